@@ -1,0 +1,15 @@
+//! The control law, one block of the papers a file.
+//!
+//! Each block is a pair of an immutable configuration, computed when the parameters change, and a
+//! state. Nothing here knows of parameters, of the throttle or of time: a call is a period.
+
+pub mod back_emf;
+pub mod modulator;
+pub mod planner;
+pub mod regulator;
+pub mod speed;
+pub mod start;
+pub mod transform;
+
+#[cfg(test)]
+mod tests;

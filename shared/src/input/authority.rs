@@ -1,0 +1,285 @@
+//! What may turn a motor: an armed wire, or a test of limited time. Nothing else.
+//!
+//! The wire is armed by zero throttle held for a time, loses that with its signal, and never turns
+//! a motor before. Only a frame whose check sum is right can change what the motor is asked to do.
+
+use super::Throttle;
+use super::capture::Event;
+use super::dshot::Kind;
+
+/// Zero-throttle frames that arm a wire, at least.
+const ARMING_FRAMES: u32 = 30;
+
+/// The longest test, s.
+const TEST_MOST_S: f32 = 3.0;
+
+/// Times of the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// How long zero throttle arms, µs.
+    pub arm_us: u64,
+    /// The longest time without a valid frame; past it the signal is lost, µs.
+    pub loss_us: u64,
+}
+
+/// What the motor is to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Do not turn.
+    Stop,
+    /// Do not turn, because the armed wire holds zero throttle, or somebody has disarmed: what was wrong
+    /// before is forgiven.
+    Zero,
+    /// Turn, by the wire's throttle.
+    Throttle(Throttle),
+    /// Turn, by a test's value.
+    Test(Throttle),
+}
+
+/// What the drive is doing, for those who may test only a motor at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DriveStatus {
+    /// The drive does not turn the motor, and the shaft is at rest.
+    pub stopped: bool,
+    /// A fault holds the bridge off.
+    pub faulted: bool,
+}
+
+/// Arming was refused: the wire does not hold valid zero throttle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Denied;
+
+/// Why a test was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TestError {
+    /// A value outside 0 to 1 (there is no reverse), or a time outside 0 to 3 s.
+    OutOfRange,
+    /// The motor turns, a fault holds, or the wire is neither silent nor at valid zero.
+    TemporarilyRejected,
+}
+
+/// Decides whether the motor may turn.
+///
+/// Times are in µs since any start, and do not run backwards.
+#[derive(Clone, Debug)]
+pub struct Authority {
+    timing: Timing,
+    armed: bool,
+    arming: Option<Arming>,
+    valid: Option<Valid>,
+    event_us: Option<u64>,
+    test: Option<Test>,
+    /// Disarmed by command while a fault held.
+    forgiven: bool,
+    bad_frames: u32,
+}
+
+/// Zero throttle since some time.
+#[derive(Clone, Copy, Debug)]
+struct Arming {
+    since_us: u64,
+    zeros: u32,
+    failed: u32,
+}
+
+/// The last frame with a right check sum.
+#[derive(Clone, Copy, Debug)]
+struct Valid {
+    at_us: u64,
+    throttle: Option<Throttle>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Test {
+    value: Throttle,
+    ends_us: u64,
+}
+
+impl Authority {
+    /// Unarmed, with no signal.
+    pub fn new(timing: Timing) -> Self {
+        Self {
+            timing,
+            armed: false,
+            arming: None,
+            valid: None,
+            event_us: None,
+            test: None,
+            forgiven: false,
+            bad_frames: 0,
+        }
+    }
+
+    /// Changes the times, at once.
+    pub fn set_timing(&mut self, timing: Timing) {
+        self.timing = timing;
+    }
+
+    /// Takes what the decoder found.
+    pub fn wire(&mut self, now_us: u64, event: Event) {
+        // What ended before this event has ended, however late `poll` is.
+        self.poll(now_us);
+        self.event_us = Some(now_us);
+        let Event::Frame { frame, .. } = event else {
+            self.bad_frames = self.bad_frames.saturating_add(1);
+            // More bad frames than good ones: what arrives may be noise, and zero by chance.
+            if let Some(arming) = &mut self.arming {
+                arming.failed = arming.failed.saturating_add(1);
+                if arming.failed > arming.zeros {
+                    self.arming = None;
+                }
+            }
+            return;
+        };
+        let throttle = match frame.kind() {
+            Kind::Throttle(throttle) => Some(throttle),
+            Kind::Stop | Kind::Command(_) => None,
+        };
+        self.valid = Some(Valid {
+            at_us: now_us,
+            throttle,
+        });
+        if throttle.is_some() {
+            self.arming = None;
+            self.test = None;
+        } else if !self.armed {
+            self.count_zero(now_us);
+        }
+    }
+
+    fn count_zero(&mut self, now_us: u64) {
+        let arming = self.arming.get_or_insert(Arming {
+            since_us: now_us,
+            zeros: 0,
+            failed: 0,
+        });
+        arming.zeros = arming.zeros.saturating_add(1);
+        let held_us = now_us.saturating_sub(arming.since_us);
+        if arming.zeros >= ARMING_FRAMES && held_us >= self.timing.arm_us {
+            self.armed = true;
+            self.arming = None;
+        }
+    }
+
+    /// Ends what the time has ended: a lost signal's arming, and a test.
+    ///
+    /// Between two calls a lost signal or a test lasts longer than it should; otherwise it does not
+    /// matter how rarely it is called.
+    pub fn poll(&mut self, now_us: u64) {
+        if !self.signal_present(now_us) {
+            self.armed = false;
+            self.arming = None;
+        }
+        if self.test.is_some_and(|test| now_us >= test.ends_us) {
+            self.test = None;
+        }
+    }
+
+    /// What the motor is to do, as of the last [`Authority::poll`] or event.
+    pub fn command(&self) -> Command {
+        if let Some(test) = self.test {
+            return Command::Test(test.value);
+        }
+        match self.valid {
+            Some(Valid {
+                throttle: Some(throttle),
+                ..
+            }) if self.armed => Command::Throttle(throttle),
+            Some(Valid { throttle: None, .. }) if self.armed => Command::Zero,
+            _ if self.forgiven => Command::Zero,
+            _ => Command::Stop,
+        }
+    }
+
+    /// Whether a throttle on the wire would turn the motor.
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// Whether a valid frame has come within the loss time.
+    pub fn signal_present(&self, now_us: u64) -> bool {
+        self.within_loss(now_us, self.valid.map(|valid| valid.at_us))
+    }
+
+    /// Runs of edges that were no frame, since the start; it stops at its greatest value.
+    pub fn bad_frames(&self) -> u32 {
+        self.bad_frames
+    }
+
+    /// Stops the motor, whatever turns it. The wire must be armed anew by its zero throttle.
+    pub fn disarm(&mut self) {
+        self.armed = false;
+        self.arming = None;
+        self.test = None;
+        self.forgiven = true;
+    }
+
+    /// A request to arm. It grants nothing that the wire does not: only its own zero throttle,
+    /// held for its time, arms it.
+    ///
+    /// # Errors
+    /// [`Denied`] unless the last valid frame is zero throttle and not older than the loss time.
+    pub fn arm(&self, now_us: u64) -> Result<(), Denied> {
+        if self.holds_zero(now_us) {
+            Ok(())
+        } else {
+            Err(Denied)
+        }
+    }
+
+    /// Turns the motor by `value`, 0 to 1, for `duration_s`; NaN ends a running test.
+    ///
+    /// It ends at its time, at any throttle on the wire but zero, at [`Authority::disarm`] and at
+    /// [`Authority::fault`].
+    ///
+    /// # Errors
+    /// See [`TestError`]. A refused test leaves a running one as it is.
+    pub fn actuator_test(
+        &mut self,
+        now_us: u64,
+        value: f32,
+        duration_s: f32,
+        drive: DriveStatus,
+    ) -> Result<(), TestError> {
+        self.poll(now_us);
+        if value.is_nan() {
+            self.test = None;
+            return Ok(());
+        }
+        if !(0.0..=1.0).contains(&value) || !(0.0..=TEST_MOST_S).contains(&duration_s) {
+            return Err(TestError::OutOfRange);
+        }
+        let silent = !self.within_loss(now_us, self.event_us);
+        if !drive.stopped || drive.faulted || !(silent || self.holds_zero(now_us)) {
+            return Err(TestError::TemporarilyRejected);
+        }
+        let duration_us = (duration_s * 1e6) as u64;
+        // No time at all, or nothing to turn by, ends a test that has not turned the motor yet.
+        self.test = (duration_us > 0 && value > 0.0).then(|| Test {
+            value: Throttle::saturating_from_num(value),
+            ends_us: now_us.saturating_add(duration_us),
+        });
+        Ok(())
+    }
+
+    /// Told, at each look, whether a fault holds the bridge off: it ends a test, and what a
+    /// disarming has forgiven is used up when it has ended.
+    pub fn fault(&mut self, holds: bool) {
+        if holds {
+            self.test = None;
+        } else {
+            self.forgiven = false;
+        }
+    }
+
+    fn holds_zero(&self, now_us: u64) -> bool {
+        self.signal_present(now_us) && self.valid.is_some_and(|valid| valid.throttle.is_none())
+    }
+
+    fn within_loss(&self, now_us: u64, since_us: Option<u64>) -> bool {
+        since_us.is_some_and(|since_us| now_us.saturating_sub(since_us) <= self.timing.loss_us)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,432 @@
+//! Arming, loss of signal and tests, by exact counts and times.
+
+use super::*;
+use crate::input::dshot::{Frame, Rate};
+use proptest::prelude::*;
+
+const TIMING: Timing = Timing {
+    arm_us: 300_000,
+    loss_us: 100_000,
+};
+const RESTING: DriveStatus = DriveStatus {
+    stopped: true,
+    faulted: false,
+};
+
+fn event(value: u16) -> Event {
+    Event::Frame {
+        rate: Rate::Dshot600,
+        frame: Frame {
+            value,
+            telemetry: false,
+        },
+    }
+}
+
+/// An authority, a clock, and frames that come 1 ms apart unless told otherwise.
+struct Bench {
+    authority: Authority,
+    now_us: u64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self {
+            authority: Authority::new(TIMING),
+            now_us: 5_000_000,
+        }
+    }
+
+    fn armed() -> Self {
+        let mut bench = Self::new();
+        bench.play(301, event(0));
+        assert!(bench.authority.armed());
+        bench
+    }
+
+    fn after(&mut self, us: u64, event: Event) {
+        self.now_us += us;
+        self.authority.wire(self.now_us, event);
+    }
+
+    fn play(&mut self, count: u32, event: Event) {
+        for _ in 0..count {
+            self.after(1_000, event);
+        }
+    }
+
+    /// Waits without any event.
+    fn wait(&mut self, us: u64) {
+        self.now_us += us;
+        self.authority.poll(self.now_us);
+    }
+
+    fn test(&mut self, value: f32, duration_s: f32) -> Result<(), TestError> {
+        self.authority
+            .actuator_test(self.now_us, value, duration_s, RESTING)
+    }
+
+    fn turns(&self) -> bool {
+        matches!(
+            self.authority.command(),
+            Command::Throttle(_) | Command::Test(_)
+        )
+    }
+}
+
+#[test]
+fn zero_throttle_arms_at_the_exact_time() {
+    let mut bench = Bench::new();
+    bench.play(1, event(0));
+    bench.play(298, event(0));
+    bench.after(1_999, event(0));
+    assert!(!bench.authority.armed(), "299.999 ms");
+    bench.after(1, event(0));
+    assert!(bench.authority.armed(), "300 ms");
+    assert!(!bench.turns());
+    bench.after(1_000, event(2047));
+    assert_eq!(bench.authority.command(), Command::Throttle(Throttle::MAX));
+    bench.after(1_000, event(48));
+    assert_eq!(bench.authority.command(), Command::Throttle(Throttle::ZERO));
+    bench.after(1_000, event(47));
+    assert_eq!(bench.authority.command(), Command::Zero);
+    assert!(bench.authority.armed());
+}
+
+#[test]
+fn slow_frames_arm_at_the_thirtieth() {
+    let mut bench = Bench::new();
+    for count in 1..=30 {
+        assert!(!bench.authority.armed(), "{count}");
+        bench.after(100_000, event(0));
+    }
+    assert!(bench.authority.armed());
+}
+
+#[test]
+fn a_gap_above_the_loss_time_restarts_the_count() {
+    let mut bench = Bench::new();
+    bench.play(300, event(0));
+    bench.after(100_001, event(0));
+    assert!(!bench.authority.armed());
+    bench.play(299, event(0));
+    assert!(!bench.authority.armed());
+    bench.play(1, event(0));
+    assert!(bench.authority.armed());
+}
+
+#[test]
+fn commands_count_as_zero() {
+    for value in 1..=47 {
+        let mut bench = Bench::new();
+        bench.play(301, event(value));
+        assert!(bench.authority.armed(), "{value}");
+        bench.play(500, event(value));
+        assert!(bench.authority.armed(), "{value}");
+        assert!(!bench.turns());
+    }
+}
+
+#[test]
+fn throttle_open_at_power_up_never_turns() {
+    let mut bench = Bench::new();
+    for _ in 0..60_000 {
+        bench.after(1_000, event(1000));
+        assert!(!bench.turns() && !bench.authority.armed());
+    }
+}
+
+#[test]
+fn one_open_throttle_restarts_the_count() {
+    let mut bench = Bench::new();
+    bench.play(300, event(0));
+    bench.after(1_000, event(48));
+    bench.play(300, event(0));
+    assert!(!bench.authority.armed());
+    bench.play(1, event(0));
+    assert!(bench.authority.armed());
+}
+
+#[test]
+fn bad_frames_alone_neither_arm_nor_keep_a_signal() {
+    let mut bench = Bench::new();
+    bench.play(5_000, Event::BadFrame);
+    assert!(!bench.authority.armed());
+    assert!(!bench.authority.signal_present(bench.now_us));
+    assert_eq!(bench.authority.bad_frames(), 5_000);
+
+    let mut bench = Bench::armed();
+    bench.after(1_000, event(1000));
+    bench.play(100, Event::BadFrame);
+    assert!(bench.turns() && bench.authority.armed(), "100 ms");
+    bench.play(1, Event::BadFrame);
+    assert!(!bench.turns() && !bench.authority.armed(), "101 ms");
+    bench.play(10, event(1000));
+    assert!(!bench.turns());
+}
+
+#[test]
+fn bad_frames_do_not_disturb_an_armed_wire() {
+    let mut bench = Bench::armed();
+    for _ in 0..1_000 {
+        bench.after(1_000, event(1000));
+        bench.play(9, Event::BadFrame);
+        assert!(bench.turns());
+    }
+    assert_eq!(bench.authority.bad_frames(), 9_000);
+}
+
+#[test]
+fn more_than_half_bad_restarts_the_count() {
+    let mut bench = Bench::new();
+    for _ in 0..1_000 {
+        bench.play(1, event(0));
+        bench.play(2, Event::BadFrame);
+    }
+    assert!(!bench.authority.armed());
+
+    let mut bench = Bench::new();
+    for _ in 0..151 {
+        assert!(!bench.authority.armed());
+        bench.play(1, event(0));
+        bench.play(1, Event::BadFrame);
+    }
+    assert!(bench.authority.armed(), "half of them");
+}
+
+#[test]
+fn a_lost_signal_stops_and_disarms() {
+    for polled in [true, false] {
+        let mut bench = Bench::armed();
+        bench.after(1_000, event(1000));
+        if polled {
+            bench.wait(100_000);
+            assert!(bench.turns());
+            bench.wait(1);
+            assert!(!bench.turns() && !bench.authority.armed());
+        } else {
+            bench.now_us += 100_001;
+        }
+        assert!(!bench.authority.signal_present(bench.now_us));
+        // The throttle is still open when the signal comes back.
+        bench.play(1_000, event(1000));
+        assert!(!bench.turns());
+        bench.play(300, event(0));
+        assert!(!bench.authority.armed());
+        bench.play(1, event(0));
+        bench.play(1, event(1000));
+        assert!(bench.turns());
+    }
+}
+
+#[test]
+fn disarming_stops_until_zero_was_held_anew() {
+    let mut bench = Bench::armed();
+    bench.after(1_000, event(1000));
+    bench.authority.disarm();
+    assert!(!bench.turns());
+    bench.play(1_000, event(1000));
+    assert!(!bench.turns());
+    bench.play(200, event(0));
+    bench.authority.disarm();
+    bench.play(300, event(0));
+    assert!(!bench.authority.armed());
+    bench.play(1, event(0));
+    assert!(bench.authority.armed());
+}
+
+#[test]
+fn a_request_to_arm_needs_valid_zero_and_does_not_replace_it() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.authority.arm(bench.now_us), Err(Denied));
+    bench.after(1_000, event(0));
+    assert_eq!(bench.authority.arm(bench.now_us), Ok(()));
+    assert!(!bench.authority.armed());
+    bench.after(1_000, event(1000));
+    assert_eq!(bench.authority.arm(bench.now_us), Err(Denied));
+    assert!(!bench.turns());
+    bench.after(1_000, event(0));
+    assert_eq!(bench.authority.arm(bench.now_us + 100_000), Ok(()));
+    assert_eq!(bench.authority.arm(bench.now_us + 100_001), Err(Denied));
+}
+
+#[test]
+fn new_times_hold_at_once() {
+    let mut bench = Bench::new();
+    bench.play(40, event(0));
+    bench.authority.set_timing(Timing {
+        arm_us: 40_000,
+        loss_us: 2_000,
+    });
+    bench.play(1, event(0));
+    assert!(bench.authority.armed());
+    bench.wait(2_001);
+    assert!(!bench.authority.armed());
+}
+
+#[test]
+fn a_test_turns_for_its_time() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.test(0.5, 2.0), Ok(()));
+    assert_eq!(
+        bench.authority.command(),
+        Command::Test(Throttle::from_num(0.5))
+    );
+    bench.wait(1_999_999);
+    assert!(bench.turns());
+    bench.wait(1);
+    assert!(!bench.turns());
+    assert_eq!(bench.test(1.0, 3.0), Ok(()));
+    assert_eq!(bench.authority.command(), Command::Test(Throttle::MAX));
+    assert_eq!(bench.test(0.3, 0.0), Ok(()));
+    assert!(!bench.turns());
+}
+
+#[test]
+fn a_test_ends_at_throttle_fault_disarming_and_nan() {
+    for (end, armed) in [(0, true), (0, false), (1, true), (2, true), (3, false)] {
+        let mut bench = if armed { Bench::armed() } else { Bench::new() };
+        bench.play(2, event(0));
+        assert_eq!(bench.test(0.1, 3.0), Ok(()));
+        bench.play(2, event(0));
+        bench.play(2, Event::BadFrame);
+        assert!(matches!(bench.authority.command(), Command::Test(_)));
+        match end {
+            0 => {
+                bench.play(1, event(48));
+                assert_eq!(bench.turns(), armed);
+                bench.play(1, event(0));
+            }
+            1 => bench.authority.fault(true),
+            2 => bench.authority.disarm(),
+            _ => assert_eq!(bench.test(f32::NAN, f32::NAN), Ok(())),
+        }
+        assert!(!bench.turns(), "{end}");
+    }
+}
+
+#[test]
+fn tests_out_of_range_are_refused() {
+    let mut bench = Bench::new();
+    for (value, duration_s) in [
+        (-0.01, 1.0),
+        (f32::NEG_INFINITY, 1.0),
+        (1.01, 1.0),
+        (f32::INFINITY, 1.0),
+        (0.5, -0.1),
+        (0.5, 3.01),
+        (0.5, f32::NAN),
+        (0.5, f32::INFINITY),
+    ] {
+        assert_eq!(
+            bench.test(value, duration_s),
+            Err(TestError::OutOfRange),
+            "{value} {duration_s}"
+        );
+        assert!(!bench.turns());
+    }
+}
+
+#[test]
+fn tests_need_a_motor_at_rest_and_a_wire_at_zero_or_silent() {
+    let rejected = Err(TestError::TemporarilyRejected);
+    for (stopped, faulted) in [(false, false), (true, true), (false, true)] {
+        let mut bench = Bench::new();
+        let drive = DriveStatus { stopped, faulted };
+        let result = bench.authority.actuator_test(bench.now_us, 0.1, 1.0, drive);
+        assert_eq!(result, rejected);
+    }
+    let mut bench = Bench::new();
+    bench.play(1, event(48));
+    assert_eq!(bench.test(0.1, 1.0), rejected, "unarmed, but open");
+    bench.play(1, event(0));
+    assert_eq!(bench.test(0.1, 1.0), Ok(()));
+    let mut bench = Bench::new();
+    bench.play(1, Event::BadFrame);
+    assert_eq!(bench.test(0.1, 1.0), rejected, "neither silent nor valid");
+    bench.wait(100_001);
+    assert_eq!(bench.test(0.1, 1.0), Ok(()));
+}
+
+proptest! {
+    /// Whatever happens, the motor turns by the wire only after 30 zero frames in 300 ms, and then
+    /// only until the signal is lost; and by a test only for its time.
+    #[test]
+    fn nothing_else_turns_the_motor(
+        steps in prop::collection::vec((0..12_u8, 0..40_000_u64, 0.0..3.0_f32), 1..400),
+    ) {
+        let mut bench = Bench::new();
+        // Since when only zeros were valid, how many, and whether they have armed: a plain model.
+        let mut zero_since_us = None;
+        let mut zeros = 0;
+        let mut may_turn = false;
+        let mut valid_us = 0;
+        let mut test_until_us = 0;
+        for (kind, us, number) in steps {
+            bench.now_us += us;
+            let now_us = bench.now_us;
+            if now_us - valid_us > TIMING.loss_us {
+                (zero_since_us, zeros, may_turn) = (None, 0, false);
+            }
+            match kind {
+                0..=7 => {
+                    bench.authority.wire(now_us, event(0));
+                    valid_us = now_us;
+                    zeros += 1;
+                    let since_us = *zero_since_us.get_or_insert(now_us);
+                    may_turn |= zeros >= 30 && now_us - since_us >= TIMING.arm_us;
+                }
+                8 => {
+                    bench.authority.wire(now_us, event(1000));
+                    valid_us = now_us;
+                    (zero_since_us, zeros) = (None, 0);
+                }
+                9 => bench.authority.wire(now_us, Event::BadFrame),
+                10 => {
+                    bench.authority.poll(now_us);
+                    if bench.test(0.5, number).is_ok() {
+                        test_until_us = now_us + (number * 1e6) as u64;
+                    }
+                }
+                _ => {
+                    bench.authority.poll(now_us);
+                    if number < 0.3 {
+                        bench.authority.disarm();
+                        (zero_since_us, zeros, may_turn) = (None, 0, false);
+                    }
+                }
+            }
+            match bench.authority.command() {
+                Command::Throttle(_) => prop_assert!(may_turn),
+                Command::Test(_) => prop_assert!(now_us < test_until_us),
+                Command::Stop | Command::Zero => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn only_an_armed_zero_or_a_disarming_forgives_a_fault() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.authority.command(), Command::Stop);
+    bench.play(10, event(0));
+    assert_eq!(bench.authority.command(), Command::Stop, "not armed yet");
+    bench.play(300, event(0));
+    assert_eq!(bench.authority.command(), Command::Zero);
+    bench.wait(200_000);
+    assert_eq!(bench.authority.command(), Command::Stop, "silent");
+    bench.authority.fault(true);
+    bench.authority.disarm();
+    assert_eq!(bench.authority.command(), Command::Zero);
+    bench.authority.fault(true);
+    assert_eq!(bench.authority.command(), Command::Zero);
+    bench.authority.fault(false);
+    assert_eq!(bench.authority.command(), Command::Stop);
+}
+
+#[test]
+fn a_test_of_nothing_turns_nothing() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.test(0.0, 1.0), Ok(()));
+    assert!(!bench.turns());
+}

@@ -1,0 +1,205 @@
+//! DShot frames: 16 bits, most significant first, each a pulse whose width is its value.
+//!
+//! 11 bits are the value, one asks for telemetry, four are a check sum.
+
+use super::Throttle;
+
+/// Value from which a frame is throttle; below are stop (0) and the commands.
+const FIRST_THROTTLE: u16 = 48;
+/// The highest value of a frame.
+const LAST_THROTTLE: u16 = 2047;
+
+/// What a frame carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// 0 stop, 1 to 47 commands, 48 to 2047 throttle; higher bits are not sent.
+    pub value: u16,
+    /// Whether the sender asks for telemetry.
+    pub telemetry: bool,
+}
+
+/// What a frame's value means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Stop the motor: value 0.
+    Stop,
+    /// A command, 1 to 47. It counts as zero throttle.
+    Command(u8),
+    /// Turn: values 48 to 2047, linearly from 0 to 1.
+    Throttle(Throttle),
+}
+
+impl Frame {
+    /// The frame of 16 bits from the wire, or nothing when the check sum does not fit.
+    pub fn from_bits(bits: u16) -> Option<Self> {
+        let data = bits >> 4;
+        (bits & 0xF == check_sum(data)).then_some(Self {
+            value: data >> 1,
+            telemetry: data & 1 != 0,
+        })
+    }
+
+    /// The 16 bits for the wire.
+    pub fn to_bits(self) -> u16 {
+        let data = (self.value & LAST_THROTTLE) << 1 | u16::from(self.telemetry);
+        data << 4 | check_sum(data)
+    }
+
+    /// What the value means.
+    pub fn kind(self) -> Kind {
+        match self.value {
+            0 => Kind::Stop,
+            command if command < FIRST_THROTTLE => Kind::Command(command as u8),
+            throttle => {
+                let step = u64::from(throttle.min(LAST_THROTTLE) - FIRST_THROTTLE);
+                let steps = u64::from(LAST_THROTTLE - FIRST_THROTTLE);
+                let share = (step << Throttle::FRAC_NBITS) / steps;
+                Kind::Throttle(Throttle::from_bits(share.min(i32::MAX as u64) as i32))
+            }
+        }
+    }
+}
+
+/// The four check bits of 12 data bits: the exclusive or of their nibbles.
+fn check_sum(data: u16) -> u16 {
+    (data ^ data >> 4 ^ data >> 8) & 0xF
+}
+
+/// The bit rate of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rate {
+    /// 150 kbit/s.
+    Dshot150,
+    /// 300 kbit/s.
+    Dshot300,
+    /// 600 kbit/s.
+    Dshot600,
+}
+
+impl Rate {
+    /// Every rate, the slowest first.
+    pub const ALL: [Self; 3] = [Self::Dshot150, Self::Dshot300, Self::Dshot600];
+
+    /// Bits a second.
+    pub const fn bit_hz(self) -> u32 {
+        match self {
+            Self::Dshot150 => 150_000,
+            Self::Dshot300 => 300_000,
+            Self::Dshot600 => 600_000,
+        }
+    }
+
+    /// The time of one bit, ns: 6667, 3333 or 1667.
+    pub const fn bit_ns(self) -> u32 {
+        self.eighths_ns(8)
+    }
+
+    /// The time from a frame's first edge to its end, 16 bits later, ns.
+    pub const fn frame_ns(self) -> u32 {
+        self.eighths_ns(16 * 8)
+    }
+
+    /// A time in eighths of a bit, in ns to the nearest: no bit is a whole number of them.
+    const fn eighths_ns(self, eighths: u32) -> u32 {
+        // 10⁹/8 over the rate is 2500/3, 1250/3 or 625/3.
+        (eighths * (125_000_000 / (self.bit_hz() / 3)) + 1) / 3
+    }
+}
+
+/// The 32 edges of a frame of these bits, check sum included: time since the first edge in ns, and
+/// the level from then on. A one is high for 75 % of its bit, a zero for 37.5 %.
+pub fn edges(bits: u16, rate: Rate) -> impl Iterator<Item = (u32, bool)> {
+    (0..16_u32).flat_map(move |bit| {
+        let high_eighths = if bits << bit & 0x8000 != 0 { 6 } else { 3 };
+        [
+            (rate.eighths_ns(bit * 8), true),
+            (rate.eighths_ns(bit * 8 + high_eighths), false),
+        ]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    #[test]
+    fn known_frames() {
+        // Value 1046 with telemetry is the example of the protocol's first description.
+        let frame = Frame {
+            value: 1046,
+            telemetry: true,
+        };
+        assert_eq!(frame.to_bits(), 0b1000_0010_1101_0111);
+        assert_eq!(Frame::from_bits(0b1000_0010_1101_0111), Some(frame));
+        assert_eq!(
+            Frame::from_bits(0),
+            Some(Frame {
+                value: 0,
+                telemetry: false
+            })
+        );
+    }
+
+    #[test]
+    fn of_all_words_one_in_sixteen_is_a_frame_and_comes_back() {
+        let frames: Vec<u16> = (0..=u16::MAX)
+            .filter(|&bits| Frame::from_bits(bits).is_some())
+            .collect();
+        assert_eq!(frames.len(), 4096);
+        for bits in frames {
+            assert_eq!(Frame::from_bits(bits).map(Frame::to_bits), Some(bits));
+            for flipped in 0..16 {
+                assert_eq!(Frame::from_bits(bits ^ 1 << flipped), None, "{bits:04x}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_are_stop_commands_and_throttle() {
+        let kind = |value| {
+            Frame {
+                value,
+                telemetry: false,
+            }
+            .kind()
+        };
+        assert_eq!(kind(0), Kind::Stop);
+        assert_eq!(kind(1), Kind::Command(1));
+        assert_eq!(kind(47), Kind::Command(47));
+        assert_eq!(kind(48), Kind::Throttle(Throttle::ZERO));
+        assert_eq!(kind(2047), Kind::Throttle(Throttle::MAX));
+        assert_eq!(kind(u16::MAX), Kind::Throttle(Throttle::MAX));
+        for value in 48..=2047 {
+            let Kind::Throttle(throttle) = kind(value) else {
+                panic!("{value} is no throttle");
+            };
+            let wanted = f64::from(value - 48) / 1999.0;
+            assert!((throttle.to_num::<f64>() - wanted).abs() < 5e-10, "{value}");
+        }
+    }
+
+    #[test]
+    fn bit_times_are_those_of_the_protocol() {
+        assert_eq!(Rate::ALL.map(Rate::bit_ns), [6667, 3333, 1667]);
+        assert_eq!(Rate::ALL.map(Rate::frame_ns), [106_667, 53_333, 26_667]);
+    }
+
+    #[test]
+    fn pulses_are_three_and_six_eighths_of_a_bit() {
+        let played: Vec<_> = edges(0x8001, Rate::Dshot300).collect();
+        assert_eq!(played.len(), 32);
+        assert_eq!(played[..3], [(0, true), (2500, false), (3333, true)]);
+        assert_eq!(played[3], (4583, false));
+        assert_eq!(played[30..], [(50_000, true), (52_500, false)]);
+    }
+
+    proptest! {
+        #[test]
+        fn a_frame_comes_back(value in 0_u16..=2047, telemetry: bool) {
+            let frame = Frame { value, telemetry };
+            prop_assert_eq!(Frame::from_bits(frame.to_bits()), Some(frame));
+        }
+    }
+}

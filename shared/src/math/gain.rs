@@ -1,0 +1,121 @@
+//! A constant factor with a range of its own.
+
+use core::marker::PhantomData;
+
+use fixed::FixedI32;
+use fixed::types::extra::Unsigned;
+
+/// A factor that turns a number with `A` fraction bits into one with `B`, in one product and one
+/// shift.
+///
+/// The factor is held as `k·2^(32 − shift)` with the largest mantissa that fits, so that 2^-31 to
+/// 2^30 (in bits out per bit in) can be had with 30 bits of precision near the top of each range.
+#[derive(Debug)]
+pub struct Gain<A, B> {
+    mantissa: i32,
+    shift: u32,
+    kind: PhantomData<(A, B)>,
+}
+
+impl<A, B> Clone for Gain<A, B> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A, B> Copy for Gain<A, B> {}
+
+impl<A, B> PartialEq for Gain<A, B> {
+    fn eq(&self, other: &Self) -> bool {
+        (self.mantissa, self.shift) == (other.mantissa, other.shift)
+    }
+}
+
+impl<A: Unsigned, B: Unsigned> Gain<A, B> {
+    /// The factor zero.
+    pub const ZERO: Self = Self {
+        mantissa: 0,
+        shift: 0,
+        kind: PhantomData,
+    };
+
+    /// The gain of value `k`, or `None` where its magnitude does not fit or is not finite.
+    ///
+    /// Called when the configuration is built, never in a control period.
+    pub fn new(k: f32) -> Option<Self> {
+        let bits_per_bit = libm::scalbn(f64::from(k), B::I32 - A::I32);
+        if !bits_per_bit.is_finite() {
+            return None;
+        }
+        // The smallest shift that leaves the mantissa below half of 2^32 loses the fewest bits.
+        let mut shift = 0;
+        let mut scaled = bits_per_bit * 4_294_967_296.0;
+        while libm::fabs(scaled) >= 2_147_483_647.0 {
+            scaled *= 0.5;
+            shift += 1;
+        }
+        (shift <= 30).then(|| Self {
+            mantissa: libm::round(scaled) as i32,
+            shift,
+            kind: PhantomData,
+        })
+    }
+
+    /// The product with `x`.
+    ///
+    /// The result wraps where it leaves its type: the caller bounds `x`, or uses
+    /// [`Gain::saturating_apply`].
+    #[inline(always)]
+    pub fn apply(self, x: FixedI32<A>) -> FixedI32<B> {
+        let top = ((i64::from(self.mantissa) * i64::from(x.to_bits())) >> 32) as i32;
+        FixedI32::from_bits(top << self.shift)
+    }
+
+    /// The product with `x`, held at the ends of its type.
+    #[inline(always)]
+    pub fn saturating_apply(self, x: FixedI32<A>) -> FixedI32<B> {
+        let top = ((i64::from(self.mantissa) * i64::from(x.to_bits())) >> 32) as i32;
+        let highest = i32::MAX >> self.shift;
+        FixedI32::from_bits(top.min(highest).max(!highest) << self.shift)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixed::types::extra::{U28, U32};
+    use fixed::types::{I0F32, I4F28};
+
+    #[test]
+    fn small_and_large_factors_are_precise() {
+        let x = I4F28::from_num(0.001);
+        for k in [1e-6_f32, -0.3, 0.49, 1.0, -7.5, 1000.0] {
+            let gain = Gain::<U28, U28>::new(k).expect("in range");
+            let wanted = f64::from(k) * 0.001;
+            let error = (gain.apply(x).to_num::<f64>() - wanted).abs();
+            // One bit of 2^-28 before the shift, which is at most four times the factor.
+            let bound = f64::from(k.abs()).max(0.5) * 1.5e-8;
+            assert!(error <= bound, "{k}: {error}");
+        }
+    }
+
+    #[test]
+    fn fraction_bits_are_converted() {
+        let gain = Gain::<U32, U28>::new(16.0).expect("in range");
+        let y: I4F28 = gain.apply(I0F32::from_num(0.125));
+        assert_eq!(y, I4F28::from_num(2));
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        assert_eq!(Gain::<U28, U28>::new(f32::NAN), None);
+        assert_eq!(Gain::<U28, U28>::new(1e30), None);
+    }
+
+    #[test]
+    fn saturation_holds_the_ends() {
+        let gain = Gain::<U28, U28>::new(100.0).expect("in range");
+        assert!(gain.saturating_apply(I4F28::from_num(1)) > I4F28::from_num(7.9));
+        assert!(gain.saturating_apply(I4F28::from_num(-1)) < I4F28::from_num(-7.9));
+    }
+}

@@ -1,0 +1,53 @@
+//! The product that keeps the top half.
+
+use core::ops::{Add, Sub};
+
+use fixed::FixedI32;
+use fixed::types::extra::{Diff, Sum, U32, Unsigned};
+
+/// The top 32 bits of the 64-bit product of two fixed-point numbers.
+pub trait TopProduct<Rhs> {
+    /// The product's type: its fraction bits are those of both factors, less 32.
+    type Output;
+
+    /// Multiplies and keeps the top half, rounding towards minus infinity.
+    ///
+    /// It cannot overflow: two 32-bit factors have a 64-bit product.
+    fn top(self, rhs: Rhs) -> Self::Output;
+}
+
+impl<A, B> TopProduct<FixedI32<B>> for FixedI32<A>
+where
+    A: Unsigned + Add<B>,
+    B: Unsigned,
+    Sum<A, B>: Unsigned + Sub<U32>,
+    Diff<Sum<A, B>, U32>: Unsigned,
+{
+    type Output = FixedI32<Diff<Sum<A, B>, U32>>;
+
+    #[inline(always)]
+    fn top(self, rhs: FixedI32<B>) -> Self::Output {
+        let product = i64::from(self.to_bits()) * i64::from(rhs.to_bits());
+        FixedI32::from_bits((product >> 32) as i32)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixed::types::{I0F32, I4F28};
+
+    #[test]
+    fn the_compiler_keeps_the_fraction_bits() {
+        let quarter = I0F32::from_num(0.25);
+        let three = I4F28::from_num(3);
+        let product: I4F28 = quarter.top(three);
+        assert_eq!(product, I4F28::from_num(0.75));
+    }
+
+    #[test]
+    fn extremes_do_not_overflow() {
+        let product = I0F32::MIN.top(I0F32::MIN);
+        assert_eq!(product, I0F32::from_num(0.25));
+    }
+}

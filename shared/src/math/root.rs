@@ -1,0 +1,107 @@
+//! Square root without a division.
+
+use fixed::types::I4F28;
+
+/// 1/√m at the middle of each section of m in 1/4..1, 30 fraction bits.
+static RECIPROCAL_ROOT: [u32; 96] = reciprocal_root_table();
+
+/// √(x² + y²), held at the type's end.
+///
+/// The error is at most 2^-26 of the value and one bit.
+#[inline]
+pub fn magnitude(x: I4F28, y: I4F28) -> I4F28 {
+    let length = root(square(x) + square(y));
+    I4F28::from_bits(length.min(i32::MAX as u32) as i32)
+}
+
+/// The other leg of a right triangle, √(c² − a²), or 0 where the leg `a` is the longer.
+///
+/// The error is as that of [`magnitude`].
+#[inline]
+pub fn other_leg(c: I4F28, a: I4F28) -> I4F28 {
+    // Below 2^31, since c² is at most 2^62.
+    I4F28::from_bits(root(square(c).saturating_sub(square(a))).min(i32::MAX as u32) as i32)
+}
+
+#[inline(always)]
+fn square(x: I4F28) -> u64 {
+    let x = u64::from(x.to_bits().unsigned_abs());
+    x * x
+}
+
+/// √x, rounded down to within 2^-26 of its value and one bit.
+///
+/// The reciprocal root comes from a table and two Newton steps, which take products only.
+#[inline]
+fn root(x: u64) -> u32 {
+    if x == 0 {
+        return 0;
+    }
+    let even = x.leading_zeros() & !1;
+    let m = ((x << even) >> 32) as u32;
+    let mut y = RECIPROCAL_ROOT[(m >> 25) as usize - 32];
+    for _ in 0..2 {
+        // y·(3 − m·y²)/2, where y has 30 fraction bits and m 32.
+        let m_y2 = top(top(y, y), m);
+        y = top(y, (3 << 28) - m_y2) << 3;
+    }
+    // √m = m/√m with 30 fraction bits, 32 wanted before the shift is undone.
+    ((u64::from(top(m, y)) << 2) >> (even / 2)) as u32
+}
+
+#[inline(always)]
+fn top(a: u32, b: u32) -> u32 {
+    ((u64::from(a) * u64::from(b)) >> 32) as u32
+}
+
+const fn reciprocal_root_table() -> [u32; 96] {
+    let mut table = [0; 96];
+    let mut i = 0;
+    while i < 96 {
+        let m = (i as f64 + 32.5) / 128.0;
+        // Newton's iteration from 1 converges for m in 1/4..1.
+        let mut y = 1.0;
+        let mut n = 0;
+        while n < 40 {
+            y *= 1.5 - 0.5 * m * y * y;
+            n += 1;
+        }
+        table[i] = (y * 1_073_741_824.0) as u32;
+        i += 1;
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn bound(value: f64) -> f64 {
+        value * 1.5e-8 + 1.1
+    }
+
+    proptest! {
+        #[test]
+        fn magnitude_is_the_length(x: i32, y: i32, shift in 0..31) {
+            let (x, y) = (x >> shift, y >> shift);
+            let got = f64::from(magnitude(I4F28::from_bits(x), I4F28::from_bits(y)).to_bits());
+            let wanted = f64::from(x).hypot(f64::from(y)).min(f64::from(i32::MAX));
+            prop_assert!((got - wanted).abs() < bound(wanted), "{got} for {wanted}");
+        }
+
+        #[test]
+        fn the_other_leg_completes_the_square(a in 0..i32::MAX, c in 0..i32::MAX) {
+            let got = f64::from(other_leg(I4F28::from_bits(c), I4F28::from_bits(a)).to_bits());
+            let wanted = (f64::from(c).powi(2) - f64::from(a).powi(2)).max(0.0).sqrt();
+            prop_assert!((got - wanted).abs() < bound(wanted), "{got} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn corners() {
+        assert_eq!(magnitude(I4F28::ZERO, I4F28::ZERO), I4F28::ZERO);
+        assert_eq!(magnitude(I4F28::MIN, I4F28::MIN), I4F28::MAX);
+        assert_eq!(other_leg(I4F28::ONE, I4F28::MIN), I4F28::ZERO);
+    }
+}

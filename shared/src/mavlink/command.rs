@@ -1,0 +1,329 @@
+//! Commands. Each that is addressed to this ESC gets a COMMAND_ACK.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult, MavSeverity,
+};
+
+use super::component::{Context, Request};
+use super::identity::{Address, Identity, Role};
+use super::receiver::Frame;
+use super::reply::{Replies, Reply};
+use super::schedule::{Interval, Schedule};
+use crate::input::authority::{self, DriveStatus, TestError};
+
+const ACTUATOR_TEST: u16 = MavCmd::MAV_CMD_ACTUATOR_TEST as u16;
+const PREFLIGHT_STORAGE: u16 = MavCmd::MAV_CMD_PREFLIGHT_STORAGE as u16;
+const PREFLIGHT_REBOOT_SHUTDOWN: u16 = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN as u16;
+const COMPONENT_ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
+/// By number: the dialect marks it as superseded, but clients still send it.
+const GET_MESSAGE_INTERVAL: u16 = 510;
+const SET_MESSAGE_INTERVAL: u16 = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL as u16;
+const REQUEST_MESSAGE: u16 = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
+
+const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
+const DENIED: MavResult = MavResult::MAV_RESULT_DENIED;
+const FAILED: MavResult = MavResult::MAV_RESULT_FAILED;
+const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;
+const TEMPORARILY_REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
+const UNSUPPORTED: MavResult = MavResult::MAV_RESULT_UNSUPPORTED;
+
+/// Ids of messages have 24 bits.
+const MESSAGE_MAX: f32 = 16_777_215.0;
+/// The slowest interval on request, 2^31 - 128 µs: MESSAGE_INTERVAL is an i32, and this is the
+/// greatest f32 below its end.
+const INTERVAL_MAX_US: f32 = 2_147_483_520.0;
+
+/// For how long a command that is sent again is the same one; clients give up after 3 s or less.
+const REPEAT_US: u64 = 5_000_000;
+/// The same for COMMAND_INT, which has no number of its transmission: as long as a client waits for
+/// an ACK, and hardly as long as a person takes to ask for the same again.
+const REPEAT_INT_US: u64 = 1_000_000;
+
+/// A command as COMMAND_LONG and COMMAND_INT carry it. The number is read as it is: it may be one
+/// that the dialect does not have.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Command {
+    from: Address,
+    at_us: u64,
+    /// Whether it names exactly this component of this system.
+    exact: bool,
+    number: u16,
+    /// Number of the transmission, which COMMAND_INT does not have.
+    confirmation: Option<u8>,
+    params: [f32; 7],
+}
+
+impl Command {
+    /// The two messages differ only in parameters 5 and 6 and in what comes after the target.
+    pub(super) fn read(now_us: u64, frame: &Frame, exact: bool) -> Self {
+        let mut params = [0.0; 7];
+        for (i, param) in params.iter_mut().enumerate() {
+            *param = frame.f32(4 * i);
+        }
+        let mut confirmation = Some(frame.u8(32));
+        if frame.id == COMMAND_INT_DATA::ID {
+            params[4] = frame.i32(16) as f32;
+            params[5] = frame.i32(20) as f32;
+            // That byte is the frame of the coordinates here.
+            confirmation = None;
+        }
+        Self {
+            from: frame.from,
+            at_us: now_us,
+            exact,
+            number: frame.u16(28),
+            confirmation,
+            params,
+        }
+    }
+
+    /// Whether this is the same command sent again because its ACK did not arrive. Values are
+    /// compared by their bits: NaN is a value here.
+    fn repeats(&self, earlier: &Self) -> bool {
+        let most_us = match (self.confirmation, earlier.confirmation) {
+            (Some(now), Some(then)) if now > then => REPEAT_US,
+            (None, None) => REPEAT_INT_US,
+            _ => return false,
+        };
+        self.at_us.saturating_sub(earlier.at_us) <= most_us
+            && self.from == earlier.from
+            && self.number == earlier.number
+            && self.params.map(f32::to_bits) == earlier.params.map(f32::to_bits)
+    }
+}
+
+/// Whose commands these are, and what they leave behind.
+#[derive(Clone, Debug)]
+pub(super) struct Commands {
+    role: Role,
+    /// `ACTUATOR_OUTPUT_FUNCTION` of the motor.
+    function: f32,
+    /// The storage command whose work is not done.
+    storage: Option<Command>,
+    /// The last command that must not be obeyed twice, and its result.
+    last: Option<(Command, MavResult)>,
+    request: Option<Request>,
+    reboot: bool,
+}
+
+impl Commands {
+    pub(super) fn new(identity: &Identity) -> Self {
+        Self {
+            role: identity.role,
+            function: identity.place.motor_function(),
+            storage: None,
+            last: None,
+            request: None,
+            reboot: false,
+        }
+    }
+
+    pub(super) fn handle(
+        &mut self,
+        command: &Command,
+        drive: DriveStatus,
+        context: &mut Context,
+        schedule: &mut Schedule,
+        replies: &mut Replies,
+    ) {
+        let earlier = self
+            .last
+            .filter(|(last, _)| command.repeats(last) && is_known(command, context));
+        let result = match (&self.storage, earlier) {
+            (Some(pending), _) if command.repeats(pending) => Some(IN_PROGRESS),
+            (_, Some((_, result))) => Some(result),
+            _ => self.obey(command, drive, context, schedule, replies),
+        };
+        if let Some(result) = result {
+            replies.ack(command.from, command.number, result);
+        }
+        if command.number == REQUEST_MESSAGE && result == Some(ACCEPTED) {
+            replies.push(requested_message(command));
+        }
+        if command.number == GET_MESSAGE_INTERVAL && result == Some(ACCEPTED) {
+            replies.push(Reply::Interval(command.params[0] as u16));
+        }
+    }
+
+    /// The result, or none when it comes later or not at all.
+    fn obey(
+        &mut self,
+        command: &Command,
+        drive: DriveStatus,
+        context: &mut Context,
+        schedule: &mut Schedule,
+        replies: &mut Replies,
+    ) -> Option<MavResult> {
+        let [p1, p2, ..] = command.params;
+        Some(match command.number {
+            ACTUATOR_TEST => {
+                let result = self.actuator_test(command, drive, context);
+                self.last = Some((*command, result));
+                result
+            }
+            COMPONENT_ARM_DISARM => arm_disarm(p1, context),
+            PREFLIGHT_STORAGE => return self.storage(command, drive),
+            PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, replies),
+            REQUEST_MESSAGE => request_message(command, schedule),
+            SET_MESSAGE_INTERVAL => set_interval(p1, p2, schedule),
+            GET_MESSAGE_INTERVAL => match message_id(p1) {
+                Some(id) if u16::try_from(id).is_ok() => ACCEPTED,
+                _ => DENIED,
+            },
+            // A command to all is for those who know it: an autopilot answers it, and its ESCs
+            // would only add refusals.
+            _ if command.exact || self.role == Role::Standalone => UNSUPPORTED,
+            _ => return None,
+        })
+    }
+
+    fn actuator_test(
+        &self,
+        command: &Command,
+        drive: DriveStatus,
+        context: &mut Context,
+    ) -> MavResult {
+        let [value, duration_s, _, _, function, ..] = command.params;
+        // No motor in particular is this one only where nobody else was asked.
+        if function != self.function && !(function == 0.0 && command.exact) {
+            return DENIED;
+        }
+        let tested = context
+            .authority
+            .actuator_test(context.now_us, value, duration_s, drive);
+        match tested {
+            Ok(()) => ACCEPTED,
+            Err(TestError::TemporarilyRejected) => TEMPORARILY_REJECTED,
+            Err(TestError::OutOfRange) => DENIED,
+        }
+    }
+
+    /// Reading and writing the flash stalls the processor, and reading changes what the motor is
+    /// driven with: both only at rest. The ACK follows when it is done.
+    fn storage(&mut self, command: &Command, drive: DriveStatus) -> Option<MavResult> {
+        let request = match command.params[0] {
+            -1.0 => return Some(ACCEPTED),
+            0.0 => Request::Load,
+            1.0 => Request::Save,
+            2.0 | 4.0 => Request::FactoryReset,
+            _ => return Some(DENIED),
+        };
+        if self.storage.is_some() || self.reboot || !drive.stopped {
+            return Some(TEMPORARILY_REJECTED);
+        }
+        self.storage = Some(*command);
+        self.request = Some(request);
+        None
+    }
+
+    /// The storage command that waits is done.
+    pub(super) fn storage_done(
+        &mut self,
+        result: Result<(), &'static str>,
+        replies: &mut Replies,
+    ) -> bool {
+        let Some(command) = self.storage.take() else {
+            return false;
+        };
+        let code = if result.is_ok() { ACCEPTED } else { FAILED };
+        self.last = Some((command, code));
+        replies.ack(command.from, command.number, code);
+        if let Err(reason) = result {
+            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, reason));
+        }
+        // A reset and a load change every value: clients should see the new ones.
+        code == ACCEPTED && command.params[0] != 1.0
+    }
+
+    fn reboot(
+        &mut self,
+        command: &Command,
+        drive: DriveStatus,
+        replies: &mut Replies,
+    ) -> MavResult {
+        match command.params[0] {
+            0.0 => return ACCEPTED,
+            1.0 => {}
+            // Shutting down and staying in a boot loader are not what an ESC can do.
+            _ => return DENIED,
+        }
+        if self.storage.is_some() || !drive.stopped {
+            return TEMPORARILY_REJECTED;
+        }
+        self.reboot = true;
+        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, "Rebooting"));
+        ACCEPTED
+    }
+
+    /// `replies_sent`: whether nothing waits to be sent. A reboot waits for its ACK.
+    pub(super) fn take_request(&mut self, replies_sent: bool) -> Option<Request> {
+        if let Some(request) = self.request.take() {
+            return Some(request);
+        }
+        if self.reboot && replies_sent {
+            self.reboot = false;
+            return Some(Request::Reboot);
+        }
+        None
+    }
+}
+
+/// Whether a command that looks like an earlier one is that one: the number of the transmission
+/// says so, and where there is none, that the test which it asked for still runs.
+fn is_known(command: &Command, context: &Context) -> bool {
+    let tests = matches!(context.authority.command(), authority::Command::Test(_));
+    command.confirmation.is_some() || (command.number == ACTUATOR_TEST && tests)
+}
+
+fn arm_disarm(arm: f32, context: &mut Context) -> MavResult {
+    if arm == 0.0 {
+        context.authority.disarm();
+        ACCEPTED
+    } else if arm == 1.0 && context.authority.arm(context.now_us).is_ok() {
+        ACCEPTED
+    } else {
+        DENIED
+    }
+}
+
+fn message_id(value: f32) -> Option<u32> {
+    let whole = (0.0..=MESSAGE_MAX).contains(&value) && libm::truncf(value) == value;
+    whole.then_some(value as u32)
+}
+
+fn request_message(command: &Command, schedule: &Schedule) -> MavResult {
+    match message_id(command.params[0]) {
+        Some(AUTOPILOT_VERSION_DATA::ID) => ACCEPTED,
+        // It is about another message, which parameter 2 names.
+        Some(MESSAGE_INTERVAL_DATA::ID) => match message_id(command.params[1]) {
+            Some(id) if u16::try_from(id).is_ok() => ACCEPTED,
+            _ => DENIED,
+        },
+        Some(id) if schedule.find(id).is_some() => ACCEPTED,
+        _ => DENIED,
+    }
+}
+
+fn requested_message(command: &Command) -> Reply {
+    match command.params[0] as u32 {
+        MESSAGE_INTERVAL_DATA::ID => Reply::Interval(command.params[1] as u16),
+        id => Reply::Message(id),
+    }
+}
+
+fn set_interval(message: f32, interval_us: f32, schedule: &mut Schedule) -> MavResult {
+    let interval = if interval_us == -1.0 {
+        Interval::Off
+    } else if interval_us == 0.0 {
+        Interval::Default
+    } else if (1.0..=INTERVAL_MAX_US).contains(&interval_us) {
+        Interval::Us(interval_us as u32)
+    } else {
+        return DENIED;
+    };
+    match message_id(message).and_then(|id| schedule.find(id)) {
+        Some(stream) if schedule.set(stream, interval) => ACCEPTED,
+        _ => DENIED,
+    }
+}

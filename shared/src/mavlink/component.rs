@@ -1,0 +1,348 @@
+//! The ESC as others on MAVLink see it.
+
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, ESC_TELEMETRY_1_TO_4_DATA,
+    FILE_TRANSFER_PROTOCOL_DATA, MESSAGE_INTERVAL_DATA, MISSION_REQUEST_LIST_DATA, MavSeverity,
+    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+};
+use mavlink::{MavlinkVersion, MessageData};
+
+use super::command::{Command, Commands};
+use super::faults::{Announcer, News};
+use super::identity::{Address, Identity, Role};
+use super::pace::Pace;
+use super::parameter::{self, List};
+use super::receiver::Frame;
+use super::reply::{PING, Replies, Reply, Writer};
+use super::schedule::{Schedule, Stream};
+use super::sender::OVERHEAD_LEN;
+use super::{ftp, messages};
+use crate::drive::{Faults, Phase};
+use crate::input::authority::{Authority, DriveStatus};
+use crate::params::{BuildError, ParamId, Params};
+use crate::telemetry::Telemetry;
+
+/// Below this the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
+/// speed that can be asked for (`CTL_RPM_MIN` goes down to it), and above the noise of an estimate
+/// at standstill.
+const AT_REST_RPM: f32 = 100.0;
+
+const PING_ID: u32 = PING.0;
+const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"));
+
+/// What the component is told and may change.
+pub struct Context<'a> {
+    /// Time since the start, µs; it does not run backwards.
+    pub now_us: u64,
+    /// The values in force; PARAM_SET changes them and asks for [`Request::ParamsChanged`].
+    pub params: &'a mut Params,
+    /// The state of the ESC.
+    pub telemetry: &'a Telemetry,
+    /// What decides whether the motor may turn.
+    pub authority: &'a mut Authority,
+    /// Whether values make a drive; a value that breaks it is refused with the reason.
+    pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
+}
+
+/// What only the caller can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Put the parameters in force: build the drive's configuration anew.
+    ParamsChanged,
+    /// Write the parameters to flash, then call [`Component::storage_done`].
+    Save,
+    /// Read the parameters from flash and put them in force, then call
+    /// [`Component::storage_done`].
+    Load,
+    /// Erase the stored parameters and put the defaults in force, then call
+    /// [`Component::storage_done`].
+    FactoryReset,
+    /// Start again; the ACK has been sent.
+    Reboot,
+}
+
+/// One ESC on MAVLink. Frames may come from several links; what it sends goes to all of them.
+#[derive(Clone, Debug)]
+pub struct Component {
+    identity: Identity,
+    writer: Writer,
+    replies: Replies,
+    list: List,
+    list_pace: Pace,
+    schedule: Schedule,
+    commands: Commands,
+    params_changed: bool,
+    announcer: Announcer,
+    /// As of the last poll.
+    faults: Faults,
+    infos: u16,
+    telemetries: u16,
+}
+
+impl Component {
+    /// A component whose identity is in `params`; a change of it applies at the next start.
+    ///
+    /// `link_bytes_per_s` is what the slowest link carries (11520 at 115200 baud). Lists of
+    /// parameters take at most half of it, and streams the other half; replies are never held up.
+    pub fn new(params: &Params, link_bytes_per_s: u32) -> Self {
+        let mut replies = Replies::new();
+        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, START_TEXT));
+        let identity = Identity::new(params);
+        Self {
+            writer: Writer::default(),
+            replies,
+            list: List::default(),
+            list_pace: Pace::new(link_bytes_per_s / 2),
+            schedule: Schedule::new(identity.place, link_bytes_per_s / 2),
+            commands: Commands::new(&identity),
+            identity,
+            params_changed: false,
+            announcer: Announcer::new(),
+            faults: Faults::NONE,
+            infos: 0,
+            telemetries: 0,
+        }
+    }
+
+    /// Obeys a frame. Replies leave at the next [`Component::poll`]; up to 40 wait, and a text
+    /// tells of any that found no room.
+    pub fn handle(&mut self, frame: &Frame, context: &mut Context) {
+        if frame.from == self.identity.address {
+            return;
+        }
+        self.identity.hear(frame);
+        let Some(target) = target(frame).filter(|target| self.identity.is_for(*target)) else {
+            return;
+        };
+        // Whether nobody else has been asked, so that what does not exist is an error.
+        let alone = target.component != 0 || self.identity.role == Role::Standalone;
+        let drive = drive_status(context.telemetry);
+        match frame.id {
+            PING_ID if target.system == 0 && target.component == 0 => {
+                self.replies.push(Reply::Pong {
+                    to: frame.from,
+                    time_us: frame.u64(0),
+                    sequence: frame.u32(8),
+                });
+            }
+            PARAM_REQUEST_LIST_DATA::ID => self.list.start(),
+            PARAM_REQUEST_READ_DATA::ID => parameter::read(frame, alone, &mut self.replies),
+            PARAM_SET_DATA::ID => {
+                self.params_changed |=
+                    parameter::set(frame, alone, drive.stopped, context, &mut self.replies);
+            }
+            COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => self.commands.handle(
+                &Command::read(context.now_us, frame, target == self.identity.address),
+                drive,
+                context,
+                &mut self.schedule,
+                &mut self.replies,
+            ),
+            MISSION_REQUEST_LIST_DATA::ID if self.identity.role == Role::Standalone => {
+                self.replies.push(Reply::MissionCount {
+                    to: frame.from,
+                    mission_type: frame.u8(2),
+                });
+            }
+            FILE_TRANSFER_PROTOCOL_DATA::ID => {
+                if let Some(answer) = ftp::Answer::to(frame) {
+                    self.replies.push(Reply::Ftp {
+                        to: frame.from,
+                        answer,
+                    });
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Sends what waits and what is due, each frame by one call of `send`. To be called every
+    /// millisecond or so.
+    pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
+        self.tell_faults(context, send);
+        while let Some(reply) = self.replies.next() {
+            self.send_reply(reply, context, send);
+        }
+        if self.replies.take_overrun() {
+            self.text(
+                MavSeverity::MAV_SEVERITY_WARNING,
+                &["MAVLink: too many requests at once"],
+                send,
+            );
+        }
+        while let Some(id) = self.replies.next_value() {
+            self.send_value(context, id, send);
+        }
+        while let Some(stream) = self.schedule.next_due(context.now_us, context.params) {
+            self.send_stream(stream, context, send);
+        }
+        self.list_pace.advance(context.now_us);
+        while !self.list.is_empty()
+            && self
+                .list_pace
+                .take(OVERHEAD_LEN + PARAM_VALUE_DATA::ENCODED_LEN)
+        {
+            if let Some(id) = self.list.next() {
+                self.send_value(context, id, send);
+            }
+        }
+    }
+
+    /// The next thing for the caller to do; to be asked after each poll until there is none.
+    pub fn take_request(&mut self) -> Option<Request> {
+        if core::mem::take(&mut self.params_changed) {
+            return Some(Request::ParamsChanged);
+        }
+        self.commands.take_request(self.replies.is_empty())
+    }
+
+    /// [`Request::Save`], [`Request::Load`] or [`Request::FactoryReset`] is done: whether what it
+    /// promises would survive the loss of power now, or a few words on why not. The command is
+    /// acknowledged with this.
+    pub fn storage_done(&mut self, result: Result<(), &'static str>) {
+        if self.commands.storage_done(result, &mut self.replies) {
+            self.list.start();
+        }
+    }
+
+    /// In words, and by ESC_INFO at once: its flags would be up to a second late.
+    fn tell_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
+        let faults = context.telemetry.faults;
+        if core::mem::replace(&mut self.faults, faults) != faults {
+            self.schedule.hasten(Stream::EscInfo);
+        }
+        while let Some(news) = self.announcer.next(context.now_us, faults) {
+            let (severity, word, fault) = match news {
+                News::Began(fault) => (MavSeverity::MAV_SEVERITY_CRITICAL, "Fault: ", fault),
+                News::Ended(fault) => (MavSeverity::MAV_SEVERITY_NOTICE, "Fault ended: ", fault),
+            };
+            self.text(severity, &[word, fault.text()], send);
+        }
+    }
+
+    fn send_reply(&mut self, reply: Reply, context: &Context, send: &mut dyn FnMut(&[u8])) {
+        let Self {
+            identity, writer, ..
+        } = self;
+        match reply {
+            Reply::Ack {
+                to,
+                command,
+                result,
+            } => writer.ack(identity, to, command, result, send),
+            Reply::Message(AUTOPILOT_VERSION_DATA::ID) => {
+                let message = messages::autopilot_version();
+                writer.sender.send(identity.address, &message, &[], send);
+            }
+            Reply::Message(id) => {
+                if let Some(stream) = self.schedule.find(id) {
+                    self.send_stream(stream, context, send);
+                }
+            }
+            Reply::Interval(message) => self.send_interval(message, context.params, send),
+            Reply::Pong {
+                to,
+                time_us,
+                sequence,
+            } => writer.pong(identity, to, (time_us, sequence), send),
+            Reply::MissionCount { to, mission_type } => {
+                writer.mission_count(identity, to, mission_type, send);
+            }
+            Reply::UnknownParam { to, name, index } => {
+                writer.unknown_param(identity, to, (name, index), send);
+            }
+            Reply::Refused {
+                id,
+                because,
+                reason,
+            } => {
+                let (other, colon) = because.map_or(("", ""), |b| (b.entry().name, ": "));
+                let pieces = [id.entry().name, " refused: ", other, colon, reason];
+                writer.text(identity, MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
+            }
+            Reply::Text(severity, text) => writer.text(identity, severity, &[text], send),
+            Reply::Ftp { to, answer } => writer.ftp(identity, to, &answer, send),
+        }
+    }
+
+    fn send_stream(&mut self, stream: Stream, context: &Context, send: &mut dyn FnMut(&[u8])) {
+        let (from, place) = (self.identity.address, self.identity.place);
+        let sender = &mut self.writer.sender;
+        let telemetry = context.telemetry;
+        match stream {
+            Stream::Heartbeat => {
+                let armed = context.authority.armed();
+                let stopped = drive_status(telemetry).stopped;
+                let message = messages::heartbeat(&self.identity, telemetry, armed, stopped);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::EscInfo => {
+                self.infos = self.infos.wrapping_add(1);
+                let message = messages::esc_info(context.now_us, telemetry, place, self.infos);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::EscStatus => {
+                let message = messages::esc_status(context.now_us, telemetry, place);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::EscTelemetry => {
+                self.telemetries = self.telemetries.wrapping_add(1);
+                let message = messages::esc_telemetry(telemetry, place, self.telemetries);
+                let mut payload = [0; ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN];
+                message.ser(MavlinkVersion::V2, &mut payload);
+                sender.send_payload(from, place.telemetry(), &payload, send);
+            }
+        }
+    }
+
+    /// MESSAGE_INTERVAL: -1 when it is off, 0 when there is no such stream.
+    fn send_interval(&mut self, message: u16, params: &Params, send: &mut dyn FnMut(&[u8])) {
+        let interval_us = match self.schedule.find(u32::from(message)) {
+            Some(stream) => self
+                .schedule
+                .interval_us(stream, params)
+                .map_or(-1, |us| i32::try_from(us).unwrap_or(i32::MAX)),
+            None => 0,
+        };
+        let data = MESSAGE_INTERVAL_DATA {
+            interval_us,
+            message_id: message,
+        };
+        self.writer
+            .sender
+            .send(self.identity.address, &data, &[], send);
+    }
+
+    fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {
+        let message = messages::param_value(context.params, id);
+        self.writer
+            .sender
+            .send(self.identity.address, &message, &[], send);
+    }
+
+    fn text(&mut self, severity: MavSeverity, pieces: &[&str], send: &mut dyn FnMut(&[u8])) {
+        self.writer.text(&self.identity, severity, pieces, send);
+    }
+}
+
+/// Whom a frame is for, by the place of the target in each message that is obeyed.
+fn target(frame: &Frame) -> Option<Address> {
+    let offset = match frame.id {
+        PARAM_REQUEST_LIST_DATA::ID | MISSION_REQUEST_LIST_DATA::ID => 0,
+        FILE_TRANSFER_PROTOCOL_DATA::ID => 1,
+        PARAM_REQUEST_READ_DATA::ID => 2,
+        PARAM_SET_DATA::ID => 4,
+        PING_ID => 12,
+        COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => 30,
+        _ => return None,
+    };
+    Some(frame.address(offset))
+}
+
+fn drive_status(telemetry: &Telemetry) -> DriveStatus {
+    let driven = !matches!(telemetry.phase, Phase::Idle | Phase::Brake);
+    DriveStatus {
+        stopped: !driven && telemetry.rpm.abs() < AT_REST_RPM,
+        faulted: !telemetry.faults.is_empty(),
+    }
+}

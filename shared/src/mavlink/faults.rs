@@ -1,0 +1,59 @@
+//! Which faults have been told in words, and when.
+
+use crate::drive::{Fault, Faults};
+
+/// Least time between two texts of a fault's beginning, and between two of its end: a fault that
+/// comes and goes each millisecond must not fill the link.
+const APART_US: u64 = 1_000_000;
+
+/// Something to tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum News {
+    Began(Fault),
+    Ended(Fault),
+}
+
+/// What has been told of each fault.
+#[derive(Clone, Debug)]
+pub(super) struct Announcer {
+    told: [bool; Fault::ALL.len()],
+    began_us: [Option<u64>; Fault::ALL.len()],
+    ended_us: [Option<u64>; Fault::ALL.len()],
+}
+
+impl Announcer {
+    pub(super) const fn new() -> Self {
+        Self {
+            told: [false; Fault::ALL.len()],
+            began_us: [None; Fault::ALL.len()],
+            ended_us: [None; Fault::ALL.len()],
+        }
+    }
+
+    /// The next fault whose state differs from what was told and may be told now. What has to wait
+    /// is told later if it still differs then.
+    pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<News> {
+        for (i, fault) in Fault::ALL.into_iter().enumerate() {
+            let present = faults.contains(fault);
+            if present == self.told[i] {
+                continue;
+            }
+            let last_us = if present {
+                &mut self.began_us[i]
+            } else {
+                &mut self.ended_us[i]
+            };
+            if last_us.is_some_and(|last_us| now_us.saturating_sub(last_us) < APART_US) {
+                continue;
+            }
+            *last_us = Some(now_us);
+            self.told[i] = present;
+            return Some(if present {
+                News::Began(fault)
+            } else {
+                News::Ended(fault)
+            });
+        }
+        None
+    }
+}

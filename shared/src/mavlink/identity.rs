@@ -1,0 +1,89 @@
+//! Who the ESC is on MAVLink.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
+
+use super::place::Place;
+use super::receiver::Frame;
+use crate::params::{ParamId, Params};
+
+/// A component of a system; 0 stands for all where something is addressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// System, 1 to 255.
+    pub system: u8,
+    /// Component within it, 1 to 255.
+    pub component: u8,
+}
+
+/// What the ESC is to a ground station (`MAV_ROLE`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// A vehicle of its own, component 1: ground stations show nothing else.
+    Standalone,
+    /// A component beside an autopilot.
+    Peripheral,
+}
+
+/// The ESC's address and role; parameters apply at the start.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Identity {
+    pub(super) role: Role,
+    pub(super) address: Address,
+    pub(super) place: Place,
+    autopilot_heard: bool,
+}
+
+impl Identity {
+    pub(super) fn new(params: &Params) -> Self {
+        let role = if params.get(ParamId::MavRole) == 0.0 {
+            Role::Standalone
+        } else {
+            Role::Peripheral
+        };
+        let (component, place) = match role {
+            Role::Standalone => (1, Place::FIRST),
+            Role::Peripheral => {
+                let component = params.get(ParamId::MavCompId) as u8;
+                (component, Place::of_component(component))
+            }
+        };
+        Self {
+            role,
+            address: Address {
+                system: params.get(ParamId::MavSysId) as u8,
+                component,
+            },
+            place,
+            autopilot_heard: false,
+        }
+    }
+
+    /// Whether something for this target is for this ESC.
+    pub(super) fn is_for(&self, target: Address) -> bool {
+        (target.system == 0 || target.system == self.address.system)
+            && (target.component == 0 || target.component == self.address.component)
+    }
+
+    /// A peripheral belongs to the first autopilot that it hears, whatever its system id.
+    pub(super) fn hear(&mut self, frame: &Frame) {
+        // Offset 5 is the autopilot: of a ground station and of other peripherals it is INVALID.
+        let from_autopilot = frame.id == HEARTBEAT_DATA::ID
+            && frame.from.component == 1
+            && frame.u8(5) != MavAutopilot::MAV_AUTOPILOT_INVALID as u8;
+        if self.role == Role::Peripheral && from_autopilot && !self.autopilot_heard {
+            self.autopilot_heard = true;
+            self.address.system = frame.from.system;
+        }
+    }
+
+    pub(super) fn kind(&self) -> (MavType, MavAutopilot) {
+        match self.role {
+            Role::Standalone => (
+                MavType::MAV_TYPE_GENERIC,
+                MavAutopilot::MAV_AUTOPILOT_GENERIC,
+            ),
+            Role::Peripheral => (MavType::MAV_TYPE_SERVO, MavAutopilot::MAV_AUTOPILOT_INVALID),
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! The ESC as a MAVLink component: bytes in, bytes out, no socket and no clock of its own.
+//!
+//! [`Receiver`] makes frames of a link's bytes; [`Component`] answers them and sends telemetry.
+//! Frames carry `mavlink`'s generated payloads where an ESC sends them; what arrives is read by
+//! offset, because the generated readers refuse a command number or a type that they do not know,
+//! and an ESC must answer those. The enum of all messages is never built or read: that alone is
+//! 98 KB of text on the chip.
+
+mod command;
+mod component;
+mod faults;
+mod ftp;
+mod identity;
+mod messages;
+mod pace;
+mod parameter;
+mod place;
+mod receiver;
+mod reply;
+mod schedule;
+mod sender;
+
+pub use component::{Component, Context, Request};
+pub use identity::Address;
+pub use receiver::{Counters, Frame, Receiver};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,71 @@
+//! Which ESC of a vehicle this is, and where the messages for four ESCs hold it.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    ESC_TELEMETRY_1_TO_4_DATA, ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA,
+    ESC_TELEMETRY_13_TO_16_DATA,
+};
+
+/// Component ids of servos and motor controllers, `MAV_COMP_ID_SERVO1` to `_SERVO14`.
+const FIRST_COMPONENT: u8 = 140;
+const LAST_COMPONENT: u8 = 153;
+
+/// ESCs in one message.
+pub(super) const SLOTS: usize = 4;
+
+/// The number of an ESC, 0 to 13.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place(u8);
+
+impl Place {
+    /// The only ESC, or one that its component id does not number.
+    pub(super) const FIRST: Self = Self(0);
+
+    /// The place of a peripheral: component 140 is the first.
+    pub(super) const fn of_component(component: u8) -> Self {
+        match component {
+            FIRST_COMPONENT..=LAST_COMPONENT => Self(component - FIRST_COMPONENT),
+            _ => Self::FIRST,
+        }
+    }
+
+    /// `index` of `ESC_INFO` and `ESC_STATUS`: the number of the ESC in their first slot.
+    pub(super) const fn index(self) -> u8 {
+        self.0 - self.0 % SLOTS as u8
+    }
+
+    /// How many ESCs there are at least. It is not known here; readers ignore what is above it.
+    pub(super) const fn count(self) -> u8 {
+        self.0 + 1
+    }
+
+    /// `ESC_INFO.info`: its own bit. The field has none for a ninth ESC and those after it.
+    pub(super) const fn online(self) -> u8 {
+        if self.0 < 8 { 1 << self.0 } else { 0 }
+    }
+
+    /// `ACTUATOR_OUTPUT_FUNCTION` of its motor.
+    pub(super) fn motor_function(self) -> f32 {
+        f32::from(self.0 + 1)
+    }
+
+    /// A value in its slot, and another in those of the other ESCs.
+    pub(super) fn slots<T: Copy>(self, own: T, other: T) -> [T; SLOTS] {
+        let mut slots = [other; SLOTS];
+        slots[usize::from(self.0) % SLOTS] = own;
+        slots
+    }
+
+    /// Id and CRC seed of the message `ESC_TELEMETRY_*` with its slot; they are laid out alike.
+    pub(super) const fn telemetry(self) -> (u32, u8) {
+        const fn of<D: MessageData>() -> (u32, u8) {
+            (D::ID, D::EXTRA_CRC)
+        }
+        match self.index() {
+            0 => of::<ESC_TELEMETRY_1_TO_4_DATA>(),
+            4 => of::<ESC_TELEMETRY_5_TO_8_DATA>(),
+            8 => of::<ESC_TELEMETRY_9_TO_12_DATA>(),
+            _ => of::<ESC_TELEMETRY_13_TO_16_DATA>(),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Bytes to frames.
+
+use mavlink::dialects::ardupilotmega::MavMessage;
+use mavlink::{MAV_STX, MAV_STX_V2, Message, calculate_crc};
+
+use super::identity::Address;
+
+/// The greatest frame: MAVLink 2, 255 bytes of payload, signed.
+const FRAME_MAX: usize = 10 + 255 + 2 + SIGNATURE_LEN;
+const SIGNATURE_LEN: usize = 13;
+/// Incompatibility flag of a signed frame; any other flag is unknown here.
+const SIGNED: u8 = 0x01;
+/// Silence after which an incomplete frame is given up. A false start byte can claim 267 bytes and
+/// would hold back the frames behind it for as long as nobody sends more. Links that stall within
+/// a frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
+const IDLE_US: u64 = 100_000;
+
+/// What a receiver has seen since the start; each counter stops at its greatest value.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames handed on.
+    pub frames: u32,
+    /// Frames whose check failed; a start byte within noise counts too.
+    pub bad_checks: u32,
+    /// Sound frames with an incompatibility flag that is not known; they are not obeyed.
+    pub incompatible: u32,
+    /// Frames of a message that the dialect does not have, so that their check is not known. What
+    /// follows the start byte is searched: noise with such a number must not hide a frame.
+    pub unknown: u32,
+    /// Sound frames with a signature; there is no key, so they are not obeyed.
+    pub signed: u32,
+    /// Incomplete frames given up after silence.
+    pub incomplete: u32,
+}
+
+/// A frame that passed its check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// Who sent it.
+    pub from: Address,
+    /// Number of the message.
+    pub id: u32,
+    /// As received: MAVLink 2 leaves trailing zeros out.
+    pub payload: &'a [u8],
+}
+
+impl Frame<'_> {
+    /// `N` bytes of the payload; those that were left out are zero.
+    pub(super) fn bytes<const N: usize>(&self, offset: usize) -> [u8; N] {
+        let mut bytes = [0; N];
+        for (byte, sent) in bytes.iter_mut().zip(self.payload.iter().skip(offset)) {
+            *byte = *sent;
+        }
+        bytes
+    }
+
+    pub(super) fn u8(&self, offset: usize) -> u8 {
+        u8::from_le_bytes(self.bytes(offset))
+    }
+
+    pub(super) fn u16(&self, offset: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(offset))
+    }
+
+    pub(super) fn i16(&self, offset: usize) -> i16 {
+        i16::from_le_bytes(self.bytes(offset))
+    }
+
+    pub(super) fn u32(&self, offset: usize) -> u32 {
+        u32::from_le_bytes(self.bytes(offset))
+    }
+
+    pub(super) fn i32(&self, offset: usize) -> i32 {
+        i32::from_le_bytes(self.bytes(offset))
+    }
+
+    pub(super) fn u64(&self, offset: usize) -> u64 {
+        u64::from_le_bytes(self.bytes(offset))
+    }
+
+    pub(super) fn f32(&self, offset: usize) -> f32 {
+        f32::from_le_bytes(self.bytes(offset))
+    }
+
+    /// The address of two bytes, system first, that a message is for.
+    pub(super) fn address(&self, offset: usize) -> Address {
+        Address {
+            system: self.u8(offset),
+            component: self.u8(offset + 1),
+        }
+    }
+}
+
+/// What stands at the front of the bytes that wait.
+enum Front {
+    /// Nothing that could be a frame yet, or not all of it.
+    Wait,
+    /// No frame starts here.
+    Reject,
+    /// A sound frame of this length that is not obeyed.
+    Skip(usize),
+    /// A sound frame: its whole length, and where its payload is.
+    Frame {
+        len: usize,
+        header_len: usize,
+        payload_len: usize,
+    },
+}
+
+/// Finds the frames in the bytes of one link; MAVLink 1 and 2.
+///
+/// A candidate that fails is searched again from its second byte, so that a start byte in noise
+/// costs no frame behind it.
+#[derive(Clone, Debug)]
+pub struct Receiver {
+    buffer: [u8; FRAME_MAX],
+    start: usize,
+    end: usize,
+    last_us: u64,
+    counters: Counters,
+}
+
+impl Default for Receiver {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Receiver {
+    /// A receiver for one link.
+    pub const fn new() -> Self {
+        Self {
+            buffer: [0; FRAME_MAX],
+            start: 0,
+            end: 0,
+            last_us: 0,
+            counters: Counters {
+                frames: 0,
+                bad_checks: 0,
+                incompatible: 0,
+                unknown: 0,
+                signed: 0,
+                incomplete: 0,
+            },
+        }
+    }
+
+    /// What it has seen since the start.
+    pub const fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Takes bytes as they come and calls `on_frame` for each frame that they complete.
+    ///
+    /// Call it without bytes now and then (every few milliseconds): after 100 ms of silence an
+    /// incomplete frame is given up and what it held back is searched for frames.
+    pub fn push(&mut self, now_us: u64, mut bytes: &[u8], mut on_frame: impl FnMut(&Frame)) {
+        if now_us.saturating_sub(self.last_us) >= IDLE_US {
+            while self.start < self.end {
+                count(&mut self.counters.incomplete);
+                self.start += 1;
+                self.search(&mut on_frame);
+            }
+        }
+        if !bytes.is_empty() {
+            self.last_us = now_us;
+        }
+        while !bytes.is_empty() {
+            self.buffer.copy_within(self.start..self.end, 0);
+            self.end -= self.start;
+            self.start = 0;
+            // A full buffer holds a whole frame of any length, and the search has taken it.
+            let (now, later) = bytes.split_at(bytes.len().min(FRAME_MAX - self.end));
+            self.buffer[self.end..self.end + now.len()].copy_from_slice(now);
+            self.end += now.len();
+            bytes = later;
+            self.search(&mut on_frame);
+        }
+    }
+
+    /// Hands on every complete frame; an incomplete one or nothing is left.
+    fn search(&mut self, on_frame: &mut impl FnMut(&Frame)) {
+        while self.start < self.end {
+            match self.front() {
+                Front::Wait => return,
+                Front::Reject => self.start += 1,
+                Front::Skip(len) => self.start += len,
+                Front::Frame {
+                    len,
+                    header_len,
+                    payload_len,
+                } => {
+                    count(&mut self.counters.frames);
+                    let bytes = &self.buffer[self.start..self.start + len];
+                    let (system, component, id) = sender_and_message(bytes);
+                    on_frame(&Frame {
+                        from: Address { system, component },
+                        id,
+                        payload: &bytes[header_len..header_len + payload_len],
+                    });
+                    self.start += len;
+                }
+            }
+        }
+    }
+
+    fn front(&mut self) -> Front {
+        let bytes = &self.buffer[self.start..self.end];
+        let header_len = match bytes[0] {
+            MAV_STX => 6,
+            MAV_STX_V2 => 10,
+            _ => return Front::Reject,
+        };
+        let version_2 = bytes[0] == MAV_STX_V2;
+        if bytes.len() < header_len {
+            return Front::Wait;
+        }
+        let (_, _, id) = sender_and_message(bytes);
+        // Of the whole dialect, not only of what an ESC obeys: a frame that something else carries
+        // (a file, a tunnel) is not found then. It costs 5 KB of text.
+        let extra_crc = MavMessage::extra_crc(id);
+        // The dialect answers 0 for what it does not have; HEARTBEAT's is 50, and no message that
+        // an ESC obeys has 0.
+        if extra_crc == 0 {
+            count(&mut self.counters.unknown);
+            return Front::Reject;
+        }
+        let payload_len = usize::from(bytes[1]);
+        let check_at = header_len + payload_len;
+        let flags = if version_2 { bytes[2] } else { 0 };
+        let signed = flags & SIGNED != 0;
+        let len = check_at + 2 + if signed { SIGNATURE_LEN } else { 0 };
+        if bytes.len() < len {
+            return Front::Wait;
+        }
+        let check = u16::from_le_bytes([bytes[check_at], bytes[check_at + 1]]);
+        if calculate_crc(&bytes[1..check_at], extra_crc) != check {
+            count(&mut self.counters.bad_checks);
+            return Front::Reject;
+        }
+        // What an unknown flag changes is not known, but the check has found where the frame ends:
+        // a frame within its payload is not searched for.
+        if flags & !SIGNED != 0 {
+            count(&mut self.counters.incompatible);
+            return Front::Skip(len);
+        }
+        if signed {
+            count(&mut self.counters.signed);
+            return Front::Skip(len);
+        }
+        Front::Frame {
+            len,
+            header_len,
+            payload_len,
+        }
+    }
+}
+
+/// System, component and message of a frame whose header is complete.
+fn sender_and_message(bytes: &[u8]) -> (u8, u8, u32) {
+    if bytes[0] == MAV_STX_V2 {
+        let id = u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]);
+        (bytes[5], bytes[6], id)
+    } else {
+        (bytes[3], bytes[4], u32::from(bytes[5]))
+    }
+}
+
+fn count(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

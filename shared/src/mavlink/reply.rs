@@ -1,0 +1,270 @@
+//! What waits to be sent at the next poll.
+
+use heapless::{Deque, Vec};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_ACK_DATA, FILE_TRANSFER_PROTOCOL_DATA, MISSION_COUNT_DATA, MavParamError, MavResult,
+    MavSeverity, PARAM_ERROR_DATA, STATUSTEXT_DATA,
+};
+use mavlink::types::CharArray;
+
+use super::ftp;
+use super::identity::{Address, Identity};
+use super::sender::Sender;
+use crate::params::{ParamId, TABLE};
+
+/// Replies that can wait. A poll empties them, so it is the most that may arrive between two:
+/// 1 ms of a serial link holds at most one frame, a datagram of 1500 bytes 35 commands.
+const WAITING: usize = 40;
+const CHUNK_LEN: usize = 50;
+/// The longest text: a parameter's refusal with another's name and the reason.
+const TEXT_MAX: usize = 200;
+/// `COMMAND_ACK.progress` when it is not known.
+const PROGRESS_UNKNOWN: u8 = u8::MAX;
+
+/// Message id and CRC seed of PING. The dialect marks the message as superseded, which would be a
+/// warning at each use, but clients still send it.
+pub(super) const PING: (u32, u8) = (4, 237);
+
+/// Something to send once.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Reply {
+    Ack {
+        to: Address,
+        command: u16,
+        result: MavResult,
+    },
+    /// One of the messages that can be asked for; the id is known to be one of them.
+    Message(u32),
+    /// MESSAGE_INTERVAL of this message.
+    Interval(u16),
+    Pong {
+        to: Address,
+        time_us: u64,
+        sequence: u32,
+    },
+    /// No missions of this type.
+    MissionCount {
+        to: Address,
+        mission_type: u8,
+    },
+    UnknownParam {
+        to: Address,
+        name: [u8; 16],
+        index: i16,
+    },
+    /// Why a value was not taken; `because` is the parameter that stands against it.
+    Refused {
+        id: ParamId,
+        because: Option<ParamId>,
+        reason: &'static str,
+    },
+    Text(MavSeverity, &'static str),
+    Ftp {
+        to: Address,
+        answer: ftp::Answer,
+    },
+}
+
+/// The replies that wait. Parameters' values are broadcast, so that one waiting is enough for any
+/// number of requests.
+#[derive(Clone, Debug)]
+pub(super) struct Replies {
+    queue: Deque<Reply, WAITING>,
+    values: [bool; TABLE.len()],
+    overrun: bool,
+}
+
+impl Replies {
+    pub(super) const fn new() -> Self {
+        Self {
+            queue: Deque::new(),
+            values: [false; TABLE.len()],
+            overrun: false,
+        }
+    }
+
+    /// Queues a reply. One too many is dropped, and the next poll says so.
+    pub(super) fn push(&mut self, reply: Reply) {
+        if self.queue.push_back(reply).is_err() {
+            self.overrun = true;
+        }
+    }
+
+    pub(super) fn ack(&mut self, to: Address, command: u16, result: MavResult) {
+        self.push(Reply::Ack {
+            to,
+            command,
+            result,
+        });
+    }
+
+    pub(super) fn value(&mut self, id: ParamId) {
+        self.values[id as usize] = true;
+    }
+
+    pub(super) fn next(&mut self) -> Option<Reply> {
+        self.queue.pop_front()
+    }
+
+    pub(super) fn next_value(&mut self) -> Option<ParamId> {
+        let index = self.values.iter().position(|due| *due)?;
+        self.values[index] = false;
+        ParamId::ALL.get(index).copied()
+    }
+
+    /// Whether replies were dropped since it was last asked.
+    pub(super) fn take_overrun(&mut self) -> bool {
+        core::mem::take(&mut self.overrun)
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.queue.is_empty()
+    }
+}
+
+/// Encodes what does not depend on the state of the ESC.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Writer {
+    pub(super) sender: Sender,
+    text_id: u16,
+}
+
+impl Writer {
+    /// COMMAND_ACK, by bytes because the command may be one that the dialect does not know.
+    pub(super) fn ack(
+        &mut self,
+        identity: &Identity,
+        to: Address,
+        command: u16,
+        result: MavResult,
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let [low, high] = command.to_le_bytes();
+        let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS {
+            PROGRESS_UNKNOWN
+        } else {
+            0
+        };
+        let payload = [
+            low,
+            high,
+            result as u8,
+            progress,
+            0,
+            0,
+            0,
+            0,
+            to.system,
+            to.component,
+        ];
+        let message = (COMMAND_ACK_DATA::ID, COMMAND_ACK_DATA::EXTRA_CRC);
+        self.sender
+            .send_payload(identity.address, message, &payload, out);
+    }
+
+    /// STATUSTEXT, in chunks of 50 bytes where it is longer.
+    pub(super) fn text(
+        &mut self,
+        identity: &Identity,
+        severity: MavSeverity,
+        pieces: &[&str],
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let mut text = Vec::<u8, TEXT_MAX>::new();
+        for byte in pieces.iter().flat_map(|piece| piece.bytes()) {
+            // A longer text ends here: a full vector takes no more.
+            if text.push(byte).is_err() {
+                break;
+            }
+        }
+        let mut id = 0;
+        let mut chunks = 1;
+        if text.len() > CHUNK_LEN {
+            self.text_id = self.text_id.checked_add(1).unwrap_or(1);
+            id = self.text_id;
+            // The last chunk is known by a zero in it, so it must not be full.
+            chunks = text.len() / CHUNK_LEN + 1;
+        }
+        for chunk in 0..chunks {
+            let mut bytes = [0; CHUNK_LEN];
+            let part = text.iter().skip(chunk * CHUNK_LEN);
+            for (to, byte) in bytes.iter_mut().zip(part) {
+                *to = *byte;
+            }
+            let [id_low, id_high] = id.to_le_bytes();
+            let message = STATUSTEXT_DATA {
+                severity,
+                text: CharArray::new(bytes),
+            };
+            let extension = [id_low, id_high, chunk as u8];
+            self.sender
+                .send(identity.address, &message, &extension, out);
+        }
+    }
+
+    pub(super) fn pong(
+        &mut self,
+        identity: &Identity,
+        to: Address,
+        (time_us, sequence): (u64, u32),
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let mut payload = [0; 14];
+        payload[..8].copy_from_slice(&time_us.to_le_bytes());
+        payload[8..12].copy_from_slice(&sequence.to_le_bytes());
+        payload[12] = to.system;
+        payload[13] = to.component;
+        self.sender
+            .send_payload(identity.address, PING, &payload, out);
+    }
+
+    pub(super) fn mission_count(
+        &mut self,
+        identity: &Identity,
+        to: Address,
+        mission_type: u8,
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let message = MISSION_COUNT_DATA {
+            count: 0,
+            target_system: to.system,
+            target_component: to.component,
+        };
+        self.sender
+            .send(identity.address, &message, &[mission_type], out);
+    }
+
+    pub(super) fn unknown_param(
+        &mut self,
+        identity: &Identity,
+        to: Address,
+        (name, index): ([u8; 16], i16),
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let message = PARAM_ERROR_DATA {
+            param_index: index,
+            target_system: to.system,
+            target_component: to.component,
+            param_id: CharArray::new(name),
+            error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+        };
+        self.sender.send(identity.address, &message, &[], out);
+    }
+
+    pub(super) fn ftp(
+        &mut self,
+        identity: &Identity,
+        to: Address,
+        answer: &ftp::Answer,
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let message = (
+            FILE_TRANSFER_PROTOCOL_DATA::ID,
+            FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC,
+        );
+        let payload = answer.payload(to);
+        self.sender
+            .send_payload(identity.address, message, &payload, out);
+    }
+}

@@ -1,0 +1,167 @@
+//! When which message is sent by itself.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA, HEARTBEAT_DATA,
+};
+
+use super::pace::Pace;
+use super::place::Place;
+use super::sender::OVERHEAD_LEN;
+use crate::params::{ParamId, Params};
+
+const SECOND_US: u64 = 1_000_000;
+
+/// A message that is sent again and again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stream {
+    Heartbeat,
+    EscInfo,
+    EscStatus,
+    EscTelemetry,
+}
+
+impl Stream {
+    const ALL: [Self; 4] = [
+        Self::Heartbeat,
+        Self::EscInfo,
+        Self::EscStatus,
+        Self::EscTelemetry,
+    ];
+
+    const fn message(self, place: Place) -> u32 {
+        match self {
+            Self::Heartbeat => HEARTBEAT_DATA::ID,
+            Self::EscInfo => ESC_INFO_DATA::ID,
+            Self::EscStatus => ESC_STATUS_DATA::ID,
+            Self::EscTelemetry => place.telemetry().0,
+        }
+    }
+
+    /// The longest frame.
+    const fn frame_len(self) -> usize {
+        OVERHEAD_LEN
+            + match self {
+                Self::Heartbeat => HEARTBEAT_DATA::ENCODED_LEN,
+                Self::EscInfo => ESC_INFO_DATA::ENCODED_LEN,
+                Self::EscStatus => ESC_STATUS_DATA::ENCODED_LEN,
+                Self::EscTelemetry => ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN,
+            }
+    }
+
+    fn default_interval_us(self, params: &Params) -> u64 {
+        match self {
+            Self::Heartbeat | Self::EscInfo => SECOND_US,
+            Self::EscStatus | Self::EscTelemetry => {
+                (SECOND_US as f32 / params.get(ParamId::TelRateHz)) as u64
+            }
+        }
+    }
+}
+
+/// How often a stream is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Interval {
+    /// As the parameters say.
+    Default,
+    /// Never.
+    Off,
+    /// This many microseconds apart, above 0.
+    Us(u32),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Timer {
+    interval: Interval,
+    due_us: u64,
+}
+
+/// The timers of the streams, within a share of the link.
+#[derive(Clone, Debug)]
+pub(super) struct Schedule {
+    timers: [Timer; Stream::ALL.len()],
+    pace: Pace,
+    place: Place,
+    /// Which stream is looked at first, so that on a link too slow for all each gets its turn.
+    first: usize,
+}
+
+impl Schedule {
+    pub(super) fn new(place: Place, bytes_per_s: u32) -> Self {
+        Self {
+            timers: [Timer {
+                interval: Interval::Default,
+                due_us: 0,
+            }; Stream::ALL.len()],
+            pace: Pace::new(bytes_per_s),
+            place,
+            first: 0,
+        }
+    }
+
+    /// The stream of this message.
+    pub(super) fn find(&self, message: u32) -> Option<Stream> {
+        Stream::ALL
+            .into_iter()
+            .find(|stream| stream.message(self.place) == message)
+    }
+
+    /// Makes a stream due now, unless it is off.
+    pub(super) fn hasten(&mut self, stream: Stream) {
+        self.timers[stream as usize].due_us = 0;
+    }
+
+    /// Changes how often a stream is sent. False for the heartbeat: without it the ESC is gone for
+    /// every ground station.
+    pub(super) fn set(&mut self, stream: Stream, interval: Interval) -> bool {
+        if stream == Stream::Heartbeat && interval != Interval::Default {
+            return false;
+        }
+        self.timers[stream as usize].interval = interval;
+        true
+    }
+
+    /// Microseconds between two, none when it is off.
+    pub(super) fn interval_us(&self, stream: Stream, params: &Params) -> Option<u64> {
+        match self.timers[stream as usize].interval {
+            Interval::Default => Some(stream.default_interval_us(params)),
+            Interval::Off => None,
+            Interval::Us(interval_us) => Some(u64::from(interval_us)),
+        }
+    }
+
+    /// The next stream that is due now; each is due at most once at one `now_us`.
+    pub(super) fn next_due(&mut self, now_us: u64, params: &Params) -> Option<Stream> {
+        self.pace.advance(now_us);
+        let mut blocked = false;
+        for offset in 0..Stream::ALL.len() {
+            let index = (self.first + offset) % Stream::ALL.len();
+            let stream = Stream::ALL[index];
+            let Some(interval_us) = self.interval_us(stream, params) else {
+                continue;
+            };
+            let timer = &mut self.timers[index];
+            let next_us = now_us.saturating_add(interval_us);
+            // A faster rate applies now, not after the slower one's time.
+            timer.due_us = timer.due_us.min(next_us);
+            if timer.due_us > now_us {
+                continue;
+            }
+            // Who finds too little of the share left holds up those behind it: shorter messages
+            // would otherwise take it all. Only the heartbeat passes.
+            blocked = blocked || !self.pace.take(stream.frame_len());
+            if blocked && stream != Stream::Heartbeat {
+                continue;
+            }
+            timer.due_us = timer.due_us.saturating_add(interval_us);
+            if timer.due_us <= now_us {
+                timer.due_us = next_us;
+            }
+            if stream != Stream::Heartbeat {
+                self.first = index + 1;
+            }
+            return Some(stream);
+        }
+        None
+    }
+}

@@ -1,0 +1,73 @@
+//! Payloads to frames.
+
+use mavlink::{MAV_STX_V2, MavlinkVersion, MessageData, calculate_crc};
+
+use super::identity::Address;
+
+/// What a frame has beside its payload: header and check.
+pub(super) const OVERHEAD_LEN: usize = 12;
+const HEADER_LEN: usize = 10;
+const PAYLOAD_MAX: usize = 255;
+
+/// Numbers the frames that leave. Always MAVLink 2: an ESC's messages have ids above 255.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sender {
+    sequence: u8,
+}
+
+impl Sender {
+    /// Sends a message; `extension` are the bytes of its extension fields, which the generated
+    /// payloads do not have.
+    pub(super) fn send<D: MessageData>(
+        &mut self,
+        from: Address,
+        data: &D,
+        extension: &[u8],
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        let mut payload = [0; PAYLOAD_MAX];
+        data.ser(MavlinkVersion::V2, &mut payload);
+        let len = PAYLOAD_MAX.min(D::ENCODED_LEN + extension.len());
+        for (to, byte) in payload[D::ENCODED_LEN..].iter_mut().zip(extension) {
+            *to = *byte;
+        }
+        self.send_payload(from, (D::ID, D::EXTRA_CRC), &payload[..len], out);
+    }
+
+    /// Sends a payload of at most 255 bytes as the message with this id and CRC seed.
+    pub(super) fn send_payload(
+        &mut self,
+        from: Address,
+        (id, extra_crc): (u32, u8),
+        payload: &[u8],
+        out: &mut dyn FnMut(&[u8]),
+    ) {
+        // MAVLink 2 leaves trailing zeros out, but for the first byte.
+        let len = payload
+            .iter()
+            .rposition(|byte| *byte != 0)
+            .map_or(1, |last| last + 1)
+            .min(PAYLOAD_MAX);
+        let mut frame = [0; OVERHEAD_LEN + PAYLOAD_MAX];
+        let [id_0, id_1, id_2, _] = id.to_le_bytes();
+        frame[..HEADER_LEN].copy_from_slice(&[
+            MAV_STX_V2,
+            len as u8,
+            0,
+            0,
+            self.sequence,
+            from.system,
+            from.component,
+            id_0,
+            id_1,
+            id_2,
+        ]);
+        for (to, byte) in frame[HEADER_LEN..HEADER_LEN + len].iter_mut().zip(payload) {
+            *to = *byte;
+        }
+        let check = calculate_crc(&frame[1..HEADER_LEN + len], extra_crc);
+        frame[HEADER_LEN + len..OVERHEAD_LEN + len].copy_from_slice(&check.to_le_bytes());
+        self.sequence = self.sequence.wrapping_add(1);
+        out(&frame[..OVERHEAD_LEN + len]);
+    }
+}

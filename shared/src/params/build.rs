@@ -1,0 +1,444 @@
+//! The configuration that the parameters make: SI values become the control's coefficients, once.
+
+use core::f32::consts::{FRAC_PI_2, TAU};
+
+use fixed::types::extra::Unsigned;
+use fixed::types::{I1F31, I36F28};
+
+use super::{ParamId, Params};
+use crate::control::back_emf::{self, Delay};
+use crate::control::modulator::{self, Modulation};
+use crate::control::{regulator, speed, start};
+use crate::drive::{Config, DeadTime, Direction, Stop};
+use crate::math::Gain;
+use crate::protection;
+use crate::units::{AdcCounts, InverseFlux, Scale, Voltage};
+
+/// What the control must know of the board.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Board {
+    /// Amperes of one count of the current converter.
+    pub current_a_per_count: f32,
+    /// Volts of one count of the supply's converter.
+    pub bus_v_per_count: f32,
+    /// Greatest phase current that the converter can show, peak amperes.
+    pub current_range_a: f32,
+    /// Control periods from the sample to the voltage.
+    pub delay: Delay,
+    /// Least time for which the low sides must be on for the currents to be read, s.
+    pub low_side_on_s: f32,
+}
+
+/// Why the parameters do not make a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BuildError {
+    /// The parameter to change.
+    pub param: ParamId,
+    /// What is wrong with it.
+    pub reason: &'static str,
+}
+
+/// ξ of the stated flux in the control's units: the voltage base makes it so for every motor.
+const XI_NOMINAL: f32 = 0.25;
+
+/// The supply may be at most this many units of voltage, of the eight that the type holds.
+const BUS_UNITS_MAX: f32 = 6.0;
+
+/// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
+/// 2357 1/s.
+const ATTITUDE_SHARE: f32 = 0.1806;
+
+/// Poles of the current regulator (21): Table III has −2357 and −2142, the second at 0.909.
+const SECOND_POLE_SHARE: f32 = 0.909;
+
+/// Speed at which (22) is linearised, of `CTL_RPM_MAX`: 4500 rpm on the bench.
+const LINEARISED_SHARE: f32 = 0.75;
+
+/// k_iω/k_pω over k_pω/J: Table III has 5.87 against 49.65 1/s.
+const SPEED_CORNER_SHARE: f32 = 0.1183;
+
+/// k_f over the current bandwidth: 500 against 2357 1/s (section V).
+const FILTER_SHARE: f32 = 0.2121;
+
+/// The phase current from which its sign is certain; below, the dead time is compensated in
+/// proportion.
+const SIGN_CERTAIN_A: f32 = 0.3;
+
+/// For how long ξ̂ may stand at the end of its range, s: far longer than any transient that the
+/// observer recovers from.
+const LOST_S: f32 = 0.1;
+
+/// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
+const SWING_DAMPING: f32 = 0.5;
+
+/// Rate at which the frame yields, over the swing's ω_n: fast against it, slow against noise.
+const YIELD_RATE_SHARE: f32 = 5.0;
+
+/// Share below which Run ends, of the speed at which it begins or of the least that can be asked
+/// for: the hysteresis of the second paper's 3.2.4.
+const SLOW_SHARE: f32 = 0.5;
+
+/// For how long zero throttle must stand before a fault ends, s.
+const CLEAR_S: f32 = 0.3;
+
+/// Time constant with which the reported speed falls while the bridge is off, s. The bench's
+/// propeller takes 1.1 s.
+const COAST_S: f32 = 2.0;
+
+/// Greatest current bandwidth of the PWM frequency: the observer's poles at (−1 ± i) times it are
+/// stepped by Euler's rule, and a period of delay stands in the loop.
+const BANDWIDTH_SHARE: f32 = 0.05;
+
+/// Greatest speed bandwidth of the current bandwidth: nested loops need that distance.
+const SPEED_SHARE: f32 = 0.2;
+
+/// What a test of the motor may use of `LIM_PHASE_A`.
+const TEST_SHARE: f32 = 0.2;
+
+/// Software trip over `LIM_PHASE_A`.
+const TRIP_SHARE: f32 = 1.4;
+
+/// What of the converter's range a trip may take: offsets and the uneven ends of the range stay
+/// below the rest.
+const SHOWN_SHARE: f32 = 0.97;
+
+/// Volts below `LIM_BUS_V_MAX` over which the returned current is brought to zero.
+const RETURN_BAND_V: f32 = 1.0;
+
+/// How fast the bounds of i_q follow the bus current, 1/s.
+const BOUND_RATE: f32 = 600.0;
+
+/// Computes the drive's coefficients from SI values.
+///
+/// # Errors
+/// A [`BuildError`] names the parameter that makes a coefficient leave its range.
+pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
+    let p = Si::new(params);
+    let scale = Scale {
+        period_s: p.period_s,
+        current_a: board.current_a_per_count * 4096.0 / 3.0,
+        voltage_v: FRAC_PI_2 * p.flux_wb / p.period_s,
+        pole_pairs: p.pole_pairs,
+    };
+    let get = |id| params.get(id);
+    if get(ParamId::LimBusVMax) > BUS_UNITS_MAX * scale.voltage_v {
+        return refuse(
+            ParamId::PwmFreqHz,
+            "too low for this flux and LIM_BUS_V_MAX",
+        );
+    }
+    if get(ParamId::LimBusVMin) >= get(ParamId::LimBusVMax) {
+        return refuse(ParamId::LimBusVMin, "not below LIM_BUS_V_MAX");
+    }
+    if get(ParamId::CtlRpmMin) > get(ParamId::CtlRpmMax) {
+        return refuse(ParamId::CtlRpmMin, "above CTL_RPM_MAX");
+    }
+    if get(ParamId::StaRunRpm) > get(ParamId::CtlRpmMax) {
+        return refuse(ParamId::StaRunRpm, "above CTL_RPM_MAX");
+    }
+    if get(ParamId::CtlBwCurHz) > BANDWIDTH_SHARE * get(ParamId::PwmFreqHz) {
+        return refuse(ParamId::CtlBwCurHz, "above a twentieth of PWM_FREQ_HZ");
+    }
+    if get(ParamId::CtlBwSpdHz) > SPEED_SHARE * get(ParamId::CtlBwCurHz) {
+        return refuse(ParamId::CtlBwSpdHz, "above a fifth of CTL_BW_CUR_HZ");
+    }
+    if get(ParamId::LimPhaseA) * TRIP_SHARE > SHOWN_SHARE * board.current_range_a {
+        return refuse(
+            ParamId::LimPhaseA,
+            "the trip at 1.4 times this is beyond the board",
+        );
+    }
+    if get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0 > 0.25 {
+        return refuse(
+            ParamId::PwmFreqHz,
+            "less than four periods a turn at CTL_RPM_MAX",
+        );
+    }
+    if ![0.0, 10.0, 11.0, 12.0].contains(&get(ParamId::InpProto)) {
+        return refuse(ParamId::InpProto, "neither 0, 10, 11 nor 12");
+    }
+    let duty_max = 1.0 - (board.low_side_on_s + 2.0 * p.dead_time_s) / p.period_s;
+    if duty_max < 0.5 {
+        return refuse(
+            ParamId::PwmFreqHz,
+            "too high: the low sides could not be read",
+        );
+    }
+
+    Ok(Config {
+        scale,
+        bus: gain(ParamId::LimBusVMax, board.bus_v_per_count / scale.voltage_v)?,
+        direction: match get(ParamId::MotDir) {
+            0.0 => Direction::Normal,
+            _ => Direction::Reversed,
+        },
+        stop: match get(ParamId::MotStop) {
+            0.0 => Stop::Coast,
+            _ => Stop::Brake,
+        },
+        observer: observer(&p, &scale, board.delay)?,
+        regulator: current_regulator(&p, &scale)?,
+        speed: speed_regulator(&p, &scale)?,
+        slew: scale.speed_from_rpm(get(ParamId::CtlSlewRpmS) * p.period_s),
+        start: start_up(params, &p, &scale)?,
+        slow: scale
+            .speed_from_rpm(SLOW_SHARE * get(ParamId::StaRunRpm).min(get(ParamId::CtlRpmMin))),
+        coast: gain(ParamId::PwmFreqHz, p.period_s / COAST_S)?,
+        modulator: modulator_limits(get(ParamId::CtlModulation), duty_max),
+        dead_time: DeadTime {
+            slope: gain(
+                ParamId::PwmDeadtimeNs,
+                p.dead_time_s / p.period_s * scale.current_a / SIGN_CERTAIN_A,
+            )?,
+            duty: I1F31::saturating_from_num(p.dead_time_s / p.period_s),
+        },
+        protection: limits(params, &p, &scale, board)?,
+        clear_periods: (CLEAR_S / p.period_s) as u32,
+        lost_periods: (LOST_S / p.period_s) as u32,
+    })
+}
+
+/// The parameters that several blocks need, in SI.
+struct Si {
+    period_s: f32,
+    dead_time_s: f32,
+    pole_pairs: f32,
+    resistance_ohm: f32,
+    inductance_h: f32,
+    flux_wb: f32,
+    inertia_kgm2: f32,
+    /// Bandwidth of the current loop, 1/s: 1/ε of (20), (21).
+    current_rad_s: f32,
+    /// Bandwidth of the speed loop, 1/s: k_pω/J.
+    speed_rad_s: f32,
+    /// Electrical speed at which (22) is linearised, 1/s.
+    linearised_rad_s: f32,
+}
+
+impl Si {
+    fn new(params: &Params) -> Self {
+        let pole_pairs = params.get(ParamId::MotPolePairs);
+        let rpm = LINEARISED_SHARE * params.get(ParamId::CtlRpmMax);
+        Self {
+            period_s: 1.0 / params.get(ParamId::PwmFreqHz),
+            dead_time_s: params.get(ParamId::PwmDeadtimeNs) * 1e-9,
+            pole_pairs,
+            resistance_ohm: params.get(ParamId::MotRMohm) * 1e-3,
+            inductance_h: params.get(ParamId::MotLUh) * 1e-6,
+            flux_wb: params.get(ParamId::MotFluxMwb) * 1e-3,
+            inertia_kgm2: params.get(ParamId::MotJGcm2) * 1e-7,
+            current_rad_s: TAU * params.get(ParamId::CtlBwCurHz),
+            speed_rad_s: TAU * params.get(ParamId::CtlBwSpdHz),
+            linearised_rad_s: rpm * pole_pairs * TAU / 60.0,
+        }
+    }
+}
+
+fn refuse<T>(param: ParamId, reason: &'static str) -> Result<T, BuildError> {
+    Err(BuildError { param, reason })
+}
+
+fn gain<A: Unsigned, B: Unsigned>(param: ParamId, k: f32) -> Result<Gain<A, B>, BuildError> {
+    Gain::new(k).ok_or(BuildError {
+        param,
+        reason: "makes a coefficient leave its range",
+    })
+}
+
+/// (6), (7), (20), (22), (28).
+fn observer(p: &Si, scale: &Scale, delay: Delay) -> Result<back_emf::Config, BuildError> {
+    let r_over_l = p.resistance_ohm / p.inductance_h;
+    let decay = -libm::expm1f(-r_over_l * p.period_s);
+    // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
+    let acts_s = decay / r_over_l;
+    let current_per_voltage = scale.voltage_v / scale.current_a;
+    let rad_per_unit = TAU / p.period_s;
+
+    // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
+    let k_p = 2.0 * p.current_rad_s - r_over_l;
+    let k_i = 2.0 * p.inductance_h * p.current_rad_s * p.current_rad_s;
+    // λ² + χ·k_η·λ + χ²·γ with both poles at (−1 ± i)·s (22).
+    let chi = p.linearised_rad_s * p.flux_wb;
+    let pole_rad_s = ATTITUDE_SHARE * p.current_rad_s;
+    let k_eta = 2.0 * pole_rad_s / chi;
+    let gamma = 2.0 * pole_rad_s * pole_rad_s / (chi * chi);
+
+    Ok(back_emf::Config {
+        delay,
+        decay: gain(ParamId::MotRMohm, decay)?,
+        admittance: gain(
+            ParamId::MotLUh,
+            acts_s / p.inductance_h * current_per_voltage,
+        )?,
+        rotation: gain(ParamId::MotLUh, acts_s * rad_per_unit)?,
+        k_p: gain(ParamId::CtlBwCurHz, k_p * acts_s)?,
+        k_i: gain(ParamId::CtlBwCurHz, k_i * p.period_s / current_per_voltage)?,
+        k_eta: gain(ParamId::CtlBwCurHz, k_eta * scale.voltage_v / rad_per_unit)?,
+        gamma: gain(
+            ParamId::CtlBwCurHz,
+            gamma * p.period_s * scale.voltage_v / scale.inverse_flux_per_wb(),
+        )?,
+        k_f: gain(
+            ParamId::CtlBwCurHz,
+            FILTER_SHARE * p.current_rad_s * p.period_s,
+        )?,
+        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
+        xi_min: InverseFlux::from_num(XI_NOMINAL / 2.0),
+        // Twice the nominal is one bit more than the type holds.
+        xi_max: InverseFlux::MAX,
+    })
+}
+
+/// (10), (21).
+fn current_regulator(p: &Si, scale: &Scale) -> Result<regulator::Config, BuildError> {
+    let voltage_per_current = scale.current_a / scale.voltage_v;
+    let r_over_l = p.resistance_ohm / p.inductance_h;
+    // λ² + (R/L + k_pe)·λ + k_ie/L with poles at −1/ε and −0.909/ε (21).
+    let k_pe = (1.0 + SECOND_POLE_SHARE) * p.current_rad_s - r_over_l;
+    let k_ie = SECOND_POLE_SHARE * p.inductance_h * p.current_rad_s * p.current_rad_s;
+    Ok(regulator::Config {
+        resistance: gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current)?,
+        reactance: gain(
+            ParamId::MotLUh,
+            p.inductance_h * voltage_per_current * TAU / p.period_s,
+        )?,
+        inductance: gain(
+            ParamId::MotLUh,
+            p.inductance_h * voltage_per_current / p.period_s,
+        )?,
+        k_pe: gain(
+            ParamId::CtlBwCurHz,
+            p.inductance_h * k_pe * voltage_per_current,
+        )?,
+        k_ie: gain(ParamId::CtlBwCurHz, k_ie * p.period_s * voltage_per_current)?,
+    })
+}
+
+/// (8), from the bandwidth and the inertia.
+fn speed_regulator(p: &Si, scale: &Scale) -> Result<speed::Config, BuildError> {
+    let rad_per_unit = TAU / (p.pole_pairs * p.period_s);
+    let k_p = p.inertia_kgm2 * p.speed_rad_s;
+    let k_i = k_p * SPEED_CORNER_SHARE * p.speed_rad_s;
+    let torque_per_speed = rad_per_unit / scale.torque_nm();
+    Ok(speed::Config {
+        k_p: gain(ParamId::CtlBwSpdHz, k_p * torque_per_speed)?,
+        k_i: gain(ParamId::CtlBwSpdHz, k_i * p.period_s * torque_per_speed)?,
+    })
+}
+
+/// Section 3.2 of the second paper.
+fn start_up(params: &Params, p: &Si, scale: &Scale) -> Result<start::Config, BuildError> {
+    let current_a = params
+        .get(ParamId::StaRampA)
+        .min(params.get(ParamId::LimPhaseA));
+    let current = scale.current_from_a(current_a);
+    let park_charge = params.get(ParamId::StaParkAs) / (scale.current_a * p.period_s);
+    // A quarter of a turn in the first half of the charge.
+    let sweep = 0.25 / (0.5 * park_charge);
+    let step = params.get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
+    // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
+    // 2ζ/ω_n a unit of speed damps it by ζ.
+    let stiffness = 1.5 * p.pole_pairs * p.pole_pairs * p.flux_wb * current_a;
+    let swing_rad_s = libm::sqrtf(stiffness / p.inertia_kgm2);
+    let yielding_s = 2.0 * SWING_DAMPING / swing_rad_s;
+    Ok(start::Config {
+        current,
+        test_current: scale.current_from_a(TEST_SHARE * params.get(ParamId::LimPhaseA)),
+        yielding: gain(ParamId::MotJGcm2, yielding_s / p.period_s)?,
+        yield_rate: gain(
+            ParamId::MotJGcm2,
+            (YIELD_RATE_SHARE * swing_rad_s * p.period_s).min(1.0),
+        )?,
+        park_charge: I36F28::saturating_from_num(park_charge),
+        sweep: gain(ParamId::StaParkAs, sweep)?,
+        k_s: gain(
+            ParamId::StaRampRpmS,
+            step * scale.current_a / params.get(ParamId::StaRampA),
+        )?,
+        run_speed: scale.speed_from_rpm(params.get(ParamId::StaRunRpm)),
+    })
+}
+
+fn modulator_limits(modulation: f32, duty_max: f32) -> modulator::Config {
+    let (modulation, longest) = match modulation {
+        0.0 => (Modulation::SpaceVector, 1.0 / libm::sqrtf(3.0)),
+        _ => (Modulation::Sine, 0.5),
+    };
+    modulator::Config {
+        modulation,
+        duty_max: I1F31::saturating_from_num(duty_max),
+        vector_max: I1F31::saturating_from_num(longest * duty_max),
+    }
+}
+
+fn limits(
+    params: &Params,
+    p: &Si,
+    scale: &Scale,
+    board: &Board,
+) -> Result<protection::Config, BuildError> {
+    let current = |id| scale.current_from_a(params.get(id));
+    let voltage = |volts: f32| Voltage::saturating_from_num(volts / scale.voltage_v);
+    let bus_max_v = params.get(ParamId::LimBusVMax);
+    let return_a = params.get(ParamId::LimRegenA);
+    Ok(protection::Config {
+        trip: AdcCounts::saturating_from_num(
+            TRIP_SHARE * params.get(ParamId::LimPhaseA) / board.current_a_per_count,
+        ),
+        bus_min: voltage(params.get(ParamId::LimBusVMin)),
+        bus_max: voltage(bus_max_v),
+        phase: current(ParamId::LimPhaseA),
+        bus_draw: current(ParamId::LimBusA),
+        bus_return: current(ParamId::LimRegenA),
+        bus_return_v: voltage(bus_max_v - RETURN_BAND_V),
+        bus_return_slope: gain(
+            ParamId::LimRegenA,
+            return_a / RETURN_BAND_V * scale.voltage_v / scale.current_a,
+        )?,
+        bound_rate: gain(ParamId::PwmFreqHz, BOUND_RATE * p.period_s)?,
+    })
+}
+
+#[cfg(test)]
+impl Board {
+    /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
+    pub(crate) const BENCH: Self = Self {
+        current_a_per_count: 40.0 / 2048.0,
+        bus_v_per_count: 70.0 / 4096.0,
+        current_range_a: 40.0,
+        delay: Delay::One,
+        low_side_on_s: 1e-6,
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_make_a_drive() {
+        build(&Params::default(), &Board::BENCH).expect("the defaults fit the bench");
+    }
+
+    #[test]
+    fn each_parameter_at_its_ends_makes_a_drive_or_a_reason() {
+        for id in ParamId::ALL {
+            for value in [id.entry().min, id.entry().max] {
+                let mut params = Params::default();
+                if params.set(id, value).is_ok()
+                    && let Err(error) = build(&params, &Board::BENCH)
+                {
+                    assert!(!error.reason.is_empty(), "{}", id.entry().name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn contradictions_are_refused_with_the_parameter() {
+        let mut params = Params::default();
+        params.set(ParamId::CtlRpmMin, 7000.0).expect("in range");
+        let error = build(&params, &Board::BENCH).expect_err("above the maximum");
+        assert_eq!(error.param, ParamId::CtlRpmMin);
+    }
+}

@@ -1,0 +1,126 @@
+//! Parameters: the table, the values, and the configuration that they make.
+
+mod build;
+mod table;
+
+pub use build::{Board, BuildError, build};
+pub use table::{Kind, ParamId, Parameter, TABLE};
+
+/// Why a value was not taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SetError {
+    /// NaN or infinite.
+    NotFinite,
+    /// Outside `min..=max` of the table.
+    OutOfRange,
+    /// A fraction where a whole number is wanted.
+    NotWhole,
+    /// The parameter is derived.
+    ReadOnly,
+}
+
+/// The value of every parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    values: [f32; TABLE.len()],
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        let mut params = Self {
+            values: TABLE.map(|p| p.default),
+        };
+        params.derive();
+        params
+    }
+}
+
+impl ParamId {
+    /// The parameter of this MAVLink name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|id| id.entry().name == name)
+    }
+
+    /// This parameter's row of the table.
+    pub const fn entry(self) -> &'static Parameter {
+        &TABLE[self as usize]
+    }
+}
+
+impl Params {
+    /// The value of one parameter, in the unit of its entry.
+    pub fn get(&self, id: ParamId) -> f32 {
+        self.values[id as usize]
+    }
+
+    /// Takes a value, or says why not and changes nothing.
+    ///
+    /// # Errors
+    /// Any [`SetError`].
+    pub fn set(&mut self, id: ParamId, value: f32) -> Result<(), SetError> {
+        let entry = id.entry();
+        if entry.kind == Kind::Derived {
+            return Err(SetError::ReadOnly);
+        }
+        if !value.is_finite() {
+            return Err(SetError::NotFinite);
+        }
+        if value < entry.min || value > entry.max {
+            return Err(SetError::OutOfRange);
+        }
+        if entry.kind == Kind::Whole && libm::truncf(value) != value {
+            return Err(SetError::NotWhole);
+        }
+        self.values[id as usize] = value;
+        self.derive();
+        Ok(())
+    }
+
+    fn derive(&mut self) {
+        let pole_pairs = self.get(ParamId::MotPolePairs);
+        let flux_wb = self.get(ParamId::MotFluxMwb) * 1e-3;
+        self.values[ParamId::MotKv as usize] =
+            60.0 / (core::f32::consts::TAU * libm::sqrtf(3.0) * pole_pairs * flux_wb);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_value_changes_nothing() {
+        let mut params = Params::default();
+        let before = params.clone();
+        assert_eq!(params.set(ParamId::MotKv, 100.0), Err(SetError::ReadOnly));
+        assert_eq!(
+            params.set(ParamId::LimPhaseA, f32::NAN),
+            Err(SetError::NotFinite)
+        );
+        assert_eq!(
+            params.set(ParamId::LimPhaseA, 1e9),
+            Err(SetError::OutOfRange)
+        );
+        assert_eq!(
+            params.set(ParamId::MotPolePairs, 6.5),
+            Err(SetError::NotWhole)
+        );
+        assert_eq!(params, before);
+    }
+
+    #[test]
+    fn kv_follows_pole_pairs_and_flux() {
+        let mut params = Params::default();
+        assert!((params.get(ParamId::MotKv) - 353.0).abs() < 0.5);
+        params.set(ParamId::MotPolePairs, 6.0).expect("in range");
+        assert!((params.get(ParamId::MotKv) - 706.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn every_name_is_found() {
+        for id in ParamId::ALL {
+            assert_eq!(ParamId::find(id.entry().name), Some(id));
+        }
+        assert_eq!(ParamId::find("NO_SUCH"), None);
+    }
+}

@@ -1,0 +1,221 @@
+//! The one table of parameters.
+
+/// Whether a parameter takes fractions, whole numbers, or is computed from others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Any value in range.
+    Real,
+    /// Whole numbers in range.
+    Whole,
+    /// Computed from other parameters; it cannot be set and is not stored.
+    Derived,
+}
+
+/// One parameter's entry.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// Number under which the value is stored; never given to another parameter.
+    pub key: u16,
+    /// Name on MAVLink, at most 16 characters.
+    pub name: &'static str,
+    /// Unit, empty for a number or a choice.
+    pub unit: &'static str,
+    /// Fractions, whole numbers or derived.
+    pub kind: Kind,
+    /// Least value that is accepted.
+    pub min: f32,
+    /// Greatest value that is accepted.
+    pub max: f32,
+    /// Value from the factory: the bench of the first paper, an Antigravity 4006 KV380 with a
+    /// 13×4.4 propeller at 24 V.
+    pub default: f32,
+    /// Whether it may change while the motor turns. All others describe the motor, the bridge, the
+    /// wire or the way it is driven, and wait until it stands.
+    pub live: bool,
+    /// One sentence for a ground station.
+    pub description: &'static str,
+}
+
+/// A row's optional word; any other does not compile.
+macro_rules! is_live {
+    () => {
+        false
+    };
+    (live) => {
+        true
+    };
+}
+
+macro_rules! parameters {
+    ($($key:literal $id:ident $name:literal $unit:literal $kind:ident
+       $min:literal .. $max:literal = $default:literal $($live:ident)? $description:literal;)*) => {
+        /// Names a row of [`TABLE`]; its order is the order on MAVLink.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum ParamId {
+            $(
+                #[doc = $description]
+                $id,
+            )*
+        }
+
+        /// Every parameter that there is. MAVLink, storage, the documentation and
+        /// [`build`](super::build) read it.
+        pub const TABLE: &[Parameter; [$(ParamId::$id),*].len()] = &[$(
+            Parameter {
+                key: $key,
+                name: $name,
+                unit: $unit,
+                kind: Kind::$kind,
+                min: $min,
+                max: $max,
+                default: $default,
+                live: is_live!($($live)?),
+                description: $description,
+            },
+        )*];
+
+        impl ParamId {
+            /// All parameters in the order of the table.
+            pub const ALL: [Self; TABLE.len()] = [$(Self::$id),*];
+        }
+    };
+}
+
+parameters! {
+    1 MavSysId "MAV_SYS_ID" "" Whole 1.0..255.0 = 1.0 live
+        "MAVLink system id; restart to apply";
+    2 MavCompId "MAV_COMP_ID" "" Whole 1.0..250.0 = 140.0 live
+        "MAVLink component id as a peripheral; standalone it is 1";
+    3 MavRole "MAV_ROLE" "" Whole 0.0..1.0 = 0.0 live
+        "0 standalone, a vehicle of its own for a ground station; 1 peripheral beside an autopilot";
+    10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 1.0..64.0 = 12.0
+        "Pole pairs of the motor: half the number of its magnets";
+    11 MotRMohm "MOT_R_MOHM" "mOhm" Real 1.0..10000.0 = 108.0
+        "Resistance of one phase (star)";
+    12 MotLUh "MOT_L_UH" "uH" Real 0.5..10000.0 = 30.6
+        "Inductance of one phase (star)";
+    13 MotFluxMwb "MOT_FLUX_MWB" "mWb" Real 0.01..1000.0 = 1.3
+        "Peak flux linkage of one phase";
+    14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" Real 0.1..10000000.0 = 1430.0
+        "Moment of inertia of motor and load";
+    15 MotDir "MOT_DIR" "" Whole 0.0..1.0 = 0.0
+        "Direction of rotation: 0 normal, 1 reversed";
+    16 MotKv "MOT_KV" "rpm/V" Derived 0.0..1000000.0 = 353.416
+        "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only";
+    17 MotStop "MOT_STOP" "" Whole 0.0..1.0 = 1.0
+        "At zero throttle and at loss of signal: 0 coast, 1 brake";
+    20 CtlMode "CTL_MODE" "" Whole 0.0..1.0 = 0.0
+        "What throttle commands: 0 speed, 1 torque";
+    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..0.0 = 0.0
+        "Drive: 0 field-oriented";
+    22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..0.0 = 0.0
+        "Position observer: 0 adaptive back-EMF";
+    23 CtlRegulator "CTL_REGULATOR" "" Whole 0.0..0.0 = 0.0
+        "Current regulator: 0 observer-based";
+    24 CtlModulation "CTL_MODULATION" "" Whole 0.0..1.0 = 0.0
+        "Modulation: 0 space vector, 1 sine";
+    25 CtlObsCure "CTL_OBS_CURE" "" Whole 0.0..0.0 = 0.0
+        "Form of the adaptive back-EMF observer: 0 as published, the only one so far";
+    26 CtlAdaptL "CTL_ADAPT_L" "" Whole 0.0..0.0 = 0.0
+        "Adaptation of the inductance: 0 off, the only choice so far";
+    27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
+        "Mechanical speed at full throttle in speed mode";
+    28 CtlRpmMin "CTL_RPM_MIN" "rpm" Real 100.0..200000.0 = 300.0
+        "Mechanical speed at the least throttle above zero in speed mode";
+    29 CtlSlewRpmS "CTL_SLEW_RPM_S" "rpm/s" Real 10.0..10000000.0 = 20000.0 live
+        "Greatest change of the speed reference";
+    30 CtlBwCurHz "CTL_BW_CUR_HZ" "Hz" Real 10.0..5000.0 = 375.0
+        "Bandwidth of the current loop and of the back-EMF observer";
+    31 CtlBwSpdHz "CTL_BW_SPD_HZ" "Hz" Real 0.1..200.0 = 7.9 live
+        "Bandwidth of the speed loop";
+    40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0
+        "PWM frequency; the control runs once a period; restart to apply";
+    41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0
+        "Time for which both switches of a phase stay off at each change; restart to apply";
+    50 InpProto "INP_PROTO" "" Whole 0.0..12.0 = 0.0
+        "Throttle protocol: 0 automatic, 10 DShot150, 11 DShot300, 12 DShot600";
+    51 Inp3d "INP_3D" "" Whole 0.0..0.0 = 0.0
+        "Both directions by one throttle: 0 off, the only choice so far";
+    52 InpArmMs "INP_ARM_MS" "ms" Real 10.0..5000.0 = 300.0
+        "Time for which zero throttle must be received before the motor may turn";
+    53 InpLossMs "INP_LOSS_MS" "ms" Real 5.0..2000.0 = 100.0
+        "Time without a valid frame after which the motor stops and must be armed again";
+    54 InpPulseMinUs "INP_PULSE_MIN_US" "us" Whole 1000.0..1000.0 = 1000.0
+        "Servo pulse of zero throttle; fixed so far";
+    55 InpPulseMaxUs "INP_PULSE_MAX_US" "us" Whole 2000.0..2000.0 = 2000.0
+        "Servo pulse of full throttle; fixed so far";
+    60 LimPhaseA "LIM_PHASE_A" "A" Real 0.5..200.0 = 20.0 live
+        "Bound of the phase current's vector, peak; the software trips at 1.4 times this";
+    61 LimBusA "LIM_BUS_A" "A" Real 0.5..200.0 = 30.0 live
+        "Bound of the current drawn from the supply";
+    62 LimRegenA "LIM_REGEN_A" "A" Real 0.0..200.0 = 10.0 live
+        "Bound of the current returned to the supply while braking";
+    63 LimBusVMin "LIM_BUS_V_MIN" "V" Real 0.0..60.0 = 9.0
+        "Supply voltage below which the bridge is turned off";
+    64 LimBusVMax "LIM_BUS_V_MAX" "V" Real 5.0..60.0 = 30.0
+        "Supply voltage above which the bridge is turned off";
+    65 LimTempC "LIM_TEMP_C" "degC" Real 40.0..150.0 = 100.0
+        "Temperature of the board above which the bridge is turned off";
+    70 StaParkAs "STA_PARK_AS" "A.s" Real 0.01..100.0 = 0.4
+        "Current times time for which the rotor is aligned before the ramp";
+    71 StaRampA "STA_RAMP_A" "A" Real 0.1..100.0 = 4.0
+        "Current of alignment and ramp, peak";
+    72 StaRampRpmS "STA_RAMP_RPM_S" "rpm/s" Real 10.0..1000000.0 = 800.0
+        "Acceleration of the ramp at full ramp current";
+    73 StaRunRpm "STA_RUN_RPM" "rpm" Real 50.0..50000.0 = 300.0
+        "Mechanical speed at which the observer takes over from the ramp";
+    80 TelRateHz "TEL_RATE_HZ" "Hz" Real 1.0..100.0 = 10.0 live
+        "Rate of ESC_STATUS and ESC_TELEMETRY_1_TO_4";
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::params::Params;
+
+    #[test]
+    fn the_table_is_sound() {
+        for (i, p) in TABLE.iter().enumerate() {
+            assert!(p.name.len() <= 16 && p.name.is_ascii(), "{}", p.name);
+            assert!(p.min <= p.default && p.default <= p.max, "{}", p.name);
+            assert!(!p.description.is_empty(), "{}", p.name);
+            for other in &TABLE[i + 1..] {
+                assert_ne!(p.name, other.name);
+                assert_ne!(p.key, other.key, "{} and {}", p.name, other.name);
+            }
+        }
+    }
+
+    #[test]
+    fn what_may_change_while_the_motor_turns_is_this_and_nothing_else() {
+        let live: Vec<_> = TABLE.iter().filter(|p| p.live).map(|p| p.name).collect();
+        let expected = [
+            "MAV_SYS_ID",
+            "MAV_COMP_ID",
+            "MAV_ROLE",
+            "CTL_SLEW_RPM_S",
+            "CTL_BW_SPD_HZ",
+            "LIM_PHASE_A",
+            "LIM_BUS_A",
+            "LIM_REGEN_A",
+            "TEL_RATE_HZ",
+        ];
+        assert_eq!(live, expected);
+    }
+
+    #[test]
+    fn the_default_of_what_is_derived_is_what_the_other_defaults_make_of_it() {
+        let params = Params::default();
+        for id in ParamId::ALL {
+            let (entry, value) = (id.entry(), params.get(id));
+            assert!(
+                (value - entry.default).abs() < 0.1,
+                "{}: {value}",
+                entry.name
+            );
+        }
+    }
+}

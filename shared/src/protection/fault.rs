@@ -1,0 +1,73 @@
+//! Faults: each has one number, in telemetry, in logs and in the documentation.
+
+/// A reason for which the bridge was turned off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// A phase current was above 1.4 times `LIM_PHASE_A` for two samples.
+    OverCurrent = 0,
+    /// The supply was above `LIM_BUS_V_MAX`.
+    OverVoltage = 1,
+    /// The supply was below `LIM_BUS_V_MIN`.
+    UnderVoltage = 2,
+    /// The board was hotter than `LIM_TEMP_C`.
+    OverTemperature = 3,
+    /// The observer's state left its range: the rotor's position is not known.
+    ObserverLost = 4,
+}
+
+impl Fault {
+    /// All faults in the order of their numbers.
+    pub const ALL: [Self; 5] = [
+        Self::OverCurrent,
+        Self::OverVoltage,
+        Self::UnderVoltage,
+        Self::OverTemperature,
+        Self::ObserverLost,
+    ];
+
+    /// A few words for a person.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::OverCurrent => "over-current",
+            Self::OverVoltage => "bus over-voltage",
+            Self::UnderVoltage => "bus under-voltage",
+            Self::OverTemperature => "over-temperature",
+            Self::ObserverLost => "rotor position lost",
+        }
+    }
+}
+
+/// A set of faults.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Faults(u8);
+
+impl Faults {
+    /// No fault.
+    pub const NONE: Self = Self(0);
+
+    /// Adds one.
+    pub fn insert(&mut self, fault: Fault) {
+        self.0 |= 1 << fault as u8;
+    }
+
+    /// Whether it is in the set.
+    pub const fn contains(self, fault: Fault) -> bool {
+        self.0 & (1 << fault as u8) != 0
+    }
+
+    /// Whether there is none.
+    pub const fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Those that are in the set, in the order of their numbers.
+    pub fn iter(self) -> impl Iterator<Item = Fault> {
+        Fault::ALL.into_iter().filter(move |f| self.contains(*f))
+    }
+
+    /// One bit a fault, at its number.
+    pub const fn bits(self) -> u8 {
+        self.0
+    }
+}

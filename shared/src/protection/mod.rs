@@ -1,0 +1,121 @@
+//! What turns the bridge off, and what bounds the current so that it need not.
+
+mod fault;
+
+pub use fault::{Fault, Faults};
+
+use fixed::types::extra::U28;
+
+use crate::control::speed::Bounds;
+use crate::math::Gain;
+use crate::units::{AdcCounts, Current, Voltage};
+
+/// Samples in a row above the trip level that are an over-current, so that one disturbed reading
+/// is not.
+const OVER_CURRENT_SAMPLES: u8 = 2;
+
+/// Thresholds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`.
+    pub trip: AdcCounts,
+    /// Least supply voltage.
+    pub bus_min: Voltage,
+    /// Greatest supply voltage.
+    pub bus_max: Voltage,
+    /// Bound of i_q, `LIM_PHASE_A`.
+    pub phase: Current,
+    /// Bound of the current from the supply, `LIM_BUS_A`.
+    pub bus_draw: Current,
+    /// Bound of the current to the supply, `LIM_REGEN_A`.
+    pub bus_return: Current,
+    /// Supply voltage from which less is returned.
+    pub bus_return_v: Voltage,
+    /// Volts above that to current.
+    pub bus_return_slope: Gain<U28, U28>,
+    /// Bus current's excess to the bound's change in a period.
+    pub bound_rate: Gain<U28, U28>,
+}
+
+/// What is remembered from sample to sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Samples in a row above the trip.
+    pub over_current_samples: u8,
+    /// Supply voltage behind a low-pass filter.
+    pub bus: Voltage,
+    /// Bounds of i_q*, moved by what the supply gives and takes.
+    pub bounds: Bounds,
+}
+
+impl State {
+    /// At power-up: full bounds, and a supply in the middle of its range until samples tell.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            over_current_samples: 0,
+            bus: config.bus_min / 2 + config.bus_max / 2,
+            bounds: config.full_bounds(),
+        }
+    }
+}
+
+impl Config {
+    fn full_bounds(&self) -> Bounds {
+        Bounds {
+            min: -self.phase,
+            max: self.phase,
+        }
+    }
+}
+
+/// Takes a sample's supply voltage into the filter and looks for a reason to turn the bridge off.
+#[inline(always)]
+pub fn check(
+    config: &Config,
+    state: &mut State,
+    currents: [AdcCounts; 3],
+    bus: Voltage,
+) -> Option<Fault> {
+    // An eighth of the difference a period: one reading that is off moves it by little.
+    let difference = bus.saturating_sub(state.bus).to_bits() >> 3;
+    state.bus = state.bus.saturating_add(Voltage::from_bits(difference));
+
+    let [a, b, c] = currents.map(AdcCounts::saturating_abs);
+    if a.max(b).max(c) > config.trip {
+        state.over_current_samples = state.over_current_samples.saturating_add(1);
+    } else {
+        state.over_current_samples = 0;
+    }
+    if state.over_current_samples >= OVER_CURRENT_SAMPLES {
+        Some(Fault::OverCurrent)
+    } else if state.bus > config.bus_max {
+        Some(Fault::OverVoltage)
+    } else if state.bus < config.bus_min {
+        Some(Fault::UnderVoltage)
+    } else {
+        None
+    }
+}
+
+/// Moves the bounds of i_q so that the supply gives no more than `bus_draw` and takes no more than
+/// `bus_return`, and less of that as its voltage nears the limit.
+#[inline(always)]
+pub fn bound(config: &Config, state: &mut State, bus_current: Current) {
+    let full = config.full_bounds();
+    let too_much_drawn = bus_current.saturating_sub(config.bus_draw);
+    let above = state
+        .bus
+        .saturating_sub(config.bus_return_v)
+        .max(Voltage::ZERO);
+    let may_return = config
+        .bus_return
+        .saturating_sub(config.bus_return_slope.saturating_apply(above));
+    let too_much_returned = bus_current.saturating_neg().saturating_sub(may_return);
+    let rate = |excess| config.bound_rate.saturating_apply(excess);
+    let lowered = state.bounds.max.saturating_sub(rate(too_much_drawn));
+    let raised = state.bounds.min.saturating_add(rate(too_much_returned));
+    state.bounds = Bounds {
+        max: lowered.min(full.max).max(Current::ZERO),
+        min: raised.max(full.min).min(Current::ZERO),
+    };
+}

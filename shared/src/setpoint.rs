@@ -1,0 +1,113 @@
+//! From what the motor may do to what the drive is asked for.
+
+use crate::drive::{Config, Setpoint};
+use crate::input::Throttle;
+use crate::input::authority::Command;
+use crate::math::TopProduct;
+use crate::params::{ParamId, Params};
+use crate::units::{Current, Speed};
+
+/// How throttle maps, by `CTL_MODE`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mapping {
+    mode: Mode,
+    test_full: Current,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mode {
+    /// Linear from the least to the greatest speed.
+    Speed { least: Speed, span: Speed },
+    /// Linear from no current to the bound.
+    Torque { full: Current },
+}
+
+impl Mapping {
+    /// The mapping that the parameters ask for.
+    pub fn new(params: &Params, config: &Config) -> Self {
+        let scale = &config.scale;
+        let full = scale.current_from_a(params.get(ParamId::LimPhaseA));
+        let speed = |id| scale.speed_from_rpm(params.get(id));
+        let least = speed(ParamId::CtlRpmMin);
+        Self {
+            mode: match params.get(ParamId::CtlMode) {
+                0.0 => Mode::Speed {
+                    least,
+                    span: speed(ParamId::CtlRpmMax).saturating_sub(least),
+                },
+                _ => Mode::Torque { full },
+            },
+            test_full: config.start.test_current,
+        }
+    }
+
+    /// The set-point of a command.
+    pub fn setpoint(&self, command: Command) -> Setpoint {
+        match (command, self.mode) {
+            (Command::Stop, _) => Setpoint::Stop,
+            (Command::Zero, _) => Setpoint::Zero,
+            (Command::Throttle(throttle), Mode::Speed { least, span }) => {
+                let above = Speed::from_bits(throttle.top(span).to_bits() << 1);
+                Setpoint::Speed(least.saturating_add(above))
+            }
+            (Command::Throttle(throttle), Mode::Torque { full }) => {
+                Setpoint::Torque(share(throttle, full))
+            }
+            (Command::Test(value), _) => Setpoint::Test(share(value, self.test_full)),
+        }
+    }
+}
+
+fn share(throttle: Throttle, full: Current) -> Current {
+    Current::from_bits(throttle.top(full).to_bits() << 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::{Board, build};
+    use crate::units::Scale;
+
+    fn mapping(mode: f32) -> (Mapping, Scale) {
+        let mut params = Params::default();
+        params.set(ParamId::CtlMode, mode).expect("in range");
+        let config = build(&params, &Board::BENCH).expect("the defaults fit");
+        (Mapping::new(&params, &config), config.scale)
+    }
+
+    fn rpm(throttle: f64) -> f32 {
+        let (mapping, scale) = mapping(0.0);
+        match mapping.setpoint(Command::Throttle(Throttle::saturating_from_num(throttle))) {
+            Setpoint::Speed(speed) => scale.rpm(speed),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn throttle_is_linear_in_speed() {
+        assert!((rpm(0.0) - 300.0).abs() < 0.01);
+        assert!((rpm(0.5) - 3150.0).abs() < 0.01);
+        assert!((rpm(1.0) - 6000.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn torque_mode_and_tests_are_shares_of_the_bound() {
+        let (mapping, scale) = mapping(1.0);
+        let half = Throttle::from_num(0.5);
+        let Setpoint::Torque(current) = mapping.setpoint(Command::Throttle(half)) else {
+            panic!("torque mode");
+        };
+        assert!((scale.amperes(current) - 10.0).abs() < 0.001);
+        let Setpoint::Test(current) = mapping.setpoint(Command::Test(half)) else {
+            panic!("a test");
+        };
+        assert!((scale.amperes(current) - 2.0).abs() < 0.001);
+    }
+
+    #[test]
+    fn stop_is_stop_and_zero_is_zero() {
+        let (mapping, _) = mapping(0.0);
+        assert_eq!(mapping.setpoint(Command::Stop), Setpoint::Stop);
+        assert_eq!(mapping.setpoint(Command::Zero), Setpoint::Zero);
+    }
+}

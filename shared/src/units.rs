@@ -1,0 +1,90 @@
+//! The control's own units.
+//!
+//! Inside the control every quantity is a fraction of a base, so that a product needs only its
+//! top half. Conversion from and to SI happens when the configuration is built and in telemetry,
+//! never in a control period.
+
+use fixed::types::{I0F32, I4F28, I16F16};
+
+/// An electrical angle in turns; it wraps.
+pub type Angle = I0F32;
+
+/// An electrical speed in turns a control period: the angle's step.
+pub type Speed = I0F32;
+
+/// A current in units of [`Scale::current_a`].
+pub type Current = I4F28;
+
+/// A voltage in units of [`Scale::voltage_v`].
+pub type Voltage = I4F28;
+
+/// A torque in units of [`Scale::torque_nm`].
+pub type Torque = I4F28;
+
+/// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
+pub type InverseFlux = I0F32;
+
+/// A reading of the converter in counts, signed and without its offset. The chip's are whole; a
+/// simulation of ideal sensing has fractions.
+pub type AdcCounts = I16F16;
+
+/// A share of the PWM period for which the high side is on, 0 to 1.
+pub type Duty = fixed::types::U1F31;
+
+/// What the control's units are worth in SI.
+///
+/// The bases are chosen so that Clarke's transform is two integer products (one unit of current is
+/// 4096/3 counts), and so that the motor's flux is the same number for every motor: the voltage
+/// base is π·φ/(2·T_s), which makes ξ = 1/4 and ψ = 2/π.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// The control period T_s, s.
+    pub period_s: f32,
+    /// One unit of [`Current`], peak phase amperes.
+    pub current_a: f32,
+    /// One unit of [`Voltage`], volts.
+    pub voltage_v: f32,
+    /// Pole pairs p.
+    pub pole_pairs: f32,
+}
+
+impl Scale {
+    /// One unit of [`InverseFlux`], 1/Wb: with it, ω = ξ·|h| holds in the control's units.
+    pub fn inverse_flux_per_wb(&self) -> f32 {
+        core::f32::consts::TAU / (self.voltage_v * self.period_s)
+    }
+
+    /// One unit of [`Torque`], Nm: with it, i_q = ξ·T (9) holds in the control's units.
+    pub fn torque_nm(&self) -> f32 {
+        1.5 * self.pole_pairs * self.current_a / self.inverse_flux_per_wb()
+    }
+
+    /// The control's speed for mechanical rpm; held below half a turn a period.
+    pub fn speed_from_rpm(&self, rpm: f32) -> Speed {
+        Speed::saturating_from_num(rpm * self.turns_per_rpm())
+    }
+
+    /// Mechanical rpm of a control's speed.
+    pub fn rpm(&self, speed: Speed) -> f32 {
+        speed.to_num::<f32>() / self.turns_per_rpm()
+    }
+
+    /// The control's current for amperes, held at the type's ends.
+    pub fn current_from_a(&self, current_a: f32) -> Current {
+        Current::saturating_from_num(current_a / self.current_a)
+    }
+
+    /// Amperes of a control's current.
+    pub fn amperes(&self, current: Current) -> f32 {
+        current.to_num::<f32>() * self.current_a
+    }
+
+    /// Volts of a control's voltage.
+    pub fn volts(&self, voltage: Voltage) -> f32 {
+        voltage.to_num::<f32>() * self.voltage_v
+    }
+
+    fn turns_per_rpm(&self) -> f32 {
+        self.pole_pairs * self.period_s / 60.0
+    }
+}
