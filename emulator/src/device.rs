@@ -1,0 +1,353 @@
+//! One emulated ESC: its tasks' side, its drive on a bench, its throttle wire and its flash.
+
+use std::collections::BTreeMap;
+
+use embassy_futures::block_on;
+use siskin_control::drive::Setpoint;
+use siskin_control::esc::Esc;
+use siskin_control::mavlink::{Receiver, Request};
+use siskin_control::params::{Board, BuildError, ParamId, Params};
+use siskin_control::store::{self, Integrity};
+use thiserror::Error;
+
+use crate::flash::{FLASH_BYTES, FileFlash};
+use crate::link::LinkId;
+use crate::rig::{Bench, Period, Rig};
+use crate::summary::Rejected;
+use crate::wire::Wire;
+
+/// Rate of the timer that captures the wire's edges: that of the STM32G431.
+const CAPTURE_HZ: u32 = 170_000_000;
+
+/// Time between two calls of the tasks.
+const TASK_NS: u64 = 1_000_000;
+
+/// Why an ESC cannot start; one line.
+#[derive(Debug, Error)]
+pub enum StartError {
+    /// The storage holds something else.
+    #[error("--storage: the stored parameters are corrupt; remove the file to start with defaults")]
+    CorruptStorage,
+    /// The parameters contradict each other or the bench.
+    #[error("parameter {name}: {reason}")]
+    Params {
+        /// The parameter to change.
+        name: &'static str,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+}
+
+impl From<BuildError> for StartError {
+    fn from(error: BuildError) -> Self {
+        Self::Params {
+            name: error.param.entry().name,
+            reason: error.reason,
+        }
+    }
+}
+
+/// What an ESC starts with.
+pub struct Start {
+    /// What stands on the bench.
+    pub bench: Bench,
+    /// The throttle wire.
+    pub wire: Wire,
+    /// Where the parameters are kept.
+    pub flash: FileFlash,
+    /// Parameters that are set over the stored ones and not stored themselves.
+    pub overrides: Vec<(ParamId, f32)>,
+    /// What the slowest MAVLink link carries.
+    pub link_bytes_per_s: u32,
+}
+
+/// One emulated ESC.
+pub struct Device {
+    esc: Esc,
+    rig: Rig,
+    wire: Wire,
+    flash: FileFlash,
+    overrides: Vec<Override>,
+    board: Board,
+    link_bytes_per_s: u32,
+    receivers: BTreeMap<LinkId, Receiver>,
+    /// Frames that receivers of streams which have ended refused.
+    rejected_frames: u64,
+    clock: Clock,
+    task_due_ns: u64,
+}
+
+/// A parameter from the command line, which is not stored.
+struct Override {
+    id: ParamId,
+    value: f32,
+    /// What is stored, and stays so.
+    stored: f32,
+}
+
+/// Simulated time: whole control periods since the start or the last restart.
+struct Clock {
+    origin_ns: f64,
+    period_ns: f64,
+    periods: u64,
+}
+
+impl Clock {
+    fn now_ns(&self) -> u64 {
+        (self.origin_ns + self.periods as f64 * self.period_ns) as u64
+    }
+}
+
+impl Device {
+    /// Powers the ESC up.
+    ///
+    /// Returns it with a warning where what was stored is not whole.
+    pub fn start(start: Start) -> Result<(Self, Option<&'static str>), StartError> {
+        let Start {
+            bench,
+            wire,
+            mut flash,
+            overrides,
+            link_bytes_per_s,
+        } = start;
+        let (mut params, report) = block_on(store::load(&mut flash, 0..FLASH_BYTES as u32));
+        let warning = match report.integrity {
+            Integrity::Sound | Integrity::Empty => None,
+            Integrity::Incomplete => Some("some stored parameters are missing; defaults stand in"),
+            Integrity::Corrupt | Integrity::Unreadable => return Err(StartError::CorruptStorage),
+        };
+        let overrides: Vec<_> = overrides
+            .into_iter()
+            .map(|(id, value)| Override {
+                id,
+                value,
+                stored: params.get(id),
+            })
+            .collect();
+        apply(&overrides, &mut params);
+        let board = bench.sensing.board(bench.delay);
+        let esc = Esc::new(params, board, CAPTURE_HZ, link_bytes_per_s)?;
+        let rig = Rig::new(bench, esc.config().clone());
+        let clock = Clock {
+            origin_ns: 0.0,
+            period_ns: rig.period_s() * 1e9,
+            periods: 0,
+        };
+        let device = Self {
+            esc,
+            rig,
+            wire,
+            flash,
+            overrides,
+            board,
+            link_bytes_per_s,
+            receivers: BTreeMap::new(),
+            rejected_frames: 0,
+            clock,
+            task_due_ns: 0,
+        };
+        Ok((device, warning))
+    }
+
+    /// Simulated time since the start, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.clock.now_ns()
+    }
+
+    /// Whether a period is left until this time, to the nearest one: a period's length is no whole
+    /// number of nanoseconds.
+    pub fn is_before(&self, until_ns: u64) -> bool {
+        self.now_ns()
+            .saturating_add(self.clock.period_ns as u64 / 2)
+            < until_ns
+    }
+
+    /// The tasks' side.
+    pub fn esc(&self) -> &Esc {
+        &self.esc
+    }
+
+    /// The drive on its bench.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    /// The throttle wire, to be polled or played.
+    pub fn wire(&mut self) -> &mut Wire {
+        &mut self.wire
+    }
+
+    /// Bytes that came in on a MAVLink stream.
+    pub fn receive(&mut self, stream: LinkId, bytes: &[u8]) {
+        let now_us = self.now_ns() / 1000;
+        let (receiver, esc) = (self.receivers.entry(stream).or_default(), &mut self.esc);
+        receiver.push(now_us, bytes, |frame| esc.receive(now_us, frame));
+    }
+
+    /// A MAVLink stream that has ended.
+    pub fn forget(&mut self, stream: LinkId) {
+        if let Some(receiver) = self.receivers.remove(&stream) {
+            self.rejected_frames += rejected(&receiver);
+        }
+    }
+
+    /// What came in since the start and was refused.
+    pub fn rejected(&self) -> Rejected {
+        let wire = self.wire.counts();
+        let open: u64 = self.receivers.values().map(rejected).sum();
+        Rejected {
+            wire_datagrams: wire.rejected + wire.dropped,
+            wire_frames: self.esc.telemetry().bad_frames,
+            mavlink_frames: self.rejected_frames + open,
+        }
+    }
+
+    /// Runs control periods until `until_ns`. `imposed` replaces what the wire asks for; `each`
+    /// sees every period with its start, s; `send` gets every MAVLink frame.
+    pub fn advance(
+        &mut self,
+        until_ns: u64,
+        imposed: impl Fn(f64, &Rig) -> Option<Setpoint>,
+        mut each: impl FnMut(f64, &Period, &Rig),
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        while self.is_before(until_ns) {
+            let now_ns = self.now_ns();
+            while let Some((edge_ns, level)) = self.wire.next_edge(now_ns) {
+                let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
+                self.esc.edge(edge_ns / 1000, ticks as u32, level);
+            }
+            if now_ns >= self.task_due_ns {
+                self.task_due_ns = now_ns - now_ns % TASK_NS + TASK_NS;
+                self.tasks(now_ns, send);
+            }
+            let t_s = now_ns as f64 * 1e-9;
+            // Past the wire or not, a task that has found a fault is heard.
+            let setpoint = match (self.esc.setpoint(), imposed(t_s, &self.rig)) {
+                (fault @ Setpoint::Fault(_), _) => fault,
+                (setpoint, imposed) => imposed.unwrap_or(setpoint),
+            };
+            let period = self.rig.period(setpoint);
+            each(t_s, &period, &self.rig);
+            self.clock.periods += 1;
+        }
+    }
+
+    fn tasks(&mut self, now_ns: u64, send: &mut dyn FnMut(&[u8])) {
+        // No bytes tell a receiver that time has passed: what a false start held back is searched.
+        let now_us = now_ns / 1000;
+        for receiver in self.receivers.values_mut() {
+            receiver.push(now_us, &[], |frame| self.esc.receive(now_us, frame));
+        }
+        let snapshot = self.rig.snapshot();
+        let temperature_c = self.rig.temperature_c() as f32;
+        self.esc.poll(now_us, &snapshot, temperature_c, send);
+        while let Some(request) = self.esc.take_request() {
+            match request {
+                Request::ParamsChanged => self.rig.configure(self.esc.config().clone()),
+                Request::Save => {
+                    let result = self.save();
+                    self.esc.storage_done(result);
+                }
+                Request::Load => {
+                    let result = self.load();
+                    self.esc.storage_done(result);
+                }
+                Request::FactoryReset => {
+                    let result = self.factory_reset();
+                    self.esc.storage_done(result);
+                }
+                Request::Reboot => self.reboot(),
+            }
+        }
+    }
+
+    /// Stores the parameters; what the command line set stays unstored.
+    fn save(&mut self) -> Result<(), &'static str> {
+        let mut params = self.esc.params().clone();
+        for given in &self.overrides {
+            if params.get(given.id) == given.value {
+                // It was in range when it was stored.
+                let _ = params.set(given.id, given.stored);
+            }
+        }
+        let range = 0..FLASH_BYTES as u32;
+        block_on(store::save(&mut self.flash, range, &params)).map_err(store::StoreError::text)?;
+        self.persist()
+    }
+
+    fn load(&mut self) -> Result<(), &'static str> {
+        let (mut params, report) = block_on(store::load(&mut self.flash, 0..FLASH_BYTES as u32));
+        if matches!(report.integrity, Integrity::Corrupt | Integrity::Unreadable) {
+            return Err("storage: the stored parameters are corrupt");
+        }
+        apply(&self.overrides, &mut params);
+        self.replace(params)
+    }
+
+    fn factory_reset(&mut self) -> Result<(), &'static str> {
+        let range = 0..FLASH_BYTES as u32;
+        block_on(store::erase(&mut self.flash, range)).map_err(store::StoreError::text)?;
+        let mut params = Params::default();
+        apply(&self.overrides, &mut params);
+        self.replace(params)?;
+        self.persist()
+    }
+
+    fn persist(&self) -> Result<(), &'static str> {
+        if !self.flash.is_persistent() {
+            return Err("storage: none, nothing would survive a restart");
+        }
+        self.flash
+            .sync()
+            .map_err(|_| "storage: the file cannot be written")
+    }
+
+    fn replace(&mut self, params: Params) -> Result<(), &'static str> {
+        self.esc
+            .replace_params(params)
+            .map_err(|error| error.reason)?;
+        self.rig.configure(self.esc.config().clone());
+        Ok(())
+    }
+
+    /// Starts the ESC again; the shaft, the supply and the wire go on as they are.
+    fn reboot(&mut self) {
+        let (mut params, _) = block_on(store::load(&mut self.flash, 0..FLASH_BYTES as u32));
+        apply(&self.overrides, &mut params);
+        // What cannot be built now was never in force: the old values go on.
+        let Ok(esc) = Esc::new(params, self.board, CAPTURE_HZ, self.link_bytes_per_s) else {
+            return;
+        };
+        self.esc = esc;
+        self.receivers.clear();
+        self.rig.restart(self.esc.config().clone());
+        self.clock = Clock {
+            origin_ns: self.clock.origin_ns + self.clock.periods as f64 * self.clock.period_ns,
+            period_ns: self.rig.period_s() * 1e9,
+            periods: 0,
+        };
+    }
+}
+
+/// Frames that a receiver did not hand on.
+fn rejected(receiver: &Receiver) -> u64 {
+    let counters = receiver.counters();
+    [
+        counters.bad_checks,
+        counters.incompatible,
+        counters.unknown,
+        counters.signed,
+        counters.incomplete,
+    ]
+    .map(u64::from)
+    .iter()
+    .sum()
+}
+
+/// Puts what the command line set over what was stored. Each value was accepted before.
+fn apply(overrides: &[Override], params: &mut Params) {
+    for given in overrides {
+        let _ = params.set(given.id, given.value);
+    }
+}

@@ -1,0 +1,360 @@
+//! The flash in which the parameters are kept, as a file or in memory only.
+//!
+//! It has the geometry and the manners of the STM32G4's flash, so that the storage code meets on a
+//! PC what it meets on the chip (RM0440, 3.3): pages of 2 KiB erase to ones, and a double word is
+//! written once after an erase.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use embedded_storage_async::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+};
+use thiserror::Error;
+
+/// Bytes of a page, which is erased as one.
+pub const PAGE_BYTES: usize = 2048;
+
+/// Bytes of the flash: four pages.
+pub const FLASH_BYTES: usize = 4 * PAGE_BYTES;
+
+/// Bytes of a double word, which is written as one.
+pub const WORD_BYTES: usize = 8;
+
+const ERASED: u8 = 0xFF;
+
+/// Flash behind which a file stands. What has been written or erased is in the file when the call
+/// returns: it survives a kill of the program, and after [`FileFlash::sync`] a loss of power.
+#[derive(Debug)]
+pub struct FileFlash {
+    content: Box<[u8; FLASH_BYTES]>,
+    file: Option<File>,
+}
+
+/// Why the file cannot serve as flash: one line, with what to do.
+#[derive(Debug, Error)]
+pub enum StorageError {
+    /// The file is not a flash image.
+    #[error(
+        "--storage {}: the file is corrupt, it has {bytes} bytes instead of {FLASH_BYTES}; remove \
+         it to start with defaults, or give another path",
+        path.display()
+    )]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        bytes: u64,
+    },
+    /// There is a folder or a device.
+    #[error("--storage {}: it is not a file; give another path or none", .0.display())]
+    NotAFile(PathBuf),
+    /// Another emulator has it open.
+    #[error(
+        "--storage {}: another emulator uses it; give this one a path of its own or none",
+        .0.display()
+    )]
+    InUse(PathBuf),
+    /// The system refuses it.
+    #[error(
+        "--storage {}: cannot be opened for reading and writing ({source}); give another path or \
+         none",
+        path.display()
+    )]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// Why an operation on the flash fails. It has then changed nothing.
+#[derive(Debug, Error)]
+pub enum FlashError {
+    /// The range is not whole words or pages.
+    #[error("the range is not aligned")]
+    NotAligned,
+    /// The range leaves the flash.
+    #[error("the range leaves the flash")]
+    OutOfBounds,
+    /// A word that is to be written is not erased (PROGERR of the chip).
+    #[error("the word at {0:#06x} is not erased")]
+    NotErased(u32),
+    /// The file cannot be written.
+    #[error("the storage file cannot be written ({0})")]
+    Io(#[from] io::Error),
+}
+
+impl FileFlash {
+    /// Flash that is forgotten at the end.
+    pub fn in_memory() -> Self {
+        Self {
+            content: Box::new([ERASED; FLASH_BYTES]),
+            file: None,
+        }
+    }
+
+    /// Flash in the file at `path`, which is made, erased, with its folders if there is none.
+    pub fn open(path: &Path) -> Result<Self, StorageError> {
+        let failed = |source| StorageError::Io {
+            path: path.to_owned(),
+            source,
+        };
+        match fs::metadata(path) {
+            Ok(found) if found.is_file() => {}
+            Ok(_) => return Err(StorageError::NotAFile(path.to_owned())),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                create(path).map_err(failed)?;
+            }
+            Err(error) => return Err(failed(error)),
+        }
+        let file = OpenOptions::new().read(true).write(true).open(path);
+        let file = file.map_err(failed)?;
+        if !lock(&file).map_err(failed)? {
+            return Err(StorageError::InUse(path.to_owned()));
+        }
+        let corrupt = |bytes| StorageError::Corrupt {
+            path: path.to_owned(),
+            bytes,
+        };
+        let bytes = file.metadata().map_err(failed)?.len();
+        if bytes != FLASH_BYTES as u64 {
+            return Err(corrupt(bytes));
+        }
+        let mut content = Box::new([ERASED; FLASH_BYTES]);
+        io::Read::read_exact(&mut &file, content.as_mut_slice()).map_err(failed)?;
+        Ok(Self {
+            content,
+            file: Some(file),
+        })
+    }
+
+    /// Whether what is written outlives the program.
+    pub fn is_persistent(&self) -> bool {
+        self.file.is_some()
+    }
+
+    /// Waits until all that was written is on the disk.
+    pub fn sync(&self) -> io::Result<()> {
+        match &self.file {
+            Some(file) => file.sync_data(),
+            None => Ok(()),
+        }
+    }
+
+    /// Puts `bytes` into the file, then into memory: if the file refuses, nothing has changed.
+    fn store(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
+        if let Some(file) = &mut self.file {
+            file.seek(SeekFrom::Start(offset as u64))?;
+            file.write_all(bytes)?;
+        }
+        self.content[offset..offset + bytes.len()].copy_from_slice(bytes);
+        Ok(())
+    }
+}
+
+/// Makes an erased file whole: one that a kill cut short would be found corrupt at the next start.
+fn create(path: &Path) -> io::Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".new-{}", std::process::id()));
+    let new = path.with_file_name(name);
+    fs::write(&new, [ERASED; FLASH_BYTES])
+        .and_then(|()| fs::rename(&new, path))
+        .inspect_err(|_| {
+            // The error that counts is the one that brought us here.
+            let _ = fs::remove_file(&new);
+        })
+}
+
+/// Keeps other emulators from the file until it is closed. False when one has it already.
+#[cfg(unix)]
+fn lock(file: &File) -> io::Result<bool> {
+    use rustix::fs::{FlockOperation, flock};
+    use rustix::io::Errno;
+    match flock(file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => Ok(true),
+        Err(Errno::WOULDBLOCK) => Ok(false),
+        // Some network file systems have no locks; the file works without.
+        Err(Errno::NOTSUP | Errno::NOLCK | Errno::NOSYS) => Ok(true),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// File locks of the standard library are younger than the oldest compiler that builds this.
+#[cfg(not(unix))]
+fn lock(_file: &File) -> io::Result<bool> {
+    Ok(true)
+}
+
+/// A range of the flash whose ends are multiples of `unit`.
+fn range(from: u32, to: usize, unit: usize) -> Result<std::ops::Range<usize>, FlashError> {
+    let from = from as usize;
+    if from > to || to > FLASH_BYTES {
+        Err(FlashError::OutOfBounds)
+    } else if !from.is_multiple_of(unit) || !to.is_multiple_of(unit) {
+        Err(FlashError::NotAligned)
+    } else {
+        Ok(from..to)
+    }
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::NotAligned => NorFlashErrorKind::NotAligned,
+            Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
+            Self::NotErased(_) | Self::Io(_) => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl ErrorType for FileFlash {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for FileFlash {
+    const READ_SIZE: usize = 1;
+
+    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        let range = range(offset, offset as usize + bytes.len(), Self::READ_SIZE)?;
+        bytes.copy_from_slice(&self.content[range]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        FLASH_BYTES
+    }
+}
+
+impl NorFlash for FileFlash {
+    const WRITE_SIZE: usize = WORD_BYTES;
+    const ERASE_SIZE: usize = PAGE_BYTES;
+
+    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        let range = range(from, to as usize, PAGE_BYTES)?;
+        Ok(self.store(range.start, &[ERASED; FLASH_BYTES][..range.len()])?)
+    }
+
+    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        let range = range(offset, offset as usize + bytes.len(), WORD_BYTES)?;
+        let used = self.content[range.clone()]
+            .iter()
+            .position(|b| *b != ERASED);
+        if let Some(used) = used {
+            let word = (range.start + used) / WORD_BYTES * WORD_BYTES;
+            return Err(FlashError::NotErased(word as u32));
+        }
+        Ok(self.store(range.start, bytes)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use embassy_futures::block_on;
+    use tempfile::tempdir;
+
+    fn read(flash: &mut FileFlash, offset: u32, length: usize) -> Vec<u8> {
+        let mut bytes = vec![0; length];
+        block_on(flash.read(offset, &mut bytes)).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn it_behaves_as_the_chip() {
+        let mut flash = FileFlash::in_memory();
+        assert_eq!((flash.capacity(), flash.is_persistent()), (8192, false));
+        let word: [u8; 8] = *b"siskin 1";
+        block_on(flash.write(2040, &word)).unwrap();
+        block_on(flash.write(2048, &word)).unwrap();
+        assert_eq!(read(&mut flash, 2041, 14), b"iskin 1siskin ");
+
+        // A word is written once, even with bits that could still be cleared.
+        let again = block_on(flash.write(2032, &[0; 16])).unwrap_err();
+        assert!(matches!(again, FlashError::NotErased(2040)), "{again}");
+        assert_eq!(read(&mut flash, 2032, 8), [0xFF; 8], "nothing has changed");
+
+        block_on(flash.erase(0, 2048)).unwrap();
+        assert_eq!(read(&mut flash, 0, 2048), [0xFF; 2048]);
+        assert_eq!(read(&mut flash, 2048, 8), word, "the next page stays");
+        block_on(flash.write(2040, &word)).unwrap();
+    }
+
+    #[test]
+    fn ranges_are_checked() {
+        use NorFlashErrorKind::{NotAligned, OutOfBounds};
+        let mut flash = FileFlash::in_memory();
+        for (offset, length, kind) in [
+            (4, 8, NotAligned),
+            (0, 7, NotAligned),
+            (8192, 8, OutOfBounds),
+            (8184, 16, OutOfBounds),
+            (u32::MAX, 8, OutOfBounds),
+        ] {
+            let error = block_on(flash.write(offset, &vec![0; length])).unwrap_err();
+            assert_eq!(error.kind(), kind, "{offset} {length}");
+        }
+        for (from, to, kind) in [
+            (0, 2047, NotAligned),
+            (8, 2048, NotAligned),
+            (2048, 0, OutOfBounds),
+            (0, 8193, OutOfBounds),
+            (0, u32::MAX, OutOfBounds),
+        ] {
+            let error = block_on(flash.erase(from, to)).unwrap_err();
+            assert_eq!(error.kind(), kind, "{from} {to}");
+        }
+        assert!(block_on(flash.read(8191, &mut [0; 2])).is_err());
+        assert_eq!(read(&mut flash, 0, 8192), [0xFF; 8192]);
+    }
+
+    #[test]
+    fn a_write_is_in_the_file_at_once() {
+        let folder = tempdir().unwrap();
+        let path = folder.path().join("a/b/flash");
+        let mut flash = FileFlash::open(&path).unwrap();
+        assert!(flash.is_persistent());
+        block_on(flash.write(4096, &[7; 24])).unwrap();
+        // What another process would find, had this one been killed here.
+        let mut wanted = vec![0xFF; FLASH_BYTES];
+        wanted[4096..4120].fill(7);
+        assert_eq!(fs::read(&path).unwrap(), wanted);
+        flash.sync().unwrap();
+        drop(flash);
+
+        let mut flash = FileFlash::open(&path).unwrap();
+        assert_eq!(read(&mut flash, 0, FLASH_BYTES), wanted);
+        block_on(flash.erase(4096, 6144)).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), [0xFF; FLASH_BYTES]);
+        let left: Vec<_> = fs::read_dir(path.parent().unwrap()).unwrap().collect();
+        assert_eq!(left.len(), 1, "no file of the creation is left");
+    }
+
+    #[test]
+    fn what_cannot_serve_is_one_line() {
+        let folder = tempdir().unwrap();
+        let line = |path: &Path| {
+            let line = FileFlash::open(path).unwrap_err().to_string();
+            assert!(line.contains(&path.display().to_string()), "{line}");
+            assert!(!line.contains('\n'), "{line}");
+            line
+        };
+        let path = folder.path().join("flash");
+        for bytes in [0, FLASH_BYTES - 1, FLASH_BYTES + 1] {
+            fs::write(&path, vec![ERASED; bytes]).unwrap();
+            assert!(line(&path).contains(&format!("{bytes} bytes instead of 8192")));
+        }
+        assert!(line(&path.join("below")).contains("cannot be opened"));
+        assert!(line(folder.path()).contains("not a file"));
+        assert!(line(Path::new("/proc/flash")).contains("cannot be opened"));
+
+        fs::remove_file(&path).unwrap();
+        let _first = FileFlash::open(&path).unwrap();
+        assert!(line(&path).contains("another emulator"));
+    }
+}

@@ -1,0 +1,22 @@
+//! The Siskin ESC's control against a simulated motor, inverter, battery and wire.
+//!
+//! [`rig`] runs the control's step against the [`plant`], period by period. [`device`] puts the
+//! tasks' side of the ESC, the throttle [`wire`] and the [`flash`] around it. [`live`] runs that in
+//! real time on the MAVLink [`link`]s, and [`scenario`] runs it offline from a file. [`watch`] looks on
+//! for the [`summary`] and for the [`record`], and [`plot`] draws.
+#![forbid(unsafe_code)]
+
+pub mod bench;
+pub mod device;
+pub mod flash;
+pub mod link;
+pub mod live;
+pub mod parameter;
+pub mod plant;
+pub mod plot;
+pub mod record;
+pub mod rig;
+pub mod scenario;
+pub mod summary;
+pub mod watch;
+pub mod wire;

@@ -1,0 +1,192 @@
+//! MAVLink's byte streams: UDP, TCP, serial ports and pseudo-terminals.
+//!
+//! Nothing here blocks or reads a clock: the emulator's one loop calls [`Links::receive`] at least
+//! once a millisecond and says what time it is, and [`Links::send`] whenever there is a frame.
+
+mod address;
+mod endpoint;
+mod error;
+mod pacer;
+#[cfg(unix)]
+mod pty;
+mod serial;
+mod tcp;
+mod tty;
+mod udp;
+
+pub use address::{AddressError, HostPort};
+pub use endpoint::{DEFAULT_BAUD, Endpoint, EndpointError, EndpointReason};
+pub use error::LinkError;
+
+use std::io;
+use std::time::Duration;
+
+/// Most bytes that one read takes: the longest datagram.
+const READ_BYTES: usize = 65_535;
+
+/// What a loopback socket takes without loss, by far.
+const SOCKET_BYTES_PER_S: u32 = 1_000_000;
+
+/// One byte stream: a TCP client, a UDP peer, a serial line while someone is there. A number is
+/// never used again, so a peer that comes back gets another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct LinkId(u64);
+
+/// What happened on a stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event<'a> {
+    /// Bytes came in. From UDP it is one whole datagram.
+    Bytes(&'a [u8]),
+    /// The stream is gone, and with it what its receiver remembers.
+    Ended,
+}
+
+/// Every open MAVLink link.
+#[derive(Default)]
+pub struct Links {
+    links: Vec<Box<dyn Link>>,
+    buffer: Vec<u8>,
+    ids: Ids,
+}
+
+/// Gives each stream its number.
+#[derive(Default)]
+struct Ids(u64);
+
+impl Ids {
+    fn next(&mut self) -> LinkId {
+        self.0 += 1;
+        LinkId(self.0)
+    }
+}
+
+/// What the parts of [`Links::receive`] share.
+struct Inbox<'a> {
+    now: Duration,
+    ids: &'a mut Ids,
+    buffer: &'a mut [u8],
+    handle: &'a mut dyn FnMut(LinkId, Event<'_>),
+}
+
+/// One endpoint that is open.
+trait Link {
+    /// Takes in what is pending, a bounded amount, and goes on with what is being sent.
+    fn receive(&mut self, inbox: &mut Inbox<'_>);
+    /// Sends a frame to each peer, whole or not at all. Returns to how many it was lost.
+    fn send(&mut self, frame: &[u8]) -> u64;
+    /// The endpoint as it came to be: with the port that the system chose.
+    fn endpoint(&self) -> Endpoint;
+    /// A line for a person.
+    fn describe(&self) -> String;
+}
+
+impl Links {
+    /// Opens all of them, or none: the first that fails closes those before it.
+    pub fn open(endpoints: &[Endpoint]) -> Result<Self, LinkError> {
+        let mut links = Vec::new();
+        for endpoint in endpoints {
+            if let Some(link) = open(endpoint)? {
+                links.push(link);
+            }
+        }
+        Ok(Self {
+            links,
+            buffer: vec![0; READ_BYTES],
+            ids: Ids::default(),
+        })
+    }
+
+    /// Hands what is pending to `handle`, at most some 16 MB a second on each stream. Serial lines
+    /// also go on sending here. `now` is wall time since any fixed moment.
+    pub fn receive(&mut self, now: Duration, mut handle: impl FnMut(LinkId, Event<'_>)) {
+        let mut inbox = Inbox {
+            now,
+            ids: &mut self.ids,
+            buffer: &mut self.buffer,
+            handle: &mut handle,
+        };
+        for link in &mut self.links {
+            link.receive(&mut inbox);
+        }
+    }
+
+    /// Sends a frame to every peer of every link; never waits. Returns for how many peers there
+    /// was no room, each of which has lost the whole frame.
+    pub fn send(&mut self, frame: &[u8]) -> u64 {
+        self.links.iter_mut().map(|link| link.send(frame)).sum()
+    }
+
+    /// What the slowest link carries, bytes/s: a terminal's rate, or what a loopback socket takes
+    /// without loss where there is none.
+    pub fn slowest_bytes_per_s(&self) -> u32 {
+        let bauds = self.links.iter().filter_map(|link| match link.endpoint() {
+            Endpoint::Serial { baud, .. } | Endpoint::Pty { baud, .. } => Some(baud),
+            _ => None,
+        });
+        bauds.min().map_or(SOCKET_BYTES_PER_S, |baud| baud / 10)
+    }
+
+    /// The endpoints as they came to be: a port of 0 is replaced by the one that was given.
+    pub fn endpoints(&self) -> Vec<Endpoint> {
+        self.links.iter().map(|link| link.endpoint()).collect()
+    }
+
+    /// A line for a person on each link, in the order of opening.
+    pub fn describe(&self) -> Vec<String> {
+        self.links.iter().map(|link| link.describe()).collect()
+    }
+}
+
+fn open(endpoint: &Endpoint) -> Result<Option<Box<dyn Link>>, LinkError> {
+    Ok(Some(match endpoint {
+        Endpoint::None => return Ok(None),
+        Endpoint::UdpOut(address) => Box::new(udp::Udp::outward(endpoint, address)?),
+        Endpoint::UdpIn(address) => Box::new(udp::Udp::inward(endpoint, address)?),
+        Endpoint::TcpIn(address) => Box::new(tcp::TcpServer::open(endpoint, address)?),
+        Endpoint::Serial { path, baud } => {
+            let port = serial::Serial::open(path, *baud);
+            let port = port.map_err(|source| LinkError::Serial {
+                endpoint: endpoint.clone(),
+                source,
+            })?;
+            Box::new(tty::Tty::new(port, *baud))
+        }
+        #[cfg(unix)]
+        Endpoint::Pty { link, baud } => {
+            let port = pty::Pty::open(endpoint, link.as_deref(), *baud)?;
+            Box::new(tty::Tty::new(port, *baud))
+        }
+        #[cfg(not(unix))]
+        Endpoint::Pty { .. } => {
+            return Err(LinkError::Pty {
+                endpoint: endpoint.clone(),
+                source: io::ErrorKind::Unsupported.into(),
+            });
+        }
+    }))
+}
+
+/// Whether an operation has only to be tried again later.
+fn is_pending(error: &io::Error) -> bool {
+    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
+    matches!(error.kind(), WouldBlock | TimedOut | Interrupted)
+}
+
+/// What refuses a socket: a port that is taken has another remedy than an address that is wrong.
+fn socket_error(endpoint: &Endpoint, source: io::Error) -> LinkError {
+    let endpoint = endpoint.clone();
+    match source.kind() {
+        io::ErrorKind::AddrInUse => LinkError::Taken { endpoint },
+        _ => LinkError::Socket { endpoint, source },
+    }
+}
+
+fn resolve(endpoint: &Endpoint, address: &HostPort) -> Result<std::net::SocketAddr, LinkError> {
+    address.resolve().map_err(|source| LinkError::Host {
+        endpoint: endpoint.clone(),
+        source,
+    })
+}
+
+#[cfg(test)]
+mod tests;

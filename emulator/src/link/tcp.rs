@@ -1,0 +1,145 @@
+//! MAVLink over TCP: a server for several clients at once.
+
+use std::collections::VecDeque;
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+
+use super::{Endpoint, Event, HostPort, Inbox, Link, LinkError, LinkId, is_pending};
+
+/// Clients at once. One more is turned away.
+const MAX_CLIENTS: usize = 32;
+
+/// Bytes that wait for a slow client, a minute of telemetry; one that lets more pile up is dropped.
+const MAX_PENDING_BYTES: usize = 256 * 1024;
+
+/// Bytes taken from a client in one call, 16 MB a second with one call a millisecond.
+const READ_BYTES: usize = 16 * 1024;
+
+/// The port and those connected to it.
+pub(super) struct TcpServer {
+    listener: TcpListener,
+    clients: Vec<Client>,
+    ended: Vec<LinkId>,
+    endpoint: Endpoint,
+}
+
+struct Client {
+    stream: TcpStream,
+    id: LinkId,
+    pending: VecDeque<u8>,
+}
+
+impl TcpServer {
+    pub(super) fn open(endpoint: &Endpoint, address: &HostPort) -> Result<Self, LinkError> {
+        let address = super::resolve(endpoint, address)?;
+        let open = || {
+            let listener = TcpListener::bind(address)?;
+            listener.set_nonblocking(true)?;
+            let given = listener.local_addr()?;
+            Ok((listener, given))
+        };
+        let (listener, given) = open().map_err(|error| super::socket_error(endpoint, error))?;
+        Ok(Self {
+            listener,
+            clients: Vec::new(),
+            ended: Vec::new(),
+            endpoint: Endpoint::TcpIn(given.into()),
+        })
+    }
+
+    fn accept(&mut self, inbox: &mut Inbox<'_>) {
+        // The bound is for a flood of connections; each one over the limit is closed at once.
+        for _ in 0..MAX_CLIENTS {
+            let stream = match self.listener.accept() {
+                Ok((stream, _)) => stream,
+                // A connection that broke before it was accepted, or no descriptor left: the
+                // port stays open and the next call tries again.
+                Err(_) => break,
+            };
+            // Telemetry is small frames that should not wait for each other's acknowledgement.
+            let ready = stream
+                .set_nonblocking(true)
+                .and_then(|()| stream.set_nodelay(true));
+            if ready.is_ok() && self.clients.len() < MAX_CLIENTS {
+                self.clients.push(Client {
+                    stream,
+                    id: inbox.ids.next(),
+                    pending: VecDeque::new(),
+                });
+            }
+        }
+    }
+
+    /// Keeps the clients for which `works` holds; the others are reported by the next `receive`.
+    fn keep(&mut self, mut works: impl FnMut(&mut Client) -> bool) {
+        let ended = &mut self.ended;
+        self.clients.retain_mut(|client| {
+            let stays = works(client);
+            if !stays {
+                ended.push(client.id);
+            }
+            stays
+        });
+    }
+}
+
+impl Client {
+    /// Reads once. An error or the end of the stream is an error.
+    fn receive(&mut self, inbox: &mut Inbox<'_>) -> io::Result<()> {
+        match self.stream.read(&mut inbox.buffer[..READ_BYTES]) {
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(length) => {
+                (inbox.handle)(self.id, Event::Bytes(&inbox.buffer[..length]));
+                Ok(())
+            }
+            Err(error) if is_pending(&error) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        while !self.pending.is_empty() {
+            match self.stream.write(self.pending.as_slices().0) {
+                Ok(length) => drop(self.pending.drain(..length)),
+                Err(error) if is_pending(&error) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, frame: &[u8]) -> io::Result<()> {
+        if self.pending.len() + frame.len() > MAX_PENDING_BYTES {
+            return Err(io::ErrorKind::OutOfMemory.into());
+        }
+        self.pending.extend(frame);
+        self.flush()
+    }
+}
+
+impl Link for TcpServer {
+    fn receive(&mut self, inbox: &mut Inbox<'_>) {
+        self.accept(inbox);
+        self.keep(|client| client.receive(inbox).and_then(|()| client.flush()).is_ok());
+        for id in self.ended.drain(..) {
+            (inbox.handle)(id, Event::Ended);
+        }
+    }
+
+    fn send(&mut self, frame: &[u8]) -> u64 {
+        let before = self.clients.len();
+        self.keep(|client| client.send(frame).is_ok());
+        (before - self.clients.len()) as u64
+    }
+
+    fn endpoint(&self) -> Endpoint {
+        self.endpoint.clone()
+    }
+
+    fn describe(&self) -> String {
+        match &self.endpoint {
+            Endpoint::TcpIn(address) => format!("TCP, listening on {address}"),
+            other => other.to_string(),
+        }
+    }
+}

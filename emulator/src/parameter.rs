@@ -1,0 +1,62 @@
+//! Parameters from a command line or a scenario.
+
+use siskin_control::params::{ParamId, Params, SetError};
+
+/// A parameter by name, its value checked against the table.
+///
+/// # Errors
+/// One line that names the parameter and what would do.
+pub fn parameter(name: &str, value: f32) -> Result<(ParamId, f32), String> {
+    let id = ParamId::find(name).ok_or_else(|| format!("there is no parameter {name}"))?;
+    let entry = id.entry();
+    match Params::default().set(id, value) {
+        Ok(()) => Ok((id, value)),
+        Err(SetError::ReadOnly) => Err(format!("{name} is computed and cannot be set")),
+        Err(SetError::NotWhole) => Err(format!("{name} = {value} is not a whole number")),
+        Err(SetError::NotFinite | SetError::OutOfRange) => Err(format!(
+            "{name} = {value} is out of range; give {} to {} {}",
+            entry.min, entry.max, entry.unit
+        )
+        .trim_end()
+        .to_owned()),
+    }
+}
+
+/// `NAME=VALUE`, as on the command line.
+///
+/// # Errors
+/// One line that names what was given and what would do.
+pub fn assignment(text: &str) -> Result<(ParamId, f32), String> {
+    let (name, value) = text
+        .split_once('=')
+        .ok_or_else(|| format!("{text} is not NAME=VALUE"))?;
+    let number = value.parse();
+    parameter(
+        name,
+        number.map_err(|_| format!("{name}: {value} is not a number"))?,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn assignments_are_checked_against_the_table() {
+        assert_eq!(
+            assignment("CTL_RPM_MAX=5000"),
+            Ok((ParamId::CtlRpmMax, 5000.0))
+        );
+        for (wrong, word) in [
+            ("CTL_RPM_MAX", "NAME=VALUE"),
+            ("CTL_RPM_MAX=fast", "not a number"),
+            ("CTL_RPM_MAX=1", "give 100 to 200000 rpm"),
+            ("NO_SUCH=1", "no parameter"),
+            ("MOT_KV=1", "computed"),
+            ("MOT_DIR=0.5", "whole"),
+        ] {
+            let error = assignment(wrong).unwrap_err();
+            assert!(error.contains(word), "{wrong}: {error}");
+        }
+    }
+}

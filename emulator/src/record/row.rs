@@ -1,0 +1,133 @@
+//! The columns of a recording.
+
+use serde::{Deserialize, Serialize};
+use siskin_control::drive::{Bridge, Phase, Snapshot};
+use siskin_control::units::Scale;
+
+use crate::rig::Period;
+
+/// One control period. The fields are the columns, in this order, with the unit as the last part
+/// of the name. Single precision holds more than any sensor, and halves the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Start of the period, s, to the nanosecond.
+    pub t_s: f64,
+    /// What the drive is doing, in small letters.
+    #[serde(with = "PhaseName")]
+    pub phase: Phase,
+    /// Faults that hold the bridge off, one bit each.
+    pub faults: u8,
+    /// True mechanical speed.
+    pub rpm: f32,
+    /// Estimated mechanical speed.
+    pub rpm_est: f32,
+    /// Reference of the mechanical speed.
+    pub rpm_ref: f32,
+    /// True electrical angle, 0 to 360.
+    pub angle_deg: f32,
+    /// Estimated electrical angle, 0 to 360.
+    pub angle_est_deg: f32,
+    /// Estimated less true electrical angle, ±180.
+    pub angle_error_deg: f32,
+    /// True current into phase a.
+    pub i_a_a: f32,
+    /// True current into phase b.
+    pub i_b_a: f32,
+    /// True current into phase c.
+    pub i_c_a: f32,
+    /// Measured current along the estimated rotor's axis.
+    pub i_d_a: f32,
+    /// Measured current across it.
+    pub i_q_a: f32,
+    /// Commanded voltage along the estimated rotor's axis.
+    pub u_d_v: f32,
+    /// Commanded voltage across it.
+    pub u_q_v: f32,
+    /// Share of the period for which phase a is high; empty while all switches are off.
+    pub duty_a: Option<f32>,
+    /// Likewise of phase b.
+    pub duty_b: Option<f32>,
+    /// Likewise of phase c.
+    pub duty_c: Option<f32>,
+    /// True voltage of the supply.
+    pub bus_v: f32,
+    /// True current from the supply.
+    pub bus_a: f32,
+    /// Electromagnetic torque, the mean over the period.
+    pub torque_nm: f32,
+}
+
+/// [`Phase`] as a recording spells it.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Phase", rename_all = "lowercase")]
+enum PhaseName {
+    Idle,
+    Park,
+    Ramp,
+    Run,
+    Stopping,
+    Brake,
+}
+
+impl Row {
+    /// The names of the columns.
+    pub const COLUMNS: [&str; 22] = [
+        "t_s",
+        "phase",
+        "faults",
+        "rpm",
+        "rpm_est",
+        "rpm_ref",
+        "angle_deg",
+        "angle_est_deg",
+        "angle_error_deg",
+        "i_a_a",
+        "i_b_a",
+        "i_c_a",
+        "i_d_a",
+        "i_q_a",
+        "u_d_v",
+        "u_q_v",
+        "duty_a",
+        "duty_b",
+        "duty_c",
+        "bus_v",
+        "bus_a",
+        "torque_nm",
+    ];
+
+    /// The period that began at `t_s`, and what the control made of it.
+    pub fn new(t_s: f64, period: &Period, snapshot: &Snapshot, scale: &Scale) -> Self {
+        let turns = snapshot.angle.to_num::<f64>();
+        let [i_a_a, i_b_a, i_c_a] = period.currents_a.map(|current_a| current_a as f32);
+        let duties = match period.bridge {
+            Bridge::Off => [None; 3],
+            Bridge::Brake => [Some(0.0); 3],
+            Bridge::Duty(duties) => duties.map(|duty| Some(duty.to_num::<f32>())),
+        };
+        Self {
+            t_s: (t_s * 1e9).round() / 1e9,
+            phase: snapshot.phase,
+            faults: snapshot.faults.bits(),
+            rpm: period.rpm() as f32,
+            rpm_est: scale.rpm(snapshot.speed),
+            rpm_ref: scale.rpm(snapshot.speed_reference),
+            angle_deg: (period.angle_turns * 360.0) as f32,
+            angle_est_deg: ((turns - turns.floor()) * 360.0) as f32,
+            angle_error_deg: period.angle_error_deg(snapshot) as f32,
+            i_a_a,
+            i_b_a,
+            i_c_a,
+            i_d_a: scale.amperes(snapshot.i.d),
+            i_q_a: scale.amperes(snapshot.i.q),
+            u_d_v: scale.volts(snapshot.u.d),
+            u_q_v: scale.volts(snapshot.u.q),
+            duty_a: duties[0],
+            duty_b: duties[1],
+            duty_c: duties[2],
+            bus_v: period.bus_v as f32,
+            bus_a: period.bus_a as f32,
+            torque_nm: period.flow.torque_nm as f32,
+        }
+    }
+}

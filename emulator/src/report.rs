@@ -1,0 +1,133 @@
+//! What is printed: the first screen, figures, verdicts. All goes to standard output at once, so
+//! that a closed pipe is one clean error.
+
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+
+use siskin_control::params::ParamId;
+use siskin_emulator::device::Device;
+use siskin_emulator::live::Opened;
+use siskin_emulator::scenario::Outcome;
+use siskin_emulator::summary::Report;
+
+use crate::cli::{DEFAULT_MOTOR, RunArgs};
+
+/// Writes text to standard output. A reader that has gone is no error: it has what it wanted.
+pub(crate) fn print(text: &str) -> Result<(), String> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("standard output cannot be written: {error}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// One JSON object on a line.
+pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, String> {
+    let text = serde_json::to_string(value).map_err(|error| error.to_string())?;
+    Ok(text + "\n")
+}
+
+/// The first screen: what is simulated, where it is reached, what to type next.
+pub(crate) fn greeting(args: &RunArgs, opened: &Opened, device: &Device) -> String {
+    let param = |id| device.esc().params().get(id);
+    let mut lines = vec![
+        format!("Siskin ESC {}, emulated", env!("CARGO_PKG_VERSION")),
+        String::new(),
+        format!("  motor     {}", args.motor),
+        format!("  load      {}", args.load),
+        format!(
+            "  supply    {:.1} V, PWM and control at {:.0} Hz, seed {}",
+            args.bus.open_v,
+            param(ParamId::PwmFreqHz),
+            args.seed
+        ),
+    ];
+    lines.extend(
+        opened
+            .links
+            .iter()
+            .map(|link| format!("  MAVLink   {link}")),
+    );
+    if let Some(address) = opened.signal {
+        lines.push(format!("  throttle  udp:{address}, a datagram a frame"));
+    }
+    if args.motor != DEFAULT_MOTOR {
+        lines.push("  The ESC's MOT_ parameters are not set by --motor: use --param.".to_owned());
+    }
+    lines.push(String::new());
+    lines.push("Next, in another terminal:".to_owned());
+    lines.push("  cargo run --release -p siskin -- params list".to_owned());
+    lines.push("  cargo run --release -p siskin -- monitor".to_owned());
+    lines.push(format!(
+        "Zero throttle for {:.0} ms arms; then throttle turns the motor.",
+        param(ParamId::InpArmMs)
+    ));
+    lines.push("README.md has a script that does so. Ctrl-C ends.".to_owned());
+    lines.join("\n") + "\n"
+}
+
+/// The figures of a run.
+pub(crate) fn figures(report: &Report) -> String {
+    let pace = report.sim_per_wall.unwrap_or_default();
+    let mut text = format!(
+        "{:.3} s simulated in {:.3} s ({pace:.1} times real time), {} control periods, trace {}\n",
+        report.sim_s, report.wall_s, report.steps, report.trace_hash
+    );
+    for fault in &report.faults {
+        line(&mut text, format_args!("fault: {fault}"));
+    }
+    if let Some(refused) = report.rejected {
+        line(
+            &mut text,
+            format_args!(
+                "refused: {} datagrams and {} frames on the wire, {} MAVLink frames",
+                refused.wire_datagrams, refused.wire_frames, refused.mavlink_frames
+            ),
+        );
+    }
+    for window in &report.windows {
+        let show = |value: Option<f64>, digits| {
+            value.map_or_else(|| "-".to_owned(), |value| format!("{value:.digits$}"))
+        };
+        line(
+            &mut text,
+            format_args!(
+                "{}: {} rpm, angle error {}° mean {}° max, torque {} Nm, i_q {} A, bus {} A",
+                window.name,
+                show(window.rpm_mean, 1),
+                show(window.angle_error_mean_deg, 2),
+                show(window.angle_error_max_deg, 2),
+                show(window.torque_mean_nm, 4),
+                show(window.i_q_mean_a, 2),
+                show(window.bus_a_mean, 2),
+            ),
+        );
+    }
+    text
+}
+
+/// Whether a scenario's expectations held.
+pub(crate) fn verdicts(outcome: &Outcome) -> String {
+    let mut text = String::new();
+    for verdict in &outcome.expectations {
+        let held = if verdict.held { "held" } else { "FAILED" };
+        let value = verdict
+            .value
+            .map_or_else(|| "no data".to_owned(), |value| value.to_string());
+        line(
+            &mut text,
+            format_args!(
+                "{held}: {}.{} is {value}, wanted {}",
+                verdict.window, verdict.key, verdict.wanted
+            ),
+        );
+    }
+    text
+}
+
+fn line(text: &mut String, arguments: std::fmt::Arguments) {
+    // A String takes all that is written to it.
+    let _ = writeln!(text, "{arguments}");
+}

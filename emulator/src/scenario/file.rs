@@ -1,0 +1,289 @@
+//! A scenario as its file gives it.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use siskin_control::control::back_emf::Delay;
+use siskin_control::params::ParamId;
+
+use super::ScenarioError;
+use super::signal::Signal;
+use crate::bench::{self, Choice, LoadTable, MotorTable};
+use crate::parameter::parameter;
+use crate::plant::Sensing;
+use crate::rig::Bench;
+
+/// The whole file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Scenario {
+    /// What stands on the bench: the truth.
+    #[serde(default)]
+    pub(super) bench: BenchTable,
+    /// What the control believes.
+    #[serde(default)]
+    pub(super) params: BTreeMap<String, f32>,
+    /// What is asked of the drive, in order.
+    #[serde(default)]
+    pub(super) signal: Vec<Signal>,
+    /// Where figures are taken.
+    #[serde(default)]
+    pub(super) window: Vec<WindowTable>,
+    /// What they must be.
+    #[serde(default)]
+    pub(super) expect: Vec<Expectation>,
+}
+
+/// The bench; each key left out takes the value of the Bosso bench.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct BenchTable {
+    /// A built-in name, a file or a table.
+    pub(super) motor: Choice<MotorTable>,
+    /// Likewise.
+    pub(super) load: Choice<LoadTable>,
+    /// Volts, or a pack as "6s".
+    pub(super) bus: Bus,
+    /// How the inverter is simulated.
+    pub(super) plant: Plant,
+    /// Speed that the shaft is held at.
+    pub(super) imposed_rpm: Option<f64>,
+    /// Seed of all randomness.
+    pub(super) seed: u64,
+    /// Simulated time.
+    pub(super) duration_s: f64,
+    /// How throttle is sent.
+    pub(super) wire: Protocol,
+    /// Resolution of the currents, 0 is exact.
+    pub(super) adc_bits: u32,
+    /// From the sample to the voltage: 0, 0.5 or 1.
+    pub(super) delay_periods: f64,
+    /// The truth against the named motor and load.
+    pub(super) scale: Factors,
+    /// Full scale of the currents.
+    pub(super) adc_range_a: f64,
+    /// Noise of the currents, rms.
+    pub(super) noise_a: f64,
+    /// Error of each current's zero.
+    pub(super) offset_a: [f64; 3],
+    /// Dead time of the inverter.
+    pub(super) dead_time_ns: f64,
+    /// Speed at the start.
+    pub(super) initial_rpm: f64,
+    /// Electrical angle at the start.
+    pub(super) initial_angle_deg: f64,
+}
+
+impl Default for BenchTable {
+    fn default() -> Self {
+        Self {
+            motor: Choice::Named("antigravity-4006-kv380".to_owned()),
+            load: Choice::Named("cfprop-13x4.4".to_owned()),
+            bus: Bus::Volts(24.0),
+            plant: Plant::Averaged,
+            imposed_rpm: None,
+            seed: 1,
+            duration_s: 3.0,
+            wire: Protocol::Dshot600,
+            adc_bits: 12,
+            delay_periods: 1.0,
+            scale: Factors::default(),
+            adc_range_a: 40.0,
+            noise_a: 0.05,
+            offset_a: [0.0; 3],
+            dead_time_ns: 500.0,
+            initial_rpm: 0.0,
+            initial_angle_deg: 0.0,
+        }
+    }
+}
+
+/// A supply.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+pub(super) enum Bus {
+    /// A stiff supply.
+    Volts(f64),
+    /// A pack.
+    Pack(String),
+}
+
+/// How the inverter is simulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Plant {
+    /// By its mean voltage over each half period.
+    Averaged,
+}
+
+/// How throttle is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Protocol {
+    /// DShot150.
+    Dshot150,
+    /// DShot300.
+    Dshot300,
+    /// DShot600.
+    Dshot600,
+}
+
+/// The truth against the named motor and load.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Factors {
+    #[serde(rename = "R")]
+    r: f64,
+    #[serde(rename = "L")]
+    l: f64,
+    flux: f64,
+    #[serde(rename = "J")]
+    j: f64,
+    load: f64,
+}
+
+impl Default for Factors {
+    fn default() -> Self {
+        Self {
+            r: 1.0,
+            l: 1.0,
+            flux: 1.0,
+            j: 1.0,
+            load: 1.0,
+        }
+    }
+}
+
+/// A measuring window.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct WindowTable {
+    /// Name.
+    pub(super) name: String,
+    /// Start.
+    pub(super) t0_s: f64,
+    /// End.
+    pub(super) t1_s: f64,
+}
+
+/// What a figure must be.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Expectation {
+    /// The window's name.
+    pub(super) window: String,
+    /// The figure's key in the summary.
+    pub(super) key: String,
+    /// It must be less.
+    pub(super) below: Option<f64>,
+    /// It must be more.
+    pub(super) above: Option<f64>,
+    /// It must be this, give or take `within`.
+    pub(super) equals: Option<f64>,
+    /// See `equals`.
+    pub(super) within: Option<f64>,
+}
+
+impl BenchTable {
+    /// What stands on the bench.
+    pub(super) fn bench(&self) -> Result<Bench, ScenarioError> {
+        let range = |key, value: f64, least: f64, most: f64| {
+            if (least..=most).contains(&value) {
+                Ok(value)
+            } else {
+                Err(ScenarioError::Range {
+                    key,
+                    value,
+                    least,
+                    most,
+                })
+            }
+        };
+        range("bench.duration_s", self.duration_s, 0.0, 1e5)?;
+        let factors = self.scale;
+        for (key, factor) in [
+            ("bench.scale.R", factors.r),
+            ("bench.scale.L", factors.l),
+            ("bench.scale.flux", factors.flux),
+            ("bench.scale.J", factors.j),
+        ] {
+            range(key, factor, 0.01, 100.0)?;
+        }
+        range("bench.scale.load", factors.load, 0.0, 100.0)?;
+        let mut motor = self.motor.motor()?;
+        motor.resistance_ohm *= factors.r;
+        motor.inductance_h *= factors.l;
+        motor.flux_wb *= factors.flux;
+        motor.inertia_kgm2 *= factors.j;
+        let mut load = self.load.load()?;
+        load.c1 *= factors.load;
+        load.c2 *= factors.load;
+        load.torque_nm *= factors.load;
+        load.inertia_kgm2 *= factors.j;
+        range(
+            "J of motor and load",
+            motor.inertia_kgm2 + load.inertia_kgm2,
+            1e-9,
+            1e6,
+        )?;
+        let delay = match self.delay_periods {
+            0.0 => Delay::None,
+            0.5 => Delay::Half,
+            1.0 => Delay::One,
+            other => return Err(ScenarioError::Delay(other)),
+        };
+        let offset = |a: f64| range("bench.offset_a", a, -1e3, 1e3);
+        Ok(Bench {
+            motor,
+            load,
+            supply: bench::supply(&self.bus.text())?,
+            sensing: Sensing {
+                range_a: range("bench.adc_range_a", self.adc_range_a, 0.1, 1e3)?,
+                bits: range("bench.adc_bits", f64::from(self.adc_bits), 0.0, 24.0)? as u32,
+                noise_a: range("bench.noise_a", self.noise_a, 0.0, 1e3)?,
+                offset_a: [
+                    offset(self.offset_a[0])?,
+                    offset(self.offset_a[1])?,
+                    offset(self.offset_a[2])?,
+                ],
+            },
+            delay,
+            dead_time_s: Some(range("bench.dead_time_ns", self.dead_time_ns, 0.0, 1e4)? * 1e-9),
+            imposed_rad_s: match self.imposed_rpm {
+                Some(rpm) => Some(rad_s(range("bench.imposed_rpm", rpm, -2e5, 2e5)?)),
+                None => None,
+            },
+            initial_rad_s: rad_s(range("bench.initial_rpm", self.initial_rpm, -2e5, 2e5)?),
+            initial_angle_turns: range(
+                "bench.initial_angle_deg",
+                self.initial_angle_deg,
+                -3600.0,
+                3600.0,
+            )? / 360.0,
+            seed: self.seed,
+        })
+    }
+}
+
+impl Bus {
+    fn text(&self) -> String {
+        match self {
+            Self::Volts(volts) => volts.to_string(),
+            Self::Pack(pack) => pack.clone(),
+        }
+    }
+}
+
+impl Scenario {
+    /// The parameters that the file sets.
+    pub(super) fn params(&self) -> Result<Vec<(ParamId, f32)>, ScenarioError> {
+        self.params
+            .iter()
+            .map(|(name, value)| parameter(name, *value).map_err(ScenarioError::Parameter))
+            .collect()
+    }
+}
+
+fn rad_s(rpm: f64) -> f64 {
+    rpm * std::f64::consts::TAU / 60.0
+}

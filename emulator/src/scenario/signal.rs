@@ -1,0 +1,193 @@
+//! What is asked of the drive over time.
+
+use std::f64::consts::{PI, TAU};
+
+use serde::Deserialize;
+
+/// One entry of the time line; it is in force until the next.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Signal {
+    /// From when.
+    pub(super) at_s: f64,
+    /// Throttle on the wire, 0 to 1; 0 is motor stop.
+    pub(super) throttle: Option<f64>,
+    /// Speed, past the wire.
+    pub(super) rpm: Option<f64>,
+    /// Torque current, past the wire.
+    pub(super) amps: Option<f64>,
+    /// How the value comes about.
+    #[serde(default)]
+    pub(super) shape: Shape,
+    /// Duration of a ramp, of a modulated sine or of a chirp.
+    pub(super) for_s: Option<f64>,
+    /// Amplitude of a sine or chirp.
+    #[serde(default)]
+    pub(super) amplitude: f64,
+    /// Frequency of a sine, first frequency of a chirp.
+    #[serde(default)]
+    pub(super) freq_hz: f64,
+    /// Last frequency of a chirp.
+    pub(super) freq_to_hz: Option<f64>,
+    /// Whether a sine's amplitude swells and fades once over `for_s`.
+    #[serde(default)]
+    pub(super) am: bool,
+}
+
+/// How a value comes about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Shape {
+    /// At once.
+    #[default]
+    Step,
+    /// From the value before, linearly over `for_s`.
+    Ramp,
+    /// Value + amplitude·sin(2π·freq_hz·t), times sin²(π·t/for_s) with `am`.
+    Sine,
+    /// Likewise, the frequency rising linearly to `freq_to_hz` over `for_s`.
+    Chirp,
+}
+
+/// What is asked for at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Demand {
+    /// Throttle on the wire.
+    Throttle(f64),
+    /// Mechanical speed, rpm.
+    Rpm(f64),
+    /// Torque current, A.
+    Amps(f64),
+}
+
+impl Signal {
+    /// What is wrong with it, if anything.
+    pub(super) fn problem(&self) -> Option<&'static str> {
+        let given = [self.throttle, self.rpm, self.amps];
+        let finite = |x: Option<f64>| x.is_none_or(f64::is_finite);
+        let numbers = [
+            Some(self.at_s),
+            self.for_s,
+            Some(self.amplitude),
+            Some(self.freq_hz),
+        ];
+        if given.iter().flatten().count() != 1 {
+            Some("needs exactly one of throttle, rpm and amps")
+        } else if !given.into_iter().chain(numbers).all(finite) || !finite(self.freq_to_hz) {
+            Some("has a number that is not finite")
+        } else if self.throttle.is_some_and(|t| !(0.0..=1.0).contains(&t)) {
+            Some("has a throttle outside 0 to 1")
+        } else if self.rpm.is_some_and(|rpm| rpm < 0.0) {
+            Some("has a negative rpm; this drive turns one way")
+        } else if self.shape != Shape::Step
+            && (self.shape != Shape::Sine || self.am)
+            && !self.for_s.is_some_and(|s| s > 0.0)
+        {
+            Some("needs for_s above 0 for its shape")
+        } else if self.shape == Shape::Chirp && self.freq_to_hz.is_none() {
+            Some("is a chirp and needs freq_to_hz")
+        } else {
+            None
+        }
+    }
+
+    /// The value at `t_s` after the start of the scenario, where `before` was in force.
+    fn demand(&self, t_s: f64, before: Option<f64>) -> Demand {
+        let t = t_s - self.at_s;
+        let length = self.for_s.unwrap_or(f64::INFINITY);
+        let value = |base: f64| match self.shape {
+            Shape::Step => base,
+            Shape::Ramp => {
+                let from = before.unwrap_or(0.0);
+                from + (base - from) * (t / length).min(1.0)
+            }
+            Shape::Sine => {
+                let swell = if self.am && t >= length {
+                    0.0
+                } else if self.am {
+                    libm::pow(libm::sin(PI * t / length), 2.0)
+                } else {
+                    1.0
+                };
+                base + self.amplitude * swell * libm::sin(TAU * self.freq_hz * t)
+            }
+            Shape::Chirp => {
+                let t = t.min(length);
+                let rate = (self.freq_to_hz.unwrap_or(self.freq_hz) - self.freq_hz) / length;
+                let turns = (self.freq_hz + 0.5 * rate * t) * t;
+                base + self.amplitude * libm::sin(TAU * turns)
+            }
+        };
+        match (self.throttle, self.rpm, self.amps) {
+            (Some(throttle), ..) => Demand::Throttle(value(throttle).clamp(0.0, 1.0)),
+            (_, Some(rpm), _) => Demand::Rpm(value(rpm).max(0.0)),
+            (.., amps) => Demand::Amps(value(amps.unwrap_or(0.0))),
+        }
+    }
+
+    /// The value that a ramp after this one starts from.
+    fn end(&self) -> Option<f64> {
+        self.throttle.or(self.rpm).or(self.amps)
+    }
+}
+
+/// What is asked for at `t_s`, or `None` before the first entry. The entries are in order.
+pub(super) fn demand(signals: &[Signal], t_s: f64) -> Option<Demand> {
+    let next = signals.partition_point(|signal| signal.at_s <= t_s);
+    let current = signals.get(next.checked_sub(1)?)?;
+    let before = next.checked_sub(2).and_then(|index| signals[index].end());
+    Some(current.demand(t_s, before))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signals(text: &str) -> Vec<Signal> {
+        #[derive(Deserialize)]
+        struct Holder {
+            signal: Vec<Signal>,
+        }
+        toml::from_str::<Holder>(text).unwrap().signal
+    }
+
+    #[test]
+    fn shapes_follow_their_formulas() {
+        let signals = signals(
+            "signal = [{ at_s = 0.0, rpm = 1000.0 },
+                       { at_s = 1.0, rpm = 2000.0, shape = 'ramp', for_s = 2.0 },
+                       { at_s = 4.0, rpm = 3000.0, shape = 'sine', amplitude = 100.0,
+                         freq_hz = 1.0, for_s = 2.0, am = true },
+                       { at_s = 8.0, amps = 2.0, shape = 'chirp', amplitude = 1.0, freq_hz = 1.0,
+                         freq_to_hz = 3.0, for_s = 2.0 }]",
+        );
+        let at = |t_s| demand(&signals, t_s);
+        assert_eq!(at(-0.1), None);
+        assert_eq!(at(0.5), Some(Demand::Rpm(1000.0)));
+        assert_eq!(at(2.0), Some(Demand::Rpm(1500.0)));
+        assert_eq!(at(3.5), Some(Demand::Rpm(2000.0)));
+        // sin²(π·0.25/2)·sin(2π·0.25) = 0.1464.
+        let Some(Demand::Rpm(rpm)) = at(4.25) else {
+            panic!()
+        };
+        assert!((rpm - 3014.64).abs() < 0.01, "{rpm}");
+        assert_eq!(at(7.0), Some(Demand::Rpm(3000.0)));
+        // (1 + 0.5·1·0.5)·0.5 = 0.625 turns.
+        let Some(Demand::Amps(amps)) = at(8.5) else {
+            panic!()
+        };
+        assert!(
+            (amps - (2.0 + libm::sin(TAU * 0.625))).abs() < 1e-9,
+            "{amps}"
+        );
+    }
+
+    #[test]
+    fn problems_are_named() {
+        let problem = |entry: &str| signals(&format!("signal = [{entry}]"))[0].problem();
+        assert!(problem("{ at_s = 0.0, rpm = 1.0 }").is_none());
+        assert!(problem("{ at_s = 0.0 }").is_some());
+        assert!(problem("{ at_s = 0.0, throttle = 1.5 }").is_some());
+        assert!(problem("{ at_s = 0.0, rpm = 1.0, shape = 'ramp' }").is_some());
+    }
+}

@@ -1,0 +1,307 @@
+//! The throttle wire: datagrams in, edges on the simulation's time axis out.
+//!
+//! A datagram is one frame as a flight controller's timer would put it on the wire, or any run of
+//! levels. Nothing here decodes: the edges go to the same capture decoder as on the chip.
+
+mod frame;
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::io;
+use std::net::{SocketAddr, UdpSocket};
+use std::str::FromStr;
+
+use thiserror::Error;
+
+use crate::link::{AddressError, HostPort};
+use frame::Frame;
+
+/// What may wait to be played, ns; a datagram that would have to wait longer is dropped.
+pub const MAX_BACKLOG_NS: u64 = 100_000_000;
+
+/// Edges that may wait: more than 100 ms of DShot1200 (193 thousand), so that only raw edges far
+/// beyond any protocol's rate reach it.
+const MAX_EDGES: usize = 1 << 18;
+
+/// Datagrams taken in one call; at DShot1200's 75 frames in a millisecond, three times as many.
+const DATAGRAMS_PER_CALL: usize = 256;
+
+/// The longest datagram.
+const READ_BYTES: usize = 65_535;
+
+/// Where the wire listens: the argument of `--signal`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SignalAddress(HostPort);
+
+/// Why a text is not the address of a wire.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error(
+    "'{text}' is not a throttle wire: {reason}; use udp:HOST:PORT, such as udp:127.0.0.1:14600"
+)]
+pub struct SignalError {
+    /// What was given.
+    pub text: String,
+    /// What is wrong with it.
+    pub reason: SignalReason,
+}
+
+/// What is wrong with the address of a wire.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum SignalReason {
+    /// It is not UDP.
+    #[error("it does not start with udp:")]
+    Kind,
+    /// The host or the port is wrong.
+    #[error(transparent)]
+    Address(#[from] AddressError),
+}
+
+/// Why a wire cannot be opened: one line, with what to do.
+#[derive(Debug, Error)]
+pub enum WireError {
+    /// The ports above the first do not reach far enough for this ESC.
+    #[error("--signal {0}: the wire of ESC {1} would be above port 65535; give a lower port")]
+    NoPort(SignalAddress, u16),
+    /// The host's name has no address.
+    #[error("--signal {0}: the host cannot be resolved ({1}); give an address, such as 127.0.0.1")]
+    Host(SignalAddress, io::Error),
+    /// Another program listens there.
+    #[error(
+        "--signal {0}: port {1} is taken; end the program that holds it or give another port (0 \
+         takes any free one)"
+    )]
+    Taken(SignalAddress, u16),
+    /// The system refuses the socket.
+    #[error("--signal {0}: cannot open the socket ({1}); give an address of this machine")]
+    Socket(SignalAddress, io::Error),
+}
+
+/// Why a datagram is not played.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Rejected {
+    /// There is not even a protocol in it.
+    #[error("an empty datagram")]
+    Empty,
+    /// The first byte is no protocol.
+    #[error("protocol {0} is unknown")]
+    Protocol(u8),
+    /// The payload does not have the protocol's length.
+    #[error("{length} bytes are not a datagram of protocol {protocol}")]
+    Length {
+        /// The first byte.
+        protocol: u8,
+        /// Bytes of the datagram.
+        length: usize,
+    },
+    /// A pulse of no width.
+    #[error("a pulse of 0 ns")]
+    NoPulse,
+    /// The first raw level is neither 0 nor 1.
+    #[error("level {0} is neither 0 nor 1")]
+    Level(u8),
+    /// It would hold the wire for more than 10 s.
+    #[error("{0} ns are more than 10 s")]
+    TooLong(u64),
+    /// Too much waits already. This one counts as dropped, the others as rejected.
+    #[error("more than 100 ms wait to be played")]
+    Backlog,
+}
+
+/// What became of the datagrams so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WireCounts {
+    /// Turned into edges.
+    pub played: u64,
+    /// Malformed.
+    pub rejected: u64,
+    /// Dropped, since too much waited already.
+    pub dropped: u64,
+}
+
+/// One ESC's throttle wire. Its line is low at the start.
+///
+/// Time is the simulation's, in ns. Times given to it do not go back.
+pub struct Wire {
+    socket: Option<UdpSocket>,
+    buffer: Vec<u8>,
+    last_sender: Option<SocketAddr>,
+    counts: WireCounts,
+    edges: VecDeque<(u64, bool)>,
+    /// The level after all that waits.
+    level: bool,
+    /// Up to here edges have been handed out; nothing is added before it.
+    taken_ns: u64,
+    /// The end of the last frame and the rest that it needs after it.
+    last: Option<(u64, u64)>,
+}
+
+impl Wire {
+    /// A wire without a socket: only [`Wire::play`] feeds it.
+    pub fn detached() -> Self {
+        Self {
+            socket: None,
+            buffer: Vec::new(),
+            last_sender: None,
+            counts: WireCounts::default(),
+            edges: VecDeque::new(),
+            level: false,
+            taken_ns: 0,
+            last: None,
+        }
+    }
+
+    /// Opens the wire of ESC `index`: `address` with its port raised by `index`. Each gets a free
+    /// port of its own when the port is 0.
+    pub fn open(address: &SignalAddress, index: u16) -> Result<Self, WireError> {
+        let no_port = || WireError::NoPort(address.clone(), index);
+        let HostPort { host, port } = &address.0;
+        let port = match port {
+            0 => 0,
+            _ => port.checked_add(index).ok_or_else(no_port)?,
+        };
+        let host = host.clone();
+        let local = HostPort { host, port }.resolve();
+        let local = local.map_err(|error| WireError::Host(address.clone(), error))?;
+        let open = || {
+            let socket = UdpSocket::bind(local)?;
+            socket.set_nonblocking(true)?;
+            Ok(socket)
+        };
+        let socket = open().map_err(|error: io::Error| match error.kind() {
+            io::ErrorKind::AddrInUse => WireError::Taken(address.clone(), port),
+            _ => WireError::Socket(address.clone(), error),
+        })?;
+        Ok(Self {
+            socket: Some(socket),
+            buffer: vec![0; READ_BYTES],
+            ..Self::detached()
+        })
+    }
+
+    /// Where it listens, with the port that the system chose if that was left to it. None without
+    /// a socket.
+    pub fn local_address(&self) -> Option<SocketAddr> {
+        self.socket.as_ref()?.local_addr().ok()
+    }
+
+    /// Who sent the last datagram that was played: to whom answers go.
+    pub fn last_sender(&self) -> Option<SocketAddr> {
+        self.last_sender
+    }
+
+    /// What became of the datagrams so far.
+    pub fn counts(&self) -> WireCounts {
+        self.counts
+    }
+
+    /// Plays the datagrams that have come in, the first from `now_ns` on. Never waits.
+    pub fn poll(&mut self, now_ns: u64) {
+        // Taken out for the loop, since playing borrows the whole wire.
+        let (Some(socket), mut buffer) = (self.socket.take(), std::mem::take(&mut self.buffer))
+        else {
+            return;
+        };
+        for _ in 0..DATAGRAMS_PER_CALL {
+            match socket.recv_from(&mut buffer) {
+                Ok((length, sender)) => {
+                    if self.play(now_ns, &buffer[..length]).is_ok() {
+                        self.last_sender = Some(sender);
+                    }
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+                // Some systems report here that an earlier answer found nobody.
+                Err(_) => {}
+            }
+        }
+        self.socket = Some(socket);
+        self.buffer = buffer;
+    }
+
+    /// Plays one datagram from `now_ns` on, or after what still plays, and counts it.
+    pub fn play(&mut self, now_ns: u64, datagram: &[u8]) -> Result<(), Rejected> {
+        let frame = Frame::parse(datagram);
+        let result = frame.and_then(|frame| self.append(now_ns, &frame));
+        match result {
+            Ok(()) => self.counts.played += 1,
+            Err(Rejected::Backlog) => self.counts.dropped += 1,
+            Err(_) => self.counts.rejected += 1,
+        }
+        result
+    }
+
+    /// The next edge that is earlier than `before_ns`: its time and the level after it. Edges come
+    /// in order, each at a later time and of another level than the one before. What is played
+    /// from now on comes at `before_ns` or later.
+    pub fn next_edge(&mut self, before_ns: u64) -> Option<(u64, bool)> {
+        self.taken_ns = self.taken_ns.max(before_ns);
+        let (time_ns, _) = self.edges.front()?;
+        if *time_ns < before_ns {
+            self.edges.pop_front()
+        } else {
+            None
+        }
+    }
+
+    fn append(&mut self, now_ns: u64, frame: &Frame<'_>) -> Result<(), Rejected> {
+        let now_ns = now_ns.max(self.taken_ns);
+        let mut start_ns = match self.last {
+            // The longer rest counts where frames of different rates follow each other.
+            Some((end_ns, rest_ns)) => {
+                now_ns.max(end_ns.saturating_add(rest_ns.max(frame.rest_before_ns())))
+            }
+            None => now_ns,
+        };
+        let edges = self.edges.len() + frame.max_edges();
+        if start_ns - now_ns > MAX_BACKLOG_NS || edges > MAX_EDGES {
+            return Err(Rejected::Backlog);
+        }
+        if frame.idle_level().is_some_and(|idle| idle != self.level) {
+            // The line comes to rest on the frame's level first, or its first edge would be none.
+            self.set_level(start_ns, !self.level);
+            start_ns = start_ns.saturating_add(frame.rest_before_ns());
+        }
+        frame.levels(|offset_ns, level| self.set_level(start_ns.saturating_add(offset_ns), level));
+        let end_ns = start_ns.saturating_add(frame.duration_ns());
+        self.last = Some((end_ns, frame.rest_after_ns()));
+        Ok(())
+    }
+
+    fn set_level(&mut self, time_ns: u64, level: bool) {
+        if level == self.level {
+            return;
+        }
+        self.level = level;
+        // A level that was held for 0 ns was none.
+        if self
+            .edges
+            .back()
+            .is_some_and(|(last_ns, _)| *last_ns == time_ns)
+        {
+            self.edges.pop_back();
+        } else {
+            self.edges.push_back((time_ns, level));
+        }
+    }
+}
+
+impl FromStr for SignalAddress {
+    type Err = SignalError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let address = text.strip_prefix("udp:").ok_or(SignalReason::Kind);
+        let address = address.and_then(|address| Ok(address.parse()?));
+        address.map(Self).map_err(|reason| SignalError {
+            text: text.to_owned(),
+            reason,
+        })
+    }
+}
+
+impl fmt::Display for SignalAddress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "udp:{}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests;
