@@ -1,0 +1,66 @@
+//! What can go wrong: one line for a person, and an exit status for a script.
+
+use std::io;
+use std::process::ExitCode;
+
+/// Why the work was not done. Each text names the input and what to do.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Error {
+    /// An argument that makes no sense.
+    #[error("{0}")]
+    Usage(String),
+
+    /// The endpoint could not be opened, or was lost.
+    #[error("{endpoint}: {reason}; {remedy}")]
+    Link {
+        endpoint: String,
+        reason: String,
+        remedy: &'static str,
+    },
+
+    /// Nothing that could be an ESC was heard.
+    #[error("{endpoint}: {heard}")]
+    NoComponent { endpoint: String, heard: String },
+
+    /// A file could not be read, written or understood.
+    #[error("{path}: {reason}")]
+    File { path: String, reason: String },
+
+    /// The ESC said no.
+    #[error("{what}: {reason}")]
+    Refused { what: String, reason: String },
+
+    /// The ESC did not answer, however often it was asked.
+    #[error("{what}: no answer after {attempts} attempts; check the link and try again")]
+    NoAnswer { what: String, attempts: u32 },
+
+    /// Nothing came for a while.
+    #[error("{what}: nothing for {seconds} s; check the link and TEL_RATE_HZ")]
+    Silent { what: String, seconds: u64 },
+
+    /// Some of several were refused; each has been listed.
+    #[error("{0}")]
+    Partly(String),
+
+    /// Standard output is gone.
+    #[error("standard output: {0}")]
+    Output(#[from] io::Error),
+}
+
+impl Error {
+    /// 2 for bad input or no connection, 1 for what the ESC refused or did not answer, 0 where
+    /// only the reader of the output went away, as in `siskin monitor | head -1`.
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Usage(_) | Self::Link { .. } | Self::NoComponent { .. } | Self::File { .. } => {
+                ExitCode::from(2)
+            }
+            Self::Refused { .. }
+            | Self::NoAnswer { .. }
+            | Self::Silent { .. }
+            | Self::Partly(_) => ExitCode::from(1),
+            Self::Output(e) if e.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+            Self::Output(_) => ExitCode::from(2),
+        }
+    }
+}
