@@ -1,0 +1,298 @@
+//! What turns the bridge off by itself, and what a ground station hears of it: the tasks' side and
+//! the drive on its bench, with a temperature that the test gives.
+
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_LONG_DATA, EscFailureFlags, MavCmd, MavMessage, MavParamType, MavResult, PARAM_SET_DATA,
+};
+use mavlink::types::CharArray;
+use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
+use siskin_control::drive::{Bridge, Fault, Setpoint};
+use siskin_control::esc::Esc;
+use siskin_control::mavlink::{Frame, Receiver, Request};
+use siskin_control::params::{ParamId, Params};
+use siskin_emulator::rig::{Bench, Rig};
+use siskin_emulator::wire::Wire;
+
+const CAPTURE_HZ: u32 = 170_000_000;
+const MS_NS: u64 = 1_000_000;
+const STOP: u16 = 0;
+/// Maps onto 3150 rpm.
+const HALF: u16 = 1048;
+const ROOM_C: f32 = 25.0;
+
+/// An ESC on its bench, with a flight controller that sends a frame a millisecond.
+struct Station {
+    esc: Esc,
+    rig: Rig,
+    wire: Wire,
+    receiver: Receiver,
+    /// Reads what the ESC sends.
+    listener: Receiver,
+    heard: Vec<MavMessage>,
+    temperature_c: f32,
+    now_ns: u64,
+    periods: u64,
+}
+
+/// What a stretch of time ended with.
+#[derive(Debug)]
+struct Seen {
+    rpm: f64,
+    /// A period in which the bridge was on.
+    on: bool,
+}
+
+impl Station {
+    fn new(params: Params) -> Self {
+        let bench = Bench::default();
+        let board = bench.sensing.board(bench.delay);
+        let esc =
+            Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("the parameters fit the bench");
+        let rig = Rig::new(bench, esc.config().clone());
+        Self {
+            esc,
+            rig,
+            wire: Wire::detached(),
+            receiver: Receiver::default(),
+            listener: Receiver::default(),
+            heard: Vec::new(),
+            temperature_c: ROOM_C,
+            now_ns: 0,
+            periods: 0,
+        }
+    }
+
+    /// One that has turned at half throttle for 3 s.
+    fn turning() -> Self {
+        let mut station = Self::new(Params::default());
+        station.run(400, STOP);
+        let seen = station.run(3_000, HALF);
+        assert!((seen.rpm - 3150.0).abs() < 31.5, "{seen:?}");
+        station
+    }
+
+    /// So many milliseconds, each with a frame of this throttle at its start.
+    fn run(&mut self, count_ms: u64, throttle: u16) -> Seen {
+        let mut seen = Seen {
+            rpm: 0.0,
+            on: false,
+        };
+        for _ in 0..count_ms {
+            let data = throttle << 1;
+            let bits = data << 4 | (data ^ data >> 4 ^ data >> 8) & 0xF;
+            let [low, high] = bits.to_le_bytes();
+            self.wire
+                .play(self.now_ns, &[12, low, high])
+                .expect("a frame fits in a millisecond");
+            self.now_ns += MS_NS;
+            while let Some((edge_ns, level)) = self.wire.next_edge(self.now_ns) {
+                let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
+                self.esc.edge(edge_ns / 1000, ticks as u32, level);
+            }
+            let setpoint = self.esc.setpoint();
+            let period_ns = self.rig.period_s() * 1e9;
+            while (self.periods as f64 * period_ns) < self.now_ns as f64 {
+                let period = self.rig.period(setpoint);
+                self.periods += 1;
+                seen.on |= period.bridge != Bridge::Off;
+                seen.rpm = period.rpm();
+            }
+            self.tasks();
+        }
+        seen
+    }
+
+    fn tasks(&mut self) {
+        let now_us = self.now_ns / 1000;
+        let (listener, heard) = (&mut self.listener, &mut self.heard);
+        self.esc.poll(
+            now_us,
+            &self.rig.snapshot(),
+            self.temperature_c,
+            &mut |frame| {
+                listener.push(now_us, frame, |frame| heard.push(message(frame)));
+            },
+        );
+        while let Some(request) = self.esc.take_request() {
+            assert_eq!(request, Request::ParamsChanged);
+            self.rig.configure(self.esc.config().clone());
+        }
+    }
+
+    /// Sends what a ground station would.
+    fn receive(&mut self, message: &MavMessage) {
+        let header = MavHeader {
+            system_id: 255,
+            component_id: 190,
+            sequence: 0,
+        };
+        let mut raw = MAVLinkV2MessageRaw::new();
+        raw.serialize_message(header, message);
+        let now_us = self.now_ns / 1000;
+        let Self { receiver, esc, .. } = self;
+        receiver.push(now_us, raw.raw_bytes(), |frame| esc.receive(now_us, frame));
+    }
+
+    fn set(&mut self, id: ParamId, value: f32) {
+        let mut name = [0; 16];
+        let text = id.entry().name.as_bytes();
+        name[..text.len()].copy_from_slice(text);
+        self.receive(&MavMessage::PARAM_SET(PARAM_SET_DATA {
+            param_value: value,
+            target_system: 1,
+            target_component: 1,
+            param_id: CharArray::new(name),
+            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+        }));
+        self.tasks();
+        assert_eq!(self.esc.params().get(id), value);
+    }
+
+    /// Asks for a test of the motor, and gives the answer.
+    fn test(&mut self) -> MavResult {
+        self.receive(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
+            param1: 0.5,
+            param2: 1.0,
+            param3: 0.0,
+            param4: 0.0,
+            param5: 1.0,
+            param6: 0.0,
+            param7: 0.0,
+            command: MavCmd::MAV_CMD_ACTUATOR_TEST,
+            target_system: 1,
+            target_component: 1,
+            confirmation: 0,
+        }));
+        self.heard.clear();
+        self.tasks();
+        self.heard
+            .iter()
+            .find_map(|message| match message {
+                MavMessage::COMMAND_ACK(ack) => Some(ack.result),
+                _ => None,
+            })
+            .expect("each command is answered")
+    }
+
+    fn has(&self, fault: Fault) -> bool {
+        self.esc.telemetry().faults.contains(fault)
+    }
+
+    fn texts(&self) -> Vec<&str> {
+        let texts = self.heard.iter().filter_map(|message| match message {
+            MavMessage::STATUSTEXT(text) => Some(text.text.to_str().expect("ASCII")),
+            _ => None,
+        });
+        texts.collect()
+    }
+
+    /// What the last ESC_INFO says has failed.
+    fn flags(&self) -> EscFailureFlags {
+        let mut infos = self.heard.iter().rev();
+        infos
+            .find_map(|message| match message {
+                MavMessage::ESC_INFO(info) => Some(info.failure_flags[0]),
+                _ => None,
+            })
+            .map(EscFailureFlags::from_bits_retain)
+            .expect("one a second")
+    }
+}
+
+fn message(frame: &Frame) -> MavMessage {
+    MavMessage::parse(MavlinkVersion::V2, frame.id, frame.payload)
+        .expect("a message of the dialect")
+}
+
+#[test]
+fn above_lim_temp_c_the_bridge_is_off_until_5_degrees_below_it_and_zero_throttle() {
+    let mut station = Station::turning();
+    station.temperature_c = 100.0;
+    let at_limit = station.run(100, HALF);
+    assert!((at_limit.rpm - 3150.0).abs() < 31.5, "{at_limit:?}");
+
+    station.temperature_c = 100.1;
+    station.heard.clear();
+    station.run(2, HALF);
+    assert_eq!(
+        station.esc.setpoint(),
+        Setpoint::Fault(Fault::OverTemperature)
+    );
+    let hot = station.run(1_100, HALF);
+    assert!(!hot.on, "{hot:?}");
+    assert!(station.has(Fault::OverTemperature));
+    assert_eq!(station.texts(), ["Fault: over-temperature"]);
+    assert!(
+        station
+            .flags()
+            .contains(EscFailureFlags::ESC_FAILURE_OVER_TEMPERATURE)
+    );
+
+    // Within the hysteresis zero throttle does not end it; below it, an open throttle does not.
+    station.temperature_c = 95.1;
+    assert!(!station.run(1_000, STOP).on);
+    assert!(station.has(Fault::OverTemperature));
+    station.temperature_c = 94.9;
+    assert!(!station.run(1_000, HALF).on);
+    assert!(station.has(Fault::OverTemperature));
+
+    station.run(1_500, STOP);
+    assert!(!station.has(Fault::OverTemperature));
+    assert_eq!(
+        station.texts(),
+        ["Fault: over-temperature", "Fault ended: over-temperature"]
+    );
+    assert!(station.flags().is_empty());
+    let again = station.run(3_000, HALF);
+    assert!((again.rpm - 3150.0).abs() < 31.5, "{again:?}");
+}
+
+#[test]
+fn a_motor_is_not_tested_while_its_shaft_turns_after_a_fault() {
+    let mut station = Station::turning();
+    // Half throttle takes 3 A, and 1.4 times the bound trips.
+    station.set(ParamId::LimPhaseA, 0.5);
+    station.run(10, HALF);
+    assert!(station.has(Fault::OverCurrent));
+    station.set(ParamId::LimPhaseA, 20.0);
+    assert_eq!(station.test(), MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
+
+    let cleared = station.run(500, STOP);
+    assert!(!station.has(Fault::OverCurrent));
+    assert!(cleared.rpm > 500.0, "it coasts: {cleared:?}");
+    let mut refused = 0;
+    loop {
+        let seen = station.run(50, STOP);
+        if station.test() == MavResult::MAV_RESULT_ACCEPTED {
+            // A start is for a shaft at rest.
+            assert!(seen.rpm.abs() < 100.0, "{seen:?}");
+            break;
+        }
+        refused += 1;
+        assert!(refused < 400, "after 20 s a test is possible again");
+    }
+    assert!(refused > 10, "{refused}");
+}
+
+#[test]
+fn a_rotor_that_the_observer_has_lost_is_a_fault() {
+    // With a third of the true resistance the voltage that the winding takes at a low speed is
+    // believed to be back-EMF, and the shaft to turn.
+    for resistance_mohm in [18.0, 27.0, 36.0] {
+        let mut params = Params::default();
+        params
+            .set(ParamId::MotRMohm, resistance_mohm)
+            .expect("in range");
+        let mut station = Station::new(params);
+        station.run(400, STOP);
+        for _ in 0..50 {
+            if !station.has(Fault::ObserverLost) {
+                station.run(100, HALF);
+            }
+        }
+        assert!(station.has(Fault::ObserverLost), "{resistance_mohm} mOhm");
+        let after = station.run(500, HALF);
+        assert!(!after.on, "{resistance_mohm} mOhm: {after:?}");
+        assert!(station.texts().contains(&"Fault: rotor position lost"));
+    }
+}
