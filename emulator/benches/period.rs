@@ -41,7 +41,8 @@ fn benches(criterion: &mut Criterion) {
         });
     });
 
-    let mut plant = Averaged::new(MOTORS[0].1, LOADS[0].1, 471.0, 0.0);
+    let mut plant = Averaged::new(MOTORS[0].1, LOADS[0].1, 0.0, 0.0);
+    plant.impose(471.0);
     let bridge = Bridge::Duty([0.5, 0.6, 0.4].map(siskin_control::units::Duty::from_num));
     criterion.bench_function("averaged plant, one period", |bencher| {
         bencher.iter(|| {
