@@ -1,13 +1,14 @@
 //! One emulated ESC: its tasks' side, its drive on a bench, its throttle wire and its flash.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use embassy_futures::block_on;
 use siskin_control::drive::Setpoint;
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, BuildError, ParamId, Params};
-use siskin_control::store::{self, Integrity};
+use siskin_control::store::{self, Integrity, LoadReport};
 use thiserror::Error;
 
 use crate::flash::{FLASH_BYTES, FileFlash};
@@ -18,6 +19,9 @@ use crate::wire::Wire;
 
 /// Rate of the timer that captures the wire's edges: that of the STM32G431.
 const CAPTURE_HZ: u32 = 170_000_000;
+
+/// Where in the flash the parameters are: all of it.
+const STORE: Range<u32> = 0..FLASH_BYTES as u32;
 
 /// Time between two calls of the tasks.
 const TASK_NS: u64 = 1_000_000;
@@ -110,7 +114,7 @@ impl Device {
             overrides,
             link_bytes_per_s,
         } = start;
-        let (mut params, report) = block_on(store::load(&mut flash, 0..FLASH_BYTES as u32));
+        let (mut params, report) = block_on(store::load(&mut flash, STORE));
         let warning = match report.integrity {
             Integrity::Sound | Integrity::Empty => None,
             Integrity::Incomplete => Some("some stored parameters are missing; defaults stand in"),
@@ -271,23 +275,27 @@ impl Device {
                 let _ = params.set(given.id, given.stored);
             }
         }
-        let range = 0..FLASH_BYTES as u32;
-        block_on(store::save(&mut self.flash, range, &params)).map_err(store::StoreError::text)?;
+        block_on(store::save(&mut self.flash, STORE, &params)).map_err(store::StoreError::text)?;
         self.persist()
     }
 
+    /// The stored parameters under those of the command line, and how sound the former are.
+    fn stored(&mut self) -> (Params, LoadReport) {
+        let (mut params, report) = block_on(store::load(&mut self.flash, STORE));
+        apply(&self.overrides, &mut params);
+        (params, report)
+    }
+
     fn load(&mut self) -> Result<(), &'static str> {
-        let (mut params, report) = block_on(store::load(&mut self.flash, 0..FLASH_BYTES as u32));
+        let (params, report) = self.stored();
         if matches!(report.integrity, Integrity::Corrupt | Integrity::Unreadable) {
             return Err("storage: the stored parameters are corrupt");
         }
-        apply(&self.overrides, &mut params);
         self.replace(params)
     }
 
     fn factory_reset(&mut self) -> Result<(), &'static str> {
-        let range = 0..FLASH_BYTES as u32;
-        block_on(store::erase(&mut self.flash, range)).map_err(store::StoreError::text)?;
+        block_on(store::erase(&mut self.flash, STORE)).map_err(store::StoreError::text)?;
         let mut params = Params::default();
         apply(&self.overrides, &mut params);
         self.replace(params)?;
@@ -313,8 +321,7 @@ impl Device {
 
     /// Starts the ESC again; the shaft, the supply and the wire go on as they are.
     fn reboot(&mut self) {
-        let (mut params, _) = block_on(store::load(&mut self.flash, 0..FLASH_BYTES as u32));
-        apply(&self.overrides, &mut params);
+        let (params, _) = self.stored();
         // What cannot be built now was never in force: the old values go on.
         let Ok(esc) = Esc::new(params, self.board, CAPTURE_HZ, self.link_bytes_per_s) else {
             return;

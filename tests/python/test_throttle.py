@@ -23,6 +23,13 @@ CURRENT_SETTLED_US = 1_000_000
 """After this the reported current, a mean over 0.2 s, has forgotten what was before."""
 
 
+def spin(esc, throttle):
+    """Waits for the arming, then brings the motor to half throttle's speed."""
+    esc.wait_armed()
+    throttle.value = HALF
+    esc.wait_rpm(3000, 3300)
+
+
 def rpm_of(value: int) -> float:
     """The default mapping of throttle in speed mode."""
     return 300.0 + (value - LEAST) / (MOST - LEAST) * 5700.0
@@ -82,9 +89,7 @@ def test_a_lost_signal_stops_the_motor_and_needs_arming_again(start):
     emulator = start(*PATIENT)
     with emulator.connect() as esc, emulator.throttle() as throttle:
         fast(esc)
-        esc.wait_armed()
-        throttle.value = HALF
-        esc.wait_rpm(3000, 3300)
+        spin(esc, throttle)
         throttle.value = None
         begin = esc.status().time_usec
         still = esc.wait_rpm(-STANDS_RPM, STANDS_RPM)
@@ -102,9 +107,7 @@ def test_a_throttle_that_is_open_at_power_up_does_not_turn_the_motor(start):
         assert stands(esc, 1.5)
         assert not esc.armed()
         throttle.value = STOP
-        esc.wait_armed()
-        throttle.value = HALF
-        esc.wait_rpm(3000, 3300)
+        spin(esc, throttle)
 
 
 @pytest.mark.parametrize("value", [STOP, HALF])
@@ -129,9 +132,7 @@ def test_bad_frames_alone_are_a_lost_signal(start):
     emulator = start(*PATIENT)
     with emulator.connect() as esc, emulator.throttle() as throttle:
         fast(esc)
-        esc.wait_armed()
-        throttle.value = HALF
-        esc.wait_rpm(3000, 3300)
+        spin(esc, throttle)
         throttle.bad_crc = True
         esc.wait_rpm(-STANDS_RPM, STANDS_RPM)
 
@@ -203,9 +204,7 @@ def test_datagrams_of_any_length_and_content_do_no_harm(start):
         assert stands(esc)
         assert not esc.armed()
         with emulator.throttle() as throttle:
-            esc.wait_armed()
-            throttle.value = HALF
-            esc.wait_rpm(3000, 3300)
+            spin(esc, throttle)
 
 
 def test_a_flood_of_frames_is_dropped_and_the_esc_goes_on(start):
@@ -216,9 +215,7 @@ def test_a_flood_of_frames_is_dropped_and_the_esc_goes_on(start):
                 wire.sendto(datagram(HALF, DSHOT150), ("127.0.0.1", emulator.signal_port))
         assert stands(esc)
         with emulator.throttle() as throttle:
-            esc.wait_armed()
-            throttle.value = HALF
-            esc.wait_rpm(3000, 3300)
+            spin(esc, throttle)
 
 
 def test_a_fault_latches_until_zero_throttle(start):
