@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use siskin_control::control::back_emf::Delay;
+use siskin_control::control::delay::Delay;
 use siskin_control::drive::{self, Bridge, Config, Sample, Setpoint, Snapshot, State, TRACE_WORDS};
 
 use crate::bench::{LOADS, MOTORS};

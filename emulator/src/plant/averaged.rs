@@ -270,7 +270,7 @@ const DUTY_BIT: f64 = 1.0 / 2_147_483_648.0;
 /// time takes by the sign of each current.
 pub fn inverter(bridge: Bridge, bus_v: f64, currents_a: [f64; 3], dead_time_share: f64) -> Drive {
     match bridge {
-        Bridge::Off => Drive::Off,
+        Bridge::Off | Bridge::Charge(_) | Bridge::Legs(_) => Drive::Off,
         Bridge::Brake => Drive::Phases([0.0; 3]),
         Bridge::Duty(duties) => {
             let mut phases = [0.0; 3];

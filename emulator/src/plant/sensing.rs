@@ -1,6 +1,6 @@
 //! From the plant's quantities to the converter's counts.
 
-use siskin_control::control::back_emf::Delay;
+use siskin_control::control::delay::Delay;
 use siskin_control::drive::Sample;
 use siskin_control::params::Board;
 use siskin_control::units::AdcCounts;
@@ -53,6 +53,8 @@ impl Sensing {
         }
         let bus = (bus_v / BUS_RANGE_V * BUS_COUNTS).clamp(0.0, BUS_COUNTS - 1.0);
         Sample {
+            terminals: [AdcCounts::ZERO; 3],
+            hall: 7,
             currents: counts,
             bus: fixed(if self.bits == 0 {
                 bus

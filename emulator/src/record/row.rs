@@ -101,7 +101,8 @@ impl Row {
         let turns = snapshot.angle.to_num::<f64>();
         let [i_a_a, i_b_a, i_c_a] = period.currents_a.map(|current_a| current_a as f32);
         let duties = match period.bridge {
-            Bridge::Off => [None; 3],
+            Bridge::Off | Bridge::Charge(_) => [None; 3],
+            Bridge::Legs(legs) => legs.map(|leg| leg.map(|duty| duty.to_num::<f32>())),
             Bridge::Brake => [Some(0.0); 3],
             Bridge::Duty(duties) => duties.map(|duty| Some(duty.to_num::<f32>())),
         };

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use siskin_control::control::back_emf::Delay;
+use siskin_control::control::delay::Delay;
 use siskin_control::drive::{Bridge, Setpoint};
 use siskin_control::params::{Params, build};
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
-use siskin_control::control::back_emf::Delay;
+use siskin_control::control::delay::Delay;
 use siskin_control::params::ParamId;
 
 use super::ScenarioError;

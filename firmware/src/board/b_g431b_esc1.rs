@@ -10,7 +10,7 @@ use embassy_stm32::rcc::{Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux
 use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::{Config, Peripherals, pac, triggers};
-use siskin_control::control::back_emf::Delay;
+use siskin_control::control::delay::Delay;
 use siskin_control::params::Board;
 use static_cell::StaticCell;
 

@@ -3,8 +3,9 @@
 //! Each block is a pair of an immutable configuration, computed when the parameters change, and a
 //! state. Nothing here knows of parameters, of the throttle or of time: a call is a period.
 
-pub mod back_emf;
+pub mod delay;
 pub mod modulator;
+pub mod observer;
 pub mod planner;
 pub mod regulator;
 pub mod speed;

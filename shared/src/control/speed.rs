@@ -2,10 +2,11 @@
 
 use fixed::types::extra::{U28, U32};
 
-use super::back_emf::Estimate;
+use super::observer::Estimate;
 use super::regulator::Reference;
+use super::transform::Dq;
 use crate::math::{Gain, TopProduct};
-use crate::units::{Current, InverseFlux, Speed, Torque};
+use crate::units::{Current, Speed, Torque, Voltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +43,6 @@ pub fn current(
     state: &mut State,
     (reference, reference_step): (Speed, Speed),
     estimate: &Estimate,
-    xi: InverseFlux,
     bounds: Bounds,
 ) -> Reference {
     let error = estimate.omega_bar.saturating_sub(reference);
@@ -50,7 +50,7 @@ pub fn current(
         .sigma
         .saturating_sub(config.k_p.saturating_apply(error));
     let integral_step = config.k_i.saturating_apply(error);
-    let i_q = xi.top(torque);
+    let i_q = estimate.xi.top(torque);
     let bounded = i_q.min(bounds.max).max(bounds.min);
     if bounded == i_q {
         state.sigma = state.sigma.saturating_sub(integral_step);
@@ -59,11 +59,15 @@ pub fn current(
             .saturating_apply(reference_step.saturating_sub(estimate.omega_bar_step))
             .saturating_sub(integral_step);
         Reference {
-            i_q,
+            i: Dq {
+                d: Current::ZERO,
+                q: i_q,
+            },
+            u_q: Voltage::ZERO,
             i_q_step: estimate
                 .xi_step
                 .top(torque)
-                .saturating_add(xi.top(torque_step)),
+                .saturating_add(estimate.xi.top(torque_step)),
         }
     } else {
         saturated(state, bounded, i_q, integral_step)
@@ -81,8 +85,5 @@ fn saturated(
     if !pushes_further {
         state.sigma = state.sigma.saturating_sub(integral_step);
     }
-    Reference {
-        i_q: bounded,
-        i_q_step: Current::ZERO,
-    }
+    Reference::steady(bounded)
 }

@@ -6,8 +6,9 @@
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
-use super::back_emf::{self, Delay};
-use super::regulator::{self, Feedback, Reference};
+use super::delay::Delay;
+use super::observer::{Estimate, back_emf};
+use super::regulator::{Feedback, Reference, observer_based as regulator};
 use super::speed::{self, Bounds};
 use super::transform::Dq;
 use crate::drive::Config;
@@ -158,7 +159,11 @@ proptest! {
     ) {
         let units = Units(config());
         let wanted = Reference {
-            i_q: units.current(i_q_star),
+            i: Dq {
+                d: Current::ZERO,
+                q: units.current(i_q_star),
+            },
+            u_q: Voltage::ZERO,
             i_q_step: units.current(p_q_star * TS),
         };
         let feedback = Feedback {
@@ -198,10 +203,11 @@ proptest! {
     ) {
         let units = Units(config());
         let xi = xi_factor / PHI;
-        let estimate = back_emf::Estimate {
+        let estimate = Estimate {
             omega: units.speed(P * omega_m),
             omega_bar: units.speed(P * omega_m),
             omega_bar_step: units.speed(P * y_f * TS),
+            xi: units.xi(xi),
             xi_step: units.xi(xi_dot * TS),
         };
         let mut state = speed::State { sigma: units.torque(sigma) };
@@ -211,20 +217,20 @@ proptest! {
             units.speed(P * omega_dot_star * TS),
         );
         let got = speed::current(
-            &units.0.speed, &mut state, reference, &estimate, units.xi(xi), bounds,
+            &units.0.speed, &mut state, reference, &estimate, bounds,
         );
         let torque = -K_P_OMEGA * error + sigma;
         let i_q = 2.0 / (3.0 * P) * xi * torque;
         let tolerance = 0.001 + TABLE_III * 2.0 / (3.0 * P) * xi * (K_P_OMEGA * error).abs();
         if i_q.abs() < bound - tolerance {
-            near(units.amperes(got.i_q), i_q, 1e-4, tolerance)?;
+            near(units.amperes(got.i.q), i_q, 1e-4, tolerance)?;
             let torque_dot = -K_P_OMEGA * y_f + K_P_OMEGA * omega_dot_star - K_I_OMEGA * error;
             let p_q = 2.0 / (3.0 * P) * (xi_dot * torque + xi * torque_dot);
             near(units.amperes(got.i_q_step) / TS, p_q, TABLE_III, 30.0)?;
             let step = TS * K_I_OMEGA * error;
             near(units.nm(state.sigma), sigma - step, 0.0, TABLE_III * step.abs() + 1e-6)?;
         } else {
-            prop_assert!(units.amperes(got.i_q).abs() <= bound + 1e-4);
+            prop_assert!(units.amperes(got.i.q).abs() <= bound + 1e-4);
         }
     }
 }
@@ -238,18 +244,18 @@ fn at_a_bound_the_integrator_only_comes_back() {
     };
     let sigma_after = |error_rad_s: f64, sigma: f64| {
         let omega = units.speed(P * 300.0);
-        let estimate = back_emf::Estimate {
+        let estimate = Estimate {
             omega,
             omega_bar: omega,
             omega_bar_step: Speed::ZERO,
+            xi: units.xi(1.0 / PHI),
             xi_step: InverseFlux::ZERO,
         };
         let mut state = speed::State {
             sigma: units.torque(sigma),
         };
         let reference = (units.speed(P * (300.0 - error_rad_s)), Speed::ZERO);
-        let xi = units.xi(1.0 / PHI);
-        let got = speed::current(&units.0.speed, &mut state, reference, &estimate, xi, bounds);
+        let got = speed::current(&units.0.speed, &mut state, reference, &estimate, bounds);
         assert_eq!(got.i_q_step, Current::ZERO);
         units.nm(state.sigma) - sigma
     };

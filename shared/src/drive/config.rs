@@ -3,7 +3,9 @@
 use fixed::types::I1F31;
 use fixed::types::extra::{U16, U27, U28, U31, U32};
 
-use crate::control::{back_emf, modulator, regulator, speed, start};
+use crate::control::observer::back_emf;
+use crate::control::regulator::observer_based as regulator;
+use crate::control::{modulator, speed, start};
 use crate::math::Gain;
 use crate::protection;
 use crate::units::{Scale, Speed};

@@ -1,8 +1,10 @@
 //! What a control period remembers, and what of it the tasks may know.
 
 use super::{Config, Fault, Faults};
+use crate::control::observer::back_emf;
+use crate::control::regulator::observer_based as regulator;
 use crate::control::transform::Dq;
-use crate::control::{back_emf, regulator, speed, start};
+use crate::control::{speed, start};
 use crate::protection;
 use crate::units::{Angle, Current, Speed, Voltage};
 

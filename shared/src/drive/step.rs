@@ -5,9 +5,9 @@ use fixed::types::I1F31;
 use super::config::{DeadTime, Direction, Stop};
 use super::state::Seen;
 use super::{Bridge, Config, Fault, Faults, Phase, Sample, Setpoint, State};
-use crate::control::back_emf::{self, Estimate};
 use crate::control::modulator::{self, Supply};
-use crate::control::regulator::{self, Feedback, Reference};
+use crate::control::observer::{Estimate, back_emf};
+use crate::control::regulator::{Feedback, Reference, observer_based as regulator};
 use crate::control::speed::{self, Bounds};
 use crate::control::transform::{AlphaBeta, Dq, clarke, inverse_park, park, phases, rotate_frame};
 use crate::control::{planner, start};
@@ -77,6 +77,7 @@ fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
     // No current, or one against the rotation, brakes what turns but starts nothing.
     let starts = match setpoint {
         Setpoint::Torque(current) | Setpoint::Test(current) => current > Current::ZERO,
+        Setpoint::Voltage(share) => share > I1F31::ZERO,
         _ => wanted,
     };
     match state.phase {
@@ -168,7 +169,7 @@ fn drive(
     // the bench at 15 kHz.
     let ahead = sin_cos(theta.wrapping_add(config.observer.delay.advance(omega)));
     let v = inverse_park(u, ahead);
-    let compensation = dead_time(&config.dead_time, wanted.i_q, ahead);
+    let compensation = dead_time(&config.dead_time, wanted.i.q, ahead);
     let duties = modulator::duties(&config.modulator, &supply, v, compensation);
     Bridge::Duty(in_order(config, duties))
 }
@@ -186,10 +187,7 @@ fn run(config: &Config, state: &mut State, setpoint: Setpoint, estimate: &Estima
             let i_q = current.min(full.max).max(full.min);
             state.reference = estimate.omega_bar;
             state.speed.sigma = torque(i_q);
-            return Reference {
-                i_q,
-                i_q_step: Current::ZERO,
-            };
+            return Reference::steady(i_q);
         }
         (_, Stop::Brake) => (
             Speed::ZERO,
@@ -207,7 +205,6 @@ fn run(config: &Config, state: &mut State, setpoint: Setpoint, estimate: &Estima
         &mut state.speed,
         (reference, step),
         estimate,
-        state.observer.xi,
         bounds,
     )
 }
@@ -229,11 +226,7 @@ fn open_loop(config: &Config, state: &mut State, setpoint: Setpoint) -> (Speed, 
     }
     let (h_d, xi) = (state.observer.h.d, config.observer.xi_nominal);
     let yields = start::damp(&config.start, &mut state.start, h_d, omega, xi);
-    let reference = Reference {
-        i_q,
-        i_q_step: Current::ZERO,
-    };
-    (omega.saturating_add(yields), omega, reference)
+    (omega.saturating_add(yields), omega, Reference::steady(i_q))
 }
 
 /// The phase of the next period: hand-over at the ramp's end, back to the start where the rotor

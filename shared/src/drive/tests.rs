@@ -20,6 +20,8 @@ fn sample(currents_a: [f64; 3], bus_v: f64) -> Sample {
     Sample {
         currents: currents_a.map(|a| AdcCounts::from_num(a * COUNTS_PER_A)),
         bus: AdcCounts::from_num(bus_v * 4096.0 / 70.0),
+        terminals: [AdcCounts::ZERO; 3],
+        hall: 7,
     }
 }
 
@@ -247,6 +249,8 @@ fn no_sample_makes_it_overflow() {
         let sample = Sample {
             currents: [reading(), reading(), reading()].map(|i| i / 2),
             bus: reading().abs() * 2,
+            terminals: [reading(), reading(), reading()].map(|v| v.abs() * 2),
+            hall: period as u8 & 7,
         };
         let setpoint = if period % 7 == 0 {
             Setpoint::Stop

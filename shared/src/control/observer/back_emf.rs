@@ -4,48 +4,11 @@
 
 use fixed::types::extra::{U28, U32};
 
-use super::transform::Dq;
+use super::Estimate;
+use crate::control::delay::Delay;
+use crate::control::transform::Dq;
 use crate::math::{Gain, TopProduct, magnitude};
 use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
-
-/// Periods between the sample and the voltage that it leads to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Delay {
-    /// At once.
-    None,
-    /// Half a period later.
-    Half,
-    /// A period later: one duty update a period, preloaded.
-    One,
-}
-
-impl Delay {
-    /// How far the rotor's frame turns from the sample to the middle of the voltage, at this
-    /// speed: (0.5 + delay) periods.
-    #[inline(always)]
-    pub fn advance(self, speed: Speed) -> Angle {
-        let half = Angle::from_bits(speed.to_bits() >> 1);
-        match self {
-            Self::None => half,
-            Self::Half => speed,
-            Self::One => speed.wrapping_add(half),
-        }
-    }
-
-    /// The voltage between this sample and the next, of what is commanded now and what was before.
-    #[inline(always)]
-    fn applied(self, now: Dq<Voltage>, before: Dq<Voltage>) -> Dq<Voltage> {
-        let mean = |a: Voltage, b: Voltage| Voltage::from_bits((a.to_bits() + b.to_bits()) >> 1);
-        match self {
-            Self::None => now,
-            Self::Half => Dq {
-                d: mean(now.d, before.d),
-                q: mean(now.q, before.q),
-            },
-            Self::One => before,
-        }
-    }
-}
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,19 +56,6 @@ pub struct State {
     pub u_before: Dq<Voltage>,
 }
 
-/// What the observer says at a sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// ω̂ = ξ̂·|ĥ| + k_η·ĥ_d (7): the step of θ̂.
-    pub omega: Speed,
-    /// ω̄̂ = ξ̂·|ĥ|: the speed without the term that passes the noise.
-    pub omega_bar: Speed,
-    /// y_f of (28), the change of ω̄̂ in a period.
-    pub omega_bar_step: Speed,
-    /// Change of ξ̂ in this period.
-    pub xi_step: InverseFlux,
-}
-
 /// The speed at a sample, of (7) and (28).
 #[inline(always)]
 pub fn estimate(config: &Config, state: &mut State) -> Estimate {
@@ -120,6 +70,7 @@ pub fn estimate(config: &Config, state: &mut State) -> Estimate {
         omega,
         omega_bar,
         omega_bar_step,
+        xi: state.xi,
         xi_step: config.gamma.saturating_apply(state.h.d),
     }
 }

@@ -2,9 +2,10 @@
 
 use fixed::types::extra::U28;
 
-use super::transform::Dq;
+use super::{Feedback, Reference};
+use crate::control::transform::Dq;
 use crate::math::{Gain, TopProduct};
-use crate::units::{Current, Speed, Voltage};
+use crate::units::{Current, Voltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,28 +29,6 @@ pub struct State {
     pub sigma: Dq<Voltage>,
 }
 
-/// The current that is wanted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
-    /// i_q*; i_d* is zero.
-    pub i_q: Current,
-    /// p_q*, its change in a period.
-    pub i_q_step: Current,
-}
-
-/// What the regulator reads of the observer and of the sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Feedback {
-    /// ω̂, the speed of the frame.
-    pub omega: Speed,
-    /// Measured currents.
-    pub i: Dq<Current>,
-    /// Estimated currents.
-    pub i_hat: Dq<Current>,
-    /// Estimated back-EMF.
-    pub h_hat: Dq<Voltage>,
-}
-
 /// The voltage that brings the estimated currents to (0, i_q*), before any limit (10).
 #[inline(always)]
 pub fn voltage(config: &Config, state: &State, wanted: Reference, fb: &Feedback) -> Dq<Voltage> {
@@ -61,13 +40,14 @@ pub fn voltage(config: &Config, state: &State, wanted: Reference, fb: &Feedback)
             .sigma
             .d
             .saturating_sub(fb.h_hat.d)
+            .saturating_add(config.resistance.saturating_apply(wanted.i.d))
             .saturating_sub(config.reactance.saturating_apply(cross_d))
             .saturating_sub(config.k_pe.saturating_apply(e.d)),
         q: state
             .sigma
             .q
             .saturating_sub(fb.h_hat.q)
-            .saturating_add(config.resistance.saturating_apply(wanted.i_q))
+            .saturating_add(config.resistance.saturating_apply(wanted.i.q))
             .saturating_add(config.reactance.saturating_apply(cross_q))
             .saturating_add(config.inductance.saturating_apply(wanted.i_q_step))
             .saturating_sub(config.k_pe.saturating_apply(e.q)),
@@ -87,7 +67,7 @@ pub fn integrate(config: &Config, state: &mut State, wanted: Reference, fb: &Fee
 #[inline(always)]
 fn error(wanted: Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
-        d: fb.i_hat.d,
-        q: fb.i_hat.q.saturating_sub(wanted.i_q),
+        d: fb.i_hat.d.saturating_sub(wanted.i.d),
+        q: fb.i_hat.q.saturating_sub(wanted.i.q),
     }
 }

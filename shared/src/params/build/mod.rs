@@ -1,18 +1,22 @@
 //! The configuration that the parameters make: SI values become the control's coefficients, once.
 
+mod observer;
+mod outer;
+mod regulator;
+mod start;
+
 use core::f32::consts::{FRAC_PI_2, TAU};
 
+use fixed::types::I1F31;
 use fixed::types::extra::Unsigned;
-use fixed::types::{I1F31, I36F28};
 
 use super::{ParamId, Params};
-use crate::control::back_emf::{self, Delay};
+use crate::control::delay::Delay;
 use crate::control::modulator::{self, Modulation};
-use crate::control::{regulator, speed, start};
 use crate::drive::{Config, DeadTime, Direction, Stop};
 use crate::math::Gain;
 use crate::protection;
-use crate::units::{AdcCounts, InverseFlux, Scale, Voltage};
+use crate::units::{AdcCounts, Scale, Voltage};
 
 /// What the control must know of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,27 +42,11 @@ pub struct BuildError {
     pub reason: &'static str,
 }
 
-/// ξ of the stated flux in the control's units: the voltage base makes it so for every motor.
-const XI_NOMINAL: f32 = 0.25;
-
 /// The supply may be at most this many units of voltage, of the eight that the type holds.
 const BUS_UNITS_MAX: f32 = 6.0;
 
-/// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
-/// 2357 1/s.
-const ATTITUDE_SHARE: f32 = 0.1806;
-
-/// Poles of the current regulator (21): Table III has −2357 and −2142, the second at 0.909.
-const SECOND_POLE_SHARE: f32 = 0.909;
-
 /// Speed at which (22) is linearised, of `CTL_RPM_MAX`: 4500 rpm on the bench.
 const LINEARISED_SHARE: f32 = 0.75;
-
-/// k_iω/k_pω over k_pω/J: Table III has 5.87 against 49.65 1/s.
-const SPEED_CORNER_SHARE: f32 = 0.1183;
-
-/// k_f over the current bandwidth: 500 against 2357 1/s (section V).
-const FILTER_SHARE: f32 = 0.2121;
 
 /// The phase current from which its sign is certain; below, the dead time is compensated in
 /// proportion.
@@ -67,12 +55,6 @@ const SIGN_CERTAIN_A: f32 = 0.3;
 /// For how long ξ̂ may stand at the end of its range, s: far longer than any transient that the
 /// observer recovers from.
 const LOST_S: f32 = 0.1;
-
-/// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
-const SWING_DAMPING: f32 = 0.5;
-
-/// Rate at which the frame yields, over the swing's ω_n: fast against it, slow against noise.
-const YIELD_RATE_SHARE: f32 = 5.0;
 
 /// Share below which Run ends, of the speed at which it begins or of the least that can be asked
 /// for: the hysteresis of the second paper's 3.2.4.
@@ -91,9 +73,6 @@ const BANDWIDTH_SHARE: f32 = 0.05;
 
 /// Greatest speed bandwidth of the current bandwidth: nested loops need that distance.
 const SPEED_SHARE: f32 = 0.2;
-
-/// What a test of the motor may use of `LIM_PHASE_A`.
-const TEST_SHARE: f32 = 0.2;
 
 /// Software trip over `LIM_PHASE_A`.
 const TRIP_SHARE: f32 = 1.4;
@@ -176,11 +155,11 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
             0.0 => Stop::Coast,
             _ => Stop::Brake,
         },
-        observer: observer(&p, &scale, board.delay)?,
-        regulator: current_regulator(&p, &scale)?,
-        speed: speed_regulator(&p, &scale)?,
+        observer: observer::back_emf(&p, &scale, board.delay)?,
+        regulator: regulator::observer_based(&p, &scale)?,
+        speed: outer::speed(&p, &scale)?,
         slew: scale.speed_from_rpm(get(ParamId::CtlSlewRpmS) * p.period_s),
-        start: start_up(params, &p, &scale)?,
+        start: start::start(params, &p, &scale)?,
         slow: scale
             .speed_from_rpm(SLOW_SHARE * get(ParamId::StaRunRpm).min(get(ParamId::CtlRpmMin))),
         coast: gain(ParamId::PwmFreqHz, p.period_s / COAST_S)?,
@@ -242,120 +221,6 @@ fn gain<A: Unsigned, B: Unsigned>(param: ParamId, k: f32) -> Result<Gain<A, B>, 
     Gain::new(k).ok_or(BuildError {
         param,
         reason: "makes a coefficient leave its range",
-    })
-}
-
-/// (6), (7), (20), (22), (28).
-fn observer(p: &Si, scale: &Scale, delay: Delay) -> Result<back_emf::Config, BuildError> {
-    let r_over_l = p.resistance_ohm / p.inductance_h;
-    let decay = -libm::expm1f(-r_over_l * p.period_s);
-    // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
-    let acts_s = decay / r_over_l;
-    let current_per_voltage = scale.voltage_v / scale.current_a;
-    let rad_per_unit = TAU / p.period_s;
-
-    // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
-    let k_p = 2.0 * p.current_rad_s - r_over_l;
-    let k_i = 2.0 * p.inductance_h * p.current_rad_s * p.current_rad_s;
-    // λ² + χ·k_η·λ + χ²·γ with both poles at (−1 ± i)·s (22).
-    let chi = p.linearised_rad_s * p.flux_wb;
-    let pole_rad_s = ATTITUDE_SHARE * p.current_rad_s;
-    let k_eta = 2.0 * pole_rad_s / chi;
-    let gamma = 2.0 * pole_rad_s * pole_rad_s / (chi * chi);
-
-    Ok(back_emf::Config {
-        delay,
-        decay: gain(ParamId::MotRMohm, decay)?,
-        admittance: gain(
-            ParamId::MotLUh,
-            acts_s / p.inductance_h * current_per_voltage,
-        )?,
-        rotation: gain(ParamId::MotLUh, acts_s * rad_per_unit)?,
-        k_p: gain(ParamId::CtlBwCurHz, k_p * acts_s)?,
-        k_i: gain(ParamId::CtlBwCurHz, k_i * p.period_s / current_per_voltage)?,
-        k_eta: gain(ParamId::CtlBwCurHz, k_eta * scale.voltage_v / rad_per_unit)?,
-        gamma: gain(
-            ParamId::CtlBwCurHz,
-            gamma * p.period_s * scale.voltage_v / scale.inverse_flux_per_wb(),
-        )?,
-        k_f: gain(
-            ParamId::CtlBwCurHz,
-            FILTER_SHARE * p.current_rad_s * p.period_s,
-        )?,
-        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
-        xi_min: InverseFlux::from_num(XI_NOMINAL / 2.0),
-        // Twice the nominal is one bit more than the type holds.
-        xi_max: InverseFlux::MAX,
-    })
-}
-
-/// (10), (21).
-fn current_regulator(p: &Si, scale: &Scale) -> Result<regulator::Config, BuildError> {
-    let voltage_per_current = scale.current_a / scale.voltage_v;
-    let r_over_l = p.resistance_ohm / p.inductance_h;
-    // λ² + (R/L + k_pe)·λ + k_ie/L with poles at −1/ε and −0.909/ε (21).
-    let k_pe = (1.0 + SECOND_POLE_SHARE) * p.current_rad_s - r_over_l;
-    let k_ie = SECOND_POLE_SHARE * p.inductance_h * p.current_rad_s * p.current_rad_s;
-    Ok(regulator::Config {
-        resistance: gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current)?,
-        reactance: gain(
-            ParamId::MotLUh,
-            p.inductance_h * voltage_per_current * TAU / p.period_s,
-        )?,
-        inductance: gain(
-            ParamId::MotLUh,
-            p.inductance_h * voltage_per_current / p.period_s,
-        )?,
-        k_pe: gain(
-            ParamId::CtlBwCurHz,
-            p.inductance_h * k_pe * voltage_per_current,
-        )?,
-        k_ie: gain(ParamId::CtlBwCurHz, k_ie * p.period_s * voltage_per_current)?,
-    })
-}
-
-/// (8), from the bandwidth and the inertia.
-fn speed_regulator(p: &Si, scale: &Scale) -> Result<speed::Config, BuildError> {
-    let rad_per_unit = TAU / (p.pole_pairs * p.period_s);
-    let k_p = p.inertia_kgm2 * p.speed_rad_s;
-    let k_i = k_p * SPEED_CORNER_SHARE * p.speed_rad_s;
-    let torque_per_speed = rad_per_unit / scale.torque_nm();
-    Ok(speed::Config {
-        k_p: gain(ParamId::CtlBwSpdHz, k_p * torque_per_speed)?,
-        k_i: gain(ParamId::CtlBwSpdHz, k_i * p.period_s * torque_per_speed)?,
-    })
-}
-
-/// Section 3.2 of the second paper.
-fn start_up(params: &Params, p: &Si, scale: &Scale) -> Result<start::Config, BuildError> {
-    let current_a = params
-        .get(ParamId::StaRampA)
-        .min(params.get(ParamId::LimPhaseA));
-    let current = scale.current_from_a(current_a);
-    let park_charge = params.get(ParamId::StaParkAs) / (scale.current_a * p.period_s);
-    // A quarter of a turn in the first half of the charge.
-    let sweep = 0.25 / (0.5 * park_charge);
-    let step = params.get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
-    // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
-    // 2ζ/ω_n a unit of speed damps it by ζ.
-    let stiffness = 1.5 * p.pole_pairs * p.pole_pairs * p.flux_wb * current_a;
-    let swing_rad_s = libm::sqrtf(stiffness / p.inertia_kgm2);
-    let yielding_s = 2.0 * SWING_DAMPING / swing_rad_s;
-    Ok(start::Config {
-        current,
-        test_current: scale.current_from_a(TEST_SHARE * params.get(ParamId::LimPhaseA)),
-        yielding: gain(ParamId::MotJGcm2, yielding_s / p.period_s)?,
-        yield_rate: gain(
-            ParamId::MotJGcm2,
-            (YIELD_RATE_SHARE * swing_rad_s * p.period_s).min(1.0),
-        )?,
-        park_charge: I36F28::saturating_from_num(park_charge),
-        sweep: gain(ParamId::StaParkAs, sweep)?,
-        k_s: gain(
-            ParamId::StaRampRpmS,
-            step * scale.current_a / params.get(ParamId::StaRampA),
-        )?,
-        run_speed: scale.speed_from_rpm(params.get(ParamId::StaRunRpm)),
     })
 }
 

@@ -1,0 +1,43 @@
+//! From the sample to the voltage that it leads to.
+
+use super::transform::Dq;
+use crate::units::{Angle, Speed, Voltage};
+
+/// Periods between the sample and the voltage that it leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Delay {
+    /// At once.
+    None,
+    /// Half a period later.
+    Half,
+    /// A period later: one duty update a period, preloaded.
+    One,
+}
+
+impl Delay {
+    /// How far the rotor's frame turns from the sample to the middle of the voltage, at this
+    /// speed: (0.5 + delay) periods.
+    #[inline(always)]
+    pub fn advance(self, speed: Speed) -> Angle {
+        let half = Angle::from_bits(speed.to_bits() >> 1);
+        match self {
+            Self::None => half,
+            Self::Half => speed,
+            Self::One => speed.wrapping_add(half),
+        }
+    }
+
+    /// The voltage between this sample and the next, of what is commanded now and what was before.
+    #[inline(always)]
+    pub(super) fn applied(self, now: Dq<Voltage>, before: Dq<Voltage>) -> Dq<Voltage> {
+        let mean = |a: Voltage, b: Voltage| Voltage::from_bits((a.to_bits() + b.to_bits()) >> 1);
+        match self {
+            Self::None => now,
+            Self::Half => Dq {
+                d: mean(now.d, before.d),
+                q: mean(now.q, before.q),
+            },
+            Self::One => before,
+        }
+    }
+}
