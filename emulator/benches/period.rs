@@ -1,12 +1,14 @@
 //! What a control period costs on this machine: the control's step, the plant, and both.
 
+use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use siskin_control::drive::{self, Bridge, Setpoint, State};
 use siskin_control::params::{Params, build};
+use siskin_control::units::Duty;
 use siskin_emulator::bench::{LOADS, MOTORS};
-use siskin_emulator::plant::{Averaged, inverter};
+use siskin_emulator::plant::{Fidelity, Plant};
 use siskin_emulator::rig::{Bench, Rig};
 
 /// The default bench with the shaft at 4500 rpm, settled in field-oriented control.
@@ -41,17 +43,34 @@ fn benches(criterion: &mut Criterion) {
         });
     });
 
-    let mut plant = Averaged::new(MOTORS[0].1, LOADS[0].1, 0.0, 0.0);
-    plant.impose(471.0);
-    let bridge = Bridge::Duty([0.5, 0.6, 0.4].map(siskin_control::units::Duty::from_num));
-    criterion.bench_function("averaged plant, one period", |bencher| {
-        bencher.iter(|| {
-            for _ in 0..2 {
-                let drive = inverter(black_box(bridge), 24.0, plant.currents_a(), 0.012);
-                black_box(plant.advance(drive, 24.0, 0.5 / 24_000.0));
-            }
+    for (name, fidelity) in [
+        ("averaged plant, one period", Fidelity::Averaged),
+        ("switching plant, one period", Fidelity::Switching),
+    ] {
+        let mut plant = Plant::new(fidelity, MOTORS[0].1, LOADS[0].1, 0.0, 0.0);
+        // Three turns in 50 periods: 4500 rpm.
+        plant.impose(TAU * 3.0 / 50.0 * 15_000.0 / f64::from(MOTORS[0].1.pole_pairs));
+        let duties = commanded();
+        let mut next = duties.iter().cycle();
+        criterion.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                let bridge = next.next().copied().unwrap_or(Bridge::Off);
+                black_box(plant.period([black_box(bridge); 2], 24.0, 1.0 / 15_000.0, 500e-9))
+            });
         });
-    });
+    }
+}
+
+/// What field-oriented control commands at 4500 rpm and 15 kHz, turn after turn: 50 periods are
+/// three.
+fn commanded() -> Vec<Bridge> {
+    (0..50)
+        .map(|k| {
+            let angle = TAU * 3.0 * f64::from(k + 1) / 50.0;
+            let duty = |phase: f64| 0.5 - 0.35 * (angle - TAU * phase / 3.0).sin();
+            Bridge::Duty([0.0, 1.0, 2.0].map(|phase| Duty::from_num(duty(phase))))
+        })
+        .collect()
 }
 
 criterion_group!(period, benches);

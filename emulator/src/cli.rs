@@ -1,13 +1,14 @@
 //! The command line.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use siskin_control::params::ParamId;
+use siskin_control::params::{ParamId, Preset};
 use siskin_emulator::link::Endpoint;
 use siskin_emulator::live::Pace;
 use siskin_emulator::parameter;
-use siskin_emulator::plant::Supply;
+use siskin_emulator::plant::{Fidelity, Supply};
 use siskin_emulator::wire::SignalAddress;
 
 /// The motor that the parameters' defaults describe.
@@ -33,6 +34,8 @@ pub(crate) enum Command {
     Run(RunArgs),
     /// Runs a scenario from a file, offline
     Scenario(ScenarioArgs),
+    /// Measures the figures of a paper
+    Reproduce(ReproduceArgs),
     /// Draws a recording
     Plot(PlotArgs),
 }
@@ -60,8 +63,8 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "VOLTS|Ns", default_value = "24", value_parser = bus)]
     pub(crate) bus: Supply,
     /// How the inverter is simulated
-    #[arg(long, value_enum, default_value_t = Plant::Averaged)]
-    pub(crate) plant: Plant,
+    #[arg(long, value_enum, default_value_t = Fidelity::Averaged)]
+    pub(crate) plant: Fidelity,
     /// Simulated seconds a second, or max
     #[arg(long, value_name = "X|max", default_value = "1", value_parser = pace)]
     pub(crate) speed: Pace,
@@ -85,12 +88,23 @@ pub(crate) struct ScenarioArgs {
     /// Another seed than the file's
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
+    /// Runs the scenario for each seed from A to B, both included
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with = "seed")]
+    pub(crate) seeds: Option<RangeInclusive<u64>>,
+    /// Gives a key of the file one value, in place of what sweeps or draws it, as bench.scale.R=0.7
+    /// or signal.0.rpm=3000.0 (entries count from 0); repeatable
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key)]
+    pub(crate) set: Vec<(String, toml::Value)>,
     #[command(flatten)]
     pub(crate) common: CommonArgs,
 }
 
 #[derive(Args, Debug)]
 pub(crate) struct CommonArgs {
+    /// Sets the parameters of a named set before the start, as --param does: bosso-table-iii is the
+    /// first paper's drive as published
+    #[arg(long, value_name = "NAME", value_parser = parameter::preset)]
+    pub(crate) preset: Option<&'static Preset>,
     /// Sets a parameter before the start, over what is stored or in the file, without storing it; repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = parameter::assignment)]
     pub(crate) param: Vec<(ParamId, f32)>,
@@ -102,6 +116,44 @@ pub(crate) struct CommonArgs {
     pub(crate) json: bool,
 }
 
+impl ScenarioArgs {
+    /// The keys that are set, parameters among them: what repeats a run is then one list.
+    pub(crate) fn keys(&self) -> Vec<(String, toml::Value)> {
+        let of_param = |(id, value): (ParamId, f32)| {
+            // By way of its shortest text: 75.6 stays 75.6 as a double.
+            let value = value.to_string().parse().unwrap_or(f64::from(value));
+            let key = format!("params.{}", id.entry().name);
+            (key, toml::Value::Float(value))
+        };
+        let params = self.common.params().into_iter().map(of_param);
+        params.chain(self.set.iter().cloned()).collect()
+    }
+}
+
+impl CommonArgs {
+    /// The preset's parameters, and those given one by one over them.
+    pub(crate) fn params(&self) -> Vec<(ParamId, f32)> {
+        let preset = self.preset.map_or(&[][..], |preset| preset.settings);
+        preset.iter().chain(&self.param).copied().collect()
+    }
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct ReproduceArgs {
+    /// The paper
+    #[arg(value_enum)]
+    pub(crate) paper: Paper,
+    /// Prints the figures as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Paper {
+    /// Flux crossings: S. Colton, 2014
+    Colton,
+}
+
 #[derive(Args, Debug)]
 pub(crate) struct PlotArgs {
     /// A recording
@@ -109,12 +161,6 @@ pub(crate) struct PlotArgs {
     /// The picture to make
     #[arg(short, long, value_name = "PICTURE.svg|.png")]
     pub(crate) output: PathBuf,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Plant {
-    /// By its mean voltage over each half period
-    Averaged,
 }
 
 fn bus(text: &str) -> Result<Supply, String> {
@@ -137,4 +183,24 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds
         .filter(|seconds| (0.0..=1e7).contains(seconds))
         .ok_or_else(|| "give seconds from 0 to 1e7".to_owned())
+}
+
+fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let ends = text.split_once("..");
+    let ends = ends.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    match ends {
+        Some((first, last)) if first <= last => Ok(first..=last),
+        _ => Err("give the first and the last seed, as 1..200".to_owned()),
+    }
+}
+
+/// A value is TOML, or else text: quotes are for what would be a number.
+fn key(text: &str) -> Result<(String, toml::Value), String> {
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| "give a key of the file and its value, as bench.scale.R=0.7".to_owned())?;
+    let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
+    let parsed = parsed.ok().and_then(|mut table| table.remove("value"));
+    let value = parsed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
+    Ok((key.to_owned(), value))
 }

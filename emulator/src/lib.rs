@@ -3,7 +3,8 @@
 //! [`rig`] runs the control's step against the [`plant`], period by period. [`device`] puts the
 //! tasks' side of the ESC, the throttle [`wire`] and the [`flash`] around it. [`live`] runs that in
 //! real time on the MAVLink [`link`]s, and [`scenario`] runs it offline from a file. [`watch`] looks on
-//! for the [`summary`] and for the [`record`], and [`plot`] draws.
+//! for the [`summary`] and for the [`record`], in the [`shaft`]'s own direction, and [`plot`] draws.
+//! [`reproduce`] measures the papers' own figures.
 #![forbid(unsafe_code)]
 
 pub mod bench;
@@ -15,8 +16,10 @@ pub mod parameter;
 pub mod plant;
 pub mod plot;
 pub mod record;
+pub mod reproduce;
 pub mod rig;
 pub mod scenario;
+pub mod shaft;
 pub mod summary;
 pub mod watch;
 pub mod wire;

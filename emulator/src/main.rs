@@ -9,15 +9,17 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
+use indicatif::ProgressBar;
 use siskin_emulator::bench::Choice;
 use siskin_emulator::flash::FileFlash;
 use siskin_emulator::link::Endpoint;
 use siskin_emulator::live::{self, Session};
 use siskin_emulator::plot;
+use siskin_emulator::reproduce;
 use siskin_emulator::rig::Bench;
-use siskin_emulator::scenario;
+use siskin_emulator::scenario::{self, Plan};
 
-use cli::{Cli, Command, PlotArgs, RunArgs, ScenarioArgs};
+use cli::{Cli, Command, Paper, PlotArgs, ReproduceArgs, RunArgs, ScenarioArgs};
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -28,6 +30,7 @@ fn main() -> ExitCode {
         None => run(cli.run),
         Some(Command::Run(args)) => run(args),
         Some(Command::Scenario(args)) => scenario(&args),
+        Some(Command::Reproduce(args)) => reproduce(&args),
         Some(Command::Plot(args)) => plot(&args),
     };
     match result {
@@ -73,6 +76,7 @@ fn run(args: RunArgs) -> Result<bool, String> {
             motor,
             load,
             supply: args.bus,
+            plant: args.plant,
             seed: args.seed,
             ..Bench::default()
         },
@@ -85,7 +89,7 @@ fn run(args: RunArgs) -> Result<bool, String> {
         pace: args.speed,
         duration: args.duration.map(Duration::from_secs_f64),
         flash: storage(args.storage.as_deref())?,
-        params: args.common.param.clone(),
+        params: args.common.params(),
         record: args.common.record.clone(),
     };
     let report = live::run(session, |opened, device| {
@@ -137,18 +141,44 @@ fn state_file() -> Option<PathBuf> {
 
 fn scenario(args: &ScenarioArgs) -> Result<bool, String> {
     let options = scenario::Options {
-        seed: args.seed,
-        params: args.common.param.clone(),
+        seeds: args.seeds.clone().or(args.seed.map(|seed| seed..=seed)),
+        set: args.keys(),
         record: args.common.record.clone(),
     };
-    let outcome = scenario::run(&args.file, &options)
-        .map_err(|error| format!("{}: {error}", args.file.display()))?;
+    let line = |error| format!("{}: {error}", args.file.display());
+    let plan = Plan::read(&args.file, &options).map_err(line)?;
+    if args.seeds.is_some() || plan.runs() > 1 {
+        // On standard error, and nothing where that is no terminal.
+        let bar = ProgressBar::new(plan.runs() as u64);
+        let survey = plan.survey(|| bar.inc(1));
+        bar.finish_and_clear();
+        let survey = survey.map_err(line)?;
+        report::print(&if args.common.json {
+            report::json(&survey)?
+        } else {
+            report::survey(&survey)
+        })?;
+        return Ok(survey.held());
+    }
+    let outcome = plan.play().map_err(line)?;
     report::print(&if args.common.json {
         report::json(&outcome)?
     } else {
         report::figures(&outcome.report) + &report::verdicts(&outcome)
     })?;
     Ok(outcome.held())
+}
+
+fn reproduce(args: &ReproduceArgs) -> Result<bool, String> {
+    let reproduction = match args.paper {
+        Paper::Colton => reproduce::colton(),
+    };
+    report::print(&if args.json {
+        report::json(&reproduction)?
+    } else {
+        reproduction.to_string()
+    })?;
+    Ok(true)
 }
 
 fn plot(args: &PlotArgs) -> Result<bool, String> {

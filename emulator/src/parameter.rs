@@ -1,6 +1,6 @@
 //! Parameters from a command line or a scenario.
 
-use siskin_control::params::{ParamId, Params, SetError};
+use siskin_control::params::{PRESETS, ParamId, Params, Preset, SetError};
 
 /// A parameter by name, its value checked against the table.
 ///
@@ -35,6 +35,20 @@ pub fn assignment(text: &str) -> Result<(ParamId, f32), String> {
         name,
         number.map_err(|_| format!("{name}: {value} is not a number"))?,
     )
+}
+
+/// A named set of parameters.
+///
+/// # Errors
+/// One line that names those that there are.
+pub fn preset(name: &str) -> Result<&'static Preset, String> {
+    PRESETS
+        .iter()
+        .find(|preset| preset.name == name)
+        .ok_or_else(|| {
+            let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
+            format!("there is no preset {name}; there is {}", names.join(", "))
+        })
 }
 
 #[cfg(test)]

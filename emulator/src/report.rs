@@ -7,7 +7,7 @@ use std::io::{self, Write as _};
 use siskin_control::params::ParamId;
 use siskin_emulator::device::Device;
 use siskin_emulator::live::Opened;
-use siskin_emulator::scenario::Outcome;
+use siskin_emulator::scenario::{Outcome, Survey, Verdict};
 use siskin_emulator::summary::Report;
 
 use crate::cli::{DEFAULT_MOTOR, RunArgs};
@@ -111,20 +111,70 @@ pub(crate) fn figures(report: &Report) -> String {
 /// Whether a scenario's expectations held.
 pub(crate) fn verdicts(outcome: &Outcome) -> String {
     let mut text = String::new();
+    for (key, value) in &outcome.drawn {
+        line(&mut text, format_args!("drawn: {key} = {value}"));
+    }
     for verdict in &outcome.expectations {
         let held = if verdict.held { "held" } else { "FAILED" };
-        let value = verdict
-            .value
-            .map_or_else(|| "no data".to_owned(), |value| value.to_string());
+        line(&mut text, format_args!("{held}: {}", sentence(verdict)));
+    }
+    text
+}
+
+/// What many runs came to.
+pub(crate) fn survey(survey: &Survey) -> String {
+    let pace = survey.sim_per_wall.unwrap_or_default();
+    let mut text = format!(
+        "{} runs, {} failed; {:.1} s simulated in {:.2} s ({pace:.1} times real \
+         time), {} control periods, traces {}\n",
+        survey.runs, survey.failed, survey.sim_s, survey.wall_s, survey.steps, survey.trace_hash
+    );
+    for (fault, runs) in &survey.faults {
+        line(&mut text, format_args!("fault in {runs}: {fault}"));
+    }
+    for failure in &survey.failures {
+        let broken: Vec<_> = failure.expectations.iter().map(sentence).collect();
+        line(
+            &mut text,
+            format_args!("failed: {}: {}", failure.options, broken.join("; ")),
+        );
+    }
+    let more = survey.failed - survey.failures.len();
+    if more > 0 {
+        line(&mut text, format_args!("failed: {more} more"));
+    }
+    for expected in &survey.expectations {
+        let held = match expected.failed {
+            0 => "held".to_owned(),
+            failed => format!("FAILED in {failed}"),
+        };
         line(
             &mut text,
             format_args!(
-                "{held}: {}.{} is {value}, wanted {}",
-                verdict.window, verdict.key, verdict.wanted
+                "{held}: {}.{} is at worst {}, wanted {}, with {}",
+                expected.window,
+                expected.key,
+                number(expected.worst),
+                expected.wanted,
+                expected.options
             ),
         );
     }
     text
+}
+
+fn sentence(verdict: &Verdict) -> String {
+    format!(
+        "{}.{} is {}, wanted {}",
+        verdict.window,
+        verdict.key,
+        number(verdict.value),
+        verdict.wanted
+    )
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "no data".to_owned(), |value| value.to_string())
 }
 
 fn line(text: &mut String, arguments: std::fmt::Arguments) {

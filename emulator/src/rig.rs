@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use siskin_control::control::delay::Delay;
-use siskin_control::drive::{self, Bridge, Config, Sample, Setpoint, Snapshot, State, TRACE_WORDS};
+use siskin_control::drive::{self, Bridge, Config, Sample, Setpoint, Snapshot, State};
 
 use crate::bench::{LOADS, MOTORS};
-use crate::plant::{Averaged, Flow, Load, Motor, Noise, Sensing, Supply, Thermal, inverter};
+use crate::plant::{Fidelity, Flow, Load, Motor, Noise, Plant, Sensing, Supply, Thermal, Truth};
 
 /// What stands on the bench.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,8 +17,12 @@ pub struct Bench {
     pub load: Load,
     /// What feeds it.
     pub supply: Supply,
-    /// Current sensors and converter.
+    /// How the inverter is simulated.
+    pub plant: Fidelity,
+    /// Sensors and converter.
     pub sensing: Sensing,
+    /// What a broken Hall sensor shows.
+    pub hall_stuck: [Option<bool>; 3],
     /// Control periods from the sample to the voltage.
     pub delay: Delay,
     /// Dead time of the inverter, s; `None` is what the parameters set the timer to.
@@ -42,12 +46,9 @@ impl Default for Bench {
             motor: MOTORS[0].1,
             load: LOADS[0].1,
             supply: Supply::stiff(24.0),
-            sensing: Sensing {
-                range_a: 40.0,
-                bits: 12,
-                noise_a: 0.05,
-                offset_a: [0.0; 3],
-            },
+            plant: Fidelity::Averaged,
+            sensing: Sensing::default(),
+            hall_stuck: [None; 3],
             delay: Delay::One,
             dead_time_s: None,
             imposed_rad_s: None,
@@ -87,7 +88,7 @@ pub struct Rig {
     bench: Bench,
     config: Config,
     state: State,
-    plant: Averaged,
+    plant: Plant,
     thermal: Thermal,
     noise: Noise,
     /// What the bridge does until the latest command takes effect.
@@ -98,7 +99,8 @@ pub struct Rig {
 impl Rig {
     /// The bench at its start, with the control at power-up.
     pub fn new(bench: Bench, config: Config) -> Self {
-        let mut plant = Averaged::new(
+        let mut plant = Plant::new(
+            bench.plant,
             bench.motor,
             bench.load,
             bench.initial_rad_s,
@@ -134,6 +136,13 @@ impl Rig {
         self.applied = Bridge::Off;
     }
 
+    /// Breaks a phase's Hall sensor, so that it shows one level, or mends it.
+    pub fn stick_hall(&mut self, phase: usize, level: Option<bool>) {
+        if let Some(stuck) = self.bench.hall_stuck.get_mut(phase) {
+            *stuck = level;
+        }
+    }
+
     /// The control's configuration.
     pub fn config(&self) -> &Config {
         &self.config
@@ -145,8 +154,9 @@ impl Rig {
     }
 
     /// Every word of the control state.
-    pub fn trace(&self) -> [u32; TRACE_WORDS] {
-        self.state.trace()
+    #[inline(always)]
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        self.state.trace(&self.config, out);
     }
 
     /// Temperature of the board, °C.
@@ -162,11 +172,20 @@ impl Rig {
     /// The next control period.
     pub fn period(&mut self, setpoint: Setpoint) -> Period {
         let currents_a = self.plant.currents_a();
-        let sample = self
-            .bench
-            .sensing
-            .sample(currents_a, self.bus_v, &mut self.noise);
         let (angle_turns, speed_rad_s) = (self.plant.angle_turns(), self.plant.speed_rad_s());
+        let truth = Truth {
+            currents_a,
+            low_s: self.plant.low_s(),
+            terminals_v: self.plant.terminals_v(),
+            bus_v: self.bus_v,
+            direction: self.plant.direction(),
+        };
+        let mut sample = self.bench.sensing.sample(&truth, &mut self.noise);
+        for (phase, stuck) in self.bench.hall_stuck.into_iter().enumerate() {
+            if let Some(level) = stuck {
+                sample.hall = sample.hall & !(1 << phase) | u8::from(level) << phase;
+            }
+        }
         let bridge = drive::step(&self.config, &mut self.state, sample, setpoint);
 
         // Turning off does not wait for the timer's preload.
@@ -181,22 +200,16 @@ impl Rig {
             Delay::One => [before, before],
         };
         self.applied = bridge;
-        let half_s = 0.5 * self.period_s();
-        let dead_time_share = match self.bench.dead_time_s {
-            Some(dead_time_s) => dead_time_s / self.period_s(),
-            None => self.config.dead_time.duty.to_num(),
-        };
-        let [first, second] = halves.map(|bridge| {
-            let currents_a = self.plant.currents_a();
-            let drive = inverter(bridge, self.bus_v, currents_a, dead_time_share);
-            self.plant.advance(drive, self.bus_v, half_s)
+        let period_s = self.period_s();
+        let dead_time_s = self.bench.dead_time_s.unwrap_or_else(|| {
+            let share: f64 = self.config.dead_time.duty.to_num();
+            share * period_s
         });
-        let flow = first.mean(&second);
-        let bus_a = flow.motor_w / self.bus_v.max(1.0);
+        let flow = self.plant.period(halves, self.bus_v, period_s, dead_time_s);
         let bus_v = self.bus_v;
-        self.bus_v = self.bench.supply.voltage(bus_a);
+        self.bus_v = self.bench.supply.voltage(flow.bus_a);
         let current_square = flow.copper_w / (1.5 * self.bench.motor.resistance_ohm);
-        self.thermal.advance(2.0 * half_s, current_square.sqrt());
+        self.thermal.advance(period_s, current_square.sqrt());
         Period {
             sample,
             setpoint,
@@ -205,7 +218,7 @@ impl Rig {
             speed_rad_s,
             currents_a,
             bus_v,
-            bus_a,
+            bus_a: flow.bus_a,
             flow,
         }
     }

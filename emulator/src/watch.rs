@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use crate::record::{RecordError, Recorder};
 use crate::rig::{Period, Rig};
+use crate::shaft::Units;
 use crate::summary::{Report, Summary};
 
 /// Why a run cannot go on; one line.
@@ -50,7 +51,7 @@ impl Watch {
         if let Some(recorder) = &mut self.recorder
             && self.failed.is_none()
         {
-            let written = recorder.write(t_s, period, &rig.snapshot(), &rig.config().scale);
+            let written = recorder.write(t_s, period, &rig.snapshot(), Units::of(rig.config()));
             self.failed = written.err().map(WatchError::Record);
         }
     }

@@ -5,7 +5,7 @@
 
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use siskin_control::drive::{Bridge, Config, State, step};
+use siskin_control::drive::{Config, State, step};
 
 use crate::exchange::{InterruptCell, InterruptEnd};
 use crate::panic::{Failure, fail};
@@ -44,10 +44,8 @@ impl Control {
 
     /// One control period.
     fn run(&mut self) {
-        let Some(sample) = self.sensors.sample() else {
-            self.pwm.apply(Bridge::Off);
-            return;
-        };
+        self.pwm.commutate();
+        let sample = self.sensors.sample();
         let setpoint = self.end.setpoint();
         let bridge = step(&self.config, &mut self.state, sample, setpoint);
         self.pwm.apply(bridge);

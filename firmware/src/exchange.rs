@@ -12,26 +12,29 @@ use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering, compiler_fence};
 
+use fixed::types::I1F31;
 use siskin_control::drive::{Fault, Setpoint, Snapshot};
 use siskin_control::units::{Current, Speed};
 
-/// Kind of set-point, in the word's bits 31 and 30.
+/// Kind of set-point, in the word's bits 31 to 29.
+const KIND_SHIFT: u32 = 29;
 const REST: u32 = 0;
 const SPEED: u32 = 1;
 const TORQUE: u32 = 2;
 const TEST: u32 = 3;
+const VOLTAGE: u32 = 4;
 
-/// The sequence number's place: bits 29 to 24.
+/// The sequence number's place: bits 28 to 24.
 const SEQUENCE_SHIFT: u32 = 24;
-const SEQUENCE_MASK: u32 = 0x3f;
+const SEQUENCE_MASK: u32 = 0x1f;
 
-/// The value's place: bits 23 to 0 hold the upper 24 bits of a speed or a current. The speed's
+/// The value's place: bits 23 to 0 hold the upper 24 bits of a speed, a current or a share. The speed's
 /// step is then 0.0072 mechanical rpm with 12 pole pairs at 24 kHz.
 const VALUE_SHIFT: u32 = 8;
 const VALUE_MASK: u32 = 0x00ff_ffff;
 
 static OPENED: AtomicBool = AtomicBool::new(false);
-static SETPOINT: AtomicU32 = AtomicU32::new(REST << 30);
+static SETPOINT: AtomicU32 = AtomicU32::new(REST << KIND_SHIFT);
 static SNAPSHOT: SnapshotLock = SnapshotLock {
     sequence: AtomicU32::new(0),
     value: UnsafeCell::new(MaybeUninit::uninit()),
@@ -114,7 +117,7 @@ pub(crate) struct SetpointWriter {
 }
 
 impl SetpointWriter {
-    /// Makes this the set-point, and renews it. 63 writes may happen within one control period
+    /// Makes this the set-point, and renews it. 31 writes may happen within one control period
     /// before the interrupt could miss one.
     pub(crate) fn write(&mut self, setpoint: Setpoint) {
         self.sequence = self.sequence.wrapping_add(1) & SEQUENCE_MASK;
@@ -167,22 +170,24 @@ unsafe impl Sync for SnapshotLock {}
 fn pack(setpoint: Setpoint) -> u32 {
     let value = |bits: i32| (bits as u32) >> VALUE_SHIFT;
     match setpoint {
-        Setpoint::Stop => REST << 30,
-        Setpoint::Zero => REST << 30 | 1,
-        Setpoint::Fault(fault) => REST << 30 | (fault as u32 + 2),
-        Setpoint::Speed(speed) => SPEED << 30 | value(speed.to_bits()),
-        Setpoint::Torque(current) => TORQUE << 30 | value(current.to_bits()),
-        Setpoint::Test(current) => TEST << 30 | value(current.to_bits()),
+        Setpoint::Stop => REST << KIND_SHIFT,
+        Setpoint::Zero => REST << KIND_SHIFT | 1,
+        Setpoint::Fault(fault) => REST << KIND_SHIFT | (fault as u32 + 2),
+        Setpoint::Speed(speed) => SPEED << KIND_SHIFT | value(speed.to_bits()),
+        Setpoint::Torque(current) => TORQUE << KIND_SHIFT | value(current.to_bits()),
+        Setpoint::Test(current) => TEST << KIND_SHIFT | value(current.to_bits()),
+        Setpoint::Voltage(share) => VOLTAGE << KIND_SHIFT | value(share.to_bits()),
     }
 }
 
 fn unpack(word: u32) -> Setpoint {
     // The shift throws kind and sequence number away and brings the sign back to bit 31.
     let bits = (word << VALUE_SHIFT) as i32;
-    match word >> 30 {
+    match word >> KIND_SHIFT {
         SPEED => Setpoint::Speed(Speed::from_bits(bits)),
         TORQUE => Setpoint::Torque(Current::from_bits(bits)),
         TEST => Setpoint::Test(Current::from_bits(bits)),
+        VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
         _ => match word & VALUE_MASK {
             0 => Setpoint::Stop,
             1 => Setpoint::Zero,

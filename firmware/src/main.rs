@@ -9,20 +9,19 @@
 //! |---|---|
 //! | `board/` | one file a board: clock, pins, converters, what a count is worth |
 //! | `pwm.rs` | TIM1: centre-aligned complementary PWM with dead time, and the converters' trigger |
-//! | `sense.rs` | the converters' counts into a `Sample`, offsets measured at the start |
+//! | `sense.rs` | the converters' counts and the Hall sensors' levels into a `Sample` |
 //! | `control.rs` | the interrupt: sample, `step`, bridge |
 //! | `exchange.rs` | the memory that the interrupt and the tasks share |
 //! | `panic.rs` | what ends everything: the bridge off first |
 //!
 //! What is there: start-up at 170 MHz, the interrupt at the end of the injected conversions once a
-//! PWM period at priority 0 with everything else below, measured current offsets, the bridge as
-//! `step` wants it, and a light that shows faults.
+//! PWM period at priority 0 with everything else below, the bridge as `step` wants it, and a light
+//! that shows faults.
 //!
 //! What is not there yet: nothing has run on a board. There is no throttle input, so the set-point
 //! is `Stop` for ever, the control stays idle and the bridge off. There is no MAVLink, no stored
 //! parameters (the table's defaults hold), no temperature (`LIM_TEMP_C` does nothing), no
-//! over-current trip in hardware, no check that the measured offsets are plausible, no watchdog,
-//! and the interrupt runs from flash.
+//! over-current trip in hardware, no watchdog, and the interrupt runs from flash.
 
 #![no_std]
 #![no_main]
@@ -81,8 +80,8 @@ async fn main(spawner: Spawner) {
     }
 }
 
-/// Flashes once every two seconds when all is well, and n + 2 times for fault number n. Dark: the
-/// control does not run.
+/// Flashes once when all is well, and n + 2 times for the fault with the lowest number n; then comes
+/// a pause. Dark: the control does not run.
 #[embassy_executor::task]
 async fn show(mut light: Output<'static>, snapshot: SnapshotReader) {
     loop {
@@ -95,6 +94,6 @@ async fn show(mut light: Output<'static>, snapshot: SnapshotReader) {
             light.set_low();
             Timer::after_millis(200).await;
         }
-        Timer::after_millis(2000_u64.saturating_sub(250 * flashes)).await;
+        Timer::after_millis(1750).await;
     }
 }

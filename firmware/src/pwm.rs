@@ -3,6 +3,21 @@
 //! The counter runs from 0 to the top and back, PWM mode 1: a high side is on below its compare
 //! value, so the top is in the middle of the low sides' on-time. There channel 4 triggers the
 //! converters. New duties are written after the top and taken at the next one, one period later.
+//!
+//! What a phase does ([`Leg`]) is in the channels' modes and enable bits. These are preloaded too
+//! (CCPC), but the timer takes them at its commutation event, not at the top: the control interrupt
+//! causes one as its first act, 3 µs after the top at which the duties that go with them were
+//! taken. In between the old switches see the new duties: a phase that is let go keeps its low side
+//! on for so long, and one that is taken up begins to switch by so much later.
+//!
+//! The hardware changes all bits of all phases in the same clock, so no order of writes can turn on
+//! both switches of a phase. The dead time between them hangs on edges of the reference output,
+//! which a commutation makes where it leaves or enters a forced level. From the low side alone to
+//! both switches there need not be one: the mode changes from 2 to 1, the reference may stay high
+//! until the next comparison, and what it drives would become the high side in the same clock. Such
+//! a change goes by way of all switches off, in two commutations; the other way round, where the
+//! high sides may just have been on, all stays off for a period. [`Bridge::Off`] does not wait for
+//! any of this: the main output enable acts at once.
 
 use core::mem;
 
@@ -41,6 +56,10 @@ pub(crate) struct BridgePins {
 pub(crate) struct Pwm {
     /// The counter's top: half a period in clocks.
     top: u16,
+    /// What the last [`apply`](Self::apply) has written.
+    low_sides: LowSides,
+    /// What follows, in the next commutation, on all switches off.
+    deferred: Option<[Leg; 3]>,
 }
 
 impl Pwm {
@@ -63,14 +82,8 @@ impl Pwm {
         TIM1.cr2().write(|w| w.set_mms(Mms::COMPARE_OC4));
         TIM1.arr().write(|w| w.set_arr(top));
         for channel in 0..3 {
-            TIM1.ccmr_output(channel / 2).modify(|w| {
-                w.set_ocm(channel % 2, Ocm::PWM_MODE1);
-                w.set_ocpe(channel % 2, true);
-            });
-            TIM1.ccer().modify(|w| {
-                w.set_cce(channel, true);
-                w.set_ccne(channel, true);
-            });
+            TIM1.ccmr_output(channel / 2)
+                .modify(|w| w.set_ocpe(channel % 2, true));
         }
         // Channel 4 has no pin. Its rising edge, half a sampling window before the top, starts the
         // converters; their start delay of two to three of their clocks (0.07 µs) is neglected.
@@ -78,7 +91,8 @@ impl Pwm {
         TIM1.ccer().modify(|w| w.set_cce(3, true));
         TIM1.ccr(3).write(|w| w.set_ccr(top - SAMPLING_CLOCKS / 2));
         // Without the main output enable the outputs are driven to their idle level, low: both
-        // switches of every phase are off.
+        // switches of every phase are off. With it, an output that is not enabled is driven low
+        // where its complement is.
         TIM1.bdtr().write(|w| {
             w.set_ossi(Ossi::IDLE_LEVEL);
             w.set_ossr(Ossr::IDLE_LEVEL);
@@ -87,7 +101,16 @@ impl Pwm {
         // A dropped pin would be given back: these stay the timer's for ever.
         let BridgePins { timer, a, b, c } = pins;
         mem::forget((timer, a, b, c));
-        Self { top }
+        let mut pwm = Self {
+            top,
+            low_sides: LowSides::None,
+            deferred: None,
+        };
+        // From here on modes and enable bits wait for a commutation, those of channel 4 too.
+        TIM1.cr2().modify(|w| w.set_ccpc(true));
+        pwm.set_modes([Leg::Off; 3]);
+        pwm.commutate();
+        pwm
     }
 
     /// Lets the counter run with all switches off, and sees to it that duties are taken at the top.
@@ -112,28 +135,103 @@ impl Pwm {
         );
     }
 
-    /// Does with the bridge what the control wants, from the counter's next top on; to turn it off
-    /// takes effect at once. The first duty after `Off` is preceded by the low sides, until the top.
-    pub(crate) fn apply(&mut self, bridge: Bridge) {
-        match bridge {
-            Bridge::Off => {
-                turn_off();
-                self.set_compare([0; 3]);
-            }
-            Bridge::Brake => {
-                self.set_compare([0; 3]);
-                turn_on();
-            }
-            Bridge::Duty(duties) => {
-                self.set_compare(duties.map(|duty| compare(duty, self.top)));
-                turn_on();
-            }
+    /// Lets the phases do what the last [`apply`](Self::apply) wanted.
+    pub(crate) fn commutate(&mut self) {
+        TIM1.egr().write(|w| w.set_comg(true));
+        if let Some(legs) = self.deferred.take() {
+            self.set_modes(legs);
+            TIM1.egr().write(|w| w.set_comg(true));
         }
     }
 
-    fn set_compare(&mut self, values: [u16; 3]) {
-        for (channel, value) in values.into_iter().enumerate() {
-            TIM1.ccr(channel).write(|w| w.set_ccr(value));
+    /// Does with the bridge what the control wants, from the counter's next top on; to turn it off
+    /// takes effect at once, and after that all switches stay off until the top.
+    pub(crate) fn apply(&mut self, bridge: Bridge) {
+        let switching = |duties: [Duty; 3]| duties.map(Leg::Switching);
+        let legs = match bridge {
+            Bridge::Off => {
+                turn_off();
+                self.low_sides = LowSides::None;
+                self.deferred = None;
+                self.set_modes([Leg::Off; 3]);
+                self.commutate();
+                return;
+            }
+            Bridge::Charge(share) => [Leg::Low(share); 3],
+            Bridge::Brake => switching([Duty::ZERO; 3]),
+            Bridge::Duty(duties) => switching(duties),
+            Bridge::Legs(legs) => legs.map(|duty| duty.map_or(Leg::Off, Leg::Switching)),
+        };
+        for (channel, leg) in legs.into_iter().enumerate() {
+            TIM1.ccr(channel)
+                .write(|w| w.set_ccr(leg.compare(self.top)));
+        }
+        let wanted = match bridge {
+            Bridge::Charge(_) => LowSides::Alone,
+            _ => LowSides::Complementary,
+        };
+        let (present, modes) = match (self.low_sides, wanted) {
+            (LowSides::Complementary, LowSides::Alone) => (LowSides::None, [Leg::Off; 3]),
+            (LowSides::Alone, LowSides::Complementary) => {
+                self.deferred = Some(legs);
+                (wanted, [Leg::Off; 3])
+            }
+            _ => (wanted, legs),
+        };
+        self.low_sides = present;
+        self.set_modes(modes);
+        turn_on();
+    }
+
+    /// Writes what the next commutation brings.
+    fn set_modes(&mut self, legs: [Leg; 3]) {
+        for (channel, leg) in legs.into_iter().enumerate() {
+            // The high side is on, or the low side alone, while the reference output is high.
+            let (mode, high, low) = match leg {
+                // One enabled output keeps the other one driven; the reference is held low.
+                Leg::Off => (Ocm::FORCE_INACTIVE, true, false),
+                // High above the compare value: around the top.
+                Leg::Low(_) => (Ocm::PWM_MODE2, false, true),
+                Leg::Switching(_) => (Ocm::PWM_MODE1, true, true),
+            };
+            TIM1.ccmr_output(channel / 2)
+                .modify(|w| w.set_ocm(channel % 2, mode));
+            TIM1.ccer().modify(|w| {
+                w.set_cce(channel, high);
+                w.set_ccne(channel, low);
+            });
+        }
+    }
+}
+
+/// What a phase does for a period.
+#[derive(Clone, Copy)]
+enum Leg {
+    /// Both switches are off.
+    Off,
+    /// The low side is on for this share around the top; the high side is off.
+    Low(Duty),
+    /// The high side is on for this share, the low side for the rest.
+    Switching(Duty),
+}
+
+/// How the low sides are driven.
+#[derive(Clone, Copy)]
+enum LowSides {
+    /// Not at all: all switches are off.
+    None,
+    /// Without the high sides.
+    Alone,
+    /// In turn with the high sides, in the phases that are not off.
+    Complementary,
+}
+
+impl Leg {
+    fn compare(self, top: u16) -> u16 {
+        match self {
+            Self::Off => 0,
+            Self::Low(share) => top - compare(share, top),
+            Self::Switching(duty) => compare(duty, top),
         }
     }
 }

@@ -5,56 +5,44 @@ use siskin_control::units::AdcCounts;
 
 use crate::board::Converters;
 
-/// Over how many periods the offsets are averaged, as a power of two: 1024 take 43 ms at 24 kHz
-/// and leave a 32nd of one reading's noise.
-const OFFSET_PERIODS_LOG2: u32 = 10;
-
 /// Fraction bits of [`AdcCounts`].
 const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
 
-/// The readings of currents and supply.
+/// Nominal reading without current, the middle of 12 bits: the drive measures what it really is.
+const MIDDLE: i32 = 2048;
+
+/// The readings of currents, supply, terminals and Hall sensors.
 pub(crate) struct Sensors {
     converters: Converters,
-    /// Sum of the readings without current, then 2^10 times the offset.
-    offset_sums: [u32; 3],
-    /// Periods for which the offsets are still measured.
-    offset_periods_left: u32,
 }
 
 impl Sensors {
-    /// Readings whose offsets are measured first.
+    /// Readings of these converters.
     pub(crate) fn new(converters: Converters) -> Self {
-        Self {
-            converters,
-            offset_sums: [0; 3],
-            offset_periods_left: 1 << OFFSET_PERIODS_LOG2,
-        }
+        Self { converters }
     }
 
-    /// The sample of this period, or `None` while the offsets are measured: until then the bridge
-    /// must be off.
-    pub(crate) fn sample(&mut self) -> Option<Sample> {
-        let [a, bus] = self.converters.a_bus.read_injected_samples();
-        let [b, c] = self.converters.b_c.read_injected_samples();
-        let counts = [a, b, c];
-        if self.offset_periods_left > 0 {
-            self.offset_periods_left -= 1;
-            for (sum, count) in self.offset_sums.iter_mut().zip(counts) {
-                // 1024 readings of 12 bits: 22 bits.
-                *sum += u32::from(count);
-            }
-            return None;
+    /// The sample of this period.
+    pub(crate) fn sample(&mut self) -> Sample {
+        let Converters {
+            first,
+            second,
+            hall,
+        } = &mut self.converters;
+        let [a, c, terminal_c, bus] = first.read_injected_samples();
+        let [b, terminal_a, terminal_b] = second.read_injected_samples();
+        let counts = |count: i32| AdcCounts::from_bits(count << FRACTION_BITS);
+        // A current into the motor comes up through the low side's shunt and makes its voltage
+        // negative.
+        let current = |count: u16| counts(MIDDLE - i32::from(count));
+        let voltage = |count: u16| counts(i32::from(count));
+        let [hall_a, hall_b, hall_c] = hall.each_ref().map(|pin| u8::from(pin.is_high()));
+        Sample {
+            currents: [a, b, c].map(current),
+            bus: voltage(bus),
+            terminals: [terminal_a, terminal_b, terminal_c].map(voltage),
+            hall: hall_a | hall_b << 1 | hall_c << 2,
         }
-        let current = |phase: usize| {
-            let offset = self.offset_sums[phase] << (FRACTION_BITS - OFFSET_PERIODS_LOG2);
-            // A current into the motor comes up through the low side's shunt and makes its voltage
-            // negative. Both terms are below 2^28.
-            AdcCounts::from_bits(offset as i32 - (i32::from(counts[phase]) << FRACTION_BITS))
-        };
-        Some(Sample {
-            currents: [current(0), current(1), current(2)],
-            bus: AdcCounts::from_bits(i32::from(bus) << FRACTION_BITS),
-        })
     }
 
     /// Whether the converters have finished since [`sample`](Self::sample).

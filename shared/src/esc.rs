@@ -88,6 +88,8 @@ impl Esc {
             polled_us: None,
         };
         esc.decoder.force(esc.protocol);
+        let two_directions = esc.params.get(ParamId::Inp3d) != 0.0;
+        esc.authority.set_two_directions(two_directions);
         Ok(esc)
     }
 
@@ -193,6 +195,8 @@ impl Esc {
         }
         self.mapping = Mapping::new(&self.params, &self.config);
         self.authority.set_timing(timing(&self.params));
+        let two_directions = self.params.get(ParamId::Inp3d) != 0.0;
+        self.authority.set_two_directions(two_directions);
         let protocol = protocol(&self.params);
         if protocol != self.protocol {
             // The decoder begins anew with it: not for every change, while frames come in.

@@ -1,8 +1,8 @@
 //! From what the motor may do to what the drive is asked for.
 
 use crate::drive::{Config, Setpoint};
-use crate::input::Throttle;
 use crate::input::authority::Command;
+use crate::input::{Throttle, reverse};
 use crate::math::TopProduct;
 use crate::params::{ParamId, Params};
 use crate::units::{Current, Speed};
@@ -20,6 +20,8 @@ enum Mode {
     Speed { least: Speed, span: Speed },
     /// Linear from no current to the bound.
     Torque { full: Current },
+    /// Linear from no voltage to full modulation.
+    Voltage,
 }
 
 impl Mapping {
@@ -35,9 +37,10 @@ impl Mapping {
                     least,
                     span: speed(ParamId::CtlRpmMax).saturating_sub(least),
                 },
-                _ => Mode::Torque { full },
+                1.0 => Mode::Torque { full },
+                _ => Mode::Voltage,
             },
-            test_full: config.start.test_current,
+            test_full: config.test_current,
         }
     }
 
@@ -47,19 +50,36 @@ impl Mapping {
             (Command::Stop, _) => Setpoint::Stop,
             (Command::Zero, _) => Setpoint::Zero,
             (Command::Throttle(throttle), Mode::Speed { least, span }) => {
-                let above = Speed::from_bits(throttle.top(span).to_bits() << 1);
-                Setpoint::Speed(least.saturating_add(above))
+                let (share, reversed) = split(throttle);
+                let above = Speed::from_bits(share.top(span).to_bits() << 1);
+                let speed = least.saturating_add(above);
+                Setpoint::Speed(if reversed { -speed } else { speed })
             }
             (Command::Throttle(throttle), Mode::Torque { full }) => {
-                Setpoint::Torque(share(throttle, full))
+                Setpoint::Torque(share_of(throttle, full))
             }
-            (Command::Test(value), _) => Setpoint::Test(share(value, self.test_full)),
+            (Command::Throttle(throttle), Mode::Voltage) => {
+                let (share, reversed) = split(throttle);
+                Setpoint::Voltage(if reversed { -share } else { share })
+            }
+            (Command::Test(value), _) => Setpoint::Test(share_of(value, self.test_full)),
         }
     }
 }
 
-fn share(throttle: Throttle, full: Current) -> Current {
-    Current::from_bits(throttle.top(full).to_bits() << 1)
+/// A throttle's share, and whether it is for the other direction.
+fn split(throttle: Throttle) -> (Throttle, bool) {
+    if throttle.is_negative() {
+        (reverse(throttle), true)
+    } else {
+        (throttle, false)
+    }
+}
+
+fn share_of(throttle: Throttle, full: Current) -> Current {
+    let (share, reversed) = split(throttle);
+    let current = Current::from_bits(share.top(full).to_bits() << 1);
+    if reversed { -current } else { current }
 }
 
 #[cfg(test)]
@@ -102,6 +122,34 @@ mod tests {
             panic!("a test");
         };
         assert!((scale.amperes(current) - 2.0).abs() < 0.001);
+    }
+
+    #[test]
+    fn voltage_mode_is_a_share_of_the_modulation() {
+        let (mapping, _) = mapping(2.0);
+        for share in [0.0, 0.3, 1.0].map(Throttle::saturating_from_num) {
+            let forward = mapping.setpoint(Command::Throttle(share));
+            assert_eq!(forward, Setpoint::Voltage(share));
+            let back = mapping.setpoint(Command::Throttle(reverse(share)));
+            assert_eq!(back, Setpoint::Voltage(-share));
+        }
+    }
+
+    #[test]
+    fn the_other_direction_mirrors_the_first_from_its_least_throttle_on() {
+        for mode in [0.0, 1.0] {
+            let (mapping, _) = mapping(mode);
+            for share in [0.0, 0.01, 0.5, 1.0].map(Throttle::saturating_from_num) {
+                let forward = mapping.setpoint(Command::Throttle(share));
+                let back = mapping.setpoint(Command::Throttle(reverse(share)));
+                match (forward, back) {
+                    (Setpoint::Speed(a), Setpoint::Speed(b)) => assert_eq!(a, -b),
+                    (Setpoint::Torque(a), Setpoint::Torque(b)) => assert_eq!(a, -b),
+                    other => panic!("{other:?}"),
+                }
+            }
+        }
+        assert!((rpm(-1.0) + 6000.0).abs() < 0.01);
     }
 
     #[test]

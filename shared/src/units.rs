@@ -21,6 +21,12 @@ pub type Voltage = I4F28;
 /// A torque in units of [`Scale::torque_nm`].
 pub type Torque = I4F28;
 
+/// A flux linkage in units of [`Scale::flux_wb`]: what a unit of voltage adds in a period.
+pub type Flux = I4F28;
+
+/// The motor's stated flux, 2/π: the voltage base makes it so for every motor.
+pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);
+
 /// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
 pub type InverseFlux = I0F32;
 
@@ -52,6 +58,11 @@ impl Scale {
     /// One unit of [`InverseFlux`], 1/Wb: with it, ω = ξ·|h| holds in the control's units.
     pub fn inverse_flux_per_wb(&self) -> f32 {
         core::f32::consts::TAU / (self.voltage_v * self.period_s)
+    }
+
+    /// One unit of [`Flux`], Wb: with it, a voltage adds itself to a flux in a period.
+    pub fn flux_wb(&self) -> f32 {
+        self.voltage_v * self.period_s
     }
 
     /// One unit of [`Torque`], Nm: with it, i_q = ξ·T (9) holds in the control's units.

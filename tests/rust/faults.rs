@@ -6,7 +6,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use mavlink::types::CharArray;
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
-use siskin_control::drive::{Bridge, Fault, Setpoint};
+use siskin_control::drive::{Bridge, Fault, Phase, Setpoint};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Frame, Receiver, Request};
 use siskin_control::params::{ParamId, Params};
@@ -44,7 +44,10 @@ struct Seen {
 
 impl Station {
     fn new(params: Params) -> Self {
-        let bench = Bench::default();
+        Self::on(Bench::default(), params)
+    }
+
+    fn on(bench: Bench, params: Params) -> Self {
         let board = bench.sensing.board(bench.delay);
         let esc =
             Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("the parameters fit the bench");
@@ -274,15 +277,20 @@ fn a_motor_is_not_tested_while_its_shaft_turns_after_a_fault() {
     assert!(refused > 10, "{refused}");
 }
 
+/// With a third of the true resistance and less, the voltage that the winding takes at a low speed is
+/// believed to be back-EMF, and the shaft to turn.
+const THIRD_AND_LESS_MOHM: [f32; 3] = [18.0, 27.0, 36.0];
+
 #[test]
-fn a_rotor_that_the_observer_has_lost_is_a_fault() {
-    // With a third of the true resistance the voltage that the winding takes at a low speed is
-    // believed to be back-EMF, and the shaft to turn.
-    for resistance_mohm in [18.0, 27.0, 36.0] {
+fn a_rotor_that_the_published_observer_has_lost_is_a_fault() {
+    for resistance_mohm in THIRD_AND_LESS_MOHM {
         let mut params = Params::default();
-        params
-            .set(ParamId::MotRMohm, resistance_mohm)
-            .expect("in range");
+        for (id, value) in [
+            (ParamId::CtlObserver, 0.0),
+            (ParamId::MotRMohm, resistance_mohm),
+        ] {
+            params.set(id, value).expect("in range");
+        }
         let mut station = Station::new(params);
         station.run(400, STOP);
         for _ in 0..50 {
@@ -295,4 +303,109 @@ fn a_rotor_that_the_observer_has_lost_is_a_fault() {
         assert!(!after.on, "{resistance_mohm} mOhm: {after:?}");
         assert!(station.texts().contains(&"Fault: rotor position lost"));
     }
+}
+
+#[test]
+fn the_default_observer_keeps_that_rotor() {
+    for resistance_mohm in THIRD_AND_LESS_MOHM {
+        let mut params = Params::default();
+        params
+            .set(ParamId::MotRMohm, resistance_mohm)
+            .expect("in range");
+        let mut station = Station::new(params);
+        station.run(400, STOP);
+        let seen = station.run(3_000, HALF);
+        assert!(
+            (seen.rpm - 3150.0).abs() < 31.5,
+            "{resistance_mohm} mOhm: {seen:?}"
+        );
+        let faults = station.texts().into_iter().filter(|t| t.contains("Fault"));
+        assert_eq!(faults.count(), 0, "{resistance_mohm} mOhm");
+    }
+}
+
+#[test]
+fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {
+    let mut station = Station::on(
+        Bench {
+            imposed_rad_s: Some(0.0),
+            ..Bench::default()
+        },
+        Params::default(),
+    );
+    station.run(400, STOP);
+    let mut starts = 0;
+    let mut before = Phase::Idle;
+    for _ in 0..6_000 {
+        station.run(1, HALF);
+        let phase = station.rig.snapshot().phase;
+        starts += u32::from(phase == Phase::Park && before != Phase::Park);
+        before = phase;
+        if station.has(Fault::Stuck) {
+            break;
+        }
+    }
+    assert!(station.has(Fault::Stuck), "after {starts} starts");
+    assert!((2..=5).contains(&starts), "{starts} starts");
+    assert!(!station.run(1_100, HALF).on);
+    assert!(station.texts().contains(&"Fault: motor does not start"));
+    let stuck = EscFailureFlags::ESC_FAILURE_MOTOR_STUCK;
+    assert!(station.flags().contains(stuck));
+    station.run(1_500, STOP);
+    assert!(!station.has(Fault::Stuck));
+}
+
+/// An offset beyond a tenth of the sensors' 40 A is a defect; below it, it is measured and taken off.
+#[test]
+fn a_current_sensor_whose_zero_is_far_off_is_a_fault_before_the_bridge_is_on() {
+    let started = |offset_a: f64| {
+        let mut bench = Bench::default();
+        bench.sensing.offset_a[1] = offset_a;
+        let mut station = Station::on(bench, Params::default());
+        station.run(400, STOP);
+        let seen = station.run(2_000, HALF);
+        (station, seen)
+    };
+    for offset_a in [-6.0, 6.0] {
+        let (station, seen) = started(offset_a);
+        assert!(station.has(Fault::CurrentSensor), "{offset_a} A: {seen:?}");
+        assert!(!seen.on, "{offset_a} A");
+        assert!(station.texts().contains(&"Fault: current sensor defect"));
+    }
+    for offset_a in [-3.0, 3.0] {
+        let (station, seen) = started(offset_a);
+        assert!(!station.has(Fault::CurrentSensor), "{offset_a} A: {seen:?}");
+        assert!((seen.rpm - 3150.0).abs() < 31.5, "{offset_a} A: {seen:?}");
+    }
+}
+
+/// With the bridge off the open terminals tell the speed, and the throttle finds the shaft turning.
+#[test]
+fn a_coasting_shaft_is_reported_and_caught() {
+    let mut station = Station::turning();
+    station.temperature_c = 101.0;
+    station.run(100, HALF);
+    assert!(station.has(Fault::OverTemperature));
+    station.temperature_c = ROOM_C;
+    for _ in 0..40 {
+        let seen = station.run(10, STOP);
+        let snapshot = station.rig.snapshot();
+        let reported = f64::from(station.rig.config().scale.rpm(snapshot.speed));
+        assert!(
+            (reported / seen.rpm - 1.0).abs() < 0.02,
+            "{reported} {seen:?}"
+        );
+    }
+    assert!(!station.has(Fault::OverTemperature));
+    let coasting = station.run(10, STOP);
+    assert!(!coasting.on && coasting.rpm > 1_000.0, "{coasting:?}");
+    let mut least_rpm = f64::INFINITY;
+    for _ in 0..1_000 {
+        let seen = station.run(1, HALF);
+        least_rpm = least_rpm.min(seen.rpm);
+        assert_ne!(station.rig.snapshot().phase, Phase::Park);
+    }
+    assert!(least_rpm > 0.95 * coasting.rpm, "{least_rpm} {coasting:?}");
+    let held = station.run(100, HALF);
+    assert!((held.rpm - 3150.0).abs() < 31.5, "{held:?}");
 }

@@ -14,11 +14,10 @@ pub struct Load {
 }
 
 impl Load {
-    /// Torque at a speed, Nm.
-    pub fn torque_at(&self, speed_rad_s: f64) -> f64 {
+    /// Torque against the rotation over the speed, at a speed, Nm·s/rad.
+    pub fn damping_at(&self, speed_rad_s: f64) -> f64 {
         let magnitude = speed_rad_s.abs();
         // The constant part is smooth over 1 rad/s, so that it does not chatter at rest.
-        let constant = self.torque_nm / (magnitude + 1.0);
-        (self.c1 + self.c2 * magnitude + constant) * speed_rad_s
+        self.c1 + self.c2 * magnitude + self.torque_nm / (magnitude + 1.0)
     }
 }

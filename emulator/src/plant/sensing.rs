@@ -1,22 +1,24 @@
 //! From the plant's quantities to the converter's counts.
 
 use siskin_control::control::delay::Delay;
+use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::Sample;
 use siskin_control::params::Board;
 use siskin_control::units::AdcCounts;
 
 use super::Noise;
+use super::vector::{AXES, dot};
 
 /// Counts from zero to full scale of the control's converter, whatever the simulated resolution.
 const FULL_SCALE_COUNTS: f64 = 2048.0;
 
-/// Full scale of the supply's divider, V.
-const BUS_RANGE_V: f64 = 70.0;
+/// Full scale of the supply's and of the terminals' dividers, V.
+const VOLTAGE_RANGE_V: f64 = 70.0;
 
-/// Counts of the supply's reading at full scale.
-const BUS_COUNTS: f64 = 4096.0;
+/// Counts of a voltage's reading at full scale.
+const VOLTAGE_COUNTS: f64 = 4096.0;
 
-/// The current sensors and their converter.
+/// The sensors and their converter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensing {
     /// Full scale of the currents, ± amperes.
@@ -27,6 +29,44 @@ pub struct Sensing {
     pub noise_a: f64,
     /// Error of each phase's zero, A.
     pub offset_a: [f64; 3],
+    /// What each phase's current is multiplied with.
+    pub gain: [f64; 3],
+    /// Time constant with which the shunts' amplifiers follow, s.
+    pub settling_s: f64,
+    /// By how much of an electrical turn each Hall sensor changes late in forward rotation, degrees.
+    pub hall_error_deg: [f64; 3],
+}
+
+/// What there is to be sensed at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Currents into the phases, A.
+    pub currents_a: [f64; 3],
+    /// For how long each has been flowing through its low side, s; `None` where it does not.
+    pub low_s: [Option<f64>; 3],
+    /// Voltages of the terminals, V.
+    pub terminals_v: [f64; 3],
+    /// Voltage of the supply, V.
+    pub bus_v: f64,
+    /// Cosine and sine of the electrical angle.
+    pub direction: [f64; 2],
+}
+
+impl Default for Sensing {
+    /// 12 bits over ±40 A and 0.05 A of noise.
+    fn default() -> Self {
+        Self {
+            range_a: 40.0,
+            bits: 12,
+            noise_a: 0.05,
+            offset_a: [0.0; 3],
+            gain: [1.0; 3],
+            // An amplifier of 1.6 MHz: after the half microsecond that the board leaves at the
+            // greatest duty it is right to 1 %.
+            settling_s: 0.1e-6,
+            hall_error_deg: [0.0; 3],
+        }
+    }
 }
 
 impl Sensing {
@@ -34,34 +74,75 @@ impl Sensing {
     pub fn board(&self, delay: Delay) -> Board {
         Board {
             current_a_per_count: (self.range_a / FULL_SCALE_COUNTS) as f32,
-            bus_v_per_count: (BUS_RANGE_V / BUS_COUNTS) as f32,
+            bus_v_per_count: (VOLTAGE_RANGE_V / VOLTAGE_COUNTS) as f32,
+            terminal_v_per_count: (VOLTAGE_RANGE_V / VOLTAGE_COUNTS) as f32,
             current_range_a: self.range_a as f32,
+            shunts: Shunts::Three,
             delay,
             low_side_on_s: 1e-6,
+            refresh_s: 1e-6,
+            charge_s: 63e-6,
         }
     }
 
-    /// One sample of the phase currents, A, and of the supply, V.
-    pub fn sample(&self, currents_a: [f64; 3], bus_v: f64, noise: &mut Noise) -> Sample {
-        let mut counts = [AdcCounts::ZERO; 3];
-        for phase in 0..3 {
-            let mut current_a = currents_a[phase] + self.offset_a[phase];
+    /// One sample of everything.
+    pub fn sample(&self, truth: &Truth, noise: &mut Noise) -> Sample {
+        let mut currents = [AdcCounts::ZERO; 3];
+        for (phase, counts) in currents.iter_mut().enumerate() {
+            let mut current_a = self.shunt_a(truth, phase) + self.offset_a[phase];
             if self.noise_a > 0.0 {
                 current_a += self.noise_a * noise.gaussian();
             }
-            counts[phase] = self.quantised(current_a / self.range_a);
+            *counts = self.quantised(current_a / self.range_a);
         }
-        let bus = (bus_v / BUS_RANGE_V * BUS_COUNTS).clamp(0.0, BUS_COUNTS - 1.0);
         Sample {
-            terminals: [AdcCounts::ZERO; 3],
-            hall: 7,
-            currents: counts,
-            bus: fixed(if self.bits == 0 {
-                bus
-            } else {
-                f64::from(nearest(bus))
-            }),
+            currents,
+            bus: self.voltage(truth.bus_v),
+            terminals: truth.terminals_v.map(|terminal_v| self.voltage(terminal_v)),
+            hall: self.hall(truth.direction),
         }
+    }
+
+    /// What a low side's amplifier shows, A: it sets out from zero when the current enters the
+    /// shunt.
+    fn shunt_a(&self, truth: &Truth, phase: usize) -> f64 {
+        let Some(on_s) = truth.low_s[phase] else {
+            return 0.0;
+        };
+        let settled_a = truth.currents_a[phase] * self.gain[phase];
+        // Nothing is left of the approach after 40 time constants.
+        if on_s >= 40.0 * self.settling_s {
+            settled_a
+        } else {
+            settled_a * (1.0 - libm::exp(-on_s / self.settling_s))
+        }
+    }
+
+    /// A divider's reading of a voltage, held at its ends.
+    fn voltage(&self, volts: f64) -> AdcCounts {
+        let counts = (volts * (VOLTAGE_COUNTS / VOLTAGE_RANGE_V)).clamp(0.0, VOLTAGE_COUNTS - 1.0);
+        fixed(if self.bits == 0 {
+            counts
+        } else {
+            f64::from(nearest(counts))
+        })
+    }
+
+    /// The Hall sensors' bits.
+    fn hall(&self, direction: [f64; 2]) -> u8 {
+        let bit = |phase: usize| {
+            let axis = AXES[phase];
+            let error_deg = self.hall_error_deg[phase];
+            let through = if error_deg == 0.0 {
+                dot(axis, direction)
+            } else {
+                let (sin, cos) = libm::sincos(error_deg.to_radians());
+                let [x, y] = axis;
+                dot([x * cos - y * sin, x * sin + y * cos], direction)
+            };
+            u8::from(through > 0.0) << phase
+        };
+        bit(0) | bit(1) | bit(2)
     }
 
     /// A share of full scale in counts, rounded to the resolution and held at its ends.
@@ -91,17 +172,29 @@ mod tests {
 
     fn sensing(bits: u32) -> Sensing {
         Sensing {
-            range_a: 40.0,
             bits,
             noise_a: 0.0,
-            offset_a: [0.0; 3],
+            ..Sensing::default()
         }
+    }
+
+    fn truth(currents_a: [f64; 3]) -> Truth {
+        Truth {
+            currents_a,
+            low_s: [Some(1.0); 3],
+            terminals_v: [0.0; 3],
+            bus_v: 24.0,
+            direction: [1.0, 0.0],
+        }
+    }
+
+    fn sample(sensing: Sensing, truth: Truth) -> Sample {
+        sensing.sample(&truth, &mut Noise::new(1))
     }
 
     #[test]
     fn twelve_bits_are_whole_counts() {
-        let mut noise = Noise::new(1);
-        let sample = sensing(12).sample([1.0, -100.0, 100.0], 24.0, &mut noise);
+        let sample = sample(sensing(12), truth([1.0, -100.0, 100.0]));
         assert_eq!(sample.currents[0], AdcCounts::from_num(51));
         assert_eq!(sample.currents[1], AdcCounts::from_num(-2048));
         assert_eq!(sample.currents[2], AdcCounts::from_num(2047));
@@ -110,8 +203,63 @@ mod tests {
 
     #[test]
     fn zero_bits_are_exact() {
-        let mut noise = Noise::new(1);
-        let sample = sensing(0).sample([1.0, 0.0, 0.0], 24.0, &mut noise);
+        let sample = sample(sensing(0), truth([1.0, 0.0, 0.0]));
         assert!((sample.currents[0].to_num::<f64>() - 51.2).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_shunt_shows_what_its_low_side_carries() {
+        let sensing = Sensing {
+            offset_a: [0.0, 0.0, 0.5],
+            gain: [1.02, 1.0, 1.0],
+            settling_s: 0.2e-6,
+            ..sensing(0)
+        };
+        let truth = Truth {
+            low_s: [Some(1.0), Some(0.2e-6), None],
+            ..truth([10.0, 10.0, -20.0])
+        };
+        let counts_per_a = 2048.0 / 40.0;
+        let shown = sample(sensing, truth).currents;
+        let shown = shown.map(|counts| counts.to_num::<f64>() / counts_per_a);
+        // One time constant leaves 1/e; a high side's current passes no shunt, its offset stays.
+        let wanted = [10.2, 10.0 * (1.0 - (-1.0_f64).exp()), 0.5];
+        for (shown, wanted) in shown.into_iter().zip(wanted) {
+            assert!((shown - wanted).abs() < 1e-5, "{shown} for {wanted}");
+        }
+    }
+
+    #[test]
+    fn terminals_are_read_within_their_divider() {
+        let truth = Truth {
+            terminals_v: [-0.7, 24.0, 80.0],
+            ..truth([0.0; 3])
+        };
+        let sample = sample(sensing(12), truth);
+        // 24/70·4096 = 1404.3.
+        assert_eq!(sample.terminals, [0, 1404, 4095].map(AdcCounts::from_num));
+    }
+
+    #[test]
+    fn hall_sensors_show_the_sign_of_the_flux_through_their_phase() {
+        let sensing = Sensing {
+            hall_error_deg: [0.0, 5.0, 0.0],
+            ..sensing(12)
+        };
+        for degrees in 0..360 {
+            let angle = (f64::from(degrees) + 0.5).to_radians();
+            let truth = Truth {
+                direction: [angle.cos(), angle.sin()],
+                ..truth([0.0; 3])
+            };
+            let positive = |late_deg: f64, phase: f64| {
+                let from_axis = f64::from(degrees) + 0.5 - late_deg - 120.0 * phase;
+                (from_axis.to_radians()).cos() > 0.0
+            };
+            let wanted = u8::from(positive(0.0, 0.0))
+                | u8::from(positive(5.0, 1.0)) << 1
+                | u8::from(positive(0.0, 2.0)) << 2;
+            assert_eq!(sample(sensing, truth).hall, wanted, "{degrees}");
+        }
     }
 }

@@ -254,6 +254,8 @@ pub(super) fn fault_times(recording: &Recording) -> Vec<f64> {
 pub(super) fn tint(phase: Phase) -> Option<RGBColor> {
     match phase {
         Phase::Idle => None,
+        Phase::Sense => Some(RGBColor(0xf2, 0xf2, 0xfb)),
+        Phase::Charge => Some(RGBColor(0xf9, 0xe4, 0xd8)),
         Phase::Park => Some(RGBColor(0xfd, 0xf1, 0xcf)),
         Phase::Ramp => Some(RGBColor(0xdf, 0xef, 0xfa)),
         Phase::Run => Some(RGBColor(0xe9, 0xf6, 0xf0)),
@@ -265,6 +267,8 @@ pub(super) fn tint(phase: Phase) -> Option<RGBColor> {
 fn name(phase: Phase) -> &'static str {
     match phase {
         Phase::Idle => "Idle",
+        Phase::Sense => "Sense",
+        Phase::Charge => "Charge",
         Phase::Park => "Park",
         Phase::Ramp => "Ramp",
         Phase::Run => "Run",

@@ -11,10 +11,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use siskin_control::drive::Snapshot;
-use siskin_control::units::Scale;
 use thiserror::Error;
 
 use crate::rig::Period;
+use crate::shaft::Units;
 
 pub use row::Row;
 
@@ -79,9 +79,9 @@ impl Recorder {
         t_s: f64,
         period: &Period,
         snapshot: &Snapshot,
-        scale: &Scale,
+        units: Units,
     ) -> Result<(), RecordError> {
-        let written = self.csv.serialize(Row::new(t_s, period, snapshot, scale));
+        let written = self.csv.serialize(Row::new(t_s, period, snapshot, units));
         written.map_err(|error| self.error(error.into()))
     }
 

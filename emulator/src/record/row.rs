@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 use siskin_control::drive::{Bridge, Phase, Snapshot};
-use siskin_control::units::Scale;
 
 use crate::rig::Period;
+use crate::shaft::Units;
 
 /// One control period. The fields are the columns, in this order, with the unit as the last part
 /// of the name. Single precision holds more than any sensor, and halves the file.
@@ -17,11 +17,11 @@ pub struct Row {
     pub phase: Phase,
     /// Faults that hold the bridge off, one bit each.
     pub faults: u8,
-    /// True mechanical speed.
+    /// True mechanical speed, positive with the phases in the order a, b, c.
     pub rpm: f32,
-    /// Estimated mechanical speed.
+    /// Estimated mechanical speed, likewise.
     pub rpm_est: f32,
-    /// Reference of the mechanical speed.
+    /// Reference of the mechanical speed, likewise.
     pub rpm_ref: f32,
     /// True electrical angle, 0 to 360.
     pub angle_deg: f32,
@@ -43,7 +43,8 @@ pub struct Row {
     pub u_d_v: f32,
     /// Commanded voltage across it.
     pub u_q_v: f32,
-    /// Share of the period for which phase a is high; empty while all switches are off.
+    /// Share of the period for which phase a is high; empty while all switches are off, and while
+    /// the low sides only charge the drivers.
     pub duty_a: Option<f32>,
     /// Likewise of phase b.
     pub duty_b: Option<f32>,
@@ -62,6 +63,8 @@ pub struct Row {
 #[serde(remote = "Phase", rename_all = "lowercase")]
 enum PhaseName {
     Idle,
+    Sense,
+    Charge,
     Park,
     Ramp,
     Run,
@@ -97,7 +100,8 @@ impl Row {
     ];
 
     /// The period that began at `t_s`, and what the control made of it.
-    pub fn new(t_s: f64, period: &Period, snapshot: &Snapshot, scale: &Scale) -> Self {
+    pub fn new(t_s: f64, period: &Period, snapshot: &Snapshot, units: Units) -> Self {
+        let scale = units.scale;
         let turns = snapshot.angle.to_num::<f64>();
         let [i_a_a, i_b_a, i_c_a] = period.currents_a.map(|current_a| current_a as f32);
         let duties = match period.bridge {
@@ -111,8 +115,8 @@ impl Row {
             phase: snapshot.phase,
             faults: snapshot.faults.bits(),
             rpm: period.rpm() as f32,
-            rpm_est: scale.rpm(snapshot.speed),
-            rpm_ref: scale.rpm(snapshot.speed_reference),
+            rpm_est: units.rpm(snapshot.speed) as f32,
+            rpm_ref: units.rpm(snapshot.speed_reference) as f32,
             angle_deg: (period.angle_turns * 360.0) as f32,
             angle_est_deg: ((turns - turns.floor()) * 360.0) as f32,
             angle_error_deg: period.angle_error_deg(snapshot) as f32,

@@ -6,16 +6,12 @@ use siskin_control::params::{Params, build};
 
 use super::{Recorder, Row};
 use crate::bench::{Choice, LoadTable, MotorTable};
-use crate::plant::{Sensing, Supply};
+use crate::plant::{Fidelity, Sensing, Supply};
 use crate::rig::{Bench, Rig};
+use crate::shaft::Units;
 
 fn rig() -> Rig {
-    let sensing = Sensing {
-        range_a: 40.0,
-        bits: 12,
-        noise_a: 0.05,
-        offset_a: [0.0; 3],
-    };
+    let sensing = Sensing::default();
     let config = build(&Params::default(), &sensing.board(Delay::One)).unwrap();
     let bench = Bench {
         motor: Choice::<MotorTable>::Named("antigravity-4006-kv380".to_owned())
@@ -25,7 +21,9 @@ fn rig() -> Rig {
             .load()
             .unwrap(),
         supply: Supply::stiff(24.0),
+        plant: Fidelity::Averaged,
         sensing,
+        hall_stuck: [None; 3],
         delay: Delay::One,
         dead_time_s: Some(500e-9),
         imposed_rad_s: None,
@@ -57,9 +55,9 @@ fn a_recording_gives_back_each_period() {
         };
         let t_s = f64::from(k) * rig.period_s();
         let period = rig.period(setpoint);
-        let (snapshot, scale) = (rig.snapshot(), rig.config().scale);
-        recorder.write(t_s, &period, &snapshot, &scale).unwrap();
-        written.push((t_s, period, Row::new(t_s, &period, &snapshot, &scale)));
+        let (snapshot, units) = (rig.snapshot(), Units::of(rig.config()));
+        recorder.write(t_s, &period, &snapshot, units).unwrap();
+        written.push((t_s, period, Row::new(t_s, &period, &snapshot, units)));
     }
     recorder.finish().unwrap();
 
@@ -68,7 +66,8 @@ fn a_recording_gives_back_each_period() {
     for (row, (t_s, period, as_written)) in rows.iter().zip(&written) {
         assert_eq!(row, as_written);
         assert!((row.t_s - t_s).abs() < 1e-9, "{} for {t_s}", row.t_s);
-        assert_eq!(row.duty_a.is_none(), period.bridge == Bridge::Off);
+        let high_off = matches!(period.bridge, Bridge::Off | Bridge::Charge(_));
+        assert_eq!(row.duty_a.is_none(), high_off);
         let sum_a = row.i_a_a + row.i_b_a + row.i_c_a;
         assert!(sum_a.abs() < 1e-4, "{sum_a} A into the star's point");
         let apart = row.angle_est_deg - row.angle_deg - row.angle_error_deg;

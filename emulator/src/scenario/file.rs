@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use siskin_control::control::delay::Delay;
 use siskin_control::params::ParamId;
+use toml::Value;
 
 use super::ScenarioError;
 use super::signal::Signal;
 use crate::bench::{self, Choice, LoadTable, MotorTable};
 use crate::parameter::parameter;
-use crate::plant::Sensing;
+use crate::plant::{Fidelity, Sensing};
 use crate::rig::Bench;
 
 /// The whole file.
@@ -32,6 +33,31 @@ pub(super) struct Scenario {
     /// What they must be.
     #[serde(default)]
     pub(super) expect: Vec<Expectation>,
+    /// Keys of this file with the values that each takes in turn.
+    #[serde(default)]
+    pub(super) sweep: BTreeMap<String, Vec<Value>>,
+    /// Keys of this file with what each is drawn from by the seed.
+    #[serde(default)]
+    pub(super) random: BTreeMap<String, Draw>,
+}
+
+/// What a value is drawn from.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "give [least, greatest] as numbers, or { of = [...] }"
+)]
+pub(super) enum Draw {
+    /// Evenly from whole numbers.
+    Whole([i64; 2]),
+    /// Evenly from a range.
+    Real([f64; 2]),
+    /// One of these.
+    OneOf {
+        /// The values.
+        of: Vec<Value>,
+    },
 }
 
 /// The bench; each key left out takes the value of the Bosso bench.
@@ -45,7 +71,7 @@ pub(super) struct BenchTable {
     /// Volts, or a pack as "6s".
     pub(super) bus: Bus,
     /// How the inverter is simulated.
-    pub(super) plant: Plant,
+    pub(super) plant: Fidelity,
     /// Speed that the shaft is held at.
     pub(super) imposed_rpm: Option<f64>,
     /// Seed of all randomness.
@@ -66,6 +92,12 @@ pub(super) struct BenchTable {
     pub(super) noise_a: f64,
     /// Error of each current's zero.
     pub(super) offset_a: [f64; 3],
+    /// What each current is multiplied with.
+    pub(super) gain: [f64; 3],
+    /// Time constant of the currents' amplifiers.
+    pub(super) settling_ns: f64,
+    /// By how much each Hall sensor changes late, electrical degrees.
+    pub(super) hall_error_deg: [f64; 3],
     /// Dead time of the inverter.
     pub(super) dead_time_ns: f64,
     /// Speed at the start.
@@ -80,7 +112,7 @@ impl Default for BenchTable {
             motor: Choice::Named("antigravity-4006-kv380".to_owned()),
             load: Choice::Named("cfprop-13x4.4".to_owned()),
             bus: Bus::Volts(24.0),
-            plant: Plant::Averaged,
+            plant: Fidelity::Averaged,
             imposed_rpm: None,
             seed: 1,
             duration_s: 3.0,
@@ -91,6 +123,9 @@ impl Default for BenchTable {
             adc_range_a: 40.0,
             noise_a: 0.05,
             offset_a: [0.0; 3],
+            gain: [1.0; 3],
+            settling_ns: 100.0,
+            hall_error_deg: [0.0; 3],
             dead_time_ns: 500.0,
             initial_rpm: 0.0,
             initial_angle_deg: 0.0,
@@ -106,14 +141,6 @@ pub(super) enum Bus {
     Volts(f64),
     /// A pack.
     Pack(String),
-}
-
-/// How the inverter is simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Plant {
-    /// By its mean voltage over each half period.
-    Averaged,
 }
 
 /// How throttle is sent.
@@ -170,7 +197,7 @@ pub(super) struct WindowTable {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Expectation {
-    /// The window's name.
+    /// The window's name, or `run` for the whole run.
     pub(super) window: String,
     /// The figure's key in the summary.
     pub(super) key: String,
@@ -178,7 +205,7 @@ pub(super) struct Expectation {
     pub(super) below: Option<f64>,
     /// It must be more.
     pub(super) above: Option<f64>,
-    /// It must be this, give or take `within`.
+    /// It must be this, give or take `within`, which is 0 where left out.
     pub(super) equals: Option<f64>,
     /// See `equals`.
     pub(super) within: Option<f64>,
@@ -232,21 +259,25 @@ impl BenchTable {
             1.0 => Delay::One,
             other => return Err(ScenarioError::Delay(other)),
         };
-        let offset = |a: f64| range("bench.offset_a", a, -1e3, 1e3);
+        let three = |key, [a, b, c]: [f64; 3], least, most| {
+            let one = |value| range(key, value, least, most);
+            Ok::<_, ScenarioError>([one(a)?, one(b)?, one(c)?])
+        };
         Ok(Bench {
             motor,
             load,
             supply: bench::supply(&self.bus.text())?,
+            plant: self.plant,
             sensing: Sensing {
                 range_a: range("bench.adc_range_a", self.adc_range_a, 0.1, 1e3)?,
                 bits: range("bench.adc_bits", f64::from(self.adc_bits), 0.0, 24.0)? as u32,
                 noise_a: range("bench.noise_a", self.noise_a, 0.0, 1e3)?,
-                offset_a: [
-                    offset(self.offset_a[0])?,
-                    offset(self.offset_a[1])?,
-                    offset(self.offset_a[2])?,
-                ],
+                offset_a: three("bench.offset_a", self.offset_a, -1e3, 1e3)?,
+                gain: three("bench.gain", self.gain, 0.1, 10.0)?,
+                settling_s: range("bench.settling_ns", self.settling_ns, 0.0, 1e5)? * 1e-9,
+                hall_error_deg: three("bench.hall_error_deg", self.hall_error_deg, -60.0, 60.0)?,
             },
+            hall_stuck: [None; 3],
             delay,
             dead_time_s: Some(range("bench.dead_time_ns", self.dead_time_ns, 0.0, 1e4)? * 1e-9),
             imposed_rad_s: match self.imposed_rpm {

@@ -12,7 +12,7 @@ pub(super) struct Signal {
     pub(super) at_s: f64,
     /// Throttle on the wire, 0 to 1; 0 is motor stop.
     pub(super) throttle: Option<f64>,
-    /// Speed, past the wire.
+    /// Speed, past the wire; negative is the other way.
     pub(super) rpm: Option<f64>,
     /// Torque current, past the wire.
     pub(super) amps: Option<f64>,
@@ -54,7 +54,7 @@ pub(super) enum Shape {
 pub(super) enum Demand {
     /// Throttle on the wire.
     Throttle(f64),
-    /// Mechanical speed, rpm.
+    /// Mechanical speed, rpm; negative is the other way.
     Rpm(f64),
     /// Torque current, A.
     Amps(f64),
@@ -77,8 +77,6 @@ impl Signal {
             Some("has a number that is not finite")
         } else if self.throttle.is_some_and(|t| !(0.0..=1.0).contains(&t)) {
             Some("has a throttle outside 0 to 1")
-        } else if self.rpm.is_some_and(|rpm| rpm < 0.0) {
-            Some("has a negative rpm; this drive turns one way")
         } else if self.shape != Shape::Step
             && (self.shape != Shape::Sine || self.am)
             && !self.for_s.is_some_and(|s| s > 0.0)
@@ -120,7 +118,7 @@ impl Signal {
         };
         match (self.throttle, self.rpm, self.amps) {
             (Some(throttle), ..) => Demand::Throttle(value(throttle).clamp(0.0, 1.0)),
-            (_, Some(rpm), _) => Demand::Rpm(value(rpm).max(0.0)),
+            (_, Some(rpm), _) => Demand::Rpm(value(rpm)),
             (.., amps) => Demand::Amps(value(amps.unwrap_or(0.0))),
         }
     }

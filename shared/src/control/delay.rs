@@ -1,6 +1,5 @@
 //! From the sample to the voltage that it leads to.
 
-use super::transform::Dq;
 use crate::units::{Angle, Speed, Voltage};
 
 /// Periods between the sample and the voltage that it leads to.
@@ -29,14 +28,10 @@ impl Delay {
 
     /// The voltage between this sample and the next, of what is commanded now and what was before.
     #[inline(always)]
-    pub(super) fn applied(self, now: Dq<Voltage>, before: Dq<Voltage>) -> Dq<Voltage> {
-        let mean = |a: Voltage, b: Voltage| Voltage::from_bits((a.to_bits() + b.to_bits()) >> 1);
+    pub fn applied(self, now: Voltage, before: Voltage) -> Voltage {
         match self {
             Self::None => now,
-            Self::Half => Dq {
-                d: mean(now.d, before.d),
-                q: mean(now.q, before.q),
-            },
+            Self::Half => Voltage::from_bits((now.to_bits() + before.to_bits()) >> 1),
             Self::One => before,
         }
     }

@@ -3,14 +3,21 @@
 //! Each block is a pair of an immutable configuration, computed when the parameters change, and a
 //! state. Nothing here knows of parameters, of the throttle or of time: a call is a period.
 
+pub mod catch;
+pub mod dead_time;
 pub mod delay;
+pub mod inductance;
 pub mod modulator;
 pub mod observer;
 pub mod planner;
 pub mod regulator;
+pub mod sensing;
+pub mod six_step;
 pub mod speed;
 pub mod start;
+pub mod torque;
 pub mod transform;
+pub mod voltage;
 
 #[cfg(test)]
 mod tests;

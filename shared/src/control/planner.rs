@@ -1,32 +1,152 @@
 //! The trajectory planner: from a speed command Ω* to ω* and its derivative.
+//!
+//! A command that jumps is followed at the greatest slew and then, over the last slew/λ,
+//! exponentially: where the reference lands softly the drive does not overshoot it, though the
+//! inertia be wrong. A command that moves within the slew is followed without a lag. The slew is
+//! reached in some milliseconds: the torque that it takes is no jump for the current loop.
 
+use fixed::types::extra::U32;
+
+use crate::math::Gain;
 use crate::units::Speed;
 
-/// Moves the reference towards the command by at most `slew` a period.
-///
-/// Returns the new reference ω* and its step ω̇*·T_s.
-#[inline(always)]
-pub fn plan(reference: Speed, command: Speed, slew: Speed) -> (Speed, Speed) {
-    let step = command.saturating_sub(reference).min(slew).max(-slew);
-    (reference.saturating_add(step), step)
+/// Limits of the trajectory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Greatest change of ω* in a period.
+    pub slew: Speed,
+    /// Greatest change of that from period to period.
+    pub jerk: Speed,
+    /// λ·T_s, the share of what is left that a period takes at the end; one lands at full slew.
+    pub approach: Gain<U32, U32>,
+}
+
+/// Where the trajectory is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// ω*.
+    pub reference: Speed,
+    /// Ω* of the last period.
+    command: Speed,
+    /// ω*'s last step.
+    step: Speed,
+}
+
+impl State {
+    /// A trajectory that begins at this speed.
+    pub fn begin(reference: Speed) -> Self {
+        Self {
+            reference,
+            command: reference,
+            step: Speed::ZERO,
+        }
+    }
+
+    /// The step that ω* may take in this period, ω̇*·T_s. The drive says by
+    /// [`State::advance`] which it takes.
+    #[inline(always)]
+    pub fn plan(&mut self, config: &Config, command: Speed) -> Speed {
+        let moved = command.saturating_sub(self.command);
+        let left = self.command.saturating_sub(self.reference);
+        self.command = command;
+        // Rounded away from zero, so that the command is reached.
+        let share = if left.is_negative() {
+            config.approach.apply(left).max(left)
+        } else {
+            (-config.approach.apply(-left)).min(left)
+        };
+        moved
+            .saturating_add(share)
+            .min(config.slew)
+            .max(-config.slew)
+            .min(self.step.saturating_add(config.jerk))
+            .max(self.step.saturating_sub(config.jerk))
+    }
+
+    /// Takes ω* on by a step.
+    #[inline(always)]
+    pub fn advance(&mut self, step: Speed) {
+        self.reference = self.reference.saturating_add(step);
+        self.step = step;
+    }
+
+    /// Hands out every word.
+    // Two drives have a planner: left as a call, it would keep the whole trace out of registers.
+    #[inline(always)]
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            reference,
+            command,
+            step,
+        } = self;
+        out(reference.to_bits() as u32);
+        out(command.to_bits() as u32);
+        out(step.to_bits() as u32);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn config(approach: f32) -> Config {
+        Config {
+            slew: Speed::from_num(0.001),
+            jerk: Speed::from_num(0.002),
+            approach: Gain::new(approach).expect("in range"),
+        }
+    }
+
+    /// The steps to a command at once, until none is left.
+    fn run(config: &Config, state: &mut State, command: Speed) -> std::vec::Vec<Speed> {
+        let mut steps = std::vec::Vec::new();
+        loop {
+            let step = state.plan(config, command);
+            if step == Speed::ZERO {
+                return steps;
+            }
+            state.advance(step);
+            steps.push(step);
+        }
+    }
+
     #[test]
     fn the_slew_is_kept_both_ways_and_the_command_is_reached() {
-        let slew = Speed::from_num(0.001);
+        let config = config(1.0);
+        let mut state = State::default();
         let command = Speed::from_num(0.0105);
-        let mut reference = Speed::ZERO;
-        for period in 0..11 {
-            let (next, step) = plan(reference, command, slew);
-            assert_eq!(step, next - reference);
-            assert_eq!(step == slew, period < 10);
-            reference = next;
+        let steps = run(&config, &mut state, command);
+        assert_eq!(steps.len(), 11);
+        assert!(steps[..10].iter().all(|step| *step == config.slew));
+        assert_eq!(state.reference, command);
+        assert_eq!(state.plan(&config, Speed::ZERO), -config.slew);
+    }
+
+    #[test]
+    fn a_jump_lands_exponentially_and_does_not_pass_the_command() {
+        let config = config(0.1);
+        for command in [0.03, -0.03].map(Speed::from_num) {
+            let mut state = State::default();
+            let steps = run(&config, &mut state, command);
+            assert_eq!(state.reference, command);
+            // Full slew until slew/λ is left: 0.01 of 0.03, 20 periods and the one that it began in.
+            let full = steps.iter().filter(|s| s.abs() == config.slew).count();
+            assert!((20..=21).contains(&full), "{full}");
+            let at_end = steps[full + 1].abs() < config.slew * 9 / 10;
+            assert!(at_end, "{:?}", steps[full + 1]);
         }
-        assert_eq!(reference, command);
-        assert_eq!(plan(reference, Speed::ZERO, slew).1, -slew);
+    }
+
+    #[test]
+    fn a_command_that_moves_within_the_slew_is_followed_at_once() {
+        let config = config(0.01);
+        let mut state = State::begin(Speed::from_num(0.05));
+        for period in 0..500 {
+            let turn = f64::from(period) / 500.0 * core::f64::consts::TAU;
+            let command = Speed::from_num(0.05 + 0.05 * turn.sin());
+            let step = state.plan(&config, command);
+            state.advance(step);
+            assert!((state.reference - command).abs() < Speed::from_num(1e-6));
+        }
     }
 }

@@ -1,14 +1,14 @@
 //! Open-loop start of the second paper, section 3.2: Park aligns the rotor, Ramp turns it.
 //!
 //! The current is held on the q axis of the control's frame, and the frame is turned without
-//! knowledge of the rotor, which follows like a stepper motor's. The back-EMF observer runs in that
-//! frame all the while, so at the hand-over it tells where the rotor really is.
+//! knowledge of the rotor, which follows like a stepper motor's. The observer runs all the while, so
+//! at the hand-over it tells where the rotor really is.
 
 use fixed::types::I36F28;
 use fixed::types::extra::{U28, U32};
 
 use super::transform::Dq;
-use crate::math::{Gain, TopProduct, atan2_turns, magnitude};
+use crate::math::{Gain, TopProduct};
 use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -16,8 +16,6 @@ use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
 pub struct Config {
     /// I_qr, the current of Park and Ramp.
     pub current: Current,
-    /// Greatest current of a test of the motor.
-    pub test_current: Current,
     /// Current times periods after which Park ends (A·s of section 3.2.2).
     pub park_charge: I36F28,
     /// Current to the frame's speed in the first half of Park. It turns the current's vector by a
@@ -29,19 +27,45 @@ pub struct Config {
     pub yielding: Gain<U32, U32>,
     /// Share of that angle that is taken in a period, as speed to speed.
     pub yield_rate: Gain<U32, U32>,
+    /// Periods in which the rotor has turned too slowly, less those in which it has not, after which
+    /// it has lost the frame.
+    pub astray_periods: u32,
+    /// R.
+    pub resistance: Gain<U28, U28>,
+    /// L, for speed times current.
+    pub reactance: Gain<U28, U28>,
     /// ω_cl, the speed at which Run begins.
     pub run_speed: Speed,
+    /// ξ of the stated flux.
+    pub xi_nominal: InverseFlux,
 }
 
 /// What Park and Ramp remember.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct State {
+    /// The frame's angle at the coming sample.
+    /// Current along q of the first frame, a quarter of a turn back, is along phase a.
+    pub frame: Angle,
     /// ∫I_qr in Park, in periods.
     pub charge: I36F28,
     /// ω_s, the speed of the frame.
     pub omega_s: Speed,
     /// Angle by which the frame yields to the rotor's swing.
     pub yielded: Angle,
+    /// Periods in which the rotor has turned too slowly, less those in which it has not.
+    pub astray: u32,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            frame: Angle::from_bits(-1 << 30),
+            charge: I36F28::ZERO,
+            omega_s: Speed::ZERO,
+            yielded: Angle::ZERO,
+            astray: 0,
+        }
+    }
 }
 
 /// One period of Park: the frame's speed, and whether the rotor has had its time.
@@ -67,60 +91,95 @@ pub fn ramp(config: &Config, state: &mut State, current: Current) -> (Speed, boo
 /// Damps the rotor's swing about the current's vector: a pendulum that a constant current does not
 /// damp. The frame yields by an angle in proportion to the rotor's speed against the frame, which
 /// is ξ·h_d, since the rotor's flux stands near the q axis; along d, neither a wrong R nor the dead
-/// time disturbs the back-EMF.
+/// time disturbs the back-EMF h_d = R·i_d − ω·L·i_q − u_d (5).
 ///
-/// Returns what it adds to the frame's speed in this period.
+/// Takes the frame on by a period and returns its speed in it.
 #[inline]
 pub fn damp(
     config: &Config,
     state: &mut State,
-    h_d: Voltage,
+    (i, u): (Dq<Current>, Dq<Voltage>),
     omega_s: Speed,
-    xi_nominal: InverseFlux,
 ) -> Speed {
+    let h_d = config
+        .resistance
+        .saturating_apply(i.d)
+        .saturating_sub(config.reactance.saturating_apply(omega_s.top(i.q)))
+        .saturating_sub(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
-    let rotor = Speed::saturating_from_num(xi_nominal.top(h_d));
+    let rotor = Speed::saturating_from_num(config.xi_nominal.top(h_d));
+    // A rotor that follows turns as fast as the frame in the mean. Below a quarter of the speed at
+    // which Run begins its swing is as fast.
+    if omega_s > config.run_speed / 4 {
+        state.astray = if rotor < omega_s / 2 {
+            state.astray + 1
+        } else {
+            state.astray.saturating_sub(1)
+        };
+    }
     let target = config
         .yielding
         .saturating_apply(omega_s.saturating_sub(rotor))
-        .min(QUARTER_TURN)
-        .max(-QUARTER_TURN);
+        .min(YIELDED_MAX)
+        .max(-YIELDED_MAX);
     let step = config
         .yield_rate
         .apply(target.saturating_sub(state.yielded));
     state.yielded += step;
-    step
+    let omega = omega_s.saturating_add(step);
+    state.frame = state.frame.wrapping_add(omega);
+    omega
 }
 
-const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
-
-/// Where the rotor is, as seen from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
-///
-/// `None` where the back-EMF is not between half and twice of what the stated flux gives at the
-/// frame's speed: the rotor has not followed, or there is none and the voltage met no current.
-pub fn rotor_lead(h: Dq<Voltage>, omega_s: Speed, xi_nominal: InverseFlux) -> Option<Angle> {
-    // A speed has 32 fraction bits, ξ·|h| 28.
-    let expected = omega_s.to_bits() >> 4;
-    let found = xi_nominal.top(magnitude(h.d, h.q)).to_bits();
-    let followed = found >= expected / 2 && found <= expected.saturating_mul(2);
-    followed.then(|| atan2_turns(h.d, h.q.saturating_neg()))
+/// Whether the rotor has lost the frame of Ramp.
+#[inline]
+pub fn lost(config: &Config, state: &State) -> bool {
+    state.astray > config.astray_periods
 }
+
+impl State {
+    /// Every word of the state.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            frame,
+            charge,
+            omega_s,
+            yielded,
+            astray,
+        } = self;
+        let charge = charge.to_bits();
+        out(frame.to_bits() as u32);
+        out(charge as u32);
+        out((charge >> 32) as u32);
+        out(omega_s.to_bits() as u32);
+        out(yielded.to_bits() as u32);
+        out(*astray);
+    }
+}
+
+/// Most by which the frame yields: a sixteenth of a turn.
+const YIELDED_MAX: Angle = Angle::from_bits(1 << 28);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::transform::inverse_park;
+    use crate::math::sin_cos;
 
     fn config() -> Config {
         Config {
             current: Current::from_num(0.5),
-            test_current: Current::from_num(0.1),
             park_charge: I36F28::from_num(100),
             // A quarter of a turn in half of the charge.
             sweep: Gain::new(0.25 / 50.0).expect("in range"),
             k_s: Gain::new(1e-4).expect("in range"),
             yielding: Gain::new(200.0).expect("in range"),
             yield_rate: Gain::new(0.02).expect("in range"),
+            astray_periods: 100,
+            resistance: Gain::new(0.5).expect("in range"),
+            reactance: Gain::new(2.0).expect("in range"),
             run_speed: Speed::from_num(0.01),
+            xi_nominal: InverseFlux::from_num(0.25),
         }
     }
 
@@ -154,44 +213,77 @@ mod tests {
     }
 
     #[test]
-    fn the_frame_yields_to_a_swing_by_at_most_a_quarter_of_a_turn() {
+    fn the_frame_yields_to_a_swing_by_at_most_a_sixteenth_of_a_turn() {
         let config = config();
         let mut state = State::default();
-        let xi = InverseFlux::from_num(0.25);
         let mut settle = |h_d: f64, omega_s: f64| {
+            // h_d = R·i_d − ω·L·i_q − u_d with R = 0.5 and L = 2.
+            let i = Dq {
+                d: Current::from_num(0.1),
+                q: Current::from_num(0.2),
+            };
+            let u = Dq {
+                d: Voltage::from_num(0.05 - 0.4 * omega_s - h_d),
+                q: Voltage::ZERO,
+            };
             for _ in 0..1000 {
-                let omega_s = Speed::from_num(omega_s);
-                damp(&config, &mut state, Voltage::from_num(h_d), omega_s, xi);
+                damp(&config, &mut state, (i, u), Speed::from_num(omega_s));
             }
             state.yielded.to_num::<f64>()
         };
-        // Rotor at ξ·h_d = 0.0005 turns a period: 200 times that against the swing.
-        assert!((settle(0.002, 0.0) + 0.1).abs() < 1e-3);
-        assert!((settle(-0.002, 0.0) - 0.1).abs() < 1e-3);
-        assert!(settle(0.002, 0.0005).abs() < 1e-3);
-        assert!((settle(1.0, 0.0) + 0.25).abs() < 1e-3);
+        // Rotor at ξ·h_d = 0.00025 turns a period: 200 times that against the swing.
+        assert!((settle(0.001, 0.0) + 0.05).abs() < 1e-3);
+        assert!((settle(-0.001, 0.0) - 0.05).abs() < 1e-3);
+        assert!(settle(0.001, 0.00025).abs() < 1e-3);
+        assert!((settle(1.0, 0.0) + 0.0625).abs() < 1e-3);
+        assert!((settle(-1.0, 0.0) - 0.0625).abs() < 1e-3);
     }
 
     #[test]
-    fn the_rotor_is_found_by_its_back_emf() {
-        let omega = Speed::from_num(0.01);
-        let xi = InverseFlux::from_num(0.25);
-        // χ = ω/ξ = 0.04; the rotor leads the frame by 60°.
-        let h = Dq {
-            d: Voltage::from_num(0.04 * 0.866_025),
-            q: Voltage::from_num(-0.04 * 0.5),
+    fn the_first_current_is_along_phase_a() {
+        let along_q = Dq {
+            d: Voltage::ZERO,
+            q: Voltage::ONE,
         };
-        let lead = rotor_lead(h, omega, xi).expect("it has followed");
-        assert!((lead.to_num::<f64>() * 360.0 - 60.0).abs() < 0.05);
-        let weak = Dq {
-            d: Voltage::from_num(0.015),
-            q: Voltage::ZERO,
+        let frame = sin_cos(State::default().frame);
+        let stator = inverse_park(along_q, frame);
+        // The table of sines is right to 2e-5.
+        assert!(
+            (stator.alpha.to_num::<f64>() - 1.0).abs() < 3e-5,
+            "{stator:?}"
+        );
+        assert!(stator.beta.to_num::<f64>().abs() < 3e-5, "{stator:?}");
+    }
+
+    #[test]
+    fn a_rotor_that_does_not_turn_with_the_frame_is_lost_and_one_that_does_is_not() {
+        let config = config();
+        // Above a quarter of the speed at which Run begins.
+        let omega_s = Speed::from_num(0.005);
+        let periods_to_loss = |followed: f64, omega_s: Speed| {
+            let mut state = State::default();
+            // ξ·h_d with h_d = −u_d is the rotor's speed.
+            let u_d = -4.0 * followed * omega_s.to_num::<f64>();
+            let u = Dq {
+                d: Voltage::from_num(u_d),
+                q: Voltage::ZERO,
+            };
+            (1..1000).find(|_| {
+                damp(&config, &mut state, (Dq::default(), u), omega_s);
+                lost(&config, &state)
+            })
         };
-        assert_eq!(rotor_lead(weak, omega, xi), None);
-        let strong = Dq {
-            d: Voltage::from_num(0.09),
-            q: Voltage::ZERO,
-        };
-        assert_eq!(rotor_lead(strong, omega, xi), None);
+        assert_eq!(
+            periods_to_loss(0.0, omega_s),
+            Some(config.astray_periods + 1)
+        );
+        assert_eq!(
+            periods_to_loss(0.4, omega_s),
+            Some(config.astray_periods + 1)
+        );
+        assert_eq!(periods_to_loss(0.6, omega_s), None);
+        assert_eq!(periods_to_loss(1.0, omega_s), None);
+        // Its swing is as fast.
+        assert_eq!(periods_to_loss(0.0, config.run_speed / 4), None);
     }
 }

@@ -7,13 +7,20 @@ use proptest::prelude::*;
 use std::f64::consts::TAU;
 
 use super::delay::Delay;
-use super::observer::{Estimate, back_emf};
-use super::regulator::{Feedback, Reference, observer_based as regulator};
-use super::speed::{self, Bounds};
+use super::inductance::Factor;
+use super::observer::{self, Estimate, back_emf};
+use super::regulator::Feedback;
 use super::transform::Dq;
 use crate::drive::Config;
+use crate::math::sin_cos;
 use crate::params::{Board, ParamId, Params, build};
-use crate::units::{Current, InverseFlux, Speed, Torque, Voltage};
+use crate::units::{Angle, Current, InverseFlux, Speed, Torque, Voltage};
+
+mod inductance;
+mod motor;
+mod outer;
+mod regulators;
+mod speed;
 
 const R: f64 = 0.108;
 const L: f64 = 30.6e-6;
@@ -35,17 +42,54 @@ const K_I_OMEGA: f64 = 41.7e-3;
 /// How far the computed gains may lie from Table III: its eigenvalues have three digits.
 const TABLE_III: f64 = 0.02;
 
-fn config() -> Config {
+fn config_with(changes: &[(ParamId, f32)]) -> Config {
     let mut params = Params::default();
     params.set(ParamId::PwmFreqHz, 15_000.0).expect("in range");
+    for (id, value) in changes {
+        params.set(*id, *value).expect("in range");
+    }
     let board = Board {
         delay: Delay::None,
         ..Board::BENCH
     };
-    build(&params, &board).expect("the defaults fit")
+    build(&params, &board).expect("it makes a drive")
+}
+
+/// The adaptive back-EMF observer of `CTL_OBSERVER` 0.
+fn published(config: &Config) -> back_emf::Config {
+    match &config.observer {
+        observer::Config::BackEmf(back_emf) => back_emf.clone(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// What that observer reads of a period's feedback.
+fn feedback(omega: Speed, i: Dq<Current>) -> Feedback {
+    Feedback {
+        omega,
+        i,
+        i_hat: i,
+        h_hat: Dq::default(),
+        inductance: Factor::ONE,
+    }
+}
+
+/// The estimate of an observer that has seen nothing.
+fn nothing_seen() -> Estimate {
+    Estimate {
+        theta: Angle::ZERO,
+        frame: sin_cos(Angle::ZERO),
+        omega: Speed::ZERO,
+        omega_bar: Speed::ZERO,
+        omega_bar_step: Speed::ZERO,
+        xi: InverseFlux::ZERO,
+        xi_step: InverseFlux::ZERO,
+        lost: false,
+    }
 }
 
 /// Between SI and the control's units.
+#[derive(Clone)]
 struct Units(Config);
 
 impl Units {
@@ -73,9 +117,6 @@ impl Units {
     fn per_wb(&self, xi: InverseFlux) -> f64 {
         xi.to_num::<f64>() * f64::from(self.0.scale.inverse_flux_per_wb())
     }
-    fn torque(&self, nm: f64) -> Torque {
-        Torque::from_num(nm / f64::from(self.0.scale.torque_nm()))
-    }
     fn nm(&self, torque: Torque) -> f64 {
         torque.to_num::<f64>() * f64::from(self.0.scale.torque_nm())
     }
@@ -102,8 +143,8 @@ proptest! {
         flux_factor in 0.7..1.5_f64,
         omega_f in 500.0..7000.0_f64,
     ) {
-        let units = Units(config());
-        let observer = &units.0.observer;
+        let units = Units(config_with(&[(ParamId::CtlObserver, 0.0)]));
+        let observer = &published(&units.0);
         let i_hat = [i[0] - i_error[0], i[1] - i_error[1]];
         let xi = flux_factor / PHI;
         let mut state = back_emf::State {
@@ -114,7 +155,7 @@ proptest! {
             ..back_emf::State::default()
         };
 
-        let estimate = back_emf::estimate(observer, &mut state);
+        let estimate = back_emf::estimate(observer, &mut state, None, Speed::ZERO);
         let omega_bar = xi * h_d.hypot(h_q);
         let omega = omega_bar + K_ETA * h_d;
         near(units.rad_s(estimate.omega_bar), omega_bar, 1e-5, 0.01)?;
@@ -123,12 +164,12 @@ proptest! {
         near(units.rad_s(estimate.omega_bar_step) / TS, y_f, TABLE_III, 10.0)?;
         near(units.rad_s(state.omega_f), omega_f + y_f * TS, 0.0, TABLE_III * (y_f * TS).abs() + 0.01)?;
 
-        back_emf::adapt(observer, &mut state, estimate.xi_step);
+        prop_assert!(!estimate.lost);
         near(units.per_wb(state.xi), xi + TS * GAMMA * h_d, 0.0, 0.03 * TS * GAMMA * h_d.abs() + 0.01)?;
 
         let measured = Dq { d: units.current(i[0]), q: units.current(i[1]) };
         let applied = Dq { d: units.voltage(u[0]), q: units.voltage(u[1]) };
-        back_emf::advance(observer, &mut state, estimate.omega, measured, applied);
+        back_emf::advance(observer, &mut state, &feedback(estimate.omega, measured), applied);
         let omega = units.rad_s(estimate.omega);
         let decay = 1.0 - (-R * TS / L).exp();
         let cross = [omega * i[1], -omega * i[0]];
@@ -145,125 +186,44 @@ proptest! {
         let turned = (omega * TS / TAU + 0.5).rem_euclid(1.0) - 0.5;
         near(state.theta.to_num::<f64>(), turned, 0.0, 1e-7)?;
     }
-
-    /// (10) and its integrators.
-    #[test]
-    fn the_regulator_is_that_of_the_equations(
-        omega in 500.0..7500.0_f64,
-        i in prop::array::uniform2(-15.0..15.0_f64),
-        i_hat in prop::array::uniform2(-15.0..15.0_f64),
-        h in prop::array::uniform2(-10.0..10.0_f64),
-        sigma in prop::array::uniform2(-1.0..1.0_f64),
-        i_q_star in -15.0..15.0_f64,
-        p_q_star in -3000.0..3000.0_f64,
-    ) {
-        let units = Units(config());
-        let wanted = Reference {
-            i: Dq {
-                d: Current::ZERO,
-                q: units.current(i_q_star),
-            },
-            u_q: Voltage::ZERO,
-            i_q_step: units.current(p_q_star * TS),
-        };
-        let feedback = Feedback {
-            omega: units.speed(omega),
-            i: Dq { d: units.current(i[0]), q: units.current(i[1]) },
-            i_hat: Dq { d: units.current(i_hat[0]), q: units.current(i_hat[1]) },
-            h_hat: Dq { d: units.voltage(h[0]), q: units.voltage(h[1]) },
-        };
-        let mut state = regulator::State {
-            sigma: Dq { d: units.voltage(sigma[0]), q: units.voltage(sigma[1]) },
-        };
-        let u = regulator::voltage(&units.0.regulator, &state, wanted, &feedback);
-        let e = [i_hat[0], i_hat[1] - i_q_star];
-        let u_d = -h[0] - L * (omega * i[1] + K_PE * e[0]) + sigma[0];
-        let u_q = R * i_q_star - h[1] + L * (omega * i[0] + p_q_star - K_PE * e[1]) + sigma[1];
-        near(units.volts(u.d), u_d, 1e-5, 1e-4 + TABLE_III * L * K_PE * e[0].abs())?;
-        near(units.volts(u.q), u_q, 1e-5, 1e-4 + TABLE_III * L * K_PE * e[1].abs())?;
-
-        regulator::integrate(&units.0.regulator, &mut state, wanted, &feedback);
-        for (axis, got) in [state.sigma.d, state.sigma.q].into_iter().enumerate() {
-            let step = TS * K_IE * e[axis];
-            near(units.volts(got), sigma[axis] - step, 1e-6, TABLE_III * step.abs() + 1e-5)?;
-        }
-    }
-
-    /// (8) and (9) away from the bounds, and that the bounds hold.
-    #[test]
-    fn the_speed_regulator_is_that_of_the_equations(
-        omega_m in 100.0..600.0_f64,
-        error in -60.0..60.0_f64,
-        omega_dot_star in -2000.0..2000.0_f64,
-        y_f in -2000.0..2000.0_f64,
-        xi_factor in 0.7..1.5_f64,
-        xi_dot in -1000.0..1000.0_f64,
-        sigma in -0.3..0.3_f64,
-        bound in 2.0..20.0_f64,
-    ) {
-        let units = Units(config());
-        let xi = xi_factor / PHI;
-        let estimate = Estimate {
-            omega: units.speed(P * omega_m),
-            omega_bar: units.speed(P * omega_m),
-            omega_bar_step: units.speed(P * y_f * TS),
-            xi: units.xi(xi),
-            xi_step: units.xi(xi_dot * TS),
-        };
-        let mut state = speed::State { sigma: units.torque(sigma) };
-        let bounds = Bounds { min: units.current(-bound), max: units.current(bound) };
-        let reference = (
-            units.speed(P * (omega_m - error)),
-            units.speed(P * omega_dot_star * TS),
-        );
-        let got = speed::current(
-            &units.0.speed, &mut state, reference, &estimate, bounds,
-        );
-        let torque = -K_P_OMEGA * error + sigma;
-        let i_q = 2.0 / (3.0 * P) * xi * torque;
-        let tolerance = 0.001 + TABLE_III * 2.0 / (3.0 * P) * xi * (K_P_OMEGA * error).abs();
-        if i_q.abs() < bound - tolerance {
-            near(units.amperes(got.i.q), i_q, 1e-4, tolerance)?;
-            let torque_dot = -K_P_OMEGA * y_f + K_P_OMEGA * omega_dot_star - K_I_OMEGA * error;
-            let p_q = 2.0 / (3.0 * P) * (xi_dot * torque + xi * torque_dot);
-            near(units.amperes(got.i_q_step) / TS, p_q, TABLE_III, 30.0)?;
-            let step = TS * K_I_OMEGA * error;
-            near(units.nm(state.sigma), sigma - step, 0.0, TABLE_III * step.abs() + 1e-6)?;
-        } else {
-            prop_assert!(units.amperes(got.i.q).abs() <= bound + 1e-4);
-        }
-    }
 }
 
-#[test]
-fn at_a_bound_the_integrator_only_comes_back() {
-    let units = Units(config());
-    let bounds = Bounds {
-        min: units.current(-1.0),
-        max: units.current(1.0),
-    };
-    let sigma_after = |error_rad_s: f64, sigma: f64| {
-        let omega = units.speed(P * 300.0);
-        let estimate = Estimate {
-            omega,
-            omega_bar: omega,
-            omega_bar_step: Speed::ZERO,
-            xi: units.xi(1.0 / PHI),
-            xi_step: InverseFlux::ZERO,
+proptest! {
+    /// The loop in place of (7): ω̂_i += T_s·(ω_n²·ε + ω̇*), ω̂ = ω̂_i + 2·ω_n·ε, ε = ĥ_d/|ĥ|.
+    #[test]
+    fn the_cured_observer_is_that_of_its_loop(
+        h_d in -8.0..8.0_f64,
+        h_q in -12.0..8.0_f64,
+        omega_i in 500.0..7000.0_f64,
+        planned in -25_000.0..25_000.0_f64,
+    ) {
+        prop_assume!(h_d.hypot(h_q) > 0.1);
+        let cured = [(ParamId::CtlObserver, 0.0), (ParamId::CtlObsCure, 1.0)];
+        let units = Units(config_with(&cured));
+        let config = published(&units.0);
+        let mut state = back_emf::State {
+            h: Dq { d: units.voltage(h_d), q: units.voltage(h_q) },
+            xi: config.xi_nominal,
+            omega_i: units.speed(omega_i),
+            ..back_emf::State::default()
         };
-        let mut state = speed::State {
-            sigma: units.torque(sigma),
-        };
-        let reference = (units.speed(P * (300.0 - error_rad_s)), Speed::ZERO);
-        let got = speed::current(&units.0.speed, &mut state, reference, &estimate, bounds);
-        assert_eq!(got.i_q_step, Current::ZERO);
-        units.nm(state.sigma) - sigma
-    };
-    // Too slow and too much torque asked for already: 1 A is 0.0234 Nm.
-    assert!(sigma_after(-50.0, 0.2).abs() < 1e-9);
-    // Too fast while the integrator asks for far too much: it falls.
-    assert!(sigma_after(1.0, 0.2) < 0.0);
-    assert!(sigma_after(50.0, -0.2).abs() < 1e-9);
+        let step = units.speed(planned * TS);
+        let got = back_emf::estimate(&config, &mut state, None, step);
+        let epsilon = h_d / h_d.hypot(h_q);
+        let omega_n = 400.0;
+        let next = omega_i + TS * (omega_n * omega_n * epsilon + planned);
+        // ε has twelve bits, |ĥ| of 28 the upper fourteen and a magnitude right to 0.1 %.
+        let length = units.voltage(h_d.hypot(h_q)).to_bits();
+        let part = 1e-3 + 1.0 / 4096.0 + 1.1 * 16_384.0 / f64::from(length);
+        near(units.rad_s(got.omega_bar), next, 0.0, 0.01 + part * TS * omega_n * omega_n)?;
+        near(units.rad_s(got.omega), next + 2.0 * omega_n * epsilon, 0.0, 0.01 + part * 2.1 * omega_n)?;
+        near(units.rad_s(got.omega_bar_step), next - omega_i, 0.0, 0.01 + part * TS * omega_n * omega_n)?;
+        near(units.rad_s(state.omega_i), units.rad_s(got.omega_bar), 0.0, 1e-9)?;
+        prop_assert_eq!(got.xi, config.xi_nominal);
+        prop_assert_eq!(state.xi, config.xi_nominal);
+        // The rotor cannot be where ĥ is opposite to what the frame expects.
+        prop_assert_eq!(got.lost, !state.h.q.is_negative());
+    }
 }
 
 #[test]
@@ -271,7 +231,7 @@ fn the_voltage_between_two_samples_follows_the_delay() {
     let run = |delay| {
         let observer = back_emf::Config {
             delay,
-            ..config().observer
+            ..published(&config_with(&[(ParamId::CtlObserver, 0.0)]))
         };
         let mut state = back_emf::State {
             u_before: Dq {
@@ -284,7 +244,8 @@ fn the_voltage_between_two_samples_follows_the_delay() {
             d: Voltage::from_num(0.5),
             q: Voltage::ZERO,
         };
-        back_emf::advance(&observer, &mut state, Speed::ZERO, Dq::default(), now);
+        let standing = feedback(Speed::ZERO, Dq::default());
+        back_emf::advance(&observer, &mut state, &standing, now);
         assert_eq!(state.u_before, now);
         state.i.d.to_num::<f64>()
     };
@@ -292,4 +253,26 @@ fn the_voltage_between_two_samples_follows_the_delay() {
     assert!((none / one - 0.5).abs() < 1e-6 && (half / one - 0.75).abs() < 1e-6);
     let ahead = Delay::One.advance(Speed::from_num(0.1)).to_num::<f64>();
     assert!((ahead - 0.15).abs() < 1e-9);
+}
+
+#[test]
+fn a_rotor_that_is_caught_without_current_is_predicted_without_current() {
+    for delay in [Delay::None, Delay::Half, Delay::One] {
+        let units = Units(config_with(&[(ParamId::CtlObserver, 0.0)]));
+        let config = back_emf::Config {
+            delay,
+            ..published(&units.0)
+        };
+        for omega in [500.0, 3000.0, 7000.0] {
+            let speed = units.speed(omega);
+            let mut state = back_emf::begin(&config, Angle::ZERO, speed);
+            let emf = Dq {
+                d: Voltage::ZERO,
+                q: units.voltage(omega * PHI),
+            };
+            back_emf::advance(&config, &mut state, &feedback(speed, Dq::default()), emf);
+            let i = [state.i.d, state.i.q].map(|i| units.amperes(i));
+            assert!(i[0].hypot(i[1]) < 1e-3, "{delay:?}, {omega}: {i:?}");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use fixed::types::extra::U32;
 use fixed::types::{I3F29, I4F28, I5F27};
 
 use crate::math::{SinCos, TopProduct};
-use crate::units::{AdcCounts, Voltage};
+use crate::units::{AdcCounts, Current, Voltage};
 
 /// A vector in the stator's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,6 +48,27 @@ pub fn clarke([a, b, c]: [AdcCounts; 3]) -> AlphaBeta<I3F29> {
     }
 }
 
+/// The currents of Clarke's transform as the control's currents.
+#[inline(always)]
+pub fn currents(v: AlphaBeta<I3F29>) -> AlphaBeta<Current> {
+    AlphaBeta {
+        alpha: Current::from_bits(v.alpha.to_bits() >> 1),
+        beta: Current::from_bits(v.beta.to_bits() >> 1),
+    }
+}
+
+/// The voltages of the inverse of Park's transform as the control's voltages, held at the ends of
+/// their type.
+#[inline(always)]
+pub fn voltages(v: AlphaBeta<I5F27>) -> AlphaBeta<Voltage> {
+    let most = i32::MAX >> 1;
+    let double = |x: I5F27| Voltage::from_bits(x.to_bits().min(most).max(-most) << 1);
+    AlphaBeta {
+        alpha: double(v.alpha),
+        beta: double(v.beta),
+    }
+}
+
 /// Park's transform (12): the stator's vector as the rotor sees it.
 #[inline(always)]
 pub fn park(v: AlphaBeta<I3F29>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
@@ -55,6 +76,22 @@ pub fn park(v: AlphaBeta<I3F29>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
         d: v.alpha.top(cos) + v.beta.top(sin),
         q: v.beta.top(cos) - v.alpha.top(sin),
     }
+}
+
+/// Greatest magnitude of a component that [`to_rotor`] takes.
+const ROTATED_MAX: I4F28 = I4F28::from_bits((1 << 30) - 1);
+
+/// Park's transform of any vector of the stator's frame; components are held within ±4.
+#[inline(always)]
+pub fn to_rotor(v: AlphaBeta<I4F28>, frame: SinCos) -> Dq<I4F28> {
+    let double = |x: I4F28| I3F29::from_bits(x.min(ROTATED_MAX).max(-ROTATED_MAX).to_bits() << 1);
+    park(
+        AlphaBeta {
+            alpha: double(v.alpha),
+            beta: double(v.beta),
+        },
+        frame,
+    )
 }
 
 /// The inverse of Park's transform (11).
@@ -80,11 +117,10 @@ pub fn phases<F>(v: AlphaBeta<FixedI32<F>>) -> [FixedI32<F>; 3] {
 /// Turns a rotor-frame vector against the frame: the vector as a frame sees it that leads by the
 /// angle. Components are held within ±4.
 pub fn rotate_frame(v: Dq<I4F28>, ahead: SinCos) -> Dq<I4F28> {
-    let clip = |x: I4F28| I3F29::saturating_from_num(x);
-    park(
+    to_rotor(
         AlphaBeta {
-            alpha: clip(v.d),
-            beta: clip(v.q),
+            alpha: v.d,
+            beta: v.q,
         },
         ahead,
     )

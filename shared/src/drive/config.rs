@@ -1,14 +1,15 @@
 //! Everything that a control period reads and does not change.
 
-use fixed::types::I1F31;
-use fixed::types::extra::{U16, U27, U28, U31, U32};
+use fixed::types::extra::{U16, U28, U32};
 
-use crate::control::observer::back_emf;
-use crate::control::regulator::observer_based as regulator;
-use crate::control::{modulator, speed, start};
+use super::six_step;
+use crate::control::delay::Delay;
+use crate::control::{
+    catch, dead_time, inductance, modulator, observer, regulator, sensing, speed, start, torque,
+};
 use crate::math::Gain;
 use crate::protection;
-use crate::units::{Scale, Speed};
+use crate::units::{Current, Duty, Scale, Speed};
 
 /// Direction of rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,13 +29,30 @@ pub enum Stop {
     Brake,
 }
 
-/// What the compensation of the dead time must know.
+/// How the supplies of the high sides' drivers are charged before the phases switch.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DeadTime {
-    /// Phase current to duty: the whole compensation at 0.3 A, where the current has a sign.
-    pub slope: Gain<U27, U31>,
-    /// The whole compensation: dead time over period.
-    pub duty: I1F31,
+pub struct Charge {
+    /// The low sides' share of each period.
+    pub duty: Duty,
+    /// Periods that it takes.
+    pub periods: u32,
+}
+
+/// How often a start is tried.
+pub const ATTEMPTS: usize = 4;
+
+/// Below some speed the back-EMF is small against what is not known: the dead time's loss around
+/// zero current, and the drop across a resistance that may be stated wrongly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LowSpeed {
+    /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
+    pub i_d: Current,
+    /// What the speed takes of it.
+    pub i_d_slope: Gain<U32, U28>,
+    /// Bound of i_q at standstill.
+    pub i_q: Current,
+    /// Bound of i_q over the speed, where that is more.
+    pub i_q_slope: Gain<U32, U28>,
 }
 
 /// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.
@@ -48,28 +66,50 @@ pub struct Config {
     pub direction: Direction,
     /// How the motor is stopped.
     pub stop: Stop,
-    /// Back-EMF observer.
-    pub observer: back_emf::Config,
+    /// Whether a set-point may turn the motor the other way.
+    pub both_ways: bool,
+    /// Voltage commanded to voltage applied.
+    pub delay: Delay,
+    /// Position observer.
+    pub observer: observer::Config,
     /// Current regulator.
     pub regulator: regulator::Config,
-    /// Speed regulator.
+    /// Planner and speed regulator.
     pub speed: speed::Config,
-    /// Greatest change of the speed reference in a period.
-    pub slew: Speed,
-    /// Start-up.
-    pub start: start::Config,
+    /// Torque and voltage mode.
+    pub torque: torque::Config,
+    /// Adaptation of the inductance, if it is asked for.
+    pub adapt_l: Option<inductance::Config>,
+    /// What is done for the observer at low speed.
+    pub low_speed: LowSpeed,
+    /// The attempts of a start, in order.
+    pub start: [start::Config; ATTEMPTS],
+    /// Greatest current of a test of the motor.
+    pub test_current: Current,
     /// Speed below which the observer no longer leads.
     pub slow: Speed,
     /// Share of the reported speed that a period with the bridge off takes away.
     pub coast: Gain<U32, U32>,
     /// Modulator.
     pub modulator: modulator::Config,
+    /// Current sensors.
+    pub sensing: sensing::Config,
+    /// Rotor that turns while the bridge is off.
+    pub catch: catch::Config,
+    /// Charging before a switch-on.
+    pub charge: Charge,
     /// Compensation of the dead time.
-    pub dead_time: DeadTime,
+    pub dead_time: dead_time::Config,
     /// Limits.
     pub protection: protection::Config,
+    /// The six-step drive, where it is to drive the motor.
+    pub six_step: Option<six_step::Config>,
+    /// Periods for which Run may be slow before it ends.
+    pub slow_periods: u32,
+    /// Periods for which Run must have lasted before a start counts as done.
+    pub proven_periods: u32,
     /// Periods at zero throttle after which a fault whose cause is gone has ended.
     pub clear_periods: u32,
-    /// Periods in a row for which ξ̂ may stand at the end of its range.
+    /// Periods in a row for which the observer's state may be out of its range.
     pub lost_periods: u32,
 }

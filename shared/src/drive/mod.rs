@@ -1,12 +1,16 @@
 //! One control period: [`step`] takes a sample and a set-point, and says what the bridge does.
 
 mod config;
+mod launch;
+mod rest;
+pub mod six_step;
 mod state;
 mod step;
+mod turn;
 
 pub use crate::protection::{Fault, Faults};
-pub use config::{Config, DeadTime, Direction, Stop};
-pub use state::{Phase, Snapshot, State, TRACE_WORDS};
+pub use config::{ATTEMPTS, Charge, Config, Direction, LowSpeed, Stop};
+pub use state::{Phase, Snapshot, State};
 pub use step::step;
 
 use fixed::types::I1F31;

@@ -1,12 +1,14 @@
 //! What a control period remembers, and what of it the tasks may know.
 
-use super::{Config, Fault, Faults};
-use crate::control::observer::back_emf;
-use crate::control::regulator::observer_based as regulator;
-use crate::control::transform::Dq;
-use crate::control::{speed, start};
+use super::{Config, Fault, Faults, six_step};
+use crate::control::catch::Rotor;
+use crate::control::inductance::Factor;
+use crate::control::transform::{AlphaBeta, Dq};
+use crate::control::{
+    catch, inductance, observer, planner, regulator, sensing, speed, start, torque,
+};
 use crate::protection;
-use crate::units::{Angle, Current, Speed, Voltage};
+use crate::units::{Angle, Current, Duty, Speed, Voltage};
 
 /// What the drive is doing (start-up of the second paper, section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +16,10 @@ use crate::units::{Angle, Current, Speed, Voltage};
 pub enum Phase {
     /// No drive; the bridge is off.
     Idle,
+    /// The bridge is off while the currents' zeros are measured and the rotor is looked for.
+    Sense,
+    /// The low sides charge the supplies of the high sides' drivers.
+    Charge,
     /// The rotor is being aligned.
     Park,
     /// The current's vector turns faster and faster and the rotor follows.
@@ -26,6 +32,9 @@ pub enum Phase {
     Brake,
 }
 
+/// The sample at which the bridge is turned off, and one for a period of delay.
+const SETTLING_PERIODS: u8 = 2;
+
 /// Everything that `step` remembers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
@@ -35,13 +44,40 @@ pub struct State {
     /// Periods at zero throttle since the last sample that was a fault.
     pub(super) clear_periods: u32,
     pub(super) lost_periods: u32,
-    pub(super) observer: back_emf::State,
+    /// Whether the motor turns, or is to turn, against the configured direction.
+    pub(super) reversed: bool,
+    /// Attempts of a start that have failed.
+    pub(super) failed_starts: u8,
+    /// Periods for which Run has been slow.
+    pub(super) slow_periods: u32,
+    /// Periods since Run began, as far as they matter.
+    pub(super) run_periods: u32,
+    /// Samples that may still show a current from before the bridge was off.
+    pub(super) settling_periods: u8,
+    /// Measurements of the currents' zeros since Sense began.
+    pub(super) looks: u8,
+    /// Periods of Charge so far.
+    pub(super) charge_periods: u32,
+    pub(super) sensing: sensing::State,
+    pub(super) catch: catch::State,
+    /// What the open terminals have told of the rotor, with the phases in the order a, b, c.
+    pub(super) rotor: Rotor,
+    pub(super) observer: observer::State,
     pub(super) regulator: regulator::State,
     pub(super) speed: speed::State,
+    pub(super) inductance: inductance::State,
+    /// Change of ω* in the last period.
+    pub(super) planned: Speed,
+    pub(super) torque: torque::State,
+    /// i_q* less i_q where the voltage was limited.
+    pub(super) missing: Current,
     pub(super) start: start::State,
     pub(super) protection: protection::State,
-    /// ω*.
-    pub(super) reference: Speed,
+    pub(super) six_step: six_step::State,
+    /// The voltages of the last two commands in the stator's frame, the latest first.
+    pub(super) commanded: [AlphaBeta<Voltage>; 2],
+    /// The last two commands' duties of the phases a, b, c, the latest first.
+    pub(super) applied: [[Duty; 3]; 2],
     /// What the last period has seen and done, for telemetry.
     pub(super) seen: Seen,
 }
@@ -66,10 +102,10 @@ pub struct Snapshot {
     pub faults: Faults,
     /// How often a fault has turned the bridge off since the start.
     pub fault_count: u32,
-    /// Electrical angle of the control's frame at the sample: the rotor's as estimated in Run and
-    /// Stopping, an imposed one in Park and Ramp.
+    /// Electrical angle of the control's frame at the sample, with the phases in the order a, b, c:
+    /// the rotor's as estimated in Run and Stopping, an imposed one in Park and Ramp.
     pub angle: Angle,
-    /// Estimated electrical speed.
+    /// Estimated electrical speed, negative against the configured direction.
     pub speed: Speed,
     /// Reference of the electrical speed.
     pub speed_reference: Speed,
@@ -81,10 +117,11 @@ pub struct Snapshot {
     pub bus: Voltage,
     /// Current from the supply, 1.5·(v·i)/V_bus; negative while braking.
     pub bus_current: Current,
+    /// The adapted inductance over the one that the parameters state.
+    pub inductance: Factor,
+    /// Whether a position sensor is at fault.
+    pub sensor_fault: bool,
 }
-
-/// Number of words in [`State::trace`].
-pub const TRACE_WORDS: usize = 34;
 
 impl State {
     /// The state at power-up: idle, without fault.
@@ -95,12 +132,28 @@ impl State {
             fault_count: 0,
             clear_periods: 0,
             lost_periods: 0,
-            observer: back_emf::State::default(),
+            reversed: false,
+            failed_starts: 0,
+            slow_periods: 0,
+            run_periods: 0,
+            settling_periods: 0,
+            looks: 0,
+            charge_periods: 0,
+            sensing: sensing::State::default(),
+            catch: catch::State::new(&config.catch),
+            rotor: Rotor::Unknown,
+            observer: observer::State::default(),
             regulator: regulator::State::default(),
             speed: speed::State::default(),
             start: start::State::default(),
+            inductance: inductance::State::default(),
+            planned: Speed::ZERO,
+            torque: torque::State::default(),
+            missing: Current::ZERO,
             protection: protection::State::new(&config.protection),
-            reference: Speed::ZERO,
+            six_step: six_step::State::default(),
+            commanded: [AlphaBeta::default(); 2],
+            applied: [[Duty::ZERO; 3]; 2],
             seen: Seen {
                 phase: Phase::Idle,
                 angle: Angle::ZERO,
@@ -122,26 +175,38 @@ impl State {
                 ..Self::new(now)
             };
         }
+        // A factor that was found for other parameters, or is no longer kept up.
+        if before.observer != now.observer
+            || before.regulator != now.regulator
+            || now.adapt_l.is_none()
+        {
+            self.inductance = inductance::State::default();
+        }
     }
 
     /// What the tasks may know.
     pub fn snapshot(&self) -> Snapshot {
+        let signed = |speed: Speed| if self.reversed { -speed } else { speed };
         Snapshot {
             phase: self.seen.phase,
             faults: self.faults,
             fault_count: self.fault_count,
             angle: self.seen.angle,
-            speed: self.seen.speed,
-            speed_reference: self.reference,
+            speed: signed(self.seen.speed),
+            speed_reference: signed(self.reference()),
             i: self.seen.i,
             u: self.seen.u,
             bus: self.protection.bus,
             bus_current: self.seen.bus_current,
+            inductance: self.inductance.factor,
+            sensor_fault: observer::sensor_fault(&self.observer),
         }
     }
 
-    /// Every word of the control state: what two machines must agree on.
-    pub fn trace(&self) -> [u32; TRACE_WORDS] {
+    /// Every word of the control state, one after the other: what two machines must agree on.
+    // One copy where it is called, or the words' place would go through memory.
+    #[inline(always)]
+    pub fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
         // Taken apart in full, so that a new field is not forgotten here.
         let Self {
             phase,
@@ -149,48 +214,59 @@ impl State {
             fault_count,
             clear_periods,
             lost_periods,
-            observer: o,
-            regulator: regulator::State { sigma },
-            speed: speed::State { sigma: sigma_omega },
-            start:
-                start::State {
-                    charge,
-                    omega_s,
-                    yielded,
-                },
+            reversed,
+            failed_starts,
+            slow_periods,
+            run_periods,
+            settling_periods,
+            looks,
+            charge_periods,
+            sensing,
+            catch,
+            rotor,
+            observer,
+            regulator,
+            speed,
+            inductance,
+            planned,
+            torque: torque::State { i_q },
+            missing,
+            start,
             protection,
-            reference,
+            six_step,
+            commanded,
+            applied,
             seen,
         } = self;
-        let charge = charge.to_bits();
-        [
-            *phase as i32,
-            i32::from(faults.bits()),
-            *fault_count as i32,
-            *clear_periods as i32,
-            *lost_periods as i32,
-            o.theta.to_bits(),
-            o.i.d.to_bits(),
-            o.i.q.to_bits(),
-            o.h.d.to_bits(),
-            o.h.q.to_bits(),
-            o.xi.to_bits(),
-            o.omega_f.to_bits(),
-            o.u_before.d.to_bits(),
-            o.u_before.q.to_bits(),
-            sigma.d.to_bits(),
-            sigma.q.to_bits(),
-            sigma_omega.to_bits(),
-            charge as i32,
-            (charge >> 32) as i32,
-            omega_s.to_bits(),
-            yielded.to_bits(),
+        for word in [
+            *phase as u32,
+            u32::from(faults.bits()),
+            *fault_count,
+            *clear_periods,
+            *lost_periods,
+            u32::from(*reversed),
+            u32::from(*failed_starts),
+            *slow_periods,
+            *run_periods,
+            u32::from(*settling_periods),
+            u32::from(*looks),
+            *charge_periods,
+            u32::from(protection.over_current_samples),
+            seen.phase as u32,
+        ] {
+            out(word);
+        }
+        for bits in [
+            planned.to_bits(),
+            i_q.to_bits(),
+            missing.to_bits(),
             protection.bus.to_bits(),
             protection.bounds.min.to_bits(),
             protection.bounds.max.to_bits(),
-            i32::from(protection.over_current_samples),
-            reference.to_bits(),
-            seen.phase as i32,
+            commanded[0].alpha.to_bits(),
+            commanded[0].beta.to_bits(),
+            commanded[1].alpha.to_bits(),
+            commanded[1].beta.to_bits(),
             seen.angle.to_bits(),
             seen.speed.to_bits(),
             seen.i.d.to_bits(),
@@ -198,8 +274,36 @@ impl State {
             seen.u.d.to_bits(),
             seen.u.q.to_bits(),
             seen.bus_current.to_bits(),
-        ]
-        .map(|word| word as u32)
+        ] {
+            out(bits as u32);
+        }
+        for duty in applied.as_flattened() {
+            out(duty.to_bits());
+        }
+        // As many words whatever is known, so that a word's place tells what it is.
+        let (kind, theta, omega) = match rotor {
+            Rotor::Unknown => (0, Angle::ZERO, Speed::ZERO),
+            Rotor::Standing => (1, Angle::ZERO, Speed::ZERO),
+            Rotor::Turning { theta, omega } => (2, *theta, *omega),
+        };
+        out(kind);
+        out(theta.to_bits() as u32);
+        out(omega.to_bits() as u32);
+        regulator.trace(out);
+        speed.trace(out);
+        inductance.trace(out);
+        sensing.trace(out);
+        catch.trace(out);
+        observer.trace(&config.observer, out);
+        start.trace(out);
+        if config.six_step.is_some() {
+            six_step.trace(out);
+        }
+    }
+
+    /// ω* of the drive in use; that of the other rests at zero.
+    fn reference(&self) -> Speed {
+        self.speed.reference().max(self.six_step.planner.reference)
     }
 
     /// Turns the bridge off until zero throttle, for this reason.
@@ -221,19 +325,36 @@ impl State {
             // That was the frame's speed, which the rotor may not have followed.
             self.seen.speed = Speed::ZERO;
         }
+        if !matches!(self.phase, Phase::Idle | Phase::Sense | Phase::Charge) {
+            // What the terminals told before they were driven is over.
+            self.rotor = Rotor::Unknown;
+            self.catch.samples = 0;
+            self.catch.fitting = 0;
+        }
         self.phase = phase;
         self.lost_periods = 0;
-        self.reference = Speed::ZERO;
+        self.slow_periods = 0;
+        self.run_periods = 0;
+        self.settling_periods = SETTLING_PERIODS;
+        self.sensing.restart();
+        self.looks = 0;
+        self.charge_periods = 0;
+        self.commanded = [AlphaBeta::default(); 2];
+        self.planned = Speed::ZERO;
+        self.missing = Current::ZERO;
+        self.torque = torque::State::default();
+        self.inductance.begin();
         self.seen.phase = phase;
         self.seen.i = Dq::default();
         self.seen.u = Dq::default();
         self.seen.bus_current = Current::ZERO;
         self.start = start::State::default();
         self.speed = speed::State::default();
+        self.six_step.planner = planner::State::default();
         self.regulator = regulator::State::default();
     }
 
-    /// With the bridge off the shaft cannot be seen: what is reported falls as slowly as a large
+    /// Until the open terminals tell the shaft's speed, what is reported falls as slowly as a large
     /// propeller coasts.
     pub(super) fn coast(&mut self, config: &Config) {
         let lost = config.coast.apply(self.seen.speed) + Speed::DELTA;

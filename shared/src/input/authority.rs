@@ -52,7 +52,7 @@ pub struct Denied;
 /// Why a test was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TestError {
-    /// A value outside 0 to 1 (there is no reverse), or a time outside 0 to 3 s.
+    /// A value outside 0 to 1, or −1 to 1 with two directions, or a time outside 0 to 3 s.
     OutOfRange,
     /// The motor turns, a fault holds, or the wire is neither silent nor at valid zero.
     TemporarilyRejected,
@@ -64,6 +64,7 @@ pub enum TestError {
 #[derive(Clone, Debug)]
 pub struct Authority {
     timing: Timing,
+    two_directions: bool,
     armed: bool,
     arming: Option<Arming>,
     valid: Option<Valid>,
@@ -100,6 +101,7 @@ impl Authority {
     pub fn new(timing: Timing) -> Self {
         Self {
             timing,
+            two_directions: false,
             armed: false,
             arming: None,
             valid: None,
@@ -113,6 +115,11 @@ impl Authority {
     /// Changes the times, at once.
     pub fn set_timing(&mut self, timing: Timing) {
         self.timing = timing;
+    }
+
+    /// Whether throttle and tests have two directions (`INP_3D`) from now on.
+    pub fn set_two_directions(&mut self, two_directions: bool) {
+        self.two_directions = two_directions;
     }
 
     /// Takes what the decoder found.
@@ -131,7 +138,7 @@ impl Authority {
             }
             return;
         };
-        let throttle = match frame.kind() {
+        let throttle = match frame.kind(self.two_directions) {
             Kind::Throttle(throttle) => Some(throttle),
             Kind::Stop | Kind::Command(_) => None,
         };
@@ -227,7 +234,7 @@ impl Authority {
         }
     }
 
-    /// Turns the motor by `value`, 0 to 1, for `duration_s`; NaN ends a running test.
+    /// Turns the motor by `value`, 0 to 1 or −1 to 1 with two directions, for `duration_s`; NaN ends a running test.
     ///
     /// It ends at its time, at any throttle on the wire but zero, at [`Authority::disarm`] and at
     /// [`Authority::fault`].
@@ -246,7 +253,8 @@ impl Authority {
             self.test = None;
             return Ok(());
         }
-        if !(0.0..=1.0).contains(&value) || !(0.0..=TEST_MOST_S).contains(&duration_s) {
+        let least = if self.two_directions { -1.0 } else { 0.0 };
+        if !(least..=1.0).contains(&value) || !(0.0..=TEST_MOST_S).contains(&duration_s) {
             return Err(TestError::OutOfRange);
         }
         let silent = !self.within_loss(now_us, self.event_us);
@@ -255,7 +263,7 @@ impl Authority {
         }
         let duration_us = (duration_s * 1e6) as u64;
         // No time at all, or nothing to turn by, ends a test that has not turned the motor yet.
-        self.test = (duration_us > 0 && value > 0.0).then(|| Test {
+        self.test = (duration_us > 0 && value != 0.0).then(|| Test {
             value: Throttle::saturating_from_num(value),
             ends_us: now_us.saturating_add(duration_us),
         });

@@ -2,12 +2,14 @@
 //!
 //! 11 bits are the value, one asks for telemetry, four are a check sum.
 
-use super::Throttle;
+use super::{Throttle, reverse};
 
 /// Value from which a frame is throttle; below are stop (0) and the commands.
 const FIRST_THROTTLE: u16 = 48;
 /// The highest value of a frame.
 const LAST_THROTTLE: u16 = 2047;
+/// The first value of the second direction, where throttle has two.
+const FIRST_FORWARD: u16 = 1048;
 
 /// What a frame carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +27,8 @@ pub enum Kind {
     Stop,
     /// A command, 1 to 47. It counts as zero throttle.
     Command(u8),
-    /// Turn: values 48 to 2047, linearly from 0 to 1.
+    /// Turn: values 48 to 2047, linearly from 0 to 1. With two directions 48 to 1047 are so in
+    /// reverse, and 1048 to 2047 forward.
     Throttle(Throttle),
 }
 
@@ -45,19 +48,25 @@ impl Frame {
         data << 4 | check_sum(data)
     }
 
-    /// What the value means.
-    pub fn kind(self) -> Kind {
+    /// What the value means, where throttle has two directions (`INP_3D`) or one.
+    pub fn kind(self, two_directions: bool) -> Kind {
         match self.value {
             0 => Kind::Stop,
             command if command < FIRST_THROTTLE => Kind::Command(command as u8),
-            throttle => {
-                let step = u64::from(throttle.min(LAST_THROTTLE) - FIRST_THROTTLE);
-                let steps = u64::from(LAST_THROTTLE - FIRST_THROTTLE);
-                let share = (step << Throttle::FRAC_NBITS) / steps;
-                Kind::Throttle(Throttle::from_bits(share.min(i32::MAX as u64) as i32))
+            value if !two_directions => Kind::Throttle(share(value, FIRST_THROTTLE, LAST_THROTTLE)),
+            value if value < FIRST_FORWARD => {
+                Kind::Throttle(reverse(share(value, FIRST_THROTTLE, FIRST_FORWARD - 1)))
             }
+            value => Kind::Throttle(share(value, FIRST_FORWARD, LAST_THROTTLE)),
         }
     }
+}
+
+/// Where a value stands between the first and the last one.
+fn share(value: u16, first: u16, last: u16) -> Throttle {
+    let step = u64::from(value.min(last) - first);
+    let share = (step << Throttle::FRAC_NBITS) / u64::from(last - first);
+    Throttle::from_bits(share.min(i32::MAX as u64) as i32)
 }
 
 /// The four check bits of 12 data bits: the exclusive or of their nibbles.
@@ -163,7 +172,7 @@ mod tests {
                 value,
                 telemetry: false,
             }
-            .kind()
+            .kind(false)
         };
         assert_eq!(kind(0), Kind::Stop);
         assert_eq!(kind(1), Kind::Command(1));
@@ -177,6 +186,32 @@ mod tests {
             };
             let wanted = f64::from(value - 48) / 1999.0;
             assert!((throttle.to_num::<f64>() - wanted).abs() < 5e-10, "{value}");
+        }
+    }
+
+    #[test]
+    fn with_two_directions_each_half_begins_at_its_least_throttle() {
+        let kind = |value| {
+            Frame {
+                value,
+                telemetry: false,
+            }
+            .kind(true)
+        };
+        assert_eq!(kind(0), Kind::Stop);
+        assert_eq!(kind(47), Kind::Command(47));
+        assert_eq!(kind(48), Kind::Throttle(reverse(Throttle::ZERO)));
+        assert_eq!(kind(1047), Kind::Throttle(reverse(Throttle::MAX)));
+        assert_eq!(kind(1048), Kind::Throttle(Throttle::ZERO));
+        assert_eq!(kind(2047), Kind::Throttle(Throttle::MAX));
+        for step in 0..1000 {
+            let wanted = f64::from(step) / 999.0;
+            for (first, sign) in [(48, -1.0), (1048, 1.0)] {
+                let Kind::Throttle(throttle) = kind(first + step) else {
+                    panic!("{} is no throttle", first + step);
+                };
+                assert!((throttle.to_num::<f64>() * sign - wanted).abs() < 2e-9);
+            }
         }
     }
 

@@ -43,19 +43,9 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
-        let bits_per_bit = libm::scalbn(f64::from(k), B::I32 - A::I32);
-        if !bits_per_bit.is_finite() {
-            return None;
-        }
-        // The smallest shift that leaves the mantissa below half of 2^32 loses the fewest bits.
-        let mut shift = 0;
-        let mut scaled = bits_per_bit * 4_294_967_296.0;
-        while libm::fabs(scaled) >= 2_147_483_647.0 {
-            scaled *= 0.5;
-            shift += 1;
-        }
-        (shift <= 30).then(|| Self {
-            mantissa: libm::round(scaled) as i32,
+        let (mantissa, shift) = factor(k, B::I32 - A::I32)?;
+        Some(Self {
+            mantissa,
             shift,
             kind: PhantomData,
         })
@@ -78,6 +68,24 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
         let highest = i32::MAX >> self.shift;
         FixedI32::from_bits(top.min(highest).max(!highest) << self.shift)
     }
+}
+
+/// Mantissa and shift of `k·2^exponent`. Once for all types, and never inlined: the arithmetic of
+/// doubles in software is 20 KB of the chip's flash when every coefficient has its own.
+#[inline(never)]
+fn factor(k: f32, exponent: i32) -> Option<(i32, u32)> {
+    let bits_per_bit = libm::scalbn(f64::from(k), exponent);
+    if !bits_per_bit.is_finite() {
+        return None;
+    }
+    // The smallest shift that leaves the mantissa below half of 2^32 loses the fewest bits.
+    let mut shift = 0;
+    let mut scaled = bits_per_bit * 4_294_967_296.0;
+    while libm::fabs(scaled) >= 2_147_483_647.0 {
+        scaled *= 0.5;
+        shift += 1;
+    }
+    (shift <= 30).then(|| (libm::round(scaled) as i32, shift))
 }
 
 #[cfg(test)]

@@ -10,6 +10,6 @@ mod root;
 mod trig;
 
 pub use gain::Gain;
-pub use product::TopProduct;
+pub use product::{EIGHTH_PI, TopProduct};
 pub use root::{magnitude, other_leg};
 pub use trig::{SinCos, atan2_turns, sin_cos};

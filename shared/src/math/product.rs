@@ -3,7 +3,11 @@
 use core::ops::{Add, Sub};
 
 use fixed::FixedI32;
+use fixed::types::I0F32;
 use fixed::types::extra::{Diff, Sum, U32, Unsigned};
+
+/// π/8: a factor of products must be below a half.
+pub const EIGHTH_PI: I0F32 = I0F32::lit("0.392699081699");
 
 /// The top 32 bits of the 64-bit product of two fixed-point numbers.
 pub trait TopProduct<Rhs> {

@@ -142,6 +142,7 @@ fn failure_flags(faults: Faults) -> u16 {
             Fault::OverCurrent => EscFailureFlags::ESC_FAILURE_OVER_CURRENT,
             Fault::OverVoltage => EscFailureFlags::ESC_FAILURE_OVER_VOLTAGE,
             Fault::OverTemperature => EscFailureFlags::ESC_FAILURE_OVER_TEMPERATURE,
+            Fault::Stuck => EscFailureFlags::ESC_FAILURE_MOTOR_STUCK,
             _ => EscFailureFlags::ESC_FAILURE_GENERIC,
         })
         .fold(0, |flags, flag| flags | flag.bits())

@@ -1,9 +1,11 @@
 //! Parameters: the table, the values, and the configuration that they make.
 
 mod build;
+mod preset;
 mod table;
 
 pub use build::{Board, BuildError, build};
+pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE};
 
 /// Why a value was not taken.

@@ -105,20 +105,20 @@ parameters! {
         "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only";
     17 MotStop "MOT_STOP" "" Whole 0.0..1.0 = 1.0
         "At zero throttle and at loss of signal: 0 coast, 1 brake";
-    20 CtlMode "CTL_MODE" "" Whole 0.0..1.0 = 0.0
-        "What throttle commands: 0 speed, 1 torque";
-    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..0.0 = 0.0
-        "Drive: 0 field-oriented";
-    22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..0.0 = 0.0
-        "Position observer: 0 adaptive back-EMF";
-    23 CtlRegulator "CTL_REGULATOR" "" Whole 0.0..0.0 = 0.0
-        "Current regulator: 0 observer-based";
+    20 CtlMode "CTL_MODE" "" Whole 0.0..2.0 = 0.0
+        "What throttle commands: 0 speed, 1 torque, 2 voltage";
+    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..1.0 = 0.0
+        "Drive: 0 field-oriented, 1 six-step";
+    22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..3.0 = 3.0
+        "Position observer: 0 adaptive back-EMF, 1 flux crossings, 2 Hall, 3 compensated flux with PLL";
+    23 CtlRegulator "CTL_REGULATOR" "" Whole 0.0..2.0 = 1.0
+        "Current regulator: 0 observer-based, 1 synchronous, 2 modified synchronous";
     24 CtlModulation "CTL_MODULATION" "" Whole 0.0..1.0 = 0.0
         "Modulation: 0 space vector, 1 sine";
-    25 CtlObsCure "CTL_OBS_CURE" "" Whole 0.0..0.0 = 0.0
-        "Form of the adaptive back-EMF observer: 0 as published, the only one so far";
-    26 CtlAdaptL "CTL_ADAPT_L" "" Whole 0.0..0.0 = 0.0
-        "Adaptation of the inductance: 0 off, the only choice so far";
+    25 CtlObsCure "CTL_OBS_CURE" "" Whole 0.0..1.0 = 0.0
+        "Form of the adaptive back-EMF observer: 0 as published, 1 cured of its sensitivity to R, L";
+    26 CtlAdaptL "CTL_ADAPT_L" "" Whole 0.0..1.0 = 0.0
+        "Adaptation of the inductance by a square wave of i_d: 0 off, 1 on";
     27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
         "Mechanical speed at full throttle in speed mode";
     28 CtlRpmMin "CTL_RPM_MIN" "rpm" Real 100.0..200000.0 = 300.0
@@ -129,14 +129,26 @@ parameters! {
         "Bandwidth of the current loop and of the back-EMF observer";
     31 CtlBwSpdHz "CTL_BW_SPD_HZ" "Hz" Real 0.1..200.0 = 7.9 live
         "Bandwidth of the speed loop";
+    32 CtlAe "CTL_AE" "" Real 0.0..0.95 = 0.5
+        "Observers 1 and 2: share of the extrapolated angle that a crossing leaves, at high speed";
+    33 CtlPosN "CTL_POS_N" "" Whole 1.0..4.0 = 1.0
+        "Observers 1 and 2: electrical turns over which the speed is measured";
+    34 CtlFluxForm "CTL_FLUX_FORM" "" Whole 0.0..3.0 = 1.0
+        "Flux integrators: 0 first order, 1 second order, limits as measured; 2, 3 limits as stated";
+    35 CtlHall "CTL_HALL" "" Whole 0.0..1.0 = 1.0
+        "Hall observer: 0 sensors alone, 1 merged with the flux crossings";
+    36 CtlSpeed "CTL_SPEED" "" Whole 0.0..2.0 = 0.0
+        "Speed loop: 0 with feed-forward of the inertia, 1 PI with feed-forward of CTL_FF_A, 2 PI";
+    37 CtlFfA "CTL_FF_A" "A" Real 0.0..200.0 = 8.4 live
+        "Steady current at CTL_RPM_MAX, fed forward with the square of the speed if CTL_SPEED is 1";
     40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0
         "PWM frequency; the control runs once a period; restart to apply";
     41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0
         "Time for which both switches of a phase stay off at each change; restart to apply";
     50 InpProto "INP_PROTO" "" Whole 0.0..12.0 = 0.0
         "Throttle protocol: 0 automatic, 10 DShot150, 11 DShot300, 12 DShot600";
-    51 Inp3d "INP_3D" "" Whole 0.0..0.0 = 0.0
-        "Both directions by one throttle: 0 off, the only choice so far";
+    51 Inp3d "INP_3D" "" Whole 0.0..1.0 = 0.0
+        "Both directions by one throttle: 0 off, 1 on";
     52 InpArmMs "INP_ARM_MS" "ms" Real 10.0..5000.0 = 300.0
         "Time for which zero throttle must be received before the motor may turn";
     53 InpLossMs "INP_LOSS_MS" "ms" Real 5.0..2000.0 = 100.0
@@ -198,6 +210,7 @@ mod tests {
             "MAV_ROLE",
             "CTL_SLEW_RPM_S",
             "CTL_BW_SPD_HZ",
+            "CTL_FF_A",
             "LIM_PHASE_A",
             "LIM_BUS_A",
             "LIM_REGEN_A",

@@ -14,16 +14,22 @@ pub enum Fault {
     OverTemperature = 3,
     /// The observer's state left its range: the rotor's position is not known.
     ObserverLost = 4,
+    /// No attempt of a start has made the motor turn.
+    Stuck = 5,
+    /// A current sensor's zero is too far off.
+    CurrentSensor = 6,
 }
 
 impl Fault {
     /// All faults in the order of their numbers.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::OverCurrent,
         Self::OverVoltage,
         Self::UnderVoltage,
         Self::OverTemperature,
         Self::ObserverLost,
+        Self::Stuck,
+        Self::CurrentSensor,
     ];
 
     /// A few words for a person.
@@ -34,6 +40,8 @@ impl Fault {
             Self::UnderVoltage => "bus under-voltage",
             Self::OverTemperature => "over-temperature",
             Self::ObserverLost => "rotor position lost",
+            Self::Stuck => "motor does not start",
+            Self::CurrentSensor => "current sensor defect",
         }
     }
 }

@@ -99,8 +99,11 @@ pub fn check(
 
 /// Moves the bounds of i_q so that the supply gives no more than `bus_draw` and takes no more than
 /// `bus_return`, and less of that as its voltage nears the limit.
+///
+/// Braking begins at a bound that returns no more than that at any speed; only then is it moved by
+/// what is returned. From the full bound it would return too much for some milliseconds.
 #[inline(always)]
-pub fn bound(config: &Config, state: &mut State, bus_current: Current) {
+pub fn bound(config: &Config, state: &mut State, bus_current: Current, i_q: Current) {
     let full = config.full_bounds();
     let too_much_drawn = bus_current.saturating_sub(config.bus_draw);
     let above = state
@@ -113,7 +116,22 @@ pub fn bound(config: &Config, state: &mut State, bus_current: Current) {
     let too_much_returned = bus_current.saturating_neg().saturating_sub(may_return);
     let rate = |excess| config.bound_rate.saturating_apply(excess);
     let lowered = state.bounds.max.saturating_sub(rate(too_much_drawn));
-    let raised = state.bounds.min.saturating_add(rate(too_much_returned));
+    let min = state.bounds.min;
+    // While the current is on its way to the bound there is nothing to say that more may be had.
+    let arrived = i_q < Current::from_bits(min.to_bits() - (min.to_bits() >> 3));
+    let raised = if i_q.is_negative() {
+        if arrived || too_much_returned.is_positive() {
+            min.saturating_add(rate(too_much_returned))
+        } else {
+            min
+        }
+    } else {
+        // The bus current is at most 1.5/√3 of i_q, at full modulation: 1 + 1/8 + 1/32 is 2/√3.
+        let bits = may_return.max(Current::ZERO).to_bits();
+        Current::from_bits(bits)
+            .saturating_add(Current::from_bits((bits >> 3) + (bits >> 5)))
+            .saturating_neg()
+    };
     state.bounds = Bounds {
         max: lowered.min(full.max).max(Current::ZERO),
         min: raised.max(full.min).min(Current::ZERO),

@@ -6,9 +6,10 @@ use fixed::types::extra::{U28, U32};
 
 use super::Estimate;
 use crate::control::delay::Delay;
-use crate::control::transform::Dq;
-use crate::math::{Gain, TopProduct, magnitude};
-use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
+use crate::control::regulator::Feedback;
+use crate::control::transform::{Dq, rotate_frame};
+use crate::math::{Gain, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
+use crate::units::{Angle, Current, Flux, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +38,21 @@ pub struct Config {
     pub xi_min: InverseFlux,
     /// Greatest ξ̂: half the stated flux.
     pub xi_max: InverseFlux,
+    /// Another way to the speed than (7); `None` is the observer as published.
+    pub cure: Option<Cure>,
+}
+
+/// A phase-locked loop on the direction of ĥ in place of (7), coefficients for one period.
+///
+/// In (7) the speed is ξ̂·|ĥ|, and what R and L that are stated too high put into ĥ comes back
+/// through the speed: lock is lost at 6000 rpm with L 5 % or R 15 % too high on the bench. With |ĥ|
+/// out of the speed and a constant ξ in (9) it holds with both 30 % off.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cure {
+    /// 2·ω_n.
+    pub proportional: Gain<U28, U32>,
+    /// ω_n².
+    pub integral: Gain<U28, U32>,
 }
 
 /// What the observer remembers from period to period.
@@ -52,33 +68,108 @@ pub struct State {
     pub xi: InverseFlux,
     /// ω̂_f of the filter (28).
     pub omega_f: Speed,
+    /// Integrator of the loop that is the cure.
+    pub omega_i: Speed,
     /// Voltage that was commanded in the last period.
     pub u_before: Dq<Voltage>,
 }
 
-/// The speed at a sample, of (7) and (28).
+/// The observer in a moment in which the frame's angle and speed are known, or imposed.
+pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
+    // ĥ_q = −ω/ξ; ω has 32 fraction bits, ξ = 1/4, a voltage 28.
+    let length = Voltage::from_bits(omega.to_bits() >> 2);
+    State {
+        theta,
+        h: Dq {
+            d: Voltage::ZERO,
+            q: -length,
+        },
+        xi: config.xi_nominal,
+        omega_f: omega,
+        omega_i: omega,
+        // Without a current the terminals show the back-EMF, as if it had been commanded.
+        u_before: Dq {
+            d: Voltage::ZERO,
+            q: length,
+        },
+        ..State::default()
+    }
+}
+
+/// The speed at a sample, of (7) and (28), and ξ̂ taken on by a period.
+///
+/// With an `imposed` speed the frame does not follow the rotor: nothing is adapted. `planned` is
+/// the change of the speed's reference in a period; only the cure uses it.
 #[inline(always)]
-pub fn estimate(config: &Config, state: &mut State) -> Estimate {
+pub fn estimate(
+    config: &Config,
+    state: &mut State,
+    imposed: Option<Speed>,
+    planned: Speed,
+) -> Estimate {
+    let theta = state.theta;
+    let frame = sin_cos(theta);
     let length = magnitude(state.h.d, state.h.q);
+    if let Some(cure) = &config.cure {
+        return cured(config, cure, state, (theta, frame), length, planned);
+    }
     // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4 turns
     // a period; above half a turn, where a speed ends, the rotor is lost anyway.
     let omega_bar = Speed::from_bits(state.xi.top(length).to_bits().min(i32::MAX >> 4) << 4);
     let omega = omega_bar.saturating_add(config.k_eta.saturating_apply(state.h.d));
     let omega_bar_step = config.k_f.apply(omega_bar.saturating_sub(state.omega_f));
     state.omega_f = state.omega_f.saturating_add(omega_bar_step);
+    let xi = state.xi;
+    let xi_step = config.gamma.saturating_apply(state.h.d);
+    let lost = imposed.is_none() && adapt(config, state, xi_step);
     Estimate {
+        theta,
+        frame,
         omega,
         omega_bar,
         omega_bar_step,
-        xi: state.xi,
-        xi_step: config.gamma.saturating_apply(state.h.d),
+        xi,
+        xi_step,
+        lost,
+    }
+}
+
+/// ω̂ = ω̂_i + 2·ω_n·ε, ω̂_i += T_s·(ω_n²·ε + ω̇*) with ε = ĥ_d/|ĥ|.
+fn cured(
+    config: &Config,
+    cure: &Cure,
+    state: &mut State,
+    (theta, frame): (Angle, SinCos),
+    length: Voltage,
+    planned: Speed,
+) -> Estimate {
+    // Twelve bits of the quotient are enough for a direction: 0.01°.
+    let quotient = (state.h.d.to_bits() >> 2) / (length.to_bits() >> 14).max(1);
+    let epsilon = Voltage::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
+    let before = state.omega_i;
+    state.omega_i = before
+        .saturating_add(cure.integral.apply(epsilon))
+        .saturating_add(planned)
+        .max(Speed::ZERO);
+    Estimate {
+        theta,
+        frame,
+        omega: state
+            .omega_i
+            .saturating_add(cure.proportional.apply(epsilon)),
+        omega_bar: state.omega_i,
+        omega_bar_step: state.omega_i.saturating_sub(before),
+        xi: config.xi_nominal,
+        xi_step: InverseFlux::ZERO,
+        // ĥ opposite to what the frame expects, or nearly none.
+        lost: !state.h.q.is_negative(),
     }
 }
 
 /// Takes ξ̂ on by a period, within the range in which the stated flux can be wrong. True if it
 /// stands at an end of that range.
 #[inline(always)]
-pub fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
+fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
     let xi = state.xi.saturating_add(xi_step);
     state.xi = xi.max(config.xi_min).min(config.xi_max);
     state.xi != xi
@@ -86,11 +177,20 @@ pub fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
 
 /// Takes θ̂, î and ĥ on by a period (6).
 ///
-/// `omega` is the speed of the frame: ω̂ when the observer leads, an imposed one during start-up.
-/// `u` is the voltage that this period commands.
+/// The feedback's speed is that of the frame: ω̂ when the observer leads, an imposed one during
+/// start-up. `u` is the voltage that this period commands.
 #[inline(always)]
-pub fn advance(config: &Config, state: &mut State, omega: Speed, i: Dq<Current>, u: Dq<Voltage>) {
-    let applied = config.delay.applied(u, state.u_before);
+pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
+    let Feedback {
+        omega,
+        i,
+        inductance,
+        ..
+    } = *fb;
+    let applied = Dq {
+        d: config.delay.applied(u.d, state.u_before.d),
+        q: config.delay.applied(u.q, state.u_before.q),
+    };
     state.u_before = u;
     let error = Dq {
         d: i.d.saturating_sub(state.i.d),
@@ -100,7 +200,7 @@ pub fn advance(config: &Config, state: &mut State, omega: Speed, i: Dq<Current>,
         i_hat
             .saturating_sub(config.decay.apply(i_hat))
             .saturating_add(config.admittance.saturating_apply(h.saturating_add(u)))
-            .saturating_add(config.rotation.saturating_apply(cross))
+            .saturating_add(config.rotation.saturating_apply(inductance.of(cross)))
             .saturating_add(config.k_p.saturating_apply(error))
     };
     state.i = Dq {
@@ -118,4 +218,97 @@ pub fn advance(config: &Config, state: &mut State, omega: Speed, i: Dq<Current>,
             .saturating_add(config.k_i.saturating_apply(error.q)),
     };
     state.theta = state.theta.wrapping_add(omega);
+}
+
+/// φ̂ = 1/ξ̂, with a division.
+pub fn flux(state: &State) -> Flux {
+    // 2^64/(2π) over ξ̂ in 2^-32: sixteen times 28 fraction bits.
+    let quotient = 0x28BE_60DB_9391_0544_i64 / i64::from(state.xi.to_bits().max(1));
+    Flux::from_bits((quotient >> 4).min(i64::from(i32::MAX)) as i32)
+}
+
+/// Turns the frame from where an open-loop start held it to where the rotor is, by what the
+/// back-EMF tells. Returns by how much; `None` where the rotor has not followed.
+pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<Angle> {
+    let lead = rotor_lead(state.h, omega_s, config.xi_nominal)?;
+    let ahead = sin_cos(lead);
+    *state = State {
+        theta: state.theta.wrapping_add(lead),
+        i: rotate_frame(state.i, ahead),
+        h: rotate_frame(state.h, ahead),
+        xi: config.xi_nominal,
+        omega_f: omega_s,
+        omega_i: omega_s,
+        u_before: rotate_frame(state.u_before, ahead),
+    };
+    Some(lead)
+}
+
+impl State {
+    /// Every word of the state.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            theta,
+            i,
+            h,
+            xi,
+            omega_f,
+            omega_i,
+            u_before,
+        } = self;
+        for bits in [
+            theta.to_bits(),
+            i.d.to_bits(),
+            i.q.to_bits(),
+            h.d.to_bits(),
+            h.q.to_bits(),
+            xi.to_bits(),
+            omega_f.to_bits(),
+            omega_i.to_bits(),
+            u_before.d.to_bits(),
+            u_before.q.to_bits(),
+        ] {
+            out(bits as u32);
+        }
+    }
+}
+
+/// Where the rotor is, as seen from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
+///
+/// `None` where the back-EMF is not between half and twice of what the stated flux gives at the
+/// frame's speed: the rotor has not followed, or there is none and the voltage met no current.
+fn rotor_lead(h: Dq<Voltage>, omega_s: Speed, xi_nominal: InverseFlux) -> Option<Angle> {
+    // A speed has 32 fraction bits, ξ·|h| 28.
+    let expected = omega_s.to_bits() >> 4;
+    let found = xi_nominal.top(magnitude(h.d, h.q)).to_bits();
+    let followed = found >= expected / 2 && found <= expected.saturating_mul(2);
+    followed.then(|| atan2_turns(h.d, h.q.saturating_neg()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rotor_is_found_by_its_back_emf() {
+        let omega = Speed::from_num(0.01);
+        let xi = InverseFlux::from_num(0.25);
+        // χ = ω/ξ = 0.04; the rotor leads the frame by 60°.
+        let h = Dq {
+            d: Voltage::from_num(0.04 * 0.866_025),
+            q: Voltage::from_num(-0.04 * 0.5),
+        };
+        let lead = rotor_lead(h, omega, xi).expect("it has followed");
+        assert!((lead.to_num::<f64>() * 360.0 - 60.0).abs() < 0.05);
+        let weak = Dq {
+            d: Voltage::from_num(0.015),
+            q: Voltage::ZERO,
+        };
+        assert_eq!(rotor_lead(weak, omega, xi), None);
+        let strong = Dq {
+            d: Voltage::from_num(0.09),
+            q: Voltage::ZERO,
+        };
+        assert_eq!(rotor_lead(strong, omega, xi), None);
+    }
 }

@@ -1,13 +1,67 @@
 //! Position observers: from voltages and currents to the rotor's angle and speed.
+//!
+//! All of them are called once a period with the same [`Input`] and say the same [`Estimate`].
 
 pub mod back_emf;
+pub mod compensated;
+pub mod crossing;
+pub mod edges;
+pub mod flux_linkage;
+pub mod hall;
+pub mod position;
+pub mod sector;
 
-use crate::units::{InverseFlux, Speed};
+use super::inductance::Factor;
+use super::regulator::Feedback;
+use super::transform::{AlphaBeta, Dq, phases};
+use crate::math::{EIGHTH_PI, SinCos, TopProduct, sin_cos};
+use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, Voltage};
 
-/// What the observer says at a sample.
+/// The observer in use (`CTL_OBSERVER`) and its coefficients.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Config {
+    /// Adaptive back-EMF.
+    BackEmf(back_emf::Config),
+    /// Crossings of the flux linkages, Hall sensors, or both.
+    Edges(edges::Config),
+    /// Compensated flux with a phase-locked loop.
+    Compensated(compensated::Config),
+}
+
+/// What the observers remember; only the one in use changes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Adaptive back-EMF.
+    pub back_emf: back_emf::State,
+    /// Crossings of the flux linkages, Hall sensors, or both.
+    pub edges: edges::State,
+    /// Compensated flux with a phase-locked loop.
+    pub compensated: compensated::State,
+}
+
+/// What an observer reads at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Currents in the stator's frame at this sample.
+    pub i: AlphaBeta<Current>,
+    /// Mean voltage in the stator's frame from the last sample to this one.
+    pub v: AlphaBeta<Voltage>,
+    /// L over the inductance that the parameters state.
+    pub inductance: Factor,
+    /// Change of the speed's reference in the last period, ω̇*·T_s.
+    pub planned: Speed,
+    /// Hall sensors, see [`Sample`](crate::drive::Sample).
+    pub hall: u8,
+}
+
+/// What an observer says at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// ω̂: the step of θ̂.
+    /// θ̂ at this sample.
+    pub theta: Angle,
+    /// Its cosine and sine.
+    pub frame: SinCos,
+    /// ω̂: the step of θ̂ until the next sample.
     pub omega: Speed,
     /// ω̄̂: the speed without the term that passes the noise.
     pub omega_bar: Speed,
@@ -17,4 +71,192 @@ pub struct Estimate {
     pub xi: InverseFlux,
     /// Change of ξ̂ in this period.
     pub xi_step: InverseFlux,
+    /// Whether the observer's state is out of its range: the rotor may be elsewhere.
+    pub lost: bool,
+}
+
+/// Takes the observer in use from the last sample to this one.
+///
+/// `imposed` is the speed that an open-loop start gives the rotor.
+#[inline(always)]
+pub fn estimate(
+    config: &Config,
+    state: &mut State,
+    input: &Input,
+    imposed: Option<Speed>,
+) -> Estimate {
+    match config {
+        Config::BackEmf(config) => {
+            back_emf::estimate(config, &mut state.back_emf, imposed, input.planned)
+        }
+        Config::Edges(config) => {
+            let (v, i) = (phases(input.v), phases(input.i));
+            let position = edges::estimate(config, &mut state.edges, v, i, input.hall);
+            Estimate {
+                theta: position.theta,
+                frame: sin_cos(position.theta),
+                omega: position.omega,
+                omega_bar: position.omega,
+                omega_bar_step: position.omega_step,
+                // The stated flux, ξ = 1/4.
+                xi: InverseFlux::from_bits(1 << 30),
+                xi_step: InverseFlux::ZERO,
+                lost: !position.known,
+            }
+        }
+        Config::Compensated(config) => {
+            compensated::estimate(config, &mut state.compensated, input, imposed)
+        }
+    }
+}
+
+/// The rotor stands where the position sensors of this sample say. False where none tell: then it
+/// must be parked.
+pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
+    state.clear();
+    match config {
+        Config::Edges(config) => edges::stand(config, &mut state.edges, hall),
+        Config::BackEmf(_) | Config::Compensated(_) => false,
+    }
+}
+
+/// Whether a position sensor is at fault.
+pub fn sensor_fault(state: &State) -> bool {
+    state.edges.hall.fault
+}
+
+/// What the current regulator reads: the speed of the control's frame, the measured current in it
+/// and what the observer makes of it.
+#[inline(always)]
+pub fn feedback(
+    config: &Config,
+    state: &State,
+    (omega, i): (Speed, Dq<Current>),
+    inductance: Factor,
+) -> Feedback {
+    let (i_hat, h_hat) = match config {
+        Config::BackEmf(_) => (state.back_emf.i, state.back_emf.h),
+        Config::Edges(_) => (i, emf(omega, FLUX_NOMINAL)),
+        Config::Compensated(_) => (i, emf(state.compensated.omega_i, state.compensated.phi)),
+    };
+    Feedback {
+        omega,
+        i,
+        i_hat,
+        h_hat,
+        inductance,
+    }
+}
+
+/// ĥ of a flux along d, ω·φ against q.
+#[inline(always)]
+fn emf(omega: Speed, flux: Flux) -> Dq<Voltage> {
+    // A speed in turns takes 2π: 16·π/8.
+    let length = omega.top(flux).top(EIGHTH_PI).to_bits() << 4;
+    Dq {
+        d: Voltage::ZERO,
+        q: Voltage::from_bits(-length),
+    }
+}
+
+/// φ̂, the rotor's flux along d.
+pub fn flux(config: &Config, state: &State) -> Flux {
+    match config {
+        Config::BackEmf(_) => back_emf::flux(&state.back_emf),
+        Config::Edges(_) => state.edges.flux.amplitude,
+        Config::Compensated(_) => state.compensated.phi,
+    }
+}
+
+/// Tells the observer the voltage `u` that a period commands, in the frame of the feedback. Only the
+/// adaptive back-EMF observer works in that frame.
+#[inline(always)]
+pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
+    if let Config::BackEmf(config) = config {
+        back_emf::advance(config, &mut state.back_emf, fb, u);
+    }
+}
+
+/// A start begins: the control's frame is at this angle, and nothing is known of the rotor's.
+pub fn align(config: &Config, state: &mut State, frame: Angle) {
+    state.clear();
+    if let Config::BackEmf(config) = config {
+        state.back_emf = back_emf::begin(config, frame, Speed::ZERO);
+    }
+}
+
+/// The rotor is known to turn at `omega` and to be at `theta` at the coming sample, under the current
+/// `i`.
+pub fn begin(
+    config: &Config,
+    state: &mut State,
+    (theta, omega): (Angle, Speed),
+    i: AlphaBeta<Current>,
+) {
+    state.clear();
+    match config {
+        Config::BackEmf(config) => state.back_emf = back_emf::begin(config, theta, omega),
+        Config::Edges(config) => {
+            // Its state is that of the sample before.
+            let before = theta.wrapping_sub(omega);
+            edges::begin(config, &mut state.edges, before, omega, phases(i));
+        }
+        Config::Compensated(config) => {
+            state.compensated = compensated::begin(config, theta, omega, i);
+        }
+    }
+}
+
+/// The rotor has been aligned and is expected at `theta` and at rest, under the current `i`.
+pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
+    match config {
+        // It works in the frame that the start imposes.
+        Config::BackEmf(_) => {}
+        Config::Edges(config) => {
+            edges::begin(config, &mut state.edges, theta, Speed::ZERO, phases(i));
+        }
+        Config::Compensated(config) => {
+            state.compensated = compensated::begin(config, theta, Speed::ZERO, i);
+        }
+    }
+}
+
+/// How far the rotor leads the control's frame, which has turned at the imposed speed `omega_s` and
+/// stands at `frame`. The observer goes on from there. `None` where the rotor has not followed.
+pub fn take_over(
+    config: &Config,
+    state: &mut State,
+    frame: Angle,
+    omega_s: Speed,
+) -> Option<Angle> {
+    match config {
+        Config::BackEmf(config) => back_emf::take_over(config, &mut state.back_emf, omega_s),
+        Config::Edges(_) => edges::found(&state.edges).map(|theta| theta.wrapping_sub(frame)),
+        Config::Compensated(_) => {
+            compensated::found(&state.compensated).map(|theta| theta.wrapping_sub(frame))
+        }
+    }
+}
+
+impl State {
+    /// Forgets the rotor, but not what is known of its sensors.
+    fn clear(&mut self) {
+        let hall = self.edges.hall.clone();
+        *self = Self::default();
+        self.edges.hall = hall;
+    }
+
+    /// Every word of the state of the observer in use; the others rest.
+    pub fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
+        let Self {
+            back_emf,
+            edges,
+            compensated,
+        } = self;
+        match config {
+            Config::BackEmf(_) => back_emf.trace(out),
+            Config::Edges(_) => edges.trace(out),
+            Config::Compensated(_) => compensated.trace(out),
+        }
+    }
 }

@@ -1,8 +1,16 @@
 //! Current regulators: from the current that is wanted to the voltage.
+//!
+//! All three take the same [`Reference`] and [`Feedback`], and each holds two integrators. A period
+//! is [`Config::voltage`], the modulator's limit, then [`Config::integrate`] with what the limit
+//! has cut off.
 
+pub mod modified;
 pub mod observer_based;
+pub mod synchronous;
 
+use super::inductance::Factor;
 use super::transform::Dq;
+use crate::math::SinCos;
 use crate::units::{Current, Speed, Voltage};
 
 /// The current that is wanted.
@@ -27,6 +35,30 @@ impl Reference {
             ..Self::default()
         }
     }
+
+    /// The same with another current along d.
+    #[must_use]
+    pub fn with_i_d(self, i_d: Current) -> Self {
+        Self {
+            i: Dq {
+                d: i_d,
+                q: self.i.q,
+            },
+            ..self
+        }
+    }
+
+    /// The same with another current along q.
+    #[must_use]
+    pub fn with_i_q(self, i_q: Current) -> Self {
+        Self {
+            i: Dq {
+                d: self.i.d,
+                q: i_q,
+            },
+            ..self
+        }
+    }
 }
 
 /// What the regulator reads of the observer and of the sample.
@@ -36,8 +68,128 @@ pub struct Feedback {
     pub omega: Speed,
     /// Measured currents.
     pub i: Dq<Current>,
-    /// Estimated currents.
+    /// Estimated currents; the measured ones where the observer estimates none.
     pub i_hat: Dq<Current>,
-    /// Estimated back-EMF.
+    /// Estimated back-EMF; (0, −ω̂·φ̂) where the observer estimates a flux.
     pub h_hat: Dq<Voltage>,
+    /// L over the inductance that the parameters state.
+    pub inductance: Factor,
+}
+
+/// One of the regulators and its coefficients (`CTL_REGULATOR`).
+#[derive(Clone, Debug, PartialEq)]
+pub enum Config {
+    /// First paper, (10).
+    ObserverBased(observer_based::Config),
+    /// Second paper, figure 10.
+    Synchronous(synchronous::Config),
+    /// Second paper, figure 11.
+    Modified(modified::Config),
+}
+
+/// The integrators of all regulators; those of the others rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    observer_based: observer_based::State,
+    synchronous: synchronous::State,
+    modified: modified::State,
+}
+
+impl Config {
+    /// The voltage that brings the currents to their references, before any limit.
+    #[inline(always)]
+    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        match self {
+            Self::ObserverBased(c) => c.voltage(&state.observer_based, wanted, fb),
+            Self::Synchronous(c) => c.voltage(&state.synchronous, wanted, fb),
+            Self::Modified(c) => c.voltage(&state.modified, wanted, fb),
+        }
+    }
+
+    /// The current i_q* for which [`Config::voltage`] is `u_q` along q (the length of the voltage
+    /// for the modified regulator), whatever i_q* is wanted.
+    ///
+    /// Regulated so, the current goes where the voltage takes it, and a bound of i_q* is a bound of
+    /// the current, reached with the regulator's own dynamics.
+    #[inline(always)]
+    pub fn current_at(
+        &self,
+        state: &State,
+        wanted: &Reference,
+        fb: &Feedback,
+        u_q: Voltage,
+    ) -> Current {
+        match self {
+            Self::ObserverBased(c) => c.current_at(&state.observer_based, wanted, fb, u_q),
+            Self::Synchronous(c) => c.current_at(&state.synchronous, wanted, fb, u_q),
+            Self::Modified(c) => c.current_at(&state.modified, wanted, fb, u_q),
+        }
+    }
+
+    /// Takes the integrators on by a period. `cut` is the voltage less what the limit has left of
+    /// it: the integrators go on as if only the current had been wanted that the rest can bring, so
+    /// that they are ready the moment that less is wanted.
+    #[inline(always)]
+    pub fn integrate(
+        &self,
+        state: &mut State,
+        wanted: &Reference,
+        fb: &Feedback,
+        cut: Dq<Voltage>,
+    ) {
+        match self {
+            Self::ObserverBased(c) => c.integrate(&mut state.observer_based, wanted, fb, cut),
+            Self::Synchronous(c) => c.integrate(&mut state.synchronous, wanted, fb, cut),
+            Self::Modified(c) => c.integrate(&mut state.modified, wanted, fb, cut),
+        }
+    }
+
+    /// Sets the integrators so that [`Config::voltage`] is `u`: the regulator takes over from what
+    /// has applied that voltage, without a jump.
+    ///
+    /// The modified regulator takes over within a quarter of a turn of the q axis, with either sign.
+    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
+        match self {
+            Self::ObserverBased(c) => c.begin(&mut state.observer_based, u, wanted, fb),
+            Self::Synchronous(c) => c.begin(&mut state.synchronous, u, wanted, fb),
+            Self::Modified(c) => c.begin(&mut state.modified, u, wanted, fb),
+        }
+    }
+
+    /// Turns the integrators with the frame, which now leads the one before by this angle.
+    pub fn rotate(&self, state: &mut State, ahead: SinCos) {
+        match self {
+            Self::ObserverBased(_) => state.observer_based.rotate(ahead),
+            Self::Synchronous(_) => state.synchronous.rotate(ahead),
+            Self::Modified(_) => state.modified.rotate(ahead),
+        }
+    }
+}
+
+impl State {
+    /// Hands out every word.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        // Taken apart in full, so that a new field is not forgotten here.
+        let Self {
+            observer_based: observer_based::State { sigma },
+            synchronous:
+                synchronous::State {
+                    sigma: integral,
+                    model,
+                },
+            modified: modified::State { length, phase },
+        } = self;
+        for word in [
+            sigma.d.to_bits(),
+            sigma.q.to_bits(),
+            integral.d.to_bits(),
+            integral.q.to_bits(),
+            model.d.to_bits(),
+            model.q.to_bits(),
+            length.to_bits(),
+            phase.to_bits(),
+        ] {
+            out(word as u32);
+        }
+    }
 }

@@ -3,8 +3,8 @@
 use fixed::types::extra::U28;
 
 use super::{Feedback, Reference};
-use crate::control::transform::Dq;
-use crate::math::{Gain, TopProduct};
+use crate::control::transform::{Dq, rotate_frame};
+use crate::math::{Gain, SinCos, TopProduct};
 use crate::units::{Current, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -20,6 +20,8 @@ pub struct Config {
     pub k_pe: Gain<U28, U28>,
     /// k_ie·T_s.
     pub k_ie: Gain<U28, U28>,
+    /// 1/(R + L·k_pe).
+    pub admittance: Gain<U28, U28>,
 }
 
 /// The integrators.
@@ -29,43 +31,94 @@ pub struct State {
     pub sigma: Dq<Voltage>,
 }
 
-/// The voltage that brings the estimated currents to (0, i_q*), before any limit (10).
-#[inline(always)]
-pub fn voltage(config: &Config, state: &State, wanted: Reference, fb: &Feedback) -> Dq<Voltage> {
-    let e = error(wanted, fb);
-    let cross_d = fb.omega.top(fb.i.q);
-    let cross_q = fb.omega.top(fb.i.d);
-    Dq {
-        d: state
-            .sigma
-            .d
+impl Config {
+    /// The voltage that brings the estimated currents to (i_d*, i_q*), before any limit (10).
+    #[inline(always)]
+    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        let u = self.forced(wanted, fb);
+        Dq {
+            d: u.d.saturating_add(state.sigma.d),
+            q: u.q.saturating_add(state.sigma.q),
+        }
+    }
+
+    /// The current i_q* for which the voltage along q is `u_q`; the one that is wanted does not matter.
+    #[inline(always)]
+    pub fn current_at(
+        &self,
+        state: &State,
+        wanted: &Reference,
+        fb: &Feedback,
+        u_q: Voltage,
+    ) -> Current {
+        let wanted = wanted.with_i_q(Current::ZERO);
+        let without = self.voltage(state, &wanted, fb).q;
+        self.admittance
+            .saturating_apply(u_q.saturating_sub(without))
+    }
+
+    /// (10) without the integrators.
+    #[inline(always)]
+    fn forced(&self, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        let e = error(wanted, fb);
+        let cross_d = fb.inductance.of(fb.omega.top(fb.i.q));
+        let cross_q = fb.inductance.of(fb.omega.top(fb.i.d));
+        let d = self
+            .resistance
+            .saturating_apply(wanted.i.d)
             .saturating_sub(fb.h_hat.d)
-            .saturating_add(config.resistance.saturating_apply(wanted.i.d))
-            .saturating_sub(config.reactance.saturating_apply(cross_d))
-            .saturating_sub(config.k_pe.saturating_apply(e.d)),
-        q: state
-            .sigma
-            .q
+            .saturating_sub(self.reactance.saturating_apply(cross_d))
+            .saturating_sub(self.k_pe.saturating_apply(e.d));
+        let q = self
+            .resistance
+            .saturating_apply(wanted.i.q)
             .saturating_sub(fb.h_hat.q)
-            .saturating_add(config.resistance.saturating_apply(wanted.i.q))
-            .saturating_add(config.reactance.saturating_apply(cross_q))
-            .saturating_add(config.inductance.saturating_apply(wanted.i_q_step))
-            .saturating_sub(config.k_pe.saturating_apply(e.q)),
+            .saturating_add(self.reactance.saturating_apply(cross_q))
+            .saturating_add(self.inductance.saturating_apply(wanted.i_q_step))
+            .saturating_sub(self.k_pe.saturating_apply(e.q))
+            .saturating_add(wanted.u_q);
+        Dq { d, q }
+    }
+
+    /// Takes the integrators on by a period, for the current that the limit has left.
+    #[inline(always)]
+    pub fn integrate(
+        &self,
+        state: &mut State,
+        wanted: &Reference,
+        fb: &Feedback,
+        cut: Dq<Voltage>,
+    ) {
+        let e = error(wanted, fb);
+        let step = |e: Current, cut| {
+            let beyond = self.admittance.saturating_apply(cut);
+            self.k_ie.saturating_apply(e.saturating_add(beyond))
+        };
+        let sigma = &mut state.sigma;
+        sigma.d = sigma.d.saturating_sub(step(e.d, cut.d));
+        sigma.q = sigma.q.saturating_sub(step(e.q, cut.q));
+    }
+
+    /// Sets the integrators so that the voltage is `u`.
+    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
+        let forced = self.forced(wanted, fb);
+        state.sigma = Dq {
+            d: u.d.saturating_sub(forced.d),
+            q: u.q.saturating_sub(forced.q),
+        };
     }
 }
 
-/// Takes the integrators on by a period. They stand still while the voltage is limited.
-#[inline(always)]
-pub fn integrate(config: &Config, state: &mut State, wanted: Reference, fb: &Feedback) {
-    let e = error(wanted, fb);
-    let sigma = &mut state.sigma;
-    sigma.d = sigma.d.saturating_sub(config.k_ie.saturating_apply(e.d));
-    sigma.q = sigma.q.saturating_sub(config.k_ie.saturating_apply(e.q));
+impl State {
+    /// Turns the integrators with the frame.
+    pub fn rotate(&mut self, ahead: SinCos) {
+        self.sigma = rotate_frame(self.sigma, ahead);
+    }
 }
 
 /// e_d and e_q: the estimated currents against their references.
 #[inline(always)]
-fn error(wanted: Reference, fb: &Feedback) -> Dq<Current> {
+fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
         d: fb.i_hat.d.saturating_sub(wanted.i.d),
         q: fb.i_hat.q.saturating_sub(wanted.i.q),

@@ -430,3 +430,22 @@ fn a_test_of_nothing_turns_nothing() {
     assert_eq!(bench.test(0.0, 1.0), Ok(()));
     assert!(!bench.turns());
 }
+
+#[test]
+fn with_two_directions_either_turns_and_a_test_may_be_negative() {
+    let mut bench = Bench::armed();
+    bench.authority.set_two_directions(true);
+    bench.after(1_000, event(48));
+    let least = Throttle::from_bits(-1);
+    assert_eq!(bench.authority.command(), Command::Throttle(least));
+    bench.after(1_000, event(1048));
+    assert_eq!(bench.authority.command(), Command::Throttle(Throttle::ZERO));
+    bench.after(1_000, event(0));
+    assert_eq!(bench.authority.command(), Command::Zero);
+    assert_eq!(bench.test(-0.5, 1.0), Ok(()));
+    assert_eq!(
+        bench.authority.command(),
+        Command::Test(Throttle::from_num(-0.5))
+    );
+    assert_eq!(bench.test(-1.1, 1.0), Err(TestError::OutOfRange));
+}

@@ -1,8 +1,12 @@
 //! The configuration that the parameters make: SI values become the control's coefficients, once.
 
+mod flux;
+mod inductance;
 mod observer;
 mod outer;
 mod regulator;
+mod sensing;
+mod six_step;
 mod start;
 
 use core::f32::consts::{FRAC_PI_2, TAU};
@@ -13,10 +17,11 @@ use fixed::types::extra::Unsigned;
 use super::{ParamId, Params};
 use crate::control::delay::Delay;
 use crate::control::modulator::{self, Modulation};
-use crate::drive::{Config, DeadTime, Direction, Stop};
+use crate::control::sensing::Shunts;
+use crate::drive::{Config, Direction, LowSpeed, Stop};
 use crate::math::Gain;
 use crate::protection;
-use crate::units::{AdcCounts, Scale, Voltage};
+use crate::units::{AdcCounts, Current, Scale, Voltage};
 
 /// What the control must know of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,10 +32,21 @@ pub struct Board {
     pub bus_v_per_count: f32,
     /// Greatest phase current that the converter can show, peak amperes.
     pub current_range_a: f32,
+    /// Volts of one count of the terminals' converter, of 4096.
+    pub terminal_v_per_count: f32,
+    /// Which phases have a current shunt.
+    pub shunts: Shunts,
     /// Control periods from the sample to the voltage.
     pub delay: Delay,
-    /// Least time for which the low sides must be on for the currents to be read, s.
+    /// Least time for which a low side must be on, half of it before the sample, for its current to
+    /// be read, s. Dead times are not part of it.
     pub low_side_on_s: f32,
+    /// Least time for which a low side must be on in each period so that its high side's driver
+    /// stays supplied, s.
+    pub refresh_s: f32,
+    /// For how long the low sides must be on in all before the high sides' drivers are supplied
+    /// after a time off, s.
+    pub charge_s: f32,
 }
 
 /// Why the parameters do not make a drive.
@@ -42,15 +58,20 @@ pub struct BuildError {
     pub reason: &'static str,
 }
 
+/// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
+const EDGES_TURNS: f32 = 1.0 / 12.0;
+
+/// ξ of the stated flux in the control's units: the voltage base makes it so for every motor.
+const XI_NOMINAL: f32 = 0.25;
+
+/// What a test of the motor may use of `LIM_PHASE_A`.
+const TEST_SHARE: f32 = 0.2;
+
 /// The supply may be at most this many units of voltage, of the eight that the type holds.
 const BUS_UNITS_MAX: f32 = 6.0;
 
 /// Speed at which (22) is linearised, of `CTL_RPM_MAX`: 4500 rpm on the bench.
 const LINEARISED_SHARE: f32 = 0.75;
-
-/// The phase current from which its sign is certain; below, the dead time is compensated in
-/// proportion.
-const SIGN_CERTAIN_A: f32 = 0.3;
 
 /// For how long ξ̂ may stand at the end of its range, s: far longer than any transient that the
 /// observer recovers from.
@@ -62,6 +83,26 @@ const SLOW_SHARE: f32 = 0.5;
 
 /// For how long zero throttle must stand before a fault ends, s.
 const CLEAR_S: f32 = 0.3;
+
+/// For how long a motor whose sensors know its position may be slow before it counts as stuck, s.
+const SENSED_S: f32 = 0.8;
+
+/// For how long the observer must have led before a start counts as done, s.
+const PROVEN_S: f32 = 0.3;
+
+/// i_d at standstill over `STA_RAMP_A`.
+const BIAS_SHARE: f32 = 0.3;
+
+/// Back-EMF over the resistive drop of i_d at standstill, at the speed at which i_d ends: 2000 rad/s
+/// on the bench.
+const BIAS_END: f32 = 16.0;
+
+/// Least bound of i_q over `STA_RAMP_A`.
+const TORQUE_LEAST_SHARE: f32 = 0.5;
+
+/// What the resistive drop of i_q may be of the back-EMF: with R stated 30 % too high, three times
+/// that leaves no estimate; and with more, the start accelerates faster than the loop can follow.
+const TORQUE_DROP_SHARE: f32 = 0.5;
 
 /// Time constant with which the reported speed falls while the bridge is off, s. The bench's
 /// propeller takes 1.1 s.
@@ -133,16 +174,21 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
             "less than four periods a turn at CTL_RPM_MAX",
         );
     }
+    let by_edges = [1.0, 2.0].contains(&get(ParamId::CtlObserver));
+    if by_edges && get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0 > EDGES_TURNS {
+        return refuse(
+            ParamId::PwmFreqHz,
+            "less than twelve periods a turn at CTL_RPM_MAX",
+        );
+    }
     if ![0.0, 10.0, 11.0, 12.0].contains(&get(ParamId::InpProto)) {
         return refuse(ParamId::InpProto, "neither 0, 10, 11 nor 12");
     }
-    let duty_max = 1.0 - (board.low_side_on_s + 2.0 * p.dead_time_s) / p.period_s;
-    if duty_max < 0.5 {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "too high: the low sides could not be read",
-        );
-    }
+    let modulation = match get(ParamId::CtlModulation) {
+        0.0 => Modulation::SpaceVector,
+        _ => Modulation::Sine,
+    };
+    let (duty_max, window) = sensing::duty_max(&p, board, modulation)?;
 
     Ok(Config {
         scale,
@@ -155,24 +201,35 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
             0.0 => Stop::Coast,
             _ => Stop::Brake,
         },
-        observer: observer::back_emf(&p, &scale, board.delay)?,
-        regulator: regulator::observer_based(&p, &scale)?,
-        speed: outer::speed(&p, &scale)?,
-        slew: scale.speed_from_rpm(get(ParamId::CtlSlewRpmS) * p.period_s),
-        start: start::start(params, &p, &scale)?,
+        delay: board.delay,
+        observer: observer::observer(params, &p, &scale, board.delay)?,
+        regulator: regulator::regulator(params, &p, &scale)?,
+        speed: outer::speed(params, &p, &scale)?,
+        torque: outer::torque(params, &p, &scale),
+        adapt_l: inductance::inductance(params, &p, &scale)?,
+        low_speed: low_speed(params, &p, &scale)?,
+        start: start::attempts(params, &p, &scale)?,
+        test_current: scale.current_from_a(TEST_SHARE * get(ParamId::LimPhaseA)),
+        both_ways: get(ParamId::Inp3d) == 1.0,
         slow: scale
             .speed_from_rpm(SLOW_SHARE * get(ParamId::StaRunRpm).min(get(ParamId::CtlRpmMin))),
         coast: gain(ParamId::PwmFreqHz, p.period_s / COAST_S)?,
-        modulator: modulator_limits(get(ParamId::CtlModulation), duty_max),
-        dead_time: DeadTime {
-            slope: gain(
-                ParamId::PwmDeadtimeNs,
-                p.dead_time_s / p.period_s * scale.current_a / SIGN_CERTAIN_A,
-            )?,
-            duty: I1F31::saturating_from_num(p.dead_time_s / p.period_s),
-        },
+        modulator: modulator_limits(modulation, duty_max),
+        sensing: sensing::sensing(&p, board, window),
+        catch: sensing::catch(params, &p, &scale, board)?,
+        charge: sensing::charge(params, &p, board),
+        dead_time: sensing::dead_time(&p, &scale)?,
         protection: limits(params, &p, &scale, board)?,
+        six_step: match get(ParamId::CtlDrive) {
+            0.0 => None,
+            _ => Some(six_step::six_step(params, &p, &scale, board, duty_max)?),
+        },
         clear_periods: (CLEAR_S / p.period_s) as u32,
+        slow_periods: match get(ParamId::CtlObserver) {
+            2.0 => (SENSED_S / p.period_s) as u32,
+            _ => 0,
+        },
+        proven_periods: (PROVEN_S / p.period_s) as u32,
         lost_periods: (LOST_S / p.period_s) as u32,
     })
 }
@@ -224,10 +281,40 @@ fn gain<A: Unsigned, B: Unsigned>(param: ParamId, k: f32) -> Result<Gain<A, B>, 
     })
 }
 
-fn modulator_limits(modulation: f32, duty_max: f32) -> modulator::Config {
-    let (modulation, longest) = match modulation {
-        0.0 => (Modulation::SpaceVector, 1.0 / libm::sqrtf(3.0)),
-        _ => (Modulation::Sine, 0.5),
+/// What keeps an observer that lives by the back-EMF in lock where there is little of it.
+fn low_speed(params: &Params, p: &Si, scale: &Scale) -> Result<LowSpeed, BuildError> {
+    let published =
+        params.get(ParamId::CtlObserver) == 0.0 && params.get(ParamId::CtlObsCure) == 0.0;
+    if published || params.get(ParamId::CtlObserver) == 2.0 {
+        // As published, and not needed where sensors tell the position.
+        return Ok(LowSpeed {
+            i_d: Current::ZERO,
+            i_d_slope: Gain::ZERO,
+            i_q: Current::MAX,
+            i_q_slope: Gain::ZERO,
+        });
+    }
+    let limit_a = params.get(ParamId::LimPhaseA);
+    let ramp_a = params.get(ParamId::StaRampA).min(limit_a);
+    let bias_a = BIAS_SHARE * ramp_a;
+    let rad_per_unit = TAU / p.period_s;
+    let end_rad_s = BIAS_END * p.resistance_ohm * bias_a / p.flux_wb;
+    let drop_a_s = TORQUE_DROP_SHARE * p.flux_wb / p.resistance_ohm;
+    Ok(LowSpeed {
+        i_d: scale.current_from_a(bias_a),
+        i_d_slope: gain(
+            ParamId::StaRampA,
+            bias_a / scale.current_a / end_rad_s * rad_per_unit,
+        )?,
+        i_q: scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a),
+        i_q_slope: gain(ParamId::MotRMohm, drop_a_s * rad_per_unit / scale.current_a)?,
+    })
+}
+
+fn modulator_limits(modulation: Modulation, duty_max: f32) -> modulator::Config {
+    let longest = match modulation {
+        Modulation::SpaceVector => 1.0 / libm::sqrtf(3.0),
+        Modulation::Sine => 0.5,
     };
     modulator::Config {
         modulation,
@@ -271,8 +358,12 @@ impl Board {
         current_a_per_count: 40.0 / 2048.0,
         bus_v_per_count: 70.0 / 4096.0,
         current_range_a: 40.0,
+        terminal_v_per_count: 70.0 / 4096.0,
+        shunts: Shunts::Three,
         delay: Delay::One,
         low_side_on_s: 1e-6,
+        refresh_s: 1e-6,
+        charge_s: 63e-6,
     };
 }
 

@@ -2,14 +2,12 @@
 
 use core::f32::consts::TAU;
 
-use super::{BuildError, Si, gain};
+use super::{BuildError, Si, XI_NOMINAL, flux, gain};
 use crate::control::delay::Delay;
-use crate::control::observer::back_emf;
-use crate::params::ParamId;
-use crate::units::{InverseFlux, Scale};
-
-/// ξ of the stated flux in the control's units: the voltage base makes it so for every motor.
-const XI_NOMINAL: f32 = 0.25;
+use crate::control::observer::back_emf::Cure;
+use crate::control::observer::{self, back_emf, compensated};
+use crate::params::{ParamId, Params};
+use crate::units::{InverseFlux, Scale, Speed};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
 /// 2357 1/s.
@@ -18,12 +16,66 @@ const ATTITUDE_SHARE: f32 = 0.1806;
 /// k_f over the current bandwidth: 500 against 2357 1/s (section V).
 const FILTER_SHARE: f32 = 0.2121;
 
-/// (6), (7), (20), (22), (28).
-pub(super) fn back_emf(
+/// ω_n of the loop that cures the published observer, 1/s.
+const CURE_RAD_S: f32 = 400.0;
+
+/// ω⁺ at the least, 1/s.
+const OMEGA_MIN_RAD_S: f32 = 60.0;
+
+/// Least and greatest ω_n of the loop, 1/s.
+const OMEGA_N_RAD_S: [f32; 2] = [150.0, 1000.0];
+
+/// Corner of what is added to the loop's integrator for the speed, 1/s.
+const SMOOTHING_RAD_S: f32 = 300.0;
+
+/// The observer that `CTL_OBSERVER` names.
+pub(super) fn observer(
+    params: &Params,
     p: &Si,
     scale: &Scale,
     delay: Delay,
-) -> Result<back_emf::Config, BuildError> {
+) -> Result<observer::Config, BuildError> {
+    Ok(match params.get(ParamId::CtlObserver) {
+        0.0 => {
+            let mut config = back_emf(p, scale, delay)?;
+            if params.get(ParamId::CtlObsCure) == 1.0 {
+                config.cure = Some(cure(p)?);
+            }
+            observer::Config::BackEmf(config)
+        }
+        1.0 | 2.0 => observer::Config::Edges(flux::edges(params, p, scale)?),
+        _ => observer::Config::Compensated(compensated(p, scale, delay)?),
+    })
+}
+
+/// The compensated flux observer.
+fn compensated(p: &Si, scale: &Scale, delay: Delay) -> Result<compensated::Config, BuildError> {
+    let flux_per_current = scale.current_a / scale.flux_wb();
+    // β = R·T_s²/(12·L); under a voltage that changes in the middle of the period half of it, the
+    // other way. The square of the speed is in turns a period.
+    let bias = p.resistance_ohm * p.period_s / p.inductance_h * TAU * TAU / 12.0;
+    let bias = match delay {
+        Delay::None | Delay::One => bias,
+        Delay::Half => -0.5 * bias,
+    };
+    let speed = |rad_s: f32| Speed::saturating_from_num(rad_s * p.period_s / TAU);
+    Ok(compensated::Config {
+        half_resistance: gain(
+            ParamId::MotRMohm,
+            0.5 * p.resistance_ohm * p.period_s * flux_per_current,
+        )?,
+        inductance: gain(ParamId::MotLUh, p.inductance_h * flux_per_current)?,
+        bias: gain(ParamId::MotLUh, bias)?,
+        omega_min: speed(OMEGA_MIN_RAD_S),
+        omega_n_min: speed(OMEGA_N_RAD_S[0]),
+        omega_n_max: speed(OMEGA_N_RAD_S[1]),
+        smoothing: gain(ParamId::PwmFreqHz, SMOOTHING_RAD_S * p.period_s)?,
+        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
+    })
+}
+
+/// The adaptive back-EMF observer (6), (7), (20), (22), (28).
+fn back_emf(p: &Si, scale: &Scale, delay: Delay) -> Result<back_emf::Config, BuildError> {
     let r_over_l = p.resistance_ohm / p.inductance_h;
     let decay = -libm::expm1f(-r_over_l * p.period_s);
     // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
@@ -63,5 +115,15 @@ pub(super) fn back_emf(
         xi_min: InverseFlux::from_num(XI_NOMINAL / 2.0),
         // Twice the nominal is one bit more than the type holds.
         xi_max: InverseFlux::MAX,
+        cure: None,
+    })
+}
+
+/// The loop that cures the published observer.
+fn cure(p: &Si) -> Result<Cure, BuildError> {
+    let omega_n = CURE_RAD_S * p.period_s;
+    Ok(Cure {
+        proportional: gain(ParamId::CtlObsCure, 2.0 * omega_n / TAU)?,
+        integral: gain(ParamId::CtlObsCure, omega_n * omega_n / TAU)?,
     })
 }

@@ -3,26 +3,34 @@
 use core::f32::consts::TAU;
 
 use super::{BuildError, Si, gain};
-use crate::control::regulator::observer_based as regulator;
-use crate::params::ParamId;
+use crate::control::regulator::{Config, modified, observer_based, synchronous};
+use crate::params::{ParamId, Params};
 use crate::units::Scale;
 
 /// Poles of the current regulator (21): Table III has −2357 and −2142, the second at 0.909.
 const SECOND_POLE_SHARE: f32 = 0.909;
 
+/// The regulator that `CTL_REGULATOR` names.
+pub(super) fn regulator(params: &Params, p: &Si, scale: &Scale) -> Result<Config, BuildError> {
+    Ok(match params.get(ParamId::CtlRegulator) {
+        0.0 => Config::ObserverBased(observer_based(p, scale)?),
+        1.0 => Config::Synchronous(synchronous(p, scale)?),
+        _ => Config::Modified(modified(params, p, scale)?),
+    })
+}
+
 /// (10), (21).
-pub(super) fn observer_based(p: &Si, scale: &Scale) -> Result<regulator::Config, BuildError> {
+fn observer_based(p: &Si, scale: &Scale) -> Result<observer_based::Config, BuildError> {
     let voltage_per_current = scale.current_a / scale.voltage_v;
     let r_over_l = p.resistance_ohm / p.inductance_h;
     // λ² + (R/L + k_pe)·λ + k_ie/L with poles at −1/ε and −0.909/ε (21).
     let k_pe = (1.0 + SECOND_POLE_SHARE) * p.current_rad_s - r_over_l;
     let k_ie = SECOND_POLE_SHARE * p.inductance_h * p.current_rad_s * p.current_rad_s;
-    Ok(regulator::Config {
+    // R + L·k_pe, the sum of both poles times L.
+    let slope_ohm = (1.0 + SECOND_POLE_SHARE) * p.current_rad_s * p.inductance_h;
+    Ok(observer_based::Config {
         resistance: gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current)?,
-        reactance: gain(
-            ParamId::MotLUh,
-            p.inductance_h * voltage_per_current * TAU / p.period_s,
-        )?,
+        reactance: gain(ParamId::MotLUh, reactance(p, scale))?,
         inductance: gain(
             ParamId::MotLUh,
             p.inductance_h * voltage_per_current / p.period_s,
@@ -32,5 +40,55 @@ pub(super) fn observer_based(p: &Si, scale: &Scale) -> Result<regulator::Config,
             p.inductance_h * k_pe * voltage_per_current,
         )?,
         k_ie: gain(ParamId::CtlBwCurHz, k_ie * p.period_s * voltage_per_current)?,
+        admittance: gain(ParamId::CtlBwCurHz, 1.0 / (slope_ohm * voltage_per_current))?,
     })
+}
+
+/// Second paper, figure 10: the PI's zero on the winding's pole.
+fn synchronous(p: &Si, scale: &Scale) -> Result<synchronous::Config, BuildError> {
+    let pi = Pi::new(p, scale);
+    Ok(synchronous::Config {
+        k_p: gain(ParamId::CtlBwCurHz, pi.k_p)?,
+        k_i: gain(ParamId::CtlBwCurHz, pi.k_i)?,
+        reactance: gain(ParamId::MotLUh, reactance(p, scale))?,
+        rate: gain(ParamId::CtlBwCurHz, p.current_rad_s * p.period_s)?,
+        admittance: gain(ParamId::CtlBwCurHz, 1.0 / pi.k_p)?,
+    })
+}
+
+/// Second paper, figure 11: the same PI for the length, and for the phase over the greatest length.
+fn modified(params: &Params, p: &Si, scale: &Scale) -> Result<modified::Config, BuildError> {
+    let pi = Pi::new(p, scale);
+    let rad_s = params.get(ParamId::CtlRpmMax) * p.pole_pairs * TAU / 60.0;
+    // One over the back-EMF in the control's unit, in turns.
+    let turns_per_voltage = scale.voltage_v / (rad_s * p.flux_wb * TAU);
+    Ok(modified::Config {
+        k_p: gain(ParamId::CtlBwCurHz, pi.k_p)?,
+        k_i: gain(ParamId::CtlBwCurHz, pi.k_i)?,
+        phase_k_p: gain(ParamId::CtlRpmMax, pi.k_p * turns_per_voltage)?,
+        phase_k_i: gain(ParamId::CtlRpmMax, pi.k_i * turns_per_voltage)?,
+        admittance: gain(ParamId::CtlBwCurHz, 1.0 / pi.k_p)?,
+    })
+}
+
+/// A PI controller's gains, current to voltage.
+struct Pi {
+    k_p: f32,
+    k_i: f32,
+}
+
+impl Pi {
+    /// k_p = bandwidth·L, k_i = bandwidth·R.
+    fn new(p: &Si, scale: &Scale) -> Self {
+        let voltage_per_current = scale.current_a / scale.voltage_v;
+        Self {
+            k_p: p.current_rad_s * p.inductance_h * voltage_per_current,
+            k_i: p.current_rad_s * p.resistance_ohm * p.period_s * voltage_per_current,
+        }
+    }
+}
+
+/// L, speed times current to voltage.
+fn reactance(p: &Si, scale: &Scale) -> f32 {
+    p.inductance_h * scale.current_a / scale.voltage_v * TAU / p.period_s
 }

@@ -1,11 +1,14 @@
 //! The coefficients of the start.
 
+use core::f32::consts::TAU;
+
 use fixed::types::I36F28;
 
-use super::{BuildError, Si, gain};
+use super::{BuildError, Si, XI_NOMINAL, gain};
 use crate::control::start;
+use crate::drive::ATTEMPTS;
 use crate::params::{ParamId, Params};
-use crate::units::Scale;
+use crate::units::{InverseFlux, Scale};
 
 /// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;
@@ -13,38 +16,158 @@ const SWING_DAMPING: f32 = 0.5;
 /// Rate at which the frame yields, over the swing's ω_n: fast against it, slow against noise.
 const YIELD_RATE_SHARE: f32 = 5.0;
 
-/// What a test of the motor may use of `LIM_PHASE_A`.
-const TEST_SHARE: f32 = 0.2;
+/// What the ramp takes of the torque that its current has: the rest is for the load and for a
+/// rotor that swings.
+const TORQUE_SHARE: f32 = 0.3;
 
-/// Section 3.2 of the second paper.
-pub(super) fn start(params: &Params, p: &Si, scale: &Scale) -> Result<start::Config, BuildError> {
-    let current_a = params
-        .get(ParamId::StaRampA)
-        .min(params.get(ParamId::LimPhaseA));
-    let current = scale.current_from_a(current_a);
-    let park_charge = params.get(ParamId::StaParkAs) / (scale.current_a * p.period_s);
-    // A quarter of a turn in the first half of the charge.
-    let sweep = 0.25 / (0.5 * park_charge);
-    let step = params.get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
+/// What an attempt has more of current than the one before.
+const CURRENT_GROWTH: f32 = 1.5;
+
+/// What an attempt takes the inertia for, over the stated one.
+const INERTIA: [f32; ATTEMPTS] = [1.0, 10.0, 20.0, 40.0];
+
+/// Least length of Park in periods of the rotor's swing: half of it sweeps, and in the other half a
+/// swing that is damped by ζ = 0.5 dies down to 3 %.
+const PARK_SWINGS: f32 = 3.0;
+
+/// For how long a rotor may turn too slowly in Ramp, in periods of its swing.
+const ASTRAY_SWINGS: f32 = 1.0;
+
+/// The attempts of a start (section 3.2 of the second paper): each with more current, up to
+/// `LIM_PHASE_A`, and slower than the one before.
+pub(super) fn attempts(
+    params: &Params,
+    p: &Si,
+    scale: &Scale,
+) -> Result<[start::Config; ATTEMPTS], BuildError> {
+    let mut current_a = params.get(ParamId::StaRampA);
+    let mut next = |inertia: f32| {
+        let bounded_a = current_a.min(params.get(ParamId::LimPhaseA));
+        current_a *= CURRENT_GROWTH;
+        attempt(params, p, scale, bounded_a, inertia * p.inertia_kgm2)
+    };
+    let [first, second, third, fourth] = INERTIA;
+    Ok([next(first)?, next(second)?, next(third)?, next(fourth)?])
+}
+
+fn attempt(
+    params: &Params,
+    p: &Si,
+    scale: &Scale,
+    current_a: f32,
+    inertia_kgm2: f32,
+) -> Result<start::Config, BuildError> {
+    // What the current can accelerate, in electrical rad/s²: p·1.5·p·φ·I/J.
+    let torque_nm = 1.5 * p.pole_pairs * p.flux_wb * current_a;
+    let possible = TORQUE_SHARE * p.pole_pairs * torque_nm / inertia_kgm2;
+    let asked = params.get(ParamId::StaRampRpmS) * p.pole_pairs * TAU / 60.0;
+    let acceleration = asked.min(possible);
+    let step = acceleration / TAU * p.period_s * p.period_s;
     // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
     // 2ζ/ω_n a unit of speed damps it by ζ.
-    let stiffness = 1.5 * p.pole_pairs * p.pole_pairs * p.flux_wb * current_a;
-    let swing_rad_s = libm::sqrtf(stiffness / p.inertia_kgm2);
+    let swing_rad_s = libm::sqrtf(p.pole_pairs * torque_nm / inertia_kgm2);
     let yielding_s = 2.0 * SWING_DAMPING / swing_rad_s;
+    let swing_as = PARK_SWINGS * TAU / swing_rad_s * current_a;
+    let park_as = params.get(ParamId::StaParkAs).max(swing_as);
+    let park_charge = park_as / (scale.current_a * p.period_s);
+    let voltage_per_current = scale.current_a / scale.voltage_v;
     Ok(start::Config {
-        current,
-        test_current: scale.current_from_a(TEST_SHARE * params.get(ParamId::LimPhaseA)),
+        current: scale.current_from_a(current_a),
         yielding: gain(ParamId::MotJGcm2, yielding_s / p.period_s)?,
         yield_rate: gain(
             ParamId::MotJGcm2,
             (YIELD_RATE_SHARE * swing_rad_s * p.period_s).min(1.0),
         )?,
         park_charge: I36F28::saturating_from_num(park_charge),
-        sweep: gain(ParamId::StaParkAs, sweep)?,
-        k_s: gain(
-            ParamId::StaRampRpmS,
-            step * scale.current_a / params.get(ParamId::StaRampA),
+        // A third of a turn, from one phase's axis to the next one's, in the first half.
+        sweep: gain(ParamId::StaParkAs, 1.0 / 3.0 / (0.5 * park_charge))?,
+        k_s: gain(ParamId::StaRampRpmS, step * scale.current_a / current_a)?,
+        astray_periods: (ASTRAY_SWINGS * TAU / (swing_rad_s * p.period_s)) as u32,
+        resistance: gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current)?,
+        reactance: gain(
+            ParamId::MotLUh,
+            p.inductance_h * voltage_per_current * TAU / p.period_s,
         )?,
         run_speed: scale.speed_from_rpm(params.get(ParamId::StaRunRpm)),
+        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::{Board, build};
+
+    fn config(changes: &[(ParamId, f32)]) -> crate::drive::Config {
+        let mut params = Params::default();
+        for (id, value) in changes {
+            params.set(*id, *value).expect("in range");
+        }
+        build(&params, &Board::BENCH).expect("it makes a drive")
+    }
+
+    /// Amperes, rpm/s and seconds of Park, of each attempt.
+    fn courses(changes: &[(ParamId, f32)]) -> std::vec::Vec<[f32; 3]> {
+        let config = config(changes);
+        let scale = config.scale;
+        let course = |attempt: &start::Config| {
+            let mut state = start::State::default();
+            let mut periods = 1;
+            while !start::park(attempt, &mut state, attempt.current).1 {
+                periods += 1;
+            }
+            // Over 1000 periods, so that rounding does not matter.
+            for _ in 0..1000 {
+                start::ramp(attempt, &mut state, attempt.current);
+            }
+            [
+                scale.amperes(attempt.current),
+                scale.rpm(state.omega_s) / (1000.0 * scale.period_s),
+                periods as f32 * scale.period_s,
+            ]
+        };
+        config.start.iter().map(course).collect()
+    }
+
+    /// rad/s² of the electrical angle that a current makes at most: p·1.5·p·φ·I/J.
+    fn possible(current_a: f32, inertia: f32) -> f32 {
+        12.0 * 1.5 * 12.0 * 1.3e-3 * current_a / (inertia * 1.43e-4)
+    }
+
+    #[test]
+    fn each_attempt_has_half_more_current_and_time_for_a_greater_inertia() {
+        let courses = courses(&[]);
+        let inertia = [1.0, 10.0, 20.0, 40.0];
+        let current = [4.0, 6.0, 9.0, 13.5];
+        for (n, [amperes, rpm_s, park_s]) in courses.into_iter().enumerate() {
+            assert!((amperes - current[n]).abs() < 1e-3, "{n}: {amperes}");
+            // The stated 800 rpm/s, or three tenths of what the current can do.
+            let most = possible(current[n], inertia[n]);
+            let wanted = (0.3 * most / 12.0 * 60.0 / TAU).min(800.0);
+            assert!(
+                (rpm_s / wanted - 1.0).abs() < 0.01,
+                "{n}: {rpm_s} of {wanted}"
+            );
+            let swing_s = TAU / libm::sqrtf(most);
+            assert!(
+                (park_s / (3.0 * swing_s) - 1.0).abs() < 0.01,
+                "{n}: {park_s}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_attempt_has_more_than_the_bound_of_the_phase_current() {
+        let courses = courses(&[(ParamId::LimPhaseA, 7.0)]);
+        let currents: std::vec::Vec<f32> = courses.iter().map(|course| course[0]).collect();
+        for (got, wanted) in currents.iter().zip([4.0, 6.0, 7.0, 7.0]) {
+            assert!((got - wanted).abs() < 1e-3, "{currents:?}");
+        }
+    }
+
+    #[test]
+    fn park_is_as_long_as_is_stated_where_the_swing_is_shorter() {
+        let courses = courses(&[(ParamId::MotJGcm2, 10.0), (ParamId::StaParkAs, 2.0)]);
+        assert!((courses[0][2] - 0.5).abs() < 1e-3, "{courses:?}");
+    }
 }

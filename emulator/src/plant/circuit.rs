@@ -1,0 +1,323 @@
+//! The stator's circuit while the speed stands still.
+//!
+//! Between two changes of the inverter the currents obey a linear equation with a constant and a
+//! rotating input, L·di/dt = u − R·i − jωφ·e^(jθ) (1), (2), in the stator's frame, which has a
+//! closed solution: i − s decays with R/L towards u/R, where s = −jωφ·e^(jθ)/(R + jωL) turns with
+//! the rotor. With one phase open the current keeps to the line across that phase's axis, and as
+//! every coefficient is a plain number, its solution is the projection of the same one on that line.
+
+use super::Motor;
+use super::series::{DECAY_MAX, ROTATION_MAX, rotation, small_decay, small_rotation};
+use super::vector::{AXES, back, dot, turn};
+
+/// Which currents can flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// All.
+    Star,
+    /// Not that of this phase.
+    Without(usize),
+    /// None.
+    Nowhere,
+}
+
+/// What the inverter does to the motor until its next change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Drive {
+    /// Voltage vector in the stator's frame, V.
+    pub(super) u: [f64; 2],
+    /// What the currents' vector is multiplied with to give the current from the supply.
+    pub(super) to_bus: [f64; 2],
+    /// Which currents flow.
+    pub(super) way: Way,
+}
+
+/// A stretch of time within a period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stretch {
+    /// Its length, s.
+    pub(super) time_s: f64,
+    /// Cosine and sine of the angle by which the rotor turns.
+    rotation: [f64; 2],
+    /// What is left of a transient.
+    decay: f64,
+}
+
+/// The currents and the rotor's direction at some time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moment {
+    /// i_d and i_q, A.
+    pub(super) i: [f64; 2],
+    /// Cosine and sine of the electrical angle.
+    pub(super) direction: [f64; 2],
+}
+
+impl Moment {
+    /// The current vector in the stator's frame, A.
+    #[inline(always)]
+    pub(super) fn stator_a(&self) -> [f64; 2] {
+        turn(self.i, self.direction)
+    }
+}
+
+/// What a stretch comes to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solution {
+    /// Its end.
+    pub(super) end: Moment,
+    /// u/R seen from the rotor at its start and end, A.
+    settled: [[f64; 2]; 2],
+}
+
+/// Integrals over the period so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// i_q, As.
+    pub(super) q: f64,
+    /// i_d² and i_q², A²s.
+    pub(super) squares: [f64; 2],
+    /// Energy into the motor, times R/1.5, V²s.
+    pub(super) energy: f64,
+    /// Charge from the supply, times R, Vs.
+    pub(super) charge: f64,
+}
+
+/// Where the circuit has come to in a period.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    /// The currents and the rotor now.
+    pub(super) now: Moment,
+    /// What has flowed.
+    pub(super) sums: Sums,
+}
+
+/// The circuit at one speed, and in a form that needs no division.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Circuit {
+    /// Electrical speed ω, rad/s.
+    pub(super) omega: f64,
+    /// Amplitude of the voltage that the rotor induces in a phase, with the sign of ω, V.
+    pub(super) emf_v: f64,
+    /// The current that turns with the rotor, in the rotor's frame, A.
+    turning: [f64; 2],
+    resistance_ohm: f64,
+    inductance_h: f64,
+    flux_wb: f64,
+    /// The current that would link as much flux as the magnets, φ/L, A.
+    magnet_a: f64,
+    /// 1/R, 1/Ω.
+    pub(super) inverse_r: f64,
+    /// R/L, 1/s.
+    rate: f64,
+    /// Whether the series of decay and of rotation reach half a period.
+    short: [bool; 2],
+}
+
+impl Circuit {
+    /// Of a motor at rest.
+    pub(super) fn new(motor: &Motor) -> Self {
+        let (r, l) = (motor.resistance_ohm, motor.inductance_h);
+        Self {
+            omega: 0.0,
+            emf_v: 0.0,
+            turning: [0.0; 2],
+            resistance_ohm: r,
+            inductance_h: l,
+            flux_wb: motor.flux_wb,
+            magnet_a: motor.flux_wb / l,
+            inverse_r: 1.0 / r,
+            rate: r / l,
+            short: [false; 2],
+        }
+    }
+
+    /// Turns to an electrical speed, for stretches of at most `longest_s`.
+    pub(super) fn turn_at(&mut self, omega: f64, longest_s: f64) {
+        let (r, x) = (self.resistance_ohm, omega * self.inductance_h);
+        self.omega = omega;
+        self.emf_v = omega * self.flux_wb;
+        let share = self.emf_v / (r * r + x * x);
+        self.turning = [-share * x, -share * r];
+        self.short = [
+            longest_s * self.rate <= DECAY_MAX,
+            longest_s * omega.abs() <= ROTATION_MAX,
+        ];
+    }
+
+    /// The greatest rate at which a phase current can change from here under a voltage vector of
+    /// this length, A/s.
+    pub(super) fn slope_bound(&self, now: &Moment, voltage_v: f64) -> f64 {
+        let [d, q] = now.i;
+        (voltage_v + self.emf_v.abs()) / self.inductance_h + self.rate * (d.abs() + q.abs())
+    }
+
+    /// A stretch of at most half a period.
+    #[inline(always)]
+    pub(super) fn stretch(&self, time_s: f64) -> Stretch {
+        let (angle, fall) = (self.omega * time_s, self.rate * time_s);
+        Stretch {
+            time_s,
+            rotation: if self.short[1] {
+                small_rotation(angle)
+            } else {
+                rotation(angle)
+            },
+            decay: if self.short[0] {
+                small_decay(fall)
+            } else {
+                libm::exp(-fall)
+            },
+        }
+    }
+
+    /// The closed solution over a stretch.
+    #[inline(always)]
+    pub(super) fn solve(&self, now: &Moment, drive: &Drive, stretch: &Stretch) -> Solution {
+        let direction = turn(now.direction, stretch.rotation);
+        let settled = [drive.u[0] * self.inverse_r, drive.u[1] * self.inverse_r];
+        let (from, to) = (back(settled, now.direction), back(settled, direction));
+        let transient = [
+            now.i[0] - (self.turning[0] + from[0]),
+            now.i[1] - (self.turning[1] + from[1]),
+        ];
+        let left = back(transient, stretch.rotation);
+        let i = [
+            self.turning[0] + to[0] + left[0] * stretch.decay,
+            self.turning[1] + to[1] + left[1] * stretch.decay,
+        ];
+        let i = match drive.way {
+            Way::Star => i,
+            way => back(confine(turn(i, direction), way), direction),
+        };
+        Solution {
+            end: Moment { i, direction },
+            settled: [from, to],
+        }
+    }
+
+    /// Takes the currents and the rotor on.
+    #[inline(always)]
+    pub(super) fn conduct(&self, course: &mut Course, drive: &Drive, stretch: &Stretch) {
+        let solution = self.solve(&course.now, drive, stretch);
+        self.follow(course, drive, stretch, &solution);
+    }
+
+    /// Takes the currents and the rotor on to a solution's end, and adds up what flows.
+    ///
+    /// The integrals of i_q and of the squares are by the values and the derivatives at both ends
+    /// (Euler and Maclaurin's trapezoid): its error is h⁵/720 of the fourth derivative, 1e-6 of the
+    /// current where the rotor turns by 0.1. That of the current itself, and so of charge and
+    /// energy, is exact: the flux linkage L·i + φ·e^(jθ) grows by u·h − R·∫i.
+    #[inline(always)]
+    pub(super) fn follow(
+        &self,
+        course: &mut Course,
+        drive: &Drive,
+        stretch: &Stretch,
+        solution: &Solution,
+    ) {
+        let now = course.now;
+        let next = solution.end;
+        let [mut from, mut to] = solution.settled;
+        course.now = next;
+        match drive.way {
+            Way::Star => {}
+            Way::Without(phase) => {
+                from = self.held_open(from, phase, &now);
+                to = self.held_open(to, phase, &next);
+            }
+            Way::Nowhere => return,
+        }
+        let (from, to) = (self.slope(from, now.i), self.slope(to, next.i));
+        let h = stretch.time_s;
+        let (half, sixth) = (0.5 * h, h * h * (1.0 / 6.0));
+        let ([d0, q0], [d1, q1]) = (now.i, next.i);
+        let sums = &mut course.sums;
+        sums.q += half * (q0 + q1) + 0.5 * sixth * (from[1] - to[1]);
+        sums.squares[0] += half * (d0 * d0 + d1 * d1) + sixth * (d0 * from[0] - d1 * to[0]);
+        sums.squares[1] += half * (q0 * q0 + q1 * q1) + sixth * (q0 * from[1] - q1 * to[1]);
+        // In the stator's frame.
+        let (before, after) = (self.linkage(&now), self.linkage(&next));
+        let lost = [
+            drive.u[0] * h - (after[0] - before[0]),
+            drive.u[1] * h - (after[1] - before[1]),
+        ];
+        let lost = confine(lost, drive.way);
+        sums.energy += dot(drive.u, lost);
+        sums.charge += dot(drive.to_bus, lost);
+    }
+
+    /// What a short pulse of voltage does to a current along it, A: as it is at the pulse's end,
+    /// and what would have to be there at its start to decay to that.
+    pub(super) fn kick_a(&self, voltage_v: f64, time_s: f64) -> [f64; 2] {
+        let decay = libm::exp(-self.rate * time_s);
+        let last_a = voltage_v * self.inverse_r * (1.0 - decay);
+        [last_a, last_a / decay]
+    }
+
+    /// Adds a current that grew in a straight line before now, or is yet to grow from now on, within
+    /// a pulse: what is missing of its integral is `missing_s`, positive or negative, times itself.
+    #[inline(always)]
+    pub(super) fn kick(
+        &self,
+        course: &mut Course,
+        kick_a: [f64; 2],
+        missing_s: f64,
+        to_bus: [f64; 2],
+    ) {
+        let (r, l) = (self.resistance_ohm, self.inductance_h);
+        let [d, q] = back(kick_a, course.now.direction);
+        let before = course.now.i;
+        let after = [before[0] + d, before[1] + q];
+        course.now.i = after;
+        let [d0, q0] = if missing_s > 0.0 { before } else { after };
+        let missing_q = missing_s * q;
+        let missing_squares = [2.0 * missing_s * d * d0, 2.0 * missing_q * q0];
+        let sums = &mut course.sums;
+        sums.q += missing_q;
+        sums.squares[0] += missing_squares[0];
+        sums.squares[1] += missing_squares[1];
+        // What it puts into the inductance, and what goes into shaft and copper meanwhile.
+        let stored = 0.5 * l * (d * (before[0] + after[0]) + q * (before[1] + after[1]));
+        let spent = self.emf_v * missing_q + r * (missing_squares[0] + missing_squares[1]);
+        sums.energy += r * (stored + spent);
+        sums.charge += r * missing_s * dot(to_bus, kick_a);
+    }
+
+    /// u/R with what an open phase shows along its axis: what the rotor induces.
+    fn held_open(&self, settled: [f64; 2], phase: usize, at: &Moment) -> [f64; 2] {
+        let axis = back(AXES[phase], at.direction);
+        let own = axis[1] * self.emf_v * self.inverse_r - dot(axis, settled);
+        [settled[0] + own * axis[0], settled[1] + own * axis[1]]
+    }
+
+    /// Derivatives of i_d and i_q: (u − R·i)/L − jω·(i + φ/L).
+    #[inline(always)]
+    fn slope(&self, settled: [f64; 2], [d, q]: [f64; 2]) -> [f64; 2] {
+        [
+            self.rate * (settled[0] - d) + self.omega * q,
+            self.rate * (settled[1] - q) - self.omega * (d + self.magnet_a),
+        ]
+    }
+
+    /// The flux linkage L·i + φ·e^(jθ) in the stator's frame, Vs.
+    #[inline(always)]
+    fn linkage(&self, at: &Moment) -> [f64; 2] {
+        let l = self.inductance_h;
+        turn([l * (at.i[0] + self.magnet_a), l * at.i[1]], at.direction)
+    }
+}
+
+/// The part of a current vector that can flow.
+#[inline(always)]
+pub(super) fn confine(i: [f64; 2], way: Way) -> [f64; 2] {
+    match way {
+        Way::Star => i,
+        Way::Without(phase) => {
+            let axis = AXES[phase];
+            let own = dot(axis, i);
+            [i[0] - own * axis[0], i[1] - own * axis[1]]
+        }
+        Way::Nowhere => [0.0; 2],
+    }
+}

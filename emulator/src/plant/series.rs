@@ -1,0 +1,143 @@
+//! Functions by their series, for the small arguments of a fraction of a control period: several
+//! times faster than the library's, and the same bits on every machine.
+
+/// Cosine and sine to 1e-15 by their series up to x¹¹, for up to [`ROTATION_MAX`] radians.
+#[inline(always)]
+pub(super) fn small_rotation(radians: f64) -> [f64; 2] {
+    let x = radians * radians;
+    let cos = horner(
+        x,
+        [
+            -1.0 / 3_628_800.0,
+            1.0 / 40_320.0,
+            -1.0 / 720.0,
+            1.0 / 24.0,
+            -1.0 / 2.0,
+            1.0,
+        ],
+    );
+    let sin = horner(
+        x,
+        [
+            -1.0 / 39_916_800.0,
+            1.0 / 362_880.0,
+            -1.0 / 5_040.0,
+            1.0 / 120.0,
+            -1.0 / 6.0,
+            1.0,
+        ],
+    );
+    [cos, radians * sin]
+}
+
+/// A polynomial, the highest power's coefficient first.
+#[inline(always)]
+fn horner<const N: usize>(x: f64, coefficients: [f64; N]) -> f64 {
+    let mut sum = coefficients[0];
+    for coefficient in &coefficients[1..] {
+        sum = sum * x + coefficient;
+    }
+    sum
+}
+
+/// See [`small_rotation`].
+pub(super) const ROTATION_MAX: f64 = 0.3;
+
+/// Cosine and sine.
+pub(super) fn rotation(radians: f64) -> [f64; 2] {
+    let (sin, cos) = libm::sincos(radians);
+    [cos, sin]
+}
+
+/// e^(−x) to 2e-15 by its series up to x⁹, for 0 to [`DECAY_MAX`].
+#[inline(always)]
+pub(super) fn small_decay(x: f64) -> f64 {
+    horner(
+        -x,
+        [
+            1.0 / 362_880.0,
+            1.0 / 40_320.0,
+            1.0 / 5_040.0,
+            1.0 / 720.0,
+            1.0 / 120.0,
+            1.0 / 24.0,
+            1.0 / 6.0,
+            1.0 / 2.0,
+            1.0,
+            1.0,
+        ],
+    )
+}
+
+/// See [`small_decay`].
+pub(super) const DECAY_MAX: f64 = 0.15;
+
+/// What is left of turns without whole ones, 0..1.
+pub(super) fn fraction(turns: f64) -> f64 {
+    let rest = turns - (turns as i64) as f64;
+    if rest < 0.0 { rest + 1.0 } else { rest }
+}
+
+/// Zero for what has decayed to nothing: arithmetic with subnormal numbers is many times slower.
+pub(super) fn settle(x: f64) -> f64 {
+    if x.abs() < 1e-15 { 0.0 } else { x }
+}
+
+/// Where `f` is zero between 0 and `end`, to `tolerance` of f; of opposite signs at the ends.
+///
+/// The secant with the stale end's weight halved (the Illinois rule), which cannot leave the
+/// bracket; 60 steps bound it, six are usual.
+pub(super) fn root(
+    f: impl Fn(f64) -> f64,
+    at_0: f64,
+    at_end: f64,
+    end: f64,
+    tolerance: f64,
+) -> f64 {
+    let (mut a, mut fa) = (0.0, at_0);
+    let (mut b, mut fb) = (end, at_end);
+    for _ in 0..60 {
+        let x = b - fb * (b - a) / (fb - fa);
+        let fx = f(x);
+        if fx.abs() <= tolerance {
+            return x;
+        }
+        if (fx < 0.0) == (fb < 0.0) {
+            fa *= 0.5;
+        } else {
+            (a, fa) = (b, fb);
+        }
+        (b, fb) = (x, fx);
+    }
+    b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_series_are_the_functions() {
+        for i in -100..=100 {
+            let x = f64::from(i) * 0.01 * ROTATION_MAX;
+            let (c, s) = (small_rotation(x)[0], small_rotation(x)[1]);
+            let [cos, sin] = rotation(x);
+            assert!((c - cos).abs() < 2e-15 && (s - sin).abs() < 2e-15, "{x}");
+            let x = f64::from(i).abs() * 0.01 * DECAY_MAX;
+            assert!((small_decay(x) - libm::exp(-x)).abs() < 3e-15, "{x}");
+        }
+    }
+
+    #[test]
+    fn fractions_of_turns_are_not_negative() {
+        assert_eq!(fraction(-0.25), 0.75);
+        assert_eq!(fraction(3.5), 0.5);
+    }
+
+    #[test]
+    fn a_root_is_found_where_the_secant_alone_crawls() {
+        let f = |x: f64| x.powi(9) - 1e-3;
+        let x = root(f, f(0.0), f(2.0), 2.0, 1e-12);
+        assert!((x.powi(9) - 1e-3).abs() <= 1e-12, "{x}");
+    }
+}

@@ -1,0 +1,194 @@
+//! Legs whose switches are both off.
+//!
+//! Such a leg conducts through the diode that its current's sign wants, until the current is zero;
+//! then it floats until the voltage at its terminal would forward-bias a diode. The instants at
+//! which that happens are found on the closed solution.
+
+use super::super::circuit::{Drive, Moment, Way};
+use super::super::series::root;
+use super::super::vector::phases;
+use super::{DIODE_V, Path, Rail, Stage, ZERO_A};
+
+/// Forward bias from which a floating leg's diode takes over, V: far above rounding and far below
+/// what moves a current.
+const ONSET_V: f64 = 1e-6;
+
+/// How closely the zero of a voltage is found, V; that of a current to [`ZERO_A`].
+const ZERO_V: f64 = 0.5e-6;
+
+/// Electrical angle within which a current or a voltage is taken to cross its limit at most once,
+/// rad: an excursion between two looks stays below ωφ/8·0.05² of voltage, 3 mV at 6000 rpm.
+const LOOK_RAD: f64 = 0.05;
+
+/// Two zero-crossings closer than this are one, s: then the current does not come back.
+const INSTANT_S: f64 = 1e-12;
+
+/// The leg that wants to conduct most.
+struct Onset {
+    /// Voltage beyond its diode's own, V.
+    excess_v: f64,
+    /// Legs that begin to conduct, and to where; both the same where there is one.
+    legs: [(usize, Rail); 2],
+}
+
+impl Stage {
+    /// Follows the diodes from event to event.
+    pub(super) fn follow(&mut self, time_s: f64) {
+        let look_s = LOOK_RAD / self.machine.circuit.omega.abs();
+        let mut left_s = time_s;
+        let mut resolve = true;
+        while left_s > 0.0 {
+            if resolve {
+                self.resolve();
+            }
+            let drive = Drive {
+                way: self.way(),
+                ..self.drive()
+            };
+            if drive.way == Way::Nowhere && self.idle() {
+                let stretch = self.machine.circuit.stretch(left_s);
+                self.machine.conduct(&drive, &stretch);
+                self.now_s += left_s;
+                return;
+            }
+            let step_s = left_s.min(look_s);
+            let (at_s, stopped) = self.next_event(&drive, step_s);
+            let stretch = self.machine.circuit.stretch(at_s);
+            self.machine.conduct(&drive, &stretch);
+            self.now_s += at_s;
+            left_s -= at_s;
+            if let Some(leg) = stopped {
+                self.connect(leg, Path::Floating);
+                self.still();
+            }
+            resolve = at_s > INSTANT_S;
+        }
+    }
+
+    /// Whether the rotor is too slow to conduct by itself, with all legs off.
+    fn idle(&self) -> bool {
+        self.only().is_none()
+            && 3.0_f64.sqrt() * self.machine.circuit.emf_v.abs() < self.bus_v + 2.0 * DIODE_V
+    }
+
+    /// The first event within a time, or its end, and the leg whose current comes to zero there.
+    fn next_event(&self, drive: &Drive, step_s: f64) -> (f64, Option<usize>) {
+        let machine = &self.machine;
+        let circuit = &machine.circuit;
+        let at = |t| circuit.solve(machine.now(), drive, &circuit.stretch(t)).end;
+        let end = at(step_s);
+        let mut at_s = step_s;
+        let mut stopped = None;
+        for leg in 0..3 {
+            let sign = match self.paths[leg] {
+                Path::Diode(Rail::Low) => 1.0,
+                Path::Diode(Rail::High) => -1.0,
+                _ => continue,
+            };
+            let forward_a = |at: &Moment| sign * phases(at.stator_a())[leg];
+            let (first, last) = (forward_a(machine.now()), forward_a(&end));
+            if last >= 0.0 {
+                continue;
+            }
+            let zero_s = if first <= 0.0 {
+                0.0
+            } else {
+                let f = |t| forward_a(&at(t));
+                root(f, first, last, step_s, ZERO_A)
+            };
+            if zero_s < at_s {
+                (at_s, stopped) = (zero_s, Some(leg));
+            }
+        }
+        if drive.way != Way::Star {
+            // Just beyond the onset, so that the leg does conduct then.
+            let beyond_v = |direction| self.onset(direction).excess_v - 2.0 * ONSET_V;
+            let (first, last) = (beyond_v(machine.now().direction), beyond_v(end.direction));
+            if first < 0.0 && last > ZERO_V {
+                let f = |t| beyond_v(at(t).direction);
+                let onset_s = root(f, first, last, step_s, ZERO_V);
+                if onset_s < at_s {
+                    (at_s, stopped) = (onset_s, None);
+                }
+            }
+        }
+        (at_s, stopped)
+    }
+
+    /// Lets floating legs conduct whose diodes are forward-biased.
+    fn resolve(&mut self) {
+        for _ in 0..3 {
+            if self.way() == Way::Star {
+                return;
+            }
+            let onset = self.onset(self.machine.now().direction);
+            if onset.excess_v < ONSET_V {
+                return;
+            }
+            for (leg, rail) in onset.legs {
+                self.connect(leg, Path::Diode(rail));
+            }
+        }
+    }
+
+    /// With fewer than two legs connected no current flows, and no diode is left conducting.
+    fn still(&mut self) {
+        if self.way() == Way::Nowhere {
+            for leg in 0..3 {
+                if matches!(self.paths[leg], Path::Diode(_)) {
+                    self.connect(leg, Path::Floating);
+                }
+            }
+        }
+        self.machine.open(self.way());
+    }
+
+    /// How far the floating legs' voltages are beyond the diodes' at a rotor's direction.
+    fn onset(&self, direction: [f64; 2]) -> Onset {
+        let emf = self.machine.emf_v(direction);
+        let mut highest = 0;
+        let mut lowest = 0;
+        for leg in 1..3 {
+            if emf[leg] > emf[highest] {
+                highest = leg;
+            }
+            if emf[leg] < emf[lowest] {
+                lowest = leg;
+            }
+        }
+        let high_v = self.bus_v + DIODE_V;
+        let star_v = match (self.way(), self.only()) {
+            (Way::Nowhere, None) => {
+                return Onset {
+                    excess_v: emf[highest] - emf[lowest] - high_v - DIODE_V,
+                    legs: [(highest, Rail::High), (lowest, Rail::Low)],
+                };
+            }
+            (Way::Nowhere, Some(leg)) => self.leg_v(leg) - emf[leg],
+            (Way::Without(leg), _) => 0.5 * (self.sum_v() + emf[leg]),
+            (Way::Star, _) => 0.0,
+        };
+        let mut onset = Onset {
+            excess_v: f64::NEG_INFINITY,
+            legs: [(0, Rail::Low); 2],
+        };
+        for (leg, emf_v) in emf.into_iter().enumerate() {
+            if self.paths[leg] != Path::Floating {
+                continue;
+            }
+            let leg_v = star_v + emf_v;
+            let (excess_v, rail) = if leg_v - high_v > -DIODE_V - leg_v {
+                (leg_v - high_v, Rail::High)
+            } else {
+                (-DIODE_V - leg_v, Rail::Low)
+            };
+            if excess_v > onset.excess_v {
+                onset = Onset {
+                    excess_v,
+                    legs: [(leg, rail); 2],
+                };
+            }
+        }
+        onset
+    }
+}

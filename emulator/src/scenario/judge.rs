@@ -1,0 +1,87 @@
+//! Whether the figures of a run are what the scenario expects.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::RUN;
+use super::error::ScenarioError;
+use super::file::Expectation;
+use crate::summary::Report;
+
+/// Whether an expectation held.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// The window's name.
+    pub window: String,
+    /// The figure's key.
+    pub key: String,
+    /// The figure; a true boolean counts as 1, a list as its length.
+    pub value: Option<f64>,
+    /// What it must be.
+    pub wanted: String,
+    /// Whether it is.
+    pub held: bool,
+    /// By how much it could be worse; −∞ without a figure.
+    #[serde(skip)]
+    pub(super) slack: f64,
+}
+
+/// Compares a figure with what is expected of it.
+pub(super) fn judge(expected: &Expectation, report: &Report) -> Result<Verdict, ScenarioError> {
+    let wrong = |problem| ScenarioError::Expectation {
+        window: expected.window.clone(),
+        key: expected.key.clone(),
+        problem,
+    };
+    let value = if expected.window == RUN && expected.key == "faults" {
+        Some(report.faults.len() as f64)
+    } else {
+        let window = report.windows.iter().find(|w| w.name == expected.window);
+        let figures = window.ok_or_else(|| wrong("names no window"))?;
+        let figures = serde_json::to_value(figures).map_err(|_| wrong("cannot be read"))?;
+        match figures.get(&expected.key) {
+            Some(Value::Bool(flag)) => Some(f64::from(u8::from(*flag))),
+            Some(Value::String(_)) | None => return Err(wrong("names no figure")),
+            Some(number) => number.as_f64(),
+        }
+    };
+    let x = value.unwrap_or(f64::NAN);
+    let mut wanted = Vec::new();
+    let mut held = value.is_some();
+    let mut slack = f64::INFINITY;
+    if let Some(limit) = expected.below {
+        wanted.push(format!("below {limit}"));
+        held &= x < limit;
+        slack = slack.min(limit - x);
+    }
+    if let Some(limit) = expected.above {
+        wanted.push(format!("above {limit}"));
+        held &= x > limit;
+        slack = slack.min(x - limit);
+    }
+    match (expected.equals, expected.within) {
+        (Some(target), within) => {
+            let within = within.unwrap_or(0.0);
+            wanted.push(format!("{target} ± {within}"));
+            held &= (x - target).abs() <= within;
+            slack = slack.min(within - (x - target).abs());
+        }
+        (None, None) => {}
+        (None, Some(_)) => return Err(wrong("has within and no equals")),
+    }
+    if wanted.is_empty() {
+        return Err(wrong("says neither below, above nor equals"));
+    }
+    Ok(Verdict {
+        window: expected.window.clone(),
+        key: expected.key.clone(),
+        value,
+        wanted: wanted.join(" and "),
+        held,
+        slack: if value.is_some() {
+            slack
+        } else {
+            f64::NEG_INFINITY
+        },
+    })
+}

@@ -1,0 +1,161 @@
+//! What many runs come to: what held in all of them, and the worst run of each expectation.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use xxhash_rust::xxh3::Xxh3;
+
+use super::judge::Verdict;
+use super::place::Place;
+use crate::summary::Report;
+
+/// Failed runs that are listed one by one.
+const LISTED: usize = 20;
+
+/// The summary of several runs.
+#[derive(Clone, Debug, Serialize)]
+pub struct Survey {
+    /// Runs.
+    pub runs: usize,
+    /// Runs in which an expectation failed.
+    pub failed: usize,
+    /// Faults that turned the bridge off, each with the number of runs.
+    pub faults: BTreeMap<&'static str, usize>,
+    /// Simulated time of all runs, s.
+    pub sim_s: f64,
+    /// Wall time, s.
+    pub wall_s: f64,
+    /// Simulated seconds per wall second.
+    pub sim_per_wall: Option<f64>,
+    /// Control periods of all runs.
+    pub steps: u64,
+    /// Hash over the trace hashes of all runs in their order, whatever ran beside what.
+    pub trace_hash: String,
+    /// What was expected of each run.
+    pub expectations: Vec<Expected>,
+    /// The first runs that failed.
+    pub failures: Vec<Failure>,
+}
+
+/// An expectation over all runs.
+#[derive(Clone, Debug, Serialize)]
+pub struct Expected {
+    /// The window's name.
+    pub window: String,
+    /// The figure's key.
+    pub key: String,
+    /// What it must be.
+    pub wanted: String,
+    /// Runs in which it was not.
+    pub failed: usize,
+    /// The worst figure: of the first run that comes nearest to failing, or fails by the most.
+    pub worst: Option<f64>,
+    /// The run with the worst figure.
+    #[serde(rename = "where")]
+    pub place: Place,
+    /// The options that make this run alone.
+    pub options: String,
+    #[serde(skip)]
+    slack: f64,
+}
+
+/// A run that failed.
+#[derive(Clone, Debug, Serialize)]
+pub struct Failure {
+    /// Which it was.
+    #[serde(rename = "where")]
+    pub place: Place,
+    /// The options that make this run alone.
+    pub options: String,
+    /// Faults that turned the bridge off.
+    pub faults: Vec<&'static str>,
+    /// What was not as expected.
+    pub expectations: Vec<Verdict>,
+}
+
+impl Survey {
+    /// The summary of these runs, in their order.
+    pub(super) fn of(
+        runs: impl IntoIterator<Item = (Place, Report, Vec<Verdict>)>,
+        wall_s: f64,
+    ) -> Self {
+        let mut survey = Self {
+            runs: 0,
+            failed: 0,
+            faults: BTreeMap::new(),
+            sim_s: 0.0,
+            wall_s,
+            sim_per_wall: None,
+            steps: 0,
+            trace_hash: String::new(),
+            expectations: Vec::new(),
+            failures: Vec::new(),
+        };
+        let mut hash = Xxh3::new();
+        for (place, report, verdicts) in runs {
+            hash.update(report.trace_hash.as_bytes());
+            survey.add(&place, &report, verdicts);
+        }
+        survey.trace_hash = format!("{:016x}", hash.digest());
+        survey.sim_per_wall = (wall_s > 0.0).then(|| survey.sim_s / wall_s);
+        survey
+    }
+
+    /// Whether every expectation held in every run.
+    pub fn held(&self) -> bool {
+        self.failed == 0
+    }
+
+    fn add(&mut self, place: &Place, report: &Report, verdicts: Vec<Verdict>) {
+        self.runs += 1;
+        for fault in &report.faults {
+            *self.faults.entry(fault).or_default() += 1;
+        }
+        self.sim_s += report.sim_s;
+        self.steps += report.steps;
+        for (index, verdict) in verdicts.iter().enumerate() {
+            match self.expectations.get_mut(index) {
+                None => self.expectations.push(Expected::new(place, verdict)),
+                Some(expected) => expected.add(place, verdict),
+            }
+        }
+        let broken: Vec<_> = verdicts.into_iter().filter(|v| !v.held).collect();
+        if broken.is_empty() {
+            return;
+        }
+        self.failed += 1;
+        if self.failures.len() < LISTED {
+            self.failures.push(Failure {
+                place: place.clone(),
+                options: place.to_string(),
+                faults: report.faults.clone(),
+                expectations: broken,
+            });
+        }
+    }
+}
+
+impl Expected {
+    fn new(place: &Place, verdict: &Verdict) -> Self {
+        Self {
+            window: verdict.window.clone(),
+            key: verdict.key.clone(),
+            wanted: verdict.wanted.clone(),
+            failed: usize::from(!verdict.held),
+            worst: verdict.value,
+            place: place.clone(),
+            options: place.to_string(),
+            slack: verdict.slack,
+        }
+    }
+
+    fn add(&mut self, place: &Place, verdict: &Verdict) {
+        self.failed += usize::from(!verdict.held);
+        if verdict.slack < self.slack {
+            self.slack = verdict.slack;
+            self.worst = verdict.value;
+            self.place = place.clone();
+            self.options = place.to_string();
+        }
+    }
+}

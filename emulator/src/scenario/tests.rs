@@ -1,0 +1,180 @@
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::*;
+
+/// A fifth of a second of the start, where half of the combinations are asked for too much.
+const FILE: &str = r#"
+    [bench]
+    duration_s = 0.2
+    [[signal]]
+    at_s = 0.0
+    rpm = 1000.0
+    [[window]]
+    name = "all"
+    t0_s = 0.0
+    t1_s = 0.2
+    [[expect]]
+    window = "all"
+    key = "current_max_a"
+    below = 5.0
+    [[expect]]
+    window = "run"
+    key = "faults"
+    equals = 0
+    [sweep]
+    "params.STA_RAMP_A" = [3.0, 8.0]
+    "bench.scale.R" = [0.7, 1.3]
+    [random]
+    "bench.initial_angle_deg" = [-180.0, 180.0]
+"#;
+
+fn plan(text: &str, options: &Options) -> Result<Plan, ScenarioError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scenario.toml");
+    std::fs::write(&path, text).unwrap();
+    Plan::read(&path, options)
+}
+
+fn seeds(first: u64, last: u64) -> Options {
+    Options {
+        seeds: Some(first..=last),
+        ..Options::default()
+    }
+}
+
+#[test]
+fn a_survey_counts_and_names_the_worst_run() {
+    let plan = plan(FILE, &seeds(1, 3)).unwrap();
+    let played = AtomicUsize::new(0);
+    let survey = plan
+        .survey(|| {
+            played.fetch_add(1, Ordering::Relaxed);
+        })
+        .unwrap();
+    assert_eq!(played.into_inner(), 12);
+    assert_eq!((survey.runs, survey.failed), (12, 6));
+    assert!(survey.faults.is_empty());
+    assert!(!survey.held());
+    assert!((survey.sim_s - 12.0 * 0.2).abs() < 0.01);
+    let [current, faults] = &survey.expectations[..] else {
+        panic!("{:?}", survey.expectations);
+    };
+    assert_eq!((current.failed, faults.failed), (6, 0));
+    assert_eq!((faults.worst, faults.wanted.as_str()), (Some(0.0), "0 ± 0"));
+    assert_eq!(survey.failures.len(), 6);
+    let currents = survey.failures.iter().map(|f| f.expectations[0].value);
+    assert_eq!(
+        current.worst,
+        currents.max_by(|a, b| a.partial_cmp(b).unwrap()).unwrap()
+    );
+
+    // The worst run alone: the same figure.
+    let alone = Options {
+        set: current.place.set.clone(),
+        ..seeds(current.place.seed, current.place.seed)
+    };
+    let outcome = self::plan(FILE, &alone).unwrap().play().unwrap();
+    assert_eq!(outcome.expectations[0].value, current.worst);
+    assert_eq!(outcome.drawn, current.place.drawn);
+}
+
+#[test]
+fn threads_and_order_change_nothing() {
+    let plan = plan(FILE, &seeds(1, 2)).unwrap();
+    let survey = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let survey = pool.build().unwrap().install(|| plan.survey(|| ()));
+        let mut survey = serde_json::to_value(survey.unwrap()).unwrap();
+        for key in ["wall_s", "sim_per_wall"] {
+            survey[key].take();
+        }
+        survey
+    };
+    assert_eq!(survey(1), survey(3));
+}
+
+#[test]
+fn seeds_make_other_runs() {
+    let hash = |first, last| plan(FILE, &seeds(first, last)).unwrap().survey(|| ());
+    let hash = |first, last| hash(first, last).unwrap().trace_hash;
+    assert_eq!(hash(1, 1), hash(1, 1));
+    assert_ne!(hash(1, 1), hash(2, 2));
+    assert_ne!(hash(1, 1), hash(1, 2));
+}
+
+#[test]
+fn a_run_without_the_figure_is_the_worst() {
+    let text = r#"
+        [bench]
+        duration_s = 0.01
+        [[window]]
+        name = "w"
+        t0_s = 0.0
+        t1_s = 1.0
+        [[expect]]
+        window = "w"
+        key = "rpm_mean"
+        below = 1.0
+        [sweep]
+        "window.0.t0_s" = [0.0, 0.5]
+    "#;
+    let survey = plan(text, &Options::default()).unwrap().survey(|| ());
+    let survey = survey.unwrap();
+    assert_eq!((survey.failed, survey.expectations[0].worst), (1, None));
+    assert_eq!(
+        survey.expectations[0].options,
+        "--seed 1 --set window.0.t0_s=0.5"
+    );
+}
+
+#[test]
+fn what_is_wrong_with_one_run_is_said_with_its_options() {
+    let wrong = |text: &str, options: &Options| match plan(text, options) {
+        Ok(_) => panic!("{text} makes sense"),
+        Err(error) => error.to_string(),
+    };
+    let swept = "[sweep]\n\"params.LIM_PHASE_A\" = [20.0, -1.0]";
+    let line = wrong(swept, &Options::default());
+    assert!(
+        line.contains("LIM_PHASE_A = -1") && line.contains("--set"),
+        "{line}"
+    );
+    let delay = "[sweep]\n\"bench.delay_periods\" = [0.0, 0.3]";
+    let line = wrong(delay, &Options::default());
+    assert!(line.contains("bench.delay_periods = 0.3"), "{line}");
+    let record = Options {
+        record: Some(PathBuf::from("/nowhere.csv")),
+        ..seeds(1, 2)
+    };
+    let line = wrong("", &record);
+    assert!(line.contains("--record"), "{line}");
+}
+
+#[test]
+fn a_negative_speed_is_asked_for_as_such() {
+    let text = r#"
+        [bench]
+        duration_s = 0.02
+        [[signal]]
+        at_s = 0.0
+        rpm = -1000.0
+        [[window]]
+        name = "all"
+        t0_s = 0.0
+        t1_s = 1.0
+        [[expect]]
+        window = "all"
+        key = "reached_s"
+        below = 0.001
+    "#;
+    // The shaft is held at the speed: it counts as reached only if it is that one.
+    for (imposed, held) in [("-1000.0", true), ("1000.0", false)] {
+        let text = text.replace(
+            "duration_s",
+            &format!("imposed_rpm = {imposed}\nduration_s"),
+        );
+        let outcome = plan(&text, &Options::default()).unwrap().play().unwrap();
+        assert_eq!(outcome.held(), held, "{:?}", outcome.expectations);
+    }
+}

@@ -1,0 +1,37 @@
+//! The control's numbers as the shaft's, whatever the configured direction.
+
+use siskin_control::drive::{Config, Direction};
+use siskin_control::units::{Scale, Speed};
+
+/// What the control's numbers are worth on the bench, where a positive speed has the phases in the
+/// order a, b, c.
+#[derive(Clone, Copy, Debug)]
+pub struct Units<'a> {
+    /// What they are worth along the configured direction.
+    pub scale: &'a Scale,
+    /// The configured direction.
+    pub direction: Direction,
+}
+
+impl<'a> Units<'a> {
+    /// Those of a configuration.
+    pub const fn of(config: &'a Config) -> Self {
+        Self {
+            scale: &config.scale,
+            direction: config.direction,
+        }
+    }
+
+    /// 1, or −1 where the configured direction has the phases in the order a, c, b.
+    pub const fn sign(&self) -> f64 {
+        match self.direction {
+            Direction::Normal => 1.0,
+            Direction::Reversed => -1.0,
+        }
+    }
+
+    /// The shaft's mechanical speed for one along the configured direction, rpm.
+    pub fn rpm(&self, speed: Speed) -> f64 {
+        self.sign() * f64::from(self.scale.rpm(speed))
+    }
+}

@@ -1,0 +1,296 @@
+//! The figures of one measuring window.
+
+use serde::Serialize;
+use siskin_control::drive::{Phase, Setpoint, Snapshot};
+
+use super::turning::Turning;
+use crate::rig::Period;
+use crate::shaft::Units;
+
+/// Angle error within which the observer has locked: it costs 3.4 % of the torque.
+const LOCKED_DEG: f64 = 15.0;
+
+/// The figures of one measuring window; none is `None` but for lack of data.
+///
+/// Speed and torque are those of the shaft, positive with the phases in the order a, b, c: with
+/// `MOT_DIR` 1 a motor that runs forward has a negative speed here, and so have the reference and the
+/// estimate that it is compared with.
+#[derive(Clone, Debug, Serialize)]
+pub struct Figures {
+    /// Name.
+    pub name: String,
+    /// Start, s.
+    pub t0_s: f64,
+    /// End, s; that of the run where it ended before.
+    pub t1_s: f64,
+    /// Mean mechanical speed, rpm.
+    pub rpm_mean: Option<f64>,
+    /// Least mechanical speed, rpm.
+    pub rpm_min: Option<f64>,
+    /// Greatest mechanical speed, rpm.
+    pub rpm_max: Option<f64>,
+    /// Mean reference of the speed, rpm, while there is one.
+    pub rpm_ref_mean: Option<f64>,
+    /// Root mean square of speed less reference, rpm.
+    pub speed_error_rms_rpm: Option<f64>,
+    /// Greatest magnitude of it.
+    pub speed_error_max_rpm: Option<f64>,
+    /// Root mean square of estimated less true speed, rpm, while the observer leads.
+    pub speed_estimate_error_rms_rpm: Option<f64>,
+    /// Mean of estimated less true electrical angle, degrees, while the observer leads.
+    pub angle_error_mean_deg: Option<f64>,
+    /// Root mean square of it.
+    pub angle_error_rms_deg: Option<f64>,
+    /// Standard deviation of it.
+    pub angle_error_std_deg: Option<f64>,
+    /// Greatest magnitude of it.
+    pub angle_error_max_deg: Option<f64>,
+    /// Time from when the observer took the lead until that error stayed within 15°, s; `None` where
+    /// it did not at the end.
+    pub lock_s: Option<f64>,
+    /// Mean electromagnetic torque, Nm.
+    pub torque_mean_nm: Option<f64>,
+    /// Torque ripple: 100·√(T_rms² − T_avg²)/|T_avg|.
+    pub torque_ripple_pct: Option<f64>,
+    /// Mean electrical power into the phases, W.
+    pub p_motor_w: Option<f64>,
+    /// Mean power lost in the windings, W.
+    pub p_copper_w: Option<f64>,
+    /// 1 − p_copper/p_motor, for a motor that takes power.
+    pub efficiency: Option<f64>,
+    /// Mean measured i_q, A.
+    pub i_q_mean_a: Option<f64>,
+    /// Mean measured i_d, A.
+    pub i_d_mean_a: Option<f64>,
+    /// Greatest magnitude of a true phase current at a sample, A.
+    pub current_max_a: Option<f64>,
+    /// Mean supply voltage, V.
+    pub bus_v_mean: Option<f64>,
+    /// Mean current from the supply, A.
+    pub bus_a_mean: Option<f64>,
+    /// The most by which the shaft stood behind the furthest point that it had reached in the
+    /// direction asked for, mechanical degrees.
+    pub turned_back_deg: Option<f64>,
+    /// Time from the start after which the shaft held 95 % of the speed asked for, s; `None`
+    /// where it did not at the end.
+    pub reached_s: Option<f64>,
+    /// Time from the start after which the shaft stayed within 1 % of the speed that was asked for
+    /// last, s; `None` where it did not at the end.
+    pub settled_s: Option<f64>,
+    /// Times that the drive began a start (Park).
+    pub starts: u64,
+    /// Whether the angle error was 90° or more.
+    pub lock_lost: bool,
+}
+
+/// A period as the windows see it.
+pub(super) struct Look<'a> {
+    /// Its start, s.
+    pub(super) t_s: f64,
+    /// The truth.
+    pub(super) period: &'a Period,
+    /// What the control made of it.
+    pub(super) snapshot: &'a Snapshot,
+    /// What the control's numbers are worth.
+    pub(super) units: Units<'a>,
+    /// Whether the drive began a start.
+    pub(super) started: bool,
+}
+
+/// Sums over a measuring window.
+#[derive(Clone, Debug)]
+pub(super) struct Window {
+    name: String,
+    t0_s: f64,
+    t1_s: f64,
+    all: Mean<8>,
+    reference: Mean<2>,
+    leading: Mean<3>,
+    rpm_min: f64,
+    rpm_max: f64,
+    current_max_a: f64,
+    speed_error_max_rpm: f64,
+    angle_error_max_deg: f64,
+    /// The observer leads.
+    led: Since,
+    /// It leads, and its angle is near.
+    locked: Since,
+    turning: Turning,
+    starts: u64,
+}
+
+/// Since when something has held without a break, s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Since(pub(super) Option<f64>);
+
+impl Since {
+    pub(super) fn add(&mut self, t_s: f64, holds: bool) {
+        self.0 = if holds { self.0.or(Some(t_s)) } else { None };
+    }
+}
+
+/// Means of several quantities over the same samples.
+#[derive(Clone, Debug)]
+struct Mean<const N: usize> {
+    count: u64,
+    sums: [f64; N],
+}
+
+impl<const N: usize> Mean<N> {
+    const fn new() -> Self {
+        Self {
+            count: 0,
+            sums: [0.0; N],
+        }
+    }
+
+    fn add(&mut self, values: [f64; N]) {
+        self.count += 1;
+        for (sum, value) in self.sums.iter_mut().zip(values) {
+            *sum += value;
+        }
+    }
+
+    fn get(&self, index: usize) -> Option<f64> {
+        self.any(self.sums[index] / self.count as f64)
+    }
+
+    /// A figure of these samples, if there are any.
+    fn any(&self, figure: f64) -> Option<f64> {
+        (self.count > 0).then_some(figure)
+    }
+}
+
+impl Window {
+    pub(super) const fn new(name: String, t0_s: f64, t1_s: f64) -> Self {
+        Self {
+            name,
+            t0_s,
+            t1_s,
+            all: Mean::new(),
+            reference: Mean::new(),
+            leading: Mean::new(),
+            rpm_min: f64::INFINITY,
+            rpm_max: f64::NEG_INFINITY,
+            current_max_a: 0.0,
+            speed_error_max_rpm: 0.0,
+            angle_error_max_deg: 0.0,
+            led: Since(None),
+            locked: Since(None),
+            turning: Turning::new(),
+            starts: 0,
+        }
+    }
+
+    /// Whether a period that begins at `t_s` is within.
+    pub(super) fn covers(&self, t_s: f64) -> bool {
+        t_s >= self.t0_s && t_s < self.t1_s
+    }
+
+    pub(super) fn add(&mut self, look: &Look) {
+        let Look {
+            t_s,
+            period,
+            snapshot,
+            units,
+            started,
+        } = *look;
+        let rpm = period.rpm();
+        let flow = &period.flow;
+        self.all.add([
+            rpm,
+            flow.torque_nm,
+            flow.torque_square,
+            flow.motor_w,
+            flow.copper_w,
+            f64::from(units.scale.amperes(snapshot.i.q)),
+            f64::from(units.scale.amperes(snapshot.i.d)),
+            period.bus_v,
+        ]);
+        self.rpm_min = self.rpm_min.min(rpm);
+        self.rpm_max = self.rpm_max.max(rpm);
+        for current_a in period.currents_a {
+            self.current_max_a = self.current_max_a.max(current_a.abs());
+        }
+        self.turning.add(t_s, rpm, period.setpoint, units);
+        self.starts += u64::from(started);
+        let leads = matches!(snapshot.phase, Phase::Run | Phase::Stopping);
+        let angle_error_deg = period.angle_error_deg(snapshot);
+        self.led.add(t_s, leads);
+        self.locked
+            .add(t_s, leads && angle_error_deg.abs() <= LOCKED_DEG);
+        if !leads {
+            return;
+        }
+        let estimate_error = units.rpm(snapshot.speed) - rpm;
+        self.leading.add([
+            estimate_error * estimate_error,
+            angle_error_deg,
+            angle_error_deg * angle_error_deg,
+        ]);
+        self.angle_error_max_deg = self.angle_error_max_deg.max(angle_error_deg.abs());
+        if !matches!(period.setpoint, Setpoint::Speed(_)) {
+            return;
+        }
+        let reference = units.rpm(snapshot.speed_reference);
+        let error = rpm - reference;
+        self.reference.add([reference, error * error]);
+        self.speed_error_max_rpm = self.speed_error_max_rpm.max(error.abs());
+    }
+
+    pub(super) fn figures(&self, end_s: f64) -> Figures {
+        let torque_mean_nm = self.all.get(1);
+        let p_motor_w = self.all.get(3);
+        let p_copper_w = self.all.get(4);
+        let bus_v_mean = self.all.get(7);
+        let angle_error_mean_deg = self.leading.get(1);
+        let angle_error_square = self.leading.get(2);
+        let ripple = |mean: f64, square: f64| {
+            (mean != 0.0).then(|| 100.0 * (square - mean * mean).max(0.0).sqrt() / mean.abs())
+        };
+        Figures {
+            name: self.name.clone(),
+            t0_s: self.t0_s,
+            t1_s: self.t1_s.min(end_s),
+            rpm_mean: self.all.get(0),
+            rpm_min: self.all.any(self.rpm_min),
+            rpm_max: self.all.any(self.rpm_max),
+            rpm_ref_mean: self.reference.get(0),
+            speed_error_rms_rpm: self.reference.get(1).map(f64::sqrt),
+            speed_error_max_rpm: self.reference.any(self.speed_error_max_rpm),
+            speed_estimate_error_rms_rpm: self.leading.get(0).map(f64::sqrt),
+            angle_error_mean_deg,
+            angle_error_rms_deg: angle_error_square.map(f64::sqrt),
+            angle_error_std_deg: angle_error_mean_deg
+                .zip(angle_error_square)
+                .map(|(mean, square)| (square - mean * mean).max(0.0).sqrt()),
+            angle_error_max_deg: self.leading.any(self.angle_error_max_deg),
+            lock_s: self
+                .locked
+                .0
+                .zip(self.led.0)
+                .map(|(locked_s, led_s)| locked_s - led_s),
+            torque_mean_nm,
+            torque_ripple_pct: torque_mean_nm
+                .zip(self.all.get(2))
+                .and_then(|(mean, square)| ripple(mean, square)),
+            p_motor_w,
+            p_copper_w,
+            efficiency: p_motor_w
+                .zip(p_copper_w)
+                .and_then(|(motor, copper)| (motor > 0.0).then(|| 1.0 - copper / motor)),
+            i_q_mean_a: self.all.get(5),
+            i_d_mean_a: self.all.get(6),
+            current_max_a: self.all.any(self.current_max_a),
+            bus_v_mean,
+            bus_a_mean: p_motor_w
+                .zip(bus_v_mean)
+                .and_then(|(power, volts)| (volts > 0.0).then(|| power / volts)),
+            turned_back_deg: self.all.any(self.turning.turned_back_deg()),
+            reached_s: self.turning.reached_at_s().map(|t_s| t_s - self.t0_s),
+            settled_s: self.turning.settled_at_s().map(|t_s| t_s - self.t0_s),
+            starts: self.starts,
+            lock_lost: self.angle_error_max_deg >= 90.0,
+        }
+    }
+}

@@ -1,0 +1,348 @@
+//! The flux comparator (second paper, section 2.3): zero crossings of the three fluxes, with
+//! hysteresis, hold-off and the order of commutation. Forwards only.
+
+use fixed::types::{I0F32, U0F32};
+
+use super::flux_linkage::{AMPLITUDE_MAX, AMPLITUDE_MIN, measure};
+use super::position::{Periods, turned};
+use super::sector::Sector;
+use crate::math::TopProduct;
+use crate::units::{Angle, Flux, Speed};
+
+/// What keeps noise from being taken for a crossing (2.3.2).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// How far beyond zero a flux must be, as a share of the amplitude: half the deadband, below
+    /// 0.5.
+    pub deadband: I0F32,
+    /// The rotor's angle at which a flux is that far: arcsin of it.
+    pub deadband_angle: Angle,
+    /// Hold-off after each crossing, as an angle at the estimated speed.
+    pub hold_off: U0F32,
+    /// Periods without a crossing after which the rotor is lost.
+    pub patience: u32,
+}
+
+/// What the comparator remembers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// The sector that the last crossing has begun.
+    pub sector: Sector,
+    /// Periods since the sample of that crossing.
+    pub since: u32,
+    /// How much the crossings are to be trusted, 0 to 12: a sound one adds one, another takes three.
+    pub sound: u8,
+    /// Whether they tell where the rotor is.
+    pub tracks: bool,
+}
+
+/// A crossing of the one phase and direction that was next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// The sector that it begins.
+    pub sector: Sector,
+    /// For how long the flux had been beyond the deadband at the sample, at most a period.
+    pub late: Periods,
+    /// Amplitude of the flux.
+    pub amplitude: Flux,
+}
+
+/// Most of [`State::sound`].
+const SOUND_MAX: u8 = 12;
+/// From here on the crossings are trusted: those of a turn.
+const SOUND: u8 = 6;
+/// What a crossing that cannot be one takes away.
+const UNSOUND: u8 = 3;
+
+/// A crossing is no crossing if the rotor has turned less than this since the last one: a third of
+/// the sixth of a turn that it should have. (Later than expected is no sign of noise.)
+const LEAST_TURNED: u64 = (1 << 32) / 18;
+
+/// Begins in the sector of the flux's angle, trusting the crossings to come.
+pub fn begin(state: &mut State, lambda_angle: Angle) {
+    *state = State {
+        sector: Sector::of(lambda_angle),
+        since: 0,
+        sound: SOUND,
+        tracks: true,
+    };
+}
+
+/// One period: looks for the next crossing in the fluxes of this sample and of the one before.
+///
+/// Only the flux that is next in the order of commutation is compared, and with a level: a crossing
+/// that was missed is made up for, and from a wrong sector the state comes to the right one.
+#[inline(always)]
+pub fn detect(
+    config: &Config,
+    state: &mut State,
+    before: &[Flux; 3],
+    now: &[Flux; 3],
+    amplitude: Flux,
+    omega: Speed,
+) -> Option<Crossing> {
+    state.since = state.since.saturating_add(1);
+    let next = state.sector.next();
+    let edge = next.edge();
+    let beyond = |fluxes: &[Flux; 3]| {
+        let flux = fluxes[edge.phase];
+        let forwards = if edge.rising {
+            flux
+        } else {
+            flux.saturating_neg()
+        };
+        forwards.saturating_sub(config.deadband.top(amplitude))
+    };
+    let excess = beyond(now);
+    if excess > Flux::ZERO {
+        return cross(config, state, next, (beyond(before), excess), now, omega);
+    }
+    if state.since >= config.patience {
+        state.sound = 0;
+        state.tracks = false;
+    }
+    None
+}
+
+/// A flux is beyond the deadband: a crossing, but for the hold-off.
+fn cross(
+    config: &Config,
+    state: &mut State,
+    sector: Sector,
+    (before, excess): (Flux, Flux),
+    now: &[Flux; 3],
+    omega: Speed,
+) -> Option<Crossing> {
+    let turned = turned(state.since, omega);
+    let knows_speed = omega > Speed::ZERO;
+    if knows_speed && turned < u64::from(config.hold_off.to_bits()) {
+        return None;
+    }
+    let amplitude = measure(now, sector);
+    let sound = (!knows_speed || turned >= LEAST_TURNED)
+        && (AMPLITUDE_MIN..=AMPLITUDE_MAX).contains(&amplitude);
+    state.sound = if sound {
+        (state.sound + 1).min(SOUND_MAX)
+    } else {
+        state.sound.saturating_sub(UNSOUND)
+    };
+    state.tracks = state.sound >= SOUND || (state.tracks && state.sound > 0);
+    state.sector = sector;
+    state.since = 0;
+    // Where it was beyond already, the hold-off has kept the crossing back, or it came out of order.
+    let late = match before < Flux::ZERO {
+        true => ratio(excess, excess.saturating_sub(before)),
+        false => Periods::ONE,
+    };
+    Some(Crossing {
+        sector,
+        late,
+        amplitude,
+    })
+}
+
+/// The share of a period in which a flux has come as far as `part`, of `whole` in a period; at most
+/// a period.
+fn ratio(part: Flux, whole: Flux) -> Periods {
+    let (part, whole) = (part.to_bits().max(0), whole.to_bits().max(1));
+    let share = (i64::from(part) << Periods::FRAC_NBITS) / i64::from(whole);
+    Periods::from_bits(share as u32).min(Periods::ONE)
+}
+
+impl State {
+    /// Whether a whole turn of crossings has been sound.
+    pub fn trusted(&self) -> bool {
+        self.tracks && self.sound >= SOUND
+    }
+
+    /// Every word of it.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            sector,
+            since,
+            sound,
+            tracks,
+        } = *self;
+        out(sector.word());
+        out(since);
+        out(u32::from(sound) | u32::from(tracks) << 8);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_2_PI, TAU};
+    use std::vec::Vec;
+
+    use super::super::flux_linkage::NOMINAL;
+
+    fn config() -> Config {
+        Config {
+            deadband: I0F32::from_num(0.1),
+            deadband_angle: Angle::from_num(0.1_f64.asin() / TAU),
+            hold_off: U0F32::from_num(0.05 / 6.0),
+            patience: 1000,
+        }
+    }
+
+    fn fluxes(turns: f64) -> [f64; 3] {
+        [0.0, -1.0, 1.0].map(|third| FRAC_2_PI * (TAU * (turns + third / 3.0)).cos())
+    }
+
+    struct Run {
+        config: Config,
+        state: State,
+        before: [Flux; 3],
+        omega: Speed,
+    }
+
+    impl Run {
+        fn new(turns: f64, omega: f64) -> Self {
+            let mut state = State::default();
+            begin(&mut state, Angle::wrapping_from_num(turns));
+            Self {
+                config: config(),
+                state,
+                before: fluxes(turns).map(Flux::from_num),
+                omega: Speed::from_num(omega),
+            }
+        }
+
+        fn step(&mut self, now: [f64; 3]) -> Option<Crossing> {
+            let now = now.map(Flux::from_num);
+            let found = detect(
+                &self.config,
+                &mut self.state,
+                &self.before,
+                &now,
+                NOMINAL,
+                self.omega,
+            );
+            self.before = now;
+            found
+        }
+    }
+
+    #[test]
+    fn crossings_come_in_order_at_the_deadband_with_their_time() {
+        let omega = 0.0137;
+        let mut run = Run::new(0.0, omega);
+        let mut sector = run.state.sector;
+        let mut count = 0;
+        for k in 1..1000 {
+            let turns = omega * f64::from(k);
+            let Some(found) = run.step(fluxes(turns)) else {
+                continue;
+            };
+            count += 1;
+            assert_eq!(found.sector, sector.next());
+            sector = found.sector;
+            // The rotor was at the edge and the deadband's angle that long before.
+            let edge = sector.begin().to_num::<f64>() + 0.1_f64.asin() / TAU;
+            let error = turns - omega * found.late.to_num::<f64>() - edge;
+            let degrees = ((error + 0.5).rem_euclid(1.0) - 0.5) * 360.0;
+            assert!(degrees.abs() < 0.1, "{degrees}");
+            let amplitude = found.amplitude.to_num::<f64>();
+            assert!((0.6..0.65).contains(&amplitude), "{amplitude}");
+        }
+        assert_eq!(count, 82, "six a turn");
+        assert!(run.state.trusted());
+    }
+
+    #[test]
+    fn noise_within_the_deadband_crosses_once() {
+        let omega = 0.0005;
+        let mut run = Run::new(0.0, omega);
+        let mut sign = 1.0;
+        let mut count = 0;
+        for k in 1..8000 {
+            sign = -sign;
+            let noisy = fluxes(omega * f64::from(k)).map(|flux| flux + sign * 0.06);
+            count += u32::from(run.step(noisy).is_some());
+        }
+        assert_eq!(count, 24, "six a turn, four turns");
+    }
+
+    #[test]
+    fn a_crossing_within_the_hold_off_is_kept_back() {
+        // 5 % of a sixth of a turn are four periods at this speed.
+        let mut run = Run::new(0.0, 1.0 / 480.0);
+        run.state.since = 1000;
+        // Phases b and a at once: the first two in order.
+        let both = [-0.3, 0.3, -0.3];
+        assert!(run.step(both).is_some());
+        let held = (1..).find(|_| run.step(both).is_some());
+        assert_eq!(held, Some(4));
+        assert!(run.step(both).is_none());
+    }
+
+    #[test]
+    fn a_crossing_out_of_order_is_ignored() {
+        let mut run = Run::new(0.0, 0.001);
+        run.state.since = 1000;
+        // In the first sector only b may rise next.
+        for other in [[-0.3, -0.3, -0.3], [0.6, -0.3, 0.3]] {
+            assert_eq!(run.step(other), None);
+        }
+        assert!(run.step([0.6, 0.3, -0.3]).is_some());
+    }
+
+    #[test]
+    fn from_a_wrong_sector_it_comes_to_the_right_one() {
+        for wrong in 0..6 {
+            let omega = 0.01;
+            let mut run = Run::new(f64::from(wrong) / 6.0, omega);
+            for k in 0..100 {
+                run.step(fluxes(omega * f64::from(k)));
+            }
+            let sector = Sector::of(Angle::from_num(-0.01 - 0.016));
+            assert_eq!(run.state.sector, sector, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn without_crossings_the_rotor_is_lost_and_found_after_a_turn_of_them() {
+        let mut run = Run::new(0.0, 0.01);
+        for _ in 0..999 {
+            run.step([0.6, -0.3, -0.3]);
+            assert!(run.state.tracks);
+        }
+        run.step([0.6, -0.3, -0.3]);
+        assert!(!run.state.tracks);
+        let mut crossings = 0;
+        for k in 0..110 {
+            crossings += u32::from(run.step(fluxes(0.01 * f64::from(k))).is_some());
+            assert_eq!(run.state.tracks, crossings >= 6);
+        }
+    }
+
+    #[test]
+    fn a_flux_that_no_motor_has_is_not_trusted() {
+        let mut run = Run::new(0.0, 0.01);
+        for k in 0..400 {
+            let small = fluxes(0.01 * f64::from(k)).map(|flux| flux * 0.2);
+            run.step(small);
+        }
+        assert!(!run.state.tracks);
+    }
+
+    proptest! {
+        #[test]
+        fn any_input_is_survived(words in prop::collection::vec(any::<[i32; 5]>(), 1..60)) {
+            let mut state = State::default();
+            let mut before = [Flux::ZERO; 3];
+            for [a, b, c, amplitude, omega] in words {
+                let now = [a, b, c].map(Flux::from_bits);
+                let omega = Speed::from_bits(omega);
+                let found: Vec<_> =
+                    detect(&config(), &mut state, &before, &now, Flux::from_bits(amplitude), omega)
+                        .into_iter()
+                        .collect();
+                prop_assert!(found.iter().all(|crossing| crossing.late <= Periods::ONE));
+                before = now;
+            }
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! The rotor's flux linkage of each phase (second paper, section 2.2, figure 17):
+//! λ = ∫(v − i·R)dt − i·L_s, by a pseudo-integrator that forgets, and limits against what is left of
+//! a bias.
+
+use fixed::FixedI32;
+use fixed::types::extra::{U28, U32};
+
+use crate::math::{Gain, TopProduct, atan2_turns, sin_cos};
+use crate::units::{Angle, Current, Flux, Speed, Voltage};
+
+use super::sector::Sector;
+
+/// The flux that the parameters state, 2/π: the base of the voltage makes it so for every motor.
+pub const NOMINAL: Flux = Flux::from_bits(170_891_319);
+
+/// Least amplitude that is believed: 0.3 times the stated flux.
+pub const AMPLITUDE_MIN: Flux = Flux::from_bits(51_267_396);
+/// Greatest amplitude that is believed: twice the stated flux.
+pub const AMPLITUDE_MAX: Flux = Flux::from_bits(341_782_638);
+
+/// Coefficients for one sample period T_s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// R: current to voltage.
+    pub resistance: Gain<U28, U28>,
+    /// L_s: current to flux.
+    pub inductance: Gain<U28, U28>,
+    /// 1 − e^(−T_s/τ_int): what the integrator forgets in a period.
+    pub forget: Gain<U28, U28>,
+    /// 1/τ_int as a speed: the integrator's corner.
+    pub corner: Speed,
+    /// The further high-pass of the second-order form.
+    pub high_pass: Option<HighPass>,
+    /// i_max·L_s, by which the integrator's limit is above that of the rotor's flux.
+    pub stator_max: Flux,
+    /// Whether the limits follow the measured amplitude; else they are those of the stated flux.
+    pub adaptive: bool,
+}
+
+/// A first-order high-pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HighPass {
+    /// 1 − e^(−T_s/τ_HPFS).
+    pub share: Gain<U28, U28>,
+    /// 1/τ_HPFS as a speed.
+    pub corner: Speed,
+}
+
+/// What the observers of the three phases remember.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Integral of v − i·R.
+    pub psi: [Flux; 3],
+    /// Its slow mean, which the high-pass takes away.
+    pub mean: [Flux; 3],
+    /// λ̂ of the phases at this sample.
+    pub lambda: [Flux; 3],
+    /// λ̂ at the sample before.
+    pub lambda_before: [Flux; 3],
+    /// Currents at the last sample.
+    pub i_before: [Current; 3],
+    /// Amplitude of λ̂, from which limits and deadband are taken.
+    pub amplitude: Flux,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            psi: [Flux::ZERO; 3],
+            mean: [Flux::ZERO; 3],
+            lambda: [Flux::ZERO; 3],
+            lambda_before: [Flux::ZERO; 3],
+            i_before: [Current::ZERO; 3],
+            amplitude: NOMINAL,
+        }
+    }
+}
+
+/// One period: `v` are the mean phase voltages since the last sample, `i` the currents at this one.
+#[inline(always)]
+pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current; 3]) {
+    let lambda_max: Flux = state.amplitude + (state.amplitude >> 2);
+    let psi_max = lambda_max.saturating_add(config.stator_max);
+    state.lambda_before = state.lambda;
+    for phase in 0..3 {
+        // The resistance's voltage of a period is that of the mean current.
+        let mean_i = (i[phase] >> 1) + (state.i_before[phase] >> 1);
+        let drive = v[phase].saturating_sub(config.resistance.saturating_apply(mean_i));
+        let psi = state.psi[phase];
+        let psi = (psi - config.forget.apply(psi)).saturating_add(drive);
+        let psi = psi.min(psi_max).max(-psi_max);
+        state.psi[phase] = psi;
+        let integral = match &config.high_pass {
+            None => psi,
+            Some(high_pass) => {
+                let off = psi.saturating_sub(state.mean[phase]);
+                let mean = state.mean[phase].saturating_add(high_pass.share.apply(off));
+                state.mean[phase] = mean;
+                psi.saturating_sub(mean)
+            }
+        };
+        let lambda = integral.saturating_sub(config.inductance.saturating_apply(i[phase]));
+        state.lambda[phase] = lambda.min(lambda_max).max(-lambda_max);
+    }
+    state.i_before = i;
+}
+
+/// The amplitude of the fluxes at the crossing with which a sector begins: the two other phases
+/// stand at ±√3/2 of it. A bias that they have in common drops out.
+pub fn measure(lambda: &[Flux; 3], sector: Sector) -> Flux {
+    let phase = sector.edge().phase;
+    let (one, other) = (lambda[(phase + 1) % 3], lambda[(phase + 2) % 3]);
+    // Each is at most 1.25 · 2 · 2/π, so the difference stays below 3.2 of 8.
+    let difference = one.saturating_sub(other).saturating_abs();
+    let half = difference.top(ROOT_3_SIXTH);
+    half.saturating_add(half)
+}
+
+/// √3/6 with 32 fraction bits.
+const ROOT_3_SIXTH: FixedI32<U32> = FixedI32::from_bits(1_239_850_262);
+
+/// Takes a measured amplitude into the limits, an eighth of it: a bias, which adds at one crossing
+/// and subtracts at that of the other sign, is averaged out.
+pub fn adapt(config: &Config, state: &mut State, measured: Flux) {
+    if config.adaptive {
+        let step = measured.saturating_sub(state.amplitude) >> 3;
+        let amplitude = state.amplitude.saturating_add(step);
+        state.amplitude = amplitude.min(AMPLITUDE_MAX).max(AMPLITUDE_MIN);
+    }
+}
+
+/// By how much λ̂ leads the rotor's flux at this speed: 90° − arctan(τ_int·ω), and as much again for
+/// the high-pass (2.2.2). None without a speed.
+pub fn lead(config: &Config, omega: Speed) -> Angle {
+    let second = config.high_pass.as_ref().map(|high_pass| high_pass.corner);
+    let second = second.map_or(Angle::ZERO, |corner| lead_of(corner, omega));
+    lead_of(config.corner, omega) + second
+}
+
+/// arctan(corner/ω): 0 to a quarter of a turn.
+fn lead_of(corner: Speed, omega: Speed) -> Angle {
+    if omega <= Speed::ZERO {
+        return Angle::ZERO;
+    }
+    // Only the ratio counts, so that the numbers may be read in another type.
+    let read = |speed: Speed| Flux::from_bits(speed.to_bits());
+    atan2_turns(read(corner), read(omega))
+}
+
+/// Begins as if the rotor had turned at `omega` for long and its flux were now at `theta`.
+pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: [Current; 3]) {
+    // A filter of first order that leads by δ has the gain cos δ.
+    let first = lead_of(config.corner, omega);
+    let both = lead(config, omega);
+    let length = shortened(NOMINAL, first);
+    let integral = phases(length, theta.wrapping_add(first));
+    let length = shortened(length, both.wrapping_sub(first));
+    let lambda = phases(length, theta.wrapping_add(both));
+    let stator = i.map(|i| config.inductance.saturating_apply(i));
+    *state = State {
+        psi: [0, 1, 2].map(|phase| integral[phase].saturating_add(stator[phase])),
+        mean: [0, 1, 2].map(|phase| integral[phase] - lambda[phase]),
+        lambda,
+        lambda_before: lambda,
+        i_before: i,
+        amplitude: NOMINAL,
+    };
+}
+
+/// The parts along the three phases of a flux of this length and direction.
+fn phases(length: Flux, theta: Angle) -> [Flux; 3] {
+    let third = Angle::from_bits(THIRD_TURN);
+    let around = [Angle::ZERO, third.wrapping_neg(), third];
+    around.map(|shift| shortened(length, theta.wrapping_add(shift)))
+}
+
+/// 2^32/3.
+const THIRD_TURN: i32 = 1_431_655_765;
+
+/// The flux times the angle's cosine.
+fn shortened(flux: Flux, angle: Angle) -> Flux {
+    // 28 + 31 − 32 fraction bits.
+    Flux::from_bits(flux.top(sin_cos(angle).cos).to_bits() << 1)
+}
+
+impl State {
+    /// Every word of it.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            psi,
+            mean,
+            lambda,
+            lambda_before,
+            i_before,
+            amplitude,
+        } = self;
+        for three in [psi, mean, lambda, lambda_before, i_before] {
+            three.iter().for_each(|word| out(word.to_bits() as u32));
+        }
+        out(amplitude.to_bits() as u32);
+    }
+}
+
+#[cfg(test)]
+mod tests;

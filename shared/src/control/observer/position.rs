@@ -1,0 +1,244 @@
+//! The position estimator (second paper, section 2.4): linear extrapolation from the last edge, and
+//! the speed from the time between edges. Flux crossings and Hall sensors trigger it alike.
+//!
+//! The paper measures the speed over N turns once in N turns. Here every edge ends a measurement over
+//! the last N turns, so that from its middle to that of the extrapolation the rotor turns by
+//! (3N + 0.5)·60° instead of up to (9N − 0.5)·60°, which is what the error of appendix A comes from.
+
+use fixed::types::U20F12;
+use fixed::types::extra::U32;
+
+use super::sector::Sector;
+use crate::math::Gain;
+use crate::units::{Angle, Speed};
+
+/// A time in control periods.
+pub type Periods = U20F12;
+
+/// What the estimator must know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// N, the electrical turns over which the speed is taken, 1 to 4.
+    pub turns: u8,
+    /// Below this speed it is taken from edge to edge (2.5.2, item 3): over whole turns it would lag
+    /// too much. Zero is never.
+    pub whole_turns_above: Speed,
+    /// A_e, the share of the extrapolated angle that an edge leaves (2.4.2), 0 to below 1.
+    pub a_e: Gain<U32, U32>,
+    /// The speed above which A_e counts.
+    pub filter_above: Speed,
+    /// Whether what is known of an edge's angle and of its time before the sample is taken into
+    /// account. The paper's figures 28 and 30 are without.
+    pub compensates: bool,
+}
+
+/// What the estimator remembers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// θ̂ at this sample.
+    pub theta: Angle,
+    /// θ_inc, the angle extrapolated since the last edge: 0 to 90°.
+    pub theta_inc: Angle,
+    /// ω̂.
+    pub omega: Speed,
+    /// Change of ω̂ in a period, between the last two measurements.
+    pub omega_step: Speed,
+    /// Periods since the sample that saw the last edge.
+    pub since: u32,
+    /// How long before that sample the edge was.
+    pub late: Periods,
+    /// The last intervals between edges, a ring.
+    pub intervals: [Periods; EDGES_MAX],
+    /// Where the next one goes.
+    pub next: u8,
+    /// How many there are, at most those of N turns.
+    pub edges: u8,
+    /// Their sum.
+    pub window: Periods,
+    /// Whether the last edge was seen, so that the next interval is one.
+    pub timed: bool,
+}
+
+/// Edges in the greatest N.
+const EDGES_MAX: usize = 6 * TURNS_MAX as usize;
+
+/// Greatest N.
+pub const TURNS_MAX: u8 = 4;
+
+/// θ_inc ≤ 90° (2.4.1).
+const LIMIT: Angle = Angle::from_bits(1 << 30);
+
+/// After the time in which the estimated speed gives a third of a turn without an edge, the speed
+/// was twice too high: the rotor has turned less than a sixth.
+const THIRD_TURN: u64 = (1 << 32) / 3;
+
+/// Held below a quarter of a turn a period: sectors could no longer be told apart.
+const OMEGA_MAX: u64 = (1 << 30) - 1;
+
+/// The angle in turns, 32 fraction bits, of so many periods at this speed.
+#[inline(always)]
+pub(super) fn turned(periods: u32, omega: Speed) -> u64 {
+    u64::from(periods) * u64::from(omega.to_bits().max(0) as u32)
+}
+
+/// One period without news: extrapolates (2.4.1).
+#[inline(always)]
+pub fn advance(state: &mut State) {
+    let step = state.omega.min(LIMIT - state.theta_inc);
+    state.theta = state.theta.wrapping_add(step);
+    state.theta_inc += step;
+    state.since = state.since.saturating_add(1);
+    if state.theta_inc == LIMIT && turned(state.since, state.omega) >= THIRD_TURN {
+        overdue(state);
+    }
+}
+
+#[cold]
+fn overdue(state: &mut State) {
+    state.omega >>= 1;
+    state.omega_step = Speed::ZERO;
+    forget(state);
+}
+
+/// Leaves the intervals so far out of the next measurements.
+fn forget(state: &mut State) {
+    state.edges = 0;
+    state.window = Periods::ZERO;
+}
+
+/// Takes the time of an edge that was `late` before this sample, for the speed.
+pub fn time(config: &Config, state: &mut State, late: Periods) {
+    let since = Periods::saturating_from_num(state.since);
+    let interval = since.saturating_add(state.late).saturating_sub(late);
+    state.since = 0;
+    state.late = late;
+    if !state.timed {
+        state.timed = true;
+        forget(state);
+        return;
+    }
+    let wanted = 6 * config.turns.clamp(1, TURNS_MAX);
+    remember(state, interval, wanted);
+    // 32 + 12 fraction bits: a rotor that is slow turns by less than a sixth in the interval.
+    let whole_turns = u64::from(config.whole_turns_above.to_bits().max(0) as u32);
+    if u64::from(interval.to_bits()) * whole_turns > (1 << 44) / 6 {
+        measure(state, 1, interval);
+    } else if state.edges == wanted {
+        measure(state, wanted, state.window);
+    }
+}
+
+/// Takes an interval into the ring, in place of the oldest once there are as many as wanted.
+fn remember(state: &mut State, interval: Periods, wanted: u8) {
+    let size = EDGES_MAX as u8;
+    if state.edges >= wanted {
+        let oldest = usize::from((state.next + size - wanted) % size);
+        state.window = state.window.saturating_sub(state.intervals[oldest]);
+    } else {
+        state.edges += 1;
+    }
+    state.intervals[usize::from(state.next % size)] = interval;
+    state.next = (state.next + 1) % size;
+    state.window = state.window.saturating_add(interval);
+}
+
+/// ω̂ of so many sixths of a turn in this time.
+fn measure(state: &mut State, sixths: u8, time: Periods) {
+    // Turns with 44 fraction bits over periods with 12.
+    let omega = ((u64::from(sixths) << 44) / 6) / u64::from(time.to_bits().max(1));
+    let omega = omega.min(OMEGA_MAX);
+    let before = state.omega.to_bits();
+    state.omega_step = if before == 0 {
+        Speed::ZERO
+    } else {
+        // The change over the time between two edges, 1/(6·ω̂).
+        let change = i64::from(omega as i32 - before) * (6 * omega) as i64;
+        Speed::from_bits((change >> 32) as i32)
+    };
+    state.omega = Speed::from_bits(omega as i32);
+}
+
+/// Takes the place of an edge: the beginning of `sector`, where the rotor was [`State::late`] before
+/// this sample, `ahead` of where it is commonly. Merges it with the extrapolated angle (2.4.2).
+pub fn place(config: &Config, state: &mut State, sector: Sector, ahead: Angle) {
+    let mut theta = sector.begin();
+    if config.compensates {
+        // 32 + 12 − 12 fraction bits; below two periods at below a quarter of a turn.
+        let since = i64::from(state.omega.to_bits()) * i64::from(state.late.to_bits());
+        let since = Angle::from_bits((since >> Periods::FRAC_NBITS) as i32);
+        theta = theta.wrapping_add(ahead).wrapping_add(since);
+    }
+    state.theta_inc = Angle::ZERO;
+    state.theta = if state.omega == Speed::ZERO {
+        // Nothing will be extrapolated: the middle is never further off than half the sector.
+        sector.middle()
+    } else if state.omega >= config.filter_above {
+        let extrapolated = state.theta.wrapping_sub(theta);
+        theta.wrapping_add(config.a_e.apply(extrapolated))
+    } else {
+        theta
+    };
+}
+
+/// Puts the rotor where it must be, and measures its speed anew from the next edge on.
+pub fn settle(state: &mut State, theta: Angle) {
+    state.theta = theta;
+    state.theta_inc = Angle::ZERO;
+    retime(state);
+}
+
+/// Measures the speed anew: the next edges come from another source.
+pub fn retime(state: &mut State) {
+    // The next edge forgets the intervals so far.
+    state.timed = false;
+    state.omega_step = Speed::ZERO;
+}
+
+/// The rotor stands somewhere in this sector.
+pub fn stand(state: &mut State, sector: Sector) {
+    settle(state, sector.middle());
+    state.omega = Speed::ZERO;
+}
+
+/// Begins at this angle and speed; a negative speed is none.
+pub fn begin(state: &mut State, theta: Angle, omega: Speed) {
+    *state = State {
+        theta,
+        omega: omega
+            .max(Speed::ZERO)
+            .min(Speed::from_bits(OMEGA_MAX as i32)),
+        ..State::default()
+    };
+}
+
+impl State {
+    /// Every word of it.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            theta,
+            theta_inc,
+            omega,
+            omega_step,
+            since,
+            late,
+            intervals,
+            next,
+            edges,
+            window,
+            timed,
+        } = *self;
+        for word in [theta, theta_inc, omega, omega_step] {
+            out(word.to_bits() as u32);
+        }
+        out(since);
+        out(late.to_bits());
+        intervals
+            .iter()
+            .for_each(|interval| out(interval.to_bits()));
+        out(window.to_bits());
+        out(u32::from(next) | u32::from(edges) << 8 | u32::from(timed) << 16);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! The sixths of an electrical turn that the signs of three fluxes tell apart (second paper, figures
+//! 22 and 24): what flux crossings and Hall sensors have in common.
+
+use crate::units::Angle;
+
+/// One of six sectors of 60°, numbered in the positive direction; the first has its middle at 0°,
+/// where the rotor's flux lies along phase a.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sector(u8);
+
+/// The zero crossing with which a sector begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Edge {
+    /// Phase whose flux crosses zero: 0, 1, 2.
+    pub phase: usize,
+    /// Whether it becomes positive.
+    pub rising: bool,
+}
+
+/// Signs of the fluxes in each sector, bits 0, 1, 2 for the phases a, b, c: set while positive.
+const CODES: [u8; 6] = [0b001, 0b011, 0b010, 0b110, 0b100, 0b101];
+
+/// 2^32/6: a sector as an angle.
+const SIXTH_TURN: u32 = 715_827_883;
+
+/// 2^32/12.
+const TWELFTH_TURN: u32 = 357_913_941;
+
+impl Sector {
+    /// Half a sector: how far the rotor can be from the middle of its sector.
+    pub const HALF: Angle = Angle::from_bits(TWELFTH_TURN as i32);
+
+    /// The sector in which an angle lies.
+    pub fn of(theta: Angle) -> Self {
+        let from_edge = (theta.to_bits() as u32).wrapping_add(TWELFTH_TURN);
+        Self(((u64::from(from_edge) * 6) >> 32) as u8)
+    }
+
+    /// The sector with these signs; all equal is none.
+    pub fn of_code(code: u8) -> Option<Self> {
+        let index = CODES.iter().position(|known| *known == code)?;
+        Some(Self(index as u8))
+    }
+
+    /// The signs of the fluxes in it.
+    pub fn code(self) -> u8 {
+        CODES[usize::from(self.0 % 6)]
+    }
+
+    /// The sector that follows in the positive direction.
+    #[inline(always)]
+    pub fn next(self) -> Self {
+        Self(if self.0 >= 5 { 0 } else { self.0 + 1 })
+    }
+
+    /// How many sectors forwards it is from here to there, 0 to 5.
+    pub fn steps_to(self, there: Self) -> u8 {
+        (there.0 + 6 - self.0) % 6
+    }
+
+    /// The angle at which it begins.
+    pub fn begin(self) -> Angle {
+        self.middle().wrapping_sub(Self::HALF)
+    }
+
+    /// The angle of its middle.
+    pub fn middle(self) -> Angle {
+        Angle::from_bits(u32::from(self.0).wrapping_mul(SIXTH_TURN) as i32)
+    }
+
+    /// The crossing with which it begins.
+    #[inline(always)]
+    pub fn edge(self) -> Edge {
+        Edge {
+            // c, b, a, c, b, a; every second one rises.
+            phase: usize::from(2 - self.0 % 3),
+            rising: self.0 & 1 == 1,
+        }
+    }
+
+    /// As a word of a trace.
+    pub fn word(self) -> u32 {
+        u32::from(self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn fluxes(degrees: f64) -> [f64; 3] {
+        [0.0, -1.0, 1.0].map(|third| (TAU * (degrees / 360.0 + third / 3.0)).cos())
+    }
+
+    fn angle(degrees: f64) -> Angle {
+        Angle::wrapping_from_num(degrees / 360.0)
+    }
+
+    #[test]
+    fn the_signs_of_the_fluxes_are_the_code_of_the_sector() {
+        for degrees in 0..360 {
+            let degrees = f64::from(degrees) + 0.5;
+            let sector = Sector::of(angle(degrees));
+            let positive = fluxes(degrees).map(|flux| u8::from(flux > 0.0));
+            let code = positive[0] | positive[1] << 1 | positive[2] << 2;
+            assert_eq!(sector.code(), code, "{degrees}");
+            assert_eq!(Sector::of_code(code), Some(sector), "{degrees}");
+            let from_middle = angle(degrees).wrapping_sub(sector.middle());
+            assert!(from_middle.abs() <= Sector::HALF, "{degrees}");
+        }
+        assert_eq!(Sector::of_code(0), None);
+        assert_eq!(Sector::of_code(7), None);
+    }
+
+    #[test]
+    fn each_sector_begins_with_its_edge() {
+        for index in 0..6 {
+            let sector = Sector(index);
+            let Edge { phase, rising } = sector.edge();
+            let degrees = sector.begin().to_num::<f64>() * 360.0;
+            let (before, after) = (fluxes(degrees - 1.0)[phase], fluxes(degrees + 1.0)[phase]);
+            assert!(before * after < 0.0, "{sector:?}");
+            assert_eq!(after > 0.0, rising, "{sector:?}");
+            assert_eq!(Sector::of(angle(degrees + 1.0)), sector);
+            assert_eq!(sector.steps_to(sector.next()), 1);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The modified synchronous current regulator of the second paper, section 1.2.5 and figure 11:
+//! the controller of the q axis sets the voltage's length V, that of the d axis its phase δ ahead
+//! of the q axis.
+//!
+//! It needs neither speed, inductance nor back-EMF. A phase moves the voltage along d by V·δ, so
+//! the d axis has the bandwidth that is asked for at the greatest speed, where V is greatest, and
+//! less of it below, where there is less to decouple.
+
+use fixed::types::extra::{U28, U32};
+
+use super::{Feedback, Reference};
+use crate::control::transform::{Dq, rotate_frame};
+use crate::math::{Gain, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
+use crate::units::{Angle, Current, Voltage};
+
+/// Coefficients for one sample period T_s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// k_p of the length, bandwidth·L.
+    pub k_p: Gain<U28, U28>,
+    /// k_i·T_s of the length, bandwidth·R·T_s.
+    pub k_i: Gain<U28, U28>,
+    /// k_p of the phase, bandwidth·L over the back-EMF at `CTL_RPM_MAX`.
+    pub phase_k_p: Gain<U28, U32>,
+    /// k_i·T_s of the phase, bandwidth·R·T_s over the same.
+    pub phase_k_i: Gain<U28, U32>,
+    /// 1/k_p of the length.
+    pub admittance: Gain<U28, U28>,
+}
+
+/// The integrators.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Of the length V, which is negative against a back-EMF that is.
+    pub length: Voltage,
+    /// Of the phase δ, within a quarter of a turn.
+    pub phase: Angle,
+}
+
+const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
+
+impl Config {
+    /// The voltage of length V at the phase δ ahead of q, before any limit: (−V·sin δ, V·cos δ).
+    #[inline(always)]
+    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        let length = self.length(state, wanted, fb);
+        let e_d = leads_with(length, fb.i.d.saturating_sub(wanted.i.d));
+        let phase = bounded(
+            state
+                .phase
+                .saturating_add(self.phase_k_p.saturating_apply(e_d)),
+        );
+        let SinCos { cos, sin } = sin_cos(phase);
+        // 28 + 31 − 32 fraction bits; the length bounds both.
+        Dq {
+            d: Voltage::from_bits(-(length.top(sin).to_bits() << 1)),
+            q: Voltage::from_bits(length.top(cos).to_bits() << 1),
+        }
+    }
+
+    /// V.
+    #[inline(always)]
+    fn length(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Voltage {
+        let e_q = wanted.i.q.saturating_sub(fb.i.q);
+        let length = state
+            .length
+            .saturating_add(self.k_p.saturating_apply(e_q))
+            .saturating_add(wanted.u_q);
+        // Twice the lowest product would not fit.
+        length.max(-Voltage::MAX)
+    }
+
+    /// The current i_q* for which the voltage has the length `u_q`; the one that is wanted does not matter.
+    #[inline(always)]
+    pub fn current_at(
+        &self,
+        state: &State,
+        wanted: &Reference,
+        fb: &Feedback,
+        u_q: Voltage,
+    ) -> Current {
+        let wanted = wanted.with_i_q(Current::ZERO);
+        let without = self.length(state, &wanted, fb);
+        self.admittance
+            .saturating_apply(u_q.saturating_sub(without))
+    }
+
+    /// Takes the integrators on by a period, the length's for the current that the limit has left.
+    #[inline(always)]
+    pub fn integrate(
+        &self,
+        state: &mut State,
+        wanted: &Reference,
+        fb: &Feedback,
+        cut: Dq<Voltage>,
+    ) {
+        let e_q = wanted.i.q.saturating_sub(fb.i.q);
+        let beyond = self.admittance.saturating_apply(cut.q);
+        let step = self.k_i.saturating_apply(e_q.saturating_sub(beyond));
+        // The limit keeps the part along d: while it cuts, the phase alone holds i_d.
+        let length = self.length(state, wanted, fb);
+        let e_d = leads_with(length, fb.i.d.saturating_sub(wanted.i.d));
+        let turn = self.phase_k_i.saturating_apply(e_d);
+        state.length = state.length.saturating_add(step);
+        state.phase = bounded(state.phase.saturating_add(turn));
+    }
+
+    /// Sets the integrators so that the voltage is `u`, where that lies within a quarter of a turn
+    /// of the q axis with either sign: everywhere.
+    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
+        state.set(u);
+        let length = state.length;
+        let e_d = leads_with(length, fb.i.d.saturating_sub(wanted.i.d));
+        let phase = state
+            .phase
+            .saturating_sub(self.phase_k_p.saturating_apply(e_d));
+        let without = self.length(&State::default(), wanted, fb);
+        *state = State {
+            length: length.saturating_sub(without),
+            phase: bounded(phase),
+        };
+    }
+}
+
+impl State {
+    /// Turns the integrators with the frame.
+    pub fn rotate(&mut self, ahead: SinCos) {
+        let SinCos { cos, sin } = sin_cos(self.phase);
+        let u = Dq {
+            d: Voltage::from_bits(-(self.length.top(sin).to_bits() << 1)),
+            q: Voltage::from_bits(self.length.top(cos).to_bits() << 1),
+        };
+        self.set(rotate_frame(u, ahead));
+    }
+
+    /// Length and phase of a voltage; behind the d axis the length is negative.
+    fn set(&mut self, u: Dq<Voltage>) {
+        let length = magnitude(u.d, u.q);
+        let behind = u.q.is_negative();
+        let sign = |x: Voltage| if behind { x.saturating_neg() } else { x };
+        *self = Self {
+            length: sign(length),
+            phase: bounded(atan2_turns(sign(u.d).saturating_neg(), sign(u.q))),
+        };
+    }
+}
+
+/// i_d's error as the phase sees it: with a negative length the other way.
+#[inline(always)]
+fn leads_with(length: Voltage, error: Current) -> Current {
+    if length.is_negative() {
+        error.saturating_neg()
+    } else {
+        error
+    }
+}
+
+#[inline(always)]
+fn bounded(phase: Angle) -> Angle {
+    phase.min(QUARTER_TURN).max(-QUARTER_TURN)
+}

@@ -1,0 +1,269 @@
+//! From the current converters' readings to three phase currents: offsets that are measured before
+//! every start, and the phase that the shunts do not show.
+//!
+//! A shunt in the low side carries its phase's current only while the low side is on. The sample is
+//! at the counter's top, in the middle of the low sides' on-time and between two periods: the half
+//! of that time before the sample is of the duty of the period that has elapsed, the half after it
+//! of the period that comes. An amplifier must have settled when it is sampled, and the sampling
+//! itself is short, so what counts is the half before: the duties of the elapsed period.
+
+use fixed::types::I16F16;
+
+use crate::units::{AdcCounts, Duty};
+
+/// Which phases have a shunt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shunts {
+    /// All three: the phase with the highest duty may be left out.
+    Three,
+    /// Phases a and b: both must be read in every period, so no duty may exceed
+    /// [`Config::window`].
+    Two,
+}
+
+/// What the reconstruction must know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Which phases have a shunt.
+    pub shunts: Shunts,
+    /// Greatest duty that leaves the low side on for long enough to be read.
+    pub window: Duty,
+    /// Readings that make an offset, as a power of two; about 5 ms.
+    pub zero_readings_log2: u32,
+    /// Greatest offset that a sound sensor has.
+    pub offset_max: AdcCounts,
+}
+
+/// The offsets, and what is known of the next ones.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Readings without current, subtracted from all later ones.
+    pub offsets: [AdcCounts; 3],
+    /// Mean of the readings so far, as if those to come were zero.
+    pub partial: [AdcCounts; 3],
+    /// Readings so far.
+    pub readings: u32,
+}
+
+/// How far the measurement of the offsets is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Zeroing {
+    /// More readings are needed.
+    Measuring,
+    /// The offsets are new; the next reading begins another measurement.
+    Done,
+    /// A sensor's offset is beyond what a sound one has: the former offsets stay.
+    Defect,
+}
+
+impl State {
+    /// Begins a measurement anew; the offsets stay.
+    pub fn restart(&mut self) {
+        self.partial = [AdcCounts::ZERO; 3];
+        self.readings = 0;
+    }
+
+    /// Hands out every word.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            offsets,
+            partial,
+            readings,
+        } = self;
+        for counts in offsets.iter().chain(partial) {
+            out(counts.to_bits() as u32);
+        }
+        out(*readings);
+    }
+}
+
+/// Takes one reading into the offsets. The bridge must have been off for long enough that no
+/// current flows; a rotor may turn as long as its back-EMF is below the supply.
+pub fn zero(config: &Config, state: &mut State, raw: [AdcCounts; 3]) -> Zeroing {
+    for (partial, reading) in state.partial.iter_mut().zip(raw) {
+        // What the shift drops is below 2^-16 counts a reading.
+        *partial += reading >> config.zero_readings_log2;
+    }
+    state.readings += 1;
+    if state.readings < 1 << config.zero_readings_log2 {
+        return Zeroing::Measuring;
+    }
+    let mut measured = state.partial;
+    if config.shunts == Shunts::Two {
+        // Nothing stands behind the third reading.
+        measured[2] = AdcCounts::ZERO;
+    }
+    state.partial = [AdcCounts::ZERO; 3];
+    state.readings = 0;
+    let beyond = |offset: &AdcCounts| offset.saturating_abs() > config.offset_max;
+    if measured.iter().any(beyond) {
+        return Zeroing::Defect;
+    }
+    state.offsets = measured;
+    Zeroing::Done
+}
+
+/// The phase currents of a sample.
+///
+/// `applied` are the duties of the elapsed period, 0 for a phase whose high side did not switch.
+/// With three shunts the phase with the highest duty is minus the sum of the others where its
+/// window is too short. Where a second window is too short as well, which the modulator's limit
+/// prevents, the two longest windows are still what is used: their readings may not have settled.
+#[inline(always)]
+pub fn currents(
+    config: &Config,
+    state: &State,
+    raw: [AdcCounts; 3],
+    applied: [Duty; 3],
+) -> [AdcCounts; 3] {
+    let read = |phase: usize| raw[phase].saturating_sub(state.offsets[phase]);
+    let [a, b] = [read(0), read(1)];
+    let other = |x: AdcCounts, y: AdcCounts| I16F16::ZERO.saturating_sub(x).saturating_sub(y);
+    if config.shunts == Shunts::Two {
+        return [a, b, other(a, b)];
+    }
+    let c = read(2);
+    let [duty_a, duty_b, duty_c] = applied;
+    let highest = duty_a.max(duty_b).max(duty_c);
+    if highest <= config.window {
+        [a, b, c]
+    } else if highest == duty_a {
+        [other(b, c), b, c]
+    } else if highest == duty_b {
+        [a, other(c, a), c]
+    } else {
+        [a, b, other(a, b)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    fn config(shunts: Shunts) -> Config {
+        Config {
+            shunts,
+            window: Duty::from_num(0.9),
+            zero_readings_log2: 7,
+            offset_max: AdcCounts::from_num(200),
+        }
+    }
+
+    fn counts(values: [f64; 3]) -> [AdcCounts; 3] {
+        values.map(AdcCounts::from_num)
+    }
+
+    fn duties(values: [f64; 3]) -> [Duty; 3] {
+        values.map(Duty::from_num)
+    }
+
+    #[test]
+    fn offsets_are_the_mean_of_the_readings() {
+        let config = config(Shunts::Three);
+        let mut state = State::default();
+        for n in 0..128 {
+            let swing = if n % 2 == 0 { 5.0 } else { -5.0 };
+            let raw = counts([30.0 + swing, -17.5 - swing, 3.25]);
+            let found = zero(&config, &mut state, raw);
+            assert_eq!(found == Zeroing::Done, n == 127);
+        }
+        let wanted = [30.0, -17.5, 3.25];
+        for (offset, wanted) in state.offsets.iter().zip(wanted) {
+            // 128 readings at 2^-16 each.
+            assert!((offset.to_num::<f64>() - wanted).abs() < 0.002, "{offset}");
+        }
+        let seen = currents(
+            &config,
+            &state,
+            counts([130.0, -17.5, -96.75]),
+            duties([0.5; 3]),
+        );
+        for (seen, wanted) in seen.iter().zip([100.0, 0.0, -100.0]) {
+            assert!((seen.to_num::<f64>() - wanted).abs() < 0.002, "{seen}");
+        }
+    }
+
+    #[test]
+    fn a_second_measurement_replaces_the_first() {
+        let config = config(Shunts::Three);
+        let mut state = State::default();
+        for offset in [10.0, -20.0] {
+            while zero(&config, &mut state, counts([offset; 3])) != Zeroing::Done {}
+            assert_eq!(state.offsets, counts([offset; 3]));
+        }
+    }
+
+    #[test]
+    fn an_offset_beyond_the_bound_is_a_defect_and_is_not_used() {
+        let config = config(Shunts::Three);
+        let mut state = State::default();
+        let mut last = Zeroing::Measuring;
+        for _ in 0..128 {
+            assert_eq!(last, Zeroing::Measuring);
+            last = zero(&config, &mut state, counts([0.0, -201.0, 0.0]));
+        }
+        assert_eq!(last, Zeroing::Defect);
+        assert_eq!(state, State::default());
+    }
+
+    #[test]
+    fn with_three_shunts_the_phase_whose_window_is_too_short_is_the_other_two() {
+        let config = config(Shunts::Three);
+        let state = State::default();
+        let truth = counts([70.0, -20.0, -50.0]);
+        for phase in 0..3 {
+            let mut raw = truth;
+            raw[phase] = AdcCounts::from_num(1000);
+            let mut applied = [0.5; 3];
+            applied[phase] = 0.91;
+            assert_eq!(currents(&config, &state, raw, duties(applied)), truth);
+            applied[phase] = 0.9;
+            assert_eq!(currents(&config, &state, raw, duties(applied)), raw);
+        }
+    }
+
+    #[test]
+    fn with_two_short_windows_the_longest_two_count() {
+        let config = config(Shunts::Three);
+        let raw = counts([300.0, 10.0, -30.0]);
+        let seen = currents(&config, &State::default(), raw, duties([0.97, 0.92, 0.1]));
+        assert_eq!(seen, counts([20.0, 10.0, -30.0]));
+    }
+
+    #[test]
+    fn with_two_shunts_the_third_phase_is_never_read() {
+        let config = config(Shunts::Two);
+        let raw = counts([70.0, -20.0, 1234.0]);
+        for applied in [[0.1; 3], [0.9, 0.1, 0.95]] {
+            let seen = currents(&config, &State::default(), raw, duties(applied));
+            assert_eq!(seen, counts([70.0, -20.0, -50.0]));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_reading_overflows(
+            raw: [i32; 3], offsets: [i32; 3], applied: [u32; 3], two: bool,
+        ) {
+            let config = config(if two { Shunts::Two } else { Shunts::Three });
+            let raw = raw.map(AdcCounts::from_bits);
+            let mut state = State {
+                offsets: offsets.map(AdcCounts::from_bits),
+                ..State::default()
+            };
+            currents(&config, &state, raw, applied.map(Duty::from_bits));
+            for _ in 0..256 {
+                zero(&config, &mut state, raw);
+            }
+        }
+    }
+
+    #[test]
+    fn the_trace_has_every_word() {
+        let mut words = Vec::new();
+        State::default().trace(&mut |word| words.push(word));
+        assert_eq!(words.len(), 7);
+    }
+}

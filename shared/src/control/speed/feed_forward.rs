@@ -1,0 +1,77 @@
+//! The speed regulator of the second paper, figure 47: PI on the speed, a current in proportion to
+//! the square of the commanded speed, which is what a propeller takes, and a voltage in proportion
+//! to it, past the current regulator.
+
+use fixed::types::extra::{U28, U32};
+
+use super::Input;
+use crate::control::regulator::Reference;
+use crate::control::transform::Dq;
+use crate::math::{Gain, TopProduct};
+use crate::units::{Current, Speed};
+
+/// Coefficients for one sample period T_s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Proportional gain, speed to current.
+    pub k_p: Gain<U32, U28>,
+    /// Integral gain times T_s.
+    pub k_i: Gain<U32, U28>,
+    /// K_FFi, the square of the speed to current.
+    pub k_ffi: Gain<U32, U28>,
+    /// K_FFv, speed to voltage: the flux.
+    pub k_ffv: Gain<U32, U28>,
+    /// What of K_FFv times the measured speed the current regulator's own feed-forward brings
+    /// already; zero for the modified one, which has none.
+    pub own: Gain<U32, U28>,
+}
+
+/// The integrator.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Of the current.
+    pub sigma: Current,
+}
+
+impl Config {
+    /// I_qr and the voltage that is fed forward, for the commanded speed ω_r behind its slew limit.
+    /// The integrator stands still where the current is at a bound and the error pushes it further.
+    #[inline(always)]
+    pub(super) fn current(&self, state: &mut State, omega_r: Speed, input: &Input) -> Reference {
+        let omega = input.estimate.omega_bar;
+        let error = omega_r.saturating_sub(omega);
+        let i_q = state
+            .sigma
+            .saturating_add(self.k_p.saturating_apply(error))
+            .saturating_add(self.propeller(omega_r));
+        let bounded = input.bounds.hold(i_q);
+        let over = i_q.saturating_sub(bounded).saturating_add(input.missing);
+        let step = self.k_i.saturating_apply(error);
+        if over == Current::ZERO || over.is_negative() != step.is_negative() {
+            state.sigma = state.sigma.saturating_add(step);
+        }
+        Reference {
+            i: Dq {
+                d: Current::ZERO,
+                q: bounded,
+            },
+            i_q_step: Current::ZERO,
+            u_q: self
+                .k_ffv
+                .saturating_apply(omega_r)
+                .saturating_sub(self.own.saturating_apply(omega)),
+        }
+    }
+
+    /// What the integrator holds of a current at this speed.
+    pub(super) fn remainder(&self, omega: Speed, i_q: Current) -> Current {
+        i_q.saturating_sub(self.propeller(omega))
+    }
+
+    /// K_FFi·ω_r², against the rotation.
+    #[inline(always)]
+    fn propeller(&self, omega_r: Speed) -> Current {
+        let square = omega_r.top(omega_r.saturating_abs());
+        self.k_ffi.saturating_apply(square)
+    }
+}

@@ -1,0 +1,123 @@
+//! Speed regulators: from a speed command to the current that is wanted (`CTL_SPEED`).
+
+pub mod feed_forward;
+pub mod nested;
+
+use super::observer::Estimate;
+use super::planner;
+use super::regulator::Reference;
+use crate::units::{Current, Speed, Torque};
+
+/// The planner and one of the laws.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// From the command to ω*.
+    pub planner: planner::Config,
+    /// From ω* to the current.
+    pub law: Law,
+}
+
+/// The regulators and their coefficients.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Law {
+    /// First paper, (8) and (9).
+    Nested(nested::Config),
+    /// Second paper, figure 47.
+    FeedForward(feed_forward::Config),
+}
+
+/// The trajectory, and the integrators of both laws.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    planner: planner::State,
+    nested: nested::State,
+    feed_forward: feed_forward::State,
+}
+
+/// What one period of speed control reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Ω*.
+    pub command: Speed,
+    /// What the observer says.
+    pub estimate: Estimate,
+    /// Bounds of i_q*.
+    pub bounds: Bounds,
+    /// i_q* less i_q of the last period where its voltage was limited, else zero: the torque that
+    /// the supply cannot give.
+    pub missing: Current,
+}
+
+/// Bounds of i_q*; by default no current.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bounds {
+    /// Least i_q*, at most zero: what braking may return.
+    pub min: Current,
+    /// Greatest i_q*.
+    pub max: Current,
+}
+
+impl Bounds {
+    /// The current, held within.
+    #[inline(always)]
+    pub fn hold(self, i_q: Current) -> Current {
+        i_q.min(self.max).max(self.min)
+    }
+}
+
+impl Config {
+    /// One period: ω* moves towards the command, and the current takes the speed to ω*.
+    #[inline(always)]
+    pub fn current(&self, state: &mut State, input: &Input) -> Reference {
+        let step = state.planner.plan(&self.planner, input.command);
+        match &self.law {
+            Law::Nested(c) => c.current(
+                &mut state.nested,
+                &mut state.planner,
+                (step, self.planner.slew),
+                input,
+            ),
+            Law::FeedForward(c) => {
+                state.planner.advance(step);
+                let reference = state.planner.reference;
+                c.current(&mut state.feed_forward, reference, input)
+            }
+        }
+    }
+
+    /// Begins, or goes on, at this speed with this current, without a jump.
+    #[inline]
+    pub fn begin(&self, state: &mut State, speed: Speed, i_q: Current) {
+        state.planner = planner::State::begin(speed);
+        match &self.law {
+            Law::Nested(_) => state.nested.sigma = torque(i_q),
+            Law::FeedForward(c) => state.feed_forward.sigma = c.remainder(speed, i_q),
+        }
+    }
+}
+
+impl State {
+    /// ω*.
+    pub fn reference(&self) -> Speed {
+        self.planner.reference
+    }
+
+    /// Hands out every word.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        // Taken apart in full, so that a new field is not forgotten here.
+        let Self {
+            planner,
+            nested: nested::State { sigma },
+            feed_forward: feed_forward::State { sigma: current },
+        } = self;
+        planner.trace(out);
+        out(sigma.to_bits() as u32);
+        out(current.to_bits() as u32);
+    }
+}
+
+/// The torque of a current with the stated flux, ξ = 1/4.
+#[inline(always)]
+fn torque(i_q: Current) -> Torque {
+    i_q.saturating_mul_int(4)
+}

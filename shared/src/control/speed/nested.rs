@@ -1,0 +1,121 @@
+//! The speed regulator (8) and the current reference (9) of the first paper.
+//!
+//! To (8), which has no feed-forward "for simplicity", the torque that ω̇* takes is added, and ω* is
+//! conditioned: where the current is at a bound or the voltage is, ω* moves only as fast as the
+//! torque that is left lets it, so that nothing winds up. Without inertia it is (8) as published.
+
+use fixed::types::extra::{U28, U32};
+
+use super::{Input, torque};
+use crate::control::planner;
+use crate::control::regulator::Reference;
+use crate::control::transform::Dq;
+use crate::math::{Gain, TopProduct};
+use crate::units::{Current, Speed, Torque, Voltage};
+
+/// From here on the error is acted on in full.
+const ALMOST_HALF: Speed = Speed::from_bits(i32::MAX - (1 << 26));
+
+/// Coefficients for one sample period T_s.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// k_pω.
+    pub k_p: Gain<U32, U28>,
+    /// k_iω·T_s.
+    pub k_i: Gain<U32, U28>,
+    /// J/T_s: ω*'s step to torque.
+    pub inertia: Gain<U32, U28>,
+    /// T_s/J; zero without conditioning.
+    pub inertia_inverse: Gain<U28, U32>,
+    /// Speed to half of the share of the error that is acted on, where that is below one. At low
+    /// speed an R stated too high closes a loop through the estimate, and its gain is that of the
+    /// regulator.
+    pub trust: Gain<U32, U32>,
+}
+
+/// The integrator.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// σ_ω.
+    pub sigma: Torque,
+}
+
+impl Config {
+    /// The current that takes the speed to its reference (8), (9), within the bounds.
+    ///
+    /// `step` is what the planner wants ω* to do in this period, and `slew` the most that it may.
+    #[inline(always)]
+    pub(super) fn current(
+        &self,
+        state: &mut State,
+        planner: &mut planner::State,
+        (step, slew): (Speed, Speed),
+        input: &Input,
+    ) -> Reference {
+        let estimate = &input.estimate;
+        let wanted = planner.reference.saturating_add(step);
+        let half_trust = self
+            .trust
+            .saturating_apply(estimate.omega_bar)
+            .max(Speed::ZERO);
+        let error = estimate.omega_bar.saturating_sub(wanted);
+        let error = if half_trust < ALMOST_HALF {
+            Speed::from_bits(error.top(half_trust).to_bits() << 1)
+        } else {
+            error
+        };
+        let torque = state
+            .sigma
+            .saturating_sub(self.k_p.saturating_apply(error))
+            .saturating_add(self.inertia.saturating_apply(step));
+        let integral_step = self.k_i.saturating_apply(error);
+        let i_q = estimate.xi.top(torque);
+        let bounded = input.bounds.hold(i_q);
+        if bounded != i_q || input.missing != Current::ZERO {
+            let over = i_q.saturating_sub(bounded).saturating_add(input.missing);
+            let step = self.conditioned(state, (step, slew), over, integral_step);
+            planner.advance(step);
+            return Reference::steady(bounded);
+        }
+        planner.advance(step);
+        state.sigma = state.sigma.saturating_sub(integral_step);
+        // ω̈* is left out: at the trajectory's corners it would be a pulse of voltage.
+        let torque_step = self
+            .k_p
+            .saturating_apply(step.saturating_sub(estimate.omega_bar_step))
+            .saturating_sub(integral_step);
+        Reference {
+            i: Dq {
+                d: Current::ZERO,
+                q: i_q,
+            },
+            u_q: Voltage::ZERO,
+            i_q_step: estimate
+                .xi_step
+                .top(torque)
+                .saturating_add(estimate.xi.top(torque_step)),
+        }
+    }
+
+    /// The step of ω* that the torque that is left can follow, where the current `over` cannot be
+    /// had. The error then goes on as if nothing were limited, and so may the integrator, unless
+    /// that step is beyond the slew.
+    #[cold]
+    fn conditioned(
+        &self,
+        state: &mut State,
+        (step, slew): (Speed, Speed),
+        over: Current,
+        integral_step: Torque,
+    ) -> Speed {
+        let less = self.inertia_inverse.saturating_apply(torque(over));
+        let free = step.saturating_sub(less);
+        let taken = free.min(slew).max(-slew);
+        let conditioned = taken == free && self.inertia_inverse != Gain::ZERO;
+        let pushes_further = over.is_positive() == integral_step.is_negative();
+        if conditioned || !pushes_further {
+            state.sigma = state.sigma.saturating_sub(integral_step);
+        }
+        taken
+    }
+}

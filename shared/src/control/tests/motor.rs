@@ -1,0 +1,165 @@
+//! The motor of the first paper (1), (2) in double precision, and a current loop closed around it.
+
+use std::f64::consts::TAU;
+
+use super::{L, P, PHI, R, TS, Units};
+use crate::control::inductance::Factor;
+use crate::control::modulator;
+use crate::control::regulator::{Feedback, Reference, State};
+use crate::control::transform::Dq;
+use crate::units::{Current, Voltage};
+
+/// Steps of the model a period.
+const PARTS: u32 = 16;
+
+/// A motor with its load. The stator's quantities are complex numbers, (α, β).
+#[derive(Clone, Debug)]
+pub(super) struct Motor {
+    pub(super) inertia_kgm2: f64,
+    /// Load of section V: c1·ω + c2·ω².
+    pub(super) c1: f64,
+    pub(super) c2: f64,
+    /// Whether the shaft is held at its speed.
+    pub(super) held: bool,
+    /// Mechanical speed, rad/s.
+    pub(super) omega_m: f64,
+    /// Electrical angle.
+    theta: f64,
+    i: (f64, f64),
+    /// What the last period has commanded: it acts in this one.
+    pending: (f64, f64),
+}
+
+impl Motor {
+    /// The bench of section V, turning at this speed without current.
+    pub(super) fn bench(rpm: f64) -> Self {
+        Self {
+            inertia_kgm2: 1.43e-4,
+            c1: 1.25e-4,
+            c2: 0.3e-6,
+            held: false,
+            omega_m: rpm * TAU / 60.0,
+            theta: 0.0,
+            i: (0.0, 0.0),
+            pending: (0.0, 0.0),
+        }
+    }
+
+    /// The same with its shaft held at that speed.
+    pub(super) fn held(rpm: f64) -> Self {
+        Self {
+            held: true,
+            ..Self::bench(rpm)
+        }
+    }
+
+    /// Electrical speed, rad/s.
+    pub(super) fn omega(&self) -> f64 {
+        P * self.omega_m
+    }
+
+    pub(super) fn rpm(&self) -> f64 {
+        self.omega_m * 60.0 / TAU
+    }
+
+    /// i_d and i_q, A.
+    pub(super) fn i_dq(&self) -> (f64, f64) {
+        turned(self.i, -self.theta)
+    }
+
+    pub(super) fn torque_nm(&self) -> f64 {
+        1.5 * P * PHI * self.i_dq().1
+    }
+
+    /// One period, at whose end the command for the next one stands: d and q of the sample's
+    /// frame, aimed at the middle of the period in which it acts.
+    pub(super) fn period(&mut self, u_dq: (f64, f64)) {
+        let acting = self.pending;
+        self.pending = turned(u_dq, self.theta + 1.5 * self.omega() * TS);
+        let dt = TS / f64::from(PARTS);
+        for _ in 0..PARTS {
+            let omega = self.omega();
+            // Midpoint: the back-EMF and the resistance's drop in the middle of the part.
+            let middle = self.theta + 0.5 * omega * dt;
+            let e = (-omega * PHI * middle.sin(), omega * PHI * middle.cos());
+            let decay = 0.5 * R * dt / L;
+            let next =
+                |i: f64, u: f64, e: f64| (i * (1.0 - decay) + (u - e) * dt / L) / (1.0 + decay);
+            self.i = (next(self.i.0, acting.0, e.0), next(self.i.1, acting.1, e.1));
+            if !self.held {
+                let load = (self.c1 + self.c2 * self.omega_m.abs()) * self.omega_m;
+                self.omega_m += (self.torque_nm() - load) / self.inertia_kgm2 * dt;
+            }
+            self.theta += omega * dt;
+        }
+    }
+}
+
+/// A vector turned ahead by an angle.
+fn turned((x, y): (f64, f64), angle: f64) -> (f64, f64) {
+    let (sin, cos) = angle.sin_cos();
+    (x * cos - y * sin, x * sin + y * cos)
+}
+
+/// A motor, a current regulator that knows the rotor's position, and a limit of the voltage.
+pub(super) struct Loop {
+    pub(super) units: Units,
+    pub(super) regulator: State,
+    pub(super) motor: Motor,
+    pub(super) vector_max: Voltage,
+    /// i_q* less i_q while the voltage is limited.
+    pub(super) missing: Current,
+}
+
+impl Loop {
+    /// At 24 V.
+    pub(super) fn new(units: Units, motor: Motor) -> Self {
+        Self {
+            vector_max: units.voltage(13.4),
+            regulator: State::default(),
+            missing: Current::ZERO,
+            units,
+            motor,
+        }
+    }
+
+    /// What an observer without errors says.
+    pub(super) fn feedback(&self) -> Feedback {
+        let (i_d, i_q) = self.motor.i_dq();
+        let i = Dq {
+            d: self.units.current(i_d),
+            q: self.units.current(i_q),
+        };
+        Feedback {
+            omega: self.units.speed(self.motor.omega()),
+            i,
+            i_hat: i,
+            h_hat: Dq {
+                d: Voltage::ZERO,
+                q: self.units.voltage(-self.motor.omega() * PHI),
+            },
+            inductance: Factor::ONE,
+        }
+    }
+
+    /// One period; the voltage that was commanded, V.
+    pub(super) fn period(&mut self, wanted: &Reference) -> (f64, f64) {
+        let feedback = self.feedback();
+        let regulator = &self.units.0.regulator;
+        let asked = regulator.voltage(&self.regulator, wanted, &feedback);
+        let (u, limited) = modulator::limit(asked, self.vector_max);
+        let cut = Dq {
+            d: asked.d - u.d,
+            q: asked.q - u.q,
+        };
+        regulator.integrate(&mut self.regulator, wanted, &feedback, cut);
+        self.missing = if limited {
+            wanted.i.q - feedback.i.q
+        } else {
+            Current::ZERO
+        };
+        let u = (self.units.volts(u.d), self.units.volts(u.q));
+        self.motor.period(u);
+        u
+    }
+}

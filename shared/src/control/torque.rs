@@ -1,0 +1,114 @@
+//! Torque mode: the command is i_q, within the bounds, braking included.
+//!
+//! Also what voltage mode and a test go through. i_q* moves from one end of its range to the other
+//! in a few milliseconds, not at once: at speed the current loop answers a jump with an overshoot
+//! of half of it, and 40 A of jump would end in the over-current trip.
+
+use super::regulator::Reference;
+use super::speed::Bounds;
+use crate::units::Current;
+
+/// Limit of the change.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Greatest change of i_q* in a period.
+    pub slew: Current,
+}
+
+/// What is remembered: i_q* of the last period.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// i_q*.
+    pub i_q: Current,
+}
+
+/// `wanted` with its i_q* within the bounds, and not far from the last one.
+#[inline(always)]
+pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
+    let i_q = bounds
+        .hold(wanted.i.q)
+        .min(state.i_q.saturating_add(config.slew))
+        .max(state.i_q.saturating_sub(config.slew));
+    state.i_q = i_q;
+    wanted.with_i_q(i_q)
+}
+
+/// `wanted` with an i_q* that has grown by no more than that, for the speed regulator; it may fall at
+/// once. Where L is stated wrongly the rotor seems to turn by asin(ΔL·i_q/φ), and the observer needs
+/// time to follow.
+#[inline(always)]
+pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
+    let least = state.i_q.min(Current::ZERO).saturating_sub(config.slew);
+    let most = state.i_q.max(Current::ZERO).saturating_add(config.slew);
+    state.i_q = wanted.i.q.min(most).max(least);
+    wanted.with_i_q(state.i_q)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: Config = Config {
+        slew: Current::lit("0.01"),
+    };
+
+    fn bounds(min: f64, max: f64) -> Bounds {
+        Bounds {
+            min: Current::from_num(min),
+            max: Current::from_num(max),
+        }
+    }
+
+    fn at(i_q: f64) -> State {
+        State {
+            i_q: Current::from_num(i_q),
+        }
+    }
+
+    #[test]
+    fn what_is_commanded_moves_by_the_slew_and_stays_within_the_bounds() {
+        for (asked, end, periods) in [(0.2, 0.1, 10), (-0.2, -0.05, 5), (0.03, 0.03, 3)] {
+            let mut state = State::default();
+            let asked = Reference::steady(Current::from_num(asked));
+            let mut moved = 0;
+            for _ in 0..50 {
+                let before = state.i_q;
+                let wanted = follow(&CONFIG, &mut state, asked, bounds(-0.05, 0.1));
+                assert_eq!(wanted.i.q, state.i_q);
+                assert!((state.i_q - before).abs() <= CONFIG.slew);
+                moved += u32::from(state.i_q != before);
+            }
+            assert!(
+                (state.i_q.to_num::<f64>() - end).abs() < 1e-6,
+                "{}",
+                state.i_q
+            );
+            // And one for what the decimal fractions are rounded by.
+            assert!((periods..=periods + 1).contains(&moved), "{moved}");
+        }
+    }
+
+    #[test]
+    fn a_current_may_grow_by_the_slew_and_fall_at_once() {
+        for (before, asked, got) in [
+            (0.0, 1.0, 0.01),
+            (0.0, -1.0, -0.01),
+            (0.5, 1.0, 0.51),
+            (0.5, 0.0, 0.0),
+            (0.5, -1.0, -0.01),
+            (-0.5, -1.0, -0.51),
+            (-0.5, 0.002, 0.002),
+        ] {
+            let mut state = at(before);
+            let asked = Reference::steady(Current::from_num(asked));
+            let wanted = grow(&CONFIG, &mut state, asked);
+            let i_q = wanted.i.q.to_num::<f64>();
+            assert!((i_q - got).abs() < 1e-7, "{before}: {i_q}");
+            assert_eq!(state.i_q, wanted.i.q);
+        }
+        let mut end = at(0.0);
+        end.i_q = Current::MAX;
+        let wanted = grow(&CONFIG, &mut end, Reference::steady(Current::MAX));
+        assert_eq!(wanted.i.q, Current::MAX);
+    }
+}

@@ -1,0 +1,113 @@
+//! The start: Park, and another attempt where the rotor has not been followed.
+
+use fixed::types::I36F28;
+
+use super::tell::tell;
+use super::{Config, State, hold, in_order, reading, turn_on};
+use crate::control::six_step::commutation::{Legs, Sector};
+use crate::control::six_step::{crossing, tracking};
+use crate::drive::{self, Bridge, Fault, Phase, Setpoint};
+use crate::units::{AdcCounts, Current, Duty};
+
+/// Starts in a row that may fail.
+const ATTEMPTS: u8 = 3;
+
+/// The rotor is first held along phase c, at 240°.
+pub(super) const FIRST_PARK: Sector = Sector::Cb;
+
+/// Then along phase a, at 0°: one that stood opposite to c has not stayed there.
+const SECOND_PARK: Sector = Sector::Ac;
+
+/// The ramp's first sextant, whose middle is 60° ahead of the rotor. Its phase rises: a back-EMF
+/// too small to be seen is then a crossing seen late, not one missed.
+const FIRST_RAMP: Sector = Sector::Ba;
+
+/// The current of Park and Ramp: half more after each start that has failed, up to the bound.
+pub(super) fn current(six_step: &Config, state: &drive::State, setpoint: Setpoint) -> Current {
+    let more = |current: Current, _| current.saturating_add(current / 2);
+    let current = (0..state.six_step.failed).fold(six_step.start_current, more);
+    let current = current.min(state.protection.bounds.max);
+    match setpoint {
+        Setpoint::Test(_) => current.min(six_step.test_current),
+        _ => current,
+    }
+}
+
+/// Holds the rotor along the phase of the switching leg. The other two are held low, not one of
+/// them open: what the rotor's swing induces flows between them without any dead time in its way,
+/// damps the swing and shows its direction.
+pub(super) fn park(
+    config: &drive::Config,
+    six_step: &Config,
+    state: &mut drive::State,
+    currents: [AdcCounts; 3],
+    setpoint: Setpoint,
+) -> Bridge {
+    let wanted = current(six_step, state, setpoint);
+    let currents = in_order(config, state, currents);
+    let s = &mut state.six_step;
+    let Legs {
+        switching,
+        low,
+        floating,
+    } = s.sector.legs(currents.map(reading));
+    hold(six_step, s, switching, wanted);
+    // By the first attempt's current: a greater one does not damp the swing any sooner. After a
+    // start that has failed, twice as long.
+    s.charge += I36F28::from(wanted.min(six_step.start_current));
+    let long = six_step.park_charge * (1 + i64::from(s.failed > 0));
+    if s.sector == FIRST_PARK {
+        if s.charge >= long {
+            s.charge = I36F28::ZERO;
+            s.sector = SECOND_PARK;
+        }
+    } else {
+        // Forwards along phase a, b has a positive back-EMF and c a negative one.
+        let forwards = low.saturating_sub(floating).saturating_sub(s.swing);
+        s.swing += Current::from_bits(forwards.to_bits() >> 6);
+        let certain = wanted / 16;
+        let was_forwards = s.swings_forwards;
+        s.swings_forwards = s.swing
+            > if s.swings_forwards {
+                Current::ZERO
+            } else {
+                certain
+            };
+        let at_end = was_forwards && !s.swings_forwards && s.charge >= long * 2;
+        if at_end || s.charge >= long * 3 {
+            s.sector = FIRST_RAMP;
+            s.tracking = tracking::State::at_rest(six_step.ramp.apply(wanted));
+            s.crossing = crossing::State::default();
+            state.phase = Phase::Ramp;
+            return turn_on(config, state, currents, switching);
+        }
+    }
+    let phases = s.sector.phases(Legs {
+        switching: Some(s.duty.for_bridge()),
+        low: Some(Duty::ZERO),
+        floating: Some(Duty::ZERO),
+    });
+    tell(config, state, currents, switching);
+    Bridge::Legs(in_order(config, state, phases))
+}
+
+/// The rotor has not been followed: another start, or none.
+#[cold]
+pub(super) fn lost(six_step: &Config, state: &mut drive::State) -> Bridge {
+    let slow = state.six_step.tracking.omega_bar <= six_step.run_speed;
+    if state.phase == Phase::Ramp || slow {
+        let failed = state.six_step.failed + 1;
+        if failed <= ATTEMPTS {
+            state.six_step = State {
+                failed,
+                ..State::default()
+            };
+            state.rest(Phase::Park);
+            return Bridge::Off;
+        }
+        state.trip(Fault::Stuck);
+    } else {
+        state.trip(Fault::ObserverLost);
+    }
+    Bridge::Off
+}

@@ -1,0 +1,62 @@
+//! What telemetry hears of the six-step drive.
+
+use fixed::types::I1F31;
+
+use crate::control::six_step::commutation::SEXTANT;
+use crate::control::transform::{Dq, clarke, park};
+use crate::drive::state::Seen;
+use crate::drive::{self, Phase};
+use crate::math::{TopProduct, sin_cos};
+use crate::protection;
+use crate::units::{AdcCounts, Current, Speed, Voltage};
+
+/// 1/√3 with 31 fraction bits.
+const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);
+
+/// What telemetry hears, and what the supply's current does to the bounds.
+pub(super) fn tell(
+    config: &drive::Config,
+    state: &mut drive::State,
+    currents: [AdcCounts; 3],
+    i: Current,
+) {
+    let s = &state.six_step;
+    let duty = s.duty.duty;
+    // 31 + 28 − 32 fraction bits; 28 wanted.
+    let of_duty = |x: Voltage| Voltage::from_bits(duty.top(x).to_bits() << 1);
+    let bus_current = of_duty(i);
+    protection::bound(&config.protection, &mut state.protection, bus_current, i);
+
+    let parked = state.phase == Phase::Park;
+    // In Park the rotor is taken to stand along the switching phase.
+    let delta = if parked { SEXTANT } else { s.tracking.delta };
+    let angle = s.sector.middle().wrapping_add(delta);
+    let from_middle = sin_cos(delta);
+    let along = of_duty(state.protection.bus)
+        .top(RECIPROCAL_ROOT_3)
+        .to_bits()
+        << 1;
+    let along = Voltage::from_bits(along);
+    let u = Dq {
+        d: Voltage::from_bits(along.top(from_middle.sin).to_bits() << 1),
+        q: Voltage::from_bits(along.top(from_middle.cos).to_bits() << 1),
+    };
+    let measured = park(clarke(currents), sin_cos(angle));
+    let speed = match (parked, s.tracking.crossings) {
+        (true, _) => Speed::ZERO,
+        (false, 0) => s.tracking.omega,
+        (false, _) => s.tracking.omega_bar,
+    };
+    state.seen = Seen {
+        phase: state.phase,
+        angle: if state.swapped(config) {
+            angle.wrapping_neg()
+        } else {
+            angle
+        },
+        speed,
+        i: measured,
+        u,
+        bus_current,
+    };
+}

@@ -1,0 +1,184 @@
+//! The six-step drive with samples that a test makes up. How it turns a motor is tested where there
+//! is one.
+
+use super::*;
+use crate::drive::{Config, Fault, State, step};
+use crate::params::{Board, ParamId, Params, build};
+
+fn drive(changes: &[(ParamId, f32)]) -> (Config, State) {
+    let mut params = Params::default();
+    let six_step = [(ParamId::PwmFreqHz, 40_000.0), (ParamId::CtlDrive, 1.0)];
+    for (id, value) in six_step.iter().chain(changes) {
+        params.set(*id, *value).expect("in range");
+    }
+    let config = build(&params, &Board::BENCH).expect("it makes a drive");
+    let state = State::new(&config);
+    (config, state)
+}
+
+/// No current and no voltage but the supply's 24 V.
+fn quiet() -> Sample {
+    Sample {
+        currents: [AdcCounts::ZERO; 3],
+        bus: AdcCounts::from_num(1404),
+        terminals: [AdcCounts::ZERO; 3],
+        hall: 7,
+    }
+}
+
+fn turn(config: &Config) -> Setpoint {
+    Setpoint::Speed(config.scale.speed_from_rpm(3000.0))
+}
+
+#[test]
+fn nothing_switches_without_a_set_point() {
+    let (config, mut state) = drive(&[]);
+    let zero = [
+        Setpoint::Stop,
+        Setpoint::Zero,
+        Setpoint::Speed(Speed::ZERO),
+        Setpoint::Torque(Current::ZERO),
+        Setpoint::Voltage(I1F31::ZERO),
+    ];
+    for setpoint in zero {
+        for _ in 0..100 {
+            assert_eq!(step(&config, &mut state, quiet(), setpoint), Bridge::Off);
+        }
+    }
+}
+
+#[test]
+fn park_holds_two_phases_low_and_ramp_lets_one_float() {
+    let (config, mut state) = drive(&[]);
+    let mut floating = 0;
+    let mut parked = 0;
+    for _ in 0..20_000 {
+        let bridge = step(&config, &mut state, quiet(), turn(&config));
+        let phase = state.snapshot().phase;
+        match bridge {
+            Bridge::Off => assert_eq!(phase, Phase::Sense),
+            Bridge::Charge(_) => assert_eq!(phase, Phase::Charge),
+            Bridge::Legs(legs) => {
+                let off = legs.iter().filter(|leg| leg.is_none()).count();
+                let low = legs.iter().filter(|leg| **leg == Some(Duty::ZERO)).count();
+                match phase {
+                    Phase::Park => assert!(off == 0 && low >= 2, "{legs:?}"),
+                    Phase::Ramp => assert!(off == 1 && low >= 1, "{legs:?}"),
+                    other => panic!("{other:?}"),
+                }
+                floating += off;
+                parked += u32::from(phase == Phase::Park);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    // 0.1 s and 0.3 s of Park, then Ramp; before them 256 readings of the currents' zeros and the
+    // charge.
+    assert!((15_990..=16_010).contains(&parked), "{parked}");
+    assert!((3700..=3760).contains(&floating), "{floating}");
+}
+
+#[test]
+fn stop_ends_a_start_at_once() {
+    for (stop, bridge) in [(0.0, Bridge::Off), (1.0, Bridge::Brake)] {
+        for (periods, phase) in [
+            (100, Phase::Sense),
+            (5000, Phase::Park),
+            (17_000, Phase::Ramp),
+        ] {
+            let (config, mut state) = drive(&[(ParamId::MotStop, stop)]);
+            for _ in 0..periods {
+                step(&config, &mut state, quiet(), turn(&config));
+            }
+            assert_eq!(state.snapshot().phase, phase);
+            // Before the rotor has been parked it may turn at any speed.
+            let bridge = if phase == Phase::Sense {
+                Bridge::Off
+            } else {
+                bridge
+            };
+            assert_eq!(step(&config, &mut state, quiet(), Setpoint::Stop), bridge);
+        }
+    }
+}
+
+#[test]
+fn a_start_without_a_rotor_that_follows_fails_within_a_second_and_ends_in_a_fault() {
+    let (config, mut state) = drive(&[(ParamId::StaParkAs, 0.04)]);
+    let fail = |state: &mut State| {
+        let (mut ramp, mut longest, mut ramps) = (0, 0, 0);
+        for _ in 0..160_000 {
+            step(&config, state, quiet(), turn(&config));
+            if state.snapshot().phase == Phase::Ramp {
+                ramps += u32::from(ramp == 0);
+                ramp += 1;
+            } else {
+                ramp = 0;
+            }
+            longest = longest.max(ramp);
+        }
+        assert!(longest < 40_000, "{longest}");
+        assert!(state.snapshot().faults.contains(Fault::Stuck));
+        ramps
+    };
+    assert_eq!(fail(&mut state), 4);
+    // 0.3 s of zero throttle end the fault, and the next start has as many attempts.
+    for _ in 0..12_100 {
+        step(&config, &mut state, quiet(), Setpoint::Zero);
+    }
+    assert!(state.snapshot().faults.is_empty());
+    assert_eq!(fail(&mut state), 4);
+}
+
+#[test]
+fn fewer_than_four_periods_a_sextant_are_refused() {
+    let mut params = Params::default();
+    params.set(ParamId::CtlDrive, 1.0).expect("in range");
+    params.set(ParamId::PwmFreqHz, 28_000.0).expect("in range");
+    let error = build(&params, &Board::BENCH).expect_err("3.9 periods");
+    assert_eq!(error.param, ParamId::PwmFreqHz);
+    params.set(ParamId::PwmFreqHz, 29_000.0).expect("in range");
+    build(&params, &Board::BENCH).expect("4.03 periods");
+}
+
+#[test]
+fn no_sample_and_no_set_point_makes_it_overflow() {
+    // Overflow panics in this build.
+    for changes in [
+        &[(ParamId::LimPhaseA, 27.0), (ParamId::LimBusVMax, 60.0)][..],
+        &[(ParamId::LimPhaseA, 0.5), (ParamId::StaRampA, 100.0)][..],
+        &[
+            (ParamId::StaRampRpmS, 1e6),
+            (ParamId::StaParkAs, 0.01),
+            (ParamId::MotPolePairs, 1.0),
+        ][..],
+    ] {
+        let (config, mut state) = drive(changes);
+        let mut noise = 1_u32;
+        let mut random = || {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (noise >> 12) as i32
+        };
+        for period in 0..300_000_u32 {
+            let mut counts = |most: i32| AdcCounts::from_num(random() % most);
+            let sample = Sample {
+                currents: [0, 1, 2].map(|_| counts(1000) - AdcCounts::from_num(500)),
+                bus: AdcCounts::from_num(1200) + counts(300),
+                terminals: [0, 1, 2].map(|_| counts(4096) >> (period / 64 % 9)),
+                hall: 7,
+            };
+            let value = random() << 12;
+            let setpoint = match period / 4096 % 6 {
+                0 => Setpoint::Speed(Speed::from_bits(value)),
+                1 => Setpoint::Torque(Current::from_bits(value)),
+                2 => Setpoint::Voltage(I1F31::from_bits(value)),
+                3 => Setpoint::Zero,
+                _ => turn(&config),
+            };
+            step(&config, &mut state, sample, setpoint);
+            if !state.snapshot().faults.is_empty() {
+                state = State::new(&config);
+            }
+        }
+    }
+}

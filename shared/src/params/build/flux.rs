@@ -1,0 +1,116 @@
+//! The coefficients of the second paper's position estimation.
+
+use core::f32::consts::TAU;
+
+use fixed::types::{I0F32, U0F32};
+
+use super::{BuildError, SLOW_SHARE, Si, gain};
+use crate::control::observer::edges::{Config, Sensors};
+use crate::control::observer::flux_linkage::HighPass;
+use crate::control::observer::{crossing, flux_linkage, hall, position};
+use crate::params::{ParamId, Params};
+use crate::units::{Angle, Flux, Scale, Speed};
+
+/// τ_int·ω at the least speed: there the first-order integrator leads by 10° (2.2.2).
+const TAU_INT: f32 = 5.671;
+
+/// τ_HPFS over τ_int, much above 1 (figure 21): at the least speed it adds 1° of lead.
+const HIGH_PASS_SHARE: f32 = 10.0;
+
+/// Half the deadband of the flux, as a share of its amplitude: 3° of the rotor (2.3.2).
+const DEADBAND: f32 = 0.05;
+
+/// Hold-off, as a share of the sixth of a turn between crossings (2.3.2).
+const HOLD_OFF: f32 = 0.05;
+
+/// For how long the next edge may be missing, in sixths of a turn at the least speed.
+const PATIENCE: f32 = 2.0;
+
+/// For how long all Hall sensors may be alike, s: far longer than their edges differ.
+const HALL_PATIENCE_S: f32 = 1e-3;
+
+/// The position error that an acceleration of `CTL_SLEW_RPM_S` may make, turns: 10°.
+const ERROR_TURNS: f32 = 10.0 / 360.0;
+
+/// A, the angle of extrapolation: 60°.
+const A_TURNS: f32 = 1.0 / 6.0;
+
+/// Greatest K of appendix A for that error while braking, 1/√(1 − K) − 1 of A; accelerating, where
+/// the paper has 0.44 for it, it is smaller.
+const K_MAX: f32 = 0.265;
+
+/// Sections 2.2 to 2.4.
+pub(super) fn edges(params: &Params, p: &Si, scale: &Scale) -> Result<Config, BuildError> {
+    let get = |id| params.get(id);
+    let run_rpm = get(ParamId::StaRunRpm);
+    let slow_rpm = SLOW_SHARE * run_rpm.min(get(ParamId::CtlRpmMin));
+    let slow_rad_s = slow_rpm * p.pole_pairs * TAU / 60.0;
+    let flux_per_current = p.inductance_h * scale.current_a / scale.flux_wb();
+    let tau_int_s = TAU_INT / slow_rad_s;
+    let tau_hpfs_s = HIGH_PASS_SHARE * tau_int_s;
+    // In a period, a filter of this time constant goes this share of its way.
+    let share = |tau_s: f32| -libm::expm1f(-p.period_s / tau_s);
+    let corner = |tau_s: f32| Speed::saturating_from_num(p.period_s / (TAU * tau_s));
+    let form = get(ParamId::CtlFluxForm);
+    let high_pass = match form {
+        0.0 | 2.0 => None,
+        _ => Some(HighPass {
+            share: gain(ParamId::StaRunRpm, share(tau_hpfs_s))?,
+            corner: corner(tau_hpfs_s),
+        }),
+    };
+    Ok(Config {
+        sensors: match (get(ParamId::CtlObserver), get(ParamId::CtlHall)) {
+            (2.0, 0.0) => Sensors::Hall,
+            (2.0, _) => Sensors::Merged,
+            _ => Sensors::None,
+        },
+        flux: flux_linkage::Config {
+            resistance: gain(
+                ParamId::MotRMohm,
+                p.resistance_ohm * scale.current_a / scale.voltage_v,
+            )?,
+            inductance: gain(ParamId::MotLUh, flux_per_current)?,
+            forget: gain(ParamId::StaRunRpm, share(tau_int_s))?,
+            corner: corner(tau_int_s),
+            high_pass,
+            stator_max: Flux::saturating_from_num(
+                get(ParamId::LimPhaseA) / scale.current_a * flux_per_current,
+            ),
+            adaptive: form < 2.0,
+        },
+        crossing: crossing::Config {
+            deadband: I0F32::from_num(DEADBAND),
+            deadband_angle: Angle::from_num(libm::asinf(DEADBAND) / TAU),
+            hold_off: U0F32::from_num(HOLD_OFF * A_TURNS),
+            patience: (PATIENCE * A_TURNS * TAU / (slow_rad_s * p.period_s)) as u32,
+        },
+        position: estimator(params, p, scale)?,
+        hall: hall::Config {
+            patience: (HALL_PATIENCE_S / p.period_s) as u32,
+        },
+        flux_above: scale.speed_from_rpm(run_rpm),
+        hall_below: scale.speed_from_rpm(slow_rpm),
+    })
+}
+
+/// Section 2.4. Where whole turns and the filter begin follows from the errors that the paper gives
+/// for the greatest acceleration that the drive asks for.
+fn estimator(params: &Params, p: &Si, scale: &Scale) -> Result<position::Config, BuildError> {
+    let n = params.get(ParamId::CtlPosN);
+    let a_e = params.get(ParamId::CtlAe);
+    let alpha = params.get(ParamId::CtlSlewRpmS) * p.pole_pairs / 60.0;
+    // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures anew, and
+    // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
+    let whole = libm::sqrtf((6.0 * n + 1.0) * alpha * A_TURNS / K_MAX);
+    let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
+    let filter = libm::sqrtf(alpha * A_TURNS * lag / ERROR_TURNS);
+    let speed = |turns_per_s: f32| scale.speed_from_rpm(turns_per_s * 60.0 / p.pole_pairs);
+    Ok(position::Config {
+        turns: n as u8,
+        whole_turns_above: speed(whole),
+        a_e: gain(ParamId::CtlAe, a_e)?,
+        filter_above: speed(filter),
+        compensates: true,
+    })
+}

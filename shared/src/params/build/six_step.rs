@@ -1,0 +1,101 @@
+//! The six-step drive's coefficients: of the board, the limits and the start, not of the motor.
+
+use core::f32::consts::TAU;
+
+use fixed::types::{I1F31, I36F28};
+
+use super::{Board, BuildError, SLOW_SHARE, Si, TEST_SHARE, gain, refuse};
+use crate::control::delay::Delay;
+use crate::control::six_step::{crossing, duty};
+use crate::drive::six_step::Config;
+use crate::params::{ParamId, Params};
+use crate::units::{Scale, Voltage};
+
+/// Back-EMF on the floating terminal that is told from none, V, and the same in counts: noise and
+/// the difference between the switches that are on.
+const LEAST_V: f32 = 0.02;
+const LEAST_COUNTS: f32 = 1.5;
+
+/// Counts at which the terminals' converter is near its end.
+const GREATEST_COUNTS: f32 = 0.97 * 4096.0;
+
+/// Least periods a sextant at `CTL_RPM_MAX`.
+const LEAST_PERIODS: f32 = 4.0;
+
+/// Duty over an error of `CTL_RPM_MAX`.
+const PROPORTIONAL: f32 = 1.0;
+
+/// k_i over k_p, of the bandwidth that the speed loop is to have: with 7.9 Hz 20 1/s, where the
+/// bench's shaft has a time constant of 46 ms under a constant duty.
+const CORNER_SHARE: f32 = 0.4;
+
+/// How fast the duty changes while the current has all of `LIM_PHASE_A` left, 1/s.
+const BOUND_RATE: f32 = 320.0;
+
+/// For how long a start waits for a crossing, s: under its ramp's current a rotor with ten times the
+/// bench's inertia takes 0.08 s.
+const PATIENCE_S: f32 = 0.2;
+
+/// For how long a start may go on without a turn of crossings in a row, s.
+const ASTRAY_S: f32 = 0.9;
+
+/// Greatest current against the rotation, of `LIM_PHASE_A`.
+const BRAKING_SHARE: f32 = 0.25;
+
+pub(super) fn six_step(
+    params: &Params,
+    p: &Si,
+    scale: &Scale,
+    board: &Board,
+    duty_max: f32,
+) -> Result<Config, BuildError> {
+    let get = |id| params.get(id);
+    let fastest = get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0;
+    if 6.0 * fastest * LEAST_PERIODS > 1.0 {
+        return refuse(
+            ParamId::PwmFreqHz,
+            "less than four periods a sextant at CTL_RPM_MAX",
+        );
+    }
+    let limit_a = get(ParamId::LimPhaseA);
+    let start_a = get(ParamId::StaRampA).min(limit_a);
+    let voltage = |volts: f32| Voltage::saturating_from_num(volts / scale.voltage_v);
+    let count_v = board.terminal_v_per_count;
+    let k_p = PROPORTIONAL / fastest;
+    let corner = CORNER_SHARE * TAU * get(ParamId::CtlBwSpdHz);
+    let bound = BOUND_RATE * p.period_s * scale.current_a / limit_a;
+    let step = get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
+    Ok(Config {
+        terminal: gain(ParamId::LimBusVMax, count_v / scale.voltage_v)?,
+        crossing: crossing::Config {
+            least: voltage(LEAST_V.max(LEAST_COUNTS * count_v)),
+            greatest: voltage(GREATEST_COUNTS * count_v),
+            delayed: match board.delay {
+                Delay::None | Delay::Half => 0,
+                Delay::One => 1,
+            },
+        },
+        duty: duty::Config {
+            k_p: gain(ParamId::CtlRpmMax, k_p)?,
+            k_i: gain(ParamId::CtlBwSpdHz, k_p * corner * p.period_s)?,
+            k_b: gain(ParamId::LimPhaseA, bound)?,
+            duty_max: I1F31::saturating_from_num(duty_max),
+        },
+        delay: board.delay,
+        braking: scale.current_from_a(BRAKING_SHARE * limit_a),
+        start_current: scale.current_from_a(start_a),
+        test_current: scale.current_from_a(TEST_SHARE * limit_a),
+        park_charge: I36F28::saturating_from_num(
+            get(ParamId::StaParkAs) / (scale.current_a * p.period_s),
+        ),
+        ramp: gain(
+            ParamId::StaRampRpmS,
+            step * scale.current_a / get(ParamId::StaRampA),
+        )?,
+        patience: (PATIENCE_S / p.period_s) as u16,
+        astray: (ASTRAY_S / p.period_s) as u16,
+        run_speed: scale.speed_from_rpm(get(ParamId::StaRunRpm)),
+        slow: scale
+            .speed_from_rpm(SLOW_SHARE * get(ParamId::StaRunRpm).min(get(ParamId::CtlRpmMin))),
+    })
+}
