@@ -56,6 +56,10 @@ def short_run(*options: str) -> list:
         (["--param", "MOT_KV=100"], "MOT_KV"),
         (["--record", "/nowhere/at/all.csv"], "/nowhere/at/all.csv"),
         (["scenario", "/nowhere.toml"], "/nowhere.toml"),
+        (["scenario", "x.toml", "--seeds", "9..1"], "9..1"),
+        (["scenario", "x.toml", "--seeds", "1"], "--seeds"),
+        (["scenario", "x.toml", "--seeds", "1..2", "--seed", "1"], "--seed"),
+        (["scenario", "x.toml", "--set", "bench.seed"], "bench.seed"),
         (["plot", "/nowhere.csv", "-o", "x.svg"], "/nowhere.csv"),
     ],
 )
@@ -124,6 +128,13 @@ def test_a_storage_that_is_all_noise_is_refused_and_left_alone(tmp_path, start, 
         ("[[signal]]\nat_s = 0.0", "throttle"),
         ("[[window]]\nname = 'w'\nt0_s = 1.0\nt1_s = 0.5", "w"),
         ("[[expect]]\nwindow = 'none'\nkey = 'rpm_mean'\nbelow = 1", "none"),
+        ("[sweep]\n'bench.scale.Q' = [1.0]", "bench.scale.Q"),
+        ("[sweep]\n'benhc.noise_a' = [1.0]", "benhc.noise_a"),
+        ("[sweep]\n'signal.0.rpm' = [1.0]", "signal.0.rpm"),
+        ("[sweep]\n'params.NO_SUCH' = [1.0]", "params.NO_SUCH=1.0"),
+        ("[sweep]\n'bench.bus' = ['99x']", "99x"),
+        ("[random]\n'bench.noise_a' = [1.0, 0.0]", "bench.noise_a"),
+        ("[random]\n'bench.noise_a' = { off = [1.0] }", "of = [...]"),
         ("this is not TOML", ""),
         ("\0\x01\x02", ""),
     ],
@@ -133,6 +144,20 @@ def test_a_scenario_that_makes_no_sense_is_refused(tmp_path, text, names):
     path.write_text(text)
     line = refused("scenario", path)
     assert str(path) in line and names in line
+
+
+def test_several_runs_are_not_recorded(tmp_path):
+    path = tmp_path / "swept.toml"
+    path.write_text("[sweep]\n'bench.noise_a' = [0.0, 0.1]")
+    record = tmp_path / "record.csv"
+    assert "--record" in refused("scenario", path, "--record", record)
+    assert not record.exists()
+
+
+def test_a_key_that_is_set_wrongly_is_named(tmp_path):
+    path = tmp_path / "empty.toml"
+    path.write_text("")
+    assert "bench.nose_a" in refused("scenario", path, "--set", "bench.nose_a=1.0")
 
 
 def test_a_scenario_that_is_no_text_is_refused(tmp_path):

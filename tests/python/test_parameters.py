@@ -21,6 +21,8 @@ DEFAULTS = {
     "CTL_RPM_MAX": 6000.0,
     "PWM_FREQ_HZ": 24000.0,
     "MOT_STOP": 1.0,
+    "CTL_OBSERVER": 3.0,
+    "CTL_REGULATOR": 0.0,
     "TEL_RATE_HZ": 10.0,
 }
 
@@ -74,6 +76,12 @@ def test_a_set_value_is_told_to_every_client(esc):
         ("LIM_PHASE_A", math.inf),
         ("MOT_POLE_PAIRS", 7.5),
         ("MOT_STOP", 2.0),
+        ("CTL_MODE", 3.0),
+        ("CTL_DRIVE", 2.0),
+        ("CTL_OBSERVER", 4.0),
+        ("CTL_REGULATOR", 3.0),
+        ("CTL_HALL", 0.5),
+        ("CTL_AE", 1.0),
         ("MOT_KV", 400.0),
     ],
 )
@@ -84,6 +92,41 @@ def test_a_refused_value_is_answered_with_the_one_in_force(esc, name, value):
     reason = esc.wait("STATUSTEXT", lambda m: name in m.text, mark)
     assert reason is not None, "no reason given"
     assert esc.read_param(name).param_value == before
+
+
+@pytest.mark.parametrize(
+    "name, values",
+    [
+        ("CTL_MODE", [0, 1, 2]),
+        ("CTL_OBSERVER", [0, 1, 2, 3]),
+        ("CTL_REGULATOR", [0, 1, 2]),
+        ("CTL_OBS_CURE", [0, 1]),
+        ("CTL_ADAPT_L", [0, 1]),
+        ("CTL_SPEED", [0, 1, 2]),
+        ("CTL_FLUX_FORM", [0, 1, 2, 3]),
+        ("CTL_HALL", [0, 1]),
+        ("CTL_POS_N", [1, 2, 3, 4]),
+        ("CTL_AE", [0.0, 0.9]),
+        ("CTL_FF_A", [0.0, 8.4]),
+        ("INP_3D", [0, 1]),
+        ("PWM_DEADTIME_NS", [0, 500]),
+        ("LIM_BUS_V_MAX", [60]),
+        ("CTL_RPM_MIN", [100]),
+    ],
+)
+def test_every_choice_of_the_control_can_be_set_at_rest(esc, name, values):
+    for value in values:
+        assert esc.set_param(name, value) == pytest.approx(value)
+
+
+def test_six_step_needs_a_pwm_that_sees_its_crossings(start):
+    with start("--param", "PWM_FREQ_HZ=40000").connect() as esc:
+        assert esc.set_param("CTL_DRIVE", 1.0) == 1.0
+    with start().connect() as esc:
+        mark = esc.mark()
+        assert esc.set_param("CTL_DRIVE", 1.0) == 0.0
+        reason = esc.wait("STATUSTEXT", lambda m: "PWM_FREQ_HZ" in m.text, mark)
+        assert reason is not None, "no reason given"
 
 
 def test_a_value_is_kept_as_the_float_that_was_sent(esc):
