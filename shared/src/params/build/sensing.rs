@@ -95,7 +95,7 @@ pub(super) fn sensing(p: &Si, board: &Board, window: f32) -> sensing::Config {
     sensing::Config {
         shunts: board.shunts,
         window: Duty::saturating_from_num(window),
-        // 6 at 8 kHz to 8 at 60 kHz.
+        // 5 at 8 kHz to 8 at 60 kHz.
         zero_readings_log2: (libm::log2f(readings) + 0.5) as u32,
         offset_max: AdcCounts::saturating_from_num(
             OFFSET_SHARE * board.current_range_a / board.current_a_per_count,
