@@ -22,7 +22,7 @@ DEFAULTS = {
     "PWM_FREQ_HZ": 24000.0,
     "MOT_STOP": 1.0,
     "CTL_OBSERVER": 3.0,
-    "CTL_REGULATOR": 0.0,
+    "CTL_REGULATOR": 1.0,
     "TEL_RATE_HZ": 10.0,
 }
 
