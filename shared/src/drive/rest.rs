@@ -4,7 +4,7 @@
 //! looked for at the open terminals. One that turns is caught where it is; one that turns the other
 //! way is stopped first; one that stands is parked.
 
-use super::{Config, Direction, Fault, Phase, Sample, State};
+use super::{Bridge, Config, Direction, Fault, Phase, Sample, State};
 use crate::control::catch::{self, Rotor};
 use crate::control::sensing::{self, Zeroing};
 use crate::units::Speed;
@@ -12,6 +12,24 @@ use crate::units::Speed;
 /// How often the currents' zeros are measured anew while it is not known whether the rotor turns:
 /// after eight times 5 ms it turns too slowly to matter, or its terminals cannot be read.
 const LOOKS: u8 = 8;
+
+/// A period of Idle, Sense or Charge. `None` when Charge is done, and in any other phase: then the
+/// drive acts.
+#[inline(always)]
+pub(super) fn period(config: &Config, state: &mut State, sample: &Sample) -> Option<Bridge> {
+    match state.phase {
+        Phase::Idle => {
+            watch(config, state, sample);
+            Some(Bridge::Off)
+        }
+        Phase::Sense => {
+            sense(config, state, sample);
+            Some(Bridge::Off)
+        }
+        Phase::Charge => charge(config, state).then_some(Bridge::Charge(config.charge.duty)),
+        _ => None,
+    }
+}
 
 /// A period with the bridge off: the rotor is watched at the open terminals.
 pub(super) fn watch(config: &Config, state: &mut State, sample: &Sample) {
@@ -29,7 +47,7 @@ pub(super) fn watch(config: &Config, state: &mut State, sample: &Sample) {
 }
 
 /// Sense: the bridge is off until the currents' zeros and the rotor are known.
-pub(super) fn sense(config: &Config, state: &mut State, sample: &Sample) {
+fn sense(config: &Config, state: &mut State, sample: &Sample) {
     watch(config, state, sample);
     if state.settling_periods > 0 {
         state.settling_periods -= 1;
@@ -49,7 +67,7 @@ pub(super) fn sense(config: &Config, state: &mut State, sample: &Sample) {
 }
 
 /// Charge: the low sides supply the drivers, and the rotor turns on unseen. False when it is done.
-pub(super) fn charge(config: &Config, state: &mut State) -> bool {
+fn charge(config: &Config, state: &mut State) -> bool {
     if let Rotor::Turning { theta, omega } = &mut state.rotor {
         *theta = theta.wrapping_add(*omega);
         state.seen.angle = *theta;

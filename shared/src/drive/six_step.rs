@@ -97,30 +97,19 @@ pub(super) fn period(
 ) -> Bridge {
     follow(config, six_step, state, setpoint);
     state.seen.phase = state.phase;
+    if let Some(bridge) = rest::period(config, state, sample) {
+        return bridge;
+    }
+    if state.phase == Phase::Charge {
+        begin(config, state, setpoint);
+    }
     match state.phase {
-        Phase::Idle => {
-            rest::watch(config, state, sample);
-            Bridge::Off
-        }
-        Phase::Sense => {
-            rest::sense(config, state, sample);
-            Bridge::Off
-        }
-        Phase::Charge => {
-            if rest::charge(config, state) {
-                return Bridge::Charge(config.charge.duty);
-            }
-            begin(config, state, setpoint);
-            start::park(config, six_step, state, currents, setpoint)
-        }
         Phase::Brake => {
             watch(config, state, currents);
             Bridge::Brake
         }
         Phase::Park => start::park(config, six_step, state, currents, setpoint),
-        Phase::Ramp | Phase::Run | Phase::Stopping => {
-            turn(config, six_step, state, (sample, currents), setpoint)
-        }
+        _ => turn(config, six_step, state, (sample, currents), setpoint),
     }
 }
 
@@ -199,10 +188,7 @@ fn demand(setpoint: Setpoint, reversed: bool) -> Demand {
 /// What follows when there is nothing left to slow down.
 fn end(config: &super::Config, state: &mut super::State) {
     state.six_step.still = 0;
-    state.rest(match config.stop {
-        Stop::Coast => Phase::Idle,
-        Stop::Brake => Phase::Brake,
-    });
+    launch::end(config, state);
 }
 
 /// Speed is regulated from the speed and the duty that there are.

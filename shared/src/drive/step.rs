@@ -60,30 +60,17 @@ fn healthy(
     }
     launch::follow(config, state, setpoint);
     state.seen.phase = state.phase;
-    match state.phase {
-        Phase::Idle => {
-            rest::watch(config, state, sample);
-            Bridge::Off
-        }
-        Phase::Sense => {
-            rest::sense(config, state, sample);
-            Bridge::Off
-        }
-        Phase::Charge => {
-            if rest::charge(config, state) {
-                return Bridge::Charge(config.charge.duty);
-            }
-            launch::begin(config, state, sample, setpoint);
-            turn::period(config, state, sample, currents, setpoint)
-        }
-        Phase::Brake => {
-            turn::watch(config, state, sample, currents);
-            Bridge::Brake
-        }
-        Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping => {
-            turn::period(config, state, sample, currents, setpoint)
-        }
+    if let Some(bridge) = rest::period(config, state, sample) {
+        return bridge;
     }
+    if state.phase == Phase::Charge {
+        launch::begin(config, state, sample, setpoint);
+    }
+    if state.phase == Phase::Brake {
+        turn::watch(config, state, sample, currents);
+        return Bridge::Brake;
+    }
+    turn::period(config, state, sample, currents, setpoint)
 }
 
 /// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
