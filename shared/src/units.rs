@@ -30,6 +30,9 @@ pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);
 /// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
 pub type InverseFlux = I0F32;
 
+/// The inverse of the motor's stated flux, ξ = 1/4: the voltage base makes it so for every motor.
+pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
+
 /// A reading of the converter in counts, signed and without its offset. The chip's are whole; a
 /// simulation of ideal sensing has fractions.
 pub type AdcCounts = I16F16;

@@ -34,10 +34,7 @@ impl Factor {
     /// The product with `x`, held at the ends of its type.
     #[inline(always)]
     pub fn of<A: Unsigned>(self, x: FixedI32<A>) -> FixedI32<A> {
-        // Two bits fewer, to be given back.
-        let product = (i64::from(x.to_bits()) * i64::from(self.0.to_bits())) >> 32;
-        let top = (product as i32).clamp(i32::MIN >> 2, i32::MAX >> 2);
-        FixedI32::from_bits(top << 2)
+        Gain::from_parts(self.0.to_bits(), 4).saturating_apply(x)
     }
 }
 

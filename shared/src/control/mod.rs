@@ -7,6 +7,7 @@ pub mod catch;
 pub mod dead_time;
 pub mod delay;
 pub mod inductance;
+pub mod low_speed;
 pub mod modulator;
 pub mod observer;
 pub mod planner;

@@ -4,7 +4,7 @@
 use fixed::types::{I0F32, I1F31, I4F28, I5F27};
 
 use super::transform::{AlphaBeta, Dq, phases};
-use crate::math::{TopProduct, other_leg};
+use crate::math::{Held, TopProduct, other_leg};
 use crate::units::{Duty, Voltage};
 
 /// How the phases' common voltage is chosen.
@@ -52,7 +52,7 @@ impl Supply {
         let error = I0F32::from_bits((((1 << 56) - product) >> 24) as i32);
         Self {
             bus,
-            reciprocal: rough.saturating_add(rough.top(error)),
+            reciprocal: rough.plus(rough.top(error)),
             vector_max: Voltage::from_bits(config.vector_max.top(bus).to_bits() << 1),
         }
     }
@@ -61,14 +61,19 @@ impl Supply {
 /// Shortens a voltage vector to what the supply can give, keeping the part along d, which cancels
 /// what the current and the speed induce.
 ///
-/// Returns the vector and whether it was shortened.
+/// Returns the vector and what was cut off, if it was shortened.
 #[inline(always)]
-pub fn limit(u: Dq<Voltage>, vector_max: Voltage) -> (Dq<Voltage>, bool) {
+pub fn limit(u: Dq<Voltage>, vector_max: Voltage) -> (Dq<Voltage>, Option<Dq<Voltage>>) {
     let square = |x: Voltage| x.top(x);
-    if square(u.d).saturating_add(square(u.q)) <= square(vector_max) {
-        (u, false)
+    if square(u.d).plus(square(u.q)) <= square(vector_max) {
+        (u, None)
     } else {
-        (shorten(u, vector_max), true)
+        let short = shorten(u, vector_max);
+        let cut = Dq {
+            d: u.d.minus(short.d),
+            q: u.q.minus(short.q),
+        };
+        (short, Some(cut))
     }
 }
 
@@ -175,11 +180,15 @@ mod tests {
             d: Voltage::from_num(-0.3),
             q: Voltage::from_num(2),
         };
-        let (limited, was) = limit(u, Voltage::from_num(0.5));
-        assert!(was);
+        let (limited, cut) = limit(u, Voltage::from_num(0.5));
+        let rest = Dq {
+            d: Voltage::ZERO,
+            q: u.q - limited.q,
+        };
+        assert_eq!(cut, Some(rest));
         assert_eq!(limited.d, u.d);
         assert!((limited.q.to_num::<f64>() - 0.4).abs() < 1e-6);
-        assert_eq!(limit(limited, Voltage::from_num(0.5001)), (limited, false));
+        assert_eq!(limit(limited, Voltage::from_num(0.5001)), (limited, None));
     }
 
     #[test]

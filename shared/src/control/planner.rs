@@ -7,7 +7,7 @@
 
 use fixed::types::extra::U32;
 
-use crate::math::Gain;
+use crate::math::{Gain, Held};
 use crate::units::Speed;
 
 /// Limits of the trajectory.
@@ -46,8 +46,8 @@ impl State {
     /// [`State::advance`] which it takes.
     #[inline(always)]
     pub fn plan(&mut self, config: &Config, command: Speed) -> Speed {
-        let moved = command.saturating_sub(self.command);
-        let left = self.command.saturating_sub(self.reference);
+        let moved = command.minus(self.command);
+        let left = self.command.minus(self.reference);
         self.command = command;
         // Rounded away from zero, so that the command is reached.
         let share = if left.is_negative() {
@@ -56,17 +56,17 @@ impl State {
             (-config.approach.apply(-left)).min(left)
         };
         moved
-            .saturating_add(share)
+            .plus(share)
             .min(config.slew)
             .max(-config.slew)
-            .min(self.step.saturating_add(config.jerk))
-            .max(self.step.saturating_sub(config.jerk))
+            .min(self.step.plus(config.jerk))
+            .max(self.step.minus(config.jerk))
     }
 
     /// Takes ω* on by a step.
     #[inline(always)]
     pub fn advance(&mut self, step: Speed) {
-        self.reference = self.reference.saturating_add(step);
+        self.reference = self.reference.plus(step);
         self.step = step;
     }
 

@@ -9,6 +9,7 @@
 
 use fixed::types::I16F16;
 
+use crate::math::Held;
 use crate::units::{AdcCounts, Duty};
 
 /// Which phases have a shunt.
@@ -116,9 +117,9 @@ pub fn currents(
     raw: [AdcCounts; 3],
     applied: [Duty; 3],
 ) -> [AdcCounts; 3] {
-    let read = |phase: usize| raw[phase].saturating_sub(state.offsets[phase]);
+    let read = |phase: usize| raw[phase].minus(state.offsets[phase]);
     let [a, b] = [read(0), read(1)];
-    let other = |x: AdcCounts, y: AdcCounts| I16F16::ZERO.saturating_sub(x).saturating_sub(y);
+    let other = |x: AdcCounts, y: AdcCounts| I16F16::ZERO.minus(x).minus(y);
     if config.shunts == Shunts::Two {
         return [a, b, other(a, b)];
     }

@@ -6,6 +6,7 @@
 
 use super::regulator::Reference;
 use super::speed::Bounds;
+use crate::math::Held;
 use crate::units::Current;
 
 /// Limit of the change.
@@ -27,8 +28,8 @@ pub struct State {
 pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
     let i_q = bounds
         .hold(wanted.i.q)
-        .min(state.i_q.saturating_add(config.slew))
-        .max(state.i_q.saturating_sub(config.slew));
+        .min(state.i_q.plus(config.slew))
+        .max(state.i_q.minus(config.slew));
     state.i_q = i_q;
     wanted.with_i_q(i_q)
 }
@@ -38,8 +39,8 @@ pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bou
 /// time to follow.
 #[inline(always)]
 pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
-    let least = state.i_q.min(Current::ZERO).saturating_sub(config.slew);
-    let most = state.i_q.max(Current::ZERO).saturating_add(config.slew);
+    let least = state.i_q.min(Current::ZERO).minus(config.slew);
+    let most = state.i_q.max(Current::ZERO).plus(config.slew);
     state.i_q = wanted.i.q.min(most).max(least);
     wanted.with_i_q(state.i_q)
 }

@@ -4,7 +4,7 @@ use fixed::FixedI32;
 use fixed::types::extra::U32;
 use fixed::types::{I3F29, I4F28, I5F27};
 
-use crate::math::{SinCos, TopProduct};
+use crate::math::{Held, SinCos, TopProduct};
 use crate::units::{AdcCounts, Current, Voltage};
 
 /// A vector in the stator's frame.
@@ -61,8 +61,7 @@ pub fn currents(v: AlphaBeta<I3F29>) -> AlphaBeta<Current> {
 /// their type.
 #[inline(always)]
 pub fn voltages(v: AlphaBeta<I5F27>) -> AlphaBeta<Voltage> {
-    let most = i32::MAX >> 1;
-    let double = |x: I5F27| Voltage::from_bits(x.to_bits().min(most).max(-most) << 1);
+    let double = |x: I5F27| Voltage::from_bits(x.plus(x).to_bits());
     AlphaBeta {
         alpha: double(v.alpha),
         beta: double(v.beta),
@@ -78,13 +77,10 @@ pub fn park(v: AlphaBeta<I3F29>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
     }
 }
 
-/// Greatest magnitude of a component that [`to_rotor`] takes.
-const ROTATED_MAX: I4F28 = I4F28::from_bits((1 << 30) - 1);
-
 /// Park's transform of any vector of the stator's frame; components are held within ±4.
 #[inline(always)]
 pub fn to_rotor(v: AlphaBeta<I4F28>, frame: SinCos) -> Dq<I4F28> {
-    let double = |x: I4F28| I3F29::from_bits(x.min(ROTATED_MAX).max(-ROTATED_MAX).to_bits() << 1);
+    let double = |x: I4F28| I3F29::from_bits(x.plus(x).to_bits());
     park(
         AlphaBeta {
             alpha: double(v.alpha),

@@ -5,7 +5,8 @@ use fixed::types::extra::{U16, U28, U32};
 use super::six_step;
 use crate::control::delay::Delay;
 use crate::control::{
-    catch, dead_time, inductance, modulator, observer, regulator, sensing, speed, start, torque,
+    catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
+    torque,
 };
 use crate::math::Gain;
 use crate::protection;
@@ -41,20 +42,6 @@ pub struct Charge {
 /// How often a start is tried.
 pub const ATTEMPTS: usize = 4;
 
-/// Below some speed the back-EMF is small against what is not known: the dead time's loss around
-/// zero current, and the drop across a resistance that may be stated wrongly.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LowSpeed {
-    /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
-    pub i_d: Current,
-    /// What the speed takes of it.
-    pub i_d_slope: Gain<U32, U28>,
-    /// Bound of i_q at standstill.
-    pub i_q: Current,
-    /// Bound of i_q over the speed, where that is more.
-    pub i_q_slope: Gain<U32, U28>,
-}
-
 /// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
@@ -81,7 +68,7 @@ pub struct Config {
     /// Adaptation of the inductance, if it is asked for.
     pub adapt_l: Option<inductance::Config>,
     /// What is done for the observer at low speed.
-    pub low_speed: LowSpeed,
+    pub low_speed: low_speed::Config,
     /// The attempts of a start, in order.
     pub start: [start::Config; ATTEMPTS],
     /// Greatest current of a test of the motor.
@@ -112,4 +99,17 @@ pub struct Config {
     pub clear_periods: u32,
     /// Periods in a row for which the observer's state may be out of its range.
     pub lost_periods: u32,
+}
+
+impl Config {
+    /// The same drive, told where its rotor is by [`State::place`](super::State::place) in place of
+    /// an observer. It starts from standstill without aligning the rotor.
+    pub fn with_position_given(self) -> Self {
+        Self {
+            observer: observer::Config::Given,
+            // 0.9 s, as for a motor with sensors: it begins Run at standstill.
+            slow_periods: self.proven_periods.saturating_mul(3),
+            ..self
+        }
+    }
 }

@@ -57,6 +57,9 @@ pub(super) fn wish(config: &Config, setpoint: Setpoint) -> Wish {
 pub(super) fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
     let wish = wish(config, setpoint);
     let present = Wish::present(state);
+    if state.phase == Phase::Run && wish == present {
+        return;
+    }
     // A torque against the rotation slows the motor down within Run, but does not turn it round.
     let holds = matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
         && state.seen.speed >= config.slow;

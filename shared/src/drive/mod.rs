@@ -9,7 +9,7 @@ mod step;
 mod turn;
 
 pub use crate::protection::{Fault, Faults};
-pub use config::{ATTEMPTS, Charge, Config, Direction, LowSpeed, Stop};
+pub use config::{ATTEMPTS, Charge, Config, Direction, Stop};
 pub use state::{Phase, Snapshot, State};
 pub use step::step;
 

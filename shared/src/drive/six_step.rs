@@ -6,6 +6,7 @@
 //! commutates by a speed that grows by `STA_RAMP_RPM_S`; crossings correct that as soon as there are
 //! some. Run begins when a turn of them has been seen in a row at `STA_RUN_RPM`.
 
+mod given;
 mod start;
 mod state;
 mod tell;
@@ -101,7 +102,7 @@ pub(super) fn period(
         return bridge;
     }
     if state.phase == Phase::Charge {
-        begin(config, state, setpoint);
+        begin(config, six_step, state, setpoint);
     }
     match state.phase {
         Phase::Brake => {
@@ -133,21 +134,19 @@ fn watch(config: &super::Config, state: &mut super::State, currents: [AdcCounts;
 /// Changes the phase where the set-point asks for it.
 fn follow(config: &super::Config, six_step: &Config, state: &mut super::State, setpoint: Setpoint) {
     let resting = demand(setpoint, state.reversed) == Demand::Rest;
+    // A shaft that turns too fast to be parked is left to slow down first.
+    let too_fast = state.seen.speed > six_step.run_speed
+        && !(given::is_given(config) && along(config, state, setpoint));
     match state.phase {
         Phase::Stopping if !resting => {
             state.phase = Phase::Run;
             run_from_here(state);
         }
-        // A shaft that turns too fast to be parked is left to slow down first.
-        Phase::Idle | Phase::Brake
-            if launch::wish(config, setpoint) != Wish::Rest
-                && state.seen.speed <= six_step.run_speed =>
-        {
+        Phase::Idle | Phase::Brake if launch::wish(config, setpoint) != Wish::Rest && !too_fast => {
             state.rest(Phase::Sense);
         }
         Phase::Sense | Phase::Charge
-            if launch::wish(config, setpoint) == Wish::Rest
-                || state.seen.speed > six_step.run_speed =>
+            if launch::wish(config, setpoint) == Wish::Rest || too_fast =>
         {
             // Not the low sides: the rotor may turn at any speed.
             state.rest(Phase::Idle);
@@ -164,10 +163,13 @@ fn along(config: &super::Config, state: &super::State, setpoint: Setpoint) -> bo
 }
 
 /// Begins a start.
-fn begin(config: &super::Config, state: &mut super::State, setpoint: Setpoint) {
+fn begin(config: &super::Config, six_step: &Config, state: &mut super::State, setpoint: Setpoint) {
     state.six_step = State::default();
     state.rest(Phase::Park);
     state.reversed = launch::wish(config, setpoint) == Wish::Backward;
+    if given::is_given(config) {
+        given::begin(config, six_step, state);
+    }
 }
 
 /// The set-point as seen along the rotation.
@@ -220,6 +222,61 @@ fn turn(
         reading(legs.low).saturating_neg()
     };
 
+    if given::is_given(config) {
+        given::follow(config, six_step, state);
+    } else if !crossings(six_step, state, terminals, ramping) {
+        return start::lost(six_step, state);
+    }
+    let s = &mut state.six_step;
+
+    if ramping {
+        hold(six_step, s, i, ramp_current);
+        if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
+            s.tracking.acceleration = Speed::ZERO;
+            state.phase = Phase::Run;
+            run_from_here(state);
+        }
+    } else {
+        run(config, six_step, state, i, setpoint);
+    }
+    let bridge = turn_on(config, state, currents, i);
+    let slow = !ramping && state.six_step.tracking.omega_bar < six_step.slow;
+    match state.phase {
+        Phase::Stopping if slow => {
+            end(config, state);
+            match config.stop {
+                Stop::Coast => Bridge::Off,
+                Stop::Brake => Bridge::Brake,
+            }
+        }
+        Phase::Run if slow && given::is_given(config) => {
+            if given::slow(config, state) {
+                Bridge::Off
+            } else {
+                bridge
+            }
+        }
+        Phase::Run if slow => start::lost(six_step, state),
+        Phase::Run if state.run_periods < config.proven_periods => {
+            state.run_periods += 1;
+            if state.run_periods == config.proven_periods {
+                state.six_step.failed = 0;
+            }
+            bridge
+        }
+        _ => bridge,
+    }
+}
+
+/// Looks for the crossing and commutates by it. False where the rotor is no longer followed.
+#[inline]
+fn crossings(
+    six_step: &Config,
+    state: &mut super::State,
+    terminals: [AdcCounts; 3],
+    ramping: bool,
+) -> bool {
+    let s = &mut state.six_step;
     s.tracking.advance();
     let terminal = s.sector.legs(terminals).floating;
     let terminal = six_step.terminal.saturating_apply(terminal);
@@ -243,40 +300,7 @@ fn turn(
     } else {
         0
     };
-    if s.missed >= LOST_SEXTANTS || s.astray >= six_step.astray {
-        return start::lost(six_step, state);
-    }
-
-    if ramping {
-        hold(six_step, s, i, ramp_current);
-        if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
-            s.tracking.acceleration = Speed::ZERO;
-            state.phase = Phase::Run;
-            run_from_here(state);
-        }
-    } else {
-        run(config, six_step, state, i, setpoint);
-    }
-    let bridge = turn_on(config, state, currents, i);
-    let slow = !ramping && state.six_step.tracking.omega_bar < six_step.slow;
-    match state.phase {
-        Phase::Stopping if slow => {
-            end(config, state);
-            match config.stop {
-                Stop::Coast => Bridge::Off,
-                Stop::Brake => Bridge::Brake,
-            }
-        }
-        Phase::Run if slow => start::lost(six_step, state),
-        Phase::Run if state.run_periods < config.proven_periods => {
-            state.run_periods += 1;
-            if state.run_periods == config.proven_periods {
-                state.six_step.failed = 0;
-            }
-            bridge
-        }
-        _ => bridge,
-    }
+    s.missed < LOST_SEXTANTS && s.astray < six_step.astray
 }
 
 /// The next sextant, where it is time.

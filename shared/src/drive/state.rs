@@ -8,7 +8,7 @@ use crate::control::{
     catch, inductance, observer, planner, regulator, sensing, speed, start, torque,
 };
 use crate::protection;
-use crate::units::{Angle, Current, Duty, Speed, Voltage};
+use crate::units::{Angle, Current, Duty, Flux, Speed, Voltage};
 
 /// What the drive is doing (start-up of the second paper, section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,6 +184,13 @@ impl State {
         }
     }
 
+    /// Tells where the rotor will be at the coming sample, as an encoder does: its electrical angle
+    /// and speed with the phases in the order a, b, c. Only
+    /// [`observer::Config::Given`] listens.
+    pub fn place(&mut self, theta: Angle, omega: Speed) {
+        self.observer.given.place(theta, omega);
+    }
+
     /// What the tasks may know.
     pub fn snapshot(&self) -> Snapshot {
         let signed = |speed: Speed| if self.reversed { -speed } else { speed };
@@ -201,6 +208,12 @@ impl State {
             inductance: self.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.observer),
         }
+    }
+
+    /// λ̂ of the phases in the order of the configured direction, where flux crossings are observed
+    /// (`CTL_OBSERVER` 1 and 2); else zero.
+    pub fn flux_linkages(&self) -> [Flux; 3] {
+        self.observer.edges.flux.lambda
     }
 
     /// Every word of the control state, one after the other: what two machines must agree on.

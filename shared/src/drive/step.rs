@@ -20,10 +20,8 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
     );
     let bus = config.bus.saturating_apply(sample.bus);
     // With the bridge off a reading is its offset, which may not have been measured yet.
-    let flowing = match state.phase {
-        Phase::Idle | Phase::Sense => [AdcCounts::ZERO; 3],
-        _ => currents,
-    };
+    let off = matches!(state.phase, Phase::Idle | Phase::Sense);
+    let flowing = (!off).then_some(currents);
     let found = protection::check(&config.protection, &mut state.protection, flowing, bus);
     if let Some(fault) = found {
         state.trip(fault);
@@ -31,19 +29,13 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
     if let Setpoint::Fault(fault) = setpoint {
         state.trip(fault);
     }
-    let bridge = if state.faults.is_empty() {
+    // None, until the phases are told to switch.
+    state.applied = [[Duty::ZERO; 3], state.applied[0]];
+    if state.faults.is_empty() {
         healthy(config, state, &sample, currents, setpoint)
     } else {
         latched(config, state, &sample, setpoint)
-    };
-    state.applied = [
-        match bridge {
-            Bridge::Duty(duties) => duties,
-            _ => [Duty::ZERO; 3],
-        },
-        state.applied[0],
-    ];
-    bridge
+    }
 }
 
 /// A period without a fault.
@@ -111,9 +103,6 @@ impl State {
     /// The duties of the period that has elapsed at this sample.
     #[inline(always)]
     fn duties(&self, delay: Delay) -> [Duty; 3] {
-        match delay {
-            Delay::None | Delay::Half => self.applied[0],
-            Delay::One => self.applied[1],
-        }
+        self.applied[usize::from(delay == Delay::One)]
     }
 }

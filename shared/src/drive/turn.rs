@@ -2,7 +2,6 @@
 
 use fixed::types::I3F29;
 
-use super::config::LowSpeed;
 use super::launch;
 use super::state::Seen;
 use super::{Bridge, Config, Phase, Sample, Setpoint, State};
@@ -12,7 +11,7 @@ use crate::control::regulator::{Feedback, Reference};
 use crate::control::speed::{self, Bounds};
 use crate::control::transform::{self, AlphaBeta, Dq, clarke, inverse_park, park, voltages};
 use crate::control::{dead_time, inductance, start, torque, voltage};
-use crate::math::{TopProduct, other_leg, sin_cos};
+use crate::math::{Held, TopProduct, sin_cos};
 use crate::protection;
 use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
@@ -54,16 +53,12 @@ pub(super) fn period(
     let (omega, i) = (fb.omega, fb.i);
 
     let asked = config.regulator.voltage(&state.regulator, &wanted, &fb);
-    let (u, limited) = modulator::limit(asked, supply.vector_max);
-    let cut = Dq {
-        d: asked.d.saturating_sub(u.d),
-        q: asked.q.saturating_sub(u.q),
-    };
+    let (u, cut) = modulator::limit(asked, supply.vector_max);
     config
         .regulator
         .integrate(&mut state.regulator, &wanted, &fb, cut);
-    state.missing = if limited {
-        wanted.i.q.saturating_sub(i.q)
+    state.missing = if cut.is_some() {
+        wanted.i.q.minus(i.q)
     } else {
         Current::ZERO
     };
@@ -101,7 +96,9 @@ pub(super) fn period(
     state.commanded = [voltages(v), state.commanded[0]];
     let compensation = dead_time::compensation(&config.dead_time, inverse_park(wanted.i, ahead));
     let duties = modulator::duties(&config.modulator, &supply, v, compensation);
-    Bridge::Duty(in_order(swapped, duties))
+    let duties = in_order(swapped, duties);
+    state.applied[0] = duties;
+    Bridge::Duty(duties)
 }
 
 /// What the observer reads at this sample.
@@ -122,6 +119,7 @@ fn input(
         inductance: state.inductance.factor,
         planned: state.planned,
         hall: hall(sample, swapped),
+        swapped,
     }
 }
 
@@ -156,12 +154,9 @@ fn run(
     } else {
         0
     };
-    let (mut i_d, full) = bounds(
-        &config.low_speed,
-        state.protection.bounds,
-        config.protection.phase,
-        estimate.omega_bar,
-    );
+    let (mut i_d, full) = config
+        .low_speed
+        .bounds(state.protection.bounds, estimate.omega_bar);
     if let Some(adapt) = &config.adapt_l {
         let flux = observer::flux(&config.observer, &state.observer);
         i_d += inductance::step(adapt, &mut state.inductance, fb.i.d, flux);
@@ -195,7 +190,7 @@ fn run(
     };
     let before = state.speed.reference();
     let wanted = config.speed.current(&mut state.speed, &input);
-    state.planned = state.speed.reference().saturating_sub(before);
+    state.planned = state.speed.reference().minus(before);
     torque::grow(&config.torque, &mut state.torque, wanted).with_i_d(i_d)
 }
 
@@ -214,27 +209,6 @@ fn directly(
         .begin(&mut state.speed, estimate.omega_bar, wanted.i.q);
     state.planned = Speed::ZERO;
     wanted
-}
-
-/// i_d*, and the bounds of i_q that this and the low speed leave.
-#[inline(always)]
-fn bounds(config: &LowSpeed, full: Bounds, phase: Current, speed: Speed) -> (Current, Bounds) {
-    let i_d = config
-        .i_d
-        .saturating_sub(config.i_d_slope.saturating_apply(speed))
-        .max(Current::ZERO)
-        .min(config.i_d);
-    let most = config.i_q.max(config.i_q_slope.saturating_apply(speed));
-    let most = if i_d > Current::ZERO {
-        most.min(other_leg(phase, i_d))
-    } else {
-        most
-    };
-    let bounds = Bounds {
-        min: full.min.max(-most),
-        max: full.max.min(most),
-    };
-    (i_d, bounds)
 }
 
 /// With the low sides on the voltage is known to be zero: the observer goes on, so that the speed

@@ -1,19 +1,21 @@
 //! A constant factor with a range of its own.
 
+mod factor;
+
 use core::marker::PhantomData;
 
 use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
-/// A factor that turns a number with `A` fraction bits into one with `B`, in one product and one
-/// shift.
+use factor::Factor;
+
+/// A factor that turns a number with `A` fraction bits into one with `B`.
 ///
-/// The factor is held as `k·2^(32 − shift)` with the largest mantissa that fits, so that 2^-31 to
+/// It is held with the largest mantissa that fits and a power of two of its own, so that 2^-31 to
 /// 2^30 (in bits out per bit in) can be had with 30 bits of precision near the top of each range.
 #[derive(Debug)]
 pub struct Gain<A, B> {
-    mantissa: i32,
-    shift: u32,
+    factor: Factor,
     kind: PhantomData<(A, B)>,
 }
 
@@ -27,28 +29,29 @@ impl<A, B> Copy for Gain<A, B> {}
 
 impl<A, B> PartialEq for Gain<A, B> {
     fn eq(&self, other: &Self) -> bool {
-        (self.mantissa, self.shift) == (other.mantissa, other.shift)
+        self.factor == other.factor
     }
 }
 
 impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     /// The factor zero.
-    pub const ZERO: Self = Self {
-        mantissa: 0,
-        shift: 0,
-        kind: PhantomData,
-    };
+    pub const ZERO: Self = Self::from_parts(0, 1);
 
     /// The gain of value `k`, or `None` where its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
-        let (mantissa, shift) = factor(k, B::I32 - A::I32)?;
-        Some(Self {
-            mantissa,
-            shift,
+        let (mantissa, power) = parts(k, B::I32 - A::I32)?;
+        Some(Self::from_parts(mantissa, power))
+    }
+
+    /// The gain `mantissa·power/2^32`, in bits out per bit in; the power is one of two up to 2^30.
+    #[inline(always)]
+    pub const fn from_parts(mantissa: i32, power: i32) -> Self {
+        Self {
+            factor: Factor::new(mantissa, power),
             kind: PhantomData,
-        })
+        }
     }
 
     /// The product with `x`.
@@ -57,23 +60,20 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     /// [`Gain::saturating_apply`].
     #[inline(always)]
     pub fn apply(self, x: FixedI32<A>) -> FixedI32<B> {
-        let top = ((i64::from(self.mantissa) * i64::from(x.to_bits())) >> 32) as i32;
-        FixedI32::from_bits(top << self.shift)
+        FixedI32::from_bits(self.factor.wrapping(x.to_bits()))
     }
 
     /// The product with `x`, held at the ends of its type.
     #[inline(always)]
     pub fn saturating_apply(self, x: FixedI32<A>) -> FixedI32<B> {
-        let top = ((i64::from(self.mantissa) * i64::from(x.to_bits())) >> 32) as i32;
-        let highest = i32::MAX >> self.shift;
-        FixedI32::from_bits(top.min(highest).max(!highest) << self.shift)
+        FixedI32::from_bits(self.factor.saturating(x.to_bits()))
     }
 }
 
-/// Mantissa and shift of `k·2^exponent`. Once for all types, and never inlined: the arithmetic of
+/// Mantissa and power of `k·2^exponent`. Once for all types, and never inlined: the arithmetic of
 /// doubles in software is 20 KB of the chip's flash when every coefficient has its own.
 #[inline(never)]
-fn factor(k: f32, exponent: i32) -> Option<(i32, u32)> {
+fn parts(k: f32, exponent: i32) -> Option<(i32, i32)> {
     let bits_per_bit = libm::scalbn(f64::from(k), exponent);
     if !bits_per_bit.is_finite() {
         return None;
@@ -85,7 +85,7 @@ fn factor(k: f32, exponent: i32) -> Option<(i32, u32)> {
         scaled *= 0.5;
         shift += 1;
     }
-    (shift <= 30).then(|| (libm::round(scaled) as i32, shift))
+    (shift <= 30).then(|| (libm::round(scaled) as i32, 1 << shift))
 }
 
 #[cfg(test)]

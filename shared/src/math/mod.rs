@@ -5,11 +5,13 @@
 //! the product of `a` and `b` fraction bits has `a + b - 32`.
 
 mod gain;
+mod held;
 mod product;
 mod root;
 mod trig;
 
 pub use gain::Gain;
+pub use held::Held;
 pub use product::{EIGHTH_PI, TopProduct};
 pub use root::{magnitude, other_leg};
 pub use trig::{SinCos, atan2_turns, sin_cos};

@@ -42,6 +42,8 @@ pub struct Frame<'a> {
     pub id: u32,
     /// As received: MAVLink 2 leaves trailing zeros out.
     pub payload: &'a [u8],
+    /// The whole frame, for a log.
+    pub raw: &'a [u8],
 }
 
 impl Frame<'_> {
@@ -197,6 +199,7 @@ impl Receiver {
                         from: Address { system, component },
                         id,
                         payload: &bytes[header_len..header_len + payload_len],
+                        raw: bytes,
                     });
                     self.start += len;
                 }

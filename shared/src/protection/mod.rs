@@ -1,13 +1,15 @@
 //! What turns the bridge off, and what bounds the current so that it need not.
 
 mod fault;
+mod ntc;
 
 pub use fault::{Fault, Faults};
+pub use ntc::Ntc;
 
 use fixed::types::extra::U28;
 
 use crate::control::speed::Bounds;
-use crate::math::Gain;
+use crate::math::{Gain, Held};
 use crate::units::{AdcCounts, Current, Voltage};
 
 /// Samples in a row above the trip level that are an over-current, so that one disturbed reading
@@ -69,19 +71,21 @@ impl Config {
 }
 
 /// Takes a sample's supply voltage into the filter and looks for a reason to turn the bridge off.
+///
+/// `currents` is `None` where the readings are those of no current.
 #[inline(always)]
 pub fn check(
     config: &Config,
     state: &mut State,
-    currents: [AdcCounts; 3],
+    currents: Option<[AdcCounts; 3]>,
     bus: Voltage,
 ) -> Option<Fault> {
     // An eighth of the difference a period: one reading that is off moves it by little.
-    let difference = bus.saturating_sub(state.bus).to_bits() >> 3;
-    state.bus = state.bus.saturating_add(Voltage::from_bits(difference));
+    let difference = bus.minus(state.bus).to_bits() >> 3;
+    state.bus = state.bus.plus(Voltage::from_bits(difference));
 
-    let [a, b, c] = currents.map(AdcCounts::saturating_abs);
-    if a.max(b).max(c) > config.trip {
+    let beyond = |current: AdcCounts| current.unsigned_abs() > config.trip;
+    if currents.is_some_and(|currents| currents.into_iter().any(beyond)) {
         state.over_current_samples = state.over_current_samples.saturating_add(1);
     } else {
         state.over_current_samples = 0;
@@ -104,24 +108,27 @@ pub fn check(
 /// what is returned. From the full bound it would return too much for some milliseconds.
 #[inline(always)]
 pub fn bound(config: &Config, state: &mut State, bus_current: Current, i_q: Current) {
-    let full = config.full_bounds();
-    let too_much_drawn = bus_current.saturating_sub(config.bus_draw);
-    let above = state
-        .bus
-        .saturating_sub(config.bus_return_v)
-        .max(Voltage::ZERO);
-    let may_return = config
-        .bus_return
-        .saturating_sub(config.bus_return_slope.saturating_apply(above));
-    let too_much_returned = bus_current.saturating_neg().saturating_sub(may_return);
     let rate = |excess| config.bound_rate.saturating_apply(excess);
-    let lowered = state.bounds.max.saturating_sub(rate(too_much_drawn));
-    let min = state.bounds.min;
-    // While the current is on its way to the bound there is nothing to say that more may be had.
-    let arrived = i_q < Current::from_bits(min.to_bits() - (min.to_bits() >> 3));
+    let bounds = &mut state.bounds;
+    let too_much_drawn = bus_current.minus(config.bus_draw);
+    if too_much_drawn.is_positive() || bounds.max != config.phase {
+        let lowered = bounds.max.minus(rate(too_much_drawn));
+        bounds.max = lowered.min(config.phase).max(Current::ZERO);
+    }
+    let above = state.bus.minus(config.bus_return_v);
+    let may_return = if above.is_positive() {
+        let less = config.bus_return_slope.saturating_apply(above);
+        config.bus_return.minus(less)
+    } else {
+        config.bus_return
+    };
+    let min = bounds.min;
     let raised = if i_q.is_negative() {
+        let too_much_returned = bus_current.saturating_neg().minus(may_return);
+        // While the current is on its way to the bound there is nothing to say that more may be had.
+        let arrived = i_q < Current::from_bits(min.to_bits() - (min.to_bits() >> 3));
         if arrived || too_much_returned.is_positive() {
-            min.saturating_add(rate(too_much_returned))
+            min.plus(rate(too_much_returned))
         } else {
             min
         }
@@ -129,11 +136,8 @@ pub fn bound(config: &Config, state: &mut State, bus_current: Current, i_q: Curr
         // The bus current is at most 1.5/√3 of i_q, at full modulation: 1 + 1/8 + 1/32 is 2/√3.
         let bits = may_return.max(Current::ZERO).to_bits();
         Current::from_bits(bits)
-            .saturating_add(Current::from_bits((bits >> 3) + (bits >> 5)))
+            .plus(Current::from_bits((bits >> 3) + (bits >> 5)))
             .saturating_neg()
     };
-    state.bounds = Bounds {
-        max: lowered.min(full.max).max(Current::ZERO),
-        min: raised.max(full.min).min(Current::ZERO),
-    };
+    bounds.min = raised.max(-config.phase).min(Current::ZERO);
 }

@@ -8,7 +8,7 @@ use super::Estimate;
 use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
+use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
 use crate::units::{Angle, Current, Flux, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -116,9 +116,9 @@ pub fn estimate(
     // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4 turns
     // a period; above half a turn, where a speed ends, the rotor is lost anyway.
     let omega_bar = Speed::from_bits(state.xi.top(length).to_bits().min(i32::MAX >> 4) << 4);
-    let omega = omega_bar.saturating_add(config.k_eta.saturating_apply(state.h.d));
-    let omega_bar_step = config.k_f.apply(omega_bar.saturating_sub(state.omega_f));
-    state.omega_f = state.omega_f.saturating_add(omega_bar_step);
+    let omega = omega_bar.plus(config.k_eta.saturating_apply(state.h.d));
+    let omega_bar_step = config.k_f.apply(omega_bar.minus(state.omega_f));
+    state.omega_f = state.omega_f.plus(omega_bar_step);
     let xi = state.xi;
     let xi_step = config.gamma.saturating_apply(state.h.d);
     let lost = imposed.is_none() && adapt(config, state, xi_step);
@@ -148,17 +148,15 @@ fn cured(
     let epsilon = Voltage::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
     let before = state.omega_i;
     state.omega_i = before
-        .saturating_add(cure.integral.apply(epsilon))
-        .saturating_add(planned)
+        .plus(cure.integral.apply(epsilon))
+        .plus(planned)
         .max(Speed::ZERO);
     Estimate {
         theta,
         frame,
-        omega: state
-            .omega_i
-            .saturating_add(cure.proportional.apply(epsilon)),
+        omega: state.omega_i.plus(cure.proportional.apply(epsilon)),
         omega_bar: state.omega_i,
-        omega_bar_step: state.omega_i.saturating_sub(before),
+        omega_bar_step: state.omega_i.minus(before),
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,
         // ĥ opposite to what the frame expects, or nearly none.
@@ -170,7 +168,7 @@ fn cured(
 /// stands at an end of that range.
 #[inline(always)]
 fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
-    let xi = state.xi.saturating_add(xi_step);
+    let xi = state.xi.plus(xi_step);
     state.xi = xi.max(config.xi_min).min(config.xi_max);
     state.xi != xi
 }
@@ -193,29 +191,23 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
     };
     state.u_before = u;
     let error = Dq {
-        d: i.d.saturating_sub(state.i.d),
-        q: i.q.saturating_sub(state.i.q),
+        d: i.d.minus(state.i.d),
+        q: i.q.minus(state.i.q),
     };
     let next = |i_hat: Current, h: Voltage, u: Voltage, cross: Current, error: Current| {
         i_hat
-            .saturating_sub(config.decay.apply(i_hat))
-            .saturating_add(config.admittance.saturating_apply(h.saturating_add(u)))
-            .saturating_add(config.rotation.saturating_apply(inductance.of(cross)))
-            .saturating_add(config.k_p.saturating_apply(error))
+            .minus(config.decay.apply(i_hat))
+            .plus(config.admittance.saturating_apply(h.plus(u)))
+            .plus(config.rotation.saturating_apply(inductance.of(cross)))
+            .plus(config.k_p.saturating_apply(error))
     };
     state.i = Dq {
         d: next(state.i.d, state.h.d, applied.d, omega.top(i.q), error.d),
         q: next(state.i.q, state.h.q, applied.q, -omega.top(i.d), error.q),
     };
     state.h = Dq {
-        d: state
-            .h
-            .d
-            .saturating_add(config.k_i.saturating_apply(error.d)),
-        q: state
-            .h
-            .q
-            .saturating_add(config.k_i.saturating_apply(error.q)),
+        d: state.h.d.plus(config.k_i.saturating_apply(error.d)),
+        q: state.h.q.plus(config.k_i.saturating_apply(error.q)),
     };
     state.theta = state.theta.wrapping_add(omega);
 }

@@ -13,7 +13,7 @@ use fixed::types::{I0F32, I1F31, I5F27};
 use super::{Estimate, Input};
 use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq, to_rotor};
-use crate::math::{EIGHTH_PI, Gain, SinCos, TopProduct, sin_cos};
+use crate::math::{EIGHTH_PI, Gain, Held, SinCos, TopProduct, sin_cos};
 use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed};
 
 /// Coefficients for one sample period T_s.
@@ -94,8 +94,8 @@ pub fn begin(config: &Config, theta: Angle, omega: Speed, i: AlphaBeta<Current>)
         omega_i: omega,
         phi: FLUX_NOMINAL,
         psi: AlphaBeta {
-            alpha: rotor.alpha.saturating_add(own.alpha),
-            beta: rotor.beta.saturating_add(own.beta),
+            alpha: rotor.alpha.plus(own.alpha),
+            beta: rotor.beta.plus(own.beta),
         },
         smooth: Speed::ZERO,
         i_before: i,
@@ -125,28 +125,25 @@ pub fn estimate(
         .min(EIGHTH_TURN);
 
     // ψ += T_s·u − R·T_s/2·(i_k + i_{k−1}), ψ_r = ψ − L·i.
-    let drop = |now: Current, before: Current| {
-        config
-            .half_resistance
-            .saturating_apply(now.saturating_add(before))
-    };
+    let drop =
+        |now: Current, before: Current| config.half_resistance.saturating_apply(now.plus(before));
     let psi = AlphaBeta {
         alpha: state
             .psi
             .alpha
-            .saturating_add(input.v.alpha)
-            .saturating_sub(drop(input.i.alpha, state.i_before.alpha)),
+            .plus(input.v.alpha)
+            .minus(drop(input.i.alpha, state.i_before.alpha)),
         beta: state
             .psi
             .beta
-            .saturating_add(input.v.beta)
-            .saturating_sub(drop(input.i.beta, state.i_before.beta)),
+            .plus(input.v.beta)
+            .minus(drop(input.i.beta, state.i_before.beta)),
     };
     state.i_before = input.i;
     let own = stator_flux(config, input.inductance, input.i);
     let psi_r = AlphaBeta {
-        alpha: psi.alpha.saturating_sub(own.alpha),
-        beta: psi.beta.saturating_sub(own.beta),
+        alpha: psi.alpha.minus(own.alpha),
+        beta: psi.beta.minus(own.beta),
     };
     let z = to_rotor(psi_r, frame);
 
@@ -155,8 +152,8 @@ pub fn estimate(
     let leak = I0F32::from_bits(omega_plus.top(EIGHTH_PI).to_bits() << 3);
     let bias = config.bias.apply(omega_plus.top(omega_plus));
     let held = |psi: Flux, psi_r: Flux, expected: Flux| {
-        psi.saturating_add(psi_r.top(bias))
-            .saturating_sub(psi_r.saturating_sub(expected).top(leak))
+        psi.plus(psi_r.top(bias))
+            .minus(psi_r.minus(expected).top(leak))
     };
     state.psi = AlphaBeta {
         alpha: held(psi.alpha, psi_r.alpha, expected.alpha),
@@ -164,9 +161,9 @@ pub fn estimate(
     };
 
     // φ̂ += 0.15·T_s·ω⁺·(z_d − φ̂).
-    let off = z.d.saturating_sub(state.phi);
+    let off = z.d.minus(state.phi);
     let phi_step = off.top(omega_plus).top(PHI_RATE_HALF).to_bits() << 1;
-    let phi = state.phi.saturating_add(Flux::from_bits(phi_step));
+    let phi = state.phi.plus(Flux::from_bits(phi_step));
     state.phi = phi.max(PHI_MIN).min(PHI_MAX);
 
     // ω_n = 0.35·ω̂_i; ω̂_i += T_s·ω_n²·ε, ω̂ = ω̂_i + 1.8·ω_n·ε.
@@ -176,23 +173,18 @@ pub fn estimate(
         .max(config.omega_n_min)
         .min(config.omega_n_max);
     let four_pi_omega_n = Speed::from_bits(omega_n.top(EIGHTH_PI).to_bits() << 5);
-    let omega_i = omega_before.saturating_add(four_pi_omega_n.top(omega_n).top(epsilon_half));
+    let omega_i = omega_before.plus(four_pi_omega_n.top(omega_n).top(epsilon_half));
     if imposed.is_none() {
         state.omega_i = omega_i;
     }
     let proportional = Speed::from_bits(omega_n.top(epsilon_half).top(DAMPING).to_bits() << 3);
-    let omega = state.omega_i.saturating_add(proportional);
+    let omega = state.omega_i.plus(proportional);
     // Under acceleration ω̂_i lags by 1.8·ω̇/ω_n and ω̂ does not, but ω̂ passes the noise: what it has
     // above ω̂_i is added smoothly.
-    let smooth_step = config
-        .smoothing
-        .apply(proportional.saturating_sub(state.smooth));
-    state.smooth = state.smooth.saturating_add(smooth_step);
-    let omega_bar = state.omega_i.saturating_add(state.smooth);
-    let omega_bar_step = state
-        .omega_i
-        .saturating_sub(omega_before)
-        .saturating_add(smooth_step);
+    let smooth_step = config.smoothing.apply(proportional.minus(state.smooth));
+    state.smooth = state.smooth.plus(smooth_step);
+    let omega_bar = state.omega_i.plus(state.smooth);
+    let omega_bar_step = state.omega_i.minus(omega_before).plus(smooth_step);
     let theta = state.theta;
     state.theta = theta.wrapping_add(omega);
     Estimate {

@@ -6,7 +6,7 @@ use fixed::types::{I0F32, U0F32};
 use super::flux_linkage::{AMPLITUDE_MAX, AMPLITUDE_MIN, measure};
 use super::position::{Periods, turned};
 use super::sector::Sector;
-use crate::math::TopProduct;
+use crate::math::{Held, TopProduct};
 use crate::units::{Angle, Flux, Speed};
 
 /// What keeps noise from being taken for a crossing (2.3.2).
@@ -91,7 +91,7 @@ pub fn detect(
         } else {
             flux.saturating_neg()
         };
-        forwards.saturating_sub(config.deadband.top(amplitude))
+        forwards.minus(config.deadband.top(amplitude))
     };
     let excess = beyond(now);
     if excess > Flux::ZERO {
@@ -131,7 +131,7 @@ fn cross(
     state.since = 0;
     // Where it was beyond already, the hold-off has kept the crossing back, or it came out of order.
     let late = match before < Flux::ZERO {
-        true => ratio(excess, excess.saturating_sub(before)),
+        true => ratio(excess, excess.minus(before)),
         false => Periods::ONE,
     };
     Some(Crossing {

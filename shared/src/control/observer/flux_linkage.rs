@@ -5,7 +5,7 @@
 use fixed::FixedI32;
 use fixed::types::extra::{U28, U32};
 
-use crate::math::{Gain, TopProduct, atan2_turns, sin_cos};
+use crate::math::{Gain, Held, TopProduct, atan2_turns, sin_cos};
 use crate::units::{Angle, Current, Flux, Speed, Voltage};
 
 use super::sector::Sector;
@@ -80,26 +80,26 @@ impl Default for State {
 #[inline(always)]
 pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current; 3]) {
     let lambda_max: Flux = state.amplitude + (state.amplitude >> 2);
-    let psi_max = lambda_max.saturating_add(config.stator_max);
+    let psi_max = lambda_max.plus(config.stator_max);
     state.lambda_before = state.lambda;
     for phase in 0..3 {
         // The resistance's voltage of a period is that of the mean current.
         let mean_i = (i[phase] >> 1) + (state.i_before[phase] >> 1);
-        let drive = v[phase].saturating_sub(config.resistance.saturating_apply(mean_i));
+        let drive = v[phase].minus(config.resistance.saturating_apply(mean_i));
         let psi = state.psi[phase];
-        let psi = (psi - config.forget.apply(psi)).saturating_add(drive);
+        let psi = (psi - config.forget.apply(psi)).plus(drive);
         let psi = psi.min(psi_max).max(-psi_max);
         state.psi[phase] = psi;
         let integral = match &config.high_pass {
             None => psi,
             Some(high_pass) => {
-                let off = psi.saturating_sub(state.mean[phase]);
-                let mean = state.mean[phase].saturating_add(high_pass.share.apply(off));
+                let off = psi.minus(state.mean[phase]);
+                let mean = state.mean[phase].plus(high_pass.share.apply(off));
                 state.mean[phase] = mean;
-                psi.saturating_sub(mean)
+                psi.minus(mean)
             }
         };
-        let lambda = integral.saturating_sub(config.inductance.saturating_apply(i[phase]));
+        let lambda = integral.minus(config.inductance.saturating_apply(i[phase]));
         state.lambda[phase] = lambda.min(lambda_max).max(-lambda_max);
     }
     state.i_before = i;
@@ -111,9 +111,9 @@ pub fn measure(lambda: &[Flux; 3], sector: Sector) -> Flux {
     let phase = sector.edge().phase;
     let (one, other) = (lambda[(phase + 1) % 3], lambda[(phase + 2) % 3]);
     // Each is at most 1.25 · 2 · 2/π, so the difference stays below 3.2 of 8.
-    let difference = one.saturating_sub(other).saturating_abs();
+    let difference = one.minus(other).saturating_abs();
     let half = difference.top(ROOT_3_SIXTH);
-    half.saturating_add(half)
+    half.plus(half)
 }
 
 /// √3/6 with 32 fraction bits.
@@ -123,8 +123,8 @@ const ROOT_3_SIXTH: FixedI32<U32> = FixedI32::from_bits(1_239_850_262);
 /// and subtracts at that of the other sign, is averaged out.
 pub fn adapt(config: &Config, state: &mut State, measured: Flux) {
     if config.adaptive {
-        let step = measured.saturating_sub(state.amplitude) >> 3;
-        let amplitude = state.amplitude.saturating_add(step);
+        let step = measured.minus(state.amplitude) >> 3;
+        let amplitude = state.amplitude.plus(step);
         state.amplitude = amplitude.min(AMPLITUDE_MAX).max(AMPLITUDE_MIN);
     }
 }
@@ -158,7 +158,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
     let lambda = phases(length, theta.wrapping_add(both));
     let stator = i.map(|i| config.inductance.saturating_apply(i));
     *state = State {
-        psi: [0, 1, 2].map(|phase| integral[phase].saturating_add(stator[phase])),
+        psi: [0, 1, 2].map(|phase| integral[phase].plus(stator[phase])),
         mean: [0, 1, 2].map(|phase| integral[phase] - lambda[phase]),
         lambda,
         lambda_before: lambda,

@@ -7,7 +7,9 @@ pub mod compensated;
 pub mod crossing;
 pub mod edges;
 pub mod flux_linkage;
+pub mod given;
 pub mod hall;
+pub mod limits;
 pub mod position;
 pub mod sector;
 
@@ -15,7 +17,9 @@ use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
 use crate::math::{EIGHTH_PI, SinCos, TopProduct, sin_cos};
-use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, Voltage};
+use crate::units::{
+    Angle, Current, FLUX_NOMINAL, Flux, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage,
+};
 
 /// The observer in use (`CTL_OBSERVER`) and its coefficients.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +30,8 @@ pub enum Config {
     Edges(edges::Config),
     /// Compensated flux with a phase-locked loop.
     Compensated(compensated::Config),
+    /// None: the drive is told where the rotor is, see [`drive::State::place`](crate::drive::State::place).
+    Given,
 }
 
 /// What the observers remember; only the one in use changes.
@@ -37,6 +43,8 @@ pub struct State {
     pub edges: edges::State,
     /// Compensated flux with a phase-locked loop.
     pub compensated: compensated::State,
+    /// What the drive has been told.
+    pub given: given::State,
 }
 
 /// What an observer reads at a sample.
@@ -52,6 +60,8 @@ pub struct Input {
     pub planned: Speed,
     /// Hall sensors, see [`Sample`](crate::drive::Sample).
     pub hall: u8,
+    /// Whether the phases b and c have changed places in all this.
+    pub swapped: bool,
 }
 
 /// What an observer says at a sample.
@@ -98,8 +108,7 @@ pub fn estimate(
                 omega: position.omega,
                 omega_bar: position.omega,
                 omega_bar_step: position.omega_step,
-                // The stated flux, ξ = 1/4.
-                xi: InverseFlux::from_bits(1 << 30),
+                xi: INVERSE_FLUX_NOMINAL,
                 xi_step: InverseFlux::ZERO,
                 lost: !position.known,
             }
@@ -107,6 +116,7 @@ pub fn estimate(
         Config::Compensated(config) => {
             compensated::estimate(config, &mut state.compensated, input, imposed)
         }
+        Config::Given => given::estimate(&state.given, input.swapped),
     }
 }
 
@@ -117,6 +127,7 @@ pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
     match config {
         Config::Edges(config) => edges::stand(config, &mut state.edges, hall),
         Config::BackEmf(_) | Config::Compensated(_) => false,
+        Config::Given => true,
     }
 }
 
@@ -136,7 +147,7 @@ pub fn feedback(
 ) -> Feedback {
     let (i_hat, h_hat) = match config {
         Config::BackEmf(_) => (state.back_emf.i, state.back_emf.h),
-        Config::Edges(_) => (i, emf(omega, FLUX_NOMINAL)),
+        Config::Edges(_) | Config::Given => (i, emf(omega, FLUX_NOMINAL)),
         Config::Compensated(_) => (i, emf(state.compensated.omega_i, state.compensated.phi)),
     };
     Feedback {
@@ -165,6 +176,7 @@ pub fn flux(config: &Config, state: &State) -> Flux {
         Config::BackEmf(_) => back_emf::flux(&state.back_emf),
         Config::Edges(_) => state.edges.flux.amplitude,
         Config::Compensated(_) => state.compensated.phi,
+        Config::Given => FLUX_NOMINAL,
     }
 }
 
@@ -204,14 +216,15 @@ pub fn begin(
         Config::Compensated(config) => {
             state.compensated = compensated::begin(config, theta, omega, i);
         }
+        Config::Given => {}
     }
 }
 
 /// The rotor has been aligned and is expected at `theta` and at rest, under the current `i`.
 pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
     match config {
-        // It works in the frame that the start imposes.
-        Config::BackEmf(_) => {}
+        // The one works in the frame that the start imposes, the other needs no start.
+        Config::BackEmf(_) | Config::Given => {}
         Config::Edges(config) => {
             edges::begin(config, &mut state.edges, theta, Speed::ZERO, phases(i));
         }
@@ -235,15 +248,18 @@ pub fn take_over(
         Config::Compensated(_) => {
             compensated::found(&state.compensated).map(|theta| theta.wrapping_sub(frame))
         }
+        // It is never started by an imposed frame.
+        Config::Given => None,
     }
 }
 
 impl State {
     /// Forgets the rotor, but not what is known of its sensors.
     fn clear(&mut self) {
-        let hall = self.edges.hall.clone();
+        let (hall, given) = (self.edges.hall.clone(), self.given.clone());
         *self = Self::default();
         self.edges.hall = hall;
+        self.given = given;
     }
 
     /// Every word of the state of the observer in use; the others rest.
@@ -252,11 +268,13 @@ impl State {
             back_emf,
             edges,
             compensated,
+            given,
         } = self;
         match config {
             Config::BackEmf(_) => back_emf.trace(out),
             Config::Edges(_) => edges.trace(out),
             Config::Compensated(_) => compensated.trace(out),
+            Config::Given => given.trace(out),
         }
     }
 }

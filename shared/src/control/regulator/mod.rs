@@ -8,9 +8,11 @@ pub mod modified;
 pub mod observer_based;
 pub mod synchronous;
 
+use fixed::types::extra::U28;
+
 use super::inductance::Factor;
 use super::transform::Dq;
-use crate::math::SinCos;
+use crate::math::{Gain, SinCos};
 use crate::units::{Current, Speed, Voltage};
 
 /// The current that is wanted.
@@ -126,8 +128,8 @@ impl Config {
         }
     }
 
-    /// Takes the integrators on by a period. `cut` is the voltage less what the limit has left of
-    /// it: the integrators go on as if only the current had been wanted that the rest can bring, so
+    /// Takes the integrators on by a period. `cut` is what the limit has cut off the voltage, if
+    /// it has: the integrators go on as if only the current had been wanted that the rest can bring, so
     /// that they are ready the moment that less is wanted.
     #[inline(always)]
     pub fn integrate(
@@ -135,7 +137,7 @@ impl Config {
         state: &mut State,
         wanted: &Reference,
         fb: &Feedback,
-        cut: Dq<Voltage>,
+        cut: Option<Dq<Voltage>>,
     ) {
         match self {
             Self::ObserverBased(c) => c.integrate(&mut state.observer_based, wanted, fb, cut),
@@ -164,6 +166,16 @@ impl Config {
             Self::Modified(_) => state.modified.rotate(ahead),
         }
     }
+}
+
+/// The current that the voltage that is cut off would have brought, by the loop's first order.
+#[inline(always)]
+fn beyond(admittance: Gain<U28, U28>, cut: Option<Dq<Voltage>>) -> Dq<Current> {
+    let current = |cut: Dq<Voltage>| Dq {
+        d: admittance.saturating_apply(cut.d),
+        q: admittance.saturating_apply(cut.q),
+    };
+    cut.map_or(Dq::default(), current)
 }
 
 impl State {

@@ -8,9 +8,9 @@
 
 use fixed::types::extra::{U28, U32};
 
-use super::{Feedback, Reference};
+use super::{Feedback, Reference, beyond};
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
+use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
 use crate::units::{Angle, Current, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -44,12 +44,8 @@ impl Config {
     #[inline(always)]
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let length = self.length(state, wanted, fb);
-        let e_d = leads_with(length, fb.i.d.saturating_sub(wanted.i.d));
-        let phase = bounded(
-            state
-                .phase
-                .saturating_add(self.phase_k_p.saturating_apply(e_d)),
-        );
+        let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
+        let phase = bounded(state.phase.plus(self.phase_k_p.saturating_apply(e_d)));
         let SinCos { cos, sin } = sin_cos(phase);
         // 28 + 31 − 32 fraction bits; the length bounds both.
         Dq {
@@ -61,11 +57,11 @@ impl Config {
     /// V.
     #[inline(always)]
     fn length(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Voltage {
-        let e_q = wanted.i.q.saturating_sub(fb.i.q);
+        let e_q = wanted.i.q.minus(fb.i.q);
         let length = state
             .length
-            .saturating_add(self.k_p.saturating_apply(e_q))
-            .saturating_add(wanted.u_q);
+            .plus(self.k_p.saturating_apply(e_q))
+            .plus(wanted.u_q);
         // Twice the lowest product would not fit.
         length.max(-Voltage::MAX)
     }
@@ -81,8 +77,7 @@ impl Config {
     ) -> Current {
         let wanted = wanted.with_i_q(Current::ZERO);
         let without = self.length(state, &wanted, fb);
-        self.admittance
-            .saturating_apply(u_q.saturating_sub(without))
+        self.admittance.saturating_apply(u_q.minus(without))
     }
 
     /// Takes the integrators on by a period, the length's for the current that the limit has left.
@@ -92,17 +87,17 @@ impl Config {
         state: &mut State,
         wanted: &Reference,
         fb: &Feedback,
-        cut: Dq<Voltage>,
+        cut: Option<Dq<Voltage>>,
     ) {
-        let e_q = wanted.i.q.saturating_sub(fb.i.q);
-        let beyond = self.admittance.saturating_apply(cut.q);
-        let step = self.k_i.saturating_apply(e_q.saturating_sub(beyond));
+        let e_q = wanted.i.q.minus(fb.i.q);
+        let beyond = beyond(self.admittance, cut);
+        let step = self.k_i.saturating_apply(e_q.minus(beyond.q));
         // The limit keeps the part along d: while it cuts, the phase alone holds i_d.
         let length = self.length(state, wanted, fb);
-        let e_d = leads_with(length, fb.i.d.saturating_sub(wanted.i.d));
+        let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
         let turn = self.phase_k_i.saturating_apply(e_d);
-        state.length = state.length.saturating_add(step);
-        state.phase = bounded(state.phase.saturating_add(turn));
+        state.length = state.length.plus(step);
+        state.phase = bounded(state.phase.plus(turn));
     }
 
     /// Sets the integrators so that the voltage is `u`, where that lies within a quarter of a turn
@@ -110,13 +105,11 @@ impl Config {
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
         state.set(u);
         let length = state.length;
-        let e_d = leads_with(length, fb.i.d.saturating_sub(wanted.i.d));
-        let phase = state
-            .phase
-            .saturating_sub(self.phase_k_p.saturating_apply(e_d));
+        let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
+        let phase = state.phase.minus(self.phase_k_p.saturating_apply(e_d));
         let without = self.length(&State::default(), wanted, fb);
         *state = State {
-            length: length.saturating_sub(without),
+            length: length.minus(without),
             phase: bounded(phase),
         };
     }

@@ -2,9 +2,9 @@
 
 use fixed::types::extra::U28;
 
-use super::{Feedback, Reference};
+use super::{Feedback, Reference, beyond};
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, SinCos, TopProduct};
+use crate::math::{Gain, Held, SinCos, TopProduct};
 use crate::units::{Current, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -37,8 +37,8 @@ impl Config {
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let u = self.forced(wanted, fb);
         Dq {
-            d: u.d.saturating_add(state.sigma.d),
-            q: u.q.saturating_add(state.sigma.q),
+            d: u.d.plus(state.sigma.d),
+            q: u.q.plus(state.sigma.q),
         }
     }
 
@@ -53,8 +53,7 @@ impl Config {
     ) -> Current {
         let wanted = wanted.with_i_q(Current::ZERO);
         let without = self.voltage(state, &wanted, fb).q;
-        self.admittance
-            .saturating_apply(u_q.saturating_sub(without))
+        self.admittance.saturating_apply(u_q.minus(without))
     }
 
     /// (10) without the integrators.
@@ -66,17 +65,17 @@ impl Config {
         let d = self
             .resistance
             .saturating_apply(wanted.i.d)
-            .saturating_sub(fb.h_hat.d)
-            .saturating_sub(self.reactance.saturating_apply(cross_d))
-            .saturating_sub(self.k_pe.saturating_apply(e.d));
+            .minus(fb.h_hat.d)
+            .minus(self.reactance.saturating_apply(cross_d))
+            .minus(self.k_pe.saturating_apply(e.d));
         let q = self
             .resistance
             .saturating_apply(wanted.i.q)
-            .saturating_sub(fb.h_hat.q)
-            .saturating_add(self.reactance.saturating_apply(cross_q))
-            .saturating_add(self.inductance.saturating_apply(wanted.i_q_step))
-            .saturating_sub(self.k_pe.saturating_apply(e.q))
-            .saturating_add(wanted.u_q);
+            .minus(fb.h_hat.q)
+            .plus(self.reactance.saturating_apply(cross_q))
+            .plus(self.inductance.saturating_apply(wanted.i_q_step))
+            .minus(self.k_pe.saturating_apply(e.q))
+            .plus(wanted.u_q);
         Dq { d, q }
     }
 
@@ -87,24 +86,22 @@ impl Config {
         state: &mut State,
         wanted: &Reference,
         fb: &Feedback,
-        cut: Dq<Voltage>,
+        cut: Option<Dq<Voltage>>,
     ) {
         let e = error(wanted, fb);
-        let step = |e: Current, cut| {
-            let beyond = self.admittance.saturating_apply(cut);
-            self.k_ie.saturating_apply(e.saturating_add(beyond))
-        };
+        let beyond = beyond(self.admittance, cut);
+        let step = |e: Current, beyond| self.k_ie.saturating_apply(e.plus(beyond));
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.saturating_sub(step(e.d, cut.d));
-        sigma.q = sigma.q.saturating_sub(step(e.q, cut.q));
+        sigma.d = sigma.d.minus(step(e.d, beyond.d));
+        sigma.q = sigma.q.minus(step(e.q, beyond.q));
     }
 
     /// Sets the integrators so that the voltage is `u`.
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
         let forced = self.forced(wanted, fb);
         state.sigma = Dq {
-            d: u.d.saturating_sub(forced.d),
-            q: u.q.saturating_sub(forced.q),
+            d: u.d.minus(forced.d),
+            q: u.q.minus(forced.q),
         };
     }
 }
@@ -120,7 +117,7 @@ impl State {
 #[inline(always)]
 fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
-        d: fb.i_hat.d.saturating_sub(wanted.i.d),
-        q: fb.i_hat.q.saturating_sub(wanted.i.q),
+        d: fb.i_hat.d.minus(wanted.i.d),
+        q: fb.i_hat.q.minus(wanted.i.q),
     }
 }

@@ -6,9 +6,9 @@
 
 use fixed::types::extra::U28;
 
-use super::{Feedback, Reference};
+use super::{Feedback, Reference, beyond};
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, SinCos, TopProduct};
+use crate::math::{Gain, Held, SinCos, TopProduct};
 use crate::units::{Current, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -47,8 +47,8 @@ impl Config {
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let u = self.forced(state, wanted, fb);
         Dq {
-            d: u.d.saturating_add(state.sigma.d),
-            q: u.q.saturating_add(state.sigma.q),
+            d: u.d.plus(state.sigma.d),
+            q: u.q.plus(state.sigma.q),
         }
     }
 
@@ -63,8 +63,7 @@ impl Config {
     ) -> Current {
         let wanted = wanted.with_i_q(Current::ZERO);
         let without = self.voltage(state, &wanted, fb).q;
-        self.admittance
-            .saturating_apply(u_q.saturating_sub(without))
+        self.admittance.saturating_apply(u_q.minus(without))
     }
 
     /// V_d and V_q without the integrators.
@@ -76,13 +75,13 @@ impl Config {
         let d = self
             .k_p
             .saturating_apply(e.d)
-            .saturating_sub(self.reactance.saturating_apply(cross_d));
+            .minus(self.reactance.saturating_apply(cross_d));
         let q = self
             .k_p
             .saturating_apply(e.q)
-            .saturating_add(self.reactance.saturating_apply(cross_q))
-            .saturating_sub(fb.h_hat.q)
-            .saturating_add(wanted.u_q);
+            .plus(self.reactance.saturating_apply(cross_q))
+            .minus(fb.h_hat.q)
+            .plus(wanted.u_q);
         Dq { d, q }
     }
 
@@ -93,21 +92,18 @@ impl Config {
         state: &mut State,
         wanted: &Reference,
         fb: &Feedback,
-        cut: Dq<Voltage>,
+        cut: Option<Dq<Voltage>>,
     ) {
         let e = error(wanted, fb);
-        let step = |e: Current, beyond| self.k_i.saturating_apply(e.saturating_sub(beyond));
-        let beyond = Dq {
-            d: self.admittance.saturating_apply(cut.d),
-            q: self.admittance.saturating_apply(cut.q),
-        };
+        let step = |e: Current, beyond| self.k_i.saturating_apply(e.minus(beyond));
+        let beyond = beyond(self.admittance, cut);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.saturating_add(step(e.d, beyond.d));
-        sigma.q = sigma.q.saturating_add(step(e.q, beyond.q));
+        sigma.d = sigma.d.plus(step(e.d, beyond.d));
+        sigma.q = sigma.q.plus(step(e.q, beyond.q));
         let model = &mut state.model;
         let follow = |model: Current, wanted: Current, beyond| {
-            let left = wanted.saturating_sub(beyond).saturating_sub(model);
-            model.saturating_add(self.rate.apply(left))
+            let left = wanted.minus(beyond).minus(model);
+            model.plus(self.rate.apply(left))
         };
         model.d = follow(model.d, wanted.i.d, beyond.d);
         model.q = follow(model.q, wanted.i.q, beyond.q);
@@ -118,8 +114,8 @@ impl Config {
         state.model = fb.i;
         let forced = self.forced(state, wanted, fb);
         state.sigma = Dq {
-            d: u.d.saturating_sub(forced.d),
-            q: u.q.saturating_sub(forced.q),
+            d: u.d.minus(forced.d),
+            q: u.q.minus(forced.q),
         };
     }
 }
@@ -136,7 +132,7 @@ impl State {
 #[inline(always)]
 fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
-        d: wanted.i.d.saturating_sub(fb.i.d),
-        q: wanted.i.q.saturating_sub(fb.i.q),
+        d: wanted.i.d.minus(fb.i.d),
+        q: wanted.i.q.minus(fb.i.q),
     }
 }

@@ -67,6 +67,20 @@ impl Sector {
         Angle::from_bits((self as i32 - 1).wrapping_mul(SEXTANT.to_bits()))
     }
 
+    /// The sextant in which a rotor at this angle is.
+    pub const fn at(theta: Angle) -> Self {
+        // The first begins at −90°. The top of the product with six counts the sextants.
+        let from_first = (theta.to_bits() as u32).wrapping_add(1 << 30);
+        match ((from_first as u64 * 6) >> 32) as u32 {
+            0 => Self::Ac,
+            1 => Self::Bc,
+            2 => Self::Ba,
+            3 => Self::Ca,
+            4 => Self::Cb,
+            _ => Self::Ab,
+        }
+    }
+
     /// Phases a, b, c by what their legs do.
     pub fn legs<T>(self, [a, b, c]: [T; 3]) -> Legs<T> {
         let (switching, low, floating) = match self {
@@ -147,6 +161,16 @@ mod tests {
             assert!(floating(middle).abs() < 1e-7, "{sector:?}");
             let before = floating(middle - 1.0 / 12.0);
             assert!((before + 0.5 * if sector.rising() { 1.0 } else { -1.0 }).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_rotor_is_in_the_sextant_whose_middle_is_within_30_degrees() {
+        for sector in ALL {
+            for degrees in -29..=29 {
+                let theta = sector.middle().to_num::<f64>() + f64::from(degrees) / 360.0;
+                assert_eq!(Sector::at(Angle::wrapping_from_num(theta)), sector);
+            }
         }
     }
 

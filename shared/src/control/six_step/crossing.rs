@@ -14,6 +14,7 @@
 
 use fixed::types::I16F16;
 
+use crate::math::Held;
 use crate::units::Voltage;
 
 /// Thresholds.
@@ -82,7 +83,7 @@ impl State {
     fn measured_slope(&self, config: &Config) -> Option<Voltage> {
         let Span { first, last } = self.above?;
         let samples = i32::from(last.0 - first.0);
-        let change = last.1.saturating_sub(first.1).saturating_abs();
+        let change = last.1.minus(first.1).saturating_abs();
         if change < config.least.saturating_mul_int(2) {
             return None;
         }
@@ -167,7 +168,7 @@ fn falling_below(state: &mut State) -> Option<I16F16> {
     state.found = true;
     // The last reading had that far to fall; a slow rotor's has some way to go from the threshold.
     let falls = periods(reading, state.slope).min(whole(state.samples / 2));
-    Some(whole(state.samples - at).saturating_sub(falls))
+    Some(whole(state.samples - at).minus(falls))
 }
 
 fn whole(samples: u16) -> I16F16 {

@@ -10,7 +10,7 @@ use fixed::types::I1F31;
 use fixed::types::extra::{U28, U31, U32};
 
 use crate::control::speed::Bounds;
-use crate::math::Gain;
+use crate::math::{Gain, Held};
 use crate::units::{Current, Duty, Speed};
 
 /// Coefficients for one sample period T_s.
@@ -61,14 +61,14 @@ impl State {
 /// current answers slowly.
 #[inline]
 pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> Range {
-    let change = i.saturating_sub(state.smoothed);
+    let change = i.minus(state.smoothed);
     state.smoothed = state
         .smoothed
-        .saturating_add(Current::from_bits(change.to_bits() >> 3));
-    let ahead = i.saturating_add(change.saturating_mul_int(3));
+        .plus(Current::from_bits(change.to_bits() >> 3));
+    let ahead = i.plus(change.saturating_mul_int(3));
     let until = |bound: Current| {
-        let step = config.k_b.saturating_apply(bound.saturating_sub(ahead));
-        let duty = state.duty.saturating_add(step);
+        let step = config.k_b.saturating_apply(bound.minus(ahead));
+        let duty = state.duty.plus(step);
         duty.max(I1F31::ZERO).min(config.duty_max)
     };
     Range {
@@ -93,16 +93,12 @@ pub fn share(state: &mut State, share: I1F31, range: Range) {
 /// while the duty is held by the range and the error pushes it further.
 #[inline]
 pub fn speed(config: &Config, state: &mut State, error: Speed, range: Range) {
-    let wanted = state
-        .sigma
-        .saturating_add(config.k_p.saturating_apply(error));
+    let wanted = state.sigma.plus(config.k_p.saturating_apply(error));
     state.duty = wanted.min(range.greatest).max(range.least);
     let held_below = state.duty < wanted && error > Speed::ZERO;
     let held_above = state.duty > wanted && error < Speed::ZERO;
     if !(held_below || held_above) {
-        let sigma = state
-            .sigma
-            .saturating_add(config.k_i.saturating_apply(error));
+        let sigma = state.sigma.plus(config.k_i.saturating_apply(error));
         state.sigma = sigma.max(I1F31::ZERO).min(config.duty_max);
     }
 }

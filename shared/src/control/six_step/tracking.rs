@@ -4,6 +4,7 @@ use fixed::types::I16F16;
 
 use super::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::delay::Delay;
+use crate::math::Held;
 use crate::units::{Angle, Speed};
 
 /// Crossings in a row after which the rotor's motion is known well enough to be smoothed.
@@ -51,20 +52,20 @@ impl State {
     /// A period passes.
     #[inline]
     pub fn advance(&mut self) {
-        self.omega = self.omega.saturating_add(self.acceleration).min(FASTEST);
-        self.delta = self.delta.saturating_add(self.omega);
-        self.elapsed = self.elapsed.saturating_add(I16F16::ONE);
+        self.omega = self.omega.plus(self.acceleration).min(FASTEST);
+        self.delta = self.delta.plus(self.omega);
+        self.elapsed = self.elapsed.plus(I16F16::ONE);
     }
 
     /// The crossing was found to be `age` periods ago: 60° since the one before.
     pub fn crossed(&mut self, age: I16F16) {
-        let interval = self.elapsed.saturating_sub(age).max(I16F16::ONE);
+        let interval = self.elapsed.minus(age).max(I16F16::ONE);
         let turned = i64::from(self.sextants.max(1)) * i64::from(SEXTANT.to_bits());
         let mean = over(turned, interval);
         let mut overdue = false;
         if self.from_rest {
             // Under a constant torque twice the mean, after a constant acceleration.
-            self.omega = mean.saturating_add(mean).min(FASTEST);
+            self.omega = mean.plus(mean).min(FASTEST);
             self.acceleration = over(i64::from(self.omega.to_bits()), interval);
             self.omega_bar = self.omega;
         } else if self.crossings < KNOWN {
@@ -79,14 +80,14 @@ impl State {
                 // The mean is the speed in the interval's middle. While the rotor is slow a crossing
                 // may be seen some degrees early or late: half of what that tells is taken.
                 let gained = times(self.acceleration, interval) >> 1;
-                let middle = self.omega.saturating_sub(bounded(gained));
-                self.omega += half(mean.saturating_sub(middle));
+                let middle = self.omega.minus(bounded(gained));
+                self.omega += half(mean.minus(middle));
             }
             self.omega_bar = self.omega;
         } else {
             self.acceleration = Speed::ZERO;
-            self.omega += half(mean.saturating_sub(self.omega));
-            self.omega_bar += half(half(mean.saturating_sub(self.omega_bar)));
+            self.omega += half(mean.minus(self.omega));
+            self.omega_bar += half(half(mean.minus(self.omega_bar)));
         }
         self.omega = self.omega.max(Speed::ZERO).min(FASTEST);
         self.delta = if overdue {
@@ -119,12 +120,12 @@ impl State {
     #[inline]
     pub fn reaches(&self, angle: Angle, delay: Delay) -> bool {
         // Half a period and the delay, which is also the way to the middle of a voltage.
-        self.delta.saturating_add(delay.advance(self.omega)) >= angle
+        self.delta.plus(delay.advance(self.omega)) >= angle
     }
 
     /// The next sextant begins, by the extrapolated angle.
     pub fn commutated(&mut self) {
-        self.delta = self.delta.saturating_sub(SEXTANT);
+        self.delta = self.delta.minus(SEXTANT);
         self.sextants = self.sextants.saturating_add(1);
     }
 

@@ -7,7 +7,7 @@ use fixed::types::extra::{U28, U32};
 use super::Input;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
-use crate::math::{Gain, TopProduct};
+use crate::math::{Gain, Held, TopProduct};
 use crate::units::{Current, Speed};
 
 /// Coefficients for one sample period T_s.
@@ -39,16 +39,16 @@ impl Config {
     #[inline(always)]
     pub(super) fn current(&self, state: &mut State, omega_r: Speed, input: &Input) -> Reference {
         let omega = input.estimate.omega_bar;
-        let error = omega_r.saturating_sub(omega);
+        let error = omega_r.minus(omega);
         let i_q = state
             .sigma
-            .saturating_add(self.k_p.saturating_apply(error))
-            .saturating_add(self.propeller(omega_r));
+            .plus(self.k_p.saturating_apply(error))
+            .plus(self.propeller(omega_r));
         let bounded = input.bounds.hold(i_q);
-        let over = i_q.saturating_sub(bounded).saturating_add(input.missing);
+        let over = i_q.minus(bounded).plus(input.missing);
         let step = self.k_i.saturating_apply(error);
         if over == Current::ZERO || over.is_negative() != step.is_negative() {
-            state.sigma = state.sigma.saturating_add(step);
+            state.sigma = state.sigma.plus(step);
         }
         Reference {
             i: Dq {
@@ -59,13 +59,13 @@ impl Config {
             u_q: self
                 .k_ffv
                 .saturating_apply(omega_r)
-                .saturating_sub(self.own.saturating_apply(omega)),
+                .minus(self.own.saturating_apply(omega)),
         }
     }
 
     /// What the integrator holds of a current at this speed.
     pub(super) fn remainder(&self, omega: Speed, i_q: Current) -> Current {
-        i_q.saturating_sub(self.propeller(omega))
+        i_q.minus(self.propeller(omega))
     }
 
     /// K_FFi·ω_r², against the rotation.

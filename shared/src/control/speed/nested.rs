@@ -10,7 +10,7 @@ use super::{Input, torque};
 use crate::control::planner;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
-use crate::math::{Gain, TopProduct};
+use crate::math::{Gain, Held, TopProduct};
 use crate::units::{Current, Speed, Torque, Voltage};
 
 /// From here on the error is acted on in full.
@@ -31,6 +31,8 @@ pub struct Config {
     /// speed an R stated too high closes a loop through the estimate, and its gain is that of the
     /// regulator.
     pub trust: Gain<U32, U32>,
+    /// Whether the current regulator reads p_q*, the change of i_q*.
+    pub with_step: bool,
 }
 
 /// The integrator.
@@ -53,12 +55,12 @@ impl Config {
         input: &Input,
     ) -> Reference {
         let estimate = &input.estimate;
-        let wanted = planner.reference.saturating_add(step);
+        let wanted = planner.reference.plus(step);
         let half_trust = self
             .trust
             .saturating_apply(estimate.omega_bar)
             .max(Speed::ZERO);
-        let error = estimate.omega_bar.saturating_sub(wanted);
+        let error = estimate.omega_bar.minus(wanted);
         let error = if half_trust < ALMOST_HALF {
             Speed::from_bits(error.top(half_trust).to_bits() << 1)
         } else {
@@ -66,24 +68,27 @@ impl Config {
         };
         let torque = state
             .sigma
-            .saturating_sub(self.k_p.saturating_apply(error))
-            .saturating_add(self.inertia.saturating_apply(step));
+            .minus(self.k_p.saturating_apply(error))
+            .plus(self.inertia.saturating_apply(step));
         let integral_step = self.k_i.saturating_apply(error);
         let i_q = estimate.xi.top(torque);
         let bounded = input.bounds.hold(i_q);
         if bounded != i_q || input.missing != Current::ZERO {
-            let over = i_q.saturating_sub(bounded).saturating_add(input.missing);
+            let over = i_q.minus(bounded).plus(input.missing);
             let step = self.conditioned(state, (step, slew), over, integral_step);
             planner.advance(step);
             return Reference::steady(bounded);
         }
         planner.advance(step);
-        state.sigma = state.sigma.saturating_sub(integral_step);
+        state.sigma = state.sigma.minus(integral_step);
+        if !self.with_step {
+            return Reference::steady(i_q);
+        }
         // ω̈* is left out: at the trajectory's corners it would be a pulse of voltage.
         let torque_step = self
             .k_p
-            .saturating_apply(step.saturating_sub(estimate.omega_bar_step))
-            .saturating_sub(integral_step);
+            .saturating_apply(step.minus(estimate.omega_bar_step))
+            .minus(integral_step);
         Reference {
             i: Dq {
                 d: Current::ZERO,
@@ -93,7 +98,7 @@ impl Config {
             i_q_step: estimate
                 .xi_step
                 .top(torque)
-                .saturating_add(estimate.xi.top(torque_step)),
+                .plus(estimate.xi.top(torque_step)),
         }
     }
 
@@ -109,12 +114,12 @@ impl Config {
         integral_step: Torque,
     ) -> Speed {
         let less = self.inertia_inverse.saturating_apply(torque(over));
-        let free = step.saturating_sub(less);
+        let free = step.minus(less);
         let taken = free.min(slew).max(-slew);
         let conditioned = taken == free && self.inertia_inverse != Gain::ZERO;
         let pushes_further = over.is_positive() == integral_step.is_negative();
         if conditioned || !pushes_further {
-            state.sigma = state.sigma.saturating_sub(integral_step);
+            state.sigma = state.sigma.minus(integral_step);
         }
         taken
     }

@@ -147,13 +147,9 @@ impl Loop {
         let feedback = self.feedback();
         let regulator = &self.units.0.regulator;
         let asked = regulator.voltage(&self.regulator, wanted, &feedback);
-        let (u, limited) = modulator::limit(asked, self.vector_max);
-        let cut = Dq {
-            d: asked.d - u.d,
-            q: asked.q - u.q,
-        };
+        let (u, cut) = modulator::limit(asked, self.vector_max);
         regulator.integrate(&mut self.regulator, wanted, &feedback, cut);
-        self.missing = if limited {
+        self.missing = if cut.is_some() {
             wanted.i.q - feedback.i.q
         } else {
             Current::ZERO

@@ -268,7 +268,7 @@ fn braking_is_bounded_by_the_supplys_current_and_voltage() {
         let (mut most_v, mut settled_a) = (0.0_f64, 0.0_f64);
         for period in 0..(0.1 / TS) as u32 {
             let bus = bench.inner.units.voltage(bus_v);
-            let fault = protection::check(&limits, &mut state, [AdcCounts::ZERO; 3], bus);
+            let fault = protection::check(&limits, &mut state, Some([AdcCounts::ZERO; 3]), bus);
             assert_eq!(fault, None, "{resistance_ohm} ohm at {bus_v} V");
             let wanted = torque::follow(&config, &mut bench.torque, asked, state.bounds);
             let i = bench.inner.motor.i_dq();

@@ -123,7 +123,7 @@ fn two_periods(units: &Units, state: &mut State, case: &Case) -> [[f64; 2]; 2] {
     let (wanted, feedback) = (case.wanted(units), case.feedback(units));
     let volts = |u: Dq<Voltage>| [units.volts(u.d), units.volts(u.q)];
     let now = volts(regulator.voltage(state, &wanted, &feedback));
-    regulator.integrate(state, &wanted, &feedback, Dq::default());
+    regulator.integrate(state, &wanted, &feedback, None);
     [now, volts(regulator.voltage(state, &wanted, &feedback))]
 }
 

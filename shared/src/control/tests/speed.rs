@@ -18,7 +18,8 @@ const J: f64 = 1.43e-4;
 const TORQUE_CONSTANT: f64 = 1.5 * P * PHI;
 
 fn units(speed: f32) -> Units {
-    Units(config_with(&[(ParamId::CtlSpeed, speed)]))
+    let observer_based = (ParamId::CtlRegulator, 0.0);
+    Units(config_with(&[(ParamId::CtlSpeed, speed), observer_based]))
 }
 
 /// Torque of the integrator, Nm, or its current, A: the trace's words after the planner's.

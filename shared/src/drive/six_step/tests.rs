@@ -2,6 +2,7 @@
 //! is one.
 
 use super::*;
+use crate::control::six_step::commutation::Sector;
 use crate::drive::{Config, Fault, State, step};
 use crate::params::{Board, ParamId, Params, build};
 
@@ -76,6 +77,40 @@ fn park_holds_two_phases_low_and_ramp_lets_one_float() {
     // charge.
     assert!((15_990..=16_010).contains(&parked), "{parked}");
     assert!((3700..=3760).contains(&floating), "{floating}");
+}
+
+#[test]
+fn a_rotor_whose_position_is_told_is_driven_from_where_it_stands() {
+    let (config, _) = drive(&[(ParamId::Inp3d, 1.0)]);
+    let config = config.with_position_given();
+    for (sector, backwards) in [(Sector::Ab, false), (Sector::Bc, false), (Sector::Ca, true)] {
+        let mut state = State::new(&config);
+        let sign = if backwards { -1 } else { 1 };
+        let command = Setpoint::Speed(config.scale.speed_from_rpm(3000.0) * sign);
+        let mut bridge = Bridge::Off;
+        for _ in 0..1_000 {
+            // Backwards the control sees the phases b and c exchanged, and the angle turned.
+            let theta = sector.middle();
+            let theta = if backwards {
+                theta.wrapping_neg()
+            } else {
+                theta
+            };
+            state.place(theta, Speed::ZERO);
+            bridge = step(&config, &mut state, quiet(), command);
+            let phase = state.snapshot().phase;
+            assert!(!matches!(phase, Phase::Park | Phase::Ramp));
+            if phase == Phase::Run {
+                break;
+            }
+        }
+        let Bridge::Legs(legs) = bridge else {
+            panic!("{bridge:?}");
+        };
+        let legs = turn::in_order(backwards, legs);
+        assert_eq!(sector.legs(legs).floating, None, "{sector:?}");
+        assert_eq!(sector.legs(legs).low, Some(Duty::ZERO), "{sector:?}");
+    }
 }
 
 #[test]

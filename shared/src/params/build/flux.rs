@@ -39,24 +39,79 @@ const A_TURNS: f32 = 1.0 / 6.0;
 /// the paper has 0.44 for it, it is smaller.
 const K_MAX: f32 = 0.265;
 
+/// What the parameters make of the second paper's time constants and filters: what its Table 1 is
+/// computed from ([`limits`](crate::control::observer::limits)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluxSettings {
+    /// τ_int, s (2.2.2).
+    pub tau_int_s: f32,
+    /// τ_HPFS of the second-order form, s.
+    pub tau_hpfs_s: Option<f32>,
+    /// Hold-off after a crossing, electrical turns at the estimated speed (2.3.2).
+    pub hold_off_turns: f32,
+    /// N, electrical turns over which the speed is measured (2.4.1).
+    pub turns: f32,
+    /// Electrical speed below which it is measured from edge to edge, turns/s: N is 1/6 there.
+    pub whole_turns_above_hz: f32,
+    /// A_e, the share of the extrapolated angle that a crossing leaves (2.4.2).
+    pub a_e: f32,
+    /// Electrical speed above which A_e counts, turns/s.
+    pub filter_above_hz: f32,
+}
+
+impl FluxSettings {
+    /// Those of a drive with these parameters.
+    ///
+    /// Where whole turns and the filter begin follows from the errors that the paper gives for the
+    /// greatest acceleration that the drive asks for.
+    pub fn new(params: &Params) -> Self {
+        let get = |id| params.get(id);
+        let tau_int_s = TAU_INT / slow_rad_s(params);
+        let (n, a_e) = (get(ParamId::CtlPosN), get(ParamId::CtlAe));
+        let alpha = get(ParamId::CtlSlewRpmS) * get(ParamId::MotPolePairs) / 60.0;
+        // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures anew, and
+        // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
+        let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
+        Self {
+            tau_int_s,
+            tau_hpfs_s: match get(ParamId::CtlFluxForm) {
+                0.0 | 2.0 => None,
+                _ => Some(HIGH_PASS_SHARE * tau_int_s),
+            },
+            hold_off_turns: HOLD_OFF * A_TURNS,
+            turns: n,
+            whole_turns_above_hz: libm::sqrtf((6.0 * n + 1.0) * alpha * A_TURNS / K_MAX),
+            a_e,
+            filter_above_hz: libm::sqrtf(alpha * A_TURNS * lag / ERROR_TURNS),
+        }
+    }
+}
+
+/// The least electrical speed that the flux is followed to, rad/s.
+fn slow_rad_s(params: &Params) -> f32 {
+    slow_rpm(params) * params.get(ParamId::MotPolePairs) * TAU / 60.0
+}
+
+fn slow_rpm(params: &Params) -> f32 {
+    SLOW_SHARE
+        * params
+            .get(ParamId::StaRunRpm)
+            .min(params.get(ParamId::CtlRpmMin))
+}
+
 /// Sections 2.2 to 2.4.
 pub(super) fn edges(params: &Params, p: &Si, scale: &Scale) -> Result<Config, BuildError> {
     let get = |id| params.get(id);
-    let run_rpm = get(ParamId::StaRunRpm);
-    let slow_rpm = SLOW_SHARE * run_rpm.min(get(ParamId::CtlRpmMin));
-    let slow_rad_s = slow_rpm * p.pole_pairs * TAU / 60.0;
+    let settings = FluxSettings::new(params);
     let flux_per_current = p.inductance_h * scale.current_a / scale.flux_wb();
-    let tau_int_s = TAU_INT / slow_rad_s;
-    let tau_hpfs_s = HIGH_PASS_SHARE * tau_int_s;
     // In a period, a filter of this time constant goes this share of its way.
     let share = |tau_s: f32| -libm::expm1f(-p.period_s / tau_s);
     let corner = |tau_s: f32| Speed::saturating_from_num(p.period_s / (TAU * tau_s));
-    let form = get(ParamId::CtlFluxForm);
-    let high_pass = match form {
-        0.0 | 2.0 => None,
-        _ => Some(HighPass {
-            share: gain(ParamId::StaRunRpm, share(tau_hpfs_s))?,
-            corner: corner(tau_hpfs_s),
+    let high_pass = match settings.tau_hpfs_s {
+        None => None,
+        Some(tau_s) => Some(HighPass {
+            share: gain(ParamId::StaRunRpm, share(tau_s))?,
+            corner: corner(tau_s),
         }),
     };
     Ok(Config {
@@ -71,46 +126,41 @@ pub(super) fn edges(params: &Params, p: &Si, scale: &Scale) -> Result<Config, Bu
                 p.resistance_ohm * scale.current_a / scale.voltage_v,
             )?,
             inductance: gain(ParamId::MotLUh, flux_per_current)?,
-            forget: gain(ParamId::StaRunRpm, share(tau_int_s))?,
-            corner: corner(tau_int_s),
+            forget: gain(ParamId::StaRunRpm, share(settings.tau_int_s))?,
+            corner: corner(settings.tau_int_s),
             high_pass,
             stator_max: Flux::saturating_from_num(
                 get(ParamId::LimPhaseA) / scale.current_a * flux_per_current,
             ),
-            adaptive: form < 2.0,
+            adaptive: get(ParamId::CtlFluxForm) < 2.0,
         },
         crossing: crossing::Config {
             deadband: I0F32::from_num(DEADBAND),
             deadband_angle: Angle::from_num(libm::asinf(DEADBAND) / TAU),
-            hold_off: U0F32::from_num(HOLD_OFF * A_TURNS),
-            patience: (PATIENCE * A_TURNS * TAU / (slow_rad_s * p.period_s)) as u32,
+            hold_off: U0F32::from_num(settings.hold_off_turns),
+            patience: (PATIENCE * A_TURNS * TAU / (slow_rad_s(params) * p.period_s)) as u32,
         },
-        position: estimator(params, p, scale)?,
+        position: estimator(&settings, p, scale)?,
         hall: hall::Config {
             patience: (HALL_PATIENCE_S / p.period_s) as u32,
         },
-        flux_above: scale.speed_from_rpm(run_rpm),
-        hall_below: scale.speed_from_rpm(slow_rpm),
+        flux_above: scale.speed_from_rpm(get(ParamId::StaRunRpm)),
+        hall_below: scale.speed_from_rpm(slow_rpm(params)),
     })
 }
 
-/// Section 2.4. Where whole turns and the filter begin follows from the errors that the paper gives
-/// for the greatest acceleration that the drive asks for.
-fn estimator(params: &Params, p: &Si, scale: &Scale) -> Result<position::Config, BuildError> {
-    let n = params.get(ParamId::CtlPosN);
-    let a_e = params.get(ParamId::CtlAe);
-    let alpha = params.get(ParamId::CtlSlewRpmS) * p.pole_pairs / 60.0;
-    // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures anew, and
-    // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
-    let whole = libm::sqrtf((6.0 * n + 1.0) * alpha * A_TURNS / K_MAX);
-    let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
-    let filter = libm::sqrtf(alpha * A_TURNS * lag / ERROR_TURNS);
+/// Section 2.4.
+fn estimator(
+    settings: &FluxSettings,
+    p: &Si,
+    scale: &Scale,
+) -> Result<position::Config, BuildError> {
     let speed = |turns_per_s: f32| scale.speed_from_rpm(turns_per_s * 60.0 / p.pole_pairs);
     Ok(position::Config {
-        turns: n as u8,
-        whole_turns_above: speed(whole),
-        a_e: gain(ParamId::CtlAe, a_e)?,
-        filter_above: speed(filter),
+        turns: settings.turns as u8,
+        whole_turns_above: speed(settings.whole_turns_above_hz),
+        a_e: gain(ParamId::CtlAe, settings.a_e)?,
+        filter_above: speed(settings.filter_above_hz),
         compensates: true,
     })
 }

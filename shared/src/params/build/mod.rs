@@ -9,6 +9,8 @@ mod sensing;
 mod six_step;
 mod start;
 
+pub use flux::FluxSettings;
+
 use core::f32::consts::{FRAC_PI_2, TAU};
 
 use fixed::types::I1F31;
@@ -16,12 +18,13 @@ use fixed::types::extra::Unsigned;
 
 use super::{ParamId, Params};
 use crate::control::delay::Delay;
+use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
-use crate::drive::{Config, Direction, LowSpeed, Stop};
+use crate::drive::{Config, Direction, Stop};
 use crate::math::Gain;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Scale, Voltage};
+use crate::units::{AdcCounts, Scale, Voltage};
 
 /// What the control must know of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,14 +64,14 @@ pub struct BuildError {
 /// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
 
-/// ξ of the stated flux in the control's units: the voltage base makes it so for every motor.
-const XI_NOMINAL: f32 = 0.25;
-
 /// What a test of the motor may use of `LIM_PHASE_A`.
 const TEST_SHARE: f32 = 0.2;
 
 /// The supply may be at most this many units of voltage, of the eight that the type holds.
 const BUS_UNITS_MAX: f32 = 6.0;
+
+/// The supply must be at least so many units, where the modulator's reciprocal of it ends.
+const BUS_UNITS_MIN: f32 = 0.125;
 
 /// Speed at which (22) is linearised, of `CTL_RPM_MAX`: 4500 rpm on the bench.
 const LINEARISED_SHARE: f32 = 0.75;
@@ -145,6 +148,12 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
         return refuse(
             ParamId::PwmFreqHz,
             "too low for this flux and LIM_BUS_V_MAX",
+        );
+    }
+    if get(ParamId::LimBusVMax) < BUS_UNITS_MIN * scale.voltage_v {
+        return refuse(
+            ParamId::PwmFreqHz,
+            "too high for this flux and LIM_BUS_V_MAX",
         );
     }
     if get(ParamId::LimBusVMin) >= get(ParamId::LimBusVMax) {
@@ -282,33 +291,31 @@ fn gain<A: Unsigned, B: Unsigned>(param: ParamId, k: f32) -> Result<Gain<A, B>, 
 }
 
 /// What keeps an observer that lives by the back-EMF in lock where there is little of it.
-fn low_speed(params: &Params, p: &Si, scale: &Scale) -> Result<LowSpeed, BuildError> {
+fn low_speed(params: &Params, p: &Si, scale: &Scale) -> Result<low_speed::Config, BuildError> {
+    let limit_a = params.get(ParamId::LimPhaseA);
+    let phase = scale.current_from_a(limit_a);
     let published =
         params.get(ParamId::CtlObserver) == 0.0 && params.get(ParamId::CtlObsCure) == 0.0;
     if published || params.get(ParamId::CtlObserver) == 2.0 {
         // As published, and not needed where sensors tell the position.
-        return Ok(LowSpeed {
-            i_d: Current::ZERO,
-            i_d_slope: Gain::ZERO,
-            i_q: Current::MAX,
-            i_q_slope: Gain::ZERO,
-        });
+        return Ok(low_speed::Config::none(phase));
     }
-    let limit_a = params.get(ParamId::LimPhaseA);
     let ramp_a = params.get(ParamId::StaRampA).min(limit_a);
     let bias_a = BIAS_SHARE * ramp_a;
     let rad_per_unit = TAU / p.period_s;
     let end_rad_s = BIAS_END * p.resistance_ohm * bias_a / p.flux_wb;
     let drop_a_s = TORQUE_DROP_SHARE * p.flux_wb / p.resistance_ohm;
-    Ok(LowSpeed {
-        i_d: scale.current_from_a(bias_a),
-        i_d_slope: gain(
-            ParamId::StaRampA,
-            bias_a / scale.current_a / end_rad_s * rad_per_unit,
-        )?,
-        i_q: scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a),
-        i_q_slope: gain(ParamId::MotRMohm, drop_a_s * rad_per_unit / scale.current_a)?,
-    })
+    let i_d_slope = gain(
+        ParamId::StaRampA,
+        bias_a / scale.current_a / end_rad_s * rad_per_unit,
+    )?;
+    let i_q = scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a);
+    let i_q_slope = gain(ParamId::MotRMohm, drop_a_s * rad_per_unit / scale.current_a)?;
+    Ok(low_speed::Config::new(
+        (scale.current_from_a(bias_a), i_d_slope),
+        (i_q, i_q_slope),
+        phase,
+    ))
 }
 
 fn modulator_limits(modulation: Modulation, duty_max: f32) -> modulator::Config {

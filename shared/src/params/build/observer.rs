@@ -2,12 +2,12 @@
 
 use core::f32::consts::TAU;
 
-use super::{BuildError, Si, XI_NOMINAL, flux, gain};
+use super::{BuildError, Si, flux, gain};
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated};
 use crate::params::{ParamId, Params};
-use crate::units::{InverseFlux, Scale, Speed};
+use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Scale, Speed};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
 /// 2357 1/s.
@@ -70,7 +70,7 @@ fn compensated(p: &Si, scale: &Scale, delay: Delay) -> Result<compensated::Confi
         omega_n_min: speed(OMEGA_N_RAD_S[0]),
         omega_n_max: speed(OMEGA_N_RAD_S[1]),
         smoothing: gain(ParamId::PwmFreqHz, SMOOTHING_RAD_S * p.period_s)?,
-        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
+        xi_nominal: INVERSE_FLUX_NOMINAL,
     })
 }
 
@@ -111,8 +111,8 @@ fn back_emf(p: &Si, scale: &Scale, delay: Delay) -> Result<back_emf::Config, Bui
             ParamId::CtlBwCurHz,
             FILTER_SHARE * p.current_rad_s * p.period_s,
         )?,
-        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
-        xi_min: InverseFlux::from_num(XI_NOMINAL / 2.0),
+        xi_nominal: INVERSE_FLUX_NOMINAL,
+        xi_min: INVERSE_FLUX_NOMINAL / 2,
         // Twice the nominal is one bit more than the type holds.
         xi_max: InverseFlux::MAX,
         cure: None,

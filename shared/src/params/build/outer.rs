@@ -64,7 +64,7 @@ pub(super) fn speed(params: &Params, p: &Si, scale: &Scale) -> Result<Config, Bu
     let (law, profile) = match params.get(ParamId::CtlSpeed) {
         0.0 => (Law::Nested(with_inertia(params, p, scale)?), soft),
         1.0 => (Law::FeedForward(feed_forward(params, p, scale)?), hard),
-        _ => (Law::Nested(published(p, scale)?), hard),
+        _ => (Law::Nested(published(params, p, scale)?), hard),
     };
     Ok(Config {
         planner: planner::Config {
@@ -83,7 +83,7 @@ struct Profile {
 }
 
 /// (8) with gains in the ratio of Table III.
-fn published(p: &Si, scale: &Scale) -> Result<nested::Config, BuildError> {
+fn published(params: &Params, p: &Si, scale: &Scale) -> Result<nested::Config, BuildError> {
     let k_p = p.inertia_kgm2 * p.speed_rad_s;
     let k_i = k_p * SPEED_CORNER_SHARE * p.speed_rad_s;
     let torque = torque_per_speed(p, scale);
@@ -94,6 +94,7 @@ fn published(p: &Si, scale: &Scale) -> Result<nested::Config, BuildError> {
         inertia_inverse: Gain::ZERO,
         // In full from a ten-thousandth of a turn a period.
         trust: gain(ParamId::CtlBwSpdHz, 5_000.0)?,
+        with_step: reads_step(params),
     })
 }
 
@@ -116,7 +117,13 @@ fn with_inertia(params: &Params, p: &Si, scale: &Scale) -> Result<nested::Config
             2.0 => gain(ParamId::CtlBwSpdHz, 5_000.0)?,
             _ => gain(ParamId::StaRampA, 0.5 / trusted)?,
         },
+        with_step: reads_step(params),
     })
+}
+
+/// Only the observer-based regulator reads p_q*.
+fn reads_step(params: &Params) -> bool {
+    params.get(ParamId::CtlRegulator) == 0.0
 }
 
 /// Second paper, figure 47.

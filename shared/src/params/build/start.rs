@@ -4,11 +4,11 @@ use core::f32::consts::TAU;
 
 use fixed::types::I36F28;
 
-use super::{BuildError, Si, XI_NOMINAL, gain};
+use super::{BuildError, Si, gain};
 use crate::control::start;
 use crate::drive::ATTEMPTS;
 use crate::params::{ParamId, Params};
-use crate::units::{InverseFlux, Scale};
+use crate::units::{INVERSE_FLUX_NOMINAL, Scale};
 
 /// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;
@@ -89,7 +89,7 @@ fn attempt(
             p.inductance_h * voltage_per_current * TAU / p.period_s,
         )?,
         run_speed: scale.speed_from_rpm(params.get(ParamId::StaRunRpm)),
-        xi_nominal: InverseFlux::from_num(XI_NOMINAL),
+        xi_nominal: INVERSE_FLUX_NOMINAL,
     })
 }
 

@@ -83,6 +83,7 @@ impl Units {
             inductance: Factor::ONE,
             planned: Speed::ZERO,
             hall: 7,
+            swapped: false,
         }
     }
 }
@@ -205,6 +206,7 @@ proptest! {
                 inductance: Factor::ONE,
                 planned: Speed::from_bits(e),
                 hall: 0,
+                swapped: false,
             };
             let imposed = (known && what & 1 == 0).then_some(Speed::from_bits(f));
             let got = estimate(&config, &mut state, &input, imposed);

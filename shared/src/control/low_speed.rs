@@ -1,0 +1,162 @@
+//! What is done for the observer at low speed.
+//!
+//! There the back-EMF is small against what is not known: the dead time's loss around zero current,
+//! and the drop across a resistance that may be stated wrongly.
+
+use fixed::types::extra::{U28, U32};
+
+use super::speed::Bounds;
+use crate::math::{Gain, Held, other_leg};
+use crate::units::{Current, Speed};
+
+/// The current along d, and the bound of the one along q.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
+    i_d: Current,
+    /// What the speed takes of it.
+    i_d_slope: Gain<U32, U28>,
+    /// Bound of i_q at standstill.
+    i_q: Current,
+    /// Bound of i_q over the speed, where that is more.
+    i_q_slope: Gain<U32, U28>,
+    /// `LIM_PHASE_A`, which bounds both.
+    phase: Current,
+    /// The last speed at which anything is done.
+    end: Speed,
+}
+
+impl Config {
+    /// `i_d` along d at standstill and `i_d_slope` less over the speed; at most `i_q` along q, or
+    /// `i_q_slope` times the speed, where that is more. No slope is negative.
+    pub fn new(
+        (i_d, i_d_slope): (Current, Gain<U32, U28>),
+        (i_q, i_q_slope): (Current, Gain<U32, U28>),
+        phase: Current,
+    ) -> Self {
+        let mut config = Self {
+            i_d,
+            i_d_slope,
+            i_q,
+            i_q_slope,
+            phase,
+            end: Speed::MAX,
+        };
+        config.end = config.last();
+        config
+    }
+
+    /// Nothing is done at any speed.
+    pub fn none(phase: Current) -> Self {
+        let i_d = (Current::ZERO, Gain::ZERO);
+        Self::new(i_d, (Current::MAX, Gain::ZERO), phase)
+    }
+
+    /// The last speed at which anything is done, by bisection: with the speed i_d* only falls and
+    /// the bound of i_q only rises.
+    fn last(&self) -> Speed {
+        let acts = |bits| {
+            let speed = Speed::from_bits(bits);
+            self.i_d_at(speed) > Current::ZERO || self.i_q_at(speed) < self.phase
+        };
+        if !acts(0) {
+            return Speed::MIN;
+        }
+        let mut last = 0;
+        for bit in (0..31).rev() {
+            if acts(last | 1 << bit) {
+                last |= 1 << bit;
+            }
+        }
+        Speed::from_bits(last)
+    }
+
+    /// i_d*, and what of the bounds of i_q* this and the speed leave.
+    #[inline(always)]
+    pub fn bounds(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
+        if speed > self.end {
+            (Current::ZERO, full)
+        } else {
+            self.slow(full, speed)
+        }
+    }
+
+    #[cold]
+    fn slow(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
+        let i_d = self.i_d_at(speed);
+        let most = self.i_q_at(speed);
+        let most = if i_d > Current::ZERO {
+            most.min(other_leg(self.phase, i_d))
+        } else {
+            most
+        };
+        let bounds = Bounds {
+            min: full.min.max(-most),
+            max: full.max.min(most),
+        };
+        (i_d, bounds)
+    }
+
+    fn i_d_at(&self, speed: Speed) -> Current {
+        self.i_d
+            .minus(self.i_d_slope.saturating_apply(speed))
+            .max(Current::ZERO)
+            .min(self.i_d)
+    }
+
+    fn i_q_at(&self, speed: Speed) -> Current {
+        self.i_q.max(self.i_q_slope.saturating_apply(speed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PHASE: Current = Current::lit("1.5");
+    const FULL: Bounds = Bounds {
+        min: Current::lit("-1.5"),
+        max: PHASE,
+    };
+
+    fn config() -> Config {
+        let gain = |k| Gain::new(k).expect("in range");
+        let at_rest = Current::from_num(0.2);
+        Config::new((at_rest, gain(10.0)), (at_rest, gain(40.0)), PHASE)
+    }
+
+    #[test]
+    fn what_is_done_ends_with_the_speed() {
+        let config = config();
+        let at = |speed: f64| config.bounds(FULL, Speed::from_num(speed));
+        let (i_d, bounds) = at(0.0);
+        assert_eq!(i_d, Current::from_num(0.2));
+        assert_eq!(bounds.max, Current::from_num(0.2));
+        assert_eq!(at(-0.1), at(0.0));
+        // i_d* has gone at 0.02, and the bound of i_q is the drive's own at 1.5/40.
+        let (i_d, bounds) = at(0.03);
+        assert_eq!(i_d, Current::ZERO);
+        assert!(
+            (bounds.max.to_num::<f64>() - 1.2).abs() < 1e-6,
+            "{bounds:?}"
+        );
+        assert_eq!(bounds.min, -bounds.max);
+        assert_eq!(at(0.0376), (Current::ZERO, FULL));
+    }
+
+    #[test]
+    fn the_end_is_the_last_speed_at_which_anything_is_done() {
+        let config = config();
+        let nothing = (Current::ZERO, FULL);
+        assert_ne!(config.slow(FULL, config.end), nothing);
+        assert_eq!(config.slow(FULL, config.end + Speed::DELTA), nothing);
+    }
+
+    #[test]
+    fn none_is_nothing_at_any_speed() {
+        let none = Config::none(PHASE);
+        for speed in [Speed::MIN, Speed::ZERO, Speed::MAX] {
+            assert_eq!(none.bounds(FULL, speed), (Current::ZERO, FULL));
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! No observer at all: an encoder, or a simulation that knows the truth, tells where the rotor is.
+
+use super::Estimate;
+use crate::math::sin_cos;
+use crate::units::{Angle, INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
+
+/// What was told of the rotor at the coming sample, with the phases in the order a, b, c.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// Electrical angle.
+    pub theta: Angle,
+    /// Electrical speed.
+    pub omega: Speed,
+    /// Its change since what was told before.
+    pub omega_step: Speed,
+}
+
+impl State {
+    /// The rotor will be at `theta` and turn at `omega` at the coming sample.
+    pub fn place(&mut self, theta: Angle, omega: Speed) {
+        self.theta = theta;
+        self.omega_step = omega.saturating_sub(self.omega);
+        self.omega = omega;
+    }
+
+    /// The angle and the speed as the control sees them: with `swapped` phases b and c it turns the
+    /// other way.
+    pub fn seen(&self, swapped: bool) -> (Angle, Speed) {
+        if swapped {
+            (self.theta.wrapping_neg(), self.omega.saturating_neg())
+        } else {
+            (self.theta, self.omega)
+        }
+    }
+
+    /// Every word of it.
+    pub fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            theta,
+            omega,
+            omega_step,
+        } = self;
+        for word in [theta.to_bits(), omega.to_bits(), omega_step.to_bits()] {
+            out(word as u32);
+        }
+    }
+}
+
+/// One period: what was told.
+#[inline]
+pub fn estimate(state: &State, swapped: bool) -> Estimate {
+    let (theta, omega) = state.seen(swapped);
+    Estimate {
+        theta,
+        frame: sin_cos(theta),
+        omega,
+        omega_bar: omega,
+        omega_bar_step: if swapped {
+            state.omega_step.saturating_neg()
+        } else {
+            state.omega_step
+        },
+        xi: INVERSE_FLUX_NOMINAL,
+        xi_step: InverseFlux::ZERO,
+        lost: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_told_is_seen_and_turned_where_the_phases_are() {
+        let mut state = State::default();
+        state.place(Angle::lit("0.2"), Speed::lit("0.01"));
+        state.place(Angle::lit("0.25"), Speed::lit("0.03"));
+        let seen = estimate(&state, false);
+        assert_eq!(
+            (seen.theta, seen.omega),
+            (Angle::lit("0.25"), Speed::lit("0.03"))
+        );
+        assert_eq!(seen.omega_bar_step, Speed::lit("0.03") - Speed::lit("0.01"));
+        let turned = estimate(&state, true);
+        assert_eq!(
+            (turned.theta, turned.omega_bar),
+            (-Angle::lit("0.25"), -Speed::lit("0.03"))
+        );
+        assert_eq!(turned.omega_bar_step, -seen.omega_bar_step);
+    }
+}

@@ -1,0 +1,122 @@
+//! The factor of a gain as each machine multiplies by it: the same bits on both.
+//!
+//! Both are `mantissa·power/2^32`, where the power is one of two up to 2^30. The product with the
+//! mantissa keeps its top half, so that what is left after the power ends in as many zeros.
+
+#[cfg(target_pointer_width = "64")]
+pub(super) use Long as Factor;
+#[cfg(not(target_pointer_width = "64"))]
+pub(super) use Short as Factor;
+
+/// For registers of 32 bits: an SMMUL and an SMULL on a Cortex-M4.
+#[cfg(any(test, not(target_pointer_width = "64")))]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Short {
+    mantissa: i32,
+    power: i32,
+}
+
+#[cfg(any(test, not(target_pointer_width = "64")))]
+impl Short {
+    pub(super) const fn new(mantissa: i32, power: i32) -> Self {
+        Self { mantissa, power }
+    }
+
+    /// The product, wrapped.
+    #[inline(always)]
+    pub(super) fn wrapping(self, x: i32) -> i32 {
+        self.top(x).wrapping_mul(self.power)
+    }
+
+    /// The product, held at the ends of the type.
+    #[inline(always)]
+    pub(super) fn saturating(self, x: i32) -> i32 {
+        let top = self.top(x);
+        top.checked_mul(self.power)
+            .unwrap_or_else(|| end(top.is_negative(), -self.power))
+    }
+
+    #[inline(always)]
+    fn top(self, x: i32) -> i32 {
+        ((i64::from(self.mantissa) * i64::from(x)) >> 32) as i32
+    }
+}
+
+/// For registers of 64 bits: one product, and a bit mask for what the other form leaves out.
+#[cfg(target_pointer_width = "64")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Long {
+    whole: i64,
+    mask: i32,
+}
+
+#[cfg(target_pointer_width = "64")]
+impl Long {
+    pub(super) const fn new(mantissa: i32, power: i32) -> Self {
+        Self {
+            whole: mantissa as i64 * power as i64,
+            mask: -power,
+        }
+    }
+
+    /// The product, wrapped.
+    #[inline(always)]
+    pub(super) fn wrapping(self, x: i32) -> i32 {
+        self.left(self.whole.wrapping_mul(i64::from(x)))
+    }
+
+    /// The product, held at the ends of the type: it leaves 64 bits where the other form leaves 32.
+    #[inline(always)]
+    pub(super) fn saturating(self, x: i32) -> i32 {
+        match self.whole.checked_mul(i64::from(x)) {
+            Some(product) => self.left(product),
+            None => end(x.is_negative() != self.whole.is_negative(), self.mask),
+        }
+    }
+
+    #[inline(always)]
+    fn left(self, product: i64) -> i32 {
+        (product >> 32) as i32 & self.mask
+    }
+}
+
+/// The last product on a side of zero.
+#[inline(always)]
+fn end(negative: bool, mask: i32) -> i32 {
+    if negative { i32::MIN } else { i32::MAX & mask }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn both_forms_make_the_same_bits(
+            x: i32,
+            mantissa: i32,
+            power_log2 in 0..31,
+            smaller in 0..31,
+        ) {
+            let (mantissa, power) = (mantissa >> smaller, 1 << power_log2);
+            let (short, long) = (Short::new(mantissa, power), Long::new(mantissa, power));
+            prop_assert_eq!(short.wrapping(x), long.wrapping(x));
+            prop_assert_eq!(short.saturating(x), long.saturating(x));
+        }
+    }
+
+    #[test]
+    fn both_forms_end_at_the_same_place() {
+        for (mantissa, power) in [(i32::MAX, 1 << 30), (1 << 30, 4), (-(1 << 30), 4)] {
+            let (short, long) = (Short::new(mantissa, power), Long::new(mantissa, power));
+            for x in [i32::MIN, -(1 << 30) - 1, -1, 0, 1, (1 << 30) - 1, i32::MAX] {
+                assert_eq!(
+                    short.saturating(x),
+                    long.saturating(x),
+                    "{mantissa}·{power}·{x}"
+                );
+            }
+        }
+    }
+}
