@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::endpoint::Endpoint;
 
-/// Parameters and live telemetry of a Siskin ESC over MAVLink.
+/// Parameters and live telemetry of a Siskin ESC over MAVLink, and the limits of a motor.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -40,6 +40,14 @@ pub(crate) enum Command {
     Params(ParamsCommand),
     /// Show speed, voltage, current and faults as they come.
     Monitor(MonitorArgs),
+    /// Compute between which speeds the flux crossings (CTL_OBSERVER 1) hold the rotor's angle, and
+    /// what limits them.
+    ///
+    /// The worst case of Colton 2014, Table 1, from the ESC's parameters; what is given here takes
+    /// their place. N and A_e from the parameters count from the speeds that the drive begins them
+    /// at; given here they count at every speed, as in the paper. The drive takes off what it knows
+    /// of lead and delay, so that it stays below.
+    Budget(BudgetArgs),
 }
 
 /// What to do with parameters.
@@ -93,4 +101,84 @@ pub(crate) struct MonitorArgs {
     /// End after N samples.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) count: Option<u64>,
+}
+
+/// What a budget is made of.
+#[derive(Debug, Args)]
+pub(crate) struct BudgetArgs {
+    /// Parameters as 'siskin params save' writes them; without, those from the factory. Of a file of
+    /// several components --component chooses one.
+    pub(crate) file: Option<PathBuf>,
+    /// A parameter in place of the file's, for example CTL_FLUX_FORM=0.
+    #[arg(long = "param", value_name = "NAME=VALUE")]
+    pub(crate) params: Vec<String>,
+    /// Greatest error of the angle, electrical degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 20.0, value_parser = positive)]
+    pub(crate) error: f64,
+    /// Poles of the motor, twice MOT_POLE_PAIRS.
+    #[arg(long, value_name = "N", conflicts_with = "pole_pairs", value_parser = even)]
+    pub(crate) poles: Option<u32>,
+    /// Pole pairs of the motor, for MOT_POLE_PAIRS.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) pole_pairs: Option<u32>,
+    /// Greatest acceleration, rpm/s, for CTL_SLEW_RPM_S.
+    #[arg(long, value_name = "RPM_S", value_parser = not_negative)]
+    pub(crate) acceleration: Option<f64>,
+    /// Greatest deceleration, rpm/s; without, the acceleration.
+    #[arg(long, value_name = "RPM_S", value_parser = not_negative)]
+    pub(crate) braking: Option<f64>,
+    /// PWM frequency, which is the sampling's, Hz, for PWM_FREQ_HZ.
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    pub(crate) pwm: Option<f64>,
+    /// N, electrical turns over which the speed is measured once, as in the paper; without,
+    /// CTL_POS_N turns at every crossing, as the drive does.
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub(crate) turns: Option<f64>,
+    /// A_e, share of the extrapolated angle that a crossing leaves, for CTL_AE.
+    #[arg(long, value_name = "A_E", value_parser = share)]
+    pub(crate) a_e: Option<f64>,
+    /// Time constant of the flux integrator, s, or inf; without, what CTL_RPM_MIN and STA_RUN_RPM
+    /// make it. It alone, where --tau-hpfs is not given.
+    #[arg(long, value_name = "S", value_parser = time_constant)]
+    pub(crate) tau_int: Option<f64>,
+    /// Time constant of the second-order form's high-pass, s.
+    #[arg(long, value_name = "S", value_parser = time_constant)]
+    pub(crate) tau_hpfs: Option<f64>,
+    /// Hold-off after a crossing, us; without, the drive's 5 % of the time between two.
+    #[arg(long, value_name = "US", value_parser = not_negative)]
+    pub(crate) hold_off: Option<f64>,
+    /// One JSON object.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+fn number(text: &str, fits: impl Fn(f64) -> bool, wanted: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| fits(*number));
+    number.ok_or_else(|| format!("give {wanted}"))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text, |x| x > 0.0 && x.is_finite(), "a number above 0")
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text, |x| x >= 0.0 && x.is_finite(), "a number from 0")
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(
+        text,
+        |x| (0.0..1.0).contains(&x),
+        "a number from 0 to below 1",
+    )
+}
+
+fn time_constant(text: &str) -> Result<f64, String> {
+    number(text, |x| x > 0.0, "seconds above 0, or inf")
+}
+
+fn even(text: &str) -> Result<u32, String> {
+    let poles = text.parse::<u32>().ok();
+    let poles = poles.filter(|poles| *poles >= 2 && poles % 2 == 0);
+    poles.ok_or_else(|| "give an even number from 2".to_owned())
 }

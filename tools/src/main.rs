@@ -1,10 +1,12 @@
-//! The command line of the Siskin ESC: parameters and live telemetry over MAVLink.
+//! The command line of the Siskin ESC: parameters and live telemetry over MAVLink, and the limits of
+//! a motor.
 //!
 //! Results go to standard output. Complaints go to standard error, one line each. The exit status
 //! is 0 when everything was done, 1 when the ESC refused something or did not answer, and 2 for
 //! bad input or no connection.
 #![forbid(unsafe_code)]
 
+mod budget;
 mod cli;
 mod endpoint;
 mod error;
@@ -62,6 +64,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
             let task = Task::check(command, &mut complaints)?;
             task.run(&mut find()?, &mut out, &mut complaints)
         }
+        Command::Budget(args) => budget::run(args, cli.component, &mut out),
         Command::Monitor(args) => monitor::run(&mut find()?, args, &mut out, &mut complaints),
     }
 }
