@@ -5,14 +5,14 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use siskin_control::params::{ParamId, Preset};
+use siskin_emulator::bench::library;
 use siskin_emulator::link::Endpoint;
 use siskin_emulator::live::Pace;
 use siskin_emulator::parameter;
-use siskin_emulator::plant::{Fidelity, Supply};
+use siskin_emulator::plant::Fidelity;
+use siskin_emulator::rig::Bench;
+use siskin_emulator::scenario::{self, ScenarioError, Standing};
 use siskin_emulator::wire::SignalAddress;
-
-/// The motor that the parameters' defaults describe.
-pub(crate) const DEFAULT_MOTOR: &str = "antigravity-4006-kv380";
 
 /// A brushless ESC on your desk: the firmware's own control code turns a simulated motor.
 #[derive(Debug, Parser)]
@@ -36,6 +36,8 @@ pub(crate) enum Command {
     Scenario(ScenarioArgs),
     /// Measures the figures of a paper
     Reproduce(ReproduceArgs),
+    /// Measures how fast the emulator is on this machine
+    Bench(BenchArgs),
     /// Draws a recording
     Plot(PlotArgs),
 }
@@ -49,19 +51,17 @@ pub(crate) struct RunArgs {
     /// Where the throttle wire listens
     #[arg(long, value_name = "udp:H:P", default_value = "udp:127.0.0.1:14600")]
     pub(crate) signal: SignalAddress,
-    /// A built-in motor or a TOML file
-    #[arg(
-        long,
-        value_name = "NAME|FILE",
-        default_value = DEFAULT_MOTOR
-    )]
-    pub(crate) motor: String,
-    /// A built-in load or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "cfprop-13x4.4")]
-    pub(crate) load: String,
-    /// Supply: volts, or a battery as 4s or 6s
-    #[arg(long, value_name = "VOLTS|Ns", default_value = "24", value_parser = bus)]
-    pub(crate) bus: Supply,
+    #[arg(long, value_name = "NAME|FILE", help = bench_help())]
+    pub(crate) bench: Option<String>,
+    /// A built-in motor or a TOML file [default: the bench's]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) motor: Option<String>,
+    /// A built-in load or a TOML file [default: the bench's]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) load: Option<String>,
+    /// Supply: volts, a battery as 4s or 6s, or a TOML file [default: the bench's]
+    #[arg(long, value_name = "VOLTS|Ns|FILE", allow_hyphen_values = true)]
+    pub(crate) bus: Option<String>,
     /// How the inverter is simulated
     #[arg(long, value_enum, default_value_t = Fidelity::Averaged)]
     pub(crate) plant: Fidelity,
@@ -108,7 +108,7 @@ pub(crate) struct CommonArgs {
     /// Sets a parameter before the start, over what is stored or in the file, without storing it; repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = parameter::assignment)]
     pub(crate) param: Vec<(ParamId, f32)>,
-    /// Writes each control period to a .csv file
+    /// Records to a file: each control period to .csv or .parquet, the wires to .vcd, MAVLink to .tlog
     #[arg(long, value_name = "PATH")]
     pub(crate) record: Option<PathBuf>,
     /// Prints the summary as one JSON object at the end
@@ -130,6 +130,31 @@ impl ScenarioArgs {
     }
 }
 
+impl RunArgs {
+    /// What stands on the bench.
+    pub(crate) fn standing(&self) -> Result<Standing, ScenarioError> {
+        let given = [
+            ("motor", &self.motor),
+            ("load", &self.load),
+            ("bus", &self.bus),
+        ];
+        let given = given.into_iter().filter_map(|(key, text)| {
+            let text = text.clone()?;
+            Some((key.to_owned(), toml::Value::String(text)))
+        });
+        let base = self.bench.as_deref().unwrap_or(library::DEFAULT);
+        let standing = scenario::stand(base, given.collect())?;
+        Ok(Standing {
+            bench: Bench {
+                plant: self.plant,
+                seed: self.seed,
+                ..standing.bench
+            },
+            ..standing
+        })
+    }
+}
+
 impl CommonArgs {
     /// The preset's parameters, and those given one by one over them.
     pub(crate) fn params(&self) -> Vec<(ParamId, f32)> {
@@ -143,6 +168,9 @@ pub(crate) struct ReproduceArgs {
     /// The paper
     #[arg(value_enum)]
     pub(crate) paper: Paper,
+    /// Draws the paper's figures into this folder, each as SVG and PNG
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
     /// Prints the figures as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
@@ -150,8 +178,17 @@ pub(crate) struct ReproduceArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Paper {
+    /// Adaptive observer: A. Bosso et al., 2021
+    Bosso,
     /// Flux crossings: S. Colton, 2014
     Colton,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct BenchArgs {
+    /// Prints the figures as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Args, Debug)]
@@ -163,8 +200,14 @@ pub(crate) struct PlotArgs {
     pub(crate) output: PathBuf,
 }
 
-fn bus(text: &str) -> Result<Supply, String> {
-    siskin_emulator::bench::supply(text).map_err(|error| error.to_string())
+fn bench_help() -> String {
+    let names: Vec<_> = library::names().collect();
+    format!(
+        "A built-in bench ({}) or a TOML file: motor, load, supply and the parameters that the ESC \
+         needs for them, set before the start as --param does [default: {}, without setting any]",
+        names.join(", "),
+        library::DEFAULT
+    )
 }
 
 fn pace(text: &str) -> Result<Pace, String> {

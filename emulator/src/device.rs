@@ -11,6 +11,7 @@ use siskin_control::params::{Board, BuildError, ParamId, Params};
 use siskin_control::store::{self, Integrity, LoadReport};
 use thiserror::Error;
 
+use crate::fault::{CHIP_V, Fault, Timeline};
 use crate::flash::{FLASH_BYTES, FileFlash};
 use crate::link::LinkId;
 use crate::rig::{Bench, Period, Rig};
@@ -61,6 +62,8 @@ pub struct Start {
     pub flash: FileFlash,
     /// Parameters that are set over the stored ones and not stored themselves.
     pub overrides: Vec<(ParamId, f32)>,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
     /// What the slowest MAVLink link carries.
     pub link_bytes_per_s: u32,
 }
@@ -79,6 +82,30 @@ pub struct Device {
     rejected_frames: u64,
     clock: Clock,
     task_due_ns: u64,
+    faults: Timeline,
+}
+
+/// Who looks on as a device runs. A closure sees the periods.
+pub trait Onlooker {
+    /// A control period that began at `t_s`.
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig);
+
+    /// The throttle wire's level changed at `time_ns`, before the next period and after all that
+    /// came before.
+    fn edge(&mut self, time_ns: u64, level: bool) {
+        let _ = (time_ns, level);
+    }
+
+    /// A whole MAVLink frame was sent, or was received and understood.
+    fn frame(&mut self, time_ns: u64, frame: &[u8]) {
+        let _ = (time_ns, frame);
+    }
+}
+
+impl<F: FnMut(f64, &Period, &Rig)> Onlooker for F {
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        self(t_s, period, rig);
+    }
 }
 
 /// A parameter from the command line, which is not stored.
@@ -109,9 +136,10 @@ impl Device {
     pub fn start(start: Start) -> Result<(Self, Option<&'static str>), StartError> {
         let Start {
             bench,
-            wire,
+            mut wire,
             mut flash,
             overrides,
+            faults,
             link_bytes_per_s,
         } = start;
         let (mut params, report) = block_on(store::load(&mut flash, STORE));
@@ -131,6 +159,7 @@ impl Device {
         apply(&overrides, &mut params);
         let board = bench.sensing.board(bench.delay);
         let esc = Esc::new(params, board, CAPTURE_HZ, link_bytes_per_s)?;
+        wire.sow(bench.seed);
         let rig = Rig::new(bench, esc.config().clone());
         let clock = Clock {
             origin_ns: 0.0,
@@ -149,6 +178,7 @@ impl Device {
             rejected_frames: 0,
             clock,
             task_due_ns: 0,
+            faults: Timeline::new(faults),
         };
         Ok((device, warning))
     }
@@ -181,11 +211,18 @@ impl Device {
         &mut self.wire
     }
 
-    /// Bytes that came in on a MAVLink stream.
-    pub fn receive(&mut self, stream: LinkId, bytes: &[u8]) {
-        let now_us = self.now_ns() / 1000;
+    /// Bytes that came in on a MAVLink stream; a chip in reset hears none.
+    pub fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
+        if self.rig.is_held() {
+            return;
+        }
+        let now_ns = self.now_ns();
+        let now_us = now_ns / 1000;
         let (receiver, esc) = (self.receivers.entry(stream).or_default(), &mut self.esc);
-        receiver.push(now_us, bytes, |frame| esc.receive(now_us, frame));
+        receiver.push(now_us, bytes, |frame| {
+            onlooker.frame(now_ns, frame.raw);
+            esc.receive(now_us, frame);
+        });
     }
 
     /// A MAVLink stream that has ended.
@@ -206,35 +243,64 @@ impl Device {
         }
     }
 
-    /// Runs control periods until `until_ns`. `imposed` replaces what the wire asks for; `each`
-    /// sees every period with its start, s; `send` gets every MAVLink frame.
+    /// Runs control periods until `until_ns`. `imposed` replaces what the wire asks for; `send`
+    /// gets every MAVLink frame.
     pub fn advance(
         &mut self,
         until_ns: u64,
         imposed: impl Fn(f64, &Rig) -> Option<Setpoint>,
-        mut each: impl FnMut(f64, &Period, &Rig),
+        onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) {
         while self.is_before(until_ns) {
             let now_ns = self.now_ns();
+            let t_s = now_ns as f64 * 1e-9;
+            if t_s >= self.faults.due_s {
+                self.disturb(t_s);
+            }
             while let Some((edge_ns, level)) = self.wire.next_edge(now_ns) {
-                let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
-                self.esc.edge(edge_ns / 1000, ticks as u32, level);
+                if !self.rig.is_held() {
+                    let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
+                    self.esc.edge(edge_ns / 1000, ticks as u32, level);
+                }
+                onlooker.edge(edge_ns, level);
             }
             if now_ns >= self.task_due_ns {
                 self.task_due_ns = now_ns - now_ns % TASK_NS + TASK_NS;
-                self.tasks(now_ns, send);
+                if !self.rig.is_held() {
+                    self.tasks(now_ns, &mut |frame| {
+                        onlooker.frame(now_ns, frame);
+                        send(frame);
+                    });
+                }
             }
-            let t_s = now_ns as f64 * 1e-9;
             // Past the wire or not, a task that has found a fault is heard.
             let setpoint = match (self.esc.setpoint(), imposed(t_s, &self.rig)) {
                 (fault @ Setpoint::Fault(_), _) => fault,
                 (setpoint, imposed) => imposed.unwrap_or(setpoint),
             };
             let period = self.rig.period(setpoint);
-            each(t_s, &period, &self.rig);
+            onlooker.period(t_s, &period, &self.rig);
             self.clock.periods += 1;
         }
+    }
+
+    /// Lets the faults of this time act.
+    #[cold]
+    fn disturb(&mut self, t_s: f64) {
+        let before = self.faults.look(t_s);
+        let now = self.faults.now;
+        self.rig.disturb(&before, &now);
+        self.wire.disturb(now.wire);
+        self.flash.fail(now.flash_fails);
+        // A bus that a fault has drained is watched until it is up again.
+        let starved = now.bus_weakened && self.rig.bus_v() < CHIP_V;
+        let held = now.held || starved;
+        if held != self.rig.is_held() || now.resets > before.resets {
+            // Into reset and out of it: nothing of what was known is left.
+            self.reboot();
+        }
+        self.rig.hold(held);
     }
 
     fn tasks(&mut self, now_ns: u64, send: &mut dyn FnMut(&[u8])) {
@@ -244,7 +310,7 @@ impl Device {
             receiver.push(now_us, &[], |frame| self.esc.receive(now_us, frame));
         }
         let snapshot = self.rig.snapshot();
-        let temperature_c = self.rig.temperature_c() as f32;
+        let temperature_c = self.rig.temperature_c();
         self.esc.poll(now_us, &snapshot, temperature_c, send);
         while let Some(request) = self.esc.take_request() {
             match request {
@@ -358,3 +424,6 @@ fn apply(overrides: &[Override], params: &mut Params) {
         let _ = params.set(given.id, given.value);
     }
 }
+
+#[cfg(test)]
+mod tests;

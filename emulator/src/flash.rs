@@ -30,6 +30,7 @@ const ERASED: u8 = 0xFF;
 pub struct FileFlash {
     content: Box<[u8; FLASH_BYTES]>,
     file: Option<File>,
+    fails: bool,
 }
 
 /// Why the file cannot serve as flash: one line, with what to do.
@@ -82,6 +83,9 @@ pub enum FlashError {
     /// A word that is to be written is not erased (PROGERR of the chip).
     #[error("the word at {0:#06x} is not erased")]
     NotErased(u32),
+    /// The flash is worn out or protected (PGSERR, WRPERR of the chip).
+    #[error("the flash refuses to change")]
+    Refused,
     /// The file cannot be written.
     #[error("the storage file cannot be written ({0})")]
     Io(#[from] io::Error),
@@ -93,7 +97,13 @@ impl FileFlash {
         Self {
             content: Box::new([ERASED; FLASH_BYTES]),
             file: None,
+            fails: false,
         }
+    }
+
+    /// Lets every write and erase fail from now on, or no more.
+    pub fn fail(&mut self, fails: bool) {
+        self.fails = fails;
     }
 
     /// Flash in the file at `path`, which is made, erased, with its folders if there is none.
@@ -128,6 +138,7 @@ impl FileFlash {
         Ok(Self {
             content,
             file: Some(file),
+            fails: false,
         })
     }
 
@@ -145,7 +156,10 @@ impl FileFlash {
     }
 
     /// Puts `bytes` into the file, then into memory: if the file refuses, nothing has changed.
-    fn store(&mut self, offset: usize, bytes: &[u8]) -> io::Result<()> {
+    fn store(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
+        if self.fails {
+            return Err(FlashError::Refused);
+        }
         if let Some(file) = &mut self.file {
             file.seek(SeekFrom::Start(offset as u64))?;
             file.write_all(bytes)?;
@@ -208,7 +222,7 @@ impl NorFlashError for FlashError {
         match self {
             Self::NotAligned => NorFlashErrorKind::NotAligned,
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
-            Self::NotErased(_) | Self::Io(_) => NorFlashErrorKind::Other,
+            Self::NotErased(_) | Self::Refused | Self::Io(_) => NorFlashErrorKind::Other,
         }
     }
 }
@@ -237,7 +251,7 @@ impl NorFlash for FileFlash {
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         let range = range(from, to as usize, PAGE_BYTES)?;
-        Ok(self.store(range.start, &[ERASED; FLASH_BYTES][..range.len()])?)
+        self.store(range.start, &[ERASED; FLASH_BYTES][..range.len()])
     }
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
@@ -249,7 +263,7 @@ impl NorFlash for FileFlash {
             let word = (range.start + used) / WORD_BYTES * WORD_BYTES;
             return Err(FlashError::NotErased(word as u32));
         }
-        Ok(self.store(range.start, bytes)?)
+        self.store(range.start, bytes)
     }
 }
 

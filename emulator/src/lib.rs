@@ -4,14 +4,18 @@
 //! tasks' side of the ESC, the throttle [`wire`] and the [`flash`] around it. [`live`] runs that in
 //! real time on the MAVLink [`link`]s, and [`scenario`] runs it offline from a file. [`watch`] looks on
 //! for the [`summary`] and for the [`record`], in the [`shaft`]'s own direction, and [`plot`] draws.
-//! [`reproduce`] measures the papers' own figures.
+//! A [`fault`] breaks something of all this at a given time. [`reproduce`] measures the papers' own
+//! figures, [`measure`] how fast all this is against a [`yardstick`].
 #![forbid(unsafe_code)]
 
 pub mod bench;
 pub mod device;
+pub mod fault;
 pub mod flash;
+pub mod interrupt;
 pub mod link;
 pub mod live;
+pub mod measure;
 pub mod parameter;
 pub mod plant;
 pub mod plot;
@@ -23,3 +27,4 @@ pub mod shaft;
 pub mod summary;
 pub mod watch;
 pub mod wire;
+pub mod yardstick;

@@ -4,8 +4,7 @@
 //! the present and sends. An answer leaves within two milliseconds.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use siskin_control::params::ParamId;
@@ -13,7 +12,9 @@ use thiserror::Error;
 
 use crate::device::{Device, Start, StartError};
 use crate::flash::FileFlash;
+use crate::interrupt;
 use crate::link::{Endpoint, Event, LinkError, Links};
+use crate::record::Recorder;
 use crate::rig::Bench;
 use crate::summary::Report;
 use crate::watch::{Watch, WatchError};
@@ -89,19 +90,21 @@ pub struct Opened {
 
 /// Runs a session until its duration or an interrupt, and tells `opened` once all is open.
 pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Report, LiveError> {
-    let stop = interrupts().map_err(LiveError::Interrupt)?;
+    let stop = interrupt::flag().map_err(LiveError::Interrupt)?;
     let mut links = Links::open(&session.mavlink)?;
     let wire = Wire::open(&session.signal, 0)?;
     let signal = wire.local_address();
     let end_s = session.duration.map(|duration| duration.as_secs_f64());
     let window = ("all".to_owned(), 0.0, end_s.unwrap_or(f64::MAX));
-    let mut watch = Watch::new([window], session.record.as_deref())?;
+    let recorder = session.record.as_deref().map(Recorder::live).transpose();
+    let mut watch = Watch::new([window], recorder.map_err(WatchError::Record)?);
     let link_bytes_per_s = links.slowest_bytes_per_s();
     let (mut device, warning) = Device::start(Start {
         bench: session.bench,
         wire,
         flash: session.flash,
         overrides: session.params,
+        faults: Vec::new(),
         link_bytes_per_s,
     })?;
     let about = Opened {
@@ -116,7 +119,7 @@ pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Re
     while !stop.load(Ordering::Relaxed) && device.is_before(end_ns) && !watch.failed() {
         let now = pacer.began.elapsed();
         links.receive(now, |stream, event| match event {
-            Event::Bytes(bytes) => device.receive(stream, bytes),
+            Event::Bytes(bytes) => device.receive(stream, bytes, &mut watch),
             Event::Ended => device.forget(stream),
         });
         let now_ns = device.now_ns();
@@ -124,7 +127,7 @@ pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Re
         device.advance(
             pacer.until_ns(now_ns).min(end_ns),
             |_, _| None,
-            |t_s, period, rig| watch.period(t_s, period, rig),
+            &mut watch,
             &mut |frame| {
                 // A peer without room loses the frame, as on any datagram link.
                 links.send(frame);
@@ -137,17 +140,6 @@ pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Re
         rejected: Some(device.rejected()),
         ..watch.finish(sim_s, pacer.began.elapsed().as_secs_f64())?
     })
-}
-
-/// A flag that an interrupt or a request to end raises.
-fn interrupts() -> std::io::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // A second one ends the program at once.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&stop))?;
-        signal_hook::flag::register(signal, Arc::clone(&stop))?;
-    }
-    Ok(stop)
 }
 
 /// Keeps simulated time in step with the wall's.

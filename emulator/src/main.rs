@@ -10,16 +10,19 @@ use std::time::Duration;
 
 use clap::Parser;
 use indicatif::ProgressBar;
-use siskin_emulator::bench::Choice;
 use siskin_emulator::flash::FileFlash;
+use siskin_emulator::interrupt;
 use siskin_emulator::link::Endpoint;
 use siskin_emulator::live::{self, Session};
+use siskin_emulator::measure;
 use siskin_emulator::plot;
 use siskin_emulator::reproduce;
-use siskin_emulator::rig::Bench;
 use siskin_emulator::scenario::{self, Plan};
 
-use cli::{Cli, Command, Paper, PlotArgs, ReproduceArgs, RunArgs, ScenarioArgs};
+use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs, RunArgs, ScenarioArgs};
+
+/// The status of what an interrupt has ended, as a shell has it.
+const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -31,11 +34,11 @@ fn main() -> ExitCode {
         Some(Command::Run(args)) => run(args),
         Some(Command::Scenario(args)) => scenario(&args),
         Some(Command::Reproduce(args)) => reproduce(&args),
+        Some(Command::Bench(args)) => bench(&args),
         Some(Command::Plot(args)) => plot(&args),
     };
     match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+        Ok(status) => status,
         Err(line) => {
             eprintln!("siskin-emulator: {line}");
             ExitCode::from(2)
@@ -50,36 +53,27 @@ fn usage(error: &clap::Error) -> ExitCode {
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
-    let text = error.render().to_string();
-    let what = text.lines().next().unwrap_or_default();
-    let what = what.trim_start_matches("error: ");
+    let what = one_line(&error.to_string());
     eprintln!("siskin-emulator: {what}; --help lists what there is");
     ExitCode::from(2)
 }
 
-fn run(args: RunArgs) -> Result<bool, String> {
+/// The argument parser's complaint and its hint on one line, without the usage that follows.
+fn one_line(message: &str) -> String {
+    let lines = message.lines().map(str::trim);
+    let said = lines.take_while(|line| !line.starts_with("Usage:"));
+    let said = said.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
+    let words = said.collect::<Vec<_>>().join(" ");
+    words.trim_start_matches("error: ").to_owned()
+}
+
+fn run(args: RunArgs) -> Result<ExitCode, String> {
     let line = |error: &dyn std::error::Error| error.to_string();
-    let motor = Choice::Named(args.motor.clone()).motor();
-    let load = Choice::Named(args.load.clone()).load();
-    let (motor, load) = (
-        motor.map_err(|error| line(&error))?,
-        load.map_err(|error| line(&error))?,
-    );
-    if motor.inertia_kgm2 + load.inertia_kgm2 <= 0.0 {
-        return Err(format!(
-            "motor {} and load {}: neither has inertia; give one a J",
-            args.motor, args.load
-        ));
-    }
+    let standing = args.standing().map_err(|error| line(&error))?;
+    let mut params = standing.params.clone();
+    params.extend(args.common.params());
     let session = Session {
-        bench: Bench {
-            motor,
-            load,
-            supply: args.bus,
-            plant: args.plant,
-            seed: args.seed,
-            ..Bench::default()
-        },
+        bench: standing.bench.clone(),
         mavlink: if args.mavlink.is_empty() {
             Endpoint::defaults()
         } else {
@@ -89,7 +83,7 @@ fn run(args: RunArgs) -> Result<bool, String> {
         pace: args.speed,
         duration: args.duration.map(Duration::from_secs_f64),
         flash: storage(args.storage.as_deref())?,
-        params: args.common.params(),
+        params,
         record: args.common.record.clone(),
     };
     let report = live::run(session, |opened, device| {
@@ -98,7 +92,7 @@ fn run(args: RunArgs) -> Result<bool, String> {
         }
         if !args.common.json {
             // Where nobody reads it, the ESC runs all the same.
-            let _ = report::print(&report::greeting(&args, opened, device));
+            let _ = report::print(&report::greeting(&args, &standing, opened, device));
         }
     });
     let report = report.map_err(|error| line(&error))?;
@@ -107,7 +101,7 @@ fn run(args: RunArgs) -> Result<bool, String> {
     } else {
         report::figures(&report)
     })?;
-    Ok(true)
+    Ok(ExitCode::SUCCESS)
 }
 
 /// The flash behind `--storage`, by default in the user's state folder.
@@ -139,7 +133,7 @@ fn state_file() -> Option<PathBuf> {
     Some(folder?.join("siskin/esc.flash"))
 }
 
-fn scenario(args: &ScenarioArgs) -> Result<bool, String> {
+fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
     let options = scenario::Options {
         seeds: args.seeds.clone().or(args.seed.map(|seed| seed..=seed)),
         set: args.keys(),
@@ -150,7 +144,9 @@ fn scenario(args: &ScenarioArgs) -> Result<bool, String> {
     if args.seeds.is_some() || plan.runs() > 1 {
         // On standard error, and nothing where that is no terminal.
         let bar = ProgressBar::new(plan.runs() as u64);
-        let survey = plan.survey(|| bar.inc(1));
+        let stop = interrupt::flag();
+        let stop = stop.map_err(|error| format!("cannot listen for interrupts: {error}"))?;
+        let survey = plan.survey(&stop, || bar.inc(1));
         bar.finish_and_clear();
         let survey = survey.map_err(line)?;
         report::print(&if args.common.json {
@@ -158,7 +154,10 @@ fn scenario(args: &ScenarioArgs) -> Result<bool, String> {
         } else {
             report::survey(&survey)
         })?;
-        return Ok(survey.held());
+        return Ok(match survey.left_out {
+            0 => verdict(survey.held()),
+            _ => ExitCode::from(INTERRUPTED),
+        });
     }
     let outcome = plan.play().map_err(line)?;
     report::print(&if args.common.json {
@@ -166,22 +165,50 @@ fn scenario(args: &ScenarioArgs) -> Result<bool, String> {
     } else {
         report::figures(&outcome.report) + &report::verdicts(&outcome)
     })?;
-    Ok(outcome.held())
+    Ok(verdict(outcome.held()))
 }
 
-fn reproduce(args: &ReproduceArgs) -> Result<bool, String> {
+/// The status of a scenario whose expectations held, or did not.
+fn verdict(held: bool) -> ExitCode {
+    if held {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(1)
+    }
+}
+
+fn reproduce(args: &ReproduceArgs) -> Result<ExitCode, String> {
+    let line = |error: plot::PlotError| error.to_string();
+    if let Some(folder) = &args.output {
+        // It takes long enough not to find out at its end.
+        plot::chart::prepare(folder).map_err(line)?;
+    }
     let reproduction = match args.paper {
+        Paper::Bosso => reproduce::bosso(),
         Paper::Colton => reproduce::colton(),
     };
+    if let Some(folder) = &args.output {
+        plot::chart::draw(&reproduction.figures, folder).map_err(line)?;
+    }
     report::print(&if args.json {
         report::json(&reproduction)?
     } else {
         reproduction.to_string()
     })?;
-    Ok(true)
+    Ok(ExitCode::SUCCESS)
 }
 
-fn plot(args: &PlotArgs) -> Result<bool, String> {
+fn bench(args: &BenchArgs) -> Result<ExitCode, String> {
+    let figures = measure::measure().map_err(|error| error.reason.to_owned())?;
+    report::print(&if args.json {
+        report::json(&figures)?
+    } else {
+        figures.to_string()
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plot(args: &PlotArgs) -> Result<ExitCode, String> {
     plot::plot(&args.record, &args.output).map_err(|error| error.to_string())?;
-    Ok(true)
+    Ok(ExitCode::SUCCESS)
 }

@@ -5,12 +5,13 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 
 use siskin_control::params::ParamId;
+use siskin_emulator::bench::DEFAULT_MOTOR;
 use siskin_emulator::device::Device;
 use siskin_emulator::live::Opened;
-use siskin_emulator::scenario::{Outcome, Survey, Verdict};
+use siskin_emulator::scenario::{Outcome, Standing, Survey, Verdict};
 use siskin_emulator::summary::Report;
 
-use crate::cli::{DEFAULT_MOTOR, RunArgs};
+use crate::cli::RunArgs;
 
 /// Writes text to standard output. A reader that has gone is no error: it has what it wanted.
 pub(crate) fn print(text: &str) -> Result<(), String> {
@@ -30,16 +31,22 @@ pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, String> {
 }
 
 /// The first screen: what is simulated, where it is reached, what to type next.
-pub(crate) fn greeting(args: &RunArgs, opened: &Opened, device: &Device) -> String {
+pub(crate) fn greeting(
+    args: &RunArgs,
+    standing: &Standing,
+    opened: &Opened,
+    device: &Device,
+) -> String {
+    let [motor, load] = &standing.names;
     let param = |id| device.esc().params().get(id);
     let mut lines = vec![
         format!("Siskin ESC {}, emulated", env!("CARGO_PKG_VERSION")),
         String::new(),
-        format!("  motor     {}", args.motor),
-        format!("  load      {}", args.load),
+        format!("  motor     {motor}"),
+        format!("  load      {load}"),
         format!(
             "  supply    {:.1} V, PWM and control at {:.0} Hz, seed {}",
-            args.bus.open_v,
+            standing.bench.supply.open_v(0.0),
             param(ParamId::PwmFreqHz),
             args.seed
         ),
@@ -53,7 +60,11 @@ pub(crate) fn greeting(args: &RunArgs, opened: &Opened, device: &Device) -> Stri
     if let Some(address) = opened.signal {
         lines.push(format!("  throttle  udp:{address}, a datagram a frame"));
     }
-    if args.motor != DEFAULT_MOTOR {
+    if args
+        .motor
+        .as_ref()
+        .is_some_and(|name| name != DEFAULT_MOTOR)
+    {
         lines.push("  The ESC's MOT_ parameters are not set by --motor: use --param.".to_owned());
     }
     lines.push(String::new());
@@ -129,6 +140,12 @@ pub(crate) fn survey(survey: &Survey) -> String {
          time), {} control periods, traces {}\n",
         survey.runs, survey.failed, survey.sim_s, survey.wall_s, survey.steps, survey.trace_hash
     );
+    if survey.left_out > 0 {
+        line(
+            &mut text,
+            format_args!("interrupted: {} runs left out", survey.left_out),
+        );
+    }
     for (fault, runs) in &survey.faults {
         line(&mut text, format_args!("fault in {runs}: {fault}"));
     }

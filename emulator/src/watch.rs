@@ -1,12 +1,10 @@
 //! Looks on at a run: figures of it, and a recording where one is wanted.
 
-use std::path::Path;
-
 use thiserror::Error;
 
+use crate::device::Onlooker;
 use crate::record::{RecordError, Recorder};
 use crate::rig::{Period, Rig};
-use crate::shaft::Units;
 use crate::summary::{Report, Summary};
 
 /// Why a run cannot go on; one line.
@@ -30,29 +28,15 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Takes figures in these windows (name, start and end, s), and records into `record`.
+    /// Takes figures in these windows (name, start and end, s), and records what it sees.
     pub fn new(
         windows: impl IntoIterator<Item = (String, f64, f64)>,
-        record: Option<&Path>,
-    ) -> Result<Self, WatchError> {
-        Ok(Self {
+        recorder: Option<Recorder>,
+    ) -> Self {
+        Self {
             summary: Summary::new(windows),
-            recorder: record.map(Recorder::create).transpose()?,
+            recorder,
             failed: None,
-        })
-    }
-
-    /// Takes in a period that began at `t_s`.
-    pub fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
-        self.summary.add(t_s, period, rig);
-        if period.diverged() {
-            self.failed = Some(WatchError::Diverged);
-        }
-        if let Some(recorder) = &mut self.recorder
-            && self.failed.is_none()
-        {
-            let written = recorder.write(t_s, period, &rig.snapshot(), Units::of(rig.config()));
-            self.failed = written.err().map(WatchError::Record);
         }
     }
 
@@ -70,5 +54,33 @@ impl Watch {
             recorder.finish()?;
         }
         Ok(self.summary.report(sim_s, wall_s))
+    }
+}
+
+impl Watch {
+    fn record(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
+        if let Some(recorder) = &mut self.recorder
+            && self.failed.is_none()
+        {
+            self.failed = write(recorder).err().map(WatchError::Record);
+        }
+    }
+}
+
+impl Onlooker for Watch {
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        self.summary.add(t_s, period, rig);
+        if period.diverged() {
+            self.failed = Some(WatchError::Diverged);
+        }
+        self.record(|recorder| recorder.period(t_s, period, rig));
+    }
+
+    fn edge(&mut self, time_ns: u64, level: bool) {
+        self.record(|recorder| recorder.edge(time_ns, level));
+    }
+
+    fn frame(&mut self, time_ns: u64, frame: &[u8]) {
+        self.record(|recorder| recorder.frame(time_ns, frame));
     }
 }

@@ -14,6 +14,7 @@ use std::str::FromStr;
 use thiserror::Error;
 
 use crate::link::{AddressError, HostPort};
+use crate::plant::Noise;
 use frame::Frame;
 
 /// What may wait to be played, ns; a datagram that would have to wait longer is dropped.
@@ -118,6 +119,17 @@ pub struct WireCounts {
     pub dropped: u64,
 }
 
+/// What is wrong with a wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WireErrors {
+    /// Nothing that is sent comes through.
+    pub lost: bool,
+    /// Probability of each bit of a DShot frame to be the other one.
+    pub bit_error_rate: f64,
+    /// By how much edges are displaced, ns rms; they stay in order.
+    pub jitter_ns: f64,
+}
+
 /// One ESC's throttle wire. Its line is low at the start.
 ///
 /// Time is the simulation's, in ns. Times given to it do not go back.
@@ -133,6 +145,8 @@ pub struct Wire {
     taken_ns: u64,
     /// The end of the last frame and the rest that it needs after it.
     last: Option<(u64, u64)>,
+    errors: WireErrors,
+    noise: Noise,
 }
 
 impl Wire {
@@ -147,7 +161,20 @@ impl Wire {
             level: false,
             taken_ns: 0,
             last: None,
+            errors: WireErrors::default(),
+            noise: Noise::new(0),
         }
+    }
+
+    /// What its errors are drawn from.
+    pub fn sow(&mut self, seed: u64) {
+        // Another sequence than the sensors' noise of the same seed.
+        self.noise = Noise::new(!seed);
+    }
+
+    /// What is wrong with it from now on.
+    pub fn disturb(&mut self, errors: WireErrors) {
+        self.errors = errors;
     }
 
     /// Opens the wire of ESC `index`: `address` with its port raised by `index`. Each gets a free
@@ -220,7 +247,13 @@ impl Wire {
     /// Plays one datagram from `now_ns` on, or after what still plays, and counts it.
     pub fn play(&mut self, now_ns: u64, datagram: &[u8]) -> Result<(), Rejected> {
         let frame = Frame::parse(datagram);
-        let result = frame.and_then(|frame| self.append(now_ns, &frame));
+        let result = frame.and_then(|frame| {
+            if self.errors.lost {
+                return Ok(());
+            }
+            let frame = self.flipped(frame);
+            self.append(now_ns, &frame)
+        });
         match result {
             Ok(()) => self.counts.played += 1,
             Err(Rejected::Backlog) => self.counts.dropped += 1,
@@ -240,6 +273,29 @@ impl Wire {
         } else {
             None
         }
+    }
+
+    /// A frame with the bit errors of the wire.
+    fn flipped<'a>(&mut self, mut frame: Frame<'a>) -> Frame<'a> {
+        let rate = self.errors.bit_error_rate;
+        if let Frame::DShot { bits, .. } = &mut frame
+            && rate > 0.0
+        {
+            for bit in 0..16 {
+                *bits ^= u16::from(self.noise.chance(rate)) << bit;
+            }
+        }
+        frame
+    }
+
+    /// When an edge comes that is sent at a time, ns: behind the one before.
+    fn displaced(&mut self, time_ns: u64) -> u64 {
+        let jitter_ns = self.errors.jitter_ns * self.noise.gaussian();
+        let earliest_ns = self.edges.back().map_or(0, |(last_ns, _)| last_ns + 1);
+        time_ns
+            .saturating_add_signed(libm::round(jitter_ns) as i64)
+            .max(earliest_ns)
+            .max(self.taken_ns)
     }
 
     fn append(&mut self, now_ns: u64, frame: &Frame<'_>) -> Result<(), Rejected> {
@@ -271,6 +327,15 @@ impl Wire {
             return;
         }
         self.level = level;
+        let time_ns = if self.errors.jitter_ns > 0.0 {
+            self.displaced(time_ns)
+        } else {
+            // An edge that waits may have been displaced beyond it.
+            match self.edges.back() {
+                Some((last_ns, _)) if *last_ns > time_ns => last_ns + 1,
+                _ => time_ns,
+            }
+        };
         // A level that was held for 0 ns was none.
         if self
             .edges

@@ -39,6 +39,7 @@ def short_run(*options: str) -> list:
         (["fly"], "fly"),
         (["--motor", "warp-drive"], "warp-drive"),
         (["--load", "anvil"], "anvil"),
+        (["--bench", "tricycle"], "tricycle"),
         (["--bus", "9s9"], "9s9"),
         (["--bus", "-3"], "-3"),
         (["--bus", "nan"], "nan"),
@@ -61,6 +62,10 @@ def short_run(*options: str) -> list:
         (["scenario", "x.toml", "--seeds", "1..2", "--seed", "1"], "--seed"),
         (["scenario", "x.toml", "--set", "bench.seed"], "bench.seed"),
         (["plot", "/nowhere.csv", "-o", "x.svg"], "/nowhere.csv"),
+        (["plot"], "<RECORD>"),
+        (["plot"], "--output <PICTURE.svg|.png>"),
+        (["reproduce"], "<PAPER>"),
+        (["reproduce", "colton", "-o", "/proc/nobody"], "/proc/nobody"),
     ],
 )
 def test_a_word_that_means_nothing_is_named(arguments, names):
@@ -117,33 +122,102 @@ def test_a_storage_that_is_all_noise_is_refused_and_left_alone(tmp_path, start, 
 @pytest.mark.parametrize(
     "text, names",
     [
-        ("[bench]\nmotor = 'warp-drive'", "warp-drive"),
-        ("[bench]\nflux_capacitor = 1", "flux_capacitor"),
-        ("[bench]\nduration_s = -1.0", "duration_s"),
-        ("[bench]\nduration_s = nan", "duration_s"),
-        ("[bench]\nbus = '99x'", "99x"),
-        ("[params]\nNO_SUCH_NAME = 1", "NO_SUCH_NAME"),
-        ("[params]\nLIM_PHASE_A = -1", "LIM_PHASE_A"),
-        ("[[signal]]\nat_s = 0.0\nthrottle = 1.5", "throttle"),
-        ("[[signal]]\nat_s = 0.0", "throttle"),
-        ("[[window]]\nname = 'w'\nt0_s = 1.0\nt1_s = 0.5", "w"),
-        ("[[expect]]\nwindow = 'none'\nkey = 'rpm_mean'\nbelow = 1", "none"),
-        ("[sweep]\n'bench.scale.Q' = [1.0]", "bench.scale.Q"),
-        ("[sweep]\n'benhc.noise_a' = [1.0]", "benhc.noise_a"),
-        ("[sweep]\n'signal.0.rpm' = [1.0]", "signal.0.rpm"),
-        ("[sweep]\n'params.NO_SUCH' = [1.0]", "params.NO_SUCH=1.0"),
-        ("[sweep]\n'bench.bus' = ['99x']", "99x"),
-        ("[random]\n'bench.noise_a' = [1.0, 0.0]", "bench.noise_a"),
-        ("[random]\n'bench.noise_a' = { off = [1.0] }", "of = [...]"),
-        ("this is not TOML", ""),
-        ("\0\x01\x02", ""),
+        ("[bench]\nmotor = 'warp-drive'", "line 2: bench.motor: "),
+        ("[bench]\nload = 'nowhere/load.toml'", "line 2: bench.load: "),
+        ("[bench]\nseed = 1\n[bench.motor]\nR = -1.0\nL = 1e-5\nflux = 1e-3\npole_pairs = 7",
+         "line 4: bench.motor.R: motor: R = -1"),
+        ("[bench]\nflux_capacitor = 1", "line 2: bench.flux_capacitor: unknown field"),
+        ("[bench]\n\nduration_s = 'long'", "line 3: bench.duration_s: invalid type"),
+        ("[bench]\nduration_s = -1.0", "line 2: bench.duration_s = -1"),
+        ("[bench]\nduration_s = nan", "line 2: bench.duration_s"),
+        ("[bench]\nscale = { R = 1.0, L = 1e9 }", "line 2: bench.scale.L"),
+        ("[bench]\nbase = 'tricycle'", "line 2: bench.base: bench tricycle"),
+        ("[bench]\nbase = 'scooter'\nmotor.warp = 9", "line 3: bench.motor.warp: "),
+        ("[bench]\nbase = 'scooter'\nmotor.R = 9e9", "line 3: bench.motor.R: motor: R = 9"),
+        ("[bench]\nbase = 'tricycle'\nmotor.R = 0.1", "line 2: bench.base: bench tricycle"),
+        ("[bench]\nmotor = { R = 100.0, L = 1e-7, flux = 1e-3, pole_pairs = 7, saturation_a = 1.0 }",
+         "line 2: R/L of a motor"),
+        ("[bench]\nbus = { volts = 99.0 }", "line 2: bench.bus.volts: bus: volts = 99"),
+        ("[bench]\nbus = { cells = 4, sinks = false }", "line 2: bench.bus: "),
+        ("[bench]\nbus = { fuel_cells = 4 }", "line 2: bench.bus.fuel_cells: "),
+        ("[bench]\nbus = '99x'", "line 2: bench.bus: bus 99x"),
+        ("[bench]\nseed = 2\ndelay_periods = 0.3", "line 3: bench.delay_periods"),
+        ("[params]\nNO_SUCH_NAME = 1", "line 2: params.NO_SUCH_NAME"),
+        ("[params]\nLIM_PHASE_A = -1", "line 2: params.LIM_PHASE_A"),
+        ("[[signal]]\nat_s = 0.0\nthrottle = 1.5", "line 3: signal.0.throttle: "),
+        ("[[signal]]\nat_s = 0.0", "line 1: signal.0.throttle: "),
+        ("[[signal]]\nat_s = 0.0\nrpm = 1e300", "line 3: signal.0.rpm: give a number within"),
+        ("[[signal]]\nat_s = 0.0\nrpm = nan", "line 3: signal.0.rpm: give a number within"),
+        ("[[signal]]\nat_s = 0.0\nrpm = 1.0\nshape = 'ramp'\nfor_s = 1e-300",
+         "line 5: signal.0.for_s: "),
+        ("[[signal]]\nat_s = 0.0\nrpm = 1.0\nshape = 'sine'\namplitude = 1e200\nfreq_hz = 1e200",
+         "line 5: signal.0.amplitude: "),
+        ("[[signal]]\nthrottle = 0.0", "line 1: signal.0: missing field `at_s`"),
+        ("[[signal]]\nat_s = 1.0\nrpm = 1.0\n[[signal]]\nat_s = 0.0\nrpm = 1.0",
+         "line 5: signal.1.at_s"),
+        ("[[signal]]\nat_s = 0.0\nrpm = 1.0\nshape = 'round'", "line 4: signal.0.shape: "),
+        ("[[signal]]\nat_s = 0.0\nrpm = 1.0\nshape = 'file'", "line 1: signal.0.path: "),
+        ("[[signal]]\nat_s = 0.0\nrpm = 1.0\nshape = 'file'\npath = 'none.csv'",
+         "line 5: signal.0.path: cannot read"),
+        ("[[fault]]\nat_s = 0.0\nkind = 'reset'\n[[fault]]\nat_s = 0.0\nkind = 'gremlin'",
+         "line 6: fault.1.kind: "),
+        ("[[fault]]\nat_s = 0.0\nkind = 'noise'\nvalue = -1.0", "line 4: fault.0.value: "),
+        ("[[fault]]\nat_s = 0.0\nkind = 'phase_open'", "line 1: fault.0.phase: "),
+        ("[[window]]\nname = 'w'\nt0_s = 1.0\nt1_s = 0.5", "line 4: window.0.t1_s: the window w"),
+        ("[[window]]\nname = 'w'\nt0_s = 0\nt1_s = 1\n[[window]]\nname = 'w'\nt0_s = 0\nt1_s = 1",
+         "line 6: window.1.name: "),
+        ("[[expect]]\nwindow = 'none'\nkey = 'rpm_mean'\nbelow = 1", "line 1: expect.0: "),
+        ("[sweep]\n'bench.scale.Q' = [1.0]", "line 2: bench.scale.Q: "),
+        ("[sweep]\n'benhc.noise_a' = [1.0]", "line 2: benhc.noise_a: "),
+        ("[sweep]\n'signal.0.rpm' = [1.0]", "line 2: signal.0.rpm: "),
+        ("[sweep]\n'params.NO_SUCH' = [1.0]", "line 2: params.NO_SUCH"),
+        ("[bench]\nbus = 24.0\n[sweep]\n'bench.bus' = [24.0, '99x']", "line 4: bench.bus: bus 99x"),
+        ("[random]\n'bench.noise_a' = [1.0, 0.0]", "line 2: bench.noise_a: "),
+        ("[random]\n'bench.noise_a' = { off = [1.0] }", "line 2: random.bench.noise_a"),
+        ("this is not TOML", "line 1: "),
+        ("\0\x01\x02", "line 1: "),
     ],
 )
 def test_a_scenario_that_makes_no_sense_is_refused(tmp_path, text, names):
     path = tmp_path / "bad.toml"
     path.write_text(text)
     line = refused("scenario", path)
-    assert str(path) in line and names in line
+    assert f"{path}: {names}" in line
+
+
+def test_a_bad_line_of_a_course_is_named(tmp_path):
+    path = tmp_path / "course.toml"
+    path.write_text("[[signal]]\nat_s = 0.0\nrpm = 0.0\nshape = 'file'\npath = 'course.csv'")
+    course = tmp_path / "course.csv"
+    for text, names in [
+        ("0.0,1.0\n1.0\n", "line 2: give seconds"),
+        ("0.0,1.0\n1.0,1e300\n", "line 2: give seconds"),
+        ("0.0,1.0\n1.0,1.0\n0.5,1.0\n", "line 3: the time does not rise"),
+    ]:
+        course.write_text(text)
+        assert f"{path}: line 5: signal.0.path: {course}: {names}" in refused("scenario", path)
+
+
+@pytest.mark.parametrize(
+    "text, names",
+    [
+        ("bench = 3", "line 1: bench: invalid type"),
+        ("[bench]\nbus = 24.0\nwarp = 9", "line 3: bench.warp: unknown field"),
+        ("[bench]\n[bench.motor]\nR = 0.1", "missing field"),
+        ("[bench]\nload = { c2 = -1.0 }", "line 2: bench.load.c2: "),
+        ("[params]\nMOT_KV = 1\nNO_SUCH = 1", "line 2: params.MOT_KV: "),
+        ("[params]\nMOT_R_MOHM = 'low'", "line 2: params.MOT_R_MOHM: invalid type"),
+        ("[bench]\nseed = 3", "seed: "),
+    ],
+)
+def test_a_bench_file_that_makes_no_sense_is_named(tmp_path, text, names):
+    (tmp_path / "mine.toml").write_text(text)
+    path = tmp_path / "scenario.toml"
+    # What it leaves out is the bench's, in this folder.
+    path.write_text("[bench]\nbase = 'mine.toml'\nload.c2 = 1e-7")
+    line = refused("scenario", path)
+    assert f"{path}: line 2: bench.base: bench file {tmp_path / 'mine.toml'}: " in line
+    assert names in line
 
 
 def test_several_runs_are_not_recorded(tmp_path):

@@ -2,6 +2,7 @@
 
 use siskin_control::drive::{Phase, Setpoint};
 use siskin_control::params::{ParamId, Params, build};
+use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
 
 /// Merged with the flux crossings.
@@ -15,6 +16,19 @@ fn rig(bench: Bench) -> Rig {
     let board = bench.sensing.board(bench.delay);
     let config = build(&params, &board).expect("the parameters fit the bench");
     Rig::new(bench, config)
+}
+
+/// Lets Hall sensors show one level from now on.
+fn stick(rig: &mut Rig, hall: [Option<bool>; 3]) {
+    let before = InForce::default();
+    rig.disturb(&before, &InForce { hall, ..before });
+}
+
+/// One sensor that shows a level.
+fn one(phase: usize, level: bool) -> [Option<bool>; 3] {
+    let mut stuck = [None; 3];
+    stuck[phase] = Some(level);
+    stuck
 }
 
 /// What a stretch of time at a speed showed.
@@ -72,7 +86,7 @@ fn a_sensor_that_breaks_while_it_runs_is_detected_and_survived() {
                 );
                 assert_eq!(before.fault_at_s, None, "{before:?}");
 
-                rig.stick_hall(phase, Some(level));
+                stick(&mut rig, one(phase, level));
                 let after = run(&mut rig, rpm, 1.0);
                 let case = format!("{rpm} rpm, {phase} {level}: {after:?}");
                 // Two turns make three contradictions or more, and the first begins anywhere.
@@ -96,11 +110,6 @@ fn a_sensor_that_breaks_while_it_runs_is_detected_and_survived() {
 #[test]
 fn a_sensor_broken_at_standstill_leaves_a_start_by_park_and_ramp() {
     let cable_off = [Some(true); 3];
-    let one = |phase: usize, level| {
-        let mut stuck = [None; 3];
-        stuck[phase] = Some(level);
-        stuck
-    };
     let mut cases = vec![cable_off];
     for phase in 0..3 {
         cases.extend([false, true].map(|level| one(phase, level)));
@@ -108,10 +117,10 @@ fn a_sensor_broken_at_standstill_leaves_a_start_by_park_and_ramp() {
     for hall_stuck in cases {
         for k in 0..6 {
             let mut rig = rig(Bench {
-                hall_stuck,
                 initial_angle_turns: (f64::from(k) + 0.4) / 6.0,
                 ..Bench::default()
             });
+            stick(&mut rig, hall_stuck);
             let seen = run(&mut rig, 3000.0, 3.0);
             let case = format!("{hall_stuck:?}, {k}: {seen:?}");
             assert!(rig.snapshot().sensor_fault, "{case}");

@@ -5,7 +5,7 @@ use siskin_control::drive::Bridge;
 use siskin_control::params::ParamId;
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::flash::FileFlash;
-use siskin_emulator::rig::Bench;
+use siskin_emulator::rig::{Bench, Period, Rig};
 use siskin_emulator::wire::Wire;
 
 const MS_NS: u64 = 1_000_000;
@@ -44,6 +44,7 @@ impl Flight {
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
             overrides: overrides.to_vec(),
+            faults: Vec::new(),
             link_bytes_per_s: 11_520,
         })
         .expect("default parameters fit the bench");
@@ -100,7 +101,7 @@ impl Flight {
             self.device.advance(
                 now_ns + MS_NS,
                 |_, _| None,
-                |_, period, _| {
+                &mut |_: f64, period: &Period, _: &Rig| {
                     seen.least_rpm = seen.least_rpm.min(period.rpm());
                     seen.most_rpm = seen.most_rpm.max(period.rpm());
                     torques_nm += period.flow.torque_nm;

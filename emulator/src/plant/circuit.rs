@@ -6,6 +6,11 @@
 //! the rotor. With one phase open the current keeps to the line across that phase's axis, and as
 //! every coefficient is a plain number, its solution is the projection of the same one on that line.
 
+mod mean;
+mod sweep;
+
+pub(super) use sweep::Sweep;
+
 use super::Motor;
 use super::series::{DECAY_MAX, ROTATION_MAX, rotation, small_decay, small_rotation};
 use super::vector::{AXES, back, dot, turn};
@@ -41,6 +46,18 @@ pub(super) struct Stretch {
     rotation: [f64; 2],
     /// What is left of a transient.
     decay: f64,
+}
+
+impl Stretch {
+    /// One that is twice as long.
+    #[inline(always)]
+    pub(super) fn twice(&self) -> Self {
+        Self {
+            time_s: 2.0 * self.time_s,
+            rotation: turn(self.rotation, self.rotation),
+            decay: self.decay * self.decay,
+        }
+    }
 }
 
 /// The currents and the rotor's direction at some time.
@@ -107,6 +124,8 @@ pub(super) struct Circuit {
     magnet_a: f64,
     /// 1/R, 1/Ω.
     pub(super) inverse_r: f64,
+    /// 1/|R + jωL|², 1/Ω².
+    inverse_z_square: f64,
     /// R/L, 1/s.
     rate: f64,
     /// Whether the series of decay and of rotation reach half a period.
@@ -126,9 +145,15 @@ impl Circuit {
             flux_wb: motor.flux_wb,
             magnet_a: motor.flux_wb / l,
             inverse_r: 1.0 / r,
+            inverse_z_square: 1.0 / (r * r),
             rate: r / l,
             short: [false; 2],
         }
+    }
+
+    /// Phase resistance, Ω.
+    pub(super) fn resistance_ohm(&self) -> f64 {
+        self.resistance_ohm
     }
 
     /// Turns to an electrical speed, for stretches of at most `longest_s`.
@@ -136,19 +161,13 @@ impl Circuit {
         let (r, x) = (self.resistance_ohm, omega * self.inductance_h);
         self.omega = omega;
         self.emf_v = omega * self.flux_wb;
-        let share = self.emf_v / (r * r + x * x);
+        self.inverse_z_square = 1.0 / (r * r + x * x);
+        let share = self.emf_v * self.inverse_z_square;
         self.turning = [-share * x, -share * r];
         self.short = [
             longest_s * self.rate <= DECAY_MAX,
             longest_s * omega.abs() <= ROTATION_MAX,
         ];
-    }
-
-    /// The greatest rate at which a phase current can change from here under a voltage vector of
-    /// this length, A/s.
-    pub(super) fn slope_bound(&self, now: &Moment, voltage_v: f64) -> f64 {
-        let [d, q] = now.i;
-        (voltage_v + self.emf_v.abs()) / self.inductance_h + self.rate * (d.abs() + q.abs())
     }
 
     /// A stretch of at most half a period.
@@ -162,11 +181,17 @@ impl Circuit {
             } else {
                 rotation(angle)
             },
-            decay: if self.short[0] {
-                small_decay(fall)
-            } else {
-                libm::exp(-fall)
-            },
+            decay: self.decay(fall),
+        }
+    }
+
+    /// What is left of a transient after a fall.
+    #[inline(always)]
+    fn decay(&self, fall: f64) -> f64 {
+        if self.short[0] {
+            small_decay(fall)
+        } else {
+            libm::exp(-fall)
         }
     }
 
@@ -247,41 +272,16 @@ impl Circuit {
         sums.charge += dot(drive.to_bus, lost);
     }
 
-    /// What a short pulse of voltage does to a current along it, A: as it is at the pulse's end,
-    /// and what would have to be there at its start to decay to that.
-    pub(super) fn kick_a(&self, voltage_v: f64, time_s: f64) -> [f64; 2] {
-        let decay = libm::exp(-self.rate * time_s);
-        let last_a = voltage_v * self.inverse_r * (1.0 - decay);
-        [last_a, last_a / decay]
+    /// The slope that a voltage along it gives a current, A/s.
+    #[inline(always)]
+    pub(super) fn slope_of(&self, volts: f64) -> f64 {
+        volts * self.inverse_r * self.rate
     }
 
-    /// Adds a current that grew in a straight line before now, or is yet to grow from now on, within
-    /// a pulse: what is missing of its integral is `missing_s`, positive or negative, times itself.
+    /// The slope of the currents in the stator's frame without voltage, A/s.
     #[inline(always)]
-    pub(super) fn kick(
-        &self,
-        course: &mut Course,
-        kick_a: [f64; 2],
-        missing_s: f64,
-        to_bus: [f64; 2],
-    ) {
-        let (r, l) = (self.resistance_ohm, self.inductance_h);
-        let [d, q] = back(kick_a, course.now.direction);
-        let before = course.now.i;
-        let after = [before[0] + d, before[1] + q];
-        course.now.i = after;
-        let [d0, q0] = if missing_s > 0.0 { before } else { after };
-        let missing_q = missing_s * q;
-        let missing_squares = [2.0 * missing_s * d * d0, 2.0 * missing_q * q0];
-        let sums = &mut course.sums;
-        sums.q += missing_q;
-        sums.squares[0] += missing_squares[0];
-        sums.squares[1] += missing_squares[1];
-        // What it puts into the inductance, and what goes into shaft and copper meanwhile.
-        let stored = 0.5 * l * (d * (before[0] + after[0]) + q * (before[1] + after[1]));
-        let spent = self.emf_v * missing_q + r * (missing_squares[0] + missing_squares[1]);
-        sums.energy += r * (stored + spent);
-        sums.charge += r * missing_s * dot(to_bus, kick_a);
+    pub(super) fn free_slope(&self, now: &Moment) -> [f64; 2] {
+        turn(self.slope([0.0; 2], now.i), now.direction)
     }
 
     /// u/R with what an open phase shows along its axis: what the rotor induces.

@@ -8,12 +8,11 @@
 //! and 0.5 µs. The period runs from sample to sample.
 
 use siskin_control::drive::Bridge;
-use siskin_control::units::Duty;
 
-use super::circuit::Stretch;
 use super::machine::{Flow, Machine};
-use super::stage::{DIODE_V, Rail, Stage};
-use super::{Load, Motor};
+use super::stage::{Breaks, DIODE_V, Rail, Stage};
+use super::timing::{Half, Timer, delayed, duties, first_half, second_half, share};
+use super::{Extras, Load, Motor};
 
 /// How the inverter is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, clap::ValueEnum)]
@@ -29,8 +28,9 @@ pub enum Fidelity {
 /// The phase current below which a dead time's loss is in proportion to the current, A.
 const SIGN_CERTAIN_A: f64 = 0.1;
 
-/// One bit of a duty.
-const DUTY_BIT: f64 = 1.0 / 2_147_483_648.0;
+/// Time from a current beyond the comparators' level to switches that are off, s: their filter and the
+/// gates' drivers.
+const TRIP_S: f64 = 1e-6;
 
 /// Motor, load and inverter.
 #[derive(Clone, Debug)]
@@ -38,24 +38,12 @@ pub struct Plant {
     fidelity: Fidelity,
     stage: Stage,
     timers: [Timer; 3],
-}
-
-/// One leg's output of the timer.
-#[derive(Clone, Copy, Debug, Default)]
-struct Timer {
-    /// The switch that is, or after the dead time will be, on.
-    output: Option<Rail>,
-    /// What is left of the dead time, s.
-    waiting_s: f64,
-}
-
-/// A leg's part in half a period: one output, then another.
-#[derive(Clone, Copy, Debug)]
-struct Half {
-    first: Option<Rail>,
-    second: Option<Rail>,
-    /// When the second begins, s.
-    edge_s: f64,
+    /// Current through a low side at which the comparators turn all switches off, A.
+    trip_a: f64,
+    /// Whether they have, and the drive has not yet.
+    tripped: bool,
+    /// Where all legs are, with none waiting.
+    settled: Option<Rail>,
 }
 
 impl Plant {
@@ -72,12 +60,73 @@ impl Plant {
             fidelity,
             stage: Stage::new(Machine::new(motor, load, speed_rad_s, angle_turns)),
             timers: [Timer::default(); 3],
+            trip_a: f64::INFINITY,
+            tripped: false,
+            settled: None,
         }
+    }
+
+    /// Breaks parts of the stage and mends all others.
+    ///
+    /// While something is broken every switch edge is simulated, and a comparator at each low side's
+    /// shunt turns all switches off where it sees more than `trip_a`. It looks at each edge, and acts
+    /// a microsecond later: with a sound stage the drive's own trip at the samples comes first.
+    pub fn break_legs(&mut self, breaks: &Breaks, trip_a: f64) {
+        self.trip_a = trip_a;
+        let on = [0, 1, 2].map(|leg| self.timers[leg].on());
+        self.stage.break_legs(breaks, on);
+    }
+
+    /// Whether the comparators hold all switches off, until the drive turns them off as well.
+    pub fn tripped(&self) -> bool {
+        self.tripped
+    }
+
+    /// Gives the motor at rest what a real one has beyond the ideal.
+    pub fn fit(&mut self, extras: &Extras) {
+        self.stage.machine.fit(extras);
+    }
+
+    /// Phase resistance now, Ω.
+    pub fn resistance_ohm(&self) -> f64 {
+        self.stage.machine.resistance_ohm()
+    }
+
+    /// Temperature of the winding, °C, if it is simulated.
+    #[cfg(test)]
+    pub(super) fn winding_c(&self) -> Option<f64> {
+        self.stage.machine.winding_c()
     }
 
     /// Holds the shaft at this speed, rad/s, whatever the torque.
     pub fn impose(&mut self, speed_rad_s: f64) {
         self.stage.machine.impose(speed_rad_s);
+    }
+
+    /// Blocks the shaft, whatever the torque, or lets it go.
+    pub fn block(&mut self, blocked: bool) {
+        self.stage.machine.block(blocked);
+    }
+
+    /// Adds to the shaft's speed at once, rad/s; not where it is held.
+    pub fn kick(&mut self, speed_rad_s: f64) {
+        self.stage.machine.kick(speed_rad_s);
+    }
+
+    /// The speed at which the wind would turn the propeller by itself, rad/s; 0 is still air.
+    pub fn set_wind_rad_s(&mut self, speed_rad_s: f64) {
+        self.stage.machine.shaft_mut().wind_rad_s = speed_rad_s;
+    }
+
+    /// A torque on the shaft beside all others, Nm; positive turns it forward.
+    pub fn set_extra_torque_nm(&mut self, torque_nm: f64) {
+        self.stage.machine.shaft_mut().torque_nm = torque_nm;
+    }
+
+    /// Energy stored in motor and shaft, J.
+    #[cfg(test)]
+    pub(super) fn stored_j(&self) -> f64 {
+        self.stage.machine.stored_j()
     }
 
     /// Electrical angle in turns, 0..1.
@@ -112,6 +161,16 @@ impl Plant {
         self.stage.low_s()
     }
 
+    /// Currents that the low sides' shunts carry into the phases, A, of the phases' `currents_a`:
+    /// the same where the stage is sound.
+    pub fn shunts_a(&self, currents_a: [f64; 3]) -> [f64; 3] {
+        if self.stage.is_sound() {
+            currents_a
+        } else {
+            self.stage.shunts_a()
+        }
+    }
+
     /// Takes the plant on by a period from sample to sample, with a command for each half.
     pub fn period(
         &mut self,
@@ -122,47 +181,86 @@ impl Plant {
     ) -> Flow {
         self.stage.begin(bus_v, period_s);
         let half_s = 0.5 * period_s;
+        if self.tripped {
+            self.tripped = halves != [Bridge::Off; 2];
+        }
         let [first, second] = halves;
-        let stretch = self.stage.machine.circuit.stretch(half_s);
-        match self.means(first) {
-            Some(duties) => self.mean(duties, dead_time_s, &stretch),
-            None => self.switch(first_half(first, half_s), half_s, dead_time_s),
+        let first = self.gated(first);
+        if first == second
+            && let Some(duties) = self.means(first)
+        {
+            self.mean(duties, dead_time_s / period_s, period_s);
+        } else {
+            for (bridge, to) in [(first, Rail::High), (second, Rail::Low)] {
+                let bridge = self.gated(bridge);
+                match self.means(bridge) {
+                    Some(duties) => self.mean(duties, dead_time_s / period_s, half_s),
+                    None => self.switch(bridge, to, half_s, dead_time_s),
+                }
+            }
         }
-        match self.means(second) {
-            Some(duties) => self.mean(duties, dead_time_s, &stretch),
-            None => self.switch(second_half(second, half_s), half_s, dead_time_s),
+        let mut flow = self.stage.machine.finish(period_s);
+        flow.bus_a += self.stage.shot_as() / period_s;
+        flow
+    }
+
+    /// What the comparators let through of a command.
+    fn gated(&self, bridge: Bridge) -> Bridge {
+        if self.tripped { Bridge::Off } else { bridge }
+    }
+
+    /// Takes the plant on by a stretch of any length with each leg at a rail, or with both switches
+    /// off: for commands that no period of the control makes, without dead time.
+    ///
+    /// The means are over the stretch; the shaft takes its torque at the end.
+    pub fn legs(&mut self, legs: [Option<Rail>; 3], bus_v: f64, time_s: f64) -> Flow {
+        self.stage.begin(bus_v, time_s);
+        self.settled = None;
+        for (leg, rail) in legs.into_iter().enumerate() {
+            self.timers[leg] = Timer {
+                output: rail,
+                waiting_s: 0.0,
+            };
+            self.stage.set(leg, rail);
         }
-        self.stage.machine.finish(period_s)
+        // The circuit's solution is prepared for halves of a period.
+        for _ in 0..2 {
+            self.stage.run(0.5 * time_s);
+        }
+        self.stage.machine.finish(time_s)
     }
 
     /// The duties whose mean voltages stand for the switches.
     fn means(&self, bridge: Bridge) -> Option<[f64; 3]> {
         match self.fidelity {
-            Fidelity::Averaged => duties(bridge),
-            Fidelity::Switching => None,
+            Fidelity::Averaged if self.stage.is_sound() => duties(bridge),
+            _ => None,
         }
     }
 
     /// Means stand for legs that are low at the samples.
+    #[cold]
     fn close_low(&mut self) {
         for (leg, timer) in self.timers.iter_mut().enumerate() {
-            if timer.output != Some(Rail::Low) || timer.waiting_s > 0.0 {
-                *timer = Timer {
-                    output: Some(Rail::Low),
-                    waiting_s: 0.0,
-                };
-                self.stage.set(leg, Some(Rail::Low));
-            }
+            *timer = Timer {
+                output: Some(Rail::Low),
+                waiting_s: 0.0,
+            };
+            self.stage.set(leg, Some(Rail::Low));
         }
+        self.settled = Some(Rail::Low);
     }
 
-    /// Half a period by the mean voltages, less what the dead time takes by the sign of each
-    /// current: the supply's voltage once and a diode's twice a period.
-    fn mean(&mut self, duties: [f64; 3], dead_time_s: f64, half: &Stretch) {
-        self.close_low();
+    /// Some time by the mean voltages, less what the dead time, a share of the period, takes by the
+    /// sign of each current: the supply's voltage once and a diode's twice a period.
+    #[inline(always)]
+    fn mean(&mut self, duties: [f64; 3], dead_share: f64, time_s: f64) {
+        if self.settled != Some(Rail::Low) {
+            self.close_low();
+        }
         let bus_v = self.stage.bus_v();
-        let loss_v = 0.5 * dead_time_s / half.time_s * (bus_v + 2.0 * DIODE_V);
-        let currents_a = self.stage.machine.currents_a();
+        let loss_v = dead_share * (bus_v + 2.0 * DIODE_V);
+        let currents_a = self.stage.machine.middle_a(time_s);
         let mut terminals_v = [0.0; 3];
         for leg in 0..3 {
             let sign = (currents_a[leg] * (1.0 / SIGN_CERTAIN_A)).clamp(-1.0, 1.0);
@@ -171,29 +269,37 @@ impl Plant {
             let loss_v = if switches { sign * loss_v } else { 0.0 };
             terminals_v[leg] = (duties[leg] * bus_v - loss_v).clamp(0.0, bus_v);
         }
-        self.stage.run_averaged(terminals_v, half);
+        self.stage.run_averaged(terminals_v, time_s);
     }
 
-    /// Half a period edge by edge.
-    fn switch(&mut self, halves: [Half; 3], half_s: f64, dead_time_s: f64) {
-        let mut halves = halves;
+    /// Half a period edge by edge, in which the legs that switch come to a rail.
+    fn switch(&mut self, bridge: Bridge, to: Rail, half_s: f64, dead_time_s: f64) {
+        if let Some(edges_s) = self.plain(bridge, to, half_s, dead_time_s)
+            && self.stage.sweep(to, edges_s, dead_time_s, half_s)
+        {
+            for timer in &mut self.timers {
+                timer.output = Some(to);
+            }
+            self.settled = Some(to);
+            return;
+        }
+        let halves = match to {
+            Rail::High => first_half(bridge, half_s),
+            Rail::Low => second_half(bridge, half_s),
+        };
+        self.play(halves, half_s, dead_time_s);
+        let first = self.timers[0].on();
+        let same = self.timers.iter().all(|timer| timer.on() == first);
+        self.settled = if same { first } else { None };
+    }
+
+    /// Plays half a period, whatever the legs do in it.
+    #[inline(never)]
+    fn play(&mut self, halves: [Half; 3], half_s: f64, dead_time_s: f64) {
+        let mut halves = halves.map(|half| half.timed(half_s, dead_time_s));
         let mut next_s = [0.0; 3];
         for leg in 0..3 {
-            let half = &mut halves[leg];
-            // An edge at an end is none.
-            if half.edge_s <= 0.0 {
-                half.first = half.second;
-            }
-            if half.edge_s <= 0.0 || half.edge_s >= half_s {
-                half.second = half.first;
-            }
-            if half.first == half.second {
-                half.edge_s = f64::INFINITY;
-            } else if half.first.is_some() && half.second.is_some() {
-                // With each turning on late by the dead time, the middle of the low side's on-time,
-                // which is when the sample is taken, is half of it behind the counter's top.
-                half.edge_s = (half.edge_s - 0.5 * dead_time_s).max(0.0);
-            }
+            let half = halves[leg];
             let timer = &mut self.timers[leg];
             if timer.output != half.first {
                 timer.turn(half.first, dead_time_s);
@@ -201,16 +307,16 @@ impl Plant {
             }
             next_s[leg] = timer.next_s(0.0).min(half.edge_s);
         }
-        if let Some((to, edges)) = self.plain(&halves, half_s, dead_time_s) {
-            self.stage.sweep(to, edges, dead_time_s, half_s);
-            for timer in &mut self.timers {
-                timer.output = Some(to);
-            }
-            return;
-        }
         let mut now_s = 0.0;
+        let mut trip_s = f64::INFINITY;
         loop {
+            if !self.stage.is_sound() && trip_s == f64::INFINITY && self.sees_too_much() {
+                trip_s = now_s + TRIP_S;
+            }
             let end_s = next_s[0].min(next_s[1]).min(next_s[2]).min(half_s);
+            if trip_s <= end_s {
+                return self.trip(now_s, trip_s, half_s);
+            }
             let time_s = end_s - now_s;
             if time_s > 0.0 {
                 self.stage.run(time_s);
@@ -239,111 +345,49 @@ impl Plant {
         }
     }
 
-    /// The edges in order of time, where each leg has one, from the same rail, and time for its
-    /// dead time before the next: nearly always, in drive.
-    fn plain(
-        &self,
-        halves: &[Half; 3],
-        half_s: f64,
-        dead_time_s: f64,
-    ) -> Option<(Rail, [(usize, f64); 3])> {
-        let to = halves[0].second?;
-        for (half, timer) in halves.iter().zip(&self.timers) {
-            let crosses = half.edge_s < half_s && half.second == Some(to) && half.first.is_some();
-            if !crosses || timer.waiting_s > 0.0 {
-                return None;
+    /// Whether a comparator sees more than its level.
+    fn sees_too_much(&self) -> bool {
+        let shunts_a = self.stage.shunts_a();
+        shunts_a.iter().any(|shunt_a| shunt_a.abs() > self.trip_a)
+    }
+
+    /// Goes on to `trip_s`, where the comparators turn all switches off, and to the half's end.
+    #[cold]
+    fn trip(&mut self, now_s: f64, trip_s: f64, half_s: f64) {
+        self.tripped = true;
+        self.stage.run(trip_s - now_s);
+        for (leg, timer) in self.timers.iter_mut().enumerate() {
+            *timer = Timer::default();
+            self.stage.set(leg, None);
+        }
+        self.stage.run(half_s - trip_s);
+    }
+
+    /// The legs' edges, where solutions add up, each leg has one from the other rail, and there is time
+    /// for its dead time: nearly always, in drive.
+    fn plain(&self, bridge: Bridge, to: Rail, half_s: f64, dead_time_s: f64) -> Option<[f64; 3]> {
+        let Bridge::Duty(duties) = bridge else {
+            return None;
+        };
+        if self.settled != Some(to.other())
+            || !self.stage.machine.is_linear()
+            || !self.stage.is_sound()
+        {
+            return None;
+        }
+        let at_s = duties.map(|duty| {
+            let high_s = half_s * share(duty);
+            match to {
+                Rail::High => half_s - high_s,
+                Rail::Low => high_s,
             }
-        }
-        let [a, b, c] = [halves[0].edge_s, halves[1].edge_s, halves[2].edge_s];
-        // Each edge's place is the number of those before it.
-        let places = [
-            usize::from(b < a) + usize::from(c < a),
-            usize::from(a <= b) + usize::from(c < b),
-            usize::from(a <= c) + usize::from(b <= c),
+        });
+        // An edge at an end is none.
+        let [first_s, last_s] = [
+            at_s[0].min(at_s[1]).min(at_s[2]),
+            at_s[0].max(at_s[1]).max(at_s[2]),
         ];
-        let mut edges = [(0, 0.0); 3];
-        for leg in 0..3 {
-            edges[places[leg]] = (leg, halves[leg].edge_s);
-        }
-        let apart = edges[1].1 - edges[0].1 >= dead_time_s
-            && edges[2].1 - edges[1].1 >= dead_time_s
-            && half_s - edges[2].1 >= dead_time_s;
-        apart.then_some((to, edges))
-    }
-}
-
-impl Timer {
-    fn turn(&mut self, output: Option<Rail>, dead_time_s: f64) {
-        // A leg that has been off needs no dead time.
-        let waits = self.output.is_some() && output.is_some();
-        self.waiting_s = if waits { dead_time_s } else { 0.0 };
-        self.output = output;
-    }
-
-    fn on(&self) -> Option<Rail> {
-        if self.waiting_s > 0.0 {
-            None
-        } else {
-            self.output
-        }
-    }
-
-    /// When the dead time ends.
-    fn next_s(&self, now_s: f64) -> f64 {
-        if self.waiting_s > 0.0 {
-            now_s + self.waiting_s
-        } else {
-            f64::INFINITY
-        }
-    }
-}
-
-/// The duties of a command with which all legs switch, 0..1.
-fn duties(bridge: Bridge) -> Option<[f64; 3]> {
-    match bridge {
-        Bridge::Duty(duties) => Some(duties.map(share)),
-        Bridge::Brake => Some([0.0; 3]),
-        Bridge::Legs([Some(a), Some(b), Some(c)]) => Some([a, b, c].map(share)),
-        Bridge::Legs(_) | Bridge::Off | Bridge::Charge(_) => None,
-    }
-}
-
-fn share(duty: Duty) -> f64 {
-    (f64::from(duty.to_bits()) * DUTY_BIT).min(1.0)
-}
-
-/// What a command makes of each leg in the half after a sample.
-fn first_half(bridge: Bridge, half_s: f64) -> [Half; 3] {
-    second_half(bridge, half_s).map(|half| Half {
-        first: half.second,
-        second: half.first,
-        edge_s: half_s - half.edge_s,
-    })
-}
-
-/// The same in the half before a sample: the first in the mirror.
-fn second_half(bridge: Bridge, half_s: f64) -> [Half; 3] {
-    let off = Half {
-        first: None,
-        second: None,
-        edge_s: half_s,
-    };
-    let switching = |duty| Half {
-        first: Some(Rail::High),
-        second: Some(Rail::Low),
-        edge_s: half_s * share(duty),
-    };
-    match bridge {
-        Bridge::Off => [off; 3],
-        Bridge::Brake => [switching(Duty::ZERO); 3],
-        Bridge::Duty(duties) => duties.map(switching),
-        Bridge::Legs(legs) => legs.map(|leg| leg.map_or(off, switching)),
-        Bridge::Charge(duty) => {
-            [Half {
-                first: None,
-                second: Some(Rail::Low),
-                edge_s: half_s * (1.0 - share(duty)),
-            }; 3]
-        }
+        let fits = first_s > 0.0 && last_s + 0.5 * dead_time_s < half_s;
+        fits.then(|| at_s.map(|at_s| delayed(at_s, dead_time_s)))
     }
 }

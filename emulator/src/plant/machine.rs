@@ -6,9 +6,13 @@
 use std::f64::consts::TAU;
 
 use super::circuit::{Circuit, Course, Drive, Moment, Stretch, Sums, Way, confine};
+use super::conduction::Conduction;
+use super::magnetics::Magnetics;
 use super::series::{fraction, settle};
-use super::vector::{back, phases};
-use super::{Load, Motor};
+use super::shaft::Shaft;
+use super::thermal::Warming;
+use super::vector::{back, phases, turn};
+use super::{Cogging, Drag, Extras, Load, Motor};
 
 /// Means over a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,6 +27,8 @@ pub struct Flow {
     pub copper_w: f64,
     /// Current from the supply, A.
     pub bus_a: f64,
+    /// Power lost to the motor's friction and in its iron while the shaft is free, W.
+    pub drag_w: f64,
 }
 
 /// A motor with its load.
@@ -31,8 +37,16 @@ pub(super) struct Machine {
     motor: Motor,
     load: Load,
     inertia_kgm2: f64,
-    /// Speed that the shaft is held at whatever the torque, rad/s.
+    /// Speed that the shaft is held at while nothing blocks it, rad/s.
     imposed_rad_s: Option<f64>,
+    /// Speed that it is held at whatever the torque, rad/s.
+    held_rad_s: Option<f64>,
+    /// Flux against current, where it is not the ideal motor's.
+    magnetics: Option<Box<Magnetics>>,
+    /// What warms the winding, if anything does.
+    warming: Option<Warming>,
+    /// What else acts on the shaft, if anything does.
+    shaft: Option<Box<Shaft>>,
     /// Electrical angle at the start of the period in turns, 0..1.
     angle_turns: f64,
     /// Mechanical speed at the start of the period, rad/s.
@@ -55,6 +69,10 @@ impl Machine {
             load,
             inertia_kgm2: motor.inertia_kgm2 + load.inertia_kgm2,
             imposed_rad_s: None,
+            held_rad_s: None,
+            magnetics: None,
+            warming: None,
+            shaft: None,
             angle_turns,
             speed_rad_s,
             acceleration: 0.0,
@@ -69,11 +87,73 @@ impl Machine {
         }
     }
 
+    /// Gives an ideal motor at rest what a real one has beyond that.
+    pub(super) fn fit(&mut self, extras: &Extras) {
+        self.magnetics = Magnetics::new(&self.motor, extras).map(Box::new);
+        let cold_ohm = self.motor.resistance_ohm;
+        self.warming = extras
+            .winding
+            .map(|winding| Warming::new(winding, cold_ohm));
+        if !extras.runs_freely() {
+            let pole_pairs = self.motor.pole_pairs;
+            let shaft = Shaft::new(pole_pairs, extras.drag, extras.cogging);
+            self.shaft = Some(Box::new(shaft));
+        }
+    }
+
+    /// Whether the currents have a closed solution between two changes of the inverter, and
+    /// solutions add up.
+    #[inline(always)]
+    pub(super) fn is_linear(&self) -> bool {
+        self.magnetics.is_none()
+    }
+
+    /// Phase resistance now, Ω.
+    pub(super) fn resistance_ohm(&self) -> f64 {
+        self.motor.resistance_ohm
+    }
+
+    /// Temperature of the winding, °C, if it is simulated.
+    #[cfg(test)]
+    pub(super) fn winding_c(&self) -> Option<f64> {
+        self.warming.as_ref().map(Warming::temperature_c)
+    }
+
     /// Holds the shaft at this speed, rad/s, whatever the torque.
     pub(super) fn impose(&mut self, speed_rad_s: f64) {
         self.imposed_rad_s = Some(speed_rad_s);
-        self.speed_rad_s = speed_rad_s;
-        self.acceleration = 0.0;
+        self.hold(self.imposed_rad_s);
+    }
+
+    /// Blocks the shaft, or lets it go.
+    pub(super) fn block(&mut self, blocked: bool) {
+        self.hold(if blocked {
+            Some(0.0)
+        } else {
+            self.imposed_rad_s
+        });
+    }
+
+    fn hold(&mut self, speed_rad_s: Option<f64>) {
+        self.held_rad_s = speed_rad_s;
+        if let Some(speed_rad_s) = speed_rad_s {
+            self.speed_rad_s = speed_rad_s;
+            self.acceleration = 0.0;
+        }
+    }
+
+    /// Adds to the speed of a shaft that is not held, rad/s.
+    pub(super) fn kick(&mut self, speed_rad_s: f64) {
+        if self.held_rad_s.is_none() {
+            self.speed_rad_s += speed_rad_s;
+        }
+    }
+
+    /// What else acts on the shaft.
+    pub(super) fn shaft_mut(&mut self) -> &mut Shaft {
+        let pole_pairs = self.motor.pole_pairs;
+        let free = || Box::new(Shaft::new(pole_pairs, Drag::default(), Cogging::default()));
+        self.shaft.get_or_insert_with(free)
     }
 
     /// Electrical angle at the start of the period in turns, 0..1.
@@ -92,14 +172,35 @@ impl Machine {
     }
 
     /// Currents into the phases, A.
+    #[inline(always)]
     pub(super) fn currents_a(&self) -> [f64; 3] {
         phases(self.now().stator_a())
     }
 
-    /// Voltages that the rotor induces in the phases, V.
-    pub(super) fn emf_v(&self, direction: [f64; 2]) -> [f64; 3] {
+    /// Voltages against the star that phases show which carry no current, V: what the rotor induces,
+    /// and in a motor that is not round what the other phases couple into an open one.
+    pub(super) fn emf_v(&self, at: &Moment, drive: &Drive) -> [f64; 3] {
+        if let Some(magnetics) = &self.magnetics {
+            let open = match drive.way {
+                Way::Without(phase) => Some(phase),
+                Way::Star | Way::Nowhere => None,
+            };
+            return magnetics.phases_v(&self.circuit, at, drive.u, open);
+        }
         let peak = self.circuit.emf_v;
-        phases([-peak * direction[1], peak * direction[0]])
+        phases([-peak * at.direction[1], peak * at.direction[0]])
+    }
+
+    /// The greatest voltage that the rotor induces between two phases, V.
+    pub(super) fn line_v(&self) -> f64 {
+        let peak = self.magnetics.as_ref().map_or(1.0, |m| m.peak());
+        3.0_f64.sqrt() * self.circuit.emf_v.abs() * peak
+    }
+
+    /// Angular speed of the fastest wave that the rotor induces, rad/s.
+    pub(super) fn fastest_rad_s(&self) -> f64 {
+        let order = self.magnetics.as_ref().map_or(1.0, |m| m.order());
+        self.circuit.omega.abs() * order
     }
 
     /// A current that has come to zero with its phase open stays there.
@@ -109,8 +210,12 @@ impl Machine {
     }
 
     /// Begins a period.
+    #[inline(always)]
     pub(super) fn begin(&mut self, period_s: f64) {
         let omega = settle(self.middle_rad_s(period_s)) * f64::from(self.motor.pole_pairs);
+        if self.warming.is_some() {
+            self.circuit = Circuit::new(&self.motor);
+        }
         self.circuit.turn_at(omega, 0.5 * period_s);
         self.course.sums = Sums::default();
     }
@@ -123,13 +228,78 @@ impl Machine {
     /// Takes the currents and the rotor on.
     #[inline(always)]
     pub(super) fn conduct(&mut self, drive: &Drive, stretch: &Stretch) {
-        self.circuit.conduct(&mut self.course, drive, stretch);
+        if let Some(magnetics) = &self.magnetics {
+            let conduction = Conduction {
+                magnetics,
+                circuit: &self.circuit,
+            };
+            let flux_wb = self.motor.flux_wb;
+            conduction.conduct(&mut self.course, drive, stretch.time_s, flux_wb);
+        } else {
+            self.circuit.conduct(&mut self.course, drive, stretch);
+        }
+    }
+
+    /// Takes the currents and the rotor on at a mean voltage, of which as much power comes from the
+    /// supply as goes into the motor.
+    #[inline(always)]
+    pub(super) fn conduct_mean(&mut self, u: [f64; 2], bus_v: f64, time_s: f64) {
+        if self.is_linear() {
+            let course = &mut self.course;
+            self.circuit.conduct_mean(course, u, bus_v, time_s);
+            return;
+        }
+        let share = 1.5 / bus_v.max(1.0);
+        let drive = Drive {
+            u,
+            to_bus: [u[0] * share, u[1] * share],
+            way: Way::Star,
+        };
+        self.conduct(&drive, &self.circuit.stretch(time_s));
+    }
+
+    /// The phase currents to expect in the middle of a stretch, A: i_d and i_q stand still, and the
+    /// rotor's turn is taken for a straight line, 2 % too long where it is 0.2 rad.
+    #[inline(always)]
+    pub(super) fn middle_a(&self, time_s: f64) -> [f64; 3] {
+        let turned = 0.5 * self.circuit.omega * time_s;
+        phases(turn(self.now().stator_a(), [1.0, turned]))
+    }
+
+    /// The currents and the rotor after a time of at most half a period.
+    pub(super) fn after(&self, drive: &Drive, time_s: f64) -> Moment {
+        match &self.magnetics {
+            Some(magnetics) => Conduction {
+                magnetics,
+                circuit: &self.circuit,
+            }
+            .at(self.now(), drive, time_s),
+            None => {
+                let stretch = self.circuit.stretch(time_s);
+                self.circuit.solve(self.now(), drive, &stretch).end
+            }
+        }
+    }
+
+    /// Energy in the currents' flux, in the shaft's motion and in its detents, J.
+    #[cfg(test)]
+    pub(super) fn stored_j(&self) -> f64 {
+        let [d, q] = self.now().i;
+        let electric_j = match &self.magnetics {
+            Some(magnetics) => magnetics.stored_j([d, q]),
+            None => 0.75 * self.motor.inductance_h * (d * d + q * q),
+        };
+        let detents_j = self.shaft.as_ref().map(|s| s.stored_j(self.angle_turns));
+        let moved_j = 0.5 * self.inertia_kgm2 * self.speed_rad_s * self.speed_rad_s;
+        electric_j + moved_j + detents_j.unwrap_or_default()
     }
 
     /// Ends the period: the shaft takes its mean torque.
+    #[inline(always)]
     pub(super) fn finish(&mut self, period_s: f64) -> Flow {
-        let turns = self.circuit.omega * period_s / TAU;
-        self.angle_turns = fraction(self.angle_turns + turns);
+        let turns = self.circuit.omega * period_s * (1.0 / TAU);
+        let angle_turns = self.angle_turns;
+        self.angle_turns = fraction(angle_turns + turns);
         let middle_rad_s = self.middle_rad_s(period_s);
         let Course { now, sums } = &mut self.course;
         let [cos, sin] = now.direction;
@@ -141,20 +311,37 @@ impl Machine {
         let share = 1.0 / period_s;
         let torque_per_a = 1.5 * f64::from(self.motor.pole_pairs) * self.motor.flux_wb;
         let torque_nm = torque_per_a * sums.q * share;
-        if self.imposed_rad_s.is_none() {
+        let mut drag_w = 0.0;
+        if let Some(shaft) = &mut self.shaft {
+            shaft.turn(angle_turns, turns);
+            if self.held_rad_s.is_none() {
+                let speeds = [self.speed_rad_s, middle_rad_s];
+                let (load, inertia) = (&self.load, self.inertia_kgm2);
+                let push = shaft.push(load, inertia, speeds, torque_nm, period_s);
+                drag_w = push.drag_w;
+                self.acceleration = push.acceleration;
+                self.speed_rad_s = settle(self.speed_rad_s + period_s * self.acceleration);
+            }
+        } else if self.held_rad_s.is_none() {
             // The load by the trapezoidal rule, which is stable however stiff the load.
             let damping = self.load.damping_at(middle_rad_s);
             let inertia = self.inertia_kgm2 + 0.5 * period_s * damping;
             let torque = torque_nm - damping * self.speed_rad_s;
-            self.acceleration = torque / inertia;
+            // The division need not wait for the torque.
+            self.acceleration = torque * (1.0 / inertia);
             self.speed_rad_s = settle(self.speed_rad_s + period_s * self.acceleration);
         }
-        Flow {
+        let flow = Flow {
             torque_nm,
             torque_square: torque_per_a * torque_per_a * sums.squares[1] * share,
             motor_w: 1.5 * self.circuit.inverse_r * sums.energy * share,
             copper_w: 1.5 * self.motor.resistance_ohm * (sums.squares[0] + sums.squares[1]) * share,
             bus_a: self.circuit.inverse_r * sums.charge * share,
+            drag_w,
+        };
+        if let Some(warming) = &mut self.warming {
+            self.motor.resistance_ohm = warming.advance(period_s, flow.copper_w);
         }
+        flow
     }
 }

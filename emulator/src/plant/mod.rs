@@ -3,27 +3,37 @@
 //! Double precision, `libm`'s functions and a fixed order of operations: equal inputs give equal
 //! bits on every machine.
 
+mod bus;
 mod circuit;
+mod conduction;
+mod extras;
+mod gates;
 mod inverter;
 mod load;
 mod machine;
+mod magnetics;
 mod motor;
 mod noise;
 mod sensing;
 mod series;
+mod shaft;
 mod stage;
 mod supply;
 mod thermal;
+mod timing;
 mod vector;
 
+pub use bus::Bus;
+pub use extras::{Cogging, Drag, Extras, Harmonic, Winding};
+pub use gates::{Gate, Gates};
 pub use inverter::{Fidelity, Plant};
 pub use load::Load;
 pub use machine::Flow;
 pub use motor::Motor;
-pub use noise::Noise;
+pub use noise::{Noise, share_of};
 pub use sensing::{Sensing, Truth};
-pub use stage::DIODE_V;
-pub use supply::Supply;
+pub use stage::{Breaks, DIODE_V, LegBreaks, Rail};
+pub use supply::{CAPACITANCE_F, CAPACITY_C, CELL_OHM, Source, Supply};
 pub use thermal::Thermal;
 
 #[cfg(test)]

@@ -7,21 +7,34 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 #[derive(Clone, Debug)]
 pub struct Noise(Xoshiro256PlusPlus);
 
+/// Every other one of four 16-bit numbers.
+const PAIRS: u64 = 0x0000_ffff_0000_ffff;
+
 impl Noise {
     /// The source of a seed.
     pub fn new(seed: u64) -> Self {
         Self(Xoshiro256PlusPlus::seed_from_u64(seed))
     }
 
+    /// True with this probability.
+    pub fn chance(&mut self, probability: f64) -> bool {
+        share_of(self.0.next_u64()) < probability
+    }
+
     /// A number of mean 0 and standard deviation 1, bounded by ±3.5: the sum of four uniform ones.
     pub fn gaussian(&mut self) -> f64 {
+        // Two sums at once, then their sum.
         let bits = self.0.next_u64();
-        let sum = (0..4)
-            .map(|i| i32::from((bits >> (16 * i)) as u16))
-            .sum::<i32>();
+        let pairs = (bits & PAIRS) + (bits >> 16 & PAIRS);
+        let sum = (pairs + (pairs >> 32)) as u32 as i32;
         // Four uniform numbers of 65536 steps: mean 4·32767.5, variance 4·65536²/12.
         (f64::from(sum) - 131_070.0) * (3.0_f64.sqrt() / 65_536.0)
     }
+}
+
+/// An even number of 0..1 from random bits, as fine as a double holds.
+pub fn share_of(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]

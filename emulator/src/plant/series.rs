@@ -1,43 +1,56 @@
 //! Functions by their series, for the small arguments of a fraction of a control period: several
 //! times faster than the library's, and the same bits on every machine.
 
-/// Cosine and sine to 1e-15 by their series up to x¹¹, for up to [`ROTATION_MAX`] radians.
-#[inline(always)]
-pub(super) fn small_rotation(radians: f64) -> [f64; 2] {
-    let x = radians * radians;
-    let cos = horner(
-        x,
-        [
-            -1.0 / 3_628_800.0,
-            1.0 / 40_320.0,
-            -1.0 / 720.0,
-            1.0 / 24.0,
-            -1.0 / 2.0,
-            1.0,
-        ],
-    );
-    let sin = horner(
-        x,
-        [
-            -1.0 / 39_916_800.0,
-            1.0 / 362_880.0,
-            -1.0 / 5_040.0,
-            1.0 / 120.0,
-            -1.0 / 6.0,
-            1.0,
-        ],
-    );
-    [cos, radians * sin]
+use std::ops::{Add, Mul};
+
+/// What a series can be of: a number, or several side by side.
+pub(super) trait Number:
+    Copy + Add<Output = Self> + Mul<Output = Self> + Add<f64, Output = Self> + Mul<f64, Output = Self>
+{
 }
 
-/// A polynomial, the highest power's coefficient first.
+impl Number for f64 {}
+impl Number for wide::f64x4 {}
+
+/// Cosine and sine to 1e-15 by their series up to x¹¹, for up to [`ROTATION_MAX`] radians.
 #[inline(always)]
-fn horner<const N: usize>(x: f64, coefficients: [f64; N]) -> f64 {
-    let mut sum = coefficients[0];
-    for coefficient in &coefficients[1..] {
-        sum = sum * x + coefficient;
-    }
-    sum
+pub(super) fn small_rotation<T: Number>(radians: T) -> [T; 2] {
+    let cos = polynomial(
+        radians * radians,
+        [
+            1.0,
+            -1.0 / 2.0,
+            1.0 / 24.0,
+            -1.0 / 720.0,
+            1.0 / 40_320.0,
+            -1.0 / 3_628_800.0,
+        ],
+    );
+    [cos, radians * small_sinc(radians)]
+}
+
+/// sin(x)/x to 1e-15, for up to [`ROTATION_MAX`] radians.
+#[inline(always)]
+pub(super) fn small_sinc<T: Number>(radians: T) -> T {
+    polynomial(
+        radians * radians,
+        [
+            1.0,
+            -1.0 / 6.0,
+            1.0 / 120.0,
+            -1.0 / 5_040.0,
+            1.0 / 362_880.0,
+            -1.0 / 39_916_800.0,
+        ],
+    )
+}
+
+/// A polynomial of six coefficients, the constant one first, in pairs (Estrin): what follows waits for
+/// it half as long as for Horner's rule.
+#[inline(always)]
+fn polynomial<T: Number>(x: T, c: [f64; 6]) -> T {
+    let square = x * x;
+    (x * c[1] + c[0]) + square * ((x * c[3] + c[2]) + square * (x * c[5] + c[4]))
 }
 
 /// See [`small_rotation`].
@@ -51,22 +64,15 @@ pub(super) fn rotation(radians: f64) -> [f64; 2] {
 
 /// e^(−x) to 2e-15 by its series up to x⁹, for 0 to [`DECAY_MAX`].
 #[inline(always)]
-pub(super) fn small_decay(x: f64) -> f64 {
-    horner(
-        -x,
-        [
-            1.0 / 362_880.0,
-            1.0 / 40_320.0,
-            1.0 / 5_040.0,
-            1.0 / 720.0,
-            1.0 / 120.0,
-            1.0 / 24.0,
-            1.0 / 6.0,
-            1.0 / 2.0,
-            1.0,
-            1.0,
-        ],
-    )
+pub(super) fn small_decay<T: Number>(x: T) -> T {
+    let square = x * x;
+    let low = polynomial(
+        x,
+        [1.0, -1.0, 1.0 / 2.0, -1.0 / 6.0, 1.0 / 24.0, -1.0 / 120.0],
+    );
+    let high =
+        (x * (-1.0 / 5_040.0) + 1.0 / 720.0) + square * (x * (-1.0 / 362_880.0) + 1.0 / 40_320.0);
+    low + square * square * square * high
 }
 
 /// See [`small_decay`].

@@ -1,33 +1,128 @@
 //! Where the power comes from.
 
-/// A voltage source behind a resistance.
+/// A source with its resistance, and the capacitor of the bus that it feeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supply {
-    /// Voltage without load, V.
-    pub open_v: f64,
+    /// What stands behind the resistance.
+    pub source: Source,
     /// Internal resistance, Ω.
     pub resistance_ohm: f64,
+    /// The bus capacitor, F, above 0. A source without resistance that takes current back holds the
+    /// bus without it; it counts once the source is disconnected.
+    pub capacitance_f: f64,
 }
 
+/// A voltage source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Source {
+    /// One voltage, V.
+    Fixed {
+        /// Volts.
+        volts: f64,
+        /// Whether it takes current back. Most bench supplies do not: braking charges the capacitor.
+        sinks: bool,
+    },
+    /// Lithium-polymer cells in series.
+    Pack {
+        /// Their number.
+        cells: u32,
+        /// Capacity, C (3600 to the Ah).
+        capacity_c: f64,
+        /// Share of the capacity that is left, 0..1.
+        charge: f64,
+    },
+}
+
+/// The capacitor of a small ESC's board, F.
+pub const CAPACITANCE_F: f64 = 470e-6;
+
+/// Capacity where only the number of cells is given, C: 2 Ah.
+pub const CAPACITY_C: f64 = 2.0 * 3600.0;
+
+/// Resistance of a cell of some 2 Ah, Ω.
+pub const CELL_OHM: f64 = 4e-3;
+
+/// Volts of a lithium-polymer cell at rest, from empty to full in steps of 5 %: the shape of the
+/// discharge tables that are published for such packs.
+const CELL_V: [f64; 21] = [
+    3.27, 3.61, 3.69, 3.71, 3.73, 3.75, 3.77, 3.79, 3.80, 3.82, 3.84, 3.85, 3.87, 3.91, 3.95, 3.98,
+    4.02, 4.08, 4.11, 4.15, 4.20,
+];
+
 impl Supply {
-    /// A bench supply: its voltage does not depend on the current.
+    /// A bench supply whose voltage does not depend on the current, in either direction.
     pub const fn stiff(volts: f64) -> Self {
         Self {
-            open_v: volts,
+            source: Source::Fixed { volts, sinks: true },
             resistance_ohm: 0.0,
+            capacitance_f: CAPACITANCE_F,
         }
     }
 
-    /// A charged lithium-polymer pack: 4.2 V and 4 mΩ a cell, as a pack of some 2 Ah has.
+    /// A charged lithium-polymer pack: 2 Ah, 4.2 V and 4 mΩ a cell.
     pub fn battery(cells: u32) -> Self {
         Self {
-            open_v: 4.2 * f64::from(cells),
-            resistance_ohm: 4e-3 * f64::from(cells),
+            source: Source::Pack {
+                cells,
+                capacity_c: CAPACITY_C,
+                charge: 1.0,
+            },
+            resistance_ohm: CELL_OHM * f64::from(cells),
+            capacitance_f: CAPACITANCE_F,
         }
     }
 
-    /// Terminal voltage at a current drawn, V, never negative.
-    pub fn voltage(&self, current_a: f64) -> f64 {
-        (self.open_v - self.resistance_ohm * current_a).max(0.0)
+    /// Voltage without load once `drawn_c` coulombs have been drawn, V.
+    pub fn open_v(&self, drawn_c: f64) -> f64 {
+        match self.source {
+            Source::Fixed { volts, .. } => volts,
+            Source::Pack {
+                cells,
+                capacity_c,
+                charge,
+            } => f64::from(cells) * cell_v(charge - drawn_c / capacity_c),
+        }
+    }
+
+    /// Whether current flows back into the source.
+    pub fn sinks(&self) -> bool {
+        match self.source {
+            Source::Fixed { sinks, .. } => sinks,
+            Source::Pack { .. } => true,
+        }
+    }
+}
+
+/// Voltage of a cell at rest by what is left of its charge, V: straight between the curve's points,
+/// and on along its ends beyond empty and full.
+fn cell_v(charge: f64) -> f64 {
+    let last = CELL_V.len() - 1;
+    let place = charge * last as f64;
+    let index = (place.max(0.0) as usize).min(last - 1);
+    let (low, high) = (CELL_V[index], CELL_V[index + 1]);
+    (low + (place - index as f64) * (high - low)).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pack_is_full_flat_and_empty() {
+        let pack = |charge| Supply {
+            source: Source::Pack {
+                cells: 4,
+                capacity_c: 3600.0,
+                charge,
+            },
+            ..Supply::battery(4)
+        };
+        assert!((pack(1.0).open_v(0.0) - 16.8).abs() < 1e-12);
+        assert!((pack(0.0).open_v(0.0) - 13.08).abs() < 1e-12);
+        // Half an ampere-hour of one.
+        assert!((pack(1.0).open_v(1800.0) - 4.0 * 3.84).abs() < 1e-9);
+        // Between two points, and over the ends.
+        assert!((cell_v(0.525) - 3.845).abs() < 1e-9);
+        assert!(cell_v(-0.05) < 3.0 && cell_v(-9.0) == 0.0 && cell_v(1.02) > 4.2);
     }
 }

@@ -1,8 +1,11 @@
 //! The plant against its equations stepped by brute force, and against what must hold in any case.
 
+mod breaks;
 mod brute_force;
+mod real_motor;
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use proptest::prelude::*;
 use siskin_control::drive::{Bridge, Setpoint};
@@ -10,11 +13,11 @@ use siskin_control::params::{Params, build};
 use siskin_control::units::Duty;
 
 use super::*;
-use crate::bench::{LOADS, MOTORS};
+use crate::fault::InForce;
 use crate::rig::{Bench, Rig};
 use brute_force::BruteForce;
 
-const MOTOR: Motor = MOTORS[0].1;
+static MOTOR: LazyLock<Motor> = LazyLock::new(|| Bench::default().motor);
 
 /// 15.15 kHz: a whole number of the brute force's steps.
 const PERIOD_S: f64 = 66e-6;
@@ -22,7 +25,7 @@ const PERIOD_S: f64 = 66e-6;
 const DEAD_TIME_S: f64 = 500e-9;
 
 fn held(fidelity: Fidelity, rpm: f64, angle_turns: f64) -> Plant {
-    let mut plant = Plant::new(fidelity, MOTOR, Load::default(), 0.0, angle_turns);
+    let mut plant = Plant::new(fidelity, *MOTOR, Load::default(), 0.0, angle_turns);
     plant.impose(rpm * TAU / 60.0);
     plant
 }
@@ -55,13 +58,30 @@ fn field_oriented(plant: &Plant, amps: f64, bus_v: f64) -> Bridge {
 }
 
 /// Runs both from the same start under commands that `command` makes, and compares all there is.
-fn compare(
+fn compare(plant: Plant, bus_v: f64, periods: u32, command: impl Fn(u32, &Plant) -> [Bridge; 2]) {
+    compare_with(&[], plant, bus_v, periods, command);
+}
+
+/// The same for a motor with harmonics.
+fn compare_with(
+    harmonics: &[Harmonic],
+    plant: Plant,
+    bus_v: f64,
+    periods: u32,
+    command: impl Fn(u32, &Plant) -> [Bridge; 2],
+) {
+    let brute = BruteForce::new(*MOTOR, harmonics, &plant, DEAD_TIME_S);
+    compare_brute(brute, plant, bus_v, periods, command);
+}
+
+/// The same for any brute force.
+fn compare_brute(
+    mut brute: BruteForce,
     mut plant: Plant,
     bus_v: f64,
     periods: u32,
     command: impl Fn(u32, &Plant) -> [Bridge; 2],
 ) {
-    let mut brute = BruteForce::new(MOTOR, &plant, DEAD_TIME_S);
     let mut peak_a = 0.0_f64;
     let mut worst_a = 0.0_f64;
     let list = |f: Flow| [f.torque_nm, f.torque_square, f.motor_w, f.copper_w, f.bus_a];
@@ -87,7 +107,7 @@ fn compare(
     assert!(peak_a > 0.1, "nothing flows");
     assert!(worst_a < 1e-6 * peak_a, "{worst_a} A of {peak_a} A");
     for (apart, gross) in apart.into_iter().zip(gross) {
-        assert!(apart.abs() < 1e-4 * gross, "{apart} of {gross}");
+        assert!(apart.abs() <= 1e-4 * gross + 1e-9, "{apart} of {gross}");
     }
     let share = 1.0 / f64::from(periods);
     let ripple_pct =
@@ -135,19 +155,22 @@ fn a_command_that_changes_within_the_period_is_as_by_brute_force() {
 #[test]
 fn six_step_commutation_is_as_by_brute_force() {
     let plant = held(Fidelity::Switching, 4000.0, 0.02);
-    compare(plant, 24.0, 40, |_, plant| {
-        let (duty, low) = (Some(0.75), Some(0.0));
-        let sector = (plant.angle_turns() * 6.0) as usize;
-        let pattern = [
-            [None, duty, low],
-            [low, duty, None],
-            [low, None, duty],
-            [None, low, duty],
-            [duty, low, None],
-            [duty, None, low],
-        ];
-        [legs(pattern[sector]); 2]
-    });
+    compare(plant, 24.0, 40, |_, plant| [six_step(plant); 2]);
+}
+
+/// Two legs drive, the third floats.
+fn six_step(plant: &Plant) -> Bridge {
+    let (duty, low) = (Some(0.75), Some(0.0));
+    let sector = (plant.angle_turns() * 6.0) as usize;
+    let pattern = [
+        [None, duty, low],
+        [low, duty, None],
+        [low, None, duty],
+        [None, low, duty],
+        [duty, low, None],
+        [duty, None, low],
+    ];
+    legs(pattern[sector])
 }
 
 #[test]
@@ -280,7 +303,7 @@ fn a_free_shaft_slows_down_as_the_load_says() {
         inertia_kgm2: 1e-4,
         ..Load::default()
     };
-    let mut plant = Plant::new(Fidelity::Averaged, MOTOR, load, 100.0, 0.1);
+    let mut plant = Plant::new(Fidelity::Averaged, *MOTOR, load, 100.0, 0.1);
     for _ in 0..10_000 {
         plant.period([Bridge::Off; 2], 24.0, 1e-4, 0.0);
     }
@@ -288,47 +311,53 @@ fn a_free_shaft_slows_down_as_the_load_says() {
     assert!((plant.speed_rad_s() - 100.0 * (-1.0_f64).exp()).abs() < 1e-6);
 }
 
-/// The default bench with the switching plant, spun up by its own control.
+/// The default bench, spun up by its own control.
 fn rig(plant: Fidelity) -> Rig {
+    rig_with(plant, Extras::default())
+}
+
+/// The same with a motor that is not ideal.
+fn rig_with(plant: Fidelity, extras: Extras) -> Rig {
     let bench = Bench {
         plant,
+        extras,
         ..Bench::default()
     };
     let config = build(&Params::default(), &bench.sensing.board(bench.delay)).unwrap();
     Rig::new(bench, config)
 }
 
-#[test]
-fn energy_is_conserved_over_a_switching_run() {
-    let mut rig = rig(Fidelity::Switching);
+/// From standing through the start to 4500 rpm, held there, and braked from there: the greatest
+/// difference between what came in and what went out or is stored, of what came in.
+fn imbalance(mut rig: Rig) -> f64 {
+    let load = Bench::default().load;
     let speed = |rig: &Rig, rpm| Setpoint::Speed(rig.config().scale.speed_from_rpm(rpm));
     let period_s = rig.period_s();
-    let inertia = MOTOR.inertia_kgm2 + LOADS[0].1.inertia_kgm2;
-    let (mut electrical, mut copper, mut load) = (0.0, 0.0, 0.0);
-    let mut ends = Vec::new();
-    let mut last = None;
+    let stored = |rig: &Rig| rig.plant().stored_j();
+    let start = stored(&rig);
+    let (mut input, mut output, mut apart) = (0.0, 0.0, 0.0_f64);
     for k in 0..60_000 {
         let rpm = if k < 40_000 { 4500.0 } else { 3000.0 };
         let setpoint = speed(&rig, rpm);
-        let period = rig.period(setpoint);
-        let [a, b, c] = period.currents_a;
-        let stored = 0.5 * MOTOR.inductance_h * (a * a + b * b + c * c)
-            + 0.5 * inertia * period.speed_rad_s.powi(2);
-        if let Some(before) = last.replace(period.speed_rad_s) {
-            // The load's by the trapezoidal rule between samples.
-            let load_w = |w: f64| LOADS[0].1.damping_at(w) * w * w;
-            load += 0.5 * period_s * (load_w(before) + load_w(period.speed_rad_s));
-        }
-        ends.push((electrical, copper, load, stored));
-        electrical += period.flow.motor_w * period_s;
-        copper += period.flow.copper_w * period_s;
+        let before = rig.plant().speed_rad_s();
+        let flow = rig.period(setpoint).flow;
+        let after = rig.plant().speed_rad_s();
+        // The load's by the trapezoidal rule between samples.
+        let load_w = |w: f64| load.damping_at(w) * w * w;
+        let lost_w = flow.copper_w + flow.drag_w + 0.5 * (load_w(before) + load_w(after));
+        input += period_s * flow.motor_w;
+        output += period_s * lost_w;
+        let grown = stored(&rig) - start;
+        apart = apart.max((input - output - grown).abs());
     }
-    // From standing through the start to 4500 rpm, held there, and braked from there.
-    let [first, last] = [ends[0], ends[ends.len() - 1]];
-    let input = last.0 - first.0;
-    let output = (last.1 - first.1) + (last.2 - first.2) + (last.3 - first.3);
     assert!(input > 50.0, "{input} J");
-    assert!((input - output).abs() < 1e-6 * input, "{input} {output}");
+    apart / input
+}
+
+#[test]
+fn energy_is_conserved_over_a_switching_run() {
+    let apart = imbalance(rig(Fidelity::Switching));
+    assert!(apart < 1e-6, "{apart}");
 }
 
 #[test]
@@ -371,12 +400,15 @@ fn both_fidelities_make_the_same_torque() {
 fn a_stuck_hall_sensor_shows_its_level() {
     let mut rig = rig(Fidelity::Averaged);
     let whole = rig.period(Setpoint::Stop).sample.hall;
-    rig.stick_hall(0, Some(false));
-    rig.stick_hall(1, Some(true));
+    let sound = InForce::default();
+    let stuck = InForce {
+        hall: [Some(false), Some(true), None],
+        ..sound
+    };
+    rig.disturb(&sound, &stuck);
     let broken = rig.period(Setpoint::Stop).sample.hall;
     assert_eq!(broken, whole & 0b100 | 0b010);
-    rig.stick_hall(0, None);
-    rig.stick_hall(1, None);
+    rig.disturb(&stuck, &sound);
     assert_eq!(rig.period(Setpoint::Stop).sample.hall, whole);
 }
 

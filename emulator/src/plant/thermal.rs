@@ -1,41 +1,157 @@
-//! The board's temperature.
+//! How warm things get.
 
-/// One thermal mass at the transistors, heated by their resistance.
-#[derive(Clone, Copy, Debug)]
-pub struct Thermal {
-    /// Temperature, °C.
-    pub temperature_c: f64,
-}
+use siskin_control::protection::Ntc;
+use siskin_control::units::AdcCounts;
 
+use super::Winding;
+
+/// Of the surroundings, and of everything at the start, °C.
 const AMBIENT_C: f64 = 25.0;
+
+/// What copper's resistance grows by, 1/K.
+const COPPER_PER_K: f64 = 3.93e-3;
 
 /// Two transistors and their shunts carry each phase's current in turn: about 6 mΩ.
 const PATH_OHM: f64 = 6e-3;
 
 /// A small board in moving air.
-const RESISTANCE_K_PER_W: f64 = 6.0;
+const BOARD_K_PER_W: f64 = 6.0;
 
 /// Its time constant, s.
-const TIME_CONSTANT_S: f64 = 20.0;
+const BOARD_S: f64 = 20.0;
+
+/// The sensor lies beside the transistors and follows the board, s.
+const SENSOR_S: f64 = 2.0;
+
+/// The sensor of the simulated board.
+const NTC: Ntc = Ntc::VESC;
+
+/// Board, with its transistors on it, and the sensor beside them.
+#[derive(Clone, Copy, Debug)]
+pub struct Thermal {
+    /// Temperature of the board, °C.
+    board_c: f64,
+    /// Temperature of the sensor, °C.
+    sensor_c: f64,
+}
 
 impl Thermal {
     /// At the temperature of the surroundings.
     pub const fn new() -> Self {
         Self {
-            temperature_c: AMBIENT_C,
+            board_c: AMBIENT_C,
+            sensor_c: AMBIENT_C,
         }
     }
 
-    /// Takes the temperature on by `time_s`, short against 20 s, at a current vector's magnitude.
-    pub fn advance(&mut self, time_s: f64, current_a: f64) {
-        let heat_w = 1.5 * PATH_OHM * current_a * current_a;
-        let settled_c = AMBIENT_C + RESISTANCE_K_PER_W * heat_w;
-        self.temperature_c += (settled_c - self.temperature_c) * (time_s / TIME_CONSTANT_S);
+    /// Takes the temperatures on by `time_s`, short against 2 s, at the mean square of a current
+    /// vector, A².
+    pub fn advance(&mut self, time_s: f64, current_square: f64) {
+        let heat_w = 1.5 * PATH_OHM * current_square;
+        let settled_c = AMBIENT_C + BOARD_K_PER_W * heat_w;
+        self.board_c += (settled_c - self.board_c) * (time_s * (1.0 / BOARD_S));
+        self.sensor_c += (self.board_c - self.sensor_c) * (time_s * (1.0 / SENSOR_S));
+    }
+
+    /// What the converter reads of the sensor's divider: 12 bits.
+    fn counts(&self) -> AdcCounts {
+        let per_k = 1.0 / (self.sensor_c + 273.15) - 1.0 / 298.15;
+        let thermistor = libm::exp(f64::from(NTC.beta_k) * per_k);
+        let pull_down = f64::from(NTC.pull_down);
+        let share = pull_down / (pull_down + thermistor);
+        AdcCounts::from_num(libm::round(4096.0 * share).min(4095.0))
+    }
+
+    /// What the control takes the board's temperature for, °C.
+    pub fn measured_c(&self) -> f32 {
+        NTC.celsius(self.counts())
     }
 }
 
 impl Default for Thermal {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// A winding that copper loss heats and whose resistance grows with it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Warming {
+    winding: Winding,
+    /// Resistance at 25 °C, Ω.
+    cold_ohm: f64,
+    excess_k: f64,
+}
+
+impl Warming {
+    pub(super) const fn new(winding: Winding, cold_ohm: f64) -> Self {
+        Self {
+            winding,
+            cold_ohm,
+            excess_k: 0.0,
+        }
+    }
+
+    /// Heats the winding for a time that is short against its time constant; its resistance then, Ω.
+    pub(super) fn advance(&mut self, time_s: f64, copper_w: f64) -> f64 {
+        let heat_w = copper_w - self.excess_k / self.winding.resistance_k_per_w;
+        self.excess_k += heat_w * time_s / self.winding.capacity_j_per_k;
+        self.cold_ohm * (1.0 + COPPER_PER_K * self.excess_k)
+    }
+
+    /// Temperature, °C.
+    #[cfg(test)]
+    pub(super) fn temperature_c(&self) -> f64 {
+        AMBIENT_C + self.excess_k
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sensor_follows_the_board() {
+        let mut thermal = Thermal::new();
+        let mut advance = |time_s: f64, current_a| {
+            for _ in 0..(time_s / 1e-3) as u32 {
+                thermal.advance(1e-3, current_a * current_a);
+            }
+            (thermal.board_c, thermal.sensor_c)
+        };
+        // 30 A are 8.1 W.
+        let (board_c, sensor_c) = advance(1.0, 30.0);
+        assert!(board_c > sensor_c && sensor_c > 25.0 && board_c < 28.0);
+        // In the end the board is up by 48.6 K, and the sensor with it.
+        let (board_c, sensor_c) = advance(200.0, 30.0);
+        assert!((board_c - 73.6).abs() < 0.1 && (sensor_c - 73.6).abs() < 0.1);
+    }
+
+    #[test]
+    fn what_the_control_makes_of_the_reading_is_the_sensor_s_temperature() {
+        let mut thermal = Thermal::new();
+        for sensor_c in [0.0, 25.0, 60.0, 100.0, 125.0] {
+            thermal.sensor_c = sensor_c;
+            let shown_c = f64::from(thermal.measured_c());
+            // A count is 0.3 K at 100 °C.
+            assert!((shown_c - sensor_c).abs() < 0.5, "{shown_c} for {sensor_c}");
+        }
+    }
+
+    #[test]
+    fn a_winding_warms_up_and_its_resistance_with_it() {
+        let winding = Winding {
+            resistance_k_per_w: 5.0,
+            capacity_j_per_k: 10.0,
+        };
+        let mut warming = Warming::new(winding, 0.1);
+        let mut ohm = 0.1;
+        for _ in 0..50_000 {
+            ohm = warming.advance(1e-3, 16.0);
+        }
+        // After one time constant, 50 s, 63.2 % of 80 K.
+        let excess_k = 80.0 * (1.0 - (-1.0_f64).exp());
+        assert!((warming.temperature_c() - 25.0 - excess_k).abs() < 0.01);
+        assert!((ohm - 0.1 * (1.0 + 0.00393 * excess_k)).abs() < 1e-5);
     }
 }

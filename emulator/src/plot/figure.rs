@@ -3,16 +3,16 @@
 use plotters::backend::DrawingBackend;
 use plotters::element::Rectangle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, FontStyle, IntoFont, RGBAColor, RGBColor, TextStyle, WHITE};
+use plotters::style::{Color, RGBAColor, RGBColor, WHITE};
 use siskin_control::drive::{Fault, Phase};
 
-use super::panel::{self, Area, Curve, Drawn, Look, Panel};
+use super::canvas::{Area, Drawn, Picture};
+use super::panel::{Curve, Look, Panel};
 use super::read::Recording;
+use super::style::{BLUE, FAULT, GREEN, GREY, GRID, ORANGE, VERMILION, heading, number, text};
 
-/// Width of the figure.
-pub(super) const WIDTH: u32 = 2400;
-/// Height of the figure.
-pub(super) const HEIGHT: u32 = 2100;
+const WIDTH: u32 = 2400;
+const HEIGHT: u32 = 2100;
 /// Columns that a recording is reduced to: one for about two and a half pixels, so that the SVG of
 /// a long recording stays below 300 kB.
 pub(super) const COLUMNS: usize = 900;
@@ -20,24 +20,8 @@ pub(super) const COLUMNS: usize = 900;
 pub(super) const LEFT: u32 = 150;
 /// Right of the axes.
 pub(super) const RIGHT: u32 = 40;
-/// The font's family.
-pub(super) const FONT: &str = "sans-serif";
-
 const TITLE: u32 = 90;
 const STRIP: u32 = 44;
-
-pub(super) const INK: RGBColor = RGBColor(0x22, 0x22, 0x22);
-pub(super) const AXIS: RGBColor = RGBColor(0x77, 0x77, 0x77);
-pub(super) const GRID: RGBColor = RGBColor(0xc0, 0xc0, 0xc0);
-const GREY: RGBColor = RGBColor(0x88, 0x88, 0x88);
-
-// The palette of Okabe and Ito, which the colour-blind can tell apart.
-const ORANGE: RGBColor = RGBColor(0xe6, 0x9f, 0x00);
-const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
-const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
-const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
-/// A fault's colour.
-pub(super) const FAULT: RGBColor = RGBColor(0xb0, 0x00, 0x20);
 
 /// A stretch of time in one phase.
 pub(super) struct Span {
@@ -46,8 +30,17 @@ pub(super) struct Span {
     pub(super) t1_s: f64,
 }
 
-/// Draws the whole figure.
-pub(super) fn draw<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
+impl Picture for Recording {
+    fn size(&self) -> (u32, u32) {
+        (WIDTH, HEIGHT)
+    }
+
+    fn draw<B: DrawingBackend>(&self, root: &Area<B>) -> Drawn<B> {
+        draw(root, self)
+    }
+}
+
+fn draw<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
     root.fill(&WHITE)?;
     title(root, recording)?;
     strip(root, recording)?;
@@ -148,7 +141,7 @@ pub(super) fn draw<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> 
 fn title<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
     let length_s = recording.t1_s - recording.t0_s;
     let rate_khz = recording.periods as f64 / length_s / 1e3;
-    let length = panel::number(length_s);
+    let length = number(length_s);
     let text = format!("{}: {length} s at {rate_khz:.1} kHz", recording.name);
     let middle = TITLE as i32 / 2;
     root.draw_text(&text, &heading(38.0), (LEFT as i32, middle))?;
@@ -206,20 +199,6 @@ pub(super) fn legend<'a, B: DrawingBackend>(
         right = left - 100;
     }
     Ok(())
-}
-
-/// Text that begins at its position and is centred on its height.
-pub(super) fn text(size: f64) -> TextStyle<'static> {
-    TextStyle::from((FONT, size).into_font())
-        .color(&INK)
-        .pos(Pos::new(HPos::Left, VPos::Center))
-}
-
-/// The same, bold.
-pub(super) fn heading(size: f64) -> TextStyle<'static> {
-    TextStyle::from((FONT, size, FontStyle::Bold).into_font())
-        .color(&INK)
-        .pos(Pos::new(HPos::Left, VPos::Center))
 }
 
 /// The stretches of the drive's phases.

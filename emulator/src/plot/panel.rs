@@ -2,19 +2,17 @@
 
 use plotters::backend::DrawingBackend;
 use plotters::chart::{ChartBuilder, ChartContext};
-use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::types::RangedCoordf64;
-use plotters::drawing::{DrawingArea, DrawingAreaErrorKind};
 use plotters::element::{PathElement, Polygon, Rectangle};
 use plotters::style::{Color, RGBAColor, RGBColor};
 
-use super::figure::{self, AXIS, GRID, LEFT, RIGHT};
+use super::canvas::{Area, Drawn};
+use super::figure::{self, LEFT, RIGHT};
 use super::read::Recording;
 use super::reduce::{Cell, Trace};
+use super::style::{AXIS, FAULT, GRID, heading, number, text};
 
-pub(super) type Area<B> = DrawingArea<B, Shift>;
-pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 type Axes<'a, B> = ChartContext<'a, B, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Height of the title's and legend's line.
@@ -95,8 +93,8 @@ impl Panel<'_> {
             .max_light_lines(0)
             .bold_line_style(GRID.stroke_width(1))
             .axis_style(AXIS.stroke_width(2))
-            .label_style(figure::text(26.0))
-            .axis_desc_style(figure::text(28.0))
+            .label_style(text(26.0))
+            .axis_desc_style(text(28.0))
             .x_label_formatter(&label)
             .y_label_formatter(&label)
             .x_desc(if self.time { "time (s)" } else { "" })
@@ -106,8 +104,7 @@ impl Panel<'_> {
             curve.draw(&mut chart, recording, low, high)?;
         }
         for t_s in figure::fault_times(recording) {
-            let line =
-                PathElement::new(vec![(t_s, low), (t_s, high)], figure::FAULT.stroke_width(3));
+            let line = PathElement::new(vec![(t_s, low), (t_s, high)], FAULT.stroke_width(3));
             chart.draw_series([line])?;
         }
         Ok(())
@@ -123,7 +120,7 @@ impl Panel<'_> {
         });
         let middle = HEADER as i32 / 2;
         figure::legend(area, middle, entries)?;
-        let title = figure::heading(30.0);
+        let title = heading(30.0);
         area.draw_text(self.title, &title, (LEFT as i32, middle))
     }
 
@@ -184,11 +181,4 @@ impl Curve<'_> {
         }
         Ok(())
     }
-}
-
-/// A number for a person: without the digits that come from counting in binary.
-pub(super) fn number(value: f64) -> String {
-    // Adding zero turns a negative zero into a plain one.
-    let rounded = (value * 1e6).round() / 1e6 + 0.0;
-    rounded.to_string()
 }

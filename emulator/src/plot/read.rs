@@ -38,6 +38,9 @@ pub(super) struct Recording {
     pub(super) angle_error_deg: Trace,
 }
 
+/// No time of a recording is beyond, s: 30 years, of which a double still tells 0.1 µs.
+const LATEST_S: f64 = 1e9;
+
 /// The extent of a recording.
 struct Extent {
     periods: u64,
@@ -71,9 +74,8 @@ impl Recording {
             u_max_v: trace.clone(),
             angle_error_deg: trace,
         };
-        for row in open(path)?.deserialize() {
-            let row = row.map_err(|error| not_a_recording(path, error))?;
-            recording.add(&row);
+        for row in rows(path)? {
+            recording.add(&row?.1);
         }
         Ok(recording)
     }
@@ -111,7 +113,45 @@ impl Recording {
     }
 }
 
-fn open(path: &Path) -> Result<csv::Reader<File>, PlotError> {
+/// The rows of a recording, each with its place in the file.
+type Rows = Box<dyn Iterator<Item = Result<(String, Row), PlotError>>>;
+
+/// Opens a recording in the format that its extension names; any other is taken for CSV.
+fn rows(path: &Path) -> Result<Rows, PlotError> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("parquet") => packed_rows(path),
+        _ => text_rows(path),
+    }
+}
+
+#[cfg(not(feature = "parquet"))]
+fn packed_rows(path: &Path) -> Result<Rows, PlotError> {
+    let reason = crate::record::NO_PARQUET.to_owned();
+    Err(content(path, reason))
+}
+
+#[cfg(feature = "parquet")]
+fn packed_rows(path: &Path) -> Result<Rows, PlotError> {
+    use crate::record::parquet::{self, ReadError};
+
+    let rows = parquet::read(path).map_err(|error| match error {
+        ReadError::Io(source) => PlotError::Read {
+            path: path.to_owned(),
+            source,
+        },
+        ReadError::Content(reason) => content(path, reason),
+    })?;
+    let path = path.to_owned();
+    Ok(Box::new(rows.enumerate().map(move |(index, row)| {
+        let place = format!("row {}", index + 1);
+        match row {
+            Ok(row) => Ok((place, row)),
+            Err(reason) => Err(content(&path, format!("{place}: {reason}"))),
+        }
+    })))
+}
+
+fn text_rows(path: &Path) -> Result<Rows, PlotError> {
     let file = File::open(path).map_err(|source| PlotError::Read {
         path: path.to_owned(),
         source,
@@ -123,59 +163,52 @@ fn open(path: &Path) -> Result<csv::Reader<File>, PlotError> {
     let missing = Row::COLUMNS
         .iter()
         .find(|name| header.iter().all(|cell| cell != name.as_bytes()));
-    match missing {
-        Some(name) => Err(PlotError::Content {
-            path: path.to_owned(),
-            reason: format!("its first line names no column {name}"),
-        }),
-        None => Ok(reader),
+    if let Some(name) = missing {
+        let reason = format!("its first line names no column {name}");
+        return Err(content(path, reason));
     }
+    let path = path.to_owned();
+    let mut rows = reader.into_deserialize();
+    Ok(Box::new(std::iter::from_fn(move || {
+        let line = rows.reader().position().line();
+        let row = rows.next()?;
+        let row = row.map_err(|error| not_a_recording(&path, error));
+        Some(row.map(|row| (format!("line {line}"), row)))
+    })))
 }
 
 fn extent(path: &Path) -> Result<Extent, PlotError> {
-    let content = |reason: String| PlotError::Content {
-        path: path.to_owned(),
-        reason,
-    };
-    let mut reader = open(path)?;
-    let header = reader
-        .byte_headers()
-        .map_err(|error| not_a_recording(path, error))?;
-    let column = header
-        .iter()
-        .position(|name| name == b"t_s")
-        .unwrap_or_default();
     let (mut periods, mut first, mut last) = (0, 0.0, f64::NEG_INFINITY);
-    let mut record = csv::ByteRecord::new();
-    while reader
-        .read_byte_record(&mut record)
-        .map_err(|error| not_a_recording(path, error))?
-    {
-        let line = record.position().map_or(0, csv::Position::line);
-        let t_s = record
-            .get(column)
-            .and_then(|cell| std::str::from_utf8(cell).ok());
-        let t_s = t_s.and_then(|cell| cell.parse::<f64>().ok());
-        let Some(t_s) = t_s.filter(|t_s| t_s.is_finite()) else {
-            return Err(content(format!("line {line}: t_s is not a time")));
-        };
-        if t_s <= last {
-            return Err(content(format!("line {line}: t_s does not rise")));
+    for row in rows(path)? {
+        let (place, row) = row?;
+        if row.t_s.is_nan() || row.t_s.abs() > LATEST_S {
+            return Err(content(path, format!("{place}: t_s is not a time")));
+        }
+        if row.t_s <= last {
+            return Err(content(path, format!("{place}: t_s does not rise")));
         }
         if periods == 0 {
-            first = t_s;
+            first = row.t_s;
         }
-        last = t_s;
+        last = row.t_s;
         periods += 1;
     }
     if periods < 2 {
-        return Err(content("it has fewer than two control periods".to_owned()));
+        let reason = "it has fewer than two control periods";
+        return Err(content(path, reason.to_owned()));
     }
     Ok(Extent {
         periods,
         t0_s: first,
         t1_s: last + (last - first) / (periods - 1) as f64,
     })
+}
+
+fn content(path: &Path, reason: String) -> PlotError {
+    PlotError::Content {
+        path: path.to_owned(),
+        reason,
+    }
 }
 
 /// What the file holds instead, in one line.

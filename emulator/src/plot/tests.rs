@@ -181,6 +181,11 @@ fn what_cannot_be_drawn_is_one_line_with_the_path() {
     assert!(content(word.as_bytes()).contains("line 2: unknown variant `asleep`"));
     let letter = good.replacen("\n0,idle,0", "\n0,idle,x", 1);
     assert!(content(letter.as_bytes()).contains("line 2, column 3: "));
+    let (_, values) = lines[2].split_once(',').unwrap();
+    for t_s in ["nan", "-inf", "1e300", "-1.1e9"] {
+        let late = [lines[0], lines[1], &format!("{t_s},{values}")].join("\n");
+        assert!(content(late.as_bytes()).ends_with("line 3: t_s is not a time"));
+    }
     let backwards = [lines[0], lines[2], lines[1]].join("\n");
     assert!(content(backwards.as_bytes()).ends_with("line 3: t_s does not rise"));
 }

@@ -1,100 +1,167 @@
-//! Recordings of a run: one line a control period.
+//! Recordings of a run, for other programs.
 //!
-//! The extension of the path selects the format; `.csv` is text with the columns of [`Row`].
+//! The extension of the path selects the format: `.csv` and `.parquet` hold the columns of [`Row`],
+//! one line a control period; `.vcd` the wires of the bridge, of the throttle and of the Hall
+//! sensors with every edge; `.tlog` the MAVLink frames of both directions.
 
+mod csv;
+#[cfg(feature = "parquet")]
+pub(crate) mod parquet;
 mod row;
 #[cfg(test)]
 mod tests;
+mod tlog;
+mod vcd;
 
-use std::ffi::OsStr;
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
 
-use siskin_control::drive::Snapshot;
 use thiserror::Error;
 
-use crate::rig::Period;
-use crate::shaft::Units;
+use crate::rig::{Period, Rig};
 
 pub use row::Row;
 
-/// Bytes between two writes to the file: a few hundred periods.
-const BUFFER_BYTES: usize = 64 * 1024;
+/// When an offline run begins by the clock of its log: 2020-01-01 00:00 UTC, so that equal runs
+/// give equal files.
+const OFFLINE_START: Duration = Duration::from_secs(1_577_836_800);
 
 /// Why there is no recording.
 #[derive(Debug, Error)]
 pub enum RecordError {
     /// No format has this extension.
-    #[error("cannot record to {}: the name must end in .csv", .0.display())]
+    #[error(
+        "cannot record to {}: the name must end in .csv, .parquet, .vcd or .tlog", .0.display()
+    )]
     Extension(PathBuf),
+    /// The format is not in this build.
+    #[error("cannot record to {}: {}", .0.display(), NO_PARQUET)]
+    NoParquet(PathBuf),
     /// The file cannot be written.
     #[error("cannot record to {}: {source}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
         /// The system's reason.
-        source: std::io::Error,
+        source: io::Error,
     },
 }
 
+/// What to do where a build cannot write or read Parquet.
+pub(crate) const NO_PARQUET: &str = "this build has no Parquet; build it with --features parquet";
+
+/// A format: it takes what it has a place for.
+trait Sink {
+    fn period(&mut self, _t_s: f64, _period: &Period, _rig: &Rig) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn edge(&mut self, _time_ns: u64, _level: bool) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn frame(&mut self, _time_ns: u64, _frame: &[u8]) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> io::Result<()>;
+}
+
 /// Writes a recording.
-#[derive(Debug)]
 pub struct Recorder {
     path: PathBuf,
-    csv: csv::Writer<File>,
+    sink: Box<dyn Sink>,
 }
 
 impl Recorder {
-    /// A new recording at `path`; what stood there is lost.
+    /// A new recording at `path` of a run offline; what stood there is lost.
     ///
     /// # Errors
     /// An extension without a format, or a file that cannot be written.
     pub fn create(path: &Path) -> Result<Self, RecordError> {
-        if path.extension() != Some(OsStr::new("csv")) {
-            return Err(RecordError::Extension(path.to_owned()));
-        }
-        let file = File::create(path).map_err(|source| RecordError::Write {
-            path: path.to_owned(),
-            source,
-        })?;
-        let mut recorder = Self {
-            path: path.to_owned(),
-            csv: csv::WriterBuilder::new()
-                .has_headers(false)
-                .buffer_capacity(BUFFER_BYTES)
-                .from_writer(file),
-        };
-        // A run that ends before its first period still leaves a recording.
-        let header = recorder.csv.write_record(Row::COLUMNS);
-        header.map_err(|error| recorder.error(error.into()))?;
-        Ok(recorder)
+        Self::from(path, OFFLINE_START)
     }
 
-    /// Appends the control period that began at `t_s`, and what the control made of it.
+    /// The same of a run that begins now.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn live(path: &Path) -> Result<Self, RecordError> {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        // A clock before 1970 is not set.
+        Self::from(path, now.unwrap_or(OFFLINE_START))
+    }
+
+    /// A recording of a run that begins so long after 1970.
+    fn from(path: &Path, start: Duration) -> Result<Self, RecordError> {
+        let error = |source| RecordError::Write {
+            path: path.to_owned(),
+            source,
+        };
+        let file = || File::create(path);
+        let extension = path.extension().and_then(|extension| extension.to_str());
+        let sink: io::Result<Box<dyn Sink>> = match extension {
+            Some("csv") => file()
+                .and_then(csv::Csv::new)
+                .map(|sink| Box::new(sink) as _),
+            Some("vcd") => file()
+                .and_then(vcd::Vcd::new)
+                .map(|sink| Box::new(sink) as _),
+            Some("tlog") => file().map(|file| Box::new(tlog::Tlog::new(file, start)) as _),
+            #[cfg(feature = "parquet")]
+            Some("parquet") => file()
+                .and_then(parquet::Parquet::new)
+                .map(|sink| Box::new(sink) as _),
+            #[cfg(not(feature = "parquet"))]
+            Some("parquet") => return Err(RecordError::NoParquet(path.to_owned())),
+            _ => return Err(RecordError::Extension(path.to_owned())),
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            sink: sink.map_err(error)?,
+        })
+    }
+
+    /// Takes in the control period that began at `t_s`, and what the control made of it.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(
-        &mut self,
-        t_s: f64,
-        period: &Period,
-        snapshot: &Snapshot,
-        units: Units,
-    ) -> Result<(), RecordError> {
-        let written = self.csv.serialize(Row::new(t_s, period, snapshot, units));
-        written.map_err(|error| self.error(error.into()))
+    pub fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) -> Result<(), RecordError> {
+        let written = self.sink.period(t_s, period, rig);
+        written.map_err(|source| self.error(source))
+    }
+
+    /// Takes in a change of the throttle wire, earlier than the next period.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn edge(&mut self, time_ns: u64, level: bool) -> Result<(), RecordError> {
+        let written = self.sink.edge(time_ns, level);
+        written.map_err(|source| self.error(source))
+    }
+
+    /// Takes in a whole MAVLink frame, sent or received.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn frame(&mut self, time_ns: u64, frame: &[u8]) -> Result<(), RecordError> {
+        let written = self.sink.frame(time_ns, frame);
+        written.map_err(|source| self.error(source))
     }
 
     /// Writes what is still in memory.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn finish(mut self) -> Result<(), RecordError> {
-        let flushed = self.csv.flush();
-        flushed.map_err(|source| self.error(source))
+    pub fn finish(self) -> Result<(), RecordError> {
+        let Self { path, sink } = self;
+        sink.finish()
+            .map_err(|source| RecordError::Write { path, source })
     }
 
-    fn error(&self, source: std::io::Error) -> RecordError {
+    fn error(&self, source: io::Error) -> RecordError {
         RecordError::Write {
             path: self.path.clone(),
             source,

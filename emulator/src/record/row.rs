@@ -1,9 +1,11 @@
 //! The columns of a recording.
 
+#[cfg(feature = "parquet")]
+use serde::Deserializer;
 use serde::{Deserialize, Serialize};
-use siskin_control::drive::{Bridge, Phase, Snapshot};
+use siskin_control::drive::{Bridge, Phase};
 
-use crate::rig::Period;
+use crate::rig::{Period, Rig};
 use crate::shaft::Units;
 
 /// One control period. The fields are the columns, in this order, with the unit as the last part
@@ -99,8 +101,21 @@ impl Row {
         "torque_nm",
     ];
 
-    /// The period that began at `t_s`, and what the control made of it.
-    pub fn new(t_s: f64, period: &Period, snapshot: &Snapshot, units: Units) -> Self {
+    /// The phase as a recording spells it.
+    #[cfg(feature = "parquet")]
+    pub(super) fn phase_name(&self) -> String {
+        format!("{:?}", self.phase).to_lowercase()
+    }
+
+    /// The phase that a recording spells so.
+    #[cfg(feature = "parquet")]
+    pub(super) fn phase_named<'a, D: Deserializer<'a>>(name: D) -> Result<Phase, D::Error> {
+        PhaseName::deserialize(name)
+    }
+
+    /// The period that began at `t_s`, and what the control of the rig made of it.
+    pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Self {
+        let (snapshot, units) = (&rig.snapshot(), Units::of(rig.config()));
         let scale = units.scale;
         let turns = snapshot.angle.to_num::<f64>();
         let [i_a_a, i_b_a, i_c_a] = period.currents_a.map(|current_a| current_a as f32);

@@ -1,18 +1,25 @@
 //! The papers' own figures, measured on the code that runs on the chip.
 
+mod bosso;
 mod colton;
 
+pub use bosso::bosso;
 pub use colton::colton;
 
 use std::fmt;
 
 use serde::Serialize;
 
+use crate::plot::chart::Figure;
+
 /// A paper's figures beside those measured here.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reproduction {
     /// In the order of the paper.
     pub items: Vec<Item>,
+    /// The paper's pictures, drawn from the same measurements.
+    #[serde(skip)]
+    pub figures: Vec<Figure>,
 }
 
 /// One figure.
@@ -30,10 +37,20 @@ pub struct Item {
     pub note: String,
 }
 
-impl Reproduction {
-    /// The item of this name.
-    pub fn find(&self, name: &str) -> Option<&Item> {
-        self.items.iter().find(|item| item.name == name)
+/// What the paper says or its formula gives, beside what was measured; what is not finite was not.
+fn item(
+    name: impl Into<String>,
+    paper: Option<f64>,
+    measured: impl Into<Option<f64>>,
+    unit: &'static str,
+    note: impl Into<String>,
+) -> Item {
+    Item {
+        name: name.into(),
+        paper,
+        measured: measured.into().filter(|value| value.is_finite()),
+        unit,
+        note: note.into(),
     }
 }
 

@@ -1,7 +1,9 @@
 //! Why a scenario cannot run.
 
 use thiserror::Error;
+use toml::Value;
 
+use super::lines::line_of;
 use crate::bench::BenchError;
 use crate::device::StartError;
 use crate::watch::WatchError;
@@ -16,7 +18,7 @@ pub enum ScenarioError {
     #[error("{0}")]
     Syntax(String),
     /// Something that cannot stand on the bench.
-    #[error("bench: {0}")]
+    #[error("{key}: {0}", key = .0.key())]
     Bench(#[from] BenchError),
     /// A quantity out of range.
     #[error("{key} = {value} is out of range; give {least} to {most}")]
@@ -33,26 +35,6 @@ pub enum ScenarioError {
     /// A delay that no board has.
     #[error("bench.delay_periods = {0}; give 0, 0.5 or 1")]
     Delay(f64),
-    /// A parameter that there is not or that is out of range.
-    #[error("params: {0}")]
-    Parameter(String),
-    /// A signal that makes no sense.
-    #[error("the signal at {at_s} s {problem}")]
-    Signal {
-        /// Its time.
-        at_s: f64,
-        /// What is wrong.
-        problem: &'static str,
-    },
-    /// Signals out of order.
-    #[error("the signal at {0} s stands after a later one; put them in order")]
-    Order(f64),
-    /// A window without time.
-    #[error("the window {0} has no time between t0_s and t1_s")]
-    Window(String),
-    /// Two windows of one name.
-    #[error("there are two windows {0}; give each its own name")]
-    Twice(String),
     /// An expectation of no window, of no figure, or of nothing.
     #[error("the expectation of {window}.{key} {problem}")]
     Expectation {
@@ -63,13 +45,21 @@ pub enum ScenarioError {
         /// What is wrong.
         problem: &'static str,
     },
-    /// A key that cannot be set, swept or drawn.
+    /// A key whose value makes no sense.
     #[error("{key}: {problem}")]
     Key {
         /// The dotted key.
         key: String,
         /// What is wrong.
         problem: String,
+    },
+    /// What is wrong, and where in the file.
+    #[error("line {line}: {error}")]
+    Line {
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong.
+        error: Box<ScenarioError>,
     },
     /// More combinations and seeds than anyone waits for.
     #[error("{runs} runs; at most {most} at once")]
@@ -96,4 +86,48 @@ pub enum ScenarioError {
     /// The plant or the recording.
     #[error("{0}")]
     Watch(#[from] WatchError),
+}
+
+impl ScenarioError {
+    /// A key whose value makes no sense.
+    pub(super) fn of_key(key: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Key {
+            key: key.into(),
+            problem: problem.into(),
+        }
+    }
+
+    /// The same with the line of its key in the file, where the value is from the file and not
+    /// from the keys that the command line sets.
+    pub(super) fn in_file(self, text: &str, set: &[(String, Value)]) -> Self {
+        let line = self.key().and_then(|key| line_of(text, &key, set));
+        match line {
+            Some(line) => Self::Line {
+                line,
+                error: Box::new(self),
+            },
+            None => self,
+        }
+    }
+
+    /// The dotted key that it is about.
+    fn key(&self) -> Option<String> {
+        match self {
+            Self::Bench(error) => Some(error.key()),
+            // What motor and load come to together begins at the motor.
+            Self::Range { key, .. } if !key.starts_with("bench.") => Some("bench.motor".to_owned()),
+            Self::Range { key, .. } => Some((*key).to_owned()),
+            Self::Delay(_) => Some("bench.delay_periods".to_owned()),
+            Self::Key { key, .. } => Some(key.clone()),
+            Self::Case { error, .. } => error.key(),
+            Self::Read(_)
+            | Self::Syntax(_)
+            | Self::Expectation { .. }
+            | Self::Line { .. }
+            | Self::Runs { .. }
+            | Self::RecordsOne(_)
+            | Self::Start(_)
+            | Self::Watch(_) => None,
+        }
+    }
 }

@@ -1,18 +1,27 @@
 //! A scenario as its file gives it.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::Deserialize;
 use siskin_control::control::delay::Delay;
 use siskin_control::params::ParamId;
-use toml::Value;
+use toml::{Table, Value};
 
 use super::ScenarioError;
+use super::fault::FaultTable;
+use super::lines::reason;
 use super::signal::Signal;
-use crate::bench::{self, Choice, LoadTable, MotorTable};
+use crate::bench::{
+    Choice, DEFAULT_LOAD, DEFAULT_MOTOR, LoadTable, MotorTable, SupplyTable, library,
+};
+use crate::fault::Fault;
 use crate::parameter::parameter;
 use crate::plant::{Fidelity, Sensing};
-use crate::rig::Bench;
+use crate::rig::{Bench, Position};
+
+/// The fastest decay of currents that are taken on step by step, 1/s: 500 steps in a period of 50 µs.
+const DECAY_MAX_PER_S: f64 = 1e6;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
@@ -27,6 +36,9 @@ pub(super) struct Scenario {
     /// What is asked of the drive, in order.
     #[serde(default)]
     pub(super) signal: Vec<Signal>,
+    /// What goes wrong.
+    #[serde(default)]
+    pub(super) fault: Vec<FaultTable>,
     /// Where figures are taken.
     #[serde(default)]
     pub(super) window: Vec<WindowTable>,
@@ -60,18 +72,22 @@ pub(super) enum Draw {
     },
 }
 
-/// The bench; each key left out takes the value of the Bosso bench.
+/// The bench; each key left out takes that of its base, or else of the Bosso bench.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct BenchTable {
+    /// The bench that this one is built on, by name or path; see [`crate::bench::library`].
+    pub(super) base: Option<String>,
     /// A built-in name, a file or a table.
     pub(super) motor: Choice<MotorTable>,
     /// Likewise.
     pub(super) load: Choice<LoadTable>,
-    /// Volts, or a pack as "6s".
-    pub(super) bus: Bus,
+    /// Volts, a pack as "6s", a file or a table.
+    pub(super) bus: Choice<SupplyTable>,
     /// How the inverter is simulated.
     pub(super) plant: Fidelity,
+    /// Where the control has the rotor's position from.
+    pub(super) position: Position,
     /// Speed that the shaft is held at.
     pub(super) imposed_rpm: Option<f64>,
     /// Seed of all randomness.
@@ -109,10 +125,12 @@ pub(super) struct BenchTable {
 impl Default for BenchTable {
     fn default() -> Self {
         Self {
-            motor: Choice::Named("antigravity-4006-kv380".to_owned()),
-            load: Choice::Named("cfprop-13x4.4".to_owned()),
-            bus: Bus::Volts(24.0),
+            base: None,
+            motor: Choice::Named(DEFAULT_MOTOR.to_owned()),
+            load: Choice::Named(DEFAULT_LOAD.to_owned()),
+            bus: Choice::Named("24".to_owned()),
             plant: Fidelity::Averaged,
+            position: Position::Observer,
             imposed_rpm: None,
             seed: 1,
             duration_s: 3.0,
@@ -131,16 +149,6 @@ impl Default for BenchTable {
             initial_angle_deg: 0.0,
         }
     }
-}
-
-/// A supply.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
-pub(super) enum Bus {
-    /// A stiff supply.
-    Volts(f64),
-    /// A pack.
-    Pack(String),
 }
 
 /// How throttle is sent.
@@ -237,11 +245,21 @@ impl BenchTable {
             range(key, factor, 0.01, 100.0)?;
         }
         range("bench.scale.load", factors.load, 0.0, 100.0)?;
-        let mut motor = self.motor.motor()?;
+        let (mut motor, extras) = self.motor.motor()?;
         motor.resistance_ohm *= factors.r;
         motor.inductance_h *= factors.l;
         motor.flux_wb *= factors.flux;
         motor.inertia_kgm2 *= factors.j;
+        if !extras.is_linear() {
+            let least_h =
+                2.0 * motor.inductance_h * extras.saliency.min(1.0) / (1.0 + extras.saliency);
+            range(
+                "R/L of a motor with harmonics, saliency or saturation",
+                motor.resistance_ohm / least_h,
+                0.0,
+                DECAY_MAX_PER_S,
+            )?;
+        }
         let mut load = self.load.load()?;
         load.c1 *= factors.load;
         load.c2 *= factors.load;
@@ -265,9 +283,11 @@ impl BenchTable {
         };
         Ok(Bench {
             motor,
+            extras,
             load,
-            supply: bench::supply(&self.bus.text())?,
+            supply: self.bus.supply()?,
             plant: self.plant,
+            position: self.position,
             sensing: Sensing {
                 range_a: range("bench.adc_range_a", self.adc_range_a, 0.1, 1e3)?,
                 bits: range("bench.adc_bits", f64::from(self.adc_bits), 0.0, 24.0)? as u32,
@@ -277,7 +297,6 @@ impl BenchTable {
                 settling_s: range("bench.settling_ns", self.settling_ns, 0.0, 1e5)? * 1e-9,
                 hall_error_deg: three("bench.hall_error_deg", self.hall_error_deg, -60.0, 60.0)?,
             },
-            hall_stuck: [None; 3],
             delay,
             dead_time_s: Some(range("bench.dead_time_ns", self.dead_time_ns, 0.0, 1e4)? * 1e-9),
             imposed_rad_s: match self.imposed_rpm {
@@ -296,21 +315,61 @@ impl BenchTable {
     }
 }
 
-impl Bus {
-    fn text(&self) -> String {
-        match self {
-            Self::Volts(volts) => volts.to_string(),
-            Self::Pack(pack) => pack.clone(),
-        }
-    }
-}
-
 impl Scenario {
+    /// The scenario that the tables of a file in this folder make, on the bench that they name as
+    /// their base.
+    pub(super) fn read(root: Table, folder: &Path) -> Result<Self, ScenarioError> {
+        Self::understand(Self::complete(root, folder)?)
+    }
+
+    /// The tables with those of the bench that they name as their base.
+    pub(super) fn complete(mut root: Table, folder: &Path) -> Result<Table, ScenarioError> {
+        library::complete(&mut root, folder, &|text, table| {
+            let alone = Self::alone(text, table);
+            alone.map_err(|error| error.in_file(text, &[]).to_string())
+        })?;
+        Ok(root)
+    }
+
+    /// Whether the file of a bench makes sense by itself; `table` is its text's.
+    fn alone(text: &str, table: &Table) -> Result<(), ScenarioError> {
+        toml::from_str::<Self>(text)
+            .map_err(|error| ScenarioError::Syntax(reason(text, &error)))?;
+        let scenario = Self::understand(table.clone())?;
+        scenario.bench.bench()?;
+        scenario.params()?;
+        Ok(())
+    }
+
+    /// The scenario that complete tables make.
+    pub(super) fn understand(root: Table) -> Result<Self, ScenarioError> {
+        Self::deserialize(root).map_err(|error| {
+            let message = error.message().replace('\n', " ");
+            ScenarioError::Syntax(message)
+        })
+    }
+
+    /// What goes wrong.
+    pub(super) fn faults(&self) -> Result<Vec<Fault>, ScenarioError> {
+        let faults = self.fault.iter().enumerate();
+        faults
+            .map(|(index, table)| {
+                let wrong = |(key, problem): (&str, String)| {
+                    ScenarioError::of_key(format!("fault.{index}.{key}"), problem)
+                };
+                table.fault().map_err(wrong)
+            })
+            .collect()
+    }
+
     /// The parameters that the file sets.
     pub(super) fn params(&self) -> Result<Vec<(ParamId, f32)>, ScenarioError> {
         self.params
             .iter()
-            .map(|(name, value)| parameter(name, *value).map_err(ScenarioError::Parameter))
+            .map(|(name, value)| {
+                let wrong = |problem| ScenarioError::of_key(format!("params.{name}"), problem);
+                parameter(name, *value).map_err(wrong)
+            })
             .collect()
     }
 }

@@ -14,29 +14,40 @@
 //! "bench.delay_periods" = { of = [0.0, 0.5, 1.0] }
 //! ```
 //!
+//! `base` in `[bench]` names a bench of the library or a file like its: its `[bench]` and `[params]`
+//! hold where the scenario says nothing. A path in a file begins at the file's folder, or else, that of
+//! a bench, motor, load or supply, at the working directory.
+//!
 //! An expectation of the window `run` is one of the whole run; its `faults` is the number of
 //! different faults.
 
+mod course;
 mod error;
+mod fault;
 mod file;
 mod judge;
+mod lines;
 mod place;
 mod play;
 mod signal;
+mod stand;
 mod survey;
 mod vary;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::summary::Report;
+use course::Courses;
 pub use error::ScenarioError;
 pub use judge::Verdict;
 pub use place::Place;
+pub use stand::{Standing, stand};
 pub use survey::{Expected, Failure, Survey};
 use vary::{Case, Variations};
 
@@ -77,6 +88,7 @@ pub struct Options {
 /// A scenario that has been read and found to make sense.
 pub struct Plan {
     variations: Variations,
+    courses: Courses,
     record: Option<PathBuf>,
 }
 
@@ -87,8 +99,12 @@ impl Plan {
     /// Any [`ScenarioError`] that shows before a run; that of the first run that has one.
     pub fn read(path: &Path, options: &Options) -> Result<Self, ScenarioError> {
         let text = std::fs::read_to_string(path).map_err(ScenarioError::Read)?;
+        let in_file = |error: ScenarioError| error.in_file(&text, &options.set);
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let variations = Variations::read(&text, &options.set, options.seeds.clone(), folder);
         let plan = Self {
-            variations: Variations::read(&text, &options.set, options.seeds.clone())?,
+            variations: variations.map_err(in_file)?,
+            courses: Courses::in_folder(folder),
             record: options.record.clone(),
         };
         if plan.record.is_some() && plan.runs() > 1 {
@@ -96,7 +112,7 @@ impl Plan {
         }
         let problems = (0..plan.runs()).into_par_iter();
         match problems.find_map_first(|index| plan.check(index).err()) {
-            Some(error) => Err(error),
+            Some(error) => Err(in_file(error)),
             None => Ok(plan),
         }
     }
@@ -119,32 +135,48 @@ impl Plan {
         })
     }
 
-    /// Plays all runs on all processors; `each` is called after each of them.
+    /// Plays all runs on all processors; `each` is called after each of them. No run begins once
+    /// `stop` is set: the survey is of those that have been played.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in a run.
-    pub fn survey(&self, each: impl Fn() + Sync) -> Result<Survey, ScenarioError> {
+    pub fn survey(
+        &self,
+        stop: &AtomicBool,
+        each: impl Fn() + Sync,
+    ) -> Result<Survey, ScenarioError> {
         let began = Instant::now();
-        let played = (0..self.runs()).into_par_iter().map(|index| {
+        let played = (0..self.runs()).into_par_iter().filter_map(|index| {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
             let played = self.play_one(index);
             each();
-            played
+            Some(played)
         });
         let played = played.collect::<Result<Vec<_>, _>>()?;
-        Ok(Survey::of(played, began.elapsed().as_secs_f64()))
+        let left_out = self.runs() - played.len();
+        Ok(Survey::of(played, left_out, began.elapsed().as_secs_f64()))
     }
 
     fn check(&self, index: usize) -> Result<(), ScenarioError> {
-        let Case { place, scenario } = self.variations.case(index)?;
+        let Case { place, scenario } = self.case(index)?;
         play::check(&scenario).map_err(|error| place.blame(error))
     }
 
     fn play_one(&self, index: usize) -> Result<(Place, Report, Vec<Verdict>), ScenarioError> {
-        let Case { place, scenario } = self.variations.case(index)?;
+        let Case { place, scenario } = self.case(index)?;
         match play::play(&scenario, self.record.as_deref()) {
             Ok((report, verdicts)) => Ok((place, report, verdicts)),
             Err(error) => Err(place.blame(error)),
         }
+    }
+
+    fn case(&self, index: usize) -> Result<Case, ScenarioError> {
+        let mut case = self.variations.case(index)?;
+        let filled = self.courses.fill(&mut case.scenario);
+        filled.map_err(|error| case.place.blame(error))?;
+        Ok(case)
     }
 }
 

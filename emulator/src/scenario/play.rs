@@ -15,9 +15,10 @@ use super::judge::{Verdict, judge};
 use super::signal::{Demand, Signal, demand};
 use crate::device::{Device, Start};
 use crate::flash::FileFlash;
+use crate::record::Recorder;
 use crate::rig::Rig;
 use crate::summary::{Report, Summary};
-use crate::watch::Watch;
+use crate::watch::{Watch, WatchError};
 use crate::wire::Wire;
 
 /// Time between two frames on the wire: what a flight controller's loop of 1 kHz sends.
@@ -29,12 +30,15 @@ pub(super) fn play(
     record: Option<&Path>,
 ) -> Result<(Report, Vec<Verdict>), ScenarioError> {
     let overrides = scenario.params()?;
-    let mut watch = Watch::new(windows(scenario), record)?;
+    let recorder = record.map(Recorder::create).transpose();
+    let recorder = recorder.map_err(WatchError::Record)?;
+    let mut watch = Watch::new(windows(scenario), recorder);
     let (mut device, _) = Device::start(Start {
         bench: scenario.bench.bench()?,
         wire: Wire::detached(),
         flash: FileFlash::in_memory(),
         overrides,
+        faults: scenario.faults()?,
         link_bytes_per_s: 11_520,
     })?;
 
@@ -53,7 +57,7 @@ pub(super) fn play(
         device.advance(
             slice_ns.min(end_ns),
             |t_s, rig| past_the_wire(signals, t_s, rig, &last),
-            |t_s, period, rig| watch.period(t_s, period, rig),
+            &mut watch,
             &mut |_| {},
         );
     }
@@ -70,30 +74,43 @@ pub(super) fn play(
 pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
     scenario.bench.bench()?;
     scenario.params()?;
+    scenario.faults()?;
     let mut last_s = f64::NEG_INFINITY;
-    for signal in &scenario.signal {
-        let at_s = signal.at_s;
+    for (index, signal) in scenario.signal.iter().enumerate() {
+        let wrong = |(key, problem): (&str, &str)| {
+            ScenarioError::of_key(format!("signal.{index}.{key}"), problem)
+        };
         if let Some(problem) = signal.problem() {
-            return Err(ScenarioError::Signal { at_s, problem });
+            return Err(wrong(problem));
         }
-        if at_s < last_s {
-            return Err(ScenarioError::Order(at_s));
+        if signal.at_s < last_s {
+            return Err(wrong((
+                "at_s",
+                "stands after a later one; put them in order",
+            )));
         }
-        last_s = at_s;
+        last_s = signal.at_s;
     }
-    for window in &scenario.window {
-        let same = |other: &&WindowTable| other.name == window.name;
-        if scenario.window.iter().filter(same).count() > 1 {
-            return Err(ScenarioError::Twice(window.name.clone()));
+    for (index, window) in scenario.window.iter().enumerate() {
+        let wrong = |key: &str, problem| {
+            let problem = format!("the window {} {problem}", window.name);
+            ScenarioError::of_key(format!("window.{index}.{key}"), problem)
+        };
+        let same = |other: &WindowTable| other.name == window.name;
+        if scenario.window[..index].iter().any(same) {
+            return Err(wrong("name", "is there twice; give each its own name"));
         }
         // Written so that NaN is refused too.
         if window.t0_s.partial_cmp(&window.t1_s) != Some(std::cmp::Ordering::Less) {
-            return Err(ScenarioError::Window(window.name.clone()));
+            return Err(wrong("t1_s", "has no time between t0_s and t1_s"));
         }
     }
     let report = Summary::new(windows(scenario)).report(0.0, 0.0);
-    for expected in &scenario.expect {
-        judge(expected, &report)?;
+    for (index, expected) in scenario.expect.iter().enumerate() {
+        let wrong = |error: ScenarioError| {
+            ScenarioError::of_key(format!("expect.{index}"), error.to_string())
+        };
+        judge(expected, &report).map_err(wrong)?;
     }
     Ok(())
 }

@@ -1,8 +1,18 @@
 //! What is asked of the drive over time.
 
 use std::f64::consts::{PI, TAU};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::Deserialize;
+
+use super::course::Course;
+
+/// The greatest magnitude of a number: what is computed from two of them stays finite.
+pub(super) const NUMBER_MAX: f64 = 1e9;
+
+/// The shortest duration of a shape, s: far below a control period.
+const FOR_LEAST_S: f64 = 1e-6;
 
 /// One entry of the time line; it is in force until the next.
 #[derive(Clone, Debug, Deserialize)]
@@ -32,6 +42,11 @@ pub(super) struct Signal {
     /// Whether a sine's amplitude swells and fades once over `for_s`.
     #[serde(default)]
     pub(super) am: bool,
+    /// File of a course; beside the scenario where it is relative.
+    pub(super) path: Option<PathBuf>,
+    /// What that file says.
+    #[serde(skip)]
+    pub(super) course: Option<Arc<Course>>,
 }
 
 /// How a value comes about.
@@ -47,6 +62,8 @@ pub(super) enum Shape {
     Sine,
     /// Likewise, the frequency rising linearly to `freq_to_hz` over `for_s`.
     Chirp,
+    /// Value + what a file says for the time since `at_s`.
+    File,
 }
 
 /// What is asked for at one moment.
@@ -61,29 +78,45 @@ pub(super) enum Demand {
 }
 
 impl Signal {
-    /// What is wrong with it, if anything.
-    pub(super) fn problem(&self) -> Option<&'static str> {
-        let given = [self.throttle, self.rpm, self.amps];
-        let finite = |x: Option<f64>| x.is_none_or(f64::is_finite);
-        let numbers = [
-            Some(self.at_s),
-            self.for_s,
-            Some(self.amplitude),
-            Some(self.freq_hz),
+    /// What is wrong with it, if anything, and the key that it is about.
+    pub(super) fn problem(&self) -> Option<(&'static str, &'static str)> {
+        let given = [
+            ("throttle", self.throttle),
+            ("rpm", self.rpm),
+            ("amps", self.amps),
         ];
-        if given.iter().flatten().count() != 1 {
-            Some("needs exactly one of throttle, rpm and amps")
-        } else if !given.into_iter().chain(numbers).all(finite) || !finite(self.freq_to_hz) {
-            Some("has a number that is not finite")
+        let numbers = [
+            ("at_s", Some(self.at_s)),
+            ("for_s", self.for_s),
+            ("amplitude", Some(self.amplitude)),
+            ("freq_hz", Some(self.freq_hz)),
+            ("freq_to_hz", self.freq_to_hz),
+        ];
+        let numbers = given.into_iter().chain(numbers);
+        let is_wild = |x: f64| !(-NUMBER_MAX..=NUMBER_MAX).contains(&x);
+        let mut wild = numbers.filter(|(_, x)| x.is_some_and(is_wild));
+        let count = given.iter().filter(|(_, x)| x.is_some()).count();
+        let lasts = match self.shape {
+            Shape::Step | Shape::File => false,
+            Shape::Sine => self.am,
+            Shape::Ramp | Shape::Chirp => true,
+        };
+        if count == 0 {
+            Some(("throttle", "give it, or rpm, or amps"))
+        } else if count > 1 {
+            Some(("throttle", "give one of throttle, rpm and amps, not more"))
+        } else if let Some((key, _)) = wild.next() {
+            Some((key, "give a number within ±1e9"))
         } else if self.throttle.is_some_and(|t| !(0.0..=1.0).contains(&t)) {
-            Some("has a throttle outside 0 to 1")
-        } else if self.shape != Shape::Step
-            && (self.shape != Shape::Sine || self.am)
-            && !self.for_s.is_some_and(|s| s > 0.0)
-        {
-            Some("needs for_s above 0 for its shape")
+            Some(("throttle", "give 0 to 1"))
+        } else if lasts && !self.for_s.is_some_and(|s| s >= FOR_LEAST_S) {
+            Some(("for_s", "the shape needs it, 1e-6 or more"))
         } else if self.shape == Shape::Chirp && self.freq_to_hz.is_none() {
-            Some("is a chirp and needs freq_to_hz")
+            Some(("freq_to_hz", "a chirp needs it"))
+        } else if self.shape == Shape::File && self.path.is_none() {
+            Some(("path", "the shape file needs it, the path of a CSV file"))
+        } else if self.shape != Shape::File && self.path.is_some() {
+            Some(("path", "is for shape = \"file\""))
         } else {
             None
         }
@@ -115,6 +148,7 @@ impl Signal {
                 let turns = (self.freq_hz + 0.5 * rate * t) * t;
                 base + self.amplitude * libm::sin(TAU * turns)
             }
+            Shape::File => base + self.course.as_ref().map_or(0.0, |course| course.at(t)),
         };
         match (self.throttle, self.rpm, self.amps) {
             (Some(throttle), ..) => Demand::Throttle(value(throttle).clamp(0.0, 1.0)),
@@ -125,7 +159,9 @@ impl Signal {
 
     /// The value that a ramp after this one starts from.
     fn end(&self) -> Option<f64> {
-        self.throttle.or(self.rpm).or(self.amps)
+        let base = self.throttle.or(self.rpm).or(self.amps)?;
+        let course = self.course.as_ref();
+        Some(base + course.map_or(0.0, |course| course.at(f64::INFINITY)))
     }
 }
 
@@ -181,11 +217,40 @@ mod tests {
     }
 
     #[test]
+    fn a_course_adds_to_the_value_and_a_ramp_goes_on_from_its_end() {
+        let mut signals = signals(
+            "signal = [{ at_s = 1.0, rpm = 100.0, shape = 'file', path = 'x.csv' },
+                       { at_s = 5.0, rpm = 0.0, shape = 'ramp', for_s = 1.0 }]",
+        );
+        let course = Course::parse(b"0.5,1000\n1.5,3000").unwrap();
+        signals[0].course = Some(Arc::new(course));
+        let at = |t_s| demand(&signals, t_s);
+        assert_eq!(at(1.0), Some(Demand::Rpm(1100.0)));
+        assert_eq!(at(2.0), Some(Demand::Rpm(2100.0)));
+        assert_eq!(at(4.0), Some(Demand::Rpm(3100.0)));
+        assert_eq!(at(5.5), Some(Demand::Rpm(1550.0)));
+    }
+
+    #[test]
     fn problems_are_named() {
         let problem = |entry: &str| signals(&format!("signal = [{entry}]"))[0].problem();
         assert!(problem("{ at_s = 0.0, rpm = 1.0 }").is_none());
         assert!(problem("{ at_s = 0.0 }").is_some());
         assert!(problem("{ at_s = 0.0, throttle = 1.5 }").is_some());
         assert!(problem("{ at_s = 0.0, rpm = 1.0, shape = 'ramp' }").is_some());
+        let key = |entry: &str| problem(entry).unwrap().0;
+        assert_eq!(key("{ at_s = 0.0, rpm = 1.0, amps = 1.0 }"), "throttle");
+        assert_eq!(key("{ at_s = inf, rpm = 1.0 }"), "at_s");
+        assert_eq!(key("{ at_s = 0.0, rpm = -2e9 }"), "rpm");
+        assert_eq!(
+            key("{ at_s = 0.0, rpm = 1.0, shape = 'ramp', for_s = 1e-300 }"),
+            "for_s"
+        );
+        assert_eq!(
+            key("{ at_s = 0.0, rpm = 1.0, shape = 'sine', am = true }"),
+            "for_s"
+        );
+        assert_eq!(key("{ at_s = 0.0, rpm = 1.0, shape = 'file' }"), "path");
+        assert_eq!(key("{ at_s = 0.0, rpm = 1.0, path = 'x.csv' }"), "path");
     }
 }

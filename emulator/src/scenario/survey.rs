@@ -17,6 +17,9 @@ const LISTED: usize = 20;
 pub struct Survey {
     /// Runs.
     pub runs: usize,
+    /// Runs that an interrupt has left out.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub left_out: usize,
     /// Runs in which an expectation failed.
     pub failed: usize,
     /// Faults that turned the bridge off, each with the number of runs.
@@ -77,10 +80,12 @@ impl Survey {
     /// The summary of these runs, in their order.
     pub(super) fn of(
         runs: impl IntoIterator<Item = (Place, Report, Vec<Verdict>)>,
+        left_out: usize,
         wall_s: f64,
     ) -> Self {
         let mut survey = Self {
             runs: 0,
+            left_out,
             failed: 0,
             faults: BTreeMap::new(),
             sim_s: 0.0,
@@ -133,6 +138,10 @@ impl Survey {
             });
         }
     }
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl Expected {

@@ -1,5 +1,5 @@
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::*;
 
@@ -48,7 +48,7 @@ fn a_survey_counts_and_names_the_worst_run() {
     let plan = plan(FILE, &seeds(1, 3)).unwrap();
     let played = AtomicUsize::new(0);
     let survey = plan
-        .survey(|| {
+        .survey(&AtomicBool::new(false), || {
             played.fetch_add(1, Ordering::Relaxed);
         })
         .unwrap();
@@ -80,11 +80,31 @@ fn a_survey_counts_and_names_the_worst_run() {
 }
 
 #[test]
+fn an_interrupt_keeps_what_has_been_played() {
+    let plan = plan(FILE, &seeds(1, 3)).unwrap();
+    let stop = AtomicBool::new(false);
+    let played = AtomicUsize::new(0);
+    let survey = plan.survey(&stop, || {
+        played.fetch_add(1, Ordering::Relaxed);
+        stop.store(true, Ordering::Relaxed);
+    });
+    let survey = survey.unwrap();
+    // Runs that go on beside the first end too.
+    assert_eq!(survey.runs, played.into_inner());
+    assert_eq!(survey.runs + survey.left_out, 12);
+    assert!((1..12).contains(&survey.runs), "{} runs", survey.runs);
+    assert_eq!(survey.expectations.len(), 2);
+}
+
+#[test]
 fn threads_and_order_change_nothing() {
     let plan = plan(FILE, &seeds(1, 2)).unwrap();
     let survey = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let survey = pool.build().unwrap().install(|| plan.survey(|| ()));
+        let survey = pool
+            .build()
+            .unwrap()
+            .install(|| plan.survey(&AtomicBool::new(false), || ()));
         let mut survey = serde_json::to_value(survey.unwrap()).unwrap();
         for key in ["wall_s", "sim_per_wall"] {
             survey[key].take();
@@ -96,7 +116,11 @@ fn threads_and_order_change_nothing() {
 
 #[test]
 fn seeds_make_other_runs() {
-    let hash = |first, last| plan(FILE, &seeds(first, last)).unwrap().survey(|| ());
+    let hash = |first, last| {
+        plan(FILE, &seeds(first, last))
+            .unwrap()
+            .survey(&AtomicBool::new(false), || ())
+    };
     let hash = |first, last| hash(first, last).unwrap().trace_hash;
     assert_eq!(hash(1, 1), hash(1, 1));
     assert_ne!(hash(1, 1), hash(2, 2));
@@ -119,7 +143,9 @@ fn a_run_without_the_figure_is_the_worst() {
         [sweep]
         "window.0.t0_s" = [0.0, 0.5]
     "#;
-    let survey = plan(text, &Options::default()).unwrap().survey(|| ());
+    let survey = plan(text, &Options::default())
+        .unwrap()
+        .survey(&AtomicBool::new(false), || ());
     let survey = survey.unwrap();
     assert_eq!((survey.failed, survey.expectations[0].worst), (1, None));
     assert_eq!(

@@ -6,17 +6,18 @@
 //! does not change it.
 
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use serde::Deserialize;
 use toml::{Table, Value};
 use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 use super::error::ScenarioError;
 use super::file::{BenchTable, Draw, Scenario};
+use super::lines::reason;
 use super::place::Place;
-use crate::bench::toml_reason;
+use crate::plant::share_of;
 
 /// Runs that are made at once: at a second of simulation each, some ten minutes.
 const RUNS_MAX: u128 = 100_000;
@@ -32,6 +33,8 @@ pub(super) struct Variations {
     /// The command line's seeds.
     seeds: Option<RangeInclusive<u64>>,
     runs: usize,
+    /// Where the paths that it names begin.
+    folder: PathBuf,
 }
 
 /// One run.
@@ -44,15 +47,27 @@ pub(super) struct Case {
 }
 
 impl Variations {
-    /// Reads a scenario; `set` are keys that the command line gives one value.
+    /// Reads a scenario of this folder; `set` are keys that the command line gives one value.
     pub(super) fn read(
         text: &str,
         set: &[(String, Value)],
         seeds: Option<RangeInclusive<u64>>,
+        folder: &Path,
     ) -> Result<Self, ScenarioError> {
-        let syntax = |error: toml::de::Error| ScenarioError::Syntax(toml_reason(text, &error));
-        let scenario = toml::from_str::<Scenario>(text).map_err(syntax)?;
-        let mut base = toml::from_str::<Table>(text).map_err(syntax)?;
+        let syntax = |error: &toml::de::Error| ScenarioError::Syntax(reason(text, error));
+        let mut base = toml::from_str::<Table>(text).map_err(|error| syntax(&error))?;
+        let scenario = match toml::from_str::<Scenario>(text) {
+            Ok(scenario) => scenario,
+            // What a table leaves out may be in the base's. What is wrong with both has a line.
+            Err(error) => {
+                let message = error.message().replace('\n', " ");
+                let whole = Scenario::read(base.clone(), folder);
+                whole.map_err(|whole| match &whole {
+                    ScenarioError::Syntax(said) if *said == message => syntax(&error),
+                    _ => whole,
+                })?
+            }
+        };
         base.remove("sweep");
         base.remove("random");
 
@@ -74,11 +89,11 @@ impl Variations {
                 draw.problem()
             };
             if let Some(problem) = problem {
-                return Err(wrong(key, problem));
+                return Err(ScenarioError::of_key(key, problem));
             }
         }
         if let Some((key, _)) = swept.iter().find(|(_, values)| values.is_empty()) {
-            return Err(wrong(key, "no values"));
+            return Err(ScenarioError::of_key(key, "no values"));
         }
 
         let seed_count = seeds.as_ref().map_or(1, |seeds| {
@@ -99,6 +114,7 @@ impl Variations {
             drawn,
             seeds,
             runs: runs as usize,
+            folder: folder.to_owned(),
         };
         variations.check_keys()?;
         Ok(variations)
@@ -139,11 +155,14 @@ impl Variations {
             drawn.push((key.clone(), value));
         }
         let place = Place { seed, set, drawn };
-        let scenario = Scenario::deserialize(root);
-        let mut scenario =
-            scenario.map_err(|error| place.blame(ScenarioError::Syntax(one_line(&error))))?;
+        let mut scenario = self.understand(root).map_err(|error| place.blame(error))?;
         scenario.bench.seed = seed;
         Ok(Case { place, scenario })
+    }
+
+    /// The scenario in a root that [`put`] has left a table.
+    fn understand(&self, root: Value) -> Result<Scenario, ScenarioError> {
+        Scenario::read(Table::try_from(root).unwrap_or_default(), &self.folder)
     }
 
     /// Puts every value in alone, so that one that does not fit is named with its key.
@@ -166,9 +185,9 @@ impl Variations {
     fn check(&self, key: &str, value: Value) -> Result<(), ScenarioError> {
         let mut root = Value::Table(self.base.clone());
         put(&mut root, key, value)?;
-        match Scenario::deserialize(root) {
+        match self.understand(root) {
             Ok(_) => Ok(()),
-            Err(error) => Err(wrong(key, one_line(&error))),
+            Err(error) => Err(ScenarioError::of_key(key, error.to_string())),
         }
     }
 }
@@ -200,8 +219,7 @@ impl Draw {
                 Value::Integer(least.saturating_add_unsigned(below(count) as u64))
             }
             Self::Real([least, greatest]) => {
-                let share = (bits >> 11) as f64 / (1_u64 << 53) as f64;
-                Value::Float(least + share * (greatest - least))
+                Value::Float(least + share_of(bits) * (greatest - least))
             }
             Self::OneOf { of } => of[below(of.len() as u128) as usize].clone(),
         }
@@ -220,7 +238,7 @@ fn put(root: &mut Value, key: &str, value: Value) -> Result<(), ScenarioError> {
                 let count = list.len();
                 let entry = part.parse().ok().and_then(|i: usize| list.get_mut(i));
                 entry.ok_or_else(|| {
-                    wrong(
+                    ScenarioError::of_key(
                         key,
                         format!("{part} is none of its {count} entries, from 0"),
                     )
@@ -228,7 +246,10 @@ fn put(root: &mut Value, key: &str, value: Value) -> Result<(), ScenarioError> {
             }
             other => {
                 let kind = other.type_str();
-                return Err(wrong(key, format!("a {kind} has no {part} in it")));
+                return Err(ScenarioError::of_key(
+                    key,
+                    format!("a {kind} has no {part} in it"),
+                ));
             }
         };
     }
@@ -243,17 +264,6 @@ fn seed(root: &Value) -> Option<u64> {
         .as_integer()?
         .try_into()
         .ok()
-}
-
-fn wrong(key: &str, problem: impl Into<String>) -> ScenarioError {
-    ScenarioError::Key {
-        key: key.to_owned(),
-        problem: problem.into(),
-    }
-}
-
-fn one_line(error: &toml::de::Error) -> String {
-    error.message().replace('\n', " ")
 }
 
 #[cfg(test)]

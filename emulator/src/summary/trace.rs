@@ -4,55 +4,51 @@ use xxhash_rust::xxh3::Xxh3;
 
 use crate::rig::Rig;
 
-/// Bytes that are hashed at once: the hash's set-up costs more than a period's words. Whole words.
+/// Bytes that wait to be hashed at once, at most: the hash's set-up costs more than a period's words.
 const BYTES: usize = 16_384;
+
+/// Bytes of one period's words, at most: there are some 200 of four.
+const PERIOD_BYTES: usize = 4_096;
 
 /// Hashes the words of the control state.
 pub(super) struct Trace {
     hash: Xxh3,
-    /// Words that have not been hashed yet, little-endian.
-    bytes: Box<[u8; BYTES]>,
-    len: usize,
+    /// The latest period's words, little-endian.
+    room: Box<[u8; PERIOD_BYTES]>,
+    /// Those that have not been hashed yet.
+    bytes: Vec<u8>,
 }
 
 impl Trace {
     pub(super) fn new() -> Self {
         Self {
             hash: Xxh3::new(),
-            bytes: Box::new([0; BYTES]),
-            len: 0,
+            room: Box::new([0; PERIOD_BYTES]),
+            bytes: Vec::with_capacity(BYTES),
         }
     }
 
     /// Takes in the state after a period.
     #[inline]
     pub(super) fn take(&mut self, rig: &Rig) {
-        let Self { hash, bytes, len } = self;
-        // A copy, which stays in a register: in memory, each word would wait for the one before.
-        let mut at = *len;
-        let mut take = |word: u32| {
-            if at == BYTES {
-                at = empty(hash, bytes);
-            }
-            bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
-            at += 4;
-        };
-        rig.trace(&mut take);
-        *len = at;
+        // Each word has a fixed place there: nothing is checked word by word.
+        let room = &mut *self.room;
+        let mut len = 0;
+        rig.trace(&mut |word: u32| {
+            room[len..len + 4].copy_from_slice(&word.to_le_bytes());
+            len += 4;
+        });
+        if self.bytes.len() + len > BYTES {
+            self.hash.update(&self.bytes);
+            self.bytes.clear();
+        }
+        self.bytes.extend_from_slice(&room[..len]);
     }
 
     /// The hash so far.
     pub(super) fn digest(&self) -> u64 {
         let mut hash = self.hash.clone();
-        hash.update(&self.bytes[..self.len]);
+        hash.update(&self.bytes);
         hash.digest()
     }
-}
-
-/// Hashes a full buffer; the place of its next word. Apart, so that each word's code stays small.
-#[cold]
-#[inline(never)]
-fn empty(hash: &mut Xxh3, bytes: &[u8; BYTES]) -> usize {
-    hash.update(bytes);
-    0
 }

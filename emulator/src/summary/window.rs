@@ -103,7 +103,7 @@ pub(super) struct Window {
     name: String,
     t0_s: f64,
     t1_s: f64,
-    all: Mean<8>,
+    all: Mean<9>,
     reference: Mean<2>,
     leading: Mean<3>,
     rpm_min: f64,
@@ -206,6 +206,7 @@ impl Window {
             f64::from(units.scale.amperes(snapshot.i.q)),
             f64::from(units.scale.amperes(snapshot.i.d)),
             period.bus_v,
+            period.bus_a,
         ]);
         self.rpm_min = self.rpm_min.min(rpm);
         self.rpm_max = self.rpm_max.max(rpm);
@@ -242,7 +243,6 @@ impl Window {
         let torque_mean_nm = self.all.get(1);
         let p_motor_w = self.all.get(3);
         let p_copper_w = self.all.get(4);
-        let bus_v_mean = self.all.get(7);
         let angle_error_mean_deg = self.leading.get(1);
         let angle_error_square = self.leading.get(2);
         let ripple = |mean: f64, square: f64| {
@@ -282,10 +282,8 @@ impl Window {
             i_q_mean_a: self.all.get(5),
             i_d_mean_a: self.all.get(6),
             current_max_a: self.all.any(self.current_max_a),
-            bus_v_mean,
-            bus_a_mean: p_motor_w
-                .zip(bus_v_mean)
-                .and_then(|(power, volts)| (volts > 0.0).then(|| power / volts)),
+            bus_v_mean: self.all.get(7),
+            bus_a_mean: self.all.get(8),
             turned_back_deg: self.all.any(self.turning.turned_back_deg()),
             reached_s: self.turning.reached_at_s().map(|t_s| t_s - self.t0_s),
             settled_s: self.turning.settled_at_s().map(|t_s| t_s - self.t0_s),

@@ -1,5 +1,7 @@
 //! Edges to the nanosecond, and datagrams of any content.
 
+mod errors;
+
 use super::*;
 use proptest::prelude::*;
 

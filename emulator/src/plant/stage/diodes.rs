@@ -34,17 +34,14 @@ struct Onset {
 impl Stage {
     /// Follows the diodes from event to event.
     pub(super) fn follow(&mut self, time_s: f64) {
-        let look_s = LOOK_RAD / self.machine.circuit.omega.abs();
+        let look_s = LOOK_RAD / self.machine.fastest_rad_s();
         let mut left_s = time_s;
         let mut resolve = true;
         while left_s > 0.0 {
             if resolve {
                 self.resolve();
             }
-            let drive = Drive {
-                way: self.way(),
-                ..self.drive()
-            };
+            let drive = self.confined();
             if drive.way == Way::Nowhere && self.idle() {
                 let stretch = self.machine.circuit.stretch(left_s);
                 self.machine.conduct(&drive, &stretch);
@@ -67,15 +64,13 @@ impl Stage {
 
     /// Whether the rotor is too slow to conduct by itself, with all legs off.
     fn idle(&self) -> bool {
-        self.only().is_none()
-            && 3.0_f64.sqrt() * self.machine.circuit.emf_v.abs() < self.bus_v + 2.0 * DIODE_V
+        self.only().is_none() && self.machine.line_v() < self.bus_v + 2.0 * DIODE_V
     }
 
     /// The first event within a time, or its end, and the leg whose current comes to zero there.
     fn next_event(&self, drive: &Drive, step_s: f64) -> (f64, Option<usize>) {
         let machine = &self.machine;
-        let circuit = &machine.circuit;
-        let at = |t| circuit.solve(machine.now(), drive, &circuit.stretch(t)).end;
+        let at = |t| machine.after(drive, t);
         let end = at(step_s);
         let mut at_s = step_s;
         let mut stopped = None;
@@ -102,10 +97,10 @@ impl Stage {
         }
         if drive.way != Way::Star {
             // Just beyond the onset, so that the leg does conduct then.
-            let beyond_v = |direction| self.onset(direction).excess_v - 2.0 * ONSET_V;
-            let (first, last) = (beyond_v(machine.now().direction), beyond_v(end.direction));
+            let beyond_v = |at: &Moment| self.onset(at, drive).excess_v - 2.0 * ONSET_V;
+            let (first, last) = (beyond_v(machine.now()), beyond_v(&end));
             if first < 0.0 && last > ZERO_V {
-                let f = |t| beyond_v(at(t).direction);
+                let f = |t| beyond_v(&at(t));
                 let onset_s = root(f, first, last, step_s, ZERO_V);
                 if onset_s < at_s {
                     (at_s, stopped) = (onset_s, None);
@@ -118,10 +113,11 @@ impl Stage {
     /// Lets floating legs conduct whose diodes are forward-biased.
     fn resolve(&mut self) {
         for _ in 0..3 {
-            if self.way() == Way::Star {
+            let drive = self.confined();
+            if drive.way == Way::Star {
                 return;
             }
-            let onset = self.onset(self.machine.now().direction);
+            let onset = self.onset(self.machine.now(), &drive);
             if onset.excess_v < ONSET_V {
                 return;
             }
@@ -143,22 +139,31 @@ impl Stage {
         self.machine.open(self.way());
     }
 
-    /// How far the floating legs' voltages are beyond the diodes' at a rotor's direction.
-    fn onset(&self, direction: [f64; 2]) -> Onset {
-        let emf = self.machine.emf_v(direction);
-        let mut highest = 0;
-        let mut lowest = 0;
+    /// The legs in which the highest and the lowest voltage are induced.
+    fn extremes(&self, emf_v: [f64; 3]) -> (usize, usize) {
+        let wired = |leg: usize| self.paths[leg] != Path::Cut;
+        let better = |leg, best, than: fn(&f64, &f64) -> bool| {
+            wired(leg) && (!wired(best) || than(&emf_v[leg], &emf_v[best]))
+        };
+        let (mut highest, mut lowest) = (0, 0);
         for leg in 1..3 {
-            if emf[leg] > emf[highest] {
+            if better(leg, highest, f64::gt) {
                 highest = leg;
             }
-            if emf[leg] < emf[lowest] {
+            if better(leg, lowest, f64::lt) {
                 lowest = leg;
             }
         }
+        (highest, lowest)
+    }
+
+    /// How far the floating legs' voltages are beyond the diodes' at some time.
+    fn onset(&self, at: &Moment, drive: &Drive) -> Onset {
+        let emf = self.machine.emf_v(at, drive);
         let high_v = self.bus_v + DIODE_V;
-        let star_v = match (self.way(), self.only()) {
+        let star_v = match (drive.way, self.only()) {
             (Way::Nowhere, None) => {
+                let (highest, lowest) = self.extremes(emf);
                 return Onset {
                     excess_v: emf[highest] - emf[lowest] - high_v - DIODE_V,
                     legs: [(highest, Rail::High), (lowest, Rail::Low)],

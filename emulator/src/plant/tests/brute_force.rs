@@ -5,18 +5,32 @@ use std::f64::consts::TAU;
 use siskin_control::drive::Bridge;
 use siskin_control::units::Duty;
 
-use super::super::{DIODE_V, Flow, Motor, Plant};
+use super::super::{Breaks, DIODE_V, Flow, Harmonic, Motor, Plant};
 
 /// The length of a step. The commands' edges are at multiples of it.
 pub(super) const STEP_S: f64 = 2e-9;
 
 pub(super) struct BruteForce {
     motor: Motor,
+    harmonics: Vec<Harmonic>,
     omega: f64,
     angle: f64,
     i: [f64; 3],
     legs: [Leg; 3],
     dead_steps: i64,
+    /// What is broken, from the start.
+    pub(super) breaks: Breaks,
+}
+
+/// What a leg's switches do.
+#[derive(Clone, Copy, PartialEq)]
+enum On {
+    /// Both are off.
+    None,
+    /// The wire is open.
+    Cut,
+    /// They hold the terminal at this share of the supply.
+    At(f64),
 }
 
 /// What the timer wants of a leg, and for how many steps it has.
@@ -29,9 +43,15 @@ struct Leg {
 }
 
 impl BruteForce {
-    pub(super) fn new(motor: Motor, plant: &Plant, dead_time_s: f64) -> Self {
+    pub(super) fn new(
+        motor: Motor,
+        harmonics: &[Harmonic],
+        plant: &Plant,
+        dead_time_s: f64,
+    ) -> Self {
         Self {
             motor,
+            harmonics: harmonics.to_vec(),
             omega: plant.speed_rad_s() * f64::from(motor.pole_pairs),
             angle: plant.angle_turns() * TAU,
             i: plant.currents_a(),
@@ -41,6 +61,7 @@ impl BruteForce {
                 crossed: false,
             }; 3],
             dead_steps: (dead_time_s / STEP_S).round() as i64,
+            breaks: Breaks::default(),
         }
     }
 
@@ -59,7 +80,10 @@ impl BruteForce {
             let height = |share: f64| 1.0 - (2.0 * share - 1.0).abs();
             let ahead = 0.5 * self.dead_steps as f64 / steps as f64;
             let heights = (height(share), height(share + ahead));
-            let on = [0, 1, 2].map(|leg| self.gate(leg, wanted(bridge, leg, heights)));
+            let on = [0, 1, 2].map(|leg| {
+                let gate = self.gate(leg, wanted(bridge, leg, heights));
+                self.switches(leg, gate)
+            });
             let mut left_s = STEP_S;
             while left_s > 0.0 {
                 let v = self.terminals(on, bus_v);
@@ -73,6 +97,7 @@ impl BruteForce {
             motor_w: sum.motor_w * share,
             copper_w: sum.copper_w * share,
             bus_a: sum.bus_a * share,
+            drag_w: 0.0,
         }
     }
 
@@ -89,20 +114,46 @@ impl BruteForce {
         if dead { None } else { wanted }
     }
 
+    /// What becomes of a gate's wish.
+    fn switches(&self, leg: usize, gate: Option<bool>) -> On {
+        let breaks = self.breaks.0[leg];
+        let [low, high] = [false, true].map(|high| {
+            let index = usize::from(high);
+            breaks.shorted[index] || gate == Some(high) && !breaks.open[index]
+        });
+        match (low, high) {
+            _ if breaks.wire => On::Cut,
+            (false, false) => On::None,
+            _ => On::At(f64::from(u8::from(high)) / f64::from(u8::from(low) + u8::from(high))),
+        }
+    }
+
     fn emf(&self, angle: f64) -> [f64; 3] {
-        let peak = self.omega * self.motor.flux_wb;
-        [0.0, 1.0, 2.0].map(|phase| -peak * (angle - phase * TAU / 3.0).sin())
+        self.waves(angle)
+            .map(|wave| self.omega * self.motor.flux_wb * wave)
+    }
+
+    /// The voltages that the rotor induces, over ωφ.
+    fn waves(&self, angle: f64) -> [f64; 3] {
+        [0.0, 1.0, 2.0].map(|phase| {
+            let angle = angle - phase * TAU / 3.0;
+            let harmonics = self.harmonics.iter();
+            let harmonics =
+                harmonics.map(|h| h.share * (f64::from(h.order) * angle + h.phase_rad).sin());
+            -angle.sin() - harmonics.sum::<f64>()
+        })
     }
 
     /// Voltages of the connected terminals.
-    fn terminals(&self, on: [Option<bool>; 3], bus_v: f64) -> [Option<f64>; 3] {
+    fn terminals(&self, on: [On; 3], bus_v: f64) -> [Option<f64>; 3] {
         let emf = self.emf(self.angle);
         let mut v = [0, 1, 2].map(|leg| match on[leg] {
-            Some(high) => Some(if high { bus_v } else { 0.0 }),
-            None if self.i[leg] > 0.0 => Some(-DIODE_V),
-            None if self.i[leg] < 0.0 => Some(bus_v + DIODE_V),
-            None => None,
+            On::At(share) => Some(share * bus_v),
+            On::None if self.i[leg] > 0.0 => Some(-DIODE_V),
+            On::None if self.i[leg] < 0.0 => Some(bus_v + DIODE_V),
+            On::None | On::Cut => None,
         });
+        let wired = || (0..3).filter(|leg| on[*leg] != On::Cut);
         // Every star voltage at which a floating leg conducts is found by trying.
         for _ in 0..3 {
             let known: Vec<usize> = (0..3).filter(|leg| v[*leg].is_some()).collect();
@@ -110,8 +161,8 @@ impl BruteForce {
                 [] => {
                     // The pair with the greatest difference, if it beats the supply.
                     let at = |leg: &usize, other: &usize| emf[*leg].total_cmp(&emf[*other]);
-                    let top = (0..3).max_by(at).unwrap_or(0);
-                    let bottom = (0..3).min_by(at).unwrap_or(0);
+                    let top = wired().max_by(at).unwrap_or(0);
+                    let bottom = wired().min_by(at).unwrap_or(0);
                     if emf[top] - emf[bottom] > bus_v + 2.0 * DIODE_V {
                         v[top] = Some(bus_v + DIODE_V);
                         v[bottom] = Some(-DIODE_V);
@@ -129,7 +180,7 @@ impl BruteForce {
                 let terminal = star + emf[leg];
                 (terminal - bus_v - DIODE_V).max(-DIODE_V - terminal)
             };
-            let most = (0..3).filter(|leg| v[*leg].is_none());
+            let most = wired().filter(|leg| v[*leg].is_none());
             let Some(leg) = most.max_by(|a, b| beyond(*a).total_cmp(&beyond(*b))) else {
                 return v;
             };
@@ -145,7 +196,7 @@ impl BruteForce {
     /// A step, or the part of it until a diode's current is zero; returns its length.
     fn step(
         &mut self,
-        on: [Option<bool>; 3],
+        on: [On; 3],
         v: [Option<f64>; 3],
         bus_v: f64,
         time_s: f64,
@@ -169,7 +220,7 @@ impl BruteForce {
         }
         // A diode stops its current at zero, in a straight line from where it was.
         let zero = |leg: usize| before[leg] / (before[leg] - after[leg]);
-        let stops = (0..3).filter(|leg| on[*leg].is_none() && before[*leg] * after[*leg] < 0.0);
+        let stops = (0..3).filter(|leg| on[*leg] == On::None && before[*leg] * after[*leg] < 0.0);
         let first = stops.min_by(|a, b| zero(*a).total_cmp(&zero(*b)));
         let share = first.map_or(1.0, zero);
         for leg in 0..3 {
@@ -185,20 +236,20 @@ impl BruteForce {
 
         let time_s = share * time_s;
         let i = [0, 1, 2].map(|leg| 0.5 * (before[leg] + self.i[leg]));
-        let per_wb = [0.0, 1.0, 2.0].map(|phase| {
-            let angle = self.angle + 0.5 * self.omega * time_s - phase * TAU / 3.0;
-            -f64::from(self.motor.pole_pairs) * angle.sin()
-        });
-        let torque: f64 = (0..3).map(|leg| i[leg] * per_wb[leg]).sum::<f64>() * self.motor.flux_wb;
+        let waves = self.waves(self.angle + 0.5 * self.omega * time_s);
+        let torque_per_a = f64::from(self.motor.pole_pairs) * self.motor.flux_wb;
+        let torque = torque_per_a * (0..3).map(|leg| i[leg] * waves[leg]).sum::<f64>();
         sum.torque_nm += torque * time_s;
         sum.torque_square += torque * torque * time_s;
         sum.copper_w += r * i.iter().map(|i| i * i).sum::<f64>() * time_s;
         for leg in 0..3 {
             let v = v[leg].unwrap_or(0.0);
             sum.motor_w += v * i[leg] * time_s;
-            if v >= bus_v {
-                sum.bus_a += i[leg] * time_s;
-            }
+            sum.bus_a += match on[leg] {
+                On::At(share) => share * i[leg] * time_s,
+                _ if v >= bus_v => i[leg] * time_s,
+                _ => 0.0,
+            };
         }
         self.angle += self.omega * time_s;
         time_s

@@ -19,7 +19,7 @@ fn read(text: &str, set: &[(&str, &str)], seeds: Option<RangeInclusive<u64>>) ->
     let set = set
         .iter()
         .map(|(key, value)| ((*key).to_owned(), toml_value(value)));
-    Variations::read(text, &set.collect::<Vec<_>>(), seeds).unwrap()
+    Variations::read(text, &set.collect::<Vec<_>>(), seeds, Path::new("")).unwrap()
 }
 
 fn toml_value(text: &str) -> Value {
@@ -27,7 +27,9 @@ fn toml_value(text: &str) -> Value {
 }
 
 fn refused(text: &str) -> String {
-    Variations::read(text, &[], None).unwrap_err().to_string()
+    Variations::read(text, &[], None, Path::new(""))
+        .unwrap_err()
+        .to_string()
 }
 
 fn cases(variations: &Variations) -> Vec<Case> {
@@ -214,7 +216,7 @@ fn a_wrong_key_is_named() {
 
 #[test]
 fn there_are_only_so_many_runs() {
-    let error = Variations::read("", &[], Some(0..=u64::MAX)).unwrap_err();
+    let error = Variations::read("", &[], Some(0..=u64::MAX), Path::new("")).unwrap_err();
     assert!(
         error.to_string().starts_with("18446744073709551616 runs"),
         "{error}"

@@ -1,0 +1,230 @@
+//! Whole benches: those in the binary, and files like them.
+//!
+//! A bench is the `[bench]` and `[params]` of a scenario: what stands there, and what the ESC must
+//! know of it. Motors and loads in it that have a `name` are known by it.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use super::supply::word;
+use super::{BenchError, toml_reason};
+
+/// The files in the binary; the first is the default.
+const FILES: [(&str, &str); 6] = [
+    ("bosso", include_str!("../../library/bosso.toml")),
+    ("bosso-real", include_str!("../../library/bosso-real.toml")),
+    ("bare", include_str!("../../library/bare.toml")),
+    (
+        "quad-5-inch",
+        include_str!("../../library/quad-5-inch.toml"),
+    ),
+    (
+        "quad-10-inch",
+        include_str!("../../library/quad-10-inch.toml"),
+    ),
+    ("scooter", include_str!("../../library/scooter.toml")),
+];
+
+/// The bench that the parameters' defaults describe.
+pub const DEFAULT: &str = FILES[0].0;
+
+static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| {
+    let table = |(_, text): &(&str, &str)| text.parse().expect("the built-in files are tested");
+    FILES.iter().map(table).collect()
+});
+
+/// The names of the built-in benches.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    FILES.iter().map(|(name, _)| *name)
+}
+
+/// Says what is wrong with a bench's file by itself, from its text and the tables in it.
+pub type Check<'a> = &'a dyn Fn(&str, &Table) -> Result<(), String>;
+
+/// Puts what stands on the bench that `bench.base` names under what `root`, a scenario's tables, says
+/// itself: tables are merged key by key, everything else of `root` stays. Paths begin at `folder`.
+///
+/// # Errors
+/// A base that is neither built in nor a file, or no bench.
+pub fn complete(root: &mut Table, folder: &Path, check: Check) -> Result<(), BenchError> {
+    begin_at(folder, root);
+    let Some(Value::Table(bench)) = root.get_mut("bench") else {
+        return Ok(());
+    };
+    // What is no text is left to be refused with the rest.
+    let Some(name) = bench.get("base").and_then(Value::as_str).map(str::to_owned) else {
+        return Ok(());
+    };
+    bench.remove("base");
+    merge(root, &find(&name, check)?);
+    Ok(())
+}
+
+/// Lets the paths in `[bench]` begin at a folder, where there is such a file.
+fn begin_at(folder: &Path, root: &mut Table) {
+    let Some(Value::Table(bench)) = root.get_mut("bench") else {
+        return;
+    };
+    for (kind, value) in bench.iter_mut() {
+        let Value::String(name) = value else {
+            continue;
+        };
+        let built_in = match kind.as_str() {
+            "base" => names().any(|known| known == name),
+            "motor" | "load" => part_named(kind, name).is_some(),
+            "bus" => word(name).is_some(),
+            _ => true,
+        };
+        let path = folder.join(&*name);
+        if let Some(path) = path.to_str()
+            && !built_in
+            && Path::new(path).is_file()
+        {
+            *name = path.to_owned();
+        }
+    }
+}
+
+/// The tables of a bench by name or path.
+fn find(name: &str, check: Check) -> Result<Table, BenchError> {
+    if let Some(index) = names().position(|known| known == name) {
+        return Ok(TABLES[index].clone());
+    }
+    let kind = "bench";
+    if !Path::new(name).is_file() {
+        return Err(BenchError::Unknown {
+            kind,
+            name: name.to_owned(),
+            known: names().collect::<Vec<_>>().join(", "),
+        });
+    }
+    let failed = |reason: String| BenchError::File {
+        kind,
+        path: name.to_owned(),
+        reason,
+    };
+    let text = std::fs::read_to_string(name).map_err(|error| failed(error.to_string()))?;
+    let table: Result<Table, _> = text.parse();
+    let mut table = table.map_err(|error| failed(toml_reason(&text, &error)))?;
+    let stranger = table
+        .keys()
+        .find(|key| !["bench", "params"].contains(&key.as_str()));
+    if let Some(key) = stranger {
+        return Err(failed(format!(
+            "{key}: a bench has [bench] and [params] only"
+        )));
+    }
+    for (key, problem) in [
+        ("base", "a bench is built on no other"),
+        ("seed", "a scenario's seed is its own"),
+    ] {
+        let bench = table.get("bench");
+        if bench.and_then(|bench| bench.get(key)).is_some() {
+            return Err(failed(format!("{key}: {problem}")));
+        }
+    }
+    begin_at(
+        Path::new(name).parent().unwrap_or(Path::new("")),
+        &mut table,
+    );
+    check(&text, &table).map_err(failed)?;
+    Ok(table)
+}
+
+/// Puts keys under those that are there.
+fn merge(over: &mut Table, under: &Table) {
+    for (key, value) in under {
+        match (over.get_mut(key), value) {
+            (Some(Value::Table(over)), Value::Table(under)) => merge(over, under),
+            (Some(_), _) => {}
+            (None, value) => {
+                over.insert(key.clone(), value.clone());
+            }
+        }
+    }
+}
+
+/// The motor or load of this name in the library.
+pub(super) fn part<T: for<'de> Deserialize<'de>>(kind: &str, name: &str) -> Option<T> {
+    T::deserialize(part_named(kind, name)?.clone()).ok()
+}
+
+fn part_named(kind: &str, name: &str) -> Option<&'static Value> {
+    let mut parts = TABLES.iter().filter_map(|table| part_of(table, kind));
+    parts.find(|part| part_name(part) == Some(name))
+}
+
+/// The names of all motors or loads in the library.
+pub(super) fn known(kind: &str) -> String {
+    let parts = TABLES.iter().filter_map(|table| part_of(table, kind));
+    let mut names: Vec<_> = parts.filter_map(part_name).collect();
+    names.sort_unstable();
+    names.dedup();
+    names.join(", ")
+}
+
+fn part_of<'a>(table: &'a Table, kind: &str) -> Option<&'a Value> {
+    table.get("bench")?.get(kind)
+}
+
+fn part_name(part: &Value) -> Option<&str> {
+    part.get("name")?.as_str()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn completed(text: &str) -> Result<Table, BenchError> {
+        let mut root: Table = text.parse().unwrap();
+        complete(&mut root, Path::new(""), &|_, _| Ok(())).map(|()| root)
+    }
+
+    #[test]
+    fn a_scenario_s_own_keys_stand_over_the_base_s() {
+        let text =
+            "[bench]\nbase = 'quad-10-inch'\nbus = 12.0\nmotor.R = 0.2\n[params]\nMOT_R_MOHM = 200";
+        let root = completed(text).unwrap();
+        let bench = &root["bench"];
+        assert_eq!(bench["bus"].as_float(), Some(12.0));
+        assert_eq!(bench["motor"]["R"].as_float(), Some(0.2));
+        assert_eq!(bench["motor"]["pole_pairs"].as_integer(), Some(7));
+        assert_eq!(bench["load"]["c2"].as_float(), Some(2.5e-7));
+        assert!(bench.get("base").is_none());
+        assert_eq!(root["params"]["MOT_R_MOHM"].as_integer(), Some(200));
+        assert_eq!(root["params"]["MOT_POLE_PAIRS"].as_integer(), Some(7));
+        // A name takes the place of the base's whole motor.
+        let root = completed("[bench]\nbase = 'scooter'\nmotor = 'x'").unwrap();
+        assert_eq!(root["bench"]["motor"].as_str(), Some("x"));
+    }
+
+    #[test]
+    fn what_is_no_bench_is_named() {
+        let error = completed("[bench]\nbase = 'tricycle'")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("tricycle") && error.contains("scooter"),
+            "{error}"
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.toml");
+        for (text, word) in [
+            ("[bench", "line 1"),
+            ("[[signal]]\nat_s = 0.0", "signal"),
+            ("[bench]\nbase = 'bosso'", "base"),
+            ("[bench]\nseed = 3", "seed"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let error = completed(&format!("[bench]\nbase = {path:?}")).unwrap_err();
+            let error = error.to_string();
+            assert!(
+                error.contains("mine.toml") && error.contains(word),
+                "{error}"
+            );
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! What faults do to the chip and its flash.
+
+use super::*;
+use crate::fault::Kind;
+
+const MS_NS: u64 = 1_000_000;
+
+fn device(flash: FileFlash, faults: Vec<Fault>) -> Device {
+    let started = Device::start(Start {
+        bench: Bench::default(),
+        wire: Wire::detached(),
+        flash,
+        overrides: Vec::new(),
+        faults,
+        link_bytes_per_s: 11_520,
+    });
+    started.unwrap().0
+}
+
+/// Runs up to a time with zero throttle each millisecond; gives how many MAVLink frames were sent.
+fn run(device: &mut Device, until_ms: u64) -> u32 {
+    let mut frames = 0;
+    while device.is_before(until_ms * MS_NS) {
+        let now_ns = device.now_ns();
+        device.wire().play(now_ns, &[12, 0, 0]).unwrap();
+        let mut none = |_: f64, _: &Period, _: &Rig| {};
+        device.advance(now_ns + MS_NS, |_, _| None, &mut none, &mut |_| frames += 1);
+    }
+    frames
+}
+
+fn set(device: &mut Device, amps: f32) {
+    let mut params = device.esc.params().clone();
+    params.set(ParamId::LimPhaseA, amps).unwrap();
+    device.replace(params).unwrap();
+}
+
+fn limit(device: &Device) -> f32 {
+    device.esc.params().get(ParamId::LimPhaseA)
+}
+
+#[test]
+fn a_flash_that_refuses_keeps_what_was_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let flash = FileFlash::open(&folder.path().join("flash")).unwrap();
+    let fails = Fault {
+        at_s: 0.1,
+        for_s: Some(0.1),
+        kind: Kind::FlashFail,
+    };
+    let mut device = device(flash, vec![fails]);
+    set(&mut device, 15.0);
+    assert_eq!(device.save(), Ok(()));
+
+    run(&mut device, 150);
+    set(&mut device, 12.0);
+    let refused = device.save().unwrap_err();
+    assert!(refused.starts_with("storage"), "{refused}");
+    assert!(device.factory_reset().is_err());
+    assert_eq!(limit(&device), 12.0, "in force until the restart");
+    device.reboot();
+    assert_eq!(limit(&device), 15.0);
+
+    run(&mut device, 250);
+    set(&mut device, 12.0);
+    assert_eq!(device.save(), Ok(()));
+    device.reboot();
+    assert_eq!(limit(&device), 12.0);
+}
+
+#[test]
+fn a_chip_in_reset_is_silent_and_forgets_that_it_was_armed() {
+    let reset = Fault {
+        at_s: 1.0,
+        for_s: Some(1.5),
+        kind: Kind::Reset,
+    };
+    let mut device = device(FileFlash::in_memory(), vec![reset]);
+    let armed = |device: &Device| device.esc.telemetry().armed;
+    assert!(run(&mut device, 1_000) > 0);
+    assert!(armed(&device));
+    assert_eq!(run(&mut device, 2_500), 0);
+    // INP_ARM_MS, 300 ms, counts from the end of the reset.
+    assert!(run(&mut device, 2_790) > 0);
+    assert!(!armed(&device));
+    run(&mut device, 2_810);
+    assert!(armed(&device));
+}
+
+/// So does a bus whose supply has come off, and one that sags, until it is up again.
+#[test]
+fn whatever_drains_the_bus_resets_the_chip() {
+    for (kind, for_s) in [
+        (Kind::BusSag(20.0), Some(0.5)),
+        (Kind::BusSag(19.0), Some(0.5)),
+        (Kind::BusDisconnect, None),
+    ] {
+        let fault = Fault {
+            at_s: 1.0,
+            for_s,
+            kind,
+        };
+        let mut device = device(FileFlash::in_memory(), vec![fault]);
+        run(&mut device, 1_001);
+        let silent = run(&mut device, 1_499) == 0;
+        // 24 V less 20 V are below 4.5 V. Nothing discharges the capacitor of a motor at rest.
+        assert_eq!(silent, kind == Kind::BusSag(20.0), "{kind:?}");
+        assert!(run(&mut device, 2_000) > 0, "{kind:?}");
+    }
+}
+
+/// The chip is gone while the bus is below 4.5 V and no longer.
+#[test]
+fn a_brown_out_resets_the_chip() {
+    let brown_out = |volts| Fault {
+        at_s: 1.0,
+        for_s: Some(0.5),
+        kind: Kind::BrownOut(volts),
+    };
+    for (volts, silent) in [(4.4, true), (4.5, false)] {
+        let mut device = device(FileFlash::in_memory(), vec![brown_out(volts)]);
+        run(&mut device, 1_001);
+        assert_eq!(run(&mut device, 1_499) == 0, silent, "{volts} V");
+        assert!(run(&mut device, 2_000) > 0);
+    }
+}

@@ -1,0 +1,171 @@
+//! Pictures that are not recordings: curves and maps over any quantities, several to a sheet.
+
+mod curve;
+mod map;
+mod panel;
+mod scale;
+mod sheet;
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use super::PlotError;
+use super::canvas::Format;
+
+/// A picture: panels side by side and below each other, under a title.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Stem of the file's name, as `bosso-3`.
+    pub name: String,
+    /// What it shows, and where the paper does.
+    pub title: String,
+    /// Panels a row; the rows follow from the number of panels.
+    pub columns: usize,
+    /// The panels, row by row.
+    pub panels: Vec<Panel>,
+}
+
+/// One set of axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Panel {
+    /// What it shows.
+    pub title: String,
+    /// The quantity to the right.
+    pub x: Axis,
+    /// The quantity upwards.
+    pub y: Axis,
+    /// Colours below the curves, where there is a third quantity.
+    pub map: Option<Map>,
+    /// The curves, each with its entry in the legend.
+    pub curves: Vec<Curve>,
+}
+
+/// An axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// The quantity with its unit, as `speed (rpm)`.
+    pub label: String,
+    /// Ends; `None` is what the curves span.
+    pub range: Option<(f64, f64)>,
+    /// Whether equal lengths are equal ratios.
+    pub logarithmic: bool,
+}
+
+/// A curve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Its entry in the legend.
+    pub name: String,
+    /// The points; one that is not finite is a gap.
+    pub points: Vec<(f64, f64)>,
+    /// How it is drawn.
+    pub look: CurveLook,
+}
+
+/// How a curve is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CurveLook {
+    /// A line: measured here.
+    #[default]
+    Line,
+    /// A dashed line: a bound, a formula or a reference.
+    Dashed,
+    /// A dot at each point: samples, or the paper's printed values.
+    Dots,
+}
+
+/// A third quantity over a grid of the two axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map {
+    /// The quantity with its unit.
+    pub label: String,
+    /// Places of the columns on the x axis, rising.
+    pub x: Vec<f64>,
+    /// Places of the rows on the y axis, rising.
+    pub y: Vec<f64>,
+    /// Rows of values from the lowest y, in each from the lowest x; what is not finite is left blank.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Panel {
+    /// Curves over an axis each way.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis, curves: Vec<Curve>) -> Self {
+        Self {
+            title: title.into(),
+            x,
+            y,
+            map: None,
+            curves,
+        }
+    }
+}
+
+impl Curve {
+    /// What was measured.
+    pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(name, CurveLook::Line, points)
+    }
+
+    /// A bound, a formula or a reference.
+    pub fn dashed(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(name, CurveLook::Dashed, points)
+    }
+
+    /// Single values: samples, or the paper's.
+    pub fn dots(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self::new(name, CurveLook::Dots, points)
+    }
+
+    fn new(
+        name: impl Into<String>,
+        look: CurveLook,
+        points: impl IntoIterator<Item = (f64, f64)>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            points: points.into_iter().collect(),
+            look,
+        }
+    }
+}
+
+impl Axis {
+    /// A linear axis over what the curves span.
+    pub fn new(label: impl Into<String>) -> Self {
+        Self {
+            label: label.into(),
+            range: None,
+            logarithmic: false,
+        }
+    }
+}
+
+/// Makes a folder for pictures where there is none, and tries whether it takes a file.
+///
+/// # Errors
+/// A folder that cannot be made or written to.
+pub fn prepare(folder: &Path) -> Result<(), PlotError> {
+    let probe = folder.join(".probe");
+    std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::write(&probe, ""))
+        .and_then(|()| std::fs::remove_file(&probe))
+        .map_err(|source| PlotError::Write {
+            path: folder.to_owned(),
+            source,
+        })
+}
+
+/// Draws figures into a folder, see [`prepare`], each as SVG and PNG.
+///
+/// # Errors
+/// A picture that cannot be written.
+pub fn draw(figures: &[Figure], folder: &Path) -> Result<(), PlotError> {
+    for figure in figures {
+        for (format, extension) in [(Format::Svg, "svg"), (Format::Png, "png")] {
+            let path = folder.join(format!("{}.{extension}", figure.name));
+            format.write(figure, &path)?;
+        }
+    }
+    Ok(())
+}

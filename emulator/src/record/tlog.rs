@@ -1,0 +1,40 @@
+//! MAVLink frames as MAVProxy and Mission Planner keep them: before each the microseconds since
+//! 1970, eight bytes, the most significant first.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::time::Duration;
+
+use super::Sink;
+
+/// The lowest bits of a time are the link's number to the readers; all frames here are of link 0.
+const LINK_BITS: u64 = 3;
+
+/// A tlog file.
+pub(super) struct Tlog {
+    file: BufWriter<File>,
+    /// Start of the run since 1970; simulated time counts from there.
+    start: Duration,
+}
+
+impl Tlog {
+    pub(super) fn new(file: File, start: Duration) -> Self {
+        Self {
+            file: BufWriter::new(file),
+            start,
+        }
+    }
+}
+
+impl Sink for Tlog {
+    fn frame(&mut self, time_ns: u64, frame: &[u8]) -> io::Result<()> {
+        let time = self.start + Duration::from_nanos(time_ns);
+        let time_us = time.as_micros() as u64 & !LINK_BITS;
+        self.file.write_all(&time_us.to_be_bytes())?;
+        self.file.write_all(frame)
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.file.flush()
+    }
+}

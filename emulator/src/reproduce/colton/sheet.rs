@@ -1,0 +1,49 @@
+//! Pictures, in short.
+
+use crate::plot::chart::{Axis, Figure, Panel};
+
+/// A sheet, its panels in so many columns.
+pub(super) fn figure(name: &str, title: &str, columns: usize, panels: Vec<Panel>) -> Figure {
+    Figure {
+        name: name.to_owned(),
+        title: title.to_owned(),
+        columns,
+        panels,
+    }
+}
+
+/// An axis with these ends.
+pub(super) fn between(label: &str, from: f64, to: f64) -> Axis {
+    Axis {
+        range: Some((from, to)),
+        ..Axis::new(label)
+    }
+}
+
+/// The same, equal lengths being equal ratios.
+pub(super) fn ratios(label: &str, from: f64, to: f64) -> Axis {
+    Axis {
+        logarithmic: true,
+        ..between(label, from, to)
+    }
+}
+
+/// So many values from one to the other at equal ratios.
+pub(super) fn spread(from: f64, to: f64, count: u32) -> impl Iterator<Item = f64> {
+    let rise = libm::log(to / from) / f64::from(count - 1);
+    (0..count).map(move |step| from * libm::exp(rise * f64::from(step)))
+}
+
+/// So many values from one to the other at equal distances.
+pub(super) fn evenly(from: f64, to: f64, count: u32) -> impl Iterator<Item = f64> {
+    let rise = (to - from) / f64::from(count - 1);
+    (0..count).map(move |step| from + rise * f64::from(step))
+}
+
+/// A formula over these places.
+pub(super) fn over(
+    places: impl Iterator<Item = f64>,
+    formula: impl Fn(f64) -> f64,
+) -> Vec<(f64, f64)> {
+    places.map(|x| (x, formula(x))).collect()
+}

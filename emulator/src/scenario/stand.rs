@@ -1,0 +1,98 @@
+//! A bench for a run that is no scenario.
+
+use std::path::Path;
+
+use siskin_control::params::ParamId;
+use toml::{Table, Value};
+
+use super::ScenarioError;
+use super::file::Scenario;
+use crate::rig::Bench;
+
+/// What stands on a bench by its name, and what the ESC must know of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// What stands there.
+    pub bench: Bench,
+    /// Parameters to be set before the start.
+    pub params: Vec<(ParamId, f32)>,
+    /// What motor and load are called.
+    pub names: [String; 2],
+}
+
+/// The bench `base`, by name or path, with the keys of `given`, those of a scenario's `[bench]`, in
+/// place of its own.
+///
+/// # Errors
+/// Any [`ScenarioError`] that a scenario on this bench would show before it is played.
+pub fn stand(base: &str, given: Table) -> Result<Standing, ScenarioError> {
+    let mut bench = given;
+    bench.insert("base".to_owned(), Value::String(base.to_owned()));
+    let root = Table::from_iter([("bench".to_owned(), Value::Table(bench))]);
+    let root = Scenario::complete(root, Path::new(""))?;
+    let name = |kind: &str| {
+        let part = root.get("bench").and_then(|bench| bench.get(kind));
+        let name = part.and_then(|part| part.get("name")).or(part);
+        let name = name.and_then(Value::as_str);
+        name.map_or_else(|| format!("that of {base}"), str::to_owned)
+    };
+    let names = [name("motor"), name("load")];
+    // Where the bench says nothing, the inverter waits as long as the parameters have it.
+    let waits = root
+        .get("bench")
+        .is_some_and(|bench| bench.get("dead_time_ns").is_some());
+    let scenario = Scenario::understand(root)?;
+    let mut bench = scenario.bench.bench()?;
+    if !waits {
+        bench.dead_time_s = None;
+    }
+    Ok(Standing {
+        bench,
+        params: scenario.params()?,
+        names,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use siskin_control::params::{Params, build};
+
+    use super::*;
+    use crate::bench::library;
+
+    #[test]
+    fn the_default_bench_is_the_first_one_of_the_library() {
+        let standing = stand(library::DEFAULT, Table::new()).unwrap();
+        assert_eq!(standing.bench, Bench::default());
+        assert_eq!(standing.params, []);
+        assert_eq!(standing.names, ["antigravity-4006-kv380", "cfprop-13x4.4"]);
+    }
+
+    #[test]
+    fn every_bench_of_the_library_stands_and_fits_its_parameters() {
+        for name in library::names() {
+            let Standing { bench, params, .. } = stand(name, Table::new()).unwrap();
+            let mut believed = Params::default();
+            for (id, value) in params {
+                believed.set(id, value).unwrap();
+            }
+            let board = bench.sensing.board(bench.delay);
+            let built = build(&believed, &board);
+            assert!(built.is_ok(), "{name}: {:?}", built.err());
+            // What the ESC believes is what stands there.
+            let believes = |id, truth: f64, name: &str| {
+                let value = f64::from(believed.get(id));
+                assert!(
+                    (value / truth - 1.0).abs() < 0.05,
+                    "{name}: {value} {truth}"
+                );
+            };
+            let inertia = bench.motor.inertia_kgm2 + bench.load.inertia_kgm2;
+            believes(ParamId::MotPolePairs, bench.motor.pole_pairs.into(), name);
+            believes(ParamId::MotRMohm, 1e3 * bench.motor.resistance_ohm, name);
+            believes(ParamId::MotLUh, 1e6 * bench.motor.inductance_h, name);
+            believes(ParamId::MotFluxMwb, 1e3 * bench.motor.flux_wb, name);
+            believes(ParamId::MotJGcm2, 1e7 * inertia, name);
+        }
+    }
+}

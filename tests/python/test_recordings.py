@@ -1,0 +1,89 @@
+"""Recordings: other programs can read them."""
+
+import signal
+import time
+
+import pytest
+from pymavlink import mavutil
+
+import siskin_dialect as dialect
+from emulator import Emulator, run, scenario
+from paths import SCENARIOS
+
+# When an offline run begins by its log: 2020-01-01 00:00 UTC.
+OFFLINE_START_S = 1_577_836_800.0
+
+
+def messages(path) -> list:
+    """All messages of a log, each with its time as `_timestamp`."""
+    log = mavutil.mavlink_connection(str(path), dialect="ardupilotmega")
+    found = []
+    while (message := log.recv_msg()) is not None:
+        assert message.get_type() != "BAD_DATA", message
+        found.append(message)
+    return found
+
+
+def test_a_log_of_a_scenario_is_read_and_equal_each_time(tmp_path):
+    logs = [tmp_path / "first.tlog", tmp_path / "second.tlog"]
+    for path in logs:
+        scenario(SCENARIOS / "half-throttle.toml", "--record", path)
+    assert logs[0].read_bytes() == logs[1].read_bytes()
+
+    log = messages(logs[0])
+    times_s = [message._timestamp - OFFLINE_START_S for message in log]
+    assert times_s == sorted(times_s)
+    assert 0.0 <= times_s[0] < 1.0 and 5.0 < times_s[-1] <= 6.0
+    telemetry = [message for message in log if message.get_type() == "ESC_TELEMETRY_1_TO_4"]
+    assert len(telemetry) == 60, "ten a second"
+    held = [m.rpm[0] for m in telemetry if 2.5 < m._timestamp - OFFLINE_START_S < 3.5]
+    assert held == [pytest.approx(3150, abs=10)] * len(held) and held
+    assert any(message.get_type() == "HEARTBEAT" for message in log)
+
+
+def test_a_log_of_a_live_run_has_both_directions_and_the_time_of_day(tmp_path):
+    path = tmp_path / "live.tlog"
+    before_s = time.time()
+    emulator = Emulator("--record", path)
+    with emulator.connect() as esc:
+        esc.command(dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_ESC_INFO)
+    emulator.process.send_signal(signal.SIGINT)
+    assert emulator.process.wait(timeout=10.0) == 0, emulator.output()
+    log = messages(path)
+    assert all(before_s - 0.1 < message._timestamp < time.time() + 0.1 for message in log)
+    kinds = {message.get_type(): message.get_srcComponent() for message in log}
+    assert kinds["COMMAND_LONG"] != kinds["COMMAND_ACK"] == kinds["HEARTBEAT"]
+
+
+def test_a_dump_of_a_scenario_has_its_wires(tmp_path):
+    path = tmp_path / "wires.vcd"
+    scenario(SCENARIOS / "half-throttle.toml", "--record", path, "--set", "bench.duration_s=0.4")
+    header, changes = path.read_text().split("$enddefinitions $end\n")
+    assert "$timescale 1 ns $end" in header
+    wires = {}
+    for line in header.splitlines():
+        if line.startswith("$var"):
+            _, _, _, code, name, _ = line.split()
+            wires[code] = name
+    times_ns = [int(line[1:]) for line in changes.splitlines() if line.startswith("#")]
+    assert times_ns[0] == 0 and times_ns == sorted(set(times_ns))
+    assert times_ns[-1] == pytest.approx(0.4e9, abs=1e3)
+    count = {name: 0 for name in wires.values()}
+    for line in changes.splitlines():
+        if line[0] in "01":
+            count[wires[line[1:]]] += 1
+    # A frame of DShot has 16 bits, a frame a millisecond.
+    assert count["signal"] == pytest.approx(400 * 32, rel=0.02)
+    # The throttle opens at 0.31 s; parking takes both gates of each leg through 24 periods a ms.
+    assert all(count[f"{leg}_{side}"] > 1000 for leg in "abc" for side in ("high", "low"))
+
+
+def test_a_build_without_parquet_says_so(tmp_path):
+    path = tmp_path / "run.parquet"
+    file = SCENARIOS / "half-throttle.toml"
+    for arguments in [("scenario", file, "--record", path), ("plot", path, "-o", "x.svg")]:
+        ended = run(*arguments)
+        assert ended.returncode == 2
+        assert str(path) in ended.stderr and "--features parquet" in ended.stderr
+        assert len(ended.stderr.splitlines()) == 1
+    assert not path.exists()
