@@ -6,7 +6,15 @@ from emulator import scenario
 from paths import SCENARIOS
 
 FAULTS = {
+    "fault-blocked": "rotor position lost",
+    "fault-blocked-start": "motor does not start",
+    "fault-disconnect": "under-voltage",
+    "fault-disconnect-braking": "over-voltage",
+    "fault-sag": "under-voltage",
+    "fault-sensor-full": "over-current",
+    "fault-sensor-start": "current sensor",
     "over-current": "over-current",
+    "over-temperature": "over-temperature",
     "over-voltage": "over-voltage",
     "under-voltage": "under-voltage",
 }
@@ -15,6 +23,13 @@ FAULTS = {
 SEEDS = {
     "catch": "1..3",
     "catch-forwards": "1..3",
+    "fault-bit-errors": "1..3",
+    "fault-kick": "1..5",
+    "fault-mosfet-open": "1..5",
+    "fault-mosfet-short": "1..5",
+    "fault-phase-open": "1..5",
+    "fault-phase-open-start": "1..5",
+    "fault-sensor-stuck": "1..5",
     "hall": "1..20",
     "low-100": "1..5",
     "low-150": "1..5",
@@ -22,6 +37,7 @@ SEEDS = {
     "random-motors": "1..60",
     "start-inertia": "1..25",
     "start-propeller": "1..200",
+    "start-thousand": "1..100",
     "start-wrong-rl": "1..20",
     "switching-100": "1..3",
     "switching-150": "1..3",
