@@ -329,7 +329,7 @@ impl Rig {
 
         // Turning off does not wait for the timer's preload.
         let before = if bridge == Bridge::Off {
-            at_once(bridge)
+            bridge
         } else {
             self.applied
         };
@@ -387,12 +387,4 @@ impl Period {
     pub fn rpm(&self) -> f64 {
         self.speed_rad_s * 60.0 / TAU
     }
-}
-
-/// The command itself, by way of a branch: where it is predicted, the plant's next period does not
-/// wait for the step's result, which saves a tenth of the time.
-#[cold]
-#[inline(never)]
-fn at_once(bridge: Bridge) -> Bridge {
-    bridge
 }
