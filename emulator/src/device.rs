@@ -1,5 +1,7 @@
 //! One emulated ESC: its tasks' side, its drive on a bench, its throttle wire and its flash.
 
+mod answer;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -17,6 +19,7 @@ use crate::link::LinkId;
 use crate::rig::{Bench, Period, Rig};
 use crate::summary::Rejected;
 use crate::wire::Wire;
+use answer::Driven;
 
 /// Rate of the timer that captures the wire's edges: that of the STM32G431.
 const CAPTURE_HZ: u32 = 170_000_000;
@@ -73,6 +76,7 @@ pub struct Device {
     esc: Esc,
     rig: Rig,
     wire: Wire,
+    driven: Driven,
     flash: FileFlash,
     overrides: Vec<Override>,
     board: Board,
@@ -94,6 +98,11 @@ pub trait Onlooker {
     /// came before.
     fn edge(&mut self, time_ns: u64, level: bool) {
         let _ = (time_ns, level);
+    }
+
+    /// The ESC has answered the edges so far on the throttle wire or on its serial line, with this datagram.
+    fn answer(&mut self, datagram: &[u8]) {
+        let _ = datagram;
     }
 
     /// A whole MAVLink frame was sent, or was received and understood.
@@ -170,6 +179,7 @@ impl Device {
             esc,
             rig,
             wire,
+            driven: Driven::default(),
             flash,
             overrides,
             board,
@@ -258,13 +268,7 @@ impl Device {
             if t_s >= self.faults.due_s {
                 self.disturb(t_s);
             }
-            while let Some((edge_ns, level)) = self.wire.next_edge(now_ns) {
-                if !self.rig.is_held() {
-                    let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
-                    self.esc.edge(edge_ns / 1000, ticks as u32, level);
-                }
-                onlooker.edge(edge_ns, level);
-            }
+            self.hear(now_ns, onlooker);
             if now_ns >= self.task_due_ns {
                 self.task_due_ns = now_ns - now_ns % TASK_NS + TASK_NS;
                 if !self.rig.is_held() {
@@ -283,6 +287,33 @@ impl Device {
             onlooker.period(t_s, &period, &self.rig);
             self.clock.periods += 1;
         }
+    }
+
+    /// Hands what came on the throttle wire before this time to the ESC, and lets it answer.
+    fn hear(&mut self, now_ns: u64, onlooker: &mut impl Onlooker) {
+        while let Some((edge_ns, level)) = self.wire.next_edge(now_ns) {
+            self.settle(edge_ns, onlooker);
+            if self.driven.is_output(edge_ns) {
+                continue;
+            }
+            onlooker.edge(edge_ns, level);
+            if !self.rig.is_held()
+                && let Some(ask) = self.esc.edge(edge_ns / 1000, ticks(edge_ns), level)
+            {
+                self.answer(edge_ns, ask, onlooker);
+            }
+        }
+        self.settle(now_ns, onlooker);
+    }
+
+    /// Tells the ESC the time, and shows what it has put on the wire before.
+    fn settle(&mut self, now_ns: u64, onlooker: &mut impl Onlooker) {
+        if !self.rig.is_held()
+            && let Some(ask) = self.esc.settle(now_ns / 1000, ticks(now_ns))
+        {
+            self.answer(now_ns, ask, onlooker);
+        }
+        self.driven.show(now_ns, onlooker);
     }
 
     /// Lets the faults of this time act.
@@ -393,6 +424,7 @@ impl Device {
             return;
         };
         self.esc = esc;
+        self.driven = Driven::default();
         self.receivers.clear();
         self.rig.restart(self.esc.config().clone());
         self.clock = Clock {
@@ -401,6 +433,11 @@ impl Device {
             periods: 0,
         };
     }
+}
+
+/// The capturing timer's count at a time.
+fn ticks(time_ns: u64) -> u32 {
+    (u128::from(time_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000) as u32
 }
 
 /// Frames that a receiver did not hand on.

@@ -27,6 +27,14 @@ const MAX_EDGES: usize = 1 << 18;
 /// Datagrams taken in one call; at DShot1200's 75 frames in a millisecond, three times as many.
 const DATAGRAMS_PER_CALL: usize = 256;
 
+/// By how much the ESC may take a frame's first edge for earlier than it was sent, ns: a tick of its
+/// timer, and what the edge strays. Half of what the shortest frames are apart, 16.7 µs.
+const EARLY_NS: u64 = 8_000;
+
+/// What began so long ago is not answered any more, ns. The ESC answers within a frame, 107 µs at
+/// most, and two control periods, 125 µs each.
+const ANSWERED_NS: u64 = 1_000_000;
+
 /// The longest datagram.
 const READ_BYTES: usize = 65_535;
 
@@ -136,7 +144,8 @@ pub struct WireErrors {
 pub struct Wire {
     socket: Option<UdpSocket>,
     buffer: Vec<u8>,
-    last_sender: Option<SocketAddr>,
+    /// Who sends, and from which time on: to whom answers go.
+    senders: VecDeque<(u64, SocketAddr)>,
     counts: WireCounts,
     edges: VecDeque<(u64, bool)>,
     /// The level after all that waits.
@@ -155,7 +164,7 @@ impl Wire {
         Self {
             socket: None,
             buffer: Vec::new(),
-            last_sender: None,
+            senders: VecDeque::new(),
             counts: WireCounts::default(),
             edges: VecDeque::new(),
             level: false,
@@ -211,11 +220,6 @@ impl Wire {
         self.socket.as_ref()?.local_addr().ok()
     }
 
-    /// Who sent the last datagram that was played: to whom answers go.
-    pub fn last_sender(&self) -> Option<SocketAddr> {
-        self.last_sender
-    }
-
     /// What became of the datagrams so far.
     pub fn counts(&self) -> WireCounts {
         self.counts
@@ -231,8 +235,8 @@ impl Wire {
         for _ in 0..DATAGRAMS_PER_CALL {
             match socket.recv_from(&mut buffer) {
                 Ok((length, sender)) => {
-                    if self.play(now_ns, &buffer[..length]).is_ok() {
-                        self.last_sender = Some(sender);
+                    if let Ok(Some(start_ns)) = self.take(now_ns, &buffer[..length]) {
+                        self.sends(start_ns, sender);
                     }
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
@@ -246,16 +250,46 @@ impl Wire {
 
     /// Plays one datagram from `now_ns` on, or after what still plays, and counts it.
     pub fn play(&mut self, now_ns: u64, datagram: &[u8]) -> Result<(), Rejected> {
+        self.take(now_ns, datagram).map(|_| ())
+    }
+
+    /// Sends an answer to who sent what was played at `asked_ns`, if that is known. A sender that
+    /// does not take it loses it, as on a wire that nobody listens to.
+    pub fn send(&mut self, asked_ns: u64, datagram: &[u8]) {
+        self.forget_senders(asked_ns.saturating_add(EARLY_NS));
+        if let (Some(socket), Some((_, sender))) = (&self.socket, self.senders.front()) {
+            let _ = socket.send_to(datagram, sender);
+        }
+    }
+
+    /// Notes who sends from this time on.
+    fn sends(&mut self, start_ns: u64, sender: SocketAddr) {
+        // Most signals are not answered.
+        self.forget_senders(self.taken_ns.saturating_sub(ANSWERED_NS));
+        if self.senders.back().is_none_or(|last| last.1 != sender) {
+            self.senders.push_back((start_ns, sender));
+        }
+    }
+
+    /// Forgets who sent before the one whose turn it is at this time.
+    fn forget_senders(&mut self, at_ns: u64) {
+        while self.senders.get(1).is_some_and(|next| next.0 <= at_ns) {
+            self.senders.pop_front();
+        }
+    }
+
+    /// Plays a datagram as [`Wire::play`] says; when its first level begins, if it comes through.
+    fn take(&mut self, now_ns: u64, datagram: &[u8]) -> Result<Option<u64>, Rejected> {
         let frame = Frame::parse(datagram);
         let result = frame.and_then(|frame| {
             if self.errors.lost {
-                return Ok(());
+                return Ok(None);
             }
             let frame = self.flipped(frame);
-            self.append(now_ns, &frame)
+            self.append(now_ns, &frame).map(Some)
         });
         match result {
-            Ok(()) => self.counts.played += 1,
+            Ok(_) => self.counts.played += 1,
             Err(Rejected::Backlog) => self.counts.dropped += 1,
             Err(_) => self.counts.rejected += 1,
         }
@@ -298,7 +332,7 @@ impl Wire {
             .max(self.taken_ns)
     }
 
-    fn append(&mut self, now_ns: u64, frame: &Frame<'_>) -> Result<(), Rejected> {
+    fn append(&mut self, now_ns: u64, frame: &Frame<'_>) -> Result<u64, Rejected> {
         let now_ns = now_ns.max(self.taken_ns);
         let mut start_ns = match self.last {
             // The longer rest counts where frames of different rates follow each other.
@@ -319,7 +353,7 @@ impl Wire {
         frame.levels(|offset_ns, level| self.set_level(start_ns.saturating_add(offset_ns), level));
         let end_ns = start_ns.saturating_add(frame.duration_ns());
         self.last = Some((end_ns, frame.rest_after_ns()));
-        Ok(())
+        Ok(start_ns)
     }
 
     fn set_level(&mut self, time_ns: u64, level: bool) {

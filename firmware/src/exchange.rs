@@ -23,12 +23,13 @@ const SPEED: u32 = 1;
 const TORQUE: u32 = 2;
 const TEST: u32 = 3;
 const VOLTAGE: u32 = 4;
+const TONE: u32 = 5;
 
 /// The sequence number's place: bits 28 to 24.
 const SEQUENCE_SHIFT: u32 = 24;
 const SEQUENCE_MASK: u32 = 0x1f;
 
-/// The value's place: bits 23 to 0 hold the upper 24 bits of a speed, a current or a share. The speed's
+/// The value's place: bits 23 to 0 hold the upper 24 bits of a speed, a current, a pitch or a share. The speed's
 /// step is then 0.0072 mechanical rpm with 12 pole pairs at 24 kHz.
 const VALUE_SHIFT: u32 = 8;
 const VALUE_MASK: u32 = 0x00ff_ffff;
@@ -176,6 +177,7 @@ fn pack(setpoint: Setpoint) -> u32 {
         Setpoint::Speed(speed) => SPEED << KIND_SHIFT | value(speed.to_bits()),
         Setpoint::Torque(current) => TORQUE << KIND_SHIFT | value(current.to_bits()),
         Setpoint::Test(current) => TEST << KIND_SHIFT | value(current.to_bits()),
+        Setpoint::Tone(pitch) => TONE << KIND_SHIFT | value(pitch.to_bits()),
         Setpoint::Voltage(share) => VOLTAGE << KIND_SHIFT | value(share.to_bits()),
     }
 }
@@ -187,6 +189,7 @@ fn unpack(word: u32) -> Setpoint {
         SPEED => Setpoint::Speed(Speed::from_bits(bits)),
         TORQUE => Setpoint::Torque(Current::from_bits(bits)),
         TEST => Setpoint::Test(Current::from_bits(bits)),
+        TONE => Setpoint::Tone(Speed::from_bits(bits)),
         VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
         _ => match word & VALUE_MASK {
             0 => Setpoint::Stop,

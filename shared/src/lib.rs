@@ -7,7 +7,8 @@
 //! converter a bridge's next period ([`drive::step`]), by way of the papers' blocks ([`control`])
 //! and the limits ([`protection`]). What the drive has done becomes [`telemetry`], and that goes
 //! out by [`mavlink`]. [`params`] turns the table of parameters into the configuration that all of
-//! it reads, and [`store`] keeps them. [`esc`] ties together what is outside the PWM interrupt.
+//! it reads, and [`store`] keeps them. [`tune`] has the tunes that the motor plays. [`esc`] ties
+//! together what is outside the PWM interrupt.
 //!
 //! Dependencies run one way: `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
 //! `telemetry` ← `mavlink` ← `esc`. `params` builds the configurations of the others.
@@ -31,6 +32,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod answer;
 pub mod control;
 pub mod drive;
 pub mod esc;
@@ -42,4 +44,5 @@ pub mod protection;
 pub mod setpoint;
 pub mod store;
 pub mod telemetry;
+pub mod tune;
 pub mod units;

@@ -1,16 +1,18 @@
 //! From what the motor may do to what the drive is asked for.
 
-use crate::drive::{Config, Setpoint};
+use crate::drive::{Config, Setpoint, tone};
 use crate::input::authority::Command;
 use crate::input::{Throttle, reverse};
 use crate::math::TopProduct;
 use crate::params::{ParamId, Params};
+use crate::tune::Note;
 use crate::units::{Current, Speed};
 
 /// How throttle maps, by `CTL_MODE`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mapping {
     mode: Mode,
+    period_s: f32,
     test_full: Current,
 }
 
@@ -40,8 +42,21 @@ impl Mapping {
                 1.0 => Mode::Torque { full },
                 _ => Mode::Voltage,
             },
+            period_s: scale.period_s,
             test_full: config.test_current,
         }
+    }
+
+    /// The set-point of a note: octaves lower where the control period is too long for it.
+    pub fn tone(&self, note: Note) -> Setpoint {
+        let Note::Pitch { hz } = note else {
+            return Setpoint::Tone(Speed::ZERO);
+        };
+        let mut pitch = Speed::saturating_from_num(f32::from(hz) * self.period_s);
+        while pitch > tone::PITCH_MAX {
+            pitch /= 2;
+        }
+        Setpoint::Tone(pitch)
     }
 
     /// The set-point of a command.
@@ -150,6 +165,47 @@ mod tests {
             }
         }
         assert!((rpm(-1.0) + 6000.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_note_that_is_too_high_for_the_control_period_is_played_octaves_lower() {
+        for (pwm_hz, hz, played_hz) in [
+            (24_000.0, 2093, 2093.0),
+            (8_000.0, 587, 587.0),
+            (8_000.0, 1047, 523.5),
+            (8_000.0, 2093, 523.25),
+        ] {
+            let mut params = Params::default();
+            params.set(ParamId::PwmFreqHz, pwm_hz).expect("in range");
+            params.set(ParamId::CtlRpmMax, 4000.0).expect("in range");
+            let config = build(&params, &Board::BENCH).expect("they fit the bench");
+            let mapping = Mapping::new(&params, &config);
+            let Setpoint::Tone(pitch) = mapping.tone(Note::Pitch { hz }) else {
+                panic!("a note");
+            };
+            let heard_hz = pitch.to_num::<f32>() * pwm_hz;
+            assert!((heard_hz / played_hz - 1.0).abs() < 1e-4, "{heard_hz}");
+        }
+        // An eighth of the control's rate is the highest that is played as it is.
+        for pwm_hz in (8_000..=24_000_u16).step_by(8) {
+            let mut params = Params::default();
+            params
+                .set(ParamId::PwmFreqHz, f32::from(pwm_hz))
+                .expect("in range");
+            params.set(ParamId::CtlRpmMax, 4000.0).expect("in range");
+            let config = build(&params, &Board::BENCH).expect("they fit the bench");
+            let mapping = Mapping::new(&params, &config);
+            for (hz, octaves) in [(pwm_hz / 8, 1.0), (pwm_hz / 8 + 1, 0.5)] {
+                let Setpoint::Tone(pitch) = mapping.tone(Note::Pitch { hz }) else {
+                    panic!("a note");
+                };
+                let heard_hz = pitch.to_num::<f32>() * f32::from(pwm_hz);
+                let share = heard_hz / f32::from(hz);
+                assert!((share - octaves).abs() < 1e-4, "{pwm_hz}: {heard_hz}");
+            }
+        }
+        let (mapping, _) = mapping(0.0);
+        assert_eq!(mapping.tone(Note::Rest), Setpoint::Tone(Speed::ZERO));
     }
 
     #[test]

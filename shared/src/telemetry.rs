@@ -1,6 +1,8 @@
 //! What the ESC tells of itself, in SI.
 
 use crate::drive::{Faults, Phase, Snapshot};
+use crate::input::authority::{Command, DriveStatus};
+use crate::input::signal::Signal;
 use crate::units::Scale;
 
 /// The state of the ESC as telemetry reports it.
@@ -24,9 +26,18 @@ pub struct Telemetry {
     pub fault_count: u32,
     /// Whether the throttle may turn the motor.
     pub armed: bool,
-    /// Frames on the throttle wire that failed their check.
+    /// Frames on the throttle wire that failed their check, since the start.
     pub bad_frames: u32,
+    /// Their share in the last second, 0 to 1.
+    pub bad_share: f32,
+    /// The signal on the throttle wire; none before it has been identified, and on a silent wire.
+    pub signal: Option<Signal>,
 }
+
+/// Below this the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
+/// speed that can be asked for (`CTL_RPM_MIN` goes down to it), and above the noise of an estimate
+/// at standstill.
+const AT_REST_RPM: f32 = 100.0;
 
 /// Time over which the current is smoothed, µs: what flows in a period differs from the next by
 /// the current's ripple, and a fifth of a second is what a person can read.
@@ -64,6 +75,18 @@ impl Telemetry {
             fault_count: 0,
             armed: false,
             bad_frames: 0,
+            bad_share: 0.0,
+            signal: None,
+        }
+    }
+
+    /// Whether the motor is at rest and sound, with what it is asked to do now: a start begins with
+    /// phases that do not turn it yet.
+    pub fn drive(&self, command: Command) -> DriveStatus {
+        let at_rest = !self.phase.drives() && self.rpm.abs() < AT_REST_RPM;
+        DriveStatus {
+            stopped: at_rest && command.rests(),
+            faulted: !self.faults.is_empty(),
         }
     }
 

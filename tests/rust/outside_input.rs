@@ -121,7 +121,10 @@ impl Desk {
     fn check(&self) {
         let setpoint = self.esc.setpoint();
         assert!(
-            matches!(setpoint, Setpoint::Stop | Setpoint::Zero),
+            matches!(
+                setpoint,
+                Setpoint::Stop | Setpoint::Zero | Setpoint::Tone(_)
+            ),
             "{setpoint:?}"
         );
     }

@@ -1,7 +1,7 @@
 //! What may turn the motor and what must stop it, from datagrams on the throttle wire to the torque
 //! of the simulated motor, to the millisecond of simulated time and with default parameters.
 
-use siskin_control::drive::Bridge;
+use siskin_control::drive::{Bridge, Setpoint};
 use siskin_control::params::ParamId;
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::flash::FileFlash;
@@ -33,7 +33,7 @@ struct Seen {
     most_rpm: f64,
     /// Mean over 10 ms.
     most_torque_nm: f64,
-    /// A period in which the bridge drove the motor.
+    /// A period in which the bridge drove the motor, and not to be heard.
     driven: bool,
 }
 
@@ -106,7 +106,8 @@ impl Flight {
                     seen.most_rpm = seen.most_rpm.max(period.rpm());
                     torques_nm += period.flow.torque_nm;
                     periods += 1;
-                    seen.driven |= matches!(period.bridge, Bridge::Duty(_));
+                    let heard = matches!(period.setpoint, Setpoint::Tone(_));
+                    seen.driven |= matches!(period.bridge, Bridge::Duty(_)) && !heard;
                 },
                 &mut |_| {},
             );
@@ -275,5 +276,46 @@ fn it_turns_again_from_any_speed_while_braking() {
             seen.least_rpm > 0.99 * HALF_RPM && seen.most_rpm < 1.01 * HALF_RPM,
             "{stop_ms} ms of brake: {seen:?}"
         );
+    }
+}
+
+#[test]
+fn commands_at_1_khz_reset_nothing_and_turn_nothing() {
+    let mut flight = Flight::new(&[]);
+    for value in 1..48 {
+        let seen = flight.send(1_000, frame(DSHOT600, value));
+        assert!(!seen.driven, "{value}: {seen:?}");
+    }
+    // It is still the ESC that has obeyed them: saved parameters and all.
+    assert_eq!(flight.device.esc().telemetry().fault_count, 0);
+    assert!(flight.device.esc().params().get(ParamId::Inp3d) != 0.0);
+    flight.send(400, frame(DSHOT600, STOP));
+    assert!(flight.is_armed());
+}
+
+#[test]
+fn in_3d_each_half_of_the_throttle_turns_its_way() {
+    let mut flight = Flight::armed(&[(ParamId::Inp3d, 1.0)]);
+    // 48 to 1047 are reverse, 1048 to 2047 forward; the middle of each is 3150 rpm.
+    flight.send(3_000, frame(DSHOT600, 48 + 500));
+    let back = flight.send(100, frame(DSHOT600, 48 + 500));
+    assert!((-3250.0..-3050.0).contains(&back.most_rpm), "{back:?}");
+    flight.send(3_000, frame(DSHOT600, 1048 + 500));
+    let forward = flight.send(100, frame(DSHOT600, 1048 + 500));
+    assert!((3050.0..3250.0).contains(&forward.least_rpm), "{forward:?}");
+}
+
+#[test]
+fn a_command_turns_the_direction_until_the_next_start() {
+    let mut flight = Flight::armed(&[]);
+    for (command, sign) in [(21, -1.0), (20, 1.0)] {
+        flight.send(10, frame(DSHOT600, command));
+        flight.send(3_000, frame(DSHOT600, HALF));
+        let seen = flight.send(100, frame(DSHOT600, HALF));
+        assert!(seen.least_rpm * sign > 3000.0, "{command}: {seen:?}");
+        // A command in between is zero throttle, and not obeyed.
+        flight.send(10, frame(DSHOT600, 8));
+        flight.send(2_000, frame(DSHOT600, STOP));
+        assert_eq!(flight.device.esc().params().get(ParamId::MotDir), 0.0);
     }
 }

@@ -1,7 +1,11 @@
-//! What faults do to the chip and its flash.
+//! What faults do to the chip and its flash, and to whom it answers.
+
+use std::net::UdpSocket;
+use std::time::Duration;
 
 use super::*;
 use crate::fault::Kind;
+use crate::wire::WireErrors;
 
 const MS_NS: u64 = 1_000_000;
 
@@ -122,5 +126,46 @@ fn a_brown_out_resets_the_chip() {
         run(&mut device, 1_001);
         assert_eq!(run(&mut device, 1_499) == 0, silent, "{volts} V");
         assert!(run(&mut device, 2_000) > 0);
+    }
+}
+
+/// Two flight controllers take turns, at times that are no ticks of the ESC's timer, on a wire that
+/// is exact and on one that is not.
+#[test]
+fn an_answer_goes_to_who_has_asked() {
+    for jitter_ns in [0.0, 60.0] {
+        let mut device = Device::start(Start {
+            bench: Bench::default(),
+            wire: Wire::open(&"udp:127.0.0.1:0".parse().unwrap(), 0).unwrap(),
+            flash: FileFlash::in_memory(),
+            overrides: vec![(ParamId::InpProto, 22.0)],
+            faults: Vec::new(),
+            link_bytes_per_s: 11_520,
+        })
+        .unwrap()
+        .0;
+        device.wire.disturb(WireErrors {
+            jitter_ns,
+            ..WireErrors::default()
+        });
+        let to = device.wire.local_address().unwrap();
+        let senders = [(); 2].map(|()| {
+            let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+            let patience = Duration::from_secs(5);
+            sender.set_read_timeout(Some(patience)).unwrap();
+            sender
+        });
+        for number in 0..20 {
+            let sender = &senders[number % 2];
+            sender.send_to(&[22, 0x0F, 0], to).unwrap();
+            let now_ns = device.now_ns();
+            while device.wire.counts().played as usize == number {
+                device.wire.poll(now_ns);
+            }
+            let mut none = |_: f64, _: &Period, _: &Rig| {};
+            device.advance(now_ns + MS_NS, |_, _| None, &mut none, &mut |_| {});
+            let answer = sender.recv(&mut [0; 16]);
+            assert_eq!(answer.ok(), Some(9), "to {number}, jitter {jitter_ns} ns");
+        }
     }
 }

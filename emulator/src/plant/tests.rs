@@ -245,6 +245,23 @@ fn short_circuit_pulses_show_the_induced_voltage() {
 }
 
 #[test]
+fn three_currents_that_end_together_leave_no_diode_on() {
+    for duty_a in [0.3, 0.6] {
+        let mut plant = held(Fidelity::Averaged, 0.0, 0.0);
+        for _ in 0..3 {
+            let along_a = duties([duty_a, 0.45, 0.45]);
+            plant.period([along_a; 2], 24.0, PERIOD_S, DEAD_TIME_S);
+        }
+        assert!(plant.currents_a()[0].abs() > 1.0);
+        for _ in 0..3 {
+            plant.period([Bridge::Off; 2], 24.0, PERIOD_S, DEAD_TIME_S);
+        }
+        assert_eq!(plant.currents_a(), [0.0; 3]);
+        assert_eq!(plant.terminals_v(), [0.0; 3]);
+    }
+}
+
+#[test]
 fn floating_terminals_show_what_the_rotor_induces() {
     let emf = |plant: &Plant| {
         let peak = plant.speed_rad_s() * f64::from(MOTOR.pole_pairs) * MOTOR.flux_wb;

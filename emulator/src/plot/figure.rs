@@ -240,6 +240,7 @@ pub(super) fn tint(phase: Phase) -> Option<RGBColor> {
         Phase::Run => Some(RGBColor(0xe9, 0xf6, 0xf0)),
         Phase::Stopping => Some(RGBColor(0xf8, 0xe8, 0xf1)),
         Phase::Brake => Some(RGBColor(0xe6, 0xe6, 0xe6)),
+        Phase::Tone => Some(RGBColor(0xec, 0xe4, 0xf7)),
     }
 }
 
@@ -253,5 +254,6 @@ fn name(phase: Phase) -> &'static str {
         Phase::Run => "Run",
         Phase::Stopping => "Stopping",
         Phase::Brake => "Brake",
+        Phase::Tone => "Tone",
     }
 }

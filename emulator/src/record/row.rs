@@ -72,6 +72,7 @@ enum PhaseName {
     Run,
     Stopping,
     Brake,
+    Tone,
 }
 
 impl Row {

@@ -20,7 +20,7 @@ const HALL: usize = 7;
 const PHASE: usize = 10;
 const FAULT: usize = PHASE + PHASES.len();
 
-const PHASES: [Phase; 8] = [
+const PHASES: [Phase; 9] = [
     Phase::Idle,
     Phase::Sense,
     Phase::Charge,
@@ -29,6 +29,7 @@ const PHASES: [Phase; 8] = [
     Phase::Run,
     Phase::Stopping,
     Phase::Brake,
+    Phase::Tone,
 ];
 
 /// The scopes with their wires, in the order of their places. Each phase and each fault has a wire:

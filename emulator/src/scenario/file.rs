@@ -12,6 +12,7 @@ use super::ScenarioError;
 use super::fault::FaultTable;
 use super::lines::reason;
 use super::signal::Signal;
+use super::wire::Wire;
 use crate::bench::{
     Choice, DEFAULT_LOAD, DEFAULT_MOTOR, LoadTable, MotorTable, SupplyTable, library,
 };
@@ -95,7 +96,7 @@ pub(super) struct BenchTable {
     /// Simulated time.
     pub(super) duration_s: f64,
     /// How throttle is sent.
-    pub(super) wire: Protocol,
+    pub(super) wire: Wire,
     /// Resolution of the currents, 0 is exact.
     pub(super) adc_bits: u32,
     /// From the sample to the voltage: 0, 0.5 or 1.
@@ -134,7 +135,7 @@ impl Default for BenchTable {
             imposed_rpm: None,
             seed: 1,
             duration_s: 3.0,
-            wire: Protocol::Dshot600,
+            wire: Wire::default(),
             adc_bits: 12,
             delay_periods: 1.0,
             scale: Factors::default(),
@@ -149,18 +150,6 @@ impl Default for BenchTable {
             initial_angle_deg: 0.0,
         }
     }
-}
-
-/// How throttle is sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum Protocol {
-    /// DShot150.
-    Dshot150,
-    /// DShot300.
-    Dshot300,
-    /// DShot600.
-    Dshot600,
 }
 
 /// The truth against the named motor and load.

@@ -33,6 +33,7 @@ mod signal;
 mod stand;
 mod survey;
 mod vary;
+mod wire;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};

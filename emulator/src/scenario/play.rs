@@ -5,12 +5,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use siskin_control::drive::Setpoint;
-use siskin_control::input::dshot;
 use siskin_control::units::Scale;
 
 use super::RUN;
 use super::error::ScenarioError;
-use super::file::{Protocol, Scenario, WindowTable};
+use super::file::{Scenario, WindowTable};
 use super::judge::{Verdict, judge};
 use super::signal::{Demand, Signal, demand};
 use crate::device::{Device, Start};
@@ -20,9 +19,6 @@ use crate::rig::Rig;
 use crate::summary::{Report, Summary};
 use crate::watch::{Watch, WatchError};
 use crate::wire::Wire;
-
-/// Time between two frames on the wire: what a flight controller's loop of 1 kHz sends.
-const FRAME_NS: u64 = 1_000_000;
 
 /// Plays a scenario.
 pub(super) fn play(
@@ -49,11 +45,14 @@ pub(super) fn play(
     let mut slice_ns = 0;
     while slice_ns < end_ns && !watch.failed() {
         if let Some(Demand::Throttle(throttle)) = demand(signals, slice_ns as f64 * 1e-9) {
-            let datagram = frame(scenario.bench.wire, throttle);
-            // A frame takes a tenth of the time to the next at the slowest rate: there is room.
+            let datagram = scenario
+                .bench
+                .wire
+                .datagram(throttle, device.esc().params());
+            // The longest pulse and its rest take 2.34 of 2.5 ms: there is room.
             let _ = device.wire().play(slice_ns, &datagram);
         }
-        slice_ns += FRAME_NS;
+        slice_ns += scenario.bench.wire.interval_ns();
         device.advance(
             slice_ns.min(end_ns),
             |t_s, rig| past_the_wire(signals, t_s, rig, &last),
@@ -146,25 +145,4 @@ fn setpoint(demand: Demand, scale: &Scale) -> Option<Setpoint> {
         Demand::Rpm(rpm) => Some(Setpoint::Speed(scale.speed_from_rpm(rpm as f32))),
         Demand::Amps(amps) => Some(Setpoint::Torque(scale.current_from_a(amps as f32))),
     }
-}
-
-/// A datagram of the throttle wire.
-fn frame(protocol: Protocol, throttle: f64) -> [u8; 3] {
-    let value = if throttle > 0.0 {
-        48 + libm::round(throttle * 1999.0) as u16
-    } else {
-        0
-    };
-    let bits = dshot::Frame {
-        value,
-        telemetry: false,
-    }
-    .to_bits();
-    let [low, high] = bits.to_le_bytes();
-    let code = match protocol {
-        Protocol::Dshot150 => 10,
-        Protocol::Dshot300 => 11,
-        Protocol::Dshot600 => 12,
-    };
-    [code, low, high]
 }

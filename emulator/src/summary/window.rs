@@ -50,13 +50,13 @@ pub struct Figures {
     pub lock_s: Option<f64>,
     /// Mean electromagnetic torque, Nm.
     pub torque_mean_nm: Option<f64>,
-    /// Torque ripple: 100·√(T_rms² − T_avg²)/|T_avg|.
+    /// Torque ripple: 100·√(T_rms² − T_avg²)/|T_avg|, where the drive has turned the motor.
     pub torque_ripple_pct: Option<f64>,
     /// Mean electrical power into the phases, W.
     pub p_motor_w: Option<f64>,
     /// Mean power lost in the windings, W.
     pub p_copper_w: Option<f64>,
-    /// 1 − p_copper/p_motor, for a motor that takes power.
+    /// 1 − p_copper/p_motor, for a motor that takes power to turn: a tone's is no work.
     pub efficiency: Option<f64>,
     /// Mean measured i_q, A.
     pub i_q_mean_a: Option<f64>,
@@ -117,6 +117,8 @@ pub(super) struct Window {
     locked: Since,
     turning: Turning,
     starts: u64,
+    /// The drive has turned the motor.
+    drove: bool,
 }
 
 /// Since when something has held without a break, s.
@@ -179,6 +181,7 @@ impl Window {
             locked: Since(None),
             turning: Turning::new(),
             starts: 0,
+            drove: false,
         }
     }
 
@@ -208,6 +211,7 @@ impl Window {
             period.bus_v,
             period.bus_a,
         ]);
+        self.drove |= snapshot.phase.drives();
         self.rpm_min = self.rpm_min.min(rpm);
         self.rpm_max = self.rpm_max.max(rpm);
         for current_a in period.currents_a {
@@ -273,11 +277,13 @@ impl Window {
             torque_mean_nm,
             torque_ripple_pct: torque_mean_nm
                 .zip(self.all.get(2))
+                .filter(|_| self.drove)
                 .and_then(|(mean, square)| ripple(mean, square)),
             p_motor_w,
             p_copper_w,
             efficiency: p_motor_w
                 .zip(p_copper_w)
+                .filter(|_| self.drove)
                 .and_then(|(motor, copper)| (motor > 0.0).then(|| 1.0 - copper / motor)),
             i_q_mean_a: self.all.get(5),
             i_d_mean_a: self.all.get(6),

@@ -1,5 +1,9 @@
 //! One datagram of the throttle wire as levels over time.
 
+use siskin_control::answer::{REPLY_DELAY_NS, gcr, reply_bit_hz};
+use siskin_control::input::dshot::{Rate, edges};
+use siskin_control::input::signal::Signal;
+
 use super::Rejected;
 
 /// The longest run of levels that is played, ns. It is far above any frame's, and bounds for how
@@ -10,12 +14,13 @@ const MAX_DURATION_NS: u64 = 10_000_000_000;
 /// which leaves a 2 ms pulse its 450 Hz.
 const MIN_PULSE_REST_NS: u64 = 2_000;
 
-/// Bit times of rest between two DShot frames. A decoder knows a frame's end by a level that
-/// lasts longer than a bit; four leave no doubt and cost a sixth of the highest frame rate.
-const DSHOT_REST_BITS: u64 = 4;
+/// The least time from a pulse to the next, ns: Multishot's 32 kHz. A decoder takes pulses that
+/// follow each other like DShot's bits for no pulses.
+const MIN_PULSE_PERIOD_NS: u64 = 31_250;
 
-/// From the end of a bidirectional frame to its answer, ns.
-const ANSWER_DELAY_NS: u64 = 30_000;
+/// Eighths of a bit of rest between two DShot frames. A decoder knows a frame's end by a level that
+/// lasts longer than a bit; four bits leave no doubt and cost a fifth of the highest frame rate.
+const DSHOT_REST_EIGHTHS: u32 = 4 * 8;
 
 /// What a datagram puts on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +29,7 @@ pub(super) enum Frame<'a> {
     Pulse { width_ns: u64 },
     /// 16 bits, from the highest on.
     DShot {
-        bits_per_s: u64,
+        rate: Rate,
         bidirectional: bool,
         bits: u16,
     },
@@ -50,14 +55,6 @@ impl<'a> Frame<'a> {
                     width_ns: u32::from_le_bytes(width).into(),
                 }
             }
-            10..=13 | 20..=23 => {
-                let bits = payload.try_into().map_err(|_| wrong_length())?;
-                Self::DShot {
-                    bits_per_s: 150_000 << (protocol % 10),
-                    bidirectional: *protocol >= 20,
-                    bits: u16::from_le_bytes(bits),
-                }
-            }
             255 => {
                 let (first, durations) = payload.split_first().ok_or_else(wrong_length)?;
                 let (durations, rest) = durations.as_chunks();
@@ -71,7 +68,22 @@ impl<'a> Frame<'a> {
                 };
                 Self::Raw { first, durations }
             }
-            _ => return Err(Rejected::Protocol(*protocol)),
+            number => {
+                // Frames have the numbers of `INP_PROTO`; pulses count from 0 here and from 1 there.
+                let Some(Signal::Dshot {
+                    rate,
+                    bidirectional,
+                }) = Signal::from_number(*number)
+                else {
+                    return Err(Rejected::Protocol(*number));
+                };
+                let bits = payload.try_into().map_err(|_| wrong_length())?;
+                Self::DShot {
+                    rate,
+                    bidirectional,
+                    bits: u16::from_le_bytes(bits),
+                }
+            }
         };
         match frame.duration_ns() {
             0 if matches!(frame, Self::Pulse { .. }) => Err(Rejected::NoPulse),
@@ -88,18 +100,12 @@ impl<'a> Frame<'a> {
                 set(width_ns, false);
             }
             Self::DShot {
-                bits_per_s,
+                rate,
                 bidirectional,
                 bits,
-            } => {
-                for bit in 0..16 {
-                    // A one is active for 6/8 of its time, a zero for 3/8.
-                    let is_one = bits & (0x8000 >> bit) != 0;
-                    let active = if is_one { 6 } else { 3 };
-                    set(eighths_ns(8 * bit, bits_per_s), !bidirectional);
-                    set(eighths_ns(8 * bit + active, bits_per_s), bidirectional);
-                }
-            }
+            } => edges(bits, rate).for_each(|(time_ns, active)| {
+                set(time_ns.into(), active != bidirectional);
+            }),
             Self::Raw { first, durations } => {
                 let (mut time_ns, mut level) = (0, first);
                 for duration in durations {
@@ -115,7 +121,7 @@ impl<'a> Frame<'a> {
     pub(super) fn duration_ns(&self) -> u64 {
         match *self {
             Self::Pulse { width_ns } => width_ns,
-            Self::DShot { bits_per_s, .. } => eighths_ns(16 * 8, bits_per_s),
+            Self::DShot { rate, .. } => rate.frame_ns().into(),
             Self::Raw { durations, .. } => durations
                 .iter()
                 .map(|duration| u64::from(u32::from_le_bytes(*duration)))
@@ -146,27 +152,26 @@ impl<'a> Frame<'a> {
     pub(super) fn rest_before_ns(&self) -> u64 {
         match *self {
             Self::Pulse { width_ns } => MIN_PULSE_REST_NS.max(width_ns / 16),
-            Self::DShot { bits_per_s, .. } => eighths_ns(DSHOT_REST_BITS * 8, bits_per_s),
+            Self::DShot { rate, .. } => rate.eighths_ns(DSHOT_REST_EIGHTHS).into(),
             Self::Raw { .. } => 0,
         }
     }
 
-    /// The rest that it needs after it, ns: after a bidirectional frame the time of its answer,
-    /// which is 21 bits at 5/4 of the rate.
+    /// The rest that it needs after it, ns: after a bidirectional frame the time of its answer too,
+    /// and after a short pulse what is left of its period.
     pub(super) fn rest_after_ns(&self) -> u64 {
+        let rest_ns = self.rest_before_ns();
         match *self {
+            Self::Pulse { width_ns } => rest_ns.max(MIN_PULSE_PERIOD_NS.saturating_sub(width_ns)),
             Self::DShot {
-                bits_per_s,
+                rate,
                 bidirectional: true,
                 ..
-            } => ANSWER_DELAY_NS + eighths_ns(21 * 8, bits_per_s * 5 / 4) + self.rest_before_ns(),
-            _ => self.rest_before_ns(),
+            } => {
+                let reply_ns = u64::from(gcr::BITS) * 1_000_000_000 / u64::from(reply_bit_hz(rate));
+                u64::from(REPLY_DELAY_NS) + reply_ns + rest_ns
+            }
+            _ => rest_ns,
         }
     }
-}
-
-/// Eighths of a bit in ns, rounded to the nearest.
-fn eighths_ns(eighths: u64, bits_per_s: u64) -> u64 {
-    let eighths_per_s = 8 * bits_per_s;
-    (eighths * 1_000_000_000 + eighths_per_s / 2) / eighths_per_s
 }

@@ -4,6 +4,8 @@ mod errors;
 
 use super::*;
 use proptest::prelude::*;
+use siskin_control::input::line::{Event, Line};
+use siskin_control::input::signal::{Pulse, Signal};
 
 fn edges(wire: &mut Wire) -> Vec<(u64, bool)> {
     std::iter::from_fn(|| wire.next_edge(u64::MAX / 2)).collect()
@@ -129,7 +131,33 @@ fn a_pulse_rests_for_a_sixteenth_of_it() {
     wire.play(0, &pulse(3, 5000)).unwrap();
     wire.play(0, &pulse(3, 5000)).unwrap();
     let starts: Vec<_> = edges(&mut wire).iter().step_by(2).map(|e| e.0).collect();
-    assert_eq!(starts, [0, 2_125_000, 2_132_000]);
+    assert_eq!(starts, [0, 2_125_000, 2_156_250]);
+}
+
+/// However many come at once, each is a pulse for the ESC: 5 to 25 µs, at 32 kHz at most.
+#[test]
+fn queued_multishot_pulses_are_decoded() {
+    const TICK_HZ: u64 = 170_000_000;
+    let widths_ns = [5_000, 5_000, 25_000, 12_345, 25_000, 5_000];
+    let mut wire = Wire::detached();
+    for width_ns in widths_ns {
+        wire.play(0, &pulse(3, width_ns)).unwrap();
+    }
+    let mut line = Line::new(TICK_HZ as u32);
+    line.force(Some(Signal::Pulse(Pulse::Multishot)));
+    let ticks = |time_ns: u64| (time_ns * TICK_HZ / 1_000_000_000) as u32;
+    let mut events: Vec<_> = edges(&mut wire)
+        .iter()
+        .filter_map(|(time_ns, level)| line.edge(ticks(*time_ns), *level))
+        .collect();
+    events.extend(line.settle(ticks(1_000_000)));
+    assert_eq!(events.len(), widths_ns.len());
+    for (event, sent_ns) in events.iter().zip(widths_ns) {
+        assert!(
+            matches!(event, Event::Pulse { width_ns, .. } if width_ns.abs_diff(sent_ns) <= 6),
+            "{event:?} for {sent_ns} ns"
+        );
+    }
 }
 
 #[test]
@@ -207,11 +235,11 @@ fn edges_come_before_the_time_asked_for() {
     assert_eq!(wire.next_edge(5), None);
     assert_eq!(wire.next_edge(6), Some((5, true)));
     assert_eq!(wire.next_edge(15), None);
-    // The slice up to 3000 is over: what comes late is played from there.
-    assert_eq!(wire.next_edge(3000), Some((15, false)));
-    assert_eq!(wire.next_edge(3000), None);
-    wire.play(2900, &pulse(0, 10)).unwrap();
-    assert_eq!(wire.next_edge(4000), Some((3000, true)));
+    // The slice up to 40 000 is over: what comes late is played from there.
+    assert_eq!(wire.next_edge(40_000), Some((15, false)));
+    assert_eq!(wire.next_edge(40_000), None);
+    wire.play(39_900, &pulse(0, 10)).unwrap();
+    assert_eq!(wire.next_edge(41_000), Some((40_000, true)));
 }
 
 #[test]
@@ -243,35 +271,50 @@ fn malformed_datagrams_are_counted() {
     assert_eq!(edges(&mut wire), []);
 }
 
+/// Until so many datagrams have been played, or it has taken too long.
+fn poll(wire: &mut Wire, now_ns: u64, played: u64) {
+    for _ in 0..5000 {
+        wire.poll(now_ns);
+        if wire.counts().played == played {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+}
+
+/// A socket whose silence fails a test.
+fn sender() -> UdpSocket {
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let patience = std::time::Duration::from_secs(5);
+    sender.set_read_timeout(Some(patience)).unwrap();
+    sender
+}
+
 #[test]
 fn datagrams_come_in_by_udp() {
     let address: SignalAddress = "udp:127.0.0.1:0".parse().unwrap();
     let mut wire = Wire::open(&address, 3).unwrap();
     let to = wire.local_address().unwrap();
-    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let sender = sender();
     wire.poll(0);
-    assert_eq!(
-        (wire.counts(), wire.last_sender()),
-        (WireCounts::default(), None)
-    );
+    assert_eq!(wire.counts(), WireCounts::default());
+    // There is nobody to answer yet.
+    wire.send(0, &[1]);
     sender.send_to(&[99], to).unwrap();
     sender.send_to(&dshot(12, 0x1234), to).unwrap();
     // Longer than any frame, and as long as a datagram gets.
     sender.send_to(&raw(1, &[1000; 16_000]), to).unwrap();
-    for _ in 0..5000 {
-        wire.poll(777);
-        if wire.counts().played == 2 {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    poll(&mut wire, 777, 2);
     let counts = WireCounts {
         played: 2,
         rejected: 1,
         dropped: 0,
     };
     assert_eq!(wire.counts(), counts);
-    assert_eq!(wire.last_sender(), sender.local_addr().ok());
+    wire.send(777, &[2, 3]);
+    let mut answer = [0; 8];
+    assert_eq!(sender.recv_from(&mut answer).unwrap(), (2, to));
+    assert_eq!(answer[..2], [2, 3]);
     assert_eq!(edges(&mut wire).len(), 32 + 16_000);
 
     // The port is taken now.
@@ -281,6 +324,44 @@ fn datagrams_come_in_by_udp() {
         line.contains(&taken.to_string()) && line.contains("is taken"),
         "{line}"
     );
+}
+
+#[test]
+fn an_answer_goes_to_who_has_asked() {
+    let mut wire = Wire::open(&"udp:127.0.0.1:0".parse().unwrap(), 0).unwrap();
+    let to = wire.local_address().unwrap();
+    let senders = [sender(), sender()];
+    for (place, sender) in senders.iter().enumerate() {
+        sender.send_to(&dshot(22, 0), to).unwrap();
+        poll(&mut wire, 0, place as u64 + 1);
+    }
+    // Both wait in the queue; the second one begins when the first has been answered.
+    let edges = edges(&mut wire);
+    let begins_ns = [edges[1].0, edges[33].0];
+    for (sender, asked_ns) in senders.iter().zip(begins_ns) {
+        wire.send(asked_ns, &asked_ns.to_le_bytes());
+        let mut answer = [0; 8];
+        sender.recv_from(&mut answer).unwrap();
+        assert_eq!(answer, asked_ns.to_le_bytes());
+    }
+}
+
+/// Frames that nobody answers leave no trace, however often the sender changes.
+#[test]
+fn senders_are_forgotten() {
+    let mut wire = Wire::open(&"udp:127.0.0.1:0".parse().unwrap(), 0).unwrap();
+    let to = wire.local_address().unwrap();
+    let senders = [sender(), sender()];
+    for number in 0..100 {
+        let sender = &senders[number % 2];
+        sender.send_to(&dshot(12, 0), to).unwrap();
+        poll(&mut wire, number as u64 * 1_000_000, number as u64 + 1);
+        while wire
+            .next_edge(number as u64 * 1_000_000 + 900_000)
+            .is_some()
+        {}
+        assert!(wire.senders.len() <= 3, "{}", wire.senders.len());
+    }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::config::Stop;
 use super::turn::hall;
-use super::{ATTEMPTS, Config, Direction, Fault, Phase, Sample, Setpoint, State};
+use super::{ATTEMPTS, Config, Direction, Fault, Phase, Sample, Setpoint, State, tone};
 use crate::control::catch::Rotor;
 use crate::control::observer;
 use crate::control::regulator::Reference;
@@ -39,7 +39,7 @@ pub(super) fn wish(config: &Config, setpoint: Setpoint) -> Wish {
         Setpoint::Speed(speed) => speed.to_bits(),
         Setpoint::Torque(current) | Setpoint::Test(current) => current.to_bits(),
         Setpoint::Voltage(share) => share.to_bits(),
-        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) => 0,
+        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) | Setpoint::Tone(_) => 0,
     };
     // A test is of either direction; else the other way is for who has asked for both.
     let both_ways = config.both_ways || matches!(setpoint, Setpoint::Test(_));
@@ -60,6 +60,9 @@ pub(super) fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
     if state.phase == Phase::Run && wish == present {
         return;
     }
+    if tone::follow(config, state, setpoint) {
+        return;
+    }
     // A torque against the rotation slows the motor down within Run, but does not turn it round.
     let holds = matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
         && state.seen.speed >= config.slow;
@@ -72,8 +75,6 @@ pub(super) fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
         Phase::Brake if wish == present && state.seen.speed > config.slow => resume(config, state),
         Phase::Idle | Phase::Brake if wish != Wish::Rest => state.rest(Phase::Sense),
         Phase::Idle | Phase::Brake => state.failed_starts = 0,
-        // Not the low sides: the rotor may turn at any speed.
-        Phase::Sense | Phase::Charge if wish == Wish::Rest => state.rest(Phase::Idle),
         Phase::Park | Phase::Ramp if wish != present => {
             state.failed_starts = 0;
             end(config, state);

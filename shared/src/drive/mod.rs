@@ -6,6 +6,7 @@ mod rest;
 pub mod six_step;
 mod state;
 mod step;
+pub mod tone;
 mod turn;
 
 pub use crate::protection::{Fault, Faults};
@@ -47,6 +48,9 @@ pub enum Setpoint {
     Torque(Current),
     /// Apply this share of the voltage that the supply can give.
     Voltage(I1F31),
+    /// Play a tone of this pitch, in cycles a period, without turning the motor: of at most
+    /// [`tone::PITCH_MAX`]; zero is a pause between two notes.
+    Tone(Speed),
     /// Hold this current i_q for a test; the start uses no more than a test may either.
     Test(Current),
 }

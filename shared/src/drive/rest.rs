@@ -4,19 +4,24 @@
 //! looked for at the open terminals. One that turns is caught where it is; one that turns the other
 //! way is stopped first; one that stands is parked.
 
-use super::{Bridge, Config, Direction, Fault, Phase, Sample, State};
+use super::{Bridge, Config, Direction, Fault, Phase, Sample, Setpoint, State, tone};
 use crate::control::catch::{self, Rotor};
 use crate::control::sensing::{self, Zeroing};
-use crate::units::Speed;
+use crate::units::{AdcCounts, Speed};
 
 /// How often the currents' zeros are measured anew while it is not known whether the rotor turns:
 /// after eight times 5 ms it turns too slowly to matter, or its terminals cannot be read.
 const LOOKS: u8 = 8;
 
-/// A period of Idle, Sense or Charge. `None` when Charge is done, and in any other phase: then the
-/// drive acts.
+/// A period of Idle, Sense, Charge or Tone. `None` when Charge is done and the motor is to turn, and
+/// in any other phase: then the drive acts.
 #[inline(always)]
-pub(super) fn period(config: &Config, state: &mut State, sample: &Sample) -> Option<Bridge> {
+pub(super) fn period(
+    config: &Config,
+    state: &mut State,
+    sample: &Sample,
+    (currents, setpoint): ([AdcCounts; 3], Setpoint),
+) -> Option<Bridge> {
     match state.phase {
         Phase::Idle => {
             watch(config, state, sample);
@@ -26,7 +31,14 @@ pub(super) fn period(config: &Config, state: &mut State, sample: &Sample) -> Opt
             sense(config, state, sample);
             Some(Bridge::Off)
         }
-        Phase::Charge => charge(config, state).then_some(Bridge::Charge(config.charge.duty)),
+        Phase::Charge => {
+            if charge(config, state) {
+                Some(Bridge::Charge(config.charge.duty))
+            } else {
+                tone::period(config, state, currents, setpoint)
+            }
+        }
+        Phase::Tone => tone::period(config, state, currents, setpoint),
         _ => None,
     }
 }

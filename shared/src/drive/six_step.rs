@@ -17,7 +17,7 @@ use fixed::types::extra::{U16, U28, U32};
 use fixed::types::{I1F31, I36F28};
 
 use super::launch::{self, Wish};
-use super::{Bridge, Phase, Sample, Setpoint, Stop, rest, turn};
+use super::{Bridge, Phase, Sample, Setpoint, Stop, rest, tone, turn};
 use crate::control::delay::Delay;
 use crate::control::planner;
 use crate::control::six_step::commutation::{HALF_SEXTANT, Legs, SEXTANT};
@@ -28,7 +28,7 @@ use crate::math::{Gain, TopProduct};
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
 /// Sextants in a row without a crossing after which the rotor is lost: two turns.
-const LOST_SEXTANTS: u8 = 12;
+pub(super) const LOST_SEXTANTS: u8 = 12;
 
 /// Sextants without a crossing for which one counts that Ramp has waited for in vain: three of them
 /// end the start.
@@ -98,7 +98,7 @@ pub(super) fn period(
 ) -> Bridge {
     follow(config, six_step, state, setpoint);
     state.seen.phase = state.phase;
-    if let Some(bridge) = rest::period(config, state, sample) {
+    if let Some(bridge) = rest::period(config, state, sample, (currents, setpoint)) {
         return bridge;
     }
     if state.phase == Phase::Charge {
@@ -133,6 +133,9 @@ fn watch(config: &super::Config, state: &mut super::State, currents: [AdcCounts;
 
 /// Changes the phase where the set-point asks for it.
 fn follow(config: &super::Config, six_step: &Config, state: &mut super::State, setpoint: Setpoint) {
+    if state.phase != Phase::Run && tone::follow(config, state, setpoint) {
+        return;
+    }
     let resting = demand(setpoint, state.reversed) == Demand::Rest;
     // A shaft that turns too fast to be parked is left to slow down first.
     let too_fast = state.seen.speed > six_step.run_speed
@@ -145,12 +148,7 @@ fn follow(config: &super::Config, six_step: &Config, state: &mut super::State, s
         Phase::Idle | Phase::Brake if launch::wish(config, setpoint) != Wish::Rest && !too_fast => {
             state.rest(Phase::Sense);
         }
-        Phase::Sense | Phase::Charge
-            if launch::wish(config, setpoint) == Wish::Rest || too_fast =>
-        {
-            // Not the low sides: the rotor may turn at any speed.
-            state.rest(Phase::Idle);
-        }
+        Phase::Sense | Phase::Charge if too_fast => state.rest(Phase::Idle),
         Phase::Park | Phase::Ramp if !along(config, state, setpoint) => end(config, state),
         Phase::Run if resting => state.phase = Phase::Stopping,
         _ => {}
@@ -217,9 +215,9 @@ fn turn(
     // The leg that was on before the last commutation carries all of the current, the other one
     // only what the released phase has left.
     let i = if s.sector.rising() {
-        reading(legs.switching)
+        turn::reading(legs.switching)
     } else {
-        reading(legs.low).saturating_neg()
+        turn::reading(legs.low).saturating_neg()
     };
 
     if given::is_given(config) {
@@ -413,11 +411,6 @@ fn turn_on(
     });
     tell::tell(config, state, currents, i);
     Bridge::Legs(in_order(config, state, phases))
-}
-
-/// A phase's reading as a current: one unit is 4096/3 counts.
-fn reading(counts: AdcCounts) -> Current {
-    Current::from_bits(counts.to_bits().saturating_mul(3))
 }
 
 /// Phases b and c change places where the motor turns the other way than a, b, c.

@@ -1,6 +1,6 @@
 //! What a control period remembers, and what of it the tasks may know.
 
-use super::{Config, Fault, Faults, six_step};
+use super::{Config, Fault, Faults, six_step, tone};
 use crate::control::catch::Rotor;
 use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq};
@@ -30,6 +30,15 @@ pub enum Phase {
     Stopping,
     /// All low sides are on.
     Brake,
+    /// The phases switch to be heard; the rotor stands.
+    Tone,
+}
+
+impl Phase {
+    /// Whether the motor is turned, or slowed down.
+    pub fn drives(self) -> bool {
+        matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)
+    }
 }
 
 /// The sample at which the bridge is turned off, and one for a period of delay.
@@ -72,6 +81,7 @@ pub struct State {
     /// i_q* less i_q where the voltage was limited.
     pub(super) missing: Current,
     pub(super) start: start::State,
+    pub(super) tone: tone::Playing,
     pub(super) protection: protection::State,
     pub(super) six_step: six_step::State,
     /// The voltages of the last two commands in the stator's frame, the latest first.
@@ -121,6 +131,12 @@ pub struct Snapshot {
     pub inductance: Factor,
     /// Whether a position sensor is at fault.
     pub sensor_fault: bool,
+    /// Attempts of the present start that have failed.
+    pub failed_starts: u8,
+    /// Periods in a row for which the observer's state has been out of its range.
+    pub lost_periods: u32,
+    /// Sextants in a row in which the six-step drive has seen no crossing where it drives.
+    pub missed_sextants: u8,
 }
 
 impl State {
@@ -146,6 +162,7 @@ impl State {
             regulator: regulator::State::default(),
             speed: speed::State::default(),
             start: start::State::default(),
+            tone: tone::Playing::default(),
             inductance: inductance::State::default(),
             planned: Speed::ZERO,
             torque: torque::State::default(),
@@ -194,6 +211,12 @@ impl State {
     /// What the tasks may know.
     pub fn snapshot(&self) -> Snapshot {
         let signed = |speed: Speed| if self.reversed { -speed } else { speed };
+        let (failed, missed) = if self.phase.drives() {
+            self.six_step.trouble()
+        } else {
+            // What the six-step drive counts is left where it was when it ended.
+            (0, 0)
+        };
         Snapshot {
             phase: self.seen.phase,
             faults: self.faults,
@@ -207,6 +230,9 @@ impl State {
             bus_current: self.seen.bus_current,
             inductance: self.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.observer),
+            failed_starts: self.failed_starts.max(failed),
+            lost_periods: self.lost_periods,
+            missed_sextants: missed,
         }
     }
 
@@ -245,6 +271,7 @@ impl State {
             torque: torque::State { i_q },
             missing,
             start,
+            tone,
             protection,
             six_step,
             commanded,
@@ -309,6 +336,7 @@ impl State {
         catch.trace(out);
         observer.trace(&config.observer, out);
         start.trace(out);
+        tone.trace(out);
         if config.six_step.is_some() {
             six_step.trace(out);
         }
@@ -356,6 +384,7 @@ impl State {
         self.planned = Speed::ZERO;
         self.missing = Current::ZERO;
         self.torque = torque::State::default();
+        self.tone = tone::Playing::default();
         self.inductance.begin();
         self.seen.phase = phase;
         self.seen.i = Dq::default();

@@ -52,7 +52,7 @@ fn healthy(
     }
     launch::follow(config, state, setpoint);
     state.seen.phase = state.phase;
-    if let Some(bridge) = rest::period(config, state, sample) {
+    if let Some(bridge) = rest::period(config, state, sample, (currents, setpoint)) {
         return bridge;
     }
     if state.phase == Phase::Charge {
@@ -89,7 +89,7 @@ impl Setpoint {
             Self::Torque(current) => Self::Torque(current.saturating_neg()),
             Self::Voltage(share) => Self::Voltage(share.saturating_neg()),
             Self::Test(current) => Self::Test(current.saturating_neg()),
-            Self::Stop | Self::Zero | Self::Fault(_) => self,
+            Self::Stop | Self::Zero | Self::Fault(_) | Self::Tone(_) => self,
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::params::{Board, ParamId, Params, build};
 mod any;
 mod at_rest;
 mod starts;
+mod tones;
 
 const COUNTS_PER_A: f64 = 2048.0 / 40.0;
 

@@ -251,9 +251,14 @@ fn in_frame(swapped: bool, theta: Angle) -> Angle {
     if swapped { theta.wrapping_neg() } else { theta }
 }
 
+/// A phase's reading as a current: one unit is 4096/3 counts.
+pub(super) fn reading(counts: AdcCounts) -> Current {
+    Current::from_bits(counts.to_bits().saturating_mul(3))
+}
+
 /// What the supply gives: 1.5·(v·i)/V_bus.
 #[inline(always)]
-fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
+pub(super) fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
     // 24 + 28 − 32 fraction bits; 28 wanted.
     let two_thirds = (u.d.top(i.d) + u.q.top(i.q))
         .top(supply.reciprocal)

@@ -1,14 +1,18 @@
 //! What may turn a motor: an armed wire, or a test of limited time. Nothing else.
 //!
-//! The wire is armed by zero throttle held for a time, loses that with its signal, and never turns
-//! a motor before. Only a frame whose check sum is right can change what the motor is asked to do.
+//! The wire is armed by zero throttle held for a time, in a signal that has been identified; it
+//! loses that with its signal, and never turns a motor before. Only a frame whose check sum is right,
+//! or a pulse, can change what the motor is asked to do.
 
 use super::Throttle;
-use super::capture::Event;
-use super::dshot::Kind;
+use super::demand::{Demand, Reading};
+use super::line::Event;
+use super::signal::Signal;
 
 /// Zero-throttle frames that arm a wire, at least.
 const ARMING_FRAMES: u32 = 30;
+/// The same for pulses, of which a servo's come 50 times a second.
+const ARMING_PULSES: u32 = 5;
 
 /// The longest test, s.
 const TEST_MOST_S: f32 = 3.0;
@@ -36,10 +40,17 @@ pub enum Command {
     Test(Throttle),
 }
 
+impl Command {
+    /// Whether nothing turns the motor.
+    pub fn rests(self) -> bool {
+        matches!(self, Self::Stop | Self::Zero)
+    }
+}
+
 /// What the drive is doing, for those who may test only a motor at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveStatus {
-    /// The drive does not turn the motor, and the shaft is at rest.
+    /// The drive does not turn the motor, nothing asks it to, and the shaft is at rest.
     pub stopped: bool,
     /// A fault holds the bridge off.
     pub faulted: bool,
@@ -64,7 +75,7 @@ pub enum TestError {
 #[derive(Clone, Debug)]
 pub struct Authority {
     timing: Timing,
-    two_directions: bool,
+    reading: Reading,
     armed: bool,
     arming: Option<Arming>,
     valid: Option<Valid>,
@@ -72,7 +83,6 @@ pub struct Authority {
     test: Option<Test>,
     /// Disarmed by command while a fault held.
     forgiven: bool,
-    bad_frames: u32,
 }
 
 /// Zero throttle since some time.
@@ -83,11 +93,14 @@ struct Arming {
     failed: u32,
 }
 
-/// The last frame with a right check sum.
+/// The last frame with a right check sum, or pulse.
 #[derive(Clone, Copy, Debug)]
 struct Valid {
     at_us: u64,
-    throttle: Option<Throttle>,
+    signal: Signal,
+    /// Whether the wire was known to carry this signal, and it means what it says.
+    identified: bool,
+    demand: Demand,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -101,14 +114,13 @@ impl Authority {
     pub fn new(timing: Timing) -> Self {
         Self {
             timing,
-            two_directions: false,
+            reading: Reading::default(),
             armed: false,
             arming: None,
             valid: None,
             event_us: None,
             test: None,
             forgiven: false,
-            bad_frames: 0,
         }
     }
 
@@ -117,69 +129,105 @@ impl Authority {
         self.timing = timing;
     }
 
-    /// Whether throttle and tests have two directions (`INP_3D`) from now on.
-    pub fn set_two_directions(&mut self, two_directions: bool) {
-        self.two_directions = two_directions;
-    }
-
-    /// Takes what the decoder found.
-    pub fn wire(&mut self, now_us: u64, event: Event) {
-        // What ended before this event has ended, however late `poll` is.
-        self.poll(now_us);
-        self.event_us = Some(now_us);
-        let Event::Frame { frame, .. } = event else {
-            self.bad_frames = self.bad_frames.saturating_add(1);
-            // More bad frames than good ones: what arrives may be noise, and zero by chance.
-            if let Some(arming) = &mut self.arming {
-                arming.failed = arming.failed.saturating_add(1);
-                if arming.failed > arming.zeros {
-                    self.arming = None;
-                }
-            }
-            return;
-        };
-        let throttle = match frame.kind(self.two_directions) {
-            Kind::Throttle(throttle) => Some(throttle),
-            Kind::Stop | Kind::Command(_) => None,
-        };
-        self.valid = Some(Valid {
-            at_us: now_us,
-            throttle,
-        });
-        if throttle.is_some() {
-            self.arming = None;
-            self.test = None;
-        } else if !self.armed {
-            self.count_zero(now_us);
+    /// Changes how frames and pulses are read, and the directions of tests. What was zero may be
+    /// full throttle now: the wire must be armed anew if anything changes.
+    pub fn set_reading(&mut self, reading: Reading) {
+        if self.reading != reading {
+            self.reading = reading;
+            self.restart();
         }
     }
 
-    fn count_zero(&mut self, now_us: u64) {
+    /// Takes what the decoder found, and the signal that it has identified so far.
+    ///
+    /// Before one is identified, zero throttle counts and does not arm. Later, any other is bad.
+    pub fn wire(&mut self, now_us: u64, event: Event, identified: Option<Signal>) {
+        // What ended before this event has ended, however late `poll` is.
+        self.poll(now_us);
+        self.event_us = Some(now_us);
+        let (Some(signal), Some(demand)) = (event.signal(), self.reading.demand(&event)) else {
+            return self.count_failure();
+        };
+        if identified.is_some_and(|identified| identified != signal) {
+            return self.count_failure();
+        }
+        if self.valid.is_some_and(|valid| valid.signal != signal) {
+            self.restart();
+        }
+        let valid = Valid {
+            at_us: now_us,
+            signal,
+            identified: identified.is_some(),
+            demand,
+        };
+        self.valid = Some(valid);
+        match demand {
+            Demand::Throttle(_) => {
+                self.arming = None;
+                self.test = None;
+            }
+            Demand::Zero if !self.armed => self.count_zero(&valid),
+            Demand::Zero => {}
+        }
+    }
+
+    fn count_zero(&mut self, valid: &Valid) {
         let arming = self.arming.get_or_insert(Arming {
-            since_us: now_us,
+            since_us: valid.at_us,
             zeros: 0,
             failed: 0,
         });
         arming.zeros = arming.zeros.saturating_add(1);
-        let held_us = now_us.saturating_sub(arming.since_us);
-        if arming.zeros >= ARMING_FRAMES && held_us >= self.timing.arm_us {
+        let held_us = valid.at_us.saturating_sub(arming.since_us);
+        let least = match valid.signal {
+            Signal::Dshot { .. } => ARMING_FRAMES,
+            Signal::Pulse(_) => ARMING_PULSES,
+        };
+        if valid.identified && arming.zeros >= least && held_us >= self.timing.arm_us {
             self.armed = true;
             self.arming = None;
+        }
+    }
+
+    /// More bad frames than good ones: what arrives may be noise, and zero by chance.
+    fn count_failure(&mut self) {
+        if let Some(arming) = &mut self.arming {
+            arming.failed = arming.failed.saturating_add(1);
+            if arming.failed > arming.zeros {
+                self.arming = None;
+            }
+        }
+    }
+
+    /// The wire must be armed anew.
+    pub fn restart(&mut self) {
+        self.armed = false;
+        self.arming = None;
+    }
+
+    /// The stick teaches its end points: what it shows now is no throttle, not even zero.
+    pub fn learn(&mut self) {
+        self.restart();
+        self.test = None;
+        if let Some(valid) = &mut self.valid {
+            valid.identified = false;
         }
     }
 
     /// Ends what the time has ended: a lost signal's arming, and a test.
     ///
     /// Between two calls a lost signal or a test lasts longer than it should; otherwise it does not
-    /// matter how rarely it is called.
-    pub fn poll(&mut self, now_us: u64) {
-        if !self.signal_present(now_us) {
-            self.armed = false;
-            self.arming = None;
-        }
+    /// matter how rarely it is called. Returns true once for each signal that was lost.
+    pub fn poll(&mut self, now_us: u64) -> bool {
         if self.test.is_some_and(|test| now_us >= test.ends_us) {
             self.test = None;
         }
+        let lost = self.valid.is_some() && !self.signal_present(now_us);
+        if lost {
+            self.valid = None;
+            self.restart();
+        }
+        lost
     }
 
     /// What the motor is to do, as of the last [`Authority::poll`] or event.
@@ -187,12 +235,9 @@ impl Authority {
         if let Some(test) = self.test {
             return Command::Test(test.value);
         }
-        match self.valid {
-            Some(Valid {
-                throttle: Some(throttle),
-                ..
-            }) if self.armed => Command::Throttle(throttle),
-            Some(Valid { throttle: None, .. }) if self.armed => Command::Zero,
+        match self.valid.map(|valid| valid.demand) {
+            Some(Demand::Throttle(throttle)) if self.armed => Command::Throttle(throttle),
+            Some(Demand::Zero) if self.armed => Command::Zero,
             _ if self.forgiven => Command::Zero,
             _ => Command::Stop,
         }
@@ -203,20 +248,22 @@ impl Authority {
         self.armed
     }
 
-    /// Whether a valid frame has come within the loss time.
+    /// Whether the wire asks the motor to turn, and may not.
+    pub fn refuses(&self) -> bool {
+        let open = self
+            .valid
+            .is_some_and(|valid| valid.identified && valid.demand != Demand::Zero);
+        open && !self.armed
+    }
+
+    /// Whether a valid frame or pulse has come within the loss time.
     pub fn signal_present(&self, now_us: u64) -> bool {
         self.within_loss(now_us, self.valid.map(|valid| valid.at_us))
     }
 
-    /// Runs of edges that were no frame, since the start; it stops at its greatest value.
-    pub fn bad_frames(&self) -> u32 {
-        self.bad_frames
-    }
-
     /// Stops the motor, whatever turns it. The wire must be armed anew by its zero throttle.
     pub fn disarm(&mut self) {
-        self.armed = false;
-        self.arming = None;
+        self.restart();
         self.test = None;
         self.forgiven = true;
     }
@@ -234,7 +281,8 @@ impl Authority {
         }
     }
 
-    /// Turns the motor by `value`, 0 to 1 or −1 to 1 with two directions, for `duration_s`; NaN ends a running test.
+    /// Turns the motor by `value`, 0 to 1 or −1 to 1 with two directions, for `duration_s`; NaN ends
+    /// a running test.
     ///
     /// It ends at its time, at any throttle on the wire but zero, at [`Authority::disarm`] and at
     /// [`Authority::fault`].
@@ -253,7 +301,11 @@ impl Authority {
             self.test = None;
             return Ok(());
         }
-        let least = if self.two_directions { -1.0 } else { 0.0 };
+        let least = if self.reading.two_directions {
+            -1.0
+        } else {
+            0.0
+        };
         if !(least..=1.0).contains(&value) || !(0.0..=TEST_MOST_S).contains(&duration_s) {
             return Err(TestError::OutOfRange);
         }
@@ -262,7 +314,7 @@ impl Authority {
             return Err(TestError::TemporarilyRejected);
         }
         let duration_us = (duration_s * 1e6) as u64;
-        // No time at all, or nothing to turn by, ends a test that has not turned the motor yet.
+        // No time at all, or nothing to turn by, is no test.
         self.test = (duration_us > 0 && value != 0.0).then(|| Test {
             value: Throttle::saturating_from_num(value),
             ends_us: now_us.saturating_add(duration_us),
@@ -281,7 +333,10 @@ impl Authority {
     }
 
     fn holds_zero(&self, now_us: u64) -> bool {
-        self.signal_present(now_us) && self.valid.is_some_and(|valid| valid.throttle.is_none())
+        let zero = self
+            .valid
+            .is_some_and(|valid| valid.identified && valid.demand == Demand::Zero);
+        zero && self.signal_present(now_us)
     }
 
     fn within_loss(&self, now_us: u64, since_us: Option<u64>) -> bool {

@@ -1,263 +1,226 @@
-//! From timed edges to frames.
+//! From believed edges to DShot frames.
 //!
-//! A frame is 16 high pulses after a quiet line, and is reported at its last falling edge. A run
-//! of pulses that cannot be a frame is reported once, when that is known, and then passed over
-//! until the line has been quiet.
+//! The last 32 edges are a frame if the line rested before them, if they lie as evenly as a frame's
+//! and if the check sum fits. A frame is reported at its last edge. Edges that belong to none are
+//! reported once for every 32 of them, or when the line comes to rest.
 
-use super::dshot::{Frame, Rate};
+use super::dshot::{Frame, INVERTED_CHECK, Rate};
+use super::filter::{Edge, since};
+use super::line::Event;
 
-/// Pulses of a frame.
-const PULSES: u32 = 16;
+/// Edges of a frame: two a bit.
+const EDGES: u8 = 32;
 
-/// A pulse's share of its bit in fortieths: below the first it is too short, from the second on a
-/// one, above the third too long.
+/// Whole bits of a frame, from a first edge to a first edge.
+const WHOLE_BITS: u32 = 15;
+
+/// Shares of the mean bit in sixteenths.
 ///
-/// A zero is high for 37.5 % and a one for 75 %; some senders use 35 % and 70 %, so the middle
-/// lies at 55 %. Edges that each stray by 60 ns and half a tick move a share by at most 0.17 at
-/// 630 kbit/s and [`LEAST_TICKS`], which these limits leave free.
-const SHORTEST: u32 = 8;
-const ONE: u32 = 22;
-const LONGEST: u32 = 37;
+/// A zero is active for 6/16 and a one for 12/16. At DShot1200, 5 % too fast, a bit lasts 794 ns,
+/// and two edges that each stray by 60 ns and a tick of 84 MHz move a width by 132 ns, 2.7/16.
+const SHARES: u32 = 16;
+const SHORTEST: u32 = 3;
+const ONE: u32 = 9;
+const LONGEST: u32 = 15;
+/// By how much a single bit may stray from the mean one.
+const STRAY: u32 = 3;
 
 /// Ticks that a bit must have for its pulses to be told apart: 7.2 MHz for DShot600.
 const LEAST_TICKS: u32 = 12;
 
-/// What the decoder has found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event {
-    /// A frame with a right check sum.
-    Frame {
-        /// How fast it was sent.
-        rate: Rate,
-        /// What it carries.
-        frame: Frame,
-    },
-    /// A run of edges that was no frame.
-    BadFrame,
-}
+/// Times that are kept: a frame's and the edge before it, to the next power of two.
+const KEPT: usize = 64;
 
-/// Finds frames of every allowed rate in the edges of one line.
+/// Finds frames in the edges of one line.
 #[derive(Clone, Debug)]
-pub struct Decoder {
-    tick_hz: u32,
-    limits: [Option<Limits>; 3],
-    /// Bounds of [`Decoder::quiet`], ticks: 1.5 bits of the fastest and the slowest rate.
-    quiet_least: u32,
-    quiet_most: u32,
-    /// A low at least this long ends the present run: 1.5 of its bits.
-    quiet: u32,
-    level: bool,
-    edge_at: u32,
-    rise_at: u32,
-    run: Run,
+pub(super) struct Decoder {
+    rates: [Option<Limits>; 4],
+    /// The rate that is taken, and whether bidirectional; nothing for all of them.
+    only: Option<(Rate, bool)>,
+    /// A level at least this long is no part of a frame.
+    rest_ticks: u32,
+    times: [u32; KEPT],
+    newest: usize,
+    /// Of the times, those that count: no more than a frame and the edge before it.
+    held: u8,
+    /// Edges that have not been reported, as a frame or as a bad one.
+    unread: u8,
 }
 
-/// What is known of the present run of pulses.
-#[derive(Clone, Debug)]
-enum Run {
-    /// No edge has come yet.
-    Fresh,
-    Pulses(Pulses),
-    /// A frame has been reported; a further pulse would be one too many.
-    Framed,
-    /// It is no frame, and that has been reported.
-    Bad,
-}
-
-/// Pulses of which each may be a bit of a frame.
-#[derive(Clone, Debug)]
-struct Pulses {
-    first_rise_at: u32,
-    count: u32,
-    /// The bits that have ended, the latest one lowest.
-    bits: u16,
-    shortest_bit: u32,
-    longest_bit: u32,
-}
-
-impl Decoder {
-    /// A decoder for a timer of `tick_hz`, which takes frames of every rate that has at least 12
-    /// ticks a bit: 7.2 MHz for DShot600, 1.8 MHz for DShot150. The line is taken as quiet and low.
-    pub fn new(tick_hz: u32) -> Self {
-        let mut decoder = Self {
-            tick_hz,
-            limits: [None; 3],
-            quiet_least: 0,
-            quiet_most: 0,
-            quiet: 0,
-            level: false,
-            edge_at: 0,
-            rise_at: 0,
-            run: Run::Fresh,
-        };
-        decoder.force(None);
-        decoder
-    }
-
-    /// Takes frames of one rate only, and counts others as bad; `None` takes every rate.
-    pub fn force(&mut self, rate: Option<Rate>) {
-        self.limits = Rate::ALL.map(|each| {
-            rate.is_none_or(|forced| forced == each)
-                .then(|| Limits::new(self.tick_hz, each))
-                .flatten()
-        });
-        // Within a frame no low exceeds 0.9 bits; after it, senders leave at least 2 bits and what
-        // remains of the last one. The rate may be off by a sixteenth.
-        let fastest = rate.unwrap_or(Rate::Dshot600);
-        let slowest = rate.unwrap_or(Rate::Dshot150);
-        self.quiet_least = ticks(self.tick_hz, fastest, 45, 32);
-        self.quiet_most = ticks(self.tick_hz, slowest, 51, 32);
-        self.quiet = self.quiet_most;
-    }
-
-    /// Takes one edge: when it came, in ticks that wrap, and the level from then on.
-    ///
-    /// A frame is reported at the falling edge that ends its 16th pulse. Should a 17th follow
-    /// without a quiet line between, that is reported as bad, after the frame.
-    pub fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
-        let since = at_ticks.wrapping_sub(self.edge_at);
-        let was = core::mem::replace(&mut self.level, level);
-        self.edge_at = at_ticks;
-        // A high line tells nothing of the bit's time, so it counts as resting after the longest.
-        let quiet = if was { self.quiet_most } else { self.quiet };
-        let rested = since >= quiet || matches!(self.run, Run::Fresh);
-        if level == was || (rested && !level) {
-            // An edge was missed, or the line rests high: a frame starts with neither.
-            return self.spoil(rested);
-        }
-        if level && rested {
-            return self.start(at_ticks);
-        }
-        if level {
-            self.bit_ends(at_ticks, since)
-        } else {
-            self.pulse_ends(since)
-        }
-    }
-
-    /// The first edge of a run; the run before it is bad if it has not come to its end.
-    fn start(&mut self, at_ticks: u32) -> Option<Event> {
-        let unfinished = matches!(self.run, Run::Pulses(_));
-        self.rise_at = at_ticks;
-        self.run = Run::Pulses(Pulses {
-            first_rise_at: at_ticks,
-            count: 1,
-            bits: 0,
-            shortest_bit: u32::MAX,
-            longest_bit: 0,
-        });
-        unfinished.then_some(Event::BadFrame)
-    }
-
-    /// A rising edge within a run, after a low of `low` ticks.
-    fn bit_ends(&mut self, at_ticks: u32, low: u32) -> Option<Event> {
-        let period = at_ticks.wrapping_sub(self.rise_at);
-        self.rise_at = at_ticks;
-        self.set_quiet(period.saturating_add(period / 2));
-        let Run::Pulses(pulses) = &mut self.run else {
-            return self.spoil(false);
-        };
-        // Neither part of the bit was a rest, so the products below stay far from their ends.
-        let Some(bit) = bit_of(period - low, period) else {
-            return self.spoil(false);
-        };
-        pulses.bits = pulses.bits << 1 | u16::from(bit);
-        pulses.shortest_bit = pulses.shortest_bit.min(period);
-        pulses.longest_bit = pulses.longest_bit.max(period);
-        pulses.count += 1;
-        None
-    }
-
-    /// A falling edge within a run, after a high of `high` ticks.
-    fn pulse_ends(&mut self, high: u32) -> Option<Event> {
-        let Run::Pulses(pulses) = &self.run else {
-            return None;
-        };
-        let span = self.rise_at.wrapping_sub(pulses.first_rise_at);
-        if pulses.count == 1 {
-            // No bit is known yet. A zero's pulse is the shortest, three eighths of a bit.
-            self.set_quiet(high.saturating_mul(4));
-            return None;
-        }
-        if pulses.count < PULSES {
-            return None;
-        }
-        let decoded = self.frame(pulses, span, high);
-        self.set_quiet(span / (PULSES - 1) * 3 / 2);
-        self.run = match decoded {
-            Some(_) => Run::Framed,
-            None => Run::Bad,
-        };
-        Some(decoded.unwrap_or(Event::BadFrame))
-    }
-
-    /// The frame of 16 pulses, of which the last was `high` and the first 15 bits took `span`.
-    fn frame(&self, pulses: &Pulses, span: u32, high: u32) -> Option<Event> {
-        let mut limits = self.limits.iter().flatten();
-        let rate = limits.find(|limits| limits.admit(pulses, span))?.rate;
-        // The last bit has no next edge to end it: the others' mean stands in.
-        let last = bit_of(high * (PULSES - 1), span)?;
-        let frame = Frame::from_bits(pulses.bits << 1 | u16::from(last))?;
-        Some(Event::Frame { rate, frame })
-    }
-
-    /// Passes over the present run and reports it once; `new_run` says that it has just begun.
-    fn spoil(&mut self, new_run: bool) -> Option<Event> {
-        let report = new_run || !matches!(self.run, Run::Bad);
-        self.run = Run::Bad;
-        report.then_some(Event::BadFrame)
-    }
-
-    fn set_quiet(&mut self, ticks: u32) {
-        self.quiet = ticks.max(self.quiet_least).min(self.quiet_most);
-    }
-}
-
-/// What the bits of one rate may take, ticks: their mean within 1/16, each within 1/8, and both a
-/// tick more.
-///
-/// Of these, 5 % are the sender's clock and the rest is jitter: 60 ns an edge are 7.2 % of a bit of
-/// DShot600.
+/// What one rate's bits may take.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     rate: Rate,
-    /// The first 15 bits together.
+    /// All whole bits of a frame, ticks: the mean within a twelfth.
+    ///
+    /// Of that, 5 % are the sender's clock, and 1 % is jitter: 132 ns at most, a fifteenth a bit.
     span_least: u32,
     span_most: u32,
-    bit_least: u32,
-    bit_most: u32,
+    /// 1.5 bits. Within a frame no level exceeds 0.95 bits; after it, senders leave at least 2
+    /// bits and what remains of the last one.
+    rest_ticks: u32,
+}
+
+impl Decoder {
+    /// A decoder for a timer of `tick_hz`, which takes every rate that has at least 12 ticks a bit.
+    pub(super) fn new(tick_hz: u32) -> Self {
+        let mut decoder = Self {
+            rates: Rate::ALL.map(|rate| Limits::new(tick_hz, rate)),
+            only: None,
+            rest_ticks: 0,
+            times: [0; KEPT],
+            newest: 0,
+            held: 0,
+            unread: 0,
+        };
+        decoder.take_only(None);
+        decoder
+    }
+
+    /// Takes one rate of one direction; nothing for all of them.
+    pub(super) fn take_only(&mut self, only: Option<(Rate, bool)>) {
+        self.only = only;
+        let mut taken = self.rates.iter().flatten();
+        // The slowest comes first, and with it the longest rest.
+        let limits = taken.find(|limits| only.is_none_or(|(rate, _)| rate == limits.rate));
+        self.rest_ticks = limits.map_or(u32::MAX, |limits| limits.rest_ticks);
+    }
+
+    /// Takes an edge of another level than the one before.
+    pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
+        let cut = self.settle(at_ticks);
+        self.push(at_ticks);
+        self.unread += 1;
+        if cut.is_some() {
+            return cut;
+        }
+        let frame = self.frame(level);
+        let bad = || (self.unread == EDGES).then_some(Event::Bad);
+        let event = frame.or_else(bad);
+        if event.is_some() {
+            self.unread = 0;
+        }
+        event
+    }
+
+    /// Whether a frame would end with this edge, which is not taken.
+    pub(super) fn ends_with(&mut self, edge: Edge) -> bool {
+        let (newest, held) = (self.newest, self.held);
+        self.push(edge.at_ticks);
+        let ends = self.frame(edge.level).is_some();
+        (self.newest, self.held) = (newest, held);
+        ends
+    }
+
+    /// Reports edges that were no frame, once the line has come to rest after them.
+    pub(super) fn settle(&mut self, now_ticks: u32) -> Option<Event> {
+        let cut = self.unread > 0 && since(now_ticks, self.back(0)) >= self.rest_ticks;
+        if cut {
+            self.unread = 0;
+        }
+        cut.then_some(Event::Bad)
+    }
+
+    /// An edge was missed before `at_ticks`: no frame goes over it. One may begin there, as the
+    /// next one does when the last edge of a frame was missed.
+    pub(super) fn spoil(&mut self, at_ticks: u32) {
+        // The edge before tells for how long the line may have rested.
+        self.held = self.held.min(1);
+        self.push(at_ticks);
+        self.unread = self.unread.max(1);
+    }
+
+    /// Forgets every edge: the line has been at rest for long.
+    pub(super) fn clear(&mut self) {
+        self.held = 0;
+        self.unread = 0;
+    }
+
+    fn push(&mut self, at_ticks: u32) {
+        self.newest = (self.newest + 1) % KEPT;
+        self.times[self.newest] = at_ticks;
+        self.held = (self.held + 1).min(EDGES + 1);
+    }
+
+    /// The time of the edge that came `edges` before the newest one.
+    fn back(&self, edges: usize) -> u32 {
+        self.times[(self.newest + KEPT - edges) % KEPT]
+    }
+
+    /// The frame that ends with the newest edge, after which the line is at `level`.
+    fn frame(&self, level: bool) -> Option<Event> {
+        // After a frame the line rests: high, if it is bidirectional.
+        let bidirectional = level;
+        let other = self.only.is_some_and(|(_, only)| only != bidirectional);
+        if other || self.held < EDGES {
+            return None;
+        }
+        let first_edge_ticks = self.back(31);
+        let span = self.back(1).wrapping_sub(first_edge_ticks);
+        // 1.5 bits. What was before the first of all edges is taken for a rest.
+        let rested = self.held == EDGES
+            || first_edge_ticks.wrapping_sub(self.back(32)) >= span / (WHOLE_BITS * 2 / 3);
+        if !rested {
+            return None;
+        }
+        let rate = self.rate(span)?;
+        let check = if bidirectional { INVERTED_CHECK } else { 0 };
+        let frame = Frame::from_bits(self.bits(span)? ^ check)?;
+        Some(Event::Frame {
+            rate,
+            bidirectional,
+            frame,
+            first_edge_ticks,
+        })
+    }
+
+    /// The rate at which the whole bits take `span`.
+    fn rate(&self, span: u32) -> Option<Rate> {
+        let mut taken = self.rates.iter().flatten();
+        let limits = taken.find(|limits| (limits.span_least..=limits.span_most).contains(&span))?;
+        self.only
+            .is_none_or(|(rate, _)| rate == limits.rate)
+            .then_some(limits.rate)
+    }
+
+    /// The bits of the newest 32 edges, of which the whole bits take `span`.
+    fn bits(&self, span: u32) -> Option<u16> {
+        // Both sides of the comparisons are times of 16 · 15 bits. A span is below 500 000 ticks.
+        let scaled = |ticks: u32| ticks.saturating_mul(SHARES * WHOLE_BITS);
+        let mut bits = 0;
+        for bit in 0..16 {
+            let start = self.back(31 - 2 * bit);
+            let active = scaled(self.back(30 - 2 * bit).wrapping_sub(start));
+            if !(SHORTEST * span..=LONGEST * span).contains(&active) {
+                return None;
+            }
+            // The last bit has no next edge to end it.
+            if let Some(next) = 29_usize.checked_sub(2 * bit) {
+                let period = scaled(self.back(next).wrapping_sub(start));
+                if period.abs_diff(SHARES * span) > STRAY * span {
+                    return None;
+                }
+            }
+            bits = bits << 1 | u16::from(active >= ONE * span);
+        }
+        Some(bits)
+    }
 }
 
 impl Limits {
     /// Nothing when the timer is too coarse for the rate.
     fn new(tick_hz: u32, rate: Rate) -> Option<Self> {
-        let whole_bits = PULSES - 1;
-        (ticks(tick_hz, rate, 1, 1) >= LEAST_TICKS).then(|| Self {
+        let ticks = |numerator: u32, denominator: u32| {
+            let ticks = u64::from(tick_hz) * u64::from(numerator);
+            (ticks / (u64::from(denominator) * u64::from(rate.bit_hz()))) as u32
+        };
+        (ticks(1, 1) >= LEAST_TICKS).then(|| Self {
             rate,
-            span_least: ticks(tick_hz, rate, 15 * whole_bits, 16) - 1,
-            span_most: ticks(tick_hz, rate, 17 * whole_bits, 16) + 1,
-            bit_least: ticks(tick_hz, rate, 7, 8) - 1,
-            bit_most: ticks(tick_hz, rate, 9, 8) + 1,
+            span_least: ticks(11 * WHOLE_BITS, 12),
+            span_most: ticks(13 * WHOLE_BITS, 12) + 1,
+            rest_ticks: ticks(3, 2),
         })
     }
-
-    fn admit(&self, pulses: &Pulses, span: u32) -> bool {
-        (self.span_least..=self.span_most).contains(&span)
-            && pulses.shortest_bit >= self.bit_least
-            && pulses.longest_bit <= self.bit_most
-    }
-}
-
-/// The ticks of `numerator / denominator` bits.
-fn ticks(tick_hz: u32, rate: Rate, numerator: u32, denominator: u32) -> u32 {
-    (u64::from(tick_hz) * u64::from(numerator)
-        / (u64::from(denominator) * u64::from(rate.bit_hz()))) as u32
-}
-
-/// The bit of a pulse by its share of the bit's time, or nothing for a share that no bit has.
-fn bit_of(high: u32, period: u32) -> Option<bool> {
-    let share = high * 40;
-    (share >= SHORTEST * period && share <= LONGEST * period).then_some(share >= ONE * period)
 }
 
 #[cfg(test)]

@@ -11,6 +11,10 @@ const LAST_THROTTLE: u16 = 2047;
 /// The first value of the second direction, where throttle has two.
 const FIRST_FORWARD: u16 = 1048;
 
+/// What turns a frame's check sum into that of a bidirectional one, by exclusive or: all four of
+/// its bits are inverted.
+pub const INVERTED_CHECK: u16 = 0xF;
+
 /// What a frame carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
@@ -83,11 +87,18 @@ pub enum Rate {
     Dshot300,
     /// 600 kbit/s.
     Dshot600,
+    /// 1200 kbit/s.
+    Dshot1200,
 }
 
 impl Rate {
     /// Every rate, the slowest first.
-    pub const ALL: [Self; 3] = [Self::Dshot150, Self::Dshot300, Self::Dshot600];
+    pub const ALL: [Self; 4] = [
+        Self::Dshot150,
+        Self::Dshot300,
+        Self::Dshot600,
+        Self::Dshot1200,
+    ];
 
     /// Bits a second.
     pub const fn bit_hz(self) -> u32 {
@@ -95,10 +106,11 @@ impl Rate {
             Self::Dshot150 => 150_000,
             Self::Dshot300 => 300_000,
             Self::Dshot600 => 600_000,
+            Self::Dshot1200 => 1_200_000,
         }
     }
 
-    /// The time of one bit, ns: 6667, 3333 or 1667.
+    /// The time of one bit, ns: 6667, 3333, 1667 or 833.
     pub const fn bit_ns(self) -> u32 {
         self.eighths_ns(8)
     }
@@ -109,9 +121,9 @@ impl Rate {
     }
 
     /// A time in eighths of a bit, in ns to the nearest: no bit is a whole number of them.
-    const fn eighths_ns(self, eighths: u32) -> u32 {
-        // 10⁹/8 over the rate is 2500/3, 1250/3 or 625/3.
-        (eighths * (125_000_000 / (self.bit_hz() / 3)) + 1) / 3
+    pub const fn eighths_ns(self, eighths: u32) -> u32 {
+        // 10⁹/8 over the rate is 5000/6, 2500/6, 1250/6 or 625/6.
+        (eighths * (750_000_000 / self.bit_hz()) + 3) / 6
     }
 }
 
@@ -217,8 +229,11 @@ mod tests {
 
     #[test]
     fn bit_times_are_those_of_the_protocol() {
-        assert_eq!(Rate::ALL.map(Rate::bit_ns), [6667, 3333, 1667]);
-        assert_eq!(Rate::ALL.map(Rate::frame_ns), [106_667, 53_333, 26_667]);
+        assert_eq!(Rate::ALL.map(Rate::bit_ns), [6667, 3333, 1667, 833]);
+        assert_eq!(
+            Rate::ALL.map(Rate::frame_ns),
+            [106_667, 53_333, 26_667, 13_333]
+        );
     }
 
     #[test]

@@ -1,18 +1,43 @@
 //! From the edges of the throttle wire to the decision whether the motor may turn.
 //!
 //! ```text
-//! timer edges → capture::Decoder → Event → authority::Authority → Command
+//! timer edges → line::Line → Event → authority::Authority → Command
+//!                                  → command::Commands → Order
+//!                                  → calibration::Calibration → the pulses' end points
 //! ```
 //!
-//! [`dshot`] knows what a frame means, [`capture`] how it looks on a timer, and [`authority`]
-//! alone what may turn a motor. None of them has a clock: the caller says when something happened.
+//! [`dshot`] knows what a frame means and [`endpoints`] what a pulse does, [`line`](mod@line) how they look on
+//! a timer, and [`authority`] alone what may turn a motor. None of them has a clock: the caller says
+//! when something happened. [`Input`] is all of it.
 
 pub mod authority;
-pub mod capture;
+pub mod calibration;
+mod capture;
+pub mod command;
+pub mod demand;
+mod detect;
 pub mod dshot;
+pub mod endpoints;
+mod filter;
+pub mod line;
+mod news;
+mod pulse;
+pub mod signal;
+mod tally;
 
 #[cfg(test)]
-mod noise;
+mod tests;
+
+pub use news::News;
+
+use authority::{Authority, DriveStatus, Timing};
+use calibration::Calibration;
+use command::{Commands, Order};
+use demand::Reading;
+use line::{Event, Line};
+use news::{Announcer, Standing};
+use signal::Signal;
+use tally::Tally;
 
 /// A share of the throttle's range, 0 to 1; its highest value, 1 − 2⁻³¹, stands for 1.
 ///
@@ -23,4 +48,180 @@ pub type Throttle = fixed::types::I1F31;
 /// The throttle of the same share in the other direction, `!share`: the least one has one too.
 pub const fn reverse(throttle: Throttle) -> Throttle {
     Throttle::from_bits(!throttle.to_bits())
+}
+
+/// What the parameters say of the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The signal that is taken and no other (`INP_PROTO`); any if there is none.
+    pub protocol: Option<Signal>,
+    /// How long what takes.
+    pub timing: Timing,
+    /// How frames and pulses are read.
+    pub reading: Reading,
+}
+
+/// What an edge has brought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Heard {
+    /// A frame or pulse of the signal that the wire is known to carry.
+    pub event: Event,
+    /// What the frame orders.
+    pub order: Option<Order>,
+}
+
+/// One throttle wire, with all that is decided by it.
+#[derive(Clone, Debug)]
+pub struct Input {
+    settings: Settings,
+    line: Line,
+    authority: Authority,
+    commands: Commands,
+    calibration: Calibration,
+    tally: Tally,
+    announcer: Announcer,
+    /// As of the last poll.
+    stopped: bool,
+}
+
+impl Input {
+    /// A quiet wire at power-up, captured by a timer of `tick_hz`.
+    pub fn new(tick_hz: u32, settings: Settings) -> Self {
+        let mut line = Line::new(tick_hz);
+        line.force(settings.protocol);
+        let mut authority = Authority::new(settings.timing);
+        authority.set_reading(settings.reading);
+        Self {
+            settings,
+            line,
+            authority,
+            commands: Commands::default(),
+            calibration: Calibration::default(),
+            tally: Tally::default(),
+            announcer: Announcer::default(),
+            stopped: false,
+        }
+    }
+
+    /// Puts other settings in force. The wire must be armed anew, unless only times have changed.
+    pub fn set(&mut self, settings: Settings) {
+        self.authority.set_timing(settings.timing);
+        self.authority.set_reading(settings.reading);
+        if settings.protocol != self.settings.protocol {
+            // The decoder begins anew with it: not for every change, while frames come in.
+            self.line.force(settings.protocol);
+            self.authority.restart();
+        }
+        self.settings = settings;
+    }
+
+    /// An edge: when the capturing timer saw it, and the level after it.
+    pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Heard> {
+        let event = self.line.edge(at_ticks, level)?;
+        self.take(now_us, event)
+    }
+
+    /// The time of the timer that captures the edges, once a control period or more often.
+    pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Heard> {
+        let event = self.line.settle(now_ticks)?;
+        self.take(now_us, event)
+    }
+
+    fn take(&mut self, now_us: u64, event: Event) -> Option<Heard> {
+        self.expire(now_us);
+        let identified = self.line.signal();
+        self.hear(now_us, event, identified)
+    }
+
+    /// Takes what the decoder found, and the signal that it has identified so far.
+    fn hear(&mut self, now_us: u64, event: Event, identified: Option<Signal>) -> Option<Heard> {
+        self.authority.wire(now_us, event, identified);
+        let known = identified.is_some() && event.signal() == identified;
+        let valid = event != Event::Bad && (known || identified.is_none());
+        self.tally.count(valid);
+        if !valid {
+            self.commands.bad(now_us);
+        }
+        if !known {
+            return None;
+        }
+        let order = match event {
+            Event::Frame { frame, .. } => {
+                self.calibration.end();
+                // What comes while the motor turns is no command, however long it is repeated.
+                if self.stopped && self.authority.command().rests() {
+                    self.commands.frame(now_us, frame)
+                } else {
+                    self.commands.interrupt();
+                    None
+                }
+            }
+            Event::Pulse { kind, width_ns } => {
+                let step = self.calibration.pulse(now_us, kind.servo_ns(width_ns));
+                self.announcer.calibration(step);
+                if self.calibration.is_under_way() {
+                    self.authority.learn();
+                }
+                None
+            }
+            Event::Bad => None,
+        };
+        Some(Heard { event, order })
+    }
+
+    /// Lets time pass, each millisecond or so, and takes in what the drive is doing.
+    pub fn poll(&mut self, now_us: u64, drive: DriveStatus) {
+        self.stopped = drive.stopped;
+        self.expire(now_us);
+        self.authority.fault(drive.faulted);
+        self.tally.poll(now_us);
+    }
+
+    /// Ends what the time has ended.
+    fn expire(&mut self, now_us: u64) {
+        let armed = self.authority.armed();
+        if self.authority.poll(now_us) {
+            self.line.lost();
+            self.commands.interrupt();
+            let cancelled = self.calibration.lost();
+            self.announcer.calibration(cancelled);
+            self.announcer.lost(armed);
+        }
+    }
+
+    /// The next thing to tell a person; to be asked after each poll until there is none.
+    pub fn news(&mut self, now_us: u64) -> Option<News> {
+        let standing = Standing {
+            signal: self.signal(now_us),
+            armed: self.authority.armed(),
+            open: self.authority.refuses() && !self.calibration.is_under_way(),
+        };
+        self.announcer.next(now_us, standing)
+    }
+
+    /// The signal on the wire; none before it has been identified, and none on a silent wire.
+    pub fn signal(&self, now_us: u64) -> Option<Signal> {
+        let present = self.authority.signal_present(now_us);
+        self.line.signal().filter(|_| present)
+    }
+
+    /// What may turn the motor.
+    pub fn authority(&self) -> &Authority {
+        &self.authority
+    }
+
+    /// The same, for those who may disarm it or test.
+    pub fn authority_mut(&mut self) -> &mut Authority {
+        &mut self.authority
+    }
+
+    /// Frames and pulses that were bad, since the start.
+    pub fn bad_frames(&self) -> u32 {
+        self.tally.bad_total()
+    }
+
+    /// The share of bad ones in the last whole second, 0 to 1.
+    pub fn bad_share(&self) -> f32 {
+        self.tally.bad_share()
+    }
 }

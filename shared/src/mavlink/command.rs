@@ -230,7 +230,8 @@ impl Commands {
         self.last = Some((command, code));
         replies.ack(command.from, command.number, code);
         if let Err(reason) = result {
-            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, reason));
+            let text = [reason, ""];
+            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, text));
         }
         // A reset and a load change every value: clients should see the new ones.
         code == ACCEPTED && command.params[0] != 1.0
@@ -252,7 +253,8 @@ impl Commands {
             return TEMPORARILY_REJECTED;
         }
         self.reboot = true;
-        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, "Rebooting"));
+        let text = ["Rebooting", ""];
+        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
         ACCEPTED
     }
 

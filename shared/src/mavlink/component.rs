@@ -16,16 +16,12 @@ use super::receiver::Frame;
 use super::reply::{PING, Replies, Reply, Writer};
 use super::schedule::{Schedule, Stream};
 use super::sender::OVERHEAD_LEN;
-use super::{ftp, messages};
-use crate::drive::{Faults, Phase};
+use super::{ftp, messages, news};
+use crate::drive::Faults;
+use crate::input::News as WireNews;
 use crate::input::authority::{Authority, DriveStatus};
 use crate::params::{BuildError, ParamId, Params};
 use crate::telemetry::Telemetry;
-
-/// Below this the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
-/// speed that can be asked for (`CTL_RPM_MIN` goes down to it), and above the noise of an estimate
-/// at standstill.
-const AT_REST_RPM: f32 = 100.0;
 
 const PING_ID: u32 = PING.0;
 const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"));
@@ -42,6 +38,12 @@ pub struct Context<'a> {
     pub authority: &'a mut Authority,
     /// Whether values make a drive; a value that breaks it is refused with the reason.
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
+}
+
+impl Context<'_> {
+    fn drive(&self) -> DriveStatus {
+        self.telemetry.drive(self.authority.command())
+    }
 }
 
 /// What only the caller can do.
@@ -86,7 +88,8 @@ impl Component {
     /// parameters take at most half of it, and streams the other half; replies are never held up.
     pub fn new(params: &Params, link_bytes_per_s: u32) -> Self {
         let mut replies = Replies::new();
-        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, START_TEXT));
+        let text = [START_TEXT, ""];
+        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
         let identity = Identity::new(params);
         Self {
             writer: Writer::default(),
@@ -116,7 +119,7 @@ impl Component {
         };
         // Whether nobody else has been asked, so that what does not exist is an error.
         let alone = target.component != 0 || self.identity.role == Role::Standalone;
-        let drive = drive_status(context.telemetry);
+        let drive = context.drive();
         match frame.id {
             PING_ID if target.system == 0 && target.component == 0 => {
                 self.replies.push(Reply::Pong {
@@ -205,6 +208,31 @@ impl Component {
         }
     }
 
+    /// Values that something else than MAVLink has changed in the context's parameters: clients are
+    /// told, and [`Request::ParamsChanged`] follows.
+    pub fn changed(&mut self, ids: &[ParamId]) {
+        for id in ids {
+            self.replies.value(*id);
+        }
+        self.params_changed = true;
+    }
+
+    /// Tells what the throttle wire has to tell.
+    pub fn tell(&mut self, news: WireNews) {
+        if let Some((severity, text)) = news::words(news) {
+            self.replies.push(Reply::Text(severity, text));
+        }
+    }
+
+    /// Tells how a request for storage ended that did not come by MAVLink.
+    pub fn tell_stored(&mut self, result: Result<(), &'static str>) {
+        let (severity, text) = match result {
+            Ok(()) => (MavSeverity::MAV_SEVERITY_INFO, "Parameters stored"),
+            Err(reason) => (MavSeverity::MAV_SEVERITY_ERROR, reason),
+        };
+        self.replies.push(Reply::Text(severity, [text, ""]));
+    }
+
     /// In words, and by ESC_INFO at once: its flags would be up to a second late.
     fn tell_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
         let faults = context.telemetry.faults;
@@ -260,7 +288,7 @@ impl Component {
                 let pieces = [id.entry().name, " refused: ", other, colon, reason];
                 writer.text(identity, MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
             }
-            Reply::Text(severity, text) => writer.text(identity, severity, &[text], send),
+            Reply::Text(severity, text) => writer.text(identity, severity, &text, send),
             Reply::Ftp { to, answer } => writer.ftp(identity, to, &answer, send),
         }
     }
@@ -272,13 +300,17 @@ impl Component {
         match stream {
             Stream::Heartbeat => {
                 let armed = context.authority.armed();
-                let stopped = drive_status(telemetry).stopped;
+                let stopped = context.drive().stopped;
                 let message = messages::heartbeat(&self.identity, telemetry, armed, stopped);
                 sender.send(from, &message, &[], send);
             }
             Stream::EscInfo => {
                 self.infos = self.infos.wrapping_add(1);
                 let message = messages::esc_info(context.now_us, telemetry, place, self.infos);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::BadFrames => {
+                let message = messages::bad_frames(context.now_us, telemetry);
                 sender.send(from, &message, &[], send);
             }
             Stream::EscStatus => {
@@ -337,12 +369,4 @@ fn target(frame: &Frame) -> Option<Address> {
         _ => return None,
     };
     Some(frame.address(offset))
-}
-
-fn drive_status(telemetry: &Telemetry) -> DriveStatus {
-    let driven = !matches!(telemetry.phase, Phase::Idle | Phase::Brake);
-    DriveStatus {
-        stopped: !driven && telemetry.rpm.abs() < AT_REST_RPM,
-        faulted: !telemetry.faults.is_empty(),
-    }
 }

@@ -3,13 +3,14 @@
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
     EscConnectionType, EscFailureFlags, HEARTBEAT_DATA, MavModeFlag, MavParamType,
-    MavProtocolCapability, MavState, PARAM_VALUE_DATA,
+    MavProtocolCapability, MavState, NAMED_VALUE_FLOAT_DATA, PARAM_VALUE_DATA,
 };
 use mavlink::types::CharArray;
 
 use super::identity::Identity;
 use super::place::Place;
 use crate::drive::{Fault, Faults};
+use crate::input::signal::{Pulse, Signal};
 use crate::params::{ParamId, Params, TABLE};
 use crate::telemetry::Telemetry;
 
@@ -64,8 +65,27 @@ pub(super) fn esc_info(
         temperature: place.slots(temperature_cdegc, NO_TEMPERATURE),
         index: place.index(),
         count: place.count(),
-        connection_type: EscConnectionType::ESC_CONNECTION_TYPE_DSHOT,
+        connection_type: connection_type(telemetry.signal),
         info: place.online(),
+    }
+}
+
+/// DShot, as long as nothing else is known.
+fn connection_type(signal: Option<Signal>) -> EscConnectionType {
+    match signal {
+        None | Some(Signal::Dshot { .. }) => EscConnectionType::ESC_CONNECTION_TYPE_DSHOT,
+        Some(Signal::Pulse(Pulse::Servo)) => EscConnectionType::ESC_CONNECTION_TYPE_PPM,
+        Some(Signal::Pulse(_)) => EscConnectionType::ESC_CONNECTION_TYPE_ONESHOT,
+    }
+}
+
+/// The share of bad frames on the throttle wire, %.
+pub(super) fn bad_frames(now_us: u64, telemetry: &Telemetry) -> NAMED_VALUE_FLOAT_DATA {
+    NAMED_VALUE_FLOAT_DATA {
+        // The field wraps after 49 days.
+        time_boot_ms: (now_us / 1000) as u32,
+        value: telemetry.bad_share * 100.0,
+        name: CharArray::new(*b"bad_frames"),
     }
 }
 

@@ -12,6 +12,7 @@ mod faults;
 mod ftp;
 mod identity;
 mod messages;
+mod news;
 mod pace;
 mod parameter;
 mod place;

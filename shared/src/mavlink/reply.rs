@@ -59,7 +59,8 @@ pub(super) enum Reply {
         because: Option<ParamId>,
         reason: &'static str,
     },
-    Text(MavSeverity, &'static str),
+    /// A text in two pieces.
+    Text(MavSeverity, [&'static str; 2]),
     Ftp {
         to: Address,
         answer: ftp::Answer,

@@ -3,6 +3,7 @@
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA, HEARTBEAT_DATA,
+    NAMED_VALUE_FLOAT_DATA,
 };
 
 use super::pace::Pace;
@@ -19,14 +20,17 @@ pub(super) enum Stream {
     EscInfo,
     EscStatus,
     EscTelemetry,
+    /// NAMED_VALUE_FLOAT, of which there is one.
+    BadFrames,
 }
 
 impl Stream {
-    const ALL: [Self; 4] = [
+    const ALL: [Self; 5] = [
         Self::Heartbeat,
         Self::EscInfo,
         Self::EscStatus,
         Self::EscTelemetry,
+        Self::BadFrames,
     ];
 
     const fn message(self, place: Place) -> u32 {
@@ -35,6 +39,7 @@ impl Stream {
             Self::EscInfo => ESC_INFO_DATA::ID,
             Self::EscStatus => ESC_STATUS_DATA::ID,
             Self::EscTelemetry => place.telemetry().0,
+            Self::BadFrames => NAMED_VALUE_FLOAT_DATA::ID,
         }
     }
 
@@ -46,12 +51,13 @@ impl Stream {
                 Self::EscInfo => ESC_INFO_DATA::ENCODED_LEN,
                 Self::EscStatus => ESC_STATUS_DATA::ENCODED_LEN,
                 Self::EscTelemetry => ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN,
+                Self::BadFrames => NAMED_VALUE_FLOAT_DATA::ENCODED_LEN,
             }
     }
 
     fn default_interval_us(self, params: &Params) -> u64 {
         match self {
-            Self::Heartbeat | Self::EscInfo => SECOND_US,
+            Self::Heartbeat | Self::EscInfo | Self::BadFrames => SECOND_US,
             Self::EscStatus | Self::EscTelemetry => {
                 (SECOND_US as f32 / params.get(ParamId::TelRateHz)) as u64
             }

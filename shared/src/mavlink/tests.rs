@@ -28,6 +28,8 @@ pub(super) const TELEMETRY: Telemetry = Telemetry {
     fault_count: 0,
     armed: false,
     bad_frames: 0,
+    bad_share: 0.0,
+    signal: None,
 };
 
 /// The ground station of these tests.
@@ -233,6 +235,7 @@ fn is_stream(message: &MavMessage) -> bool {
             | MavMessage::ESC_INFO(_)
             | MavMessage::ESC_STATUS(_)
             | MavMessage::ESC_TELEMETRY_1_TO_4(_)
+            | MavMessage::NAMED_VALUE_FLOAT(_)
     )
 }
 

@@ -4,7 +4,7 @@ mod build;
 mod preset;
 mod table;
 
-pub use build::{Board, BuildError, FluxSettings, build};
+pub use build::{Board, BuildError, FluxSettings, build, input};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE};
 

@@ -105,6 +105,8 @@ parameters! {
         "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only";
     17 MotStop "MOT_STOP" "" Whole 0.0..1.0 = 1.0
         "At zero throttle and at loss of signal: 0 coast, 1 brake";
+    18 MotToneA "MOT_TONE_A" "A" Real 0.0..10.0 = 1.5 live
+        "Bound of tones' phase current, peak; up to a quarter more with R or L stated 30 % wrong; 0 is silent";
     20 CtlMode "CTL_MODE" "" Whole 0.0..2.0 = 0.0
         "What throttle commands: 0 speed, 1 torque, 2 voltage";
     21 CtlDrive "CTL_DRIVE" "" Whole 0.0..1.0 = 0.0
@@ -145,18 +147,18 @@ parameters! {
         "PWM frequency; the control runs once a period; restart to apply";
     41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0
         "Time for which both switches of a phase stay off at each change; restart to apply";
-    50 InpProto "INP_PROTO" "" Whole 0.0..12.0 = 0.0
-        "Throttle protocol: 0 automatic, 10 DShot150, 11 DShot300, 12 DShot600";
+    50 InpProto "INP_PROTO" "" Whole 0.0..23.0 = 0.0
+        "Throttle protocol: 0 automatic, 1 servo, 2 OneShot125, 3 OneShot42, 4 Multishot, 10..13 DShot150..1200, 20..23 bidirectional";
     51 Inp3d "INP_3D" "" Whole 0.0..1.0 = 0.0
         "Both directions by one throttle: 0 off, 1 on";
     52 InpArmMs "INP_ARM_MS" "ms" Real 10.0..5000.0 = 300.0
         "Time for which zero throttle must be received before the motor may turn";
     53 InpLossMs "INP_LOSS_MS" "ms" Real 5.0..2000.0 = 100.0
-        "Time without a valid frame after which the motor stops and must be armed again";
-    54 InpPulseMinUs "INP_PULSE_MIN_US" "us" Whole 1000.0..1000.0 = 1000.0
-        "Servo pulse of zero throttle; fixed so far";
-    55 InpPulseMaxUs "INP_PULSE_MAX_US" "us" Whole 2000.0..2000.0 = 2000.0
-        "Servo pulse of full throttle; fixed so far";
+        "Time without a valid frame after which the motor stops and must be armed again; above the time between two";
+    54 InpPulseMinUs "INP_PULSE_MIN_US" "us" Whole 800.0..1400.0 = 1000.0
+        "Servo pulse of zero throttle, in 3D of full reverse; other pulses are scaled";
+    55 InpPulseMaxUs "INP_PULSE_MAX_US" "us" Whole 1500.0..2200.0 = 2000.0
+        "Servo pulse of full throttle; other pulses are scaled";
     60 LimPhaseA "LIM_PHASE_A" "A" Real 0.5..200.0 = 20.0 live
         "Bound of the phase current's vector, peak; the software trips at 1.4 times this";
     61 LimBusA "LIM_BUS_A" "A" Real 0.5..200.0 = 30.0 live
@@ -208,6 +210,7 @@ mod tests {
             "MAV_SYS_ID",
             "MAV_COMP_ID",
             "MAV_ROLE",
+            "MOT_TONE_A",
             "CTL_SLEW_RPM_S",
             "CTL_BW_SPD_HZ",
             "CTL_FF_A",

@@ -214,6 +214,8 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             fault_count: 0,
             armed: false,
             bad_frames: 7,
+            bad_share: 0.0,
+            signal: None,
         };
         let mut context = Context {
             now_us,

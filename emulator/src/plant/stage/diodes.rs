@@ -127,13 +127,16 @@ impl Stage {
         }
     }
 
-    /// With fewer than two legs connected no current flows, and no diode is left conducting.
+    /// With fewer than two legs connected no current flows, and no diode is left conducting; nor is one
+    /// of two legs that have come to zero with the third.
     fn still(&mut self) {
-        if self.way() == Way::Nowhere {
-            for leg in 0..3 {
-                if matches!(self.paths[leg], Path::Diode(_)) {
-                    self.connect(leg, Path::Floating);
-                }
+        self.machine.open(self.way());
+        let currents_a = phases(self.machine.now().stator_a());
+        let nowhere = self.way() == Way::Nowhere;
+        for (leg, current_a) in currents_a.into_iter().enumerate() {
+            let idle = nowhere || current_a.abs() <= ZERO_A;
+            if idle && matches!(self.paths[leg], Path::Diode(_)) {
+                self.connect(leg, Path::Floating);
             }
         }
         self.machine.open(self.way());

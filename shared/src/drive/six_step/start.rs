@@ -3,9 +3,10 @@
 use fixed::types::I36F28;
 
 use super::tell::tell;
-use super::{Config, State, hold, in_order, reading, turn_on};
+use super::{Config, State, hold, in_order, turn_on};
 use crate::control::six_step::commutation::{Legs, Sector};
 use crate::control::six_step::{crossing, tracking};
+use crate::drive::turn::reading;
 use crate::drive::{self, Bridge, Fault, Phase, Setpoint};
 use crate::units::{AdcCounts, Current, Duty};
 

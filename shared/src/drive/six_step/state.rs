@@ -53,6 +53,11 @@ impl Default for State {
 }
 
 impl State {
+    /// Starts in a row that have failed, and sextants in a row without a crossing.
+    pub(in crate::drive) fn trouble(&self) -> (u8, u8) {
+        (self.failed, self.missed)
+    }
+
     /// Every word of the state.
     pub fn trace(&self, out: &mut impl FnMut(u32)) {
         let Self {

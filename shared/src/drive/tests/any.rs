@@ -42,6 +42,8 @@ impl Noise {
             3 => Setpoint::Test(Current::from_bits(value)),
             4 => Setpoint::Zero,
             5 => Setpoint::Torque(Current::from_bits(value >> 4)),
+            6 => Setpoint::Tone(Speed::from_bits(value)),
+            7 => Setpoint::Tone(Speed::from_bits(1 << 27)),
             _ => turn,
         }
     }

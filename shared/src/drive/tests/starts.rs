@@ -47,7 +47,7 @@ fn nothing_switches_before_park_and_after_the_end() {
             Phase::Idle | Phase::Sense => bridge == Bridge::Off,
             Phase::Charge => bridge == Bridge::Charge(bench.config.charge.duty),
             Phase::Brake => bridge == Bridge::Brake,
-            Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping => {
+            Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping | Phase::Tone => {
                 matches!(bridge, Bridge::Duty(_))
             }
         };

@@ -4,6 +4,8 @@ use super::*;
 use crate::input::dshot::{Frame, Rate};
 use proptest::prelude::*;
 
+mod signals;
+
 const TIMING: Timing = Timing {
     arm_us: 300_000,
     loss_us: 100_000,
@@ -13,9 +15,16 @@ const RESTING: DriveStatus = DriveStatus {
     faulted: false,
 };
 
+const IDENTIFIED: Option<Signal> = Some(Signal::Dshot {
+    rate: Rate::Dshot600,
+    bidirectional: false,
+});
+
 fn event(value: u16) -> Event {
     Event::Frame {
         rate: Rate::Dshot600,
+        bidirectional: false,
+        first_edge_ticks: 0,
         frame: Frame {
             value,
             telemetry: false,
@@ -46,7 +55,7 @@ impl Bench {
 
     fn after(&mut self, us: u64, event: Event) {
         self.now_us += us;
-        self.authority.wire(self.now_us, event);
+        self.authority.wire(self.now_us, event, IDENTIFIED);
     }
 
     fn play(&mut self, count: u32, event: Event) {
@@ -150,16 +159,15 @@ fn one_open_throttle_restarts_the_count() {
 #[test]
 fn bad_frames_alone_neither_arm_nor_keep_a_signal() {
     let mut bench = Bench::new();
-    bench.play(5_000, Event::BadFrame);
+    bench.play(5_000, Event::Bad);
     assert!(!bench.authority.armed());
     assert!(!bench.authority.signal_present(bench.now_us));
-    assert_eq!(bench.authority.bad_frames(), 5_000);
 
     let mut bench = Bench::armed();
     bench.after(1_000, event(1000));
-    bench.play(100, Event::BadFrame);
+    bench.play(100, Event::Bad);
     assert!(bench.turns() && bench.authority.armed(), "100 ms");
-    bench.play(1, Event::BadFrame);
+    bench.play(1, Event::Bad);
     assert!(!bench.turns() && !bench.authority.armed(), "101 ms");
     bench.play(10, event(1000));
     assert!(!bench.turns());
@@ -170,10 +178,9 @@ fn bad_frames_do_not_disturb_an_armed_wire() {
     let mut bench = Bench::armed();
     for _ in 0..1_000 {
         bench.after(1_000, event(1000));
-        bench.play(9, Event::BadFrame);
+        bench.play(9, Event::Bad);
         assert!(bench.turns());
     }
-    assert_eq!(bench.authority.bad_frames(), 9_000);
 }
 
 #[test]
@@ -181,7 +188,7 @@ fn more_than_half_bad_restarts_the_count() {
     let mut bench = Bench::new();
     for _ in 0..1_000 {
         bench.play(1, event(0));
-        bench.play(2, Event::BadFrame);
+        bench.play(2, Event::Bad);
     }
     assert!(!bench.authority.armed());
 
@@ -189,7 +196,7 @@ fn more_than_half_bad_restarts_the_count() {
     for _ in 0..151 {
         assert!(!bench.authority.armed());
         bench.play(1, event(0));
-        bench.play(1, Event::BadFrame);
+        bench.play(1, Event::Bad);
     }
     assert!(bench.authority.armed(), "half of them");
 }
@@ -289,7 +296,7 @@ fn a_test_ends_at_throttle_fault_disarming_and_nan() {
         bench.play(2, event(0));
         assert_eq!(bench.test(0.1, 3.0), Ok(()));
         bench.play(2, event(0));
-        bench.play(2, Event::BadFrame);
+        bench.play(2, Event::Bad);
         assert!(matches!(bench.authority.command(), Command::Test(_)));
         match end {
             0 => {
@@ -342,7 +349,7 @@ fn tests_need_a_motor_at_rest_and_a_wire_at_zero_or_silent() {
     bench.play(1, event(0));
     assert_eq!(bench.test(0.1, 1.0), Ok(()));
     let mut bench = Bench::new();
-    bench.play(1, Event::BadFrame);
+    bench.play(1, Event::Bad);
     assert_eq!(bench.test(0.1, 1.0), rejected, "neither silent nor valid");
     bench.wait(100_001);
     assert_eq!(bench.test(0.1, 1.0), Ok(()));
@@ -370,18 +377,18 @@ proptest! {
             }
             match kind {
                 0..=7 => {
-                    bench.authority.wire(now_us, event(0));
+                    bench.authority.wire(now_us, event(0), IDENTIFIED);
                     valid_us = now_us;
                     zeros += 1;
                     let since_us = *zero_since_us.get_or_insert(now_us);
                     may_turn |= zeros >= 30 && now_us - since_us >= TIMING.arm_us;
                 }
                 8 => {
-                    bench.authority.wire(now_us, event(1000));
+                    bench.authority.wire(now_us, event(1000), IDENTIFIED);
                     valid_us = now_us;
                     (zero_since_us, zeros) = (None, 0);
                 }
-                9 => bench.authority.wire(now_us, Event::BadFrame),
+                9 => bench.authority.wire(now_us, Event::Bad, IDENTIFIED),
                 10 => {
                     bench.authority.poll(now_us);
                     if bench.test(0.5, number).is_ok() {
@@ -433,8 +440,12 @@ fn a_test_of_nothing_turns_nothing() {
 
 #[test]
 fn with_two_directions_either_turns_and_a_test_may_be_negative() {
-    let mut bench = Bench::armed();
-    bench.authority.set_two_directions(true);
+    let mut bench = Bench::new();
+    bench.authority.set_reading(Reading {
+        two_directions: true,
+        ..Reading::default()
+    });
+    bench.play(301, event(0));
     bench.after(1_000, event(48));
     let least = Throttle::from_bits(-1);
     assert_eq!(bench.authority.command(), Command::Throttle(least));

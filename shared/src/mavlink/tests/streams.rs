@@ -4,7 +4,10 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::*;
 use crate::drive::Fault;
+use crate::input::News;
 use crate::input::authority::DriveStatus;
+use crate::input::calibration::Step;
+use crate::input::signal::{Pulse, Signal};
 
 const HEARTBEAT: u32 = 0;
 const ESC_INFO: u32 = 290;
@@ -72,6 +75,7 @@ fn the_values_arrive_in_the_units_of_the_messages() {
         phase: Phase::Run,
         fault_count: 3,
         bad_frames: 4,
+        bad_share: 0.125,
         ..TELEMETRY
     };
     let mut seen = 0;
@@ -104,10 +108,15 @@ fn the_values_arrive_in_the_units_of_the_messages() {
                 assert_eq!(beat.system_status, MavState::MAV_STATE_ACTIVE);
                 assert_eq!(beat.mavlink_version, 3);
             }
+            MavMessage::NAMED_VALUE_FLOAT(value) => {
+                assert_eq!(value.name.to_str().expect("ASCII"), "bad_frames");
+                assert_eq!(value.value, 12.5);
+                assert_eq!(u64::from(value.time_boot_ms), sent.at_us / 1000);
+            }
             other => panic!("{other:?}"),
         }
     }
-    assert_eq!(seen, 22);
+    assert_eq!(seen, 23);
 }
 
 fn beat(bench: &mut Bench) -> HEARTBEAT_DATA {
@@ -246,11 +255,12 @@ fn a_peripheral_fills_its_own_slot() {
                     let rpm = [24, 26, 28, 30].map(|i| f64::from(at(i)));
                     assert_eq!(rpm, only(3000.0), "component {component}");
                 }
+                MavMessage::NAMED_VALUE_FLOAT(_) => seen |= 8,
                 MavMessage::HEARTBEAT(_) | MavMessage::STATUSTEXT(_) => {}
                 other => panic!("{other:?}"),
             }
         }
-        assert_eq!(seen, 7, "component {component}");
+        assert_eq!(seen, 15, "component {component}");
     }
 }
 
@@ -346,4 +356,65 @@ fn a_running_test_shows_as_turning() {
         .expect("the wire is silent");
     bench.telemetry.phase = Phase::Park;
     assert_eq!(beat(&mut bench).system_status, MavState::MAV_STATE_ACTIVE);
+}
+
+#[test]
+fn the_type_of_connection_follows_the_signal() {
+    let mut bench = Bench::new();
+    for signal in Signal::all().map(Some).chain([None]) {
+        bench.telemetry.signal = signal;
+        let wanted = match signal {
+            Some(Signal::Pulse(Pulse::Servo)) => 0,
+            Some(Signal::Pulse(_)) => 2,
+            Some(Signal::Dshot { .. }) | None => 5,
+        };
+        let sent = bench.run_ms(1000);
+        let found = sent.iter().filter_map(|sent| match &sent.message {
+            MavMessage::ESC_INFO(info) => Some(info.connection_type as u8),
+            _ => None,
+        });
+        let found: Vec<_> = found.collect();
+        assert_eq!(found, [wanted], "{signal:?}");
+    }
+}
+
+#[test]
+fn what_the_wire_tells_is_told_in_words() {
+    let mut bench = Bench::new();
+    let bidirectional = Signal::from_number(22).expect("it is one");
+    for (news, words) in [
+        (
+            News::Identified(bidirectional),
+            &["Throttle: bidirectional DShot600"][..],
+        ),
+        (News::OpenThrottle, &["Throttle is open: lower it to arm"]),
+        (
+            News::Lost { armed: true },
+            &["Throttle: signal lost while armed"],
+        ),
+        (News::Lost { armed: false }, &["Throttle: signal lost"]),
+        (
+            News::Calibration(Step::Full),
+            &["Stick calibration: full taken, now lower it"],
+        ),
+        (
+            News::Calibration(Step::Cancelled),
+            &["Stick calibration: given up, nothing changed"],
+        ),
+        (News::Armed, &[]),
+    ] {
+        bench.component.tell(news);
+        assert_eq!(texts(&bench.answers()), words);
+    }
+}
+
+#[test]
+fn what_something_else_has_changed_is_broadcast_and_put_in_force() {
+    let mut bench = Bench::new();
+    bench.params.set(ParamId::MotDir, 1.0).expect("in range");
+    bench.component.changed(&[ParamId::MotDir]);
+    let sent = bench.answers();
+    assert_eq!(values(&sent), [(ParamId::MotDir as u16, 1.0)]);
+    assert_eq!(bench.component.take_request(), Some(Request::ParamsChanged));
+    assert_eq!(bench.component.take_request(), None);
 }

@@ -2,14 +2,17 @@
 
 mod flux;
 mod inductance;
+mod input;
 mod observer;
 mod outer;
 mod regulator;
 mod sensing;
 mod six_step;
 mod start;
+mod tone;
 
 pub use flux::FluxSettings;
+pub use input::input;
 
 use core::f32::consts::{FRAC_PI_2, TAU};
 
@@ -22,6 +25,7 @@ use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Stop};
+use crate::input::signal::Signal;
 use crate::math::Gain;
 use crate::protection;
 use crate::units::{AdcCounts, Scale, Voltage};
@@ -190,8 +194,12 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
             "less than twelve periods a turn at CTL_RPM_MAX",
         );
     }
-    if ![0.0, 10.0, 11.0, 12.0].contains(&get(ParamId::InpProto)) {
-        return refuse(ParamId::InpProto, "neither 0, 10, 11 nor 12");
+    let protocol = get(ParamId::InpProto);
+    if protocol != 0.0 && Signal::from_number(protocol as u8).is_none() {
+        return refuse(
+            ParamId::InpProto,
+            "neither 0, 1 to 4, 10 to 13 nor 20 to 23",
+        );
     }
     let modulation = match get(ParamId::CtlModulation) {
         0.0 => Modulation::SpaceVector,
@@ -229,6 +237,7 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
         charge: sensing::charge(params, &p, board),
         dead_time: sensing::dead_time(&p, &scale)?,
         protection: limits(params, &p, &scale, board)?,
+        tone: tone::tone(params, &p, &scale)?,
         six_step: match get(ParamId::CtlDrive) {
             0.0 => None,
             _ => Some(six_step::six_step(params, &p, &scale, board, duty_max)?),

@@ -1,0 +1,129 @@
+//! Extended DShot telemetry 2.0.0: words that no normalised speed has
+//! (<https://github.com/bird-sanctuary/extended-dshot-telemetry>).
+
+/// What an extended word says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extended {
+    /// Temperature, °C.
+    Temperature(u8),
+    /// Supply voltage in 0.25 V.
+    Voltage(u8),
+    /// Supply current, A.
+    Current(u8),
+    /// For whoever writes the ESC's program; Siskin sends neither.
+    Debug1(u8),
+    /// Likewise.
+    Debug2(u8),
+    /// How hard it is to keep the motor turning: 0 no trouble, 255 it cannot be done.
+    Stress(u8),
+    /// What has happened since the word of this kind before; see [`Status`]. It also announces
+    /// that extended telemetry is on ([`ENABLED`]) or off ([`DISABLED`]).
+    Status(u8),
+}
+
+/// Answer to the command that turns extended telemetry on. Betaflight accepts no other.
+pub const ENABLED: Extended = Extended::Status(0);
+
+/// Answer to the command that turns it off.
+pub const DISABLED: Extended = Extended::Status(0xFF);
+
+/// What [`Extended::Status`] says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Status {
+    /// Bit 7: something to be counted.
+    pub alert: bool,
+    /// Bit 6: something suspect.
+    pub warning: bool,
+    /// Bit 5: a serious problem.
+    pub error: bool,
+    /// Bits 3 to 0: the greatest stress in sixteenths of its range. The specification's text says
+    /// bits 3 to 1 for 0 to 15; Bluejay sends and ArduPilot reads four bits.
+    pub max_stress: u8,
+}
+
+impl Extended {
+    /// The 12 bits of data.
+    pub const fn data(self) -> u16 {
+        let (kind, value) = match self {
+            Self::Temperature(value) => (0x2, value),
+            Self::Voltage(value) => (0x4, value),
+            Self::Current(value) => (0x6, value),
+            Self::Debug1(value) => (0x8, value),
+            Self::Debug2(value) => (0xA, value),
+            Self::Stress(value) => (0xC, value),
+            Self::Status(value) => (0xE, value),
+        };
+        kind << 8 | value as u16
+    }
+
+    /// What 12 bits of data say; nothing where they are a speed.
+    pub const fn from_data(data: u16) -> Option<Self> {
+        let value = data as u8;
+        Some(match data >> 8 & 0xF {
+            0x2 => Self::Temperature(value),
+            0x4 => Self::Voltage(value),
+            0x6 => Self::Current(value),
+            0x8 => Self::Debug1(value),
+            0xA => Self::Debug2(value),
+            0xC => Self::Stress(value),
+            0xE => Self::Status(value),
+            _ => return None,
+        })
+    }
+}
+
+impl Status {
+    /// The word.
+    pub const fn word(self) -> Extended {
+        Extended::Status(
+            (self.alert as u8) << 7
+                | (self.warning as u8) << 6
+                | (self.error as u8) << 5
+                | self.max_stress & 0xF,
+        )
+    }
+
+    /// What the value of a word says.
+    pub const fn from_value(value: u8) -> Self {
+        Self {
+            alert: value & 1 << 7 != 0,
+            warning: value & 1 << 6 != 0,
+            error: value & 1 << 5 != 0,
+            max_stress: value & 0xF,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_words_are_those_of_the_specification() {
+        assert_eq!(Extended::Temperature(25).data(), 0x219);
+        assert_eq!(Extended::Voltage(96).data(), 0x460);
+        assert_eq!(Extended::Current(7).data(), 0x607);
+        assert_eq!(Extended::Stress(255).data(), 0xCFF);
+        assert_eq!(ENABLED.data(), 0xE00);
+        assert_eq!(DISABLED.data(), 0xEFF);
+        let status = Status {
+            alert: true,
+            warning: false,
+            error: true,
+            max_stress: 9,
+        };
+        assert_eq!(status.word().data(), 0xEA9);
+        assert_eq!(Status::from_value(0xA9), status);
+    }
+
+    #[test]
+    fn a_word_is_extended_or_a_speed() {
+        for data in 0..=0xFFF_u16 {
+            let extended = data >> 8 != 0 && data & 0x100 == 0;
+            match Extended::from_data(data) {
+                Some(word) => assert_eq!((word.data(), extended), (data, true)),
+                None => assert!(!extended, "{data:03x}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,184 @@
+//! How well the drive fares, as the status and stress words of extended telemetry tell it.
+//!
+//! The specification calls stress the effort to keep commutation going: 0 is perfect, and the end
+//! of the range is that it cannot be kept. Here it is [`Config::doubt`]: how near the drive is to
+//! giving the rotor up. It tells nothing of load, which the current tells.
+//!
+//! | event | raised by |
+//! |---|---|
+//! | alert | the current stands at `LIM_PHASE_A`: there is no more torque to be had |
+//! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a Hall sensor is at fault |
+//! | error | a fault has turned the bridge off |
+//!
+//! An event is told once, by the next status word, and again as long as it lasts.
+
+use super::extended::{Extended, Status};
+use crate::drive::{Config, Snapshot};
+
+/// Doubt from which on it is worth a warning: a quarter of what is allowed, as one of four starts
+/// that has failed. A crossing that the current hides now and then is none.
+const SUSPECT: u8 = 63;
+
+/// What has happened since it was last told.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Health {
+    status: Status,
+    /// The greatest stress since the last word of it, and since the last status.
+    stress: u8,
+    max_stress: u8,
+    fault_count: u32,
+}
+
+impl Health {
+    /// Takes in what the drive says, at each reply.
+    pub(super) fn observe(&mut self, snapshot: &Snapshot, config: &Config) {
+        let doubt = config.doubt(snapshot);
+        self.stress = self.stress.max(doubt);
+        self.max_stress = self.max_stress.max(doubt);
+        let status = &mut self.status;
+        status.alert |= at_limit(snapshot, config);
+        status.warning |= doubt >= SUSPECT || snapshot.sensor_fault;
+        status.error |= !snapshot.faults.is_empty() || snapshot.fault_count != self.fault_count;
+        self.fault_count = snapshot.fault_count;
+    }
+
+    /// Forgets what has happened so far.
+    pub(super) fn begin(&mut self) {
+        *self = Self {
+            fault_count: self.fault_count,
+            ..Self::default()
+        };
+    }
+
+    /// The stress word.
+    pub(super) fn stress(&mut self) -> Extended {
+        Extended::Stress(core::mem::take(&mut self.stress))
+    }
+
+    /// The status word.
+    pub(super) fn status(&mut self) -> Extended {
+        let status = Status {
+            max_stress: core::mem::take(&mut self.max_stress) >> 4,
+            ..core::mem::take(&mut self.status)
+        };
+        status.word()
+    }
+}
+
+/// Whether the current's vector is within a sixteenth of its bound: the regulator holds it there
+/// within its ripple.
+fn at_limit(snapshot: &Snapshot, config: &Config) -> bool {
+    let square = |bits: i32| i64::from(bits) * i64::from(bits);
+    let bound = config.protection.phase.to_bits();
+    square(snapshot.i.d.to_bits()) + square(snapshot.i.q.to_bits()) >= square(bound - bound / 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::{Fault, State};
+    use crate::params::{Board, Params, build};
+    use crate::units::Current;
+
+    fn rig() -> (Config, Snapshot) {
+        let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
+        let snapshot = State::new(&config).snapshot();
+        (config, snapshot)
+    }
+
+    fn status(health: &mut Health) -> Status {
+        match health.status() {
+            Extended::Status(value) => Status::from_value(value),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_drive_without_trouble_has_nothing_to_tell() {
+        let (config, snapshot) = rig();
+        let mut health = Health::default();
+        health.observe(&snapshot, &config);
+        assert_eq!(status(&mut health), Status::default());
+        assert_eq!(health.stress(), Extended::Stress(0));
+    }
+
+    #[test]
+    fn a_current_at_its_bound_is_an_alert_and_told_once() {
+        let (config, calm) = rig();
+        let mut health = Health::default();
+        let mut loaded = calm;
+        for (share, alert) in [(0.9, false), (0.95, true), (-1.0, true)] {
+            loaded.i.q = Current::from_num(config.protection.phase.to_num::<f64>() * share);
+            health.observe(&loaded, &config);
+            health.observe(&calm, &config);
+            assert_eq!(status(&mut health).alert, alert, "{share}");
+            assert!(!status(&mut health).alert);
+        }
+    }
+
+    #[test]
+    fn failed_starts_are_stress_until_the_last_one_is_a_fault() {
+        let (config, calm) = rig();
+        let mut health = Health::default();
+        for (failed_starts, stress) in [(0, 0), (1, 63), (2, 127), (3, 191)] {
+            let snapshot = Snapshot {
+                failed_starts,
+                ..calm
+            };
+            health.observe(&snapshot, &config);
+            assert_eq!(health.stress(), Extended::Stress(stress));
+            let told = status(&mut health);
+            assert_eq!(told.max_stress, stress >> 4);
+            assert_eq!((told.warning, told.error), (failed_starts > 0, false));
+        }
+        let mut stuck = calm;
+        stuck.faults.insert(Fault::Stuck);
+        health.observe(&stuck, &config);
+        assert_eq!(health.stress(), Extended::Stress(255));
+        let told = status(&mut health);
+        assert!(told.warning && told.error);
+    }
+
+    #[test]
+    fn a_position_that_is_in_doubt_is_stress() {
+        let (config, calm) = rig();
+        let mut health = Health::default();
+        let lost = Snapshot {
+            lost_periods: config.lost_periods / 2,
+            ..calm
+        };
+        health.observe(&lost, &config);
+        health.observe(&calm, &config);
+        assert_eq!(health.stress(), Extended::Stress(127));
+        assert_eq!(health.stress(), Extended::Stress(0), "it is over");
+        assert_eq!(status(&mut health).max_stress, 7, "but was not told here");
+    }
+
+    #[test]
+    fn a_fault_that_has_ended_before_anyone_asked_is_told_once() {
+        let (config, calm) = rig();
+        let mut health = Health::default();
+        let after = Snapshot {
+            fault_count: 1,
+            ..calm
+        };
+        health.observe(&after, &config);
+        assert!(status(&mut health).error);
+        health.observe(&after, &config);
+        assert!(!status(&mut health).error);
+    }
+
+    #[test]
+    fn what_happened_before_the_beginning_is_not_told() {
+        let (config, calm) = rig();
+        let mut health = Health::default();
+        let after = Snapshot {
+            fault_count: 1,
+            ..calm
+        };
+        health.observe(&after, &config);
+        health.begin();
+        health.observe(&after, &config);
+        assert_eq!(status(&mut health), Status::default());
+    }
+}

@@ -1,0 +1,106 @@
+//! The ESC's information, which DShot's command 6 asks for: 64 bytes on the serial line.
+//!
+//! The layout is that of BLHeli_32, which flight controllers know and print (Betaflight:
+//! `dshotprog 0 6`):
+//!
+//! | byte | what it is |
+//! |---|---|
+//! | 0 to 11 | serial number of the microcontroller |
+//! | 12 | 254: this layout |
+//! | 13, 14 | version of the firmware, printed as 1.02 |
+//! | 15 | type, not printed |
+//! | 16 | direction: 0 normal, 1 reversed |
+//! | 17 | 3D: 0 off, 1 on |
+//! | 18 | least supply voltage in 0.1 V, 0 off |
+//! | 19 | limit of the current in A, 0 off |
+//! | 20 to 23 | lights 0 to 3: 0 off, 1 on, 255 there is none |
+//! | 31 to 62 | name, zeros to the end |
+//! | 63 | check sum, as of a KISS frame |
+
+use super::kiss::crc8;
+use crate::params::{ParamId, Params};
+
+/// Bytes of the information.
+pub const BYTES: usize = 64;
+
+/// From its start to that of the next frame on its line at least, µs: its 640 bits take 5556.
+pub const SPACING_US: u32 = 6000;
+
+/// By this in byte 12 a reader knows the layout.
+const LAYOUT: u8 = 254;
+/// There is no such thing.
+const UNSUPPORTED: u8 = 255;
+/// The highest value that is not taken for [`UNSUPPORTED`].
+const MOST: f32 = 254.0;
+
+const NAME: &[u8] = b"Siskin";
+
+/// The information of an ESC with these parameters and this state of its light. The serial number is
+/// 0: it is the chip's, and not known here.
+pub fn info(params: &Params, light: bool) -> [u8; BYTES] {
+    let get = |id| params.get(id);
+    // Conversions saturate, and a limit below the unit is still one.
+    let limit = |value: f32| {
+        let least = if value > 0.0 { 1.0 } else { 0.0 };
+        libm::roundf(value).clamp(least, MOST) as u8
+    };
+    let mut bytes = [0; BYTES];
+    bytes[12] = LAYOUT;
+    bytes[13..15].copy_from_slice(&version());
+    bytes[16] = get(ParamId::MotDir) as u8;
+    bytes[17] = get(ParamId::Inp3d) as u8;
+    bytes[18] = limit(get(ParamId::LimBusVMin) * 10.0);
+    bytes[19] = limit(get(ParamId::LimPhaseA));
+    bytes[20] = u8::from(light);
+    bytes[21..24].fill(UNSUPPORTED);
+    bytes[31..31 + NAME.len()].copy_from_slice(NAME);
+    bytes[BYTES - 1] = crc8(&bytes[..BYTES - 1]);
+    bytes
+}
+
+/// Major version, and minor version with the patch: 0.1.0 is 0 and 10, printed as 0.10.
+fn version() -> [u8; 2] {
+    let mut parts = env!("CARGO_PKG_VERSION").split('.');
+    let mut part = || parts.next().and_then(|part| part.parse().ok()).unwrap_or(0);
+    let (major, minor, patch): (u8, u8, u8) = (part(), part(), part());
+    [major, minor.saturating_mul(10).saturating_add(patch)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What Betaflight makes of it: `printEscInfo` of its command line.
+    #[test]
+    fn a_flight_controller_reads_it() {
+        let mut params = Params::default();
+        let values = [
+            (ParamId::MotDir, 1.0),
+            (ParamId::Inp3d, 1.0),
+            (ParamId::LimBusVMin, 13.2),
+            (ParamId::LimPhaseA, 35.0),
+        ];
+        for (id, value) in values {
+            params.set(id, value).expect("in range");
+        }
+        let bytes = info(&params, true);
+        assert_eq!(bytes[12], 254);
+        assert_eq!(bytes[13..15], version());
+        assert_eq!(bytes[16..24], [1, 1, 132, 35, 1, 255, 255, 255]);
+        let name = bytes[31..63].split(|byte| *byte == 0).next();
+        assert_eq!(name, Some(&b"Siskin"[..]));
+        assert_eq!(crc8(&bytes), 0);
+    }
+
+    #[test]
+    fn a_limit_never_looks_as_if_there_were_none() {
+        let mut params = Params::default();
+        params.set(ParamId::LimBusVMin, 0.0).expect("in range");
+        params.set(ParamId::LimPhaseA, 0.5).expect("in range");
+        let bytes = info(&params, false);
+        assert_eq!(bytes[18..21], [0, 1, 0]);
+        params.set(ParamId::LimBusVMin, 60.0).expect("in range");
+        params.set(ParamId::LimPhaseA, 200.0).expect("in range");
+        assert_eq!(info(&params, false)[18..20], [254, 200]);
+    }
+}

@@ -1,0 +1,243 @@
+//! What the ESC sends back to the flight controller: on the throttle wire and on a serial line.
+//!
+//! A bidirectional frame is answered on its own wire ([`gcr`]) with the speed ([`erpm`]) or a word
+//! of extended telemetry ([`extended`]); a frame with its telemetry bit set, on the serial line
+//! ([`kiss`]).
+
+pub mod erpm;
+pub mod extended;
+pub mod gcr;
+mod health;
+pub mod info;
+pub mod kiss;
+mod schedule;
+
+use crate::drive::{Config, Snapshot};
+use crate::input::command::Order;
+use crate::input::dshot::Rate;
+use crate::input::line::Event;
+use crate::telemetry::Telemetry;
+use extended::Extended;
+use health::Health;
+use schedule::{Kind, Schedule};
+
+/// From the end of a frame to its reply, ns, at every rate.
+pub const REPLY_DELAY_NS: u32 = 30_000;
+
+/// What a frame may ask the ESC to send.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ask {
+    /// When the frame's first edge came, in ticks of the capturing timer.
+    pub first_edge_ticks: u32,
+    /// How fast it was sent.
+    pub rate: Rate,
+    /// Whether it is to be answered on its wire.
+    pub bidirectional: bool,
+    /// Whether telemetry is to be sent on the serial line.
+    pub telemetry: bool,
+}
+
+/// What is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// On the wire.
+    pub reply: Option<Reply>,
+    /// On the serial line: a frame of KISS telemetry.
+    pub kiss: Option<[u8; kiss::BYTES]>,
+    /// On the serial line, without a KISS frame: the ESC's information, which a command has asked for.
+    pub info: Option<[u8; info::BYTES]>,
+}
+
+/// A reply on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// 21 bits, the highest first; 1 is line high.
+    pub bits: u32,
+    /// Bits a second: 5/4 of the frame's.
+    pub bit_hz: u32,
+    /// When its first bit begins, in ticks of the capturing timer.
+    pub at_ticks: u32,
+}
+
+impl Ask {
+    /// What the sender of a frame or pulse may want; nothing, if nothing.
+    pub fn of(event: &Event) -> Option<Self> {
+        let Event::Frame {
+            rate,
+            bidirectional,
+            frame,
+            first_edge_ticks,
+        } = *event
+        else {
+            return None;
+        };
+        let info = Order::of(frame.value) == Some(Order::Info);
+        (bidirectional || frame.telemetry || info).then_some(Self {
+            first_edge_ticks,
+            rate,
+            bidirectional,
+            telemetry: frame.telemetry,
+        })
+    }
+}
+
+/// What is remembered from answer to answer.
+#[derive(Clone, Debug)]
+pub struct Answers {
+    /// From a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
+    reply_ticks: [u32; Rate::ALL.len()],
+    /// For how long a KISS frame, and the ESC's information, take the serial line.
+    kiss_ticks: u32,
+    info_ticks: u32,
+    /// When the frame before began.
+    asked_at_ticks: Option<u32>,
+    /// How long the serial line is still taken.
+    busy_ticks: u32,
+    extended: bool,
+    /// The answer to the command that turned extended telemetry on or off.
+    announcement: Option<Extended>,
+    schedule: Schedule,
+    health: Health,
+    info: Option<[u8; info::BYTES]>,
+}
+
+impl Answers {
+    /// Nothing sent yet; `tick_hz` is the rate of the timer that captures the wire's edges.
+    pub fn new(tick_hz: u32) -> Self {
+        let ticks = |time_us| (u64::from(tick_hz) * u64::from(time_us) / 1_000_000) as u32;
+        Self {
+            reply_ticks: Rate::ALL.map(|rate| reply_ticks(tick_hz, rate)),
+            kiss_ticks: ticks(kiss::SPACING_US),
+            info_ticks: ticks(info::SPACING_US),
+            asked_at_ticks: None,
+            busy_ticks: 0,
+            extended: false,
+            announcement: None,
+            schedule: Schedule::new(ticks(schedule::SLOT_US)),
+            health: Health::default(),
+            info: None,
+        }
+    }
+
+    /// Turns extended telemetry on or off, and announces it with the next reply that may be an
+    /// extended word.
+    pub fn set_extended(&mut self, on: bool) {
+        self.extended = on;
+        self.announcement = Some(if on {
+            extended::ENABLED
+        } else {
+            extended::DISABLED
+        });
+        self.schedule.begin();
+        self.health.begin();
+    }
+
+    /// Sends the ESC's information with the next answer for which the serial line is free.
+    pub fn send_info(&mut self, info: [u8; info::BYTES]) {
+        self.info = Some(info);
+    }
+
+    /// What is sent for a frame, with the drive as it is now.
+    pub fn answer(
+        &mut self,
+        ask: Ask,
+        snapshot: &Snapshot,
+        config: &Config,
+        telemetry: &Telemetry,
+    ) -> Answer {
+        self.pass(ask.first_edge_ticks);
+        self.health.observe(snapshot, config);
+        let free = self.busy_ticks == 0;
+        let info = self.info.take_if(|_| free);
+        // A flight controller that asks for the information sets the telemetry bit as well, and reads
+        // the bytes that it gets as the information.
+        let kiss = free && info.is_none() && ask.telemetry;
+        if info.is_some() {
+            self.busy_ticks = self.info_ticks;
+        } else if kiss {
+            self.busy_ticks = self.kiss_ticks;
+        }
+        Answer {
+            reply: ask
+                .bidirectional
+                .then(|| self.reply(ask, snapshot, config, telemetry)),
+            kiss: kiss.then(|| {
+                let scale = &config.scale;
+                let erpm = scale.rpm(snapshot.speed).abs() * scale.pole_pairs;
+                kiss::frame(telemetry, erpm)
+            }),
+            info,
+        }
+    }
+
+    /// Takes in when a frame has come. The ticks wrap, in 25 s at 170 MHz: after a longer rest a
+    /// word or a frame may come late by its interval.
+    fn pass(&mut self, now_ticks: u32) {
+        let before_ticks = self.asked_at_ticks.replace(now_ticks).unwrap_or(now_ticks);
+        let ticks = now_ticks.wrapping_sub(before_ticks);
+        self.busy_ticks = self.busy_ticks.saturating_sub(ticks);
+        self.schedule.pass(ticks);
+    }
+
+    fn reply(
+        &mut self,
+        ask: Ask,
+        snapshot: &Snapshot,
+        config: &Config,
+        telemetry: &Telemetry,
+    ) -> Reply {
+        let data = match self.extended(telemetry) {
+            Some(word) => {
+                self.schedule.sends();
+                word.data()
+            }
+            None => erpm::of_speed(snapshot.speed, &config.scale),
+        };
+        Reply {
+            bits: gcr::encode(data),
+            bit_hz: reply_bit_hz(ask.rate),
+            at_ticks: ask
+                .first_edge_ticks
+                .wrapping_add(self.reply_ticks[ask.rate as usize]),
+        }
+    }
+
+    /// The extended word that this reply shall be, if any.
+    fn extended(&mut self, telemetry: &Telemetry) -> Option<Extended> {
+        if !self.schedule.is_free() {
+            return None;
+        }
+        if let Some(announcement) = self.announcement.take() {
+            return Some(announcement);
+        }
+        if !self.extended {
+            return None;
+        }
+        // A float's conversion saturates.
+        let whole = |value: f32| libm::roundf(value) as u8;
+        Some(match self.schedule.due()? {
+            Kind::Status => self.health.status(),
+            Kind::Temperature => Extended::Temperature(whole(telemetry.temperature_c)),
+            Kind::Voltage => Extended::Voltage(whole(telemetry.bus_v * 4.0)),
+            Kind::Current => Extended::Current(whole(telemetry.bus_a)),
+            Kind::Stress => self.health.stress(),
+        })
+    }
+}
+
+/// Bits a second of the reply to a frame of this rate.
+pub const fn reply_bit_hz(rate: Rate) -> u32 {
+    rate.bit_hz() / 4 * 5
+}
+
+/// From a frame's first edge to its reply, in ticks to the nearest: 16 nominal bits, whatever the
+/// frame's own were, and the delay.
+const fn reply_ticks(tick_hz: u32, rate: Rate) -> u32 {
+    // 16 bits in units of 10⁻⁹/3 s, which every rate's bit is a whole number of.
+    let frame = 16 * (1_000_000_000 / (rate.bit_hz() as u64 / 3));
+    let whole = frame + 3 * REPLY_DELAY_NS as u64;
+    ((whole * tick_hz as u64 + 1_500_000_000) / 3_000_000_000) as u32
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,200 @@
+//! Tones: the motor as a loudspeaker, without turning it.
+//!
+//! The phases make a sine voltage along the axis of phase a, which pulls a rotor to and fro as often
+//! as the pitch says and, over a cycle, nowhere. The voltage is imposed, not the current: what a rotor
+//! that moves induces drives a current that brakes it. It is played only to a rotor that stands.
+//!
+//! The voltage's amplitude begins at zero and is led, each half cycle, to where the greatest phase
+//! current is to be: R and L may be stated wrongly, and the dead time eats an unknown part of so
+//! small a voltage, more of one half cycle than of the next. It rises by a quarter of the square of
+//! the share that is missing and falls by half of the share that is too much: so it is soon there,
+//! and the greatest of the half cycles stays near what is wanted. For a sensor that shows nothing,
+//! the amplitude itself is bounded: by what twice the current and the dead time need.
+
+use fixed::types::extra::{U28, U31, U32};
+use fixed::types::{I1F31, I5F27};
+
+use super::launch::{self, Wish};
+use super::state::Seen;
+use super::turn::{bus_current, reading};
+use super::{Bridge, Phase, Setpoint, State};
+use crate::control::catch::Rotor;
+use crate::control::modulator::{self, Supply};
+use crate::control::transform::{AlphaBeta, Dq};
+use crate::math::{Gain, Held, TopProduct, magnitude, sin_cos};
+use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
+
+/// Highest pitch, turns a period: with eight samples a cycle the greatest of them is at most 8 %
+/// below the current's peak.
+pub const PITCH_MAX: Speed = Speed::lit("0.125");
+
+/// Config of the tones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// Peak that the greatest phase current is led to.
+    pub peak: Current,
+    /// Current to its share of that.
+    pub share: Gain<U28, U31>,
+    /// R times the peak.
+    pub resistive: Voltage,
+    /// Pitch to ωL times the peak.
+    pub reactive: Gain<U32, U28>,
+    /// What the dead time takes of a vector along a phase, of the supply.
+    pub dead: I1F31,
+}
+
+/// The tone that is being played.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Playing {
+    /// Turns a period; zero is a pause.
+    pitch: Speed,
+    /// The sine's angle.
+    angle: Angle,
+    /// The sine's amplitude.
+    amplitude: Voltage,
+    /// Greatest phase current since the last half cycle began.
+    peak: Current,
+    /// The low sides were on before, and will be again: at once where a tone has been played, else
+    /// when the rotor is seen to stand.
+    braked: bool,
+}
+
+impl Playing {
+    /// Every word.
+    pub(super) fn trace(&self, out: &mut impl FnMut(u32)) {
+        let Self {
+            pitch,
+            angle,
+            amplitude,
+            peak,
+            braked,
+        } = self;
+        out(pitch.to_bits() as u32);
+        out(angle.to_bits() as u32);
+        out(amplitude.to_bits() as u32);
+        out(peak.to_bits() as u32);
+        out(u32::from(*braked));
+    }
+}
+
+/// Changes the phase for a tone that is asked for, or that has ended, and where nothing that was to
+/// begin is asked for any more. False where the set-point and the phase have nothing to do with that.
+#[cold]
+pub(super) fn follow(config: &super::Config, state: &mut State, setpoint: Setpoint) -> bool {
+    let plays = config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
+    let rests = launch::wish(config, setpoint) == Wish::Rest;
+    let braked = state.tone.braked;
+    let stands = state.rotor == Rotor::Standing;
+    match state.phase {
+        Phase::Tone | Phase::Sense if plays => {}
+        Phase::Charge if plays && stands => {}
+        Phase::Idle if plays && stands => to(state, Phase::Sense, braked),
+        Phase::Brake if plays && state.seen.speed == Speed::ZERO => to(state, Phase::Sense, true),
+        Phase::Tone if !rests => state.rest(Phase::Sense),
+        Phase::Tone if braked => state.rest(Phase::Brake),
+        Phase::Idle if braked && rests && stands => state.rest(Phase::Brake),
+        Phase::Tone => state.rest(Phase::Idle),
+        // Not the low sides: the rotor may turn, and is looked at until it stands.
+        Phase::Sense | Phase::Charge if rests => to(state, Phase::Idle, braked),
+        _ => return false,
+    }
+    true
+}
+
+/// On the way to a tone, or back from one that has not come to be played.
+fn to(state: &mut State, phase: Phase, braked: bool) {
+    state.rest(phase);
+    state.tone.braked = braked;
+}
+
+/// A period in which a tone may be played: `None` where none is asked for.
+#[cold]
+pub(super) fn period(
+    config: &super::Config,
+    state: &mut State,
+    currents: [AdcCounts; 3],
+    setpoint: Setpoint,
+) -> Option<Bridge> {
+    let (Some(tone), Setpoint::Tone(pitch)) = (&config.tone, setpoint) else {
+        return None;
+    };
+    state.phase = Phase::Tone;
+    let supply = Supply::new(&config.modulator, state.protection.bus);
+    let [a, b, c] = currents.map(reading);
+    let greatest = a
+        .saturating_abs()
+        .max(b.saturating_abs())
+        .max(c.saturating_abs());
+    let u = play(tone, &mut state.tone, pitch, greatest, &supply);
+    let i = Dq {
+        d: a,
+        q: Current::ZERO,
+    };
+    let along = Dq {
+        d: u,
+        q: Voltage::ZERO,
+    };
+    state.seen = Seen {
+        phase: Phase::Tone,
+        angle: Angle::ZERO,
+        speed: Speed::ZERO,
+        i,
+        u: along,
+        bus_current: bus_current(along, i, &supply),
+    };
+    if state.tone.pitch == Speed::ZERO {
+        // A pause brakes what a tone has left of a movement, and keeps the drivers charged.
+        return Some(Bridge::Brake);
+    }
+    let v = AlphaBeta {
+        alpha: I5F27::from_bits(u.to_bits() >> 1),
+        beta: I5F27::ZERO,
+    };
+    let duties = modulator::duties(&config.modulator, &supply, v, [I1F31::ZERO; 3]);
+    state.applied[0] = duties;
+    Some(Bridge::Duty(duties))
+}
+
+/// The voltage along the axis of phase a.
+fn play(
+    tone: &Config,
+    playing: &mut Playing,
+    pitch: Speed,
+    greatest: Current,
+    supply: &Supply,
+) -> Voltage {
+    let pitch = pitch.max(Speed::ZERO).min(PITCH_MAX);
+    if pitch != playing.pitch {
+        *playing = Playing {
+            pitch,
+            braked: playing.braked,
+            ..Playing::default()
+        };
+    }
+    playing.peak = playing.peak.max(greatest);
+    let before = playing.angle;
+    playing.angle = before.wrapping_add(pitch);
+    if playing.angle.is_negative() != before.is_negative() {
+        regulate(tone, playing, supply);
+    }
+    let sine = sin_cos(playing.angle).sin;
+    Voltage::from_bits(playing.amplitude.top(sine).to_bits() << 1)
+}
+
+/// The amplitude of the coming half cycle.
+fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
+    let reactive = tone.reactive.saturating_apply(playing.pitch);
+    let needed = magnitude(tone.resistive, reactive);
+    let missing = tone.share.saturating_apply(tone.peak.minus(playing.peak));
+    // 28 + 31 − 32 fraction bits are half of it with 28.
+    let half = needed.top(missing);
+    let step = Voltage::from_bits(if half < 0 {
+        half.to_bits()
+    } else {
+        half.top(missing).to_bits()
+    });
+    let dead = Voltage::from_bits(tone.dead.top(supply.bus).to_bits() << 1);
+    let most = needed.plus(needed).plus(dead).min(supply.vector_max);
+    playing.amplitude = playing.amplitude.plus(step).max(Voltage::ZERO).min(most);
+    playing.peak = Current::ZERO;
+}

@@ -1,0 +1,119 @@
+//! What the ESC does by the throttle wire, beside turning the motor: it obeys DShot's commands, takes
+//! the stick's calibration, and tells a person what has happened.
+
+use super::Esc;
+use crate::answer::info::info;
+use crate::input::News;
+use crate::input::calibration::Step;
+use crate::input::command::Order;
+use crate::input::endpoints::EndPoints;
+use crate::params::ParamId;
+use crate::tune::Tune;
+
+impl Esc {
+    /// Whether the light shall be on, by command.
+    pub fn light(&self) -> bool {
+        self.light
+    }
+
+    /// Takes an order of the wire. What is to be sent is sent with the answer to the same frame, and
+    /// the rest waits for the tasks.
+    pub(super) fn order(&mut self, order: Order) {
+        match order {
+            Order::Info => self.answers.send_info(info(&self.params, self.light)),
+            Order::Extended(on) => self.answers.set_extended(on),
+            order => {
+                // Most orders take six frames: more than four between two polls are noise, and one
+                // that finds no room is as if it had not been heard.
+                let _ = self.orders.push_back(order);
+            }
+        }
+    }
+
+    /// What the tasks do for the wire.
+    pub(super) fn follow_wire(&mut self, now_us: u64) {
+        while let Some(news) = self.input.news(now_us) {
+            self.hear(now_us, news);
+        }
+        // The motor may have been asked to turn since it was ordered.
+        let stopped = self.drive().stopped;
+        while let Some(order) = self.orders.pop_front() {
+            if stopped {
+                self.obey(now_us, order);
+            }
+        }
+    }
+
+    fn hear(&mut self, now_us: u64, news: News) {
+        let news = match news {
+            News::Calibration(Step::Done(ends)) if !self.calibrate(ends) => {
+                News::Calibration(Step::Cancelled)
+            }
+            news => news,
+        };
+        self.component.tell(news);
+        let tune = match news {
+            News::Armed => Tune::Armed,
+            News::Lost { armed: true } => Tune::Lost,
+            News::OpenThrottle => Tune::OpenThrottle,
+            News::Calibration(Step::Full) => Tune::Calibrating,
+            News::Calibration(Step::Done(_)) => Tune::Calibrated,
+            News::Identified(_)
+            | News::Lost { armed: false }
+            | News::Calibration(Step::Cancelled) => return,
+        };
+        self.sound.play(now_us, tune);
+    }
+
+    fn obey(&mut self, now_us: u64, order: Order) {
+        let number = |on| f32::from(u8::from(on));
+        match order {
+            Order::Beacon(beacon) => self.sound.play(now_us, Tune::Beacon(beacon)),
+            Order::Direction { reversed } => {
+                self.change(&[(ParamId::MotDir, number(reversed))]);
+            }
+            Order::TwoDirections(on) => {
+                self.change(&[(ParamId::Inp3d, number(on))]);
+            }
+            Order::Save => self.storage.save(),
+            Order::Spin { opposite } => {
+                self.given.opposite = opposite;
+                // No value changes, but the configuration does.
+                self.component.changed(&[]);
+            }
+            Order::Light(on) => self.light = on,
+            Order::Silent => self.sound.toggle_silent(),
+            Order::Info | Order::Extended(_) => {}
+        }
+    }
+
+    /// Takes the stick's end points, and has them stored; whether they fit.
+    fn calibrate(&mut self, ends: EndPoints) -> bool {
+        let fit = self.change(&[
+            (ParamId::InpPulseMinUs, f32::from(ends.min_us)),
+            (ParamId::InpPulseMaxUs, f32::from(ends.max_us)),
+        ]);
+        if fit {
+            self.storage.save();
+        }
+        fit
+    }
+
+    /// Sets parameters as MAVLink does: all of them, or none where they do not fit; which of the two.
+    fn change(&mut self, values: &[(ParamId, f32)]) -> bool {
+        let mut params = self.params.clone();
+        for (id, value) in values {
+            if params.set(*id, *value).is_err() {
+                return false;
+            }
+        }
+        if self.given.build(&params, &self.board).is_err() {
+            return false;
+        }
+        self.params = params;
+        for (id, _) in values {
+            self.component.changed(&[*id]);
+        }
+        true
+    }
+}

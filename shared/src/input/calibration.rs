@@ -1,0 +1,287 @@
+//! The end points of pulses, taught by the stick.
+//!
+//! As with other ESCs: the ESC is powered up with the stick at full throttle and says after three
+//! seconds that it has measured it; the stick is then pulled to no throttle, and after one and a half
+//! seconds both ends are known. Anything else leaves them as they were, until the next power-up.
+
+use super::endpoints::EndPoints;
+
+/// Servo pulses that may be full throttle, ns: the upper part of what is accepted. The middle of a
+/// stick for two directions must not begin a calibration.
+const FULL_NS: core::ops::RangeInclusive<u32> = 1_700_000..=2_200_000;
+/// Servo pulses that may be no throttle, ns.
+const NONE_NS: core::ops::RangeInclusive<u32> = 800_000..=1_300_000;
+/// The least distance of the two ends, ns.
+const SPAN_NS: u32 = 500_000;
+
+/// How long full throttle is held, µs.
+const FULL_US: u64 = 3_000_000;
+/// How long no throttle is held, µs.
+const NONE_US: u64 = 1_500_000;
+/// The most that a held stick strays from where it was when it came to rest, ns: receivers jitter by
+/// some µs.
+const STEADY_NS: u32 = 16_000;
+/// The longest way of the stick from one end to the other, µs.
+const WAY_US: u64 = 2_000_000;
+
+/// What is to be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Full throttle has been measured; no throttle is awaited.
+    Full,
+    /// Both ends have been measured.
+    Done(EndPoints),
+    /// After full throttle came something else than no throttle.
+    Cancelled,
+}
+
+/// Watches the first signal after power-up.
+#[derive(Clone, Debug, Default)]
+pub struct Calibration {
+    stage: Stage,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+enum Stage {
+    /// Nothing has come.
+    #[default]
+    Fresh,
+    /// The stick is at full throttle.
+    Full(Held),
+    /// Full throttle has been measured.
+    None {
+        full_ns: u32,
+        /// When the stick was last at full throttle.
+        full_us: u64,
+        held: Option<Held>,
+    },
+    Over,
+}
+
+/// A stick that is held.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    since_us: u64,
+    first_ns: u32,
+    /// Against the first width.
+    sum_ns: i64,
+    count: u32,
+}
+
+impl Calibration {
+    /// A signal that was identified carries something else than pulses.
+    pub fn end(&mut self) {
+        self.stage = Stage::Over;
+    }
+
+    /// Whether full throttle has been measured and no throttle is awaited.
+    pub fn is_under_way(&self) -> bool {
+        matches!(self.stage, Stage::None { .. })
+    }
+
+    /// The signal was lost, if there was an identified one.
+    pub fn lost(&mut self) -> Option<Step> {
+        let cancelled = self.is_under_way().then_some(Step::Cancelled);
+        if !matches!(self.stage, Stage::Fresh) {
+            self.end();
+        }
+        cancelled
+    }
+
+    /// A pulse of an identified signal, by the servo pulse that means the same.
+    pub fn pulse(&mut self, now_us: u64, servo_ns: u32) -> Option<Step> {
+        let full = FULL_NS.contains(&servo_ns);
+        match &mut self.stage {
+            Stage::Fresh if full => self.stage = Stage::Full(Held::new(now_us, servo_ns)),
+            Stage::Full(held) if full => {
+                held.add(now_us, servo_ns);
+                if held.for_us(now_us) >= FULL_US {
+                    self.stage = Stage::None {
+                        full_ns: held.mean_ns(),
+                        full_us: now_us,
+                        held: None,
+                    };
+                    return Some(Step::Full);
+                }
+            }
+            Stage::Fresh | Stage::Full(_) => self.end(),
+            Stage::None {
+                full_ns,
+                full_us,
+                held,
+            } => {
+                if full {
+                    *full_us = now_us;
+                    *held = None;
+                    return None;
+                }
+                if NONE_NS.contains(&servo_ns) && full_ns.abs_diff(servo_ns) >= SPAN_NS {
+                    let held = held.get_or_insert(Held::new(now_us, servo_ns));
+                    held.add(now_us, servo_ns);
+                    if held.for_us(now_us) >= NONE_US {
+                        let ends = EndPoints {
+                            min_us: whole_us(held.mean_ns()),
+                            max_us: whole_us(*full_ns),
+                        };
+                        self.end();
+                        return Some(Step::Done(ends));
+                    }
+                } else {
+                    *held = None;
+                }
+                if held.is_none() && now_us.saturating_sub(*full_us) > WAY_US {
+                    self.end();
+                    return Some(Step::Cancelled);
+                }
+            }
+            Stage::Over => {}
+        }
+        None
+    }
+}
+
+impl Held {
+    fn new(now_us: u64, width_ns: u32) -> Self {
+        Self {
+            since_us: now_us,
+            first_ns: width_ns,
+            sum_ns: 0,
+            count: 0,
+        }
+    }
+
+    /// One more pulse; a stick that has moved begins anew.
+    fn add(&mut self, now_us: u64, width_ns: u32) {
+        if self.first_ns.abs_diff(width_ns) > STEADY_NS {
+            *self = Self::new(now_us, width_ns);
+        }
+        self.sum_ns += i64::from(width_ns) - i64::from(self.first_ns);
+        self.count += 1;
+    }
+
+    fn for_us(&self, now_us: u64) -> u64 {
+        now_us.saturating_sub(self.since_us)
+    }
+
+    fn mean_ns(&self) -> u32 {
+        let mean_ns = self.sum_ns / i64::from(self.count.max(1));
+        // The mean strays no further from the first than any of the widths.
+        self.first_ns.saturating_add_signed(mean_ns as i32)
+    }
+}
+
+/// To the nearest.
+fn whole_us(ns: u32) -> u16 {
+    ((ns + 500) / 1000) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    /// A calibration, a clock, and pulses each 20 ms.
+    #[derive(Default)]
+    struct Bench {
+        calibration: Calibration,
+        now_us: u64,
+    }
+
+    impl Bench {
+        /// What is told, and how many ms after the first of these pulses.
+        fn hold(&mut self, ms: u64, width_us: impl Fn(u64) -> u32) -> Vec<(u64, Step)> {
+            let mut steps = Vec::new();
+            for pulse in 0..ms / 20 {
+                let step = self.calibration.pulse(self.now_us, width_us(pulse) * 1000);
+                steps.extend(step.map(|step| (pulse * 20, step)));
+                self.now_us += 20_000;
+            }
+            steps
+        }
+    }
+
+    const DONE: Step = Step::Done(EndPoints {
+        min_us: 1105,
+        max_us: 1912,
+    });
+
+    #[test]
+    fn high_for_three_seconds_then_low_for_one_and_a_half_is_taken() {
+        let mut bench = Bench::default();
+        assert_eq!(bench.hold(5_000, |_| 1912), [(3_000, Step::Full)]);
+        assert_eq!(bench.hold(400, |n| 1900 - n as u32 * 40), []);
+        assert_eq!(bench.hold(2_000, |_| 1105), [(1_500, DONE)]);
+        // Once: nothing that comes later is a calibration.
+        assert_eq!(bench.hold(5_000, |_| 1950), []);
+        assert_eq!(bench.hold(5_000, |_| 1050), []);
+    }
+
+    #[test]
+    fn the_mean_is_taken_of_what_jitters() {
+        let mut bench = Bench::default();
+        let jitter = |n: u64| (n % 7) as u32 * 2;
+        assert_eq!(
+            bench.hold(3_020, |n| 1906 + jitter(n)),
+            [(3_000, Step::Full)]
+        );
+        assert_eq!(bench.hold(1_520, |n| 1099 + jitter(n)), [(1_500, DONE)]);
+    }
+
+    #[test]
+    fn a_stick_that_moves_at_its_end_is_waited_for() {
+        let mut bench = Bench::default();
+        assert_eq!(bench.hold(2_900, |n| 1750 + n as u32), []);
+        assert_eq!(bench.hold(3_020, |_| 1912), [(3_000, Step::Full)]);
+        assert_eq!(bench.hold(1_400, |_| 1200), []);
+        assert_eq!(bench.hold(1_520, |_| 1105), [(1_500, DONE)]);
+    }
+
+    #[test]
+    fn anything_else_at_first_is_no_calibration() {
+        for first_us in [700, 1000, 1500, 1699, 2201] {
+            let mut bench = Bench::default();
+            bench.hold(20, |_| first_us);
+            assert_eq!(bench.hold(5_000, |_| 1912), []);
+            assert_eq!(bench.hold(5_000, |_| 1105), []);
+        }
+        // High, but lowered too early.
+        let mut bench = Bench::default();
+        bench.hold(2_980, |_| 1912);
+        assert_eq!(bench.hold(5_000, |_| 1105), []);
+        assert_eq!(bench.hold(5_000, |_| 1912), []);
+    }
+
+    #[test]
+    fn the_middle_and_a_span_too_small_cancel() {
+        for rest_us in [1500, 1301, 799] {
+            let mut bench = Bench::default();
+            bench.hold(3_020, |_| 1912);
+            let steps = bench.hold(9_000, |_| rest_us);
+            assert_eq!(steps, [(2_000, Step::Cancelled)], "{rest_us}");
+            assert_eq!(bench.hold(5_000, |_| 1105), []);
+        }
+        let mut bench = Bench::default();
+        bench.hold(3_020, |_| 1700);
+        assert_eq!(bench.hold(9_000, |_| 1201), [(2_000, Step::Cancelled)]);
+        let mut bench = Bench::default();
+        bench.hold(3_020, |_| 1700);
+        assert!(matches!(
+            bench.hold(9_000, |_| 1200)[..],
+            [(1_500, Step::Done(_))]
+        ));
+    }
+
+    #[test]
+    fn a_lost_signal_cancels() {
+        let mut bench = Bench::default();
+        bench.hold(2_000, |_| 1912);
+        assert_eq!(bench.calibration.lost(), None, "nothing was told yet");
+        assert_eq!(bench.hold(9_000, |_| 1912), []);
+
+        let mut bench = Bench::default();
+        bench.hold(3_500, |_| 1912);
+        bench.hold(1_000, |_| 1105);
+        assert_eq!(bench.calibration.lost(), Some(Step::Cancelled));
+        assert_eq!(bench.hold(9_000, |_| 1105), []);
+    }
+}

@@ -1,0 +1,309 @@
+//! DShot's commands: values 1 to 47.
+//!
+//! | value | meaning | in a row |
+//! |---|---|---|
+//! | 1 to 5 | beacon, the motor as a loudspeaker | 1 |
+//! | 6 | the ESC's information on the serial line | 1 |
+//! | 7, 8 | direction 1 or 2: `MOT_DIR` 0 or 1 | 6 |
+//! | 9, 10 | one direction of throttle or two: `INP_3D` 0 or 1 | 6 |
+//! | 12 | save the settings | 6 |
+//! | 13, 14 | extended telemetry on, off | 6 |
+//! | 20, 21 | turn as `MOT_DIR` says, or against it, until the next start | 6 |
+//! | 22, 26 | the light on, off | 1 |
+//! | 31 | silent mode on, off: no tunes but beacons | 6 |
+//!
+//! The others are heard and ignored, and count as zero throttle like these: 11 asks for settings in
+//! a form that nobody has published, 23 to 25 and 27 to 29 are for lights that no board here has, 30
+//! is an audio stream, 32 to 35 switch a telemetry that bidirectional DShot has replaced, and the
+//! rest has no meaning.
+//!
+//! A command is obeyed only while the motor stands, and once for all its repeats: flight controllers
+//! send most of them ten times. One that counts at once may be another frame whose errors the check
+//! sum has not shown, so it does not where frames have been bad of late: there it needs six like the
+//! rest. Flight controllers send a beacon once. What this cannot prevent: on a wire that has shown no
+//! bad frame for a second, or none yet, one frame whose errors pass the check sum can sound a beacon,
+//! send the information or switch the light. What changes something always takes six.
+
+use super::dshot::Frame;
+use crate::tune::Beacon;
+
+/// Frames in a row that a command takes which changes something.
+const REPEATS: u8 = 6;
+
+/// For how long a bad frame makes the wire one whose single frames prove nothing, µs.
+const DOUBT_US: u64 = 1_000_000;
+
+/// The least time between two beacons, which flight controllers leave too, µs.
+const BEACON_APART_US: u64 = 260_000;
+
+/// What a command wants done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Sound a beacon.
+    Beacon(Beacon),
+    /// Send the ESC's information on the serial line.
+    Info,
+    /// Set `MOT_DIR`, to 1 if reversed.
+    Direction {
+        /// Whether it is the other direction.
+        reversed: bool,
+    },
+    /// Set `INP_3D`.
+    TwoDirections(bool),
+    /// Store the parameters.
+    Save,
+    /// Turn extended telemetry on or off.
+    Extended(bool),
+    /// Turn as `MOT_DIR` says or against it, until the next start.
+    Spin {
+        /// Whether it is against `MOT_DIR`.
+        opposite: bool,
+    },
+    /// Turn the light on or off.
+    Light(bool),
+    /// Turn tunes off, or on again.
+    Silent,
+}
+
+impl Order {
+    /// What this value means.
+    pub(crate) fn of(value: u16) -> Option<Self> {
+        Some(match value {
+            1 => Self::Beacon(Beacon::One),
+            2 => Self::Beacon(Beacon::Two),
+            3 => Self::Beacon(Beacon::Three),
+            4 => Self::Beacon(Beacon::Four),
+            5 => Self::Beacon(Beacon::Five),
+            6 => Self::Info,
+            7 => Self::Direction { reversed: false },
+            8 => Self::Direction { reversed: true },
+            9 => Self::TwoDirections(false),
+            10 => Self::TwoDirections(true),
+            12 => Self::Save,
+            13 => Self::Extended(true),
+            14 => Self::Extended(false),
+            20 => Self::Spin { opposite: false },
+            21 => Self::Spin { opposite: true },
+            22 => Self::Light(true),
+            26 => Self::Light(false),
+            31 => Self::Silent,
+            _ => return None,
+        })
+    }
+
+    /// Frames in a row that it takes. One is enough where what it does ends by itself or is only to
+    /// be seen.
+    fn repeats(self) -> u8 {
+        match self {
+            Self::Beacon(_) | Self::Info | Self::Light(_) => 1,
+            _ => REPEATS,
+        }
+    }
+}
+
+/// Frames in a row that the command of this value takes where none has been bad of late; nothing
+/// for one that is ignored.
+pub fn repeats(value: u16) -> Option<u8> {
+    Order::of(value).map(Order::repeats)
+}
+
+/// Counts repeats.
+#[derive(Clone, Debug, Default)]
+pub struct Commands {
+    value: u16,
+    /// Valid frames of this value in a row; it stops at [`REPEATS`].
+    count: u8,
+    /// Whether this value has been obeyed since it came.
+    done: bool,
+    bad_us: Option<u64>,
+    beacon_us: Option<u64>,
+}
+
+impl Commands {
+    /// A valid frame while the motor stands. The telemetry bit makes no difference.
+    pub fn frame(&mut self, now_us: u64, frame: Frame) -> Option<Order> {
+        if frame.value != self.value {
+            self.interrupt();
+            self.value = frame.value;
+        }
+        self.count = REPEATS.min(self.count + 1);
+        let order = Order::of(frame.value)?;
+        let doubted = within(now_us, self.bad_us, DOUBT_US);
+        let enough = if doubted { REPEATS } else { order.repeats() };
+        if self.done || self.count < enough {
+            return None;
+        }
+        self.done = true;
+        if matches!(order, Order::Beacon(_)) {
+            if within(now_us, self.beacon_us, BEACON_APART_US - 1) {
+                return None;
+            }
+            self.beacon_us = Some(now_us);
+        }
+        Some(order)
+    }
+
+    /// A bad frame: the next ones are in a row only with each other.
+    pub fn bad(&mut self, now_us: u64) {
+        self.bad_us = Some(now_us);
+        self.count = 0;
+    }
+
+    /// The signal was lost, or the motor turns: nothing has been heard.
+    pub fn interrupt(&mut self) {
+        self.value = 0;
+        self.count = 0;
+        self.done = false;
+    }
+}
+
+/// Whether it is at most `most_us` since some time.
+fn within(now_us: u64, since_us: Option<u64>, most_us: u64) -> bool {
+    since_us.is_some_and(|since_us| now_us.saturating_sub(since_us) <= most_us)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    /// Commands, a clock, and frames 1 ms apart.
+    struct Bench {
+        commands: Commands,
+        now_us: u64,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            Self {
+                commands: Commands::default(),
+                now_us: 5_000_000,
+            }
+        }
+
+        /// What is ordered, and by which of these frames, counted from 1.
+        fn play(&mut self, count: usize, value: u16) -> Vec<(usize, Order)> {
+            let mut orders = Vec::new();
+            for number in 1..=count {
+                self.now_us += 1_000;
+                let frame = Frame {
+                    value,
+                    telemetry: number % 2 == 0,
+                };
+                let order = self.commands.frame(self.now_us, frame);
+                orders.extend(order.map(|order| (number, order)));
+            }
+            orders
+        }
+
+        fn bad(&mut self) {
+            self.now_us += 1_000;
+            self.commands.bad(self.now_us);
+        }
+    }
+
+    /// Every value that means something, and how many frames it takes.
+    const MEANT: [(u16, usize, Order); 18] = [
+        (1, 1, Order::Beacon(Beacon::One)),
+        (2, 1, Order::Beacon(Beacon::Two)),
+        (3, 1, Order::Beacon(Beacon::Three)),
+        (4, 1, Order::Beacon(Beacon::Four)),
+        (5, 1, Order::Beacon(Beacon::Five)),
+        (6, 1, Order::Info),
+        (7, 6, Order::Direction { reversed: false }),
+        (8, 6, Order::Direction { reversed: true }),
+        (9, 6, Order::TwoDirections(false)),
+        (10, 6, Order::TwoDirections(true)),
+        (12, 6, Order::Save),
+        (13, 6, Order::Extended(true)),
+        (14, 6, Order::Extended(false)),
+        (20, 6, Order::Spin { opposite: false }),
+        (21, 6, Order::Spin { opposite: true }),
+        (22, 1, Order::Light(true)),
+        (26, 1, Order::Light(false)),
+        (31, 6, Order::Silent),
+    ];
+
+    #[test]
+    fn each_command_is_obeyed_once_and_by_its_count() {
+        for value in 0..=2047 {
+            let meant = MEANT.iter().find(|(other, ..)| *other == value);
+            let wanted: Vec<_> = meant
+                .map(|(_, at, order)| (*at, *order))
+                .into_iter()
+                .collect();
+            let count = repeats(value).map(usize::from);
+            assert_eq!(count, meant.map(|(_, at, _)| *at), "{value}");
+            let mut bench = Bench::new();
+            assert_eq!(bench.play(10_000, value), wanted, "{value}");
+            bench.now_us += 260_000;
+            bench.play(1, 0);
+            assert_eq!(bench.play(10, value), wanted, "{value} again");
+        }
+    }
+
+    #[test]
+    fn five_are_not_six() {
+        for (value, frames, _) in MEANT.into_iter().filter(|(_, frames, _)| *frames == 6) {
+            for between in [0, 11, 30, 48] {
+                let mut bench = Bench::new();
+                for _ in 0..100 {
+                    assert_eq!(bench.play(frames - 1, value), [], "{value}");
+                    assert_eq!(bench.play(1, between), [], "{value}, {between}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_bad_frame_breaks_a_row_and_does_not_make_a_second_one() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.play(5, 21), []);
+        bench.bad();
+        assert_eq!(bench.play(5, 21), []);
+        assert_eq!(bench.play(1, 21), [(1, Order::Spin { opposite: true })]);
+        bench.bad();
+        assert_eq!(bench.play(100, 21), []);
+    }
+
+    #[test]
+    fn for_a_second_after_a_bad_frame_a_beacon_takes_six() {
+        let mut bench = Bench::new();
+        bench.bad();
+        assert_eq!(bench.play(5, 3), []);
+        assert_eq!(bench.play(5, 3), [(1, Order::Beacon(Beacon::Three))]);
+        bench.bad();
+        bench.play(999, 0);
+        assert_eq!(bench.play(1, 6), [], "a second");
+        bench.play(1, 0);
+        assert_eq!(bench.play(1, 6), [(1, Order::Info)], "longer");
+    }
+
+    #[test]
+    fn beacons_are_260_ms_apart() {
+        let mut bench = Bench::new();
+        let mut beacons_us = Vec::new();
+        for _ in 0..1_000 {
+            bench.play(1, 0);
+            if !bench.play(1, 1).is_empty() {
+                beacons_us.push(bench.now_us);
+            }
+        }
+        assert_eq!(beacons_us.len(), 8, "2 s");
+        assert!(
+            beacons_us
+                .windows(2)
+                .all(|pair| pair[1] - pair[0] == 260_000)
+        );
+    }
+
+    #[test]
+    fn what_was_interrupted_is_counted_anew() {
+        let mut bench = Bench::new();
+        bench.play(5, 12);
+        bench.commands.interrupt();
+        assert_eq!(bench.play(6, 12), [(6, Order::Save)]);
+        bench.commands.interrupt();
+        assert_eq!(bench.play(6, 12), [(6, Order::Save)]);
+    }
+}

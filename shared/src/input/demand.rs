@@ -1,0 +1,53 @@
+//! What a frame or a pulse asks of the motor.
+
+use super::Throttle;
+use super::dshot::Kind;
+use super::endpoints::EndPoints;
+use super::line::Event;
+
+/// What is asked of the motor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Demand {
+    /// Not to turn. So do DShot's stop and its commands.
+    Zero,
+    /// To turn.
+    Throttle(Throttle),
+}
+
+/// How frames and pulses are read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// Whether throttle has two directions (`INP_3D`).
+    pub two_directions: bool,
+    /// The ends of the pulses' range.
+    pub ends: EndPoints,
+}
+
+impl Default for Reading {
+    /// One direction, 1000 to 2000 µs.
+    fn default() -> Self {
+        Self {
+            two_directions: false,
+            ends: EndPoints {
+                min_us: 1000,
+                max_us: 2000,
+            },
+        }
+    }
+}
+
+impl Reading {
+    /// What an event asks for; a bad one asks for nothing.
+    pub fn demand(&self, event: &Event) -> Option<Demand> {
+        Some(match *event {
+            Event::Frame { frame, .. } => match frame.kind(self.two_directions) {
+                Kind::Throttle(throttle) => Demand::Throttle(throttle),
+                Kind::Stop | Kind::Command(_) => Demand::Zero,
+            },
+            Event::Pulse { kind, width_ns } => {
+                self.ends.demand(kind, width_ns, self.two_directions)
+            }
+            Event::Bad => return None,
+        })
+    }
+}

@@ -1,0 +1,153 @@
+//! Which signal a line carries, from what the decoders find in its edges.
+//!
+//! DShot and pulses have a candidate each, with what spoke for it and what against it. A candidate
+//! that lasts is the signal.
+
+use super::line::Event;
+use super::signal::{Pulse, Signal};
+
+/// How often a signal must have been found, and for how long, before it is believed. At 50 Hz four
+/// pulses take 60 ms, and the first one may come 20 ms late.
+const HITS: u32 = 4;
+const HELD_MS: u32 = 50;
+
+/// The longest time between two hits, ms.
+const GAP_MS: u32 = 100;
+
+/// What the width of a pulse may differ from the one before, as a part of its range: a stick that
+/// goes from end to end in 0.16 s, at 50 Hz. Random edges differ by more.
+const STEADY_PART: u32 = 8;
+
+/// The candidates of one line.
+#[derive(Clone, Debug)]
+pub(super) struct Detector {
+    held_ticks: u32,
+    gap_ticks: u32,
+    frames: Option<Candidate>,
+    pulses: Option<Candidate>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    signal: Signal,
+    hits: u32,
+    misses: u32,
+    first_at: u32,
+    last_at: u32,
+    /// Of the last pulse, ns.
+    width_ns: u32,
+}
+
+impl Detector {
+    pub(super) fn new(tick_hz: u32) -> Self {
+        Self {
+            held_ticks: tick_hz / 1000 * HELD_MS,
+            gap_ticks: tick_hz / 1000 * GAP_MS,
+            frames: None,
+            pulses: None,
+        }
+    }
+
+    /// Begins anew.
+    pub(super) fn clear(&mut self) {
+        self.frames = None;
+        self.pulses = None;
+    }
+
+    /// The signal, once it is known.
+    pub(super) fn signal(&self) -> Option<Signal> {
+        let known = |candidate: &Candidate| {
+            candidate.hits >= HITS
+                && candidate.misses <= candidate.hits / 2
+                && candidate.last_at.wrapping_sub(candidate.first_at) >= self.held_ticks
+        };
+        // A right check sum says more than a width.
+        let leading = self.frames.or(self.pulses);
+        leading.filter(known).map(|candidate| candidate.signal)
+    }
+
+    /// Weighs what the DShot decoder has found, and returns it if it is to be handed on.
+    pub(super) fn frame(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
+        let Some(signal) = event.signal() else {
+            self.frames = self.frames.and_then(Candidate::missed);
+            // While pulses lead, these edges are theirs.
+            return self.pulses.is_none().then_some(event);
+        };
+        let gap_ticks = self.gap_ticks;
+        if let Some(frames) = self
+            .frames
+            .filter(|frames| frames.lasts(at_ticks, gap_ticks))
+        {
+            if frames.signal == signal {
+                self.frames = Some(frames.hit(at_ticks, 0));
+                return Some(event);
+            }
+            if let Some(frames) = frames.missed() {
+                self.frames = Some(frames);
+                return Some(Event::Bad);
+            }
+        }
+        self.frames = Some(Candidate::new(signal, at_ticks, 0));
+        Some(event)
+    }
+
+    /// Weighs what the pulse decoder has found, and returns it if it is to be handed on.
+    pub(super) fn pulse(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
+        let before = self.pulses.take();
+        if let Event::Pulse { kind, width_ns } = event {
+            let signal = Signal::Pulse(kind);
+            // Nothing may speak against pulses, which have no check sum.
+            let same = before.filter(|pulses| {
+                pulses.signal == signal
+                    && pulses.lasts(at_ticks, self.gap_ticks)
+                    && is_steady(kind, pulses.width_ns, width_ns)
+            });
+            let candidate = same.map_or(Candidate::new(signal, at_ticks, width_ns), |pulses| {
+                pulses.hit(at_ticks, width_ns)
+            });
+            self.pulses = Some(candidate);
+        } else if before.is_none() {
+            return None;
+        }
+        // While frames lead, these edges are theirs.
+        self.frames.is_none().then_some(event)
+    }
+}
+
+impl Candidate {
+    /// A first hit.
+    fn new(signal: Signal, at_ticks: u32, width_ns: u32) -> Self {
+        Self {
+            signal,
+            hits: 1,
+            misses: 0,
+            first_at: at_ticks,
+            last_at: at_ticks,
+            width_ns,
+        }
+    }
+
+    fn hit(self, at_ticks: u32, width_ns: u32) -> Self {
+        Self {
+            hits: self.hits.saturating_add(1),
+            last_at: at_ticks,
+            width_ns,
+            ..self
+        }
+    }
+
+    /// Nothing when the misses outweigh the hits.
+    fn missed(self) -> Option<Self> {
+        let misses = self.misses.saturating_add(1);
+        (misses <= self.hits).then_some(Self { misses, ..self })
+    }
+
+    fn lasts(&self, at_ticks: u32, gap_ticks: u32) -> bool {
+        at_ticks.wrapping_sub(self.last_at) <= gap_ticks
+    }
+}
+
+fn is_steady(kind: Pulse, before_ns: u32, width_ns: u32) -> bool {
+    let (least_ns, most_ns) = kind.end_points_ns();
+    before_ns.abs_diff(width_ns) <= (most_ns - least_ns) / STEADY_PART
+}

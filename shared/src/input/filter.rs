@@ -1,0 +1,180 @@
+//! Drops levels that are too short to be meant.
+//!
+//! An edge is believed when its level has lasted for the filter's time. A shorter level vanishes
+//! as if it had never been, and the level around it goes on.
+
+/// An edge that is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Edge {
+    /// When it came.
+    pub(super) at_ticks: u32,
+    /// The level from then on.
+    pub(super) level: bool,
+}
+
+/// What an edge told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Told {
+    /// The edge before, if this one confirms it.
+    pub(super) believed: Option<Edge>,
+    /// An edge was missed before this one: it tells a level that the line already had.
+    pub(super) missed: bool,
+}
+
+/// The filter of one line.
+#[derive(Clone, Debug)]
+pub(super) struct Filter {
+    /// How long a level must last, ticks.
+    pub(super) time_ticks: u32,
+    /// The level that is believed; nothing before the first edge.
+    level: Option<bool>,
+    /// An edge away from it, which is not believed yet.
+    pending: Option<Edge>,
+}
+
+impl Filter {
+    pub(super) fn new(time_ticks: u32) -> Self {
+        Self {
+            time_ticks,
+            level: None,
+            pending: None,
+        }
+    }
+
+    /// Takes an edge as the timer saw it.
+    pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Told {
+        let believed = match self.pending {
+            Some(pending) if at_ticks.wrapping_sub(pending.at_ticks) >= self.time_ticks => {
+                self.believe()
+            }
+            _ => None,
+        };
+        let before = self
+            .pending
+            .map_or(self.level, |pending| Some(pending.level));
+        let missed = before == Some(level);
+        if missed || self.level == Some(level) {
+            // Nobody knows since when the line has had a level that was missed.
+            self.level = Some(level);
+            self.pending = None;
+        } else {
+            self.level = Some(!level);
+            self.pending = Some(Edge { at_ticks, level });
+        }
+        Told { believed, missed }
+    }
+
+    /// Believes the last edge, if its level has lasted until now.
+    pub(super) fn settle(&mut self, now_ticks: u32) -> Option<Edge> {
+        let pending = self.pending?;
+        (since(now_ticks, pending.at_ticks) >= self.time_ticks)
+            .then(|| self.believe())
+            .flatten()
+    }
+
+    /// The line has been silent: what its level was does not matter to the next edge.
+    pub(super) fn rest(&mut self) {
+        self.level = None;
+    }
+
+    /// The last edge, while it is not believed.
+    pub(super) fn pending(&self) -> Option<Edge> {
+        self.pending
+    }
+
+    /// Believes the last edge, however short its level.
+    pub(super) fn believe(&mut self) -> Option<Edge> {
+        let edge = self.pending.take()?;
+        self.level = Some(edge.level);
+        Some(edge)
+    }
+}
+
+/// The ticks from `at_ticks` to `now_ticks`; none for a time that is still to come, since an edge
+/// may be captured after the time was read.
+pub(super) fn since(now_ticks: u32, at_ticks: u32) -> u32 {
+    (now_ticks.wrapping_sub(at_ticks) as i32).max(0) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    /// What a filter of 10 ticks believes of these edges, the last of them long before the end.
+    fn believed(edges: &[(u32, bool)]) -> Vec<(u32, bool)> {
+        let mut filter = Filter::new(10);
+        let mut believed: Vec<_> = edges
+            .iter()
+            .filter_map(|&(at_ticks, level)| filter.edge(at_ticks, level).believed)
+            .collect();
+        let end = edges.last().map_or(0, |(at_ticks, _)| at_ticks + 1000);
+        believed.extend(filter.settle(end));
+        assert_eq!(filter.settle(end + 1000), None);
+        believed
+            .iter()
+            .map(|edge| (edge.at_ticks, edge.level))
+            .collect()
+    }
+
+    #[test]
+    fn levels_that_last_are_believed_at_their_first_edge() {
+        let edges = [(100, true), (110, false), (120, true), (500, false)];
+        assert_eq!(believed(&edges), edges);
+    }
+
+    #[test]
+    fn shorter_levels_vanish() {
+        let around = [(100, true), (300, false)];
+        for start in [120, 150, 289] {
+            let edges = [
+                around[0],
+                (start, false),
+                (start + 9, true),
+                around[1],
+                (320, true),
+                (329, false),
+            ];
+            assert_eq!(believed(&edges), around, "{start}");
+        }
+    }
+
+    #[test]
+    fn a_contact_that_bounces_counts_from_its_last_bounce() {
+        let edges = [
+            (100, true),
+            (103, false),
+            (106, true),
+            (109, false),
+            (112, true),
+        ];
+        assert_eq!(believed(&edges), [(112, true)]);
+    }
+
+    #[test]
+    fn the_end_of_a_level_waits_for_the_filter() {
+        let mut filter = Filter::new(10);
+        filter.edge(u32::MAX - 3, true);
+        assert_eq!(filter.settle(u32::MAX - 4), None, "before the edge");
+        assert_eq!(filter.settle(5), None);
+        let edge = Edge {
+            at_ticks: u32::MAX - 3,
+            level: true,
+        };
+        assert_eq!(filter.settle(6), Some(edge));
+    }
+
+    #[test]
+    fn an_edge_to_the_same_level_tells_of_a_missed_one() {
+        let mut filter = Filter::new(10);
+        assert!(!filter.edge(100, true).missed, "no level was known");
+        let told = filter.edge(200, true);
+        assert!(told.missed);
+        assert_eq!(told.believed.map(|edge| edge.at_ticks), Some(100));
+        assert!(!filter.edge(300, false).missed);
+        assert_eq!(filter.settle(400).map(|edge| edge.at_ticks), Some(300));
+        assert!(filter.edge(500, false).missed);
+        filter.rest();
+        assert!(!filter.edge(900, false).missed, "after a silence");
+    }
+}

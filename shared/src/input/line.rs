@@ -1,0 +1,218 @@
+//! One throttle wire: timed edges in, frames and pulses out.
+
+use super::capture;
+use super::detect::Detector;
+use super::dshot::{Frame, Rate};
+use super::filter::{Edge, Filter, since};
+use super::pulse;
+use super::signal::{Pulse, Signal};
+
+/// A line without an edge for so long is at rest, whatever was on it. At 50 Hz pulses leave 19 ms.
+const SILENCE_MS: u32 = 100;
+
+/// What has been found on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A DShot frame with a right check sum.
+    Frame {
+        /// How fast it was sent.
+        rate: Rate,
+        /// Whether the line rests high and the check sum is inverted.
+        bidirectional: bool,
+        /// What it carries.
+        frame: Frame,
+        /// When its first edge came, in ticks of the capturing timer.
+        first_edge_ticks: u32,
+    },
+    /// A pulse.
+    Pulse {
+        /// Which kind.
+        kind: Pulse,
+        /// Its width, ns.
+        width_ns: u32,
+    },
+    /// Edges that were neither.
+    Bad,
+}
+
+/// The wire's decoder.
+#[derive(Clone, Debug)]
+pub struct Line {
+    tick_hz: u32,
+    filter: Filter,
+    frames: capture::Decoder,
+    pulses: pulse::Decoder,
+    detector: Detector,
+    signal: Option<Signal>,
+    forced: bool,
+    edge_at: u32,
+    /// The line has been silent for long.
+    silent: bool,
+}
+
+impl Line {
+    /// A quiet line, captured by a timer of `tick_hz`.
+    pub fn new(tick_hz: u32) -> Self {
+        Self {
+            tick_hz,
+            filter: Filter::new(filter_ticks(tick_hz, None)),
+            frames: capture::Decoder::new(tick_hz),
+            pulses: pulse::Decoder::new(tick_hz),
+            detector: Detector::new(tick_hz),
+            signal: None,
+            forced: false,
+            edge_at: 0,
+            silent: true,
+        }
+    }
+
+    /// Takes one signal only, and counts others as bad; `None` detects it, anew from now on.
+    pub fn force(&mut self, signal: Option<Signal>) {
+        self.forced = signal.is_some();
+        self.begin(signal);
+    }
+
+    /// The signal that was forced or has been detected. Before it is known, events may come from
+    /// any signal, and must not turn a motor.
+    pub fn signal(&self) -> Option<Signal> {
+        self.signal
+    }
+
+    /// The signal is lost: what was detected is forgotten, what was forced stays.
+    pub fn lost(&mut self) {
+        if self.signal.is_some() && !self.forced {
+            self.begin(None);
+        }
+    }
+
+    /// Takes one edge: when it came, in ticks that wrap, and the level from then on.
+    ///
+    /// An edge is believed when its level has lasted for the filter's time, or when a frame ends with
+    /// it: a check sum says more. So what this returns may come from the edge before.
+    pub fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
+        self.edge_at = at_ticks;
+        self.silent = false;
+        let told = self.filter.edge(at_ticks, level);
+        let event = told.believed.and_then(|edge| self.decode(edge));
+        if told.missed {
+            self.frames.spoil(at_ticks);
+            self.pulses.spoil();
+        }
+        if event.is_some() {
+            return event;
+        }
+        let last = self.filter.pending()?;
+        if matches!(self.signal, Some(Signal::Pulse(_))) || !self.frames.ends_with(last) {
+            return None;
+        }
+        let last = self.filter.believe()?;
+        self.decode(last)
+    }
+
+    /// Believes the last edge if the filter's time has passed since. To be called once a control
+    /// period or more often, so that the end of a frame does not wait for the next one's edges.
+    pub fn settle(&mut self, now_ticks: u32) -> Option<Event> {
+        if self.silent {
+            return None;
+        }
+        if let Some(edge) = self.filter.settle(now_ticks) {
+            return self.decode(edge);
+        }
+        if since(now_ticks, self.edge_at) >= self.tick_hz / 1000 * SILENCE_MS {
+            // Well before the ticks wrap, which would make a long level look like a short one.
+            self.silent = true;
+            self.filter.rest();
+            self.clear();
+            return None;
+        }
+        match self.signal {
+            Some(Signal::Dshot { .. }) => self.frames.settle(now_ticks),
+            Some(Signal::Pulse(_)) => None,
+            None => {
+                let event = self.frames.settle(now_ticks)?;
+                self.detector.frame(now_ticks, event)
+            }
+        }
+    }
+
+    fn decode(&mut self, edge: Edge) -> Option<Event> {
+        let Edge { at_ticks, level } = edge;
+        match self.signal {
+            Some(Signal::Dshot { .. }) => self.frames.edge(at_ticks, level),
+            Some(Signal::Pulse(_)) => self.pulses.edge(at_ticks, level),
+            None => {
+                let pulse = self.pulses.edge(at_ticks, level);
+                let pulse = pulse.and_then(|event| self.detector.pulse(at_ticks, event));
+                let frame = self.frames.edge(at_ticks, level);
+                let frame = frame.and_then(|event| self.detector.frame(at_ticks, event));
+                let signal = self.detector.signal();
+                if signal.is_some() {
+                    self.take_only(signal);
+                }
+                frame.or(pulse)
+            }
+        }
+    }
+
+    /// Begins to listen to one signal, or to find out which there is.
+    fn begin(&mut self, signal: Option<Signal>) {
+        self.take_only(signal);
+        self.clear();
+    }
+
+    fn take_only(&mut self, signal: Option<Signal>) {
+        self.signal = signal;
+        self.filter.time_ticks = filter_ticks(self.tick_hz, signal);
+        self.frames.take_only(match signal {
+            Some(Signal::Dshot {
+                rate,
+                bidirectional,
+            }) => Some((rate, bidirectional)),
+            _ => None,
+        });
+        self.pulses.take_only(match signal {
+            Some(Signal::Pulse(kind)) => Some(kind),
+            _ => None,
+        });
+    }
+
+    fn clear(&mut self) {
+        self.frames.clear();
+        self.pulses.clear();
+        self.detector.clear();
+    }
+}
+
+/// How long a level must last to be believed.
+fn filter_ticks(tick_hz: u32, signal: Option<Signal>) -> u32 {
+    let time_ns = match signal {
+        // A sixteenth of a bit. The shortest level of DShot1200 with its errors is 66 ns.
+        None => Rate::Dshot1200.bit_ns() / 16,
+        Some(Signal::Dshot { rate, .. }) => rate.bit_ns() / 16,
+        Some(Signal::Pulse(Pulse::Multishot)) => 200,
+        Some(Signal::Pulse(Pulse::OneShot125 | Pulse::OneShot42)) => 500,
+        Some(Signal::Pulse(Pulse::Servo)) => 2_000,
+    };
+    (u64::from(tick_hz) * u64::from(time_ns) / 1_000_000_000) as u32
+}
+
+impl Event {
+    /// The signal that it belongs to; nothing for a bad one.
+    pub fn signal(&self) -> Option<Signal> {
+        match *self {
+            Self::Frame {
+                rate,
+                bidirectional,
+                ..
+            } => Some(Signal::Dshot {
+                rate,
+                bidirectional,
+            }),
+            Self::Pulse { kind, .. } => Some(Signal::Pulse(kind)),
+            Self::Bad => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,119 @@
+//! What the wire has to tell a person, and when.
+
+use super::calibration::Step;
+use super::signal::Signal;
+
+/// The least time between two of the same kind, µs: a wire that fails again and again must not fill
+/// the MAVLink link.
+const APART_US: u64 = 1_000_000;
+
+/// For how long throttle is open before the ESC complains, µs.
+const OPEN_US: u64 = 500_000;
+/// Time between two complaints, µs.
+const OPEN_AGAIN_US: u64 = 3_000_000;
+
+/// Something to tell, in words or by a tune.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum News {
+    /// The wire carries this signal.
+    Identified(Signal),
+    /// The signal is gone.
+    Lost {
+        /// Whether the wire was armed.
+        armed: bool,
+    },
+    /// The wire is armed.
+    Armed,
+    /// The wire asks the motor to turn, and must show zero throttle first.
+    OpenThrottle,
+    /// A step of the stick's calibration.
+    Calibration(Step),
+}
+
+/// How things stand on the wire.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Standing {
+    /// The signal that has been identified and is there.
+    pub(super) signal: Option<Signal>,
+    pub(super) armed: bool,
+    /// Whether the wire asks the motor to turn, may not, and this is nobody's calibration.
+    pub(super) open: bool,
+}
+
+/// What has been told.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Announcer {
+    signal: Option<Signal>,
+    identified_us: Option<u64>,
+    /// A loss that is still to be told, and whether the wire was armed.
+    loss: Option<bool>,
+    lost_us: Option<u64>,
+    armed: bool,
+    open_since_us: Option<u64>,
+    open_told_us: Option<u64>,
+    step: Option<Step>,
+}
+
+impl Announcer {
+    /// A signal was lost.
+    pub(super) fn lost(&mut self, armed: bool) {
+        // Signals that nobody has heard of come and go in noise.
+        if armed || self.signal.is_some() {
+            self.loss = Some(armed || self.loss == Some(true));
+        }
+    }
+
+    /// The calibration has come a step further.
+    pub(super) fn calibration(&mut self, step: Option<Step>) {
+        self.step = step.or(self.step);
+    }
+
+    /// The next thing to tell; to be asked until there is none.
+    pub(super) fn next(&mut self, now_us: u64, standing: Standing) -> Option<News> {
+        if let Some(armed) = self.loss
+            && is_apart(now_us, self.lost_us, APART_US)
+        {
+            self.loss = None;
+            self.lost_us = Some(now_us);
+            self.signal = None;
+            // It may be armed again already.
+            self.armed = false;
+            return Some(News::Lost { armed });
+        }
+        if let Some(signal) = standing.signal
+            && self.loss.is_none()
+            && self.signal != standing.signal
+            && is_apart(now_us, self.identified_us, APART_US)
+        {
+            self.signal = standing.signal;
+            self.identified_us = Some(now_us);
+            return Some(News::Identified(signal));
+        }
+        if core::mem::replace(&mut self.armed, standing.armed) != standing.armed && standing.armed {
+            return Some(News::Armed);
+        }
+        if let Some(step) = self.step.take() {
+            return Some(News::Calibration(step));
+        }
+        self.next_open(now_us, standing.open)
+    }
+
+    fn next_open(&mut self, now_us: u64, open: bool) -> Option<News> {
+        if !open {
+            self.open_since_us = None;
+            return None;
+        }
+        let since_us = *self.open_since_us.get_or_insert(now_us);
+        if now_us.saturating_sub(since_us) < OPEN_US
+            || !is_apart(now_us, self.open_told_us, OPEN_AGAIN_US)
+        {
+            return None;
+        }
+        self.open_told_us = Some(now_us);
+        Some(News::OpenThrottle)
+    }
+}
+
+fn is_apart(now_us: u64, last_us: Option<u64>, apart_us: u64) -> bool {
+    last_us.is_none_or(|last_us| now_us.saturating_sub(last_us) >= apart_us)
+}

@@ -1,0 +1,173 @@
+//! The decoder of pulses at its bounds.
+
+use super::*;
+use proptest::prelude::*;
+use std::vec::Vec;
+
+/// A tick is a nanosecond: widths come out as they went in.
+const TICK_HZ: u32 = 1_000_000_000;
+
+/// A decoder and a line that is low.
+struct Wire {
+    decoder: Decoder,
+    now: u32,
+}
+
+impl Wire {
+    fn new() -> Self {
+        Self {
+            decoder: Decoder::new(TICK_HZ),
+            now: 0,
+        }
+    }
+
+    /// A low level and a pulse, ns.
+    fn pulse(&mut self, low: u32, width: u32) -> Option<Event> {
+        self.now = self.now.wrapping_add(low);
+        assert_eq!(self.decoder.edge(self.now, true), None);
+        self.now = self.now.wrapping_add(width);
+        self.decoder.edge(self.now, false)
+    }
+}
+
+fn pulse(kind: Pulse, width_ns: u32) -> Option<Event> {
+    Some(Event::Pulse { kind, width_ns })
+}
+
+#[test]
+fn widths_tell_the_kind() {
+    for (kind, least, most) in [
+        (Pulse::Servo, 800_000, 2_200_000),
+        (Pulse::OneShot125, 100_000, 275_000),
+        (Pulse::OneShot42, 33_600, 92_400),
+        (Pulse::Multishot, 4_000, 27_500),
+    ] {
+        for width in [least, (least + most) / 2, most] {
+            assert_eq!(Wire::new().pulse(5_000_000, width), pulse(kind, width));
+        }
+        for width in [least - 1, most + 1] {
+            assert_eq!(Wire::new().pulse(5_000_000, width), Some(Event::Bad));
+        }
+    }
+}
+
+#[test]
+fn one_kind_alone_is_taken() {
+    for only in Pulse::ALL {
+        let mut wire = Wire::new();
+        wire.decoder.take_only(Some(only));
+        for kind in Pulse::ALL {
+            wire.decoder.clear();
+            let width = kind.end_points_ns().0;
+            let wanted = if kind == only {
+                pulse(kind, width)
+            } else {
+                Some(Event::Bad)
+            };
+            assert_eq!(wire.pulse(5_000_000, width), wanted);
+        }
+    }
+}
+
+#[test]
+fn pulses_need_a_low_between_them() {
+    for (width, low) in [
+        (2_000_000, 2_000_000 / 64),
+        (250_000, 250_000 / 64),
+        (42_000, 1_000),
+    ] {
+        let mut wire = Wire::new();
+        assert!(wire.pulse(5_000_000, width).is_some());
+        assert_ne!(wire.pulse(low, width), Some(Event::Bad));
+        assert_eq!(wire.pulse(low - 1, width), Some(Event::Bad));
+    }
+}
+
+#[test]
+fn multishot_comes_at_most_at_32_khz() {
+    let mut wire = Wire::new();
+    assert_eq!(wire.pulse(5_000_000, 5_000), pulse(Pulse::Multishot, 5_000));
+    for _ in 0..10 {
+        let event = wire.pulse(31_250 - 5_000, 5_000);
+        assert_eq!(event, pulse(Pulse::Multishot, 5_000));
+    }
+    assert_eq!(wire.pulse(28_000 - 5_001, 5_000), Some(Event::Bad));
+}
+
+#[test]
+fn the_pulse_after_what_was_none_is_not_reported() {
+    let mut wire = Wire::new();
+    assert_eq!(wire.pulse(5_000_000, 3_000_000), Some(Event::Bad));
+    assert_eq!(wire.pulse(5_000_000, 1_000_000), None);
+    assert_eq!(
+        wire.pulse(5_000_000, 1_000_000),
+        pulse(Pulse::Servo, 1_000_000)
+    );
+    wire.decoder.spoil();
+    assert_eq!(wire.pulse(5_000_000, 1_000_000), None);
+    assert_eq!(
+        wire.pulse(5_000_000, 1_000_000),
+        pulse(Pulse::Servo, 1_000_000)
+    );
+}
+
+#[test]
+fn bits_of_dshot150_are_no_multishot_pulses() {
+    let mut wire = Wire::new();
+    let mut events = Vec::new();
+    for _ in 0..100 {
+        events.push(wire.pulse(20_000, 5_000));
+        for _ in 1..16 {
+            events.push(wire.pulse(1_667, 5_000));
+        }
+    }
+    // The first one of all has none before it that speaks against it.
+    let (first, others) = events.split_first().expect("pulses were played");
+    assert_eq!(*first, pulse(Pulse::Multishot, 5_000));
+    assert!(!others.iter().flatten().any(|event| *event != Event::Bad));
+}
+
+#[test]
+fn the_end_of_a_pulse_that_was_not_seen_to_begin_is_nothing() {
+    let mut decoder = Decoder::new(TICK_HZ);
+    assert_eq!(decoder.edge(1_500_000, false), None);
+    let mut wire = Wire::new();
+    wire.pulse(5_000_000, 1_000_000);
+    wire.decoder.edge(wire.now + 1_000_000, true);
+    wire.decoder.clear();
+    assert_eq!(wire.decoder.edge(wire.now + 2_000_000, false), None);
+}
+
+proptest! {
+    #[test]
+    fn widths_are_right_to_half_a_nanosecond(
+        tick_hz in 10_000_000_u32..=u32::MAX,
+        width in 800_000.0..2_200_000.0_f64,
+        start: u32,
+    ) {
+        let ticks = (width * 1e-9 * f64::from(tick_hz)).ceil();
+        let mut decoder = Decoder::new(tick_hz);
+        decoder.edge(start, true);
+        let event = decoder.edge(start.wrapping_add(ticks as u32), false);
+        let Some(Event::Pulse { width_ns, .. }) = event else {
+            return Err(TestCaseError::fail("no pulse"));
+        };
+        let true_ns = ticks * 1e9 / f64::from(tick_hz);
+        // The time of a tick is known to 2⁻²⁴ ns.
+        let error_ns = (f64::from(width_ns) - true_ns).abs();
+        prop_assert!(error_ns <= 0.5 + ticks / f64::from(1 << TICK_PLACES), "{error_ns}");
+    }
+
+    #[test]
+    fn any_edges_are_taken(
+        tick_hz: u32,
+        steps in prop::collection::vec((any::<u32>(), any::<bool>()), 0..50),
+    ) {
+        let mut decoder = Decoder::new(tick_hz);
+        let mut at = 0_u32;
+        for (step, level) in steps {
+            at = at.wrapping_add(step);
+            decoder.edge(at, level);
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! What the throttle wire has to tell, in words.
+
+use mavlink::dialects::ardupilotmega::MavSeverity;
+
+use crate::input::News;
+use crate::input::calibration::Step;
+
+/// How grave it is and what it says, in two pieces; nothing for what only a tune tells.
+pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
+    Some(match news {
+        News::Identified(signal) => (
+            MavSeverity::MAV_SEVERITY_INFO,
+            ["Throttle: ", signal.name()],
+        ),
+        News::Lost { armed: true } => (
+            MavSeverity::MAV_SEVERITY_WARNING,
+            ["Throttle: signal lost while armed", ""],
+        ),
+        News::Lost { armed: false } => (
+            MavSeverity::MAV_SEVERITY_NOTICE,
+            ["Throttle: signal lost", ""],
+        ),
+        News::OpenThrottle => (
+            MavSeverity::MAV_SEVERITY_WARNING,
+            ["Throttle is open: lower it to arm", ""],
+        ),
+        News::Calibration(step) => (
+            MavSeverity::MAV_SEVERITY_NOTICE,
+            [
+                "Stick calibration: ",
+                match step {
+                    Step::Full => "full taken, now lower it",
+                    Step::Done(_) => "both ends taken",
+                    Step::Cancelled => "given up, nothing changed",
+                },
+            ],
+        ),
+        News::Armed => return None,
+    })
+}

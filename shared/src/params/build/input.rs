@@ -1,0 +1,28 @@
+//! What the parameters say of the throttle wire.
+
+use crate::input::Settings;
+use crate::input::authority::Timing;
+use crate::input::demand::Reading;
+use crate::input::endpoints::EndPoints;
+use crate::input::signal::Signal;
+use crate::params::{ParamId, Params};
+
+/// How the throttle wire is read.
+pub fn input(params: &Params) -> Settings {
+    let time_us = |id| (params.get(id) * 1000.0) as u64;
+    let width_us = |id| params.get(id) as u16;
+    Settings {
+        protocol: Signal::from_number(params.get(ParamId::InpProto) as u8),
+        timing: Timing {
+            arm_us: time_us(ParamId::InpArmMs),
+            loss_us: time_us(ParamId::InpLossMs),
+        },
+        reading: Reading {
+            two_directions: params.get(ParamId::Inp3d) != 0.0,
+            ends: EndPoints {
+                min_us: width_us(ParamId::InpPulseMinUs),
+                max_us: width_us(ParamId::InpPulseMaxUs),
+            },
+        },
+    }
+}

@@ -1,0 +1,40 @@
+//! The coefficients of the tones.
+
+use core::f32::consts::TAU;
+
+use fixed::types::I1F31;
+
+use super::{BuildError, Si, gain};
+use crate::drive::tone::Config;
+use crate::params::{ParamId, Params};
+use crate::units::{Scale, Voltage};
+
+/// What of `MOT_TONE_A` the peaks are led to. How much of a half cycle the dead time takes depends on
+/// where the samples fall in it, so they vary by up to a quarter from one to the next.
+const LED_SHARE: f32 = 0.75;
+
+/// Greatest bound of a tone's current, of `LIM_PHASE_A`: with the voltage that twice as much needs, all
+/// that a sensor without a reading leaves in place, the limit still holds.
+const LIMIT_SHARE: f32 = 0.5;
+
+/// What the dead time takes of a vector along a phase, of what it takes of one phase: the current
+/// flows in by one and out by two, 1 + 1/3.
+const DEAD_TIME_VECTOR: f32 = 4.0 / 3.0;
+
+/// The tones of `MOT_TONE_A`; none where it is 0.
+pub(super) fn tone(params: &Params, p: &Si, scale: &Scale) -> Result<Option<Config>, BuildError> {
+    let limit_a = LIMIT_SHARE * params.get(ParamId::LimPhaseA);
+    let bound_a = params.get(ParamId::MotToneA).min(limit_a);
+    if bound_a == 0.0 {
+        return Ok(None);
+    }
+    let led_a = LED_SHARE * bound_a;
+    let units = |ohm: f32| ohm * led_a / scale.voltage_v;
+    Ok(Some(Config {
+        peak: scale.current_from_a(led_a),
+        share: gain(ParamId::MotToneA, scale.current_a / led_a)?,
+        resistive: Voltage::saturating_from_num(units(p.resistance_ohm)),
+        reactive: gain(ParamId::MotLUh, units(TAU * p.inductance_h / p.period_s))?,
+        dead: I1F31::saturating_from_num(DEAD_TIME_VECTOR * p.dead_time_s / p.period_s),
+    }))
+}
