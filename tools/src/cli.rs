@@ -4,9 +4,11 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::decode;
 use crate::endpoint::Endpoint;
 
-/// Parameters and live telemetry of a Siskin ESC over MAVLink, and the limits of a motor.
+/// Parameters and live telemetry of a Siskin ESC over MAVLink, captures of a throttle wire, and the
+/// limits of a motor.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -40,6 +42,12 @@ pub(crate) enum Command {
     Params(ParamsCommand),
     /// Show speed, voltage, current and faults as they come.
     Monitor(MonitorArgs),
+    /// Show what a logic analyser has seen on a throttle wire: frames, commands, replies, errors and
+    /// timing.
+    ///
+    /// Reads CSV as PulseView, sigrok-cli and Saleae Logic export it, and VCD. Equal frames in a row
+    /// are one line. Throttle is told for one direction and the pulse ends from the factory.
+    Decode(DecodeArgs),
     /// Compute between which speeds the flux crossings (CTL_OBSERVER 1) hold the rotor's angle, and
     /// what limits them.
     ///
@@ -101,6 +109,15 @@ pub(crate) struct MonitorArgs {
     /// End after N samples.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) count: Option<u64>,
+}
+
+/// What to decode.
+#[derive(Debug, Args)]
+pub(crate) struct DecodeArgs {
+    /// File to read.
+    pub(crate) capture: PathBuf,
+    #[command(flatten)]
+    pub(crate) options: decode::Options,
 }
 
 /// What a budget is made of.

@@ -1,0 +1,183 @@
+//! `siskin decode`: what a logic analyser has seen on a throttle wire.
+//!
+//! The capture is read from its beginning several times, and never held: once to see which channel
+//! has edges, where that is not told; once to detect the signal; and once to decode it with what has
+//! been detected, so that the first frames are in the table too.
+
+mod capture;
+mod choose;
+mod command;
+mod detect;
+mod measure;
+mod reply;
+mod row;
+mod sampling;
+mod spread;
+mod summary;
+mod table;
+mod throttle;
+mod track;
+mod wire;
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Seek, Write};
+use std::path::Path;
+
+use clap::Args;
+use siskin_control::input::signal::Signal;
+
+use crate::error::Error;
+use capture::{Capture, Reason};
+use choose::choose;
+use detect::detect;
+use sampling::Sampling;
+use summary::Summary;
+use table::Table;
+use track::{Sighting, Tracker};
+use wire::Wire;
+
+/// Bytes of the file that are held.
+const BUFFER: usize = 1 << 16;
+
+/// How long the line is taken to rest after a capture, ns: enough for the last frame or reply to be
+/// over, and too short for a reply to be missed.
+const REST_NS: i64 = 25_000;
+
+/// An edge of the wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Edge {
+    at_ns: i64,
+    /// From then on.
+    level: bool,
+}
+
+/// How to decode.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Options {
+    /// Channel by name or by place from 0, instead of the only one with edges.
+    #[arg(long, value_name = "NAME_OR_PLACE")]
+    pub channel: Option<String>,
+    /// The signal by its number in INP_PROTO or its name, for example 12 or DShot600, instead of
+    /// what is detected.
+    #[arg(long, value_name = "SIGNAL", value_parser = signal)]
+    pub protocol: Option<Signal>,
+    /// A line for each frame.
+    #[arg(long)]
+    pub all: bool,
+    /// One JSON object a line; the last one is the summary.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Why a capture was not decoded.
+#[derive(Debug, thiserror::Error)]
+pub enum DecodeError {
+    /// It is no capture, has no such channel or no signal that is known: what to do.
+    #[error("{0}")]
+    Capture(String),
+    /// The table could not be written.
+    #[error(transparent)]
+    Output(#[from] io::Error),
+}
+
+impl From<Reason> for DecodeError {
+    fn from(reason: Reason) -> Self {
+        Self::Capture(reason)
+    }
+}
+
+/// Decodes the file of this name.
+///
+/// # Errors
+/// A file that is none or is no capture, a channel that is not in it, a signal that is not known.
+pub(crate) fn run(path: &Path, options: &Options, out: &mut dyn Write) -> Result<(), Error> {
+    let done = File::open(path)
+        .map_err(|error| DecodeError::Capture(error.to_string()))
+        .and_then(|file| decode(file, options, out));
+    done.map_err(|error| match error {
+        DecodeError::Capture(reason) => Error::File {
+            path: path.display().to_string(),
+            reason,
+        },
+        DecodeError::Output(error) => Error::Output(error),
+    })
+}
+
+/// Prints the table and the summary of a capture, which is read from its beginning.
+///
+/// # Errors
+/// It is no capture, has no such channel or no signal that is known, or `out` takes no more.
+pub fn decode(
+    mut input: impl Read + Seek,
+    options: &Options,
+    out: &mut dyn Write,
+) -> Result<(), DecodeError> {
+    let channel = choose(open(&mut input)?, options.channel.as_deref())?;
+    let signal = match options.protocol {
+        Some(signal) => signal,
+        None => detect(open(&mut input)?, channel)?,
+    };
+    let mut capture = open(&mut input)?;
+    let mut table = Table::begin(signal, options, BufWriter::new(out))?;
+    let mut summary = Summary::new(signal);
+    let mut sampling = Sampling::new(capture.sample_hz());
+    let mut wire = Wire::new(Some(signal));
+    let mut tracker = Tracker::new(signal);
+    let mut sightings = Vec::new();
+    while let Some(edge) = next_edge(&mut capture, channel)? {
+        sampling.edge(edge.at_ns);
+        summary.edge(edge.at_ns);
+        wire.edge(edge, &mut |item| tracker.take(item, &mut sightings));
+        report(&mut sightings, &mut summary, &mut table)?;
+    }
+    wire.rest(capture.now_ns() + REST_NS, &mut |item| {
+        tracker.take(item, &mut sightings);
+    });
+    tracker.finish(&mut sightings);
+    report(&mut sightings, &mut summary, &mut table)?;
+    table.finish(&summary, sampling.hz())?;
+    Ok(())
+}
+
+/// The signal of an argument.
+fn signal(text: &str) -> Result<Signal, String> {
+    let wanted = text.replace(['-', '_'], " ");
+    let named = Signal::all().find(|signal| signal.name().eq_ignore_ascii_case(&wanted));
+    let numbered = || text.parse().ok().and_then(Signal::from_number);
+    named.or_else(numbered).ok_or_else(|| {
+        let all: Vec<_> = Signal::all()
+            .map(|signal| format!("{} {}", signal.number(), signal.name()))
+            .collect();
+        format!("give one of {}", all.join(", "))
+    })
+}
+
+/// Counts and prints what has been seen.
+fn report(
+    sightings: &mut Vec<Sighting>,
+    summary: &mut Summary,
+    table: &mut Table<impl Write>,
+) -> io::Result<()> {
+    sightings.drain(..).try_for_each(|sighting| {
+        summary.add(&sighting);
+        table.add(sighting)
+    })
+}
+
+fn next_edge(capture: &mut Capture<impl BufRead>, channel: usize) -> Result<Option<Edge>, Reason> {
+    while let Some(change) = capture.next()? {
+        if change.channel == channel {
+            return Ok(Some(Edge {
+                at_ns: change.at_ns,
+                level: change.level,
+            }));
+        }
+    }
+    Ok(None)
+}
+
+/// The capture from its beginning.
+fn open<R: Read + Seek>(input: &mut R) -> Result<Capture<BufReader<&mut R>>, Reason> {
+    input.rewind().map_err(|error| error.to_string())?;
+    Capture::open(BufReader::with_capacity(BUFFER, input))
+}

@@ -1,0 +1,145 @@
+//! Replies of an ESC on a bidirectional wire: 21 bits after a frame.
+
+use siskin_control::answer::extended::Extended;
+use siskin_control::answer::{erpm, gcr};
+use siskin_control::input::dshot::Rate;
+
+use super::Edge;
+
+/// Every bit is a change or none, and the line ends high.
+const MOST_EDGES: usize = gcr::BITS as usize + 1;
+
+/// The latest that a reply may begin after its frame, ns. It should after 30 µs; senders listen
+/// for about twice as long.
+const LATEST_NS: i64 = 100_000;
+
+/// The shortest level of a reply in bits. Each bit of a frame has a part of 0.47 reply bits or less,
+/// so that no frame is taken for a reply.
+const SHORTEST_BITS: f64 = 0.65;
+
+/// Edges from which a run of levels may be a reply: its code changes once in three bits or more
+/// often.
+const FEWEST_EDGES: usize = 5;
+
+/// A reply as it was on the wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reply {
+    /// 21 levels, the first highest; 1 is high.
+    pub(crate) bits: u32,
+    /// The time of one, ns.
+    pub(crate) bit_ns: f64,
+    /// From the frame's nominal end to the first edge, ns.
+    pub(crate) delay_ns: i64,
+}
+
+/// What a reply carries.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Content {
+    /// Electrical revolutions a minute; 0 where the motor stands still.
+    Erpm(u32),
+    /// Extended telemetry.
+    Extended(Extended),
+}
+
+impl Reply {
+    /// The 12 bits of data, or nothing where the code or the check sum is wrong.
+    pub(crate) fn data(&self) -> Option<u16> {
+        gcr::decode(self.bits)
+    }
+
+    /// What the data means.
+    pub(crate) fn content(&self) -> Option<Content> {
+        let data = self.data()?;
+        let erpm = || erpm::period_us(data).map_or(0, |period_us| 60_000_000 / period_us);
+        Some(Extended::from_data(data).map_or_else(|| Content::Erpm(erpm()), Content::Extended))
+    }
+}
+
+/// The edges after a frame, until it is known whether they are a reply.
+#[derive(Debug)]
+pub(super) struct Listener {
+    end_ns: i64,
+    bit_ns: f64,
+    edges: Vec<Edge>,
+}
+
+/// What a listener makes of the edges.
+#[derive(Debug, PartialEq)]
+pub(super) enum Heard {
+    /// It needs more of them.
+    More,
+    /// A reply: its edges are used up.
+    Reply(Reply),
+    /// None came. Edges that were something else have yet to be looked at.
+    None(Vec<Edge>),
+}
+
+impl Listener {
+    /// Listens after a frame that ended at `end_ns`.
+    pub(super) fn new(end_ns: i64, rate: Rate) -> Self {
+        Self {
+            end_ns,
+            bit_ns: 0.8e9 / f64::from(rate.bit_hz()),
+            edges: Vec::new(),
+        }
+    }
+
+    /// Whether edges wait for a verdict.
+    pub(super) fn holds_edges(&self) -> bool {
+        !self.edges.is_empty()
+    }
+
+    /// Keeps an edge for the verdict.
+    pub(super) fn edge(&mut self, edge: Edge) {
+        self.edges.push(edge);
+    }
+
+    /// The verdict, when no edge comes before `now_ns`.
+    pub(super) fn verdict(&mut self, now_ns: i64) -> Heard {
+        let (Some(first), Some(last)) = (self.edges.first(), self.edges.last()) else {
+            let too_late = now_ns - self.end_ns > LATEST_NS;
+            return if too_late {
+                Heard::None(Vec::new())
+            } else {
+                Heard::More
+            };
+        };
+        // Within a reply a level lasts three bits at most.
+        let rested = (now_ns - last.at_ns) as f64 > 4.0 * self.bit_ns;
+        let too_long = (now_ns - first.at_ns) as f64 > (f64::from(gcr::BITS) + 2.0) * self.bit_ns;
+        if !rested && !too_long && self.edges.len() <= MOST_EDGES {
+            return Heard::More;
+        }
+        match self.reply() {
+            Some(reply) => Heard::Reply(reply),
+            None => Heard::None(std::mem::take(&mut self.edges)),
+        }
+    }
+
+    fn reply(&self) -> Option<Reply> {
+        let (first, last) = (self.edges.first()?, self.edges.last()?);
+        if first.level || !last.level || self.edges.len() < FEWEST_EDGES {
+            return None;
+        }
+        let (mut bits, mut count) = (0, 0);
+        for pair in self.edges.windows(2) {
+            let length = (pair[1].at_ns - pair[0].at_ns) as f64 / self.bit_ns;
+            if length < SHORTEST_BITS {
+                return None;
+            }
+            for _ in 0..libm::round(length) as u32 {
+                bits = bits << 1 | u32::from(pair[0].level);
+                count += 1;
+            }
+        }
+        if count > gcr::BITS {
+            return None;
+        }
+        let rest = gcr::BITS - count;
+        Some(Reply {
+            bits: bits << rest | ((1 << rest) - 1),
+            bit_ns: (last.at_ns - first.at_ns) as f64 / f64::from(count),
+            delay_ns: first.at_ns - self.end_ns,
+        })
+    }
+}

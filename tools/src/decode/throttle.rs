@@ -1,0 +1,57 @@
+//! What a frame or a pulse asks for.
+
+use siskin_control::input::demand::{Demand, Reading};
+use siskin_control::input::dshot::Kind;
+use siskin_control::input::signal::Signal;
+
+use super::track::What;
+
+/// A share of the throttle's range, by the ends from the factory and with one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Share {
+    /// It asks for none: a stop, or a command.
+    Zero,
+    /// 0 to 1.
+    Throttle(f64),
+    /// It cannot be told.
+    None,
+}
+
+impl Share {
+    /// As a number; nothing where it cannot be told.
+    pub(super) fn share(self) -> Option<f64> {
+        match self {
+            Self::Zero => Some(0.0),
+            Self::Throttle(share) => Some((share * 1e4).round() / 1e4),
+            Self::None => None,
+        }
+    }
+}
+
+/// Two pulses that differ by less are shown as one, ns: a thousandth of the range.
+pub(super) fn step_ns(signal: Signal) -> u32 {
+    match signal {
+        Signal::Pulse(kind) => {
+            let (least_ns, most_ns) = kind.end_points_ns();
+            (most_ns - least_ns) / 1000
+        }
+        Signal::Dshot { .. } => 0,
+    }
+}
+
+/// What a sighting asks for.
+pub(super) fn of(signal: Signal, what: &What) -> Share {
+    match (what, signal) {
+        (What::Frame { frame, .. }, _) => match frame.kind(false) {
+            Kind::Stop | Kind::Command(_) => Share::Zero,
+            Kind::Throttle(throttle) => Share::Throttle(throttle.to_num()),
+        },
+        (What::Pulse { width_ns }, Signal::Pulse(kind)) => {
+            match Reading::default().ends.demand(kind, *width_ns, false) {
+                Demand::Zero => Share::Zero,
+                Demand::Throttle(throttle) => Share::Throttle(throttle.to_num()),
+            }
+        }
+        _ => Share::None,
+    }
+}
