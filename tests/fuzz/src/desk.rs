@@ -1,0 +1,262 @@
+//! An ESC at rest with a throttle wire, and a judge who knows when its motor may turn.
+
+use siskin_control::answer::Ask;
+use siskin_control::drive::{Setpoint, Snapshot, State};
+use siskin_control::esc::Esc;
+use siskin_control::input::line::{Event, Line};
+use siskin_control::input::signal::Signal;
+use siskin_control::mavlink::Request;
+use siskin_control::params::{ParamId, Params};
+use siskin_emulator::rig::Bench;
+
+/// The rate of the capturing timer.
+pub const CAPTURE_HZ: u32 = 170_000_000;
+
+/// What `INP_ARM_MS` and `INP_LOSS_MS` are by default.
+const ARM_NS: u64 = 300_000_000;
+const LOSS_NS: u64 = 100_000_000;
+
+/// Frames and pulses of zero throttle that arm.
+const ARMING_FRAMES: u32 = 30;
+const ARMING_PULSES: u32 = 5;
+
+/// No edge waits longer to be believed, where time is told.
+const LONGEST_FILTER_NS: u64 = 3_000;
+
+/// How often the tasks run.
+const POLL_NS: u64 = 1_000_000;
+
+/// An ESC, its wire and the time.
+pub struct Desk {
+    /// The ESC.
+    pub esc: Esc,
+    /// What it is told of its drive.
+    pub snapshot: Snapshot,
+    judge: Judge,
+    now_ns: u64,
+    /// Where the timer's count was at the start.
+    origin_ticks: u32,
+    polled_ns: u64,
+}
+
+impl Desk {
+    /// One with a signal that `INP_PROTO` forces, or none.
+    pub fn new(signal: Option<Signal>, origin_ticks: u32) -> Self {
+        let mut params = Params::default();
+        if let Some(signal) = signal {
+            params
+                .set(ParamId::InpProto, f32::from(signal.number()))
+                .expect("a number of the table");
+        }
+        let bench = Bench::default();
+        let board = bench.sensing.board(bench.delay);
+        let esc = Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("defaults fit the bench");
+        let snapshot = State::new(esc.config()).snapshot();
+        Self {
+            esc,
+            snapshot,
+            judge: Judge::new(signal),
+            now_ns: 0,
+            origin_ticks,
+            polled_ns: 0,
+        }
+    }
+
+    fn ticks(&self) -> u32 {
+        let ticks = u128::from(self.now_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
+        self.origin_ticks.wrapping_add(ticks as u32)
+    }
+
+    /// An edge after a time; what it asks for.
+    pub fn edge(&mut self, after_ns: u64, level: bool) -> Option<Ask> {
+        self.now_ns += after_ns;
+        let ticks = self.ticks();
+        self.judge.edge(self.now_ns, ticks, level);
+        let ask = self.esc.edge(self.now_ns / 1000, ticks, level);
+        self.check();
+        ask
+    }
+
+    /// Time passes without an edge; what it asks for. The tasks run at its end.
+    pub fn settle(&mut self, after_ns: u64) -> Option<Ask> {
+        self.now_ns += after_ns;
+        let ticks = self.ticks();
+        self.judge.settle(self.now_ns, ticks);
+        let ask = self.esc.settle(self.now_ns / 1000, ticks);
+        if self.now_ns - self.polled_ns >= POLL_NS {
+            self.polled_ns = self.now_ns;
+            // Between two polls a signal lasts longer than it should.
+            self.judge.poll(self.now_ns);
+            let now_us = self.now_ns / 1000;
+            self.esc.poll(now_us, &self.snapshot, 25.0, &mut |_| {});
+            while let Some(request) = self.esc.take_request() {
+                if request == Request::Save {
+                    self.esc.storage_done(Ok(()));
+                }
+            }
+        }
+        self.check();
+        ask
+    }
+
+    fn check(&self) {
+        let turns = matches!(
+            self.esc.setpoint(),
+            Setpoint::Speed(_) | Setpoint::Torque(_) | Setpoint::Voltage(_) | Setpoint::Test(_)
+        );
+        assert!(!turns || self.judge.may_turn(), "it turns and is not armed");
+        let armed = self.esc.telemetry().armed;
+        let polled = self.polled_ns == self.now_ns;
+        assert!(
+            !(armed && polled) || self.judge.may_turn(),
+            "armed by nothing"
+        );
+    }
+}
+
+/// Knows what has been on the wire: least of all that an armed wire must have had.
+struct Judge {
+    /// The decoder of a signal that is forced sees what the ESC's sees. While the ESC detects one, it
+    /// is not known when it begins anew.
+    line: Option<Line>,
+    least: u32,
+    zeros: u32,
+    since_ns: u64,
+    last_ns: u64,
+    /// The last edge, which no time has let the ESC believe yet.
+    waits_ns: Option<u64>,
+    has_armed: bool,
+    /// The wire has been silent for too long since the tasks looked.
+    has_lapsed: bool,
+}
+
+impl Judge {
+    fn new(signal: Option<Signal>) -> Self {
+        let line = signal.map(|signal| {
+            let mut line = Line::new(CAPTURE_HZ);
+            line.force(Some(signal));
+            line
+        });
+        Self {
+            line,
+            least: match signal {
+                Some(Signal::Dshot { .. }) => ARMING_FRAMES,
+                Some(Signal::Pulse(_)) => ARMING_PULSES,
+                // A pulse has two edges.
+                None => 2 * ARMING_PULSES,
+            },
+            zeros: 0,
+            since_ns: 0,
+            last_ns: 0,
+            waits_ns: None,
+            has_armed: false,
+            has_lapsed: false,
+        }
+    }
+
+    fn edge(&mut self, now_ns: u64, ticks: u32, level: bool) {
+        match &mut self.line {
+            Some(line) => {
+                let event = line.edge(ticks, level);
+                self.event(now_ns, event);
+            }
+            None => {
+                self.waits_ns = Some(now_ns);
+                self.zero(now_ns);
+            }
+        }
+    }
+
+    fn settle(&mut self, now_ns: u64, ticks: u32) {
+        let event = self.line.as_mut().and_then(|line| line.settle(ticks));
+        self.event(now_ns, event);
+        // What an edge has ended counts from when it is believed.
+        if let Some(edge_ns) = self.waits_ns {
+            self.zero(now_ns);
+            if now_ns - edge_ns >= LONGEST_FILTER_NS {
+                self.waits_ns = None;
+            }
+        }
+    }
+
+    fn event(&mut self, now_ns: u64, event: Option<Event>) {
+        match event {
+            Some(Event::Frame { frame, .. }) if frame.value >= 48 => {
+                self.expire(now_ns);
+                self.last_ns = now_ns;
+                self.zeros = 0;
+            }
+            // The pulses' end points may have been calibrated: each might be zero.
+            Some(Event::Frame { .. } | Event::Pulse { .. }) => self.zero(now_ns),
+            Some(Event::Bad) | None => {}
+        }
+    }
+
+    fn zero(&mut self, now_ns: u64) {
+        self.expire(now_ns);
+        if self.zeros == 0 {
+            self.since_ns = now_ns;
+        }
+        self.zeros += 1;
+        self.last_ns = now_ns;
+        // The ESC counts in whole microseconds.
+        let held_ns = now_ns - self.since_ns + 1000;
+        self.has_armed |= self.zeros >= self.least && held_ns >= ARM_NS;
+    }
+
+    /// Begins to count anew after too long a silence.
+    fn expire(&mut self, now_ns: u64) {
+        if now_ns - self.last_ns > LOSS_NS + 1000 {
+            self.zeros = 0;
+            self.has_lapsed = true;
+        }
+    }
+
+    /// The tasks look, and find a silence.
+    fn poll(&mut self, now_ns: u64) {
+        self.expire(now_ns);
+        self.has_armed &= !core::mem::take(&mut self.has_lapsed);
+    }
+
+    fn may_turn(&self) -> bool {
+        self.has_armed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use siskin_control::input::dshot::{Frame, Rate, edges};
+
+    /// Whether it turns after this many frames of no throttle and some of half, 1 ms apart, and
+    /// whether it may.
+    fn turns_after(zeros: u32) -> (bool, bool) {
+        let rate = Rate::Dshot300;
+        let mut desk = Desk::new(
+            Some(Signal::Dshot {
+                rate,
+                bidirectional: false,
+            }),
+            0,
+        );
+        for frame in 0..zeros + 20 {
+            let value = if frame < zeros { 0 } else { 1046 };
+            let telemetry = false;
+            let mut before_ns = 0;
+            for (at_ns, level) in edges(Frame { value, telemetry }.to_bits(), rate) {
+                desk.edge(u64::from(at_ns - before_ns), level);
+                before_ns = at_ns;
+            }
+            desk.settle(1_000_000 - u64::from(before_ns));
+        }
+        let turns = matches!(desk.esc.setpoint(), Setpoint::Speed(_));
+        (turns, desk.judge.may_turn())
+    }
+
+    #[test]
+    fn the_judge_knows_an_armed_wire_from_another() {
+        assert_eq!(turns_after(350), (true, true));
+        assert_eq!(turns_after(250), (false, false));
+        assert_eq!(turns_after(0), (false, false));
+    }
+}

@@ -1,0 +1,6 @@
+//! What the fuzz targets share. Each of them takes any bytes and knows what may come of them; see
+//! `targets`, and `run`, which builds and runs them.
+#![forbid(unsafe_code)]
+
+pub mod bytes;
+pub mod desk;
