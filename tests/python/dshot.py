@@ -5,8 +5,13 @@ import threading
 import time
 
 DSHOT150, DSHOT300, DSHOT600 = 10, 11, 12
+BIDIRECTIONAL_DSHOT600 = 22
+KISS = 30
 RAW_EDGES = 255
 STOP = 0
+EXTENDED_ON, EXTENDED_OFF = 13, 14
+STANDS = 0xFFF
+"""The data of a reply while the motor stands."""
 LEAST, MOST = 48, 2047
 HALF = (LEAST + MOST + 1) // 2
 """The step above the middle of 48..2047."""
@@ -18,16 +23,54 @@ def frame(value: int, telemetry: bool = False) -> int:
     return data << 4 | (data ^ data >> 4 ^ data >> 8) & 0xF
 
 
-def datagram(value: int, protocol: int = DSHOT600, bad_crc: bool = False) -> bytes:
-    """A frame for the emulator's wire."""
-    bits = frame(value) ^ (0x5 if bad_crc else 0)
+def datagram(
+    value: int, protocol: int = DSHOT600, bad_crc: bool = False, telemetry: bool = False
+) -> bytes:
+    """A frame for the emulator's wire. A bidirectional one's check sum is inverted."""
+    bits = frame(value, telemetry) ^ (0xF if protocol >= 20 else 0) ^ (0x5 if bad_crc else 0)
     return bytes([protocol]) + bits.to_bytes(2, "little")
+
+
+GROUPS = "19 1B 12 13 1D 15 16 17 1A 09 0A 0B 1E 0D 0E 0F"
+NIBBLES = {int(code, 16): nibble for nibble, code in enumerate(GROUPS.split())}
+
+
+def reply(answer: bytes) -> int:
+    """The 12 bits of data of a reply's datagram."""
+    assert len(answer) == 9, answer
+    levels = int.from_bytes(answer[1:5], "little")
+    assert levels < 1 << 20, "the start bit is low"
+    toggles = levels ^ levels >> 1
+    nibbles = [NIBBLES[toggles >> shift & 0x1F] for shift in (15, 10, 5, 0)]
+    assert nibbles[0] ^ nibbles[1] ^ nibbles[2] ^ nibbles[3] == 0xF, "the check sum is inverted"
+    return nibbles[0] << 8 | nibbles[1] << 4 | nibbles[2]
+
+
+def is_extended(data: int) -> bool:
+    """Whether it is a word of extended telemetry."""
+    return data >> 8 != 0 and not data & 0x100
+
+
+def erpm(data: int) -> float:
+    """Electrical rpm of a reply that tells the speed."""
+    return 0.0 if data == STANDS else 60e6 / ((data & 0x1FF) << (data >> 9))
+
+
+def crc8(data: bytes) -> int:
+    """The check sum of KISS telemetry: polynomial 0x07, from 0; 0 over a frame with its own."""
+    crc = 0
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc << 1 & 0xFF ^ (0x07 if crc & 0x80 else 0)
+    return crc
 
 
 class Throttle(threading.Thread):
     """Sends one value 1000 times a second until told otherwise; None is a silent wire.
 
     Frames that fell due while the machine was busy are left out, as a flight controller would.
+    What the ESC answers is kept in `answers`.
     """
 
     def __init__(self, port: int, value: int | None = STOP, protocol: int = DSHOT600):
@@ -35,7 +78,9 @@ class Throttle(threading.Thread):
         self.value = value
         self.protocol = protocol
         self.bad_crc = False
+        self.telemetry = False
         self.sent = 0
+        self.answers: list[bytes] = []
         self._port = port
         self._ended = threading.Event()
 
@@ -47,12 +92,24 @@ class Throttle(threading.Thread):
                 value = self.value
                 if value is not None:
                     try:
-                        wire.send(datagram(value, self.protocol, self.bad_crc))
+                        wire.send(datagram(value, self.protocol, self.bad_crc, self.telemetry))
                         self.sent += 1
                     except ConnectionRefusedError:
                         pass  # The emulator has ended; the test will say so.
                 due = max(due + 0.001, time.monotonic() - 0.001)
                 time.sleep(max(0.0, due - time.monotonic()))
+                self._listen(wire)
+
+    def _listen(self, wire: socket.socket) -> None:
+        try:
+            while True:
+                self.answers.append(wire.recv(128, socket.MSG_DONTWAIT))
+        except (BlockingIOError, ConnectionRefusedError):
+            pass
+
+    def replies(self, since: int = 0) -> list[int]:
+        """The data of the replies on the wire, from the answer with this number on."""
+        return [reply(answer) for answer in self.answers[since:] if answer[0] == self.protocol]
 
     def __enter__(self) -> "Throttle":
         self.start()

@@ -12,6 +12,10 @@ from dshot import Throttle
 from esc import TIMEOUT_S, Esc
 from paths import PROGRAM
 
+PATIENT = ("--param", "INP_LOSS_MS=500")
+"""For a flight controller that is a thread on a busy machine: its frames may have longer gaps than the
+default allows."""
+
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:
     """A port that nobody has now."""

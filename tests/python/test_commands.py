@@ -7,6 +7,7 @@ import pytest
 
 import siskin_dialect as dialect
 from dshot import HALF, STOP
+from emulator import PATIENT
 from esc import gaps_us
 
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
@@ -68,7 +69,7 @@ def test_an_interval_holds_and_can_be_ended(esc):
 
 def test_arming_by_command_needs_zero_throttle_on_the_wire(start):
     # Long enough that a busy machine is no lost signal.
-    emulator = start("--param", "INP_LOSS_MS=500")
+    emulator = start(*PATIENT)
     with emulator.connect() as esc:
         assert esc.command(ARM_DISARM, 1) == DENIED, "a silent wire"
         with emulator.throttle(HALF) as throttle:
@@ -82,7 +83,7 @@ def test_arming_by_command_needs_zero_throttle_on_the_wire(start):
 
 
 def test_disarming_stops_a_turning_motor_until_zero_throttle(start):
-    emulator = start("--param", "INP_LOSS_MS=500")
+    emulator = start(*PATIENT)
     with emulator.connect() as esc, emulator.throttle() as throttle:
         esc.stream(ESC_STATUS, 20_000)
         esc.wait_armed()
@@ -129,7 +130,7 @@ def test_an_actuator_test_has_limits(esc):
 
 
 def test_the_wire_takes_over_from_an_actuator_test(start):
-    emulator = start("--param", "INP_LOSS_MS=500")
+    emulator = start(*PATIENT)
     with emulator.connect() as esc, emulator.throttle() as throttle:
         esc.stream(ESC_STATUS, 20_000)
         esc.wait_armed()

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from dshot import HALF
+from emulator import PATIENT
 from paths import ROOT
 
 SCRIPT = """
@@ -39,7 +40,7 @@ def run_script(text: str, emulator) -> str:
 
 
 def test_the_wheel_alone_reads_the_telemetry(start):
-    emulator = start("--param", "INP_LOSS_MS=500")
+    emulator = start(*PATIENT)
     with emulator.connect() as esc, emulator.throttle() as throttle:
         esc.wait_armed()
         throttle.value = HALF
@@ -65,6 +66,6 @@ def test_readme_has_a_script_that_reads_the_telemetry():
 @pytest.mark.parametrize("index", range(len(readme_scripts())))
 def test_a_script_of_the_readme_works_as_pasted(start, index):
     # A busy machine is no lost signal.
-    printed = run_script(readme_scripts()[index], start("--param", "INP_LOSS_MS=500"))
+    printed = run_script(readme_scripts()[index], start(*PATIENT))
     rpm = [int(number) for number in re.findall(r"(-?\d+) rpm", printed)]
     assert abs(rpm[-1] - 3150) <= 32, f"half throttle: {rpm}"

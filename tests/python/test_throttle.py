@@ -14,9 +14,9 @@ import pytest
 
 import siskin_dialect as dialect
 from dshot import DSHOT150, DSHOT300, DSHOT600, HALF, LEAST, MOST, RAW_EDGES, STOP, datagram, frame
+from emulator import PATIENT
 from esc import Esc
 
-PATIENT = ("--param", "INP_LOSS_MS=500")
 STANDS_RPM = 100
 
 CURRENT_SETTLED_US = 1_000_000
