@@ -154,14 +154,18 @@ mod tests {
         assert_eq!(status(&mut health).max_stress, 7, "but was not told here");
     }
 
+    fn after_a_fault(calm: Snapshot) -> Snapshot {
+        Snapshot {
+            fault_count: 1,
+            ..calm
+        }
+    }
+
     #[test]
     fn a_fault_that_has_ended_before_anyone_asked_is_told_once() {
         let (config, calm) = rig();
         let mut health = Health::default();
-        let after = Snapshot {
-            fault_count: 1,
-            ..calm
-        };
+        let after = after_a_fault(calm);
         health.observe(&after, &config);
         assert!(status(&mut health).error);
         health.observe(&after, &config);
@@ -172,10 +176,7 @@ mod tests {
     fn what_happened_before_the_beginning_is_not_told() {
         let (config, calm) = rig();
         let mut health = Health::default();
-        let after = Snapshot {
-            fault_count: 1,
-            ..calm
-        };
+        let after = after_a_fault(calm);
         health.observe(&after, &config);
         health.begin();
         health.observe(&after, &config);

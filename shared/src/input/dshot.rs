@@ -74,7 +74,7 @@ fn share(value: u16, first: u16, last: u16) -> Throttle {
 }
 
 /// The four check bits of 12 data bits: the exclusive or of their nibbles.
-fn check_sum(data: u16) -> u16 {
+pub const fn check_sum(data: u16) -> u16 {
     (data ^ data >> 4 ^ data >> 8) & 0xF
 }
 

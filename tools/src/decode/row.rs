@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use siskin_control::answer::extended::{DISABLED, ENABLED, Extended, Status};
-use siskin_control::input::dshot::{INVERTED_CHECK, Kind};
+use siskin_control::input::dshot::{INVERTED_CHECK, Kind, check_sum};
 use siskin_control::input::signal::{Pulse, Signal};
 
 use super::command;
@@ -183,8 +183,7 @@ fn error(signal: Signal, what: &What) -> Option<String> {
 }
 
 fn frame_error(measured: &Measured, bidirectional: bool) -> String {
-    let data = measured.bits >> 4;
-    let sum = (data ^ data >> 4 ^ data >> 8) & 0xF;
+    let sum = check_sum(measured.bits >> 4);
     let (sum, other) = if bidirectional {
         (sum ^ INVERTED_CHECK, sum)
     } else {
