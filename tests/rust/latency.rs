@@ -1,7 +1,7 @@
 //! From the last edge of a frame on the throttle wire to the set-point of a control period.
 
 use siskin_control::drive::Setpoint;
-use siskin_control::input::dshot::{Frame, INVERTED_CHECK};
+use siskin_control::input::dshot::{Frame, check_mask};
 use siskin_control::params::ParamId;
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::flash::FileFlash;
@@ -71,7 +71,7 @@ fn dshot(protocol: u8, value: u16) -> [u8; 3] {
         value,
         telemetry: false,
     };
-    let bits = frame.to_bits() ^ if protocol >= 20 { INVERTED_CHECK } else { 0 };
+    let bits = frame.to_bits() ^ check_mask(protocol >= 20);
     let [low, high] = bits.to_le_bytes();
     [protocol, low, high]
 }

@@ -1,7 +1,7 @@
 //! How a scenario sends throttle.
 
 use serde::Deserialize;
-use siskin_control::input::dshot::{self, INVERTED_CHECK, Rate};
+use siskin_control::input::dshot::{self, Rate};
 use siskin_control::input::endpoints::ZERO_DIVISOR;
 use siskin_control::input::signal::{Pulse, Signal};
 use siskin_control::params::{ParamId, Params};
@@ -81,7 +81,7 @@ fn bits(throttle: f64, bidirectional: bool) -> u16 {
         value,
         telemetry: false,
     };
-    frame.to_bits() ^ if bidirectional { INVERTED_CHECK } else { 0 }
+    frame.to_bits() ^ dshot::check_mask(bidirectional)
 }
 
 /// The servo pulse of a throttle, µs.

@@ -4,7 +4,7 @@
 //! and if the check sum fits. A frame is reported at its last edge. Edges that belong to none are
 //! reported once for every 32 of them, or when the line comes to rest.
 
-use super::dshot::{Frame, INVERTED_CHECK, Rate};
+use super::dshot::{Frame, Rate, check_mask};
 use super::filter::{Edge, since};
 use super::line::Event;
 
@@ -164,8 +164,7 @@ impl Decoder {
             return None;
         }
         let rate = self.rate(span)?;
-        let check = if bidirectional { INVERTED_CHECK } else { 0 };
-        let frame = Frame::from_bits(self.bits(span)? ^ check)?;
+        let frame = Frame::from_bits(self.bits(span)? ^ check_mask(bidirectional))?;
         Some(Event::Frame {
             rate,
             bidirectional,

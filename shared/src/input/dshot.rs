@@ -11,9 +11,11 @@ const LAST_THROTTLE: u16 = 2047;
 /// The first value of the second direction, where throttle has two.
 const FIRST_FORWARD: u16 = 1048;
 
-/// What turns a frame's check sum into that of a bidirectional one, by exclusive or: all four of
-/// its bits are inverted.
-pub const INVERTED_CHECK: u16 = 0xF;
+/// What makes of a frame's bits those of this kind of wire, by exclusive or: a bidirectional one
+/// inverts all four bits of the check sum.
+pub const fn check_mask(bidirectional: bool) -> u16 {
+    if bidirectional { 0xF } else { 0 }
+}
 
 /// What a frame carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! A sender of throttle signals with the errors that a real one has, and the line that hears it.
 
-use siskin_control::input::dshot::{INVERTED_CHECK, Rate, edges};
+use siskin_control::input::dshot::{Rate, check_mask, edges};
 use siskin_control::input::line::{Event, Line};
 use siskin_control::input::signal::{Pulse, Signal};
 
@@ -177,7 +177,7 @@ impl<L: Listener> Wire<L> {
     /// Sends 16 bits from the edge `first` on, and rests for two bits. Of a bidirectional rate both
     /// the levels and the check sum are inverted.
     pub(crate) fn frame_from(&mut self, first: usize, rate: Rate, bidirectional: bool, bits: u16) {
-        let mut bits = bits ^ if bidirectional { INVERTED_CHECK } else { 0 };
+        let mut bits = bits ^ check_mask(bidirectional);
         if self.errors.flipped_permille > 0 {
             for bit in 0..16 {
                 let flipped = self.chance.below(1000) < self.errors.flipped_permille;

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use siskin_control::answer::extended::{DISABLED, ENABLED, Extended, Status};
-use siskin_control::input::dshot::{INVERTED_CHECK, Kind, check_sum};
+use siskin_control::input::dshot::{Kind, check_mask, check_sum};
 use siskin_control::input::signal::{Pulse, Signal};
 
 use super::command;
@@ -183,12 +183,8 @@ fn error(signal: Signal, what: &What) -> Option<String> {
 }
 
 fn frame_error(measured: &Measured, bidirectional: bool) -> String {
-    let sum = check_sum(measured.bits >> 4);
-    let (sum, other) = if bidirectional {
-        (sum ^ INVERTED_CHECK, sum)
-    } else {
-        (sum, sum ^ INVERTED_CHECK)
-    };
+    let sum_on = |bidirectional| check_sum(measured.bits >> 4) ^ check_mask(bidirectional);
+    let (sum, other) = (sum_on(bidirectional), sum_on(!bidirectional));
     match measured.bits & 0xF {
         sent if sent == sum => format!("a bit takes {:.2} us", measured.bit_ns / 1000.0),
         sent if sent == other => "inverted check sum".to_owned(),

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use siskin_control::input::dshot::{Frame, INVERTED_CHECK};
+use siskin_control::input::dshot::{Frame, check_mask};
 use siskin_control::input::line::Event;
 use siskin_control::input::signal::Signal;
 
@@ -154,7 +154,7 @@ impl Tracker {
         let good = burst.good.map(|good| match good {
             Good::Frame(frame, answer) => What::Frame {
                 frame,
-                bits: frame.to_bits() ^ if bidirectional { INVERTED_CHECK } else { 0 },
+                bits: frame.to_bits() ^ check_mask(bidirectional),
                 measured,
                 answer,
             },

@@ -66,11 +66,7 @@ impl Wire {
     }
 
     fn check(&self) -> u16 {
-        if self.bidirectional {
-            INVERTED_CHECK
-        } else {
-            0
-        }
+        check_mask(self.bidirectional)
     }
 
     /// What a frame of these bits is, the first edge of which came at `start_ns`.
@@ -265,7 +261,7 @@ fn levels_and_check_sum_belong_together() {
         for bidirectional in [false, true] {
             let mut wire = Wire::new(TICK_HZ, bidirectional);
             for _ in 0..10 {
-                let events = wire.frame(WORD ^ INVERTED_CHECK, rate, 1.0);
+                let events = wire.frame(WORD ^ check_mask(true), rate, 1.0);
                 assert!(at_the_end(&events, Some(Event::Bad)), "{rate:?}");
             }
         }

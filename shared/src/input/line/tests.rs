@@ -1,7 +1,7 @@
 //! A whole wire: what happens to it while a signal is sent, and what is made of that.
 
 use super::*;
-use crate::input::dshot::{INVERTED_CHECK, edges};
+use crate::input::dshot::{check_mask, edges};
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -68,7 +68,7 @@ impl Wire {
             Signal::Dshot {
                 rate,
                 bidirectional,
-            } => edges(if bidirectional { INVERTED_CHECK } else { 0 }, rate)
+            } => edges(check_mask(bidirectional), rate)
                 .map(|(at_ns, active)| (self.now_ns + u64::from(at_ns), active != bidirectional))
                 .collect(),
             Signal::Pulse(kind) => {
