@@ -11,6 +11,7 @@ use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, BuildError, ParamId, Params};
 use siskin_control::store::{self, Integrity, LoadReport};
+use siskin_control::throttle::Throttle;
 use thiserror::Error;
 
 use crate::fault::{CHIP_V, Fault, Timeline};
@@ -74,6 +75,7 @@ pub struct Start {
 /// One emulated ESC.
 pub struct Device {
     esc: Esc,
+    throttle: Throttle,
     rig: Rig,
     wire: Wire,
     driven: Driven,
@@ -167,9 +169,9 @@ impl Device {
             .collect();
         apply(&overrides, &mut params);
         let board = bench.sensing.board(bench.delay);
-        let esc = Esc::new(params, board, CAPTURE_HZ, link_bytes_per_s)?;
+        let (esc, throttle) = Esc::new(params, board, CAPTURE_HZ, link_bytes_per_s)?;
         wire.sow(bench.seed);
-        let rig = Rig::new(bench, esc.config().clone());
+        let rig = Rig::new(bench, esc.config()?);
         let clock = Clock {
             origin_ns: 0.0,
             period_ns: rig.period_s() * 1e9,
@@ -177,6 +179,7 @@ impl Device {
         };
         let device = Self {
             esc,
+            throttle,
             rig,
             wire,
             driven: Driven::default(),
@@ -228,10 +231,11 @@ impl Device {
         }
         let now_ns = self.now_ns();
         let now_us = now_ns / 1000;
-        let (receiver, esc) = (self.receivers.entry(stream).or_default(), &mut self.esc);
+        let receiver = self.receivers.entry(stream).or_default();
+        let (esc, throttle) = (&mut self.esc, &mut self.throttle);
         receiver.push(now_us, bytes, |frame| {
             onlooker.frame(now_ns, frame.raw);
-            esc.receive(now_us, frame);
+            esc.receive(throttle, now_us, frame);
         });
     }
 
@@ -279,7 +283,7 @@ impl Device {
                 }
             }
             // Past the wire or not, a task that has found a fault is heard.
-            let setpoint = match (self.esc.setpoint(), imposed(t_s, &self.rig)) {
+            let setpoint = match (self.throttle.setpoint(), imposed(t_s, &self.rig)) {
                 (fault @ Setpoint::Fault(_), _) => fault,
                 (setpoint, imposed) => imposed.unwrap_or(setpoint),
             };
@@ -298,7 +302,7 @@ impl Device {
             }
             onlooker.edge(edge_ns, level);
             if !self.rig.is_held()
-                && let Some(ask) = self.esc.edge(edge_ns / 1000, ticks(edge_ns), level)
+                && let Some(ask) = self.throttle.edge(edge_ns / 1000, ticks(edge_ns), level)
             {
                 self.answer(edge_ns, ask, onlooker);
             }
@@ -309,7 +313,7 @@ impl Device {
     /// Tells the ESC the time, and shows what it has put on the wire before.
     fn settle(&mut self, now_ns: u64, onlooker: &mut impl Onlooker) {
         if !self.rig.is_held()
-            && let Some(ask) = self.esc.settle(now_ns / 1000, ticks(now_ns))
+            && let Some(ask) = self.throttle.settle(now_ns / 1000, ticks(now_ns))
         {
             self.answer(now_ns, ask, onlooker);
         }
@@ -338,25 +342,29 @@ impl Device {
         // No bytes tell a receiver that time has passed: what a false start held back is searched.
         let now_us = now_ns / 1000;
         for receiver in self.receivers.values_mut() {
-            receiver.push(now_us, &[], |frame| self.esc.receive(now_us, frame));
+            receiver.push(now_us, &[], |frame| {
+                self.esc.receive(&mut self.throttle, now_us, frame);
+            });
         }
         let snapshot = self.rig.snapshot();
         let temperature_c = self.rig.temperature_c();
-        self.esc.poll(now_us, &snapshot, temperature_c, send);
-        while let Some(request) = self.esc.take_request() {
+        let throttle = &mut self.throttle;
+        self.esc
+            .poll(throttle, now_us, &snapshot, temperature_c, send);
+        while let Some(request) = self.esc.take_request(&mut self.throttle) {
             match request {
-                Request::ParamsChanged => self.rig.configure(self.esc.config().clone()),
+                Request::ParamsChanged => self.configure(),
                 Request::Save => {
                     let result = self.save();
-                    self.esc.storage_done(result);
+                    self.esc.storage_done(&mut self.throttle, result);
                 }
                 Request::Load => {
                     let result = self.load();
-                    self.esc.storage_done(result);
+                    self.esc.storage_done(&mut self.throttle, result);
                 }
                 Request::FactoryReset => {
                     let result = self.factory_reset();
-                    self.esc.storage_done(result);
+                    self.esc.storage_done(&mut self.throttle, result);
                 }
                 Request::Reboot => self.reboot(),
             }
@@ -410,23 +418,33 @@ impl Device {
 
     fn replace(&mut self, params: Params) -> Result<(), &'static str> {
         self.esc
-            .replace_params(params)
+            .replace_params(&mut self.throttle, params)
             .map_err(|error| error.reason)?;
-        self.rig.configure(self.esc.config().clone());
+        self.configure();
         Ok(())
+    }
+
+    fn configure(&mut self) {
+        // Always, since what is in force has been built before.
+        if let Ok(config) = self.esc.config() {
+            self.rig.configure(config);
+        }
     }
 
     /// Starts the ESC again; the shaft, the supply and the wire go on as they are.
     fn reboot(&mut self) {
         let (params, _) = self.stored();
         // What cannot be built now was never in force: the old values go on.
-        let Ok(esc) = Esc::new(params, self.board, CAPTURE_HZ, self.link_bytes_per_s) else {
+        let Ok((esc, throttle)) = Esc::new(params, self.board, CAPTURE_HZ, self.link_bytes_per_s)
+        else {
             return;
         };
+        let Ok(config) = esc.config() else { return };
         self.esc = esc;
+        self.throttle = throttle;
         self.driven = Driven::default();
         self.receivers.clear();
-        self.rig.restart(self.esc.config().clone());
+        self.rig.restart(config);
         self.clock = Clock {
             origin_ns: self.clock.origin_ns + self.clock.periods as f64 * self.clock.period_ns,
             period_ns: self.rig.period_s() * 1e9,

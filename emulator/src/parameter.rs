@@ -15,7 +15,9 @@ pub fn parameter(name: &str, value: f32) -> Result<(ParamId, f32), String> {
         Err(SetError::NotWhole) => Err(format!("{name} = {value} is not a whole number")),
         Err(SetError::NotFinite | SetError::OutOfRange) => Err(format!(
             "{name} = {value} is out of range; give {} to {} {}",
-            entry.min, entry.max, entry.unit
+            entry.min,
+            entry.max,
+            id.text().unit
         )
         .trim_end()
         .to_owned()),

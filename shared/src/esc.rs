@@ -1,17 +1,15 @@
 //! The ESC outside the PWM interrupt: what the tasks of the firmware and the loop of the emulator
 //! share. It takes edges, frames and snapshots in, and gives set-points, frames and requests out.
 
-use crate::answer::{Answer, Answers, Ask};
-use crate::drive::{Config, Fault, Phase, Setpoint, Snapshot};
-use crate::input::authority::DriveStatus;
-use crate::input::command::Order;
-use crate::input::{Heard, Input};
-use crate::mavlink::{Component, Context, Frame, Request};
-use crate::params::{self, Board, BuildError, ParamId, Params, build};
-use crate::setpoint::Mapping;
+use crate::answer::info::info;
+use crate::drive::{Config, Phase, Snapshot};
+use crate::input::authority::{Command, DriveStatus};
+use crate::mavlink::{Component, Context, Frame, Request, Warning};
+use crate::params::{Board, BuildError, ParamId, Params, build};
 use crate::telemetry::{Charge, Telemetry};
+use crate::throttle::{Reach, Reached, Throttle, Told};
 use crate::tune::Tune;
-use heapless::Deque;
+use crate::units::Scale;
 use sound::Sound;
 use storage::{Asker, Storage};
 
@@ -22,15 +20,16 @@ mod wire;
 /// Degrees below `LIM_TEMP_C` at which an over-temperature has ended.
 const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 
-/// One ESC without its interrupt.
+/// For how long a wire with signals must have asked for rest before the flash is written, µs: what
+/// is written stalls the processor, and so a flight controller's frames are not heard.
+const REST_US: u64 = 1_000_000;
+
+/// One ESC without its interrupt and its throttle.
 pub struct Esc {
     board: Board,
     given: Given,
     params: Params,
-    config: Config,
-    mapping: Mapping,
-    input: Input,
-    answers: Answers,
+    scale: Scale,
     component: Component,
     telemetry: Telemetry,
     charge: Charge,
@@ -38,8 +37,11 @@ pub struct Esc {
     polled_us: Option<u64>,
     sound: Sound,
     light: bool,
-    /// What DShot commands have ordered since the last poll.
-    orders: Deque<Order, 4>,
+    /// What the motor was to do at the last poll, and since when it has been nothing.
+    command: Command,
+    rests_since_us: Option<u64>,
+    /// Whether the wire carried signals then.
+    traffic: bool,
     storage: Storage,
 }
 
@@ -81,7 +83,7 @@ impl Given {
 }
 
 impl Esc {
-    /// An ESC at power-up, and what its interrupt shall run with.
+    /// An ESC at power-up, and its throttle.
     ///
     /// `tick_hz` is the rate of the timer that captures the wire's edges, and `link_bytes_per_s`
     /// what the slowest MAVLink link carries.
@@ -93,20 +95,19 @@ impl Esc {
         board: Board,
         tick_hz: u32,
         link_bytes_per_s: u32,
-    ) -> Result<Self, BuildError> {
+    ) -> Result<(Self, Throttle), BuildError> {
         let config = build(&params, &board)?;
-        Ok(Self {
+        let mut throttle = Throttle::new(tick_hz, &params, &config);
+        throttle.tell_info(info(&params, false, &board.image));
+        let esc = Self {
             board,
             given: Given {
                 pwm_freq_hz: params.get(ParamId::PwmFreqHz),
                 pwm_deadtime_ns: params.get(ParamId::PwmDeadtimeNs),
                 opposite: false,
             },
-            mapping: Mapping::new(&params, &config),
-            config,
-            input: Input::new(tick_hz, params::input(&params)),
-            answers: Answers::new(tick_hz),
-            component: Component::new(&params, link_bytes_per_s),
+            scale: config.scale,
+            component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),
             params,
@@ -114,14 +115,20 @@ impl Esc {
             polled_us: None,
             sound: Sound::default(),
             light: false,
-            orders: Deque::new(),
+            command: Command::Stop,
+            rests_since_us: None,
+            traffic: false,
             storage: Storage::default(),
-        })
+        };
+        Ok((esc, throttle))
     }
 
-    /// What the interrupt shall run with.
-    pub fn config(&self) -> &Config {
-        &self.config
+    /// What the interrupt shall run with, computed anew at each call: it is larger than all else.
+    ///
+    /// # Errors
+    /// Never with the parameters in force, which have been tried before.
+    pub fn config(&self) -> Result<Config, BuildError> {
+        self.given.build(&self.params, &self.board)
     }
 
     /// The parameters in force.
@@ -134,48 +141,14 @@ impl Esc {
         &self.telemetry
     }
 
-    /// An edge on the throttle wire: when the capturing timer saw it, and the level after it. Returns
-    /// what the sender asks for, to be given to [`Esc::answer`].
-    pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Ask> {
-        let heard = self.input.edge(now_us, at_ticks, level)?;
-        self.heard(heard)
-    }
-
-    /// Tells the time of the timer that captures the wire's edges, once a control period or more
-    /// often. Returns what [`Esc::edge`] does.
-    pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Ask> {
-        let heard = self.input.settle(now_us, now_ticks)?;
-        self.heard(heard)
-    }
-
-    fn heard(&mut self, heard: Heard) -> Option<Ask> {
-        if let Some(order) = heard.order {
-            self.order(order);
-        }
-        Ask::of(&heard.event)
-    }
-
-    /// What is sent back to the flight controller, with the drive as it is now.
-    pub fn answer(&mut self, ask: Ask, snapshot: &Snapshot) -> Answer {
-        self.answers
-            .answer(ask, snapshot, &self.config, &self.telemetry)
-    }
-
-    /// What the drive is asked for.
-    pub fn setpoint(&self) -> Setpoint {
-        if self.too_hot {
-            return Setpoint::Fault(Fault::OverTemperature);
-        }
-        let command = self.input.authority().command();
-        match self.sound.note() {
-            Some(note) if command.rests() => self.mapping.tone(note),
-            _ => self.mapping.setpoint(command),
-        }
+    /// Warns a person, at the next poll.
+    pub fn warn(&mut self, warning: Warning) {
+        self.component.warn(warning);
     }
 
     /// A frame that came in on any MAVLink link.
-    pub fn receive(&mut self, now_us: u64, frame: &Frame) {
-        self.with_component(now_us, |component, context| {
+    pub fn receive(&mut self, throttle: &mut impl Reach, now_us: u64, frame: &Frame) {
+        self.with_component(throttle, now_us, |component, context| {
             component.handle(frame, context);
         });
     }
@@ -183,6 +156,7 @@ impl Esc {
     /// What is due, about each millisecond: time-outs, telemetry, and frames to every link.
     pub fn poll(
         &mut self,
+        throttle: &mut impl Reach,
         now_us: u64,
         snapshot: &Snapshot,
         temperature_c: f32,
@@ -192,7 +166,31 @@ impl Esc {
             self.sound.play(now_us, Tune::Start);
         }
         let before_us = self.polled_us.replace(now_us).unwrap_or(now_us);
-        let time_us = now_us.saturating_sub(before_us);
+        self.observe(snapshot, temperature_c, now_us.saturating_sub(before_us));
+        let standing = throttle.reach(|throttle| throttle.poll(now_us, &self.telemetry));
+        self.telemetry.armed = standing.armed;
+        self.telemetry.signal = standing.signal;
+        self.telemetry.bad_frames = standing.bad_frames;
+        self.telemetry.bad_share = standing.bad_share;
+        self.traffic = standing.traffic;
+        self.command = standing.command;
+        self.follow_wire(throttle, now_us);
+        self.with_component(throttle, now_us, |component, context| {
+            component.poll(context, send);
+        });
+        self.command = throttle.reach(|throttle| throttle.command());
+        let rests = self.command.rests();
+        self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
+        self.sound.look(now_us, snapshot, rests);
+        let told = Told {
+            note: self.sound.note(),
+            too_hot: self.too_hot,
+        };
+        throttle.reach(|throttle| throttle.tell(told));
+    }
+
+    /// Takes in what the drive and the board tell.
+    fn observe(&mut self, snapshot: &Snapshot, temperature_c: f32, time_us: u64) {
         let limit_c = self.params.get(ParamId::LimTempC);
         let limit_c = if self.too_hot {
             limit_c - TEMPERATURE_HYSTERESIS_C
@@ -201,34 +199,28 @@ impl Esc {
         };
         // A reading that is no number is too hot as well.
         self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
-        let scale = &self.config.scale;
-        self.telemetry.observe(snapshot, scale, time_us);
+        self.telemetry.observe(snapshot, &self.scale, time_us);
         self.charge
-            .add(scale.amperes(snapshot.bus_current), time_us);
+            .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();
         self.telemetry.temperature_c = temperature_c;
-        self.input.poll(now_us, self.drive());
-        self.telemetry.armed = self.input.authority().armed();
-        self.telemetry.signal = self.input.signal(now_us);
-        self.telemetry.bad_frames = self.input.bad_frames();
-        self.telemetry.bad_share = self.input.bad_share();
-        self.follow_wire(now_us);
-        self.with_component(now_us, |component, context| component.poll(context, send));
-        let rests = self.input.authority().command().rests();
-        self.sound.look(now_us, snapshot, rests);
     }
 
     /// What only the caller can do. [`Request::ParamsChanged`] has been done as far as this side
     /// goes: the interrupt shall run with [`Esc::config`] from now on. A request for storage waits
-    /// until the bridge rests and the one before has ended.
-    pub fn take_request(&mut self) -> Option<Request> {
+    /// until the bridge rests and the one before has ended; nothing turns the motor from then on
+    /// until [`Esc::storage_done`].
+    pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
         let request = self.component.take_request();
         match request {
-            Some(Request::ParamsChanged) => self.apply(),
+            Some(Request::ParamsChanged) => self.apply(throttle),
             Some(Request::Reboot) => {}
             Some(Request::Save | Request::Load | Request::FactoryReset) | None => {
                 self.storage.ask(request);
-                return self.storage.take_if(self.may_store());
+                if self.storage.waits() && self.may_store() && throttle.reach(Throttle::store) {
+                    return self.storage.take();
+                }
+                return None;
             }
         }
         request
@@ -238,11 +230,17 @@ impl Esc {
     /// must not switch, nor be about to.
     fn may_store(&self) -> bool {
         let holds = matches!(self.telemetry.phase, Phase::Idle | Phase::Brake);
-        holds && self.drive().stopped && self.sound.note().is_none()
+        let rested = match (self.rests_since_us, self.polled_us) {
+            (Some(since_us), Some(now_us)) => {
+                !self.traffic || now_us.saturating_sub(since_us) >= REST_US
+            }
+            _ => false,
+        };
+        holds && rested && self.drive().stopped && self.sound.note().is_none()
     }
 
     fn drive(&self) -> DriveStatus {
-        self.telemetry.drive(self.input.authority().command())
+        self.telemetry.drive(self.command)
     }
 
     /// Puts other parameters in force, as loaded from storage. The interrupt shall run with
@@ -250,15 +248,21 @@ impl Esc {
     ///
     /// # Errors
     /// The parameter that does not fit the board; nothing has changed then.
-    pub fn replace_params(&mut self, params: Params) -> Result<(), BuildError> {
+    pub fn replace_params(
+        &mut self,
+        throttle: &mut impl Reach,
+        params: Params,
+    ) -> Result<(), BuildError> {
         self.given.build(&params, &self.board)?;
         self.params = params;
-        self.apply();
+        self.apply(throttle);
         Ok(())
     }
 
-    /// Tells how a request for storage ended, so that it is acknowledged.
-    pub fn storage_done(&mut self, result: Result<(), &'static str>) {
+    /// Tells how a request for storage ended, so that it is acknowledged, and lets the motor turn
+    /// again.
+    pub fn storage_done(&mut self, throttle: &mut impl Reach, result: Result<(), &'static str>) {
+        throttle.reach(Throttle::stored);
         match self.storage.done() {
             Some(Asker::Wire) => self.component.tell_stored(result),
             Some(Asker::Mavlink) => self.component.storage_done(result),
@@ -266,22 +270,32 @@ impl Esc {
         }
     }
 
-    fn apply(&mut self) {
-        // Each change has been validated: the configuration stays where it cannot be built.
-        if let Ok(config) = self.given.build(&self.params, &self.board) {
-            self.config = config;
+    fn apply(&mut self, throttle: &mut impl Reach) {
+        // Each change has been validated: the old configuration stays where it cannot be built.
+        if let Ok(config) = self.config() {
+            self.scale = config.scale;
+            throttle.reach(|throttle| throttle.adopt(&self.params, &config));
         }
-        self.mapping = Mapping::new(&self.params, &self.config);
-        self.input.set(params::input(&self.params));
+        self.tell_info(throttle);
     }
 
-    fn with_component(&mut self, now_us: u64, run: impl FnOnce(&mut Component, &mut Context)) {
+    fn tell_info(&self, throttle: &mut impl Reach) {
+        let info = info(&self.params, self.light, &self.board.image);
+        throttle.reach(|throttle| throttle.tell_info(info));
+    }
+
+    fn with_component(
+        &mut self,
+        throttle: &mut impl Reach,
+        now_us: u64,
+        run: impl FnOnce(&mut Component, &mut Context),
+    ) {
         let (given, board) = (self.given, self.board);
         let mut context = Context {
             now_us,
             params: &mut self.params,
             telemetry: &self.telemetry,
-            authority: self.input.authority_mut(),
+            authority: &mut Reached(throttle),
             validate: &|params| given.build(params, &board).map(|_| ()),
         };
         run(&mut self.component, &mut context);

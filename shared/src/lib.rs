@@ -7,11 +7,11 @@
 //! converter a bridge's next period ([`drive::step`]), by way of the papers' blocks ([`control`])
 //! and the limits ([`protection`]). What the drive has done becomes [`telemetry`], and that goes
 //! out by [`mavlink`]. [`params`] turns the table of parameters into the configuration that all of
-//! it reads, and [`store`] keeps them. [`tune`] has the tunes that the motor plays. [`esc`] ties
-//! together what is outside the PWM interrupt.
+//! it reads, and [`store`] keeps them. [`tune`] has the tunes that the motor plays. [`throttle`] and
+//! [`esc`] tie together what is outside the PWM interrupt.
 //!
 //! Dependencies run one way: `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
-//! `telemetry` ← `mavlink` ← `esc`. `params` builds the configurations of the others.
+//! `telemetry` ← {`throttle`, `mavlink`} ← `esc`. `params` builds the configurations of the others.
 //!
 //! # Numbers
 //! Fixed point with the fraction bits in the type ([`math`]), in units in which a product needs
@@ -36,6 +36,7 @@ pub mod answer;
 pub mod control;
 pub mod drive;
 pub mod esc;
+pub mod image;
 pub mod input;
 pub mod math;
 pub mod mavlink;
@@ -44,5 +45,6 @@ pub mod protection;
 pub mod setpoint;
 pub mod store;
 pub mod telemetry;
+pub mod throttle;
 pub mod tune;
 pub mod units;

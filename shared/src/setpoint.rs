@@ -2,7 +2,7 @@
 
 use crate::drive::{Config, Setpoint, tone};
 use crate::input::authority::Command;
-use crate::input::{Throttle, reverse};
+use crate::input::{Share, reverse};
 use crate::math::TopProduct;
 use crate::params::{ParamId, Params};
 use crate::tune::Note;
@@ -83,7 +83,7 @@ impl Mapping {
 }
 
 /// A throttle's share, and whether it is for the other direction.
-fn split(throttle: Throttle) -> (Throttle, bool) {
+fn split(throttle: Share) -> (Share, bool) {
     if throttle.is_negative() {
         (reverse(throttle), true)
     } else {
@@ -91,7 +91,7 @@ fn split(throttle: Throttle) -> (Throttle, bool) {
     }
 }
 
-fn share_of(throttle: Throttle, full: Current) -> Current {
+fn share_of(throttle: Share, full: Current) -> Current {
     let (share, reversed) = split(throttle);
     let current = Current::from_bits(share.top(full).to_bits() << 1);
     if reversed { -current } else { current }
@@ -112,7 +112,7 @@ mod tests {
 
     fn rpm(throttle: f64) -> f32 {
         let (mapping, scale) = mapping(0.0);
-        match mapping.setpoint(Command::Throttle(Throttle::saturating_from_num(throttle))) {
+        match mapping.setpoint(Command::Throttle(Share::saturating_from_num(throttle))) {
             Setpoint::Speed(speed) => scale.rpm(speed),
             other => panic!("{other:?}"),
         }
@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn torque_mode_and_tests_are_shares_of_the_bound() {
         let (mapping, scale) = mapping(1.0);
-        let half = Throttle::from_num(0.5);
+        let half = Share::from_num(0.5);
         let Setpoint::Torque(current) = mapping.setpoint(Command::Throttle(half)) else {
             panic!("torque mode");
         };
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn voltage_mode_is_a_share_of_the_modulation() {
         let (mapping, _) = mapping(2.0);
-        for share in [0.0, 0.3, 1.0].map(Throttle::saturating_from_num) {
+        for share in [0.0, 0.3, 1.0].map(Share::saturating_from_num) {
             let forward = mapping.setpoint(Command::Throttle(share));
             assert_eq!(forward, Setpoint::Voltage(share));
             let back = mapping.setpoint(Command::Throttle(reverse(share)));
@@ -154,7 +154,7 @@ mod tests {
     fn the_other_direction_mirrors_the_first_from_its_least_throttle_on() {
         for mode in [0.0, 1.0] {
             let (mapping, _) = mapping(mode);
-            for share in [0.0, 0.01, 0.5, 1.0].map(Throttle::saturating_from_num) {
+            for share in [0.0, 0.01, 0.5, 1.0].map(Share::saturating_from_num) {
                 let forward = mapping.setpoint(Command::Throttle(share));
                 let back = mapping.setpoint(Command::Throttle(reverse(share)));
                 match (forward, back) {

@@ -10,6 +10,7 @@ use siskin_control::drive::{Bridge, Fault, Phase, Setpoint};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Frame, Receiver, Request};
 use siskin_control::params::{ParamId, Params};
+use siskin_control::throttle::Throttle;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_emulator::wire::Wire;
 
@@ -23,6 +24,7 @@ const ROOM_C: f32 = 25.0;
 /// An ESC on its bench, with a flight controller that sends a frame a millisecond.
 struct Station {
     esc: Esc,
+    throttle: Throttle,
     rig: Rig,
     wire: Wire,
     receiver: Receiver,
@@ -49,11 +51,13 @@ impl Station {
 
     fn on(bench: Bench, params: Params) -> Self {
         let board = bench.sensing.board(bench.delay);
-        let esc =
+        let (esc, throttle) =
             Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("the parameters fit the bench");
-        let rig = Rig::new(bench, esc.config().clone());
+        let config = esc.config().expect("they fit");
+        let rig = Rig::new(bench, config);
         Self {
             esc,
+            throttle,
             rig,
             wire: Wire::detached(),
             receiver: Receiver::default(),
@@ -90,9 +94,9 @@ impl Station {
             self.now_ns += MS_NS;
             while let Some((edge_ns, level)) = self.wire.next_edge(self.now_ns) {
                 let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
-                self.esc.edge(edge_ns / 1000, ticks as u32, level);
+                self.throttle.edge(edge_ns / 1000, ticks as u32, level);
             }
-            let setpoint = self.esc.setpoint();
+            let setpoint = self.throttle.setpoint();
             let period_ns = self.rig.period_s() * 1e9;
             while (self.periods as f64 * period_ns) < self.now_ns as f64 {
                 let period = self.rig.period(setpoint);
@@ -109,6 +113,7 @@ impl Station {
         let now_us = self.now_ns / 1000;
         let (listener, heard) = (&mut self.listener, &mut self.heard);
         self.esc.poll(
+            &mut self.throttle,
             now_us,
             &self.rig.snapshot(),
             self.temperature_c,
@@ -116,9 +121,10 @@ impl Station {
                 listener.push(now_us, frame, |frame| heard.push(message(frame)));
             },
         );
-        while let Some(request) = self.esc.take_request() {
+        while let Some(request) = self.esc.take_request(&mut self.throttle) {
             assert_eq!(request, Request::ParamsChanged);
-            self.rig.configure(self.esc.config().clone());
+            let config = self.esc.config().expect("what is in force fits");
+            self.rig.configure(config);
         }
     }
 
@@ -132,8 +138,15 @@ impl Station {
         let mut raw = MAVLinkV2MessageRaw::new();
         raw.serialize_message(header, message);
         let now_us = self.now_ns / 1000;
-        let Self { receiver, esc, .. } = self;
-        receiver.push(now_us, raw.raw_bytes(), |frame| esc.receive(now_us, frame));
+        let Self {
+            receiver,
+            esc,
+            throttle,
+            ..
+        } = self;
+        receiver.push(now_us, raw.raw_bytes(), |frame| {
+            esc.receive(throttle, now_us, frame);
+        });
     }
 
     fn set(&mut self, id: ParamId, value: f32) {
@@ -218,7 +231,7 @@ fn above_lim_temp_c_the_bridge_is_off_until_5_degrees_below_it_and_zero_throttle
     station.heard.clear();
     station.run(2, HALF);
     assert_eq!(
-        station.esc.setpoint(),
+        station.throttle.setpoint(),
         Setpoint::Fault(Fault::OverTemperature)
     );
     let hot = station.run(1_100, HALF);

@@ -11,6 +11,7 @@ use siskin_control::drive::{Setpoint, Snapshot, State};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, ParamId, Params};
+use siskin_control::throttle::Throttle;
 use siskin_emulator::rig::Bench;
 use siskin_emulator::wire::Wire;
 
@@ -31,6 +32,7 @@ const OBEYED: [u16; 5] = [245, 246, 400, 511, 512];
 struct Desk {
     board: Board,
     esc: Esc,
+    throttle: Throttle,
     stored: Params,
     wire: Wire,
     receiver: Receiver,
@@ -45,11 +47,13 @@ impl Desk {
     fn new() -> Self {
         let bench = Bench::default();
         let board = bench.sensing.board(bench.delay);
-        let esc = Self::esc(Params::default(), board);
-        let snapshot = State::new(esc.config()).snapshot();
+        let (esc, throttle) = Self::esc(Params::default(), board);
+        let config = esc.config().expect("it fits the bench");
+        let snapshot = State::new(&config).snapshot();
         Self {
             board,
             esc,
+            throttle,
             stored: Params::default(),
             wire: Wire::detached(),
             receiver: Receiver::default(),
@@ -61,14 +65,21 @@ impl Desk {
     }
 
     /// One at power-up. What is stored has been in force: it fits the board.
-    fn esc(params: Params, board: Board) -> Esc {
+    fn esc(params: Params, board: Board) -> (Esc, Throttle) {
         Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("the parameters fit the bench")
     }
 
     fn receive(&mut self, bytes: &[u8]) {
         let now_us = self.now_ns / 1000;
-        let Self { receiver, esc, .. } = self;
-        receiver.push(now_us, bytes, |frame| esc.receive(now_us, frame));
+        let Self {
+            receiver,
+            esc,
+            throttle,
+            ..
+        } = self;
+        receiver.push(now_us, bytes, |frame| {
+            esc.receive(throttle, now_us, frame);
+        });
         self.check();
     }
 
@@ -77,16 +88,18 @@ impl Desk {
         self.now_ns += MS_NS;
         while let Some((edge_ns, level)) = self.wire.next_edge(self.now_ns) {
             let ticks = u128::from(edge_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
-            self.esc.edge(edge_ns / 1000, ticks as u32, level);
+            self.throttle.edge(edge_ns / 1000, ticks as u32, level);
             self.check();
         }
         let now_us = self.now_ns / 1000;
         let (listener, sent) = (&mut self.listener, &mut self.sent);
-        self.esc.poll(now_us, &self.snapshot, 25.0, &mut |frame| {
-            *sent += 1;
-            listener.push(now_us, frame, |_| {});
-        });
-        while let Some(request) = self.esc.take_request() {
+        let throttle = &mut self.throttle;
+        self.esc
+            .poll(throttle, now_us, &self.snapshot, 25.0, &mut |frame| {
+                *sent += 1;
+                listener.push(now_us, frame, |_| {});
+            });
+        while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.answer(request);
         }
         self.check();
@@ -105,21 +118,21 @@ impl Desk {
                 self.replace(Params::default())
             }
             Request::Reboot => {
-                self.esc = Self::esc(self.stored.clone(), self.board);
+                (self.esc, self.throttle) = Self::esc(self.stored.clone(), self.board);
                 return;
             }
         };
-        self.esc.storage_done(result);
+        self.esc.storage_done(&mut self.throttle, result);
     }
 
     fn replace(&mut self, params: Params) -> Result<(), &'static str> {
         self.esc
-            .replace_params(params)
+            .replace_params(&mut self.throttle, params)
             .map_err(|error| error.reason)
     }
 
     fn check(&self) {
-        let setpoint = self.esc.setpoint();
+        let setpoint = self.throttle.setpoint();
         assert!(
             matches!(
                 setpoint,

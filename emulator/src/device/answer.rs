@@ -62,7 +62,7 @@ impl Driven {
 impl Device {
     /// Sends what was asked for at about `now_ns`.
     pub(super) fn answer(&mut self, now_ns: u64, ask: Ask, onlooker: &mut impl Onlooker) {
-        let Answer { reply, kiss, info } = self.esc.answer(ask, &self.rig.snapshot());
+        let Answer { reply, kiss, info } = self.throttle.answer(ask, &self.rig.snapshot());
         let asked_ns = time_ns(ask.first_edge_ticks, now_ns);
         let mut send = |code: u8, payload: &[&[u8]]| {
             let datagram = [&[code], payload.concat().as_slice()].concat();

@@ -3,6 +3,7 @@
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::Sample;
+use siskin_control::image::Image;
 use siskin_control::params::Board;
 use siskin_control::units::AdcCounts;
 
@@ -77,6 +78,7 @@ impl Sensing {
     /// The board that these sensors make, for [`siskin_control::params::build`].
     pub fn board(&self, delay: Delay) -> Board {
         Board {
+            image: Image::EMULATOR,
             current_a_per_count: (self.range_a / FULL_SCALE_COUNTS) as f32,
             bus_v_per_count: (VOLTAGE_RANGE_V / VOLTAGE_COUNTS) as f32,
             terminal_v_per_count: (VOLTAGE_RANGE_V / VOLTAGE_COUNTS) as f32,

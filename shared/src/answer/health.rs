@@ -1,7 +1,7 @@
 //! How well the drive fares, as the status and stress words of extended telemetry tell it.
 //!
 //! The specification calls stress the effort to keep commutation going: 0 is perfect, and the end
-//! of the range is that it cannot be kept. Here it is [`Config::doubt`]: how near the drive is to
+//! of the range is that it cannot be kept. Here it is [`Basis::doubt`]: how near the drive is to
 //! giving the rotor up. It tells nothing of load, which the current tells.
 //!
 //! | event | raised by |
@@ -12,8 +12,9 @@
 //!
 //! An event is told once, by the next status word, and again as long as it lasts.
 
+use super::Basis;
 use super::extended::{Extended, Status};
-use crate::drive::{Config, Snapshot};
+use crate::drive::Snapshot;
 
 /// Doubt from which on it is worth a warning: a quarter of what is allowed, as one of four starts
 /// that has failed. A crossing that the current hides now and then is none.
@@ -31,12 +32,12 @@ pub(super) struct Health {
 
 impl Health {
     /// Takes in what the drive says, at each reply.
-    pub(super) fn observe(&mut self, snapshot: &Snapshot, config: &Config) {
-        let doubt = config.doubt(snapshot);
+    pub(super) fn observe(&mut self, snapshot: &Snapshot, basis: &Basis) {
+        let doubt = basis.doubt(snapshot);
         self.stress = self.stress.max(doubt);
         self.max_stress = self.max_stress.max(doubt);
         let status = &mut self.status;
-        status.alert |= at_limit(snapshot, config);
+        status.alert |= basis.at_limit(snapshot);
         status.warning |= doubt >= SUSPECT || snapshot.sensor_fault;
         status.error |= !snapshot.faults.is_empty() || snapshot.fault_count != self.fault_count;
         self.fault_count = snapshot.fault_count;
@@ -65,14 +66,6 @@ impl Health {
     }
 }
 
-/// Whether the current's vector is within a sixteenth of its bound: the regulator holds it there
-/// within its ripple.
-fn at_limit(snapshot: &Snapshot, config: &Config) -> bool {
-    let square = |bits: i32| i64::from(bits) * i64::from(bits);
-    let bound = config.protection.phase.to_bits();
-    square(snapshot.i.d.to_bits()) + square(snapshot.i.q.to_bits()) >= square(bound - bound / 16)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,10 +73,10 @@ mod tests {
     use crate::params::{Board, Params, build};
     use crate::units::Current;
 
-    fn rig() -> (Config, Snapshot) {
+    fn rig() -> (Basis, Snapshot) {
         let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
         let snapshot = State::new(&config).snapshot();
-        (config, snapshot)
+        (Basis::new(&config), snapshot)
     }
 
     fn status(health: &mut Health) -> Status {
@@ -95,22 +88,22 @@ mod tests {
 
     #[test]
     fn a_drive_without_trouble_has_nothing_to_tell() {
-        let (config, snapshot) = rig();
+        let (basis, snapshot) = rig();
         let mut health = Health::default();
-        health.observe(&snapshot, &config);
+        health.observe(&snapshot, &basis);
         assert_eq!(status(&mut health), Status::default());
         assert_eq!(health.stress(), Extended::Stress(0));
     }
 
     #[test]
     fn a_current_at_its_bound_is_an_alert_and_told_once() {
-        let (config, calm) = rig();
+        let (basis, calm) = rig();
         let mut health = Health::default();
         let mut loaded = calm;
         for (share, alert) in [(0.9, false), (0.95, true), (-1.0, true)] {
-            loaded.i.q = Current::from_num(config.protection.phase.to_num::<f64>() * share);
-            health.observe(&loaded, &config);
-            health.observe(&calm, &config);
+            loaded.i.q = Current::from_num(basis.phase.to_num::<f64>() * share);
+            health.observe(&loaded, &basis);
+            health.observe(&calm, &basis);
             assert_eq!(status(&mut health).alert, alert, "{share}");
             assert!(!status(&mut health).alert);
         }
@@ -118,14 +111,14 @@ mod tests {
 
     #[test]
     fn failed_starts_are_stress_until_the_last_one_is_a_fault() {
-        let (config, calm) = rig();
+        let (basis, calm) = rig();
         let mut health = Health::default();
         for (failed_starts, stress) in [(0, 0), (1, 63), (2, 127), (3, 191)] {
             let snapshot = Snapshot {
                 failed_starts,
                 ..calm
             };
-            health.observe(&snapshot, &config);
+            health.observe(&snapshot, &basis);
             assert_eq!(health.stress(), Extended::Stress(stress));
             let told = status(&mut health);
             assert_eq!(told.max_stress, stress >> 4);
@@ -133,7 +126,7 @@ mod tests {
         }
         let mut stuck = calm;
         stuck.faults.insert(Fault::Stuck);
-        health.observe(&stuck, &config);
+        health.observe(&stuck, &basis);
         assert_eq!(health.stress(), Extended::Stress(255));
         let told = status(&mut health);
         assert!(told.warning && told.error);
@@ -141,14 +134,14 @@ mod tests {
 
     #[test]
     fn a_position_that_is_in_doubt_is_stress() {
-        let (config, calm) = rig();
+        let (basis, calm) = rig();
         let mut health = Health::default();
         let lost = Snapshot {
-            lost_periods: config.lost_periods / 2,
+            lost_periods: basis.lost_periods / 2,
             ..calm
         };
-        health.observe(&lost, &config);
-        health.observe(&calm, &config);
+        health.observe(&lost, &basis);
+        health.observe(&calm, &basis);
         assert_eq!(health.stress(), Extended::Stress(127));
         assert_eq!(health.stress(), Extended::Stress(0), "it is over");
         assert_eq!(status(&mut health).max_stress, 7, "but was not told here");
@@ -163,23 +156,23 @@ mod tests {
 
     #[test]
     fn a_fault_that_has_ended_before_anyone_asked_is_told_once() {
-        let (config, calm) = rig();
+        let (basis, calm) = rig();
         let mut health = Health::default();
         let after = after_a_fault(calm);
-        health.observe(&after, &config);
+        health.observe(&after, &basis);
         assert!(status(&mut health).error);
-        health.observe(&after, &config);
+        health.observe(&after, &basis);
         assert!(!status(&mut health).error);
     }
 
     #[test]
     fn what_happened_before_the_beginning_is_not_told() {
-        let (config, calm) = rig();
+        let (basis, calm) = rig();
         let mut health = Health::default();
         let after = after_a_fault(calm);
-        health.observe(&after, &config);
+        health.observe(&after, &basis);
         health.begin();
-        health.observe(&after, &config);
+        health.observe(&after, &basis);
         assert_eq!(status(&mut health), Status::default());
     }
 }

@@ -14,10 +14,11 @@
 //! | 18 | least supply voltage in 0.1 V, 0 off |
 //! | 19 | limit of the current in A, 0 off |
 //! | 20 to 23 | lights 0 to 3: 0 off, 1 on, 255 there is none |
-//! | 31 to 62 | name, zeros to the end |
+//! | 31 to 62 | name and board, zeros to the end |
 //! | 63 | check sum, as of a KISS frame |
 
 use super::kiss::crc8;
+use crate::image::{Image, VERSION};
 use crate::params::{ParamId, Params};
 
 /// Bytes of the information.
@@ -33,11 +34,12 @@ const UNSUPPORTED: u8 = 255;
 /// The highest value that is not taken for [`UNSUPPORTED`].
 const MOST: f32 = 254.0;
 
-const NAME: &[u8] = b"Siskin";
+const NAME: &[u8] = b"Siskin ";
+/// Bytes 31 to 62.
+const NAME_BYTES: usize = 32;
 
-/// The information of an ESC with these parameters and this state of its light. The serial number is
-/// 0: it is the chip's, and not known here.
-pub fn info(params: &Params, light: bool) -> [u8; BYTES] {
+/// The information of an ESC with these parameters and this state of its light.
+pub fn info(params: &Params, light: bool, image: &Image) -> [u8; BYTES] {
     let get = |id| params.get(id);
     // Conversions saturate, and a limit below the unit is still one.
     let limit = |value: f32| {
@@ -45,6 +47,7 @@ pub fn info(params: &Params, light: bool) -> [u8; BYTES] {
         libm::roundf(value).clamp(least, MOST) as u8
     };
     let mut bytes = [0; BYTES];
+    bytes[..12].copy_from_slice(&image.serial);
     bytes[12] = LAYOUT;
     bytes[13..15].copy_from_slice(&version());
     bytes[16] = get(ParamId::MotDir) as u8;
@@ -53,22 +56,36 @@ pub fn info(params: &Params, light: bool) -> [u8; BYTES] {
     bytes[19] = limit(get(ParamId::LimPhaseA));
     bytes[20] = u8::from(light);
     bytes[21..24].fill(UNSUPPORTED);
-    bytes[31..31 + NAME.len()].copy_from_slice(NAME);
+    bytes[31..31 + NAME_BYTES].copy_from_slice(&name(image.board));
     bytes[BYTES - 1] = crc8(&bytes[..BYTES - 1]);
     bytes
 }
 
 /// Major version, and minor version with the patch: 0.1.0 is 0 and 10, printed as 0.10.
 fn version() -> [u8; 2] {
-    let mut parts = env!("CARGO_PKG_VERSION").split('.');
-    let mut part = || parts.next().and_then(|part| part.parse().ok()).unwrap_or(0);
-    let (major, minor, patch): (u8, u8, u8) = (part(), part(), part());
+    let [major, minor, patch] = VERSION;
     [major, minor.saturating_mul(10).saturating_add(patch)]
+}
+
+/// The name, and the board's behind it where there is room.
+fn name(board: &str) -> [u8; NAME_BYTES] {
+    let mut name = [0; NAME_BYTES];
+    let bytes = NAME.iter().copied().chain(board.bytes());
+    // Zeros end it.
+    for (to, byte) in name[..NAME_BYTES - 1].iter_mut().zip(bytes) {
+        *to = byte;
+    }
+    name
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const IMAGE: Image = Image {
+        serial: *b"0123456789ab",
+        ..Image::EMULATOR
+    };
 
     /// What Betaflight makes of it: `printEscInfo` of its command line.
     #[test]
@@ -83,12 +100,13 @@ mod tests {
         for (id, value) in values {
             params.set(id, value).expect("in range");
         }
-        let bytes = info(&params, true);
+        let bytes = info(&params, true, &IMAGE);
         assert_eq!(bytes[12], 254);
         assert_eq!(bytes[13..15], version());
         assert_eq!(bytes[16..24], [1, 1, 132, 35, 1, 255, 255, 255]);
         let name = bytes[31..63].split(|byte| *byte == 0).next();
-        assert_eq!(name, Some(&b"Siskin"[..]));
+        assert_eq!(name, Some(&b"Siskin emulator"[..]));
+        assert_eq!(bytes[..12], IMAGE.serial);
         assert_eq!(crc8(&bytes), 0);
     }
 
@@ -97,10 +115,10 @@ mod tests {
         let mut params = Params::default();
         params.set(ParamId::LimBusVMin, 0.0).expect("in range");
         params.set(ParamId::LimPhaseA, 0.5).expect("in range");
-        let bytes = info(&params, false);
+        let bytes = info(&params, false, &IMAGE);
         assert_eq!(bytes[18..21], [0, 1, 0]);
         params.set(ParamId::LimBusVMin, 60.0).expect("in range");
         params.set(ParamId::LimPhaseA, 200.0).expect("in range");
-        assert_eq!(info(&params, false)[18..20], [254, 200]);
+        assert_eq!(info(&params, false, &IMAGE)[18..20], [254, 200]);
     }
 }

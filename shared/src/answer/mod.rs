@@ -4,6 +4,7 @@
 //! of extended telemetry ([`extended`]); a frame with its telemetry bit set, on the serial line
 //! ([`kiss`]).
 
+mod basis;
 pub mod erpm;
 pub mod extended;
 pub mod gcr;
@@ -12,11 +13,12 @@ pub mod info;
 pub mod kiss;
 mod schedule;
 
-use crate::drive::{Config, Snapshot};
+use crate::drive::Snapshot;
 use crate::input::command::Order;
 use crate::input::dshot::Rate;
 use crate::input::line::Event;
 use crate::telemetry::Telemetry;
+pub use basis::Basis;
 use extended::Extended;
 use health::Health;
 use schedule::{Kind, Schedule};
@@ -142,11 +144,11 @@ impl Answers {
         &mut self,
         ask: Ask,
         snapshot: &Snapshot,
-        config: &Config,
+        basis: &Basis,
         telemetry: &Telemetry,
     ) -> Answer {
         self.pass(ask.first_edge_ticks);
-        self.health.observe(snapshot, config);
+        self.health.observe(snapshot, basis);
         let free = self.busy_ticks == 0;
         let info = self.info.take_if(|_| free);
         // A flight controller that asks for the information sets the telemetry bit as well, and reads
@@ -160,9 +162,9 @@ impl Answers {
         Answer {
             reply: ask
                 .bidirectional
-                .then(|| self.reply(ask, snapshot, config, telemetry)),
+                .then(|| self.reply(ask, snapshot, basis, telemetry)),
             kiss: kiss.then(|| {
-                let scale = &config.scale;
+                let scale = &basis.scale;
                 let erpm = scale.rpm(snapshot.speed).abs() * scale.pole_pairs;
                 kiss::frame(telemetry, erpm)
             }),
@@ -183,7 +185,7 @@ impl Answers {
         &mut self,
         ask: Ask,
         snapshot: &Snapshot,
-        config: &Config,
+        basis: &Basis,
         telemetry: &Telemetry,
     ) -> Reply {
         let data = match self.extended(telemetry) {
@@ -191,7 +193,7 @@ impl Answers {
                 self.schedule.sends();
                 word.data()
             }
-            None => erpm::of_speed(snapshot.speed, &config.scale),
+            None => erpm::of_speed(snapshot.speed, &basis.scale),
         };
         Reply {
             bits: gcr::encode(data),

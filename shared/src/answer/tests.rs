@@ -9,7 +9,7 @@ const TICK_HZ: u32 = 170_000_000;
 
 struct Rig {
     answers: Answers,
-    config: Config,
+    basis: Basis,
     snapshot: Snapshot,
     telemetry: Telemetry,
     now_ticks: u32,
@@ -21,7 +21,7 @@ impl Rig {
         Self {
             answers: Answers::new(TICK_HZ),
             snapshot: State::new(&config).snapshot(),
-            config,
+            basis: Basis::new(&config),
             telemetry: Telemetry {
                 temperature_c: 40.6,
                 bus_v: 23.9,
@@ -44,7 +44,7 @@ impl Rig {
             telemetry,
         };
         let answers = &mut self.answers;
-        answers.answer(ask, &self.snapshot, &self.config, &self.telemetry)
+        answers.answer(ask, &self.snapshot, &self.basis, &self.telemetry)
     }
 
     /// The data of the reply to the next frame.
@@ -129,7 +129,7 @@ fn the_information_has_the_serial_line_for_itself() {
 #[test]
 fn without_extended_telemetry_every_reply_is_the_speed() {
     let mut rig = Rig::new();
-    rig.snapshot.speed = rig.config.scale.speed_from_rpm(-3000.0);
+    rig.snapshot.speed = rig.basis.scale.speed_from_rpm(-3000.0);
     for _ in 0..20_000 {
         // 36000 eRPM, a turn in 1667 µs, to the nearest 4.
         assert_eq!(erpm::period_us(rig.data(125)), Some(1668));

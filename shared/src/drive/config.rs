@@ -2,7 +2,7 @@
 
 use fixed::types::extra::{U16, U28, U32};
 
-use super::{Fault, Snapshot, six_step, tone};
+use super::{six_step, tone};
 use crate::control::delay::Delay;
 use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
@@ -104,24 +104,6 @@ pub struct Config {
 }
 
 impl Config {
-    /// How near the drive is to giving the rotor up: 0 where all is well, 255 where it has.
-    ///
-    /// It is the greatest share that has been used of what is allowed: of the attempts of a start,
-    /// of the periods without an estimate, and of the six-step drive's sextants without a crossing.
-    pub fn doubt(&self, snapshot: &Snapshot) -> u8 {
-        let faults = snapshot.faults;
-        if faults.contains(Fault::ObserverLost) || faults.contains(Fault::Stuck) {
-            return u8::MAX;
-        }
-        let share = |part: u32, whole: u32| part.min(whole) * u32::from(u8::MAX) / whole.max(1);
-        share(snapshot.failed_starts.into(), ATTEMPTS as u32)
-            .max(share(snapshot.lost_periods, self.lost_periods))
-            .max(share(
-                snapshot.missed_sextants.into(),
-                six_step::LOST_SEXTANTS.into(),
-            )) as u8
-    }
-
     /// The same drive, told where its rotor is by [`State::place`](super::State::place) in place of
     /// an observer. It starts from standstill without aligning the rotor.
     pub fn with_position_given(self) -> Self {

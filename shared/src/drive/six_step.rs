@@ -28,7 +28,7 @@ use crate::math::{Gain, TopProduct};
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
 /// Sextants in a row without a crossing after which the rotor is lost: two turns.
-pub(super) const LOST_SEXTANTS: u8 = 12;
+pub(crate) const LOST_SEXTANTS: u8 = 12;
 
 /// Sextants without a crossing for which one counts that Ramp has waited for in vain: three of them
 /// end the start.

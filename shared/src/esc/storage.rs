@@ -32,11 +32,13 @@ impl Storage {
         self.save = true;
     }
 
-    /// The next request, if it may be one now and none is under way.
-    pub(super) fn take_if(&mut self, may: bool) -> Option<Request> {
-        if !may || self.under_way.is_some() {
-            return None;
-        }
+    /// Whether a request waits, and none is under way.
+    pub(super) fn waits(&self) -> bool {
+        self.under_way.is_none() && (self.mavlink.is_some() || self.save)
+    }
+
+    /// The next request, which is under way now.
+    pub(super) fn take(&mut self) -> Option<Request> {
         if let Some(request) = self.mavlink.take() {
             self.under_way = Some(Asker::Mavlink);
             return Some(request);

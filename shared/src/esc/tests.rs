@@ -4,8 +4,9 @@ use std::string::{String, ToString};
 use std::vec::Vec;
 
 use super::*;
-use crate::answer::info::info;
-use crate::drive::{Direction, Phase, State};
+use crate::answer::{Answer, Ask};
+use crate::drive::{Direction, Setpoint, State};
+use crate::image::Image;
 use crate::input::dshot::{self, Rate, edges};
 use crate::input::signal::Signal;
 use crate::tune::{Beacon, Note, Player};
@@ -21,6 +22,7 @@ const TICK_HZ: u32 = 170_000_000;
 /// An ESC, its clock, its drive's snapshot, and all that it has said and asked for.
 struct Bench {
     esc: Esc,
+    throttle: Throttle,
     snapshot: Snapshot,
     now_us: u64,
     texts: Vec<String>,
@@ -37,10 +39,12 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let esc = Esc::new(Params::default(), Board::BENCH, TICK_HZ, 1_000_000);
-        let esc = esc.expect("the defaults fit");
+        let (esc, throttle) = esc.expect("the defaults fit");
+        let config = esc.config().expect("the defaults fit");
         let mut bench = Self {
-            snapshot: State::new(esc.config()).snapshot(),
+            snapshot: State::new(&config).snapshot(),
             esc,
+            throttle,
             now_us: 1_000_000,
             texts: Vec::new(),
             values: Vec::new(),
@@ -53,10 +57,10 @@ impl Bench {
         bench
     }
 
-    /// Armed by DShot600, with the tunes of it over.
+    /// Armed by DShot600 and long enough at rest for storage, with the tunes of it over.
     fn armed() -> Self {
         let mut bench = Self::new();
-        bench.frames(600, 0);
+        bench.frames(1_100, 0);
         assert!(bench.esc.telemetry().armed);
         bench.texts.clear();
         bench.notes.clear();
@@ -66,8 +70,9 @@ impl Bench {
     fn poll(&mut self) {
         let (texts, values) = (&mut self.texts, &mut self.values);
         let results = &mut self.results;
+        let throttle = &mut self.throttle;
         self.esc
-            .poll(self.now_us, &self.snapshot, 25.0, &mut |frame| {
+            .poll(throttle, self.now_us, &self.snapshot, 25.0, &mut |frame| {
                 let mut id = [0; 4];
                 id[..3].copy_from_slice(&frame[7..10]);
                 let payload = &frame[10..frame.len() - 2];
@@ -92,7 +97,7 @@ impl Bench {
                     other => panic!("{other:?}"),
                 }
             });
-        while let Some(request) = self.esc.take_request() {
+        while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.requests.push(request);
         }
         if let Some(note) = self.esc.sound.note()
@@ -106,7 +111,7 @@ impl Bench {
         for _ in 0..ms {
             self.now_us += 1_000;
             let ticks = self.ticks(0);
-            self.esc.settle(self.now_us, ticks);
+            self.throttle.settle(self.now_us, ticks);
             self.poll();
         }
     }
@@ -124,11 +129,11 @@ impl Bench {
         for _ in 0..count {
             for (at_ns, level) in edges(frame.to_bits(), Rate::Dshot600) {
                 let ticks = self.ticks(u64::from(at_ns));
-                let ask = self.esc.edge(self.now_us, ticks, level);
+                let ask = self.throttle.edge(self.now_us, ticks, level);
                 self.answer(ask);
             }
             let ticks = self.ticks(40_000);
-            let ask = self.esc.settle(self.now_us, ticks);
+            let ask = self.throttle.settle(self.now_us, ticks);
             self.answer(ask);
             self.wait_ms(1);
         }
@@ -136,7 +141,7 @@ impl Bench {
 
     fn answer(&mut self, ask: Option<Ask>) {
         if let Some(ask) = ask {
-            self.answers.push(self.esc.answer(ask, &self.snapshot));
+            self.answers.push(self.throttle.answer(ask, &self.snapshot));
         }
     }
 
@@ -145,10 +150,14 @@ impl Bench {
         for _ in 0..count {
             for (at_us, level) in [(0, true), (u64::from(width_us), false)] {
                 let ticks = self.ticks(at_us * 1000);
-                self.esc.edge(self.now_us + at_us, ticks, level);
+                self.throttle.edge(self.now_us + at_us, ticks, level);
             }
             self.wait_ms(20);
         }
+    }
+
+    fn config(&self) -> Config {
+        self.esc.config().expect("what is in force can be built")
     }
 
     fn get(&self, id: ParamId) -> f32 {
@@ -156,7 +165,7 @@ impl Bench {
     }
 
     fn storage_done(&mut self, result: Result<(), &'static str>) {
-        self.esc.storage_done(result);
+        self.esc.storage_done(&mut self.throttle, result);
         self.wait_ms(1);
     }
 }
@@ -176,7 +185,7 @@ fn direction_and_3d_are_parameters_that_are_told_and_put_in_force() {
         assert_eq!(bench.get(id), value, "{command}");
         assert_eq!(bench.values, [(id as u16, value)]);
         assert_eq!(bench.requests, [Request::ParamsChanged]);
-        let reversed = bench.esc.config().direction == Direction::Reversed;
+        let reversed = bench.config().direction == Direction::Reversed;
         assert_eq!(reversed, bench.get(ParamId::MotDir) == 1.0);
         bench.values.clear();
         bench.requests.clear();
@@ -190,9 +199,9 @@ fn a_wire_whose_3d_has_changed_is_armed_anew_and_turns_both_ways() {
     assert!(!bench.esc.telemetry().armed);
     bench.frames(310, 0);
     bench.frames(1, 1047);
-    assert!(matches!(bench.esc.setpoint(), Setpoint::Speed(speed) if speed.is_negative()));
+    assert!(matches!(bench.throttle.setpoint(), Setpoint::Speed(speed) if speed.is_negative()));
     bench.frames(1, 2047);
-    assert!(matches!(bench.esc.setpoint(), Setpoint::Speed(speed) if speed.is_positive()));
+    assert!(matches!(bench.throttle.setpoint(), Setpoint::Speed(speed) if speed.is_positive()));
 }
 
 #[test]
@@ -220,15 +229,15 @@ fn a_save_is_asked_for_once_and_its_end_is_told() {
 fn a_spin_against_the_direction_is_no_parameter() {
     let mut bench = Bench::armed();
     bench.frames(10, 21);
-    assert_eq!(bench.esc.config().direction, Direction::Reversed);
+    assert_eq!(bench.config().direction, Direction::Reversed);
     assert_eq!(bench.get(ParamId::MotDir), 0.0);
     assert_eq!(bench.values, []);
     assert_eq!(bench.requests, [Request::ParamsChanged]);
     // It is against MOT_DIR, whatever that is.
     bench.frames(10, 8);
-    assert_eq!(bench.esc.config().direction, Direction::Normal);
+    assert_eq!(bench.config().direction, Direction::Normal);
     bench.frames(10, 20);
-    assert_eq!(bench.esc.config().direction, Direction::Reversed);
+    assert_eq!(bench.config().direction, Direction::Reversed);
     assert!(bench.esc.telemetry().armed);
 }
 
@@ -253,7 +262,10 @@ fn information_is_sent_with_the_answer_to_its_frame() {
     bench.answers.clear();
     bench.frames(10, 6);
     let sent: Vec<_> = bench.answers.iter().map(|answer| answer.info).collect();
-    assert_eq!(sent[0], Some(info(bench.esc.params(), false)));
+    assert_eq!(
+        sent[0],
+        Some(info(bench.esc.params(), false, &Image::EMULATOR))
+    );
     assert!(sent[1..].iter().all(Option::is_none));
 }
 
@@ -356,10 +368,10 @@ fn the_stick_calibrates_and_the_ends_are_stored() {
         Some("Parameters stored")
     );
     bench.pulses(1, 1912);
-    let Setpoint::Speed(speed) = bench.esc.setpoint() else {
+    let Setpoint::Speed(speed) = bench.throttle.setpoint() else {
         panic!("it turns");
     };
-    assert!((bench.esc.config().scale.rpm(speed) - 6000.0).abs() < 1.0);
+    assert!((bench.config().scale.rpm(speed) - 6000.0).abs() < 1.0);
 }
 
 #[test]

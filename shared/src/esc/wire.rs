@@ -2,12 +2,12 @@
 //! the stick's calibration, and tells a person what has happened.
 
 use super::Esc;
-use crate::answer::info::info;
 use crate::input::News;
 use crate::input::calibration::Step;
 use crate::input::command::Order;
 use crate::input::endpoints::EndPoints;
 use crate::params::ParamId;
+use crate::throttle::{Reach, Throttle};
 use crate::tune::Tune;
 
 impl Esc {
@@ -16,30 +16,16 @@ impl Esc {
         self.light
     }
 
-    /// Takes an order of the wire. What is to be sent is sent with the answer to the same frame, and
-    /// the rest waits for the tasks.
-    pub(super) fn order(&mut self, order: Order) {
-        match order {
-            Order::Info => self.answers.send_info(info(&self.params, self.light)),
-            Order::Extended(on) => self.answers.set_extended(on),
-            order => {
-                // Most orders take six frames: more than four between two polls are noise, and one
-                // that finds no room is as if it had not been heard.
-                let _ = self.orders.push_back(order);
-            }
-        }
-    }
-
     /// What the tasks do for the wire.
-    pub(super) fn follow_wire(&mut self, now_us: u64) {
-        while let Some(news) = self.input.news(now_us) {
+    pub(super) fn follow_wire(&mut self, throttle: &mut impl Reach, now_us: u64) {
+        while let Some(news) = throttle.reach(|throttle| throttle.news(now_us)) {
             self.hear(now_us, news);
         }
         // The motor may have been asked to turn since it was ordered.
         let stopped = self.drive().stopped;
-        while let Some(order) = self.orders.pop_front() {
+        while let Some(order) = throttle.reach(Throttle::next_order) {
             if stopped {
-                self.obey(now_us, order);
+                self.obey(throttle, now_us, order);
             }
         }
     }
@@ -65,7 +51,7 @@ impl Esc {
         self.sound.play(now_us, tune);
     }
 
-    fn obey(&mut self, now_us: u64, order: Order) {
+    fn obey(&mut self, throttle: &mut impl Reach, now_us: u64, order: Order) {
         let number = |on| f32::from(u8::from(on));
         match order {
             Order::Beacon(beacon) => self.sound.play(now_us, Tune::Beacon(beacon)),
@@ -81,7 +67,10 @@ impl Esc {
                 // No value changes, but the configuration does.
                 self.component.changed(&[]);
             }
-            Order::Light(on) => self.light = on,
+            Order::Light(on) => {
+                self.light = on;
+                self.tell_info(throttle);
+            }
             Order::Silent => self.sound.toggle_silent(),
             Order::Info | Order::Extended(_) => {}
         }

@@ -4,7 +4,7 @@
 //! loses that with its signal, and never turns a motor before. Only a frame whose check sum is right,
 //! or a pulse, can change what the motor is asked to do.
 
-use super::Throttle;
+use super::Share;
 use super::demand::{Demand, Reading};
 use super::line::Event;
 use super::signal::Signal;
@@ -35,9 +35,9 @@ pub enum Command {
     /// before is forgiven.
     Zero,
     /// Turn, by the wire's throttle.
-    Throttle(Throttle),
+    Throttle(Share),
     /// Turn, by a test's value.
-    Test(Throttle),
+    Test(Share),
 }
 
 impl Command {
@@ -105,7 +105,7 @@ struct Valid {
 
 #[derive(Clone, Copy, Debug)]
 struct Test {
-    value: Throttle,
+    value: Share,
     ends_us: u64,
 }
 
@@ -316,7 +316,7 @@ impl Authority {
         let duration_us = (duration_s * 1e6) as u64;
         // No time at all, or nothing to turn by, is no test.
         self.test = (duration_us > 0 && value != 0.0).then(|| Test {
-            value: Throttle::saturating_from_num(value),
+            value: Share::saturating_from_num(value),
             ends_us: now_us.saturating_add(duration_us),
         });
         Ok(())

@@ -1,6 +1,6 @@
 //! What a frame or a pulse asks of the motor.
 
-use super::Throttle;
+use super::Share;
 use super::dshot::Kind;
 use super::endpoints::EndPoints;
 use super::line::Event;
@@ -11,7 +11,7 @@ pub enum Demand {
     /// Not to turn. So do DShot's stop and its commands.
     Zero,
     /// To turn.
-    Throttle(Throttle),
+    Throttle(Share),
 }
 
 /// How frames and pulses are read.

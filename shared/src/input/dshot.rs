@@ -2,7 +2,7 @@
 //!
 //! 11 bits are the value, one asks for telemetry, four are a check sum.
 
-use super::{Throttle, reverse};
+use super::{Share, reverse};
 
 /// Value from which a frame is throttle; below are stop (0) and the commands.
 const FIRST_THROTTLE: u16 = 48;
@@ -35,7 +35,7 @@ pub enum Kind {
     Command(u8),
     /// Turn: values 48 to 2047, linearly from 0 to 1. With two directions 48 to 1047 are so in
     /// reverse, and 1048 to 2047 forward.
-    Throttle(Throttle),
+    Throttle(Share),
 }
 
 impl Frame {
@@ -69,10 +69,10 @@ impl Frame {
 }
 
 /// Where a value stands between the first and the last one.
-fn share(value: u16, first: u16, last: u16) -> Throttle {
+fn share(value: u16, first: u16, last: u16) -> Share {
     let step = u64::from(value.min(last) - first);
-    let share = (step << Throttle::FRAC_NBITS) / u64::from(last - first);
-    Throttle::from_bits(share.min(i32::MAX as u64) as i32)
+    let share = (step << Share::FRAC_NBITS) / u64::from(last - first);
+    Share::from_bits(share.min(i32::MAX as u64) as i32)
 }
 
 /// The four check bits of 12 data bits: the exclusive or of their nibbles.
@@ -191,9 +191,9 @@ mod tests {
         assert_eq!(kind(0), Kind::Stop);
         assert_eq!(kind(1), Kind::Command(1));
         assert_eq!(kind(47), Kind::Command(47));
-        assert_eq!(kind(48), Kind::Throttle(Throttle::ZERO));
-        assert_eq!(kind(2047), Kind::Throttle(Throttle::MAX));
-        assert_eq!(kind(u16::MAX), Kind::Throttle(Throttle::MAX));
+        assert_eq!(kind(48), Kind::Throttle(Share::ZERO));
+        assert_eq!(kind(2047), Kind::Throttle(Share::MAX));
+        assert_eq!(kind(u16::MAX), Kind::Throttle(Share::MAX));
         for value in 48..=2047 {
             let Kind::Throttle(throttle) = kind(value) else {
                 panic!("{value} is no throttle");
@@ -214,10 +214,10 @@ mod tests {
         };
         assert_eq!(kind(0), Kind::Stop);
         assert_eq!(kind(47), Kind::Command(47));
-        assert_eq!(kind(48), Kind::Throttle(reverse(Throttle::ZERO)));
-        assert_eq!(kind(1047), Kind::Throttle(reverse(Throttle::MAX)));
-        assert_eq!(kind(1048), Kind::Throttle(Throttle::ZERO));
-        assert_eq!(kind(2047), Kind::Throttle(Throttle::MAX));
+        assert_eq!(kind(48), Kind::Throttle(reverse(Share::ZERO)));
+        assert_eq!(kind(1047), Kind::Throttle(reverse(Share::MAX)));
+        assert_eq!(kind(1048), Kind::Throttle(Share::ZERO));
+        assert_eq!(kind(2047), Kind::Throttle(Share::MAX));
         for step in 0..1000 {
             let wanted = f64::from(step) / 999.0;
             for (first, sign) in [(48, -1.0), (1048, 1.0)] {

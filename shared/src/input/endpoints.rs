@@ -2,7 +2,7 @@
 
 use super::demand::Demand;
 use super::signal::Pulse;
-use super::{Throttle, reverse};
+use super::{Share, reverse};
 
 const NS_PER_US: u32 = 1000;
 
@@ -76,13 +76,13 @@ impl EndPoints {
 }
 
 /// How far a width is above the widest that is zero, as a share of the way to full throttle.
-fn above(width_ns: u32, zero_ns: u32, full_ns: u32) -> Option<Throttle> {
+fn above(width_ns: u32, zero_ns: u32, full_ns: u32) -> Option<Share> {
     let over_ns = width_ns.min(full_ns).checked_sub(zero_ns)?;
     if over_ns == 0 {
         return None;
     }
-    let share = (u64::from(over_ns) << Throttle::FRAC_NBITS) / u64::from(full_ns - zero_ns);
-    Some(Throttle::from_bits(share.min(i32::MAX as u64) as i32))
+    let share = (u64::from(over_ns) << Share::FRAC_NBITS) / u64::from(full_ns - zero_ns);
+    Some(Share::from_bits(share.min(i32::MAX as u64) as i32))
 }
 
 #[cfg(test)]
@@ -174,7 +174,7 @@ mod tests {
             assert_eq!(kind.width_ns(1_000_000), low_ns, "{kind:?}");
             assert_eq!(kind.width_ns(2_000_000), high_ns, "{kind:?}");
             assert_eq!(USUAL.demand(kind, low_ns, false), Demand::Zero);
-            let full = Demand::Throttle(Throttle::MAX);
+            let full = Demand::Throttle(Share::MAX);
             assert_eq!(USUAL.demand(kind, high_ns, false), full);
         }
     }

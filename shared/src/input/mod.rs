@@ -10,6 +10,7 @@
 //! a timer, and [`authority`] alone what may turn a motor. None of them has a clock: the caller says
 //! when something happened. [`Input`] is all of it.
 
+pub mod access;
 pub mod authority;
 pub mod calibration;
 mod capture;
@@ -43,11 +44,11 @@ use tally::Tally;
 ///
 /// 0 is the least throttle that turns, and not a stop: whether to turn is said beside it. A throttle
 /// for the other direction is the complement of its share, −2⁻³¹ to −1: see [`reverse`].
-pub type Throttle = fixed::types::I1F31;
+pub type Share = fixed::types::I1F31;
 
 /// The throttle of the same share in the other direction, `!share`: the least one has one too.
-pub const fn reverse(throttle: Throttle) -> Throttle {
-    Throttle::from_bits(!throttle.to_bits())
+pub const fn reverse(throttle: Share) -> Share {
+    Share::from_bits(!throttle.to_bits())
 }
 
 /// What the parameters say of the wire.

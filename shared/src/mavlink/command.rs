@@ -273,7 +273,7 @@ impl Commands {
 
 /// Whether a command that looks like an earlier one is that one: the number of the transmission
 /// says so, and where there is none, that the test which it asked for still runs.
-fn is_known(command: &Command, context: &Context) -> bool {
+fn is_known(command: &Command, context: &mut Context) -> bool {
     let tests = matches!(context.authority.command(), authority::Command::Test(_));
     command.confirmation.is_some() || (command.number == ACTUATOR_TEST && tests)
 }

@@ -1,5 +1,6 @@
 //! The ESC as others on MAVLink see it.
 
+use heapless::{Deque, String};
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, ESC_TELEMETRY_1_TO_4_DATA,
     FILE_TRANSFER_PROTOCOL_DATA, MESSAGE_INTERVAL_DATA, MISSION_REQUEST_LIST_DATA, MavSeverity,
@@ -18,13 +19,18 @@ use super::schedule::{Schedule, Stream};
 use super::sender::OVERHEAD_LEN;
 use super::{ftp, messages, news};
 use crate::drive::Faults;
+use crate::image::Image;
 use crate::input::News as WireNews;
-use crate::input::authority::{Authority, DriveStatus};
+use crate::input::access::Access;
+use crate::input::authority::DriveStatus;
 use crate::params::{BuildError, ParamId, Params};
 use crate::telemetry::Telemetry;
 
 const PING_ID: u32 = PING.0;
-const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"));
+const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"), ", ");
+
+/// A text that is made up at run time; STATUSTEXT has room for 50 letters.
+pub type Warning = String<50>;
 
 /// What the component is told and may change.
 pub struct Context<'a> {
@@ -35,13 +41,13 @@ pub struct Context<'a> {
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
     /// What decides whether the motor may turn.
-    pub authority: &'a mut Authority,
+    pub authority: &'a mut dyn Access,
     /// Whether values make a drive; a value that breaks it is refused with the reason.
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
 }
 
 impl Context<'_> {
-    fn drive(&self) -> DriveStatus {
+    fn drive(&mut self) -> DriveStatus {
         self.telemetry.drive(self.authority.command())
     }
 }
@@ -79,6 +85,8 @@ pub struct Component {
     faults: Faults,
     infos: u16,
     telemetries: u16,
+    image: Image,
+    warnings: Deque<Warning, 2>,
 }
 
 impl Component {
@@ -86,9 +94,9 @@ impl Component {
     ///
     /// `link_bytes_per_s` is what the slowest link carries (11520 at 115200 baud). Lists of
     /// parameters take at most half of it, and streams the other half; replies are never held up.
-    pub fn new(params: &Params, link_bytes_per_s: u32) -> Self {
+    pub fn new(params: &Params, image: &Image, link_bytes_per_s: u32) -> Self {
         let mut replies = Replies::new();
-        let text = [START_TEXT, ""];
+        let text = [START_TEXT, image.board];
         replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
         let identity = Identity::new(params);
         Self {
@@ -104,6 +112,8 @@ impl Component {
             faults: Faults::NONE,
             infos: 0,
             telemetries: 0,
+            image: *image,
+            warnings: Deque::new(),
         }
     }
 
@@ -173,6 +183,9 @@ impl Component {
                 send,
             );
         }
+        while let Some(warning) = self.warnings.pop_front() {
+            self.text(MavSeverity::MAV_SEVERITY_WARNING, &[&warning], send);
+        }
         while let Some(id) = self.replies.next_value() {
             self.send_value(context, id, send);
         }
@@ -224,6 +237,11 @@ impl Component {
         }
     }
 
+    /// Warns a person at the next poll. Two wait; of more, the first are told.
+    pub fn warn(&mut self, warning: Warning) {
+        let _ = self.warnings.push_back(warning);
+    }
+
     /// Tells how a request for storage ended that did not come by MAVLink.
     pub fn tell_stored(&mut self, result: Result<(), &'static str>) {
         let (severity, text) = match result {
@@ -248,7 +266,7 @@ impl Component {
         }
     }
 
-    fn send_reply(&mut self, reply: Reply, context: &Context, send: &mut dyn FnMut(&[u8])) {
+    fn send_reply(&mut self, reply: Reply, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         let Self {
             identity, writer, ..
         } = self;
@@ -259,7 +277,7 @@ impl Component {
                 result,
             } => writer.ack(identity, to, command, result, send),
             Reply::Message(AUTOPILOT_VERSION_DATA::ID) => {
-                let message = messages::autopilot_version();
+                let message = messages::autopilot_version(&self.image);
                 writer.sender.send(identity.address, &message, &[], send);
             }
             Reply::Message(id) => {
@@ -293,7 +311,7 @@ impl Component {
         }
     }
 
-    fn send_stream(&mut self, stream: Stream, context: &Context, send: &mut dyn FnMut(&[u8])) {
+    fn send_stream(&mut self, stream: Stream, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         let (from, place) = (self.identity.address, self.identity.place);
         let sender = &mut self.writer.sender;
         let telemetry = context.telemetry;

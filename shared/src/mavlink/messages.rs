@@ -10,6 +10,7 @@ use mavlink::types::CharArray;
 use super::identity::Identity;
 use super::place::Place;
 use crate::drive::{Fault, Faults};
+use crate::image::{Image, VERSION};
 use crate::input::signal::{Pulse, Signal};
 use crate::params::{ParamId, Params, TABLE};
 use crate::telemetry::Telemetry;
@@ -117,20 +118,20 @@ pub(super) fn esc_telemetry(
     }
 }
 
-pub(super) fn autopilot_version() -> AUTOPILOT_VERSION_DATA {
+pub(super) fn autopilot_version(image: &Image) -> AUTOPILOT_VERSION_DATA {
     AUTOPILOT_VERSION_DATA {
         // C_CAST: a float is the value itself, never an integer's bytes.
         capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
             | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT,
-        uid: 0,
+        uid: uid(&image.serial),
         flight_sw_version: version(),
         middleware_sw_version: 0,
         os_sw_version: 0,
-        board_version: 0,
+        board_version: image.board_number.into(),
         vendor_id: 0,
         product_id: 0,
-        flight_custom_version: [0; 8],
+        flight_custom_version: image.build,
         middleware_custom_version: [0; 8],
         os_custom_version: [0; 8],
     }
@@ -168,16 +169,19 @@ fn failure_flags(faults: Faults) -> u16 {
         .fold(0, |flags, flag| flags | flag.bits())
 }
 
-/// Major, minor, patch and release type of the crate's version, a byte each.
+/// Major, minor, patch and release type of the version, a byte each.
 fn version() -> u32 {
-    const OFFICIAL: u32 = 255;
-    env!("CARGO_PKG_VERSION")
-        .split('.')
-        .chain(core::iter::repeat("0"))
-        .take(3)
-        .fold(0, |all, part| all << 8 | part.parse::<u32>().unwrap_or(0))
-        << 8
-        | OFFICIAL
+    const OFFICIAL: u8 = 255;
+    let [major, minor, patch] = VERSION;
+    u32::from_be_bytes([major, minor, patch, OFFICIAL])
+}
+
+/// The chip's serial number, folded to the bits that there are.
+fn uid(serial: &[u8; 12]) -> u64 {
+    let word = |at: usize| {
+        u32::from_le_bytes([serial[at], serial[at + 1], serial[at + 2], serial[at + 3]])
+    };
+    u64::from(word(0) ^ word(8)) << 32 | u64::from(word(4))
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ mod reply;
 mod schedule;
 mod sender;
 
-pub use component::{Component, Context, Request};
+pub use component::{Component, Context, Request, Warning};
 pub use identity::Address;
 pub use receiver::{Counters, Frame, Receiver};
 

@@ -13,6 +13,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::drive::{Faults, Phase};
+use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
 use crate::params::{BuildError, ParamId, Params};
 use crate::telemetry::Telemetry;
@@ -74,7 +75,7 @@ impl Bench {
     fn with(params: Params, link_bytes_per_s: u32) -> Self {
         let mut bench = Self {
             now_us: 1_000_000,
-            component: Component::new(&params, link_bytes_per_s),
+            component: Component::new(&params, &Image::EMULATOR, link_bytes_per_s),
             params,
             telemetry: TELEMETRY,
             authority: Authority::new(Timing {

@@ -6,7 +6,7 @@ mod table;
 
 pub use build::{Board, BuildError, FluxSettings, build, input};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
-pub use table::{Kind, ParamId, Parameter, TABLE};
+pub use table::{Kind, ParamId, Parameter, TABLE, Text};
 
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]

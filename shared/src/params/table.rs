@@ -18,8 +18,6 @@ pub struct Parameter {
     pub key: u16,
     /// Name on MAVLink, at most 16 characters.
     pub name: &'static str,
-    /// Unit, empty for a number or a choice.
-    pub unit: &'static str,
     /// Fractions, whole numbers or derived.
     pub kind: Kind,
     /// Least value that is accepted.
@@ -32,6 +30,14 @@ pub struct Parameter {
     /// Whether it may change while the motor turns. All others describe the motor, the bridge, the
     /// wire or the way it is driven, and wait until it stands.
     pub live: bool,
+}
+
+/// What a person reads of a parameter. It is apart from the table so that a chip, which does not
+/// tell it, need not hold it.
+#[derive(Clone, Copy, Debug)]
+pub struct Text {
+    /// Unit, empty for a number or a choice.
+    pub unit: &'static str,
     /// One sentence for a ground station.
     pub description: &'static str,
 }
@@ -65,12 +71,17 @@ macro_rules! parameters {
             Parameter {
                 key: $key,
                 name: $name,
-                unit: $unit,
                 kind: Kind::$kind,
                 min: $min,
                 max: $max,
                 default: $default,
                 live: is_live!($($live)?),
+            },
+        )*];
+
+        const TEXTS: &[Text; TABLE.len()] = &[$(
+            Text {
+                unit: $unit,
                 description: $description,
             },
         )*];
@@ -78,6 +89,11 @@ macro_rules! parameters {
         impl ParamId {
             /// All parameters in the order of the table.
             pub const ALL: [Self; TABLE.len()] = [$(Self::$id),*];
+
+            /// What a person reads of this parameter.
+            pub const fn text(self) -> &'static Text {
+                &TEXTS[self as usize]
+            }
         }
     };
 }
@@ -181,6 +197,8 @@ parameters! {
         "Mechanical speed at which the observer takes over from the ramp";
     80 TelRateHz "TEL_RATE_HZ" "Hz" Real 1.0..100.0 = 10.0 live
         "Rate of ESC_STATUS and ESC_TELEMETRY_1_TO_4";
+    81 TelBaud "TEL_BAUD" "bit/s" Whole 115200.0..921600.0 = 115200.0
+        "Speed of the board's serial MAVLink port; applies at the next start";
 }
 
 #[cfg(test)]
@@ -195,7 +213,7 @@ mod tests {
         for (i, p) in TABLE.iter().enumerate() {
             assert!(p.name.len() <= 16 && p.name.is_ascii(), "{}", p.name);
             assert!(p.min <= p.default && p.default <= p.max, "{}", p.name);
-            assert!(!p.description.is_empty(), "{}", p.name);
+            assert!(!TEXTS[i].description.is_empty(), "{}", p.name);
             for other in &TABLE[i + 1..] {
                 assert_ne!(p.name, other.name);
                 assert_ne!(p.key, other.key, "{} and {}", p.name, other.name);

@@ -7,6 +7,7 @@ use siskin_control::input::line::{Event, Line};
 use siskin_control::input::signal::Signal;
 use siskin_control::mavlink::Request;
 use siskin_control::params::{ParamId, Params};
+use siskin_control::throttle::Throttle;
 use siskin_emulator::rig::Bench;
 
 /// The rate of the capturing timer.
@@ -30,6 +31,8 @@ const POLL_NS: u64 = 1_000_000;
 pub struct Desk {
     /// The ESC.
     pub esc: Esc,
+    /// Its wire.
+    pub throttle: Throttle,
     /// What it is told of its drive.
     pub snapshot: Snapshot,
     judge: Judge,
@@ -50,10 +53,13 @@ impl Desk {
         }
         let bench = Bench::default();
         let board = bench.sensing.board(bench.delay);
-        let esc = Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("defaults fit the bench");
-        let snapshot = State::new(esc.config()).snapshot();
+        let (esc, throttle) =
+            Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("defaults fit the bench");
+        let config = esc.config().expect("defaults fit the bench");
+        let snapshot = State::new(&config).snapshot();
         Self {
             esc,
+            throttle,
             snapshot,
             judge: Judge::new(signal),
             now_ns: 0,
@@ -72,7 +78,7 @@ impl Desk {
         self.now_ns += after_ns;
         let ticks = self.ticks();
         self.judge.edge(self.now_ns, ticks, level);
-        let ask = self.esc.edge(self.now_ns / 1000, ticks, level);
+        let ask = self.throttle.edge(self.now_ns / 1000, ticks, level);
         self.check();
         ask
     }
@@ -82,16 +88,18 @@ impl Desk {
         self.now_ns += after_ns;
         let ticks = self.ticks();
         self.judge.settle(self.now_ns, ticks);
-        let ask = self.esc.settle(self.now_ns / 1000, ticks);
+        let ask = self.throttle.settle(self.now_ns / 1000, ticks);
         if self.now_ns - self.polled_ns >= POLL_NS {
             self.polled_ns = self.now_ns;
             // Between two polls a signal lasts longer than it should.
             self.judge.poll(self.now_ns);
             let now_us = self.now_ns / 1000;
-            self.esc.poll(now_us, &self.snapshot, 25.0, &mut |_| {});
-            while let Some(request) = self.esc.take_request() {
+            let throttle = &mut self.throttle;
+            self.esc
+                .poll(throttle, now_us, &self.snapshot, 25.0, &mut |_| {});
+            while let Some(request) = self.esc.take_request(throttle) {
                 if request == Request::Save {
-                    self.esc.storage_done(Ok(()));
+                    self.esc.storage_done(throttle, Ok(()));
                 }
             }
         }
@@ -101,7 +109,7 @@ impl Desk {
 
     fn check(&self) {
         let turns = matches!(
-            self.esc.setpoint(),
+            self.throttle.setpoint(),
             Setpoint::Speed(_) | Setpoint::Torque(_) | Setpoint::Voltage(_) | Setpoint::Test(_)
         );
         assert!(!turns || self.judge.may_turn(), "it turns and is not armed");
@@ -249,7 +257,7 @@ mod tests {
             }
             desk.settle(1_000_000 - u64::from(before_ns));
         }
-        let turns = matches!(desk.esc.setpoint(), Setpoint::Speed(_));
+        let turns = matches!(desk.throttle.setpoint(), Setpoint::Speed(_));
         (turns, desk.judge.may_turn())
     }
 

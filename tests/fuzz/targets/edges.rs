@@ -71,6 +71,6 @@ fn take(desk: &mut Desk, step: Step) {
     };
     if let Some(ask) = ask {
         let snapshot = desk.snapshot;
-        desk.esc.answer(ask, &snapshot);
+        desk.throttle.answer(ask, &snapshot);
     }
 }

@@ -144,7 +144,7 @@ impl Sender {
     fn answer(&mut self, ask: Option<Ask>) {
         let Some(ask) = ask else { return };
         let snapshot = self.desk.snapshot;
-        let answer = self.desk.esc.answer(ask, &snapshot);
+        let answer = self.desk.throttle.answer(ask, &snapshot);
         if let Some(reply) = answer.reply {
             assert!(gcr::decode(reply.bits).is_some(), "{:021b}", reply.bits);
             assert_eq!(reply.bit_hz, ask.rate.bit_hz() / 4 * 5);

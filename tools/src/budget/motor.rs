@@ -135,7 +135,10 @@ fn set(params: &mut Params, id: ParamId, value: f32) -> Result<(), String> {
         SetError::NotWhole => format!("{} takes whole numbers", entry.name),
         SetError::NotFinite | SetError::OutOfRange => format!(
             "{} is {} to {} {}, and {value} is not",
-            entry.name, entry.min, entry.max, entry.unit
+            entry.name,
+            entry.min,
+            entry.max,
+            id.text().unit
         ),
     })
 }

@@ -9,6 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use siskin_control::drive::{Faults, Phase};
+use siskin_control::image::Image;
 use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request};
 use siskin_control::params::{BuildError, ParamId, Params};
@@ -189,7 +190,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
         arm_us: 300_000,
         loss_us: 100_000,
     });
-    let mut component = Component::new(&params, 1_000_000);
+    let mut component = Component::new(&params, &Image::EMULATOR, 1_000_000);
     let mut client: Option<(TcpStream, Receiver)> = None;
     let mut lost_in = Loss {
         every: behaviour.lose_every,

@@ -24,8 +24,16 @@ impl Bench {
             sequence: 0,
         };
         raw.serialize_message_data(header, data);
-        let (esc, now_us) = (&mut self.esc, self.now_us);
-        Receiver::new().push(now_us, raw.raw_bytes(), |frame| esc.receive(now_us, frame));
+        let Self {
+            esc,
+            throttle,
+            now_us,
+            ..
+        } = self;
+        let now_us = *now_us;
+        Receiver::new().push(now_us, raw.raw_bytes(), |frame| {
+            esc.receive(throttle, now_us, frame);
+        });
     }
 
     fn command(&mut self, command: MavCmd, param1: f32) {
@@ -58,8 +66,34 @@ fn a_save_that_waited_for_a_tune_is_not_made_in_flight() {
     bench.frames(10, 0);
     assert_eq!(bench.requests, [], "it still turns");
     bench.snapshot.phase = Phase::Idle;
-    bench.frames(1, 0);
+    bench.frames(985, 0);
+    assert_eq!(bench.requests, [], "not a second yet");
+    bench.frames(15, 0);
     assert_eq!(bench.requests, [Request::Save]);
+}
+
+#[test]
+fn a_silent_wire_is_not_waited_for() {
+    let mut bench = Bench::armed();
+    bench.frames(1, 1000);
+    bench.frames(10, 0);
+    bench.command(STORAGE, 1.0);
+    bench.wait_ms(95);
+    assert_eq!(bench.requests, [], "the signal may come back");
+    // The tune of the loss is over, and not a second has passed.
+    bench.wait_ms(800);
+    assert_eq!(bench.requests, [Request::Save]);
+}
+
+#[test]
+fn nothing_turns_the_motor_while_the_flash_is_written() {
+    let mut bench = Bench::armed();
+    bench.frames(10, 12);
+    assert_eq!(bench.requests, [Request::Save]);
+    bench.frames(5, 1000);
+    assert_eq!(bench.throttle.setpoint(), Setpoint::Stop);
+    bench.storage_done(Ok(()));
+    assert!(matches!(bench.throttle.setpoint(), Setpoint::Speed(_)));
 }
 
 #[test]
@@ -84,7 +118,7 @@ fn a_start_is_no_rest_in_any_of_its_phases() {
         assert_eq!(bench.requests, [], "{phase:?}");
         assert_eq!(bench.results, [REJECTED; 5], "{phase:?}");
         assert_eq!(bench.get(ParamId::MotDir), 0.0);
-        let command = bench.esc.input.authority().command();
+        let command = bench.throttle.command();
         assert!(matches!(command, Command::Throttle(_)));
     }
 }

@@ -94,9 +94,9 @@ fn zero_throttle_arms_at_the_exact_time() {
     assert!(bench.authority.armed(), "300 ms");
     assert!(!bench.turns());
     bench.after(1_000, event(2047));
-    assert_eq!(bench.authority.command(), Command::Throttle(Throttle::MAX));
+    assert_eq!(bench.authority.command(), Command::Throttle(Share::MAX));
     bench.after(1_000, event(48));
-    assert_eq!(bench.authority.command(), Command::Throttle(Throttle::ZERO));
+    assert_eq!(bench.authority.command(), Command::Throttle(Share::ZERO));
     bench.after(1_000, event(47));
     assert_eq!(bench.authority.command(), Command::Zero);
     assert!(bench.authority.armed());
@@ -277,14 +277,14 @@ fn a_test_turns_for_its_time() {
     assert_eq!(bench.test(0.5, 2.0), Ok(()));
     assert_eq!(
         bench.authority.command(),
-        Command::Test(Throttle::from_num(0.5))
+        Command::Test(Share::from_num(0.5))
     );
     bench.wait(1_999_999);
     assert!(bench.turns());
     bench.wait(1);
     assert!(!bench.turns());
     assert_eq!(bench.test(1.0, 3.0), Ok(()));
-    assert_eq!(bench.authority.command(), Command::Test(Throttle::MAX));
+    assert_eq!(bench.authority.command(), Command::Test(Share::MAX));
     assert_eq!(bench.test(0.3, 0.0), Ok(()));
     assert!(!bench.turns());
 }
@@ -447,16 +447,16 @@ fn with_two_directions_either_turns_and_a_test_may_be_negative() {
     });
     bench.play(301, event(0));
     bench.after(1_000, event(48));
-    let least = Throttle::from_bits(-1);
+    let least = Share::from_bits(-1);
     assert_eq!(bench.authority.command(), Command::Throttle(least));
     bench.after(1_000, event(1048));
-    assert_eq!(bench.authority.command(), Command::Throttle(Throttle::ZERO));
+    assert_eq!(bench.authority.command(), Command::Throttle(Share::ZERO));
     bench.after(1_000, event(0));
     assert_eq!(bench.authority.command(), Command::Zero);
     assert_eq!(bench.test(-0.5, 1.0), Ok(()));
     assert_eq!(
         bench.authority.command(),
-        Command::Test(Throttle::from_num(-0.5))
+        Command::Test(Share::from_num(-0.5))
     );
     assert_eq!(bench.test(-1.1, 1.0), Err(TestError::OutOfRange));
 }

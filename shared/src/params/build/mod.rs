@@ -25,6 +25,7 @@ use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Stop};
+use crate::image::Image;
 use crate::input::signal::Signal;
 use crate::math::Gain;
 use crate::protection;
@@ -33,6 +34,8 @@ use crate::units::{AdcCounts, Scale, Voltage};
 /// What the control must know of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Board {
+    /// What the program says it is.
+    pub image: Image,
     /// Amperes of one count of the current converter.
     pub current_a_per_count: f32,
     /// Volts of one count of the supply's converter.
@@ -371,6 +374,7 @@ fn limits(
 impl Board {
     /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
     pub(crate) const BENCH: Self = Self {
+        image: Image::EMULATOR,
         current_a_per_count: 40.0 / 2048.0,
         bus_v_per_count: 70.0 / 4096.0,
         current_range_a: 40.0,

@@ -1,0 +1,53 @@
+//! What answers need to know of the drive's configuration.
+
+use crate::drive::{ATTEMPTS, Config, Fault, Snapshot, six_step};
+use crate::units::{Current, Scale};
+
+/// The little of a [`Config`] that is needed to read a snapshot.
+#[derive(Clone, Copy, Debug)]
+pub struct Basis {
+    /// What the control's units are worth.
+    pub scale: Scale,
+    /// Bound of the current's vector, `LIM_PHASE_A`.
+    pub(super) phase: Current,
+    /// As [`Config::lost_periods`].
+    pub(super) lost_periods: u32,
+}
+
+impl Basis {
+    /// Of this configuration.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            scale: config.scale,
+            phase: config.protection.phase,
+            lost_periods: config.lost_periods,
+        }
+    }
+
+    /// How near the drive is to giving the rotor up: 0 where all is well, 255 where it has.
+    ///
+    /// It is the greatest share that has been used of what is allowed: of the attempts of a start,
+    /// of the periods without an estimate, and of the six-step drive's sextants without a crossing.
+    pub(super) fn doubt(&self, snapshot: &Snapshot) -> u8 {
+        let faults = snapshot.faults;
+        if faults.contains(Fault::ObserverLost) || faults.contains(Fault::Stuck) {
+            return u8::MAX;
+        }
+        let share = |part: u32, whole: u32| part.min(whole) * u32::from(u8::MAX) / whole.max(1);
+        share(snapshot.failed_starts.into(), ATTEMPTS as u32)
+            .max(share(snapshot.lost_periods, self.lost_periods))
+            .max(share(
+                snapshot.missed_sextants.into(),
+                six_step::LOST_SEXTANTS.into(),
+            )) as u8
+    }
+
+    /// Whether the current's vector is within a sixteenth of its bound: the regulator holds it there
+    /// within its ripple.
+    pub(super) fn at_limit(&self, snapshot: &Snapshot) -> bool {
+        let square = |bits: i32| i64::from(bits) * i64::from(bits);
+        let bound = self.phase.to_bits();
+        square(snapshot.i.d.to_bits()) + square(snapshot.i.q.to_bits())
+            >= square(bound - bound / 16)
+    }
+}

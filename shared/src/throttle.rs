@@ -1,0 +1,229 @@
+//! The throttle wire's side of an ESC: what must keep up with the wire's edges, whatever the other
+//! tasks do.
+//!
+//! On the chip it belongs to a task that interrupts the one with [`Esc`](crate::esc::Esc), which
+//! gets at it by [`Reach`], for a moment at a time. What either needs of the other is copied then.
+
+use heapless::Deque;
+
+use crate::answer::info;
+use crate::answer::{Answer, Answers, Ask, Basis};
+use crate::drive::{Config, Fault, Setpoint, Snapshot};
+use crate::input::access::Access;
+use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
+use crate::input::command::Order;
+use crate::input::signal::Signal;
+use crate::input::{Heard, Input, News};
+use crate::params::{self, Params};
+use crate::setpoint::Mapping;
+use crate::telemetry::Telemetry;
+use crate::tune::Note;
+
+/// A throttle wire, what is sent back on it, and what it asks of the drive.
+pub struct Throttle {
+    input: Input,
+    answers: Answers,
+    mapping: Mapping,
+    basis: Basis,
+    /// As the tasks last told it, for answers.
+    telemetry: Telemetry,
+    info: [u8; info::BYTES],
+    told: Told,
+    /// What DShot commands have ordered since the last poll.
+    orders: Deque<Order, 4>,
+    /// While the flash is written: the bridge must stay at rest until the processor is back.
+    storing: bool,
+}
+
+/// What the tasks say of each poll.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Told {
+    /// The note that is due, to be played while nothing turns the motor.
+    pub(crate) note: Option<Note>,
+    /// Whether the temperature is past its limit.
+    pub(crate) too_hot: bool,
+}
+
+/// How the wire stands.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Standing {
+    pub(crate) command: Command,
+    pub(crate) armed: bool,
+    pub(crate) signal: Option<Signal>,
+    /// Whether valid frames or pulses come in.
+    pub(crate) traffic: bool,
+    pub(crate) bad_frames: u32,
+    pub(crate) bad_share: f32,
+}
+
+/// A way to the throttle's side for the tasks, which it may interrupt.
+pub trait Reach {
+    /// Does this with it, at one moment. On the chip its edges wait meanwhile, so it must be short.
+    fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T;
+}
+
+impl Reach for Throttle {
+    fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T {
+        act(self)
+    }
+}
+
+impl Throttle {
+    /// A quiet wire at power-up, captured by a timer of `tick_hz`.
+    pub(crate) fn new(tick_hz: u32, params: &Params, config: &Config) -> Self {
+        Self {
+            input: Input::new(tick_hz, params::input(params)),
+            answers: Answers::new(tick_hz),
+            mapping: Mapping::new(params, config),
+            basis: Basis::new(config),
+            telemetry: Telemetry::new(),
+            info: [0; info::BYTES],
+            told: Told::default(),
+            orders: Deque::new(),
+            storing: false,
+        }
+    }
+
+    /// An edge on the throttle wire: when the capturing timer saw it, and the level after it. Returns
+    /// what the sender asks for, to be given to [`Throttle::answer`].
+    pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Ask> {
+        let heard = self.input.edge(now_us, at_ticks, level)?;
+        self.heard(heard)
+    }
+
+    /// Tells the time of the timer that captures the wire's edges, once a control period or more
+    /// often. Returns what [`Throttle::edge`] does.
+    pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Ask> {
+        let heard = self.input.settle(now_us, now_ticks)?;
+        self.heard(heard)
+    }
+
+    fn heard(&mut self, heard: Heard) -> Option<Ask> {
+        match heard.order {
+            Some(Order::Info) => self.answers.send_info(self.info),
+            Some(Order::Extended(on)) => self.answers.set_extended(on),
+            // Most orders take six frames: more than four between two polls are noise, and one
+            // that finds no room is as if it had not been heard.
+            Some(order) => drop(self.orders.push_back(order)),
+            None => {}
+        }
+        Ask::of(&heard.event)
+    }
+
+    /// What is sent back to the flight controller, with the drive as it is now.
+    pub fn answer(&mut self, ask: Ask, snapshot: &Snapshot) -> Answer {
+        self.answers
+            .answer(ask, snapshot, &self.basis, &self.telemetry)
+    }
+
+    /// What the drive is asked for.
+    pub fn setpoint(&self) -> Setpoint {
+        if self.told.too_hot {
+            return Setpoint::Fault(Fault::OverTemperature);
+        }
+        if self.storing {
+            return Setpoint::Stop;
+        }
+        let command = self.command();
+        match self.told.note {
+            Some(note) if command.rests() => self.mapping.tone(note),
+            _ => self.mapping.setpoint(command),
+        }
+    }
+
+    /// What the motor is to do by the wire or by a test.
+    pub fn command(&self) -> Command {
+        self.input.authority().command()
+    }
+
+    /// Lets time pass, and takes in what the drive is doing.
+    pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
+        self.telemetry = *telemetry;
+        self.input.poll(now_us, telemetry.drive(self.command()));
+        let authority = self.input.authority();
+        Standing {
+            command: authority.command(),
+            armed: authority.armed(),
+            signal: self.input.signal(now_us),
+            traffic: authority.signal_present(now_us),
+            bad_frames: self.input.bad_frames(),
+            bad_share: self.input.bad_share(),
+        }
+    }
+
+    /// The next thing that the wire has to tell a person.
+    pub(crate) fn news(&mut self, now_us: u64) -> Option<News> {
+        self.input.news(now_us)
+    }
+
+    /// The next order of the wire for the tasks.
+    pub(crate) fn next_order(&mut self) -> Option<Order> {
+        self.orders.pop_front()
+    }
+
+    /// Takes what the tasks say.
+    pub(crate) fn tell(&mut self, told: Told) {
+        self.told = told;
+    }
+
+    /// Takes what is sent when the wire asks for the ESC's information.
+    pub(crate) fn tell_info(&mut self, info: [u8; info::BYTES]) {
+        self.info = info;
+    }
+
+    /// Goes on with other parameters.
+    pub(crate) fn adopt(&mut self, params: &Params, config: &Config) {
+        self.mapping = Mapping::new(params, config);
+        self.basis = Basis::new(config);
+        self.input.set(params::input(params));
+    }
+
+    /// Keeps the motor at rest until [`Throttle::stored`], if nothing asks it to turn; else does
+    /// nothing.
+    pub(crate) fn store(&mut self) -> bool {
+        self.storing = self.command().rests();
+        self.storing
+    }
+
+    /// The flash is written.
+    pub(crate) fn stored(&mut self) {
+        self.storing = false;
+    }
+}
+
+/// The authority of a throttle that is reached.
+pub(crate) struct Reached<'a, R>(pub(crate) &'a mut R);
+
+impl<R: Reach> Reached<'_, R> {
+    fn authority<T>(&mut self, act: impl FnOnce(&mut Authority) -> T) -> T {
+        self.0.reach(|throttle| act(throttle.input.authority_mut()))
+    }
+}
+
+impl<R: Reach> Access for Reached<'_, R> {
+    fn command(&mut self) -> Command {
+        self.authority(Access::command)
+    }
+
+    fn armed(&mut self) -> bool {
+        self.authority(Access::armed)
+    }
+
+    fn disarm(&mut self) {
+        self.authority(Authority::disarm);
+    }
+
+    fn arm(&mut self, now_us: u64) -> Result<(), Denied> {
+        self.authority(|authority| authority.arm(now_us))
+    }
+
+    fn actuator_test(
+        &mut self,
+        now_us: u64,
+        value: f32,
+        duration_s: f32,
+        drive: DriveStatus,
+    ) -> Result<(), TestError> {
+        self.authority(|authority| authority.actuator_test(now_us, value, duration_s, drive))
+    }
+}
