@@ -14,6 +14,7 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::{Config, Peripherals, pac, triggers};
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
+use siskin_control::image::Image;
 use siskin_control::params::Board;
 use static_cell::StaticCell;
 
@@ -41,6 +42,12 @@ pub(crate) const SAMPLING_CLOCKS: u16 = 50;
 
 /// What the control must know of this board.
 pub(crate) const BOARD: Board = Board {
+    image: Image {
+        board: "b-g431b-esc1",
+        board_number: 1,
+        build: [0; 8],
+        serial: [0; 12],
+    },
     current_a_per_count: V_PER_COUNT / (SHUNT_OHM * SHUNT_GAIN),
     bus_v_per_count: V_PER_COUNT / BUS_DIVIDER,
     terminal_v_per_count: V_PER_COUNT / TERMINAL_DIVIDER,
