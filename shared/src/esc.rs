@@ -57,9 +57,8 @@ struct Given {
 }
 
 impl Given {
-    /// The configuration that these parameters make here.
-    fn build(self, params: &Params, board: &Board) -> Result<Config, BuildError> {
-        build(params, board)?;
+    /// These parameters as the drive runs with them here.
+    fn running(self, params: &Params) -> Params {
         let mut running = params.clone();
         let direction = params.get(ParamId::MotDir);
         let kept = [
@@ -78,8 +77,21 @@ impl Given {
             // The first two were in range at the start, and a direction is 0 or 1.
             let _ = running.set(id, value);
         }
-        build(&running, board)
+        running
     }
+
+    /// Whether these parameters make a drive, here and after the next start.
+    fn check(self, params: &Params, board: &Board) -> Result<(), BuildError> {
+        check(params, board)?;
+        check(&self.running(params), board)
+    }
+}
+
+/// Whether parameters make a drive. Never inlined: a configuration takes 0.9 KB of stack.
+#[inline(never)]
+fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
+    build(params, board)?;
+    Ok(())
 }
 
 impl Esc {
@@ -97,9 +109,23 @@ impl Esc {
         link_bytes_per_s: u32,
     ) -> Result<(Self, Throttle), BuildError> {
         let config = build(&params, &board)?;
-        let mut throttle = Throttle::new(tick_hz, &params, &config);
-        throttle.tell_info(info(&params, false, &board.image));
-        let esc = Self {
+        let throttle = Throttle::new(tick_hz, &params, &board, &config);
+        let esc = Self::with_config(params, board, &config, link_bytes_per_s);
+        Ok((esc, throttle))
+    }
+
+    /// An ESC at power-up whose configuration has been built, without its throttle.
+    ///
+    /// Never inlined: on the chip it is made where it stays, by this and by [`Throttle::new`], since
+    /// the two on their way through [`Esc::new`] take 10 KB of stack.
+    #[inline(never)]
+    pub fn with_config(
+        params: Params,
+        board: Board,
+        config: &Config,
+        link_bytes_per_s: u32,
+    ) -> Self {
+        Self {
             board,
             given: Given {
                 pwm_freq_hz: params.get(ParamId::PwmFreqHz),
@@ -119,8 +145,7 @@ impl Esc {
             rests_since_us: None,
             traffic: false,
             storage: Storage::default(),
-        };
-        Ok((esc, throttle))
+        }
     }
 
     /// What the interrupt shall run with, computed anew at each call: it is larger than all else.
@@ -128,7 +153,7 @@ impl Esc {
     /// # Errors
     /// Never with the parameters in force, which have been tried before.
     pub fn config(&self) -> Result<Config, BuildError> {
-        self.given.build(&self.params, &self.board)
+        build(&self.given.running(&self.params), &self.board)
     }
 
     /// The parameters in force.
@@ -226,8 +251,8 @@ impl Esc {
         request
     }
 
-    /// Flash stalls the chip for up to half a second, and the bridge stays as it is meanwhile: it
-    /// must not switch, nor be about to.
+    /// Flash stalls the chip for up to half a second, in which the bridge is off and nothing is
+    /// controlled: it must not switch, nor be about to.
     fn may_store(&self) -> bool {
         let holds = matches!(self.telemetry.phase, Phase::Idle | Phase::Brake);
         let rested = match (self.rests_since_us, self.polled_us) {
@@ -253,7 +278,7 @@ impl Esc {
         throttle: &mut impl Reach,
         params: Params,
     ) -> Result<(), BuildError> {
-        self.given.build(&params, &self.board)?;
+        self.given.check(&params, &self.board)?;
         self.params = params;
         self.apply(throttle);
         Ok(())
@@ -296,7 +321,7 @@ impl Esc {
             params: &mut self.params,
             telemetry: &self.telemetry,
             authority: &mut Reached(throttle),
-            validate: &|params| given.build(params, &board).map(|_| ()),
+            validate: &|params| given.check(params, &board),
         };
         run(&mut self.component, &mut context);
     }

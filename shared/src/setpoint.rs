@@ -3,7 +3,7 @@
 use crate::drive::{Config, Setpoint, tone};
 use crate::input::authority::Command;
 use crate::input::{Share, reverse};
-use crate::math::TopProduct;
+use crate::math::{Real, TopProduct};
 use crate::params::{ParamId, Params};
 use crate::tune::Note;
 use crate::units::{Current, Speed};
@@ -52,7 +52,7 @@ impl Mapping {
         let Note::Pitch { hz } = note else {
             return Setpoint::Tone(Speed::ZERO);
         };
-        let mut pitch = Speed::saturating_from_num(f32::from(hz) * self.period_s);
+        let mut pitch = Speed::from_f32(f32::from(hz) * self.period_s);
         while pitch > tone::PITCH_MAX {
             pitch /= 2;
         }

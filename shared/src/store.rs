@@ -78,28 +78,26 @@ pub async fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Params, Loa
         loaded: 0,
         skipped: 0,
     };
-    let stored = match Stored::read(flash, range.clone()).await {
-        Ok(stored) => stored,
-        Err(error) => {
-            report.integrity = match error {
-                ReadError::Corrupt => Integrity::Corrupt,
-                ReadError::Store(_) => Integrity::Unreadable,
-            };
-            return (params, report);
-        }
-    };
+    let mut stored = Stored::NOTHING;
+    if let Err(error) = stored.read(flash, range.clone()).await {
+        report.integrity = match error {
+            ReadError::Corrupt => Integrity::Corrupt,
+            ReadError::Store(_) => Integrity::Unreadable,
+        };
+        return (params, report);
+    }
     report.skipped = stored.skipped;
-    for (id, bits) in ParamId::ALL.into_iter().zip(stored.values) {
+    for (id, bits) in ParamId::ALL.into_iter().zip(&stored.items) {
         let Some(bits) = bits else { continue };
-        let counter = match params.set(id, f32::from_bits(bits)) {
+        let counter = match params.set(id, f32::from_bits(*bits)) {
             Ok(()) => &mut report.loaded,
             Err(_) => &mut report.skipped,
         };
         *counter = counter.saturating_add(1);
     }
-    if stored.seal != stored.expected_seal() {
+    if stored.items[SEAL_AT] != stored.expected_seal() {
         report.integrity = Integrity::Incomplete;
-    } else if stored.seal.is_none() {
+    } else if stored.items[SEAL_AT].is_none() {
         report.integrity = match written_bytes(flash, range).await {
             Ok(0) => Integrity::Empty,
             Ok(count) if count <= FIRST_SAVE_BYTES => Integrity::Incomplete,
@@ -140,22 +138,26 @@ pub async fn save<F: NorFlash>(
     range: Range<u32>,
     params: &Params,
 ) -> Result<usize, StoreError> {
-    let sound = match Stored::read(flash, range.clone()).await {
-        Ok(stored) => stored.seal.is_some() && stored.seal == stored.expected_seal(),
+    let mut stored = Stored::NOTHING;
+    let sound = match stored.read(flash, range.clone()).await {
+        Ok(()) => {
+            stored.items[SEAL_AT].is_some() && stored.items[SEAL_AT] == stored.expected_seal()
+        }
         Err(ReadError::Corrupt) => false,
         Err(ReadError::Store(error)) => return Err(error),
     };
-    match append(flash, range.clone(), params).await {
-        Ok(written) => return Ok(written),
-        // Flash refuses to write where something has rotted, which an erase heals. What is sound
-        // is not risked for it: a flash that fails may lose it.
-        Err(ReadError::Store(StoreError::Flash)) if sound => return Err(StoreError::Flash),
-        Err(_) => erase(flash, range.clone()).await?,
-    }
-    match append(flash, range, params).await {
-        Ok(written) => Ok(written),
-        Err(ReadError::Corrupt) => Err(StoreError::NotStored),
-        Err(ReadError::Store(error)) => Err(error),
+    let mut erased = false;
+    loop {
+        match append(flash, range.clone(), params, &mut stored).await {
+            Ok(written) => return Ok(written),
+            Err(ReadError::Corrupt) if erased => return Err(StoreError::NotStored),
+            Err(ReadError::Store(error)) if erased => return Err(error),
+            // Flash refuses to write where something has rotted, which an erase heals. What is sound
+            // is not risked for it: a flash that fails may lose it.
+            Err(ReadError::Store(StoreError::Flash)) if sound => return Err(StoreError::Flash),
+            Err(_) => erase(flash, range.clone()).await?,
+        }
+        erased = true;
     }
 }
 
@@ -201,36 +203,44 @@ impl From<StoreError> for ReadError {
     }
 }
 
+/// The seal's place behind those of the table's values.
+const SEAL_AT: usize = TABLE.len();
+
 /// What the flash holds, as bits: a value may be one that the table does not accept.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone)]
 struct Stored {
-    values: [Option<u32>; TABLE.len()],
-    seal: Option<u32>,
+    items: [Option<u32>; SEAL_AT + 1],
     skipped: u16,
 }
 
 impl Stored {
-    async fn read<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<Self, ReadError> {
-        let mut stored = Self {
-            values: [None; TABLE.len()],
-            seal: None,
-            skipped: 0,
-        };
+    const NOTHING: Self = Self {
+        items: [None; SEAL_AT + 1],
+        skipped: 0,
+    };
+
+    /// Reads what the flash holds, in place of what is here: a task keeps one of these, not one for
+    /// each time that it reads.
+    async fn read<F: NorFlash>(
+        &mut self,
+        flash: &mut F,
+        range: Range<u32>,
+    ) -> Result<(), ReadError> {
+        *self = Self::NOTHING;
         let mut map = open(flash, range)?;
         let mut buffer = [0; BUFFER_LEN];
         let mut items = map.fetch_all_items(&mut buffer).await?;
         loop {
             // Items come in the order in which they were written: the last of a key counts.
             match items.next::<u32>(&mut buffer).await {
-                Ok(Some((SEAL, bits))) => stored.seal = Some(bits),
-                Ok(Some((key, bits))) => match index_of(key) {
-                    Some(index) => stored.values[index] = Some(bits),
-                    None => stored.skipped = stored.skipped.saturating_add(1),
+                Ok(Some((key, bits))) => match place_of(key) {
+                    Some(place) => self.items[place] = Some(bits),
+                    None => self.skipped = self.skipped.saturating_add(1),
                 },
-                Ok(None) => return Ok(stored),
+                Ok(None) => return Ok(()),
                 // The item is of another size, so not of this firmware; the next may be.
                 Err(Error::SerializationError(_) | Error::BufferTooSmall(_)) => {
-                    stored.skipped = stored.skipped.saturating_add(1);
+                    self.skipped = self.skipped.saturating_add(1);
                 }
                 Err(error) => return Err(error.into()),
             }
@@ -240,7 +250,7 @@ impl Stored {
     /// A hash (FNV-1a) over keys and values in the order of the table; none over nothing.
     fn expected_seal(&self) -> Option<u32> {
         let mut seal = None;
-        for (parameter, bits) in TABLE.iter().zip(self.values) {
+        for (parameter, bits) in TABLE.iter().zip(&self.items) {
             let Some(bits) = bits else { continue };
             let key = parameter.key.to_le_bytes();
             for byte in key.into_iter().chain(bits.to_le_bytes()) {
@@ -252,45 +262,45 @@ impl Stored {
     }
 }
 
-/// The place of a stored key in the table; derived parameters are not stored.
-fn index_of(key: u16) -> Option<usize> {
-    TABLE
-        .iter()
-        .position(|parameter| parameter.key == key && parameter.kind != Kind::Derived)
+/// The place of a stored key; derived parameters are not stored.
+fn place_of(key: u16) -> Option<usize> {
+    (0..=SEAL_AT).find(|place| match TABLE.get(*place) {
+        Some(parameter) => parameter.key == key && parameter.kind != Kind::Derived,
+        None => key == SEAL,
+    })
 }
 
 async fn append<F: NorFlash>(
     flash: &mut F,
     range: Range<u32>,
     params: &Params,
+    stored: &mut Stored,
 ) -> Result<usize, ReadError> {
-    let stored = Stored::read(flash, range.clone()).await?;
-    let mut wanted = stored;
-    for (id, value) in ParamId::ALL.into_iter().zip(&mut wanted.values) {
+    stored.read(flash, range.clone()).await?;
+    let mut wanted = stored.clone();
+    for (id, value) in ParamId::ALL.into_iter().zip(&mut wanted.items) {
         let entry = id.entry();
         let known = value.is_some() || params.get(id) != entry.default;
         if entry.kind != Kind::Derived && known {
             *value = Some(params.get(id).to_bits());
         }
     }
-    wanted.seal = wanted.expected_seal();
+    wanted.items[SEAL_AT] = wanted.expected_seal();
 
     let mut written = 0;
     let mut map = open(flash, range.clone())?;
     let mut buffer = [0; BUFFER_LEN];
-    for ((parameter, old), new) in TABLE.iter().zip(stored.values).zip(wanted.values) {
+    // The seal comes last.
+    for (place, (old, new)) in stored.items.iter().zip(&wanted.items).enumerate() {
         if let Some(bits) = new.filter(|_| new != old) {
-            map.store_item(&mut buffer, &parameter.key, &bits).await?;
+            let key = TABLE.get(place).map_or(SEAL, |parameter| parameter.key);
+            map.store_item(&mut buffer, &key, &bits).await?;
             written += 1;
         }
     }
-    if let Some(bits) = wanted.seal.filter(|_| wanted.seal != stored.seal) {
-        map.store_item(&mut buffer, &SEAL, &bits).await?;
-        written += 1;
-    }
 
-    let now = Stored::read(flash, range).await?;
-    if (now.values, now.seal) == (wanted.values, wanted.seal) {
+    stored.read(flash, range).await?;
+    if stored.items == wanted.items {
         Ok(written)
     } else {
         Err(StoreError::NotStored.into())

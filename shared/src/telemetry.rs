@@ -41,7 +41,7 @@ const AT_REST_RPM: f32 = 100.0;
 
 /// Time over which the current is smoothed, µs: what flows in a period differs from the next by
 /// the current's ripple, and a fifth of a second is what a person can read.
-const READABLE_US: f32 = 200_000.0;
+const READABLE_US: u32 = 200_000;
 
 /// A charge in µA·µs. Whole numbers: a sum of floats would stop growing after some ampere-hours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,14 +50,14 @@ pub struct Charge(i64);
 impl Charge {
     /// Adds a current that has flowed for a while.
     pub fn add(&mut self, current_a: f32, time_us: u64) {
-        let charge = (current_a * 1e6) as i64 * time_us as i64;
+        let charge = i64::from((current_a * 1e6) as i32) * time_us as i64;
         self.0 = self.0.saturating_add(charge);
     }
 
     /// The charge in mAh.
     pub fn mah(self) -> f32 {
         // 3600 s of 1 mA.
-        (self.0 / 1_000_000) as f32 / 3_600_000.0
+        self.0 as f32 / 3.6e12
     }
 }
 
@@ -95,7 +95,8 @@ impl Telemetry {
         self.rpm = scale.rpm(snapshot.speed);
         self.bus_v = scale.volts(snapshot.bus);
         let bus_a = scale.amperes(snapshot.bus_current);
-        self.bus_a += (bus_a - self.bus_a) * (time_us as f32 / READABLE_US).min(1.0);
+        let time_us = time_us.min(READABLE_US.into()) as u32;
+        self.bus_a += (bus_a - self.bus_a) * (time_us as f32 / READABLE_US as f32);
         self.phase = snapshot.phase;
         self.faults = snapshot.faults;
         self.fault_count = snapshot.fault_count;

@@ -14,7 +14,7 @@ use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError
 use crate::input::command::Order;
 use crate::input::signal::Signal;
 use crate::input::{Heard, Input, News};
-use crate::params::{self, Params};
+use crate::params::{self, Board, Params};
 use crate::setpoint::Mapping;
 use crate::telemetry::Telemetry;
 use crate::tune::Note;
@@ -69,15 +69,17 @@ impl Reach for Throttle {
 }
 
 impl Throttle {
-    /// A quiet wire at power-up, captured by a timer of `tick_hz`.
-    pub(crate) fn new(tick_hz: u32, params: &Params, config: &Config) -> Self {
+    /// A quiet wire at power-up, captured by a timer of `tick_hz`, with the configuration that these
+    /// parameters make of this board.
+    #[inline(never)]
+    pub fn new(tick_hz: u32, params: &Params, board: &Board, config: &Config) -> Self {
         Self {
             input: Input::new(tick_hz, params::input(params)),
             answers: Answers::new(tick_hz),
             mapping: Mapping::new(params, config),
             basis: Basis::new(config),
             telemetry: Telemetry::new(),
-            info: [0; info::BYTES],
+            info: info::info(params, false, &board.image),
             told: Told::default(),
             orders: Deque::new(),
             storing: false,
@@ -136,6 +138,11 @@ impl Throttle {
         self.input.authority().command()
     }
 
+    /// The signal that the wire is known to carry, or has been told to carry.
+    pub fn signal(&self) -> Option<Signal> {
+        self.input.known()
+    }
+
     /// Lets time pass, and takes in what the drive is doing.
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
@@ -182,6 +189,12 @@ impl Throttle {
     /// nothing.
     pub(crate) fn store(&mut self) -> bool {
         self.storing = self.command().rests();
+        self.storing
+    }
+
+    /// Whether the flash is being written. Edges are stale then: the processor may have been stalled for
+    /// longer than the capturing timer counts.
+    pub fn is_storing(&self) -> bool {
         self.storing
     }
 

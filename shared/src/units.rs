@@ -4,7 +4,9 @@
 //! top half. Conversion from and to SI happens when the configuration is built and in telemetry,
 //! never in a control period.
 
-use fixed::types::{I0F32, I4F28, I16F16};
+use fixed::types::{I0F32, I4F28, I8F24, I16F16};
+
+use crate::math::Real;
 
 /// An electrical angle in turns; it wraps.
 pub type Angle = I0F32;
@@ -17,6 +19,21 @@ pub type Current = I4F28;
 
 /// A voltage in units of [`Scale::voltage_v`].
 pub type Voltage = I4F28;
+
+/// A voltage with room for sums of what may be far beyond the supply.
+pub type WideVoltage = I8F24;
+
+/// The voltage, with room for sums.
+#[inline(always)]
+pub fn wide(u: Voltage) -> WideVoltage {
+    WideVoltage::from_bits(u.to_bits() >> 4)
+}
+
+/// The voltage, held at the ends of its type.
+#[inline(always)]
+pub fn narrow(u: WideVoltage) -> Voltage {
+    Voltage::saturating_from_num(u)
+}
 
 /// A torque in units of [`Scale::torque_nm`].
 pub type Torque = I4F28;
@@ -75,27 +92,27 @@ impl Scale {
 
     /// The control's speed for mechanical rpm; held below half a turn a period.
     pub fn speed_from_rpm(&self, rpm: f32) -> Speed {
-        Speed::saturating_from_num(rpm * self.turns_per_rpm())
+        Speed::from_f32(rpm * self.turns_per_rpm())
     }
 
     /// Mechanical rpm of a control's speed.
     pub fn rpm(&self, speed: Speed) -> f32 {
-        speed.to_num::<f32>() / self.turns_per_rpm()
+        speed.to_f32() / self.turns_per_rpm()
     }
 
     /// The control's current for amperes, held at the type's ends.
     pub fn current_from_a(&self, current_a: f32) -> Current {
-        Current::saturating_from_num(current_a / self.current_a)
+        Current::from_f32(current_a / self.current_a)
     }
 
     /// Amperes of a control's current.
     pub fn amperes(&self, current: Current) -> f32 {
-        current.to_num::<f32>() * self.current_a
+        current.to_f32() * self.current_a
     }
 
     /// Volts of a control's voltage.
     pub fn volts(&self, voltage: Voltage) -> f32 {
-        voltage.to_num::<f32>() * self.voltage_v
+        voltage.to_f32() * self.voltage_v
     }
 
     fn turns_per_rpm(&self) -> f32 {

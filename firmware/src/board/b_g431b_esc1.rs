@@ -6,19 +6,39 @@ use core::mem;
 
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, Exten, InjectedAdc, SampleTime};
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::mode::Async;
 use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
-use embassy_stm32::peripherals::{ADC1, ADC2, OPAMP1, OPAMP2, OPAMP3};
-use embassy_stm32::rcc::{Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux::Adcsel};
+use embassy_stm32::peripherals::{
+    ADC1, ADC2, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, IWDG, OPAMP1, OPAMP2,
+    OPAMP3, PA15, PB6, TIM1, TIM2, TIM3, USART1, USART2,
+};
 use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
+use embassy_stm32::timer::input_capture::CapturePin;
 use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
-use embassy_stm32::{Config, Peripherals, pac, triggers};
+use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
+use embassy_stm32::usart::{self, Uart, UartTx};
+use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::image::Image;
 use siskin_control::params::Board;
+use siskin_control::protection::Ntc;
+use siskin_control::units::AdcCounts;
 use static_cell::StaticCell;
 
-use crate::pwm::BridgePins;
+use crate::chip::{self, comparators};
+use crate::image;
+use crate::interrupt::Registers;
+use crate::interrupt::gate_driver::Pins;
+use crate::interrupt::sample::{Slot, Wiring};
+use crate::interrupt::trip_level::TripCircuit;
+use crate::priority;
+use crate::storage::Storage;
+use crate::tasks::throttle::{self, Capture, CaptureInterrupt, Replier};
+
+pub use crate::chip::TIMER_HZ;
+
+/// The board's name, in its image and for MAVLink.
+pub const NAME: &str = "b-g431b-esc1";
 
 /// Volts of one count: 12 bits of the 3.3 V supply.
 const V_PER_COUNT: f32 = 3.3 / 4096.0;
@@ -26,8 +46,11 @@ const V_PER_COUNT: f32 = 3.3 / 4096.0;
 /// Each phase's shunt in the low side.
 const SHUNT_OHM: f32 = 0.003;
 
-/// From the shunt to the converter: the resistors' 4/7 and the op-amp's 16.
-const SHUNT_GAIN: f32 = 64.0 / 7.0;
+/// From the shunt to the op-amp's input, by its resistors.
+const SHUNT_DIVIDER: f32 = 4.0 / 7.0;
+
+/// The op-amp's.
+const GAIN: f32 = 16.0;
 
 /// From the supply to the converter.
 const BUS_DIVIDER: f32 = 18.0 / (18.0 + 169.0);
@@ -36,24 +59,40 @@ const BUS_DIVIDER: f32 = 18.0 / (18.0 + 169.0);
 /// 18.3 V.
 const TERMINAL_DIVIDER: f32 = 2.2 / (2.2 + 10.0);
 
+/// The board's rating, peak amperes. The converter shows more: ±60 A about the middle of its range.
+const RATING_A: f32 = 40.0;
+
 /// For how long the phase currents are sampled: 12.5 cycles of the converters' 42.5 MHz, in
 /// clocks of the timer's 170 MHz. 0.29 µs, above the 0.2 µs that an op-amp's output needs.
 pub(crate) const SAMPLING_CLOCKS: u16 = 50;
 
+/// The comparators break the PWM.
+pub(crate) const BREAKS: bool = true;
+
+/// No gate driver that speaks.
+pub(crate) const GATE_DRIVER: Option<Pins> = None;
+
+/// The phases, from 0, on the timer's channels 1, 2, 3.
+pub(crate) const PHASES: [usize; 3] = [0, 1, 2];
+
+/// The order of the sequences in [`Hardware::claim`].
+pub(crate) const WIRING: Wiring = Wiring {
+    currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), Some(Slot(0, 1))],
+    // A current into the motor comes up through the low side's shunt and makes its voltage negative.
+    rises: false,
+    terminals: [Slot(1, 1), Slot(1, 2), Slot(0, 2)],
+    bus: Slot(0, 3),
+    hall: Some(6),
+};
+
 /// What the control must know of this board.
-pub(crate) const BOARD: Board = Board {
-    image: Image {
-        board: "b-g431b-esc1",
-        board_number: 1,
-        build: [0; 8],
-        serial: [0; 12],
-    },
-    current_a_per_count: V_PER_COUNT / (SHUNT_OHM * SHUNT_GAIN),
+pub const BOARD: Board = Board {
+    image: image::identity(NAME, 1),
+    current_a_per_count: V_PER_COUNT / (SHUNT_OHM * SHUNT_DIVIDER * GAIN),
     bus_v_per_count: V_PER_COUNT / BUS_DIVIDER,
     terminal_v_per_count: V_PER_COUNT / TERMINAL_DIVIDER,
     shunts: Shunts::Three,
-    // The board's rating. The converter shows more: ±60 A about the middle of its range.
-    current_range_a: 40.0,
+    current_range_a: RATING_A,
     // The duties computed in one period are applied from the next counter's top on.
     delay: Delay::One,
     // The first sampling window is centred on the counter's top, so half of it (0.15 µs) and 1 µs
@@ -68,7 +107,77 @@ pub(crate) const BOARD: Board = Board {
     charge_s: 63e-6,
 };
 
-/// The two converters, which the PWM timer triggers once a period, and the Hall sensors' pins.
+/// The thermistor: 10 kΩ at 25 °C over 4.7 kΩ, which are 1.055 V at 25 °C as ST's motor control kit
+/// has it for this board; its β is that of the usual part.
+pub const NTC: Ntc = Ntc {
+    pull_down: 0.47,
+    beta_k: 3380.0,
+};
+
+/// The comparators' view: the bias is half the supply over the op-amp's gain.
+const TRIP: TripCircuit = TripCircuit {
+    bias_v: 3.3 / 2.0 / GAIN,
+    v_per_a: SHUNT_OHM * SHUNT_DIVIDER,
+    rating_a: RATING_A,
+    v_per_step: V_PER_COUNT,
+};
+
+bind_interrupts!(struct Interrupts {
+    USART2 => usart::InterruptHandler<USART2>;
+    DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
+    DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
+    DMA1_CHANNEL3 => dma::InterruptHandler<DMA1_CH3>;
+    DMA1_CHANNEL4 => dma::InterruptHandler<DMA1_CH4>;
+    DMA1_CHANNEL5 => dma::InterruptHandler<DMA1_CH5>;
+    DMA1_CHANNEL6 => dma::InterruptHandler<DMA1_CH6>;
+    TIM2 => CaptureInterrupt;
+});
+
+/// The throttle wire's timers and pin.
+pub(crate) mod wire {
+    use embassy_stm32::pac;
+    use embassy_stm32::pac::gpio::Gpio;
+    use embassy_stm32::pac::timer::{TimGp16, TimGp32};
+    use embassy_stm32::peripherals::{TIM2, TIM3};
+
+    /// Captures the edges.
+    pub(crate) type CaptureTimer = TIM2;
+    /// Its registers.
+    pub(crate) const CAPTURE: TimGp32 = pac::TIM2;
+    /// Bits of its counter.
+    pub(crate) const TIMER_BITS: u32 = 32;
+    /// What its clock is divided by.
+    pub(crate) const PRESCALER: u16 = 1;
+    /// Its rate.
+    pub(crate) const TICK_HZ: u32 = super::TIMER_HZ;
+    /// Its channel at the pin, from 0.
+    pub(crate) const SIGNAL_CHANNEL: usize = 0;
+    /// Paces replies.
+    pub(crate) type PaceTimer = TIM3;
+    /// Its registers.
+    pub(crate) const PACE: TimGp16 = pac::TIM3;
+    /// Its rate.
+    pub(crate) const PACE_HZ: u32 = super::TIMER_HZ;
+    /// The pin's port.
+    pub(crate) const PORT: Gpio = pac::GPIOA;
+    /// The pin's number there.
+    pub(crate) const PIN: usize = 15;
+}
+
+/// The interrupt in which the throttle's task runs: one whose unit is not used.
+pub(crate) const EXECUTOR: interrupt::Interrupt = interrupt::FMAC;
+
+#[interrupt]
+fn FMAC() {
+    throttle::run_executor();
+}
+
+/// The gate signals, set up; [`crate::interrupt::start`] takes them.
+pub struct Bridge {
+    _timer: Peri<'static, TIM1>,
+}
+
+/// The two converters, which the PWM timer triggers once a period.
 ///
 /// A conversion takes 12.5 cycles of 42.5 MHz after its sampling. The sampling windows begin at
 /// these times from the counter's top, in µs, and the end of the first converter's sequence is the
@@ -78,68 +187,123 @@ pub(crate) const BOARD: Board = Board {
 /// |---|---|---|---|---|
 /// | first | current a −0.15 to 0.15 | current c 0.44 to 0.74 | terminal c 1.03 to 1.61 | supply 1.90 to 3.02 |
 /// | second | current b −0.15 to 0.15 | terminal a 0.44 to 1.02 | terminal b 1.31 to 1.89 | |
-pub(crate) struct Converters {
-    /// Phases a and c, terminal c, the supply.
-    pub(crate) first: InjectedAdc<'static, ADC1, 4>,
-    /// Phase b, terminals a and b.
-    pub(crate) second: InjectedAdc<'static, ADC2, 3>,
-    /// Hall sensors a, b, c.
-    pub(crate) hall: [Input<'static>; 3],
+pub struct Converters {
+    _first: InjectedAdc<'static, ADC1, 4>,
+    _second: InjectedAdc<'static, ADC2, 3>,
+    /// Hall sensors b and c; that of a is also the KISS telemetry's pin.
+    _hall: [Input<'static>; 2],
+}
+
+/// The throttle wire.
+pub struct Throttle {
+    pin: Peri<'static, PA15>,
+    _timers: (Peri<'static, TIM2>, Peri<'static, TIM3>),
+    rising: Peri<'static, DMA1_CH4>,
+    falling: Peri<'static, DMA1_CH5>,
+    reply: Peri<'static, DMA1_CH6>,
+}
+
+impl Throttle {
+    /// Begins to capture.
+    pub(crate) fn open(self) -> (Capture, Replier) {
+        // A wire that is not connected is at rest. A dropped pin would be given back.
+        mem::forget(CapturePin::<TIM2, Ch1>::new(self.pin, Pull::Up));
+        let requests = [
+            Dma::<TIM2, Ch1>::request(&*self.rising),
+            Dma::<TIM2, Ch2>::request(&*self.falling),
+        ];
+        let channels = [
+            dma::Channel::new(self.rising, Interrupts),
+            dma::Channel::new(self.falling, Interrupts),
+        ];
+        let update = UpDma::<TIM3>::request(&*self.reply);
+        let reply = dma::Channel::new(self.reply, Interrupts);
+        (
+            Capture::new(channels, requests),
+            Replier::new(reply, update),
+        )
+    }
+}
+
+/// The KISS telemetry, on the pin of Hall sensor a.
+pub struct Kiss {
+    uart: Peri<'static, USART1>,
+    pin: Peri<'static, PB6>,
+    dma: Peri<'static, DMA1_CH3>,
+}
+
+impl Kiss {
+    /// Takes the pin from the Hall sensor: for a motor without sensors.
+    pub fn open(self) -> UartTx<'static, Async> {
+        let config = usart::Config::default();
+        UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
+            .expect("115200 baud can be had of 170 MHz")
+    }
+}
+
+/// The board's temperature.
+pub struct Temperature {
+    reading: chip::Reading,
+}
+
+impl Temperature {
+    /// The thermistor's reading, for [`NTC`]; it waits 10 µs for it.
+    pub fn read(&mut self) -> AdcCounts {
+        AdcCounts::from_num(self.reading.counts())
+    }
 }
 
 /// The parts of the board, set up.
-pub(crate) struct Hardware {
+pub struct Hardware {
     /// Gate signals.
-    pub(crate) bridge: BridgePins,
+    pub bridge: Bridge,
     /// Currents, voltages and Hall sensors.
-    pub(crate) converters: Converters,
+    pub converters: Converters,
     /// The LED.
-    pub(crate) light: Output<'static>,
-}
-
-/// 170 MHz from the internal 16 MHz: sources disagree on the crystal's frequency.
-pub(crate) fn clock() -> Config {
-    let mut config = Config::default();
-    config.rcc.hsi = true;
-    config.rcc.pll = Some(Pll {
-        source: PllSource::HSI,
-        prediv: PllPreDiv::DIV4,
-        mul: PllMul::MUL85,
-        divp: None,
-        divq: None,
-        divr: Some(PllRDiv::DIV2),
-    });
-    config.rcc.sys = Sysclk::PLL1_R;
-    config.rcc.boost = true;
-    config.rcc.mux.adc12sel = Adcsel::SYS;
-    config
+    pub light: Output<'static>,
+    /// The throttle wire.
+    pub throttle: Throttle,
+    /// MAVLink, 115200 baud.
+    pub mavlink: Uart<'static, Async>,
+    /// The KISS telemetry.
+    pub kiss: Kiss,
+    /// The flash that keeps the parameters.
+    pub flash: Storage,
+    /// The watchdog, which does not run yet.
+    pub watchdog: Peri<'static, IWDG>,
+    /// The thermistor.
+    pub temperature: Temperature,
 }
 
 impl Hardware {
-    /// Sets up the pins, the op-amps and the converters. The gate signals are low until the timer
-    /// drives them.
-    pub(crate) fn claim(p: Peripherals) -> Self {
+    /// Starts the chip, and sets up the pins, the op-amps, the comparators and the converters. The
+    /// gate signals are low until the timer drives them. To be called once.
+    #[inline(never)]
+    pub fn claim() -> Self {
+        let p = embassy_stm32::init(chip::clock());
+        // Before any of them is used: critical sections rely on it.
+        priority::lower_all(chip::INTERRUPTS);
+        rcc::enable_and_reset::<TIM1>();
+        // A breakpoint stops the timer, and a stopped timer turns its outputs off.
+        pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
+        comparators::set_up(TRIP.level(RATING_A));
+        chip::break_on_lock_up();
+
         // The pull keeps the gates off while nothing drives the pin.
         let gate = PwmPinConfig {
             output_type: OutputType::PushPull,
             speed: Speed::VeryHigh,
             pull: Pull::Down,
         };
-        let bridge = BridgePins {
-            timer: p.TIM1,
-            a: (
-                PwmPin::new_with_config(p.PA8, gate),
-                ComplementaryPwmPin::new_with_config(p.PC13, gate),
-            ),
-            b: (
-                PwmPin::new_with_config(p.PA9, gate),
-                ComplementaryPwmPin::new_with_config(p.PA12, gate),
-            ),
-            c: (
-                PwmPin::new_with_config(p.PA10, gate),
-                ComplementaryPwmPin::new_with_config(p.PB15, gate),
-            ),
-        };
+        // A dropped pin would be given back: these stay the timer's for ever.
+        mem::forget((
+            PwmPin::<TIM1, _>::new_with_config(p.PA8, gate),
+            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PC13, gate),
+            PwmPin::<TIM1, _>::new_with_config(p.PA9, gate),
+            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PA12, gate),
+            PwmPin::<TIM1, _>::new_with_config(p.PA10, gate),
+            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB15, gate),
+        ));
 
         static AMPLIFIER_A: StaticCell<OpAmp<'static, OPAMP1>> = StaticCell::new();
         static AMPLIFIER_B: StaticCell<OpAmp<'static, OPAMP2>> = StaticCell::new();
@@ -175,31 +339,66 @@ impl Hardware {
             (p.PA4.degrade_adc(), SampleTime::CYCLES24_5),
             (p.PC4.degrade_adc(), SampleTime::CYCLES24_5),
         ];
+        let mut hall_a = p.PB6;
+        // Open collectors; without sensors the pulls read 7. The telemetry may take this one.
+        mem::forget(Input::new(hall_a.reborrow(), Pull::Up));
+        // The thermistor, before the converter's injected sequence is armed: what is sampled how long
+        // may not be changed afterwards (RM0440, ADC_SMPR1).
+        let thermistor = p.PB14.degrade_adc();
+        let temperature = Temperature {
+            reading: chip::Reading::new(thermistor.get_hw_channel()),
+        };
         let converters = Converters {
-            second: Adc::new(p.ADC2, AdcConfig::default()).setup_injected_conversions(
+            _second: Adc::new(p.ADC2, AdcConfig::default()).setup_injected_conversions(
                 second,
                 triggers::TIM1_TRGO,
                 Exten::RISING_EDGE,
                 false,
             ),
-            first: Adc::new(p.ADC1, AdcConfig::default()).setup_injected_conversions(
+            _first: Adc::new(p.ADC1, AdcConfig::default()).setup_injected_conversions(
                 first,
                 triggers::TIM1_TRGO,
                 Exten::RISING_EDGE,
                 true,
             ),
-            // Open collectors; without sensors the pulls read 7.
-            hall: [
-                Input::new(p.PB6, Pull::Up),
-                Input::new(p.PB7, Pull::Up),
-                Input::new(p.PB8, Pull::Up),
-            ],
+            _hall: [Input::new(p.PB7, Pull::Up), Input::new(p.PB8, Pull::Up)],
         };
-
+        let uart = usart::Config::default();
         Self {
-            bridge,
+            bridge: Bridge { _timer: p.TIM1 },
             converters,
             light: Output::new(p.PC6, Level::Low, Speed::Low),
+            throttle: Throttle {
+                pin: p.PA15,
+                _timers: (p.TIM2, p.TIM3),
+                rising: p.DMA1_CH4,
+                falling: p.DMA1_CH5,
+                reply: p.DMA1_CH6,
+            },
+            mavlink: Uart::new(
+                p.USART2, p.PB4, p.PB3, p.DMA1_CH1, p.DMA1_CH2, Interrupts, uart,
+            )
+            .expect("115200 baud can be had of 170 MHz"),
+            kiss: Kiss {
+                uart: p.USART1,
+                pin: hall_a,
+                dma: p.DMA1_CH3,
+            },
+            flash: Storage::new(p.FLASH),
+            watchdog: p.IWDG,
+            temperature,
         }
     }
+}
+
+/// What the interrupt is at, from then on its own. It waits 1 ms for the amplifiers to settle.
+pub(crate) fn prepare(bridge: Bridge, converters: Converters) -> Registers {
+    mem::forget((bridge, converters));
+    cortex_m::asm::delay(TIMER_HZ / 1000);
+    Registers::CHIP
+}
+
+/// Sets the comparators' level for a bound on the phase currents, peak amperes.
+pub(crate) fn set_trip(phase_a: f32) {
+    comparators::set_level(TRIP.level(phase_a));
 }

@@ -1,6 +1,12 @@
-//! The board, chosen by a feature.
+//! The board, chosen by a feature: one file each.
+#![doc = include_str!("third.md")]
 
 #[cfg(feature = "b-g431b-esc1")]
 mod b_g431b_esc1;
+#[cfg(feature = "vesc4-f405")]
+mod vesc4_f405;
+
 #[cfg(feature = "b-g431b-esc1")]
-pub(crate) use b_g431b_esc1::{BOARD, Converters, Hardware, SAMPLING_CLOCKS, clock};
+pub use b_g431b_esc1::*;
+#[cfg(feature = "vesc4-f405")]
+pub use vesc4_f405::*;

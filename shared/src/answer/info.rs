@@ -19,6 +19,7 @@
 
 use super::kiss::crc8;
 use crate::image::{Image, VERSION};
+use crate::math::round;
 use crate::params::{ParamId, Params};
 
 /// Bytes of the information.
@@ -44,7 +45,7 @@ pub fn info(params: &Params, light: bool, image: &Image) -> [u8; BYTES] {
     // Conversions saturate, and a limit below the unit is still one.
     let limit = |value: f32| {
         let least = if value > 0.0 { 1.0 } else { 0.0 };
-        libm::roundf(value).clamp(least, MOST) as u8
+        round(value).clamp(least, MOST) as u8
     };
     let mut bytes = [0; BYTES];
     bytes[..12].copy_from_slice(&image.serial);

@@ -1,5 +1,6 @@
 //! KISS telemetry on a serial line: 115200 baud, 8N1, ten bytes with the highest first.
 
+use crate::math::round;
 use crate::telemetry::Telemetry;
 
 /// Bytes of a frame.
@@ -13,7 +14,7 @@ pub const SPACING_US: u32 = 1000;
 pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
     let mut frame = [0; BYTES];
     // A float's conversion saturates, and makes 0 of what is no number.
-    frame[0] = libm::roundf(telemetry.temperature_c) as i8 as u8;
+    frame[0] = round(telemetry.temperature_c) as i8 as u8;
     let words = [
         telemetry.bus_v * 100.0,
         telemetry.bus_a * 100.0,
@@ -21,7 +22,7 @@ pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
         erpm / 100.0,
     ];
     for (place, word) in frame[1..].chunks_exact_mut(2).zip(words) {
-        place.copy_from_slice(&(libm::roundf(word) as u16).to_be_bytes());
+        place.copy_from_slice(&(round(word) as u16).to_be_bytes());
     }
     frame[BYTES - 1] = crc8(&frame[..BYTES - 1]);
     frame

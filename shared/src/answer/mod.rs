@@ -17,6 +17,7 @@ use crate::drive::Snapshot;
 use crate::input::command::Order;
 use crate::input::dshot::Rate;
 use crate::input::line::Event;
+use crate::math::{quotient, round};
 use crate::telemetry::Telemetry;
 pub use basis::Basis;
 use extended::Extended;
@@ -106,7 +107,7 @@ pub struct Answers {
 impl Answers {
     /// Nothing sent yet; `tick_hz` is the rate of the timer that captures the wire's edges.
     pub fn new(tick_hz: u32) -> Self {
-        let ticks = |time_us| (u64::from(tick_hz) * u64::from(time_us) / 1_000_000) as u32;
+        let ticks = |time_us| quotient(u64::from(tick_hz) * u64::from(time_us), 1_000_000);
         Self {
             reply_ticks: Rate::ALL.map(|rate| reply_ticks(tick_hz, rate)),
             kiss_ticks: ticks(kiss::SPACING_US),
@@ -216,7 +217,7 @@ impl Answers {
             return None;
         }
         // A float's conversion saturates.
-        let whole = |value: f32| libm::roundf(value) as u8;
+        let whole = |value: f32| round(value) as u8;
         Some(match self.schedule.due()? {
             Kind::Status => self.health.status(),
             Kind::Temperature => Extended::Temperature(whole(telemetry.temperature_c)),
@@ -234,11 +235,11 @@ pub const fn reply_bit_hz(rate: Rate) -> u32 {
 
 /// From a frame's first edge to its reply, in ticks to the nearest: 16 nominal bits, whatever the
 /// frame's own were, and the delay.
-const fn reply_ticks(tick_hz: u32, rate: Rate) -> u32 {
+fn reply_ticks(tick_hz: u32, rate: Rate) -> u32 {
     // 16 bits in units of 10⁻⁹/3 s, which every rate's bit is a whole number of.
-    let frame = 16 * (1_000_000_000 / (rate.bit_hz() as u64 / 3));
-    let whole = frame + 3 * REPLY_DELAY_NS as u64;
-    ((whole * tick_hz as u64 + 1_500_000_000) / 3_000_000_000) as u32
+    let frame = 16 * (1_000_000_000 / (rate.bit_hz() / 3));
+    let whole = u64::from(frame + 3 * REPLY_DELAY_NS);
+    quotient(whole * u64::from(tick_hz) + 1_500_000_000, 3_000_000_000)
 }
 
 #[cfg(test)]

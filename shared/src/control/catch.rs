@@ -10,66 +10,60 @@
 //! and an amplitude E, and corrects by what differs:
 //!
 //! - A phase that stands at a clamp in prediction and reading says nothing.
-//! - Of the others, the derivatives by θ_e and by E give the correction of each (Gauss-Newton).
+//! - Of the others, the derivatives by θ_e and by E give the correction of each (Gauss-Newton):
+//!   `compare.rs`.
 //! - θ_e and ω are the line that fits all innovations so far best, by recursive least squares: of
 //!   the weights w = Σ(∂r/∂θ_e)²/E² and their ages, S_0 = Σw, S_1 = Σw·age, S_2 = Σw·age² say
 //!   how much of an innovation is the angle's and how much the speed's. So the gains fall as
 //!   knowledge grows, rise again over a gap (in a sixth of a turn only one half-wave shows, near its
-//!   top, and the angle is hardly seen), and the sums say how certain the speed is.
+//!   top, and the angle is hardly seen), and the sums say how certain the speed is: `learn.rs`.
 //! - The sums forget with a time constant of one electrical turn, so that a rotor that slows down is
 //!   followed: a propeller coasts with a time constant of a second.
 //!
-//! It divides five times a period, in 64 bits; the bridge is off and nothing else is computed.
+//! A period with the bridge off is to be no longer than one that drives, so the work is done in
+//! turns of four periods (`Turn`). A slow rotor, whose readings are small in their noise, is
+//! compared with the mean of four readings. Ages are in such looks, and so are all times of the
+//! configuration.
 
-use fixed::types::extra::{U16, U32};
-use fixed::types::{I4F28, I16F16};
+mod compare;
+mod learn;
 
-use super::transform::{AlphaBeta, phases};
-use crate::math::{Gain, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
+use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
+
+use crate::math::{TopProduct, atan2_turns, sin_cos};
 use crate::units::{AdcCounts, Angle, Speed};
+use compare::Difference;
 
-/// Noise of one reading that is reckoned with, counts rms.
-const NOISE_COUNTS: i64 = 2;
+/// Periods from look to look.
+pub const LOOK_PERIODS: u32 = 1 << LOOK_SHIFT;
 
-/// The highest reading of the converter's 12 bits: it may be a clamp.
-const CLAMP: i32 = 4094 << FRACTION;
-
-/// Fraction bits of counts while they are worked on.
-const FRACTION: u32 = 15;
-
-/// Fraction bits of the sums.
-const SUM_FRACTION: u32 = 12;
+const LOOK_SHIFT: u32 = 2;
 
 /// Highest reading from which an observation may begin, three times the noise.
-const BEGIN: i32 = 6 << FRACTION;
-
-/// Fastest forgetting, a quarter a period with 16 fraction bits: faster rotors are not driven.
-const FORGET_MAX: i64 = 1 << 14;
-
-/// Share of the newest sample in the squared residual's mean, as a shift.
-const RESIDUAL_SHIFT: u32 = 4;
+const BEGIN: I17F15 = I17F15::lit("6");
 
 /// What the observer must know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Speed to the back-EMF's amplitude that the stated flux gives, in counts of the terminals.
-    pub emf: Gain<U32, U16>,
+    /// Back-EMF's amplitude that the stated flux gives, in counts of the terminals with 8 fraction
+    /// bits, over the speed in turns a period.
+    pub emf: u32,
     /// A diode's drop.
     pub diode: AdcCounts,
-    /// Noise times the amplitude a radian per period, counts²: (E/|ω|)·σ, which makes the first
+    /// Noise times the amplitude a radian per look, counts²: (E/|ω|)·σ, which makes the first
     /// guess of the speed's uncertainty.
     pub prior: u32,
-    /// Slowest forgetting, a share a period with 16 fraction bits.
-    pub forget_min: u32,
+    /// Slowest forgetting, a share a look.
+    pub forget_min: I0F32,
     /// Mean of the highest reading below which the rotor stands, or turns so slowly that it can be
     /// aligned.
     pub standing: AdcCounts,
-    /// Share of a new sample in that mean, 16 fraction bits.
-    pub level_share: u32,
-    /// Periods in a row for which all must fit before the rotor is known.
-    pub sure_periods: u32,
-    /// Periods for which something may not fit before the observation begins anew.
-    pub lost_periods: u32,
+    /// Share of a new look in that mean.
+    pub level_share: I0F32,
+    /// Looks in a row for which all must fit before the rotor is known.
+    pub sure_looks: u32,
+    /// Looks for which something may not fit before the observation begins anew.
+    pub lost_looks: u32,
 }
 
 /// What is known of the rotor.
@@ -89,29 +83,56 @@ pub enum Rotor {
     },
 }
 
+/// What a period does for a look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Turn {
+    /// It compares the readings with the prediction.
+    Look,
+    /// It finds by how much angle and speed are to be corrected for what differs.
+    Weigh,
+    /// It corrects them, and the amplitude.
+    Correct,
+    /// It sees whether all fits.
+    Judge,
+}
+
 /// What is remembered from sample to sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Mean of the highest reading.
-    pub level: AdcCounts,
-    /// Samples of this observation; 0 while there is none.
-    pub samples: u32,
-    /// θ_e, the angle of the back-EMF's vector.
-    pub theta: Angle,
+    level: AdcCounts,
+    /// What this period is to do.
+    turn: Turn,
+    /// Sum of the readings after the last look.
+    readings: [I17F15; 3],
+    /// Looks of this observation; 0 while there is none.
+    looks: u32,
+    /// θ_e, the angle of the back-EMF's vector at this sample.
+    theta: Angle,
     /// ω.
-    pub omega: Speed,
+    omega: Speed,
     /// E, in counts.
-    pub amplitude: AdcCounts,
-    /// S_0, S_1, S_2, 12 fraction bits.
-    pub sums: [i64; 3],
-    /// Sum of the weights of E, likewise.
-    pub amplitude_sum: i64,
-    /// Mean of the squared residuals, counts² with 16 fraction bits.
-    pub residual: i64,
-    /// Periods in a row for which all fitted.
-    pub fitting: u32,
-    /// Periods for which something did not.
-    pub unfitting: u32,
+    amplitude: AdcCounts,
+    /// S_0.
+    weight: I20F12,
+    /// S_1 and S_2, 12 fraction bits.
+    ages: [i64; 2],
+    /// Sum of the weights of E.
+    amplitude_weight: I20F12,
+    /// Sum of the squared ages about their mean, looks².
+    spread: u32,
+    /// Mean of the errors' magnitudes, summed over the phases.
+    residual: I17F15,
+    /// What the last look has told.
+    told: Difference,
+    /// k_ω, 30 fraction bits.
+    speed_gain: i32,
+    /// S_1/S_0, looks with 12 fraction bits.
+    mean_age: i32,
+    /// Looks in a row for which all fitted.
+    fitting: u32,
+    /// Looks for which something did not.
+    unfitting: u32,
 }
 
 impl State {
@@ -120,100 +141,190 @@ impl State {
         Self {
             // Twice the threshold: a resting rotor is told from one that has not been seen.
             level: config.standing.saturating_mul_int(2),
-            samples: 0,
+            turn: Turn::Look,
+            readings: [I17F15::ZERO; 3],
+            looks: 0,
             theta: Angle::ZERO,
             omega: Speed::ZERO,
             amplitude: AdcCounts::ZERO,
-            sums: [0; 3],
-            amplitude_sum: 0,
-            residual: 0,
+            weight: I20F12::ZERO,
+            ages: [0; 2],
+            amplitude_weight: I20F12::ZERO,
+            spread: 0,
+            residual: I17F15::ZERO,
+            told: Difference::default(),
+            speed_gain: 0,
+            mean_age: 0,
             fitting: 0,
             unfitting: 0,
         }
+    }
+
+    /// Begins anew, but for the mean that tells a resting rotor.
+    pub fn restart(&mut self) {
+        self.turn = Turn::Look;
+        self.looks = 0;
+        self.omega = Speed::ZERO;
+        self.residual = I17F15::ZERO;
+        self.fitting = 0;
+        self.unfitting = 0;
     }
 
     /// Hands out every word.
     pub fn trace(&self, out: &mut impl FnMut(u32)) {
         let Self {
             level,
-            samples,
+            turn,
+            readings,
+            looks,
             theta,
             omega,
             amplitude,
-            sums: [s_0, s_1, s_2],
-            amplitude_sum,
+            weight,
+            ages: [s_1, s_2],
+            amplitude_weight,
+            spread,
             residual,
+            told,
+            speed_gain,
+            mean_age,
             fitting,
             unfitting,
         } = self;
         out(level.to_bits() as u32);
-        out(*samples);
+        out(*turn as u32);
+        for sum in readings {
+            out(sum.to_bits() as u32);
+        }
+        out(*looks);
         out(theta.to_bits() as u32);
         out(omega.to_bits() as u32);
         out(amplitude.to_bits() as u32);
-        for wide in [s_0, s_1, s_2, amplitude_sum, residual] {
+        out(weight.to_bits() as u32);
+        for wide in [s_1, s_2] {
             out(*wide as u32);
             out((wide >> 32) as u32);
         }
+        out(amplitude_weight.to_bits() as u32);
+        out(*spread);
+        out(residual.to_bits() as u32);
+        out(told.by_angle.to_bits() as u32);
+        out(told.angle_weight.to_bits() as u32);
+        out(told.by_amplitude.to_bits() as u32);
+        out(told.amplitude_weight.to_bits() as u32);
+        out(told.misfit.to_bits() as u32);
+        out(*speed_gain as u32);
+        out(*mean_age as u32);
         out(*fitting);
         out(*unfitting);
-    }
-
-    /// Begins anew, but for the mean that tells a resting rotor.
-    fn forget(&mut self, config: &Config) {
-        *self = Self {
-            level: self.level,
-            ..Self::new(config)
-        };
     }
 }
 
 /// Takes one sample of the terminals a, b, c with the bridge off and says what is known by now.
+#[inline(never)]
 pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) -> Rotor {
-    let readings = terminals.map(|v| v.to_bits().clamp(0, 4095 << 16) >> (16 - FRACTION));
-    let [a, b, c] = readings;
-    let highest = i64::from(a.max(b).max(c)) << (16 - FRACTION);
-    let level = i64::from(state.level.to_bits());
-    let step = ((highest - level) * i64::from(config.level_share)) >> 16;
-    state.level = I16F16::from_bits((level + step) as i32);
-    if state.level < config.standing {
-        state.forget(config);
-        return Rotor::Standing;
-    }
-    match state.samples {
-        0 => begin(config, state, readings),
-        1 => second(config, state, readings),
-        _ => follow(config, state, readings),
-    }
-    if state.samples == 0 || state.fitting < config.sure_periods {
-        return Rotor::Unknown;
-    }
-    // The back-EMF leads the flux by a quarter of a turn, in the direction of rotation.
-    let quarter = Angle::from_bits(if state.omega.is_negative() {
-        -(1 << 30)
+    state.theta = state.theta.wrapping_add(state.omega);
+    // 12 bits and their fraction, whatever is above.
+    let held = |v: AdcCounts| I17F15::from_bits(v.to_bits() >> 1 & ((1 << 27) - 1));
+    let [a, b, c] = terminals;
+    let readings @ [a, b, c] = [held(a), held(b), held(c)];
+    if state.turn == Turn::Look {
+        look(config, state, readings);
     } else {
-        1 << 30
-    });
-    Rotor::Turning {
-        theta: state.theta.wrapping_sub(quarter),
-        omega: state.omega,
+        let [before_a, before_b, before_c] = state.readings;
+        state.readings = [before_a + a, before_b + b, before_c + c];
+        learn::learn(config, state);
+    }
+    if state.level < config.standing {
+        Rotor::Standing
+    } else if state.looks == 0 || state.fitting < config.sure_looks {
+        Rotor::Unknown
+    } else {
+        // The back-EMF leads the flux by a quarter of a turn, in the direction of rotation.
+        let quarter = if state.omega.is_negative() {
+            -1 << 30
+        } else {
+            1 << 30
+        };
+        Rotor::Turning {
+            theta: state.theta.wrapping_sub(Angle::from_bits(quarter)),
+            omega: state.omega,
+        }
+    }
+}
+
+/// A look at the terminals.
+#[inline(always)]
+fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
+    let [a, b, c] = readings;
+    let highest = I16F16::from_bits(a.max(b).max(c).to_bits() << 1);
+    state.level += (highest - state.level).top(config.level_share);
+    if state.level < config.standing || state.unfitting > config.lost_looks {
+        state.restart();
+    } else if state.seeks(config) {
+        seek(config, state, readings);
+    } else {
+        follow(config, state, readings);
+    }
+}
+
+impl State {
+    /// Whether looks are at the mean of four readings.
+    fn is_slow(&self) -> bool {
+        self.omega.saturating_abs() < SLOW
+    }
+
+    /// Whether there is no vector yet, or a large one and no speed: of a large back-EMF the
+    /// difference of two vectors is the speed, since the prediction of a rotor at rest may be too far
+    /// off. A small one is of a slow rotor, and too noisy for that.
+    fn seeks(&self, config: &Config) -> bool {
+        self.looks == 0 || self.looks == 1 && self.amplitude >> 1 > config.diode
+    }
+}
+
+/// One look of a beginning: two of them, a period apart, where the back-EMF is large.
+#[cold]
+#[inline(never)]
+fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
+    let Some((theta, amplitude)) = vector(config, readings) else {
+        state.restart();
+        return;
+    };
+    let before = state.theta;
+    state.theta = theta;
+    state.amplitude = amplitude;
+    state.looks += 1;
+    if state.looks == 1 {
+        begin(config, state);
+    } else {
+        state.omega = theta.wrapping_sub(before);
+        // Two looks of weight 1.5 each, a quarter of the usual time apart.
+        state.weight = const { I20F12::lit("3") };
+        state.ages = [3 << (SUM_FRACTION - 3), 3 << (SUM_FRACTION - 5)];
+        state.amplitude_weight = state.weight;
+    }
+    if !state.seeks(config) {
+        // There is nothing to weigh; this reading is the first of the next mean.
+        state.told = Difference::default();
+        state.readings = readings;
+        state.turn = Turn::Correct;
     }
 }
 
 /// Angle and amplitude of the vector that three readings make, or `None` where they do not: two of
 /// them must be clearly above the clamp, the lower one at three tenths of the higher or more.
-fn vector(config: &Config, readings: [i32; 3]) -> Option<(Angle, AdcCounts)> {
-    let [a, b, c] = readings;
+fn vector(config: &Config, [a, b, c]: [I17F15; 3]) -> Option<(Angle, AdcCounts)> {
     let highest = a.max(b).max(c);
     let lowest = a.min(b).min(c);
-    let sum = a + b + c;
-    let middle = sum - highest - lowest;
-    if highest < BEGIN || i64::from(middle) * 10 < i64::from(highest) * 3 {
+    let middle = a + b + c - highest - lowest;
+    // 39/128 of it.
+    let three_tenths = (highest >> 2) + (highest >> 4) - (highest >> 7);
+    if highest < BEGIN || middle < three_tenths {
         return None;
     }
     // Without the diode the phases' sum is zero; with it the lowest stands at its drop, and the
     // others' sum is above that.
-    let below = (highest + middle).min(config.diode.to_bits() >> (16 - FRACTION));
+    let below = (highest + middle).min(I17F15::from_bits(config.diode.to_bits() >> 1));
     // Of equal lowest readings one is enough.
     let (a, b, c) = if a == lowest {
         (-below, b, c)
@@ -222,209 +333,67 @@ fn vector(config: &Config, readings: [i32; 3]) -> Option<(Angle, AdcCounts)> {
     } else {
         (a, b, -below)
     };
-    let alpha = (2 * a - b - c) / 3;
-    // (b − c)/√3 with 1/√3 of 31 fraction bits.
-    let beta = ((i64::from(b - c) * 1_239_850_263) >> 31) as i32;
-    // The scale does not matter to an angle, and the length's is that of the components.
-    let (alpha, beta) = (I4F28::from_bits(alpha), I4F28::from_bits(beta));
-    let amplitude = I16F16::from_bits(magnitude(alpha, beta).to_bits() << (16 - FRACTION));
-    Some((atan2_turns(beta, alpha), amplitude))
+    // 3/2 of the components, and of beta half of that: to the angle only their ratio matters.
+    let alpha: I17F15 = a - ((b + c) >> 1);
+    let beta: I17F15 = (b - c).top(HALF_ROOT_3);
+    let theta = atan2_turns(
+        I4F28::from_bits(beta.to_bits() << 1),
+        I4F28::from_bits(alpha.to_bits()),
+    );
+    let along = sin_cos(theta);
+    let length = alpha.top(along.cos) + (beta + beta).top(along.sin);
+    let third = length.top(THIRD);
+    // Of 14 fraction bits; two thirds of 16.
+    Some((theta, AdcCounts::from_bits(third.to_bits() << 3)))
 }
 
-/// The first sample: the angle, and a speed about zero as uncertain as this amplitude lets it be.
-fn begin(config: &Config, state: &mut State, readings: [i32; 3]) {
-    let Some((theta, amplitude)) = vector(config, readings) else {
-        state.samples = 0;
-        return;
-    };
-    state.samples = 1;
-    state.theta = theta;
+/// A speed about zero, as uncertain as this amplitude lets it be.
+fn begin(config: &Config, state: &mut State) {
     state.omega = Speed::ZERO;
-    state.amplitude = amplitude;
-    // (σ/E)² over the speed's variance, which with |ω| of E is (σ·(E/|ω|)/E²)².
-    let square = i64::from(amplitude.to_bits() >> 8).pow(2);
-    let ratio = (i64::from(config.prior) << (16 + SUM_FRACTION)) / square;
-    let prior = ratio.min(1 << 26).pow(2) >> SUM_FRACTION;
-    state.sums = [0, 0, prior];
-    state.amplitude_sum = 0;
+    // (σ/E)² over the speed's variance, which with |ω| of E is (σ·(E/|ω|)/E²)²: the root with 8
+    // fraction bits. E is at least 4 counts, of which 4 fraction bits are kept.
+    let divisor = (state.amplitude.to_bits() >> 12) as u32;
+    let root = (((config.prior << 12) / divisor) << 4) / divisor;
+    let root = u64::from(root.min(1 << 22));
+    state.weight = I20F12::ZERO;
+    state.ages = [0, ((root * root) >> 4) as i64];
+    state.amplitude_weight = I20F12::ZERO;
 }
 
-/// The second sample. Of a large back-EMF the difference of two vectors is the speed: the prediction
-/// of a rotor at rest may be too far off. A small one is of a slow rotor, and too noisy for that.
-fn second(config: &Config, state: &mut State, readings: [i32; 3]) {
-    if state.amplitude <= config.diode.saturating_mul_int(2) {
-        follow(config, state, readings);
-        return;
-    }
-    let Some((theta, amplitude)) = vector(config, readings) else {
-        state.samples = 0;
-        return;
-    };
-    state.samples = 2;
-    state.omega = theta.wrapping_sub(state.theta);
-    state.theta = theta;
-    state.amplitude = amplitude;
-    // Two samples of weight 1.5 each, a period apart.
-    let weight = 3 << (SUM_FRACTION - 1);
-    state.sums = [2 * weight, weight, weight];
-    state.amplitude_sum = 2 * weight;
-}
-
-/// Every later sample.
-fn follow(config: &Config, state: &mut State, readings: [i32; 3]) {
-    state.samples = state.samples.saturating_add(1);
-    state.theta = state.theta.wrapping_add(state.omega);
-    age(config, state);
-    let Difference {
-        by_angle,
-        angle_weight,
-        by_amplitude,
-        amplitude_weight,
-        squares,
-    } = compare(config, state, readings);
-    state.residual += (squares - state.residual) >> RESIDUAL_SHIFT;
-    state.sums[0] += angle_weight;
-    state.amplitude_sum += amplitude_weight;
-
-    let [s_0, s_1, s_2] = state.sums;
-    // Below a sixteenth of one good sample's weight nothing is known of the angle.
-    if s_0 >= 1 << (SUM_FRACTION - 4) {
-        let mean_age = (s_1 << SUM_FRACTION) / s_0;
-        let spread = (s_2 - ((mean_age * s_1) >> SUM_FRACTION)).max(0);
-        // 32 and 24 fraction bits.
-        let k_omega = (mean_age << 32).checked_div(spread).unwrap_or(0);
-        let k_omega = k_omega.min(1 << 33);
-        let k_theta = (1 << (24 + SUM_FRACTION)) / s_0 + ((mean_age * k_omega) >> 20);
-        let radians = (by_angle << 27) / i64::from(state.amplitude.to_bits());
-        // 1/2π with 32 fraction bits; the bound is beyond any angle that a vector has.
-        let turns = (radians.clamp(-(1 << 26), 1 << 26) * 683_565_276) >> 32;
-        let step = |gain: i64, shift: u32| ((gain.min(1 << 33) * turns) >> shift) as i32;
-        state.theta = state
-            .theta
-            .wrapping_add(Angle::from_bits(step(k_theta, 16)));
-        state.omega = state
-            .omega
-            .saturating_add(Speed::from_bits(step(k_omega, 24)));
-        judge(config, state, spread);
-    }
-    if state.amplitude_sum > 0 {
-        let step = (by_amplitude << 15) / state.amplitude_sum;
-        let amplitude = i64::from(state.amplitude.to_bits()) + step;
-        // 1 to 8191 counts.
-        state.amplitude = I16F16::from_bits(amplitude.clamp(1 << 16, 8191 << 16) as i32);
-    }
-    if state.unfitting > config.lost_periods {
-        state.forget(config);
-    }
-}
-
-/// Makes what the sums hold a period older, and forgets a share of it.
-fn age(config: &Config, state: &mut State) {
-    let [s_0, s_1, s_2] = state.sums;
-    let a_turn = i64::from(state.omega.to_bits().unsigned_abs() >> 16);
-    let share = a_turn.max(i64::from(config.forget_min)).min(FORGET_MAX);
-    let keep = |sum: i64| sum - ((sum * share) >> 16);
-    state.sums = [keep(s_0), keep(s_1 + s_0), keep(s_2 + 2 * s_1 + s_0)];
-    state.amplitude_sum = keep(state.amplitude_sum);
-}
-
-/// What the readings say against the prediction: counts with 13 fraction bits, weights with
-/// [`SUM_FRACTION`], squares with 16.
-struct Difference {
-    by_angle: i64,
-    angle_weight: i64,
-    by_amplitude: i64,
-    amplitude_weight: i64,
-    squares: i64,
-}
-
-fn compare(config: &Config, state: &State, readings: [i32; 3]) -> Difference {
-    let SinCos { cos, sin } = sin_cos(state.theta);
-    // What each phase sees of the vector, and how that changes with the angle.
-    let seen = phases(AlphaBeta {
-        alpha: cos,
-        beta: sin,
-    });
-    let turned = phases(AlphaBeta {
-        alpha: -sin,
-        beta: cos,
-    });
-    let emf = seen.map(|share| state.amplitude.top(share).to_bits());
-    let lowest = emf[0].min(emf[1]).min(emf[2]);
-    let lift = -lowest - (config.diode.to_bits() >> (16 - FRACTION));
-    // The phase at whose diode drop the readings stand, if it conducts.
-    let base = if lift <= 0 {
-        None
+/// Every later look.
+#[inline(always)]
+fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
+    let (theta, readings) = if state.is_slow() {
+        let [before_a, before_b, before_c] = state.readings;
+        let [a, b, c] = readings;
+        let mean = [
+            (before_a + a) >> LOOK_SHIFT,
+            (before_b + b) >> LOOK_SHIFT,
+            (before_c + c) >> LOOK_SHIFT,
+        ];
+        // Between the second and the third of them.
+        let back = state.omega.wrapping_add(state.omega >> 1);
+        (state.theta.wrapping_sub(back), mean)
     } else {
-        emf.iter().position(|&e| e == lowest)
+        (state.theta, readings)
     };
-    let (base_seen, base_turned) = base.map_or((0, 0), |phase| {
-        (seen[phase].to_bits() >> 1, turned[phase].to_bits() >> 1)
-    });
-    let half = state.amplitude.to_bits() >> (17 - FRACTION);
-    let mut sum = Difference {
-        by_angle: 0,
-        angle_weight: 0,
-        by_amplitude: 0,
-        amplitude_weight: 0,
-        squares: 0,
-    };
-    for phase in 0..3 {
-        let predicted = emf[phase] + lift.max(0);
-        let reading = readings[phase];
-        if predicted >= CLAMP && reading >= CLAMP {
-            continue;
-        }
-        let error = i64::from(reading - predicted.clamp(0, CLAMP));
-        sum.squares += (error * error) >> (2 * FRACTION - 16);
-        // A little above zero where nothing is predicted is noise; half the amplitude is not.
-        if predicted <= 0 && reading < half {
-            continue;
-        }
-        // 30 fraction bits, at most √3.
-        let by_angle = i64::from((turned[phase].to_bits() >> 1) - base_turned);
-        let by_amplitude = i64::from((seen[phase].to_bits() >> 1) - base_seen);
-        sum.by_angle += (by_angle * error) >> 32;
-        sum.by_amplitude += (by_amplitude * error) >> 32;
-        sum.angle_weight += (by_angle * by_angle) >> (60 - SUM_FRACTION);
-        sum.amplitude_weight += (by_amplitude * by_amplitude) >> (60 - SUM_FRACTION);
-    }
-    sum
+    state.told = compare::compare(config.diode, theta, state.amplitude, readings);
+    state.looks = state.looks.saturating_add(1);
+    state.readings = [I17F15::ZERO; 3];
+    state.turn = Turn::Weigh;
 }
 
-/// Whether the speed is known to 1 % by what has been seen, over nearly half a turn, and amplitude,
-/// speed and residual fit each other. `spread` is the sum of the squared ages about their mean.
-fn judge(config: &Config, state: &mut State, spread: i64) {
-    let amplitude = i64::from(state.amplitude.to_bits());
-    let omega = i64::from(state.omega.to_bits()).abs();
-    // The speed's standard deviation is σ/(E·√spread): (E·ω)² > (100·σ/2π)²/spread, 32 fraction bits.
-    let slope = (amplitude * omega) >> 32;
-    let wanted = (100 * NOISE_COUNTS).pow(2) * 10 / 395;
-    let spread = spread.max(1);
-    let precise = slope * slope > (wanted << (32 + SUM_FRACTION)) / spread;
-    // The ages' standard deviation times ω is that of an arc of 0.43 turns: (0.123 turns)² of 40
-    // fraction bits.
-    let omega = omega >> 12;
-    let far = omega * omega > (16_700_000_000 * state.sums[0]) / spread;
-    let known = precise && far;
-    // A flux between half and twice the stated one.
-    let expected = i64::from(config.emf.saturating_apply(state.omega).to_bits()).abs();
-    let fits = 2 * amplitude > expected && amplitude < 2 * expected;
-    // Three readings' noise, twice, and an eighth of the amplitude for what the model leaves out:
-    // the diode's drop depends on its current.
-    let noise = (6 * NOISE_COUNTS * NOISE_COUNTS) << 16;
-    let quiet = state.residual < noise + ((amplitude >> 3).pow(2) >> 16);
-    if known && fits && quiet {
-        state.fitting = state.fitting.saturating_add(1);
-        state.unfitting = 0;
-    } else {
-        state.fitting = 0;
-        let settled = state.samples > config.lost_periods;
-        if settled && (!quiet || (known && !fits)) {
-            state.unfitting += 1;
-        }
-    }
-}
+/// Speed below which the mean of four readings is as good as one: 3° a period.
+const SLOW: Speed = Speed::lit("0.0078125");
+
+/// Fraction bits of the sums.
+const SUM_FRACTION: u32 = 12;
+
+/// √3/4, which with a sum of its product makes √3/2.
+const HALF_ROOT_3: I0F32 = I0F32::lit("0.4330127018922");
+
+/// A third.
+const THIRD: I0F32 = I0F32::lit("0.3333333333");
 
 #[cfg(test)]
 mod tests;

@@ -5,55 +5,97 @@
 //! should be high, and the other way round. The duty that this takes is the dead time over the
 //! period, with the current's sign.
 
-use fixed::types::I1F31;
-use fixed::types::I5F27;
-use fixed::types::extra::{U27, U31};
+use fixed::FixedI32;
+use fixed::types::extra::{U25, U26, U28};
+use fixed::types::{I2F30, I6F26, I8F24};
 
-use super::transform::{AlphaBeta, phases};
-use crate::math::Gain;
+use super::modulator::Share;
+use super::transform::{Dq, turn};
+use crate::math::{Gain, SinCos, TopSum};
+use crate::units::Current;
 
 /// What the compensation must know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Phase current to duty: the whole compensation where the current's sign is certain.
-    pub slope: Gain<U27, U31>,
+    /// Phase current over the least whose sign is certain.
+    pub certainty: Gain<U28, U26>,
     /// The whole compensation: dead time over period.
-    pub duty: I1F31,
+    pub duty: I2F30,
 }
 
-/// What is added to each phase's duty.
-///
-/// `current` is the vector of the current's reference in the stator's frame: it has no noise, and
-/// what it lags or leads by is below the width around zero in which the compensation is in
-/// proportion, because there a ripple crosses zero within the period.
-#[inline(always)]
-pub fn compensation(config: &Config, current: AlphaBeta<I5F27>) -> [I1F31; 3] {
-    phases(current).map(|current| {
-        let share = config.slope.saturating_apply(current);
-        share.min(config.duty).max(-config.duty)
-    })
+/// A current over the least whose sign is certain, in the rotor's frame and as seen from where that
+/// frame will be in the middle of the voltage.
+pub type Certainty = Dq<FixedI32<U25>>;
+
+/// The certainty of the current's reference: it has no noise, and what it lags or leads by is below
+/// the width around zero in which the compensation is in proportion, because there a ripple crosses
+/// zero within the period. Taken every few periods, with the frame's turn until the voltage acts.
+pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certainty {
+    // Halved while it is too long for its type, 31: beyond that the width is wider in proportion.
+    let mut i = wanted;
+    loop {
+        let d: I6F26 = config.certainty.saturating_apply(i.d);
+        let q: I6F26 = config.certainty.saturating_apply(i.q);
+        let long = |x: I6F26| x.saturating_abs() >= LONGEST;
+        if !long(d) && !long(q) {
+            return turn(Dq { d, q }, ahead);
+        }
+        i.d >>= 1;
+        i.q >>= 1;
+    }
 }
+
+const LONGEST: I6F26 = I6F26::lit("31");
+
+impl Config {
+    /// No dead time.
+    pub const NONE: Self = Self {
+        certainty: Gain::ZERO,
+        duty: I2F30::ZERO,
+    };
+
+    /// A phase's share of the supply and what the dead time takes away of it, for the certainty of its
+    /// current's sign.
+    #[inline(always)]
+    pub fn compensated(&self, share: Share, certainty: I8F24) -> Share {
+        let sign = certainty.to_bits().clamp(-CERTAIN, CERTAIN - 1);
+        share.plus_top(I8F24::from_bits(sign), self.duty)
+    }
+}
+
+/// One with 24 fraction bits.
+const CERTAIN: i32 = 1 << 24;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::transform::{AlphaBeta, inverse_park, phases};
+    use crate::math::sin_cos;
+    use crate::units::Angle;
     use core::f64::consts::TAU;
 
     /// 0.5 µs of 66.7 µs, in full from 0.3 of the unit of current on.
     fn config() -> Config {
         Config {
-            slope: Gain::new(0.0075 / 0.3).expect("in range"),
-            duty: I1F31::from_num(0.0075),
+            certainty: Gain::new(1.0 / 0.3).expect("in range"),
+            duty: I2F30::from_num(0.0075),
         }
     }
 
+    /// What is added to each phase.
+    fn made(config: &Config, certainty: AlphaBeta<I8F24>) -> [f64; 3] {
+        phases(certainty).map(|x| config.compensated(Share::ZERO, x).to_num())
+    }
+
     fn at(length: f64, degrees: i32) -> [f64; 3] {
-        let (sin, cos) = (f64::from(degrees) / 360.0 * TAU).sin_cos();
-        let current = AlphaBeta {
-            alpha: I5F27::from_num(length * cos),
-            beta: I5F27::from_num(length * sin),
+        let angle =
+            |share: f64| sin_cos(Angle::wrapping_from_num(f64::from(degrees) * share / 360.0));
+        let current = Dq {
+            d: Current::from_num(length),
+            q: Current::ZERO,
         };
-        compensation(&config(), current).map(I1F31::to_num)
+        let seen = certainty(&config(), current, angle(0.25));
+        made(&config(), inverse_park(seen, angle(0.75)))
     }
 
     #[test]
@@ -74,11 +116,16 @@ mod tests {
     #[test]
     fn no_current_needs_none_and_the_longest_vector_does_not_wrap() {
         assert_eq!(at(0.0, 0), [0.0; 3]);
-        let most = AlphaBeta {
-            alpha: I5F27::from_num(7.99),
-            beta: I5F27::from_num(-7.99),
+        let config = Config {
+            certainty: Gain::new(1000.0).expect("in range"),
+            ..config()
         };
-        let [a, b, c] = compensation(&config(), most).map(|x| x.to_num::<f64>());
+        let most = Dq {
+            d: Current::from_num(7.99),
+            q: Current::from_num(-7.99),
+        };
+        let seen = certainty(&config, most, sin_cos(Angle::ZERO));
+        let [a, b, c] = made(&config, inverse_park(seen, sin_cos(Angle::ZERO)));
         let whole = 0.0075;
         assert!((a - whole).abs() < 1e-6 && (b + whole).abs() < 1e-6 && (c - whole).abs() < 1e-6);
     }

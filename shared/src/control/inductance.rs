@@ -5,10 +5,10 @@
 //! φ̂ = φ + (L − L̂)·i_d, so each of the wave's edges shows the inductance's error: Δφ̂/Δi_d.
 
 use fixed::FixedI32;
-use fixed::types::I2F30;
 use fixed::types::extra::{U28, U30, Unsigned};
+use fixed::types::{I0F32, I2F30};
 
-use crate::math::Gain;
+use crate::math::{Gain, Multiplier};
 use crate::units::{Current, Flux};
 
 /// L over the inductance that the parameters state, within 0.5 to 1.7.
@@ -29,6 +29,12 @@ impl Factor {
     /// The factor's value.
     pub fn get(self) -> I2F30 {
         self.0
+    }
+
+    /// A factor times this, held at the ends of its type.
+    pub fn multiplied<A, B>(self, factor: Multiplier<A, B>) -> Multiplier<A, B> {
+        let bits = self.of(I0F32::from_bits(factor.to_bits())).to_bits();
+        Multiplier::from_bits(bits)
     }
 
     /// The product with `x`, held at the ends of its type.

@@ -1,7 +1,8 @@
 //! The control law, one block of the papers a file.
 //!
 //! Each block is a pair of an immutable configuration, computed when the parameters change, and a
-//! state. Nothing here knows of parameters, of the throttle or of time: a call is a period.
+//! state. Nothing here knows of parameters, of the throttle or of time: a call is a period, or one
+//! of the longer ones of the outer loops.
 
 pub mod catch;
 pub mod dead_time;
@@ -19,6 +20,9 @@ pub mod start;
 pub mod torque;
 pub mod transform;
 pub mod voltage;
+
+/// Control periods in one of the outer loops: speed, torque and voltage.
+pub const PERIODS: u32 = 8;
 
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,14 @@
 //! From a voltage vector to three duties: space-vector or sine modulation with a minimum low-side
 //! on-time, and the compensation of the dead time.
 
-use fixed::types::{I0F32, I1F31, I4F28, I5F27};
+use fixed::FixedI32;
+use fixed::types::extra::{U20, U22, U24};
+use fixed::types::{I0F32, I1F31, I4F28, I6F26, I8F24, I16F16};
 
-use super::transform::{AlphaBeta, Dq, phases};
-use crate::math::{Held, TopProduct, other_leg};
-use crate::units::{Duty, Voltage};
+use super::dead_time;
+use super::transform::{AlphaBeta, Dq, Order, phases_in};
+use crate::math::{Held, Multiplier, Real, TopProduct, TopSum, other_leg};
+use crate::units::{Duty, Voltage, WideVoltage, wide};
 
 /// How the phases' common voltage is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,16 +22,37 @@ pub enum Modulation {
 /// What the modulator must know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// How the common voltage is chosen.
-    pub modulation: Modulation,
+    /// All ones where the common voltage follows the phases, else zero.
+    centred: I1F31,
     /// Greatest duty: what is left is the time for which the low sides must be on, so that their
     /// shunts can be read.
     pub duty_max: I1F31,
     /// Greatest length of the voltage vector as a share of the supply.
     pub vector_max: I1F31,
+    /// The length up to which every phase can be read, likewise; negative where none is.
+    pub readable: I1F31,
 }
 
-/// The supply of one period and its reciprocal.
+impl Config {
+    /// The modulator of this kind with a greatest duty. Phases can be read up to the duty `window`,
+    /// all of them in a vector that is not too long for it.
+    pub fn new(modulation: Modulation, duty_max: f32, window: f32) -> Self {
+        let root_3 = libm::sqrtf(3.0);
+        let (longest, readable, centred) = match modulation {
+            // The highest phase has half the greatest duty, and √3/2 of the vector at most.
+            Modulation::SpaceVector => (1.0 / root_3, (2.0 * window - duty_max) / root_3, -1),
+            Modulation::Sine => (0.5, window - 0.5 * duty_max, 0),
+        };
+        Self {
+            centred: I1F31::from_bits(centred),
+            duty_max: I1F31::from_f32(duty_max),
+            vector_max: I1F31::from_f32(longest * duty_max),
+            readable: I1F31::from_f32(readable),
+        }
+    }
+}
+
+/// The supply and its reciprocal, taken every few periods.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supply {
     /// Voltage.
@@ -36,13 +60,57 @@ pub struct Supply {
     /// 1/V with 28 fraction bits, held at 8.
     pub reciprocal: I4F28,
     /// Longest voltage vector that can be had.
-    pub vector_max: Voltage,
+    pub longest: Longest,
+    /// Square of the length up to which every phase can be read.
+    pub readable: I16F16,
+}
+
+/// The longest voltage vector that can be had, and its part along q near some part along d.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Longest {
+    length: Voltage,
+    square: I16F16,
+    /// Square of that part along d.
+    d_square: I8F24,
+    /// What is left along q.
+    q: WideVoltage,
+    /// What of the square's change q loses, 1/(2·q).
+    slope: Multiplier<U24, U20>,
+}
+
+impl Longest {
+    /// Of this length, where the part along d will be near this one.
+    pub fn new(length: Voltage, d: Voltage) -> Self {
+        let d = d.min(length).max(-length);
+        let q = other_leg(length, d);
+        // 2^55 over q's bits; the floor is a sixteenth, below which little is left to lose.
+        let q_upper = (q.to_bits() >> 16).max(257) as u32;
+        Self {
+            length,
+            square: square(wide(length)),
+            d_square: d.top(d),
+            q: wide(q),
+            slope: Multiplier::from_bits((((1 << 31) / q_upper) << 8) as i32),
+        }
+    }
+
+    /// Its length.
+    pub fn length(self) -> Voltage {
+        self.length
+    }
+
+    /// The most along q beside this part along d.
+    #[inline(always)]
+    fn beside(&self, d: Voltage) -> WideVoltage {
+        // Both squares are below 12, and the slope is below 8.
+        let less = self.slope.of(d.top(d) - self.d_square).to_bits() << 4;
+        (self.q - WideVoltage::from_bits(less)).max(WideVoltage::ZERO)
+    }
 }
 
 impl Supply {
-    /// The one division of a control period.
-    #[inline(always)]
-    pub fn new(config: &Config, bus: Voltage) -> Self {
+    /// The supply of this voltage, while the part along d of what is commanded is near this one.
+    pub fn new(config: &Config, bus: Voltage, d: Voltage) -> Self {
         // 2^56/bus of the voltage's upper bits, right to 2^-11 at the worst, and one Newton step. The
         // floor of 1/8 bounds the reciprocal.
         let bits = bus.to_bits().max(1 << 25);
@@ -50,85 +118,119 @@ impl Supply {
         let rough = I4F28::from_bits(rough as i32);
         let product = i64::from(bits) * i64::from(rough.to_bits());
         let error = I0F32::from_bits((((1 << 56) - product) >> 24) as i32);
+        let length = Voltage::from_bits(config.vector_max.top(bus).to_bits() << 1);
         Self {
             bus,
             reciprocal: rough.plus(rough.top(error)),
-            vector_max: Voltage::from_bits(config.vector_max.top(bus).to_bits() << 1),
+            longest: Longest::new(length, d),
+            readable: if config.readable.is_negative() {
+                -I16F16::DELTA
+            } else {
+                let length = config.readable.top(wide(bus)).to_bits() << 1;
+                square(WideVoltage::from_bits(length))
+            },
         }
     }
 }
+
+/// The square of a limited vector may be longer by this shift's share: 0.05 % of its length.
+const TOO_LONG: u32 = 10;
 
 /// Shortens a voltage vector to what the supply can give, keeping the part along d, which cancels
 /// what the current and the speed induce.
 ///
 /// Returns the vector and what was cut off, if it was shortened.
 #[inline(always)]
-pub fn limit(u: Dq<Voltage>, vector_max: Voltage) -> (Dq<Voltage>, Option<Dq<Voltage>>) {
-    let square = |x: Voltage| x.top(x);
-    if square(u.d).plus(square(u.q)) <= square(vector_max) {
-        (u, None)
-    } else {
-        let short = shorten(u, vector_max);
-        let cut = Dq {
-            d: u.d.minus(short.d),
-            q: u.q.minus(short.q),
-        };
-        (short, Some(cut))
+pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<WideVoltage>>) {
+    if square_of(u) <= longest.square {
+        return (short(u), None);
     }
+    let most = wide(longest.length);
+    let d = u.d.min(most).max(-most);
+    let short_d = Voltage::from_bits(d.to_bits() << 4);
+    let mut q_max = longest.beside(short_d);
+    // The slope is too generous far from where it was taken, and never too strict.
+    if square_of(Dq { d, q: q_max }) > longest.square + (longest.square >> TOO_LONG) {
+        q_max = wide(other_leg(longest.length, short_d));
+    }
+    let q = u.q.min(q_max).max(-q_max);
+    let cut = Dq {
+        d: u.d.wrapping_sub(d),
+        q: u.q.wrapping_sub(q),
+    };
+    (short(Dq { d, q }), Some(cut))
 }
 
-#[cold]
-fn shorten(u: Dq<Voltage>, vector_max: Voltage) -> Dq<Voltage> {
-    let d = u.d.min(vector_max).max(-vector_max);
-    let q_max = other_leg(vector_max, d);
+/// The square of a vector's length. No component is above 128: the sum is below 2^15.
+#[inline(always)]
+pub fn square_of(u: Dq<WideVoltage>) -> I16F16 {
+    square(u.d).plus_top(u.q, u.q)
+}
+
+#[inline(always)]
+fn square(u: WideVoltage) -> I16F16 {
+    u.top(u)
+}
+
+/// A vector that is known to be within ±8.
+#[inline(always)]
+pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
     Dq {
-        d,
-        q: u.q.min(q_max).max(-q_max),
+        d: Voltage::from_bits(u.d.to_bits() << 4),
+        q: Voltage::from_bits(u.q.to_bits() << 4),
     }
 }
 
 /// The three duties of a voltage vector that [`limit`] has passed.
 ///
-/// `compensation` is added to each phase's duty: what the dead time takes away.
+/// The dead time takes away from each phase's duty what `dead_time` makes of the certainty of its
+/// current's sign, which is added.
 #[inline(always)]
 pub fn duties(
     config: &Config,
     supply: &Supply,
-    v: AlphaBeta<I5F27>,
-    compensation: [I1F31; 3],
+    (v, order): (AlphaBeta<I6F26>, Order),
+    (dead_time, certainty): (&dead_time::Config, AlphaBeta<I8F24>),
 ) -> [Duty; 3] {
-    // Share of the supply, 23 fraction bits.
-    let [a, b, c] = phases(AlphaBeta {
+    let share: AlphaBeta<Share> = AlphaBeta {
         alpha: v.alpha.top(supply.reciprocal),
         beta: v.beta.top(supply.reciprocal),
-    });
-    let [ca, cb, cc] = compensation;
-    let shares = [(a, ca), (b, cb), (c, cc)].map(|(v, c)| v.to_bits() + (c.to_bits() >> 8));
-    let highest = shares[0].max(shares[1]).max(shares[2]);
-    let lowest = shares[0].min(shares[1]).min(shares[2]);
-    let duty_max = config.duty_max.to_bits() >> 8;
-    let common = match config.modulation {
-        Modulation::SpaceVector => (duty_max - highest - lowest) >> 1,
-        Modulation::Sine => duty_max >> 1,
     };
-    shares.map(|share| Duty::from_bits(((share + common).max(0).min(duty_max) as u32) << 8))
+    let [a, b, c] = phases_in(order, share);
+    // Without the common voltage the phases' sum is zero: what lies between the highest and the
+    // lowest is minus the phase in the middle.
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    let middle = c.max(low).min(high);
+    let half: I1F31 = whole(middle) >> 1;
+    let common: I1F31 = (config.duty_max >> 1) + (half & config.centred);
+    let [ca, cb, cc] = phases_in(order, certainty);
+    // Not by `map`, which the compiler makes a loop of where size counts.
+    let duty = |share, certainty| {
+        let share = dead_time.compensated(share, certainty);
+        let duty = common.wrapping_add(whole(share)).max(I1F31::ZERO);
+        Duty::from_bits(duty.min(config.duty_max).to_bits() as u32)
+    };
+    [duty(a, ca), duty(b, cb), duty(c, cc)]
+}
+
+/// A share of the supply.
+pub type Share = FixedI32<U22>;
+
+/// The share as a duty: a vector is at most 1/√3 long.
+#[inline(always)]
+fn whole(share: Share) -> I1F31 {
+    I1F31::from_bits(share.to_bits() << 9)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use core::f64::consts::TAU;
+    use fixed::types::I2F30;
+    use proptest::prelude::*;
 
     fn config(modulation: Modulation, duty_max: f64) -> Config {
-        let vector = match modulation {
-            Modulation::SpaceVector => 1.0 / 3.0_f64.sqrt(),
-            Modulation::Sine => 0.5,
-        };
-        Config {
-            modulation,
-            duty_max: I1F31::from_num(duty_max),
-            vector_max: I1F31::from_num(vector * duty_max),
-        }
+        Config::new(modulation, duty_max as f32, duty_max as f32)
     }
 
     /// What the duties make of the supply: the vector without its common part.
@@ -137,25 +239,64 @@ mod tests {
         ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt())
     }
 
+    proptest! {
+        #[test]
+        fn no_vector_is_longer_than_the_limit_wherever_the_slope_was_taken(
+            bus in 0.2..5.0_f64,
+            slope_at in -1.2..1.2_f64,
+            d in -3.0..3.0_f64,
+            q in -30.0..30_f64,
+            turns in 0.0..1_f64,
+        ) {
+            let config = config(Modulation::SpaceVector, 0.95);
+            let length = config.vector_max.to_num::<f64>() * bus;
+            let slope_at = Voltage::from_num(slope_at * length);
+            let supply = Supply::new(&config, Voltage::from_num(bus), slope_at);
+            let asked = Dq {
+                d: WideVoltage::from_num(d * length),
+                q: WideVoltage::from_num(q * length),
+            };
+            let (u, _) = limit(asked, &supply.longest);
+            let [u_d, u_q] = [u.d, u.q].map(|x| x.to_num::<f64>());
+            prop_assert!(u_d.hypot(u_q) < length * 1.001, "{u_d} {u_q} for {length}");
+            // And no duty wraps: what they make is the vector.
+            let (sin, cos) = (turns * TAU).sin_cos();
+            let (alpha, beta) = (u_d * cos - u_q * sin, u_d * sin + u_q * cos);
+            let v = AlphaBeta {
+                alpha: I6F26::from_num(alpha),
+                beta: I6F26::from_num(beta),
+            };
+            let none = (&dead_time::Config::NONE, AlphaBeta::default());
+            let made = vector(duties(&config, &supply, (v, Order::NORMAL), none), bus);
+            let error = (made.0 - alpha).hypot(made.1 - beta);
+            prop_assert!(error < 2e-3 * length.max(1.0), "{error}");
+        }
+    }
+
     #[test]
     fn the_duties_make_the_vector_up_to_the_limit() {
         for modulation in [Modulation::SpaceVector, Modulation::Sine] {
             let config = config(modulation, 0.95);
             for bus in [0.2, 0.98, 5.0] {
-                let supply = Supply::new(&config, Voltage::from_num(bus));
-                let most = supply.vector_max.to_num::<f64>();
+                let supply = Supply::new(&config, Voltage::from_num(bus), Voltage::ZERO);
+                let most = supply.longest.length().to_num::<f64>();
                 for degrees in 0..360 {
                     let (sin, cos) = (f64::from(degrees) / 360.0 * TAU).sin_cos();
                     for length in [0.0, 0.3 * most, 0.999 * most] {
                         let v = AlphaBeta {
-                            alpha: I5F27::from_num(length * cos),
-                            beta: I5F27::from_num(length * sin),
+                            alpha: I6F26::from_num(length * cos),
+                            beta: I6F26::from_num(length * sin),
                         };
-                        let made = duties(&config, &supply, v, [I1F31::ZERO; 3]);
+                        let made = duties(
+                            &config,
+                            &supply,
+                            (v, Order::NORMAL),
+                            (&dead_time::Config::NONE, AlphaBeta::default()),
+                        );
                         let (alpha, beta) = vector(made, bus);
                         assert!((alpha - length * cos).abs() < 2e-5 * bus.max(1.0));
                         assert!((beta - length * sin).abs() < 2e-5 * bus.max(1.0));
-                        assert!(made.iter().all(|d| *d <= Duty::from_num(0.95)));
+                        assert!(made.iter().all(|d| *d <= Duty::from_num(0.950001)));
                     }
                 }
             }
@@ -165,40 +306,65 @@ mod tests {
     #[test]
     fn space_vector_centres_the_pulses_between_the_limits() {
         let config = config(Modulation::SpaceVector, 0.9);
-        let supply = Supply::new(&config, Voltage::ONE);
+        let supply = Supply::new(&config, Voltage::ONE, Voltage::ZERO);
         let v = AlphaBeta {
-            alpha: I5F27::from_num(0.4),
-            beta: I5F27::ZERO,
+            alpha: I6F26::from_num(0.4),
+            beta: I6F26::ZERO,
         };
-        let [a, b, c] = duties(&config, &supply, v, [I1F31::ZERO; 3]).map(|d| d.to_num::<f64>());
+        let [a, b, c] = duties(
+            &config,
+            &supply,
+            (v, Order::NORMAL),
+            (&dead_time::Config::NONE, AlphaBeta::default()),
+        )
+        .map(|d| d.to_num::<f64>());
         assert!((a + b - 0.9).abs() < 1e-5 && (b - c).abs() < 1e-6);
     }
 
     #[test]
     fn a_vector_that_is_too_long_keeps_its_d() {
         let u = Dq {
-            d: Voltage::from_num(-0.3),
-            q: Voltage::from_num(2),
+            d: WideVoltage::from_num(-0.3),
+            q: WideVoltage::from_num(20),
         };
-        let (limited, cut) = limit(u, Voltage::from_num(0.5));
+        let longest =
+            |length: f64| Longest::new(Voltage::from_num(length), Voltage::from_num(-0.29));
+        let (limited, cut) = limit(u, &longest(0.5));
         let rest = Dq {
-            d: Voltage::ZERO,
-            q: u.q - limited.q,
+            d: WideVoltage::ZERO,
+            q: u.q - wide(limited.q),
         };
         assert_eq!(cut, Some(rest));
-        assert_eq!(limited.d, u.d);
-        assert!((limited.q.to_num::<f64>() - 0.4).abs() < 1e-6);
-        assert_eq!(limit(limited, Voltage::from_num(0.5001)), (limited, None));
+        assert_eq!(wide(limited.d), u.d);
+        assert!((limited.q.to_num::<f64>() - 0.4).abs() < 1e-4);
+        let again = Dq {
+            d: wide(limited.d),
+            q: wide(limited.q),
+        };
+        let (passed, cut) = limit(again, &longest(0.501));
+        assert_eq!(cut, None);
+        assert_eq!((wide(passed.d), wide(passed.q)), (again.d, again.q));
     }
 
     #[test]
     fn compensation_is_added() {
         let config = config(Modulation::Sine, 0.99);
-        let supply = Supply::new(&config, Voltage::ONE);
-        let extra = [0.01, -0.01, 0.0].map(I1F31::from_num);
-        let made = duties(&config, &supply, AlphaBeta::default(), extra);
+        let supply = Supply::new(&config, Voltage::ONE, Voltage::ZERO);
+        let dead_time = dead_time::Config {
+            duty: I2F30::from_num(0.01),
+            ..dead_time::Config::NONE
+        };
+        // The signs of a current along phase b against a, and none in c.
+        let certainty = AlphaBeta {
+            alpha: I8F24::from_num(20),
+            beta: I8F24::from_num(-20.0 / 3.0_f64.sqrt()),
+        };
+        let v = (AlphaBeta::default(), Order::NORMAL);
+        let made = duties(&config, &supply, v, (&dead_time, certainty));
         let [a, b, c] = made.map(|d| d.to_num::<f64>());
-        assert!((a - c - 0.01).abs() < 1e-6 && (c - b - 0.01).abs() < 1e-6);
+        assert!((a - 0.505).abs() < 1e-6, "{a}");
+        assert!((b - 0.485).abs() < 1e-6, "{b}");
+        assert!((c - 0.495).abs() < 1e-6, "{c}");
     }
 
     #[test]
@@ -206,8 +372,10 @@ mod tests {
         let config = config(Modulation::SpaceVector, 0.95);
         for i in 26..1600 {
             let bus = Voltage::from_num(f64::from(i) * 0.005);
-            let product =
-                Supply::new(&config, bus).reciprocal.to_num::<f64>() * bus.to_num::<f64>();
+            let product = Supply::new(&config, bus, Voltage::ZERO)
+                .reciprocal
+                .to_num::<f64>()
+                * bus.to_num::<f64>();
             assert!((product - 1.0).abs() < 1e-6, "{bus}: {product}");
         }
     }
@@ -215,8 +383,8 @@ mod tests {
     #[test]
     fn no_supply_does_not_divide_by_zero() {
         let config = config(Modulation::SpaceVector, 0.95);
-        let supply = Supply::new(&config, Voltage::ZERO);
-        assert_eq!(supply.vector_max, Voltage::ZERO);
+        let supply = Supply::new(&config, Voltage::ZERO, Voltage::ZERO);
+        assert_eq!(supply.longest.length(), Voltage::ZERO);
         assert!(supply.reciprocal > I4F28::from_num(7.9));
     }
 }

@@ -104,26 +104,31 @@ pub fn zero(config: &Config, state: &mut State, raw: [AdcCounts; 3]) -> Zeroing 
     Zeroing::Done
 }
 
+/// The readings of a sample less their offsets.
+#[inline(always)]
+pub fn read(state: &State, raw: [AdcCounts; 3]) -> [AdcCounts; 3] {
+    let [a, b, c] = raw;
+    let [offset_a, offset_b, offset_c] = state.offsets;
+    [a.minus(offset_a), b.minus(offset_b), c.minus(offset_c)]
+}
+
 /// The phase currents of a sample.
 ///
 /// `applied` are the duties of the elapsed period, 0 for a phase whose high side did not switch.
 /// With three shunts the phase with the highest duty is minus the sum of the others where its
 /// window is too short. Where a second window is too short as well, which the modulator's limit
 /// prevents, the two longest windows are still what is used: their readings may not have settled.
-#[inline(always)]
 pub fn currents(
     config: &Config,
     state: &State,
     raw: [AdcCounts; 3],
     applied: [Duty; 3],
 ) -> [AdcCounts; 3] {
-    let read = |phase: usize| raw[phase].minus(state.offsets[phase]);
-    let [a, b] = [read(0), read(1)];
+    let [a, b, c] = read(state, raw);
     let other = |x: AdcCounts, y: AdcCounts| I16F16::ZERO.minus(x).minus(y);
     if config.shunts == Shunts::Two {
         return [a, b, other(a, b)];
     }
-    let c = read(2);
     let [duty_a, duty_b, duty_c] = applied;
     let highest = duty_a.max(duty_b).max(duty_c);
     if highest <= config.window {

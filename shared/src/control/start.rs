@@ -8,7 +8,7 @@ use fixed::types::I36F28;
 use fixed::types::extra::{U28, U32};
 
 use super::transform::Dq;
-use crate::math::{Gain, TopProduct};
+use crate::math::{Gain, Held, TopProduct};
 use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -48,10 +48,14 @@ pub struct State {
     pub frame: Angle,
     /// ∫I_qr in Park, in periods.
     pub charge: I36F28,
-    /// ω_s, the speed of the frame.
+    /// ω_s, the speed of the frame but for its yielding.
     pub omega_s: Speed,
+    /// Its change in a period.
+    pub acceleration: Speed,
     /// Angle by which the frame yields to the rotor's swing.
     pub yielded: Angle,
+    /// Its change in a period.
+    pub yielding: Speed,
     /// Periods in which the rotor has turned too slowly, less those in which it has not.
     pub astray: u32,
 }
@@ -62,30 +66,56 @@ impl Default for State {
             frame: Angle::from_bits(-1 << 30),
             charge: I36F28::ZERO,
             omega_s: Speed::ZERO,
+            acceleration: Speed::ZERO,
             yielded: Angle::ZERO,
+            yielding: Speed::ZERO,
             astray: 0,
         }
     }
 }
 
-/// One period of Park: the frame's speed, and whether the rotor has had its time.
-#[inline]
-pub fn park(config: &Config, state: &mut State, current: Current) -> (Speed, bool) {
-    state.charge += I36F28::from(current);
+/// How far Park is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Park {
+    /// The rotor is being aligned.
+    Aligning,
+    /// It has just had its time.
+    Aligned,
+    /// It had before.
+    Over,
+}
+
+/// So many `periods` of Park with this current: the frame's speed.
+pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) -> Park {
+    let over = state.charge >= config.park_charge;
+    state.charge += I36F28::from(current) * i64::from(periods);
     let sweeping = state.charge < config.park_charge / 2;
-    let omega = if sweeping {
+    state.omega_s = if sweeping {
         config.sweep.apply(current)
     } else {
         Speed::ZERO
     };
-    (omega, state.charge >= config.park_charge)
+    if over {
+        Park::Over
+    } else if state.charge >= config.park_charge {
+        Park::Aligned
+    } else {
+        Park::Aligning
+    }
 }
 
-/// One period of Ramp: the frame's speed, and whether it has reached ω_cl.
-#[inline]
-pub fn ramp(config: &Config, state: &mut State, current: Current) -> (Speed, bool) {
-    state.omega_s = state.omega_s.saturating_add(config.k_s.apply(current));
-    (state.omega_s, state.omega_s >= config.run_speed)
+/// Ramp with this current: the frame's acceleration.
+pub fn ramp(config: &Config, state: &mut State, current: Current) {
+    state.acceleration = config.k_s.apply(current);
+}
+
+/// Takes the frame on by a period and returns its speed in it.
+#[inline(always)]
+pub fn advance(state: &mut State) -> Speed {
+    state.omega_s = state.omega_s.plus(state.acceleration);
+    let omega = state.omega_s.plus(state.yielding);
+    state.frame = state.frame.wrapping_add(omega);
+    omega
 }
 
 /// Damps the rotor's swing about the current's vector: a pendulum that a constant current does not
@@ -93,42 +123,33 @@ pub fn ramp(config: &Config, state: &mut State, current: Current) -> (Speed, boo
 /// is ξ·h_d, since the rotor's flux stands near the q axis; along d, neither a wrong R nor the dead
 /// time disturbs the back-EMF h_d = R·i_d − ω·L·i_q − u_d (5).
 ///
-/// Takes the frame on by a period and returns its speed in it.
-#[inline]
-pub fn damp(
-    config: &Config,
-    state: &mut State,
-    (i, u): (Dq<Current>, Dq<Voltage>),
-    omega_s: Speed,
-) -> Speed {
+/// Called every so many `periods`, which are few against those of a swing.
+pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage>), periods: u32) {
+    state.yielded = state.yielded.plus(state.yielding * periods as i32);
+    let omega_s = state.omega_s;
     let h_d = config
         .resistance
         .saturating_apply(i.d)
-        .saturating_sub(config.reactance.saturating_apply(omega_s.top(i.q)))
-        .saturating_sub(u.d);
+        .minus(config.reactance.saturating_apply(omega_s.top(i.q)))
+        .minus(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
-    let rotor = Speed::saturating_from_num(config.xi_nominal.top(h_d));
+    let rotor = config.xi_nominal.top(h_d).to_bits();
+    let rotor = Speed::from_bits(rotor.clamp(-SPEED_END, SPEED_END - 1) << 4);
     // A rotor that follows turns as fast as the frame in the mean. Below a quarter of the speed at
     // which Run begins its swing is as fast.
     if omega_s > config.run_speed / 4 {
         state.astray = if rotor < omega_s / 2 {
-            state.astray + 1
+            state.astray + periods
         } else {
-            state.astray.saturating_sub(1)
+            state.astray.saturating_sub(periods)
         };
     }
     let target = config
         .yielding
-        .saturating_apply(omega_s.saturating_sub(rotor))
+        .saturating_apply(omega_s.minus(rotor))
         .min(YIELDED_MAX)
         .max(-YIELDED_MAX);
-    let step = config
-        .yield_rate
-        .apply(target.saturating_sub(state.yielded));
-    state.yielded += step;
-    let omega = omega_s.saturating_add(step);
-    state.frame = state.frame.wrapping_add(omega);
-    omega
+    state.yielding = config.yield_rate.apply(target.minus(state.yielded));
 }
 
 /// Whether the rotor has lost the frame of Ramp.
@@ -144,7 +165,9 @@ impl State {
             frame,
             charge,
             omega_s,
+            acceleration,
             yielded,
+            yielding,
             astray,
         } = self;
         let charge = charge.to_bits();
@@ -152,10 +175,15 @@ impl State {
         out(charge as u32);
         out((charge >> 32) as u32);
         out(omega_s.to_bits() as u32);
+        out(acceleration.to_bits() as u32);
         out(yielded.to_bits() as u32);
+        out(yielding.to_bits() as u32);
         out(*astray);
     }
 }
+
+/// Where the speeds end, half a turn, with 28 fraction bits.
+const SPEED_END: i32 = 1 << 27;
 
 /// Most by which the frame yields: a sixteenth of a turn.
 const YIELDED_MAX: Angle = Angle::from_bits(1 << 28);
@@ -190,10 +218,10 @@ mod tests {
         let mut turned = 0.0;
         let mut periods = 0;
         loop {
-            let (omega, done) = park(&config, &mut state, config.current);
-            turned += omega.to_num::<f64>();
+            let done = park(&config, &mut state, config.current, 1);
+            turned += state.omega_s.to_num::<f64>();
             periods += 1;
-            if done {
+            if done != Park::Aligning {
                 break;
             }
         }
@@ -205,8 +233,12 @@ mod tests {
     fn ramp_is_the_integral_of_the_current() {
         let config = config();
         let mut state = State::default();
+        ramp(&config, &mut state, config.current);
         let periods = (1..)
-            .find(|_| ramp(&config, &mut state, config.current).1)
+            .find(|_| {
+                advance(&mut state);
+                state.omega_s >= config.run_speed
+            })
             .expect("it ends");
         // 0.01 / (0.5 · 1e-4), and one for the rounding of K_s.
         assert!((200..=201).contains(&periods), "{periods}");
@@ -226,8 +258,9 @@ mod tests {
                 d: Voltage::from_num(0.05 - 0.4 * omega_s - h_d),
                 q: Voltage::ZERO,
             };
+            state.omega_s = Speed::from_num(omega_s);
             for _ in 0..1000 {
-                damp(&config, &mut state, (i, u), Speed::from_num(omega_s));
+                damp(&config, &mut state, (i, u), 2);
             }
             state.yielded.to_num::<f64>()
         };
@@ -261,7 +294,10 @@ mod tests {
         // Above a quarter of the speed at which Run begins.
         let omega_s = Speed::from_num(0.005);
         let periods_to_loss = |followed: f64, omega_s: Speed| {
-            let mut state = State::default();
+            let mut state = State {
+                omega_s,
+                ..State::default()
+            };
             // ξ·h_d with h_d = −u_d is the rotor's speed.
             let u_d = -4.0 * followed * omega_s.to_num::<f64>();
             let u = Dq {
@@ -269,7 +305,7 @@ mod tests {
                 q: Voltage::ZERO,
             };
             (1..1000).find(|_| {
-                damp(&config, &mut state, (Dq::default(), u), omega_s);
+                damp(&config, &mut state, (Dq::default(), u), 1);
                 lost(&config, &state)
             })
         };

@@ -12,7 +12,7 @@ use crate::units::Current;
 /// Limit of the change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Greatest change of i_q* in a period.
+    /// Greatest change of i_q* in a period of the outer loops.
     pub slew: Current,
 }
 

@@ -1,11 +1,13 @@
 //! Clarke's and Park's transforms, preserving the amplitude (11), (12).
 
-use fixed::FixedI32;
-use fixed::types::extra::U32;
-use fixed::types::{I3F29, I4F28, I5F27};
+use core::ops::{Add, Sub};
 
-use crate::math::{Held, SinCos, TopProduct};
-use crate::units::{AdcCounts, Current, Voltage};
+use fixed::FixedI32;
+use fixed::types::extra::{Diff, Sum, U31, U32, Unsigned};
+use fixed::types::{I0F32, I4F28, I5F27, I6F26};
+
+use crate::math::{Held, SinCos, TopProduct, TopSum};
+use crate::units::{AdcCounts, Angle, Current, Voltage};
 
 /// A vector in the stator's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,95 +27,131 @@ pub struct Dq<T> {
     pub q: T,
 }
 
-/// √3/4 with 32 fraction bits.
-const ROOT_3_QUARTER: FixedI32<U32> = FixedI32::from_bits(1_859_775_393);
+/// The order in which three phases follow one another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Order {
+    /// ±√3/4: what fits a factor below a half.
+    root_3_quarter: I0F32,
+    /// ±1.
+    sign: i32,
+}
+
+impl Order {
+    /// a, b, c.
+    pub const NORMAL: Self = Self {
+        root_3_quarter: I0F32::from_bits(1_859_775_393),
+        sign: 1,
+    };
+
+    /// a, c, b: what a motor that turns the other way makes of them.
+    pub const SWAPPED: Self = Self {
+        root_3_quarter: I0F32::from_bits(-1_859_775_393),
+        sign: -1,
+    };
+
+    /// An angle of the frame of the phases in this order, with the phases in the order a, b, c.
+    #[inline(always)]
+    pub fn angle(self, theta: Angle) -> Angle {
+        theta.wrapping_mul_int(self.sign)
+    }
+}
 
 /// Clarke's transform of three readings (12): one unit of current is 4096/3 counts, so that two
 /// integer products are enough.
 ///
-/// Readings are within ±2048 counts, which makes each component at most 2 of ±4.
+/// Readings are within ±2048 counts, which makes each component at most 2 of ±8.
 #[inline(always)]
-pub fn clarke([a, b, c]: [AdcCounts; 3]) -> AlphaBeta<I3F29> {
+pub fn clarke(readings: [AdcCounts; 3]) -> AlphaBeta<Current> {
+    clarke_in(Order::NORMAL, readings)
+}
+
+/// The same of phases in this order.
+#[inline(always)]
+pub fn clarke_in(order: Order, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> {
     let (a, b, c) = (a.to_bits(), b.to_bits(), c.to_bits());
-    // (2a − b − c)/3 counts are (2a − b − c)/4096 units: 2^28 of them a unit, and one bit more.
-    let alpha = (2 * a - b - c) << 1;
-    // (b − c)/√3 counts are (b − c)·√3/4096 units; √3/4 is what fits a factor below a half.
-    let beta = FixedI32::<U32>::from_bits((b - c) << 2)
-        .top(ROOT_3_QUARTER)
-        .to_bits()
-        << 1;
+    // (2a − b − c)/3 counts are (2a − b − c)/4096 units: 2^28 of them a unit.
+    let alpha = 2 * a - (b + c);
+    // (b − c)/√3 counts are (b − c)·√3/4096 units.
+    let beta = I0F32::from_bits((b - c) << 2).top(order.root_3_quarter);
     AlphaBeta {
-        alpha: I3F29::from_bits(alpha),
-        beta: I3F29::from_bits(beta),
+        alpha: Current::from_bits(alpha),
+        beta: Current::from_bits(beta.to_bits()),
     }
 }
 
-/// The currents of Clarke's transform as the control's currents.
+/// The voltages of a vector that is turned twice, as the control's voltages: it is within ±8.
 #[inline(always)]
-pub fn currents(v: AlphaBeta<I3F29>) -> AlphaBeta<Current> {
+pub fn voltages(v: AlphaBeta<I6F26>) -> AlphaBeta<Voltage> {
     AlphaBeta {
-        alpha: Current::from_bits(v.alpha.to_bits() >> 1),
-        beta: Current::from_bits(v.beta.to_bits() >> 1),
+        alpha: Voltage::from_bits(v.alpha.to_bits() << 2),
+        beta: Voltage::from_bits(v.beta.to_bits() << 2),
     }
 }
 
-/// The voltages of the inverse of Park's transform as the control's voltages, held at the ends of
-/// their type.
+/// Park's transform (12): the stator's vector as the rotor sees it. Components are held within ±8.
 #[inline(always)]
-pub fn voltages(v: AlphaBeta<I5F27>) -> AlphaBeta<Voltage> {
-    let double = |x: I5F27| Voltage::from_bits(x.plus(x).to_bits());
-    AlphaBeta {
-        alpha: double(v.alpha),
-        beta: double(v.beta),
-    }
-}
-
-/// Park's transform (12): the stator's vector as the rotor sees it.
-#[inline(always)]
-pub fn park(v: AlphaBeta<I3F29>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
+pub fn park(v: AlphaBeta<I4F28>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
+    let double = |x: I5F27| I4F28::from_bits(x.plus(x).to_bits());
     Dq {
-        d: v.alpha.top(cos) + v.beta.top(sin),
-        q: v.beta.top(cos) - v.alpha.top(sin),
+        d: double(v.alpha.top(cos).plus_top(v.beta, sin)),
+        q: double(v.beta.top(cos).minus_top(v.alpha, sin)),
     }
 }
 
-/// Park's transform of any vector of the stator's frame; components are held within ±4.
+/// The inverse of Park's transform (11); the sine takes a fraction bit.
 #[inline(always)]
-pub fn to_rotor(v: AlphaBeta<I4F28>, frame: SinCos) -> Dq<I4F28> {
-    let double = |x: I4F28| I3F29::from_bits(x.plus(x).to_bits());
-    park(
-        AlphaBeta {
-            alpha: double(v.alpha),
-            beta: double(v.beta),
-        },
-        frame,
-    )
-}
-
-/// The inverse of Park's transform (11).
-#[inline(always)]
-pub fn inverse_park(v: Dq<Voltage>, SinCos { cos, sin }: SinCos) -> AlphaBeta<I5F27> {
+pub fn inverse_park<A>(
+    v: Dq<FixedI32<A>>,
+    SinCos { cos, sin }: SinCos,
+) -> AlphaBeta<FixedI32<Diff<Sum<A, U31>, U32>>>
+where
+    A: Unsigned + Add<U31>,
+    Sum<A, U31>: Unsigned + Sub<U32>,
+    Diff<Sum<A, U31>, U32>: Unsigned,
+{
     AlphaBeta {
-        alpha: v.d.top(cos) - v.q.top(sin),
-        beta: v.d.top(sin) + v.q.top(cos),
+        alpha: v.d.top(cos).minus_top(v.q, sin),
+        beta: v.d.top(sin).plus_top(v.q, cos),
     }
+}
+
+/// Turns a vector of the rotor's frame ahead by an angle; the sine takes a fraction bit.
+#[inline(always)]
+pub fn turn<A>(v: Dq<FixedI32<A>>, ahead: SinCos) -> Dq<FixedI32<Diff<Sum<A, U31>, U32>>>
+where
+    A: Unsigned + Add<U31>,
+    Sum<A, U31>: Unsigned + Sub<U32>,
+    Diff<Sum<A, U31>, U32>: Unsigned,
+{
+    let AlphaBeta { alpha, beta } = inverse_park(v, ahead);
+    Dq { d: alpha, q: beta }
 }
 
 /// The three phases' values of a vector (11).
 #[inline(always)]
 pub fn phases<F>(v: AlphaBeta<FixedI32<F>>) -> [FixedI32<F>; 3] {
+    phases_in(Order::NORMAL, v)
+}
+
+/// The same of phases in this order.
+#[inline(always)]
+pub fn phases_in<F>(order: Order, v: AlphaBeta<FixedI32<F>>) -> [FixedI32<F>; 3] {
     let alpha = v.alpha.to_bits();
     // √3/2 = 2·√3/4, and the product keeps the top half.
-    let product = i64::from(v.beta.to_bits()) * i64::from(ROOT_3_QUARTER.to_bits());
+    let product = i64::from(v.beta.to_bits()) * i64::from(order.root_3_quarter.to_bits());
     let beta = ((product >> 32) as i32) << 1;
     let half = alpha >> 1;
-    [alpha, beta - half, -beta - half].map(FixedI32::from_bits)
+    [
+        FixedI32::from_bits(alpha),
+        FixedI32::from_bits(beta - half),
+        FixedI32::from_bits(-beta - half),
+    ]
 }
 
 /// Turns a rotor-frame vector against the frame: the vector as a frame sees it that leads by the
-/// angle. Components are held within ±4.
+/// angle. Components are held within ±8.
 pub fn rotate_frame(v: Dq<I4F28>, ahead: SinCos) -> Dq<I4F28> {
-    to_rotor(
+    park(
         AlphaBeta {
             alpha: v.d,
             beta: v.q,
@@ -163,8 +201,8 @@ mod tests {
         let stator = inverse_park(v, sc);
         let back = park(
             AlphaBeta {
-                alpha: I3F29::from_num(stator.alpha),
-                beta: I3F29::from_num(stator.beta),
+                alpha: I4F28::from_num(stator.alpha),
+                beta: I4F28::from_num(stator.beta),
             },
             sc,
         );

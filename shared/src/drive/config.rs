@@ -1,6 +1,6 @@
 //! Everything that a control period reads and does not change.
 
-use fixed::types::extra::{U16, U28, U32};
+use fixed::types::extra::{U16, U24, U32};
 
 use super::{six_step, tone};
 use crate::control::delay::Delay;
@@ -8,7 +8,7 @@ use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
     torque,
 };
-use crate::math::Gain;
+use crate::math::{Gain, Multiplier};
 use crate::protection;
 use crate::units::{Current, Duty, Scale, Speed};
 
@@ -48,7 +48,7 @@ pub struct Config {
     /// What the control's units are worth.
     pub scale: Scale,
     /// Counts of the supply's converter to voltage.
-    pub bus: Gain<U16, U28>,
+    pub bus: Multiplier<U16, U24>,
     /// Direction of rotation.
     pub direction: Direction,
     /// How the motor is stopped.

@@ -1,13 +1,14 @@
 //! Starting, handing over, stopping: what changes the drive's phase.
 
 use super::config::Stop;
+use super::slow::{self, CYCLE};
 use super::turn::hall;
 use super::{ATTEMPTS, Config, Direction, Fault, Phase, Sample, Setpoint, State, tone};
 use crate::control::catch::Rotor;
-use crate::control::observer;
 use crate::control::regulator::Reference;
-use crate::control::start;
-use crate::control::transform::{AlphaBeta, Dq, inverse_park, rotate_frame, voltages};
+use crate::control::start::{self, Park};
+use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, rotate_frame, turn, voltages};
+use crate::control::{PERIODS, observer};
 use crate::math::sin_cos;
 use crate::units::{Angle, Current, Speed, Voltage};
 
@@ -83,10 +84,47 @@ pub(super) fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
     }
 }
 
-/// Begins to drive: the rotor is caught where it turns, started where its sensors show it, or parked.
+/// Periods behind Charge in which a drive is made ready, a piece in each.
+pub(super) const READY_PERIODS: u32 = 7;
+
+/// Piece `n`, from 1, of what makes a drive ready: the rotor is caught where it turns, started where
+/// its sensors show it, or parked, from the period after the last piece on.
 #[cold]
-pub(super) fn begin(config: &Config, state: &mut State, sample: &Sample, setpoint: Setpoint) {
-    let backward = wish(config, setpoint) == Wish::Backward;
+pub(super) fn begin(
+    config: &Config,
+    state: &mut State,
+    (sample, setpoint): (&Sample, Setpoint),
+    n: u32,
+) {
+    let caught = turning(config, state);
+    // Until the first period that drives.
+    let periods = READY_PERIODS as i32 + 1 - n as i32;
+    match (n, caught) {
+        (1..=3, _) => slow::begin(config, state, n),
+        (4, Some((theta, omega))) => {
+            let theta = theta.wrapping_add(omega.wrapping_mul_int(periods));
+            let rest = AlphaBeta::default();
+            observer::begin(&config.observer, &mut state.observer, (theta, omega), rest);
+        }
+        (5, Some((_, omega))) => regulate(config, state, omega),
+        (6, Some((theta, omega))) => {
+            let theta = theta.wrapping_add(omega.wrapping_mul_int(periods));
+            state.commanded = commanded(config, theta, omega);
+        }
+        (READY_PERIODS, _) => {
+            go(
+                config,
+                state,
+                (sample, setpoint),
+                caught.map(|(_, omega)| omega),
+            );
+        }
+        _ => {}
+    }
+}
+
+/// The rotor's angle and speed as the control sees them, where it turns fast enough to be caught.
+fn turning(config: &Config, state: &mut State) -> Option<(Angle, Speed)> {
     match state.rotor {
         Rotor::Turning { theta, omega } if omega.saturating_abs() > config.slow => {
             state.reversed = omega.is_negative() != (config.direction == Direction::Reversed);
@@ -95,55 +133,79 @@ pub(super) fn begin(config: &Config, state: &mut State, sample: &Sample, setpoin
             } else {
                 theta
             };
-            catch(config, state, theta, omega.saturating_abs());
-            // One that turns the other way is stopped first.
-            state.phase = if state.reversed == backward {
-                Phase::Run
-            } else {
-                Phase::Stopping
-            };
+            Some((theta, omega.saturating_abs()))
         }
-        _ => {
-            state.reversed = backward;
-            let hall = hall(sample, state.swapped(config));
-            if observer::stand(&config.observer, &mut state.observer, hall) {
-                state.phase = Phase::Run;
-                config
-                    .speed
-                    .begin(&mut state.speed, Speed::ZERO, Current::ZERO);
-            } else {
-                state.phase = Phase::Park;
-                observer::align(&config.observer, &mut state.observer, state.start.frame);
-            }
-        }
+        _ => None,
     }
 }
 
-/// Field-oriented control from a rotor's angle and speed, without current.
-fn catch(config: &Config, state: &mut State, theta: Angle, omega: Speed) {
-    let rest = AlphaBeta::default();
-    observer::begin(&config.observer, &mut state.observer, (theta, omega), rest);
-    config.speed.begin(&mut state.speed, omega, Current::ZERO);
-    // The back-EMF has been at the terminals, as if it had been commanded. ω has 32 fraction bits,
-    // ξ = 1/4, a voltage 28.
-    let emf = Dq {
+/// The first phase of a drive, for a rotor that turns at `omega`, or stands.
+fn go(
+    config: &Config,
+    state: &mut State,
+    (sample, setpoint): (&Sample, Setpoint),
+    omega: Option<Speed>,
+) {
+    let backward = wish(config, setpoint) == Wish::Backward;
+    // The first period takes its reference.
+    state.turn = CYCLE as u8 - 1;
+    if omega.is_none() {
+        state.reversed = backward;
+    }
+    let swapped = state.swapped(config);
+    state.order = if swapped {
+        Order::SWAPPED
+    } else {
+        Order::NORMAL
+    };
+    state.phase = if let Some(omega) = omega {
+        config.speed.begin(&mut state.speed, omega, Current::ZERO);
+        // One that turns the other way is stopped first.
+        if state.reversed == backward {
+            Phase::Run
+        } else {
+            Phase::Stopping
+        }
+    } else {
+        let (frame, hall) = (state.start.frame, hall(sample, swapped));
+        if observer::stand(&config.observer, &mut state.observer, frame, hall) {
+            config
+                .speed
+                .begin(&mut state.speed, Speed::ZERO, Current::ZERO);
+            Phase::Run
+        } else {
+            Phase::Park
+        }
+    };
+}
+
+/// The back-EMF at this speed. ω has 32 fraction bits, ξ = 1/4, a voltage 28.
+fn emf(omega: Speed) -> Dq<Voltage> {
+    Dq {
         d: Voltage::ZERO,
         q: Voltage::from_bits(omega.to_bits() >> 2),
-    };
+    }
+}
+
+/// The current regulator at this speed, without current.
+fn regulate(config: &Config, state: &mut State, omega: Speed) {
     let still = Dq::default();
     let factor = state.inductance.factor;
     let fb = observer::feedback(&config.observer, &state.observer, (omega, still), factor);
     let wanted = Reference::default();
     config
         .regulator
-        .begin(&mut state.regulator, emf, &wanted, &fb);
+        .begin(&mut state.regulator, emf(omega), &wanted, &fb);
+}
+
+/// The back-EMF has been at the terminals, as if it had been commanded: the last two commands, for a
+/// rotor that is at `theta` at the first period's sample.
+fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
     let to_middle = config.delay.advance(omega).wrapping_sub(omega);
-    let commanded =
-        |middle: Angle| voltages(inverse_park(emf, sin_cos(theta.wrapping_add(middle))));
-    state.commanded = [
-        commanded(to_middle),
-        commanded(to_middle.wrapping_sub(omega)),
-    ];
+    let frame = sin_cos(theta);
+    let emf = emf(omega);
+    let at = |middle: Angle| voltages(inverse_park(turn(emf, sin_cos(middle)), frame));
+    [at(to_middle), at(to_middle.wrapping_sub(omega))]
 }
 
 /// Drives on from the speed and the current that there are.
@@ -163,32 +225,50 @@ pub(super) fn end(config: &Config, state: &mut State) {
     });
 }
 
-/// Park and Ramp: the frame's speed and the current.
-#[inline]
-pub(super) fn open_loop(
-    config: &Config,
-    state: &mut State,
-    setpoint: Setpoint,
-    i: AlphaBeta<Current>,
-) -> (Speed, Reference) {
+/// Periods from one look at the rotor's swing to the next: every other one, those in which nothing
+/// else has its turn. A swing takes hundreds of them.
+const DAMP_PERIODS: u32 = 2;
+
+/// Park and Ramp: what of the imposed frame has its turn in this period.
+pub(super) fn impose(config: &Config, state: &mut State, setpoint: Setpoint) {
+    if !state.turn.is_multiple_of(DAMP_PERIODS as u8) {
+        let felt = (state.seen.i, state.seen.u);
+        start::damp(attempt(config, state), &mut state.start, felt, DAMP_PERIODS);
+    } else if state.turn.is_multiple_of(PERIODS as u8) {
+        current(config, state, setpoint);
+    }
+}
+
+/// The current, and what it makes of the frame's speed.
+#[inline(never)]
+fn current(config: &Config, state: &mut State, setpoint: Setpoint) {
     let attempt = attempt(config, state);
     let mut i_q = attempt.current.min(state.protection.bounds.max);
     if matches!(setpoint, Setpoint::Test(_)) {
         i_q = i_q.min(config.test_current);
     }
-    let omega_s = if state.phase == Phase::Park {
-        let (omega, done) = start::park(attempt, &mut state.start, i_q);
-        if done {
-            state.phase = Phase::Ramp;
-            // The rotor's flux stands along the current, on the frame's q axis.
-            let rotor = state.start.frame.wrapping_add(Angle::from_bits(1 << 30));
-            observer::expect(&config.observer, &mut state.observer, rotor, i);
+    state.wanted = Reference::steady(i_q);
+    if state.phase == Phase::Park {
+        match start::park(attempt, &mut state.start, i_q, PERIODS) {
+            Park::Aligning => {}
+            // Not in Ramp's first period, which would be long.
+            Park::Aligned => expect(config, state),
+            Park::Over => state.phase = Phase::Ramp,
         }
-        omega
-    } else {
-        start::ramp(attempt, &mut state.start, i_q).0
-    };
-    (omega_s, Reference::steady(i_q))
+    }
+    if state.phase == Phase::Ramp {
+        start::ramp(attempt, &mut state.start, i_q);
+    }
+    state.seen.phase = state.phase;
+}
+
+/// The rotor's flux stands along the current, on the frame's q axis.
+fn expect(config: &Config, state: &mut State) {
+    let frame = state.start.frame;
+    let rotor = frame.wrapping_add(Angle::from_bits(1 << 30));
+    let Dq { d: alpha, q: beta } = rotate_frame(state.seen.i, sin_cos(frame.wrapping_neg()));
+    let i = AlphaBeta { alpha, beta };
+    observer::expect(&config.observer, &mut state.observer, rotor, i);
 }
 
 /// The coefficients of the attempt that is being made.
@@ -196,7 +276,7 @@ pub(super) fn attempt<'a>(config: &'a Config, state: &State) -> &'a start::Confi
     &config.start[usize::from(state.failed_starts).min(ATTEMPTS - 1)]
 }
 
-/// The phase of the next period: hand-over at the ramp's end, back to the start where the rotor
+/// Every [`CYCLE`]: the phase of the next period, hand-over at the ramp's end, back to the start where the rotor
 /// has not followed or has become too slow. `Some` where the observer is lost, or nothing starts
 /// the motor.
 #[inline(always)]
@@ -218,7 +298,7 @@ pub(super) fn proceed(config: &Config, state: &mut State) -> Option<Fault> {
             }
         }
         Phase::Run if state.seen.speed < config.slow => {
-            state.slow_periods += 1;
+            state.slow_periods += CYCLE;
             if state.slow_periods > config.slow_periods {
                 failed(state)
             } else {
@@ -230,8 +310,8 @@ pub(super) fn proceed(config: &Config, state: &mut State) -> Option<Fault> {
             None
         }
         Phase::Run if state.run_periods < config.proven_periods => {
-            state.run_periods += 1;
-            if state.run_periods == config.proven_periods {
+            state.run_periods += CYCLE;
+            if state.run_periods >= config.proven_periods {
                 state.failed_starts = 0;
             }
             None
@@ -274,6 +354,7 @@ fn hand_over(config: &Config, state: &mut State) -> Option<Fault> {
         .begin(&mut state.regulator, u, &wanted, &fb);
     // What the ramp's current accelerates with is not what the load takes.
     config.speed.begin(&mut state.speed, omega_s, Current::ZERO);
+    state.wanted = wanted;
     state.phase = Phase::Run;
     None
 }

@@ -4,6 +4,7 @@ mod config;
 mod launch;
 mod rest;
 pub mod six_step;
+mod slow;
 mod state;
 mod step;
 pub mod tone;

@@ -4,18 +4,101 @@
 //! looked for at the open terminals. One that turns is caught where it is; one that turns the other
 //! way is stopped first; one that stands is parked.
 
-use super::{Bridge, Config, Direction, Fault, Phase, Sample, Setpoint, State, tone};
+use super::launch::{self, Wish};
+use super::{Bridge, Config, Direction, Fault, Faults, Phase, Sample, Setpoint, State, tone};
 use crate::control::catch::{self, Rotor};
 use crate::control::sensing::{self, Zeroing};
-use crate::units::{AdcCounts, Speed};
+use crate::protection;
+use crate::units::{AdcCounts, Duty, Speed, Voltage};
 
 /// How often the currents' zeros are measured anew while it is not known whether the rotor turns:
 /// after eight times 5 ms it turns too slowly to matter, or its terminals cannot be read.
 const LOOKS: u8 = 8;
 
+/// Whether the bridge is off and stays so until something is asked for: with a fault, in Idle and in
+/// Sense. The six-step drive has its own.
+#[inline(always)]
+pub(super) fn is_off(config: &Config, state: &State) -> bool {
+    let rests = matches!(state.phase, Phase::Idle | Phase::Sense);
+    !state.faults.is_empty() || rests && config.six_step.is_none()
+}
+
+/// A period with the bridge off. The currents are not looked at: a reading is its offset, which may
+/// not have been measured yet.
+#[inline(never)]
+pub(super) fn off(
+    config: &Config,
+    state: &mut State,
+    sample: &Sample,
+    setpoint: Setpoint,
+) -> Bridge {
+    let bus = bus(config, sample);
+    if let Some(fault) = protection::check(&config.protection, &mut state.protection, None, bus) {
+        state.trip(fault);
+    }
+    if let Setpoint::Fault(fault) = setpoint {
+        state.trip(fault);
+    }
+    state.applied = [[Duty::ZERO; 3]; 2];
+    if !state.faults.is_empty() {
+        watch(config, state, sample);
+        clear(config, state, setpoint);
+        return Bridge::Off;
+    }
+    if !goes_on(config, state, setpoint) {
+        launch::follow(config, state, setpoint);
+    }
+    state.seen.phase = state.phase;
+    match state.phase {
+        Phase::Idle => watch(config, state, sample),
+        Phase::Sense => sense(config, state, sample),
+        // From the next period on.
+        _ => {}
+    }
+    Bridge::Off
+}
+
+/// Whether the set-point asks for no other phase than Idle or Sense, whichever it is.
+#[inline(always)]
+fn goes_on(config: &Config, state: &mut State, setpoint: Setpoint) -> bool {
+    if state.phase == Phase::Sense {
+        return launch::wish(config, setpoint) != Wish::Rest;
+    }
+    stays(state, setpoint)
+}
+
+/// Whether Idle or Brake, which were asked for by nothing but rest, go on.
+#[inline(always)]
+pub(super) fn stays(state: &mut State, setpoint: Setpoint) -> bool {
+    let nothing = matches!(setpoint, Setpoint::Stop | Setpoint::Zero) && !state.tone.braked;
+    if nothing {
+        state.failed_starts = 0;
+    }
+    nothing
+}
+
+/// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
+/// by then, and a limit that is grazed does not come and go.
+#[inline(always)]
+fn clear(config: &Config, state: &mut State, setpoint: Setpoint) {
+    if setpoint != Setpoint::Zero {
+        state.clear_periods = 0;
+    } else if state.clear_periods < config.clear_periods {
+        state.clear_periods += 1;
+    } else {
+        state.faults = Faults::NONE;
+        state.failed_starts = 0;
+    }
+}
+
+/// The supply's voltage at a sample.
+#[inline(always)]
+pub(super) fn bus(config: &Config, sample: &Sample) -> Voltage {
+    Voltage::from_bits(config.bus.of(sample.bus).to_bits() << 4)
+}
+
 /// A period of Idle, Sense, Charge or Tone. `None` when Charge is done and the motor is to turn, and
 /// in any other phase: then the drive acts.
-#[inline(always)]
 pub(super) fn period(
     config: &Config,
     state: &mut State,
@@ -44,7 +127,8 @@ pub(super) fn period(
 }
 
 /// A period with the bridge off: the rotor is watched at the open terminals.
-pub(super) fn watch(config: &Config, state: &mut State, sample: &Sample) {
+#[inline(never)]
+fn watch(config: &Config, state: &mut State, sample: &Sample) {
     state.rotor = catch::observe(&config.catch, &mut state.catch, sample.terminals);
     match state.rotor {
         Rotor::Unknown => state.coast(config),

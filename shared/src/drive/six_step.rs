@@ -48,6 +48,8 @@ pub struct Config {
     pub terminal: Gain<U16, U28>,
     /// Zero crossings.
     pub crossing: crossing::Config,
+    /// From the command to ω*, period by period.
+    pub planner: planner::Config,
     /// The outer loop.
     pub duty: duty::Config,
     /// From the sample to the commutation that it leads to.
@@ -355,7 +357,7 @@ fn run(
     };
     match demand(setpoint, reversed) {
         Demand::Speed(command) => {
-            let step = s.planner.plan(&config.speed.planner, command);
+            let step = s.planner.plan(&six_step.planner, command);
             s.planner.advance(step);
             let reference = s.planner.reference;
             let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);

@@ -3,10 +3,14 @@
 use super::{Config, Fault, Faults, six_step, tone};
 use crate::control::catch::Rotor;
 use crate::control::inductance::Factor;
-use crate::control::transform::{AlphaBeta, Dq};
+use crate::control::modulator::Supply;
+use crate::control::regulator::Reference;
+use crate::control::speed::Bounds;
+use crate::control::transform::{AlphaBeta, Dq, Order};
 use crate::control::{
-    catch, inductance, observer, planner, regulator, sensing, speed, start, torque,
+    catch, dead_time, inductance, observer, planner, regulator, sensing, speed, start, torque,
 };
+use crate::math::{SinCos, sin_cos};
 use crate::protection;
 use crate::units::{Angle, Current, Duty, Flux, Speed, Voltage};
 
@@ -35,6 +39,12 @@ pub enum Phase {
 }
 
 impl Phase {
+    /// Whether the control's frame is imposed on the rotor.
+    #[inline(always)]
+    pub(super) fn is_open_loop(self) -> bool {
+        matches!(self, Self::Park | Self::Ramp)
+    }
+
     /// Whether the motor is turned, or slowed down.
     pub fn drives(self) -> bool {
         matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)
@@ -44,10 +54,21 @@ impl Phase {
 /// The sample at which the bridge is turned off, and one for a period of delay.
 const SETTLING_PERIODS: u8 = 2;
 
+/// No kind of set-point.
+pub(super) const NOT_PLAIN: u8 = u8::MAX;
+
 /// Everything that `step` remembers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     pub(super) phase: Phase,
+    /// The kind of set-point under which the next period is a plain one, or [`NOT_PLAIN`].
+    pub(super) plain: u8,
+    /// Samples for which a phase may be unreadable.
+    pub(super) unread: u8,
+    /// Which piece of the slow work this period has done.
+    pub(super) turn: u8,
+    /// The phases' order as the control sees it.
+    pub(super) order: Order,
     pub(super) faults: Faults,
     pub(super) fault_count: u32,
     /// Periods at zero throttle since the last sample that was a fault.
@@ -78,6 +99,18 @@ pub struct State {
     /// Change of ω* in the last period.
     pub(super) planned: Speed,
     pub(super) torque: torque::State,
+    /// What is wanted of the current regulator.
+    pub(super) wanted: Reference,
+    /// i_d* at this speed.
+    pub(super) i_d: Current,
+    /// Bounds of i_q* at this speed.
+    pub(super) bounds: Bounds,
+    /// How far the frame turns until the voltage acts.
+    pub(super) ahead: SinCos,
+    /// The wanted current as the dead time's compensation takes it.
+    pub(super) certainty: dead_time::Certainty,
+    /// What the supply gives.
+    pub(super) supply: Supply,
     /// i_q* less i_q where the voltage was limited.
     pub(super) missing: Current,
     pub(super) start: start::State,
@@ -144,6 +177,10 @@ impl State {
     pub fn new(config: &Config) -> Self {
         Self {
             phase: Phase::Idle,
+            plain: NOT_PLAIN,
+            unread: 0,
+            turn: 0,
+            order: Order::NORMAL,
             faults: Faults::NONE,
             fault_count: 0,
             clear_periods: 0,
@@ -166,6 +203,12 @@ impl State {
             inductance: inductance::State::default(),
             planned: Speed::ZERO,
             torque: torque::State::default(),
+            wanted: Reference::default(),
+            i_d: Current::ZERO,
+            bounds: Bounds::default(),
+            ahead: sin_cos(Angle::ZERO),
+            certainty: Dq::default(),
+            supply: Supply::new(&config.modulator, Voltage::ZERO, Voltage::ZERO),
             missing: Current::ZERO,
             protection: protection::State::new(&config.protection),
             six_step: six_step::State::default(),
@@ -185,12 +228,13 @@ impl State {
     /// Goes on under a new configuration. Where its units differ, all but the faults starts anew:
     /// the numbers would mean something else. That is for a drive at rest.
     pub fn adopt(&mut self, before: &Config, now: &Config) {
+        self.plain = NOT_PLAIN;
         if before.scale != now.scale {
-            *self = Self {
-                faults: self.faults,
-                fault_count: self.fault_count,
-                ..Self::new(now)
-            };
+            // In two steps: a state in between would take a KB of the interrupt's stack.
+            let (faults, fault_count) = (self.faults, self.fault_count);
+            *self = Self::new(now);
+            self.faults = faults;
+            self.fault_count = fault_count;
         }
         // A factor that was found for other parameters, or is no longer kept up.
         if before.observer != now.observer
@@ -249,6 +293,10 @@ impl State {
         // Taken apart in full, so that a new field is not forgotten here.
         let Self {
             phase,
+            plain,
+            unread,
+            turn,
+            order,
             faults,
             fault_count,
             clear_periods,
@@ -269,6 +317,12 @@ impl State {
             inductance,
             planned,
             torque: torque::State { i_q },
+            wanted,
+            i_d,
+            bounds,
+            ahead,
+            certainty,
+            supply,
             missing,
             start,
             tone,
@@ -280,6 +334,10 @@ impl State {
         } = self;
         for word in [
             *phase as u32,
+            u32::from(*plain),
+            u32::from(*unread),
+            u32::from(*turn),
+            u32::from(*order == Order::SWAPPED),
             u32::from(faults.bits()),
             *fault_count,
             *clear_periods,
@@ -314,6 +372,21 @@ impl State {
             seen.u.d.to_bits(),
             seen.u.q.to_bits(),
             seen.bus_current.to_bits(),
+            wanted.i.d.to_bits(),
+            wanted.i.q.to_bits(),
+            wanted.i_q_step.to_bits(),
+            wanted.u_q.to_bits(),
+            i_d.to_bits(),
+            bounds.min.to_bits(),
+            bounds.max.to_bits(),
+            ahead.cos.to_bits(),
+            ahead.sin.to_bits(),
+            certainty.d.to_bits(),
+            certainty.q.to_bits(),
+            supply.bus.to_bits(),
+            supply.reciprocal.to_bits(),
+            supply.longest.length().to_bits(),
+            supply.readable.to_bits(),
         ] {
             out(bits as u32);
         }
@@ -350,11 +423,14 @@ impl State {
     /// Turns the bridge off until zero throttle, for this reason.
     #[cold]
     pub(super) fn trip(&mut self, fault: Fault) {
+        self.clear_periods = 0;
+        if self.faults.contains(fault) && self.phase == Phase::Idle {
+            return;
+        }
         if !self.faults.contains(fault) {
             self.fault_count = self.fault_count.saturating_add(1);
         }
         self.faults.insert(fault);
-        self.clear_periods = 0;
         self.rest(Phase::Idle);
     }
 
@@ -362,6 +438,12 @@ impl State {
     /// that is reported stays where it was the rotor's: the shaft turns on.
     #[cold]
     pub(super) fn rest(&mut self, phase: Phase) {
+        let off = |phase| matches!(phase, Phase::Idle | Phase::Sense);
+        if off(self.phase) && off(phase) {
+            // All else has been at rest since the bridge was turned off.
+            self.listen(phase);
+            return;
+        }
         if matches!(self.phase, Phase::Park | Phase::Ramp) {
             // That was the frame's speed, which the rotor may not have followed.
             self.seen.speed = Speed::ZERO;
@@ -369,24 +451,20 @@ impl State {
         if !matches!(self.phase, Phase::Idle | Phase::Sense | Phase::Charge) {
             // What the terminals told before they were driven is over.
             self.rotor = Rotor::Unknown;
-            self.catch.samples = 0;
-            self.catch.fitting = 0;
+            self.catch.restart();
         }
-        self.phase = phase;
+        self.listen(phase);
+        self.plain = NOT_PLAIN;
         self.lost_periods = 0;
         self.slow_periods = 0;
         self.run_periods = 0;
-        self.settling_periods = SETTLING_PERIODS;
-        self.sensing.restart();
-        self.looks = 0;
         self.charge_periods = 0;
         self.commanded = [AlphaBeta::default(); 2];
         self.planned = Speed::ZERO;
         self.missing = Current::ZERO;
         self.torque = torque::State::default();
-        self.tone = tone::Playing::default();
+        self.wanted = Reference::default();
         self.inductance.begin();
-        self.seen.phase = phase;
         self.seen.i = Dq::default();
         self.seen.u = Dq::default();
         self.seen.bus_current = Current::ZERO;
@@ -394,6 +472,17 @@ impl State {
         self.speed = speed::State::default();
         self.six_step.planner = planner::State::default();
         self.regulator = regulator::State::default();
+    }
+
+    /// Begins a phase in which nothing has been measured yet.
+    #[inline(always)]
+    fn listen(&mut self, phase: Phase) {
+        self.phase = phase;
+        self.seen.phase = phase;
+        self.settling_periods = SETTLING_PERIODS;
+        self.sensing.restart();
+        self.looks = 0;
+        self.tone = tone::Playing::default();
     }
 
     /// Until the open terminals tell the shaft's speed, what is reported falls as slowly as a large

@@ -12,15 +12,17 @@
 //! the amplitude itself is bounded: by what twice the current and the dead time need.
 
 use fixed::types::extra::{U28, U31, U32};
-use fixed::types::{I1F31, I5F27};
+use fixed::types::{I1F31, I6F26};
 
 use super::launch::{self, Wish};
+use super::slow::CYCLE;
 use super::state::Seen;
 use super::turn::{bus_current, reading};
 use super::{Bridge, Phase, Setpoint, State};
 use crate::control::catch::Rotor;
+use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
-use crate::control::transform::{AlphaBeta, Dq};
+use crate::control::transform::{AlphaBeta, Dq, Order};
 use crate::math::{Gain, Held, TopProduct, magnitude, sin_cos};
 use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
@@ -56,7 +58,7 @@ pub(super) struct Playing {
     peak: Current,
     /// The low sides were on before, and will be again: at once where a tone has been played, else
     /// when the rotor is seen to stand.
-    braked: bool,
+    pub(super) braked: bool,
 }
 
 impl Playing {
@@ -118,8 +120,12 @@ pub(super) fn period(
     let (Some(tone), Setpoint::Tone(pitch)) = (&config.tone, setpoint) else {
         return None;
     };
-    state.phase = Phase::Tone;
-    let supply = Supply::new(&config.modulator, state.protection.bus);
+    state.turn = (state.turn + 1) % CYCLE as u8;
+    if state.phase != Phase::Tone || state.turn == 0 {
+        state.supply = Supply::new(&config.modulator, state.protection.bus, Voltage::ZERO);
+        state.phase = Phase::Tone;
+    }
+    let supply = state.supply;
     let [a, b, c] = currents.map(reading);
     let greatest = a
         .saturating_abs()
@@ -147,10 +153,12 @@ pub(super) fn period(
         return Some(Bridge::Brake);
     }
     let v = AlphaBeta {
-        alpha: I5F27::from_bits(u.to_bits() >> 1),
-        beta: I5F27::ZERO,
+        alpha: I6F26::from_bits(u.to_bits() >> 2),
+        beta: I6F26::ZERO,
     };
-    let duties = modulator::duties(&config.modulator, &supply, v, [I1F31::ZERO; 3]);
+    let v = (v, Order::NORMAL);
+    let none = (&dead_time::Config::NONE, AlphaBeta::default());
+    let duties = modulator::duties(&config.modulator, &supply, v, none);
     state.applied[0] = duties;
     Some(Bridge::Duty(duties))
 }
@@ -194,7 +202,7 @@ fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
         half.top(missing).to_bits()
     });
     let dead = Voltage::from_bits(tone.dead.top(supply.bus).to_bits() << 1);
-    let most = needed.plus(needed).plus(dead).min(supply.vector_max);
+    let most = needed.plus(needed).plus(dead).min(supply.longest.length());
     playing.amplitude = playing.amplitude.plus(step).max(Voltage::ZERO).min(most);
     playing.peak = Current::ZERO;
 }

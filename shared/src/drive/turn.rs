@@ -1,120 +1,110 @@
 //! A period in which the phases switch, and one in which the low sides are on.
 
-use fixed::types::I3F29;
-
-use super::launch;
+use super::slow::{self, CYCLE};
 use super::state::Seen;
-use super::{Bridge, Config, Phase, Sample, Setpoint, State};
+use super::{Bridge, Config, Phase, Sample, State};
+use crate::control::delay::Delay;
 use crate::control::modulator::{self, Supply};
-use crate::control::observer::{self, Estimate, Input};
-use crate::control::regulator::{Feedback, Reference};
-use crate::control::speed::{self, Bounds};
-use crate::control::transform::{self, AlphaBeta, Dq, clarke, inverse_park, park, voltages};
-use crate::control::{dead_time, inductance, start, torque, voltage};
+use crate::control::observer::{self, Input, Observer};
+use crate::control::regulator::Regulator;
+use crate::control::start;
+use crate::control::transform::{
+    self, AlphaBeta, Dq, Order, clarke_in, inverse_park, park, voltages,
+};
 use crate::math::{Held, TopProduct, sin_cos};
-use crate::protection;
-use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
+use crate::units::{AdcCounts, Current, Speed, Voltage, WideVoltage};
 
-/// A period in which the phases switch.
+/// A period in which the phases switch, with this observer and this regulator.
 #[inline(always)]
 pub(super) fn period(
-    config: &Config,
-    state: &mut State,
-    sample: &Sample,
-    currents: [AdcCounts; 3],
-    setpoint: Setpoint,
+    (open_loop, delay): (bool, Delay),
+    (observer, regulator): (&impl Observer, &impl Regulator),
+    (config, state): (&Config, &mut State),
+    (sample, currents): (&Sample, [AdcCounts; 3]),
 ) -> Bridge {
-    let setpoint = if state.reversed {
-        setpoint.turned()
-    } else {
-        setpoint
-    };
-    let swapped = state.swapped(config);
-    let supply = Supply::new(&config.modulator, state.protection.bus);
-    let stator = clarke(in_order(swapped, currents));
-    let input = input(config, state, (sample, swapped), stator);
-    let open_loop = matches!(state.phase, Phase::Park | Phase::Ramp);
-    let imposed = open_loop.then_some(state.start.omega_s);
-    let estimate = observer::estimate(&config.observer, &mut state.observer, &input, imposed);
-
-    let (theta, fb, wanted) = if open_loop {
+    let order = state.order;
+    let stator = clarke_in(order, currents);
+    let swapped = order == Order::SWAPPED;
+    let input = input(delay, state, (sample, swapped), stator);
+    let (frame, fb) = if open_loop {
+        let imposed = Some(state.start.omega_s);
+        if state.phase == Phase::Ramp || observer.follows_park() {
+            observer.estimate(&mut state.observer, &input, imposed);
+        }
         let theta = state.start.frame;
-        let i = park(stator, sin_cos(theta));
-        let (omega_s, wanted) = launch::open_loop(config, state, setpoint, input.i);
-        let attempt = launch::attempt(config, state);
-        let omega = start::damp(attempt, &mut state.start, (i, state.seen.u), omega_s);
-        (theta, feedback(config, state, omega, i), wanted)
+        let frame = sin_cos(theta);
+        let i = park(stator, frame);
+        state.seen.angle = order.angle(theta);
+        state.seen.i = i;
+        state.seen.speed = state.start.omega_s;
+        let omega = start::advance(&mut state.start);
+        let factor = state.inductance.factor;
+        let fb = observer.feedback(&state.observer, (omega, i), factor);
+        (frame, fb)
     } else {
+        let estimate = observer.estimate(&mut state.observer, &input, None);
         let i = park(stator, estimate.frame);
-        let fb = feedback(config, state, estimate.omega, i);
-        let wanted = run(config, state, setpoint, &estimate, &fb, supply.vector_max);
-        (estimate.theta, fb, wanted)
+        state.seen.angle = order.angle(estimate.theta);
+        state.seen.speed = estimate.omega_bar;
+        state.seen.i = i;
+        let factor = state.inductance.factor;
+        let fb = observer.feedback(&state.observer, (estimate.omega, i), factor);
+        (estimate.frame, fb)
     };
-    let (omega, i) = (fb.omega, fb.i);
 
-    let asked = config.regulator.voltage(&state.regulator, &wanted, &fb);
-    let (u, cut) = modulator::limit(asked, supply.vector_max);
-    config
-        .regulator
-        .integrate(&mut state.regulator, &wanted, &fb, cut);
-    state.missing = if cut.is_some() {
-        wanted.i.q.minus(i.q)
+    let asked = regulator.voltage(&state.regulator, &state.wanted, &fb);
+    regulator.integrate(&mut state.regulator, &state.wanted, &fb);
+    let square = modulator::square_of(asked);
+    let u = if square <= state.supply.readable {
+        modulator::short(asked)
     } else {
-        Current::ZERO
+        long(regulator, state, asked)
     };
-    observer::advance(&config.observer, &mut state.observer, &fb, u);
+    observer.advance(&mut state.observer, &fb, u);
+    state.seen.u = u;
 
-    let bus_current = bus_current(u, i, &supply);
-    protection::bound(&config.protection, &mut state.protection, bus_current, i.q);
-    state.seen = Seen {
-        phase: state.phase,
-        angle: in_frame(swapped, theta),
-        speed: if open_loop {
-            state.start.omega_s
-        } else {
-            estimate.omega_bar
-        },
-        i,
-        u,
-        bus_current,
-    };
-    if let Some(fault) = launch::proceed(config, state) {
-        state.trip(fault);
-    }
-    // What has ended switches no more.
-    match state.phase {
-        Phase::Idle => return Bridge::Off,
-        Phase::Brake => return Bridge::Brake,
-        _ => {}
-    }
-
-    // The voltage acts from `delay` to `delay + 1` periods after the sample, while the rotor turns
-    // on: aimed at the middle of that time. Without this the loop is unstable above 4489 rpm on
-    // the bench at 15 kHz.
-    let ahead = sin_cos(theta.wrapping_add(config.delay.advance(omega)));
-    let v = inverse_park(u, ahead);
+    let v = inverse_park(transform::turn(u, state.ahead), frame);
     state.commanded = [voltages(v), state.commanded[0]];
-    let compensation = dead_time::compensation(&config.dead_time, inverse_park(wanted.i, ahead));
-    let duties = modulator::duties(&config.modulator, &supply, v, compensation);
-    let duties = in_order(swapped, duties);
+    let certainty = inverse_park(state.certainty, frame);
+    let dead_time = (&config.dead_time, certainty);
+    let duties = modulator::duties(&config.modulator, &state.supply, (v, order), dead_time);
     state.applied[0] = duties;
     Bridge::Duty(duties)
 }
 
+/// A voltage vector so long that a phase cannot be read, or than the supply can give.
+#[cold]
+fn long(regulator: &impl Regulator, state: &mut State, asked: Dq<WideVoltage>) -> Dq<Voltage> {
+    if state.unread == 0 {
+        // Since then nobody has asked for them.
+        state.applied[1] = state.applied[0];
+    }
+    state.unread = UNREAD;
+    let (u, cut) = modulator::limit(asked, &state.supply.longest);
+    if let Some(cut) = cut {
+        regulator.give_way(&mut state.regulator, cut);
+        state.missing = state.wanted.i.q.minus(state.seen.i.q);
+    }
+    u
+}
+
+/// Samples after a long vector in which its duties may still count.
+const UNREAD: u8 = 3;
+
 /// What the observer reads at this sample.
 #[inline(always)]
 fn input(
-    config: &Config,
+    delay: Delay,
     state: &State,
     (sample, swapped): (&Sample, bool),
-    stator: AlphaBeta<I3F29>,
+    stator: AlphaBeta<Current>,
 ) -> Input {
     let [now, before] = state.commanded;
     Input {
-        i: transform::currents(stator),
+        i: stator,
         v: AlphaBeta {
-            alpha: config.delay.applied(now.alpha, before.alpha),
-            beta: config.delay.applied(now.beta, before.beta),
+            alpha: delay.applied(now.alpha, before.alpha),
+            beta: delay.applied(now.beta, before.beta),
         },
         inductance: state.inductance.factor,
         planned: state.planned,
@@ -132,102 +122,42 @@ pub(super) fn hall(sample: &Sample, swapped: bool) -> u8 {
     }
 }
 
-/// What the current regulator reads.
-#[inline(always)]
-fn feedback(config: &Config, state: &State, omega: Speed, i: Dq<Current>) -> Feedback {
-    let factor = state.inductance.factor;
-    observer::feedback(&config.observer, &state.observer, (omega, i), factor)
-}
-
-/// Run and Stopping: the current reference.
-#[inline(always)]
-fn run(
-    config: &Config,
-    state: &mut State,
-    setpoint: Setpoint,
-    estimate: &Estimate,
-    fb: &Feedback,
-    vector_max: Voltage,
-) -> Reference {
-    state.lost_periods = if estimate.lost {
-        state.lost_periods + 1
-    } else {
-        0
-    };
-    let (mut i_d, full) = config
-        .low_speed
-        .bounds(state.protection.bounds, estimate.omega_bar);
-    if let Some(adapt) = &config.adapt_l {
-        let flux = observer::flux(&config.observer, &state.observer);
-        i_d += inductance::step(adapt, &mut state.inductance, fb.i.d, flux);
-    }
-    let (command, bounds) = match (state.phase, setpoint) {
-        (Phase::Run, Setpoint::Speed(command)) => (command, full),
-        (Phase::Run, Setpoint::Torque(i_q) | Setpoint::Test(i_q)) => {
-            let wanted = Reference::steady(i_q).with_i_d(i_d);
-            return directly(config, state, estimate, wanted, full);
-        }
-        (Phase::Run, Setpoint::Voltage(share)) => {
-            let u_q = voltage::of_share(share, vector_max);
-            let (regulator, integrators) = (&config.regulator, &state.regulator);
-            let wanted = voltage::reference(regulator, integrators, fb, i_d, u_q);
-            return directly(config, state, estimate, wanted, full);
-        }
-        // Stopping, and turning round, is by regenerative braking.
-        _ => (
-            Speed::ZERO,
-            Bounds {
-                max: Current::ZERO,
-                ..full
-            },
-        ),
-    };
-    let input = speed::Input {
-        command,
-        estimate: *estimate,
-        bounds,
-        missing: state.missing,
-    };
-    let before = state.speed.reference();
-    let wanted = config.speed.current(&mut state.speed, &input);
-    state.planned = state.speed.reference().minus(before);
-    torque::grow(&config.torque, &mut state.torque, wanted).with_i_d(i_d)
-}
-
-/// A current that is commanded, while the speed regulator stands by to take over.
-#[inline]
-fn directly(
-    config: &Config,
-    state: &mut State,
-    estimate: &Estimate,
-    wanted: Reference,
-    bounds: Bounds,
-) -> Reference {
-    let wanted = torque::follow(&config.torque, &mut state.torque, wanted, bounds);
-    config
-        .speed
-        .begin(&mut state.speed, estimate.omega_bar, wanted.i.q);
-    state.planned = Speed::ZERO;
-    wanted
-}
-
 /// With the low sides on the voltage is known to be zero: the observer goes on, so that the speed
 /// is reported down to where its back-EMF drowns in noise.
-pub(super) fn watch(config: &Config, state: &mut State, sample: &Sample, currents: [AdcCounts; 3]) {
-    let swapped = state.swapped(config);
-    let stator = clarke(in_order(swapped, currents));
+#[inline(never)]
+pub(super) fn watch(
+    observer: &impl Observer,
+    (config, state): (&Config, &mut State),
+    sample: &Sample,
+    currents: [AdcCounts; 3],
+) {
+    state.turn = (state.turn + 1) % CYCLE as u8;
+    let stator = clarke_in(state.order, currents);
     state.commanded = [AlphaBeta::default(), state.commanded[0]];
-    let input = input(config, state, (sample, swapped), stator);
-    let estimate = observer::estimate(&config.observer, &mut state.observer, &input, None);
+    let swapped = state.order == Order::SWAPPED;
+    let input = input(config.delay, state, (sample, swapped), stator);
+    let estimate = observer.estimate(&mut state.observer, &input, None);
     let i = park(stator, estimate.frame);
     let u = Dq::default();
-    let fb = feedback(config, state, estimate.omega, i);
-    observer::advance(&config.observer, &mut state.observer, &fb, u);
+    match state.turn {
+        0 => {
+            let factor = state.inductance.factor;
+            observer::pace(&config.observer, &mut state.observer, factor, CYCLE);
+        }
+        // A drive may resume at any time.
+        8 => slow::begin(config, state, 1),
+        16 => slow::begin(config, state, 2),
+        24 => slow::begin(config, state, 3),
+        _ => {}
+    }
+    let factor = state.inductance.factor;
+    let fb = observer.feedback(&state.observer, (estimate.omega, i), factor);
+    observer.advance(&mut state.observer, &fb, u);
     // An eighth of the speed at which Run ends: 19 rpm with the defaults.
     let turns = estimate.omega_bar.to_bits() > config.slow.to_bits() >> 3;
     state.seen = Seen {
         phase: Phase::Brake,
-        angle: in_frame(swapped, estimate.theta),
+        angle: state.order.angle(estimate.theta),
         speed: if turns {
             estimate.omega_bar
         } else {
@@ -243,12 +173,6 @@ pub(super) fn watch(config: &Config, state: &mut State, sample: &Sample, current
 #[inline(always)]
 pub(super) fn in_order<T>(swapped: bool, [a, b, c]: [T; 3]) -> [T; 3] {
     if swapped { [a, c, b] } else { [a, b, c] }
-}
-
-/// An angle of the control's frame with the phases in the order a, b, c.
-#[inline(always)]
-fn in_frame(swapped: bool, theta: Angle) -> Angle {
-    if swapped { theta.wrapping_neg() } else { theta }
 }
 
 /// A phase's reading as a current: one unit is 4096/3 counts.

@@ -96,7 +96,7 @@ impl Esc {
                 return false;
             }
         }
-        if self.given.build(&params, &self.board).is_err() {
+        if self.given.check(&params, &self.board).is_err() {
             return false;
         }
         self.params = params;

@@ -8,6 +8,7 @@ use super::Share;
 use super::demand::{Demand, Reading};
 use super::line::Event;
 use super::signal::Signal;
+use crate::math::Real;
 
 /// Zero-throttle frames that arm a wire, at least.
 const ARMING_FRAMES: u32 = 30;
@@ -313,10 +314,10 @@ impl Authority {
         if !drive.stopped || drive.faulted || !(silent || self.holds_zero(now_us)) {
             return Err(TestError::TemporarilyRejected);
         }
-        let duration_us = (duration_s * 1e6) as u64;
+        let duration_us = u64::from((duration_s * 1e6) as u32);
         // No time at all, or nothing to turn by, is no test.
         self.test = (duration_us > 0 && value != 0.0).then(|| Test {
-            value: Share::saturating_from_num(value),
+            value: Share::from_f32(value),
             ends_us: now_us.saturating_add(duration_us),
         });
         Ok(())

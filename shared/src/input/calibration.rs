@@ -5,6 +5,7 @@
 //! seconds both ends are known. Anything else leaves them as they were, until the next power-up.
 
 use super::endpoints::EndPoints;
+use crate::math::quotient;
 
 /// Servo pulses that may be full throttle, ns: the upper part of what is accepted. The middle of a
 /// stick for two directions must not begin a calibration.
@@ -164,9 +165,13 @@ impl Held {
     }
 
     fn mean_ns(&self) -> u32 {
-        let mean_ns = self.sum_ns / i64::from(self.count.max(1));
+        let mean_ns = quotient(self.sum_ns.unsigned_abs(), self.count.max(1));
         // The mean strays no further from the first than any of the widths.
-        self.first_ns.saturating_add_signed(mean_ns as i32)
+        if self.sum_ns < 0 {
+            self.first_ns.saturating_sub(mean_ns)
+        } else {
+            self.first_ns.saturating_add(mean_ns)
+        }
     }
 }
 

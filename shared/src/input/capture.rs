@@ -7,9 +7,13 @@
 use super::dshot::{Frame, Rate, check_mask};
 use super::filter::{Edge, since};
 use super::line::Event;
+use crate::math::quotient;
 
 /// Edges of a frame: two a bit.
 const EDGES: u8 = 32;
+
+/// From the last edge of a frame back to its first.
+const EDGES_BEFORE: usize = EDGES as usize - 1;
 
 /// Whole bits of a frame, from a first edge to a first edge.
 const WHOLE_BITS: u32 = 15;
@@ -39,10 +43,14 @@ pub(super) struct Decoder {
     only: Option<(Rate, bool)>,
     /// A level at least this long is no part of a frame.
     rest_ticks: u32,
+    /// A level shorter than this is no rest before a frame, however fast that is: 1.375 bits.
+    rest_least: u32,
     times: [u32; KEPT],
     newest: usize,
     /// Of the times, those that count: no more than a frame and the edge before it.
     held: u8,
+    /// Edges since the line has rested for `rest_least`.
+    run: u8,
     /// Edges that have not been reported, as a frame or as a bad one.
     unread: u8,
 }
@@ -68,9 +76,11 @@ impl Decoder {
             rates: Rate::ALL.map(|rate| Limits::new(tick_hz, rate)),
             only: None,
             rest_ticks: 0,
+            rest_least: 0,
             times: [0; KEPT],
             newest: 0,
             held: 0,
+            run: 0,
             unread: 0,
         };
         decoder.take_only(None);
@@ -80,10 +90,26 @@ impl Decoder {
     /// Takes one rate of one direction; nothing for all of them.
     pub(super) fn take_only(&mut self, only: Option<(Rate, bool)>) {
         self.only = only;
-        let mut taken = self.rates.iter().flatten();
-        // The slowest comes first, and with it the longest rest.
-        let limits = taken.find(|limits| only.is_none_or(|(rate, _)| rate == limits.rate));
-        self.rest_ticks = limits.map_or(u32::MAX, |limits| limits.rest_ticks);
+        let rates = self.rates.iter().flatten();
+        let mut taken = rates.filter(|limits| only.is_none_or(|(rate, _)| rate == limits.rate));
+        // The slowest comes first and the fastest last, and with them the longest and shortest rest.
+        let slowest = taken.next();
+        let fastest = taken.next_back().or(slowest);
+        self.rest_ticks = slowest.map_or(u32::MAX, |limits| limits.rest_ticks);
+        self.rest_least = fastest.map_or(u32::MAX, |limits| rest(limits.span_least));
+    }
+
+    /// Takes an edge within a frame of the rate that is taken, and says so: a short way for nearly
+    /// all of them.
+    pub(super) fn pass(&mut self, at_ticks: u32) -> bool {
+        let run = self.run_with(at_ticks);
+        let begins_or_goes_on = run > 1 || self.unread == 0;
+        let passes = begins_or_goes_on && run < EDGES && self.unread < EDGES - 1;
+        if passes {
+            self.push_of_run(at_ticks, run);
+            self.unread += 1;
+        }
+        passes
     }
 
     /// Takes an edge of another level than the one before.
@@ -103,18 +129,26 @@ impl Decoder {
         event
     }
 
-    /// Whether a frame would end with this edge, which is not taken.
-    pub(super) fn ends_with(&mut self, edge: Edge) -> bool {
-        let (newest, held) = (self.newest, self.held);
+    /// Takes an edge if a frame ends with it, and returns that one.
+    pub(super) fn end(&mut self, edge: Edge) -> Option<Event> {
+        // Within a frame of the rate that is taken no level is as long as a rest.
+        if self.only.is_some() && self.run != EDGES - 1 {
+            return None;
+        }
+        let before = (self.newest, self.held, self.run);
         self.push(edge.at_ticks);
-        let ends = self.frame(edge.level).is_some();
-        (self.newest, self.held) = (newest, held);
-        ends
+        let event = self.frame(edge.level);
+        if event.is_some() {
+            self.unread = 0;
+        } else {
+            (self.newest, self.held, self.run) = before;
+        }
+        event
     }
 
     /// Reports edges that were no frame, once the line has come to rest after them.
     pub(super) fn settle(&mut self, now_ticks: u32) -> Option<Event> {
-        let cut = self.unread > 0 && since(now_ticks, self.back(0)) >= self.rest_ticks;
+        let cut = self.rests(now_ticks);
         if cut {
             self.unread = 0;
         }
@@ -126,6 +160,7 @@ impl Decoder {
     pub(super) fn spoil(&mut self, at_ticks: u32) {
         // The edge before tells for how long the line may have rested.
         self.held = self.held.min(1);
+        self.run = self.held;
         self.push(at_ticks);
         self.unread = self.unread.max(1);
     }
@@ -133,13 +168,35 @@ impl Decoder {
     /// Forgets every edge: the line has been at rest for long.
     pub(super) fn clear(&mut self) {
         self.held = 0;
+        self.run = 0;
         self.unread = 0;
     }
 
+    /// Whether the line has come to rest after edges that have not been reported.
+    fn rests(&self, now_ticks: u32) -> bool {
+        self.unread > 0 && since(now_ticks, self.back(0)) >= self.rest_ticks
+    }
+
+    /// What the run becomes by an edge at this time.
+    fn run_with(&self, at_ticks: u32) -> u8 {
+        if at_ticks.wrapping_sub(self.back(0)) >= self.rest_least {
+            1
+        } else {
+            self.run.saturating_add(1)
+        }
+    }
+
     fn push(&mut self, at_ticks: u32) {
+        self.push_of_run(at_ticks, self.run_with(at_ticks));
+    }
+
+    fn push_of_run(&mut self, at_ticks: u32, run: u8) {
+        self.run = run;
         self.newest = (self.newest + 1) % KEPT;
         self.times[self.newest] = at_ticks;
-        self.held = (self.held + 1).min(EDGES + 1);
+        if self.held <= EDGES {
+            self.held += 1;
+        }
     }
 
     /// The time of the edge that came `edges` before the newest one.
@@ -155,11 +212,11 @@ impl Decoder {
         if other || self.held < EDGES {
             return None;
         }
-        let first_edge_ticks = self.back(31);
+        let first_edge_ticks = self.back(EDGES_BEFORE);
         let span = self.back(1).wrapping_sub(first_edge_ticks);
-        // 1.5 bits. What was before the first of all edges is taken for a rest.
-        let rested = self.held == EDGES
-            || first_edge_ticks.wrapping_sub(self.back(32)) >= span / (WHOLE_BITS * 2 / 3);
+        let before_ticks = first_edge_ticks.wrapping_sub(self.back(EDGES_BEFORE + 1));
+        // What was before the first of all edges is taken for a rest.
+        let rested = self.held == EDGES || before_ticks >= rest(span);
         if !rested {
             return None;
         }
@@ -184,26 +241,36 @@ impl Decoder {
 
     /// The bits of the newest 32 edges, of which the whole bits take `span`.
     fn bits(&self, span: u32) -> Option<u16> {
-        // Both sides of the comparisons are times of 16 · 15 bits. A span is below 500 000 ticks.
-        let scaled = |ticks: u32| ticks.saturating_mul(SHARES * WHOLE_BITS);
+        // Whole ticks on the inner side of so many shares of the mean bit. A span is below 500 000.
+        let least = |shares: u32| (shares * span).div_ceil(SHARES * WHOLE_BITS);
+        let most = |shares: u32| shares * span / (SHARES * WHOLE_BITS);
+        let actives = least(SHORTEST)..most(LONGEST) + 1;
+        let one = least(ONE);
+        let periods = least(SHARES - STRAY)..most(SHARES + STRAY) + 1;
+        let mut start = self.back(EDGES_BEFORE);
         let mut bits = 0;
-        for bit in 0..16 {
-            let start = self.back(31 - 2 * bit);
-            let active = scaled(self.back(30 - 2 * bit).wrapping_sub(start));
-            if !(SHORTEST * span..=LONGEST * span).contains(&active) {
+        for left in (0..16).rev() {
+            let active = self.back(2 * left).wrapping_sub(start);
+            if !actives.contains(&active) {
                 return None;
             }
+            bits = bits << 1 | u16::from(active >= one);
             // The last bit has no next edge to end it.
-            if let Some(next) = 29_usize.checked_sub(2 * bit) {
-                let period = scaled(self.back(next).wrapping_sub(start));
-                if period.abs_diff(SHARES * span) > STRAY * span {
+            if left > 0 {
+                let next = self.back(2 * left - 1);
+                if !periods.contains(&next.wrapping_sub(start)) {
                     return None;
                 }
+                start = next;
             }
-            bits = bits << 1 | u16::from(active >= ONE * span);
         }
         Some(bits)
     }
+}
+
+/// The least rest before a frame, 1.5 bits of it, where its whole bits take `span`.
+fn rest(span: u32) -> u32 {
+    span / (WHOLE_BITS * 2 / 3)
 }
 
 impl Limits {
@@ -211,7 +278,7 @@ impl Limits {
     fn new(tick_hz: u32, rate: Rate) -> Option<Self> {
         let ticks = |numerator: u32, denominator: u32| {
             let ticks = u64::from(tick_hz) * u64::from(numerator);
-            (ticks / (u64::from(denominator) * u64::from(rate.bit_hz()))) as u32
+            quotient(ticks, denominator * rate.bit_hz())
         };
         (ticks(1, 1) >= LEAST_TICKS).then(|| Self {
             rate,

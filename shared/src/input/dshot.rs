@@ -70,9 +70,12 @@ impl Frame {
 
 /// Where a value stands between the first and the last one.
 fn share(value: u16, first: u16, last: u16) -> Share {
-    let step = u64::from(value.min(last) - first);
-    let share = (step << Share::FRAC_NBITS) / u64::from(last - first);
-    Share::from_bits(share.min(i32::MAX as u64) as i32)
+    let (step, steps) = (u32::from(value.min(last) - first), u32::from(last - first));
+    // step·2^31/steps in 32 bits: the whole part of 2^31/steps, and its rest.
+    let whole = (1 << Share::FRAC_NBITS) / steps;
+    let rest = (1 << Share::FRAC_NBITS) % steps;
+    let share = step * whole + step * rest / steps;
+    Share::from_bits(share.min(i32::MAX as u32) as i32)
 }
 
 /// The four check bits of 12 data bits: the exclusive or of their nibbles.

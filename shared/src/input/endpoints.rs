@@ -3,6 +3,7 @@
 use super::demand::Demand;
 use super::signal::Pulse;
 use super::{Share, reverse};
+use crate::math::quotient;
 
 const NS_PER_US: u32 = 1000;
 
@@ -81,8 +82,8 @@ fn above(width_ns: u32, zero_ns: u32, full_ns: u32) -> Option<Share> {
     if over_ns == 0 {
         return None;
     }
-    let share = (u64::from(over_ns) << Share::FRAC_NBITS) / u64::from(full_ns - zero_ns);
-    Some(Share::from_bits(share.min(i32::MAX as u64) as i32))
+    let share = quotient(u64::from(over_ns) << Share::FRAC_NBITS, full_ns - zero_ns);
+    Some(Share::from_bits(share.min(i32::MAX as u32) as i32))
 }
 
 #[cfg(test)]

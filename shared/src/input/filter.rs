@@ -43,6 +43,18 @@ impl Filter {
 
     /// Takes an edge as the timer saw it.
     pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Told {
+        // A short way for the edges of a sound signal.
+        if let Some(pending) = self.pending
+            && pending.level != level
+            && at_ticks.wrapping_sub(pending.at_ticks) >= self.time_ticks
+        {
+            self.level = Some(pending.level);
+            self.pending = Some(Edge { at_ticks, level });
+            return Told {
+                believed: Some(pending),
+                missed: false,
+            };
+        }
         let believed = match self.pending {
             Some(pending) if at_ticks.wrapping_sub(pending.at_ticks) >= self.time_ticks => {
                 self.believe()

@@ -6,12 +6,16 @@ use super::dshot::{Frame, Rate};
 use super::filter::{Edge, Filter, since};
 use super::pulse;
 use super::signal::{Pulse, Signal};
+use crate::math::quotient;
 
 /// A line without an edge for so long is at rest, whatever was on it. At 50 Hz pulses leave 19 ms.
 const SILENCE_MS: u32 = 100;
 
 /// What has been found on the wire.
+///
+/// In whole words, tag and all: a chip copies it in a few instructions at every edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
 pub enum Event {
     /// A DShot frame with a right check sum.
     Frame {
@@ -93,7 +97,10 @@ impl Line {
         self.edge_at = at_ticks;
         self.silent = false;
         let told = self.filter.edge(at_ticks, level);
-        let event = told.believed.and_then(|edge| self.decode(edge));
+        let event = match told.believed {
+            Some(edge) if !self.pass(edge) => self.decode(edge),
+            _ => None,
+        };
         if told.missed {
             self.frames.spoil(at_ticks);
             self.pulses.spoil();
@@ -101,12 +108,16 @@ impl Line {
         if event.is_some() {
             return event;
         }
-        let last = self.filter.pending()?;
-        if matches!(self.signal, Some(Signal::Pulse(_))) || !self.frames.ends_with(last) {
+        if matches!(self.signal, Some(Signal::Pulse(_))) {
             return None;
         }
-        let last = self.filter.believe()?;
-        self.decode(last)
+        let last = self.filter.pending()?;
+        let frame = self.frames.end(last)?;
+        self.filter.believe();
+        match self.signal {
+            Some(_) => Some(frame),
+            None => self.detect(last, Some(frame)),
+        }
     }
 
     /// Believes the last edge if the filter's time has passed since. To be called once a control
@@ -135,23 +146,34 @@ impl Line {
         }
     }
 
+    /// Takes an edge if it is within a frame; false otherwise.
+    fn pass(&mut self, edge: Edge) -> bool {
+        matches!(self.signal, Some(Signal::Dshot { .. })) && self.frames.pass(edge.at_ticks)
+    }
+
     fn decode(&mut self, edge: Edge) -> Option<Event> {
         let Edge { at_ticks, level } = edge;
         match self.signal {
             Some(Signal::Dshot { .. }) => self.frames.edge(at_ticks, level),
             Some(Signal::Pulse(_)) => self.pulses.edge(at_ticks, level),
             None => {
-                let pulse = self.pulses.edge(at_ticks, level);
-                let pulse = pulse.and_then(|event| self.detector.pulse(at_ticks, event));
                 let frame = self.frames.edge(at_ticks, level);
-                let frame = frame.and_then(|event| self.detector.frame(at_ticks, event));
-                let signal = self.detector.signal();
-                if signal.is_some() {
-                    self.take_only(signal);
-                }
-                frame.or(pulse)
+                self.detect(edge, frame)
             }
         }
+    }
+
+    /// Weighs an edge, and what the DShot decoder has found with it, while the signal is not known.
+    fn detect(&mut self, edge: Edge, frame: Option<Event>) -> Option<Event> {
+        let Edge { at_ticks, level } = edge;
+        let pulse = self.pulses.edge(at_ticks, level);
+        let pulse = pulse.and_then(|event| self.detector.pulse(at_ticks, event));
+        let frame = frame.and_then(|event| self.detector.frame(at_ticks, event));
+        let signal = self.detector.signal();
+        if signal.is_some() {
+            self.take_only(signal);
+        }
+        frame.or(pulse)
     }
 
     /// Begins to listen to one signal, or to find out which there is.
@@ -193,7 +215,7 @@ fn filter_ticks(tick_hz: u32, signal: Option<Signal>) -> u32 {
         Some(Signal::Pulse(Pulse::OneShot125 | Pulse::OneShot42)) => 500,
         Some(Signal::Pulse(Pulse::Servo)) => 2_000,
     };
-    (u64::from(tick_hz) * u64::from(time_ns) / 1_000_000_000) as u32
+    quotient(u64::from(tick_hz) * u64::from(time_ns), 1_000_000_000)
 }
 
 impl Event {

@@ -118,27 +118,27 @@ impl Input {
 
     /// An edge: when the capturing timer saw it, and the level after it.
     pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Heard> {
-        let event = self.line.edge(at_ticks, level)?;
-        self.take(now_us, event)
+        let event = self.line.edge(at_ticks, level);
+        self.take(now_us, event.as_ref()?)
     }
 
     /// The time of the timer that captures the edges, once a control period or more often.
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Heard> {
-        let event = self.line.settle(now_ticks)?;
-        self.take(now_us, event)
+        let event = self.line.settle(now_ticks);
+        self.take(now_us, event.as_ref()?)
     }
 
-    fn take(&mut self, now_us: u64, event: Event) -> Option<Heard> {
+    fn take(&mut self, now_us: u64, event: &Event) -> Option<Heard> {
         self.expire(now_us);
         let identified = self.line.signal();
         self.hear(now_us, event, identified)
     }
 
     /// Takes what the decoder found, and the signal that it has identified so far.
-    fn hear(&mut self, now_us: u64, event: Event, identified: Option<Signal>) -> Option<Heard> {
-        self.authority.wire(now_us, event, identified);
+    fn hear(&mut self, now_us: u64, event: &Event, identified: Option<Signal>) -> Option<Heard> {
+        self.authority.wire(now_us, *event, identified);
         let known = identified.is_some() && event.signal() == identified;
-        let valid = event != Event::Bad && (known || identified.is_none());
+        let valid = *event != Event::Bad && (known || identified.is_none());
         self.tally.count(valid);
         if !valid {
             self.commands.bad(now_us);
@@ -146,7 +146,7 @@ impl Input {
         if !known {
             return None;
         }
-        let order = match event {
+        let order = match *event {
             Event::Frame { frame, .. } => {
                 self.calibration.end();
                 // What comes while the motor turns is no command, however long it is repeated.
@@ -167,7 +167,10 @@ impl Input {
             }
             Event::Bad => None,
         };
-        Some(Heard { event, order })
+        Some(Heard {
+            event: *event,
+            order,
+        })
     }
 
     /// Lets time pass, each millisecond or so, and takes in what the drive is doing.
@@ -204,6 +207,11 @@ impl Input {
     pub fn signal(&self, now_us: u64) -> Option<Signal> {
         let present = self.authority.signal_present(now_us);
         self.line.signal().filter(|_| present)
+    }
+
+    /// The signal that has been identified or forced, whether it is there or not.
+    pub fn known(&self) -> Option<Signal> {
+        self.line.signal()
     }
 
     /// What may turn the motor.

@@ -5,6 +5,7 @@
 
 use super::line::Event;
 use super::signal::Pulse;
+use crate::math::quotient;
 
 /// The least time from a Multishot pulse to the next, ns: 32 kHz, 5 % fast and 5 % early. The bits
 /// of DShot150 are as wide as its pulses, but follow each other in 7 µs.
@@ -142,7 +143,7 @@ impl Limits {
 }
 
 fn ticks(tick_hz: u32, ns: u32) -> u32 {
-    (u64::from(tick_hz) * u64::from(ns) / 1_000_000_000) as u32
+    quotient(u64::from(tick_hz) * u64::from(ns), 1_000_000_000)
 }
 
 #[cfg(test)]

@@ -70,22 +70,34 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     }
 }
 
-/// Mantissa and power of `k·2^exponent`. Once for all types, and never inlined: the arithmetic of
-/// doubles in software is 20 KB of the chip's flash when every coefficient has its own.
+/// Bits of a float's mantissa, with the one that it does not store.
+const MANTISSA_BITS: i32 = 24;
+
+/// The [`Gain::from_parts`] of `k·2^exponent`, or `None` where they do not exist.
+///
+/// Once for all types, and never inlined: on the chip it is called for every coefficient.
 #[inline(never)]
-fn parts(k: f32, exponent: i32) -> Option<(i32, i32)> {
-    let bits_per_bit = libm::scalbn(f64::from(k), exponent);
-    if !bits_per_bit.is_finite() {
+pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, i32)> {
+    if !k.is_finite() {
         return None;
     }
+    let bits = k.to_bits();
+    // What is too small for the implied one is 0 in the end.
+    let mantissa = (1 << (MANTISSA_BITS - 1)) | (bits & ((1 << (MANTISSA_BITS - 1)) - 1));
+    // With the implied point behind the mantissa, and the 32 bits that a product leaves behind.
+    let power = (bits << 1 >> MANTISSA_BITS) as i32 - (127 + MANTISSA_BITS - 1) + exponent + 32;
     // The smallest shift that leaves the mantissa below half of 2^32 loses the fewest bits.
-    let mut shift = 0;
-    let mut scaled = bits_per_bit * 4_294_967_296.0;
-    while libm::fabs(scaled) >= 2_147_483_647.0 {
-        scaled *= 0.5;
-        shift += 1;
-    }
-    (shift <= 30).then(|| (libm::round(scaled) as i32, 1 << shift))
+    let shift = (power - (31 - MANTISSA_BITS)).max(0);
+    let left = power - shift;
+    let magnitude = if left >= 0 {
+        mantissa << left
+    } else if left >= -MANTISSA_BITS {
+        (mantissa + (1 << (-left - 1))) >> -left
+    } else {
+        0
+    };
+    let sign = if k < 0.0 { -1 } else { 1 };
+    (shift <= 30).then(|| (sign * magnitude as i32, 1 << shift))
 }
 
 #[cfg(test)]
@@ -112,6 +124,32 @@ mod tests {
         let gain = Gain::<U32, U28>::new(16.0).expect("in range");
         let y: I4F28 = gain.apply(I0F32::from_num(0.125));
         assert_eq!(y, I4F28::from_num(2));
+    }
+
+    #[test]
+    fn parts_are_those_that_double_precision_finds() {
+        let wanted = |k: f32, exponent: i32| {
+            let mut scaled = f64::from(k) * 2_f64.powi(exponent + 32);
+            let mut shift = 0;
+            while scaled.abs() >= 2_147_483_647.0 {
+                scaled *= 0.5;
+                shift += 1;
+            }
+            (shift <= 30).then(|| (scaled.round() as i32, 1 << shift))
+        };
+        let mantissas = [0, 1, 0x2a_aaaa, 0x40_0000, 0x55_5555, 0x7f_ffff];
+        for exponent in [-32, -4, 0, 3, 32] {
+            for (power, mantissa) in (0..255).flat_map(|p| mantissas.map(|m| (p, m))) {
+                for sign in [0, 1] {
+                    let k = f32::from_bits(sign << 31 | power << 23 | mantissa);
+                    assert_eq!(
+                        parts(k, exponent),
+                        wanted(k, exponent),
+                        "{k:e}·2^{exponent}"
+                    );
+                }
+            }
+        }
     }
 
     #[test]

@@ -6,12 +6,19 @@
 
 mod gain;
 mod held;
+mod multiplier;
 mod product;
+mod quotient;
+mod real;
 mod root;
 mod trig;
 
 pub use gain::Gain;
+pub(crate) use gain::parts as gain_parts;
 pub use held::Held;
-pub use product::{EIGHTH_PI, TopProduct};
+pub use multiplier::Multiplier;
+pub use product::{EIGHTH_PI, TopProduct, TopSum};
+pub use quotient::quotient;
+pub use real::{Real, round};
 pub use root::{magnitude, other_leg};
 pub use trig::{SinCos, atan2_turns, sin_cos};

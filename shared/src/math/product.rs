@@ -36,10 +36,57 @@ where
     }
 }
 
+/// Sums with a product that keeps its top half: one SMMLA or SMMLS each.
+///
+/// They wrap: the caller knows the range of what it adds.
+pub trait TopSum<A, B> {
+    /// self + a·b.
+    #[must_use]
+    fn plus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self;
+
+    /// self − a·b.
+    #[must_use]
+    fn minus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self;
+}
+
+impl<A, B> TopSum<A, B> for FixedI32<Diff<Sum<A, B>, U32>>
+where
+    A: Unsigned + Add<B>,
+    B: Unsigned,
+    Sum<A, B>: Unsigned + Sub<U32>,
+    Diff<Sum<A, B>, U32>: Unsigned,
+{
+    #[inline(always)]
+    fn plus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self {
+        self.wrapping_add(a.top(b))
+    }
+
+    #[inline(always)]
+    fn minus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self {
+        FixedI32::from_bits(less(self.to_bits(), a.to_bits(), b.to_bits()))
+    }
+}
+
+/// The top half of 2^32·sum − a·b, which is what SMMLS makes: it rounds the product up.
+#[inline(always)]
+pub(super) fn less(sum: i32, a: i32, b: i32) -> i32 {
+    let whole = i64::from(sum) << 32;
+    (whole.wrapping_sub(i64::from(a) * i64::from(b)) >> 32) as i32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use fixed::types::{I0F32, I4F28};
+
+    #[test]
+    fn sums_with_a_product() {
+        let (half, three) = (I0F32::from_num(-0.5), I4F28::from_num(3));
+        let seven = I4F28::from_num(7);
+        assert_eq!(seven.plus_top(half, three), I4F28::from_num(5.5));
+        // 8.5 wraps.
+        assert_eq!(seven.minus_top(half, three), I4F28::from_num(-7.5));
+    }
 
     #[test]
     fn the_compiler_keeps_the_fraction_bits() {

@@ -19,8 +19,7 @@ const TABLE_BITS: u32 = 9;
 const TABLE_SIZE: usize = 1 << TABLE_BITS;
 const LENGTH: f64 = 1.0 - 1.9e-5;
 
-/// Cosine and sine at the middle of each of the table's sections, so that what remains to be
-/// rotated is at most ±π/512. That rotation lengthens by up to 1.9e-5; the entries are shorter by
+/// Cosine and sine at the table's angles; what remains to be rotated is at most ±π/512. That rotation lengthens by up to 1.9e-5; the entries are shorter by
 /// as much, so that no sum leaves ±1.
 static TABLE: [SinCos; TABLE_SIZE] = table();
 
@@ -33,14 +32,15 @@ const EIGHTH_TURN: I1F31 = I1F31::from_bits(1_686_629_713);
 #[inline(always)]
 pub fn sin_cos(angle: I0F32) -> SinCos {
     let bits = angle.to_bits() as u32;
-    let near = TABLE[(bits >> (32 - TABLE_BITS)) as usize];
-    let half_section = 1_i32 << (31 - TABLE_BITS);
-    let remainder = (bits & ((1 << (32 - TABLE_BITS)) - 1)) as i32 - half_section;
-    // The remainder is below 2^22: 8 bits to the left are free. Times 2π/8 that is the angle in
-    // radians with 36 fraction bits, and its product with a cosine has 35, four more than it needs.
-    let delta = FixedI32::<U31>::from_bits(remainder << 8).top(EIGHTH_TURN);
-    let cos_step = delta.top(near.cos).to_bits() >> 4;
-    let sin_step = delta.top(near.sin).to_bits() >> 4;
+    let half_section = 1 << (31 - TABLE_BITS);
+    let near = &TABLE[(bits.wrapping_add(half_section) >> (32 - TABLE_BITS)) as usize];
+    // From the nearest angle of the table, with 9 bits more than an angle. Times 2π/8 that is the
+    // angle in radians with 37 fraction bits, and its product with a cosine has 36, five more than
+    // it needs.
+    let remainder = FixedI32::<U31>::from_bits((bits << TABLE_BITS) as i32);
+    let delta = remainder.top(EIGHTH_TURN);
+    let cos_step = delta.top(near.cos).to_bits() >> 5;
+    let sin_step = delta.top(near.sin).to_bits() >> 5;
     SinCos {
         cos: I1F31::from_bits(near.cos.to_bits() - sin_step),
         sin: I1F31::from_bits(near.sin.to_bits() + cos_step),
@@ -52,14 +52,16 @@ pub fn sin_cos(angle: I0F32) -> SinCos {
 /// A polynomial over one octant with an error below 0.02°. It divides, so it is for the events of
 /// a start, not for each period.
 pub fn atan2_turns(y: I4F28, x: I4F28) -> I0F32 {
-    let (ax, ay) = (i64::from(x.to_bits()).abs(), i64::from(y.to_bits()).abs());
+    let (ax, ay) = (x.unsigned_abs().to_bits(), y.unsigned_abs().to_bits());
     if ax == 0 && ay == 0 {
         return I0F32::ZERO;
     }
     let steep = ay > ax;
     let (small, large) = if steep { (ax, ay) } else { (ay, ax) };
-    // q = small/large with 30 fraction bits; the polynomial is arctan(q)/2π with 32.
-    let q = (small << 30) / large;
+    // q = small/large with 30 fraction bits, of which 15 are right, 0.002°: more would be a division
+    // of 64 bits, which the chip has not. The polynomial is arctan(q)/2π with 32.
+    let zeros = large.leading_zeros();
+    let q = i64::from((small << zeros) / ((large << zeros) >> 15)) << 15;
     let q2 = (q * q) >> 30;
     // Abramowitz and Stegun 4.4.49, each coefficient divided by 2π and times 2^32.
     let mut sum = 14_241_949_i64;
@@ -85,7 +87,7 @@ const fn table() -> [SinCos; TABLE_SIZE] {
     }; TABLE_SIZE];
     let mut i = 0;
     while i < TABLE_SIZE {
-        let radians = (i as f64 + 0.5) * core::f64::consts::TAU / TABLE_SIZE as f64;
+        let radians = i as f64 * core::f64::consts::TAU / TABLE_SIZE as f64;
         table[i] = SinCos {
             cos: to_fixed(LENGTH * sine(radians + core::f64::consts::FRAC_PI_2)),
             sin: to_fixed(LENGTH * sine(radians)),

@@ -12,6 +12,7 @@ use super::place::Place;
 use crate::drive::{Fault, Faults};
 use crate::image::{Image, VERSION};
 use crate::input::signal::{Pulse, Signal};
+use crate::math::{quotient, round};
 use crate::params::{ParamId, Params, TABLE};
 use crate::telemetry::Telemetry;
 
@@ -56,7 +57,7 @@ pub(super) fn esc_info(
     let temperature_cdegc = if telemetry.temperature_c.is_nan() {
         NO_TEMPERATURE
     } else {
-        (libm::roundf(telemetry.temperature_c * 100.0) as i16).min(NO_TEMPERATURE - 1)
+        (round(telemetry.temperature_c * 100.0) as i16).min(NO_TEMPERATURE - 1)
     };
     ESC_INFO_DATA {
         time_usec: now_us,
@@ -84,7 +85,7 @@ fn connection_type(signal: Option<Signal>) -> EscConnectionType {
 pub(super) fn bad_frames(now_us: u64, telemetry: &Telemetry) -> NAMED_VALUE_FLOAT_DATA {
     NAMED_VALUE_FLOAT_DATA {
         // The field wraps after 49 days.
-        time_boot_ms: (now_us / 1000) as u32,
+        time_boot_ms: quotient(now_us, 1000),
         value: telemetry.bad_share * 100.0,
         name: CharArray::new(*b"bad_frames"),
     }
@@ -93,7 +94,7 @@ pub(super) fn bad_frames(now_us: u64, telemetry: &Telemetry) -> NAMED_VALUE_FLOA
 pub(super) fn esc_status(now_us: u64, telemetry: &Telemetry, place: Place) -> ESC_STATUS_DATA {
     ESC_STATUS_DATA {
         time_usec: now_us,
-        rpm: place.slots(libm::roundf(telemetry.rpm) as i32, 0),
+        rpm: place.slots(round(telemetry.rpm) as i32, 0),
         voltage: place.slots(telemetry.bus_v, 0.0),
         current: place.slots(telemetry.bus_a, 0.0),
         index: place.index(),
@@ -107,14 +108,14 @@ pub(super) fn esc_telemetry(
     place: Place,
     count: u16,
 ) -> ESC_TELEMETRY_1_TO_4_DATA {
-    let own = |value: f32| place.slots(libm::roundf(value) as u16, 0);
+    let own = |value: f32| place.slots(round(value) as u16, 0);
     ESC_TELEMETRY_1_TO_4_DATA {
         voltage: own(telemetry.bus_v * 100.0),
         current: own(telemetry.bus_a * 100.0),
         totalcurrent: own(telemetry.consumed_mah),
         rpm: own(telemetry.rpm.abs()),
         count: place.slots(count, 0),
-        temperature: place.slots(libm::roundf(telemetry.temperature_c) as u8, 0),
+        temperature: place.slots(round(telemetry.temperature_c) as u8, 0),
     }
 }
 

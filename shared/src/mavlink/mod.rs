@@ -19,6 +19,7 @@ mod place;
 mod receiver;
 mod reply;
 mod schedule;
+mod seed;
 mod sender;
 
 pub use component::{Component, Context, Request, Warning};

@@ -26,7 +26,7 @@ impl Pace {
 
     /// What may leave at once: 20 ms of the share, but always the longest frame.
     fn most(&self) -> u64 {
-        (u64::from(self.bytes_per_s) * MILLIONTHS / 50).max(280 * MILLIONTHS)
+        (u64::from(self.bytes_per_s) * (MILLIONTHS / 50)).max(280 * MILLIONTHS)
     }
 
     /// Lets time pass.

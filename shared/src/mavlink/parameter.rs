@@ -120,7 +120,7 @@ fn reason(error: SetError) -> &'static str {
 /// A name of 16 characters has no zero at its end.
 fn find(name: &[u8; 16]) -> Option<ParamId> {
     let name = name.split(|byte| *byte == 0).next()?;
-    ParamId::find(core::str::from_utf8(name).ok()?)
+    ParamId::find_bytes(name)
 }
 
 fn unknown(to: Address, name: [u8; 16], index: i16, replies: &mut Replies) {

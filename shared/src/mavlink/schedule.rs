@@ -59,7 +59,7 @@ impl Stream {
         match self {
             Self::Heartbeat | Self::EscInfo | Self::BadFrames => SECOND_US,
             Self::EscStatus | Self::EscTelemetry => {
-                (SECOND_US as f32 / params.get(ParamId::TelRateHz)) as u64
+                u64::from((SECOND_US as f32 / params.get(ParamId::TelRateHz)) as u32)
             }
         }
     }

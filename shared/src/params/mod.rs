@@ -8,6 +8,9 @@ pub use build::{Board, BuildError, FluxSettings, build, input};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE, Text};
 
+/// √3, which the standard library has not.
+const SQRT_3: f32 = 1.732_050_8;
+
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetError {
@@ -40,7 +43,13 @@ impl Default for Params {
 impl ParamId {
     /// The parameter of this MAVLink name.
     pub fn find(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|id| id.entry().name == name)
+        Self::find_bytes(name.as_bytes())
+    }
+
+    /// The parameter of this MAVLink name, which need not be text.
+    pub(crate) fn find_bytes(name: &[u8]) -> Option<Self> {
+        let row = TABLE.iter().position(|row| row.name.as_bytes() == name)?;
+        Some(Self::ALL[row])
     }
 
     /// This parameter's row of the table.
@@ -82,7 +91,7 @@ impl Params {
         let pole_pairs = self.get(ParamId::MotPolePairs);
         let flux_wb = self.get(ParamId::MotFluxMwb) * 1e-3;
         self.values[ParamId::MotKv as usize] =
-            60.0 / (core::f32::consts::TAU * libm::sqrtf(3.0) * pole_pairs * flux_wb);
+            60.0 / (core::f32::consts::TAU * SQRT_3 * pole_pairs * flux_wb);
     }
 }
 

@@ -9,7 +9,7 @@ pub use ntc::Ntc;
 use fixed::types::extra::U28;
 
 use crate::control::speed::Bounds;
-use crate::math::{Gain, Held};
+use crate::math::{Gain, Held, Multiplier};
 use crate::units::{AdcCounts, Current, Voltage};
 
 /// Samples in a row above the trip level that are an over-current, so that one disturbed reading
@@ -36,7 +36,7 @@ pub struct Config {
     /// Volts above that to current.
     pub bus_return_slope: Gain<U28, U28>,
     /// Bus current's excess to the bound's change in a period.
-    pub bound_rate: Gain<U28, U28>,
+    pub bound_rate: Multiplier<U28, U28>,
 }
 
 /// What is remembered from sample to sample.
@@ -81,34 +81,53 @@ pub fn check(
     bus: Voltage,
 ) -> Option<Fault> {
     // An eighth of the difference a period: one reading that is off moves it by little.
-    let difference = bus.minus(state.bus).to_bits() >> 3;
-    state.bus = state.bus.plus(Voltage::from_bits(difference));
+    // Both are from 0 to 8, the type is of ±8: nothing here wraps.
+    state.bus = state.bus.wrapping_add(bus.wrapping_sub(state.bus) >> 3);
 
-    let beyond = |current: AdcCounts| current.unsigned_abs() > config.trip;
-    if currents.is_some_and(|currents| currents.into_iter().any(beyond)) {
+    if currents.is_some_and(|currents| beyond(config.trip, currents)) {
         state.over_current_samples = state.over_current_samples.saturating_add(1);
-    } else {
+        if state.over_current_samples >= OVER_CURRENT_SAMPLES {
+            return Some(Fault::OverCurrent);
+        }
+    } else if state.over_current_samples != 0 {
         state.over_current_samples = 0;
     }
-    if state.over_current_samples >= OVER_CURRENT_SAMPLES {
-        Some(Fault::OverCurrent)
+    // Below the least wraps round to above the greatest: one comparison.
+    let above = state.bus.wrapping_sub(config.bus_min).to_bits() as u32;
+    if above <= config.bus_max.wrapping_sub(config.bus_min).to_bits() as u32 {
+        None
     } else if state.bus > config.bus_max {
         Some(Fault::OverVoltage)
-    } else if state.bus < config.bus_min {
-        Some(Fault::UnderVoltage)
     } else {
-        None
+        Some(Fault::UnderVoltage)
     }
 }
 
-/// Moves the bounds of i_q so that the supply gives no more than `bus_draw` and takes no more than
+/// Whether a phase's current is beyond ±`trip`.
+#[inline(always)]
+fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
+    let trip = trip.to_bits();
+    // Below −trip wraps round to above 2·trip: one comparison a phase.
+    let far = |current: AdcCounts| current.to_bits().wrapping_add(trip) as u32 > 2 * trip as u32;
+    let [a, b, c] = currents;
+    far(a) || far(b) || far(c)
+}
+
+/// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw` and takes no more than
 /// `bus_return`, and less of that as its voltage nears the limit.
 ///
 /// Braking begins at a bound that returns no more than that at any speed; only then is it moved by
 /// what is returned. From the full bound it would return too much for some milliseconds.
-#[inline(always)]
-pub fn bound(config: &Config, state: &mut State, bus_current: Current, i_q: Current) {
-    let rate = |excess| config.bound_rate.saturating_apply(excess);
+pub fn bound(
+    config: &Config,
+    state: &mut State,
+    (bus_current, i_q): (Current, Current),
+    periods: u32,
+) {
+    let rate = |excess| {
+        let change: Current = config.bound_rate.of(excess);
+        change.saturating_mul_int(periods as i32)
+    };
     let bounds = &mut state.bounds;
     let too_much_drawn = bus_current.minus(config.bus_draw);
     if too_much_drawn.is_positive() || bounds.max != config.phase {

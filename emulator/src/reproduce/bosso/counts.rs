@@ -53,14 +53,14 @@ const ROWS: [Row; 8] = [
         name: "clarke_park",
         printed: [5, 7, 0, 2, 0],
         counted: [5, 5, 0, 2, 0],
-        functions: "transform::clarke, park, sin_cos (12)",
+        functions: "transform::clarke_in, park, sin_cos (12)",
     },
     Row {
         name: "current_controller",
         printed: [9, 9, 0, 0, 2],
-        // Two errors, three and five of the voltages, σ in both, two sums an axis to integrate; ω·i and
-        // its factor an axis, three and four gains, k_ie an axis.
-        counted: [16, 13, 0, 0, 2],
+        // Two errors, three and five of the voltages, σ in both, a sum an axis to integrate; ω·i and its
+        // factor an axis, three and four gains, k_ie an axis.
+        counted: [14, 13, 0, 0, 2],
         functions: "observer_based::Config::voltage, integrate (10)",
     },
     Row {
@@ -73,9 +73,10 @@ const ROWS: [Row; 8] = [
     Row {
         name: "inverse_park_clarke",
         printed: [4, 4, 0, 2, 0],
-        // The angle ahead and its step, two and two; four of the rotation and √3/2.
-        counted: [6, 5, 0, 2, 0],
-        functions: "transform::inverse_park, phases, sin_cos of the angle ahead (11)",
+        // Four of the rotation by the angle ahead, whose sine is taken now and then; four of that into the
+        // stator's frame, by the sine of clarke_park; and √3/2.
+        counted: [6, 9, 0, 0, 0],
+        functions: "transform::turn, inverse_park, phases_in (11)",
     },
 ];
 
@@ -114,16 +115,18 @@ mod tests {
     const TRANSFORM: &str = include_str!("../../../../shared/src/control/transform.rs");
     const REGULATOR: &str =
         include_str!("../../../../shared/src/control/regulator/observer_based.rs");
-    const DELAY: &str = include_str!("../../../../shared/src/control/delay.rs");
-    const TURN: &str = include_str!("../../../../shared/src/drive/turn.rs");
 
     /// How sums, products and comparisons are written, each with how many it stands for.
     const SUMS: &[(&str, i32)] = &[
         (".plus(", 1),
         (".minus(", 1),
         (".wrapping_add(", 1),
+        (".plus_top(", 1),
+        (".minus_top(", 1),
         (" + ", 1),
         (" - ", 1),
+        // Doubling is a shift, and no sum.
+        ("x.plus(x)", -1),
     ];
     const PRODUCTS: &[(&str, i32)] = &[
         (".top(", 1),
@@ -131,6 +134,8 @@ mod tests {
         (".saturating_apply(", 1),
         // The inductance's factor.
         (".of(", 1),
+        (".plus_top(", 1),
+        (".minus_top(", 1),
         (" * ", 1),
         // Doubling is a shift, and no product.
         ("2 * ", -1),
@@ -229,24 +234,20 @@ mod tests {
         // The path that a period takes with nothing limited.
         let current = statements(NESTED, "current", &["if half_trust <", "if bounded !="]);
         let [reference, speed] = parted(current, &["let i_q =", "Reference {"]);
-        let [ahead, _] = parted(all(TURN, "period"), &["let ahead ="]);
         let counted = [
             [adaptive, all(BACK_EMF, "adapt"), theta].concat(),
             filter,
             speed,
             reference,
-            [all(TRANSFORM, "clarke"), all(TRANSFORM, "park")].concat(),
+            [all(TRANSFORM, "clarke_in"), all(TRANSFORM, "park")].concat(),
             ["voltage", "forced", "error", "integrate"]
                 .map(|name| all(REGULATOR, name))
                 .concat(),
             high_gain,
-            [
-                ahead,
-                all(DELAY, "advance"),
-                all(TRANSFORM, "inverse_park"),
-                all(TRANSFORM, "phases"),
-            ]
-            .concat(),
+            // `turn` is one, too.
+            ["inverse_park", "inverse_park", "phases_in"]
+                .map(|name| all(TRANSFORM, name))
+                .concat(),
         ];
         for (row, statements) in ROWS.iter().zip(counted) {
             let [sums, products, comparisons, ..] = row.counted;

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
+use siskin_control::control::PERIODS;
 use siskin_control::control::delay::Delay;
 use siskin_control::control::{observer, regulator, speed};
 use siskin_control::math::Gain;
@@ -101,7 +102,7 @@ impl Gains {
             gamma: value(observer.gamma) * f64::from(config.scale.inverse_flux_per_wb())
                 / (period_s * f64::from(voltage_v)),
             k_p_omega: value(speed.k_p) / torque_per_speed,
-            k_i_omega: value(speed.k_i) / (period_s * torque_per_speed),
+            k_i_omega: value(speed.k_i) / (f64::from(PERIODS) * period_s * torque_per_speed),
         }
     }
 

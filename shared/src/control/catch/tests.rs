@@ -354,5 +354,5 @@ proptest! {
 fn the_trace_has_every_word() {
     let mut words = Vec::new();
     State::new(&config(BENCH, 24_000.0, 1.0)).trace(&mut |word| words.push(word));
-    assert_eq!(words.len(), 17);
+    assert_eq!(words.len(), 26);
 }

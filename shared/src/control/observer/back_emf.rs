@@ -4,7 +4,7 @@
 
 use fixed::types::extra::{U28, U32};
 
-use super::Estimate;
+use super::{Estimate, Told};
 use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
@@ -106,7 +106,7 @@ pub fn estimate(
     state: &mut State,
     imposed: Option<Speed>,
     planned: Speed,
-) -> Estimate {
+) -> (Estimate, Told) {
     let theta = state.theta;
     let frame = sin_cos(theta);
     let length = magnitude(state.h.d, state.h.q);
@@ -122,16 +122,19 @@ pub fn estimate(
     let xi = state.xi;
     let xi_step = config.gamma.saturating_apply(state.h.d);
     let lost = imposed.is_none() && adapt(config, state, xi_step);
-    Estimate {
+    let estimate = Estimate {
         theta,
         frame,
         omega,
         omega_bar,
+    };
+    let told = Told {
         omega_bar_step,
         xi,
         xi_step,
         lost,
-    }
+    };
+    (estimate, told)
 }
 
 /// ω̂ = ω̂_i + 2·ω_n·ε, ω̂_i += T_s·(ω_n²·ε + ω̇*) with ε = ĥ_d/|ĥ|.
@@ -142,7 +145,7 @@ fn cured(
     (theta, frame): (Angle, SinCos),
     length: Voltage,
     planned: Speed,
-) -> Estimate {
+) -> (Estimate, Told) {
     // Twelve bits of the quotient are enough for a direction: 0.01°.
     let quotient = (state.h.d.to_bits() >> 2) / (length.to_bits() >> 14).max(1);
     let epsilon = Voltage::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
@@ -151,17 +154,20 @@ fn cured(
         .plus(cure.integral.apply(epsilon))
         .plus(planned)
         .max(Speed::ZERO);
-    Estimate {
+    let estimate = Estimate {
         theta,
         frame,
         omega: state.omega_i.plus(cure.proportional.apply(epsilon)),
         omega_bar: state.omega_i,
+    };
+    let told = Told {
         omega_bar_step: state.omega_i.minus(before),
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,
         // ĥ opposite to what the frame expects, or nearly none.
         lost: !state.h.q.is_negative(),
-    }
+    };
+    (estimate, told)
 }
 
 /// Takes ξ̂ on by a period, within the range in which the stated flux can be wrong. True if it

@@ -7,22 +7,23 @@
 //!
 //! In the control's units a voltage for one period is a flux, and the stated flux φ is 2/π.
 
-use fixed::types::extra::{U28, U32};
-use fixed::types::{I0F32, I1F31, I5F27};
+use fixed::FixedI32;
+use fixed::types::extra::{U24, U27, U28, U29, U32};
+use fixed::types::{I0F32, I5F27};
 
-use super::{Estimate, Input};
+use super::{Estimate, Input, Told};
 use crate::control::inductance::Factor;
-use crate::control::transform::{AlphaBeta, Dq, to_rotor};
-use crate::math::{EIGHTH_PI, Gain, Held, SinCos, TopProduct, sin_cos};
-use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed};
+use crate::control::transform::{AlphaBeta, Dq};
+use crate::math::{EIGHTH_PI, Gain, Held, Multiplier, SinCos, TopProduct, TopSum, sin_cos};
+use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// R·T_s/2, current to flux.
-    pub half_resistance: Gain<U28, U28>,
+    pub half_resistance: Multiplier<U28, U28>,
     /// L, current to flux.
-    pub inductance: Gain<U28, U28>,
+    pub inductance: Multiplier<U28, U24>,
     /// β·ω²·T_s over the speed's square. The mean of a period's current is not the mean of its two
     /// ends: without β that is 0.56° at 6000 rpm on the bench.
     pub bias: Gain<U32, U32>,
@@ -33,9 +34,11 @@ pub struct Config {
     /// Greatest ω_n.
     pub omega_n_max: Speed,
     /// Share of a new sample in what ω̂ has above ω̂_i.
-    pub smoothing: Gain<U32, U32>,
+    pub smoothing: Multiplier<U32, U32>,
     /// ξ of the stated flux.
     pub xi_nominal: InverseFlux,
+    /// A quarter over the stated flux: along q to ε.
+    pub quarter_per_flux: Multiplier<U27, U27>,
 }
 
 /// What the observer remembers from period to period.
@@ -47,12 +50,37 @@ pub struct State {
     pub omega_i: Speed,
     /// φ̂.
     pub phi: Flux,
+    /// z_d at the last sample, with which a rotor that is lost shows.
+    z_d: Flux,
     /// ψ, the stator's flux.
     psi: AlphaBeta<Flux>,
     /// What ω̂ has above ω̂_i, smoothed.
     smooth: Speed,
     /// Current at the last sample.
     i_before: AlphaBeta<Current>,
+    /// What the speed makes of the coefficients.
+    pace: Pace,
+}
+
+/// Coefficients that follow the speed, and the inductance: taken anew by [`pace`] every few periods.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Pace {
+    /// L, with what is known of it.
+    inductance: Multiplier<U28, U24>,
+    /// 0.5·ω⁺·T_s.
+    leak: I0F32,
+    /// The same less β·ω⁺²·T_s.
+    held: I0F32,
+    /// Rate of φ̂, 0.15·ω⁺·T_s.
+    phi: I0F32,
+    /// ω_n²·T_s, for half of ε.
+    integral: Speed,
+    /// 1.8·ω_n, for half of ε.
+    proportional: Speed,
+    /// φ̂, speed to back-EMF.
+    emf: Multiplier<U32, U24>,
+    /// ω̄̂ when these were taken.
+    omega_bar: Speed,
 }
 
 impl Default for State {
@@ -61,9 +89,11 @@ impl Default for State {
             theta: Angle::ZERO,
             omega_i: Speed::ZERO,
             phi: FLUX_NOMINAL,
+            z_d: FLUX_NOMINAL,
             psi: AlphaBeta::default(),
             smooth: Speed::ZERO,
             i_before: AlphaBeta::default(),
+            pace: Pace::default(),
         }
     }
 }
@@ -85,21 +115,55 @@ const PHI_MIN: Flux = Flux::from_bits(51_267_396);
 const PHI_MAX: Flux = Flux::from_bits(341_782_638);
 
 /// The observer where the rotor's speed is known, and its angle at the coming sample.
-pub fn begin(config: &Config, theta: Angle, omega: Speed, i: AlphaBeta<Current>) -> State {
+pub fn begin(
+    config: &Config,
+    state: &mut State,
+    (theta, omega): (Angle, Speed),
+    i: AlphaBeta<Current>,
+) {
     // ψ is that of the sample before: the voltage since then is still to be added.
     let rotor = rotor_flux(FLUX_NOMINAL, sin_cos(theta.wrapping_sub(omega)));
-    let own = stator_flux(config, Factor::ONE, i);
-    State {
+    let own = stator_flux(config.inductance, i);
+    *state = State {
         theta,
         omega_i: omega,
-        phi: FLUX_NOMINAL,
         psi: AlphaBeta {
             alpha: rotor.alpha.plus(own.alpha),
             beta: rotor.beta.plus(own.beta),
         },
-        smooth: Speed::ZERO,
         i_before: i,
-    }
+        ..State::default()
+    };
+    pace(config, state, Factor::ONE);
+}
+
+/// Takes the coefficients that follow the speed, every few periods.
+pub fn pace(config: &Config, state: &mut State, inductance: Factor) {
+    state.phi = state.phi.max(PHI_MIN).min(PHI_MAX);
+    let omega = state.omega_i;
+    // An eighth of a turn a period bounds the leak below one.
+    let omega_plus = omega
+        .saturating_abs()
+        .max(config.omega_min)
+        .min(EIGHTH_TURN);
+    // Half of ω⁺·T_s is π times its turns.
+    let leak = I0F32::from_bits(omega_plus.top(EIGHTH_PI).to_bits() << 3);
+    let omega_n = omega
+        .top(OMEGA_N_SHARE)
+        .max(config.omega_n_min)
+        .min(config.omega_n_max);
+    let four_pi_omega_n = Speed::from_bits(omega_n.top(EIGHTH_PI).to_bits() << 5);
+    state.pace = Pace {
+        inductance: inductance.multiplied(config.inductance),
+        leak,
+        held: leak.minus(config.bias.apply(omega_plus.top(omega_plus))),
+        phi: I0F32::from_bits(omega_plus.top(PHI_RATE_HALF).to_bits() << 1),
+        integral: four_pi_omega_n.top(omega_n),
+        proportional: Speed::from_bits(omega_n.top(DAMPING).to_bits() << 3),
+        // A speed in turns takes 2π: 16·π/8, and a voltage with 24 fraction bits has a sixteenth.
+        emf: Multiplier::from_bits(state.phi.top(EIGHTH_PI).to_bits()),
+        omega_bar: state.omega_bar(),
+    };
 }
 
 /// Takes the observer from the last sample to this one.
@@ -114,97 +178,95 @@ pub fn estimate(
     imposed: Option<Speed>,
 ) -> Estimate {
     let frame = sin_cos(state.theta);
+    let pace = &state.pace;
     if let Some(speed) = imposed {
         state.omega_i = speed;
     }
-    let omega_before = state.omega_i;
-    // An eighth of a turn a period bounds the leak below one.
-    let omega_plus = omega_before
-        .saturating_abs()
-        .max(config.omega_min)
-        .min(EIGHTH_TURN);
 
     // ψ += T_s·u − R·T_s/2·(i_k + i_{k−1}), ψ_r = ψ − L·i.
-    let drop =
-        |now: Current, before: Current| config.half_resistance.saturating_apply(now.plus(before));
+    let step = |v: Voltage, now: Current, before: Current| {
+        config.half_resistance.taken(v, now.plus(before))
+    };
     let psi = AlphaBeta {
         alpha: state
             .psi
             .alpha
-            .plus(input.v.alpha)
-            .minus(drop(input.i.alpha, state.i_before.alpha)),
+            .plus(step(input.v.alpha, input.i.alpha, state.i_before.alpha)),
         beta: state
             .psi
             .beta
-            .plus(input.v.beta)
-            .minus(drop(input.i.beta, state.i_before.beta)),
+            .plus(step(input.v.beta, input.i.beta, state.i_before.beta)),
     };
     state.i_before = input.i;
-    let own = stator_flux(config, input.inductance, input.i);
+    let own = stator_flux(pace.inductance, input.i);
     let psi_r = AlphaBeta {
         alpha: psi.alpha.minus(own.alpha),
         beta: psi.beta.minus(own.beta),
     };
-    let z = to_rotor(psi_r, frame);
-
-    // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})); half of ω⁺·T_s is π times its turns.
-    let expected = rotor_flux(state.phi, frame);
-    let leak = I0F32::from_bits(omega_plus.top(EIGHTH_PI).to_bits() << 3);
-    let bias = config.bias.apply(omega_plus.top(omega_plus));
-    let held = |psi: Flux, psi_r: Flux, expected: Flux| {
-        psi.plus(psi_r.top(bias))
-            .minus(psi_r.minus(expected).top(leak))
+    // 28 + 31 − 32 fraction bits.
+    let z: Dq<I5F27> = Dq {
+        d: psi_r.alpha.top(frame.cos).plus_top(psi_r.beta, frame.sin),
+        q: psi_r.beta.top(frame.cos).minus_top(psi_r.alpha, frame.sin),
     };
+    state.z_d = Flux::from_bits(z.d.plus(z.d).to_bits());
+
+    // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})). The leak is below a half: a bit is free.
+    let led = FixedI32::<U29>::from_bits(state.phi.top(pace.leak).to_bits() << 1);
     state.psi = AlphaBeta {
-        alpha: held(psi.alpha, psi_r.alpha, expected.alpha),
-        beta: held(psi.beta, psi_r.beta, expected.beta),
+        alpha: psi
+            .alpha
+            .minus_top(psi_r.alpha, pace.held)
+            .plus_top(led, frame.cos),
+        beta: psi
+            .beta
+            .minus_top(psi_r.beta, pace.held)
+            .plus_top(led, frame.sin),
     };
 
     // φ̂ += 0.15·T_s·ω⁺·(z_d − φ̂).
-    let off = z.d.minus(state.phi);
-    let phi_step = off.top(omega_plus).top(PHI_RATE_HALF).to_bits() << 1;
-    let phi = state.phi.plus(Flux::from_bits(phi_step));
-    state.phi = phi.max(PHI_MIN).min(PHI_MAX);
+    let off = state.z_d.minus(state.phi);
+    state.phi = state.phi.plus_top(off, pace.phi);
 
-    // ω_n = 0.35·ω̂_i; ω̂_i += T_s·ω_n²·ε, ω̂ = ω̂_i + 1.8·ω_n·ε.
-    let epsilon_half = half_epsilon(z);
-    let omega_n = omega_before
-        .top(OMEGA_N_SHARE)
-        .max(config.omega_n_min)
-        .min(config.omega_n_max);
-    let four_pi_omega_n = Speed::from_bits(omega_n.top(EIGHTH_PI).to_bits() << 5);
-    let omega_i = omega_before.plus(four_pi_omega_n.top(omega_n).top(epsilon_half));
+    // ω̂_i += T_s·ω_n²·ε, ω̂ = ω̂_i + 1.8·ω_n·ε.
+    let epsilon_half = half_epsilon(config, z);
     if imposed.is_none() {
-        state.omega_i = omega_i;
+        state.omega_i = state.omega_i.plus(pace.integral.top(epsilon_half));
     }
-    let proportional = Speed::from_bits(omega_n.top(epsilon_half).top(DAMPING).to_bits() << 3);
+    let proportional = pace.proportional.top(epsilon_half);
     let omega = state.omega_i.plus(proportional);
     // Under acceleration ω̂_i lags by 1.8·ω̇/ω_n and ω̂ does not, but ω̂ passes the noise: what it has
     // above ω̂_i is added smoothly.
-    let smooth_step = config.smoothing.apply(proportional.minus(state.smooth));
-    state.smooth = state.smooth.plus(smooth_step);
-    let omega_bar = state.omega_i.plus(state.smooth);
-    let omega_bar_step = state.omega_i.minus(omega_before).plus(smooth_step);
+    state.smooth = config
+        .smoothing
+        .added(state.smooth, proportional.minus(state.smooth));
     let theta = state.theta;
     state.theta = theta.wrapping_add(omega);
     Estimate {
         theta,
         frame,
         omega,
-        omega_bar,
-        omega_bar_step,
+        omega_bar: state.omega_bar(),
+    }
+}
+
+/// What the speed regulator reads besides, `periods` after [`pace`].
+pub fn told(config: &Config, state: &State, periods: u32) -> Told {
+    let change = state.omega_bar().minus(state.pace.omega_bar);
+    Told {
+        omega_bar_step: change / periods as i32,
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,
-        lost: z.d < PHI_MIN || z.d > PHI_MAX,
+        lost: state.z_d < PHI_MIN || state.z_d > PHI_MAX,
     }
 }
 
 /// L·i.
 #[inline(always)]
-fn stator_flux(config: &Config, factor: Factor, i: AlphaBeta<Current>) -> AlphaBeta<Flux> {
+fn stator_flux(inductance: Multiplier<U28, U24>, i: AlphaBeta<Current>) -> AlphaBeta<Flux> {
+    let flux = |i: Current| Flux::from_bits(inductance.of(i).to_bits() << 4);
     AlphaBeta {
-        alpha: factor.of(config.inductance.saturating_apply(i.alpha)),
-        beta: factor.of(config.inductance.saturating_apply(i.beta)),
+        alpha: flux(i.alpha),
+        beta: flux(i.beta),
     }
 }
 
@@ -221,18 +283,25 @@ fn rotor_flux(phi: Flux, frame: SinCos) -> AlphaBeta<Flux> {
 
 /// ε/2: z_q over the stated flux, held at ±1, and all of that where the rotor points backwards.
 #[inline(always)]
-fn half_epsilon(z: Dq<Flux>) -> I0F32 {
-    let most = Flux::from_bits(FLUX_NOMINAL.to_bits() - 1);
-    let z_q = if z.d.is_negative() {
-        if z.q.is_negative() { -most } else { most }
+fn half_epsilon(config: &Config, z: Dq<I5F27>) -> I0F32 {
+    let quarter = config.quarter_per_flux.of(z.q).to_bits();
+    let held = if z.d.is_negative() {
+        whole(quarter)
     } else {
-        z.q.min(most).max(-most)
+        quarter.clamp(-ONE_QUARTER, ONE_QUARTER - 1)
     };
-    // z_q·π/4. Held at 2/π it is below one: three bits are free. Its product with π/8 has 31 + 32 −
-    // 32 fraction bits; one more, and twice the value.
-    let z_q = I1F31::from_bits(z_q.to_bits() << 3);
-    I0F32::from_bits(z_q.top(EIGHTH_PI).to_bits() << 2)
+    I0F32::from_bits(held << 6)
 }
+
+/// All of it, with the sign.
+#[cold]
+#[inline(never)]
+fn whole(quarter: i32) -> i32 {
+    (quarter >> 31) ^ (ONE_QUARTER - 1)
+}
+
+/// A quarter with 27 fraction bits.
+const ONE_QUARTER: i32 = 1 << 25;
 
 /// The rotor's angle at the coming sample, if its flux is near the stated one.
 pub fn found(state: &State) -> Option<Angle> {
@@ -241,16 +310,40 @@ pub fn found(state: &State) -> Option<Angle> {
 }
 
 impl State {
+    /// The back-EMF.
+    #[inline(always)]
+    pub(super) fn emf(&self) -> WideVoltage {
+        self.pace.emf.of(self.omega_i)
+    }
+
+    /// ω̄̂.
+    #[inline(always)]
+    fn omega_bar(&self) -> Speed {
+        self.omega_i.plus(self.smooth)
+    }
+
     /// Every word of the state.
     pub fn trace(&self, out: &mut impl FnMut(u32)) {
         let Self {
             theta,
             omega_i,
             phi,
+            z_d,
             psi,
             smooth,
             i_before,
+            pace,
         } = self;
+        let Pace {
+            inductance,
+            leak,
+            held,
+            phi: phi_rate,
+            integral,
+            proportional,
+            emf,
+            omega_bar,
+        } = pace;
         for bits in [
             theta.to_bits(),
             omega_i.to_bits(),
@@ -260,6 +353,15 @@ impl State {
             smooth.to_bits(),
             i_before.alpha.to_bits(),
             i_before.beta.to_bits(),
+            z_d.to_bits(),
+            inductance.to_bits(),
+            leak.to_bits(),
+            held.to_bits(),
+            phi_rate.to_bits(),
+            integral.to_bits(),
+            proportional.to_bits(),
+            emf.to_bits(),
+            omega_bar.to_bits(),
         ] {
             out(bits as u32);
         }

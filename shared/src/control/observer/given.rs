@@ -1,8 +1,8 @@
 //! No observer at all: an encoder, or a simulation that knows the truth, tells where the rotor is.
 
-use super::Estimate;
+use super::{Estimate, Told};
 use crate::math::sin_cos;
-use crate::units::{Angle, INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
+use crate::units::{Angle, Speed};
 
 /// What was told of the rotor at the coming sample, with the phases in the order a, b, c.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,22 +48,23 @@ impl State {
 
 /// One period: what was told.
 #[inline]
-pub fn estimate(state: &State, swapped: bool) -> Estimate {
+pub fn estimate(state: &State, swapped: bool) -> (Estimate, Told) {
     let (theta, omega) = state.seen(swapped);
-    Estimate {
+    let estimate = Estimate {
         theta,
         frame: sin_cos(theta),
         omega,
         omega_bar: omega,
+    };
+    let told = Told {
         omega_bar_step: if swapped {
             state.omega_step.saturating_neg()
         } else {
             state.omega_step
         },
-        xi: INVERSE_FLUX_NOMINAL,
-        xi_step: InverseFlux::ZERO,
-        lost: false,
-    }
+        ..Told::default()
+    };
+    (estimate, told)
 }
 
 #[cfg(test)]
@@ -75,17 +76,17 @@ mod tests {
         let mut state = State::default();
         state.place(Angle::lit("0.2"), Speed::lit("0.01"));
         state.place(Angle::lit("0.25"), Speed::lit("0.03"));
-        let seen = estimate(&state, false);
+        let (seen, told) = estimate(&state, false);
         assert_eq!(
             (seen.theta, seen.omega),
             (Angle::lit("0.25"), Speed::lit("0.03"))
         );
-        assert_eq!(seen.omega_bar_step, Speed::lit("0.03") - Speed::lit("0.01"));
-        let turned = estimate(&state, true);
+        assert_eq!(told.omega_bar_step, Speed::lit("0.03") - Speed::lit("0.01"));
+        let (turned, turned_told) = estimate(&state, true);
         assert_eq!(
             (turned.theta, turned.omega_bar),
             (-Angle::lit("0.25"), -Speed::lit("0.03"))
         );
-        assert_eq!(turned.omega_bar_step, -seen.omega_bar_step);
+        assert_eq!(turned_told.omega_bar_step, -told.omega_bar_step);
     }
 }

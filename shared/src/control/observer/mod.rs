@@ -19,6 +19,7 @@ use super::transform::{AlphaBeta, Dq, phases};
 use crate::math::{EIGHTH_PI, SinCos, TopProduct, sin_cos};
 use crate::units::{
     Angle, Current, FLUX_NOMINAL, Flux, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage,
+    WideVoltage, wide,
 };
 
 /// The observer in use (`CTL_OBSERVER`) and its coefficients.
@@ -45,6 +46,8 @@ pub struct State {
     pub compensated: compensated::State,
     /// What the drive has been told.
     pub given: given::State,
+    /// What the observer in use says besides; the compensated flux observer says it by [`pace`].
+    pub told: Told,
 }
 
 /// What an observer reads at a sample.
@@ -75,14 +78,100 @@ pub struct Estimate {
     pub omega: Speed,
     /// ω̄̂: the speed without the term that passes the noise.
     pub omega_bar: Speed,
+}
+
+/// What an observer says besides, for what is not done in every period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Told {
     /// The change of ω̄̂ in a period.
     pub omega_bar_step: Speed,
     /// ξ̂, the inverse of the flux.
     pub xi: InverseFlux,
-    /// Change of ξ̂ in this period.
+    /// Change of ξ̂ in a period.
     pub xi_step: InverseFlux,
     /// Whether the observer's state is out of its range: the rotor may be elsewhere.
     pub lost: bool,
+}
+
+impl Default for Told {
+    fn default() -> Self {
+        Self {
+            omega_bar_step: Speed::ZERO,
+            xi: INVERSE_FLUX_NOMINAL,
+            xi_step: InverseFlux::ZERO,
+            lost: false,
+        }
+    }
+}
+
+/// An observer in a control period: the one in use of all, or one that is known beforehand.
+pub trait Observer {
+    /// Takes the observer from the last sample to this one. `imposed` is the speed that an open-loop
+    /// start gives the rotor.
+    fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate;
+
+    /// Whether what it sees while the rotor is being aligned counts; else [`expect`] begins it anew.
+    fn follows_park(&self) -> bool;
+
+    /// What the current regulator reads: the speed of the control's frame, the measured current in it
+    /// and what the observer makes of it.
+    fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback;
+
+    /// Tells the observer the voltage `u` that a period commands, in the frame of the feedback. Only
+    /// the adaptive back-EMF observer works in that frame.
+    fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>);
+}
+
+// Not inlined: what is chosen among all is not in the default's way.
+impl Observer for Config {
+    #[inline(never)]
+    fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
+        estimate(self, state, input, imposed)
+    }
+
+    fn follows_park(&self) -> bool {
+        !matches!(self, Self::Compensated(_))
+    }
+
+    #[inline(never)]
+    fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback {
+        feedback(self, state, frame, inductance)
+    }
+
+    #[inline(never)]
+    fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
+        advance(self, state, fb, u);
+    }
+}
+
+impl Observer for compensated::Config {
+    #[inline(always)]
+    fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
+        compensated::estimate(self, &mut state.compensated, input, imposed)
+    }
+
+    #[inline(always)]
+    fn follows_park(&self) -> bool {
+        false
+    }
+
+    #[inline(always)]
+    fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback {
+        let (omega, i) = frame;
+        Feedback {
+            omega,
+            i,
+            i_hat: i,
+            h_hat: Dq {
+                d: WideVoltage::ZERO,
+                q: state.compensated.emf().wrapping_neg(),
+            },
+            inductance,
+        }
+    }
+
+    #[inline(always)]
+    fn advance(&self, _: &mut State, _: &Feedback, _: Dq<Voltage>) {}
 }
 
 /// Takes the observer in use from the last sample to this one.
@@ -97,36 +186,57 @@ pub fn estimate(
 ) -> Estimate {
     match config {
         Config::BackEmf(config) => {
-            back_emf::estimate(config, &mut state.back_emf, imposed, input.planned)
+            let (estimate, told) =
+                back_emf::estimate(config, &mut state.back_emf, imposed, input.planned);
+            state.told = told;
+            estimate
         }
         Config::Edges(config) => {
             let (v, i) = (phases(input.v), phases(input.i));
             let position = edges::estimate(config, &mut state.edges, v, i, input.hall);
+            state.told = Told {
+                omega_bar_step: position.omega_step,
+                lost: !position.known,
+                ..Told::default()
+            };
             Estimate {
                 theta: position.theta,
                 frame: sin_cos(position.theta),
                 omega: position.omega,
                 omega_bar: position.omega,
-                omega_bar_step: position.omega_step,
-                xi: INVERSE_FLUX_NOMINAL,
-                xi_step: InverseFlux::ZERO,
-                lost: !position.known,
             }
         }
         Config::Compensated(config) => {
             compensated::estimate(config, &mut state.compensated, input, imposed)
         }
-        Config::Given => given::estimate(&state.given, input.swapped),
+        Config::Given => {
+            let (estimate, told) = given::estimate(&state.given, input.swapped);
+            state.told = told;
+            estimate
+        }
     }
 }
 
-/// The rotor stands where the position sensors of this sample say. False where none tell: then it
-/// must be parked.
-pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
-    state.clear();
+/// What is done every so many `periods`: coefficients follow the speed, and [`State::told`] is
+/// brought up to date.
+pub fn pace(config: &Config, state: &mut State, inductance: Factor, periods: u32) {
+    if let Config::Compensated(config) = config {
+        state.told = compensated::told(config, &state.compensated, periods);
+        compensated::pace(config, &mut state.compensated, inductance);
+    }
+}
+
+/// A start begins: the rotor stands where the position sensors of this sample say. False where none
+/// tell: then it must be parked, by the control's frame that is at this angle.
+pub fn stand(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool {
+    state.clear(config);
     match config {
+        Config::BackEmf(config) => {
+            state.back_emf = back_emf::begin(config, frame, Speed::ZERO);
+            false
+        }
         Config::Edges(config) => edges::stand(config, &mut state.edges, hall),
-        Config::BackEmf(_) | Config::Compensated(_) => false,
+        Config::Compensated(_) => false,
         Config::Given => true,
     }
 }
@@ -146,9 +256,13 @@ pub fn feedback(
     inductance: Factor,
 ) -> Feedback {
     let (i_hat, h_hat) = match config {
-        Config::BackEmf(_) => (state.back_emf.i, state.back_emf.h),
+        Config::BackEmf(_) => {
+            let h = state.back_emf.h;
+            let (d, q) = (wide(h.d), wide(h.q));
+            (state.back_emf.i, Dq { d, q })
+        }
         Config::Edges(_) | Config::Given => (i, emf(omega, FLUX_NOMINAL)),
-        Config::Compensated(_) => (i, emf(state.compensated.omega_i, state.compensated.phi)),
+        Config::Compensated(config) => return config.feedback(state, (omega, i), inductance),
     };
     Feedback {
         omega,
@@ -161,12 +275,12 @@ pub fn feedback(
 
 /// ĥ of a flux along d, ω·φ against q.
 #[inline(always)]
-fn emf(omega: Speed, flux: Flux) -> Dq<Voltage> {
-    // A speed in turns takes 2π: 16·π/8.
-    let length = omega.top(flux).top(EIGHTH_PI).to_bits() << 4;
+fn emf(omega: Speed, flux: Flux) -> Dq<WideVoltage> {
+    // A speed in turns takes 2π: 16·π/8, and the sixteenth is what the fraction bits are apart.
+    let length = omega.top(flux).top(EIGHTH_PI).to_bits();
     Dq {
-        d: Voltage::ZERO,
-        q: Voltage::from_bits(-length),
+        d: WideVoltage::ZERO,
+        q: WideVoltage::from_bits(-length),
     }
 }
 
@@ -189,14 +303,6 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
     }
 }
 
-/// A start begins: the control's frame is at this angle, and nothing is known of the rotor's.
-pub fn align(config: &Config, state: &mut State, frame: Angle) {
-    state.clear();
-    if let Config::BackEmf(config) = config {
-        state.back_emf = back_emf::begin(config, frame, Speed::ZERO);
-    }
-}
-
 /// The rotor is known to turn at `omega` and to be at `theta` at the coming sample, under the current
 /// `i`.
 pub fn begin(
@@ -205,7 +311,7 @@ pub fn begin(
     (theta, omega): (Angle, Speed),
     i: AlphaBeta<Current>,
 ) {
-    state.clear();
+    state.clear(config);
     match config {
         Config::BackEmf(config) => state.back_emf = back_emf::begin(config, theta, omega),
         Config::Edges(config) => {
@@ -214,7 +320,7 @@ pub fn begin(
             edges::begin(config, &mut state.edges, before, omega, phases(i));
         }
         Config::Compensated(config) => {
-            state.compensated = compensated::begin(config, theta, omega, i);
+            compensated::begin(config, &mut state.compensated, (theta, omega), i);
         }
         Config::Given => {}
     }
@@ -229,7 +335,7 @@ pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Cur
             edges::begin(config, &mut state.edges, theta, Speed::ZERO, phases(i));
         }
         Config::Compensated(config) => {
-            state.compensated = compensated::begin(config, theta, Speed::ZERO, i);
+            compensated::begin(config, &mut state.compensated, (theta, Speed::ZERO), i);
         }
     }
 }
@@ -254,12 +360,21 @@ pub fn take_over(
 }
 
 impl State {
-    /// Forgets the rotor, but not what is known of its sensors.
-    fn clear(&mut self) {
-        let (hall, given) = (self.edges.hall.clone(), self.given.clone());
-        *self = Self::default();
-        self.edges.hall = hall;
-        self.given = given;
+    /// The observer in use forgets the rotor, but not what is known of its sensors.
+    fn clear(&mut self, config: &Config) {
+        self.told = Told::default();
+        match config {
+            // A start or a catch gives it all of its state.
+            Config::BackEmf(_) | Config::Given => {}
+            Config::Edges(_) => {
+                let hall = self.edges.hall.clone();
+                self.edges = edges::State {
+                    hall,
+                    ..edges::State::default()
+                };
+            }
+            Config::Compensated(_) => self.compensated = compensated::State::default(),
+        }
     }
 
     /// Every word of the state of the observer in use; the others rest.
@@ -269,7 +384,16 @@ impl State {
             edges,
             compensated,
             given,
+            told,
         } = self;
+        for word in [
+            told.omega_bar_step.to_bits(),
+            told.xi.to_bits(),
+            told.xi_step.to_bits(),
+            i32::from(told.lost),
+        ] {
+            out(word as u32);
+        }
         match config {
             Config::BackEmf(_) => back_emf.trace(out),
             Config::Edges(_) => edges.trace(out),

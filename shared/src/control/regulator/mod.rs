@@ -1,8 +1,8 @@
 //! Current regulators: from the current that is wanted to the voltage.
 //!
 //! All three take the same [`Reference`] and [`Feedback`], and each holds two integrators. A period
-//! is [`Config::voltage`], the modulator's limit, then [`Config::integrate`] with what the limit
-//! has cut off.
+//! is [`Config::voltage`], [`Config::integrate`], and where the modulator's limit cuts something off
+//! [`Config::give_way`].
 
 pub mod modified;
 pub mod observer_based;
@@ -12,8 +12,8 @@ use fixed::types::extra::U28;
 
 use super::inductance::Factor;
 use super::transform::Dq;
-use crate::math::{Gain, SinCos};
-use crate::units::{Current, Speed, Voltage};
+use crate::math::Gain;
+use crate::units::{Current, Speed, Voltage, WideVoltage, narrow, wide};
 
 /// The current that is wanted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -73,7 +73,7 @@ pub struct Feedback {
     /// Estimated currents; the measured ones where the observer estimates none.
     pub i_hat: Dq<Current>,
     /// Estimated back-EMF; (0, −ω̂·φ̂) where the observer estimates a flux.
-    pub h_hat: Dq<Voltage>,
+    pub h_hat: Dq<WideVoltage>,
     /// L over the inductance that the parameters state.
     pub inductance: Factor,
 }
@@ -100,11 +100,15 @@ pub struct State {
 impl Config {
     /// The voltage that brings the currents to their references, before any limit.
     #[inline(always)]
-    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
-        match self {
+    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+        let u = match self {
             Self::ObserverBased(c) => c.voltage(&state.observer_based, wanted, fb),
-            Self::Synchronous(c) => c.voltage(&state.synchronous, wanted, fb),
+            Self::Synchronous(c) => return c.voltage(&state.synchronous, wanted, fb),
             Self::Modified(c) => c.voltage(&state.modified, wanted, fb),
+        };
+        Dq {
+            d: wide(u.d),
+            q: wide(u.q),
         }
     }
 
@@ -128,21 +132,24 @@ impl Config {
         }
     }
 
-    /// Takes the integrators on by a period. `cut` is what the limit has cut off the voltage, if
-    /// it has: the integrators go on as if only the current had been wanted that the rest can bring, so
-    /// that they are ready the moment that less is wanted.
+    /// Takes the integrators on by a period.
     #[inline(always)]
-    pub fn integrate(
-        &self,
-        state: &mut State,
-        wanted: &Reference,
-        fb: &Feedback,
-        cut: Option<Dq<Voltage>>,
-    ) {
+    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         match self {
-            Self::ObserverBased(c) => c.integrate(&mut state.observer_based, wanted, fb, cut),
-            Self::Synchronous(c) => c.integrate(&mut state.synchronous, wanted, fb, cut),
-            Self::Modified(c) => c.integrate(&mut state.modified, wanted, fb, cut),
+            Self::ObserverBased(c) => c.integrate(&mut state.observer_based, wanted, fb),
+            Self::Synchronous(c) => c.integrate(&mut state.synchronous, wanted, fb),
+            Self::Modified(c) => c.integrate(&mut state.modified, wanted, fb),
+        }
+    }
+
+    /// Corrects [`Config::integrate`] for what the limit has cut off the voltage: the integrators go on
+    /// as if only the current had been wanted that the rest can bring, so that they are ready the
+    /// moment that less is wanted.
+    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        match self {
+            Self::ObserverBased(c) => c.give_way(&mut state.observer_based, cut),
+            Self::Synchronous(c) => c.give_way(&mut state.synchronous, cut),
+            Self::Modified(c) => c.give_way(&mut state.modified, cut),
         }
     }
 
@@ -158,24 +165,65 @@ impl Config {
         }
     }
 
-    /// Turns the integrators with the frame, which now leads the one before by this angle.
-    pub fn rotate(&self, state: &mut State, ahead: SinCos) {
-        match self {
-            Self::ObserverBased(_) => state.observer_based.rotate(ahead),
-            Self::Synchronous(_) => state.synchronous.rotate(ahead),
-            Self::Modified(_) => state.modified.rotate(ahead),
+    /// What is done every few periods: coefficients follow the speed.
+    pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
+        if let Self::Synchronous(c) = self {
+            c.pace(&mut state.synchronous, omega, inductance);
         }
+    }
+}
+
+/// A current regulator in a control period: the one in use of all, or one that is known beforehand.
+pub trait Regulator {
+    /// The voltage that brings the currents to their references, before any limit.
+    fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage>;
+
+    /// Takes the integrators on by a period; see [`Config::integrate`].
+    fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback);
+
+    /// Corrects that for what the limit has cut off; see [`Config::give_way`].
+    fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>);
+}
+
+impl Regulator for Config {
+    #[inline(never)]
+    fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+        Self::voltage(self, state, wanted, fb)
+    }
+
+    #[inline(never)]
+    fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
+        Self::integrate(self, state, wanted, fb);
+    }
+
+    fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        Self::give_way(self, state, cut);
+    }
+}
+
+impl Regulator for synchronous::Config {
+    #[inline(always)]
+    fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+        Self::voltage(self, &state.synchronous, wanted, fb)
+    }
+
+    #[inline(always)]
+    fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
+        Self::integrate(self, &mut state.synchronous, wanted, fb);
+    }
+
+    fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        Self::give_way(self, &mut state.synchronous, cut);
     }
 }
 
 /// The current that the voltage that is cut off would have brought, by the loop's first order.
 #[inline(always)]
-fn beyond(admittance: Gain<U28, U28>, cut: Option<Dq<Voltage>>) -> Dq<Current> {
-    let current = |cut: Dq<Voltage>| Dq {
-        d: admittance.saturating_apply(cut.d),
-        q: admittance.saturating_apply(cut.q),
-    };
-    cut.map_or(Dq::default(), current)
+fn beyond(admittance: Gain<U28, U28>, cut: Dq<WideVoltage>) -> Dq<Current> {
+    Dq {
+        d: admittance.saturating_apply(narrow(cut.d)),
+        q: admittance.saturating_apply(narrow(cut.q)),
+    }
 }
 
 impl State {
@@ -188,6 +236,7 @@ impl State {
                 synchronous::State {
                     sigma: integral,
                     model,
+                    cross,
                 },
             modified: modified::State { length, phase },
         } = self;
@@ -198,6 +247,7 @@ impl State {
             integral.q.to_bits(),
             model.d.to_bits(),
             model.q.to_bits(),
+            cross.to_bits(),
             length.to_bits(),
             phase.to_bits(),
         ] {

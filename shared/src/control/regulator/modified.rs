@@ -9,9 +9,9 @@
 use fixed::types::extra::{U28, U32};
 
 use super::{Feedback, Reference, beyond};
-use crate::control::transform::{Dq, rotate_frame};
+use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
-use crate::units::{Angle, Current, Voltage};
+use crate::units::{Angle, Current, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,24 +80,22 @@ impl Config {
         self.admittance.saturating_apply(u_q.minus(without))
     }
 
-    /// Takes the integrators on by a period, the length's for the current that the limit has left.
+    /// Takes the integrators on by a period.
     #[inline(always)]
-    pub fn integrate(
-        &self,
-        state: &mut State,
-        wanted: &Reference,
-        fb: &Feedback,
-        cut: Option<Dq<Voltage>>,
-    ) {
-        let e_q = wanted.i.q.minus(fb.i.q);
-        let beyond = beyond(self.admittance, cut);
-        let step = self.k_i.saturating_apply(e_q.minus(beyond.q));
+    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
+        let step = self.k_i.saturating_apply(wanted.i.q.minus(fb.i.q));
         // The limit keeps the part along d: while it cuts, the phase alone holds i_d.
         let length = self.length(state, wanted, fb);
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
         let turn = self.phase_k_i.saturating_apply(e_d);
         state.length = state.length.plus(step);
         state.phase = bounded(state.phase.plus(turn));
+    }
+
+    /// Takes back what the length has gone on by for the voltage that is cut off.
+    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        let beyond = beyond(self.admittance, cut);
+        state.length = state.length.minus(self.k_i.saturating_apply(beyond.q));
     }
 
     /// Sets the integrators so that the voltage is `u`, where that lies within a quarter of a turn
@@ -116,16 +114,6 @@ impl Config {
 }
 
 impl State {
-    /// Turns the integrators with the frame.
-    pub fn rotate(&mut self, ahead: SinCos) {
-        let SinCos { cos, sin } = sin_cos(self.phase);
-        let u = Dq {
-            d: Voltage::from_bits(-(self.length.top(sin).to_bits() << 1)),
-            q: Voltage::from_bits(self.length.top(cos).to_bits() << 1),
-        };
-        self.set(rotate_frame(u, ahead));
-    }
-
     /// Length and phase of a voltage; behind the d axis the length is negative.
     fn set(&mut self, u: Dq<Voltage>) {
         let length = magnitude(u.d, u.q);

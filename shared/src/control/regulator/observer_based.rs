@@ -3,9 +3,9 @@
 use fixed::types::extra::U28;
 
 use super::{Feedback, Reference, beyond};
-use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, Held, SinCos, TopProduct};
-use crate::units::{Current, Voltage};
+use crate::control::transform::Dq;
+use crate::math::{Gain, Held, TopProduct};
+use crate::units::{Current, Voltage, WideVoltage, narrow};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,13 +65,13 @@ impl Config {
         let d = self
             .resistance
             .saturating_apply(wanted.i.d)
-            .minus(fb.h_hat.d)
+            .minus(narrow(fb.h_hat.d))
             .minus(self.reactance.saturating_apply(cross_d))
             .minus(self.k_pe.saturating_apply(e.d));
         let q = self
             .resistance
             .saturating_apply(wanted.i.q)
-            .minus(fb.h_hat.q)
+            .minus(narrow(fb.h_hat.q))
             .plus(self.reactance.saturating_apply(cross_q))
             .plus(self.inductance.saturating_apply(wanted.i_q_step))
             .minus(self.k_pe.saturating_apply(e.q))
@@ -79,21 +79,21 @@ impl Config {
         Dq { d, q }
     }
 
-    /// Takes the integrators on by a period, for the current that the limit has left.
+    /// Takes the integrators on by a period.
     #[inline(always)]
-    pub fn integrate(
-        &self,
-        state: &mut State,
-        wanted: &Reference,
-        fb: &Feedback,
-        cut: Option<Dq<Voltage>>,
-    ) {
+    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
-        let beyond = beyond(self.admittance, cut);
-        let step = |e: Current, beyond| self.k_ie.saturating_apply(e.plus(beyond));
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.minus(step(e.d, beyond.d));
-        sigma.q = sigma.q.minus(step(e.q, beyond.q));
+        sigma.d = sigma.d.minus(self.k_ie.saturating_apply(e.d));
+        sigma.q = sigma.q.minus(self.k_ie.saturating_apply(e.q));
+    }
+
+    /// Takes back what the integrators have gone on by for the voltage that is cut off.
+    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        let beyond = beyond(self.admittance, cut);
+        let sigma = &mut state.sigma;
+        sigma.d = sigma.d.minus(self.k_ie.saturating_apply(beyond.d));
+        sigma.q = sigma.q.minus(self.k_ie.saturating_apply(beyond.q));
     }
 
     /// Sets the integrators so that the voltage is `u`.
@@ -103,13 +103,6 @@ impl Config {
             d: u.d.minus(forced.d),
             q: u.q.minus(forced.q),
         };
-    }
-}
-
-impl State {
-    /// Turns the integrators with the frame.
-    pub fn rotate(&mut self, ahead: SinCos) {
-        self.sigma = rotate_frame(self.sigma, ahead);
     }
 }
 

@@ -4,36 +4,39 @@
 //! With the zero of each PI on the winding's pole (k_i/k_p = R/L) the loop is of first order, at
 //! the bandwidth that k_p = bandwidth·L sets.
 
-use fixed::types::extra::U28;
+use fixed::types::extra::{U24, U28, U32};
 
-use super::{Feedback, Reference, beyond};
-use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, Held, SinCos, TopProduct};
-use crate::units::{Current, Voltage};
+use super::{Feedback, Reference};
+use crate::control::inductance::Factor;
+use crate::control::transform::Dq;
+use crate::math::{Gain, Held, Multiplier};
+use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// k_p, bandwidth·L.
-    pub k_p: Gain<U28, U28>,
+    pub k_p: Multiplier<U28, U24>,
     /// k_i·T_s, bandwidth·R·T_s.
-    pub k_i: Gain<U28, U28>,
-    /// L, for speed times current.
-    pub reactance: Gain<U28, U28>,
+    pub k_i: Multiplier<U28, U24>,
+    /// L, speed to voltage over current.
+    pub reactance: Gain<U32, U28>,
     /// Bandwidth·T_s.
-    pub rate: Gain<U28, U28>,
+    pub rate: Multiplier<U28, U28>,
     /// 1/k_p.
-    pub admittance: Gain<U28, U28>,
+    pub admittance: Gain<U24, U28>,
 }
 
 /// The integrators.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Of the voltage along d and q.
-    pub sigma: Dq<Voltage>,
+    pub sigma: Dq<WideVoltage>,
     /// The currents that the references bring, at the loop's first order: what is decoupled. They
     /// have no noise, and the references themselves would cross the axes at a step.
     pub model: Dq<Current>,
+    /// ω̂·L.
+    pub cross: Multiplier<U28, U24>,
 }
 
 impl Config {
@@ -44,16 +47,20 @@ impl Config {
     ///
     /// where the last i_d and i_q are those of the model.
     #[inline(always)]
-    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
-        let u = self.forced(state, wanted, fb);
+    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+        let e = error(wanted, fb);
+        let model = &state.model;
+        // Currents are within four units and k_p is below eight: no sum comes near 128.
+        let d = self.k_p.added(state.sigma.d, e.d);
+        let q = self.k_p.added(state.sigma.q, e.q);
+        let forward = wide(wanted.u_q).wrapping_sub(fb.h_hat.q);
         Dq {
-            d: u.d.plus(state.sigma.d),
-            q: u.q.plus(state.sigma.q),
+            d: state.cross.taken(d, model.q),
+            q: state.cross.added(q, model.d).wrapping_add(forward),
         }
     }
 
     /// The current i_q* for which V_q is `u_q`; the one that is wanted does not matter.
-    #[inline(always)]
     pub fn current_at(
         &self,
         state: &State,
@@ -63,68 +70,52 @@ impl Config {
     ) -> Current {
         let wanted = wanted.with_i_q(Current::ZERO);
         let without = self.voltage(state, &wanted, fb).q;
-        self.admittance.saturating_apply(u_q.minus(without))
+        self.admittance.saturating_apply(wide(u_q).minus(without))
     }
 
-    /// V_d and V_q without the integrators.
+    /// Takes the integrators on by a period.
     #[inline(always)]
-    fn forced(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
+    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
-        let cross_d = fb.inductance.of(fb.omega.top(state.model.q));
-        let cross_q = fb.inductance.of(fb.omega.top(state.model.d));
-        let d = self
-            .k_p
-            .saturating_apply(e.d)
-            .minus(self.reactance.saturating_apply(cross_d));
-        let q = self
-            .k_p
-            .saturating_apply(e.q)
-            .plus(self.reactance.saturating_apply(cross_q))
-            .minus(fb.h_hat.q)
-            .plus(wanted.u_q);
-        Dq { d, q }
-    }
-
-    /// Takes the integrators on by a period, for the current that the limit has left.
-    #[inline(always)]
-    pub fn integrate(
-        &self,
-        state: &mut State,
-        wanted: &Reference,
-        fb: &Feedback,
-        cut: Option<Dq<Voltage>>,
-    ) {
-        let e = error(wanted, fb);
-        let step = |e: Current, beyond| self.k_i.saturating_apply(e.minus(beyond));
-        let beyond = beyond(self.admittance, cut);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.plus(step(e.d, beyond.d));
-        sigma.q = sigma.q.plus(step(e.q, beyond.q));
+        sigma.d = self.k_i.added(sigma.d, e.d);
+        sigma.q = self.k_i.added(sigma.q, e.q);
         let model = &mut state.model;
-        let follow = |model: Current, wanted: Current, beyond| {
-            let left = wanted.minus(beyond).minus(model);
-            model.plus(self.rate.apply(left))
+        model.d = self.rate.added(model.d, wanted.i.d.minus(model.d));
+        model.q = self.rate.added(model.q, wanted.i.q.minus(model.q));
+    }
+
+    /// Takes back what the integrators have gone on by for the current that the voltage that is cut
+    /// off would have brought, by the loop's first order.
+    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        let beyond = Dq {
+            d: self.admittance.saturating_apply(cut.d),
+            q: self.admittance.saturating_apply(cut.q),
         };
-        model.d = follow(model.d, wanted.i.d, beyond.d);
-        model.q = follow(model.q, wanted.i.q, beyond.q);
+        let State { sigma, model, .. } = state;
+        sigma.d = self.k_i.taken(sigma.d, beyond.d);
+        sigma.q = self.k_i.taken(sigma.q, beyond.q);
+        model.d = self.rate.taken(model.d, beyond.d);
+        model.q = self.rate.taken(model.q, beyond.q);
+    }
+
+    /// Takes ω̂·L, every few periods.
+    pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
+        // The range of the factor's type is that of a number with 28 fraction bits.
+        let product = inductance.of(self.reactance.saturating_apply(omega));
+        state.cross = Multiplier::from_bits(product.to_bits());
     }
 
     /// Sets the integrators so that the voltage is `u`.
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
+        self.pace(state, fb.omega, fb.inductance);
         state.model = fb.i;
-        let forced = self.forced(state, wanted, fb);
+        state.sigma = Dq::default();
+        let forced = self.voltage(state, wanted, fb);
         state.sigma = Dq {
-            d: u.d.minus(forced.d),
-            q: u.q.minus(forced.q),
+            d: wide(u.d).minus(forced.d),
+            q: wide(u.q).minus(forced.q),
         };
-    }
-}
-
-impl State {
-    /// Turns the integrators with the frame.
-    pub fn rotate(&mut self, ahead: SinCos) {
-        self.sigma = rotate_frame(self.sigma, ahead);
-        self.model = rotate_frame(self.model, ahead);
     }
 }
 

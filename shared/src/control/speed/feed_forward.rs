@@ -10,7 +10,7 @@ use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
 use crate::units::{Current, Speed};
 
-/// Coefficients for one sample period T_s.
+/// Coefficients for one period of the outer loops, here T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Proportional gain, speed to current.
@@ -38,7 +38,7 @@ impl Config {
     /// The integrator stands still where the current is at a bound and the error pushes it further.
     #[inline(always)]
     pub(super) fn current(&self, state: &mut State, omega_r: Speed, input: &Input) -> Reference {
-        let omega = input.estimate.omega_bar;
+        let omega = input.speed;
         let error = omega_r.minus(omega);
         let i_q = state
             .sigma

@@ -3,7 +3,7 @@
 pub mod feed_forward;
 pub mod nested;
 
-use super::observer::Estimate;
+use super::observer::Told;
 use super::planner;
 use super::regulator::Reference;
 use crate::units::{Current, Speed, Torque};
@@ -34,13 +34,15 @@ pub struct State {
     feed_forward: feed_forward::State,
 }
 
-/// What one period of speed control reads.
+/// What one period of speed control, [`PERIODS`](super::PERIODS) of the drive, reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     /// Ω*.
     pub command: Speed,
-    /// What the observer says.
-    pub estimate: Estimate,
+    /// ω̄̂.
+    pub speed: Speed,
+    /// What the observer says besides.
+    pub told: Told,
     /// Bounds of i_q*.
     pub bounds: Bounds,
     /// i_q* less i_q of the last period where its voltage was limited, else zero: the torque that
@@ -66,8 +68,7 @@ impl Bounds {
 }
 
 impl Config {
-    /// One period: ω* moves towards the command, and the current takes the speed to ω*.
-    #[inline(always)]
+    /// One of the outer loops' periods: ω* moves towards the command, and the current takes the speed to ω*.
     pub fn current(&self, state: &mut State, input: &Input) -> Reference {
         let step = state.planner.plan(&self.planner, input.command);
         match &self.law {

@@ -7,16 +7,16 @@
 use fixed::types::extra::{U28, U32};
 
 use super::{Input, torque};
-use crate::control::planner;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
+use crate::control::{PERIODS, planner};
 use crate::math::{Gain, Held, TopProduct};
 use crate::units::{Current, Speed, Torque, Voltage};
 
 /// From here on the error is acted on in full.
 const ALMOST_HALF: Speed = Speed::from_bits(i32::MAX - (1 << 26));
 
-/// Coefficients for one sample period T_s.
+/// Coefficients for one period of the outer loops, here T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// k_pω.
@@ -54,13 +54,10 @@ impl Config {
         (step, slew): (Speed, Speed),
         input: &Input,
     ) -> Reference {
-        let estimate = &input.estimate;
+        let told = &input.told;
         let wanted = planner.reference.plus(step);
-        let half_trust = self
-            .trust
-            .saturating_apply(estimate.omega_bar)
-            .max(Speed::ZERO);
-        let error = estimate.omega_bar.minus(wanted);
+        let half_trust = self.trust.saturating_apply(input.speed).max(Speed::ZERO);
+        let error = input.speed.minus(wanted);
         let error = if half_trust < ALMOST_HALF {
             Speed::from_bits(error.top(half_trust).to_bits() << 1)
         } else {
@@ -71,7 +68,7 @@ impl Config {
             .minus(self.k_p.saturating_apply(error))
             .plus(self.inertia.saturating_apply(step));
         let integral_step = self.k_i.saturating_apply(error);
-        let i_q = estimate.xi.top(torque);
+        let i_q = told.xi.top(torque);
         let bounded = input.bounds.hold(i_q);
         if bounded != i_q || input.missing != Current::ZERO {
             let over = i_q.minus(bounded).plus(input.missing);
@@ -85,20 +82,18 @@ impl Config {
             return Reference::steady(i_q);
         }
         // ω̈* is left out: at the trajectory's corners it would be a pulse of voltage.
+        let periods = PERIODS as i32;
         let torque_step = self
             .k_p
-            .saturating_apply(step.minus(estimate.omega_bar_step))
-            .minus(integral_step);
+            .saturating_apply((step / periods).minus(told.omega_bar_step))
+            .minus(integral_step / periods);
         Reference {
             i: Dq {
                 d: Current::ZERO,
                 q: i_q,
             },
             u_q: Voltage::ZERO,
-            i_q_step: estimate
-                .xi_step
-                .top(torque)
-                .plus(estimate.xi.top(torque_step)),
+            i_q_step: told.xi_step.top(torque).plus(told.xi.top(torque_step)),
         }
     }
 

@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use super::{L, P, PHI, R, TS, Units};
 use crate::control::inductance::Factor;
-use crate::control::modulator;
+use crate::control::modulator::{self, Longest};
 use crate::control::regulator::{Feedback, Reference, State};
 use crate::control::transform::Dq;
-use crate::units::{Current, Voltage};
+use crate::units::{Current, Voltage, WideVoltage, narrow};
 
 /// Steps of the model a period.
 const PARTS: u32 = 16;
@@ -135,8 +135,8 @@ impl Loop {
             i,
             i_hat: i,
             h_hat: Dq {
-                d: Voltage::ZERO,
-                q: self.units.voltage(-self.motor.omega() * PHI),
+                d: WideVoltage::ZERO,
+                q: self.units.wide(-self.motor.omega() * PHI),
             },
             inductance: Factor::ONE,
         }
@@ -146,9 +146,13 @@ impl Loop {
     pub(super) fn period(&mut self, wanted: &Reference) -> (f64, f64) {
         let feedback = self.feedback();
         let regulator = &self.units.0.regulator;
+        regulator.pace(&mut self.regulator, feedback.omega, feedback.inductance);
         let asked = regulator.voltage(&self.regulator, wanted, &feedback);
-        let (u, cut) = modulator::limit(asked, self.vector_max);
-        regulator.integrate(&mut self.regulator, wanted, &feedback, cut);
+        let (u, cut) = modulator::limit(asked, &Longest::new(self.vector_max, narrow(asked.d)));
+        regulator.integrate(&mut self.regulator, wanted, &feedback);
+        if let Some(cut) = cut {
+            regulator.give_way(&mut self.regulator, cut);
+        }
         self.missing = if cut.is_some() {
             wanted.i.q - feedback.i.q
         } else {

@@ -2,8 +2,9 @@
 
 use proptest::prelude::*;
 
-use super::{K_I_OMEGA, K_P_OMEGA, P, PHI, TABLE_III, TS, Units, config_with, near, nothing_seen};
-use crate::control::observer::Estimate;
+use super::{K_I_OMEGA, K_P_OMEGA, P, PHI, TABLE_III, TS, Units, config_with, near};
+use crate::control::PERIODS;
+use crate::control::observer::Told;
 use crate::control::speed::{Bounds, Input, State};
 use crate::params::ParamId;
 use crate::units::{Current, Torque};
@@ -11,6 +12,9 @@ use crate::units::{Current, Torque};
 /// `CTL_SPEED`.
 const FEED_FORWARD: f32 = 1.0;
 const PUBLISHED: f32 = 2.0;
+
+/// The regulators' period.
+const T: f64 = TS * PERIODS as f64;
 
 /// J of section V.
 const J: f64 = 1.43e-4;
@@ -63,18 +67,17 @@ impl Case {
         let i_q = units.current(self.sigma_nm / TORQUE_CONSTANT);
         config.begin(&mut state, begin, i_q);
         let before = sigma(units, &state);
-        let step = units.speed(P * self.omega_dot_star * TS);
+        let step = units.speed(P * self.omega_dot_star * T);
         let wanted = config.current(
             &mut state,
             &Input {
                 command: begin + step,
-                estimate: Estimate {
-                    omega: units.speed(P * self.omega_m),
-                    omega_bar: units.speed(P * self.omega_m),
+                speed: units.speed(P * self.omega_m),
+                told: Told {
                     omega_bar_step: units.speed(P * self.y_f * TS),
                     xi: units.xi(self.xi),
                     xi_step: units.xi(self.xi_dot * TS),
-                    ..nothing_seen()
+                    lost: false,
                 },
                 bounds: Bounds {
                     min: units.current(-self.bound),
@@ -89,7 +92,7 @@ impl Case {
             p_q: units.amperes(wanted.i_q_step) / TS,
             u_q: units.volts(wanted.u_q),
             sigma_step: [after[0] - before[0], after[1] - before[1]],
-            omega_dot_star: units.rad_s(state.reference() - begin) / P / TS,
+            omega_dot_star: units.rad_s(state.reference() - begin) / P / T,
         }
     }
 }
@@ -109,7 +112,7 @@ proptest! {
     ) {
         let units = units(PUBLISHED);
         let xi = xi_factor / PHI;
-        let omega_star = omega_m - error - omega_dot_star * TS;
+        let omega_star = omega_m - error - omega_dot_star * T;
         let got = Case {
             omega_m, omega_star, omega_dot_star, y_f, xi, xi_dot, sigma_nm, bound, missing: 0.0,
         }.run(&units);
@@ -121,7 +124,7 @@ proptest! {
             let torque_dot = -K_P_OMEGA * y_f + K_P_OMEGA * omega_dot_star - K_I_OMEGA * error;
             let p_q = 2.0 / (3.0 * P) * (xi_dot * torque + xi * torque_dot);
             near(got.p_q, p_q, TABLE_III, 30.0)?;
-            let step = TS * K_I_OMEGA * error;
+            let step = T * K_I_OMEGA * error;
             near(got.sigma_step[0], -step, 0.0, TABLE_III * step.abs() + 1e-6)?;
         } else {
             prop_assert!(got.i_q.abs() <= bound + 1e-4);
@@ -141,7 +144,7 @@ proptest! {
         missing in prop_oneof![Just(0.0), -2.0..2.0_f64],
     ) {
         let units = units(0.0);
-        let omega_star = omega_m - error - omega_dot_star * TS;
+        let omega_star = omega_m - error - omega_dot_star * T;
         let got = Case {
             omega_m, omega_star, omega_dot_star, y_f: 0.0, xi: 1.0 / PHI, xi_dot: 0.0, sigma_nm,
             bound, missing,
@@ -156,7 +159,7 @@ proptest! {
         // 20 000 rpm/s.
         let taken = possible.clamp(-2094.4, 2094.4);
         near(got.omega_dot_star, taken, 1e-3, 1.0)?;
-        let step = -TS * pole * pole * J * error;
+        let step = -T * pole * pole * J * error;
         let conditioned = (possible - taken).abs() < 1.0;
         let comes_back = over.signum() != step.signum();
         if conditioned || comes_back {
@@ -192,7 +195,7 @@ proptest! {
         // Regulators 0 and 1 bring the back-EMF of the measured speed themselves.
         let own = if regulator == 2 { 0.0 } else { omega_m };
         near(got.u_q, P * PHI * (omega_r - own), 1e-4, 1e-4)?;
-        let step = TS * K_I_OMEGA * error / TORQUE_CONSTANT;
+        let step = T * K_I_OMEGA * error / TORQUE_CONSTANT;
         let over = i_q.abs() - bound;
         if over < -tolerance || i_q.signum() != step.signum() {
             near(got.sigma_step[1], step, TABLE_III, 1e-6)?;

@@ -26,7 +26,7 @@ pub(super) fn begin(config: &drive::Config, six_step: &Config, state: &mut drive
     let s = &mut state.six_step;
     // ω has 32 fraction bits, ξ = 1/4, a voltage 28.
     let emf = Voltage::from_bits(s.tracking.omega.max(Speed::ZERO).to_bits() >> 2);
-    let supply = Supply::new(&config.modulator, state.protection.bus);
+    let supply = Supply::new(&config.modulator, state.protection.bus, Voltage::ZERO);
     // 28 + 28 − 32 and 24 + 30 − 32 fraction bits; 31 wanted.
     let share = emf.top(supply.reciprocal).top(BETWEEN_PHASES).to_bits();
     let duty = I1F31::from_bits(share.min((1 << 22) - 1) << 9);

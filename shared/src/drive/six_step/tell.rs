@@ -25,7 +25,12 @@ pub(super) fn tell(
     // 31 + 28 − 32 fraction bits; 28 wanted.
     let of_duty = |x: Voltage| Voltage::from_bits(duty.top(x).to_bits() << 1);
     let bus_current = of_duty(i);
-    protection::bound(&config.protection, &mut state.protection, bus_current, i);
+    protection::bound(
+        &config.protection,
+        &mut state.protection,
+        (bus_current, i),
+        1,
+    );
 
     let parked = state.phase == Phase::Park;
     // In Park the rotor is taken to stand along the switching phase.

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::control::catch::Rotor;
+use crate::drive::launch;
 
 /// A rotor that turns at a constant speed while no current flows.
 struct Coasting {
@@ -69,8 +70,8 @@ fn a_rotor_that_turns_is_caught_into_run() {
                 let case = std::format!("{observer}, {direction}, {rpm}");
                 let turn = motor.bench.turn();
                 let periods = motor.until(Phase::Run, turn);
-                // 128 readings of the currents' zeros and 63 µs of charge.
-                assert!(periods < 145, "{case}: {periods}");
+                // 128 readings of the currents' zeros, 63 µs of charge, and what makes ready.
+                assert!(periods < 145 + launch::READY_PERIODS, "{case}: {periods}");
                 let error = motor.angle_error_deg();
                 assert!(error.abs() < 5.0, "{case}: {error}");
                 let seen = motor.seen_rpm();

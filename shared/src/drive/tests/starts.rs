@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::control::observer::sector::Sector;
+use crate::drive::launch;
+use crate::drive::slow::CYCLE;
 use crate::units::Angle;
 use fixed::types::I1F31;
 
@@ -23,11 +25,12 @@ fn a_start_senses_charges_parks_and_ramps() {
     };
     // 5 ms are 128 periods, rounded to a power of two; before them a current may still die for two.
     assert_eq!(sense, 2 + 128);
-    assert_eq!(charge, pulses);
-    // Three periods of the rotor's swing, which are more than 0.4 As at 4 A.
+    assert_eq!(charge, pulses + launch::READY_PERIODS);
+    // Three periods of the rotor's swing, which are more than 0.4 As at 4 A, in steps of eight, and
+    // eight for the observer.
     let expected = 3.0 * TAU / swing_rad_s * 24_000.0;
     assert!(
-        (f64::from(park) - expected).abs() < 5.0,
+        (f64::from(park) - expected - 8.0).abs() < 8.0,
         "{park}, {expected}"
     );
 }
@@ -131,7 +134,11 @@ fn reversed_is_two_phases_swapped() {
         let (Bridge::Duty([a, b, c]), Bridge::Duty(swapped)) = (a, b) else {
             panic!("both switch");
         };
-        assert_eq!([a, c, b], swapped);
+        // Products round towards minus infinity, a mirrored one the other way.
+        for (duty, swapped) in [a, c, b].into_iter().zip(swapped) {
+            let off = duty.to_num::<f64>() - swapped.to_num::<f64>();
+            assert!(off.abs() < 2e-6, "{off}");
+        }
     }
 }
 
@@ -147,7 +154,7 @@ fn a_test_starts_with_no_more_than_its_bound() {
     bench.until(Phase::Park, test);
     // At half of the ramp's current Park takes twice its time.
     let half = bench.until(Phase::Ramp, test);
-    assert!(half.abs_diff(2 * full) < 5, "{half}, {full}");
+    assert!(half.abs_diff(2 * full) < 20, "{half}, {full}");
 }
 
 /// Set-points of one sign, of each kind that has one.
@@ -187,7 +194,9 @@ fn the_other_direction_ends_a_start() {
     let [forwards, ..] = signed(&bench, 1.0);
     let [backwards, ..] = signed(&bench, -1.0);
     bench.until(Phase::Ramp, forwards);
-    assert_eq!(bench.quiet(1, backwards), Bridge::Brake);
+    let mut bridges = (0..CYCLE).map(|_| bench.quiet(1, backwards));
+    let ended = bridges.find(|bridge| !matches!(bridge, Bridge::Duty(_)));
+    assert_eq!(ended, Some(Bridge::Brake));
     bench.until(Phase::Ramp, backwards);
     assert!(bench.state.reversed);
     let snapshot = bench.state.snapshot();
@@ -275,7 +284,7 @@ fn a_torque_against_the_rotation_does_not_turn_the_motor_round_within_run() {
         let (forwards, backwards) = (setpoint(current(1.0)), setpoint(current(-1.0)));
         bench.run(200, sample, forwards);
         assert_eq!(bench.phase(), Phase::Run);
-        let bridge = bench.run(2, sample, backwards);
+        let bridge = bench.run(CYCLE + 1, sample, backwards);
         assert!(
             !matches!(bridge, Bridge::Duty(_)),
             "{backwards:?}: {bridge:?}"
@@ -292,9 +301,10 @@ fn a_torque_against_the_rotation_does_not_turn_the_motor_round_within_run() {
 fn what_the_last_run_held_is_forgotten_by_the_next_start() {
     let mut bench = Bench::new(&[]);
     let turn = bench.turn();
+    bench.until(Phase::Park, turn);
     // The bounds of the speed regulator's current grow from it.
     bench.state.torque.i_q = Current::ONE;
-    bench.quiet(1, turn);
+    bench.quiet(CYCLE, Setpoint::Stop);
     assert_eq!(bench.state.torque.i_q, Current::ZERO);
 }
 

@@ -8,32 +8,41 @@ pub(super) use Long as Factor;
 #[cfg(not(target_pointer_width = "64"))]
 pub(super) use Short as Factor;
 
-/// For registers of 32 bits: an SMMUL and an SMULL on a Cortex-M4.
+/// For registers of 32 bits: an SMMUL and two shifts on a Cortex-M4.
 #[cfg(any(test, not(target_pointer_width = "64")))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Short {
     mantissa: i32,
-    power: i32,
+    shift: u32,
 }
 
 #[cfg(any(test, not(target_pointer_width = "64")))]
 impl Short {
     pub(super) const fn new(mantissa: i32, power: i32) -> Self {
-        Self { mantissa, power }
+        Self {
+            mantissa,
+            shift: power.trailing_zeros(),
+        }
     }
 
     /// The product, wrapped.
     #[inline(always)]
     pub(super) fn wrapping(self, x: i32) -> i32 {
-        self.top(x).wrapping_mul(self.power)
+        // Masked, a shift cannot be out of range.
+        self.top(x) << (self.shift & 31)
     }
 
     /// The product, held at the ends of the type.
     #[inline(always)]
     pub(super) fn saturating(self, x: i32) -> i32 {
         let top = self.top(x);
-        top.checked_mul(self.power)
-            .unwrap_or_else(|| end(top.is_negative(), -self.power))
+        let shift = self.shift & 31;
+        let product = top << shift;
+        if product >> shift == top {
+            product
+        } else {
+            end(top.is_negative(), -1 << shift)
+        }
     }
 
     #[inline(always)]

@@ -4,12 +4,13 @@ use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
 
-use super::{BuildError, SLOW_SHARE, Si, gain};
+use super::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{crossing, flux_linkage, hall, position};
+use crate::math::Real;
 use crate::params::{ParamId, Params};
-use crate::units::{Angle, Flux, Scale, Speed};
+use crate::units::{Angle, Flux, Speed};
 
 /// τ_int·ω at the least speed: there the first-order integrator leads by 10° (2.2.2).
 const TAU_INT: f32 = 5.671;
@@ -100,67 +101,60 @@ fn slow_rpm(params: &Params) -> f32 {
 }
 
 /// Sections 2.2 to 2.4.
-pub(super) fn edges(params: &Params, p: &Si, scale: &Scale) -> Result<Config, BuildError> {
-    let get = |id| params.get(id);
-    let settings = FluxSettings::new(params);
-    let flux_per_current = p.inductance_h * scale.current_a / scale.flux_wb();
+pub(super) fn edges(p: &Si) -> Config {
+    let get = |id| p.get(id);
+    let settings = FluxSettings::new(p.params);
+    let flux_per_current = p.inductance_h * p.scale.current_a / p.scale.flux_wb();
     // In a period, a filter of this time constant goes this share of its way.
     let share = |tau_s: f32| -libm::expm1f(-p.period_s / tau_s);
-    let corner = |tau_s: f32| Speed::saturating_from_num(p.period_s / (TAU * tau_s));
-    let high_pass = match settings.tau_hpfs_s {
-        None => None,
-        Some(tau_s) => Some(HighPass {
-            share: gain(ParamId::StaRunRpm, share(tau_s))?,
-            corner: corner(tau_s),
-        }),
-    };
-    Ok(Config {
+    let corner = |tau_s: f32| Speed::from_f32(p.period_s / (TAU * tau_s));
+    let high_pass = settings.tau_hpfs_s.map(|tau_s| HighPass {
+        share: p.gain(ParamId::StaRunRpm, share(tau_s)),
+        corner: corner(tau_s),
+    });
+    Config {
         sensors: match (get(ParamId::CtlObserver), get(ParamId::CtlHall)) {
             (2.0, 0.0) => Sensors::Hall,
             (2.0, _) => Sensors::Merged,
             _ => Sensors::None,
         },
         flux: flux_linkage::Config {
-            resistance: gain(
+            resistance: p.gain(
                 ParamId::MotRMohm,
-                p.resistance_ohm * scale.current_a / scale.voltage_v,
-            )?,
-            inductance: gain(ParamId::MotLUh, flux_per_current)?,
-            forget: gain(ParamId::StaRunRpm, share(settings.tau_int_s))?,
+                p.resistance_ohm * p.scale.current_a / p.scale.voltage_v,
+            ),
+            inductance: p.gain(ParamId::MotLUh, flux_per_current),
+            forget: p.gain(ParamId::StaRunRpm, share(settings.tau_int_s)),
             corner: corner(settings.tau_int_s),
             high_pass,
-            stator_max: Flux::saturating_from_num(
-                get(ParamId::LimPhaseA) / scale.current_a * flux_per_current,
+            stator_max: Flux::from_f32(
+                get(ParamId::LimPhaseA) / p.scale.current_a * flux_per_current,
             ),
             adaptive: get(ParamId::CtlFluxForm) < 2.0,
         },
         crossing: crossing::Config {
-            deadband: I0F32::from_num(DEADBAND),
-            deadband_angle: Angle::from_num(libm::asinf(DEADBAND) / TAU),
-            hold_off: U0F32::from_num(settings.hold_off_turns),
-            patience: (PATIENCE * A_TURNS * TAU / (slow_rad_s(params) * p.period_s)) as u32,
+            deadband: I0F32::from_f32(DEADBAND),
+            deadband_angle: Angle::from_f32(libm::asinf(DEADBAND) / TAU),
+            hold_off: U0F32::from_f32(settings.hold_off_turns),
+            patience: (PATIENCE * A_TURNS * TAU / (slow_rad_s(p.params) * p.period_s)) as u32,
         },
-        position: estimator(&settings, p, scale)?,
+        position: estimator(p, &settings),
         hall: hall::Config {
             patience: (HALL_PATIENCE_S / p.period_s) as u32,
         },
-        flux_above: scale.speed_from_rpm(get(ParamId::StaRunRpm)),
-        hall_below: scale.speed_from_rpm(slow_rpm(params)),
-    })
+        flux_above: p.scale.speed_from_rpm(get(ParamId::StaRunRpm)),
+        hall_below: p.scale.speed_from_rpm(slow_rpm(p.params)),
+    }
 }
 
 /// Section 2.4.
-fn estimator(
-    settings: &FluxSettings,
-    p: &Si,
-    scale: &Scale,
-) -> Result<position::Config, BuildError> {
-    let speed = |turns_per_s: f32| scale.speed_from_rpm(turns_per_s * 60.0 / p.pole_pairs);
-    Ok(position::Config {
+fn estimator(p: &Si, settings: &FluxSettings) -> position::Config {
+    let speed = |turns_per_s: f32| p.scale.speed_from_rpm(turns_per_s * 60.0 / p.pole_pairs);
+    position::Config {
         turns: settings.turns as u8,
         whole_turns_above: speed(settings.whole_turns_above_hz),
-        a_e: gain(ParamId::CtlAe, settings.a_e)?,
+        a_e: p.gain(ParamId::CtlAe, settings.a_e),
         filter_above: speed(settings.filter_above_hz),
         compensates: true,
-    })
+    }
 }

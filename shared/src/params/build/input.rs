@@ -9,7 +9,7 @@ use crate::params::{ParamId, Params};
 
 /// How the throttle wire is read.
 pub fn input(params: &Params) -> Settings {
-    let time_us = |id| (params.get(id) * 1000.0) as u64;
+    let time_us = |id| u64::from((params.get(id) * 1000.0) as u32);
     let width_us = |id| params.get(id) as u16;
     Settings {
         protocol: Signal::from_number(params.get(ParamId::InpProto) as u8),

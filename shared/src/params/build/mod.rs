@@ -14,12 +14,12 @@ mod tone;
 pub use flux::FluxSettings;
 pub use input::input;
 
+use core::cell::Cell;
 use core::f32::consts::{FRAC_PI_2, TAU};
 
-use fixed::types::I1F31;
 use fixed::types::extra::Unsigned;
 
-use super::{ParamId, Params};
+use super::{ParamId, Params, SQRT_3};
 use crate::control::delay::Delay;
 use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
@@ -27,9 +27,9 @@ use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Stop};
 use crate::image::Image;
 use crate::input::signal::Signal;
-use crate::math::Gain;
+use crate::math::{Gain, Multiplier, Real, gain_parts};
 use crate::protection;
-use crate::units::{AdcCounts, Scale, Voltage};
+use crate::units::{AdcCounts, Scale, Speed, Voltage};
 
 /// What the control must know of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,120 +143,146 @@ const BOUND_RATE: f32 = 600.0;
 /// # Errors
 /// A [`BuildError`] names the parameter that makes a coefficient leave its range.
 pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
-    let p = Si::new(params);
-    let scale = Scale {
-        period_s: p.period_s,
-        current_a: board.current_a_per_count * 4096.0 / 3.0,
-        voltage_v: FRAC_PI_2 * p.flux_wb / p.period_s,
-        pole_pairs: p.pole_pairs,
-    };
-    let get = |id| params.get(id);
-    if get(ParamId::LimBusVMax) > BUS_UNITS_MAX * scale.voltage_v {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "too low for this flux and LIM_BUS_V_MAX",
-        );
-    }
-    if get(ParamId::LimBusVMax) < BUS_UNITS_MIN * scale.voltage_v {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "too high for this flux and LIM_BUS_V_MAX",
-        );
-    }
-    if get(ParamId::LimBusVMin) >= get(ParamId::LimBusVMax) {
-        return refuse(ParamId::LimBusVMin, "not below LIM_BUS_V_MAX");
-    }
-    if get(ParamId::CtlRpmMin) > get(ParamId::CtlRpmMax) {
-        return refuse(ParamId::CtlRpmMin, "above CTL_RPM_MAX");
-    }
-    if get(ParamId::StaRunRpm) > get(ParamId::CtlRpmMax) {
-        return refuse(ParamId::StaRunRpm, "above CTL_RPM_MAX");
-    }
-    if get(ParamId::CtlBwCurHz) > BANDWIDTH_SHARE * get(ParamId::PwmFreqHz) {
-        return refuse(ParamId::CtlBwCurHz, "above a twentieth of PWM_FREQ_HZ");
-    }
-    if get(ParamId::CtlBwSpdHz) > SPEED_SHARE * get(ParamId::CtlBwCurHz) {
-        return refuse(ParamId::CtlBwSpdHz, "above a fifth of CTL_BW_CUR_HZ");
-    }
-    if get(ParamId::LimPhaseA) * TRIP_SHARE > SHOWN_SHARE * board.current_range_a {
-        return refuse(
-            ParamId::LimPhaseA,
-            "the trip at 1.4 times this is beyond the board",
-        );
-    }
-    if get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0 > 0.25 {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "less than four periods a turn at CTL_RPM_MAX",
-        );
-    }
-    let by_edges = [1.0, 2.0].contains(&get(ParamId::CtlObserver));
-    if by_edges && get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0 > EDGES_TURNS {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "less than twelve periods a turn at CTL_RPM_MAX",
-        );
-    }
-    let protocol = get(ParamId::InpProto);
-    if protocol != 0.0 && Signal::from_number(protocol as u8).is_none() {
-        return refuse(
-            ParamId::InpProto,
-            "neither 0, 1 to 4, 10 to 13 nor 20 to 23",
-        );
-    }
-    let modulation = match get(ParamId::CtlModulation) {
+    let p = Si::new(params, board);
+    refuse_contradictions(&p);
+    let modulation = match p.get(ParamId::CtlModulation) {
         0.0 => Modulation::SpaceVector,
         _ => Modulation::Sine,
     };
-    let (duty_max, window) = sensing::duty_max(&p, board, modulation)?;
-
-    Ok(Config {
-        scale,
-        bus: gain(ParamId::LimBusVMax, board.bus_v_per_count / scale.voltage_v)?,
-        direction: match get(ParamId::MotDir) {
+    let (duty_max, window) = sensing::duty_max(&p, modulation);
+    p.verdict()?;
+    let config = Config {
+        scale: p.scale,
+        bus: p.factor(
+            ParamId::LimBusVMax,
+            board.bus_v_per_count / p.scale.voltage_v,
+        ),
+        direction: match p.get(ParamId::MotDir) {
             0.0 => Direction::Normal,
             _ => Direction::Reversed,
         },
-        stop: match get(ParamId::MotStop) {
+        stop: match p.get(ParamId::MotStop) {
             0.0 => Stop::Coast,
             _ => Stop::Brake,
         },
         delay: board.delay,
-        observer: observer::observer(params, &p, &scale, board.delay)?,
-        regulator: regulator::regulator(params, &p, &scale)?,
-        speed: outer::speed(params, &p, &scale)?,
-        torque: outer::torque(params, &p, &scale),
-        adapt_l: inductance::inductance(params, &p, &scale)?,
-        low_speed: low_speed(params, &p, &scale)?,
-        start: start::attempts(params, &p, &scale)?,
-        test_current: scale.current_from_a(TEST_SHARE * get(ParamId::LimPhaseA)),
-        both_ways: get(ParamId::Inp3d) == 1.0,
-        slow: scale
-            .speed_from_rpm(SLOW_SHARE * get(ParamId::StaRunRpm).min(get(ParamId::CtlRpmMin))),
-        coast: gain(ParamId::PwmFreqHz, p.period_s / COAST_S)?,
-        modulator: modulator_limits(modulation, duty_max),
-        sensing: sensing::sensing(&p, board, window),
-        catch: sensing::catch(params, &p, &scale, board)?,
-        charge: sensing::charge(params, &p, board),
-        dead_time: sensing::dead_time(&p, &scale)?,
-        protection: limits(params, &p, &scale, board)?,
-        tone: tone::tone(params, &p, &scale)?,
-        six_step: match get(ParamId::CtlDrive) {
+        observer: observer::observer(&p),
+        regulator: regulator::regulator(&p),
+        speed: outer::speed(&p),
+        torque: outer::torque(&p),
+        adapt_l: inductance::inductance(&p),
+        low_speed: low_speed(&p),
+        start: start::attempts(&p),
+        test_current: p
+            .scale
+            .current_from_a(TEST_SHARE * p.get(ParamId::LimPhaseA)),
+        both_ways: p.get(ParamId::Inp3d) == 1.0,
+        slow: p.slow(),
+        coast: p.gain(ParamId::PwmFreqHz, p.period_s / COAST_S),
+        modulator: modulator::Config::new(
+            modulation,
+            duty_max,
+            match board.shunts {
+                // The dead time's compensation comes on top of what the vector makes.
+                Shunts::Three => window - p.dead_time_s / p.period_s,
+                Shunts::Two => 0.0,
+            },
+        ),
+        sensing: sensing::sensing(&p, window),
+        catch: sensing::catch(&p),
+        charge: sensing::charge(&p),
+        dead_time: sensing::dead_time(&p),
+        protection: limits(&p),
+        tone: tone::tone(&p),
+        six_step: match p.get(ParamId::CtlDrive) {
             0.0 => None,
-            _ => Some(six_step::six_step(params, &p, &scale, board, duty_max)?),
+            _ => Some(six_step::six_step(&p, duty_max)),
         },
-        clear_periods: (CLEAR_S / p.period_s) as u32,
-        slow_periods: match get(ParamId::CtlObserver) {
-            2.0 => (SENSED_S / p.period_s) as u32,
+        clear_periods: p.periods(CLEAR_S),
+        slow_periods: match p.get(ParamId::CtlObserver) {
+            2.0 => p.periods(SENSED_S),
             _ => 0,
         },
-        proven_periods: (PROVEN_S / p.period_s) as u32,
-        lost_periods: (LOST_S / p.period_s) as u32,
-    })
+        proven_periods: p.periods(PROVEN_S),
+        lost_periods: p.periods(LOST_S),
+    };
+    p.verdict()?;
+    Ok(config)
 }
 
-/// The parameters that several blocks need, in SI.
-struct Si {
+/// Refuses what is wrong whatever the coefficients are.
+fn refuse_contradictions(p: &Si) {
+    let get = |id| p.get(id);
+    let unit_v = p.scale.voltage_v;
+    p.refuse_if(
+        get(ParamId::LimBusVMax) > BUS_UNITS_MAX * unit_v,
+        ParamId::PwmFreqHz,
+        "too low for this flux and LIM_BUS_V_MAX",
+    );
+    p.refuse_if(
+        get(ParamId::LimBusVMax) < BUS_UNITS_MIN * unit_v,
+        ParamId::PwmFreqHz,
+        "too high for this flux and LIM_BUS_V_MAX",
+    );
+    p.refuse_if(
+        get(ParamId::LimBusVMin) >= get(ParamId::LimBusVMax),
+        ParamId::LimBusVMin,
+        "not below LIM_BUS_V_MAX",
+    );
+    p.refuse_if(
+        get(ParamId::CtlRpmMin) > get(ParamId::CtlRpmMax),
+        ParamId::CtlRpmMin,
+        "above CTL_RPM_MAX",
+    );
+    p.refuse_if(
+        get(ParamId::StaRunRpm) > get(ParamId::CtlRpmMax),
+        ParamId::StaRunRpm,
+        "above CTL_RPM_MAX",
+    );
+    p.refuse_if(
+        get(ParamId::CtlBwCurHz) > BANDWIDTH_SHARE * get(ParamId::PwmFreqHz),
+        ParamId::CtlBwCurHz,
+        "above a twentieth of PWM_FREQ_HZ",
+    );
+    p.refuse_if(
+        get(ParamId::CtlBwSpdHz) > SPEED_SHARE * get(ParamId::CtlBwCurHz),
+        ParamId::CtlBwSpdHz,
+        "above a fifth of CTL_BW_CUR_HZ",
+    );
+    p.refuse_if(
+        get(ParamId::LimPhaseA) * TRIP_SHARE > SHOWN_SHARE * p.board.current_range_a,
+        ParamId::LimPhaseA,
+        "the trip at 1.4 times this is beyond the board",
+    );
+    let turns = get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0;
+    p.refuse_if(
+        turns > 0.25,
+        ParamId::PwmFreqHz,
+        "less than four periods a turn at CTL_RPM_MAX",
+    );
+    let by_edges = [1.0, 2.0].contains(&get(ParamId::CtlObserver));
+    p.refuse_if(
+        by_edges && turns > EDGES_TURNS,
+        ParamId::PwmFreqHz,
+        "less than twelve periods a turn at CTL_RPM_MAX",
+    );
+    let protocol = get(ParamId::InpProto);
+    p.refuse_if(
+        protocol != 0.0 && Signal::from_number(protocol as u8).is_none(),
+        ParamId::InpProto,
+        "neither 0, 1 to 4, 10 to 13 nor 20 to 23",
+    );
+}
+
+/// Why most coefficients are refused.
+const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
+
+/// What the coefficients are computed from: the parameters that several blocks need in SI, and all
+/// else that there is.
+struct Si<'a> {
+    params: &'a Params,
+    board: &'a Board,
+    scale: Scale,
     period_s: f32,
     dead_time_s: f32,
     pole_pairs: f32,
@@ -270,104 +296,146 @@ struct Si {
     speed_rad_s: f32,
     /// Electrical speed at which (22) is linearised, 1/s.
     linearised_rad_s: f32,
+    /// The first that was refused. Noted here and not returned: on the chip, a hundred early returns
+    /// take more flash than the coefficients that they guard.
+    refused: Cell<Option<BuildError>>,
 }
 
-impl Si {
-    fn new(params: &Params) -> Self {
+impl<'a> Si<'a> {
+    fn new(params: &'a Params, board: &'a Board) -> Self {
         let pole_pairs = params.get(ParamId::MotPolePairs);
+        let flux_wb = params.get(ParamId::MotFluxMwb) * 1e-3;
+        let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
         let rpm = LINEARISED_SHARE * params.get(ParamId::CtlRpmMax);
         Self {
-            period_s: 1.0 / params.get(ParamId::PwmFreqHz),
+            params,
+            board,
+            scale: Scale {
+                period_s,
+                current_a: board.current_a_per_count * 4096.0 / 3.0,
+                voltage_v: FRAC_PI_2 * flux_wb / period_s,
+                pole_pairs,
+            },
+            period_s,
             dead_time_s: params.get(ParamId::PwmDeadtimeNs) * 1e-9,
             pole_pairs,
             resistance_ohm: params.get(ParamId::MotRMohm) * 1e-3,
             inductance_h: params.get(ParamId::MotLUh) * 1e-6,
-            flux_wb: params.get(ParamId::MotFluxMwb) * 1e-3,
+            flux_wb,
             inertia_kgm2: params.get(ParamId::MotJGcm2) * 1e-7,
             current_rad_s: TAU * params.get(ParamId::CtlBwCurHz),
             speed_rad_s: TAU * params.get(ParamId::CtlBwSpdHz),
             linearised_rad_s: rpm * pole_pairs * TAU / 60.0,
+            refused: Cell::new(None),
         }
     }
-}
 
-fn refuse<T>(param: ParamId, reason: &'static str) -> Result<T, BuildError> {
-    Err(BuildError { param, reason })
-}
+    fn get(&self, id: ParamId) -> f32 {
+        self.params.get(id)
+    }
 
-fn gain<A: Unsigned, B: Unsigned>(param: ParamId, k: f32) -> Result<Gain<A, B>, BuildError> {
-    Gain::new(k).ok_or(BuildError {
-        param,
-        reason: "makes a coefficient leave its range",
-    })
+    /// A time in whole periods.
+    fn periods(&self, time_s: f32) -> u32 {
+        (time_s / self.period_s) as u32
+    }
+
+    /// Below this speed Run ends.
+    fn slow(&self) -> Speed {
+        let least_rpm = self
+            .get(ParamId::StaRunRpm)
+            .min(self.get(ParamId::CtlRpmMin));
+        self.scale.speed_from_rpm(SLOW_SHARE * least_rpm)
+    }
+
+    /// A volt number in the control's unit.
+    fn voltage(&self, volts: f32) -> Voltage {
+        Voltage::from_f32(volts / self.scale.voltage_v)
+    }
+
+    /// The gain of value `k`; where there is none, the parameter is refused.
+    fn gain<A: Unsigned, B: Unsigned>(&self, param: ParamId, k: f32) -> Gain<A, B> {
+        let (mantissa, power) = self.gain_parts(param, k, B::I32 - A::I32);
+        Gain::from_parts(mantissa, power)
+    }
+
+    /// The factor of value `k`; where it leaves its type's range, the parameter is refused.
+    fn factor<A: Unsigned, B: Unsigned>(&self, param: ParamId, k: f32) -> Multiplier<A, B> {
+        Multiplier::from_bits(self.factor_bits(param, k, B::I32 - A::I32))
+    }
+
+    #[inline(never)]
+    fn factor_bits(&self, param: ParamId, k: f32, exponent: i32) -> i32 {
+        let (bits, power) = self.gain_parts(param, k, exponent);
+        self.refuse_if(power != 1, param, OUT_OF_RANGE);
+        bits
+    }
+
+    #[inline(never)]
+    fn gain_parts(&self, param: ParamId, k: f32, exponent: i32) -> (i32, i32) {
+        let parts = gain_parts(k, exponent);
+        self.refuse_if(parts.is_none(), param, OUT_OF_RANGE);
+        parts.unwrap_or((0, 1))
+    }
+
+    /// Refuses a parameter in some case, unless another has been refused before.
+    #[inline(never)]
+    fn refuse_if(&self, refused: bool, param: ParamId, reason: &'static str) {
+        if refused && self.refused.get().is_none() {
+            self.refused.set(Some(BuildError { param, reason }));
+        }
+    }
+
+    /// What has been refused so far.
+    fn verdict(&self) -> Result<(), BuildError> {
+        self.refused.get().map_or(Ok(()), Err)
+    }
 }
 
 /// What keeps an observer that lives by the back-EMF in lock where there is little of it.
-fn low_speed(params: &Params, p: &Si, scale: &Scale) -> Result<low_speed::Config, BuildError> {
-    let limit_a = params.get(ParamId::LimPhaseA);
-    let phase = scale.current_from_a(limit_a);
-    let published =
-        params.get(ParamId::CtlObserver) == 0.0 && params.get(ParamId::CtlObsCure) == 0.0;
-    if published || params.get(ParamId::CtlObserver) == 2.0 {
+fn low_speed(p: &Si) -> low_speed::Config {
+    let limit_a = p.get(ParamId::LimPhaseA);
+    let phase = p.scale.current_from_a(limit_a);
+    let published = p.get(ParamId::CtlObserver) == 0.0 && p.get(ParamId::CtlObsCure) == 0.0;
+    if published || p.get(ParamId::CtlObserver) == 2.0 {
         // As published, and not needed where sensors tell the position.
-        return Ok(low_speed::Config::none(phase));
+        return low_speed::Config::none(phase);
     }
-    let ramp_a = params.get(ParamId::StaRampA).min(limit_a);
+    let ramp_a = p.get(ParamId::StaRampA).min(limit_a);
     let bias_a = BIAS_SHARE * ramp_a;
     let rad_per_unit = TAU / p.period_s;
     let end_rad_s = BIAS_END * p.resistance_ohm * bias_a / p.flux_wb;
     let drop_a_s = TORQUE_DROP_SHARE * p.flux_wb / p.resistance_ohm;
-    let i_d_slope = gain(
-        ParamId::StaRampA,
-        bias_a / scale.current_a / end_rad_s * rad_per_unit,
-    )?;
-    let i_q = scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a);
-    let i_q_slope = gain(ParamId::MotRMohm, drop_a_s * rad_per_unit / scale.current_a)?;
-    Ok(low_speed::Config::new(
-        (scale.current_from_a(bias_a), i_d_slope),
-        (i_q, i_q_slope),
+    let i_d = p.scale.current_from_a(bias_a);
+    let i_d_slope = bias_a / p.scale.current_a / end_rad_s * rad_per_unit;
+    let i_q = p.scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a);
+    let i_q_slope = drop_a_s * rad_per_unit / p.scale.current_a;
+    low_speed::Config::new(
+        (i_d, p.gain(ParamId::StaRampA, i_d_slope)),
+        (i_q, p.gain(ParamId::MotRMohm, i_q_slope)),
         phase,
-    ))
+    )
 }
 
-fn modulator_limits(modulation: Modulation, duty_max: f32) -> modulator::Config {
-    let longest = match modulation {
-        Modulation::SpaceVector => 1.0 / libm::sqrtf(3.0),
-        Modulation::Sine => 0.5,
-    };
-    modulator::Config {
-        modulation,
-        duty_max: I1F31::saturating_from_num(duty_max),
-        vector_max: I1F31::saturating_from_num(longest * duty_max),
-    }
-}
-
-fn limits(
-    params: &Params,
-    p: &Si,
-    scale: &Scale,
-    board: &Board,
-) -> Result<protection::Config, BuildError> {
-    let current = |id| scale.current_from_a(params.get(id));
-    let voltage = |volts: f32| Voltage::saturating_from_num(volts / scale.voltage_v);
-    let bus_max_v = params.get(ParamId::LimBusVMax);
-    let return_a = params.get(ParamId::LimRegenA);
-    Ok(protection::Config {
-        trip: AdcCounts::saturating_from_num(
-            TRIP_SHARE * params.get(ParamId::LimPhaseA) / board.current_a_per_count,
+fn limits(p: &Si) -> protection::Config {
+    let current = |id| p.scale.current_from_a(p.get(id));
+    let bus_max_v = p.get(ParamId::LimBusVMax);
+    let return_a = p.get(ParamId::LimRegenA);
+    protection::Config {
+        trip: AdcCounts::from_f32(
+            TRIP_SHARE * p.get(ParamId::LimPhaseA) / p.board.current_a_per_count,
         ),
-        bus_min: voltage(params.get(ParamId::LimBusVMin)),
-        bus_max: voltage(bus_max_v),
+        bus_min: p.voltage(p.get(ParamId::LimBusVMin)),
+        bus_max: p.voltage(bus_max_v),
         phase: current(ParamId::LimPhaseA),
         bus_draw: current(ParamId::LimBusA),
         bus_return: current(ParamId::LimRegenA),
-        bus_return_v: voltage(bus_max_v - RETURN_BAND_V),
-        bus_return_slope: gain(
+        bus_return_v: p.voltage(bus_max_v - RETURN_BAND_V),
+        bus_return_slope: p.gain(
             ParamId::LimRegenA,
-            return_a / RETURN_BAND_V * scale.voltage_v / scale.current_a,
-        )?,
-        bound_rate: gain(ParamId::PwmFreqHz, BOUND_RATE * p.period_s)?,
-    })
+            return_a / RETURN_BAND_V * p.scale.voltage_v / p.scale.current_a,
+        ),
+        bound_rate: p.factor(ParamId::PwmFreqHz, BOUND_RATE * p.period_s),
+    }
 }
 
 #[cfg(test)]

@@ -2,12 +2,13 @@
 
 use core::f32::consts::TAU;
 
-use super::{BuildError, Si, flux, gain};
+use super::{Si, flux};
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated};
-use crate::params::{ParamId, Params};
-use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Scale, Speed};
+use crate::math::{EIGHTH_PI, Multiplier, Real};
+use crate::params::ParamId;
+use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
 /// 2357 1/s.
@@ -28,59 +29,66 @@ const OMEGA_N_RAD_S: [f32; 2] = [150.0, 1000.0];
 /// Corner of what is added to the loop's integrator for the speed, 1/s.
 const SMOOTHING_RAD_S: f32 = 300.0;
 
+/// Flux of a unit of current, in units of flux: with up to a unit and a half of current the stator's
+/// flux stays within the eight units of its type. That is L·i of 9.4 times the stated flux at the end
+/// of the converter's range.
+const INDUCTANCE_MAX: f32 = 4.0;
+
 /// The observer that `CTL_OBSERVER` names.
-pub(super) fn observer(
-    params: &Params,
-    p: &Si,
-    scale: &Scale,
-    delay: Delay,
-) -> Result<observer::Config, BuildError> {
-    Ok(match params.get(ParamId::CtlObserver) {
+pub(super) fn observer(p: &Si) -> observer::Config {
+    match p.get(ParamId::CtlObserver) {
         0.0 => {
-            let mut config = back_emf(p, scale, delay)?;
-            if params.get(ParamId::CtlObsCure) == 1.0 {
-                config.cure = Some(cure(p)?);
+            let mut config = back_emf(p);
+            if p.get(ParamId::CtlObsCure) == 1.0 {
+                config.cure = Some(cure(p));
             }
             observer::Config::BackEmf(config)
         }
-        1.0 | 2.0 => observer::Config::Edges(flux::edges(params, p, scale)?),
-        _ => observer::Config::Compensated(compensated(p, scale, delay)?),
-    })
+        1.0 | 2.0 => observer::Config::Edges(flux::edges(p)),
+        _ => observer::Config::Compensated(compensated(p)),
+    }
 }
 
 /// The compensated flux observer.
-fn compensated(p: &Si, scale: &Scale, delay: Delay) -> Result<compensated::Config, BuildError> {
-    let flux_per_current = scale.current_a / scale.flux_wb();
+fn compensated(p: &Si) -> compensated::Config {
+    let flux_per_current = p.scale.current_a / p.scale.flux_wb();
     // β = R·T_s²/(12·L); under a voltage that changes in the middle of the period half of it, the
     // other way. The square of the speed is in turns a period.
     let bias = p.resistance_ohm * p.period_s / p.inductance_h * TAU * TAU / 12.0;
-    let bias = match delay {
+    let bias = match p.board.delay {
         Delay::None | Delay::One => bias,
         Delay::Half => -0.5 * bias,
     };
-    let speed = |rad_s: f32| Speed::saturating_from_num(rad_s * p.period_s / TAU);
-    Ok(compensated::Config {
-        half_resistance: gain(
+    let speed = |rad_s: f32| Speed::from_f32(rad_s * p.period_s / TAU);
+    p.refuse_if(
+        p.inductance_h * flux_per_current >= INDUCTANCE_MAX,
+        ParamId::MotLUh,
+        "too high for this flux and the board's range",
+    );
+    compensated::Config {
+        half_resistance: p.factor(
             ParamId::MotRMohm,
             0.5 * p.resistance_ohm * p.period_s * flux_per_current,
-        )?,
-        inductance: gain(ParamId::MotLUh, p.inductance_h * flux_per_current)?,
-        bias: gain(ParamId::MotLUh, bias)?,
+        ),
+        inductance: p.factor(ParamId::MotLUh, p.inductance_h * flux_per_current),
+        bias: p.gain(ParamId::MotLUh, bias),
         omega_min: speed(OMEGA_MIN_RAD_S),
         omega_n_min: speed(OMEGA_N_RAD_S[0]),
         omega_n_max: speed(OMEGA_N_RAD_S[1]),
-        smoothing: gain(ParamId::PwmFreqHz, SMOOTHING_RAD_S * p.period_s)?,
+        smoothing: p.factor(ParamId::PwmFreqHz, SMOOTHING_RAD_S * p.period_s),
         xi_nominal: INVERSE_FLUX_NOMINAL,
-    })
+        // The stated flux is 2/π.
+        quarter_per_flux: Multiplier::from_bits(EIGHTH_PI.to_bits()),
+    }
 }
 
 /// The adaptive back-EMF observer (6), (7), (20), (22), (28).
-fn back_emf(p: &Si, scale: &Scale, delay: Delay) -> Result<back_emf::Config, BuildError> {
+fn back_emf(p: &Si) -> back_emf::Config {
     let r_over_l = p.resistance_ohm / p.inductance_h;
     let decay = -libm::expm1f(-r_over_l * p.period_s);
     // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
     let acts_s = decay / r_over_l;
-    let current_per_voltage = scale.voltage_v / scale.current_a;
+    let current_per_voltage = p.scale.voltage_v / p.scale.current_a;
     let rad_per_unit = TAU / p.period_s;
 
     // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
@@ -92,38 +100,41 @@ fn back_emf(p: &Si, scale: &Scale, delay: Delay) -> Result<back_emf::Config, Bui
     let k_eta = 2.0 * pole_rad_s / chi;
     let gamma = 2.0 * pole_rad_s * pole_rad_s / (chi * chi);
 
-    Ok(back_emf::Config {
-        delay,
-        decay: gain(ParamId::MotRMohm, decay)?,
-        admittance: gain(
+    back_emf::Config {
+        delay: p.board.delay,
+        decay: p.gain(ParamId::MotRMohm, decay),
+        admittance: p.gain(
             ParamId::MotLUh,
             acts_s / p.inductance_h * current_per_voltage,
-        )?,
-        rotation: gain(ParamId::MotLUh, acts_s * rad_per_unit)?,
-        k_p: gain(ParamId::CtlBwCurHz, k_p * acts_s)?,
-        k_i: gain(ParamId::CtlBwCurHz, k_i * p.period_s / current_per_voltage)?,
-        k_eta: gain(ParamId::CtlBwCurHz, k_eta * scale.voltage_v / rad_per_unit)?,
-        gamma: gain(
+        ),
+        rotation: p.gain(ParamId::MotLUh, acts_s * rad_per_unit),
+        k_p: p.gain(ParamId::CtlBwCurHz, k_p * acts_s),
+        k_i: p.gain(ParamId::CtlBwCurHz, k_i * p.period_s / current_per_voltage),
+        k_eta: p.gain(
             ParamId::CtlBwCurHz,
-            gamma * p.period_s * scale.voltage_v / scale.inverse_flux_per_wb(),
-        )?,
-        k_f: gain(
+            k_eta * p.scale.voltage_v / rad_per_unit,
+        ),
+        gamma: p.gain(
+            ParamId::CtlBwCurHz,
+            gamma * p.period_s * p.scale.voltage_v / p.scale.inverse_flux_per_wb(),
+        ),
+        k_f: p.gain(
             ParamId::CtlBwCurHz,
             FILTER_SHARE * p.current_rad_s * p.period_s,
-        )?,
+        ),
         xi_nominal: INVERSE_FLUX_NOMINAL,
         xi_min: INVERSE_FLUX_NOMINAL / 2,
         // Twice the nominal is one bit more than the type holds.
         xi_max: InverseFlux::MAX,
         cure: None,
-    })
+    }
 }
 
 /// The loop that cures the published observer.
-fn cure(p: &Si) -> Result<Cure, BuildError> {
+fn cure(p: &Si) -> Cure {
     let omega_n = CURE_RAD_S * p.period_s;
-    Ok(Cure {
-        proportional: gain(ParamId::CtlObsCure, 2.0 * omega_n / TAU)?,
-        integral: gain(ParamId::CtlObsCure, omega_n * omega_n / TAU)?,
-    })
+    Cure {
+        proportional: p.gain(ParamId::CtlObsCure, 2.0 * omega_n / TAU),
+        integral: p.gain(ParamId::CtlObsCure, omega_n * omega_n / TAU),
+    }
 }

@@ -1,16 +1,17 @@
 //! Coefficients of the sensing, of the dead time and of the bridge's preparation.
 
-use core::f32::consts::TAU;
+use core::f32::consts::{SQRT_2, TAU};
 
-use fixed::types::I1F31;
+use fixed::types::{I0F32, I2F30};
 
-use super::{Board, BuildError, Si, gain, refuse};
+use super::{SQRT_3, Si};
 use crate::control::modulator::Modulation;
 use crate::control::sensing::{self, Shunts};
 use crate::control::{catch, dead_time};
 use crate::drive::Charge;
-use crate::params::{ParamId, Params};
-use crate::units::{AdcCounts, Duty, Scale, Speed};
+use crate::math::Real;
+use crate::params::ParamId;
+use crate::units::{AdcCounts, Duty, Speed};
 
 /// For how long the offsets are measured, s; rounded to a power of two of periods. 5 ms leave a
 /// tenth of one reading's noise.
@@ -31,8 +32,8 @@ const CHARGE_CURRENT_SHARE: f32 = 0.125;
 /// Drop of a low side's body diode at the milliamperes that the dividers draw, V.
 const DIODE_V: f32 = 0.7;
 
-/// Noise of a terminal's reading, counts rms, as `catch` reckons with.
-const TERMINAL_NOISE_COUNTS: f32 = 2.0;
+/// Noise of the mean of four readings of a terminal, counts rms, as `catch` reckons with.
+const TERMINAL_NOISE_COUNTS: f32 = 1.0;
 
 /// Mean of the highest of three readings that noise alone does not reach: 1.9 counts for 2 rms.
 const TERMINAL_FLOOR_COUNTS: f32 = 4.5;
@@ -57,15 +58,11 @@ const UNFIT_S: f32 = 0.004;
 
 /// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high
 /// sides supplied; and the greatest duty of a phase that is read.
-pub(super) fn duty_max(
-    p: &Si,
-    board: &Board,
-    modulation: Modulation,
-) -> Result<(f32, f32), BuildError> {
+pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
     let with_low_side_on = |s: f32| 1.0 - (s + 2.0 * p.dead_time_s) / p.period_s;
-    let window = with_low_side_on(board.low_side_on_s);
-    let supplied = with_low_side_on(board.refresh_s);
-    let read = match board.shunts {
+    let window = with_low_side_on(p.board.low_side_on_s);
+    let supplied = with_low_side_on(p.board.refresh_s);
+    let read = match p.board.shunts {
         // One number for all phases: where c is the highest more would not lengthen the vector that
         // a and b allow a sixth of a turn later.
         Shunts::Two => window,
@@ -73,82 +70,78 @@ pub(super) fn duty_max(
         // it comes to this share of the greatest duty, and the dead time's compensation on top.
         Shunts::Three => {
             let second = match modulation {
-                Modulation::SpaceVector => 0.5 + libm::sqrtf(3.0) / 4.0,
+                Modulation::SpaceVector => 0.5 + SQRT_3 / 4.0,
                 Modulation::Sine => 0.75,
             };
             (window - p.dead_time_s / p.period_s) / second
         }
     };
     let duty_max = read.min(supplied);
-    if window.min(duty_max) < 0.5 {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "too high: the low sides could not be read",
-        );
-    }
-    Ok((duty_max, window))
+    p.refuse_if(
+        window.min(duty_max) < 0.5,
+        ParamId::PwmFreqHz,
+        "too high: the low sides could not be read",
+    );
+    (duty_max, window)
 }
 
 /// The currents' offsets and reconstruction.
-pub(super) fn sensing(p: &Si, board: &Board, window: f32) -> sensing::Config {
-    let readings = ZERO_S / p.period_s;
+pub(super) fn sensing(p: &Si, window: f32) -> sensing::Config {
+    // To the nearest power on a scale of logarithms: down from √2 times as many.
+    let readings = SQRT_2 * ZERO_S / p.period_s;
     sensing::Config {
-        shunts: board.shunts,
-        window: Duty::saturating_from_num(window),
+        shunts: p.board.shunts,
+        window: Duty::from_f32(window),
         // 5 at 8 kHz to 8 at 60 kHz.
-        zero_readings_log2: (libm::log2f(readings) + 0.5) as u32,
-        offset_max: AdcCounts::saturating_from_num(
-            OFFSET_SHARE * board.current_range_a / board.current_a_per_count,
+        zero_readings_log2: (readings as u32).checked_ilog2().unwrap_or(0),
+        offset_max: AdcCounts::from_f32(
+            OFFSET_SHARE * p.board.current_range_a / p.board.current_a_per_count,
         ),
     }
 }
 
 /// The observation of the terminals while the bridge is off.
-pub(super) fn catch(
-    params: &Params,
-    p: &Si,
-    scale: &Scale,
-    board: &Board,
-) -> Result<catch::Config, BuildError> {
-    let counts_per_turn = p.flux_wb * TAU / (p.period_s * board.terminal_v_per_count);
-    let standing: Speed = scale.speed_from_rpm(STANDING_SHARE * params.get(ParamId::StaRunRpm));
-    let standing_counts = HIGHEST_SHARE * counts_per_turn * standing.to_num::<f32>();
-    let share = |time_s: f32| (65536.0 * p.period_s / time_s) as u32;
-    let periods = |time_s: f32| (time_s / p.period_s) as u32;
-    Ok(catch::Config {
-        emf: gain(ParamId::MotFluxMwb, counts_per_turn)?,
-        diode: AdcCounts::saturating_from_num(DIODE_V / board.terminal_v_per_count),
-        prior: (TERMINAL_NOISE_COUNTS * counts_per_turn / TAU) as u32,
+pub(super) fn catch(p: &Si) -> catch::Config {
+    let look_s = catch::LOOK_PERIODS as f32 * p.period_s;
+    let counts_per_turn = p.flux_wb * TAU / (p.period_s * p.board.terminal_v_per_count);
+    let standing: Speed = p
+        .scale
+        .speed_from_rpm(STANDING_SHARE * p.get(ParamId::StaRunRpm));
+    let standing_counts = HIGHEST_SHARE * counts_per_turn * standing.to_f32();
+    let share = |time_s: f32| I0F32::from_f32(look_s / time_s);
+    let looks = |time_s: f32| (time_s / look_s) as u32;
+    let per_look = p.period_s / look_s;
+    catch::Config {
+        emf: (256.0 * counts_per_turn) as u32,
+        diode: AdcCounts::from_f32(DIODE_V / p.board.terminal_v_per_count),
+        prior: (TERMINAL_NOISE_COUNTS * counts_per_turn * per_look / TAU) as u32,
         forget_min: share(MEMORY_S),
-        standing: AdcCounts::saturating_from_num(standing_counts.max(TERMINAL_FLOOR_COUNTS)),
+        standing: AdcCounts::from_f32(standing_counts.max(TERMINAL_FLOOR_COUNTS)),
         level_share: share(LEVEL_S),
-        sure_periods: periods(SURE_S),
-        lost_periods: periods(UNFIT_S),
-    })
+        sure_looks: looks(SURE_S),
+        lost_looks: looks(UNFIT_S),
+    }
 }
 
 /// The dead time's compensation.
-pub(super) fn dead_time(p: &Si, scale: &Scale) -> Result<dead_time::Config, BuildError> {
+pub(super) fn dead_time(p: &Si) -> dead_time::Config {
     let duty = p.dead_time_s / p.period_s;
-    Ok(dead_time::Config {
-        slope: gain(
-            ParamId::PwmDeadtimeNs,
-            duty * scale.current_a / SIGN_CERTAIN_A,
-        )?,
-        duty: I1F31::saturating_from_num(duty),
-    })
+    dead_time::Config {
+        certainty: p.gain(ParamId::PwmDeadtimeNs, p.scale.current_a / SIGN_CERTAIN_A),
+        duty: I2F30::from_f32(duty),
+    }
 }
 
 /// The low sides' pulses before a switch-on: as wide as the back-EMF of the fastest rotor allows,
 /// but wide enough to be read and at most half a period, and as many as the board's time takes.
-pub(super) fn charge(params: &Params, p: &Si, board: &Board) -> Charge {
-    let rad_s = params.get(ParamId::CtlRpmMax) * p.pole_pairs * TAU / 60.0;
+pub(super) fn charge(p: &Si) -> Charge {
+    let rad_s = p.get(ParamId::CtlRpmMax) * p.pole_pairs * TAU / 60.0;
     let rise_a_s = rad_s * p.flux_wb / p.inductance_h;
-    let allowed_s = CHARGE_CURRENT_SHARE * params.get(ParamId::LimPhaseA) / rise_a_s;
-    let pulse_s = allowed_s.max(board.low_side_on_s).min(0.5 * p.period_s);
+    let allowed_s = CHARGE_CURRENT_SHARE * p.get(ParamId::LimPhaseA) / rise_a_s;
+    let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * p.period_s);
     Charge {
-        duty: Duty::saturating_from_num(pulse_s / p.period_s),
-        periods: libm::ceilf(board.charge_s / pulse_s) as u32,
+        duty: Duty::from_f32(pulse_s / p.period_s),
+        periods: libm::ceilf(p.board.charge_s / pulse_s) as u32,
     }
 }
 
@@ -156,11 +149,11 @@ pub(super) fn charge(params: &Params, p: &Si, board: &Board) -> Charge {
 mod tests {
     use super::*;
     use crate::control::modulator::{Supply, duties};
-    use crate::control::transform::AlphaBeta;
+    use crate::control::transform::{AlphaBeta, Order};
     use crate::drive::Config;
-    use crate::params::build;
+    use crate::params::{Board, Params, build};
     use crate::units::Voltage;
-    use fixed::types::I5F27;
+    use fixed::types::{I6F26, I8F24};
 
     /// A board on which the windows decide, not the drivers' supply.
     const SLOW_AMPLIFIERS: Board = Board {
@@ -180,20 +173,25 @@ mod tests {
     /// Greatest duty of the highest and of the second phase, over a turn of the longest vector
     /// with the whole compensation for its signs.
     fn highest_and_second(config: &Config) -> (f32, f32) {
-        let supply = Supply::new(&config.modulator, Voltage::ONE);
-        let length = supply.vector_max.to_num::<f32>();
+        let supply = Supply::new(&config.modulator, Voltage::ONE, Voltage::ZERO);
+        let length = supply.longest.length().to_num::<f32>();
         let mut greatest = (0.0_f32, 0.0_f32);
         for degrees in 0..360 {
             let (sin, cos) = libm::sincosf(degrees as f32 * TAU / 360.0);
             let v = AlphaBeta {
-                alpha: I5F27::from_num(length * cos),
-                beta: I5F27::from_num(length * sin),
+                alpha: I6F26::from_num(length * cos),
+                beta: I6F26::from_num(length * sin),
             };
-            let whole = config.dead_time.duty;
-            for signs in 0..8 {
-                let extra = [0, 1, 2].map(|bit| if signs >> bit & 1 == 0 { whole } else { -whole });
-                let mut made =
-                    duties(&config.modulator, &supply, v, extra).map(|d| d.to_num::<f32>());
+            for sixth in 0..6 {
+                // A current with the six signs that three phases can have.
+                let (sin, cos) = libm::sincosf(sixth as f32 * TAU / 6.0);
+                let certainty = AlphaBeta {
+                    alpha: I8F24::from_num(20.0 * cos),
+                    beta: I8F24::from_num(20.0 * sin),
+                };
+                let dead_time = (&config.dead_time, certainty);
+                let made = duties(&config.modulator, &supply, (v, Order::NORMAL), dead_time);
+                let mut made = made.map(|d| d.to_num::<f32>());
                 made.sort_by(f32::total_cmp);
                 greatest = (greatest.0.max(made[2]), greatest.1.max(made[1]));
             }

@@ -4,12 +4,12 @@ use core::f32::consts::TAU;
 
 use fixed::types::{I1F31, I36F28};
 
-use super::{Board, BuildError, SLOW_SHARE, Si, TEST_SHARE, gain, refuse};
+use super::{Si, TEST_SHARE, outer};
 use crate::control::delay::Delay;
 use crate::control::six_step::{crossing, duty};
 use crate::drive::six_step::Config;
-use crate::params::{ParamId, Params};
-use crate::units::{Scale, Voltage};
+use crate::math::Real;
+use crate::params::ParamId;
 
 /// Back-EMF on the floating terminal that is told from none, V, and the same in counts: noise and
 /// the difference between the switches that are on.
@@ -42,60 +42,50 @@ const ASTRAY_S: f32 = 0.9;
 /// Greatest current against the rotation, of `LIM_PHASE_A`.
 const BRAKING_SHARE: f32 = 0.25;
 
-pub(super) fn six_step(
-    params: &Params,
-    p: &Si,
-    scale: &Scale,
-    board: &Board,
-    duty_max: f32,
-) -> Result<Config, BuildError> {
-    let get = |id| params.get(id);
+pub(super) fn six_step(p: &Si, duty_max: f32) -> Config {
+    let get = |id| p.get(id);
     let fastest = get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0;
-    if 6.0 * fastest * LEAST_PERIODS > 1.0 {
-        return refuse(
-            ParamId::PwmFreqHz,
-            "less than four periods a sextant at CTL_RPM_MAX",
-        );
-    }
+    p.refuse_if(
+        6.0 * fastest * LEAST_PERIODS > 1.0,
+        ParamId::PwmFreqHz,
+        "less than four periods a sextant at CTL_RPM_MAX",
+    );
     let limit_a = get(ParamId::LimPhaseA);
     let start_a = get(ParamId::StaRampA).min(limit_a);
-    let voltage = |volts: f32| Voltage::saturating_from_num(volts / scale.voltage_v);
-    let count_v = board.terminal_v_per_count;
+    let count_v = p.board.terminal_v_per_count;
     let k_p = PROPORTIONAL / fastest;
     let corner = CORNER_SHARE * TAU * get(ParamId::CtlBwSpdHz);
-    let bound = BOUND_RATE * p.period_s * scale.current_a / limit_a;
+    let bound = BOUND_RATE * p.period_s * p.scale.current_a / limit_a;
     let step = get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
-    Ok(Config {
-        terminal: gain(ParamId::LimBusVMax, count_v / scale.voltage_v)?,
+    Config {
+        planner: outer::planner(p, p.period_s),
+        terminal: p.gain(ParamId::LimBusVMax, count_v / p.scale.voltage_v),
         crossing: crossing::Config {
-            least: voltage(LEAST_V.max(LEAST_COUNTS * count_v)),
-            greatest: voltage(GREATEST_COUNTS * count_v),
-            delayed: match board.delay {
+            least: p.voltage(LEAST_V.max(LEAST_COUNTS * count_v)),
+            greatest: p.voltage(GREATEST_COUNTS * count_v),
+            delayed: match p.board.delay {
                 Delay::None | Delay::Half => 0,
                 Delay::One => 1,
             },
         },
         duty: duty::Config {
-            k_p: gain(ParamId::CtlRpmMax, k_p)?,
-            k_i: gain(ParamId::CtlBwSpdHz, k_p * corner * p.period_s)?,
-            k_b: gain(ParamId::LimPhaseA, bound)?,
-            duty_max: I1F31::saturating_from_num(duty_max),
+            k_p: p.gain(ParamId::CtlRpmMax, k_p),
+            k_i: p.gain(ParamId::CtlBwSpdHz, k_p * corner * p.period_s),
+            k_b: p.gain(ParamId::LimPhaseA, bound),
+            duty_max: I1F31::from_f32(duty_max),
         },
-        delay: board.delay,
-        braking: scale.current_from_a(BRAKING_SHARE * limit_a),
-        start_current: scale.current_from_a(start_a),
-        test_current: scale.current_from_a(TEST_SHARE * limit_a),
-        park_charge: I36F28::saturating_from_num(
-            get(ParamId::StaParkAs) / (scale.current_a * p.period_s),
-        ),
-        ramp: gain(
+        delay: p.board.delay,
+        braking: p.scale.current_from_a(BRAKING_SHARE * limit_a),
+        start_current: p.scale.current_from_a(start_a),
+        test_current: p.scale.current_from_a(TEST_SHARE * limit_a),
+        park_charge: I36F28::from_f32(get(ParamId::StaParkAs) / (p.scale.current_a * p.period_s)),
+        ramp: p.gain(
             ParamId::StaRampRpmS,
-            step * scale.current_a / get(ParamId::StaRampA),
-        )?,
+            step * p.scale.current_a / get(ParamId::StaRampA),
+        ),
         patience: (PATIENCE_S / p.period_s) as u16,
         astray: (ASTRAY_S / p.period_s) as u16,
-        run_speed: scale.speed_from_rpm(get(ParamId::StaRunRpm)),
-        slow: scale
-            .speed_from_rpm(SLOW_SHARE * get(ParamId::StaRunRpm).min(get(ParamId::CtlRpmMin))),
-    })
+        run_speed: p.scale.speed_from_rpm(get(ParamId::StaRunRpm)),
+        slow: p.slow(),
+    }
 }

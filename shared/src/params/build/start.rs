@@ -4,17 +4,21 @@ use core::f32::consts::TAU;
 
 use fixed::types::I36F28;
 
-use super::{BuildError, Si, gain};
+use super::Si;
 use crate::control::start;
 use crate::drive::ATTEMPTS;
-use crate::params::{ParamId, Params};
-use crate::units::{INVERSE_FLUX_NOMINAL, Scale};
+use crate::math::Real;
+use crate::params::ParamId;
+use crate::units::INVERSE_FLUX_NOMINAL;
 
 /// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;
 
 /// Rate at which the frame yields, over the swing's ω_n: fast against it, slow against noise.
 const YIELD_RATE_SHARE: f32 = 5.0;
+
+/// Greatest rate a period: all that is missing in the two periods until the next look.
+const YIELD_RATE_MAX: f32 = 0.5;
 
 /// What the ramp takes of the torque that its current has: the rest is for the load and for a
 /// rotor that swings.
@@ -35,32 +39,22 @@ const ASTRAY_SWINGS: f32 = 1.0;
 
 /// The attempts of a start (section 3.2 of the second paper): each with more current, up to
 /// `LIM_PHASE_A`, and slower than the one before.
-pub(super) fn attempts(
-    params: &Params,
-    p: &Si,
-    scale: &Scale,
-) -> Result<[start::Config; ATTEMPTS], BuildError> {
-    let mut current_a = params.get(ParamId::StaRampA);
+pub(super) fn attempts(p: &Si) -> [start::Config; ATTEMPTS] {
+    let mut current_a = p.get(ParamId::StaRampA);
     let mut next = |inertia: f32| {
-        let bounded_a = current_a.min(params.get(ParamId::LimPhaseA));
+        let bounded_a = current_a.min(p.get(ParamId::LimPhaseA));
         current_a *= CURRENT_GROWTH;
-        attempt(params, p, scale, bounded_a, inertia * p.inertia_kgm2)
+        attempt(p, bounded_a, inertia * p.inertia_kgm2)
     };
     let [first, second, third, fourth] = INERTIA;
-    Ok([next(first)?, next(second)?, next(third)?, next(fourth)?])
+    [next(first), next(second), next(third), next(fourth)]
 }
 
-fn attempt(
-    params: &Params,
-    p: &Si,
-    scale: &Scale,
-    current_a: f32,
-    inertia_kgm2: f32,
-) -> Result<start::Config, BuildError> {
+fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
     // What the current can accelerate, in electrical rad/s²: p·1.5·p·φ·I/J.
     let torque_nm = 1.5 * p.pole_pairs * p.flux_wb * current_a;
     let possible = TORQUE_SHARE * p.pole_pairs * torque_nm / inertia_kgm2;
-    let asked = params.get(ParamId::StaRampRpmS) * p.pole_pairs * TAU / 60.0;
+    let asked = p.get(ParamId::StaRampRpmS) * p.pole_pairs * TAU / 60.0;
     let acceleration = asked.min(possible);
     let step = acceleration / TAU * p.period_s * p.period_s;
     // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
@@ -68,35 +62,35 @@ fn attempt(
     let swing_rad_s = libm::sqrtf(p.pole_pairs * torque_nm / inertia_kgm2);
     let yielding_s = 2.0 * SWING_DAMPING / swing_rad_s;
     let swing_as = PARK_SWINGS * TAU / swing_rad_s * current_a;
-    let park_as = params.get(ParamId::StaParkAs).max(swing_as);
-    let park_charge = park_as / (scale.current_a * p.period_s);
-    let voltage_per_current = scale.current_a / scale.voltage_v;
-    Ok(start::Config {
-        current: scale.current_from_a(current_a),
-        yielding: gain(ParamId::MotJGcm2, yielding_s / p.period_s)?,
-        yield_rate: gain(
+    let park_as = p.get(ParamId::StaParkAs).max(swing_as);
+    let park_charge = park_as / (p.scale.current_a * p.period_s);
+    let voltage_per_current = p.scale.current_a / p.scale.voltage_v;
+    start::Config {
+        current: p.scale.current_from_a(current_a),
+        yielding: p.gain(ParamId::MotJGcm2, yielding_s / p.period_s),
+        yield_rate: p.gain(
             ParamId::MotJGcm2,
-            (YIELD_RATE_SHARE * swing_rad_s * p.period_s).min(1.0),
-        )?,
-        park_charge: I36F28::saturating_from_num(park_charge),
+            (YIELD_RATE_SHARE * swing_rad_s * p.period_s).min(YIELD_RATE_MAX),
+        ),
+        park_charge: I36F28::from_f32(park_charge),
         // A third of a turn, from one phase's axis to the next one's, in the first half.
-        sweep: gain(ParamId::StaParkAs, 1.0 / 3.0 / (0.5 * park_charge))?,
-        k_s: gain(ParamId::StaRampRpmS, step * scale.current_a / current_a)?,
+        sweep: p.gain(ParamId::StaParkAs, 1.0 / 3.0 / (0.5 * park_charge)),
+        k_s: p.gain(ParamId::StaRampRpmS, step * p.scale.current_a / current_a),
         astray_periods: (ASTRAY_SWINGS * TAU / (swing_rad_s * p.period_s)) as u32,
-        resistance: gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current)?,
-        reactance: gain(
+        resistance: p.gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current),
+        reactance: p.gain(
             ParamId::MotLUh,
             p.inductance_h * voltage_per_current * TAU / p.period_s,
-        )?,
-        run_speed: scale.speed_from_rpm(params.get(ParamId::StaRunRpm)),
+        ),
+        run_speed: p.scale.speed_from_rpm(p.get(ParamId::StaRunRpm)),
         xi_nominal: INVERSE_FLUX_NOMINAL,
-    })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::{Board, build};
+    use crate::params::{Board, Params, build};
 
     fn config(changes: &[(ParamId, f32)]) -> crate::drive::Config {
         let mut params = Params::default();
@@ -113,12 +107,13 @@ mod tests {
         let course = |attempt: &start::Config| {
             let mut state = start::State::default();
             let mut periods = 1;
-            while !start::park(attempt, &mut state, attempt.current).1 {
+            while start::park(attempt, &mut state, attempt.current, 1) == start::Park::Aligning {
                 periods += 1;
             }
             // Over 1000 periods, so that rounding does not matter.
+            start::ramp(attempt, &mut state, attempt.current);
             for _ in 0..1000 {
-                start::ramp(attempt, &mut state, attempt.current);
+                start::advance(&mut state);
             }
             [
                 scale.amperes(attempt.current),

@@ -4,10 +4,11 @@ use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
 
-use super::{BuildError, Si, gain};
+use super::Si;
 use crate::drive::tone::Config;
-use crate::params::{ParamId, Params};
-use crate::units::{Scale, Voltage};
+use crate::math::Real;
+use crate::params::ParamId;
+use crate::units::Voltage;
 
 /// What of `MOT_TONE_A` the peaks are led to. How much of a half cycle the dead time takes depends on
 /// where the samples fall in it, so they vary by up to a quarter from one to the next.
@@ -22,19 +23,19 @@ const LIMIT_SHARE: f32 = 0.5;
 const DEAD_TIME_VECTOR: f32 = 4.0 / 3.0;
 
 /// The tones of `MOT_TONE_A`; none where it is 0.
-pub(super) fn tone(params: &Params, p: &Si, scale: &Scale) -> Result<Option<Config>, BuildError> {
-    let limit_a = LIMIT_SHARE * params.get(ParamId::LimPhaseA);
-    let bound_a = params.get(ParamId::MotToneA).min(limit_a);
+pub(super) fn tone(p: &Si) -> Option<Config> {
+    let limit_a = LIMIT_SHARE * p.get(ParamId::LimPhaseA);
+    let bound_a = p.get(ParamId::MotToneA).min(limit_a);
     if bound_a == 0.0 {
-        return Ok(None);
+        return None;
     }
     let led_a = LED_SHARE * bound_a;
-    let units = |ohm: f32| ohm * led_a / scale.voltage_v;
-    Ok(Some(Config {
-        peak: scale.current_from_a(led_a),
-        share: gain(ParamId::MotToneA, scale.current_a / led_a)?,
-        resistive: Voltage::saturating_from_num(units(p.resistance_ohm)),
-        reactive: gain(ParamId::MotLUh, units(TAU * p.inductance_h / p.period_s))?,
-        dead: I1F31::saturating_from_num(DEAD_TIME_VECTOR * p.dead_time_s / p.period_s),
-    }))
+    let units = |ohm: f32| ohm * led_a / p.scale.voltage_v;
+    Some(Config {
+        peak: p.scale.current_from_a(led_a),
+        share: p.gain(ParamId::MotToneA, p.scale.current_a / led_a),
+        resistive: Voltage::from_f32(units(p.resistance_ohm)),
+        reactive: p.gain(ParamId::MotLUh, units(TAU * p.inductance_h / p.period_s)),
+        dead: I1F31::from_f32(DEAD_TIME_VECTOR * p.dead_time_s / p.period_s),
+    })
 }

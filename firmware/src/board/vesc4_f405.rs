@@ -1,0 +1,382 @@
+//! VESC 4.10 class: STM32F405, gate driver DRV8301, two low-side shunts.
+//!
+//! Phases a, b, c of the control are the timer's channels 1, 3 and 2: the shunts are those of a and b
+//! (the VESC's own firmware drives two-shunt boards in this order).
+//!
+//! The DRV8301 is not set up over SPI, whose pins this class of boards does not have in common. It
+//! keeps what it wakes up with: six inputs, its over-current threshold of 60 mV across a transistor,
+//! and *current limit*, by which a transistor is turned off until the next edge of its input. So its
+//! nFAULT tells of what it cannot limit: a supply of the gates that is too low, and over-temperature.
+
+use core::mem;
+
+use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, Exten, InjectedAdc, SampleTime};
+use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::{
+    ADC1, ADC2, ADC3, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA2_CH1, DMA2_CH2, DMA2_CH6, IWDG, PB5, PB10,
+    TIM1, TIM3, TIM8, USART3, USART6,
+};
+use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
+use embassy_stm32::timer::input_capture::CapturePin;
+use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
+use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
+use embassy_stm32::usart::{self, Uart, UartTx};
+use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
+use siskin_control::control::delay::Delay;
+use siskin_control::control::sensing::Shunts;
+use siskin_control::params::Board;
+use siskin_control::protection::Ntc;
+use siskin_control::units::AdcCounts;
+
+use crate::chip;
+use crate::image;
+use crate::interrupt::gate_driver::Pins;
+use crate::interrupt::sample::{Slot, Wiring};
+use crate::interrupt::{Registers, alarm};
+use crate::priority;
+use crate::storage::Storage;
+use crate::tasks::throttle::{self, Capture, CaptureInterrupt, Replier};
+
+pub use crate::chip::TIMER_HZ;
+
+/// The board's name, in its image and for MAVLink.
+pub const NAME: &str = "vesc4-f405";
+
+/// Volts of one count: 12 bits of the 3.3 V supply.
+const V_PER_COUNT: f32 = 3.3 / 4096.0;
+
+/// Each measured phase's shunt in the low side.
+const SHUNT_OHM: f32 = 0.001;
+
+/// The gate driver's amplifiers.
+const GAIN: f32 = 10.0;
+
+/// From the supply to the converter, and from a terminal.
+const DIVIDER: f32 = 2.2 / (2.2 + 39.0);
+
+/// For how long the phase currents are sampled: 15 cycles of the converters' 21 MHz, in clocks of
+/// the timer's 168 MHz.
+pub(crate) const SAMPLING_CLOCKS: u16 = 120;
+
+/// The gate driver turns itself off; nothing breaks the PWM.
+pub(crate) const BREAKS: bool = false;
+
+/// On port C.
+pub(crate) const GATE_DRIVER: Option<Pins> = Some(Pins {
+    enable: 10,
+    fault: FAULT,
+});
+
+/// nFAULT's pin.
+const FAULT: usize = 12;
+
+/// The phases, from 0, on the timer's channels 1, 2, 3.
+pub(crate) const PHASES: [usize; 3] = [0, 2, 1];
+
+/// The order of the sequences in [`Hardware::claim`].
+pub(crate) const WIRING: Wiring = Wiring {
+    currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), None],
+    // As the VESC's own firmware reads them.
+    rises: true,
+    terminals: [Slot(0, 1), Slot(1, 1), Slot(1, 2)],
+    bus: Slot(0, 2),
+    // Their pins are those of the serial line.
+    hall: None,
+};
+
+/// What the control must know of this board. Its times are estimates until they are measured.
+pub const BOARD: Board = Board {
+    image: image::identity(NAME, 2),
+    current_a_per_count: V_PER_COUNT / (SHUNT_OHM * GAIN),
+    bus_v_per_count: V_PER_COUNT / DIVIDER,
+    terminal_v_per_count: V_PER_COUNT / DIVIDER,
+    shunts: Shunts::Two,
+    // The converter shows ±165 A about the middle of its range.
+    current_range_a: 120.0,
+    // The duties computed in one period are applied from the next counter's top on.
+    delay: Delay::One,
+    // Half of the sampling window, 0.36 µs, and 1.5 µs for the amplifier to settle before the top.
+    low_side_on_s: 3.7e-6,
+    // The DRV8301's bootstrap capacitors are charged through its diodes, without resistors.
+    refresh_s: 1.0e-6,
+    charge_s: 50e-6,
+};
+
+/// The transistors' thermistor.
+pub const NTC: Ntc = Ntc::VESC;
+
+bind_interrupts!(struct Interrupts {
+    USART6 => usart::InterruptHandler<USART6>;
+    DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
+    DMA1_STREAM4 => dma::InterruptHandler<DMA1_CH4>;
+    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
+    DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
+    DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
+    DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
+    TIM3 => CaptureInterrupt;
+});
+
+/// The throttle wire's timers and pin.
+pub(crate) mod wire {
+    use embassy_stm32::pac;
+    use embassy_stm32::pac::gpio::Gpio;
+    use embassy_stm32::pac::timer::{TimGp16, TimGp32};
+    use embassy_stm32::peripherals::{TIM3, TIM8};
+
+    /// Captures the edges.
+    pub(crate) type CaptureTimer = TIM3;
+    /// Its registers.
+    // SAFETY: the same block; the upper halves of its words, which this view has and the timer has
+    // not, read as zeros.
+    pub(crate) const CAPTURE: TimGp32 = unsafe { TimGp32::from_ptr(pac::TIM3.as_ptr()) };
+    /// Bits of its counter.
+    pub(crate) const TIMER_BITS: u32 = 16;
+    /// What its clock is divided by: 16 bits are 3.1 ms.
+    pub(crate) const PRESCALER: u16 = 4;
+    /// Its rate.
+    pub(crate) const TICK_HZ: u32 = super::TIMER_HZ / 2 / PRESCALER as u32;
+    /// Its channel at the pin, from 0.
+    pub(crate) const SIGNAL_CHANNEL: usize = 1;
+    /// Paces replies: of the timers that reach the DMA which reaches the ports, one that is free.
+    pub(crate) type PaceTimer = TIM8;
+    /// Its registers.
+    // SAFETY: the same block, of which this view has the part that every timer has.
+    pub(crate) const PACE: TimGp16 = unsafe { TimGp16::from_ptr(pac::TIM8.as_ptr()) };
+    /// Its rate.
+    pub(crate) const PACE_HZ: u32 = super::TIMER_HZ;
+    /// The pin's port.
+    pub(crate) const PORT: Gpio = pac::GPIOB;
+    /// The pin's number there.
+    pub(crate) const PIN: usize = 5;
+}
+
+/// The interrupt in which the throttle's task runs: one whose unit is not used.
+pub(crate) const EXECUTOR: interrupt::Interrupt = interrupt::CAN2_SCE;
+
+#[interrupt]
+fn CAN2_SCE() {
+    throttle::run_executor();
+}
+
+/// The gate signals, set up; [`crate::interrupt::start`] takes them.
+pub struct Bridge {
+    _timer: Peri<'static, TIM1>,
+    enable: Output<'static>,
+    _fault: Input<'static>,
+}
+
+/// The two converters, which the PWM timer triggers once a period.
+///
+/// A reading takes 15 cycles of 21 MHz of sampling and 12 of conversion, 1.29 µs. The sampling
+/// windows begin at these times from the counter's top, in µs, and both sequences end at 3.5 µs:
+///
+/// | converter | | | |
+/// |---|---|---|---|
+/// | first | current a −0.36 to 0.36 | terminal a 0.93 to 1.64 | supply 2.21 to 2.93 |
+/// | second | current b −0.36 to 0.36 | terminal b 0.93 to 1.64 | terminal c 2.21 to 2.93 |
+pub struct Converters {
+    _first: InjectedAdc<'static, ADC1, 3>,
+    _second: InjectedAdc<'static, ADC2, 3>,
+}
+
+/// The throttle wire.
+pub struct Throttle {
+    pin: Peri<'static, PB5>,
+    _timers: (Peri<'static, TIM3>, Peri<'static, TIM8>),
+    rising: Peri<'static, DMA1_CH4>,
+    falling: Peri<'static, DMA1_CH5>,
+    reply: Peri<'static, DMA2_CH1>,
+}
+
+impl Throttle {
+    /// Begins to capture.
+    pub(crate) fn open(self) -> (Capture, Replier) {
+        // A wire that is not connected is at rest. A dropped pin would be given back.
+        mem::forget(CapturePin::<TIM3, Ch2>::new(self.pin, Pull::Up));
+        let requests = [
+            Dma::<TIM3, Ch1>::request(&*self.rising),
+            Dma::<TIM3, Ch2>::request(&*self.falling),
+        ];
+        let channels = [
+            dma::Channel::new(self.rising, Interrupts),
+            dma::Channel::new(self.falling, Interrupts),
+        ];
+        let update = UpDma::<TIM8>::request(&*self.reply);
+        let reply = dma::Channel::new(self.reply, Interrupts);
+        (
+            Capture::new(channels, requests),
+            Replier::new(reply, update),
+        )
+    }
+}
+
+/// The KISS telemetry, on a pin of its own.
+pub struct Kiss {
+    uart: Peri<'static, USART3>,
+    pin: Peri<'static, PB10>,
+    dma: Peri<'static, DMA1_CH3>,
+}
+
+impl Kiss {
+    /// Takes the pin.
+    pub fn open(self) -> UartTx<'static, Async> {
+        let config = usart::Config::default();
+        UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
+            .expect("115200 baud can be had of 42 MHz")
+    }
+}
+
+/// The transistors' temperature.
+pub struct Temperature {
+    converter: Adc<'static, ADC3>,
+    pin: AnyAdcChannel<'static, ADC3>,
+}
+
+impl Temperature {
+    /// The thermistor's reading, for [`NTC`]; it waits 10 µs for it.
+    pub fn read(&mut self) -> AdcCounts {
+        let counts = self
+            .converter
+            .blocking_read(&mut self.pin, SampleTime::CYCLES144);
+        AdcCounts::from_num(counts)
+    }
+}
+
+/// The parts of the board, set up.
+pub struct Hardware {
+    /// Gate signals.
+    pub bridge: Bridge,
+    /// Currents and voltages.
+    pub converters: Converters,
+    /// The green LED.
+    pub light: Output<'static>,
+    /// The throttle wire.
+    pub throttle: Throttle,
+    /// MAVLink, 115200 baud.
+    pub mavlink: Uart<'static, Async>,
+    /// The KISS telemetry.
+    pub kiss: Kiss,
+    /// The flash that keeps the parameters.
+    pub flash: Storage,
+    /// The watchdog, which does not run yet.
+    pub watchdog: Peri<'static, IWDG>,
+    /// The thermistor.
+    pub temperature: Temperature,
+}
+
+impl Hardware {
+    /// Starts the chip, and sets up the pins and the converters. The gate driver is off. To be called
+    /// once.
+    #[inline(never)]
+    pub fn claim() -> Self {
+        let p = embassy_stm32::init(chip::clock());
+        // Before any of them is used: critical sections rely on it.
+        priority::lower_all(chip::INTERRUPTS);
+        let enable = Output::new(p.PC10, Level::Low, Speed::Low);
+        rcc::enable_and_reset::<TIM1>();
+        // A breakpoint stops the timer, and a stopped timer turns its outputs off.
+        pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
+
+        // The pull keeps the gates off while nothing drives the pin.
+        let gate = PwmPinConfig {
+            output_type: OutputType::PushPull,
+            speed: Speed::VeryHigh,
+            pull: Pull::Down,
+        };
+        // A dropped pin would be given back: these stay the timer's for ever.
+        mem::forget((
+            PwmPin::<TIM1, _>::new_with_config(p.PA8, gate),
+            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB13, gate),
+            PwmPin::<TIM1, _>::new_with_config(p.PA9, gate),
+            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB14, gate),
+            PwmPin::<TIM1, _>::new_with_config(p.PA10, gate),
+            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB15, gate),
+        ));
+        // The amplifiers measure: their calibration is off.
+        mem::forget(Output::new(p.PB12, Level::Low, Speed::Low));
+
+        let long = SampleTime::CYCLES15;
+        let first = [
+            (p.PB1.degrade_adc(), long),
+            (p.PA2.degrade_adc(), long),
+            (p.PC2.degrade_adc(), long),
+        ];
+        let second = [
+            (p.PB0.degrade_adc(), long),
+            (p.PA0.degrade_adc(), long),
+            (p.PA1.degrade_adc(), long),
+        ];
+        let converters = Converters {
+            _second: Adc::new(p.ADC2).setup_injected_conversions(
+                second,
+                triggers::TIM1_TRGO,
+                Exten::RISING_EDGE,
+                false,
+            ),
+            _first: Adc::new(p.ADC1).setup_injected_conversions(
+                first,
+                triggers::TIM1_TRGO,
+                Exten::RISING_EDGE,
+                true,
+            ),
+        };
+        let uart = usart::Config::default();
+        Self {
+            bridge: Bridge {
+                _timer: p.TIM1,
+                enable,
+                _fault: Input::new(p.PC12, Pull::Up),
+            },
+            converters,
+            light: Output::new(p.PC4, Level::Low, Speed::Low),
+            throttle: Throttle {
+                pin: p.PB5,
+                _timers: (p.TIM3, p.TIM8),
+                rising: p.DMA1_CH4,
+                falling: p.DMA1_CH5,
+                reply: p.DMA2_CH1,
+            },
+            mavlink: Uart::new(
+                p.USART6, p.PC7, p.PC6, p.DMA2_CH6, p.DMA2_CH2, Interrupts, uart,
+            )
+            .expect("115200 baud can be had of 84 MHz"),
+            kiss: Kiss {
+                uart: p.USART3,
+                pin: p.PB10,
+                dma: p.DMA1_CH3,
+            },
+            flash: Storage::new(p.FLASH),
+            watchdog: p.IWDG,
+            temperature: Temperature {
+                converter: Adc::new(p.ADC3),
+                pin: p.PA3.degrade_adc(),
+            },
+        }
+    }
+}
+
+/// What the interrupt is at, from then on its own. It enables the gate driver and waits 20 ms: the
+/// driver takes up to 10 ms, and its amplifiers must have settled before their zeros are measured.
+pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
+    bridge.enable.set_high();
+    mem::forget((bridge, converters));
+    cortex_m::asm::delay(TIMER_HZ / 50);
+    chip::listen(FAULT);
+    priority::set(chip::ALARM as usize, priority::ALARM);
+    // SAFETY: what the handler needs is in place, and no critical section relies on its being
+    // masked.
+    unsafe { cortex_m::peripheral::NVIC::unmask(chip::ALARM) };
+    Registers::CHIP
+}
+
+/// The gate driver has a trip of its own.
+pub(crate) fn set_trip(_phase_a: f32) {}
+
+/// nFAULT, at priority 1: not even the tasks' critical sections hold it up.
+#[interrupt]
+#[unsafe(link_section = ".control")]
+fn EXTI15_10() {
+    alarm(Registers::CHIP);
+    chip::heard(FAULT);
+}

@@ -1,0 +1,12 @@
+//! The chips: what the boards with one have in common, and what the HAL does not have.
+
+pub(crate) mod flash;
+#[cfg(feature = "stm32f405")]
+mod stm32f4;
+#[cfg(feature = "stm32g431")]
+mod stm32g4;
+
+#[cfg(feature = "stm32f405")]
+pub use stm32f4::*;
+#[cfg(feature = "stm32g431")]
+pub use stm32g4::*;

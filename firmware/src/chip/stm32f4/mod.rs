@@ -1,0 +1,76 @@
+//! STM32F405.
+
+pub(crate) mod pages;
+
+use embassy_stm32::Config;
+use embassy_stm32::interrupt;
+use embassy_stm32::pac::adc::Adc;
+use embassy_stm32::pac::adc::regs::Sr;
+use embassy_stm32::pac::{EXTI, RCC, SYSCFG};
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
+};
+
+/// Clock of the timers on APB2; those on APB1 have half of it.
+pub const TIMER_HZ: u32 = 168_000_000;
+
+/// External interrupts (RM0090, vector table).
+pub(crate) const INTERRUPTS: usize = 82;
+
+/// The interrupt at the end of the injected conversions.
+pub(crate) const CONVERTED: interrupt::Interrupt = interrupt::ADC;
+
+/// The interrupt of the lines 10 to 15.
+pub(crate) const ALARM: interrupt::Interrupt = interrupt::EXTI15_10;
+
+/// Word of the converter's block at which the injected readings begin: JDR1 at 0x3c.
+pub(crate) const READINGS_AT_WORD: usize = 0x3c / 4;
+
+/// Takes the interrupt's request back. Both sequences have the same length.
+#[inline(always)]
+pub(crate) fn acknowledge(converters: &[Adc; 2]) {
+    // What is written as 1 stays as it is.
+    let mut others = Sr(!0);
+    others.set_jeoc(false);
+    converters[0].sr().write_value(others);
+}
+
+/// 168 MHz from the internal 16 MHz, as no source tells this board's crystal for sure.
+pub(crate) fn clock() -> Config {
+    let mut config = Config::default();
+    config.rcc.hsi = true;
+    config.rcc.pll_src = PllSource::HSI;
+    config.rcc.pll = Some(Pll {
+        prediv: PllPreDiv::DIV8,
+        mul: PllMul::MUL168,
+        divp: Some(PllPDiv::DIV2),
+        divq: None,
+        divr: None,
+    });
+    config.rcc.sys = Sysclk::PLL1_P;
+    config.rcc.ahb_pre = AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = APBPrescaler::DIV4;
+    config.rcc.apb2_pre = APBPrescaler::DIV2;
+    config
+}
+
+/// Lets a falling edge of a pin of port C, from 10 to 15, ask for [`ALARM`].
+pub(crate) fn listen(pin: usize) {
+    RCC.apb2enr().modify(|w| w.set_syscfgen(true));
+    SYSCFG.exticr(pin / 4).modify(|w| w.set_exti(pin % 4, 2));
+    EXTI.ftsr(0).modify(|w| w.set_line(pin, true));
+    EXTI.imr(0).modify(|w| w.set_line(pin, true));
+}
+
+/// Takes that request back.
+pub(crate) fn heard(pin: usize) {
+    EXTI.pr(0).write(|w| w.set_line(pin, true));
+}
+
+/// Whether the watchdog has caused the last reset; to be asked once.
+pub(crate) fn take_watchdog_reset() -> bool {
+    let starved = RCC.csr().read().wdgrstf();
+    // The flags stay until they are removed.
+    RCC.csr().modify(|w| w.set_rmvf(true));
+    starved
+}

@@ -1,0 +1,56 @@
+//! The comparators that turn the bridge off: over the break input of TIM1, without the processor.
+//!
+//! Each compares an op-amp's input with a level from DAC3 (RM0440, tables of the comparators' inputs
+//! and of TIM1's break). They see the shunt of a phase from one side only: the reading rises with a
+//! current out of the motor, which comes down through the low side.
+
+use embassy_stm32::pac::comp::Comp;
+use embassy_stm32::pac::comp::vals::{Hysteresis, Inm};
+use embassy_stm32::pac::dac::vals::Mode;
+use embassy_stm32::pac::{COMP1, COMP2, COMP4, DAC3, RCC, TIM1};
+
+/// The comparators with the level that each compares with. All get the first of INPSEL: PA1, PA7
+/// and PB0.
+const COMPARATORS: [Comp; 3] = [COMP1, COMP2, COMP4];
+
+/// Sets the comparators up with a level of 4096, and lets them break the PWM. The timer's clock must
+/// be on.
+pub(crate) fn set_up(level: u16) {
+    RCC.ahb2enr().modify(|w| w.set_dac3en(true));
+    RCC.apb2enr().modify(|w| w.set_syscfgen(true));
+    DAC3.mcr().write(|w| {
+        for channel in 0..2 {
+            w.set_mode(channel, Mode::NORMAL_INT_BUFDIS);
+        }
+        // For a bus above 160 MHz.
+        w.set_hfsel(2);
+    });
+    set_level(level);
+    DAC3.cr().modify(|w| {
+        for channel in 0..2 {
+            w.set_en(channel, true);
+        }
+    });
+    for comparator in COMPARATORS {
+        comparator.csr().write(|w| {
+            // DAC3's channel 1 for COMP1, its channel 2 for the others.
+            w.set_inmsel(Inm::DACA);
+            w.set_hyst(Hysteresis::NONE);
+            w.set_en(true);
+        });
+    }
+    TIM1.af1().write(|w| {
+        // No pin breaks.
+        w.set_bkine(false);
+        for number in [0, 1, 3] {
+            w.set_bkcmpe(number, true);
+        }
+    });
+}
+
+/// Sets the level, of 4096.
+pub(crate) fn set_level(level: u16) {
+    for channel in 0..2 {
+        DAC3.dhr12r(channel).write(|w| w.set_dhr(level));
+    }
+}

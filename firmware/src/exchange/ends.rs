@@ -1,0 +1,197 @@
+//! The ends of the exchange, given out once, so that the types see to the single writers.
+
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use siskin_control::drive::{Config, Setpoint, Snapshot};
+
+use super::latest::{self, Latest};
+use super::swap::{self, Swap};
+use super::word;
+use crate::board::TIMER_HZ;
+use crate::interrupt::timing::Timing;
+
+static OPENED: AtomicBool = AtomicBool::new(false);
+static SETPOINT: AtomicU32 = AtomicU32::new(0);
+static SNAPSHOT: Latest<Snapshot> = Latest::new();
+static CONFIG: Swap<Config> = Swap::new();
+
+/// What the timer makes of the configuration that was offered last, which takes floating point. It
+/// is written before the offer, and the next offer waits until it has been read.
+static TIMING: AtomicU32 = AtomicU32::new(0);
+
+/// The ends of the exchange.
+pub struct Ends {
+    /// For the interrupt.
+    pub interrupt: InterruptEnd,
+    /// For the task that decides what the motor does.
+    pub setpoint: SetpointWriter,
+    /// For the tasks that tell what it does.
+    pub snapshot: SnapshotReader,
+    /// For the task that keeps the parameters.
+    pub config: ConfigWriter,
+}
+
+/// Gives the ends out, the first time that it is called.
+///
+/// A set-point that is not renewed for more than `stale_periods` control periods is `Stop`.
+pub fn open(stale_periods: u32) -> Option<Ends> {
+    if OPENED.swap(true, Ordering::Relaxed) {
+        return None;
+    }
+    // SAFETY: reached once.
+    let (writer, reader) = unsafe { Latest::<Snapshot>::hands() };
+    // SAFETY: as above.
+    let (offerer, beginner) = unsafe { Swap::<Config>::hands() };
+    Some(Ends {
+        interrupt: InterruptEnd {
+            stale_periods,
+            snapshot: writer,
+            config: beginner,
+        },
+        setpoint: SetpointWriter { sequence: 0 },
+        snapshot: SnapshotReader {
+            hand: Mutex::new(RefCell::new(reader)),
+        },
+        config: ConfigWriter { hand: offerer },
+    })
+}
+
+/// The interrupt's end before it has a configuration.
+pub struct InterruptEnd {
+    stale_periods: u32,
+    snapshot: latest::Writer,
+    config: swap::Beginner,
+}
+
+impl InterruptEnd {
+    /// Puts the first configuration into use.
+    pub(crate) fn begin(self, config: Config) -> RunningEnd {
+        RunningEnd {
+            word: 0,
+            setpoint: Setpoint::Stop,
+            age_periods: 0,
+            stale_periods: self.stale_periods,
+            snapshot: self.snapshot,
+            config: CONFIG.begin(self.config, config),
+        }
+    }
+}
+
+/// The interrupt's end.
+pub(crate) struct RunningEnd {
+    /// The last word, and the set-point that it holds.
+    word: u32,
+    setpoint: Setpoint,
+    age_periods: u32,
+    stale_periods: u32,
+    snapshot: latest::Writer,
+    config: swap::User,
+}
+
+impl RunningEnd {
+    /// Looks for a new set-point; to be called once a period, which is how its age is counted.
+    #[inline(always)]
+    pub(crate) fn listen(&mut self) {
+        let word = SETPOINT.load(Ordering::Relaxed);
+        if word != self.word {
+            self.renew(word);
+        } else if self.age_periods < self.stale_periods {
+            self.age_periods += 1;
+        } else {
+            self.setpoint = Setpoint::Stop;
+        }
+    }
+
+    /// The set-point for this period.
+    #[inline(always)]
+    pub(crate) fn setpoint(&self) -> &Setpoint {
+        &self.setpoint
+    }
+
+    /// Two words that follow one another differ in their sequence number.
+    #[inline(never)]
+    fn renew(&mut self, word: u32) {
+        self.word = word;
+        self.setpoint = word::unpack(word);
+        self.age_periods = 0;
+    }
+
+    /// Changes over to the configuration that is offered, if one is, after `change` has seen the one
+    /// before, the new one and its timing.
+    #[inline(always)]
+    pub(crate) fn adopt(&mut self, change: impl FnOnce(&Config, &Config, Timing)) {
+        CONFIG.adopt(&mut self.config, |before, now| {
+            let timing = Timing::from_bits(TIMING.load(Ordering::Relaxed));
+            change(before, now, timing);
+        });
+    }
+
+    /// Works with the configuration in use.
+    #[inline(always)]
+    pub(crate) fn with_config<R>(&self, work: impl FnOnce(&Config) -> R) -> R {
+        CONFIG.with(&self.config, work)
+    }
+
+    /// Puts the snapshot where the tasks find it.
+    #[inline(always)]
+    pub(crate) fn publish(&mut self, snapshot: Snapshot) {
+        SNAPSHOT.publish(&mut self.snapshot, snapshot);
+    }
+}
+
+/// The end of the task that decides what the motor does.
+pub struct SetpointWriter {
+    sequence: u32,
+}
+
+impl SetpointWriter {
+    /// Makes this the set-point, and renews it. 31 writes may happen within one control period
+    /// before the interrupt could miss one.
+    pub fn write(&mut self, setpoint: Setpoint) {
+        self.sequence = self.sequence.wrapping_add(1);
+        SETPOINT.store(word::pack(setpoint, self.sequence), Ordering::Relaxed);
+    }
+}
+
+/// The end of the tasks that tell what the motor does. They share it by reference, and read one at a
+/// time.
+pub struct SnapshotReader {
+    hand: Mutex<CriticalSectionRawMutex, RefCell<latest::Reader>>,
+}
+
+impl SnapshotReader {
+    /// The latest snapshot, or `None` while there has been none.
+    pub fn read(&self) -> Option<Snapshot> {
+        self.hand.lock(|hand| SNAPSHOT.read(&mut hand.borrow_mut()))
+    }
+}
+
+/// The end of the task that keeps the parameters.
+pub struct ConfigWriter {
+    hand: swap::Offerer,
+}
+
+impl ConfigWriter {
+    /// Offers a configuration, which the interrupt adopts as a whole at its next period.
+    ///
+    /// # Errors
+    /// The one before has not been adopted yet: this one comes back.
+    #[expect(
+        clippy::result_large_err,
+        reason = "what comes back is what was given, to be offered again"
+    )]
+    pub fn offer(&mut self, config: Config) -> Result<(), Config> {
+        match CONFIG.free(&mut self.hand) {
+            None => Err(config),
+            Some(free) => {
+                let timing = Timing::new(&config, TIMER_HZ);
+                TIMING.store(timing.to_bits(), Ordering::Relaxed);
+                free.offer(config);
+                Ok(())
+            }
+        }
+    }
+}

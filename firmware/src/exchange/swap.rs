@@ -1,0 +1,214 @@
+//! What a task replaces as a whole, and the interrupt reads in place: two slots, of which one is in
+//! use. The other belongs to the task until it offers what it has put there.
+
+use core::mem::MaybeUninit;
+
+use super::sync::{AtomicU8, Ordering, UnsafeCell, write};
+
+/// No offer: the slot that is not in use is the task's.
+const QUIET: u8 = 0;
+/// The slot that is not in use waits for the interrupt.
+const OFFERED: u8 = 1;
+
+/// The two slots. What is in them needs no drop.
+pub(crate) struct Swap<T> {
+    slots: [UnsafeCell<MaybeUninit<T>>; 2],
+    state: AtomicU8,
+}
+
+// SAFETY: the user reads only the slot in use, the offerer writes only the other, and only while
+// the state is `QUIET`; the user changes them over while it is `OFFERED`. There is one of each.
+unsafe impl<T: Send> Sync for Swap<T> {}
+
+/// Who offers.
+pub(crate) struct Offerer {
+    /// The slot that is, or becomes, free.
+    free: usize,
+}
+
+/// Who will use, and has nothing to use yet.
+pub(crate) struct Beginner(());
+
+/// Who uses.
+pub(crate) struct User {
+    used: usize,
+}
+
+impl<T> Swap<T> {
+    /// Two empty slots.
+    #[cfg(not(test))]
+    pub(crate) const fn new() -> Self {
+        Self {
+            slots: [const { UnsafeCell::new(MaybeUninit::uninit()) }; 2],
+            state: AtomicU8::new(QUIET),
+        }
+    }
+
+    /// Two empty slots: loom's are not made at compile time.
+    #[cfg(test)]
+    pub(crate) fn new() -> Self {
+        Self {
+            slots: core::array::from_fn(|_| UnsafeCell::new(MaybeUninit::uninit())),
+            state: AtomicU8::new(QUIET),
+        }
+    }
+
+    /// The two who share the slots.
+    ///
+    /// # Safety
+    /// To be called once for these slots.
+    pub(crate) unsafe fn hands() -> (Offerer, Beginner) {
+        (Offerer { free: 1 }, Beginner(()))
+    }
+
+    /// Puts the first value into use.
+    pub(crate) fn begin(&self, _hand: Beginner, value: T) -> User {
+        let user = User { used: 0 };
+        // SAFETY: the slot in use is the user's.
+        unsafe { write(&self.slots[user.used], MaybeUninit::new(value)) };
+        user
+    }
+
+    /// The way to offer a value, or `None` while one before it waits.
+    #[inline(always)]
+    pub(crate) fn free<'a>(&'a self, hand: &'a mut Offerer) -> Option<Free<'a, T>> {
+        // Acquire: the user is done with the slot that it has left.
+        let waits = self.state.load(Ordering::Acquire) == OFFERED;
+        (!waits).then_some(Free { swap: self, hand })
+    }
+
+    /// Changes over to what is offered, if anything is, after a look at what was and what will be in
+    /// use.
+    #[inline(always)]
+    pub(crate) fn adopt(&self, hand: &mut User, change: impl FnOnce(&T, &T)) {
+        if self.state.load(Ordering::Acquire) == OFFERED {
+            let next = hand.used ^ 1;
+            self.look(hand.used, |before| {
+                self.look(next, |now| change(before, now));
+            });
+            hand.used = next;
+            self.state.store(QUIET, Ordering::Release);
+        }
+    }
+
+    /// What is in use.
+    #[inline(always)]
+    pub(crate) fn with<R>(&self, hand: &User, work: impl FnOnce(&T) -> R) -> R {
+        self.look(hand.used, work)
+    }
+
+    #[inline(always)]
+    fn look<R>(&self, slot: usize, work: impl FnOnce(&T) -> R) -> R {
+        let slot = &self.slots[slot & 1];
+        #[cfg(not(test))]
+        // SAFETY: the user looks at the slot in use, which holds a value since `begin`, and at the
+        // other one while it is offered, since when it holds one: the offerer writes to neither.
+        let result = work(unsafe { (*slot.get()).assume_init_ref() });
+        #[cfg(test)]
+        // SAFETY: as above; loom checks it.
+        let result = slot.with(|place| work(unsafe { (*place).assume_init_ref() }));
+        result
+    }
+}
+
+/// The slot that is the offerer's.
+pub(crate) struct Free<'a, T> {
+    swap: &'a Swap<T>,
+    hand: &'a mut Offerer,
+}
+
+impl<T> Free<'_, T> {
+    /// Offers a value.
+    #[inline(always)]
+    pub(crate) fn offer(self, value: T) {
+        let slot = &self.swap.slots[self.hand.free & 1];
+        // SAFETY: without an offer the slot that is not in use is the offerer's.
+        unsafe { write(slot, MaybeUninit::new(value)) };
+        self.hand.free ^= 1;
+        self.swap.state.store(OFFERED, Ordering::Release);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use loom::sync::Arc;
+    use loom::thread;
+    use std::collections::BTreeSet;
+    use std::sync::Mutex;
+
+    /// What three periods use while a task offers 1 and then, if it may, 2. Loom goes another way
+    /// where a thread yields between two of its steps, so both are tried.
+    #[test]
+    fn a_period_uses_one_whole_value_and_changes_over_in_order() {
+        static SEEN: Mutex<BTreeSet<(bool, [u32; 3])>> = Mutex::new(BTreeSet::new());
+        for pauses in [false, true] {
+            loom::model(move || {
+                let outcome = offer_twice(pauses);
+                SEEN.lock().expect("not poisoned").insert(outcome);
+            });
+        }
+        let seen = SEEN.lock().expect("not poisoned");
+        // Without the second: 1 is adopted in one of three periods or after them.
+        let refused = seen.iter().filter(|(second, _)| !second).count();
+        assert_eq!(refused, 4, "{seen:?}");
+        // With it: 1 in the first and 2 in the second, the third or later; or 1 in the second and 2
+        // in the third or later; or 1 in the third.
+        let taken = seen.iter().filter(|(second, _)| *second).count();
+        assert_eq!(taken, 6, "{seen:?}");
+    }
+
+    /// Whether the value could be offered.
+    fn offer<T>(swap: &Swap<T>, hand: &mut Offerer, value: T) -> bool {
+        let free = swap.free(hand);
+        let is_free = free.is_some();
+        if let Some(free) = free {
+            free.offer(value);
+        }
+        is_free
+    }
+
+    fn offer_twice(pauses: bool) -> (bool, [u32; 3]) {
+        let swap = Arc::new(Swap::new());
+        // SAFETY: once for these slots.
+        let (mut offerer, beginner) = unsafe { Swap::<[u32; 2]>::hands() };
+        let mut user = swap.begin(beginner, [0, !0]);
+        let theirs = Arc::clone(&swap);
+        let interrupt = thread::spawn(move || {
+            [(); 3].map(|()| {
+                theirs.adopt(&mut user, |before, now| assert_eq!(before[0] + 1, now[0]));
+                let [number, complement] = theirs.with(&user, |value| *value);
+                assert_eq!(complement, !number, "two values are mixed");
+                if pauses {
+                    thread::yield_now();
+                }
+                number
+            })
+        });
+        assert!(offer(&swap, &mut offerer, [1, !1]));
+        let second = offer(&swap, &mut offerer, [2, !2]) || {
+            thread::yield_now();
+            offer(&swap, &mut offerer, [2, !2])
+        };
+        let used = interrupt.join().expect("it does not panic");
+        assert!(used.is_sorted(), "{used:?}");
+        (second, used)
+    }
+
+    #[test]
+    fn an_offer_waits_for_the_one_before() {
+        loom::model(|| {
+            let swap = Swap::new();
+            // SAFETY: once for these slots.
+            let (mut offerer, beginner) = unsafe { Swap::<u32>::hands() };
+            let mut user = swap.begin(beginner, 0);
+            assert!(offer(&swap, &mut offerer, 1));
+            assert!(!offer(&swap, &mut offerer, 2));
+            swap.adopt(&mut user, |_, _| {});
+            assert!(offer(&swap, &mut offerer, 3));
+            assert_eq!(swap.with(&user, |value| *value), 1);
+            swap.adopt(&mut user, |before, now| assert_eq!((before, now), (&1, &3)));
+            assert_eq!(swap.with(&user, |value| *value), 3);
+        });
+    }
+}

@@ -1,0 +1,45 @@
+//! The atomics and cells of the exchange: the core's, and in tests those of loom, which tries every
+//! order in which two threads may see them.
+
+#[cfg(not(test))]
+pub(super) use core::{
+    cell::UnsafeCell,
+    sync::atomic::{AtomicU8, Ordering},
+};
+#[cfg(test)]
+pub(super) use loom::{
+    cell::UnsafeCell,
+    sync::atomic::{AtomicU8, Ordering},
+};
+
+/// Writes to a cell's content.
+///
+/// # Safety
+/// Nobody else is at it.
+#[inline(always)]
+pub(super) unsafe fn write<T>(cell: &UnsafeCell<T>, value: T) {
+    #[cfg(not(test))]
+    // SAFETY: as the caller promises.
+    unsafe {
+        *cell.get() = value;
+    }
+    #[cfg(test)]
+    // SAFETY: as the caller promises; loom checks it.
+    cell.with_mut(|place| unsafe { *place = value });
+}
+
+/// A copy of a cell's content.
+///
+/// # Safety
+/// Nobody writes to it meanwhile.
+#[inline(always)]
+pub(super) unsafe fn read<T: Copy>(cell: &UnsafeCell<T>) -> T {
+    #[cfg(not(test))]
+    // SAFETY: as the caller promises.
+    unsafe {
+        *cell.get()
+    }
+    #[cfg(test)]
+    // SAFETY: as the caller promises; loom checks it.
+    cell.with(|place| unsafe { *place })
+}

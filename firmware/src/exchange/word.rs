@@ -1,0 +1,113 @@
+//! The set-point in one word, which an atomic store hands over whole.
+
+use fixed::types::I1F31;
+use siskin_control::drive::{Fault, Setpoint};
+use siskin_control::units::{Current, Speed};
+
+/// Kind of set-point, in the word's bits 31 to 29.
+const KIND_SHIFT: u32 = 29;
+const REST: u32 = 0;
+const SPEED: u32 = 1;
+const TORQUE: u32 = 2;
+const TEST: u32 = 3;
+const VOLTAGE: u32 = 4;
+const TONE: u32 = 5;
+
+/// The sequence number's place: bits 28 to 24.
+const SEQUENCE_SHIFT: u32 = 24;
+const SEQUENCE_MASK: u32 = 0x1f;
+
+/// The value's place: bits 23 to 0 hold the upper 24 bits of a speed, a current, a pitch or a share.
+/// The speed's step is then 0.0072 mechanical rpm with 12 pole pairs at 24 kHz.
+const VALUE_SHIFT: u32 = 8;
+const VALUE_MASK: u32 = 0x00ff_ffff;
+
+/// The word of a set-point with a sequence number, of which the lowest five bits count.
+pub(super) fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
+    let value = |bits: i32| (bits as u32) >> VALUE_SHIFT;
+    let (kind, value) = match setpoint {
+        Setpoint::Stop => (REST, 0),
+        Setpoint::Zero => (REST, 1),
+        Setpoint::Fault(fault) => (REST, fault as u32 + 2),
+        Setpoint::Speed(speed) => (SPEED, value(speed.to_bits())),
+        Setpoint::Torque(current) => (TORQUE, value(current.to_bits())),
+        Setpoint::Test(current) => (TEST, value(current.to_bits())),
+        Setpoint::Tone(pitch) => (TONE, value(pitch.to_bits())),
+        Setpoint::Voltage(share) => (VOLTAGE, value(share.to_bits())),
+    };
+    kind << KIND_SHIFT | (sequence & SEQUENCE_MASK) << SEQUENCE_SHIFT | value
+}
+
+/// The set-point of a word.
+pub(super) fn unpack(word: u32) -> Setpoint {
+    // The shift throws kind and sequence number away and brings the sign back to bit 31.
+    let bits = (word << VALUE_SHIFT) as i32;
+    match word >> KIND_SHIFT {
+        SPEED => Setpoint::Speed(Speed::from_bits(bits)),
+        TORQUE => Setpoint::Torque(Current::from_bits(bits)),
+        TEST => Setpoint::Test(Current::from_bits(bits)),
+        TONE => Setpoint::Tone(Speed::from_bits(bits)),
+        VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
+        _ => rest(word & VALUE_MASK),
+    }
+}
+
+/// What does not turn the motor.
+fn rest(number: u32) -> Setpoint {
+    // Written out: a look-up would be a table in flash.
+    match number {
+        1 => Setpoint::Zero,
+        2 => Setpoint::Fault(Fault::OverCurrent),
+        3 => Setpoint::Fault(Fault::OverVoltage),
+        4 => Setpoint::Fault(Fault::UnderVoltage),
+        5 => Setpoint::Fault(Fault::OverTemperature),
+        6 => Setpoint::Fault(Fault::ObserverLost),
+        7 => Setpoint::Fault(Fault::Stuck),
+        8 => Setpoint::Fault(Fault::CurrentSensor),
+        _ => Setpoint::Stop,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setpoint_comes_back_within_the_value_s_step() {
+        let current = Current::from_num(-3.25);
+        let mut all = vec![
+            Setpoint::Stop,
+            Setpoint::Zero,
+            Setpoint::Torque(current),
+            Setpoint::Test(-current),
+            Setpoint::Tone(Speed::from_num(0.125)),
+            Setpoint::Voltage(I1F31::from_num(-0.75)),
+            Setpoint::Speed(Speed::from_bits(-0x1234_5600)),
+        ];
+        all.extend(Fault::ALL.map(Setpoint::Fault));
+        for setpoint in all {
+            for number in [0, 1, 31] {
+                let word = pack(setpoint, number);
+                assert_eq!(unpack(word), setpoint);
+                assert_ne!(pack(setpoint, number + 1), word);
+            }
+        }
+        // What the word has no room for is rounded down.
+        let fine = Setpoint::Speed(Speed::from_bits(0x1234_56ff));
+        let coarse = Setpoint::Speed(Speed::from_bits(0x1234_5600));
+        assert_eq!(unpack(pack(fine, 5)), coarse);
+    }
+
+    #[test]
+    fn the_sequence_number_wraps() {
+        assert_eq!(pack(Setpoint::Zero, 32), pack(Setpoint::Zero, 0));
+        assert_eq!(unpack(pack(Setpoint::Zero, 33)), Setpoint::Zero);
+    }
+
+    #[test]
+    fn a_word_that_nobody_writes_is_stop() {
+        assert_eq!(unpack(9), Setpoint::Stop);
+        assert_eq!(unpack(6 << KIND_SHIFT | 77), Setpoint::Stop);
+        assert_eq!(unpack(0), Setpoint::Stop);
+    }
+}

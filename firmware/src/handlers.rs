@@ -1,0 +1,85 @@
+//! What ends everything: a panic, a hard fault, an unexpected interrupt.
+
+use core::arch::{asm, naked_asm};
+use core::panic::PanicInfo;
+
+use cortex_m::peripheral::SCB;
+use cortex_m_rt::exception;
+use siskin_firmware::last_words::{DETAILS, Failure, fail, turn_off};
+
+/// Names no file: nothing of what a panic says is in the image, only where it was.
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    turn_off();
+    fail(Failure::Panic, return_addresses())
+}
+
+unsafe extern "C" {
+    static _stack_end: u32;
+    static _stack_start: u32;
+}
+
+/// Where the innermost calls return to. On this target every function keeps in r7 the address of two
+/// words: its caller's r7, and where it returns to.
+#[inline(always)]
+fn return_addresses() -> [u32; DETAILS] {
+    let stack = &raw const _stack_end as u32..&raw const _stack_start as u32 - 4;
+    let mut frame: u32;
+    // SAFETY: a register is read.
+    unsafe { asm!("mov {}, r7", out(reg) frame, options(nomem, nostack, preserves_flags)) };
+    let mut addresses = [0; DETAILS];
+    for address in &mut addresses {
+        if !stack.contains(&frame) || !frame.is_multiple_of(4) {
+            break;
+        }
+        // SAFETY: two words of the stack, whatever is in them.
+        let words = unsafe { (frame as *const [u32; 2]).read_volatile() };
+        [frame, *address] = words;
+    }
+    addresses
+}
+
+/// A hard fault, by its raw vector: the stack may be what is at fault, so it begins anew.
+///
+/// # Safety
+/// For the processor.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+#[unsafe(link_section = ".control")]
+unsafe extern "C" fn hard_fault_vector() {
+    naked_asm!(
+        "mrs r0, msp",
+        "ldr r1, =_stack_start",
+        "msr msp, r1",
+        "b {}",
+        sym hard_fault,
+    )
+}
+
+/// The fault with its stack pointer, which is of no use where the stack has left its memory.
+extern "C" fn hard_fault(stack: u32) -> ! {
+    // First of all: what follows reads what may be wrong.
+    turn_off();
+    let [lowest, highest] = [&raw const _stack_end as u32, &raw const _stack_start as u32];
+    // SAFETY: a register of the processor without side effects.
+    let status = unsafe { (*SCB::PTR).cfsr.read() };
+    // The frame of an exception: eight words, of which the seventh is the program counter.
+    if stack < lowest {
+        fail(Failure::StackOverflow, [0, status, 0, 0])
+    } else if !stack.is_multiple_of(4) || stack > highest - 32 {
+        fail(Failure::HardFault, [0, status, 0, 0])
+    } else {
+        // SAFETY: the processor has put the frame there, within the stack.
+        let at = unsafe { *((stack + 24) as *const u32) };
+        fail(Failure::HardFault, [at, status, 0, 0])
+    }
+}
+
+// SAFETY: it runs instead of whatever failed and does not return to it.
+#[exception]
+unsafe fn DefaultHandler(interrupt: i16) -> ! {
+    fail(
+        Failure::UnexpectedInterrupt,
+        [i32::from(interrupt) as u32, 0, 0, 0],
+    )
+}

@@ -1,0 +1,59 @@
+//! Periods that were not done with when the next was due.
+
+/// What an overrun counts, in periods without one.
+const WEIGHT: u32 = 100;
+
+/// Overruns in a row that end the drive; more than one in 100 periods do so in time too.
+const REPEATED: u32 = 3;
+
+/// The recent overruns. One is borne: a duty comes a period late. Repeated ones are a processor too
+/// slow for its PWM frequency, and every duty would be late.
+#[derive(Default)]
+pub(crate) struct Overruns {
+    /// It falls by one a period.
+    level: u32,
+    /// The period of the last overrun.
+    last: u32,
+}
+
+impl Overruns {
+    /// Takes note of an overrun in this period, of a number that wraps; whether there have been too
+    /// many.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn note(&mut self, period: u32) -> bool {
+        let since = period.wrapping_sub(self.last);
+        self.last = period;
+        self.level = self.level.saturating_sub(since) + WEIGHT;
+        self.level > (REPEATED - 1) * WEIGHT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The overrun that is too much, of one every so many periods from here on.
+    fn ends_at(begin: u32, every: u32) -> Option<u32> {
+        let mut overruns = Overruns::default();
+        (0..1000).find(|count| overruns.note(begin.wrapping_add(count * every)))
+    }
+
+    #[test]
+    fn three_in_a_row_end_the_drive() {
+        assert_eq!(ends_at(77, 1), Some(2));
+        assert_eq!(ends_at(u32::MAX, 1), Some(2));
+    }
+
+    #[test]
+    fn one_now_and_then_is_borne() {
+        assert_eq!(ends_at(0, 100), None);
+        assert_eq!(ends_at(0, 24_000), None);
+    }
+
+    #[test]
+    fn many_that_are_not_in_a_row_end_it_too() {
+        // Each leaves 50 of its weight of 100: the fourth makes 250.
+        assert_eq!(ends_at(0, 50), Some(3));
+    }
+}

@@ -1,0 +1,170 @@
+//! One control period.
+
+use core::mem;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use cortex_m::peripheral::NVIC;
+use siskin_control::drive::{Bridge, Config, Fault, Setpoint, State, step};
+
+use super::gate_driver::GateDriver;
+use super::overruns::Overruns;
+use super::pwm::Pwm;
+use super::registers::Registers;
+use super::sample::sample;
+use super::timing::Timing;
+use crate::board::TIMER_HZ;
+use crate::chip;
+use crate::exchange::{InterruptEnd, RunningEnd};
+use crate::last_words::{Failure, fail};
+
+/// Whether the flash is being written.
+static WRITING: AtomicBool = AtomicBool::new(false);
+
+static PERIODS: AtomicU32 = AtomicU32::new(0);
+static OVERRUNS: AtomicU32 = AtomicU32::new(0);
+
+/// Every so many periods the tasks get a snapshot: they look at it once a millisecond, which is 8
+/// periods at the slowest PWM.
+const PUBLISHED_EVERY: u32 = 8;
+
+/// Control periods since the start, wrapping: while it counts, the interrupt lives.
+pub fn periods() -> u32 {
+    PERIODS.load(Ordering::Relaxed)
+}
+
+/// Control periods since the start that were not done with when the next was due.
+pub fn overruns() -> u32 {
+    OVERRUNS.load(Ordering::Relaxed)
+}
+
+/// Tells the interrupt that the flash is being written, or is not any more: meanwhile it calls nothing
+/// that lies there, and the bridge is off. For a motor at rest.
+pub(crate) fn set_writing(writing: bool) {
+    WRITING.store(writing, Ordering::Relaxed);
+}
+
+/// Everything that the interrupt owns.
+pub struct Interrupt {
+    registers: Registers,
+    pwm: Pwm,
+    gate_driver: GateDriver,
+    state: State,
+    end: RunningEnd,
+    /// What the control is told where the hardware has turned the bridge off: it does what it does
+    /// after a fault that it finds itself.
+    trip: Setpoint,
+    overruns: Overruns,
+    /// Whether the gate driver has given an alarm while the flash was written.
+    alarmed: bool,
+}
+
+impl Interrupt {
+    /// The interrupt at power-up, with the timer set up and all switches off.
+    pub fn new(registers: Registers, config: Config, end: InterruptEnd) -> Self {
+        Self {
+            registers,
+            pwm: Pwm::new(registers.timer, Timing::new(&config, TIMER_HZ)),
+            gate_driver: GateDriver::new(registers.gate_driver),
+            state: State::new(&config),
+            end: end.begin(config),
+            trip: Setpoint::Fault(Fault::OverCurrent),
+            overruns: Overruns::default(),
+            alarmed: false,
+        }
+    }
+
+    /// Lets the PWM run.
+    pub(super) fn begin(&mut self) {
+        self.pwm.start();
+    }
+
+    /// One control period.
+    #[inline(always)]
+    pub fn run(&mut self) {
+        chip::acknowledge(&self.registers.converters);
+        if WRITING.load(Ordering::Relaxed) {
+            self.hold();
+        } else {
+            self.control();
+        }
+    }
+
+    /// A period while the flash is written, when nothing can be fetched from it: the bridge, which was
+    /// at rest, is off. An alarm of the hardware in the meantime is told in the first period after.
+    #[cold]
+    #[inline(never)]
+    fn hold(&mut self) {
+        self.pwm.commutate();
+        self.pwm.apply(Bridge::Off);
+        self.alarmed |= !self.gate_driver.ready();
+        count(&PERIODS);
+    }
+
+    /// Any other period.
+    #[inline(never)]
+    fn control(&mut self) {
+        self.pwm.commutate();
+        self.end.listen();
+        self.adopt();
+        let alarmed = mem::take(&mut self.alarmed);
+        let tripped = self.pwm.broken() || !self.gate_driver.ready() || alarmed;
+        if tripped {
+            self.pwm.clear_break();
+        }
+        // One of two in memory: made up here, it would go through registers in pieces.
+        let setpoint = *if tripped {
+            &self.trip
+        } else {
+            self.end.setpoint()
+        };
+        let sample = sample(&self.registers);
+        let state = &mut self.state;
+        let bridge = self
+            .end
+            .with_config(|config| step(config, state, sample, setpoint));
+        self.pwm.apply(bridge);
+        let period = count(&PERIODS);
+        if period.is_multiple_of(PUBLISHED_EVERY) {
+            self.publish();
+        }
+        if NVIC::is_pending(chip::CONVERTED) {
+            count(&OVERRUNS);
+            if self.overruns.note(period) {
+                fail(Failure::Overrun, [overruns(), 0, 0, 0]);
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn publish(&mut self) {
+        self.end.publish(self.state.snapshot());
+    }
+
+    /// Changes over to a new configuration, if one is offered.
+    #[inline(always)]
+    fn adopt(&mut self) {
+        let Self {
+            pwm, state, end, ..
+        } = self;
+        end.adopt(|before, now, timing| adopt(pwm, state, (before, now), timing));
+    }
+}
+
+/// Another frequency has another scale, under which the drive begins anew with the bridge off.
+#[cold]
+#[inline(never)]
+fn adopt(pwm: &mut Pwm, state: &mut State, (before, now): (&Config, &Config), timing: Timing) {
+    state.adopt(before, now);
+    if pwm.timing() != timing {
+        pwm.retime(timing);
+    }
+}
+
+/// Counts one more, and says how many it was before. There is one writer: this need not be one
+/// indivisible step.
+#[inline(always)]
+fn count(counter: &AtomicU32) -> u32 {
+    let before = counter.load(Ordering::Relaxed);
+    counter.store(before.wrapping_add(1), Ordering::Relaxed);
+    before
+}

@@ -1,0 +1,305 @@
+//! The bridge's PWM: TIM1, centre-aligned, complementary, with dead time.
+//!
+//! The counter runs from 0 to the top and back, PWM mode 1: a high side is on below its compare
+//! value, so the top is in the middle of the low sides' on-time. There channel 4 triggers the
+//! converters. New duties are written after the top and taken at the next one, one period later.
+//!
+//! What a phase does ([`Leg`]) is in the channels' modes and enable bits. These are preloaded too
+//! (CCPC), but the timer takes them at its commutation event, not at the top: the control interrupt
+//! causes one as its first act, 3 µs after the top at which the duties that go with them were
+//! taken. In between the old switches see the new duties: a phase that is let go keeps its low side
+//! on for so long, and one that is taken up begins to switch by so much later.
+//!
+//! The hardware changes all bits of all phases in the same clock, so no order of writes can turn on
+//! both switches of a phase. The dead time between them hangs on edges of the reference output,
+//! which a commutation makes where it leaves or enters a forced level. From the low side alone to
+//! both switches there need not be one: the mode changes from 2 to 1, the reference may stay high
+//! until the next comparison, and what it drives would become the high side in the same clock. Such
+//! a change goes by way of all switches off, in two commutations; the other way round, where the
+//! high sides may just have been on, all stays off for a period. [`Bridge::Off`] does not wait for
+//! any of this: the main output enable acts at once.
+
+use embassy_stm32::pac::timer::TimAdv;
+use embassy_stm32::pac::timer::regs::{Ccr1ch, SrAdv};
+use embassy_stm32::pac::timer::vals::{Bkp, Cms, Dir, FilterValue, Mms, Ocm, Ossi, Ossr};
+use siskin_control::drive::Bridge;
+use siskin_control::units::Duty;
+
+use super::timing::{Timing, compare};
+use crate::board::{PHASES, SAMPLING_CLOCKS};
+
+/// The running PWM.
+pub(crate) struct Pwm {
+    timer: TimAdv,
+    timing: Timing,
+    /// What the last [`apply`](Self::apply) has written.
+    low_sides: LowSides,
+    /// What follows, in the next commutation, on all switches off.
+    deferred: Option<[Leg; 3]>,
+}
+
+impl Pwm {
+    /// Sets the timer up with all switches off; [`start`](Self::start) lets it count.
+    pub(crate) fn new(timer: TimAdv, timing: Timing) -> Self {
+        timer.cr1().write(|w| {
+            w.set_cms(Cms::CENTER_ALIGNED1);
+            w.set_arpe(true);
+        });
+        timer.cr2().write(|w| w.set_mms(Mms::COMPARE_OC4));
+        // Channel 4 has no pin. Its rising edge, half a sampling window before the top, starts the
+        // converters; their start delay of two to three of their clocks (0.07 µs) is neglected.
+        timer.ccer().write(|w| w.set_cce(3, true));
+        // Without the main output enable the outputs are driven to their idle level, low: both
+        // switches of every phase are off. With it, an output that is not enabled is driven low
+        // where its complement is. The break is taken after six samples at a sixteenth of the
+        // clock, 0.56 µs: the comparators see each switching edge ring.
+        timer.bdtr().write(|w| {
+            w.set_ossi(Ossi::IDLE_LEVEL);
+            w.set_ossr(Ossr::IDLE_LEVEL);
+            w.set_bkp(0, Bkp::ACTIVE_HIGH);
+            w.set_bkf(0, FilterValue::FDTS_DIV16_N6);
+            w.set_bke(0, crate::board::BREAKS);
+        });
+        let mut pwm = Self {
+            timer,
+            timing,
+            low_sides: LowSides::None,
+            deferred: None,
+        };
+        pwm.retime(timing);
+        pwm.set_modes([Leg::Off; 3]);
+        // From here on modes and enable bits wait for a commutation, those of channel 4 too.
+        timer.cr2().modify(|w| w.set_ccpc(true));
+        pwm.commutate();
+        pwm
+    }
+
+    /// Lets the counter run with all switches off, and sees to it that duties are taken at the top.
+    /// To be called with interrupts held up, but for its own, which nothing enables yet.
+    pub(crate) fn start(&mut self) {
+        let timer = self.timer;
+        // With a repetition count of 0 the first update is at the first top. The count of 1, written
+        // behind the start, is taken there and makes every second turn an update: the tops, not the
+        // zeros.
+        timer.rcr().write(|w| w.set_rep(0));
+        timer.egr().write(|w| w.set_ug(true));
+        timer.cr1().modify(|w| w.set_cen(true));
+        timer.rcr().write(|w| w.set_rep(1));
+        for _ in 0..2 {
+            timer.sr().modify(|w| w.set_uif(false));
+            while !timer.sr().read().uif() {}
+        }
+        assert!(
+            timer.cr1().read().dir() == Dir::DOWN,
+            "after the update at the top the counter goes down"
+        );
+    }
+
+    /// Takes another frequency and dead time from the next top on. For a bridge that is off: the
+    /// compare values are of the old top until they are written again.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn retime(&mut self, timing: Timing) {
+        self.timing = timing;
+        self.timer.arr().write(|w| w.set_arr(timing.top));
+        self.timer
+            .ccr(3)
+            .write(|w| w.set_ccr(timing.top - SAMPLING_CLOCKS / 2));
+        self.timer.bdtr().modify(|w| w.set_dtg(timing.dead_time));
+    }
+
+    /// What it was set to last.
+    pub(crate) fn timing(&self) -> Timing {
+        self.timing
+    }
+
+    /// Lets the phases do what the last [`apply`](Self::apply) wanted.
+    #[inline(always)]
+    pub(crate) fn commutate(&mut self) {
+        self.timer.egr().write(|w| w.set_comg(true));
+        if self.deferred.is_some() {
+            self.second();
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn second(&mut self) {
+        if let Some(legs) = self.deferred.take() {
+            self.set_modes(legs);
+            self.timer.egr().write(|w| w.set_comg(true));
+        }
+    }
+
+    /// Whether the break has turned the bridge off since [`clear_break`](Self::clear_break).
+    #[inline(always)]
+    pub(crate) fn broken(&self) -> bool {
+        self.timer.sr().read().bif(0)
+    }
+
+    /// Forgets a break; the hardware holds the bridge off for as long as its cause lasts.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn clear_break(&mut self) {
+        // What is written as 1 stays as it is.
+        let mut others = SrAdv(!0);
+        others.set_bif(0, false);
+        self.timer.sr().write_value(others);
+    }
+
+    /// Does with the bridge what the control wants, from the counter's next top on; to turn it off
+    /// takes effect at once, and after that all switches stay off until the top.
+    #[inline(always)]
+    pub(crate) fn apply(&mut self, bridge: Bridge) {
+        match (bridge, self.low_sides) {
+            (Bridge::Duty(duties), LowSides::Switching) => {
+                let [a, b, c] = duties;
+                let top = self.timing.top;
+                // The main output is on since the period before, or a break has turned it off.
+                self.set_compares([compare(a, top), compare(b, top), compare(c, top)]);
+            }
+            _ => self.change(bridge),
+        }
+    }
+
+    /// Every bridge but that of a motor that is driven from period to period.
+    #[cold]
+    #[inline(never)]
+    fn change(&mut self, bridge: Bridge) {
+        let switching =
+            |[a, b, c]: [Duty; 3]| [Leg::Switching(a), Leg::Switching(b), Leg::Switching(c)];
+        let open_or = |duty: Option<Duty>| duty.map_or(Leg::Off, Leg::Switching);
+        let (wanted, legs) = match bridge {
+            Bridge::Off => return self.off(),
+            Bridge::Charge(share) => (LowSides::Alone, [Leg::Low(share); 3]),
+            Bridge::Brake => (LowSides::Switching, switching([Duty::ZERO; 3])),
+            Bridge::Duty(duties) => (LowSides::Switching, switching(duties)),
+            Bridge::Legs([a, b, c]) => (LowSides::Some, [open_or(a), open_or(b), open_or(c)]),
+        };
+        let [a, b, c] = legs;
+        let top = self.timing.top;
+        self.set_compares([a.compare(top), b.compare(top), c.compare(top)]);
+        let with_high_sides = |low: LowSides| matches!(low, LowSides::Switching | LowSides::Some);
+        let (present, modes) = match (self.low_sides, wanted) {
+            (before, LowSides::Alone) if with_high_sides(before) => (LowSides::None, [Leg::Off; 3]),
+            (LowSides::Alone, after) if with_high_sides(after) => {
+                self.deferred = Some(legs);
+                (wanted, [Leg::Off; 3])
+            }
+            _ => (wanted, legs),
+        };
+        self.low_sides = present;
+        self.set_modes(modes);
+        self.turn_on();
+    }
+
+    fn off(&mut self) {
+        turn_off(self.timer);
+        self.low_sides = LowSides::None;
+        self.deferred = None;
+        self.set_modes([Leg::Off; 3]);
+        self.commutate();
+    }
+
+    fn turn_on(&mut self) {
+        // After a break the control is told first.
+        if !self.broken() {
+            self.timer.bdtr().modify(|w| w.set_moe(true));
+        }
+    }
+
+    // Channel by channel, here and below: a loop would keep the checks of the channels' numbers.
+    #[inline(always)]
+    fn set_compares(&mut self, values: [u32; 3]) {
+        let timer = self.timer;
+        timer.ccr(0).write_value(Ccr1ch(values[PHASES[0]]));
+        timer.ccr(1).write_value(Ccr1ch(values[PHASES[1]]));
+        timer.ccr(2).write_value(Ccr1ch(values[PHASES[2]]));
+    }
+
+    /// Writes what the next commutation brings.
+    fn set_modes(&mut self, legs: [Leg; 3]) {
+        let [first, second, third] = [legs[PHASES[0]], legs[PHASES[1]], legs[PHASES[2]]];
+        self.timer.ccmr_output(0).write(|w| {
+            w.set_ocm(0, first.mode());
+            w.set_ocpe(0, true);
+            w.set_ocm(1, second.mode());
+            w.set_ocpe(1, true);
+        });
+        self.timer.ccmr_output(1).write(|w| {
+            w.set_ocm(0, third.mode());
+            w.set_ocpe(0, true);
+            // The trigger.
+            w.set_ocm(1, Ocm::PWM_MODE2);
+        });
+        self.timer.ccer().write(|w| {
+            w.set_cce(0, first.enables_high());
+            w.set_ccne(0, first.enables_low());
+            w.set_cce(1, second.enables_high());
+            w.set_ccne(1, second.enables_low());
+            w.set_cce(2, third.enables_high());
+            w.set_ccne(2, third.enables_low());
+            w.set_cce(3, true);
+        });
+    }
+}
+
+/// What a phase does for a period.
+#[derive(Clone, Copy)]
+enum Leg {
+    /// Both switches are off.
+    Off,
+    /// The low side is on for this share around the top; the high side is off.
+    Low(Duty),
+    /// The high side is on for this share, the low side for the rest.
+    Switching(Duty),
+}
+
+/// How the low sides are driven.
+#[derive(Clone, Copy, PartialEq)]
+enum LowSides {
+    /// Not at all: all switches are off.
+    None,
+    /// Without the high sides.
+    Alone,
+    /// In turn with the high sides, in the phases that are not off.
+    Some,
+    /// In turn with the high sides, in all phases.
+    Switching,
+}
+
+impl Leg {
+    /// The high side is on, or the low side alone, while the reference output is high.
+    fn mode(self) -> Ocm {
+        match self {
+            // The reference is held low.
+            Self::Off => Ocm::FORCE_INACTIVE,
+            // High above the compare value: around the top.
+            Self::Low(_) => Ocm::PWM_MODE2,
+            Self::Switching(_) => Ocm::PWM_MODE1,
+        }
+    }
+
+    /// Of a phase that is off, one enabled output keeps the other one driven.
+    fn enables_high(self) -> bool {
+        !matches!(self, Self::Low(_))
+    }
+
+    fn enables_low(self) -> bool {
+        !matches!(self, Self::Off)
+    }
+
+    fn compare(self, top: u16) -> u32 {
+        match self {
+            Self::Off => 0,
+            Self::Low(share) => u32::from(top).saturating_sub(compare(share, top)),
+            Self::Switching(duty) => compare(duty, top),
+        }
+    }
+}
+
+/// Turns all switches off, at once. It may be called at any time, also before the timer is set up.
+#[inline(always)]
+pub(crate) fn turn_off(timer: TimAdv) {
+    timer.bdtr().modify(|w| w.set_moe(false));
+}

@@ -1,0 +1,99 @@
+//! Where the interrupt reads and writes: the blocks of registers, which may also be plain memory.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use embassy_stm32::pac::adc::Adc;
+use embassy_stm32::pac::gpio::Gpio;
+use embassy_stm32::pac::timer::TimAdv;
+use embassy_stm32::pac::{ADC1, ADC2, GPIOB, GPIOC, TIM1};
+use siskin_control::drive::Sample;
+
+use super::sample::{self, Slot};
+use crate::board::WIRING;
+use crate::chip::READINGS_AT_WORD;
+
+/// The blocks that the interrupt is at.
+#[derive(Clone, Copy)]
+pub struct Registers {
+    /// The PWM timer.
+    pub(crate) timer: TimAdv,
+    /// The converters that the timer triggers.
+    pub(crate) converters: [Adc; 2],
+    /// The port of the Hall sensors.
+    pub(crate) hall: Gpio,
+    /// The port of the gate driver.
+    pub(crate) gate_driver: Gpio,
+}
+
+impl Registers {
+    /// The chip's.
+    pub const CHIP: Self = Self {
+        timer: TIM1,
+        converters: [ADC1, ADC2],
+        hall: GPIOB,
+        gate_driver: GPIOC,
+    };
+}
+
+/// Words of the largest block: 1 KB.
+const WORDS: usize = 256;
+
+/// A block of registers in plain memory.
+type Block = [AtomicU32; WORDS];
+
+/// Memory in place of the blocks, where the interrupt can be run without its chip: to count its
+/// instructions on an emulated processor.
+pub struct Stand {
+    timer: Block,
+    converters: [Block; 2],
+    hall: Block,
+    gate_driver: Block,
+}
+
+impl Stand {
+    /// All words 0: no reading, no flag, and the gate driver's alarm, which is low when it is given,
+    /// at rest.
+    #[expect(
+        clippy::new_without_default,
+        reason = "it is made at compile time, which a default cannot be"
+    )]
+    pub const fn new() -> Self {
+        Self {
+            timer: [const { AtomicU32::new(0) }; WORDS],
+            converters: [const { [const { AtomicU32::new(0) }; WORDS] }; 2],
+            hall: [const { AtomicU32::new(0) }; WORDS],
+            gate_driver: [const { AtomicU32::new(!0) }; WORDS],
+        }
+    }
+
+    /// Puts a sample where the converters and the pins of the board would show it.
+    pub fn set_sample(&self, sample: &Sample) {
+        for (Slot(converter, rank), counts) in sample::readings(sample) {
+            self.converters[converter][READINGS_AT_WORD + rank].store(counts, Ordering::Relaxed);
+        }
+        let hall = u32::from(sample.hall) << WIRING.hall.unwrap_or(0);
+        // GPIO's IDR is at 0x10.
+        self.hall[0x10 / 4].store(hall, Ordering::Relaxed);
+    }
+
+    /// The blocks in this memory.
+    pub fn registers(&'static self) -> Registers {
+        // SAFETY: the pointers are to aligned memory of at least the blocks' sizes, which stays where
+        // it is and may change behind a shared reference.
+        unsafe {
+            Registers {
+                timer: TimAdv::from_ptr(pointer(&self.timer)),
+                converters: [
+                    Adc::from_ptr(pointer(&self.converters[0])),
+                    Adc::from_ptr(pointer(&self.converters[1])),
+                ],
+                hall: Gpio::from_ptr(pointer(&self.hall)),
+                gate_driver: Gpio::from_ptr(pointer(&self.gate_driver)),
+            }
+        }
+    }
+}
+
+fn pointer(block: &'static Block) -> *mut () {
+    block.as_ptr().cast_mut().cast()
+}

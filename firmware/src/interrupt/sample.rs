@@ -1,0 +1,79 @@
+//! From the converters' counts to a [`Sample`].
+
+use siskin_control::drive::Sample;
+use siskin_control::units::AdcCounts;
+
+use super::registers::Registers;
+use crate::board::WIRING;
+
+/// Fraction bits of [`AdcCounts`].
+const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
+
+/// Nominal reading without current, the middle of 12 bits: the drive measures what it really is.
+const MIDDLE: i32 = 2048;
+
+/// Where a reading is: a converter and the rank in its sequence.
+#[derive(Clone, Copy)]
+pub(crate) struct Slot(pub(crate) usize, pub(crate) usize);
+
+/// How a board's signals come to the converters and pins.
+pub(crate) struct Wiring {
+    /// Currents of the phases a, b, c; a phase without a shunt has none.
+    pub(crate) currents: [Option<Slot>; 3],
+    /// Whether a reading rises with the current into the motor.
+    pub(crate) rises: bool,
+    /// Voltages of the terminals a, b, c.
+    pub(crate) terminals: [Slot; 3],
+    /// The supply.
+    pub(crate) bus: Slot,
+    /// The Hall sensors' first pin of port B, with the others behind it, where there are any.
+    pub(crate) hall: Option<u8>,
+}
+
+/// The sample of this period.
+#[inline(always)]
+pub(crate) fn sample(registers: &Registers) -> Sample {
+    let counts = |count: i32| AdcCounts::from_bits(count << FRACTION_BITS);
+    let reading =
+        |Slot(converter, rank)| i32::from(registers.converters[converter].jdr(rank).read().jdata());
+    let current = |slot: Option<Slot>| match slot {
+        None => AdcCounts::ZERO,
+        Some(slot) if WIRING.rises => counts(reading(slot) - MIDDLE),
+        Some(slot) => counts(MIDDLE - reading(slot)),
+    };
+    let hall = match WIRING.hall {
+        // Without sensors their pull-ups read 7.
+        None => 7,
+        Some(pin) => (registers.hall.idr().read().0 >> pin) as u8 & 7,
+    };
+    // One by one: a loop would keep the checks of the ranks.
+    let [a, b, c] = WIRING.currents;
+    let [at_a, at_b, at_c] = WIRING.terminals;
+    Sample {
+        currents: [current(a), current(b), current(c)],
+        bus: counts(reading(WIRING.bus)),
+        terminals: [
+            counts(reading(at_a)),
+            counts(reading(at_b)),
+            counts(reading(at_c)),
+        ],
+        hall,
+    }
+}
+
+/// The reverse of [`sample`]: where each reading of a sample is, and what is read there.
+pub(crate) fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
+    let reading = |counts: AdcCounts| counts.to_num::<i32>();
+    let current = move |counts: AdcCounts| {
+        let counts = reading(counts);
+        MIDDLE + if WIRING.rises { counts } else { -counts }
+    };
+    let currents = (WIRING.currents.into_iter().zip(sample.currents))
+        .filter_map(move |(slot, counts)| Some((slot?, current(counts))));
+    let terminals = (WIRING.terminals.into_iter().zip(sample.terminals))
+        .map(move |(slot, counts)| (slot, reading(counts)));
+    currents
+        .chain(terminals)
+        .chain([(WIRING.bus, reading(sample.bus))])
+        .map(|(slot, counts)| (slot, counts as u32))
+}

@@ -1,0 +1,90 @@
+//! The start of the interrupt.
+
+use core::cell::UnsafeCell;
+
+use cortex_m::peripheral::{NVIC, SCB};
+use embassy_stm32::interrupt;
+use siskin_control::drive::Config;
+
+use super::period::Interrupt;
+use crate::board;
+use crate::chip;
+use crate::exchange::{InterruptCell, InterruptEnd};
+use crate::priority;
+
+#[unsafe(link_section = ".control_state")]
+static INTERRUPT: InterruptCell<Interrupt> = InterruptCell::new();
+
+/// Starts the PWM and, with it, the interrupt; all switches are off until a set-point turns the
+/// motor.
+///
+/// It waits 20 ms for the gate driver and the amplifiers.
+///
+/// # Panics
+/// When it is called again.
+// Out of line, here and in the board's `claim`: their stack is given back before the tasks begin.
+#[inline(never)]
+pub fn start(
+    bridge: board::Bridge,
+    converters: board::Converters,
+    config: Config,
+    end: InterruptEnd,
+) {
+    // SAFETY: the processor's own, of which nothing but what follows uses the vector table's
+    // address; embassy has not been given it.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    vectors_in_ram(&mut core.SCB);
+    let registers = board::prepare(bridge, converters);
+    // SAFETY: the interrupt is not enabled, and this runs in thread mode.
+    let put = unsafe { INTERRUPT.put(|| Interrupt::new(registers, config, end)) };
+    assert!(put, "the interrupt is started once");
+    // SAFETY: as above; the cell is filled.
+    critical_section::with(|_| unsafe { INTERRUPT.with(Interrupt::begin) });
+    priority::set(chip::CONVERTED as usize, priority::PWM);
+    // SAFETY: what the interrupt needs is in place, and no critical section relies on its being
+    // masked.
+    unsafe { NVIC::unmask(chip::CONVERTED) };
+}
+
+/// Sets the hardware's over-current trip for a bound of `phase_a` on the phase currents, peak
+/// amperes: 1.6 times that, and no more than the board's rating. A board whose gate driver has a
+/// trip of its own keeps that.
+pub fn set_trip(phase_a: f32) {
+    board::set_trip(phase_a);
+}
+
+/// The vector table moves to where no erase of the flash holds it up.
+fn vectors_in_ram(scb: &mut SCB) {
+    unsafe extern "C" {
+        static __vector_table: UnsafeCell<u32>;
+        static __vector_table_end: UnsafeCell<u32>;
+        static __ram_vectors: UnsafeCell<u32>;
+    }
+    // SAFETY: the linker script keeps as much room at the one place as the table takes at the other,
+    // aligned to 512, and nothing else is there. The table is written before it is used.
+    unsafe {
+        let from = __vector_table.get();
+        let words = __vector_table_end.get().offset_from(from) as usize;
+        from.copy_to_nonoverlapping(__ram_vectors.get(), words);
+        scb.vtor.write(__ram_vectors.get() as u32);
+    }
+    cortex_m::asm::dsb();
+}
+
+/// The end of the injected conversions.
+#[cfg(feature = "stm32g431")]
+#[interrupt]
+#[unsafe(link_section = ".control")]
+fn ADC1_2() {
+    // SAFETY: this is the interrupt; it is enabled once the cell is filled.
+    unsafe { INTERRUPT.with(Interrupt::run) };
+}
+
+/// The end of the injected conversions.
+#[cfg(feature = "stm32f405")]
+#[interrupt]
+#[unsafe(link_section = ".control")]
+fn ADC() {
+    // SAFETY: this is the interrupt; it is enabled once the cell is filled.
+    unsafe { INTERRUPT.with(Interrupt::run) };
+}

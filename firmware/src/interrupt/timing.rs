@@ -1,0 +1,150 @@
+//! A drive's frequency and dead time in the timer's clocks.
+
+use siskin_control::drive::Config;
+use siskin_control::units::Duty;
+
+/// What the timer is set to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Timing {
+    /// The counter's top: half a period.
+    pub(crate) top: u16,
+    /// The dead-time generator's code.
+    pub(crate) dead_time: u8,
+}
+
+impl Timing {
+    /// The period rounded to twice a whole number of clocks, the dead time up to the generator's
+    /// steps.
+    pub(crate) fn new(config: &Config, clock_hz: u32) -> Self {
+        let period_clocks = clock_hz as f32 * config.scale.period_s;
+        let dead_clocks = period_clocks * config.dead_time.duty.to_num::<f32>();
+        Self {
+            // The table's 8 to 60 kHz give 10625 to 1400 clocks.
+            top: (0.5 * period_clocks + 0.5) as u16,
+            // A duty of 2^-31 that is too large must not make another step of it.
+            dead_time: dead_time_code((dead_clocks + 0.99) as u16),
+        }
+    }
+}
+
+impl Timing {
+    /// Both in a word.
+    pub(crate) fn to_bits(self) -> u32 {
+        u32::from(self.top) << 8 | u32::from(self.dead_time)
+    }
+
+    /// What [`to_bits`](Self::to_bits) has put into a word.
+    pub(crate) fn from_bits(bits: u32) -> Self {
+        Self {
+            top: (bits >> 8) as u16,
+            dead_time: bits as u8,
+        }
+    }
+}
+
+/// The compare value of a duty: top·duty. A duty has 31 fraction bits, so with twice the top the
+/// product's upper half is the result. A duty above 1, which the control does not give, is all of the
+/// period too.
+#[inline(always)]
+pub(crate) const fn compare(duty: Duty, top: u16) -> u32 {
+    let product = duty.to_bits() as u64 * (2 * top as u32) as u64;
+    (product >> 32) as u32
+}
+
+/// The dead-time generator's code for at least so many clocks: steps of 1 up to 127, of 2 up to
+/// 254, of 8 up to 504, of 16 up to 1008, where it ends (5.9 µs at 170 MHz).
+const fn dead_time_code(clocks: u16) -> u8 {
+    match clocks {
+        0..=127 => clocks as u8,
+        128..=254 => 0x80 | (clocks.div_ceil(2) - 64) as u8,
+        255..=504 => 0xc0 | (clocks.div_ceil(8) - 32) as u8,
+        505..=1008 => 0xe0 | (clocks.div_ceil(16) - 32) as u8,
+        _ => 0xff,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use siskin_control::control::delay::Delay;
+    use siskin_control::control::sensing::Shunts;
+    use siskin_control::params::{Board, ParamId, Params, build};
+
+    /// Any board.
+    const BOARD: Board = Board {
+        image: crate::image::identity("any", 0),
+        current_a_per_count: 0.03,
+        bus_v_per_count: 0.01,
+        current_range_a: 40.0,
+        terminal_v_per_count: 0.005,
+        shunts: Shunts::Three,
+        delay: Delay::One,
+        low_side_on_s: 2e-6,
+        refresh_s: 3e-6,
+        charge_s: 60e-6,
+    };
+
+    /// Clocks of a code, as the reference manuals state them (RM0440 and RM0090, TIM1_BDTR.DTG).
+    fn clocks(code: u8) -> u16 {
+        let code = u16::from(code);
+        match code >> 5 {
+            0..=3 => code,
+            4 | 5 => (64 + (code & 0x3f)) * 2,
+            6 => (32 + (code & 0x1f)) * 8,
+            _ => (32 + (code & 0x1f)) * 16,
+        }
+    }
+
+    #[test]
+    fn a_dead_time_is_the_next_longer_step() {
+        for wanted in 0..=1008 {
+            let code = dead_time_code(wanted);
+            assert!(clocks(code) >= wanted, "{wanted}");
+            assert!(code == 0 || clocks(code - 1) < wanted, "{wanted}");
+        }
+        assert_eq!(dead_time_code(5000), 0xff);
+    }
+
+    #[test]
+    fn a_duty_is_its_share_of_the_top() {
+        assert_eq!(compare(Duty::ZERO, 3542), 0);
+        assert_eq!(compare(Duty::from_num(0.5), 3542), 1771);
+        assert_eq!(compare(Duty::from_num(1.0), 3542), 3542);
+        // It fits the register for the longest period, so that it is not taken for a small one.
+        assert!((10625..1 << 16).contains(&compare(Duty::MAX, 10625)));
+    }
+
+    #[test]
+    fn a_word_holds_it() {
+        let timing = Timing {
+            top: 0xfedc,
+            dead_time: 0x98,
+        };
+        assert_eq!(Timing::from_bits(timing.to_bits()), timing);
+    }
+
+    #[test]
+    fn parameters_become_clocks() {
+        let mut params = Params::default();
+        params.set(ParamId::PwmFreqHz, 24_000.0).expect("in range");
+        params.set(ParamId::PwmDeadtimeNs, 500.0).expect("in range");
+        let config = build(&params, &BOARD).expect("it makes a drive");
+        let timing = Timing::new(&config, 170_000_000);
+        // 170 MHz / 48 kHz = 3541.7; 0.5 µs are 85 clocks.
+        assert_eq!(
+            timing,
+            Timing {
+                top: 3542,
+                dead_time: 85
+            }
+        );
+        let timing = Timing::new(&config, 168_000_000);
+        assert_eq!(
+            timing,
+            Timing {
+                top: 3500,
+                dead_time: 84
+            }
+        );
+    }
+}

@@ -1,0 +1,79 @@
+//! The level at which hardware turns the bridge off.
+//!
+//! It is 1.6 times `LIM_PHASE_A` and at most the board's rating. What trips in the end differs from
+//! it, by what the board's circuit has (figures for the B-G431B-ESC1, of 1.71 mV/A at the
+//! comparators):
+//!
+//! | cause | spread |
+//! |---|---|
+//! | one step of the DAC, 0.81 mV | 0.47 A, rounded down |
+//! | offset of DAC and comparator, ±9 mV and ±10 mV (data sheet of the STM32G431) | ±11 A at worst |
+//! | resistors of 1 % about the bias of 103 mV | ±1.2 A |
+//! | the vector's angle: a comparator sees a current out of the motor only, of which the largest of three is between half and all of the vector's length | 1 to 2 times the level |
+//! | the break's filter of 0.56 µs and the ringing that it keeps out | 0.56 µs of a rise of V/L |
+//!
+//! A turning vector passes its worst angle within a sixth of an electrical turn; at standstill the
+//! software's trip at 1.4 times, which sees both signs of all phases, comes first.
+
+/// Of `LIM_PHASE_A`.
+const TRIP_SHARE: f32 = 1.6;
+
+/// How a board's comparators see a current out of the motor.
+#[derive(Clone, Copy)]
+pub(crate) struct TripCircuit {
+    /// Volts at the comparator without current.
+    pub(crate) bias_v: f32,
+    /// Volts at the comparator for each ampere.
+    pub(crate) v_per_a: f32,
+    /// The board's rating, peak amperes.
+    pub(crate) rating_a: f32,
+    /// Volts of one step of the DAC.
+    pub(crate) v_per_step: f32,
+}
+
+impl TripCircuit {
+    /// The DAC's level for a bound of `phase_a` on the phase currents, peak amperes.
+    pub(crate) fn level(&self, phase_a: f32) -> u16 {
+        // A bound that is no number asks for the rating: `min` takes the other one.
+        let trip_a = (TRIP_SHARE * phase_a).min(self.rating_a).max(0.0);
+        let level = (self.bias_v + trip_a * self.v_per_a) / self.v_per_step;
+        level as u16
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CIRCUIT: TripCircuit = TripCircuit {
+        bias_v: 0.1031,
+        v_per_a: 0.003 * 4.0 / 7.0,
+        rating_a: 40.0,
+        v_per_step: 3.3 / 4096.0,
+    };
+
+    fn amperes(level: u16) -> f32 {
+        (f32::from(level) * CIRCUIT.v_per_step - CIRCUIT.bias_v) / CIRCUIT.v_per_a
+    }
+
+    #[test]
+    fn the_level_is_within_a_step_below_1_6_times_the_bound() {
+        for tenths in 10..250 {
+            let bound = tenths as f32 / 10.0;
+            let trip = amperes(CIRCUIT.level(bound));
+            let wanted = 1.6 * bound;
+            assert!(
+                (wanted - 0.48..wanted + 0.01).contains(&trip),
+                "{bound}: {trip}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_bound_takes_it_above_the_rating() {
+        for bound in [25.0, 60.0, 1e9, f32::INFINITY, f32::NAN] {
+            let trip = amperes(CIRCUIT.level(bound));
+            assert!((39.5..40.01).contains(&trip), "{bound}: {trip}");
+        }
+    }
+}

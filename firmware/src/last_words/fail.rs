@@ -1,0 +1,60 @@
+//! The end of a run, and the beginning of the next.
+
+use core::cell::UnsafeCell;
+
+use cortex_m::peripheral::SCB;
+use heapless::String;
+
+use super::record::{DETAILS, Failure, Record, TEXT_BYTES};
+use crate::chip;
+use crate::interrupt::{self, Registers};
+
+struct Place(UnsafeCell<Record>);
+
+// SAFETY: written by `fail`, which no interrupt interrupts and which does not return, and by
+// `take`, which runs before anything that could fail in an interrupt.
+unsafe impl Sync for Place {}
+
+/// The linker script puts it where start-up clears nothing.
+#[unsafe(link_section = ".last_words")]
+static PLACE: Place = Place(UnsafeCell::new(Record::empty()));
+
+/// Turns the bridge off for ever: nothing runs any more that could turn it on.
+pub fn turn_off() {
+    // One instruction, and the control interrupt cannot turn the bridge on again.
+    cortex_m::interrupt::disable();
+    interrupt::turn_off(Registers::CHIP.timer);
+}
+
+/// Turns the bridge off, writes the cause down, and resets the chip.
+#[cold]
+#[inline(never)]
+pub fn fail(failure: Failure, details: [u32; DETAILS]) -> ! {
+    turn_off();
+    let record = Record::new(failure, details);
+    // SAFETY: nothing interrupts this, and nothing comes after it.
+    unsafe { PLACE.0.get().write_volatile(record) };
+    SCB::sys_reset()
+}
+
+/// Turns the bridge off and resets the chip, by a person's wish.
+pub fn restart() -> ! {
+    turn_off();
+    SCB::sys_reset()
+}
+
+/// Why the run before ended, if not by a power-down or by a wish; the record is cleared. To be called
+/// once, early.
+pub fn take() -> Option<String<TEXT_BYTES>> {
+    // SAFETY: a failure in between writes it whole, and then there is nothing after.
+    let record = unsafe { PLACE.0.get().read_volatile() };
+    // SAFETY: as above.
+    unsafe { PLACE.0.get().write_volatile(Record::empty()) };
+    let text = record.text();
+    let starved = chip::take_watchdog_reset();
+    let text = text
+        .or_else(|| starved.then(|| String::try_from("Restart: the watchdog was not fed").ok())?);
+    #[cfg(feature = "defmt")]
+    defmt::info!("last words: {}", text.as_deref());
+    text
+}

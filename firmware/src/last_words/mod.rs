@@ -1,0 +1,17 @@
+//! What ends everything, and what the next start knows of it.
+//!
+//! A failure turns the bridge off first; then it writes its cause to memory that start-up does not
+//! clear, and resets the chip. The next start takes the record and tells it.
+
+#[cfg_attr(
+    not(any(board, test)),
+    expect(dead_code, reason = "for the boards; tested on the host")
+)]
+mod record;
+
+#[cfg(board)]
+mod fail;
+
+#[cfg(board)]
+pub use fail::{fail, restart, take, turn_off};
+pub use record::{DETAILS, Failure, TEXT_BYTES};

@@ -1,0 +1,110 @@
+//! Siskin on a board: the control crate's [`step`](siskin_control::drive::step) in the PWM
+//! interrupt, and tasks around it.
+//!
+//! ```text
+//! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features b-g431b-esc1
+//! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features vesc4-f405
+//! ```
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`board`] | one file a board: pins, converters, what a count is worth; [how to add one](board#a-third-board-in-an-hour) |
+//! | `chip` | clock, converters' flags and comparators: what the HAL does not have, by its PAC |
+//! | [`interrupt`] | the control period: readings, set-point, `step`, duties; and its start |
+//! | [`exchange`] | the memory that the interrupt and the tasks share, proven with loom |
+//! | [`tasks`] | throttle, MAVLink, storage, temperature, light, serial telemetry, watchdog |
+//! | [`storage`] | the flash that keeps the parameters |
+//! | [`last_words`] | a failure turns the bridge off, and what happened is kept over the reset |
+//! | `priority` | priorities, and critical sections that never hold up the PWM |
+//! | [`image`] | board, version and commit in the image |
+//! | `link/` | the linker script: a file a chip for its memories, one for what stands where |
+//!
+//! Parts that need no chip are tested on the host: `cargo test -p siskin-firmware --lib`.
+//!
+//! # Priorities
+//! A smaller number comes first. A critical section raises BASEPRI to 2.
+//!
+//! | interrupt | priority | takes | may hold up |
+//! |---|---|---|---|
+//! | PWM: `ADC1_2` on the G431, `ADC` on the F405 | 0, alone | 107 instructions besides `step`, 102 more in every eighth period, and some 120 where the bridge is turned on or off | everything |
+//! | nFAULT of the gate driver: `EXTI15_10`, F405 | 1, alone | 20 instructions | all but the PWM |
+//! | clock (`TIM4`), serial lines, DMA, throttle's timer | 2 | a waker each, below 5 µs by their length | tasks; not each other |
+//! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4400 instructions for a DShot600 frame and its answer | the other tasks, and drivers' interrupts, not their DMA |
+//! | the other tasks | thread mode | | nothing |
+//!
+//! What runs at 0 and 1 uses no critical section, no lock, no log and no type of the executor. A
+//! fault's handlers are above all and do not return. An interrupt that the chip has and nobody
+//! handles ends in [`last_words`].
+//!
+//! # Memory
+//! | memory | written by | read by |
+//! |---|---|---|
+//! | control state, PWM, overruns: `.control_state`, CCM on the G431 | PWM interrupt | PWM interrupt |
+//! | set-point's word | the throttle's task | PWM interrupt |
+//! | the throttle's side ([`tasks`]) | the throttle's task and, in critical sections, the MAVLink task | the same |
+//! | edges of the wire | DMA | the throttle's task |
+//! | bytes of the serial lines | DMA; tasks | tasks; DMA |
+//! | parameters, MAVLink, storage | the MAVLink task | the same |
+//! | two configurations | the task of the parameters, only the one not in use | PWM interrupt |
+//! | three snapshots | PWM interrupt | tasks |
+//! | counts of periods and overruns | PWM interrupt | tasks |
+//! | last snapshot read, its reader | tasks, in a critical section | tasks |
+//! | the gate driver's alarm | its interrupt sets it, the PWM interrupt takes it | |
+//! | TIM1 and the injected readings | the start, then the PWM interrupt; the main output's *off* by any failure | |
+//! | comparators' level | a task | hardware |
+//! | last words | a failure | the next start |
+//! | all else | tasks | tasks |
+//!
+//! RAM begins with the stack, so one that overflows leaves the memory: that is a hard fault, whose
+//! handler begins a new stack. The vector table in use, and what of the control a driven motor needs,
+//! are copied out of flash at the start (`link/sections.x`); on the G431 the rest of the control stays
+//! there for want of room.
+//!
+//! An erase stalls what is fetched from the flash, 22 ms a page on the G431 and half a second a sector
+//! on the F405. It is made only with the motor at rest, by code in RAM with all interrupts held off but
+//! the PWM's and the gate driver's; and the PWM interrupt then only holds the bridge, by functions that
+//! lie in RAM. The image is linked with its relocations, by which this is checked.
+//!
+//! # When something goes wrong
+//! | event | what turns the bridge off | what is told |
+//! |---|---|---|
+//! | current above the hardware's trip, G431 | comparators over the timer's break, without the processor | over-current |
+//! | over-current, F405 | the gate driver turns that transistor off until its next edge, by itself | nothing; the control's own trip |
+//! | low supply of the gates, over-temperature of the driver, F405 | the gate driver; its nFAULT also the timer and the driver's enable | over-current |
+//! | set-point not renewed | the control, by `Stop` | loss of signal, by the tasks |
+//! | overrun, three in a row or more than one in 100 periods for long | [`last_words`] | after the reset |
+//! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
+//! | processor locked up, G431 | the timer's break | after the watchdog's reset |
+//! | tasks or interrupt stand still | the watchdog's reset: the gates' pull-downs | after the reset |
+//!
+//! # What no board has shown yet
+//! None of this has run on a board. Pins and alternate functions agree with the metadata of
+//! `stm32-metapac` (the HAL's types would not take others); that the comparators' inputs, DAC3's
+//! channels and the break's bits are as `chip` has them is from the reference manual alone. Of the
+//! boards, these could not be checked: the order and the sign of the VESC's two shunts, the amplifiers'
+//! settling times, what a DRV8301 does with over-current when it is not set up, and the thermistor of
+//! the B-G431B-ESC1.
+#![cfg_attr(not(test), no_std)]
+
+#[cfg(all(feature = "b-g431b-esc1", feature = "vesc4-f405"))]
+compile_error!("choose one board, not two");
+
+// Linked for its transport alone.
+#[cfg(all(board, feature = "defmt"))]
+use defmt_rtt as _;
+
+#[cfg(board)]
+pub mod board;
+#[cfg(board)]
+mod chip;
+pub mod exchange;
+pub mod image;
+pub mod interrupt;
+pub mod last_words;
+#[cfg(target_os = "none")]
+mod priority;
+#[cfg(board)]
+pub mod storage;
+#[cfg(board)]
+pub mod tasks;
+mod text;

@@ -1,0 +1,39 @@
+//! What comes before the memory is set up: the control's code goes where no erase of the flash holds
+//! it up, and its state is cleared.
+
+use core::arch::global_asm;
+
+// The addresses are multiples of four. It uses no memory but what it copies and clears.
+global_asm!(
+    // Copies from r2 to between r0 and r1; a part that is used where it lies needs no copy.
+    ".macro copy_part part",
+    "ldr r0, =\\part",
+    "ldr r1, =\\part\\()_end",
+    "ldr r2, =\\part\\()_load",
+    "cmp r0, r2",
+    "beq 1f",
+    "0: cmp r0, r1",
+    "beq 1f",
+    "ldm r2!, {{r3}}",
+    "stm r0!, {{r3}}",
+    "b 0b",
+    "1:",
+    ".endm",
+    ".section .Reset, \"ax\"",
+    ".global __pre_init",
+    ".type __pre_init, %function",
+    ".thumb_func",
+    "__pre_init:",
+    "copy_part __control",
+    "copy_part __control_more",
+    "copy_part __control_rest",
+    "ldr r0, =__control_state",
+    "ldr r1, =__control_state_end",
+    "movs r2, #0",
+    "2: cmp r0, r1",
+    "beq 3f",
+    "stm r0!, {{r2}}",
+    "b 2b",
+    "3: bx lr",
+    ".ltorg",
+);

@@ -1,0 +1,110 @@
+//! The part of the flash that keeps the parameters.
+//!
+//! The HAL's driver waits for the flash with code that lies in it, and so stalls the processor with
+//! all its interrupts. This one waits in RAM, where the control's interrupt goes on; all others are
+//! held off meanwhile, since they are in the flash.
+
+use core::ops::Range;
+
+use embassy_stm32::Peri;
+use embassy_stm32::peripherals::FLASH;
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
+    check_write,
+};
+
+use crate::chip::flash::{self, PAGE_BYTES, WORD_BYTES};
+
+/// Where it is, as the linker script says: from the beginning of the flash.
+fn place() -> Range<usize> {
+    unsafe extern "C" {
+        static __store: u8;
+        static __store_end: u8;
+    }
+    (&raw const __store as usize)..(&raw const __store_end as usize)
+}
+
+/// All of the store, in offsets from its beginning.
+pub(crate) fn range() -> Range<u32> {
+    0..place().len() as u32
+}
+
+/// The store's flash; offsets are from its beginning.
+pub struct Storage {
+    _flash: Peri<'static, FLASH>,
+    place: Range<usize>,
+}
+
+/// Why the flash did not do what it was asked to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StorageError {
+    /// Outside the store, or not at whole words or pages.
+    Misplaced(NorFlashErrorKind),
+    /// The flash has reported an error.
+    Failed,
+}
+
+impl NorFlashError for StorageError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Misplaced(kind) => *kind,
+            Self::Failed => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl Storage {
+    /// The store of this chip, which nothing else writes to.
+    pub fn new(flash: Peri<'static, FLASH>) -> Self {
+        Self {
+            _flash: flash,
+            place: place(),
+        }
+    }
+}
+
+impl ErrorType for Storage {
+    type Error = StorageError;
+}
+
+impl ReadNorFlash for Storage {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), StorageError> {
+        check_read(self, offset, bytes.len()).map_err(StorageError::Misplaced)?;
+        let from = (self.place.start + offset as usize) as *const u8;
+        // SAFETY: within the store, which is mapped into memory; its words change only by `write` and
+        // `erase`, for which this must be borrowed as well.
+        unsafe { from.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) };
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.place.len()
+    }
+}
+
+impl NorFlash for Storage {
+    const WRITE_SIZE: usize = WORD_BYTES;
+    const ERASE_SIZE: usize = PAGE_BYTES;
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), StorageError> {
+        check_write(self, offset, bytes.len()).map_err(StorageError::Misplaced)?;
+        let mut address = self.place.start + offset as usize;
+        for word in bytes.as_chunks::<WORD_BYTES>().0 {
+            // SAFETY: within the store.
+            unsafe { flash::program(address, word) }.map_err(|_| StorageError::Failed)?;
+            address += WORD_BYTES;
+        }
+        Ok(())
+    }
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), StorageError> {
+        check_erase(self, from, to).map_err(StorageError::Misplaced)?;
+        for offset in (from as usize..to as usize).step_by(PAGE_BYTES) {
+            // SAFETY: within the store.
+            unsafe { flash::erase(self.place.start + offset) }.map_err(|_| StorageError::Failed)?;
+        }
+        Ok(())
+    }
+}

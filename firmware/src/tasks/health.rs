@@ -1,0 +1,42 @@
+//! Slow protection: the transistors' temperature. The supply's voltage and the currents are the
+//! control's.
+
+use embassy_time::{Duration, Instant};
+
+use crate::board::{NTC, Temperature};
+
+/// How often it is read: the board's copper takes seconds to warm.
+const EVERY: Duration = Duration::from_millis(10);
+
+/// What has been read.
+pub(crate) struct Health {
+    sensor: Temperature,
+    due: Instant,
+    temperature_c: f32,
+}
+
+impl Health {
+    /// The temperature now.
+    pub(crate) fn new(sensor: Temperature) -> Self {
+        let mut health = Self {
+            sensor,
+            due: Instant::MIN,
+            temperature_c: f32::NAN,
+        };
+        health.look(Instant::now());
+        health
+    }
+
+    /// Reads what is due.
+    pub(crate) fn look(&mut self, now: Instant) {
+        if now >= self.due {
+            self.due = now + EVERY;
+            self.temperature_c = NTC.celsius(self.sensor.read());
+        }
+    }
+
+    /// Temperature of the transistors, °C; not a number where the sensor is torn off.
+    pub(crate) fn temperature_c(&self) -> f32 {
+        self.temperature_c
+    }
+}

@@ -1,0 +1,168 @@
+//! The ESC's tasks outside the throttle: MAVLink on the board's serial port, telemetry, requests.
+//!
+//! One task owns the [`Esc`], and with it the parameters; bytes come in and go out by DMA.
+
+use embassy_futures::select::{Either, select};
+use embassy_stm32::mode::Async;
+use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::pipe::Pipe;
+use embassy_time::{Duration, Instant, Ticker};
+use siskin_control::esc::Esc;
+use siskin_control::mavlink::{Receiver, Request};
+use siskin_control::params::ParamId;
+
+use super::supervisor::{Task, lives};
+use super::throttle::Port;
+use super::trouble::Teller;
+use super::{health, light, store};
+use crate::exchange::{ConfigWriter, SnapshotReader};
+use crate::{interrupt, last_words};
+
+/// How often what is due is looked for.
+const POLL: Duration = Duration::from_millis(1);
+
+/// Bytes that wait to be sent: replies to a burst of requests, 90 ms of the slowest link.
+static OUT: Pipe<CriticalSectionRawMutex, 1024> = Pipe::new();
+
+/// Sends for ever.
+#[embassy_executor::task]
+pub(crate) async fn transmit(mut line: UartTx<'static, Async>) -> ! {
+    let mut bytes = [0; 64];
+    loop {
+        let count = OUT.read(&mut bytes).await;
+        // There is nobody to tell of an error on the line to those who would be told.
+        let _ = line.write(&bytes[..count]).await;
+    }
+}
+
+/// A whole frame, or, where the line is behind, nothing: half a frame would spoil the next as well.
+fn send(frame: &[u8]) {
+    if OUT.free_capacity() >= frame.len() {
+        let _ = OUT.try_write(frame);
+    }
+}
+
+/// Polls between the last byte's leaving for the line and a restart: the line still has 64 of them,
+/// 6 ms at the lowest speed.
+const RESTART_POLLS: u8 = 10;
+
+/// What the task owns.
+pub(crate) struct Desk {
+    pub(crate) esc: &'static mut Esc,
+    pub(crate) throttle: Port,
+    pub(crate) line: RingBufferedUartRx<'static>,
+    pub(crate) config: ConfigWriter,
+    pub(crate) snapshot: &'static SnapshotReader,
+    pub(crate) flash: store::Flash,
+    pub(crate) health: health::Health,
+    pub(crate) receiver: Receiver,
+    pub(crate) teller: Teller,
+    /// Whether the interrupt is still to be given the configuration in force.
+    pub(crate) changed: bool,
+    /// Polls until the chip restarts, if it is to.
+    pub(crate) restart_polls: Option<u8>,
+}
+
+/// Attends to the ESC for ever.
+#[embassy_executor::task]
+pub(crate) async fn attend(desk: &'static mut Desk) -> ! {
+    let mut ticker = Ticker::every(POLL);
+    let mut bytes = [0; 64];
+    loop {
+        match select(ticker.next(), desk.line.read(&mut bytes)).await {
+            Either::First(()) => desk.poll(),
+            Either::Second(Ok(count)) => desk.receive(&bytes[..count]),
+            // Bytes were lost or garbled: the frame's check sum tells.
+            Either::Second(Err(_)) => {}
+        }
+        lives(Task::Mavlink);
+    }
+}
+
+// Each out of line: the stack that one takes is free for the next.
+impl Desk {
+    #[inline(never)]
+    fn receive(&mut self, bytes: &[u8]) {
+        let now_us = Instant::now().as_micros();
+        let (esc, throttle) = (&mut self.esc, &mut self.throttle);
+        self.receiver
+            .push(now_us, bytes, |frame| esc.receive(throttle, now_us, frame));
+    }
+
+    #[inline(never)]
+    fn poll(&mut self) {
+        // No bytes tell a receiver that time has passed: what a false start held back is searched.
+        self.receive(&[]);
+        let Some(snapshot) = self.snapshot.read() else {
+            return;
+        };
+        let now = Instant::now();
+        if let Some(warning) = self.teller.next(now.as_millis()) {
+            self.esc.warn(warning);
+        }
+        self.health.look(now);
+        self.esc.poll(
+            &mut self.throttle,
+            now.as_micros(),
+            &snapshot,
+            self.health.temperature_c(),
+            &mut |frame| send(frame),
+        );
+        light::order(self.esc.light());
+        while let Some(request) = self.esc.take_request(&mut self.throttle) {
+            self.obey(request);
+        }
+        self.configure();
+        self.restart();
+    }
+
+    #[inline(never)]
+    fn obey(&mut self, request: Request) {
+        match request {
+            Request::ParamsChanged => self.changed = true,
+            Request::Save | Request::Load | Request::FactoryReset => {
+                let result = self.store(request);
+                self.esc.storage_done(&mut self.throttle, result);
+            }
+            Request::Reboot => self.restart_polls = Some(RESTART_POLLS),
+        }
+    }
+
+    #[inline(never)]
+    fn store(&mut self, request: Request) -> Result<(), &'static str> {
+        let Some(params) = store::obey(request, &mut self.flash, self.esc.params())? else {
+            return Ok(());
+        };
+        self.changed = true;
+        self.esc
+            .replace_params(&mut self.throttle, params)
+            .map_err(|error| error.reason)
+    }
+
+    /// Restarts the chip when it has been asked to and the acknowledgement is gone.
+    fn restart(&mut self) {
+        let Some(polls) = &mut self.restart_polls else {
+            return;
+        };
+        if OUT.is_empty() {
+            *polls -= 1;
+        }
+        if *polls == 0 {
+            last_words::restart();
+        }
+    }
+
+    /// Gives the interrupt what the parameters make, once it has a place for it.
+    #[inline(never)]
+    fn configure(&mut self) {
+        if !self.changed {
+            return;
+        }
+        // It can be built, since it has been before.
+        if let Ok(config) = self.esc.config() {
+            self.changed = self.config.offer(config).is_err();
+        }
+        interrupt::set_trip(self.esc.params().get(ParamId::LimPhaseA));
+    }
+}

@@ -1,0 +1,22 @@
+//! What runs beside the control's interrupt.
+//!
+//! | task | does | where |
+//! |---|---|---|
+//! | `throttle::listen` | edges into set-points and answers | an executor of its own, above the others |
+//! | `mavlink::attend` | the ESC: MAVLink in, telemetry, requests, storage, health | thread |
+//! | `mavlink::transmit` | MAVLink out | thread |
+//! | `kiss::transmit` | telemetry on the serial line | thread |
+//! | `light::show` | the light | thread |
+//! | `supervisor::supervise` | the watchdog | thread |
+
+pub(crate) mod health;
+pub(crate) mod kiss;
+pub(crate) mod light;
+pub(crate) mod mavlink;
+mod start;
+pub(crate) mod store;
+pub(crate) mod supervisor;
+pub(crate) mod throttle;
+pub(crate) mod trouble;
+
+pub use start::start;

@@ -1,0 +1,161 @@
+//! The start of everything.
+
+use embassy_executor::Spawner;
+use embassy_stm32::uid::uid;
+use embassy_stm32::wdg::IndependentWatchdog;
+use siskin_control::drive::Config;
+use siskin_control::esc::Esc;
+use siskin_control::image::Image;
+use siskin_control::mavlink::{Receiver, Warning};
+use siskin_control::params::{Board, ParamId, Params, build};
+use siskin_control::throttle::Throttle;
+use static_cell::StaticCell;
+
+use super::health::Health;
+use super::mavlink::Desk;
+use super::throttle::{Listener, Port};
+use super::trouble::Teller;
+use super::{kiss, light, mavlink, store, supervisor, throttle};
+use crate::board::wire::TICK_HZ;
+use crate::board::{BOARD, Bridge, Converters, Hardware};
+use crate::exchange::{InterruptEnd, SnapshotReader};
+use crate::text::push;
+use crate::{exchange, interrupt, last_words};
+
+/// Age at which the interrupt stops obeying a set-point: ten missed renewals.
+const STALE_S: f32 = 0.01;
+
+/// The watchdog outlasts the longest that the tasks are held up: the erase of a sector, at most 0.8 s
+/// (DS8626, table 40), and as much again.
+const WATCHDOG_US: u32 = 1_600_000;
+
+/// `CTL_OBSERVER` of Hall sensors, one of which has the pin of the serial line on some boards.
+const HALL: f32 = 2.0;
+
+/// Bytes that come in between two looks of the task: 5 ms of the fastest link.
+const LINE_BYTES: usize = 512;
+
+/// Starts the control's interrupt and the tasks.
+///
+/// # Panics
+/// When it is called again, or the defaults do not fit the board.
+pub fn start(spawner: Spawner, hardware: Hardware) {
+    let mut flash = store::Flash::new(hardware.flash);
+    let (params, trouble) = store::load(&mut flash);
+    let (esc, port) = power_up(&params);
+    if let Some(text) = trouble {
+        warn(esc, text);
+    }
+    if let Some(text) = last_words::take() {
+        esc.warn(text);
+    }
+    let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
+    let baud = esc.params().get(ParamId::TelBaud) as u32;
+    let has_hall_sensors = esc.params().get(ParamId::CtlObserver) == HALL;
+
+    let stale_periods = (pwm_hz * STALE_S) as u32;
+    let ends = exchange::open(stale_periods).expect("opened here and nowhere else");
+    static SNAPSHOT: StaticCell<SnapshotReader> = StaticCell::new();
+    let snapshot = &*SNAPSHOT.init(ends.snapshot);
+    start_interrupt(esc, hardware.bridge, hardware.converters, ends.interrupt);
+    let (capture, replier) = hardware.throttle.open();
+    throttle::start(Listener {
+        port,
+        capture,
+        replier,
+        setpoint: ends.setpoint,
+        snapshot,
+    });
+
+    let line = hardware.mavlink;
+    // The table's range is what the port can do.
+    let _ = line.set_baudrate(baud);
+    let (out, line) = line.split();
+    static BYTES: StaticCell<[u8; LINE_BYTES]> = StaticCell::new();
+    let line = line.into_ring_buffered(BYTES.init_with(|| [0; LINE_BYTES]));
+    static DESK: StaticCell<Desk> = StaticCell::new();
+    let desk = DESK.init_with(|| Desk {
+        esc,
+        throttle: port,
+        line,
+        config: ends.config,
+        snapshot,
+        flash,
+        health: Health::new(hardware.temperature),
+        receiver: Receiver::new(),
+        teller: Teller::new(),
+        changed: false,
+        restart_polls: None,
+    });
+
+    let once = "spawned here and nowhere else";
+    spawner.spawn(mavlink::attend(desk).expect(once));
+    spawner.spawn(mavlink::transmit(out).expect(once));
+    if !has_hall_sensors {
+        spawner.spawn(kiss::transmit(hardware.kiss.open()).expect(once));
+    }
+    spawner.spawn(light::show(hardware.light, snapshot).expect(once));
+    let watchdog = IndependentWatchdog::new(hardware.watchdog, WATCHDOG_US);
+    spawner.spawn(supervisor::supervise(watchdog).expect(once));
+}
+
+#[inline(never)]
+fn warn(esc: &mut Esc, text: &str) {
+    let mut warning = Warning::new();
+    push(&mut warning, text);
+    esc.warn(warning);
+}
+
+/// The ESC and its throttle with these parameters or, where they do not fit the board, with the
+/// defaults.
+// Out of line, as what follows: the stack that one takes is free for the next.
+#[inline(never)]
+fn power_up(params: &Params) -> (&'static mut Esc, Port) {
+    let board = Board {
+        image: Image {
+            serial: uid(),
+            ..BOARD.image
+        },
+        ..BOARD
+    };
+    let defaults = Params::default();
+    let (params, config) = match build(params, &board) {
+        Ok(config) => (params, Ok(config)),
+        Err(_) => (&defaults, build(&defaults, &board)),
+    };
+    let config = config.expect("the defaults fit every board");
+    let (esc, port) = make(params, board, &config);
+    if core::ptr::eq(params, &raw const defaults) {
+        let text = "Parameters do not fit the board: defaults in force";
+        warn(esc, text);
+    }
+    (esc, port)
+}
+
+/// The two, made where they stay: they take 3 KB.
+fn make(params: &Params, board: Board, config: &Config) -> (&'static mut Esc, Port) {
+    (
+        make_esc(params, board, config),
+        make_port(params, &board, config),
+    )
+}
+
+#[inline(never)]
+fn make_esc(params: &Params, board: Board, config: &Config) -> &'static mut Esc {
+    static ESC: StaticCell<Esc> = StaticCell::new();
+    let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
+    ESC.init_with(|| Esc::with_config(params.clone(), board, config, bytes_per_s))
+}
+
+#[inline(never)]
+fn make_port(params: &Params, board: &Board, config: &Config) -> Port {
+    Port::open(|| Throttle::new(TICK_HZ, params, board, config))
+}
+
+/// The control's interrupt with what the parameters make.
+#[inline(never)]
+fn start_interrupt(esc: &Esc, bridge: Bridge, converters: Converters, end: InterruptEnd) {
+    let config = esc.config().expect("it has been built before");
+    interrupt::set_trip(esc.params().get(ParamId::LimPhaseA));
+    interrupt::start(bridge, converters, config, end);
+}

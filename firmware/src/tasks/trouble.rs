@@ -1,0 +1,70 @@
+//! What goes wrong with the throttle wire on this chip: counted where it happens, told by the tasks.
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use siskin_control::mavlink::Warning;
+
+use crate::text::{push, push_decimal};
+
+/// Time between two texts, so that they do not fill the link.
+const APART_MS: u64 = 5000;
+
+/// Counts of what has gone wrong since the start.
+pub(crate) struct Trouble {
+    lost_edges: AtomicU32,
+    late_replies: AtomicU32,
+}
+
+/// Where they are counted.
+pub(crate) static TROUBLE: Trouble = Trouble {
+    lost_edges: AtomicU32::new(0),
+    late_replies: AtomicU32::new(0),
+};
+
+impl Trouble {
+    /// Edges came faster than they were taken in.
+    pub(crate) fn lost_edges(&self) {
+        self.lost_edges.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// A reply was not ready at its time, and not sent.
+    pub(crate) fn late_reply(&self) {
+        self.late_replies.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Tells a person of new trouble, now and then.
+pub(crate) struct Teller {
+    told: [u32; 2],
+    told_ms: u64,
+}
+
+impl Teller {
+    /// One that has told nothing yet.
+    pub(crate) const fn new() -> Self {
+        Self {
+            told: [0; 2],
+            told_ms: 0,
+        }
+    }
+
+    /// What is to be told now.
+    pub(crate) fn next(&mut self, now_ms: u64) -> Option<Warning> {
+        let counts =
+            [&TROUBLE.lost_edges, &TROUBLE.late_replies].map(|count| count.load(Ordering::Relaxed));
+        if counts == self.told || now_ms - self.told_ms < APART_MS {
+            return None;
+        }
+        self.told = counts;
+        self.told_ms = now_ms;
+        let mut text = Warning::new();
+        let [lost, late] = counts;
+        // 47 letters at the most: it fits.
+        push(&mut text, "Throttle: ");
+        push_decimal(&mut text, lost);
+        push(&mut text, " gaps, ");
+        push_decimal(&mut text, late);
+        push(&mut text, " late replies");
+        Some(text)
+    }
+}

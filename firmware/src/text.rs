@@ -1,0 +1,55 @@
+//! Numbers as text, for a person: the formatting of the core library would take 3 KB of the image.
+
+use heapless::String;
+
+/// Appends a number as decimal digits; those that do not fit are left out.
+pub(crate) fn push_decimal<const N: usize>(text: &mut String<N>, number: u32) {
+    push_digits(text, number, 10);
+}
+
+/// Appends a number as hexadecimal digits; those that do not fit are left out.
+pub(crate) fn push_hex<const N: usize>(text: &mut String<N>, number: u32) {
+    push_digits(text, number, 16);
+}
+
+/// Appends words; those that do not fit are left out.
+pub(crate) fn push<const N: usize>(text: &mut String<N>, words: &str) {
+    let _ = text.push_str(words);
+}
+
+// Never inlined: it serves all.
+#[inline(never)]
+fn push_digits<const N: usize>(text: &mut String<N>, number: u32, base: u32) {
+    let mut worth = 1;
+    while number / worth >= base {
+        worth *= base;
+    }
+    while worth > 0 {
+        let digit = (number / worth % base) as usize;
+        push(text, &"0123456789abcdef"[digit..=digit]);
+        worth /= base;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_as_the_core_library_writes_them() {
+        for number in [0, 1, 9, 10, 15, 16, 99, 100, 0x1000, 123_456_789, u32::MAX] {
+            let mut text = String::<32>::new();
+            push_decimal(&mut text, number);
+            push_hex(&mut text, number);
+            assert_eq!(text.as_str(), std::format!("{number}{number:x}"));
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_left_out() {
+        let mut text = String::<4>::new();
+        push(&mut text, "a");
+        push_decimal(&mut text, 98_765);
+        assert_eq!(text.as_str(), "a987");
+    }
+}

@@ -1,0 +1,95 @@
+//! What a look says against the prediction.
+
+use fixed::types::{I2F30, I4F28, I17F15, I19F13};
+
+use crate::control::transform::{AlphaBeta, phases};
+use crate::math::{SinCos, TopProduct, sin_cos};
+use crate::units::{AdcCounts, Angle};
+
+/// The highest reading of the converter's 12 bits: it may be a clamp.
+const CLAMP: I17F15 = I17F15::lit("4094");
+
+/// The readings against the prediction, in terms of what would correct it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Difference {
+    /// Sum of the errors, in counts, each times its derivative by the angle over E.
+    pub(super) by_angle: I19F13,
+    /// Sum of the squares of these derivatives.
+    pub(super) angle_weight: I4F28,
+    /// The same of the derivatives by E.
+    pub(super) by_amplitude: I19F13,
+    /// Likewise.
+    pub(super) amplitude_weight: I4F28,
+    /// Sum of the errors' magnitudes.
+    pub(super) misfit: I17F15,
+}
+
+/// A phase: what it sees of a vector of length one, how that changes with the vector's angle, and
+/// what its terminal shows.
+type Phase = (I2F30, I2F30, I17F15);
+
+/// Compares readings with what a vector at `theta` of this amplitude makes the terminals show.
+#[inline(always)]
+pub(super) fn compare(
+    diode: AdcCounts,
+    theta: Angle,
+    amplitude: AdcCounts,
+    readings: [I17F15; 3],
+) -> Difference {
+    let SinCos { cos, sin } = sin_cos(theta);
+    let half = |bits: i32| I2F30::from_bits(bits >> 1);
+    let (cos, sin) = (half(cos.to_bits()), half(sin.to_bits()));
+    let [a, b, c] = phases(AlphaBeta {
+        alpha: cos,
+        beta: sin,
+    });
+    let [da, db, dc] = phases(AlphaBeta {
+        alpha: -sin,
+        beta: cos,
+    });
+    let [ra, rb, rc] = readings;
+    let (a, b, c): (Phase, Phase, Phase) = ((a, da, ra), (b, db, rb), (c, dc, rc));
+    let (lowest, one, other) = if a.0 <= b.0 && a.0 <= c.0 {
+        (a, b, c)
+    } else if b.0 <= c.0 {
+        (b, a, c)
+    } else {
+        (c, a, b)
+    };
+    let (low_seen, low_turned, low_reading) = lowest;
+    // 16 + 30 − 32 fraction bits.
+    let counts = |seen: I2F30| I17F15::from_bits(amplitude.top(seen).to_bits() << 1);
+    // The readings stand on the diode's drop of the lowest phase, if it conducts.
+    let lift = counts(-low_seen) - I17F15::from_bits(diode.to_bits() >> 1);
+    let (lift, base_seen, base_turned) = if lift > I17F15::ZERO {
+        (lift, low_seen, low_turned)
+    } else {
+        (I17F15::ZERO, I2F30::ZERO, I2F30::ZERO)
+    };
+    let half_amplitude = I17F15::from_bits(amplitude.to_bits() >> 2);
+    // The lowest phase is predicted at its clamp.
+    let mut sum = Difference {
+        misfit: low_reading,
+        ..Difference::default()
+    };
+    let mut take = |(seen, turned, reading): Phase| {
+        let predicted = counts(seen) + lift;
+        if predicted >= CLAMP && reading >= CLAMP {
+            return;
+        }
+        let error = reading - predicted.max(I17F15::ZERO).min(CLAMP);
+        sum.misfit += error.abs();
+        // A little above zero where nothing is predicted is noise; half the amplitude is not.
+        if predicted > I17F15::ZERO || reading >= half_amplitude {
+            // At most √3.
+            let (by_amplitude, by_angle) = (seen - base_seen, turned - base_turned);
+            sum.by_angle += by_angle.top(error);
+            sum.by_amplitude += by_amplitude.top(error);
+            sum.angle_weight += by_angle.top(by_angle);
+            sum.amplitude_weight += by_amplitude.top(by_amplitude);
+        }
+    };
+    take(one);
+    take(other);
+    sum
+}

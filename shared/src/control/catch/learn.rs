@@ -1,0 +1,179 @@
+//! What the looks so far say of the rotor, by recursive least squares, and how well they fit.
+
+use fixed::types::{I0F32, I16F16, I17F15, I20F12};
+
+use super::{Config, LOOK_SHIFT, SUM_FRACTION, State, Turn};
+use crate::math::TopProduct;
+use crate::units::{Angle, Speed};
+
+/// Speed of the fastest forgetting, a sixteenth of a turn a period with 32 fraction bits.
+const FORGET_MAX: i32 = 1 << 28;
+
+/// Least S_0 with which the angle is corrected, a sixteenth of one good look's weight: below,
+/// nothing is known of it.
+const WEIGHT_MIN: I20F12 = I20F12::lit("0.0625");
+
+/// Least sum of the weights of E with which it is corrected.
+const AMPLITUDE_WEIGHT_MIN: I20F12 = I20F12::lit("0.25");
+
+/// Bounds of E, counts.
+const AMPLITUDE: [I16F16; 2] = [I16F16::lit("1"), I16F16::lit("8191")];
+
+/// 0.43 turns with 32 fraction bits.
+const FAR: u64 = 1_846_835_937;
+
+/// 1/2π with 32 fraction bits.
+const TURNS_PER_RADIAN: i32 = 683_565_276;
+
+/// (σ/(2π·0.01))², counts², for a speed that is known to 1 % with the readings' noise σ of 2 counts.
+const WANTED: u64 = 1012;
+
+/// Share of the newest look in the residual's mean, as a shift.
+const RESIDUAL_SHIFT: u32 = 3;
+
+/// Residual that noise alone leaves at most: three magnitudes are 0.8·σ each in the mean, 4.8 counts,
+/// and their mean over eight looks strays by 0.5.
+const QUIET: I17F15 = I17F15::lit("7");
+
+/// A period after a look.
+#[inline(never)]
+pub(super) fn learn(config: &Config, state: &mut State) {
+    match state.turn {
+        Turn::Look => {}
+        Turn::Weigh => {
+            state.turn = Turn::Correct;
+            weigh(config, state);
+        }
+        Turn::Correct => {
+            state.turn = Turn::Judge;
+            correct(state);
+        }
+        Turn::Judge => {
+            state.turn = Turn::Look;
+            judge(config, state);
+        }
+    }
+}
+
+/// Makes the sums a look older, forgets a share of them, and adds the last look's weights: what that
+/// says of the speed.
+#[inline(always)]
+fn weigh(config: &Config, state: &mut State) {
+    let omega = state.omega.to_bits().saturating_abs().min(FORGET_MAX);
+    // A turn is 1/(4·ω) looks.
+    let share = (omega << LOOK_SHIFT).max(config.forget_min.to_bits());
+    let share = I0F32::from_bits(share);
+    // Sixteen fraction bits of it: S_2 has up to 47 bits.
+    let of_ages = (share.to_bits() >> 16) as u32;
+    let keep = |sum: i64| sum - ((sum as u64 * u64::from(of_ages)) >> 16) as i64;
+    let [s_1, s_2] = state.ages;
+    let s_0 = i64::from(state.weight.to_bits());
+    let [s_1, s_2] = [keep(s_1 + s_0), keep(s_2 + 2 * s_1 + s_0)];
+    state.ages = [s_1, s_2];
+    let told = &state.told;
+    let of_angle = I20F12::from_bits(told.angle_weight.to_bits() >> 16);
+    let of_amplitude = I20F12::from_bits(told.amplitude_weight.to_bits() >> 16);
+    state.weight += of_angle - state.weight.top(share);
+    state.amplitude_weight += of_amplitude - state.amplitude_weight.top(share);
+    if state.weight < WEIGHT_MIN {
+        return;
+    }
+    let weight = state.weight.to_bits() as u32;
+    // 12 fraction bits: S_1 fits with 6 of its own.
+    let mean_age = quotient((s_1 >> 6) as i32, weight, 18);
+    let moment = (s_1 as u64 * mean_age as u64) >> SUM_FRACTION;
+    let spread = (s_2 - moment as i64).max(0) as u64;
+    // At most 1 with 30 fraction bits. A large spread needs no fraction of its own.
+    (state.spread, state.speed_gain) = if spread >> 32 != 0 {
+        let whole = (spread >> 16) as u32;
+        (whole.min(u32::MAX >> 4) << 4, quotient(mean_age, whole, 14))
+    } else {
+        let by = (spread as u32).max(mean_age as u32).max(1);
+        ((spread >> SUM_FRACTION) as u32, quotient(mean_age, by, 30))
+    };
+    state.mean_age = mean_age;
+}
+
+/// Corrects the vector by what the last look has told.
+#[inline(always)]
+fn correct(state: &mut State) {
+    let amplitude = state.amplitude.to_bits();
+    if state.weight >= WEIGHT_MIN {
+        // The innovation, of 13 and 16 fraction bits: 24 bits, at most 4 radians; as turns 28.
+        let most = amplitude >> 1;
+        let by_angle = state.told.by_angle.to_bits().max(-most).min(most);
+        let radians = quotient(by_angle, amplitude as u32, 27);
+        let turns = ((i64::from(radians << 4) * i64::from(TURNS_PER_RADIAN)) >> 32) as i32;
+        // 30 + 28 fraction bits: a look's 32, and a quarter of that a period.
+        let faster = (i64::from(state.speed_gain) * i64::from(turns)) >> 26;
+        let omega = Speed::from_bits((faster >> LOOK_SHIFT) as i32);
+        // k_θ = 1/S_0 + mean age·k_ω; the speed's correction acts since the look, two periods ago,
+        // or since the middle of four readings.
+        let older = (faster * i64::from(state.mean_age)) >> SUM_FRACTION;
+        let ahead = quotient(turns, state.weight.to_bits() as u32, 16).wrapping_add(older as i32);
+        let since = if state.is_slow() { 7 } else { 4 };
+        let ahead = ahead.wrapping_add((omega.to_bits() >> 1).wrapping_mul(since));
+        state.omega = state.omega.saturating_add(omega);
+        state.theta = state.theta.wrapping_add(Angle::from_bits(ahead));
+    }
+    if state.amplitude_weight >= AMPLITUDE_WEIGHT_MIN {
+        // 13 − 12 fraction bits; 16 wanted.
+        let weight = state.amplitude_weight.to_bits() as u32;
+        let step = quotient(state.told.by_amplitude.to_bits(), weight, 15);
+        let amplitude = state.amplitude.saturating_add(I16F16::from_bits(step));
+        state.amplitude = amplitude.max(AMPLITUDE[0]).min(AMPLITUDE[1]);
+    }
+}
+
+/// Sees whether the speed is known to 1 % by what has been seen, over nearly half a turn, and
+/// amplitude, speed and residual fit each other.
+#[inline(always)]
+fn judge(config: &Config, state: &mut State) {
+    state.residual += (state.told.misfit - state.residual) >> RESIDUAL_SHIFT;
+    let omega = state.omega.unsigned_abs().to_bits();
+    let a_look = omega.min(u32::MAX >> LOOK_SHIFT) << LOOK_SHIFT;
+    let amplitude = state.amplitude.to_bits() as u32;
+    // The speed's standard deviation is σ/(E·√spread) radians a look: (E·ω)² > WANTED/spread with ω in turns a look, four times that a period. 16 fraction bits, and at most 64 counts: with as
+    // many a spread of one is enough. Eight fraction bits of the square are left out.
+    let slope = ((u64::from(amplitude) * u64::from(a_look)) >> 32).min(1 << 22);
+    let wanted = WANTED << (32 - 8);
+    // A mean of four readings has half of their noise.
+    let wanted = wanted >> if state.is_slow() { 2 } else { 0 };
+    // Over a gap in the half-waves a known speed fades: half of that is enough.
+    let wanted = wanted >> u32::from(state.fitting > 0);
+    let precise = ((slope * slope) >> 8) * u64::from(state.spread.min(1 << 24)) > wanted;
+    // 0.43 turns since the observation has begun.
+    let far = u64::from(a_look) * u64::from(state.looks) > FAR;
+    let known = precise && far;
+    // A flux between half and twice the stated one.
+    let expected = ((u64::from(config.emf) * u64::from(omega)) >> 32) as u32;
+    let made = amplitude >> 8;
+    let fits = 2 * made > expected && made < 2 * expected;
+    // And three sixteenths of the amplitude for what the model leaves out: the diode's drop depends
+    // on its current.
+    let left_out = I17F15::from_bits((amplitude >> 4) as i32 + (amplitude >> 5) as i32);
+    let quiet = state.residual < QUIET + left_out;
+    if known && fits && quiet {
+        state.fitting = state.fitting.saturating_add(1);
+        state.unfitting = 0;
+    } else {
+        state.fitting = 0;
+        let settled = state.looks > config.lost_looks;
+        if settled && (!quiet || (known && !fits)) {
+            state.unfitting += 1;
+        }
+    }
+}
+
+/// `a·2^fraction/by`, within 2^-15 of its value, of which the lower 32 bits are kept; `by` is not 0
+/// and `fraction` at most 33.
+///
+/// One division of 32 bits by 16: of 64 bits the chip has none.
+#[inline(never)]
+fn quotient(a: i32, by: u32, fraction: u32) -> i32 {
+    let zeros = by.leading_zeros();
+    // 2^32 over the divisor's upper 16 bits: 17 bits, and 1/by = reciprocal·2^(zeros − 48).
+    let reciprocal = u32::MAX / ((by << zeros) >> 16);
+    let product = (i64::from(a) * i64::from(reciprocal)) << 15;
+    (product >> (63 - zeros - fraction)) as i32
+}

@@ -1,0 +1,117 @@
+//! A constant factor whose range stands in its type.
+
+use core::marker::PhantomData;
+
+use fixed::FixedI32;
+use fixed::types::extra::Unsigned;
+
+use super::gain;
+
+/// A factor that turns a number with `A` fraction bits into one with `B`.
+///
+/// Its magnitude is below 2^(A − B − 1): then the product is one SMMUL, and with a sum one SMMLA or
+/// SMMLS. What needs another range takes other fraction bits. [`super::Gain`] has a range of its
+/// own, at four times the price.
+#[derive(Debug)]
+pub struct Multiplier<A, B> {
+    bits: i32,
+    kind: PhantomData<(A, B)>,
+}
+
+impl<A, B> Clone for Multiplier<A, B> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<A, B> Copy for Multiplier<A, B> {}
+
+impl<A, B> PartialEq for Multiplier<A, B> {
+    fn eq(&self, other: &Self) -> bool {
+        self.bits == other.bits
+    }
+}
+
+impl<A, B> Default for Multiplier<A, B> {
+    fn default() -> Self {
+        Self::from_bits(0)
+    }
+}
+
+impl<A, B> Multiplier<A, B> {
+    /// The factor `bits`/2^32, in bits out per bit in.
+    pub const fn from_bits(bits: i32) -> Self {
+        Self {
+            bits,
+            kind: PhantomData,
+        }
+    }
+
+    /// The same factor as [`Multiplier::from_bits`] takes it.
+    pub const fn to_bits(self) -> i32 {
+        self.bits
+    }
+}
+
+impl<A: Unsigned, B: Unsigned> Multiplier<A, B> {
+    /// The factor of value `k`, or `None` where its magnitude does not fit or is not finite.
+    ///
+    /// Called when the configuration is built, never in a control period.
+    pub fn new(k: f32) -> Option<Self> {
+        match gain::parts(k, B::I32 - A::I32)? {
+            (mantissa, 1) => Some(Self::from_bits(mantissa)),
+            _ => None,
+        }
+    }
+
+    /// The product with `x`, rounded towards minus infinity.
+    #[inline(always)]
+    pub fn of(self, x: FixedI32<A>) -> FixedI32<B> {
+        FixedI32::from_bits(((i64::from(self.bits) * i64::from(x.to_bits())) >> 32) as i32)
+    }
+
+    /// `sum` and the product with `x`; it wraps, so the caller knows the range of both.
+    #[inline(always)]
+    pub fn added(self, sum: FixedI32<B>, x: FixedI32<A>) -> FixedI32<B> {
+        sum.wrapping_add(self.of(x))
+    }
+
+    /// `sum` less the product with `x`, likewise.
+    #[inline(always)]
+    pub fn taken(self, sum: FixedI32<B>, x: FixedI32<A>) -> FixedI32<B> {
+        FixedI32::from_bits(super::product::less(sum.to_bits(), self.bits, x.to_bits()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixed::types::extra::{U24, U28};
+    use fixed::types::{I4F28, I8F24};
+
+    #[test]
+    fn the_range_is_that_of_the_fraction_bits() {
+        assert!(Multiplier::<U28, U28>::new(0.49).is_some());
+        assert_eq!(Multiplier::<U28, U28>::new(0.5), None);
+        assert!(Multiplier::<U28, U24>::new(-7.9).is_some());
+        assert_eq!(Multiplier::<U28, U24>::new(8.0), None);
+        assert_eq!(Multiplier::<U28, U28>::new(f32::NAN), None);
+    }
+
+    #[test]
+    fn sums_are_right_to_a_bit() {
+        let gain = Multiplier::<U28, U24>::new(-3.3).expect("in range");
+        let sum = I8F24::from_num(20);
+        for x in [-7.5, -0.001, 0.0, 0.3, 7.9] {
+            let product = -3.3 * x;
+            let x = I4F28::from_num(x);
+            for (got, wanted) in [
+                (gain.of(x), product),
+                (gain.added(sum, x), 20.0 + product),
+                (gain.taken(sum, x), 20.0 - product),
+            ] {
+                assert!((got.to_num::<f64>() - wanted).abs() < 2e-6, "{got}");
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Fixed point from and to floating point.
+
+use fixed::types::extra::Unsigned;
+use fixed::{FixedI32, FixedI64, FixedU32};
+
+/// The same numbers as the [`fixed`] crate's `saturating_from_num` and `to_num`, but that NaN is 0
+/// and no panic, in a tenth of the chip's flash: single precision alone, and once for all types.
+pub trait Real {
+    /// The nearest number, of two the even one, held at the ends of the type.
+    fn from_f32(value: f32) -> Self;
+
+    /// The nearest float.
+    fn to_f32(self) -> f32;
+}
+
+impl<F: Unsigned> Real for FixedI32<F> {
+    fn from_f32(value: f32) -> Self {
+        Self::from_bits(whole(value, F::I32))
+    }
+
+    fn to_f32(self) -> f32 {
+        self.to_bits() as f32 * power_of_two(-F::I32)
+    }
+}
+
+impl<F: Unsigned> Real for FixedU32<F> {
+    fn from_f32(value: f32) -> Self {
+        // What a float has beside 32 bits are zeros.
+        Self::from_bits(libm::rintf(value * power_of_two(F::I32)) as u32)
+    }
+
+    fn to_f32(self) -> f32 {
+        self.to_bits() as f32 * power_of_two(-F::I32)
+    }
+}
+
+impl<F: Unsigned> Real for FixedI64<F> {
+    fn from_f32(value: f32) -> Self {
+        Self::from_bits(libm::rintf(value * power_of_two(F::I32)) as i64)
+    }
+
+    fn to_f32(self) -> f32 {
+        self.to_bits() as f32 * power_of_two(-F::I32)
+    }
+}
+
+/// The bits of a number with so many binary places. Never inlined: each coefficient has one.
+#[inline(never)]
+fn whole(value: f32, places: i32) -> i32 {
+    libm::rintf(value * power_of_two(places)) as i32
+}
+
+/// The nearest whole number, of two the one further from 0. Never inlined, as telemetry has many.
+#[inline(never)]
+pub fn round(value: f32) -> f32 {
+    libm::roundf(value)
+}
+
+/// 2 to the power of at most the bits of a type: products with it are exact.
+const fn power_of_two(power: i32) -> f32 {
+    f32::from_bits(((127 + power) << 23) as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fixed::types::{I0F32, I4F28, I16F16, I36F28, U0F32, U1F31};
+    use proptest::prelude::*;
+
+    /// Both ways of making and of reading a number agree.
+    macro_rules! agree {
+        ($($kind:ty),*; $value:expr) => {$(
+            let made = <$kind>::from_f32($value);
+            prop_assert_eq!(made, <$kind>::saturating_from_num($value), "{:e}", $value);
+            prop_assert_eq!(made.to_f32().to_bits(), made.to_num::<f32>().to_bits());
+        )*};
+    }
+
+    proptest! {
+        #[test]
+        fn numbers_are_those_of_the_fixed_crate(
+            value in any::<f32>().prop_filter("a number", |value| !value.is_nan()),
+            small in -20.0..20_f32,
+            bits: i32,
+        ) {
+            for value in [value, small] {
+                agree!(I0F32, I4F28, I16F16, I36F28, U0F32, U1F31; value);
+            }
+            let number = I4F28::from_bits(bits);
+            prop_assert_eq!(number.to_f32(), number.to_num::<f32>());
+        }
+    }
+
+    #[test]
+    fn halves_go_to_the_even_number_and_ends_hold() {
+        let bit = I16F16::DELTA.to_f32();
+        for (bits, wanted) in [(0.5, 0), (1.5, 2), (-2.5, -2), (2.501, 3)] {
+            assert_eq!(I16F16::from_f32(bits * bit), I16F16::from_bits(wanted));
+        }
+        assert_eq!(I4F28::from_f32(f32::INFINITY), I4F28::MAX);
+        assert_eq!(I4F28::from_f32(-8.5), I4F28::MIN);
+        assert_eq!(U1F31::from_f32(-1.0), U1F31::ZERO);
+        assert_eq!(I0F32::from_f32(f32::NAN), I0F32::ZERO);
+    }
+}

@@ -1,0 +1,13 @@
+//! Hands the linker the memory map and the start-up code's script, for the chip only.
+
+use std::env;
+
+fn main() {
+    println!("cargo::rerun-if-changed=memory.x");
+    println!("cargo::rerun-if-changed=build.rs");
+    if env::var_os("CARGO_FEATURE_CHIP").is_some() {
+        // `link.x` of cortex-m-rt includes `memory.x` from here.
+        println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
+        println!("cargo::rustc-link-arg-bins=-Tlink.x");
+    }
+}

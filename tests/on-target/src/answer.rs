@@ -1,0 +1,66 @@
+//! What both sides must agree on after each control period.
+
+use siskin_control::drive::{Bridge, Config, Snapshot, State};
+use siskin_control::units::Duty;
+use xxhash_rust::xxh32::xxh32;
+
+/// Words that say what a period has done: the bridge's and the digest of the state.
+pub const RESULT_WORDS: usize = 5;
+
+/// Words of one period on the chip: its result and the instructions that it took.
+pub const PERIOD_WORDS: usize = RESULT_WORDS + 1;
+
+/// Bytes of the state's words, at most: there are some 200 of four.
+const STATE_BYTES: usize = 4096;
+
+/// The result of one period.
+pub fn result(config: &Config, state: &State, bridge: Bridge) -> [u32; RESULT_WORDS] {
+    let [kind, a, b, c] = bridge_words(bridge);
+    let mut bytes = [0; STATE_BYTES];
+    let mut len = 0;
+    state.trace(config, &mut |word: u32| {
+        bytes[len..len + 4].copy_from_slice(&word.to_le_bytes());
+        len += 4;
+    });
+    [kind, a, b, c, xxh32(&bytes[..len], 0)]
+}
+
+/// Words of one period of the whole interrupt: what it has published and its instructions.
+pub const INTERRUPT_WORDS: usize = 2;
+
+/// A digest of what the interrupt publishes.
+pub fn snapshot(snapshot: &Snapshot) -> u32 {
+    let words = [
+        snapshot.phase as i32,
+        snapshot.faults.iter().count() as i32,
+        snapshot.fault_count as i32,
+        snapshot.angle.to_bits(),
+        snapshot.speed.to_bits(),
+        snapshot.i.d.to_bits(),
+        snapshot.i.q.to_bits(),
+        snapshot.u.d.to_bits(),
+        snapshot.u.q.to_bits(),
+        snapshot.bus.to_bits(),
+    ];
+    let mut bytes = [0; 40];
+    for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+        *to = word.to_le_bytes();
+    }
+    xxh32(&bytes, 0)
+}
+
+/// What the bridge does: the kind in the low byte, in `Legs` the phases that switch above it, and
+/// the duties.
+fn bridge_words(bridge: Bridge) -> [u32; 4] {
+    match bridge {
+        Bridge::Off => [0; 4],
+        Bridge::Charge(duty) => [1, duty.to_bits(), 0, 0],
+        Bridge::Brake => [2, 0, 0, 0],
+        Bridge::Duty([a, b, c]) => [3, a.to_bits(), b.to_bits(), c.to_bits()],
+        Bridge::Legs(legs) => {
+            let switching = |phase: usize| u32::from(legs[phase].is_some()) << (8 + phase);
+            let [a, b, c] = legs.map(|duty| duty.map_or(0, Duty::to_bits));
+            [4 | switching(0) | switching(1) | switching(2), a, b, c]
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! The chip's program for the whole interrupt: the board's registers are memory here, where the
+//! recorded counts are put before each period, and what the interrupt publishes is what it answers
+//! with.
+
+#![no_std]
+#![no_main]
+
+mod count;
+mod words;
+
+use core::hint::black_box;
+
+use cortex_m::Peripherals;
+use cortex_m_rt::entry;
+use semihosting::{io, process};
+use siskin_control::params::build;
+use siskin_firmware::exchange;
+use siskin_firmware::interrupt::{Interrupt, Stand};
+use siskin_on_target::{answer, request};
+
+use count::Counter;
+use words::{Reader, Writer};
+
+/// A set-point is renewed before each period.
+const STALE_PERIODS: u32 = 10;
+
+static STAND: Stand = Stand::new();
+
+#[entry]
+fn main() -> ! {
+    let peripherals = Peripherals::take().expect("taken here and nowhere else");
+    replay(&Counter::new(peripherals.SYST)).expect("the PC gives and takes the files");
+    process::exit(0)
+}
+
+fn replay(counter: &Counter) -> io::Result<()> {
+    let mut reader = Reader::open()?;
+    let mut writer = Writer::create()?;
+    let set_up = reader.next()?.expect("the set-up comes first");
+    let (params, board) = request::read_set_up(&set_up);
+    let config = build(&params, &board).expect("the PC has built it");
+    let mut ends = exchange::open(STALE_PERIODS).expect("opened here and nowhere else");
+    let mut interrupt = Interrupt::new(STAND.registers(), config, ends.interrupt);
+    while let Some(words) = reader.next()? {
+        let (sample, setpoint) = request::read_period(&words);
+        STAND.set_sample(&sample);
+        ends.setpoint.write(setpoint);
+        let ((), instructions) = counter.count(|| period(&mut interrupt));
+        let snapshot = ends.snapshot.read().expect("one has been published");
+        writer.put(&[answer::snapshot(&snapshot), instructions])?;
+    }
+    writer.flush()
+}
+
+/// What is counted: from the call to the return. The processor's own entry and exit, which store
+/// and restore registers, are no instructions.
+#[inline(never)]
+fn period(interrupt: &mut Interrupt) {
+    black_box(interrupt).run();
+}

@@ -1,0 +1,49 @@
+//! The chip's program for the control's step: replays the recorded control periods and answers with what they did.
+
+#![no_std]
+#![no_main]
+
+mod count;
+mod words;
+
+use core::hint::black_box;
+
+use cortex_m::Peripherals;
+use cortex_m_rt::entry;
+use semihosting::{io, process};
+use siskin_control::drive::{Bridge, Config, Sample, Setpoint, State, step};
+use siskin_control::params::build;
+use siskin_on_target::{answer, request};
+
+use count::Counter;
+use words::{Reader, Writer};
+
+#[entry]
+fn main() -> ! {
+    let peripherals = Peripherals::take().expect("taken here and nowhere else");
+    replay(&Counter::new(peripherals.SYST)).expect("the PC gives and takes the files");
+    process::exit(0)
+}
+
+fn replay(counter: &Counter) -> io::Result<()> {
+    let mut reader = Reader::open()?;
+    let mut writer = Writer::create()?;
+    let set_up = reader.next()?.expect("the set-up comes first");
+    let (params, board) = request::read_set_up(&set_up);
+    let config = build(&params, &board).expect("the PC has built it");
+    let mut state = State::new(&config);
+    while let Some(words) = reader.next()? {
+        let input = request::read_period(&words);
+        let (bridge, instructions) = counter.count(|| period(&config, &mut state, &input));
+        writer.put(&answer::result(&config, &state, bridge))?;
+        writer.put(&[instructions])?;
+    }
+    writer.flush()
+}
+
+/// What is counted: from the call to the return.
+#[inline(never)]
+fn period(config: &Config, state: &mut State, input: &(Sample, Setpoint)) -> Bridge {
+    let (sample, setpoint) = *input;
+    black_box(step(config, state, sample, setpoint))
+}

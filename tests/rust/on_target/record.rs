@@ -1,0 +1,155 @@
+//! A run of the emulator's bench, and what the chip must answer to it.
+
+use fixed::types::I1F31;
+use siskin_control::drive::{Config, Phase, Sample, Setpoint, State, step};
+use siskin_control::params::{ParamId, Params, build};
+use siskin_control::units::{Current, Speed};
+use siskin_emulator::fault::InForce;
+use siskin_emulator::rig::{Bench, Rig};
+use siskin_on_target::{answer, request};
+
+/// The interrupt publishes a snapshot every so many periods, from the first one on.
+const PUBLISHED_EVERY: usize = 8;
+
+/// What the drive is asked for, or suffers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Act {
+    Stop,
+    Zero,
+    /// Hz.
+    Tone(f64),
+    Rpm(f32),
+    Amperes(f32),
+    /// Of the supply's voltage.
+    Share(f64),
+    /// Phase a's current sensor is stuck at 35 A while speed is asked for.
+    SensorStuck,
+}
+
+impl Act {
+    fn setpoint(self, config: &Config) -> Setpoint {
+        let scale = &config.scale;
+        match self {
+            Self::Stop => Setpoint::Stop,
+            Self::Zero => Setpoint::Zero,
+            Self::Tone(hz) => Setpoint::Tone(Speed::from_num(hz * f64::from(scale.period_s))),
+            Self::Rpm(rpm) => Setpoint::Speed(scale.speed_from_rpm(rpm)),
+            Self::Amperes(current_a) => Setpoint::Torque(scale.current_from_a(current_a)),
+            Self::Share(share) => Setpoint::Voltage(I1F31::from_num(share)),
+            Self::SensorStuck => Self::Rpm(3000.0).setpoint(config),
+        }
+    }
+
+    fn wrong(self) -> InForce {
+        InForce {
+            stuck_a: match self {
+                Self::SensorStuck => [Some(35.0), None, None],
+                _ => [None; 3],
+            },
+            ..InForce::default()
+        }
+    }
+}
+
+/// What a period is counted as.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Label {
+    /// What the drive did.
+    pub(crate) phase: Phase,
+    /// Whether a fault held the bridge off.
+    pub(crate) latched: bool,
+}
+
+/// A recorded run.
+pub(crate) struct Run {
+    /// What the chip is given.
+    pub(crate) request: Vec<u32>,
+    /// Of each period.
+    pub(crate) labels: Vec<Label>,
+    results: Vec<[u32; answer::RESULT_WORDS]>,
+    snapshots: Vec<u32>,
+}
+
+impl Run {
+    /// Each of the acts for so many seconds, on the default bench with its realistic sensing.
+    pub(crate) fn record(changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Self {
+        let mut params = Params::default();
+        for (id, value) in changes {
+            params.set(*id, *value).expect("in range");
+        }
+        let bench = Bench::default();
+        let board = bench.sensing.board(bench.delay);
+        let config = build(&params, &board).expect("the parameters fit the bench");
+        let mut rig = Rig::new(bench, config.clone());
+        // The rig's own state is not to be seen; this one does the same.
+        let mut state = State::new(&config);
+        let mut run = Self {
+            request: request::set_up(&params, &board).to_vec(),
+            labels: Vec::new(),
+            results: Vec::new(),
+            snapshots: Vec::new(),
+        };
+        let mut before = InForce::default();
+        for (time_s, act) in acts {
+            let now = act.wrong();
+            rig.disturb(&before, &now);
+            before = now;
+            for _ in 0..(time_s / rig.period_s()) as u32 {
+                let period = rig.period(exchanged(act.setpoint(&config)));
+                run.take(&config, &mut state, &period.sample, period.setpoint);
+            }
+        }
+        run
+    }
+
+    fn take(&mut self, config: &Config, state: &mut State, sample: &Sample, setpoint: Setpoint) {
+        let bridge = step(config, state, *sample, setpoint);
+        let snapshot = state.snapshot();
+        self.request.extend(request::period(sample, setpoint));
+        self.labels.push(Label {
+            phase: snapshot.phase,
+            latched: !snapshot.faults.is_empty(),
+        });
+        self.results.push(answer::result(config, state, bridge));
+        self.snapshots.push(answer::snapshot(&snapshot));
+    }
+
+    /// Checks the chip's answer word for word, and gives the instructions of each period.
+    pub(crate) fn compare(&self, words: &[u32]) -> Vec<u32> {
+        let (periods, rest) = words.as_chunks::<{ answer::PERIOD_WORDS }>();
+        assert!(rest.is_empty() && periods.len() == self.results.len());
+        let mut instructions = Vec::with_capacity(periods.len());
+        for (n, (period, expected)) in periods.iter().zip(&self.results).enumerate() {
+            let [result @ .., count] = period;
+            assert_eq!(result, expected, "period {n}, {:?}", self.labels[n]);
+            instructions.push(*count);
+        }
+        instructions
+    }
+
+    /// As [`compare`](Self::compare), for the whole interrupt.
+    pub(crate) fn compare_interrupt(&self, words: &[u32]) -> Vec<u32> {
+        let (periods, rest) = words.as_chunks::<{ answer::INTERRUPT_WORDS }>();
+        assert!(rest.is_empty() && periods.len() == self.snapshots.len());
+        let mut instructions = Vec::with_capacity(periods.len());
+        for (n, [snapshot, count]) in periods.iter().enumerate() {
+            let expected = self.snapshots[n - n % PUBLISHED_EVERY];
+            assert_eq!(*snapshot, expected, "period {n}, {:?}", self.labels[n]);
+            instructions.push(*count);
+        }
+        instructions
+    }
+}
+
+/// A set-point as it comes out of the firmware's exchange, which carries the upper 24 bits of a value.
+fn exchanged(setpoint: Setpoint) -> Setpoint {
+    let upper = |bits: i32| bits & !0xff;
+    match setpoint {
+        Setpoint::Speed(speed) => Setpoint::Speed(Speed::from_bits(upper(speed.to_bits()))),
+        Setpoint::Torque(i_q) => Setpoint::Torque(Current::from_bits(upper(i_q.to_bits()))),
+        Setpoint::Voltage(share) => Setpoint::Voltage(I1F31::from_bits(upper(share.to_bits()))),
+        Setpoint::Tone(pitch) => Setpoint::Tone(Speed::from_bits(upper(pitch.to_bits()))),
+        Setpoint::Test(i_q) => Setpoint::Test(Current::from_bits(upper(i_q.to_bits()))),
+        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) => setpoint,
+    }
+}
