@@ -6,9 +6,10 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::decode;
 use crate::endpoint::Endpoint;
+use crate::image::Board;
 
-/// Parameters and live telemetry of a Siskin ESC over MAVLink, captures of a throttle wire, and the
-/// limits of a motor.
+/// Parameters and live telemetry of a Siskin ESC over MAVLink, images for its boards, captures of a
+/// throttle wire, and the limits of a motor.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -56,6 +57,16 @@ pub(crate) enum Command {
     /// at; given here they count at every speed, as in the paper. The drive takes off what it knows
     /// of lead and delay, so that it stays below.
     Budget(BudgetArgs),
+    /// Make the files that go onto a board: BOARD.elf, BOARD.bin and BOARD.hex.
+    ///
+    /// Prints for which board they are, which version, from which commit (+ behind it where files
+    /// differed), and how much of the flash they take.
+    Image(ImageArgs),
+    /// Write an image into a board's flash, once it is known to be that board's.
+    ///
+    /// By the program probe-rs through a debug probe (the B-G431B-ESC1 has one on it), or by dfu-util
+    /// over USB with BOOT0 at 3.3 V. Stored parameters and option bytes stay.
+    Flash(FlashArgs),
 }
 
 /// What to do with parameters.
@@ -118,6 +129,35 @@ pub(crate) struct DecodeArgs {
     pub(crate) capture: PathBuf,
     #[command(flatten)]
     pub(crate) options: decode::Options,
+}
+
+/// What an image is made from.
+#[derive(Debug, Args)]
+pub(crate) struct ImageArgs {
+    /// Image as the linker left it; without, it is built for --board.
+    pub(crate) elf: Option<PathBuf>,
+    /// Board that it is for.
+    #[arg(long)]
+    pub(crate) board: Option<Board>,
+    /// Folder for the files.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+}
+
+/// What to write where.
+#[derive(Debug, Args)]
+pub(crate) struct FlashArgs {
+    /// Image, as 'siskin image' makes it or as the linker left it.
+    pub(crate) elf: PathBuf,
+    /// Board that is connected; an image for another is refused.
+    #[arg(long)]
+    pub(crate) board: Option<Board>,
+    /// Debug probe, where several are connected: VID:PID or VID:PID:SERIAL.
+    #[arg(long, value_name = "SELECTOR", conflicts_with = "dfu")]
+    pub(crate) probe: Option<String>,
+    /// Over USB, by the chip's own loader.
+    #[arg(long)]
+    pub(crate) dfu: bool,
 }
 
 /// What a budget is made of.

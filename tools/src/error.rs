@@ -26,6 +26,20 @@ pub(crate) enum Error {
     #[error("{path}: {reason}")]
     File { path: String, reason: String },
 
+    /// A program that does a part of the work is not installed.
+    #[error("{program} is not installed: {remedy}")]
+    Missing {
+        program: &'static str,
+        remedy: &'static str,
+    },
+
+    /// A program that does a part of the work has not done it.
+    #[error("{program}: {reason}")]
+    Program {
+        program: &'static str,
+        reason: String,
+    },
+
     /// The ESC said no.
     #[error("{what}: {reason}")]
     Refused { what: String, reason: String },
@@ -48,14 +62,17 @@ pub(crate) enum Error {
 }
 
 impl Error {
-    /// 2 for bad input or no connection, 1 for what the ESC refused or did not answer, 0 where
-    /// only the reader of the output went away, as in `siskin monitor | head -1`.
+    /// 2 for bad input or no connection, 1 for what the ESC or another program refused or did not
+    /// answer, 0 where only the reader of the output went away, as in `siskin monitor | head -1`.
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
-            Self::Usage(_) | Self::Link { .. } | Self::NoComponent { .. } | Self::File { .. } => {
-                ExitCode::from(2)
-            }
-            Self::Refused { .. }
+            Self::Usage(_)
+            | Self::Link { .. }
+            | Self::NoComponent { .. }
+            | Self::File { .. }
+            | Self::Missing { .. } => ExitCode::from(2),
+            Self::Program { .. }
+            | Self::Refused { .. }
             | Self::NoAnswer { .. }
             | Self::Silent { .. }
             | Self::Partly(_) => ExitCode::from(1),

@@ -1,9 +1,10 @@
-//! The command line of the Siskin ESC: parameters and live telemetry over MAVLink, captures of a
-//! throttle wire, and the limits of a motor.
+//! The command line of the Siskin ESC: parameters and live telemetry over MAVLink, images for boards,
+//! captures of a throttle wire, and the limits of a motor.
 //!
-//! Results go to standard output. Complaints go to standard error, one line each. The exit status
-//! is 0 when everything was done, 1 when the ESC refused something or did not answer, and 2 for
-//! bad input or no connection.
+//! Results go to standard output. Complaints go to standard error, one line each; where another
+//! program does the work, what that says stands before them. The exit status is 0 when everything
+//! was done, 1 when the ESC or another program refused something or did not answer, and 2 for bad
+//! input, no connection or a program that is not installed.
 #![forbid(unsafe_code)]
 
 mod budget;
@@ -11,6 +12,8 @@ mod cli;
 pub mod decode;
 mod endpoint;
 mod error;
+mod flash;
+mod image;
 mod json;
 mod link;
 mod message;
@@ -19,6 +22,7 @@ mod param_commands;
 mod param_file;
 mod param_load;
 mod params;
+mod program;
 mod sample;
 mod session;
 
@@ -68,6 +72,8 @@ fn run(cli: &Cli) -> Result<(), Error> {
         }
         Command::Decode(args) => decode::run(&args.capture, &args.options, &mut out),
         Command::Budget(args) => budget::run(args, cli.component, &mut out),
+        Command::Image(args) => image::run(args, &mut out),
+        Command::Flash(args) => flash::run(args, &mut out),
         Command::Monitor(args) => monitor::run(&mut find()?, args, &mut out, &mut complaints),
     }
 }

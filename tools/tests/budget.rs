@@ -1,20 +1,17 @@
 //! `siskin budget`: no ESC is needed.
 
-use std::fs;
-use std::process::Command;
+#[path = "common/run.rs"]
+mod run;
 
+use std::fs;
+
+use run::{Run, siskin};
 use serde_json::Value;
 
 /// Status, output and complaints.
 fn budget(arguments: &[&str]) -> (i32, String, String) {
-    let run = Command::new(env!("CARGO_BIN_EXE_siskin"))
-        .arg("budget")
-        .args(arguments)
-        .output()
-        .expect("the binary that cargo built");
-    let text = |bytes| String::from_utf8(bytes).expect("text");
-    let status = run.status.code().expect("it ends by itself");
-    (status, text(run.stdout), text(run.stderr))
+    let Run { status, out, err } = siskin(&[&["budget"], arguments].concat());
+    (status, out, err)
 }
 
 #[track_caller]

@@ -1,16 +1,20 @@
 //! The whole program against the real MAVLink component.
 
-mod common;
+#[path = "common/esc.rs"]
+mod esc;
+#[path = "common/run.rs"]
+mod run;
 
 use std::fs;
 
-use common::{Behaviour, Esc, UdpRelay, siskin};
+use esc::{Behaviour, Esc, UdpRelay};
+use run::{Run, siskin};
 use serde_json::Value;
 use siskin_control::params::{ParamId, Params, TABLE};
 
 /// Asserts the status and returns the output.
 #[track_caller]
-fn ended(run: &common::Run, status: i32) -> &str {
+fn ended(run: &Run, status: i32) -> &str {
     assert_eq!(run.status, status, "{run:?}");
     &run.out
 }

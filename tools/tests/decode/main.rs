@@ -1,6 +1,8 @@
 //! `siskin decode`: captures in, tables out.
 
 mod generator;
+#[path = "../common/run.rs"]
+mod run;
 mod summary;
 mod table;
 
@@ -11,21 +13,16 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 
 use generator::{Layout, Wire, word};
+use run::{Run, siskin};
 
 /// Runs it on a capture: exit status, output and complaints.
 fn decode(capture: impl AsRef<[u8]>, arguments: &[&str]) -> (i32, String, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("capture");
     fs::write(&file, capture).expect("written");
-    let run = Command::new(env!("CARGO_BIN_EXE_siskin"))
-        .arg("decode")
-        .arg(&file)
-        .args(arguments)
-        .output()
-        .expect("the binary that cargo built");
-    let text = |bytes| String::from_utf8(bytes).expect("text");
-    let status = run.status.code().expect("it ends by itself");
-    (status, text(run.stdout), text(run.stderr))
+    let file = file.to_str().expect("text");
+    let Run { status, out, err } = siskin(&[&["decode", file], arguments].concat());
+    (status, out, err)
 }
 
 /// Its lines as objects: the rows, and the summary.
@@ -341,15 +338,7 @@ fn bad_input_is_one_line_that_says_what_to_do() {
     }
     let (status, _, err) = decode("", &["--no-such"]);
     assert_eq!((status, err.lines().count()), (2, 1));
-    let run = Command::new(env!("CARGO_BIN_EXE_siskin"))
-        .args(["decode", "no-such.csv"])
-        .output()
-        .expect("the binary that cargo built");
-    let err = String::from_utf8(run.stderr).expect("text");
-    assert_eq!(
-        (run.status.code(), err.lines().count()),
-        (Some(2), 1),
-        "{err}"
-    );
+    let Run { status, err, .. } = siskin(&["decode", "no-such.csv"]);
+    assert_eq!((status, err.lines().count()), (2, 1), "{err}");
     assert!(err.contains("no-such.csv"), "{err}");
 }

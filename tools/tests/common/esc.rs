@@ -2,7 +2,6 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
-use std::process::{Command, Output};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
@@ -14,6 +13,8 @@ use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request};
 use siskin_control::params::{BuildError, ParamId, Params};
 use siskin_control::telemetry::Telemetry;
+
+use crate::run::{Run, siskin};
 
 const HEARTBEAT: u32 = 0;
 const PARAM_VALUE: u32 = 22;
@@ -129,31 +130,6 @@ fn relay(
             peer = Some(from);
             stream.write_all(&buffer[..length]).expect("the ESC runs");
         }
-    }
-}
-
-/// What a command printed, and its exit status.
-#[derive(Debug)]
-pub(crate) struct Run {
-    pub(crate) status: i32,
-    pub(crate) out: String,
-    pub(crate) err: String,
-}
-
-/// Runs the program under test.
-pub(crate) fn siskin(arguments: &[&str]) -> Run {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = Command::new(env!("CARGO_BIN_EXE_siskin"))
-        .args(arguments)
-        .output()
-        .expect("the binary that cargo built");
-    Run {
-        status: status.code().expect("it ends by itself"),
-        out: String::from_utf8(stdout).expect("text"),
-        err: String::from_utf8(stderr).expect("text"),
     }
 }
 

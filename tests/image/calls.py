@@ -1,0 +1,114 @@
+"""Who calls whom in an image, and how much stack that takes."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import indirect
+from image import Function, Image, Unreadable
+from machine import Code, code_of
+
+FRAME_BYTES = 26 * 4 + 4
+"""What the processor pushes for an interrupt: 26 words with the floating-point unit's, and up to one
+more so that the stack stands at a multiple of 8."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Most stack that a function can take, and the calls that lead there."""
+
+    size: int
+    path: tuple[Function, ...]
+
+
+class Calls:
+    """The call graph of an image. What it could not make out stands in `problems`."""
+
+    def __init__(self, image: Image):
+        self.image = image
+        self.problems = []
+        self.code = {}
+        for function in image.functions.values():
+            try:
+                self.code[function.begin] = code_of(image, function)
+            except Unreadable as reason:
+                self.problems.append(str(reason))
+                self.code[function.begin] = Code()
+        self.by_address = self._called_by_address()
+        self._bounds = {}
+
+    def _called_by_address(self) -> list[Function]:
+        """All functions whose address is stored, outside of the vector table, or held by code."""
+        stored = {value & ~1 for _, value in self.image.data_addresses() if value & 1}
+        held = {use & ~1 for code in self.code.values() for use in code.uses if use & 1}
+        found = [self.image.functions[b] for b in sorted(stored | held) if b in self.image.functions]
+        for function in found:
+            if not indirect.is_foreseen(function.name):
+                self.problems.append(f"who calls {function.name} by its address? see indirect.py")
+        return found
+
+    def callees(self, function: Function):
+        """Pairs of the stack in use at a call and the function called."""
+        for call in self.code[function.begin].calls:
+            if call.target is None:
+                targets = [
+                    target
+                    for target in self.by_address
+                    if indirect.may_lead_to(function.name, target.name)
+                ]
+                if not indirect.may_call(function.name):
+                    self.note(f"whom does {function.name} call at {call.site:#x}? see indirect.py")
+            else:
+                target = self.image.functions.get(call.target)
+                targets = [target] if target else []
+                if not target:
+                    self.note(f"{function.name} calls {call.target:#x}, which is no function")
+            for target in targets:
+                yield call.depth, target
+
+    def note(self, problem: str):
+        if problem not in self.problems:
+            self.problems.append(problem)
+
+    def bound(self, function: Function, callers: tuple = (), without: frozenset[Function] = frozenset()) -> Bound:
+        """The most stack that it and all that it calls take, but for some that are not called. A
+        recursion has no bound and is a problem."""
+        if function in callers:
+            names = " -> ".join(f.name for f in (*callers[callers.index(function) :], function))
+            self.note(f"recursion: {names}")
+            return Bound(0, ())
+        key = (function, without)
+        if key not in self._bounds:
+            most = Bound(self.code[function.begin].frame, (function,))
+            for depth, callee in self.callees(function):
+                if callee in without:
+                    continue
+                inner = self.bound(callee, (*callers, function), without)
+                if depth + inner.size > most.size:
+                    most = Bound(depth + inner.size, (function, *inner.path))
+            self._bounds[key] = most
+        return self._bounds[key]
+
+    def reached(
+        self, function: Function, without: str | None = None
+    ) -> dict[Function, Function | None]:
+        """Every function that it leads to, itself included, each with one that calls it; but not the
+        one of a name, nor what only that leads to."""
+        callers, waiting = {function: None}, [function]
+        while waiting:
+            caller = waiting.pop()
+            for _, callee in self.callees(caller):
+                if callee not in callers and callee.name != without:
+                    callers[callee] = caller
+                    waiting.append(callee)
+        return callers
+
+
+def path(functions: Iterable[Function]) -> str:
+    """Names on a way of calls, in turn, without those of far jumps: they are as their targets'."""
+    names = []
+    for function in functions:
+        name = re.sub(r"^siskin_", "", function.name)
+        if name not in names[-1:]:
+            names.append(name)
+    return " -> ".join(names)

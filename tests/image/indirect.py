@@ -1,0 +1,52 @@
+"""Calls whose target is not known until they run, and what they can lead to.
+
+Each line is who calls, and whom, as patterns of names. A caller without a line, and a function whose
+address is stored somewhere though no line leads to it, are found and refused: whoever adds one adds a
+line, having looked.
+"""
+
+import re
+
+WAKER = r"^embassy_executor::raw::waker::(clone|wake|drop)$"
+TASK = r"::TaskStorage<F>::poll$"
+EXITED = r"^embassy_executor::raw::poll_exited$"
+
+LEADS_TO = [
+    # An executor runs what has been woken; that of the throttle's task is an interrupt.
+    (r"^embassy_executor::.*Executor::(run|poll)$|^(FMAC|CAN2_SCE)$", rf"{TASK}|{EXITED}"),
+    # A waker's table: of the time queue, of channels and pipes that a task waits for.
+    (
+        rf"^(_embassy_time_schedule_wake|embassy_time_queue_utils::|embassy_sync::waitqueue::)|{TASK}"
+        r"|^siskin_firmware::tasks::kiss::send$"
+        r"|^<embassy_sync::blocking_mutex::raw::\w+ as embassy_sync::blocking_mutex::raw::RawMutex>::lock$",
+        WAKER,
+    ),
+    # MAVLink asks the throttle's side, checks parameters and hands out bytes by what it is given.
+    (r"^siskin_control::mavlink::", r" as siskin_control::input::access::Access>::"),
+    (r"^siskin_control::mavlink::", r"^siskin_control::esc::Esc::with_component::{{closure}}$"),
+    # Stored keys and values are written by themselves.
+    (r"^sequential_storage::map::", r" as sequential_storage::map::(Key|Value)>::serialize_into$"),
+]
+
+NEVER_CALLED = [
+    # They stand in tables beside those above; nothing here owns a value of unknown kind, whose end or
+    # only call these would be.
+    r"^core::ptr::drop_in_place<",
+    r"^core::ops::function::FnOnce::call_once{{vtable.shim}}$",
+]
+
+
+def may_lead_to(caller: str, target: str) -> bool:
+    """Whether an indirect call in the one function can reach the other."""
+    return any(re.search(a, caller) and re.search(b, target) for a, b in LEADS_TO)
+
+
+def is_foreseen(target: str) -> bool:
+    """Whether it is known who calls a function by its address."""
+    patterns = [pattern for _, pattern in LEADS_TO] + NEVER_CALLED
+    return any(re.search(pattern, target) for pattern in patterns)
+
+
+def may_call(caller: str) -> bool:
+    """Whether it is known whom a function calls by an address."""
+    return any(re.search(pattern, caller) for pattern, _ in LEADS_TO)

@@ -1,0 +1,76 @@
+"""Sizes, stack and reach of a linked image, against what its board allows.
+
+    report.py BOARD ELF
+
+Exit status 1 if anything is too large, not to be made out, or where it must not be.
+"""
+
+import sys
+from pathlib import Path
+
+import reach
+import sizes
+import stack
+from boards import BOARDS, Board
+from calls import Calls, path
+from image import Image, Unreadable
+
+
+def limited(name: str, size: int, limit: int, problems: list[str]) -> str:
+    """A line that tells a size and its limit."""
+    if size > limit:
+        problems.append(f"{name}: {size} bytes, {size - limit} too many")
+    return f"{name:<24}{size:>8} of {limit:>7} bytes"
+
+
+def report(board: Board, image: Image) -> list[str]:
+    """Prints what there is to know; gives what is wrong."""
+    problems = []
+    regions = [board.flash, *board.memories]
+    print(limited("flash", sizes.stored(image, board.flash), board.flash.limit, problems))
+    for memory in board.memories:
+        print(limited(memory.name, sizes.used(image, memory), memory.limit, problems))
+    for memory, name, size in sizes.sections(image, board):
+        print(f"  {memory:<6}{name:<18}{size:>6}")
+
+    print(f"{'code by module':<32}" + "".join(f"{region.name:>8}" for region in regions))
+    for name, row in sizes.by_module(image, regions):
+        print(f"  {name:<30}" + "".join(f"{size or '':>8}" for size in row))
+
+    calls = Calls(image)
+    levels = stack.levels(calls, board)
+    room = image.symbols["_stack_start"] - image.symbols["_stack_end"]
+    print(limited("stack at most", sum(b.size for _, b in levels), room, problems))
+    for name, bound in levels:
+        print(f"  {name:<22}{bound.size:>8}  {path(bound.path)}")
+
+    for when, writing in [("while the flash is written", True), ("in any other period", False)]:
+        called = reach.called(calls, board, writing)
+        total = sum(function.size for function in called)
+        stored = sum(function.size for function in called if function.begin in board.flash)
+        print(f"the PWM interrupt calls {when} {len(called)} functions, {total} bytes", end="")
+        print(f", {stored} of them in the flash")
+    found = reach.in_flash(calls, board)
+    print(f"and needs from the flash while that is written: {'' if found else 'nothing'}")
+    for line in found:
+        print(f"  {line}")
+    if found:
+        problems.append(f"the PWM interrupt needs {len(found)} things from the flash while that is written")
+    return problems + calls.problems
+
+
+def main() -> int:
+    if len(sys.argv) != 3 or sys.argv[1] not in BOARDS:
+        print(f"usage: report.py {'|'.join(BOARDS)} ELF", file=sys.stderr)
+        return 2
+    try:
+        problems = report(BOARDS[sys.argv[1]], Image(Path(sys.argv[2])))
+    except (Unreadable, OSError) as reason:
+        problems = [str(reason)]
+    for problem in problems:
+        print(f"FAILED: {problem}")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

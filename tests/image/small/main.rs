@@ -1,0 +1,13 @@
+//! A small image: nothing but the assembly that a test gives.
+#![no_std]
+#![no_main]
+
+use core::arch::global_asm;
+use core::panic::PanicInfo;
+
+global_asm!(include_str!(env!("ASSEMBLY")), options(raw));
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    loop {}
+}

@@ -1,0 +1,214 @@
+"""The report on images as a whole: sizes, what the PWM interrupt needs from the flash, and the boards'
+own images."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from elftools.dwarf.callframe import FDE
+from elftools.elf.elffile import ELFFile
+
+from paths import IMAGE_REPORT, IMAGES, TOOL
+from small_image import LEVELS, VECTORS, build
+
+sys.path.insert(0, str(IMAGE_REPORT))
+
+import reach  # noqa: E402  (it needs the report's folder)
+import sizes  # noqa: E402
+from boards import BOARDS  # noqa: E402
+from calls import FRAME_BYTES, Calls  # noqa: E402
+from image import Image, Unreadable  # noqa: E402
+
+BOARD = BOARDS["b-g431b-esc1"]
+
+LEAVES = """
+    function Reset
+    b Reset
+    end Reset
+    function SLOW
+    bx lr
+    end SLOW
+    function QUICK
+    bx lr
+    end QUICK
+    function slow
+    bx lr
+    end slow
+    function never
+    bx lr
+    end never
+    .section .rodata, "a", %progbits
+    .global table
+    table: .word 1, 2, 3
+    .section .control, "ax", %progbits
+    function ADC1_2
+    push {r7, lr}
+    bl between
+    pop {r7, pc}
+    end ADC1_2
+    function between
+    push {r7, lr}
+    bl slow                         // by a jump that the linker makes: it is far
+    pop {r7, lr}
+    movw r0, #:lower16:table
+    movt r0, #:upper16:table
+    ldr r1, =0x08000004             // a number that looks like an address
+    ldr r2, =table + 4
+    bx lr
+    .ltorg
+    end between
+    .balign 4
+    .global leading
+    leading: .word table, between, 0x08000000
+"""
+
+
+def test_what_the_pwm_interrupt_needs_from_the_flash_is_found_with_its_way(tmp_path):
+    image = Image(build(tmp_path, LEAVES + VECTORS))
+    calls = Calls(image)
+    table = image.symbols["table"]
+    found = reach.in_flash(calls, BOARD)
+    assert sorted(found) == sorted(
+        [
+            f"ADC1_2 -> between reads {table:#x}",
+            f"ADC1_2 -> between reads {table + 4:#x}",
+            "ADC1_2 -> between -> slow, 2 bytes",
+            f"the word at {image.symbols['leading']:#x} leads to {table:#x}",
+        ]
+    )
+    assert calls.problems == ["who calls between by its address? see indirect.py"]
+
+
+def test_without_relocations_nothing_is_said(tmp_path):
+    with pytest.raises(Unreadable, match="emit-relocs"):
+        Image(build(tmp_path, LEVELS + VECTORS, options=()))
+
+
+def test_sizes_are_those_of_the_memories(tmp_path):
+    image = Image(build(tmp_path, LEVELS + VECTORS))
+    # Nine vectors, the code in the flash, of which the compiler adds some, and that of the CCM.
+    text = next(s.size for s in image.sections if s.name == ".text")
+    assert sizes.stored(image, BOARD.flash) == 36 + text + 18
+    ccm, sram = BOARD.memories
+    assert sizes.used(image, ccm) == 512 + 18
+    assert sizes.used(image, sram) == 1024
+    rows = dict(sizes.by_module(image, [BOARD.flash, ccm, sram]))
+    # Fault 4, Reset 4, SLOW 6, QUICK 6; ADC1_2 12, fast 6.
+    assert rows["without a module"] == [20, 18, 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "module"),
+    [
+        ("siskin_control::drive::step::step", "siskin_control::drive"),
+        ("<siskin_control::math::gain::Gain as core::cmp::PartialEq>::eq", "siskin_control::math"),
+        ("<&mut heapless::string::String as core::fmt::Write>::write_str", "heapless"),
+        ("siskin_firmware::__cortex_m_rt_main", "siskin_firmware"),
+        ("_RNvNtNtCs7NhdfSRABLd_17compiler_builtins3mem6memcpy", "compiler_builtins"),
+        ("core::fmt::write", "core"),
+        ("ADC1_2", "without a module"),
+    ],
+)
+def test_a_name_tells_its_module(name, module):
+    assert sizes.module(name) == module
+
+
+def report(*arguments) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, str(IMAGE_REPORT / "report.py"), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+
+
+def test_the_report_ends_well_or_says_why_not(tmp_path):
+    good = report("b-g431b-esc1", build(tmp_path, LEVELS + VECTORS))
+    assert good.returncode == 0, good.stdout + good.stderr
+    assert "while that is written: nothing" in good.stdout
+
+    # The room is 1 KB, of which this alone takes 4.
+    greedy = LEVELS.replace("sub sp, #24", "sub sp, #4096").replace("add sp, #24", "add sp, #4096")
+    greedy = report("b-g431b-esc1", build(tmp_path, greedy + VECTORS))
+    assert greedy.returncode == 1
+    over = 8 + FRAME_BYTES + 4096 + FRAME_BYTES + 56 - 1024
+    assert f"FAILED: stack at most: {over + 1024} bytes, {over} too many" in greedy.stdout
+
+    far = report("b-g431b-esc1", build(tmp_path, LEAVES + VECTORS))
+    assert far.returncode == 1
+    assert "FAILED: the PWM interrupt needs 4 things from the flash" in far.stdout
+
+
+def test_too_much_is_told_by_memory(tmp_path):
+    stuffed = LEVELS + VECTORS + "    .section .rodata\n    .space 130000\n"
+    told = report("b-g431b-esc1", build(tmp_path, stuffed))
+    assert told.returncode == 1
+    assert "FAILED: flash: " in told.stdout and "FAILED: CCM" not in told.stdout
+    stuffed = LEVELS + '    .section .control, "ax"\n    .space 9800\n' + VECTORS
+    told = report("b-g431b-esc1", build(tmp_path, stuffed))
+    assert told.returncode == 1 and "FAILED: CCM: " in told.stdout
+
+
+def test_bad_input_is_told(tmp_path):
+    for arguments in [(), ("b-g431b-esc1",), ("third-board", "x")]:
+        told = report(*arguments)
+        assert told.returncode == 2 and "usage" in told.stderr
+    told = report("b-g431b-esc1", tmp_path / "none")
+    assert told.returncode == 1 and "FAILED: " in told.stdout
+    text = tmp_path / "text"
+    text.write_text("no ELF")
+    told = report("b-g431b-esc1", text)
+    assert told.returncode == 1 and "FAILED: " in told.stdout and not told.stderr
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_the_frames_of_a_board_are_those_that_the_compiler_notes(board):
+    path = IMAGES / f"{board}.elf"
+    calls = Calls(Image(path))
+    compared = 0
+    with path.open("rb") as file:
+        notes = ELFFile(file).get_dwarf_info(relocate_dwarf_sections=False)
+        for entry in notes.CFI_entries():
+            begin = entry["initial_location"] & ~1 if isinstance(entry, FDE) else None
+            if begin not in calls.code:
+                continue
+            frames = [row["cfa"] for row in entry.get_decoded().table]
+            # Once the frame is held by another register, the stack may go deeper than that.
+            by_stack_pointer = all(frame.reg == 13 for frame in frames)
+            noted, found = max(frame.offset for frame in frames), calls.code[begin].frame
+            assert found == noted if by_stack_pointer else found >= noted, entry
+            compared += 1
+    assert compared > 100
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_the_tool_tells_a_boards_image(board, tmp_path):
+    elf = IMAGES / f"{board}.elf"
+    told = subprocess.run(
+        [TOOL, "image", elf, "--board", board, "--output", tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert told.returncode == 0, told.stderr
+    assert re.search(rf"^board +{board}$", told.stdout, re.MULTILINE)
+    assert re.search(r"^version +\d+\.\d+\.\d+$", told.stdout, re.MULTILINE)
+    assert re.search(r"^build +([0-9a-f]{16}\+?|unknown)$", told.stdout, re.MULTILINE)
+    image = Image(elf)
+    contents = (tmp_path / f"{board}.bin").read_bytes()
+    assert len(contents) == sizes.stored(image, BOARDS[board].flash)
+    vectors = [int.from_bytes(contents[at : at + 4], "little") for at in (0, 4)]
+    assert vectors == [image.symbols["_stack_start"], image.symbols["Reset"] | 1]
+
+
+@pytest.mark.parametrize(("board", "other"), [tuple(BOARDS), tuple(reversed(BOARDS))])
+def test_the_tool_refuses_a_boards_image_for_the_other(board, other):
+    told = subprocess.run(
+        [TOOL, "flash", IMAGES / f"{board}.elf", "--board", other],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (told.returncode, told.stdout) == (2, "")
+    assert f"made for {board}, not for {other}" in told.stderr

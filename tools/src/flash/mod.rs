@@ -1,0 +1,42 @@
+//! `siskin flash`: an image into a board's flash, once it is known to be that board's.
+//!
+//! What the image does not cover stays as it is: the stored parameters, and the option bytes,
+//! without which the B-G431B-ESC1 does not start.
+
+mod dfu;
+mod probe;
+
+use std::io::Write;
+
+use crate::cli::FlashArgs;
+use crate::error::Error;
+use crate::image::Image;
+
+/// Checks the image, writes it by the program for it, and starts it.
+///
+/// # Errors
+/// [`Error::File`] and [`Error::Usage`] before anything is written; [`Error::Missing`] and
+/// [`Error::Program`] from the program.
+pub(crate) fn run(args: &FlashArgs, out: &mut dyn Write) -> Result<(), Error> {
+    let image = Image::read(&args.elf, args.board)?;
+    let board = image.board;
+    if args.dfu && !board.has_usb() {
+        return Err(Error::Usage(format!(
+            "--dfu: {} has no USB of its own; leave it out and use the probe",
+            board.name()
+        )));
+    }
+    write!(out, "{}", image.description())?;
+    out.flush()?;
+    if args.dfu {
+        dfu::write(&image)?;
+        writeln!(
+            out,
+            "written and read back; release BOOT0 and power the board up anew"
+        )?;
+    } else {
+        probe::write(board.chip(), &args.elf, args.probe.as_deref())?;
+        writeln!(out, "written, verified and started")?;
+    }
+    Ok(())
+}

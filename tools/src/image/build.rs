@@ -1,0 +1,34 @@
+//! A board's image, built by cargo.
+
+use std::path::PathBuf;
+use std::process::Stdio;
+
+use serde_json::Value;
+
+use super::Board;
+use crate::error::Error;
+use crate::program::Program;
+
+const CARGO: Program = Program {
+    name: "cargo",
+    remedy: "install Rust from https://rustup.rs",
+};
+
+/// Builds it, in the folder of the repository, and gives the ELF file.
+///
+/// # Errors
+/// [`Error::Missing`] without cargo, [`Error::Program`] if it did not build.
+pub(super) fn build(board: Board) -> Result<PathBuf, Error> {
+    let mut command = CARGO.command();
+    command.args(["build", "--package", "siskin-firmware", "--release"]);
+    command.args(["--target", "thumbv7em-none-eabihf"]);
+    command.args(["--features", board.name()]);
+    // Its messages for a person stay on standard error.
+    command.arg("--message-format=json-render-diagnostics");
+    let messages = CARGO.run(command.stdout(Stdio::piped()))?;
+    let executable = String::from_utf8_lossy(&messages)
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from));
+    executable.ok_or_else(|| CARGO.failed("it names no file that it has built"))
+}

@@ -1,0 +1,148 @@
+//! A linked image: what goes into the flash, and for which board.
+
+use std::fs;
+use std::path::Path;
+
+use object::LittleEndian;
+use object::elf::{EM_ARM, FileHeader32, PT_LOAD};
+use object::read::elf::{FileHeader, ProgramHeader};
+
+use super::{Board, Tag};
+use crate::error::Error;
+
+/// What an erased flash holds.
+const ERASED: u8 = 0xFF;
+
+/// Bytes between two segments that are written as erased. A larger hole is left as it is: on the
+/// VESC the stored parameters lie in one, between the vectors and the code.
+const GAP_BYTES: u32 = 256;
+
+/// A part of an image without a hole.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Piece {
+    /// Address of its first byte.
+    pub(crate) at: u32,
+    /// What goes there.
+    pub(crate) bytes: Vec<u8>,
+}
+
+impl Piece {
+    fn end(&self) -> u32 {
+        self.at + self.bytes.len() as u32
+    }
+}
+
+/// An image that may be written.
+#[derive(Debug)]
+pub(crate) struct Image {
+    /// What it says of itself.
+    pub(crate) tag: Tag,
+    /// The board of the tag.
+    pub(crate) board: Board,
+    /// Where it starts to run.
+    pub(crate) entry: u32,
+    /// Its parts in the order of their addresses; there is one at least.
+    pub(crate) pieces: Vec<Piece>,
+}
+
+impl Image {
+    /// Reads an ELF file, and checks that it is for a board, for the wanted one if any, and that it
+    /// fits.
+    ///
+    /// # Errors
+    /// [`Error::File`] that names the file and what is wrong.
+    pub(crate) fn read(path: &Path, wanted: Option<Board>) -> Result<Self, Error> {
+        let image = fs::read(path).map_err(|e| e.to_string());
+        let image = image.and_then(|bytes| Self::parse(&bytes));
+        let image = image.and_then(|image| match wanted {
+            Some(wanted) if image.board != wanted => Err(format!(
+                "made for {}, not for {}",
+                image.board.name(),
+                wanted.name()
+            )),
+            _ => Ok(image),
+        });
+        image.map_err(|reason| Error::File {
+            path: path.display().to_string(),
+            reason,
+        })
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Self, String> {
+        let (mut segments, entry) = segments(bytes)?;
+        segments.sort_by_key(|segment| segment.0);
+        if segments.is_empty() {
+            return Err("nothing in it goes into the flash".to_owned());
+        }
+        // Before anything is laid out: an address may be anything.
+        let tag = segments.iter().find_map(|(_, data)| Tag::find(data));
+        let tag = tag.ok_or("no tag of a Siskin image in it")?;
+        let board = Board::named(&tag.board)
+            .ok_or_else(|| format!("made for '{}', which is no board known here", tag.board))?;
+        let flash = board.flash();
+        let mut pieces: Vec<Piece> = Vec::new();
+        for (at, data) in segments {
+            let end = u64::from(at) + data.len() as u64;
+            if at < flash.start || end > u64::from(flash.end) {
+                return Err(format!(
+                    "{at:#010x} to {end:#010x} is not within {:#010x} to {:#010x}, the flash for \
+                     images of {}",
+                    flash.start,
+                    flash.end,
+                    board.name()
+                ));
+            }
+            match pieces.last_mut() {
+                Some(last) if at < last.end() => {
+                    return Err(format!("two parts of it have the address {at:#010x}"));
+                }
+                Some(last) if at - last.end() <= GAP_BYTES => {
+                    last.bytes.resize((at - last.at) as usize, ERASED);
+                    last.bytes.extend_from_slice(data);
+                }
+                _ => pieces.push(Piece {
+                    at,
+                    bytes: data.to_vec(),
+                }),
+            }
+        }
+        Ok(Self {
+            tag,
+            board,
+            entry,
+            pieces,
+        })
+    }
+
+    /// All bytes from the first address to the last, holes as erased.
+    pub(crate) fn contents(&self) -> Vec<u8> {
+        let mut contents = Vec::new();
+        for piece in &self.pieces {
+            contents.resize((piece.at - self.pieces[0].at) as usize, ERASED);
+            contents.extend_from_slice(&piece.bytes);
+        }
+        contents
+    }
+}
+
+/// A piece that is to be loaded, with its address in the flash.
+type Segment<'a> = (u32, &'a [u8]);
+
+/// What is to be loaded, and the entry's address.
+fn segments(bytes: &[u8]) -> Result<(Vec<Segment<'_>>, u32), String> {
+    let no_elf = |e| format!("no ELF file of 32 bits: {e}");
+    let header = FileHeader32::<LittleEndian>::parse(bytes).map_err(no_elf)?;
+    let endian = header.endian().map_err(no_elf)?;
+    if header.e_machine(endian) != EM_ARM {
+        return Err("no ELF file for an Arm chip".to_owned());
+    }
+    let mut segments = Vec::new();
+    for segment in header.program_headers(endian, bytes).map_err(no_elf)? {
+        if segment.p_type(endian) == PT_LOAD && segment.p_filesz(endian) > 0 {
+            let data = segment.data(endian, bytes);
+            let data = data.map_err(|()| "the file is cut off".to_owned())?;
+            segments.push((segment.p_paddr(endian), data));
+        }
+    }
+    Ok((segments, header.e_entry(endian)))
+}

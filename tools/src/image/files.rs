@@ -1,0 +1,65 @@
+//! The files of an image: ELF for probes, HEX for other programs, BIN for those that know neither.
+//! The first two leave holes as they are, in which parameters may be stored; BIN has them as erased.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use ihex::{Record, create_object_file_representation};
+
+use super::Image;
+use crate::error::Error;
+
+/// Bytes of a line of HEX: as many as other programs write.
+const LINE_BYTES: usize = 16;
+
+/// Bytes that the 16 address bits of a HEX line reach.
+const PAGE_BYTES: u32 = 1 << 16;
+
+/// Writes `BOARD.elf`, `.bin` and `.hex` into a folder, which is made if need be, and gives their
+/// names.
+///
+/// # Errors
+/// [`Error::File`] for what cannot be written.
+pub(super) fn write(image: &Image, elf: &Path, folder: &Path) -> Result<[PathBuf; 3], Error> {
+    let failed = |path: &Path, reason: String| Error::File {
+        path: path.display().to_string(),
+        reason,
+    };
+    fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
+    let name = |extension| folder.join(image.board.name()).with_extension(extension);
+    let [elf_copy, bin, hex] = [name("elf"), name("bin"), name("hex")];
+
+    let original = fs::read(elf).map_err(|e| failed(elf, e.to_string()))?;
+    fs::write(&elf_copy, original).map_err(|e| failed(&elf_copy, e.to_string()))?;
+    fs::write(&bin, image.contents()).map_err(|e| failed(&bin, e.to_string()))?;
+    let text = intel_hex(image).map_err(|e| failed(&hex, e))?;
+    fs::write(&hex, text).map_err(|e| failed(&hex, e.to_string()))?;
+    Ok([elf_copy, bin, hex])
+}
+
+fn intel_hex(image: &Image) -> Result<String, String> {
+    let mut records = Vec::new();
+    let mut page = None;
+    for piece in &image.pieces {
+        let (mut at, mut rest) = (piece.at, piece.bytes.as_slice());
+        while !rest.is_empty() {
+            let upper = (at / PAGE_BYTES) as u16;
+            if page != Some(upper) {
+                page = Some(upper);
+                records.push(Record::ExtendedLinearAddress(upper));
+            }
+            let to_page_end = (PAGE_BYTES - at % PAGE_BYTES) as usize;
+            let (line, after) = rest.split_at(LINE_BYTES.min(to_page_end).min(rest.len()));
+            records.push(Record::Data {
+                offset: (at % PAGE_BYTES) as u16,
+                value: line.to_vec(),
+            });
+            at += line.len() as u32;
+            rest = after;
+        }
+    }
+    records.push(Record::StartLinearAddress(image.entry));
+    records.push(Record::EndOfFile);
+    let text = create_object_file_representation(&records).map_err(|e| e.to_string())?;
+    Ok(text + "\n")
+}

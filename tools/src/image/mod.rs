@@ -1,0 +1,53 @@
+//! `siskin image`: what goes onto a board, in the formats that flashing programs read.
+
+mod board;
+mod build;
+mod elf;
+mod files;
+mod tag;
+
+use std::io::Write;
+
+pub(crate) use board::Board;
+pub(crate) use elf::{Image, Piece};
+use tag::Tag;
+
+use crate::cli::ImageArgs;
+use crate::error::Error;
+
+/// Builds the image if it is asked for, writes the files, and prints what they are.
+///
+/// # Errors
+/// [`Error::Usage`] with nothing to make it from, [`Error::File`] for a file that is no image or
+/// cannot be written, [`Error::Missing`] and [`Error::Program`] if cargo cannot build it.
+pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
+    let elf = match (&args.elf, args.board) {
+        (Some(elf), _) => elf.clone(),
+        (None, Some(board)) => build::build(board)?,
+        (None, None) => return Err(Error::Usage("give an ELF file or --board".to_owned())),
+    };
+    let image = Image::read(&elf, args.board)?;
+    write!(out, "{}", image.description())?;
+    for file in files::write(&image, &elf, &args.output)? {
+        writeln!(out, "wrote    {}", file.display())?;
+    }
+    Ok(())
+}
+
+impl Image {
+    /// Board, version, build and size, a line each.
+    pub(crate) fn description(&self) -> String {
+        let Tag {
+            board,
+            version,
+            build,
+        } = &self.tag;
+        let size: usize = self.pieces.iter().map(|piece| piece.bytes.len()).sum();
+        let flash = self.board.flash().len();
+        format!(
+            "board    {board}\nversion  {version}\nbuild    {build}\n\
+             size     {size} of {flash} bytes, from {:#010x}\n",
+            self.pieces[0].at
+        )
+    }
+}

@@ -1,0 +1,143 @@
+//! What the flashing programs are asked for, and what follows from how they end.
+
+use std::fs;
+
+use crate::bench::Bench;
+use crate::elf::Elf;
+
+#[test]
+fn a_probe_is_told_chip_and_file_then_resets() {
+    for (board, chip) in [
+        ("b-g431b-esc1", "STM32G431CBUx"),
+        ("vesc4-f405", "STM32F405RGTx"),
+    ] {
+        let bench = Bench::with(&["probe-rs"]);
+        let image = bench.image(board);
+        let ended = bench.siskin(&["flash", &image, "--board", board]);
+        assert_eq!((ended.status, ended.err.as_str()), (0, ""));
+        assert!(
+            ended.out.contains("build    0123456789ab+"),
+            "{}",
+            ended.out
+        );
+        assert!(ended.out.contains("verified"), "{}", ended.out);
+        let download = format!("probe-rs download --chip {chip} --verify {image}");
+        assert_eq!(
+            bench.asked(),
+            [download, format!("probe-rs reset --chip {chip}")]
+        );
+    }
+}
+
+#[test]
+fn one_of_several_probes_can_be_chosen() {
+    let bench = Bench::with(&["probe-rs"]);
+    let image = bench.image("b-g431b-esc1");
+    let ended = bench.siskin(&["flash", &image, "--probe", "0483:374b:0012"]);
+    assert_eq!(ended.status, 0, "{}", ended.err);
+    let asked = bench.asked();
+    assert_eq!(asked.len(), 2);
+    for line in asked {
+        assert!(line.contains(" --probe 0483:374b:0012"), "{line}");
+    }
+}
+
+#[test]
+fn an_image_for_another_board_is_refused_and_nothing_is_written() {
+    let bench = Bench::with(&["probe-rs", "dfu-util"]);
+    let image = bench.image("vesc4-f405");
+    for arguments in [&[][..], &["--dfu"]] {
+        let wanted = ["flash", &image, "--board", "b-g431b-esc1"];
+        let ended = bench.siskin(&[&wanted, arguments].concat());
+        assert_eq!((ended.status, ended.out.as_str()), (2, ""));
+        let complaint = format!("siskin: {image}: made for vesc4-f405, not for b-g431b-esc1\n");
+        assert_eq!(ended.err, complaint);
+    }
+    assert_eq!(bench.asked(), [""; 0]);
+}
+
+#[test]
+fn over_usb_the_flash_is_read_back() {
+    let bench = Bench::with(&["dfu-util"]);
+    let image = bench.image("vesc4-f405");
+    let ended = bench.siskin(&["flash", &image, "--dfu"]);
+    assert_eq!((ended.status, ended.err.as_str()), (0, ""));
+    assert!(ended.out.contains("release BOOT0"), "{}", ended.out);
+    let written = fs::read(bench.path("flash")).expect("downloaded");
+    assert!(written == crate::flash(&Elf::of("vesc4-f405")));
+    let asked = bench.asked();
+    let loader = "dfu-util --device 0483:df11 --alt 0 --dfuse-address";
+    let download = format!("{loader} 0x08000000 --download ");
+    let upload = format!("{loader} 0x08000000:{} --upload ", written.len());
+    assert_eq!(asked.len(), 2, "{asked:?}");
+    assert!(asked[0].starts_with(&download), "{asked:?}");
+    assert!(asked[1].starts_with(&upload), "{asked:?}");
+}
+
+#[test]
+fn what_is_stored_in_a_hole_of_the_image_is_not_written_over() {
+    let bench = Bench::with(&["dfu-util"]);
+    let mut elf = Elf::of("vesc4-f405");
+    // The code moves behind the second and the third sector.
+    elf.segments[0].1 = 0x0800_C000;
+    let path = bench.path("holed.elf");
+    fs::write(&path, elf.bytes()).expect("written");
+    let ended = bench.siskin(&["flash", path.to_str().expect("UTF-8"), "--dfu"]);
+    assert_eq!((ended.status, ended.err.as_str()), (0, ""));
+    let downloads: Vec<String> = bench.asked();
+    let addresses = downloads.iter().filter_map(|line| {
+        let (before, _) = line.split_once(" --download")?;
+        before.rsplit(' ').next()
+    });
+    assert_eq!(addresses.collect::<Vec<_>>(), ["0x08000000", "0x0800c000"]);
+}
+
+#[test]
+fn a_flash_that_holds_something_else_is_told() {
+    let mut bench = Bench::with(&["dfu-util"]);
+    let image = bench.image("vesc4-f405");
+    bench.file("worn", [0xFF; 100]);
+    bench.variables.push(("FLASH", "worn".to_owned()));
+    let ended = bench.siskin(&["flash", &image, "--dfu"]);
+    assert_eq!(ended.status, 1);
+    assert!(ended.err.contains("does not hold"), "{}", ended.err);
+    assert!(!ended.out.contains("written"), "{}", ended.out);
+}
+
+#[test]
+fn a_board_without_usb_is_not_asked_over_usb() {
+    let bench = Bench::with(&["dfu-util"]);
+    let image = bench.image("b-g431b-esc1");
+    let ended = bench.siskin(&["flash", &image, "--dfu"]);
+    assert_eq!((ended.status, ended.out.as_str()), (2, ""));
+    assert_eq!(ended.err.lines().count(), 1, "{}", ended.err);
+    assert!(ended.err.contains("no USB"), "{}", ended.err);
+    assert_eq!(bench.asked(), [""; 0]);
+}
+
+#[test]
+fn a_program_that_fails_or_is_not_there_is_named() {
+    for (board, option, program, remedy) in [
+        ("b-g431b-esc1", None, "probe-rs", "https://probe.rs"),
+        ("vesc4-f405", Some("--dfu"), "dfu-util", "package dfu-util"),
+    ] {
+        let mut bench = Bench::with(&[program]);
+        let image = bench.image(board);
+        let arguments: Vec<&str> = ["flash", &image].into_iter().chain(option).collect();
+        bench.variables.push(("STATUS", "74".to_owned()));
+        let failed = bench.siskin(&arguments);
+        let complaint = format!("siskin: {program}: exit status: 74; see above\n");
+        assert_eq!((failed.status, failed.err), (1, complaint));
+        assert_eq!(bench.asked().len(), 1, "no further step");
+
+        let bench = Bench::with(&[]);
+        let image = bench.image(board);
+        let arguments: Vec<&str> = ["flash", &image].into_iter().chain(option).collect();
+        let missing = bench.siskin(&arguments);
+        assert_eq!(missing.status, 2);
+        assert_eq!(missing.err.lines().count(), 1, "{}", missing.err);
+        let complaint = format!("siskin: {program} is not installed: install");
+        assert!(missing.err.starts_with(&complaint), "{}", missing.err);
+        assert!(missing.err.contains(remedy), "{}", missing.err);
+    }
+}
