@@ -18,25 +18,13 @@ const BRIDGE: usize = 0;
 const SIGNAL: usize = 6;
 const HALL: usize = 7;
 const PHASE: usize = 10;
-const FAULT: usize = PHASE + PHASES.len();
-
-const PHASES: [Phase; 9] = [
-    Phase::Idle,
-    Phase::Sense,
-    Phase::Charge,
-    Phase::Park,
-    Phase::Ramp,
-    Phase::Run,
-    Phase::Stopping,
-    Phase::Brake,
-    Phase::Tone,
-];
+const FAULT: usize = PHASE + Phase::ALL.len();
 
 /// The scopes with their wires, in the order of their places. Each phase and each fault has a wire:
 /// older PulseViews leave out what has several bits, and none shows text.
 fn wires() -> [(&'static str, Vec<String>); 5] {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
-    let phases = PHASES.map(|phase| format!("{phase:?}").to_lowercase());
+    let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
     let faults = Fault::ALL.map(|fault| fault.text().replace([' ', '-'], "_"));
     let bridge = ["a_high", "a_low", "b_high", "b_low", "c_high", "c_low"];
     [
@@ -144,7 +132,7 @@ impl Sink for Vcd {
             let level = period.sample.hall >> phase & 1 != 0;
             change(start_ns, HALL + phase, level);
         }
-        for (place, phase) in PHASES.into_iter().enumerate() {
+        for (place, phase) in Phase::ALL.into_iter().enumerate() {
             change(start_ns, PHASE + place, snapshot.phase == phase);
         }
         for (place, fault) in Fault::ALL.into_iter().enumerate() {

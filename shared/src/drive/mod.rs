@@ -2,6 +2,7 @@
 
 mod config;
 mod launch;
+mod phase;
 mod rest;
 pub mod six_step;
 mod slow;
@@ -12,7 +13,8 @@ mod turn;
 
 pub use crate::protection::{Fault, Faults};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop};
-pub use state::{Phase, Snapshot, State};
+pub use phase::Phase;
+pub use state::{Snapshot, State};
 pub use step::step;
 
 use fixed::types::I1F31;

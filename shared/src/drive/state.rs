@@ -1,6 +1,6 @@
 //! What a control period remembers, and what of it the tasks may know.
 
-use super::{Config, Fault, Faults, six_step, tone};
+use super::{Config, Fault, Faults, Phase, six_step, tone};
 use crate::control::catch::Rotor;
 use crate::control::inductance::Factor;
 use crate::control::modulator::Supply;
@@ -13,43 +13,6 @@ use crate::control::{
 use crate::math::{SinCos, sin_cos};
 use crate::protection;
 use crate::units::{Angle, Current, Duty, Flux, Speed, Voltage};
-
-/// What the drive is doing (start-up of the second paper, section 3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Phase {
-    /// No drive; the bridge is off.
-    Idle,
-    /// The bridge is off while the currents' zeros are measured and the rotor is looked for.
-    Sense,
-    /// The low sides charge the supplies of the high sides' drivers.
-    Charge,
-    /// The rotor is being aligned.
-    Park,
-    /// The current's vector turns faster and faster and the rotor follows.
-    Ramp,
-    /// The observer knows the rotor's position: field-oriented control.
-    Run,
-    /// The shaft coasts without torque or is slowed down to be stopped.
-    Stopping,
-    /// All low sides are on.
-    Brake,
-    /// The phases switch to be heard; the rotor stands.
-    Tone,
-}
-
-impl Phase {
-    /// Whether the control's frame is imposed on the rotor.
-    #[inline(always)]
-    pub(super) fn is_open_loop(self) -> bool {
-        matches!(self, Self::Park | Self::Ramp)
-    }
-
-    /// Whether the motor is turned, or slowed down.
-    pub fn drives(self) -> bool {
-        matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)
-    }
-}
 
 /// The sample at which the bridge is turned off, and one for a period of delay.
 const SETTLING_PERIODS: u8 = 2;

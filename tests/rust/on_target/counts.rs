@@ -6,18 +6,6 @@ use siskin_control::drive::Phase;
 
 use crate::record::Label;
 
-const PHASES: [Phase; 9] = [
-    Phase::Idle,
-    Phase::Sense,
-    Phase::Charge,
-    Phase::Park,
-    Phase::Ramp,
-    Phase::Run,
-    Phase::Stopping,
-    Phase::Brake,
-    Phase::Tone,
-];
-
 /// The least, the median and the most of some counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spread {
@@ -65,7 +53,7 @@ impl Counts {
         Self {
             all: spread(&|_| true).expect("a run has periods"),
             latched: spread(&|label| label.latched),
-            phases: PHASES
+            phases: Phase::ALL
                 .into_iter()
                 .filter_map(|phase| Some((phase, of_phase(phase)?)))
                 .collect(),

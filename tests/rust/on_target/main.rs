@@ -96,17 +96,7 @@ fn replay(name: &str, changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Counts
 #[test]
 fn the_default_drive_has_the_same_bits_and_a_short_period() {
     let counts = replay("default", &[], &FLIGHT);
-    for phase in [
-        Phase::Idle,
-        Phase::Sense,
-        Phase::Charge,
-        Phase::Park,
-        Phase::Ramp,
-        Phase::Run,
-        Phase::Stopping,
-        Phase::Brake,
-        Phase::Tone,
-    ] {
+    for phase in Phase::ALL {
         assert!(counts.has(phase), "the run is without {phase:?}");
     }
     assert!(counts.has_faults(), "the run is without a fault");
