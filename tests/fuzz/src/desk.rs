@@ -209,7 +209,11 @@ impl Judge {
         self.last_ns = now_ns;
         // The ESC counts in whole microseconds.
         let held_ns = now_ns - self.since_ns + 1000;
-        self.has_armed |= self.zeros >= self.least && held_ns >= ARM_NS;
+        if self.zeros >= self.least && held_ns >= ARM_NS {
+            self.has_armed = true;
+            // Armed anew since the silence, which then says nothing any more.
+            self.has_lapsed = false;
+        }
     }
 
     /// Begins to count anew after too long a silence.
@@ -235,6 +239,7 @@ impl Judge {
 mod tests {
     use super::*;
     use siskin_control::input::dshot::{Frame, Rate, edges};
+    use siskin_control::input::signal::Pulse;
 
     /// Whether it turns after this many frames of no throttle and some of half, 1 ms apart, and
     /// whether it may.
@@ -259,6 +264,43 @@ mod tests {
         }
         let turns = matches!(desk.throttle.setpoint(), Setpoint::Speed(_));
         (turns, desk.judge.may_turn())
+    }
+
+    /// A wire of servo pulses of zero throttle.
+    fn pulsed() -> Desk {
+        Desk::new(Some(Signal::Pulse(Pulse::Servo)), 0)
+    }
+
+    /// Half a second of pulses of no throttle at 50 Hz. The tasks do not run.
+    fn half_a_second(desk: &mut Desk) {
+        for _ in 0..25 {
+            desk.edge(19_000_000, true);
+            desk.edge(1_000_000, false);
+        }
+    }
+
+    #[test]
+    fn between_two_looks_of_the_tasks_a_wire_may_lapse_and_be_armed_anew() {
+        let mut desk = pulsed();
+        half_a_second(&mut desk);
+        desk.settle(2_000_000);
+        assert!(desk.esc.telemetry().armed);
+        desk.edge(200_000_000, true);
+        desk.edge(1_000_000, false);
+        half_a_second(&mut desk);
+        desk.settle(2_000_000);
+        assert!(desk.esc.telemetry().armed && desk.judge.may_turn());
+    }
+
+    #[test]
+    fn what_lapsed_and_was_not_armed_anew_may_not_turn() {
+        let mut desk = pulsed();
+        half_a_second(&mut desk);
+        desk.settle(2_000_000);
+        desk.edge(200_000_000, true);
+        desk.edge(1_000_000, false);
+        desk.settle(2_000_000);
+        assert!(!desk.esc.telemetry().armed && !desk.judge.may_turn());
     }
 
     #[test]
