@@ -29,10 +29,10 @@ pub fn wide(u: Voltage) -> WideVoltage {
     WideVoltage::from_bits(u.to_bits() >> 4)
 }
 
-/// The voltage, held at the ends of its type.
+/// The voltage, held at the ends of its type but for the bits that the wide one has not.
 #[inline(always)]
 pub fn narrow(u: WideVoltage) -> Voltage {
-    Voltage::saturating_from_num(u)
+    Voltage::from_bits(u.to_bits().clamp(i32::MIN >> 4, i32::MAX >> 4) << 4)
 }
 
 /// A torque in units of [`Scale::torque_nm`].
@@ -91,6 +91,7 @@ impl Scale {
     }
 
     /// The control's speed for mechanical rpm; held below half a turn a period.
+    #[inline(never)]
     pub fn speed_from_rpm(&self, rpm: f32) -> Speed {
         Speed::from_f32(rpm * self.turns_per_rpm())
     }
@@ -101,6 +102,7 @@ impl Scale {
     }
 
     /// The control's current for amperes, held at the type's ends.
+    #[inline(never)]
     pub fn current_from_a(&self, current_a: f32) -> Current {
         Current::from_f32(current_a / self.current_a)
     }

@@ -10,17 +10,11 @@ use siskin_control::drive::{Config, Setpoint, Snapshot};
 use super::latest::{self, Latest};
 use super::swap::{self, Swap};
 use super::word;
-use crate::board::TIMER_HZ;
-use crate::interrupt::timing::Timing;
 
 static OPENED: AtomicBool = AtomicBool::new(false);
 static SETPOINT: AtomicU32 = AtomicU32::new(0);
 static SNAPSHOT: Latest<Snapshot> = Latest::new();
 static CONFIG: Swap<Config> = Swap::new();
-
-/// What the timer makes of the configuration that was offered last, which takes floating point. It
-/// is written before the offer, and the next offer waits until it has been read.
-static TIMING: AtomicU32 = AtomicU32::new(0);
 
 /// The ends of the exchange.
 pub struct Ends {
@@ -120,13 +114,10 @@ impl RunningEnd {
     }
 
     /// Changes over to the configuration that is offered, if one is, after `change` has seen the one
-    /// before, the new one and its timing.
+    /// before and the new one.
     #[inline(always)]
-    pub(crate) fn adopt(&mut self, change: impl FnOnce(&Config, &Config, Timing)) {
-        CONFIG.adopt(&mut self.config, |before, now| {
-            let timing = Timing::from_bits(TIMING.load(Ordering::Relaxed));
-            change(before, now, timing);
-        });
+    pub(crate) fn adopt(&mut self, change: impl FnOnce(&Config, &Config)) {
+        CONFIG.adopt(&mut self.config, change);
     }
 
     /// Works with the configuration in use.
@@ -187,8 +178,6 @@ impl ConfigWriter {
         match CONFIG.free(&mut self.hand) {
             None => Err(config),
             Some(free) => {
-                let timing = Timing::new(&config, TIMER_HZ);
-                TIMING.store(timing.to_bits(), Ordering::Relaxed);
                 free.offer(config);
                 Ok(())
             }

@@ -143,21 +143,15 @@ impl Interrupt {
     /// Changes over to a new configuration, if one is offered.
     #[inline(always)]
     fn adopt(&mut self) {
-        let Self {
-            pwm, state, end, ..
-        } = self;
-        end.adopt(|before, now, timing| adopt(pwm, state, (before, now), timing));
+        let Self { state, end, .. } = self;
+        end.adopt(|before, now| adopt(state, before, now));
     }
 }
 
-/// Another frequency has another scale, under which the drive begins anew with the bridge off.
 #[cold]
 #[inline(never)]
-fn adopt(pwm: &mut Pwm, state: &mut State, (before, now): (&Config, &Config), timing: Timing) {
+fn adopt(state: &mut State, before: &Config, now: &Config) {
     state.adopt(before, now);
-    if pwm.timing() != timing {
-        pwm.retime(timing);
-    }
 }
 
 /// Counts one more, and says how many it was before. There is one writer: this need not be one

@@ -31,7 +31,8 @@ use crate::board::{PHASES, SAMPLING_CLOCKS};
 /// The running PWM.
 pub(crate) struct Pwm {
     timer: TimAdv,
-    timing: Timing,
+    /// The counter's top.
+    top: u16,
     /// What the last [`apply`](Self::apply) has written.
     low_sides: LowSides,
     /// What follows, in the next commutation, on all switches off.
@@ -59,14 +60,16 @@ impl Pwm {
             w.set_bkp(0, Bkp::ACTIVE_HIGH);
             w.set_bkf(0, FilterValue::FDTS_DIV16_N6);
             w.set_bke(0, crate::board::BREAKS);
+            w.set_dtg(timing.dead_time);
         });
+        timer.arr().write(|w| w.set_arr(timing.top));
+        (timer.ccr(3)).write(|w| w.set_ccr(timing.top - SAMPLING_CLOCKS / 2));
         let mut pwm = Self {
             timer,
-            timing,
+            top: timing.top,
             low_sides: LowSides::None,
             deferred: None,
         };
-        pwm.retime(timing);
         pwm.set_modes([Leg::Off; 3]);
         // From here on modes and enable bits wait for a commutation, those of channel 4 too.
         timer.cr2().modify(|w| w.set_ccpc(true));
@@ -93,24 +96,6 @@ impl Pwm {
             timer.cr1().read().dir() == Dir::DOWN,
             "after the update at the top the counter goes down"
         );
-    }
-
-    /// Takes another frequency and dead time from the next top on. For a bridge that is off: the
-    /// compare values are of the old top until they are written again.
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn retime(&mut self, timing: Timing) {
-        self.timing = timing;
-        self.timer.arr().write(|w| w.set_arr(timing.top));
-        self.timer
-            .ccr(3)
-            .write(|w| w.set_ccr(timing.top - SAMPLING_CLOCKS / 2));
-        self.timer.bdtr().modify(|w| w.set_dtg(timing.dead_time));
-    }
-
-    /// What it was set to last.
-    pub(crate) fn timing(&self) -> Timing {
-        self.timing
     }
 
     /// Lets the phases do what the last [`apply`](Self::apply) wanted.
@@ -154,15 +139,20 @@ impl Pwm {
         match (bridge, self.low_sides) {
             (Bridge::Duty(duties), LowSides::Switching) => {
                 let [a, b, c] = duties;
-                let top = self.timing.top;
+                let top = self.top;
                 // The main output is on since the period before, or a break has turned it off.
                 self.set_compares([compare(a, top), compare(b, top), compare(c, top)]);
+            }
+            (Bridge::Brake, LowSides::Switching) => self.set_compares([0; 3]),
+            (Bridge::Off, LowSides::None) => turn_off(self.timer),
+            (Bridge::Charge(share), LowSides::Alone) => {
+                self.set_compares([Leg::Low(share).compare(self.top); 3]);
             }
             _ => self.change(bridge),
         }
     }
 
-    /// Every bridge but that of a motor that is driven from period to period.
+    /// Every bridge that differs from the one before in more than its duties.
     #[cold]
     #[inline(never)]
     fn change(&mut self, bridge: Bridge) {
@@ -177,7 +167,7 @@ impl Pwm {
             Bridge::Legs([a, b, c]) => (LowSides::Some, [open_or(a), open_or(b), open_or(c)]),
         };
         let [a, b, c] = legs;
-        let top = self.timing.top;
+        let top = self.top;
         self.set_compares([a.compare(top), b.compare(top), c.compare(top)]);
         let with_high_sides = |low: LowSides| matches!(low, LowSides::Switching | LowSides::Some);
         let (present, modes) = match (self.low_sides, wanted) {

@@ -27,21 +27,6 @@ impl Timing {
     }
 }
 
-impl Timing {
-    /// Both in a word.
-    pub(crate) fn to_bits(self) -> u32 {
-        u32::from(self.top) << 8 | u32::from(self.dead_time)
-    }
-
-    /// What [`to_bits`](Self::to_bits) has put into a word.
-    pub(crate) fn from_bits(bits: u32) -> Self {
-        Self {
-            top: (bits >> 8) as u16,
-            dead_time: bits as u8,
-        }
-    }
-}
-
 /// The compare value of a duty: top·duty. A duty has 31 fraction bits, so with twice the top the
 /// product's upper half is the result. A duty above 1, which the control does not give, is all of the
 /// period too.
@@ -112,15 +97,6 @@ mod tests {
         assert_eq!(compare(Duty::from_num(1.0), 3542), 3542);
         // It fits the register for the longest period, so that it is not taken for a small one.
         assert!((10625..1 << 16).contains(&compare(Duty::MAX, 10625)));
-    }
-
-    #[test]
-    fn a_word_holds_it() {
-        let timing = Timing {
-            top: 0xfedc,
-            dead_time: 0x98,
-        };
-        assert_eq!(Timing::from_bits(timing.to_bits()), timing);
     }
 
     #[test]

@@ -98,7 +98,7 @@ impl Desk {
             return;
         };
         let now = Instant::now();
-        if let Some(warning) = self.teller.next(now.as_millis()) {
+        if let Some(warning) = self.teller.next(now.as_micros()) {
             self.esc.warn(warning);
         }
         self.health.look(now);

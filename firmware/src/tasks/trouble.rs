@@ -7,7 +7,7 @@ use siskin_control::mavlink::Warning;
 use crate::text::{push, push_decimal};
 
 /// Time between two texts, so that they do not fill the link.
-const APART_MS: u64 = 5000;
+const APART_US: u64 = 5_000_000;
 
 /// Counts of what has gone wrong since the start.
 pub(crate) struct Trouble {
@@ -36,7 +36,7 @@ impl Trouble {
 /// Tells a person of new trouble, now and then.
 pub(crate) struct Teller {
     told: [u32; 2],
-    told_ms: u64,
+    told_us: u64,
 }
 
 impl Teller {
@@ -44,19 +44,19 @@ impl Teller {
     pub(crate) const fn new() -> Self {
         Self {
             told: [0; 2],
-            told_ms: 0,
+            told_us: 0,
         }
     }
 
     /// What is to be told now.
-    pub(crate) fn next(&mut self, now_ms: u64) -> Option<Warning> {
+    pub(crate) fn next(&mut self, now_us: u64) -> Option<Warning> {
         let counts =
             [&TROUBLE.lost_edges, &TROUBLE.late_replies].map(|count| count.load(Ordering::Relaxed));
-        if counts == self.told || now_ms - self.told_ms < APART_MS {
+        if counts == self.told || now_us - self.told_us < APART_US {
             return None;
         }
         self.told = counts;
-        self.told_ms = now_ms;
+        self.told_us = now_us;
         let mut text = Warning::new();
         let [lost, late] = counts;
         // 47 letters at the most: it fits.

@@ -30,7 +30,7 @@ mod learn;
 
 use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
 
-use crate::math::{TopProduct, atan2_turns, sin_cos};
+use crate::math::{SinCos, TopProduct, atan2_turns};
 use crate::units::{AdcCounts, Angle, Speed};
 use compare::Difference;
 
@@ -340,7 +340,7 @@ fn vector(config: &Config, [a, b, c]: [I17F15; 3]) -> Option<(Angle, AdcCounts)>
         I4F28::from_bits(beta.to_bits() << 1),
         I4F28::from_bits(alpha.to_bits()),
     );
-    let along = sin_cos(theta);
+    let along = SinCos::of(theta);
     let length = alpha.top(along.cos) + (beta + beta).top(along.sin);
     let third = length.top(THIRD);
     // Of 14 fraction bits; two thirds of 16.

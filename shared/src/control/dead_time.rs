@@ -107,7 +107,8 @@ mod tests {
                     let angle = f64::from(degrees) / 360.0 - phase as f64 / 3.0;
                     let current = length * (TAU * angle).cos();
                     let wanted = 0.0075 * (current / 0.3).clamp(-1.0, 1.0);
-                    assert!((made - wanted).abs() < 1e-6, "{made} for {wanted}");
+                    // Each of two sines is up to 8e-5 short.
+                    assert!((made - wanted).abs() < 1.3e-6, "{made} for {wanted}");
                 }
             }
         }

@@ -8,7 +8,7 @@ use fixed::FixedI32;
 use fixed::types::extra::{U28, U30, Unsigned};
 use fixed::types::{I0F32, I2F30};
 
-use crate::math::{Gain, Multiplier};
+use crate::math::{Gain, Multiplier, divide};
 use crate::units::{Current, Flux};
 
 /// L over the inductance that the parameters state, within 0.5 to 1.7.
@@ -40,7 +40,7 @@ impl Factor {
     /// The product with `x`, held at the ends of its type.
     #[inline(always)]
     pub fn of<A: Unsigned>(self, x: FixedI32<A>) -> FixedI32<A> {
-        Gain::from_parts(self.0.to_bits(), 4).saturating_apply(x)
+        Gain::from_parts(self.0.to_bits(), 2).saturating_apply(x)
     }
 }
 
@@ -174,8 +174,10 @@ fn edge(config: &Config, state: &mut State) {
     let moved =
         (config.amplitude.to_bits() >> SUM_SHIFT).saturating_mul(config.mean_periods as i32);
     if state.compares && di_d.unsigned_abs() > moved.unsigned_abs() {
-        let slope = (i64::from(dflux) << Flux::FRAC_NBITS) / i64::from(di_d);
-        let slope = Flux::from_bits(slope.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32);
+        let flux = u64::from(dflux.unsigned_abs()) << Flux::FRAC_NBITS;
+        let slope = divide(flux, di_d.unsigned_abs()).min(i32::MAX as u64) as i32;
+        let falls = dflux.is_negative() != di_d.is_negative();
+        let slope = Flux::from_bits(if falls { -slope } else { slope });
         let step = config.gain.saturating_apply(slope);
         let step = step.min(STEP_MAX).max(-STEP_MAX);
         state.factor = Factor::new(state.factor.get() + step);

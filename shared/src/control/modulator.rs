@@ -7,7 +7,7 @@ use fixed::types::{I0F32, I1F31, I4F28, I6F26, I8F24, I16F16};
 
 use super::dead_time;
 use super::transform::{AlphaBeta, Dq, Order, phases_in};
-use crate::math::{Held, Multiplier, Real, TopProduct, TopSum, other_leg};
+use crate::math::{Held, Multiplier, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use crate::units::{Duty, Voltage, WideVoltage, wide};
 
 /// How the phases' common voltage is chosen.
@@ -37,10 +37,9 @@ impl Config {
     /// The modulator of this kind with a greatest duty. Phases can be read up to the duty `window`,
     /// all of them in a vector that is not too long for it.
     pub fn new(modulation: Modulation, duty_max: f32, window: f32) -> Self {
-        let root_3 = libm::sqrtf(3.0);
         let (longest, readable, centred) = match modulation {
             // The highest phase has half the greatest duty, and √3/2 of the vector at most.
-            Modulation::SpaceVector => (1.0 / root_3, (2.0 * window - duty_max) / root_3, -1),
+            Modulation::SpaceVector => (1.0 / SQRT_3, (2.0 * window - duty_max) / SQRT_3, -1),
             Modulation::Sine => (0.5, window - 0.5 * duty_max, 0),
         };
         Self {
@@ -49,6 +48,13 @@ impl Config {
             vector_max: I1F31::from_f32(longest * duty_max),
             readable: I1F31::from_f32(readable),
         }
+    }
+
+    /// The duty of a phase.
+    #[inline(always)]
+    fn duty(&self, common: I1F31, share: Share) -> Duty {
+        let duty = common.wrapping_add(whole(share)).max(I1F31::ZERO);
+        Duty::from_bits(duty.min(self.duty_max).to_bits() as u32)
     }
 }
 
@@ -79,6 +85,15 @@ pub struct Longest {
 }
 
 impl Longest {
+    /// None at all.
+    const NONE: Self = Self {
+        length: Voltage::ZERO,
+        square: I16F16::ZERO,
+        d_square: I8F24::ZERO,
+        q: WideVoltage::ZERO,
+        slope: Multiplier::from_bits(0),
+    };
+
     /// Of this length, where the part along d will be near this one.
     pub fn new(length: Voltage, d: Voltage) -> Self {
         let d = d.min(length).max(-length);
@@ -111,6 +126,20 @@ impl Longest {
 impl Supply {
     /// The supply of this voltage, while the part along d of what is commanded is near this one.
     pub fn new(config: &Config, bus: Voltage, d: Voltage) -> Self {
+        let mut supply = Self {
+            bus,
+            reciprocal: I4F28::ZERO,
+            longest: Longest::NONE,
+            readable: I16F16::ZERO,
+        };
+        supply.follow(bus);
+        supply.reach(config, d);
+        supply
+    }
+
+    /// Takes another voltage; [`reach`](Self::reach) takes what it is enough for.
+    #[inline(never)]
+    pub fn follow(&mut self, bus: Voltage) {
         // 2^56/bus of the voltage's upper bits, right to 2^-11 at the worst, and one Newton step. The
         // floor of 1/8 bounds the reciprocal.
         let bits = bus.to_bits().max(1 << 25);
@@ -118,18 +147,21 @@ impl Supply {
         let rough = I4F28::from_bits(rough as i32);
         let product = i64::from(bits) * i64::from(rough.to_bits());
         let error = I0F32::from_bits((((1 << 56) - product) >> 24) as i32);
-        let length = Voltage::from_bits(config.vector_max.top(bus).to_bits() << 1);
-        Self {
-            bus,
-            reciprocal: rough.plus(rough.top(error)),
-            longest: Longest::new(length, d),
-            readable: if config.readable.is_negative() {
-                -I16F16::DELTA
-            } else {
-                let length = config.readable.top(wide(bus)).to_bits() << 1;
-                square(WideVoltage::from_bits(length))
-            },
-        }
+        self.bus = bus;
+        self.reciprocal = rough.plus(rough.top(error));
+    }
+
+    /// Takes the lengths that a vector can have, while its part along d is near this one.
+    #[inline(never)]
+    pub fn reach(&mut self, config: &Config, d: Voltage) {
+        let length = Voltage::from_bits(config.vector_max.top(self.bus).to_bits() << 1);
+        self.longest = Longest::new(length, d);
+        self.readable = if config.readable.is_negative() {
+            -I16F16::DELTA
+        } else {
+            let length = config.readable.top(wide(self.bus)).to_bits() << 1;
+            square(WideVoltage::from_bits(length))
+        };
     }
 }
 
@@ -204,13 +236,12 @@ pub fn duties(
     let half: I1F31 = whole(middle) >> 1;
     let common: I1F31 = (config.duty_max >> 1) + (half & config.centred);
     let [ca, cb, cc] = phases_in(order, certainty);
-    // Not by `map`, which the compiler makes a loop of where size counts.
-    let duty = |share, certainty| {
-        let share = dead_time.compensated(share, certainty);
-        let duty = common.wrapping_add(whole(share)).max(I1F31::ZERO);
-        Duty::from_bits(duty.min(config.duty_max).to_bits() as u32)
-    };
-    [duty(a, ca), duty(b, cb), duty(c, cc)]
+    // Not by `map` or a closure: where size counts they become a loop or calls.
+    [
+        config.duty(common, dead_time.compensated(a, ca)),
+        config.duty(common, dead_time.compensated(b, cb)),
+        config.duty(common, dead_time.compensated(c, cc)),
+    ]
 }
 
 /// A share of the supply.

@@ -78,17 +78,25 @@ impl State {
     }
 }
 
-/// Takes one reading into the offsets. The bridge must have been off for long enough that no
-/// current flows; a rotor may turn as long as its back-EMF is below the supply.
+/// Takes one reading into the offsets, or, in the period after the last one, judges them. The bridge
+/// must have been off for long enough that no current flows; a rotor may turn as long as its back-EMF
+/// is below the supply.
 pub fn zero(config: &Config, state: &mut State, raw: [AdcCounts; 3]) -> Zeroing {
-    for (partial, reading) in state.partial.iter_mut().zip(raw) {
-        // What the shift drops is below 2^-16 counts a reading.
-        *partial += reading >> config.zero_readings_log2;
-    }
-    state.readings += 1;
     if state.readings < 1 << config.zero_readings_log2 {
-        return Zeroing::Measuring;
+        for (partial, reading) in state.partial.iter_mut().zip(raw) {
+            // What the shift drops is below 2^-16 counts a reading.
+            *partial += reading >> config.zero_readings_log2;
+        }
+        state.readings += 1;
+        Zeroing::Measuring
+    } else {
+        judge(config, state)
     }
+}
+
+/// What has been measured, if the sensors are sound.
+#[cold]
+fn judge(config: &Config, state: &mut State) -> Zeroing {
     let mut measured = state.partial;
     if config.shunts == Shunts::Two {
         // Nothing stands behind the third reading.
@@ -169,11 +177,11 @@ mod tests {
     fn offsets_are_the_mean_of_the_readings() {
         let config = config(Shunts::Three);
         let mut state = State::default();
-        for n in 0..128 {
+        for n in 0..=128 {
             let swing = if n % 2 == 0 { 5.0 } else { -5.0 };
             let raw = counts([30.0 + swing, -17.5 - swing, 3.25]);
             let found = zero(&config, &mut state, raw);
-            assert_eq!(found == Zeroing::Done, n == 127);
+            assert_eq!(found == Zeroing::Done, n == 128);
         }
         let wanted = [30.0, -17.5, 3.25];
         for (offset, wanted) in state.offsets.iter().zip(wanted) {
@@ -206,7 +214,7 @@ mod tests {
         let config = config(Shunts::Three);
         let mut state = State::default();
         let mut last = Zeroing::Measuring;
-        for _ in 0..128 {
+        for _ in 0..=128 {
             assert_eq!(last, Zeroing::Measuring);
             last = zero(&config, &mut state, counts([0.0, -201.0, 0.0]));
         }

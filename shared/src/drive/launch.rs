@@ -6,10 +6,10 @@ use super::turn::hall;
 use super::{ATTEMPTS, Config, Direction, Fault, Phase, Sample, Setpoint, State, tone};
 use crate::control::catch::Rotor;
 use crate::control::regulator::Reference;
-use crate::control::start::{self, Park};
+use crate::control::start;
 use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, rotate_frame, turn, voltages};
 use crate::control::{PERIODS, observer};
-use crate::math::sin_cos;
+use crate::math::SinCos;
 use crate::units::{Angle, Current, Speed, Voltage};
 
 /// Which way a set-point wants the motor to turn, against the configured direction.
@@ -58,7 +58,7 @@ pub(super) fn wish(config: &Config, setpoint: Setpoint) -> Wish {
 pub(super) fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
     let wish = wish(config, setpoint);
     let present = Wish::present(state);
-    if state.phase == Phase::Run && wish == present {
+    if matches!(state.phase, Phase::Run | Phase::Park | Phase::Ramp) && wish == present {
         return;
     }
     if tone::follow(config, state, setpoint) {
@@ -85,7 +85,7 @@ pub(super) fn follow(config: &Config, state: &mut State, setpoint: Setpoint) {
 }
 
 /// Periods behind Charge in which a drive is made ready, a piece in each.
-pub(super) const READY_PERIODS: u32 = 7;
+pub(super) const READY_PERIODS: u32 = 10;
 
 /// Piece `n`, from 1, of what makes a drive ready: the rotor is caught where it turns, started where
 /// its sensors show it, or parked, from the period after the last piece on.
@@ -100,14 +100,18 @@ pub(super) fn begin(
     // Until the first period that drives.
     let periods = READY_PERIODS as i32 + 1 - n as i32;
     match (n, caught) {
-        (1..=3, _) => slow::begin(config, state, n),
-        (4, Some((theta, omega))) => {
+        (1..=5, _) => slow::begin(config, state, n),
+        (6, Some((theta, omega))) => {
             let theta = theta.wrapping_add(omega.wrapping_mul_int(periods));
             let rest = AlphaBeta::default();
             observer::begin(&config.observer, &mut state.observer, (theta, omega), rest);
         }
-        (5, Some((_, omega))) => regulate(config, state, omega),
-        (6, Some((theta, omega))) => {
+        (7, Some(_)) => {
+            let factor = state.inductance.factor;
+            observer::pace(&config.observer, &mut state.observer, factor, CYCLE);
+        }
+        (8, Some((_, omega))) => regulate(config, state, omega),
+        (9, Some((theta, omega))) => {
             let theta = theta.wrapping_add(omega.wrapping_mul_int(periods));
             state.commanded = commanded(config, theta, omega);
         }
@@ -202,9 +206,9 @@ fn regulate(config: &Config, state: &mut State, omega: Speed) {
 /// rotor that is at `theta` at the first period's sample.
 fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
     let to_middle = config.delay.advance(omega).wrapping_sub(omega);
-    let frame = sin_cos(theta);
+    let frame = SinCos::of(theta);
     let emf = emf(omega);
-    let at = |middle: Angle| voltages(inverse_park(turn(emf, sin_cos(middle)), frame));
+    let at = |middle: Angle| voltages(inverse_park(turn(emf, SinCos::of(middle)), frame));
     [at(to_middle), at(to_middle.wrapping_sub(omega))]
 }
 
@@ -230,34 +234,41 @@ pub(super) fn end(config: &Config, state: &mut State) {
 const DAMP_PERIODS: u32 = 2;
 
 /// Park and Ramp: what of the imposed frame has its turn in this period.
-pub(super) fn impose(config: &Config, state: &mut State, setpoint: Setpoint) {
+#[inline(always)]
+pub(super) fn impose(config: &Config, state: &mut State, setpoint: &Setpoint) {
     if !state.turn.is_multiple_of(DAMP_PERIODS as u8) {
-        let felt = (state.seen.i, state.seen.u);
-        start::damp(attempt(config, state), &mut state.start, felt, DAMP_PERIODS);
+        damp(config, state);
     } else if state.turn.is_multiple_of(PERIODS as u8) {
         current(config, state, setpoint);
     }
 }
 
+/// The rotor's swing; once, at the end of Park, where the rotor is.
+#[inline(never)]
+fn damp(config: &Config, state: &mut State) {
+    let attempt = attempt(config, state);
+    let first = state.turn % PERIODS as u8 == 1;
+    if first && state.phase == Phase::Park && start::aligned(attempt, &state.start) {
+        expect(config, state);
+    } else {
+        let felt = (state.seen.i, state.seen.u);
+        start::damp(attempt, &mut state.start, felt, DAMP_PERIODS);
+    }
+}
+
 /// The current, and what it makes of the frame's speed.
 #[inline(never)]
-fn current(config: &Config, state: &mut State, setpoint: Setpoint) {
+fn current(config: &Config, state: &mut State, setpoint: &Setpoint) {
     let attempt = attempt(config, state);
     let mut i_q = attempt.current.min(state.protection.bounds.max);
     if matches!(setpoint, Setpoint::Test(_)) {
         i_q = i_q.min(config.test_current);
     }
     state.wanted = Reference::steady(i_q);
-    if state.phase == Phase::Park {
-        match start::park(attempt, &mut state.start, i_q, PERIODS) {
-            Park::Aligning => {}
-            // Not in Ramp's first period, which would be long.
-            Park::Aligned => expect(config, state),
-            Park::Over => state.phase = Phase::Ramp,
-        }
-    }
     if state.phase == Phase::Ramp {
         start::ramp(attempt, &mut state.start, i_q);
+    } else if start::park(attempt, &mut state.start, i_q, PERIODS) {
+        state.phase = Phase::Ramp;
     }
     state.seen.phase = state.phase;
 }
@@ -266,7 +277,7 @@ fn current(config: &Config, state: &mut State, setpoint: Setpoint) {
 fn expect(config: &Config, state: &mut State) {
     let frame = state.start.frame;
     let rotor = frame.wrapping_add(Angle::from_bits(1 << 30));
-    let Dq { d: alpha, q: beta } = rotate_frame(state.seen.i, sin_cos(frame.wrapping_neg()));
+    let Dq { d: alpha, q: beta } = rotate_frame(state.seen.i, SinCos::of(frame.wrapping_neg()));
     let i = AlphaBeta { alpha, beta };
     observer::expect(&config.observer, &mut state.observer, rotor, i);
 }
@@ -342,7 +353,7 @@ fn hand_over(config: &Config, state: &mut State) -> Option<Fault> {
     let Some(lead) = lead else {
         return failed(state);
     };
-    let ahead = sin_cos(lead);
+    let ahead = SinCos::of(lead);
     // The voltage goes on as it was, in the new frame.
     let u = rotate_frame(state.seen.u, ahead);
     let i = rotate_frame(state.seen.i, ahead);

@@ -279,7 +279,7 @@ fn crossings(
     let s = &mut state.six_step;
     s.tracking.advance();
     let terminal = s.sector.legs(terminals).floating;
-    let terminal = six_step.terminal.saturating_apply(terminal);
+    let terminal = six_step.terminal.held(terminal);
     let rising = s.sector.rising();
     let found = crossing::look(
         &six_step.crossing,

@@ -8,7 +8,6 @@
 use super::turn::bus_current;
 use super::{Config, Phase, Setpoint, State, launch};
 use crate::control::dead_time;
-use crate::control::modulator::Supply;
 use crate::control::observer;
 use crate::control::regulator::Reference;
 use crate::control::speed::{self, Bounds};
@@ -30,31 +29,49 @@ pub(super) fn turn(config: &Config, state: &mut State, setpoint: &Setpoint) {
     state.turn = (state.turn + 1) % CYCLE as u8;
     match state.turn {
         0 | 8 | 16 | 24 => reference(config, state, setpoint),
-        2 => supervise(config, state, setpoint),
-        4 | 20 => supply(config, state),
-        6 | 22 => bounds(config, state),
-        10 => aim(config, state),
+        4 | 20 => {
+            supply(state);
+            if !state.phase.is_open_loop() {
+                reach(config, state);
+            }
+        }
+        6 | 22 => {
+            bounds(config, state);
+            if !state.phase.is_open_loop() {
+                share(config, state);
+            }
+        }
+        10 => supervise(config, state, setpoint),
         12 => pace(config, state),
+        18 => proceed(config, state),
         _ => {}
     }
 }
 
-/// What a drive that begins must know before its first period, in three pieces.
+/// What a drive that begins must know before its first period, in five pieces.
 pub(super) fn begin(config: &Config, state: &mut State, n: u32) {
     match n {
-        1 => supply(config, state),
-        2 => bounds(config, state),
+        1 => supply(state),
+        2 => reach(config, state),
+        3 => bounds(config, state),
+        4 => share(config, state),
         _ => aim(config, state),
     }
 }
 
-/// The drive's phase, and what crosses between the regulator's axes at this speed.
+/// The drive's phase, as the set-point asks for it, and where the voltage is aimed.
 #[inline(never)]
 fn supervise(config: &Config, state: &mut State, setpoint: &Setpoint) {
+    aim(config, state);
     launch::follow(config, state, *setpoint);
-    if !state.phase.drives() {
-        return;
-    }
+    state.seen.phase = state.phase;
+}
+
+/// The drive's phase, as the rotor allows it, and what crosses between the regulator's axes at this
+/// speed.
+#[inline(never)]
+fn proceed(config: &Config, state: &mut State) {
+    let before = state.phase;
     state.lost_periods = if state.observer.told.lost && !state.phase.is_open_loop() {
         state.lost_periods + CYCLE
     } else {
@@ -64,17 +81,27 @@ fn supervise(config: &Config, state: &mut State, setpoint: &Setpoint) {
         state.trip(fault);
     }
     state.seen.phase = state.phase;
-    cross(config, state);
+    if state.phase == before {
+        // One that is handed over has begun with that.
+        cross(config, state);
+    }
 }
 
 /// What the supply gives.
 #[inline(never)]
-fn supply(config: &Config, state: &mut State) {
-    state.supply = Supply::new(&config.modulator, state.protection.bus, state.seen.u.d);
+fn supply(state: &mut State) {
+    state.supply.follow(state.protection.bus);
     state.seen.bus_current = bus_current(state.seen.u, state.seen.i, &state.supply);
 }
 
-/// What the supply's current and the speed do to the bounds of i_q.
+/// What its voltage is enough for. The current that a start imposes takes little of it, and is bounded
+/// by the supply alone: it needs neither this nor the speed's [`share`].
+#[inline(never)]
+fn reach(config: &Config, state: &mut State) {
+    state.supply.reach(&config.modulator, state.seen.u.d);
+}
+
+/// What the supply's current does to the bounds of i_q.
 #[inline(never)]
 fn bounds(config: &Config, state: &mut State) {
     let seen = &state.seen;
@@ -84,11 +111,16 @@ fn bounds(config: &Config, state: &mut State) {
         (seen.bus_current, seen.i.q),
         SUPPLY_PERIODS,
     );
-    let bounds = state.protection.bounds;
-    (state.i_d, state.bounds) = config.low_speed.bounds(bounds, state.seen.speed);
     // What is wanted next follows from that; a bound that braking has reached does not wait for it:
     // where the supply takes nothing its voltage rises by volts a millisecond.
-    state.wanted.i.q = state.wanted.i.q.max(bounds.min);
+    state.wanted.i.q = state.wanted.i.q.max(state.protection.bounds.min);
+}
+
+/// What the speed leaves of them, and i_d.
+#[inline(never)]
+fn share(config: &Config, state: &mut State) {
+    let bounds = state.protection.bounds;
+    (state.i_d, state.bounds) = config.low_speed.bounds(bounds, state.seen.speed);
 }
 
 /// Run and Stopping: the current reference.
@@ -159,7 +191,7 @@ fn directly(config: &Config, state: &mut State, wanted: Reference) {
 /// The voltage acts from `delay` to `delay + 1` periods after the sample, while the rotor turns on:
 /// aimed at the middle of that time. Without this the loop is unstable above 4489 rpm on the bench
 /// at 15 kHz.
-#[inline(never)]
+#[inline(always)]
 fn aim(config: &Config, state: &mut State) {
     state.ahead = sin_cos(config.delay.advance(state.seen.speed));
     state.certainty = dead_time::certainty(&config.dead_time, state.wanted.i, state.ahead);
@@ -173,6 +205,7 @@ fn pace(config: &Config, state: &mut State) {
 }
 
 /// The regulator's.
+#[inline(always)]
 fn cross(config: &Config, state: &mut State) {
     let factor = state.inductance.factor;
     config

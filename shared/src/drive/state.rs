@@ -10,7 +10,7 @@ use crate::control::transform::{AlphaBeta, Dq, Order};
 use crate::control::{
     catch, dead_time, inductance, observer, planner, regulator, sensing, speed, start, torque,
 };
-use crate::math::{SinCos, sin_cos};
+use crate::math::SinCos;
 use crate::protection;
 use crate::units::{Angle, Current, Duty, Flux, Speed, Voltage};
 
@@ -169,7 +169,7 @@ impl State {
             wanted: Reference::default(),
             i_d: Current::ZERO,
             bounds: Bounds::default(),
-            ahead: sin_cos(Angle::ZERO),
+            ahead: SinCos::of(Angle::ZERO),
             certainty: Dq::default(),
             supply: Supply::new(&config.modulator, Voltage::ZERO, Voltage::ZERO),
             missing: Current::ZERO,
@@ -199,11 +199,9 @@ impl State {
             self.faults = faults;
             self.fault_count = fault_count;
         }
-        // A factor that was found for other parameters, or is no longer kept up.
-        if before.observer != now.observer
-            || before.regulator != now.regulator
-            || now.adapt_l.is_none()
-        {
+        // A factor that was found for another inductance, or is no longer kept up.
+        let stated = |config: &Config| config.adapt_l.as_ref().map(|adapt| adapt.gain);
+        if stated(before) != stated(now) {
             self.inductance = inductance::State::default();
         }
     }
@@ -216,6 +214,8 @@ impl State {
     }
 
     /// What the tasks may know.
+    // Made where it is put, not copied there.
+    #[inline(always)]
     pub fn snapshot(&self) -> Snapshot {
         let signed = |speed: Speed| if self.reversed { -speed } else { speed };
         let (failed, missed) = if self.phase.drives() {

@@ -21,12 +21,35 @@ use crate::units::{AdcCounts, Duty};
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
     match (&config.observer, &config.regulator) {
         (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
-            if setpoint.kind() == state.plain =>
+            if state.plain != NOT_PLAIN =>
         {
+            if setpoint.kind() == state.plain {
+                slow::turn(config, state, &setpoint);
+            } else if !stays_plain(config, state, &setpoint) {
+                return any(config, state, &sample, setpoint);
+            }
             plain((observer, regulator), (config, state), &sample, &setpoint)
         }
         _ => any(config, state, &sample, setpoint),
     }
+}
+
+/// Whether a period under another kind of set-point than the one before is as plain as that. Its slow
+/// work is left out: it has another turn.
+#[cold]
+#[inline(never)]
+fn stays_plain(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
+    if matches!(setpoint, Setpoint::Fault(_)) {
+        return false;
+    }
+    state.turn = (state.turn + 1) % slow::CYCLE as u8;
+    launch::follow(config, state, *setpoint);
+    let drives = state.phase.drives();
+    if drives {
+        state.plain = setpoint.kind();
+        state.seen.phase = state.phase;
+    }
+    drives
 }
 
 /// A plain period.
@@ -37,7 +60,6 @@ fn plain(
     sample: &Sample,
     setpoint: &Setpoint,
 ) -> Bridge {
-    slow::turn(config, state, setpoint);
     if matches!(state.phase, Phase::Run | Phase::Stopping) {
         switching(false, parts, (config, state), sample)
     } else if state.phase.is_open_loop() {
@@ -72,7 +94,7 @@ fn open_loop(
     sample: &Sample,
     setpoint: &Setpoint,
 ) -> Bridge {
-    launch::impose(config, state, *setpoint);
+    launch::impose(config, state, setpoint);
     switching(true, parts, (config, state), sample)
 }
 
@@ -188,6 +210,10 @@ fn healthy(
     }
     launch::follow(config, state, setpoint);
     state.seen.phase = state.phase;
+    if matches!(state.phase, Phase::Idle | Phase::Sense) {
+        // The rotor is watched from the next period on.
+        return Bridge::Off;
+    }
     if let Some(bridge) = rest::period(config, state, sample, (currents, setpoint)) {
         return bridge;
     }
@@ -199,7 +225,7 @@ fn healthy(
     if state.phase.drives() {
         slow::turn(config, state, &setpoint);
         if state.phase.is_open_loop() {
-            launch::impose(config, state, setpoint);
+            launch::impose(config, state, &setpoint);
         } else if let Some(adapt) = &config.adapt_l {
             let flux = observer::flux(&config.observer, &state.observer);
             let wave = inductance::step(adapt, &mut state.inductance, state.seen.i.d, flux);

@@ -15,7 +15,7 @@ use fixed::types::extra::{U28, U31, U32};
 use fixed::types::{I1F31, I6F26};
 
 use super::launch::{self, Wish};
-use super::slow::CYCLE;
+use super::slow::{self, CYCLE};
 use super::state::Seen;
 use super::turn::{bus_current, reading};
 use super::{Bridge, Phase, Setpoint, State};
@@ -23,12 +23,15 @@ use crate::control::catch::Rotor;
 use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
 use crate::control::transform::{AlphaBeta, Dq, Order};
-use crate::math::{Gain, Held, TopProduct, magnitude, sin_cos};
+use crate::math::{Gain, Held, SinCos, TopProduct, magnitude};
 use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
 /// Highest pitch, turns a period: with eight samples a cycle the greatest of them is at most 8 %
 /// below the current's peak.
 pub const PITCH_MAX: Speed = Speed::lit("0.125");
+
+/// The period behind Charge in which a tone begins; those before it look at the supply.
+const READY_PERIODS: u32 = 3;
 
 /// Config of the tones.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,18 +123,26 @@ pub(super) fn period(
     let (Some(tone), Setpoint::Tone(pitch)) = (&config.tone, setpoint) else {
         return None;
     };
-    state.turn = (state.turn + 1) % CYCLE as u8;
-    if state.phase != Phase::Tone || state.turn == 0 {
-        state.supply = Supply::new(&config.modulator, state.protection.bus, Voltage::ZERO);
+    if state.phase == Phase::Charge {
+        let n = state.charge_periods - config.charge.periods;
+        if n < READY_PERIODS {
+            slow::begin(config, state, n);
+            return Some(Bridge::Charge(config.charge.duty));
+        }
         state.phase = Phase::Tone;
     }
-    let supply = state.supply;
+    state.turn = (state.turn + 1) % CYCLE as u8;
+    match state.turn {
+        0 => state.supply.follow(state.protection.bus),
+        16 => state.supply.reach(&config.modulator, Voltage::ZERO),
+        _ => {}
+    }
     let [a, b, c] = currents.map(reading);
     let greatest = a
         .saturating_abs()
         .max(b.saturating_abs())
         .max(c.saturating_abs());
-    let u = play(tone, &mut state.tone, pitch, greatest, &supply);
+    let u = play(tone, &mut state.tone, pitch, greatest, &state.supply);
     let i = Dq {
         d: a,
         q: Current::ZERO,
@@ -146,7 +157,7 @@ pub(super) fn period(
         speed: Speed::ZERO,
         i,
         u: along,
-        bus_current: bus_current(along, i, &supply),
+        bus_current: bus_current(along, i, &state.supply),
     };
     if state.tone.pitch == Speed::ZERO {
         // A pause brakes what a tone has left of a movement, and keeps the drivers charged.
@@ -158,7 +169,7 @@ pub(super) fn period(
     };
     let v = (v, Order::NORMAL);
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
-    let duties = modulator::duties(&config.modulator, &supply, v, none);
+    let duties = modulator::duties(&config.modulator, &state.supply, v, none);
     state.applied[0] = duties;
     Some(Bridge::Duty(duties))
 }
@@ -185,15 +196,15 @@ fn play(
     if playing.angle.is_negative() != before.is_negative() {
         regulate(tone, playing, supply);
     }
-    let sine = sin_cos(playing.angle).sin;
+    let sine = SinCos::of(playing.angle).sin;
     Voltage::from_bits(playing.amplitude.top(sine).to_bits() << 1)
 }
 
 /// The amplitude of the coming half cycle.
 fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
-    let reactive = tone.reactive.saturating_apply(playing.pitch);
+    let reactive = tone.reactive.held(playing.pitch);
     let needed = magnitude(tone.resistive, reactive);
-    let missing = tone.share.saturating_apply(tone.peak.minus(playing.peak));
+    let missing = tone.share.held(tone.peak.minus(playing.peak));
     // 28 + 31 − 32 fraction bits are half of it with 28.
     let half = needed.top(missing);
     let step = Voltage::from_bits(if half < 0 {

@@ -145,9 +145,7 @@ pub(super) fn watch(
             observer::pace(&config.observer, &mut state.observer, factor, CYCLE);
         }
         // A drive may resume at any time.
-        8 => slow::begin(config, state, 1),
-        16 => slow::begin(config, state, 2),
-        24 => slow::begin(config, state, 3),
+        turn @ (4 | 8 | 12 | 16 | 20) => slow::begin(config, state, u32::from(turn) / 4),
         _ => {}
     }
     let factor = state.inductance.factor;

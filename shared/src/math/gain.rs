@@ -35,21 +35,21 @@ impl<A, B> PartialEq for Gain<A, B> {
 
 impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     /// The factor zero.
-    pub const ZERO: Self = Self::from_parts(0, 1);
+    pub const ZERO: Self = Self::from_parts(0, 0);
 
     /// The gain of value `k`, or `None` where its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
-        let (mantissa, power) = parts(k, B::I32 - A::I32)?;
-        Some(Self::from_parts(mantissa, power))
+        let (mantissa, shift) = parts(k, B::I32 - A::I32)?;
+        Some(Self::from_parts(mantissa, shift))
     }
 
-    /// The gain `mantissa·power/2^32`, in bits out per bit in; the power is one of two up to 2^30.
+    /// The gain `mantissa·2^shift/2^32`, in bits out per bit in; the shift is at most 30.
     #[inline(always)]
-    pub const fn from_parts(mantissa: i32, power: i32) -> Self {
+    pub const fn from_parts(mantissa: i32, shift: u32) -> Self {
         Self {
-            factor: Factor::new(mantissa, power),
+            factor: Factor::new(mantissa, shift),
             kind: PhantomData,
         }
     }
@@ -63,11 +63,24 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
         FixedI32::from_bits(self.factor.wrapping(x.to_bits()))
     }
 
+    /// [`Gain::saturating_apply`] where it is called and not inlined, for what is not in the way of
+    /// the default drive: that takes half of the chip's flash.
+    #[inline(always)]
+    pub fn held(self, x: FixedI32<A>) -> FixedI32<B> {
+        FixedI32::from_bits(held(self.factor, x.to_bits()))
+    }
+
     /// The product with `x`, held at the ends of its type.
     #[inline(always)]
     pub fn saturating_apply(self, x: FixedI32<A>) -> FixedI32<B> {
         FixedI32::from_bits(self.factor.saturating(x.to_bits()))
     }
+}
+
+/// Once for all types.
+#[inline(never)]
+fn held(factor: Factor, x: i32) -> i32 {
+    factor.saturating(x)
 }
 
 /// Bits of a float's mantissa, with the one that it does not store.
@@ -77,7 +90,7 @@ const MANTISSA_BITS: i32 = 24;
 ///
 /// Once for all types, and never inlined: on the chip it is called for every coefficient.
 #[inline(never)]
-pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, i32)> {
+pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, u32)> {
     if !k.is_finite() {
         return None;
     }
@@ -97,7 +110,7 @@ pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, i32)> {
         0
     };
     let sign = if k < 0.0 { -1 } else { 1 };
-    (shift <= 30).then(|| (sign * magnitude as i32, 1 << shift))
+    (shift <= 30).then(|| (sign * magnitude as i32, shift as u32))
 }
 
 #[cfg(test)]
@@ -135,7 +148,7 @@ mod tests {
                 scaled *= 0.5;
                 shift += 1;
             }
-            (shift <= 30).then(|| (scaled.round() as i32, 1 << shift))
+            (shift <= 30).then(|| (scaled.round() as i32, shift))
         };
         let mantissas = [0, 1, 0x2a_aaaa, 0x40_0000, 0x55_5555, 0x7f_ffff];
         for exponent in [-32, -4, 0, 3, 32] {

@@ -4,6 +4,7 @@
 //! The fraction bits stand in the types of the [`fixed`] crate, so the compiler keeps the books:
 //! the product of `a` and `b` fraction bits has `a + b - 32`.
 
+mod elementary;
 mod gain;
 mod held;
 mod multiplier;
@@ -13,12 +14,13 @@ mod real;
 mod root;
 mod trig;
 
+pub use elementary::{SQRT_3, settled, square_root};
 pub use gain::Gain;
 pub(crate) use gain::parts as gain_parts;
 pub use held::Held;
 pub use multiplier::Multiplier;
 pub use product::{EIGHTH_PI, TopProduct, TopSum};
-pub use quotient::quotient;
+pub use quotient::{divide, quotient};
 pub use real::{Real, round};
 pub use root::{magnitude, other_leg};
 pub use trig::{SinCos, atan2_turns, sin_cos};

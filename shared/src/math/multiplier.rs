@@ -59,7 +59,7 @@ impl<A: Unsigned, B: Unsigned> Multiplier<A, B> {
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
         match gain::parts(k, B::I32 - A::I32)? {
-            (mantissa, 1) => Some(Self::from_bits(mantissa)),
+            (mantissa, 0) => Some(Self::from_bits(mantissa)),
             _ => None,
         }
     }

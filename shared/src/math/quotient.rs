@@ -1,12 +1,18 @@
 //! Division of 64 bits.
 
-/// `numerator / divisor`, of which the lower 32 bits; the divisor is not 0.
+/// The lower 32 bits of [`divide`].
+pub fn quotient(numerator: u64, divisor: u32) -> u32 {
+    divide(numerator, divisor) as u32
+}
+
+/// `numerator / divisor`; the divisor is not 0.
 ///
 /// A Cortex-M4 divides 32 bits. For 64 the compiler takes a routine of 1 KB that is made to be fast;
 /// this one takes a tenth of it, and about 300 instructions for each quotient.
 #[inline(never)]
-pub fn quotient(numerator: u64, divisor: u32) -> u32 {
-    let mut rest = (numerator >> 32) as u32 % divisor;
+pub fn divide(numerator: u64, divisor: u32) -> u64 {
+    let high = (numerator >> 32) as u32;
+    let mut rest = high % divisor;
     let mut quotient = numerator as u32;
     for _ in 0..u32::BITS {
         // The numerator leaves the quotient's word at one end as the quotient enters it at the other.
@@ -18,7 +24,7 @@ pub fn quotient(numerator: u64, divisor: u32) -> u32 {
             quotient |= 1;
         }
     }
-    quotient
+    u64::from(high / divisor) << 32 | u64::from(quotient)
 }
 
 #[cfg(test)]
@@ -35,14 +41,13 @@ mod tests {
             smaller in 0..32,
         ) {
             let (numerator, divisor) = (numerator >> places, u32::max(divisor >> smaller, 1));
-            let wanted = (numerator / u64::from(divisor)) as u32;
-            prop_assert_eq!(quotient(numerator, divisor), wanted);
+            prop_assert_eq!(divide(numerator, divisor), numerator / u64::from(divisor));
         }
     }
 
     #[test]
     fn ends() {
-        assert_eq!(quotient(u64::MAX, u32::MAX), 1);
+        assert_eq!(divide(u64::MAX, u32::MAX), (1 << 32) + 1);
         assert_eq!(quotient((1 << 32) - 1, 1), u32::MAX);
         assert_eq!(quotient(1 << 32, 1), 0);
         assert_eq!(

@@ -50,10 +50,9 @@ fn whole(value: f32, places: i32) -> i32 {
     libm::rintf(value * power_of_two(places)) as i32
 }
 
-/// The nearest whole number, of two the one further from 0. Never inlined, as telemetry has many.
-#[inline(never)]
+/// The nearest whole number, of two the even one.
 pub fn round(value: f32) -> f32 {
-    libm::roundf(value)
+    libm::rintf(value)
 }
 
 /// 2 to the power of at most the bits of a type: products with it are exact.

@@ -4,12 +4,11 @@ mod build;
 mod preset;
 mod table;
 
+use crate::math::SQRT_3;
+
 pub use build::{Board, BuildError, FluxSettings, build, input};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE, Text};
-
-/// √3, which the standard library has not.
-const SQRT_3: f32 = 1.732_050_8;
 
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]

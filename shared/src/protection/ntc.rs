@@ -1,5 +1,6 @@
 //! A thermistor's reading.
 
+use crate::math::Real;
 use crate::units::AdcCounts;
 
 /// Readings of a converter of 12 bits.
@@ -30,7 +31,7 @@ impl Ntc {
     ///
     /// For the tasks, about once a millisecond: it takes a logarithm.
     pub fn celsius(&self, reading: AdcCounts) -> f32 {
-        let counts: f32 = reading.to_num();
+        let counts = reading.to_f32();
         if counts <= 1.0 || counts >= COUNTS - 1.0 {
             return f32::NAN;
         }

@@ -21,7 +21,10 @@ use siskin_on_target::{answer, request};
 use count::Counter;
 use words::{Reader, Writer};
 
-/// A set-point is renewed before each period.
+/// A task renews the set-point once a millisecond, or at once where another one is wanted: at the
+/// slowest PWM each so many periods.
+const RENEWED_EVERY: usize = 8;
+
 const STALE_PERIODS: u32 = 10;
 
 static STAND: Stand = Stand::new();
@@ -41,10 +44,15 @@ fn replay(counter: &Counter) -> io::Result<()> {
     let config = build(&params, &board).expect("the PC has built it");
     let mut ends = exchange::open(STALE_PERIODS).expect("opened here and nowhere else");
     let mut interrupt = Interrupt::new(STAND.registers(), config, ends.interrupt);
-    while let Some(words) = reader.next()? {
+    let mut before = None;
+    for n in 0.. {
+        let Some(words) = reader.next()? else { break };
         let (sample, setpoint) = request::read_period(&words);
         STAND.set_sample(&sample);
-        ends.setpoint.write(setpoint);
+        if n % RENEWED_EVERY == 0 || before != Some(setpoint) {
+            ends.setpoint.write(setpoint);
+            before = Some(setpoint);
+        }
         let ((), instructions) = counter.count(|| period(&mut interrupt));
         let snapshot = ends.snapshot.read().expect("one has been published");
         writer.put(&[answer::snapshot(&snapshot), instructions])?;

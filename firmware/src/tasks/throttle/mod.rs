@@ -17,6 +17,7 @@ use embassy_time::Instant;
 use siskin_control::answer::{Answer, Ask};
 use siskin_control::input::dshot::Rate;
 use siskin_control::input::signal::Signal;
+use siskin_control::math::quotient;
 use siskin_control::throttle::{Reach, Throttle};
 use static_cell::StaticCell;
 
@@ -166,5 +167,5 @@ impl Listener {
 /// So many bits of a frame.
 fn bits_ticks(rate: Rate, bits: u32) -> u32 {
     let ticks = u64::from(TICK_HZ) * u64::from(bits);
-    (ticks / u64::from(rate.bit_hz())) as u32
+    quotient(ticks, rate.bit_hz())
 }

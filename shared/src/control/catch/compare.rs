@@ -3,7 +3,7 @@
 use fixed::types::{I2F30, I4F28, I17F15, I19F13};
 
 use crate::control::transform::{AlphaBeta, phases};
-use crate::math::{SinCos, TopProduct, sin_cos};
+use crate::math::{SinCos, TopProduct};
 use crate::units::{AdcCounts, Angle};
 
 /// The highest reading of the converter's 12 bits: it may be a clamp.
@@ -36,7 +36,7 @@ pub(super) fn compare(
     amplitude: AdcCounts,
     readings: [I17F15; 3],
 ) -> Difference {
-    let SinCos { cos, sin } = sin_cos(theta);
+    let SinCos { cos, sin } = SinCos::of(theta);
     let half = |bits: i32| I2F30::from_bits(bits >> 1);
     let (cos, sin) = (half(cos.to_bits()), half(sin.to_bits()));
     let [a, b, c] = phases(AlphaBeta {

@@ -8,7 +8,7 @@ use super::{Estimate, Told};
 use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude, sin_cos};
+use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, divide, magnitude};
 use crate::units::{Angle, Current, Flux, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -108,7 +108,7 @@ pub fn estimate(
     planned: Speed,
 ) -> (Estimate, Told) {
     let theta = state.theta;
-    let frame = sin_cos(theta);
+    let frame = SinCos::of(theta);
     let length = magnitude(state.h.d, state.h.q);
     if let Some(cure) = &config.cure {
         return cured(config, cure, state, (theta, frame), length, planned);
@@ -116,11 +116,11 @@ pub fn estimate(
     // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4 turns
     // a period; above half a turn, where a speed ends, the rotor is lost anyway.
     let omega_bar = Speed::from_bits(state.xi.top(length).to_bits().min(i32::MAX >> 4) << 4);
-    let omega = omega_bar.plus(config.k_eta.saturating_apply(state.h.d));
+    let omega = omega_bar.plus(config.k_eta.held(state.h.d));
     let omega_bar_step = config.k_f.apply(omega_bar.minus(state.omega_f));
     state.omega_f = state.omega_f.plus(omega_bar_step);
     let xi = state.xi;
-    let xi_step = config.gamma.saturating_apply(state.h.d);
+    let xi_step = config.gamma.held(state.h.d);
     let lost = imposed.is_none() && adapt(config, state, xi_step);
     let estimate = Estimate {
         theta,
@@ -203,17 +203,17 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
     let next = |i_hat: Current, h: Voltage, u: Voltage, cross: Current, error: Current| {
         i_hat
             .minus(config.decay.apply(i_hat))
-            .plus(config.admittance.saturating_apply(h.plus(u)))
-            .plus(config.rotation.saturating_apply(inductance.of(cross)))
-            .plus(config.k_p.saturating_apply(error))
+            .plus(config.admittance.held(h.plus(u)))
+            .plus(config.rotation.held(inductance.of(cross)))
+            .plus(config.k_p.held(error))
     };
     state.i = Dq {
         d: next(state.i.d, state.h.d, applied.d, omega.top(i.q), error.d),
         q: next(state.i.q, state.h.q, applied.q, -omega.top(i.d), error.q),
     };
     state.h = Dq {
-        d: state.h.d.plus(config.k_i.saturating_apply(error.d)),
-        q: state.h.q.plus(config.k_i.saturating_apply(error.q)),
+        d: state.h.d.plus(config.k_i.held(error.d)),
+        q: state.h.q.plus(config.k_i.held(error.q)),
     };
     state.theta = state.theta.wrapping_add(omega);
 }
@@ -221,15 +221,15 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
 /// φ̂ = 1/ξ̂, with a division.
 pub fn flux(state: &State) -> Flux {
     // 2^64/(2π) over ξ̂ in 2^-32: sixteen times 28 fraction bits.
-    let quotient = 0x28BE_60DB_9391_0544_i64 / i64::from(state.xi.to_bits().max(1));
-    Flux::from_bits((quotient >> 4).min(i64::from(i32::MAX)) as i32)
+    let quotient = divide(0x28BE_60DB_9391_0544, state.xi.to_bits().max(1) as u32);
+    Flux::from_bits((quotient >> 4).min(i32::MAX as u64) as i32)
 }
 
 /// Turns the frame from where an open-loop start held it to where the rotor is, by what the
 /// back-EMF tells. Returns by how much; `None` where the rotor has not followed.
 pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<Angle> {
     let lead = rotor_lead(state.h, omega_s, config.xi_nominal)?;
-    let ahead = sin_cos(lead);
+    let ahead = SinCos::of(lead);
     *state = State {
         theta: state.theta.wrapping_add(lead),
         i: rotate_frame(state.i, ahead),

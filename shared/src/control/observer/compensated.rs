@@ -115,7 +115,13 @@ const PHI_MIN: Flux = Flux::from_bits(51_267_396);
 const PHI_MAX: Flux = Flux::from_bits(341_782_638);
 
 /// The observer where the rotor's speed is known, and its angle at the coming sample.
-pub fn begin(
+pub fn begin(config: &Config, state: &mut State, rotor: (Angle, Speed), i: AlphaBeta<Current>) {
+    place(config, state, rotor, i);
+    pace(config, state, Factor::ONE);
+}
+
+/// The same but for what the speed makes of the coefficients, [`pace`].
+pub fn place(
     config: &Config,
     state: &mut State,
     (theta, omega): (Angle, Speed),
@@ -134,7 +140,6 @@ pub fn begin(
         i_before: i,
         ..State::default()
     };
-    pace(config, state, Factor::ONE);
 }
 
 /// Takes the coefficients that follow the speed, every few periods.

@@ -6,7 +6,7 @@ use fixed::types::{I0F32, U0F32};
 use super::flux_linkage::{AMPLITUDE_MAX, AMPLITUDE_MIN, measure};
 use super::position::{Periods, turned};
 use super::sector::Sector;
-use crate::math::{Held, TopProduct};
+use crate::math::{Held, TopProduct, divide};
 use crate::units::{Angle, Flux, Speed};
 
 /// What keeps noise from being taken for a crossing (2.3.2).
@@ -145,7 +145,7 @@ fn cross(
 /// a period.
 fn ratio(part: Flux, whole: Flux) -> Periods {
     let (part, whole) = (part.to_bits().max(0), whole.to_bits().max(1));
-    let share = (i64::from(part) << Periods::FRAC_NBITS) / i64::from(whole);
+    let share = divide((part as u64) << Periods::FRAC_NBITS, whole as u32);
     Periods::from_bits(share as u32).min(Periods::ONE)
 }
 

@@ -5,7 +5,7 @@
 use fixed::FixedI32;
 use fixed::types::extra::{U28, U32};
 
-use crate::math::{Gain, Held, TopProduct, atan2_turns, sin_cos};
+use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
 use crate::units::{Angle, Current, Flux, Speed, Voltage};
 
 use super::sector::Sector;
@@ -85,7 +85,7 @@ pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current;
     for phase in 0..3 {
         // The resistance's voltage of a period is that of the mean current.
         let mean_i = (i[phase] >> 1) + (state.i_before[phase] >> 1);
-        let drive = v[phase].minus(config.resistance.saturating_apply(mean_i));
+        let drive = v[phase].minus(config.resistance.held(mean_i));
         let psi = state.psi[phase];
         let psi = (psi - config.forget.apply(psi)).plus(drive);
         let psi = psi.min(psi_max).max(-psi_max);
@@ -99,7 +99,7 @@ pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current;
                 psi.minus(mean)
             }
         };
-        let lambda = integral.minus(config.inductance.saturating_apply(i[phase]));
+        let lambda = integral.minus(config.inductance.held(i[phase]));
         state.lambda[phase] = lambda.min(lambda_max).max(-lambda_max);
     }
     state.i_before = i;
@@ -156,7 +156,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
     let integral = phases(length, theta.wrapping_add(first));
     let length = shortened(length, both.wrapping_sub(first));
     let lambda = phases(length, theta.wrapping_add(both));
-    let stator = i.map(|i| config.inductance.saturating_apply(i));
+    let stator = i.map(|i| config.inductance.held(i));
     *state = State {
         psi: [0, 1, 2].map(|phase| integral[phase].plus(stator[phase])),
         mean: [0, 1, 2].map(|phase| integral[phase] - lambda[phase]),
@@ -180,7 +180,7 @@ const THIRD_TURN: i32 = 1_431_655_765;
 /// The flux times the angle's cosine.
 fn shortened(flux: Flux, angle: Angle) -> Flux {
     // 28 + 31 − 32 fraction bits.
-    Flux::from_bits(flux.top(sin_cos(angle).cos).to_bits() << 1)
+    Flux::from_bits(flux.top(SinCos::of(angle).cos).to_bits() << 1)
 }
 
 impl State {

@@ -1,7 +1,7 @@
 //! No observer at all: an encoder, or a simulation that knows the truth, tells where the rotor is.
 
 use super::{Estimate, Told};
-use crate::math::sin_cos;
+use crate::math::SinCos;
 use crate::units::{Angle, Speed};
 
 /// What was told of the rotor at the coming sample, with the phases in the order a, b, c.
@@ -52,7 +52,7 @@ pub fn estimate(state: &State, swapped: bool) -> (Estimate, Told) {
     let (theta, omega) = state.seen(swapped);
     let estimate = Estimate {
         theta,
-        frame: sin_cos(theta),
+        frame: SinCos::of(theta),
         omega,
         omega_bar: omega,
     };

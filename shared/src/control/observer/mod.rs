@@ -16,7 +16,7 @@ pub mod sector;
 use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
-use crate::math::{EIGHTH_PI, SinCos, TopProduct, sin_cos};
+use crate::math::{EIGHTH_PI, SinCos, TopProduct};
 use crate::units::{
     Angle, Current, FLUX_NOMINAL, Flux, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage,
     WideVoltage, wide,
@@ -201,7 +201,7 @@ pub fn estimate(
             };
             Estimate {
                 theta: position.theta,
-                frame: sin_cos(position.theta),
+                frame: SinCos::of(position.theta),
                 omega: position.omega,
                 omega_bar: position.omega,
             }
@@ -304,7 +304,7 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
 }
 
 /// The rotor is known to turn at `omega` and to be at `theta` at the coming sample, under the current
-/// `i`.
+/// `i`. [`pace`] comes before that.
 pub fn begin(
     config: &Config,
     state: &mut State,
@@ -320,7 +320,7 @@ pub fn begin(
             edges::begin(config, &mut state.edges, before, omega, phases(i));
         }
         Config::Compensated(config) => {
-            compensated::begin(config, &mut state.compensated, (theta, omega), i);
+            compensated::place(config, &mut state.compensated, (theta, omega), i);
         }
         Config::Given => {}
     }

@@ -9,7 +9,7 @@ use fixed::types::U20F12;
 use fixed::types::extra::U32;
 
 use super::sector::Sector;
-use crate::math::Gain;
+use crate::math::{Gain, divide};
 use crate::units::{Angle, Speed};
 
 /// A time in control periods.
@@ -145,8 +145,8 @@ fn remember(state: &mut State, interval: Periods, wanted: u8) {
 /// ω̂ of so many sixths of a turn in this time.
 fn measure(state: &mut State, sixths: u8, time: Periods) {
     // Turns with 44 fraction bits over periods with 12.
-    let omega = ((u64::from(sixths) << 44) / 6) / u64::from(time.to_bits().max(1));
-    let omega = omega.min(OMEGA_MAX);
+    let turns = divide(u64::from(sixths) << 44, 6);
+    let omega = divide(turns, time.to_bits().max(1)).min(OMEGA_MAX);
     let before = state.omega.to_bits();
     state.omega_step = if before == 0 {
         Speed::ZERO

@@ -53,28 +53,28 @@ impl Config {
     ) -> Current {
         let wanted = wanted.with_i_q(Current::ZERO);
         let without = self.voltage(state, &wanted, fb).q;
-        self.admittance.saturating_apply(u_q.minus(without))
+        self.admittance.held(u_q.minus(without))
     }
 
-    /// (10) without the integrators.
-    #[inline(always)]
+    /// (10) without the integrators. Once for all that asks for it.
+    #[inline(never)]
     fn forced(&self, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let e = error(wanted, fb);
         let cross_d = fb.inductance.of(fb.omega.top(fb.i.q));
         let cross_q = fb.inductance.of(fb.omega.top(fb.i.d));
         let d = self
             .resistance
-            .saturating_apply(wanted.i.d)
+            .held(wanted.i.d)
             .minus(narrow(fb.h_hat.d))
-            .minus(self.reactance.saturating_apply(cross_d))
-            .minus(self.k_pe.saturating_apply(e.d));
+            .minus(self.reactance.held(cross_d))
+            .minus(self.k_pe.held(e.d));
         let q = self
             .resistance
-            .saturating_apply(wanted.i.q)
+            .held(wanted.i.q)
             .minus(narrow(fb.h_hat.q))
-            .plus(self.reactance.saturating_apply(cross_q))
-            .plus(self.inductance.saturating_apply(wanted.i_q_step))
-            .minus(self.k_pe.saturating_apply(e.q))
+            .plus(self.reactance.held(cross_q))
+            .plus(self.inductance.held(wanted.i_q_step))
+            .minus(self.k_pe.held(e.q))
             .plus(wanted.u_q);
         Dq { d, q }
     }
@@ -84,16 +84,16 @@ impl Config {
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.minus(self.k_ie.saturating_apply(e.d));
-        sigma.q = sigma.q.minus(self.k_ie.saturating_apply(e.q));
+        sigma.d = sigma.d.minus(self.k_ie.held(e.d));
+        sigma.q = sigma.q.minus(self.k_ie.held(e.q));
     }
 
     /// Takes back what the integrators have gone on by for the voltage that is cut off.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let beyond = beyond(self.admittance, cut);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.minus(self.k_ie.saturating_apply(beyond.d));
-        sigma.q = sigma.q.minus(self.k_ie.saturating_apply(beyond.q));
+        sigma.d = sigma.d.minus(self.k_ie.held(beyond.d));
+        sigma.q = sigma.q.minus(self.k_ie.held(beyond.q));
     }
 
     /// Sets the integrators so that the voltage is `u`.

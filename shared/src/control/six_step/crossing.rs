@@ -14,7 +14,7 @@
 
 use fixed::types::I16F16;
 
-use crate::math::Held;
+use crate::math::{Held, divide};
 use crate::units::Voltage;
 
 /// Thresholds.
@@ -177,8 +177,11 @@ fn whole(samples: u16) -> I16F16 {
 
 /// How long a reading takes to grow by this slope; none where the slope is not known.
 fn periods(reading: Voltage, slope: Voltage) -> I16F16 {
-    let quotient = (i64::from(reading.to_bits()) << 16).checked_div(i64::from(slope.to_bits()));
-    I16F16::from_bits(quotient.unwrap_or(0).clamp(0, 1 << 30) as i32)
+    if reading <= Voltage::ZERO || slope <= Voltage::ZERO {
+        return I16F16::ZERO;
+    }
+    let quotient = divide((reading.to_bits() as u64) << 16, slope.to_bits() as u32);
+    I16F16::from_bits(quotient.min(1 << 30) as i32)
 }
 
 #[cfg(test)]

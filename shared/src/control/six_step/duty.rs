@@ -67,7 +67,7 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
         .plus(Current::from_bits(change.to_bits() >> 3));
     let ahead = i.plus(change.saturating_mul_int(3));
     let until = |bound: Current| {
-        let step = config.k_b.saturating_apply(bound.minus(ahead));
+        let step = config.k_b.held(bound.minus(ahead));
         let duty = state.duty.plus(step);
         duty.max(I1F31::ZERO).min(config.duty_max)
     };
@@ -93,12 +93,12 @@ pub fn share(state: &mut State, share: I1F31, range: Range) {
 /// while the duty is held by the range and the error pushes it further.
 #[inline]
 pub fn speed(config: &Config, state: &mut State, error: Speed, range: Range) {
-    let wanted = state.sigma.plus(config.k_p.saturating_apply(error));
+    let wanted = state.sigma.plus(config.k_p.held(error));
     state.duty = wanted.min(range.greatest).max(range.least);
     let held_below = state.duty < wanted && error > Speed::ZERO;
     let held_above = state.duty > wanted && error < Speed::ZERO;
     if !(held_below || held_above) {
-        let sigma = state.sigma.plus(config.k_i.saturating_apply(error));
+        let sigma = state.sigma.plus(config.k_i.held(error));
         state.sigma = sigma.max(I1F31::ZERO).min(config.duty_max);
     }
 }

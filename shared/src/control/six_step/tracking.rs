@@ -4,7 +4,7 @@ use fixed::types::I16F16;
 
 use super::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::delay::Delay;
-use crate::math::Held;
+use crate::math::{Held, divide};
 use crate::units::{Angle, Speed};
 
 /// Crossings in a row after which the rotor's motion is known well enough to be smoothed.
@@ -60,13 +60,13 @@ impl State {
     /// The crossing was found to be `age` periods ago: 60° since the one before.
     pub fn crossed(&mut self, age: I16F16) {
         let interval = self.elapsed.minus(age).max(I16F16::ONE);
-        let turned = i64::from(self.sextants.max(1)) * i64::from(SEXTANT.to_bits());
+        let turned = u64::from(self.sextants.max(1)) * SEXTANT.to_bits() as u64;
         let mean = over(turned, interval);
         let mut overdue = false;
         if self.from_rest {
             // Under a constant torque twice the mean, after a constant acceleration.
             self.omega = mean.plus(mean).min(FASTEST);
-            self.acceleration = over(i64::from(self.omega.to_bits()), interval);
+            self.acceleration = over(self.omega.to_bits() as u64, interval);
             self.omega_bar = self.omega;
         } else if self.crossings < KNOWN {
             let off = i64::from(self.delta.to_bits()) - times(self.omega, age);
@@ -147,9 +147,9 @@ fn half(speed: Speed) -> Speed {
 }
 
 /// A quantity with 32 fraction bits over a time, at most [`FASTEST`].
-fn over(bits: i64, periods: I16F16) -> Speed {
-    let quotient = (bits << 16) / i64::from(periods.to_bits());
-    Speed::from_bits(quotient.min(i64::from(FASTEST.to_bits())) as i32)
+fn over(bits: u64, periods: I16F16) -> Speed {
+    let quotient = divide(bits << 16, periods.to_bits().unsigned_abs());
+    Speed::from_bits(quotient.min(FASTEST.to_bits() as u64) as i32)
 }
 
 /// A step a period times a time, in bits of a turn.

@@ -6,7 +6,7 @@ use crate::control::six_step::commutation::SEXTANT;
 use crate::control::transform::{Dq, clarke, park};
 use crate::drive::state::Seen;
 use crate::drive::{self, Phase};
-use crate::math::{TopProduct, sin_cos};
+use crate::math::{SinCos, TopProduct};
 use crate::protection;
 use crate::units::{AdcCounts, Current, Speed, Voltage};
 
@@ -36,7 +36,7 @@ pub(super) fn tell(
     // In Park the rotor is taken to stand along the switching phase.
     let delta = if parked { SEXTANT } else { s.tracking.delta };
     let angle = s.sector.middle().wrapping_add(delta);
-    let from_middle = sin_cos(delta);
+    let from_middle = SinCos::of(delta);
     let along = of_duty(state.protection.bus)
         .top(RECIPROCAL_ROOT_3)
         .to_bits()
@@ -46,7 +46,7 @@ pub(super) fn tell(
         d: Voltage::from_bits(along.top(from_middle.sin).to_bits() << 1),
         q: Voltage::from_bits(along.top(from_middle.cos).to_bits() << 1),
     };
-    let measured = park(clarke(currents), sin_cos(angle));
+    let measured = park(clarke(currents), SinCos::of(angle));
     let speed = match (parked, s.tracking.crossings) {
         (true, _) => Speed::ZERO,
         (false, 0) => s.tracking.omega,

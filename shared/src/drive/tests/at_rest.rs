@@ -150,7 +150,7 @@ fn a_start_begins_with_offsets_measured_anew() {
     for offset_a in [0.5, -0.7] {
         let off = sample([offset_a, 0.0, -offset_a], 24.0);
         assert_eq!(
-            bench.run(132, off, turn),
+            bench.run(133, off, turn),
             Bridge::Charge(bench.config.charge.duty)
         );
         assert_eq!(bench.phase(), Phase::Charge);
@@ -208,8 +208,8 @@ fn terminals_that_tell_nothing_delay_a_start_by_40_ms() {
         periods += 1;
     }
     assert_eq!(bench.state.rotor, Rotor::Unknown);
-    // Two periods in which a current may still die, and eight measurements.
-    assert_eq!(periods, 2 + 8 * 128);
+    // Two periods in which a current may still die, and eight measurements that end in one that judges.
+    assert_eq!(periods, 2 + 8 * (128 + 1));
 }
 
 #[test]

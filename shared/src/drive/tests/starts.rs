@@ -23,8 +23,9 @@ fn a_start_senses_charges_parks_and_ramps() {
     else {
         panic!("{phases:?}");
     };
-    // 5 ms are 128 periods, rounded to a power of two; before them a current may still die for two.
-    assert_eq!(sense, 2 + 128);
+    // 5 ms are 128 periods, rounded to a power of two; before them a current may still die for two,
+    // and one after them judges what was read.
+    assert_eq!(sense, 2 + 128 + 1);
     assert_eq!(charge, pulses + launch::READY_PERIODS);
     // Three periods of the rotor's swing, which are more than 0.4 As at 4 A, in steps of eight, and
     // eight for the observer.

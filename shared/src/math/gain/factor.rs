@@ -1,7 +1,7 @@
 //! The factor of a gain as each machine multiplies by it: the same bits on both.
 //!
-//! Both are `mantissa·power/2^32`, where the power is one of two up to 2^30. The product with the
-//! mantissa keeps its top half, so that what is left after the power ends in as many zeros.
+//! Both are `mantissa·2^shift/2^32`, where the shift is at most 30. The product with the mantissa
+//! keeps its top half, so that what is left after the shift ends in as many zeros.
 
 #[cfg(target_pointer_width = "64")]
 pub(super) use Long as Factor;
@@ -18,11 +18,8 @@ pub(super) struct Short {
 
 #[cfg(any(test, not(target_pointer_width = "64")))]
 impl Short {
-    pub(super) const fn new(mantissa: i32, power: i32) -> Self {
-        Self {
-            mantissa,
-            shift: power.trailing_zeros(),
-        }
+    pub(super) const fn new(mantissa: i32, shift: u32) -> Self {
+        Self { mantissa, shift }
     }
 
     /// The product, wrapped.
@@ -41,7 +38,7 @@ impl Short {
         if product >> shift == top {
             product
         } else {
-            end(top.is_negative(), -1 << shift)
+            beyond(top, shift)
         }
     }
 
@@ -61,10 +58,10 @@ pub(super) struct Long {
 
 #[cfg(target_pointer_width = "64")]
 impl Long {
-    pub(super) const fn new(mantissa: i32, power: i32) -> Self {
+    pub(super) const fn new(mantissa: i32, shift: u32) -> Self {
         Self {
-            whole: mantissa as i64 * power as i64,
-            mask: -power,
+            whole: (mantissa as i64) << shift,
+            mask: -1 << shift,
         }
     }
 
@@ -89,6 +86,14 @@ impl Long {
     }
 }
 
+/// The last product on the side of `top`. Not inlined: it would be worked out for every product.
+#[cfg(any(test, not(target_pointer_width = "64")))]
+#[cold]
+#[inline(never)]
+fn beyond(top: i32, shift: u32) -> i32 {
+    end(top.is_negative(), -1 << (shift & 31))
+}
+
 /// The last product on a side of zero.
 #[inline(always)]
 fn end(negative: bool, mask: i32) -> i32 {
@@ -105,11 +110,11 @@ mod tests {
         fn both_forms_make_the_same_bits(
             x: i32,
             mantissa: i32,
-            power_log2 in 0..31,
+            shift in 0_u32..31,
             smaller in 0..31,
         ) {
-            let (mantissa, power) = (mantissa >> smaller, 1 << power_log2);
-            let (short, long) = (Short::new(mantissa, power), Long::new(mantissa, power));
+            let mantissa = mantissa >> smaller;
+            let (short, long) = (Short::new(mantissa, shift), Long::new(mantissa, shift));
             prop_assert_eq!(short.wrapping(x), long.wrapping(x));
             prop_assert_eq!(short.saturating(x), long.saturating(x));
         }
@@ -117,13 +122,13 @@ mod tests {
 
     #[test]
     fn both_forms_end_at_the_same_place() {
-        for (mantissa, power) in [(i32::MAX, 1 << 30), (1 << 30, 4), (-(1 << 30), 4)] {
-            let (short, long) = (Short::new(mantissa, power), Long::new(mantissa, power));
+        for (mantissa, shift) in [(i32::MAX, 30), (1 << 30, 2), (-(1 << 30), 2)] {
+            let (short, long) = (Short::new(mantissa, shift), Long::new(mantissa, shift));
             for x in [i32::MIN, -(1 << 30) - 1, -1, 0, 1, (1 << 30) - 1, i32::MAX] {
                 assert_eq!(
                     short.saturating(x),
                     long.saturating(x),
-                    "{mantissa}·{power}·{x}"
+                    "{mantissa}·2^{shift}·{x}"
                 );
             }
         }

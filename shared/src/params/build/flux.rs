@@ -8,7 +8,7 @@ use super::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{crossing, flux_linkage, hall, position};
-use crate::math::Real;
+use crate::math::{Real, settled, square_root};
 use crate::params::{ParamId, Params};
 use crate::units::{Angle, Flux, Speed};
 
@@ -81,9 +81,9 @@ impl FluxSettings {
             },
             hold_off_turns: HOLD_OFF * A_TURNS,
             turns: n,
-            whole_turns_above_hz: libm::sqrtf((6.0 * n + 1.0) * alpha * A_TURNS / K_MAX),
+            whole_turns_above_hz: square_root((6.0 * n + 1.0) * alpha * A_TURNS / K_MAX),
             a_e,
-            filter_above_hz: libm::sqrtf(alpha * A_TURNS * lag / ERROR_TURNS),
+            filter_above_hz: square_root(alpha * A_TURNS * lag / ERROR_TURNS),
         }
     }
 }
@@ -106,7 +106,7 @@ pub(super) fn edges(p: &Si) -> Config {
     let settings = FluxSettings::new(p.params);
     let flux_per_current = p.inductance_h * p.scale.current_a / p.scale.flux_wb();
     // In a period, a filter of this time constant goes this share of its way.
-    let share = |tau_s: f32| -libm::expm1f(-p.period_s / tau_s);
+    let share = |tau_s: f32| settled(p.period_s / tau_s);
     let corner = |tau_s: f32| Speed::from_f32(p.period_s / (TAU * tau_s));
     let high_pass = settings.tau_hpfs_s.map(|tau_s| HighPass {
         share: p.gain(ParamId::StaRunRpm, share(tau_s)),

@@ -19,7 +19,7 @@ use core::f32::consts::{FRAC_PI_2, TAU};
 
 use fixed::types::extra::Unsigned;
 
-use super::{ParamId, Params, SQRT_3};
+use super::{ParamId, Params};
 use crate::control::delay::Delay;
 use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
@@ -143,7 +143,8 @@ const BOUND_RATE: f32 = 600.0;
 /// # Errors
 /// A [`BuildError`] names the parameter that makes a coefficient leave its range.
 pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
-    let p = Si::new(params, board);
+    let refused = Cell::new(None);
+    let p = Si::new(params, board, &refused);
     refuse_contradictions(&p);
     let modulation = match p.get(ParamId::CtlModulation) {
         0.0 => Modulation::SpaceVector,
@@ -298,11 +299,11 @@ struct Si<'a> {
     linearised_rad_s: f32,
     /// The first that was refused. Noted here and not returned: on the chip, a hundred early returns
     /// take more flash than the coefficients that they guard.
-    refused: Cell<Option<BuildError>>,
+    refused: &'a Cell<Option<BuildError>>,
 }
 
 impl<'a> Si<'a> {
-    fn new(params: &'a Params, board: &'a Board) -> Self {
+    fn new(params: &'a Params, board: &'a Board, refused: &'a Cell<Option<BuildError>>) -> Self {
         let pole_pairs = params.get(ParamId::MotPolePairs);
         let flux_wb = params.get(ParamId::MotFluxMwb) * 1e-3;
         let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
@@ -326,7 +327,7 @@ impl<'a> Si<'a> {
             current_rad_s: TAU * params.get(ParamId::CtlBwCurHz),
             speed_rad_s: TAU * params.get(ParamId::CtlBwSpdHz),
             linearised_rad_s: rpm * pole_pairs * TAU / 60.0,
-            refused: Cell::new(None),
+            refused,
         }
     }
 
@@ -348,14 +349,15 @@ impl<'a> Si<'a> {
     }
 
     /// A volt number in the control's unit.
+    #[inline(never)]
     fn voltage(&self, volts: f32) -> Voltage {
         Voltage::from_f32(volts / self.scale.voltage_v)
     }
 
     /// The gain of value `k`; where there is none, the parameter is refused.
     fn gain<A: Unsigned, B: Unsigned>(&self, param: ParamId, k: f32) -> Gain<A, B> {
-        let (mantissa, power) = self.gain_parts(param, k, B::I32 - A::I32);
-        Gain::from_parts(mantissa, power)
+        let (mantissa, shift) = self.gain_parts(param, k, B::I32 - A::I32);
+        Gain::from_parts(mantissa, shift)
     }
 
     /// The factor of value `k`; where it leaves its type's range, the parameter is refused.
@@ -365,16 +367,16 @@ impl<'a> Si<'a> {
 
     #[inline(never)]
     fn factor_bits(&self, param: ParamId, k: f32, exponent: i32) -> i32 {
-        let (bits, power) = self.gain_parts(param, k, exponent);
-        self.refuse_if(power != 1, param, OUT_OF_RANGE);
+        let (bits, shift) = self.gain_parts(param, k, exponent);
+        self.refuse_if(shift != 0, param, OUT_OF_RANGE);
         bits
     }
 
     #[inline(never)]
-    fn gain_parts(&self, param: ParamId, k: f32, exponent: i32) -> (i32, i32) {
+    fn gain_parts(&self, param: ParamId, k: f32, exponent: i32) -> (i32, u32) {
         let parts = gain_parts(k, exponent);
         self.refuse_if(parts.is_none(), param, OUT_OF_RANGE);
-        parts.unwrap_or((0, 1))
+        parts.unwrap_or((0, 0))
     }
 
     /// Refuses a parameter in some case, unless another has been refused before.

@@ -6,7 +6,7 @@ use super::{Si, flux};
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated};
-use crate::math::{EIGHTH_PI, Multiplier, Real};
+use crate::math::{EIGHTH_PI, Multiplier, Real, settled};
 use crate::params::ParamId;
 use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
 
@@ -85,7 +85,7 @@ fn compensated(p: &Si) -> compensated::Config {
 /// The adaptive back-EMF observer (6), (7), (20), (22), (28).
 fn back_emf(p: &Si) -> back_emf::Config {
     let r_over_l = p.resistance_ohm / p.inductance_h;
-    let decay = -libm::expm1f(-r_over_l * p.period_s);
+    let decay = settled(r_over_l * p.period_s);
     // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
     let acts_s = decay / r_over_l;
     let current_per_voltage = p.scale.voltage_v / p.scale.current_a;

@@ -4,12 +4,12 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use fixed::types::{I0F32, I2F30};
 
-use super::{SQRT_3, Si};
+use super::Si;
 use crate::control::modulator::Modulation;
 use crate::control::sensing::{self, Shunts};
 use crate::control::{catch, dead_time};
 use crate::drive::Charge;
-use crate::math::Real;
+use crate::math::{Real, SQRT_3};
 use crate::params::ParamId;
 use crate::units::{AdcCounts, Duty, Speed};
 
@@ -141,7 +141,7 @@ pub(super) fn charge(p: &Si) -> Charge {
     let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * p.period_s);
     Charge {
         duty: Duty::from_f32(pulse_s / p.period_s),
-        periods: libm::ceilf(p.board.charge_s / pulse_s) as u32,
+        periods: (p.board.charge_s / pulse_s) as u32 + 1,
     }
 }
 
