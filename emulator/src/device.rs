@@ -5,12 +5,11 @@ mod answer;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use embassy_futures::block_on;
 use siskin_control::drive::Setpoint;
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, BuildError, ParamId, Params};
-use siskin_control::store::{self, Integrity, LoadReport};
+use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
 use thiserror::Error;
 
@@ -153,10 +152,12 @@ impl Device {
             faults,
             link_bytes_per_s,
         } = start;
-        let (mut params, report) = block_on(store::load(&mut flash, STORE));
-        let warning = match report.integrity {
+        let (mut params, integrity) = store::load(&mut flash, STORE);
+        let warning = match integrity {
             Integrity::Sound | Integrity::Empty => None,
-            Integrity::Incomplete => Some("some stored parameters are missing; defaults stand in"),
+            Integrity::Incomplete => {
+                Some("the stored parameters are not whole; an earlier save is in force")
+            }
             Integrity::Corrupt | Integrity::Unreadable => return Err(StartError::CorruptStorage),
         };
         let overrides: Vec<_> = overrides
@@ -380,27 +381,27 @@ impl Device {
                 let _ = params.set(given.id, given.stored);
             }
         }
-        block_on(store::save(&mut self.flash, STORE, &params)).map_err(store::StoreError::text)?;
+        store::save(&mut self.flash, STORE, &params).map_err(store::StoreError::text)?;
         self.persist()
     }
 
     /// The stored parameters under those of the command line, and how sound the former are.
-    fn stored(&mut self) -> (Params, LoadReport) {
-        let (mut params, report) = block_on(store::load(&mut self.flash, STORE));
+    fn stored(&mut self) -> (Params, Integrity) {
+        let (mut params, integrity) = store::load(&mut self.flash, STORE);
         apply(&self.overrides, &mut params);
-        (params, report)
+        (params, integrity)
     }
 
     fn load(&mut self) -> Result<(), &'static str> {
-        let (params, report) = self.stored();
-        if matches!(report.integrity, Integrity::Corrupt | Integrity::Unreadable) {
+        let (params, integrity) = self.stored();
+        if matches!(integrity, Integrity::Corrupt | Integrity::Unreadable) {
             return Err("storage: the stored parameters are corrupt");
         }
         self.replace(params)
     }
 
     fn factory_reset(&mut self) -> Result<(), &'static str> {
-        block_on(store::erase(&mut self.flash, STORE)).map_err(store::StoreError::text)?;
+        store::erase(&mut self.flash, STORE).map_err(store::StoreError::text)?;
         let mut params = Params::default();
         apply(&self.overrides, &mut params);
         self.replace(params)?;

@@ -8,7 +8,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use embedded_storage_async::nor_flash::{
+use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use thiserror::Error;
@@ -234,7 +234,7 @@ impl ErrorType for FileFlash {
 impl ReadNorFlash for FileFlash {
     const READ_SIZE: usize = 1;
 
-    async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         let range = range(offset, offset as usize + bytes.len(), Self::READ_SIZE)?;
         bytes.copy_from_slice(&self.content[range]);
         Ok(())
@@ -249,12 +249,12 @@ impl NorFlash for FileFlash {
     const WRITE_SIZE: usize = WORD_BYTES;
     const ERASE_SIZE: usize = PAGE_BYTES;
 
-    async fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         let range = range(from, to as usize, PAGE_BYTES)?;
         self.store(range.start, &[ERASED; FLASH_BYTES][..range.len()])
     }
 
-    async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         let range = range(offset, offset as usize + bytes.len(), WORD_BYTES)?;
         let used = self.content[range.clone()]
             .iter()
@@ -270,12 +270,11 @@ impl NorFlash for FileFlash {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use embassy_futures::block_on;
     use tempfile::tempdir;
 
     fn read(flash: &mut FileFlash, offset: u32, length: usize) -> Vec<u8> {
         let mut bytes = vec![0; length];
-        block_on(flash.read(offset, &mut bytes)).unwrap();
+        flash.read(offset, &mut bytes).unwrap();
         bytes
     }
 
@@ -284,19 +283,19 @@ mod tests {
         let mut flash = FileFlash::in_memory();
         assert_eq!((flash.capacity(), flash.is_persistent()), (8192, false));
         let word: [u8; 8] = *b"siskin 1";
-        block_on(flash.write(2040, &word)).unwrap();
-        block_on(flash.write(2048, &word)).unwrap();
+        flash.write(2040, &word).unwrap();
+        flash.write(2048, &word).unwrap();
         assert_eq!(read(&mut flash, 2041, 14), b"iskin 1siskin ");
 
         // A word is written once, even with bits that could still be cleared.
-        let again = block_on(flash.write(2032, &[0; 16])).unwrap_err();
+        let again = flash.write(2032, &[0; 16]).unwrap_err();
         assert!(matches!(again, FlashError::NotErased(2040)), "{again}");
         assert_eq!(read(&mut flash, 2032, 8), [0xFF; 8], "nothing has changed");
 
-        block_on(flash.erase(0, 2048)).unwrap();
+        flash.erase(0, 2048).unwrap();
         assert_eq!(read(&mut flash, 0, 2048), [0xFF; 2048]);
         assert_eq!(read(&mut flash, 2048, 8), word, "the next page stays");
-        block_on(flash.write(2040, &word)).unwrap();
+        flash.write(2040, &word).unwrap();
     }
 
     #[test]
@@ -310,7 +309,7 @@ mod tests {
             (8184, 16, OutOfBounds),
             (u32::MAX, 8, OutOfBounds),
         ] {
-            let error = block_on(flash.write(offset, &vec![0; length])).unwrap_err();
+            let error = flash.write(offset, &vec![0; length]).unwrap_err();
             assert_eq!(error.kind(), kind, "{offset} {length}");
         }
         for (from, to, kind) in [
@@ -320,10 +319,10 @@ mod tests {
             (0, 8193, OutOfBounds),
             (0, u32::MAX, OutOfBounds),
         ] {
-            let error = block_on(flash.erase(from, to)).unwrap_err();
+            let error = flash.erase(from, to).unwrap_err();
             assert_eq!(error.kind(), kind, "{from} {to}");
         }
-        assert!(block_on(flash.read(8191, &mut [0; 2])).is_err());
+        assert!(flash.read(8191, &mut [0; 2]).is_err());
         assert_eq!(read(&mut flash, 0, 8192), [0xFF; 8192]);
     }
 
@@ -333,7 +332,7 @@ mod tests {
         let path = folder.path().join("a/b/flash");
         let mut flash = FileFlash::open(&path).unwrap();
         assert!(flash.is_persistent());
-        block_on(flash.write(4096, &[7; 24])).unwrap();
+        flash.write(4096, &[7; 24]).unwrap();
         // What another process would find, had this one been killed here.
         let mut wanted = vec![0xFF; FLASH_BYTES];
         wanted[4096..4120].fill(7);
@@ -343,7 +342,7 @@ mod tests {
 
         let mut flash = FileFlash::open(&path).unwrap();
         assert_eq!(read(&mut flash, 0, FLASH_BYTES), wanted);
-        block_on(flash.erase(4096, 6144)).unwrap();
+        flash.erase(4096, 6144).unwrap();
         assert_eq!(fs::read(&path).unwrap(), [0xFF; FLASH_BYTES]);
         let left: Vec<_> = fs::read_dir(path.parent().unwrap()).unwrap().collect();
         assert_eq!(left.len(), 1, "no file of the creation is left");

@@ -31,6 +31,8 @@ set_impl!(Basepri);
 // SAFETY: everything that uses a critical section runs in thread mode or at `TASKS`, which the
 // raised BASEPRI holds up; to restore what was before lets sections nest. There is one core.
 unsafe impl Impl for Basepri {
+    // Never inlined: some sixty sections begin with it.
+    #[inline(never)]
     unsafe fn acquire() -> RawRestoreState {
         let before: u8;
         // SAFETY: the two registers hold no memory; the instruction synchronisation makes the new

@@ -1,25 +1,26 @@
 //! Numbers as text, for a person: the formatting of the core library would take 3 KB of the image.
 
-use heapless::String;
+use heapless::string::StringView;
 
 /// Appends a number as decimal digits; those that do not fit are left out.
-pub(crate) fn push_decimal<const N: usize>(text: &mut String<N>, number: u32) {
+pub(crate) fn push_decimal(text: &mut StringView, number: u32) {
     push_digits(text, number, 10);
 }
 
 /// Appends a number as hexadecimal digits; those that do not fit are left out.
-pub(crate) fn push_hex<const N: usize>(text: &mut String<N>, number: u32) {
+pub(crate) fn push_hex(text: &mut StringView, number: u32) {
     push_digits(text, number, 16);
 }
 
+// As what follows it, never inlined and for strings of any length: it serves all.
 /// Appends words; those that do not fit are left out.
-pub(crate) fn push<const N: usize>(text: &mut String<N>, words: &str) {
+#[inline(never)]
+pub(crate) fn push(text: &mut StringView, words: &str) {
     let _ = text.push_str(words);
 }
 
-// Never inlined: it serves all.
 #[inline(never)]
-fn push_digits<const N: usize>(text: &mut String<N>, number: u32, base: u32) {
+fn push_digits(text: &mut StringView, number: u32, base: u32) {
     let mut worth = 1;
     while number / worth >= base {
         worth *= base;
@@ -34,6 +35,7 @@ fn push_digits<const N: usize>(text: &mut String<N>, number: u32, base: u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use heapless::String;
 
     #[test]
     fn numbers_are_as_the_core_library_writes_them() {

@@ -1,23 +1,20 @@
 //! Parameters in flash.
 //!
-//! Each value is one item of a log (`sequential-storage`) under the parameter's key, with a CRC of
-//! its own; a new value is appended, and a full page moves on. A loss of power leaves each value
-//! old or new. One more item, the seal, is written last and is over all values, so that a half
-//! written set and a value whose item has rotted are noticed.
+//! A save appends all stored values as one set, of 8 bytes a value, and ends it with a seal over them.
+//! The newest set with its seal counts, so a loss of power leaves the values of this save or of the one
+//! before. The flash is used in two halves: where one has no more room, or anything written is not
+//! whole, the other is erased for the set. What it replaces stays until the new one stands.
 
 use core::ops::Range;
 
-use embedded_storage_async::nor_flash::NorFlash;
-use sequential_storage::Error;
-use sequential_storage::cache::{Cache, Uncached};
-use sequential_storage::map::{MapConfig, MapStorage};
+use embedded_storage::nor_flash::NorFlash;
 
 use crate::params::{Kind, ParamId, Params, TABLE};
 
 /// Key of the seal; no parameter has it.
 const SEAL: u16 = 0;
-/// A key of 2 bytes and a value of 4, rounded up to the longest word that the log supports.
-const BUFFER_LEN: usize = 32;
+/// Number of the first set in empty flash.
+const FIRST: u16 = 1;
 
 /// How sound the stored parameters were.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,9 +23,8 @@ pub enum Integrity {
     Sound,
     /// Nothing was stored: the values are the defaults.
     Empty,
-    /// The seal does not fit: a save was interrupted, an item has rotted, or another version of
-    /// the firmware has stored other parameters. A value that is missing is an older one or the
-    /// default.
+    /// A save was interrupted, or a value has rotted: the values are those of an earlier save, or the
+    /// defaults if there is none.
     Incomplete,
     /// No order was found in the flash: the values are the defaults.
     Corrupt,
@@ -36,21 +32,10 @@ pub enum Integrity {
     Unreadable,
 }
 
-/// What [`load`] found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LoadReport {
-    /// How sound it was.
-    pub integrity: Integrity,
-    /// Parameters whose stored value is in force.
-    pub loaded: u16,
-    /// Stored items that are not in force: unknown keys, other sizes, values out of range.
-    pub skipped: u16,
-}
-
 /// Why nothing is promised of what was stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError {
-    /// The range is not at least two whole pages of the flash.
+    /// The range is not two halves of whole pages of the flash.
     BadRange,
     /// The flash refused a read, a write or an erase.
     Flash,
@@ -69,95 +54,66 @@ impl StoreError {
     }
 }
 
-/// Reads the parameters from `range` of the flash, whatever is in it: what cannot be used is
-/// reported and stays at its default.
-pub async fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Params, LoadReport) {
-    let mut params = Params::default();
-    let mut report = LoadReport {
-        integrity: Integrity::Sound,
-        loaded: 0,
-        skipped: 0,
+/// Reads the parameters from `range` of the flash, whatever is in it. A value that was not stored, or
+/// that this firmware does not know or accept, is the default.
+pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> (Params, Integrity) {
+    let read = |halves| {
+        let found = Found::look(flash, &halves)?;
+        Ok((found.newest.params(flash)?, found.integrity()))
     };
-    let mut stored = Stored::NOTHING;
-    if let Err(error) = stored.read(flash, range.clone()).await {
-        report.integrity = match error {
-            ReadError::Corrupt => Integrity::Corrupt,
-            ReadError::Store(_) => Integrity::Unreadable,
-        };
-        return (params, report);
-    }
-    report.skipped = stored.skipped;
-    for (id, bits) in ParamId::ALL.into_iter().zip(&stored.items) {
-        let Some(bits) = bits else { continue };
-        let counter = match params.set(id, f32::from_bits(*bits)) {
-            Ok(()) => &mut report.loaded,
-            Err(_) => &mut report.skipped,
-        };
-        *counter = counter.saturating_add(1);
-    }
-    if stored.items[SEAL_AT] != stored.expected_seal() {
-        report.integrity = Integrity::Incomplete;
-    } else if stored.items[SEAL_AT].is_none() {
-        report.integrity = match written_bytes(flash, range).await {
-            Ok(0) => Integrity::Empty,
-            Ok(count) if count <= FIRST_SAVE_BYTES => Integrity::Incomplete,
-            Ok(_) => Integrity::Corrupt,
-            Err(_) => Integrity::Unreadable,
-        };
-    }
-    (params, report)
+    halves::<F>(range)
+        .and_then(read)
+        .unwrap_or_else(|_: StoreError| (Params::default(), Integrity::Unreadable))
 }
 
-/// What a first save leaves at the most if it is interrupted before its first value is whole: a
-/// page's mark and one item, each rounded up to the longest word.
-const FIRST_SAVE_BYTES: usize = 2 * BUFFER_LEN;
-
-/// How many bytes are not as an erase leaves them.
-async fn written_bytes<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<usize, F::Error> {
-    let mut count = 0;
-    let mut buffer = [0; BUFFER_LEN];
-    for offset in range.step_by(BUFFER_LEN) {
-        flash.read(offset, &mut buffer).await?;
-        count += buffer.iter().filter(|byte| **byte != 0xFF).count();
-    }
-    Ok(count)
-}
-
-/// Writes what differs from what is stored, reads it back, and says how many items it wrote. When
-/// it is done the values survive the loss of power.
+/// Writes a new set if the values are not those that are stored, and looks whether it stands. When it
+/// is done the values survive the loss of power.
 ///
-/// A default that was never stored is not written. Flash that is corrupt, or full of other things,
-/// is erased first.
+/// A default that was never stored is not written; what this firmware does not know is kept.
 ///
 /// # Errors
-/// Any [`StoreError`]; values may then be old, new or, after an erase, missing. With
-/// [`StoreError::Flash`] a sound set has not been erased; where it stays at that, [`erase`] heals
-/// a place that has rotted.
-pub async fn save<F: NorFlash>(
+/// Any [`StoreError`]; what was stored before is still there then, or these values are.
+pub fn save<F: NorFlash>(
     flash: &mut F,
     range: Range<u32>,
     params: &Params,
-) -> Result<usize, StoreError> {
-    let mut stored = Stored::NOTHING;
-    let sound = match stored.read(flash, range.clone()).await {
-        Ok(()) => {
-            stored.items[SEAL_AT].is_some() && stored.items[SEAL_AT] == stored.expected_seal()
-        }
-        Err(ReadError::Corrupt) => false,
-        Err(ReadError::Store(error)) => return Err(error),
+) -> Result<(), StoreError> {
+    let halves = halves::<F>(range)?;
+    let found = Found::look(flash, &halves)?;
+    let old = found.newest;
+    if found.whole && old.params(flash)? == *params {
+        return Ok(());
+    }
+    let [first, second] = &halves;
+    let (here, there) = if first.contains(&old.values.start) {
+        (first, second)
+    } else {
+        (second, first)
     };
-    let mut erased = false;
-    loop {
-        match append(flash, range.clone(), params, &mut stored).await {
-            Ok(written) => return Ok(written),
-            Err(ReadError::Corrupt) if erased => return Err(StoreError::NotStored),
-            Err(ReadError::Store(error)) if erased => return Err(error),
-            // Flash refuses to write where something has rotted, which an erase heals. What is sound
-            // is not risked for it: a flash that fails may lose it.
-            Err(ReadError::Store(StoreError::Flash)) if sound => return Err(StoreError::Flash),
-            Err(_) => erase(flash, range.clone()).await?,
+    let bytes_max = old.values.len() as u32 + (TABLE.len() as u32 + 1) * Word::BYTES;
+    let stays = found.whole && here.end - old.after >= bytes_max;
+    if !stays {
+        if there.len() < bytes_max as usize {
+            return Err(StoreError::NotStored);
         }
-        erased = true;
+        wipe(flash, there)?;
+    }
+    let mut writer = Writer {
+        at: if stays { old.after } else { there.start },
+        number: old.number.wrapping_add(1),
+        hash: HASH_BASIS,
+    };
+    writer.write(flash, &old, params)?;
+
+    let new = Found::look(flash, &halves)?.newest;
+    if new.number != writer.number || new.params(flash)? != *params {
+        return Err(StoreError::NotStored);
+    }
+    // What is not whole would be found again.
+    if found.whole {
+        Ok(())
+    } else {
+        wipe(flash, here)
     }
 }
 
@@ -165,145 +121,220 @@ pub async fn save<F: NorFlash>(
 ///
 /// # Errors
 /// [`StoreError::BadRange`] and [`StoreError::Flash`].
-pub async fn erase<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<(), StoreError> {
-    open(flash, range)?
-        .erase_all()
-        .await
+pub fn erase<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<(), StoreError> {
+    halves::<F>(range)?
+        .iter()
+        .try_for_each(|half| wipe(flash, half))
+}
+
+fn wipe<F: NorFlash>(flash: &mut F, half: &Range<u32>) -> Result<(), StoreError> {
+    flash
+        .erase(half.start, half.end)
         .map_err(|_| StoreError::Flash)
 }
 
-type Map<'a, F> = MapStorage<u16, &'a mut F, Cache<Uncached, Uncached, Uncached, u16>>;
-
-fn open<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<Map<'_, F>, StoreError> {
-    if range.start > range.end {
-        return Err(StoreError::BadRange);
+fn halves<F: NorFlash>(range: Range<u32>) -> Result<[Range<u32>; 2], StoreError> {
+    let middle = range.start.midpoint(range.end);
+    let halves = [range.start..middle, middle..range.end];
+    let pages = |half: &Range<u32>| {
+        !half.is_empty()
+            && half.start.is_multiple_of(F::ERASE_SIZE as u32)
+            && half.end.is_multiple_of(F::ERASE_SIZE as u32)
+    };
+    if halves.iter().all(pages) {
+        Ok(halves)
+    } else {
+        Err(StoreError::BadRange)
     }
-    let config = MapConfig::try_new(range).map_err(|_| StoreError::BadRange)?;
-    Ok(MapStorage::new(flash, config, Cache::new_uncached()))
 }
 
-enum ReadError {
-    Corrupt,
-    Store(StoreError),
+/// What the flash is read and written by.
+struct Word {
+    key: u16,
+    /// That of its set.
+    number: u16,
+    /// A value's, or the hash of the set.
+    bits: u32,
 }
 
-impl<E> From<Error<E>> for ReadError {
-    fn from(error: Error<E>) -> Self {
-        match error {
-            Error::Storage { .. } => Self::Store(StoreError::Flash),
-            Error::FullStorage | Error::ItemTooBig => Self::Store(StoreError::NotStored),
-            _ => Self::Corrupt,
+impl Word {
+    const BYTES: u32 = 8;
+
+    fn read<F: NorFlash>(flash: &mut F, at: u32) -> Result<Self, StoreError> {
+        let mut bytes = [0; Self::BYTES as usize];
+        flash.read(at, &mut bytes).map_err(|_| StoreError::Flash)?;
+        let [a, b, c, d, e, f, g, h] = bytes;
+        Ok(Self {
+            key: u16::from_le_bytes([a, b]),
+            number: u16::from_le_bytes([c, d]),
+            bits: u32::from_le_bytes([e, f, g, h]),
+        })
+    }
+
+    fn bytes(&self) -> [u8; Self::BYTES as usize] {
+        let [a, b] = self.key.to_le_bytes();
+        let [c, d] = self.number.to_le_bytes();
+        let [e, f, g, h] = self.bits.to_le_bytes();
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// As an erase leaves it.
+    fn is_blank(&self) -> bool {
+        self.bytes() == [0xFF; Self::BYTES as usize]
+    }
+
+    /// The parameter whose value it is; derived parameters are not stored.
+    fn id(&self) -> Option<ParamId> {
+        ParamId::ALL
+            .into_iter()
+            .find(|id| id.entry().key == self.key && id.entry().kind != Kind::Derived)
+    }
+
+    /// A hash (FNV-1a) over this and what was before.
+    fn hash(&self, before: u32) -> u32 {
+        self.bytes().into_iter().fold(before, |hash, byte| {
+            (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+        })
+    }
+}
+
+const HASH_BASIS: u32 = 0x811c_9dc5;
+
+/// Where in the flash a set is.
+#[derive(Clone)]
+struct Set {
+    /// Its words but for the seal.
+    values: Range<u32>,
+    /// Behind the seal.
+    after: u32,
+    /// One more than that of the set before.
+    number: u16,
+}
+
+impl Set {
+    fn params<F: NorFlash>(&self, flash: &mut F) -> Result<Params, StoreError> {
+        let mut params = Params::default();
+        for at in self.values.clone().step_by(Word::BYTES as usize) {
+            let word = Word::read(flash, at)?;
+            if let Some(id) = word.id() {
+                // What is out of range has been stored by another version of the firmware.
+                let _ = params.set(id, f32::from_bits(word.bits));
+            }
+        }
+        Ok(params)
+    }
+}
+
+/// What the flash holds.
+struct Found {
+    /// Of the sets with their seals; without words if there is none.
+    newest: Set,
+    /// Whether all that is written belongs to such a set.
+    whole: bool,
+    /// Whether all that is written may belong to a first set.
+    first: bool,
+}
+
+impl Found {
+    fn look<F: NorFlash>(flash: &mut F, halves: &[Range<u32>; 2]) -> Result<Self, StoreError> {
+        let origin = halves[0].start;
+        let mut found = Self {
+            newest: Set {
+                values: origin..origin,
+                after: origin,
+                number: FIRST - 1,
+            },
+            whole: true,
+            first: true,
+        };
+        for half in halves {
+            let mut start = half.start;
+            let mut number = FIRST;
+            let mut hash = HASH_BASIS;
+            let mut whole = true;
+            for at in half.clone().step_by(Word::BYTES as usize) {
+                let word = Word::read(flash, at)?;
+                if word.is_blank() {
+                    continue;
+                }
+                if whole || word.number != number {
+                    found.whole &= whole;
+                    (start, number, hash) = (at, word.number, HASH_BASIS);
+                }
+                found.first &= number == FIRST;
+                whole = word.key == SEAL && word.bits == hash;
+                hash = word.hash(hash);
+                let newest = &found.newest;
+                let is_newer = number.wrapping_sub(newest.number).cast_signed() > 0;
+                if whole && (newest.values.is_empty() || is_newer) {
+                    found.newest = Set {
+                        values: start..at,
+                        after: at + Word::BYTES,
+                        number,
+                    };
+                }
+            }
+            found.whole &= whole;
+        }
+        Ok(found)
+    }
+
+    fn integrity(&self) -> Integrity {
+        match (self.newest.values.is_empty(), self.whole) {
+            (false, true) => Integrity::Sound,
+            (true, true) => Integrity::Empty,
+            (true, false) if !self.first => Integrity::Corrupt,
+            (_, false) => Integrity::Incomplete,
         }
     }
 }
 
-impl From<StoreError> for ReadError {
-    fn from(error: StoreError) -> Self {
-        Self::Store(error)
-    }
+/// Writes a set.
+struct Writer {
+    at: u32,
+    number: u16,
+    hash: u32,
 }
 
-/// The seal's place behind those of the table's values.
-const SEAL_AT: usize = TABLE.len();
-
-/// What the flash holds, as bits: a value may be one that the table does not accept.
-#[derive(Clone)]
-struct Stored {
-    items: [Option<u32>; SEAL_AT + 1],
-    skipped: u16,
-}
-
-impl Stored {
-    const NOTHING: Self = Self {
-        items: [None; SEAL_AT + 1],
-        skipped: 0,
-    };
-
-    /// Reads what the flash holds, in place of what is here: a task keeps one of these, not one for
-    /// each time that it reads.
-    async fn read<F: NorFlash>(
+impl Writer {
+    /// The words of the set before, with the values in force, and what is not in it and no default.
+    fn write<F: NorFlash>(
         &mut self,
         flash: &mut F,
-        range: Range<u32>,
-    ) -> Result<(), ReadError> {
-        *self = Self::NOTHING;
-        let mut map = open(flash, range)?;
-        let mut buffer = [0; BUFFER_LEN];
-        let mut items = map.fetch_all_items(&mut buffer).await?;
-        loop {
-            // Items come in the order in which they were written: the last of a key counts.
-            match items.next::<u32>(&mut buffer).await {
-                Ok(Some((key, bits))) => match place_of(key) {
-                    Some(place) => self.items[place] = Some(bits),
-                    None => self.skipped = self.skipped.saturating_add(1),
-                },
-                Ok(None) => return Ok(()),
-                // The item is of another size, so not of this firmware; the next may be.
-                Err(Error::SerializationError(_) | Error::BufferTooSmall(_)) => {
-                    self.skipped = self.skipped.saturating_add(1);
-                }
-                Err(error) => return Err(error.into()),
+        old: &Set,
+        params: &Params,
+    ) -> Result<(), StoreError> {
+        let mut written = [false; TABLE.len()];
+        for at in old.values.clone().step_by(Word::BYTES as usize) {
+            let mut word = Word::read(flash, at)?;
+            if let Some(id) = word.id() {
+                word.bits = params.get(id).to_bits();
+                written[id as usize] = true;
+            }
+            self.put(flash, word.key, word.bits)?;
+        }
+        for (id, written) in ParamId::ALL.into_iter().zip(written) {
+            let entry = id.entry();
+            if !written && entry.kind != Kind::Derived && params.get(id) != entry.default {
+                self.put(flash, entry.key, params.get(id).to_bits())?;
             }
         }
+        self.put(flash, SEAL, self.hash)
     }
 
-    /// A hash (FNV-1a) over keys and values in the order of the table; none over nothing.
-    fn expected_seal(&self) -> Option<u32> {
-        let mut seal = None;
-        for (parameter, bits) in TABLE.iter().zip(&self.items) {
-            let Some(bits) = bits else { continue };
-            let key = parameter.key.to_le_bytes();
-            for byte in key.into_iter().chain(bits.to_le_bytes()) {
-                let hash = seal.unwrap_or(0x811c_9dc5) ^ u32::from(byte);
-                seal = Some(hash.wrapping_mul(0x0100_0193));
-            }
-        }
-        seal
-    }
-}
-
-/// The place of a stored key; derived parameters are not stored.
-fn place_of(key: u16) -> Option<usize> {
-    (0..=SEAL_AT).find(|place| match TABLE.get(*place) {
-        Some(parameter) => parameter.key == key && parameter.kind != Kind::Derived,
-        None => key == SEAL,
-    })
-}
-
-async fn append<F: NorFlash>(
-    flash: &mut F,
-    range: Range<u32>,
-    params: &Params,
-    stored: &mut Stored,
-) -> Result<usize, ReadError> {
-    stored.read(flash, range.clone()).await?;
-    let mut wanted = stored.clone();
-    for (id, value) in ParamId::ALL.into_iter().zip(&mut wanted.items) {
-        let entry = id.entry();
-        let known = value.is_some() || params.get(id) != entry.default;
-        if entry.kind != Kind::Derived && known {
-            *value = Some(params.get(id).to_bits());
-        }
-    }
-    wanted.items[SEAL_AT] = wanted.expected_seal();
-
-    let mut written = 0;
-    let mut map = open(flash, range.clone())?;
-    let mut buffer = [0; BUFFER_LEN];
-    // The seal comes last.
-    for (place, (old, new)) in stored.items.iter().zip(&wanted.items).enumerate() {
-        if let Some(bits) = new.filter(|_| new != old) {
-            let key = TABLE.get(place).map_or(SEAL, |parameter| parameter.key);
-            map.store_item(&mut buffer, &key, &bits).await?;
-            written += 1;
-        }
-    }
-
-    stored.read(flash, range).await?;
-    if stored.items == wanted.items {
-        Ok(written)
-    } else {
-        Err(StoreError::NotStored.into())
+    fn put<F: NorFlash>(&mut self, flash: &mut F, key: u16, bits: u32) -> Result<(), StoreError> {
+        const { assert!((Word::BYTES as usize).is_multiple_of(F::WRITE_SIZE)) }
+        let word = Word {
+            key,
+            number: self.number,
+            bits,
+        };
+        flash
+            .write(self.at, &word.bytes())
+            .map_err(|_| StoreError::Flash)?;
+        self.hash = word.hash(self.hash);
+        self.at += Word::BYTES;
+        Ok(())
     }
 }
 

@@ -24,8 +24,6 @@ LEADS_TO = [
     # MAVLink asks the throttle's side, checks parameters and hands out bytes by what it is given.
     (r"^siskin_control::mavlink::", r" as siskin_control::input::access::Access>::"),
     (r"^siskin_control::mavlink::", r"^siskin_control::esc::Esc::with_component::{{closure}}$"),
-    # Stored keys and values are written by themselves.
-    (r"^sequential_storage::map::", r" as sequential_storage::map::(Key|Value)>::serialize_into$"),
 ]
 
 NEVER_CALLED = [

@@ -4,13 +4,13 @@
 
 use core::mem;
 
-use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, Exten, InjectedAdc, SampleTime};
+use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, Exten, SampleTime};
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
 use embassy_stm32::peripherals::{
-    ADC1, ADC2, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, IWDG, OPAMP1, OPAMP2,
-    OPAMP3, PA15, PB6, TIM1, TIM2, TIM3, USART1, USART2,
+    DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, IWDG, PA15, PB3, PB4, PB6, TIM1,
+    TIM2, TIM3, USART1, USART2,
 };
 use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::input_capture::CapturePin;
@@ -23,7 +23,6 @@ use siskin_control::control::sensing::Shunts;
 use siskin_control::params::Board;
 use siskin_control::protection::Ntc;
 use siskin_control::units::AdcCounts;
-use static_cell::StaticCell;
 
 use crate::chip::{self, comparators};
 use crate::image;
@@ -188,10 +187,7 @@ pub struct Bridge {
 /// | first | current a −0.15 to 0.15 | current c 0.44 to 0.74 | terminal c 1.03 to 1.61 | supply 1.90 to 3.02 |
 /// | second | current b −0.15 to 0.15 | terminal a 0.44 to 1.02 | terminal b 1.31 to 1.89 | |
 pub struct Converters {
-    _first: InjectedAdc<'static, ADC1, 4>,
-    _second: InjectedAdc<'static, ADC2, 3>,
-    /// Hall sensors b and c; that of a is also the KISS telemetry's pin.
-    _hall: [Input<'static>; 2],
+    _private: (),
 }
 
 /// The throttle wire.
@@ -222,6 +218,24 @@ impl Throttle {
             Capture::new(channels, requests),
             Replier::new(reply, update),
         )
+    }
+}
+
+/// MAVLink's serial line.
+pub struct Mavlink {
+    uart: Peri<'static, USART2>,
+    pins: (Peri<'static, PB4>, Peri<'static, PB3>),
+    dma: (Peri<'static, DMA1_CH1>, Peri<'static, DMA1_CH2>),
+}
+
+impl Mavlink {
+    /// Opens it at a rate that the table of parameters allows.
+    pub fn open(self, baud: u32) -> Uart<'static, Async> {
+        let mut config = usart::Config::default();
+        config.baudrate = baud;
+        let ((rx, tx), (out, into)) = (self.pins, self.dma);
+        Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
+            .expect("the table's range can be had of 170 MHz")
     }
 }
 
@@ -263,8 +277,8 @@ pub struct Hardware {
     pub light: Output<'static>,
     /// The throttle wire.
     pub throttle: Throttle,
-    /// MAVLink, 115200 baud.
-    pub mavlink: Uart<'static, Async>,
+    /// MAVLink's serial line.
+    pub mavlink: Mavlink,
     /// The KISS telemetry.
     pub kiss: Kiss,
     /// The flash that keeps the parameters.
@@ -305,13 +319,10 @@ impl Hardware {
             ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB15, gate),
         ));
 
-        static AMPLIFIER_A: StaticCell<OpAmp<'static, OPAMP1>> = StaticCell::new();
-        static AMPLIFIER_B: StaticCell<OpAmp<'static, OPAMP2>> = StaticCell::new();
-        static AMPLIFIER_C: StaticCell<OpAmp<'static, OPAMP3>> = StaticCell::new();
         let fast = OpAmpSpeed::HighSpeed;
-        let a = AMPLIFIER_A.init(OpAmp::new(p.OPAMP1, fast));
-        let b = AMPLIFIER_B.init(OpAmp::new(p.OPAMP2, fast));
-        let c = AMPLIFIER_C.init(OpAmp::new(p.OPAMP3, fast));
+        let mut a = OpAmp::new(p.OPAMP1, fast);
+        let mut b = OpAmp::new(p.OPAMP2, fast);
+        let mut c = OpAmp::new(p.OPAMP3, fast);
         let a = a.pga_int(p.PA1, OpAmpGain::Mul16).degrade_adc();
         let b = b.pga_int(p.PA7, OpAmpGain::Mul16).degrade_adc();
         // This one's internal way leads to the second converter, which has b at that time.
@@ -348,25 +359,27 @@ impl Hardware {
         let temperature = Temperature {
             reading: chip::Reading::new(thermistor.get_hw_channel()),
         };
-        let converters = Converters {
-            _second: Adc::new(p.ADC2, AdcConfig::default()).setup_injected_conversions(
+        // Dropped converters would stop, and dropped pins be given back. Hall sensor a's is also the
+        // KISS telemetry's.
+        mem::forget((
+            Adc::new(p.ADC2, AdcConfig::default()).setup_injected_conversions(
                 second,
                 triggers::TIM1_TRGO,
                 Exten::RISING_EDGE,
                 false,
             ),
-            _first: Adc::new(p.ADC1, AdcConfig::default()).setup_injected_conversions(
+            Adc::new(p.ADC1, AdcConfig::default()).setup_injected_conversions(
                 first,
                 triggers::TIM1_TRGO,
                 Exten::RISING_EDGE,
                 true,
             ),
-            _hall: [Input::new(p.PB7, Pull::Up), Input::new(p.PB8, Pull::Up)],
-        };
-        let uart = usart::Config::default();
+            Input::new(p.PB7, Pull::Up),
+            Input::new(p.PB8, Pull::Up),
+        ));
         Self {
             bridge: Bridge { _timer: p.TIM1 },
-            converters,
+            converters: Converters { _private: () },
             light: Output::new(p.PC6, Level::Low, Speed::Low),
             throttle: Throttle {
                 pin: p.PA15,
@@ -375,10 +388,11 @@ impl Hardware {
                 falling: p.DMA1_CH5,
                 reply: p.DMA1_CH6,
             },
-            mavlink: Uart::new(
-                p.USART2, p.PB4, p.PB3, p.DMA1_CH1, p.DMA1_CH2, Interrupts, uart,
-            )
-            .expect("115200 baud can be had of 170 MHz"),
+            mavlink: Mavlink {
+                uart: p.USART2,
+                pins: (p.PB4, p.PB3),
+                dma: (p.DMA1_CH1, p.DMA1_CH2),
+            },
             kiss: Kiss {
                 uart: p.USART1,
                 pin: hall_a,
@@ -392,8 +406,7 @@ impl Hardware {
 }
 
 /// What the interrupt is at, from then on its own. It waits 1 ms for the amplifiers to settle.
-pub(crate) fn prepare(bridge: Bridge, converters: Converters) -> Registers {
-    mem::forget((bridge, converters));
+pub(crate) fn prepare(_bridge: Bridge, _converters: Converters) -> Registers {
     cortex_m::asm::delay(TIMER_HZ / 1000);
     Registers::CHIP
 }

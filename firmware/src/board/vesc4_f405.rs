@@ -15,7 +15,7 @@ use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{
     ADC1, ADC2, ADC3, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA2_CH1, DMA2_CH2, DMA2_CH6, IWDG, PB5, PB10,
-    TIM1, TIM3, TIM8, USART3, USART6,
+    PC6, PC7, TIM1, TIM3, TIM8, USART3, USART6,
 };
 use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::input_capture::CapturePin;
@@ -211,6 +211,24 @@ impl Throttle {
     }
 }
 
+/// MAVLink's serial line.
+pub struct Mavlink {
+    uart: Peri<'static, USART6>,
+    pins: (Peri<'static, PC7>, Peri<'static, PC6>),
+    dma: (Peri<'static, DMA2_CH6>, Peri<'static, DMA2_CH2>),
+}
+
+impl Mavlink {
+    /// Opens it at a rate that the table of parameters allows.
+    pub fn open(self, baud: u32) -> Uart<'static, Async> {
+        let mut config = usart::Config::default();
+        config.baudrate = baud;
+        let ((rx, tx), (out, into)) = (self.pins, self.dma);
+        Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
+            .expect("the table's range can be had of 84 MHz")
+    }
+}
+
 /// The KISS telemetry, on a pin of its own.
 pub struct Kiss {
     uart: Peri<'static, USART3>,
@@ -253,8 +271,8 @@ pub struct Hardware {
     pub light: Output<'static>,
     /// The throttle wire.
     pub throttle: Throttle,
-    /// MAVLink, 115200 baud.
-    pub mavlink: Uart<'static, Async>,
+    /// MAVLink's serial line.
+    pub mavlink: Mavlink,
     /// The KISS telemetry.
     pub kiss: Kiss,
     /// The flash that keeps the parameters.
@@ -321,7 +339,6 @@ impl Hardware {
                 true,
             ),
         };
-        let uart = usart::Config::default();
         Self {
             bridge: Bridge {
                 _timer: p.TIM1,
@@ -337,10 +354,11 @@ impl Hardware {
                 falling: p.DMA1_CH5,
                 reply: p.DMA2_CH1,
             },
-            mavlink: Uart::new(
-                p.USART6, p.PC7, p.PC6, p.DMA2_CH6, p.DMA2_CH2, Interrupts, uart,
-            )
-            .expect("115200 baud can be had of 84 MHz"),
+            mavlink: Mavlink {
+                uart: p.USART6,
+                pins: (p.PC7, p.PC6),
+                dma: (p.DMA2_CH6, p.DMA2_CH2),
+            },
             kiss: Kiss {
                 uart: p.USART3,
                 pin: p.PB10,

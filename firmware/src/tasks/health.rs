@@ -16,15 +16,13 @@ pub(crate) struct Health {
 }
 
 impl Health {
-    /// The temperature now.
+    /// One that has read nothing yet.
     pub(crate) fn new(sensor: Temperature) -> Self {
-        let mut health = Self {
+        Self {
             sensor,
             due: Instant::MIN,
             temperature_c: f32::NAN,
-        };
-        health.look(Instant::now());
-        health
+        }
     }
 
     /// Reads what is due.
@@ -35,7 +33,8 @@ impl Health {
         }
     }
 
-    /// Temperature of the transistors, °C; not a number where the sensor is torn off.
+    /// Temperature of the transistors, °C; not a number where the sensor is torn off, or
+    /// has not been read.
     pub(crate) fn temperature_c(&self) -> f32 {
         self.temperature_c
     }

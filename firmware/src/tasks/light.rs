@@ -1,43 +1,49 @@
 //! The light, by which a person without a ground station sees what is wrong.
 
-use core::sync::atomic::{AtomicBool, Ordering};
-
 use embassy_stm32::gpio::Output;
-use embassy_time::Timer;
-
-use crate::exchange::SnapshotReader;
-
-/// Whether a flight controller has ordered the light to be on.
-static ORDERED: AtomicBool = AtomicBool::new(false);
-
-/// Turns the light on or off by order; faults are shown before it.
-pub(crate) fn order(on: bool) {
-    ORDERED.store(on, Ordering::Relaxed);
-}
+use embassy_time::{Duration, Instant};
+use siskin_control::drive::Snapshot;
 
 /// Flashes once when all is well, and n + 2 times for the fault with the lowest number n; then comes
 /// a pause. Dark: the control does not run.
-#[embassy_executor::task]
-pub(crate) async fn show(mut light: Output<'static>, snapshot: &'static SnapshotReader) -> ! {
-    loop {
-        let fault = snapshot.read().map(|s| s.faults.iter().next());
-        let flashes = match fault {
-            None => 0,
-            Some(None) if ORDERED.load(Ordering::Relaxed) => {
-                light.set_high();
-                Timer::after_millis(100).await;
-                continue;
-            }
-            Some(None) => 1,
-            Some(Some(fault)) => fault as u64 + 2,
-        };
-        for _ in 0..flashes {
-            light.set_high();
-            Timer::after_millis(50).await;
-            light.set_low();
-            Timer::after_millis(200).await;
+pub(crate) struct Light {
+    pin: Output<'static>,
+    due: Instant,
+    /// Times of light and of darkness until the pattern begins again.
+    steps: u8,
+}
+
+impl Light {
+    /// One that is dark.
+    pub(crate) fn new(pin: Output<'static>) -> Self {
+        Self {
+            pin,
+            due: Instant::MIN,
+            steps: 0,
         }
-        light.set_low();
-        Timer::after_millis(1750).await;
+    }
+
+    /// Shows what is due. Where all is well, a flight controller may have ordered it to be on.
+    pub(crate) fn look(&mut self, now: Instant, snapshot: Option<&Snapshot>, ordered: bool) {
+        if now < self.due {
+            return;
+        }
+        if self.steps == 0 {
+            self.steps = match snapshot.map(|s| s.faults.iter().next()) {
+                None => 0,
+                Some(None) if ordered => 0,
+                Some(None) => 2,
+                Some(Some(fault)) => 2 * (fault as u8 + 2),
+            };
+        }
+        let (lit, time_ms) = match self.steps {
+            0 => (snapshot.is_some(), 100),
+            1 => (false, 1950),
+            steps if steps.is_multiple_of(2) => (true, 50),
+            _ => (false, 200),
+        };
+        self.pin.set_level(lit.into());
+        self.steps = self.steps.saturating_sub(1);
+        self.due = now + Duration::from_millis(time_ms);
     }
 }

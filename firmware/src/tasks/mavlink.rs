@@ -12,11 +12,13 @@ use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::ParamId;
 
-use super::supervisor::{Task, lives};
+use super::light::Light;
+use super::supervisor::Supervisor;
 use super::throttle::Port;
 use super::trouble::Teller;
-use super::{health, light, store};
+use super::{health, store};
 use crate::exchange::{ConfigWriter, SnapshotReader};
+use crate::storage::Storage;
 use crate::{interrupt, last_words};
 
 /// How often what is due is looked for.
@@ -54,10 +56,12 @@ pub(crate) struct Desk {
     pub(crate) line: RingBufferedUartRx<'static>,
     pub(crate) config: ConfigWriter,
     pub(crate) snapshot: &'static SnapshotReader,
-    pub(crate) flash: store::Flash,
+    pub(crate) flash: Storage,
     pub(crate) health: health::Health,
     pub(crate) receiver: Receiver,
     pub(crate) teller: Teller,
+    pub(crate) light: Light,
+    pub(crate) supervisor: Supervisor,
     /// Whether the interrupt is still to be given the configuration in force.
     pub(crate) changed: bool,
     /// Polls until the chip restarts, if it is to.
@@ -76,7 +80,6 @@ pub(crate) async fn attend(desk: &'static mut Desk) -> ! {
             // Bytes were lost or garbled: the frame's check sum tells.
             Either::Second(Err(_)) => {}
         }
-        lives(Task::Mavlink);
     }
 }
 
@@ -94,11 +97,14 @@ impl Desk {
     fn poll(&mut self) {
         // No bytes tell a receiver that time has passed: what a false start held back is searched.
         self.receive(&[]);
-        let Some(snapshot) = self.snapshot.read() else {
+        let now = Instant::now();
+        self.supervisor.look(now);
+        let snapshot = self.snapshot.read();
+        self.light.look(now, snapshot.as_ref(), self.esc.light());
+        let Some(snapshot) = snapshot else {
             return;
         };
-        let now = Instant::now();
-        if let Some(warning) = self.teller.next(now.as_micros()) {
+        if let Some(warning) = self.teller.next(now) {
             self.esc.warn(warning);
         }
         self.health.look(now);
@@ -109,7 +115,6 @@ impl Desk {
             self.health.temperature_c(),
             &mut |frame| send(frame),
         );
-        light::order(self.esc.light());
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.obey(request);
         }

@@ -3,11 +3,9 @@
 //! | task | does | where |
 //! |---|---|---|
 //! | `throttle::listen` | edges into set-points and answers | an executor of its own, above the others |
-//! | `mavlink::attend` | the ESC: MAVLink in, telemetry, requests, storage, health | thread |
+//! | `mavlink::attend` | the ESC: MAVLink in, telemetry, storage, health, light, watchdog | thread |
 //! | `mavlink::transmit` | MAVLink out | thread |
 //! | `kiss::transmit` | telemetry on the serial line | thread |
-//! | `light::show` | the light | thread |
-//! | `supervisor::supervise` | the watchdog | thread |
 
 pub(crate) mod health;
 pub(crate) mod kiss;

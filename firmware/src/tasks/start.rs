@@ -2,7 +2,6 @@
 
 use embassy_executor::Spawner;
 use embassy_stm32::uid::uid;
-use embassy_stm32::wdg::IndependentWatchdog;
 use siskin_control::drive::Config;
 use siskin_control::esc::Esc;
 use siskin_control::image::Image;
@@ -12,10 +11,12 @@ use siskin_control::throttle::Throttle;
 use static_cell::StaticCell;
 
 use super::health::Health;
+use super::light::Light;
 use super::mavlink::Desk;
+use super::supervisor::Supervisor;
 use super::throttle::{Listener, Port};
 use super::trouble::Teller;
-use super::{kiss, light, mavlink, store, supervisor, throttle};
+use super::{kiss, mavlink, store, throttle};
 use crate::board::wire::TICK_HZ;
 use crate::board::{BOARD, Bridge, Converters, Hardware};
 use crate::exchange::{InterruptEnd, SnapshotReader};
@@ -24,10 +25,6 @@ use crate::{exchange, interrupt, last_words};
 
 /// Age at which the interrupt stops obeying a set-point: ten missed renewals.
 const STALE_S: f32 = 0.01;
-
-/// The watchdog outlasts the longest that the tasks are held up: the erase of a sector, at most 0.8 s
-/// (DS8626, table 40), and as much again.
-const WATCHDOG_US: u32 = 1_600_000;
 
 /// `CTL_OBSERVER` of Hall sensors, one of which has the pin of the serial line on some boards.
 const HALL: f32 = 2.0;
@@ -40,7 +37,7 @@ const LINE_BYTES: usize = 512;
 /// # Panics
 /// When it is called again, or the defaults do not fit the board.
 pub fn start(spawner: Spawner, hardware: Hardware) {
-    let mut flash = store::Flash::new(hardware.flash);
+    let mut flash = hardware.flash;
     let (params, trouble) = store::load(&mut flash);
     let (esc, port) = power_up(&params);
     if let Some(text) = trouble {
@@ -67,10 +64,7 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
         snapshot,
     });
 
-    let line = hardware.mavlink;
-    // The table's range is what the port can do.
-    let _ = line.set_baudrate(baud);
-    let (out, line) = line.split();
+    let (out, line) = hardware.mavlink.open(baud).split();
     static BYTES: StaticCell<[u8; LINE_BYTES]> = StaticCell::new();
     let line = line.into_ring_buffered(BYTES.init_with(|| [0; LINE_BYTES]));
     static DESK: StaticCell<Desk> = StaticCell::new();
@@ -84,6 +78,8 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
         health: Health::new(hardware.temperature),
         receiver: Receiver::new(),
         teller: Teller::new(),
+        light: Light::new(hardware.light),
+        supervisor: Supervisor::new(hardware.watchdog),
         changed: false,
         restart_polls: None,
     });
@@ -94,9 +90,6 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
     if !has_hall_sensors {
         spawner.spawn(kiss::transmit(hardware.kiss.open()).expect(once));
     }
-    spawner.spawn(light::show(hardware.light, snapshot).expect(once));
-    let watchdog = IndependentWatchdog::new(hardware.watchdog, WATCHDOG_US);
-    spawner.spawn(supervisor::supervise(watchdog).expect(once));
 }
 
 #[inline(never)]

@@ -1,26 +1,18 @@
 //! Requests of the ESC that concern storage.
-//!
-//! The flash is waited for on the spot: there is nothing to be awaited, and one copy of the code
-//! serves the start and the requests.
 
-use embassy_embedded_hal::adapter::BlockingAsync;
-use embassy_futures::block_on;
 use siskin_control::mavlink::Request;
 use siskin_control::params::Params;
 use siskin_control::store::{self, Integrity, StoreError};
 
 use crate::storage::{Storage, range};
 
-/// The store as the control crate wants it.
-pub(crate) type Flash = BlockingAsync<Storage>;
-
 /// The parameters as stored, and what a person must know of them.
 #[inline(never)]
-pub(crate) fn load(flash: &mut Flash) -> (Params, Option<&'static str>) {
-    let (params, report) = block_on(store::load(flash, range()));
-    let trouble = match report.integrity {
+pub(crate) fn load(flash: &mut Storage) -> (Params, Option<&'static str>) {
+    let (params, integrity) = store::load(flash, range());
+    let trouble = match integrity {
         Integrity::Sound | Integrity::Empty => None,
-        Integrity::Incomplete => Some("storage: some values are missing, defaults stand in"),
+        Integrity::Incomplete => Some("storage: not whole, an earlier save is in force"),
         Integrity::Corrupt => Some("storage: corrupt, all values are the defaults"),
         Integrity::Unreadable => Some("storage: unreadable, all values are the defaults"),
     };
@@ -35,12 +27,12 @@ pub(crate) fn load(flash: &mut Flash) -> (Params, Option<&'static str>) {
 #[inline(never)]
 pub(crate) fn obey(
     request: Request,
-    flash: &mut Flash,
+    flash: &mut Storage,
     params: &Params,
 ) -> Result<Option<Params>, &'static str> {
     match request {
         Request::Save => {
-            block_on(store::save(flash, range(), params)).map_err(StoreError::text)?;
+            store::save(flash, range(), params).map_err(StoreError::text)?;
             Ok(None)
         }
         Request::Load => match load(flash) {
@@ -48,7 +40,7 @@ pub(crate) fn obey(
             (_, Some(trouble)) => Err(trouble),
         },
         Request::FactoryReset => {
-            block_on(store::erase(flash, range())).map_err(StoreError::text)?;
+            store::erase(flash, range()).map_err(StoreError::text)?;
             Ok(Some(Params::default()))
         }
         Request::ParamsChanged | Request::Reboot => Ok(None),

@@ -1,56 +1,69 @@
-//! The watchdog, fed only by proof of life from the control's interrupt, from the throttle's task and
-//! from the other tasks: if one of them stands still, the chip starts anew, and the bridge is off. An
-//! interrupt that stands still is not waited for that long.
+//! The watchdog, fed only by proof of life from the control's interrupt and from the throttle's task,
+//! in the task that attends to the rest: if one of them stands still, the chip starts anew, and the
+//! bridge is off. An interrupt that stands still is not waited for that long.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use embassy_stm32::Peri;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_time::{Duration, Ticker};
+use embassy_time::{Duration, Instant};
 
 use crate::interrupt;
 use crate::last_words::{DETAILS, Failure, fail};
 
-/// Who must show that it lives.
-#[derive(Clone, Copy)]
-pub(crate) enum Task {
-    /// The throttle's.
-    Throttle,
-    /// That with MAVLink and storage.
-    Mavlink,
-}
+/// The watchdog outlasts the longest that the tasks are held up: the erase of a sector, at most 0.8 s
+/// (DS8626, table 40), and as much again.
+const WATCHDOG_US: u32 = 1_600_000;
 
-static LIFE: [AtomicU32; 2] = [const { AtomicU32::new(0) }; 2];
-
-/// Shows that a task lives; each does so within [`LOOK`].
-pub(crate) fn lives(task: Task) {
-    LIFE[task as usize].fetch_add(1, Ordering::Relaxed);
-}
-
-/// How often they are looked at.
+/// How often the others are looked at; each shows within that time that it lives.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Feeds the watchdog as long as all live.
-#[embassy_executor::task]
-pub(crate) async fn supervise(mut watchdog: IndependentWatchdog<'static, IWDG>) -> ! {
-    watchdog.unleash();
-    let mut ticker = Ticker::every(LOOK);
-    let (mut periods, mut tasks) = (interrupt::periods(), proofs());
-    loop {
-        ticker.next().await;
-        // The bridge would keep its last duties until the watchdog's time is over.
-        if interrupt::periods() == periods {
-            fail(Failure::Standstill, [0; DETAILS]);
-        }
-        periods = interrupt::periods();
-        let now = proofs();
-        if now.iter().zip(tasks).all(|(now, before)| *now != before) {
-            watchdog.pet();
-            tasks = now;
-        }
-    }
+static THROTTLE: AtomicU32 = AtomicU32::new(0);
+
+/// Shows that the throttle's task lives.
+pub(crate) fn throttle_lives() {
+    THROTTLE.fetch_add(1, Ordering::Relaxed);
 }
 
-fn proofs() -> [u32; 2] {
-    LIFE.each_ref().map(|count| count.load(Ordering::Relaxed))
+/// What feeds the watchdog.
+pub(crate) struct Supervisor {
+    watchdog: IndependentWatchdog<'static, IWDG>,
+    due: Instant,
+    periods: u32,
+    throttle: u32,
+}
+
+impl Supervisor {
+    /// Starts the watchdog.
+    pub(crate) fn new(watchdog: Peri<'static, IWDG>) -> Self {
+        let mut watchdog = IndependentWatchdog::new(watchdog, WATCHDOG_US);
+        watchdog.unleash();
+        Self {
+            watchdog,
+            // The first look takes all to live: no count has come that far.
+            due: Instant::MIN,
+            periods: u32::MAX,
+            throttle: u32::MAX,
+        }
+    }
+
+    /// Feeds the watchdog when it is due, as long as all live.
+    pub(crate) fn look(&mut self, now: Instant) {
+        if now < self.due {
+            return;
+        }
+        self.due = now + LOOK;
+        let periods = interrupt::periods();
+        // The bridge would keep its last duties until the watchdog's time is over.
+        if periods == self.periods {
+            fail(Failure::Standstill, [0; DETAILS]);
+        }
+        self.periods = periods;
+        let throttle = THROTTLE.load(Ordering::Relaxed);
+        if throttle != self.throttle {
+            self.watchdog.pet();
+            self.throttle = throttle;
+        }
+    }
 }

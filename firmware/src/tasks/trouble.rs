@@ -2,12 +2,13 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use embassy_time::{Duration, Instant};
 use siskin_control::mavlink::Warning;
 
 use crate::text::{push, push_decimal};
 
 /// Time between two texts, so that they do not fill the link.
-const APART_US: u64 = 5_000_000;
+const APART: Duration = Duration::from_secs(5);
 
 /// Counts of what has gone wrong since the start.
 pub(crate) struct Trouble {
@@ -36,7 +37,7 @@ impl Trouble {
 /// Tells a person of new trouble, now and then.
 pub(crate) struct Teller {
     told: [u32; 2],
-    told_us: u64,
+    told_at: Instant,
 }
 
 impl Teller {
@@ -44,19 +45,19 @@ impl Teller {
     pub(crate) const fn new() -> Self {
         Self {
             told: [0; 2],
-            told_us: 0,
+            told_at: Instant::MIN,
         }
     }
 
     /// What is to be told now.
-    pub(crate) fn next(&mut self, now_us: u64) -> Option<Warning> {
+    pub(crate) fn next(&mut self, now: Instant) -> Option<Warning> {
         let counts =
             [&TROUBLE.lost_edges, &TROUBLE.late_replies].map(|count| count.load(Ordering::Relaxed));
-        if counts == self.told || now_us - self.told_us < APART_US {
+        if counts == self.told || now - self.told_at < APART {
             return None;
         }
         self.told = counts;
-        self.told_us = now_us;
+        self.told_at = now;
         let mut text = Warning::new();
         let [lost, late] = counts;
         // 47 letters at the most: it fits.

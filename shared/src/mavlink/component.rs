@@ -195,11 +195,10 @@ impl Component {
         while let Some(stream) = self.schedule.next_due(context.now_us, context.params) {
             self.send_stream(stream, context, send);
         }
-        self.list_pace.advance(context.now_us);
         while !self.list.is_empty()
             && self
                 .list_pace
-                .take(OVERHEAD_LEN + PARAM_VALUE_DATA::ENCODED_LEN)
+                .take(context.now_us, OVERHEAD_LEN + PARAM_VALUE_DATA::ENCODED_LEN)
         {
             if let Some(id) = self.list.next() {
                 self.send_value(context, id, send);

@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::{
 use mavlink::types::CharArray;
 
 use super::identity::Identity;
-use super::place::Place;
+use super::place::{Place, SLOTS};
 use crate::drive::{Fault, Faults};
 use crate::image::{Image, VERSION};
 use crate::input::signal::{Pulse, Signal};
@@ -108,12 +108,16 @@ pub(super) fn esc_telemetry(
     place: Place,
     count: u16,
 ) -> ESC_TELEMETRY_1_TO_4_DATA {
-    let own = |value: f32| place.slots(round(value) as u16, 0);
+    // Never inlined: four fields are made by it.
+    #[inline(never)]
+    fn whole(place: Place, value: f32) -> [u16; SLOTS] {
+        place.slots(round(value) as u16, 0)
+    }
     ESC_TELEMETRY_1_TO_4_DATA {
-        voltage: own(telemetry.bus_v * 100.0),
-        current: own(telemetry.bus_a * 100.0),
-        totalcurrent: own(telemetry.consumed_mah),
-        rpm: own(telemetry.rpm.abs()),
+        voltage: whole(place, telemetry.bus_v * 100.0),
+        current: whole(place, telemetry.bus_a * 100.0),
+        totalcurrent: whole(place, telemetry.consumed_mah),
+        rpm: whole(place, telemetry.rpm.abs()),
         count: place.slots(count, 0),
         temperature: place.slots(round(telemetry.temperature_c) as u8, 0),
     }

@@ -6,6 +6,7 @@
 //! and an ESC must answer those. The enum of all messages is never built or read: that alone is
 //! 98 KB of text on the chip.
 
+mod check;
 mod command;
 mod component;
 mod faults;
@@ -19,7 +20,6 @@ mod place;
 mod receiver;
 mod reply;
 mod schedule;
-mod seed;
 mod sender;
 
 pub use component::{Component, Context, Request, Warning};

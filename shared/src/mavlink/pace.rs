@@ -1,53 +1,40 @@
 //! Shares of a link.
 
 /// A share of a link's bytes, so that what can wait does not hold up what cannot.
-///
-/// The level counts millionths of a byte: whole numbers only, the same on every machine.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     bytes_per_s: u32,
-    level: u64,
-    last_us: u64,
+    /// When all that has been taken will have left.
+    free_us: u64,
 }
 
-const MILLIONTHS: u64 = 1_000_000;
+/// The longest frame; it may always leave at once.
+const FRAME_MAX: usize = 280;
+
+/// What may leave at once otherwise, as time of the share.
+const BURST_US: u64 = 20_000;
 
 impl Pace {
-    /// A share of `bytes_per_s`, full.
+    /// A share of `bytes_per_s`, of which nothing has been taken.
     pub(super) fn new(bytes_per_s: u32) -> Self {
-        let mut pace = Self {
-            bytes_per_s,
-            level: 0,
-            last_us: 0,
-        };
-        pace.level = pace.most();
-        pace
-    }
-
-    /// What may leave at once: 20 ms of the share, but always the longest frame.
-    fn most(&self) -> u64 {
-        (u64::from(self.bytes_per_s) * (MILLIONTHS / 50)).max(280 * MILLIONTHS)
-    }
-
-    /// Lets time pass.
-    pub(super) fn advance(&mut self, now_us: u64) {
-        let passed_us = now_us.saturating_sub(self.last_us);
-        self.last_us = now_us;
-        self.level = passed_us
-            .saturating_mul(u64::from(self.bytes_per_s))
-            .saturating_add(self.level)
-            .min(self.most());
-    }
-
-    /// Takes `len` bytes if they may leave now.
-    pub(super) fn take(&mut self, len: usize) -> bool {
-        match self.level.checked_sub(len as u64 * MILLIONTHS) {
-            Some(rest) => {
-                self.level = rest;
-                true
-            }
-            None => false,
+        Self {
+            bytes_per_s: bytes_per_s.max(1),
+            free_us: 0,
         }
+    }
+
+    fn time_us(&self, len: usize) -> u64 {
+        (len as u32 * 1_000_000).div_ceil(self.bytes_per_s).into()
+    }
+
+    /// Takes at most [`FRAME_MAX`] bytes if they may leave now.
+    pub(super) fn take(&mut self, now_us: u64, len: usize) -> bool {
+        let free_us = self.free_us.max(now_us).saturating_add(self.time_us(len));
+        let may = free_us - now_us <= self.time_us(FRAME_MAX).max(BURST_US);
+        if may {
+            self.free_us = free_us;
+        }
+        may
     }
 }
 
@@ -60,8 +47,7 @@ mod tests {
         let mut pace = Pace::new(5760);
         let mut sent_bytes = 0;
         for now_ms in 0..=1000 {
-            pace.advance(now_ms * 1000);
-            while pace.take(37) {
+            while pace.take(now_ms * 1000, 37) {
                 sent_bytes += 37;
             }
         }
@@ -74,7 +60,7 @@ mod tests {
 
     #[test]
     fn a_slow_link_still_sends_the_longest_frame() {
-        assert!(Pace::new(1).take(280));
-        assert!(!Pace::new(1).take(281));
+        assert!(Pace::new(1).take(0, 280));
+        assert!(!Pace::new(1).take(0, 281));
     }
 }

@@ -1,9 +1,9 @@
 //! Bytes to frames.
 
-use mavlink::{MAV_STX, MAV_STX_V2, calculate_crc};
+use mavlink::{MAV_STX, MAV_STX_V2};
 
+use super::check;
 use super::identity::Address;
-use super::seed;
 
 /// The greatest frame: MAVLink 2, 255 bytes of payload, signed.
 const FRAME_MAX: usize = 10 + 255 + 2 + SIGNATURE_LEN;
@@ -229,7 +229,7 @@ impl Receiver {
             return Front::Wait;
         }
         let (_, _, id) = sender_and_message(bytes);
-        let extra_crc = seed::extra_crc(id);
+        let extra_crc = check::extra_crc(id);
         // The dialect answers 0 for what it does not have; HEARTBEAT's is 50, and no message that
         // an ESC obeys has 0.
         if extra_crc == 0 {
@@ -245,7 +245,7 @@ impl Receiver {
             return Front::Wait;
         }
         let check = u16::from_le_bytes([bytes[check_at], bytes[check_at + 1]]);
-        if calculate_crc(&bytes[1..check_at], extra_crc) != check {
+        if check::of(&bytes[1..check_at], extra_crc) != check {
             count(&mut self.counters.bad_checks);
             return Front::Reject;
         }

@@ -1,6 +1,6 @@
 //! What waits to be sent at the next poll.
 
-use heapless::{Deque, Vec};
+use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, FILE_TRANSFER_PROTOCOL_DATA, MISSION_COUNT_DATA, MavParamError, MavResult,
@@ -175,31 +175,29 @@ impl Writer {
         pieces: &[&str],
         out: &mut dyn FnMut(&[u8]),
     ) {
-        let mut text = Vec::<u8, TEXT_MAX>::new();
-        for byte in pieces.iter().flat_map(|piece| piece.bytes()) {
-            // A longer text ends here: a full vector takes no more.
-            if text.push(byte).is_err() {
-                break;
-            }
+        // Whole chunks: what is behind the text is zero.
+        let mut text = [0; TEXT_MAX + CHUNK_LEN];
+        let mut len = 0;
+        let bytes = pieces.iter().flat_map(|piece| piece.bytes());
+        // A longer text ends here.
+        for (to, byte) in text.iter_mut().take(TEXT_MAX).zip(bytes) {
+            *to = byte;
+            len += 1;
         }
         let mut id = 0;
         let mut chunks = 1;
-        if text.len() > CHUNK_LEN {
+        if len > CHUNK_LEN {
             self.text_id = self.text_id.checked_add(1).unwrap_or(1);
             id = self.text_id;
             // The last chunk is known by a zero in it, so it must not be full.
-            chunks = text.len() / CHUNK_LEN + 1;
+            chunks = len / CHUNK_LEN + 1;
         }
-        for chunk in 0..chunks {
-            let mut bytes = [0; CHUNK_LEN];
-            let part = text.iter().skip(chunk * CHUNK_LEN);
-            for (to, byte) in bytes.iter_mut().zip(part) {
-                *to = *byte;
-            }
-            let [id_low, id_high] = id.to_le_bytes();
+        let [id_low, id_high] = id.to_le_bytes();
+        let parts = text.as_chunks::<CHUNK_LEN>().0.iter();
+        for (chunk, part) in parts.take(chunks).enumerate() {
             let message = STATUSTEXT_DATA {
                 severity,
-                text: CharArray::new(bytes),
+                text: CharArray::new(*part),
             };
             let extension = [id_low, id_high, chunk as u8];
             self.sender

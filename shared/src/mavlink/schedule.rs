@@ -138,7 +138,6 @@ impl Schedule {
 
     /// The next stream that is due now; each is due at most once at one `now_us`.
     pub(super) fn next_due(&mut self, now_us: u64, params: &Params) -> Option<Stream> {
-        self.pace.advance(now_us);
         let mut blocked = false;
         for offset in 0..Stream::ALL.len() {
             let index = (self.first + offset) % Stream::ALL.len();
@@ -155,7 +154,7 @@ impl Schedule {
             }
             // Who finds too little of the share left holds up those behind it: shorter messages
             // would otherwise take it all. Only the heartbeat passes.
-            blocked = blocked || !self.pace.take(stream.frame_len());
+            blocked = blocked || !self.pace.take(now_us, stream.frame_len());
             if blocked && stream != Stream::Heartbeat {
                 continue;
             }

@@ -1,7 +1,8 @@
 //! Payloads to frames.
 
-use mavlink::{MAV_STX_V2, MavlinkVersion, MessageData, calculate_crc};
+use mavlink::{MAV_STX_V2, MavlinkVersion, MessageData};
 
+use super::check;
 use super::identity::Address;
 
 /// What a frame has beside its payload: header and check.
@@ -27,11 +28,10 @@ impl Sender {
     ) {
         let mut payload = [0; PAYLOAD_MAX];
         data.ser(MavlinkVersion::V2, &mut payload);
-        let len = PAYLOAD_MAX.min(D::ENCODED_LEN + extension.len());
-        for (to, byte) in payload[D::ENCODED_LEN..].iter_mut().zip(extension) {
+        for (to, byte) in payload.iter_mut().skip(D::ENCODED_LEN).zip(extension) {
             *to = *byte;
         }
-        self.send_payload(from, (D::ID, D::EXTRA_CRC), &payload[..len], out);
+        self.send_payload(from, (D::ID, D::EXTRA_CRC), &payload, out);
     }
 
     /// Sends a payload of at most 255 bytes as the message with this id and CRC seed.
@@ -65,7 +65,7 @@ impl Sender {
         for (to, byte) in frame[HEADER_LEN..HEADER_LEN + len].iter_mut().zip(payload) {
             *to = *byte;
         }
-        let check = calculate_crc(&frame[1..HEADER_LEN + len], extra_crc);
+        let check = check::of(&frame[1..HEADER_LEN + len], extra_crc);
         frame[HEADER_LEN + len..OVERHEAD_LEN + len].copy_from_slice(&check.to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);
         out(&frame[..OVERHEAD_LEN + len]);

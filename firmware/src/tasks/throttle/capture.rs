@@ -83,7 +83,7 @@ impl Capture {
     /// first channel, and of its second. The pin leads to it.
     pub(crate) fn new(channels: [dma::Channel<'static>; 2], requests: [dma::Request; 2]) -> Self {
         static MEMORY: StaticCell<[[u32; RING_LEN]; 2]> = StaticCell::new();
-        let memory = MEMORY.init([[0; RING_LEN]; 2]).each_mut();
+        let [rising, falling] = MEMORY.init([[0; RING_LEN]; 2]);
         embassy_stm32::rcc::enable_and_reset::<CaptureTimer>();
         CAPTURE.psc().write_value(PRESCALER - 1);
         CAPTURE.arr().write_value(COUNTER_MASK);
@@ -112,12 +112,8 @@ impl Capture {
             w.set_ccde(0, true);
             w.set_ccde(1, true);
         });
-        let mut index = 0;
-        let mut channels = channels.into_iter().zip(requests).zip(memory);
-        let rings = core::array::from_fn(|_| {
-            let ((channel, request), memory) = channels.next().expect("two of each");
+        let ring = |index, channel, request, memory: &'static mut [u32; RING_LEN]| {
             let register = CAPTURE.ccr(index).as_ptr();
-            index += 1;
             // SAFETY: the register is one of a timer that this owns, and the ring has its memory
             // for ever.
             let mut ring = unsafe {
@@ -131,7 +127,12 @@ impl Capture {
             };
             ring.start();
             ring
-        });
+        };
+        let [first, second] = channels;
+        let rings = [
+            ring(0, first, requests[0], rising),
+            ring(1, second, requests[1], falling),
+        ];
         CAPTURE.egr().write(|w| w.set_ug(true));
         CAPTURE.cr1().modify(|w| w.set_cen(true));
         // SAFETY: the handler touches nothing but the timer, and wakes a task.

@@ -17,12 +17,11 @@ use embassy_time::Instant;
 use siskin_control::answer::{Answer, Ask};
 use siskin_control::input::dshot::Rate;
 use siskin_control::input::signal::Signal;
-use siskin_control::math::quotient;
 use siskin_control::throttle::{Reach, Throttle};
 use static_cell::StaticCell;
 
 use super::kiss;
-use super::supervisor::{Task, lives};
+use super::supervisor::throttle_lives;
 use super::trouble::TROUBLE;
 use crate::board;
 use crate::board::wire::TICK_HZ;
@@ -104,11 +103,11 @@ impl Listener {
     async fn burst(&mut self) {
         let begin_ticks = self.capture.now();
         let signal = self.port.reach(|throttle| throttle.signal());
-        let looks = match signal {
-            Some(Signal::Dshot { rate, .. }) => FRAME_LOOKS_BITS.map(|bits| bits_ticks(rate, bits)),
-            _ => [1, 2].map(|times| capture::ticks_of_us(times * UNKNOWN_LOOK_US)),
-        };
-        for after_ticks in looks {
+        for (bits, times) in FRAME_LOOKS_BITS.into_iter().zip(1..) {
+            let after_ticks = match signal {
+                Some(Signal::Dshot { rate, .. }) => bits_ticks(rate, bits),
+                _ => times * capture::ticks_of_us(UNKNOWN_LOOK_US),
+            };
             self.capture
                 .wait_until(begin_ticks.wrapping_add(after_ticks))
                 .await;
@@ -136,7 +135,7 @@ impl Listener {
             (ask, throttle.setpoint())
         });
         self.setpoint.write(setpoint);
-        lives(Task::Throttle);
+        throttle_lives();
         if let Some(ask) = ask {
             self.answer(ask).await;
         }
@@ -164,8 +163,7 @@ impl Listener {
     }
 }
 
-/// So many bits of a frame.
+/// So many bits of a frame; 25 are the most.
 fn bits_ticks(rate: Rate, bits: u32) -> u32 {
-    let ticks = u64::from(TICK_HZ) * u64::from(bits);
-    quotient(ticks, rate.bit_hz())
+    TICK_HZ * bits / rate.bit_hz()
 }
