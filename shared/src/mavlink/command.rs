@@ -10,6 +10,7 @@ use super::identity::{Address, Identity, Role};
 use super::receiver::Frame;
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
+use super::signing::Trust;
 use crate::input::authority::{self, DriveStatus, TestError};
 
 const ACTUATOR_TEST: u16 = MavCmd::MAV_CMD_ACTUATOR_TEST as u16;
@@ -45,6 +46,7 @@ const REPEAT_INT_US: u64 = 1_000_000;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Command {
     from: Address,
+    trust: Trust,
     at_us: u64,
     /// Whether it names exactly this component of this system.
     exact: bool,
@@ -56,7 +58,7 @@ pub(super) struct Command {
 
 impl Command {
     /// The two messages differ only in parameters 5 and 6 and in what comes after the target.
-    pub(super) fn read(now_us: u64, frame: &Frame, exact: bool) -> Self {
+    pub(super) fn read(now_us: u64, frame: &Frame, trust: Trust, exact: bool) -> Self {
         let mut params = [0.0; 7];
         for (i, param) in params.iter_mut().enumerate() {
             *param = frame.f32(4 * i);
@@ -70,12 +72,19 @@ impl Command {
         }
         Self {
             from: frame.from,
+            trust,
             at_us: now_us,
             exact,
             number: frame.u16(28),
             confirmation,
             params,
         }
+    }
+
+    /// Whether its sender may have it obeyed: who may only ask gets messages.
+    fn is_allowed(&self) -> bool {
+        let asks = matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL);
+        self.trust == Trust::Full || asks
     }
 
     /// Whether this is the same command sent again because its ACK did not arrive. Values are
@@ -127,6 +136,10 @@ impl Commands {
         schedule: &mut Schedule,
         replies: &mut Replies,
     ) {
+        if !command.is_allowed() {
+            replies.ack(command.from, command.number, DENIED);
+            return;
+        }
         let earlier = self
             .last
             .filter(|(last, _)| command.repeats(last) && is_known(command, context));

@@ -5,6 +5,7 @@ use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, ESC_TELEMETRY_1_TO_4_DATA,
     FILE_TRANSFER_PROTOCOL_DATA, MESSAGE_INTERVAL_DATA, MISSION_REQUEST_LIST_DATA, MavSeverity,
     PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    SETUP_SIGNING_DATA,
 };
 use mavlink::{MavlinkVersion, MessageData};
 
@@ -17,6 +18,7 @@ use super::receiver::Frame;
 use super::reply::{PING, Replies, Reply, Writer};
 use super::schedule::{Schedule, Stream};
 use super::sender::OVERHEAD_LEN;
+use super::signing::{Kept, Signing, Trust};
 use super::{ftp, messages, news};
 use crate::drive::Faults;
 use crate::image::Image;
@@ -103,7 +105,7 @@ impl Component {
         replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
         let identity = Identity::new(params);
         Self {
-            writer: Writer::default(),
+            writer: Writer::new(Signing::new(None)),
             replies,
             list: List::default(),
             list_pace: Pace::new(link_bytes_per_s / 2),
@@ -126,7 +128,14 @@ impl Component {
         if frame.from == self.identity.address {
             return;
         }
-        self.identity.hear(frame);
+        let signing = &mut self.writer.sender.signing;
+        signing.advance(context.now_us);
+        let trust = signing.judge(frame);
+        match trust {
+            Trust::Full => self.identity.hear(frame),
+            Trust::Read => {}
+            Trust::None => return,
+        }
         let Some(target) = target(frame).filter(|target| self.identity.is_for(*target)) else {
             return;
         };
@@ -144,16 +153,28 @@ impl Component {
             PARAM_REQUEST_LIST_DATA::ID => self.list.start(),
             PARAM_REQUEST_READ_DATA::ID => parameter::read(frame, alone, &mut self.replies),
             PARAM_SET_DATA::ID => {
-                self.params_changed |=
-                    parameter::set(frame, alone, drive.stopped, context, &mut self.replies);
+                self.params_changed |= parameter::set(
+                    frame,
+                    trust,
+                    alone,
+                    drive.stopped,
+                    context,
+                    &mut self.replies,
+                );
             }
             COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => self.commands.handle(
-                &Command::read(context.now_us, frame, target == self.identity.address),
+                &Command::read(
+                    context.now_us,
+                    frame,
+                    trust,
+                    target == self.identity.address,
+                ),
                 drive,
                 context,
                 &mut self.schedule,
                 &mut self.replies,
             ),
+            SETUP_SIGNING_DATA::ID if trust == Trust::Full => self.set_up_signing(frame),
             MISSION_REQUEST_LIST_DATA::ID if self.identity.role == Role::Standalone => {
                 self.replies.push(Reply::MissionCount {
                     to: frame.from,
@@ -172,9 +193,32 @@ impl Component {
         }
     }
 
+    fn set_up_signing(&mut self, frame: &Frame) {
+        let signing = &mut self.writer.sender.signing;
+        signing.set_up(frame.bytes(10), frame.u64(0));
+        let text = if signing.signs() {
+            "Signing: only who has the key may change anything"
+        } else {
+            "Signing: off"
+        };
+        let severity = MavSeverity::MAV_SEVERITY_NOTICE;
+        self.replies.push(Reply::Text(severity, [text, ""]));
+    }
+
+    /// The key and the time of signatures, as kept from before the start.
+    pub fn keep_signing(&mut self, kept: Option<Kept>) {
+        self.writer.sender.signing = Signing::new(kept);
+    }
+
+    /// The key and the time of signatures, to be kept over a loss of power.
+    pub fn kept_signing(&self) -> Option<Kept> {
+        self.writer.sender.signing.kept()
+    }
+
     /// Sends what waits and what is due, each frame by one call of `send`. To be called every
     /// millisecond or so.
     pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
+        self.writer.sender.signing.advance(context.now_us);
         self.tell_faults(context, send);
         while let Some(reply) = self.replies.next() {
             self.send_reply(reply, context, send);
@@ -384,6 +428,7 @@ fn target(frame: &Frame) -> Option<Address> {
         FILE_TRANSFER_PROTOCOL_DATA::ID => 1,
         PARAM_REQUEST_READ_DATA::ID => 2,
         PARAM_SET_DATA::ID => 4,
+        SETUP_SIGNING_DATA::ID => 8,
         PING_ID => 12,
         COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => 30,
         _ => return None,

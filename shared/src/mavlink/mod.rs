@@ -21,10 +21,12 @@ mod receiver;
 mod reply;
 mod schedule;
 mod sender;
+mod signing;
 
 pub use component::{Component, Context, Request, Warning};
 pub use identity::Address;
 pub use receiver::{Counters, Frame, Receiver};
+pub use signing::{Kept as KeptSigning, Key};
 
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@ use super::component::Context;
 use super::identity::Address;
 use super::receiver::Frame;
 use super::reply::{Replies, Reply};
+use super::signing::Trust;
 use crate::params::{ParamId, SetError, TABLE};
 
 /// `PARAM_REQUEST_READ.param_index` when the name counts.
@@ -60,6 +61,7 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
 /// parameter means.
 pub(super) fn set(
     frame: &Frame,
+    trust: Trust,
     alone: bool,
     stopped: bool,
     context: &mut Context,
@@ -73,7 +75,10 @@ pub(super) fn set(
         return false;
     };
     replies.value(id);
-    let result = take(id, frame.f32(0), stopped, context);
+    let result = match trust {
+        Trust::Full => take(id, frame.f32(0), stopped, context),
+        Trust::Read | Trust::None => Err((None, "it is not signed")),
+    };
     if let Err((because, reason)) = result {
         replies.push(Reply::Refused {
             id,

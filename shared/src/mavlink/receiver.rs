@@ -4,12 +4,12 @@ use mavlink::{MAV_STX, MAV_STX_V2};
 
 use super::check;
 use super::identity::Address;
+use super::signing::SIGNATURE_LEN;
 
 /// The greatest frame: MAVLink 2, 255 bytes of payload, signed.
 const FRAME_MAX: usize = 10 + 255 + 2 + SIGNATURE_LEN;
-const SIGNATURE_LEN: usize = 13;
 /// Incompatibility flag of a signed frame; any other flag is unknown here.
-const SIGNED: u8 = 0x01;
+pub(super) const SIGNED: u8 = 0x01;
 /// Silence after which an incomplete frame is given up. A false start byte can claim 267 bytes and
 /// would hold back the frames behind it for as long as nobody sends more. Links that stall within
 /// a frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
@@ -27,7 +27,7 @@ pub struct Counters {
     /// Frames of a message that the dialect does not have, so that their check is not known. What
     /// follows the start byte is searched: noise with such a number must not hide a frame.
     pub unknown: u32,
-    /// Sound frames with a signature; there is no key, so they are not obeyed.
+    /// Of the frames handed on, those with a signature. Whether it fits is not known here.
     pub signed: u32,
     /// Incomplete frames given up after silence.
     pub incomplete: u32,
@@ -42,7 +42,7 @@ pub struct Frame<'a> {
     pub id: u32,
     /// As received: MAVLink 2 leaves trailing zeros out.
     pub payload: &'a [u8],
-    /// The whole frame, for a log.
+    /// The whole frame, for its signature or a log.
     pub raw: &'a [u8],
 }
 
@@ -239,7 +239,7 @@ impl Receiver {
         let payload_len = usize::from(bytes[1]);
         let check_at = header_len + payload_len;
         let flags = if version_2 { bytes[2] } else { 0 };
-        let signed = flags & SIGNED != 0;
+        let signed = is_signed(bytes);
         let len = check_at + 2 + if signed { SIGNATURE_LEN } else { 0 };
         if bytes.len() < len {
             return Front::Wait;
@@ -257,7 +257,6 @@ impl Receiver {
         }
         if signed {
             count(&mut self.counters.signed);
-            return Front::Skip(len);
         }
         Front::Frame {
             len,
@@ -265,6 +264,11 @@ impl Receiver {
             payload_len,
         }
     }
+}
+
+/// Whether a frame whose header is complete has a signature.
+pub(super) fn is_signed(bytes: &[u8]) -> bool {
+    matches!(*bytes, [MAV_STX_V2, _, flags, ..] if flags & SIGNED != 0)
 }
 
 /// System, component and message of a frame whose header is complete.

@@ -11,6 +11,7 @@ use mavlink::types::CharArray;
 use super::ftp;
 use super::identity::{Address, Identity};
 use super::sender::Sender;
+use super::signing::Signing;
 use crate::params::{ParamId, TABLE};
 
 /// Replies that can wait. A poll empties them, so it is the most that may arrive between two:
@@ -128,13 +129,20 @@ impl Replies {
 }
 
 /// Encodes what does not depend on the state of the ESC.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Writer {
     pub(super) sender: Sender,
     text_id: u16,
 }
 
 impl Writer {
+    pub(super) fn new(signing: Signing) -> Self {
+        Self {
+            sender: Sender::new(signing),
+            text_id: 0,
+        }
+    }
+
     /// COMMAND_ACK, by bytes because the command may be one that the dialect does not know.
     pub(super) fn ack(
         &mut self,

@@ -4,6 +4,8 @@ use mavlink::{MAV_STX_V2, MavlinkVersion, MessageData};
 
 use super::check;
 use super::identity::Address;
+use super::receiver::SIGNED;
+use super::signing::{SIGNATURE_LEN, Signing};
 
 /// What a frame has beside its payload: header and check.
 pub(super) const OVERHEAD_LEN: usize = 12;
@@ -11,12 +13,20 @@ const HEADER_LEN: usize = 10;
 const PAYLOAD_MAX: usize = 255;
 
 /// Numbers the frames that leave. Always MAVLink 2: an ESC's messages have ids above 255.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Sender {
     sequence: u8,
+    pub(super) signing: Signing,
 }
 
 impl Sender {
+    pub(super) fn new(signing: Signing) -> Self {
+        Self {
+            sequence: 0,
+            signing,
+        }
+    }
+
     /// Sends a message; `extension` are the bytes of its extension fields, which the generated
     /// payloads do not have.
     pub(super) fn send<D: MessageData>(
@@ -48,12 +58,12 @@ impl Sender {
             .rposition(|byte| *byte != 0)
             .map_or(1, |last| last + 1)
             .min(PAYLOAD_MAX);
-        let mut frame = [0; OVERHEAD_LEN + PAYLOAD_MAX];
+        let mut frame = [0; OVERHEAD_LEN + PAYLOAD_MAX + SIGNATURE_LEN];
         let [id_0, id_1, id_2, _] = id.to_le_bytes();
         frame[..HEADER_LEN].copy_from_slice(&[
             MAV_STX_V2,
             len as u8,
-            0,
+            if self.signing.signs() { SIGNED } else { 0 },
             0,
             self.sequence,
             from.system,
@@ -68,6 +78,12 @@ impl Sender {
         let check = check::of(&frame[1..HEADER_LEN + len], extra_crc);
         frame[HEADER_LEN + len..OVERHEAD_LEN + len].copy_from_slice(&check.to_le_bytes());
         self.sequence = self.sequence.wrapping_add(1);
-        out(&frame[..OVERHEAD_LEN + len]);
+        let (unsigned, room) = frame.split_at_mut(OVERHEAD_LEN + len);
+        let mut len = unsigned.len();
+        if let Some(signature) = self.signing.sign(unsigned) {
+            room[..SIGNATURE_LEN].copy_from_slice(&signature);
+            len += SIGNATURE_LEN;
+        }
+        out(&frame[..len]);
     }
 }

@@ -3,6 +3,7 @@
 mod commands;
 mod parameters;
 mod receiving;
+mod signing;
 mod streams;
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavMessage};
@@ -113,7 +114,14 @@ impl Bench {
     }
 
     fn poll(&mut self) -> Vec<Sent> {
-        let mut sent = Vec::new();
+        let mut frames = Vec::new();
+        self.poll_bytes(&mut frames);
+        let sent = frames.iter().map(|bytes| parse(self.now_us, bytes));
+        sent.collect()
+    }
+
+    /// What leaves at this poll, frame by frame.
+    fn poll_bytes(&mut self, frames: &mut Vec<Vec<u8>>) {
         let mut context = Context {
             now_us: self.now_us,
             params: &mut self.params,
@@ -121,11 +129,9 @@ impl Bench {
             authority: &mut self.authority,
             validate: &refuse_slow_pwm,
         };
-        let at_us = self.now_us;
         self.component.poll(&mut context, &mut |bytes| {
-            sent.push(parse(at_us, bytes));
+            frames.push(bytes.to_vec());
         });
-        sent
     }
 
     /// Sends a message to the ESC and returns what it answers at the next poll, without what it

@@ -12,7 +12,7 @@ fn name(text: &str) -> CharArray<16> {
     CharArray::new(bytes)
 }
 
-fn set(text: &str, value: f32) -> PARAM_SET_DATA {
+pub(super) fn set(text: &str, value: f32) -> PARAM_SET_DATA {
     PARAM_SET_DATA {
         param_value: value,
         target_system: 1,
@@ -22,7 +22,7 @@ fn set(text: &str, value: f32) -> PARAM_SET_DATA {
     }
 }
 
-fn read(text: &str, index: i16) -> PARAM_REQUEST_READ_DATA {
+pub(super) fn read(text: &str, index: i16) -> PARAM_REQUEST_READ_DATA {
     PARAM_REQUEST_READ_DATA {
         param_index: index,
         target_system: 1,

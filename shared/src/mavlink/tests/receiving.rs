@@ -123,7 +123,7 @@ fn unknown_flags_and_signatures_are_not_obeyed() {
     let counters = bench.receiver.counters();
     assert_eq!(
         (counters.incompatible, counters.signed, counters.frames),
-        (3, 1, 0)
+        (3, 1, 1)
     );
 
     bench.receive(&request_bytes());

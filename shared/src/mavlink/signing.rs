@@ -1,0 +1,228 @@
+//! Signatures of frames (MAVLink 2, "Message Signing"): once there is a key, only who has it may
+//! change anything.
+//!
+//! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a
+//! component and a link), and no stream may begin more than a minute behind the newest timestamp that
+//! was heard or sent. What was newest is kept over a loss of power with the key, so that what was
+//! recorded before cannot be played again after it.
+
+use sha2::{Digest, Sha256};
+
+use super::identity::Address;
+use super::receiver::{Frame, is_signed};
+
+/// Link, timestamp and hash, behind the check of a frame.
+pub(super) const SIGNATURE_LEN: usize = 13;
+const TIMESTAMP_LEN: usize = 6;
+const HASH_LEN: usize = 6;
+
+/// The link that this ESC signs for: it sends the same frames on all of them.
+const LINK: u8 = 0;
+
+/// By how much a stream may begin behind the newest timestamp: a minute.
+const BEHIND_TICKS: u64 = 6_000_000;
+const TICK_US: u64 = 10;
+
+/// Streams that are followed: ground stations, companions and an autopilot, each over two links.
+const STREAMS: usize = 8;
+
+/// Places of a timestamp that are not kept over a loss of power: 0.66 s.
+const KEPT_SHIFT: u32 = 16;
+
+/// What two sides share. It is never sent or printed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Key(pub(crate) [u8; 32]);
+
+impl core::fmt::Debug for Key {
+    fn fmt(&self, formatter: &mut core::fmt::Formatter) -> core::fmt::Result {
+        formatter.write_str("Key(..)")
+    }
+}
+
+/// What survives a loss of power.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// The key.
+    pub key: Key,
+    /// The newest timestamp, in 0.66 s.
+    pub newest: u32,
+}
+
+/// What the sender of a frame may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Trust {
+    /// Everything.
+    Full,
+    /// Ask, and change nothing.
+    Read,
+    /// Nothing: the signature does not fit, is old, or cannot be verified.
+    None,
+}
+
+/// The latest frame of a stream.
+#[derive(Clone, Copy, Debug)]
+struct Stream {
+    from: Address,
+    link: u8,
+    timestamp: u64,
+}
+
+/// The key and the time.
+#[derive(Clone, Debug)]
+pub(super) struct Signing {
+    key: Option<Key>,
+    /// The newest timestamp that was heard or sent, and when that was.
+    newest: u64,
+    newest_at_us: u64,
+    /// Up to here, everything may have been heard before the start.
+    floor: u64,
+    streams: [Option<Stream>; STREAMS],
+    now_us: u64,
+}
+
+impl Signing {
+    /// With what was kept from before the start; no key means that nothing is signed.
+    pub(super) fn new(kept: Option<Kept>) -> Self {
+        let floor = kept.map_or(0, |kept| (u64::from(kept.newest) + 1 << KEPT_SHIFT) - 1);
+        Self {
+            key: kept.map(|kept| kept.key),
+            newest: floor,
+            newest_at_us: 0,
+            floor,
+            streams: [None; STREAMS],
+            now_us: 0,
+        }
+    }
+
+    /// What is to be kept.
+    pub(super) fn kept(&self) -> Option<Kept> {
+        let newest = u32::try_from(self.newest >> KEPT_SHIFT).unwrap_or(u32::MAX);
+        self.key.map(|key| Kept { key, newest })
+    }
+
+    /// SETUP_SIGNING: a key from now on, or with a key of zeros none.
+    pub(super) fn set_up(&mut self, key: [u8; 32], timestamp: u64) {
+        let now_us = self.now_us;
+        let key = Some(Key(key)).filter(|key| key.0 != [0; 32]);
+        *self = Self {
+            key,
+            newest: timestamp,
+            newest_at_us: now_us,
+            now_us,
+            ..Self::new(None)
+        };
+    }
+
+    /// Time since the start, which does not run backwards.
+    pub(super) fn advance(&mut self, now_us: u64) {
+        self.now_us = now_us;
+    }
+
+    /// Whether what leaves is signed.
+    pub(super) fn signs(&self) -> bool {
+        self.key.is_some()
+    }
+
+    /// What the sender of this frame may do.
+    pub(super) fn judge(&mut self, frame: &Frame) -> Trust {
+        match (self.key, signature(frame.raw)) {
+            (None, None) => Trust::Full,
+            (None, Some(_)) => Trust::None,
+            (Some(_), None) => Trust::Read,
+            (Some(key), Some((signed, hash))) => {
+                if fits(&key, signed, hash) && self.is_new(frame.from, signed) {
+                    Trust::Full
+                } else {
+                    Trust::None
+                }
+            }
+        }
+    }
+
+    /// Whether a frame whose hash fits is younger than all of its stream, and takes note of it.
+    fn is_new(&mut self, from: Address, signed: &[u8]) -> bool {
+        let [.., link, a, b, c, d, e, f] = *signed else {
+            return false;
+        };
+        let timestamp = u64::from_le_bytes([a, b, c, d, e, f, 0, 0]);
+        let oldest = self.floor.max(self.clock().saturating_sub(BEHIND_TICKS));
+        let mine = |stream: &Option<Stream>| {
+            stream.is_some_and(|stream| stream.from == from && stream.link == link)
+        };
+        let place = match self.streams.iter().position(mine) {
+            Some(place) => Some(place).filter(|place| {
+                self.streams[*place].is_none_or(|stream| timestamp > stream.timestamp)
+            }),
+            // A stream is forgotten when its frames are too old to begin one.
+            None if timestamp > oldest => self
+                .streams
+                .iter()
+                .position(|stream| stream.is_none_or(|stream| stream.timestamp <= oldest)),
+            None => None,
+        };
+        let Some(place) = place else {
+            return false;
+        };
+        self.streams[place] = Some(Stream {
+            from,
+            link,
+            timestamp,
+        });
+        if timestamp > self.clock() {
+            self.newest = timestamp;
+            self.newest_at_us = self.now_us;
+        }
+        true
+    }
+
+    /// The time now, as far as it is known here.
+    fn clock(&self) -> u64 {
+        self.newest + self.now_us.saturating_sub(self.newest_at_us) / TICK_US
+    }
+
+    /// Signs a frame: from its start to its check, with the flag set and the check over it. The
+    /// signature stands behind it; nothing without a key.
+    pub(super) fn sign(&mut self, frame: &[u8]) -> Option<[u8; SIGNATURE_LEN]> {
+        let key = self.key?;
+        let timestamp = self.clock().max(self.newest + 1);
+        self.newest = timestamp;
+        self.newest_at_us = self.now_us;
+        let mut signature = [0; SIGNATURE_LEN];
+        signature[0] = LINK;
+        signature[1..=TIMESTAMP_LEN].copy_from_slice(&timestamp.to_le_bytes()[..TIMESTAMP_LEN]);
+        let (stamp, hash) = signature.split_at_mut(SIGNATURE_LEN - HASH_LEN);
+        hash.copy_from_slice(&digest(&key, &[frame, stamp]));
+        Some(signature)
+    }
+}
+
+/// What a signed frame's hash is over beside the key, and that hash.
+fn signature(raw: &[u8]) -> Option<(&[u8], &[u8; HASH_LEN])> {
+    is_signed(raw)
+        .then(|| raw.split_last_chunk::<HASH_LEN>())
+        .flatten()
+}
+
+fn fits(key: &Key, signed: &[u8], hash: &[u8; HASH_LEN]) -> bool {
+    // All bytes are compared, whatever the first ones are: the time says nothing of them.
+    let wrong = digest(key, &[signed])
+        .iter()
+        .zip(hash)
+        .fold(0, |wrong, (a, b)| wrong | (a ^ b));
+    wrong == 0
+}
+
+#[inline(never)]
+fn digest(key: &Key, parts: &[&[u8]]) -> [u8; HASH_LEN] {
+    let mut hasher = Sha256::new();
+    hasher.update(key.0);
+    for part in parts {
+        hasher.update(part);
+    }
+    let whole = hasher.finalize();
+    let mut hash = [0; HASH_LEN];
+    for (to, byte) in hash.iter_mut().zip(whole) {
+        *to = byte;
+    }
+    hash
+}

@@ -1,0 +1,280 @@
+use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavResult, SETUP_SIGNING_DATA};
+use sha2::{Digest, Sha256};
+
+use super::parameters::{read, set};
+use super::*;
+
+const KEY: [u8; 32] = [
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25,
+    26, 27, 28, 29, 30, 31,
+];
+
+/// 2026-11-22, in 10 µs since 2015.
+const TODAY: u64 = 37_542_528_000_000;
+const SECOND: u64 = 100_000;
+
+/// MOT_POLE_PAIRS = 7 from the station over link 3, signed by pymavlink 2.4.50 with [`KEY`] at the
+/// timestamp 0x0102030405.
+const BY_PYMAVLINK: [u8; 48] = [
+    0xfd, 0x17, 0x01, 0x00, 0x00, 0xff, 0xbe, 0x17, 0x00, 0x00, 0x00, 0x00, 0xe0, 0x40, 0x01, 0x01,
+    0x4d, 0x4f, 0x54, 0x5f, 0x50, 0x4f, 0x4c, 0x45, 0x5f, 0x50, 0x41, 0x49, 0x52, 0x53, 0x00, 0x00,
+    0x09, 0x55, 0x34, 0x03, 0x05, 0x04, 0x03, 0x02, 0x01, 0x00, 0x80, 0x0b, 0x1f, 0xd2, 0xb1, 0x3e,
+];
+
+fn setup(key: [u8; 32], timestamp: u64) -> SETUP_SIGNING_DATA {
+    SETUP_SIGNING_DATA {
+        initial_timestamp: timestamp,
+        target_system: 1,
+        target_component: 1,
+        secret_key: key,
+    }
+}
+
+/// What was heard or sent at this time, with a hash of its own making.
+fn signed<D: MessageData>(
+    from: Address,
+    data: &D,
+    key: &[u8],
+    link: u8,
+    timestamp: u64,
+) -> Vec<u8> {
+    let plain = encode(from, data, &[]);
+    let payload = &plain[10..plain.len() - 2];
+    let mut bytes = frame(from, (D::ID, D::EXTRA_CRC), 1, payload);
+    bytes.push(link);
+    bytes.extend_from_slice(&timestamp.to_le_bytes()[..6]);
+    let mut hasher = Sha256::new();
+    hasher.update(key);
+    hasher.update(&bytes);
+    bytes.extend_from_slice(&hasher.finalize()[..6]);
+    bytes
+}
+
+fn command(number: MavCmd, param1: f32) -> COMMAND_LONG_DATA {
+    COMMAND_LONG_DATA {
+        param1,
+        command: number,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::DEFAULT
+    }
+}
+
+/// With a key as of today.
+fn keyed() -> Bench {
+    let mut bench = Bench::new();
+    bench.receive(&encode(STATION, &setup(KEY, TODAY), &[]));
+    let answers = bench.answers();
+    let wanted = ["Signing: only who has the key may change anything"];
+    assert_eq!(texts(&answers), wanted);
+    bench
+}
+
+/// Sends a value of CTL_BW_SPD_HZ that is signed like this; whether it was taken.
+fn takes(bench: &mut Bench, value: f32, from: Address, link: u8, timestamp: u64) -> bool {
+    bench.receive(&signed(
+        from,
+        &set("CTL_BW_SPD_HZ", value),
+        &KEY,
+        link,
+        timestamp,
+    ));
+    bench.answers();
+    bench.params.get(ParamId::CtlBwSpdHz) == value
+}
+
+#[test]
+fn what_pymavlink_has_signed_is_obeyed() {
+    let mut bench = Bench::new();
+    bench.receive(&encode(STATION, &setup(KEY, 0x01_0203_0000), &[]));
+    let mut spoilt = BY_PYMAVLINK;
+    for at in [12, 35, 40, 47] {
+        spoilt[at] ^= 1;
+        bench.receive(&spoilt);
+        assert_ne!(bench.params.get(ParamId::MotPolePairs), 7.0, "{at}");
+        spoilt[at] ^= 1;
+    }
+    bench.receive(&BY_PYMAVLINK);
+    assert_eq!(bench.params.get(ParamId::MotPolePairs), 7.0);
+}
+
+#[test]
+fn without_a_signature_one_may_ask_and_change_nothing() {
+    let mut bench = keyed();
+    let before = bench.params.clone();
+    let answers = bench.ask(&set("CTL_BW_SPD_HZ", 5.0));
+    assert_eq!(values(&answers), [(ParamId::CtlBwSpdHz as u16, 7.9)]);
+    assert_eq!(texts(&answers), ["CTL_BW_SPD_HZ refused: it is not signed"]);
+    for number in [
+        MavCmd::MAV_CMD_PREFLIGHT_STORAGE,
+        MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
+        MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
+        MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
+        MavCmd::MAV_CMD_ACTUATOR_TEST,
+    ] {
+        let answers = bench.ask(&command(number, 1.0));
+        let MavMessage::COMMAND_ACK(ack) = &answers[0].message else {
+            panic!("{:?}", answers[0]);
+        };
+        assert_eq!(ack.result, MavResult::MAV_RESULT_DENIED, "{number:?}");
+        assert_eq!(bench.component.take_request(), None, "{number:?}");
+    }
+    // Nor may one take the key away, or bring another.
+    bench.receive(&encode(STATION, &setup([0; 32], TODAY), &[]));
+    bench.receive(&encode(STATION, &setup([9; 32], TODAY), &[]));
+    assert_eq!(bench.answers().len(), 0);
+    assert_eq!(
+        bench.component.kept_signing().map(|kept| kept.key.0),
+        Some(KEY)
+    );
+
+    assert_eq!(bench.params, before);
+    let answers = bench.ask(&read("CTL_BW_SPD_HZ", -1));
+    assert_eq!(values(&answers).len(), 1);
+}
+
+#[test]
+fn another_key_opens_nothing() {
+    let mut bench = keyed();
+    let value = set("CTL_BW_SPD_HZ", 5.0);
+    bench.receive(&signed(STATION, &value, &[9; 32], 0, TODAY + SECOND));
+    assert_eq!(bench.answers().len(), 0);
+    assert_ne!(bench.params.get(ParamId::CtlBwSpdHz), 5.0);
+}
+
+#[test]
+fn without_a_key_nothing_that_is_signed_is_obeyed() {
+    let mut bench = Bench::new();
+    bench.receive(&BY_PYMAVLINK);
+    assert_eq!(bench.answers().len(), 0);
+    assert_ne!(bench.params.get(ParamId::MotPolePairs), 7.0);
+}
+
+#[test]
+fn a_frame_is_obeyed_once_and_in_its_order() {
+    let mut bench = keyed();
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + 2 * SECOND));
+    assert!(takes(&mut bench, 6.0, STATION, 1, TODAY + 3 * SECOND));
+    assert!(
+        !takes(&mut bench, 5.0, STATION, 1, TODAY + 2 * SECOND),
+        "again"
+    );
+    assert!(
+        !takes(&mut bench, 4.0, STATION, 1, TODAY + 3 * SECOND),
+        "as old"
+    );
+    // Another link has an order of its own, within a minute.
+    assert!(takes(&mut bench, 7.0, STATION, 2, TODAY + SECOND));
+    let later = TODAY + 100 * SECOND;
+    assert!(takes(&mut bench, 8.0, STATION, 1, later));
+    assert!(!takes(&mut bench, 9.0, STATION, 3, later - 61 * SECOND));
+    assert!(takes(&mut bench, 9.0, STATION, 3, later - 59 * SECOND));
+}
+
+#[test]
+fn time_passes_for_a_stream_that_begins() {
+    let mut bench = keyed();
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY));
+    bench.run_ms(61_000);
+    assert!(!takes(&mut bench, 6.0, STATION, 2, TODAY));
+    assert!(takes(&mut bench, 6.0, STATION, 2, TODAY + 2 * SECOND));
+}
+
+#[test]
+fn more_streams_than_can_be_followed_push_out_none_that_could_be_played_again() {
+    let mut bench = keyed();
+    for link in 0..8 {
+        assert!(takes(
+            &mut bench,
+            5.0 + f32::from(link),
+            STATION,
+            link,
+            TODAY + SECOND
+        ));
+    }
+    assert!(!takes(&mut bench, 20.0, STATION, 8, TODAY + 2 * SECOND));
+    // A minute later they are too old to begin anew, and make room.
+    let later = TODAY + 62 * SECOND;
+    assert!(takes(&mut bench, 20.0, STATION, 7, later));
+    assert!(takes(&mut bench, 21.0, STATION, 8, later));
+    assert!(!takes(&mut bench, 5.0, STATION, 0, TODAY + SECOND), "again");
+}
+
+#[test]
+fn what_was_heard_before_a_loss_of_power_is_not_obeyed_after_it() {
+    let mut bench = keyed();
+    let heard = TODAY + 5 * SECOND;
+    assert!(takes(&mut bench, 5.0, STATION, 1, heard));
+    let kept = bench.component.kept_signing();
+
+    let mut bench = Bench::new();
+    bench.component.keep_signing(kept);
+    for link in [1, 2] {
+        assert!(!takes(&mut bench, 5.0, STATION, link, heard), "{link}");
+        assert!(
+            !takes(&mut bench, 5.0, STATION, link, heard - SECOND),
+            "{link}"
+        );
+    }
+    assert!(takes(&mut bench, 5.0, STATION, 1, heard + SECOND));
+}
+
+#[test]
+fn who_has_the_key_may_change_it_and_take_it_away() {
+    let mut bench = keyed();
+    let other = [7; 32];
+    bench.receive(&signed(
+        STATION,
+        &setup(other, TODAY),
+        &KEY,
+        0,
+        TODAY + SECOND,
+    ));
+    assert_eq!(
+        bench.component.kept_signing().map(|kept| kept.key.0),
+        Some(other)
+    );
+    assert!(!takes(&mut bench, 5.0, STATION, 0, TODAY + 2 * SECOND));
+    let off = setup([0; 32], TODAY);
+    bench.receive(&signed(STATION, &off, &other, 0, TODAY + 3 * SECOND));
+    assert_eq!(bench.component.kept_signing(), None);
+    bench.ask(&set("CTL_BW_SPD_HZ", 6.0));
+    assert_eq!(bench.params.get(ParamId::CtlBwSpdHz), 6.0);
+}
+
+#[test]
+fn what_leaves_is_signed_by_times_that_grow_also_over_a_loss_of_power() {
+    let mut bench = keyed();
+    let mut last = 0;
+    for start in 0..2 {
+        for _ in 0..3 {
+            let mut frames = Vec::new();
+            bench.receive(&encode(STATION, &read("CTL_BW_SPD_HZ", -1), &[]));
+            bench.poll_bytes(&mut frames);
+            for bytes in frames {
+                let (frame, signature) = bytes.split_at(bytes.len() - 13);
+                assert_eq!((frame[2], signature[0]), (1, 0));
+                let mut hasher = Sha256::new();
+                hasher.update(KEY);
+                hasher.update(&bytes[..bytes.len() - 6]);
+                assert_eq!(hasher.finalize()[..6], signature[7..]);
+                let mut timestamp = [0; 8];
+                timestamp[..6].copy_from_slice(&signature[1..7]);
+                let timestamp = u64::from_le_bytes(timestamp);
+                assert!(timestamp > last, "{start}: {timestamp} {last}");
+                last = timestamp;
+            }
+        }
+        let kept = bench.component.kept_signing();
+        bench = Bench::new();
+        bench.component.keep_signing(kept);
+    }
+    assert!(last > TODAY);
+}
+
+#[test]
+fn a_key_does_not_print() {
+    let kept = keyed().component.kept_signing();
+    let text = std::format!("{kept:?}");
+    assert!(text.contains("Key(..)") && !text.contains("30"), "{text}");
+}
