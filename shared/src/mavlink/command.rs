@@ -7,6 +7,7 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::component::{Context, Request};
 use super::identity::{Address, Identity, Role};
+use super::messages;
 use super::receiver::Frame;
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
@@ -310,6 +311,7 @@ fn message_id(value: f32) -> Option<u32> {
 fn request_message(command: &Command, schedule: &Schedule) -> MavResult {
     match message_id(command.params[0]) {
         Some(AUTOPILOT_VERSION_DATA::ID) => ACCEPTED,
+        Some(id) if messages::is_metadata(id) => ACCEPTED,
         // It is about another message, which parameter 2 names.
         Some(MESSAGE_INTERVAL_DATA::ID) => match message_id(command.params[1]) {
             Some(id) if u16::try_from(id).is_ok() => ACCEPTED,

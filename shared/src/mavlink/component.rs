@@ -29,6 +29,11 @@ use crate::params::{BuildError, ParamId, Params};
 use crate::telemetry::Telemetry;
 
 const PING_ID: u32 = PING.0;
+/// FILE_TRANSFER_PROTOCOL.
+const FILE: (u32, u8) = (
+    FILE_TRANSFER_PROTOCOL_DATA::ID,
+    FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC,
+);
 const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"), ", ");
 
 /// A text that is made up at run time; STATUSTEXT has room for 50 letters.
@@ -89,6 +94,9 @@ pub struct Component {
     telemetries: u16,
     image: Image,
     warnings: Deque<Warning, 2>,
+    /// The last of them, for who reads it later.
+    last_warning: Warning,
+    files: ftp::Server,
 }
 
 impl Component {
@@ -119,6 +127,8 @@ impl Component {
             telemetries: 0,
             image: *image,
             warnings: Deque::new(),
+            last_warning: Warning::new(),
+            files: ftp::Server::default(),
         }
     }
 
@@ -182,7 +192,12 @@ impl Component {
                 });
             }
             FILE_TRANSFER_PROTOCOL_DATA::ID => {
-                if let Some(answer) = ftp::Answer::to(frame) {
+                let view = ftp::View {
+                    params: context.params,
+                    telemetry: context.telemetry,
+                    warning: &self.last_warning,
+                };
+                if let Some(answer) = self.files.handle(context.now_us, frame, &view) {
                     self.replies.push(Reply::Ftp {
                         to: frame.from,
                         answer,
@@ -248,6 +263,13 @@ impl Component {
                 self.send_value(context, id, send);
             }
         }
+        while let Some(len) = self.files.burst_frame_len()
+            && self.list_pace.take(context.now_us, len)
+        {
+            if let Some((to, answer)) = self.files.next_of_burst(context.now_us) {
+                self.send_file(to, answer, context, send);
+            }
+        }
     }
 
     /// The next thing for the caller to do; to be asked after each poll until there is none.
@@ -285,6 +307,7 @@ impl Component {
 
     /// Warns a person at the next poll. Two wait; of more, the first are told.
     pub fn warn(&mut self, warning: Warning) {
+        self.last_warning.clone_from(&warning);
         let _ = self.warnings.push_back(warning);
     }
 
@@ -326,6 +349,11 @@ impl Component {
                 let message = messages::autopilot_version(&self.image);
                 writer.sender.send(identity.address, &message, &[], send);
             }
+            Reply::Message(id) if messages::is_metadata(id) => {
+                let (message, payload) = messages::metadata(id, context.now_us);
+                let sender = &mut writer.sender;
+                sender.send_payload(identity.address, message, &payload, send);
+            }
             Reply::Message(id) => {
                 if let Some(stream) = self.schedule.find(id) {
                     self.send_stream(stream, context, send);
@@ -353,7 +381,7 @@ impl Component {
                 writer.text(identity, MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
             }
             Reply::Text(severity, text) => writer.text(identity, severity, &text, send),
-            Reply::Ftp { to, answer } => writer.ftp(identity, to, &answer, send),
+            Reply::Ftp { to, answer } => self.send_file(to, answer, context, send),
         }
     }
 
@@ -407,6 +435,26 @@ impl Component {
         self.writer
             .sender
             .send(self.identity.address, &data, &[], send);
+    }
+
+    /// Never inlined: its stack is free for what else is sent.
+    #[inline(never)]
+    fn send_file(
+        &mut self,
+        to: Address,
+        answer: ftp::Answer,
+        context: &Context,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        let view = ftp::View {
+            params: context.params,
+            telemetry: context.telemetry,
+            warning: &self.last_warning,
+        };
+        let mut payload = [0; ftp::PAYLOAD_MAX];
+        answer.write(to, &mut self.files, &view, &mut payload);
+        let sender = &mut self.writer.sender;
+        sender.send_payload(self.identity.address, FILE, &payload, send);
     }
 
     fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {

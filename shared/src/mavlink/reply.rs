@@ -3,8 +3,8 @@
 use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_ACK_DATA, FILE_TRANSFER_PROTOCOL_DATA, MISSION_COUNT_DATA, MavParamError, MavResult,
-    MavSeverity, PARAM_ERROR_DATA, STATUSTEXT_DATA,
+    COMMAND_ACK_DATA, MISSION_COUNT_DATA, MavParamError, MavResult, MavSeverity, PARAM_ERROR_DATA,
+    STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 
@@ -260,21 +260,5 @@ impl Writer {
             error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
         };
         self.sender.send(identity.address, &message, &[], out);
-    }
-
-    pub(super) fn ftp(
-        &mut self,
-        identity: &Identity,
-        to: Address,
-        answer: &ftp::Answer,
-        out: &mut dyn FnMut(&[u8]),
-    ) {
-        let message = (
-            FILE_TRANSFER_PROTOCOL_DATA::ID,
-            FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC,
-        );
-        let payload = answer.payload(to);
-        self.sender
-            .send_payload(identity.address, message, &payload, out);
     }
 }

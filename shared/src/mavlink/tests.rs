@@ -1,6 +1,7 @@
 //! Drives bytes in and reads bytes out.
 
 mod commands;
+mod files;
 mod parameters;
 mod receiving;
 mod signing;

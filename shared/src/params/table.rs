@@ -32,35 +32,54 @@ pub struct Parameter {
     pub live: bool,
 }
 
-/// What a person reads of a parameter. It is apart from the table so that a chip, which does not
-/// tell it, need not hold it.
+/// What a person reads of a parameter. It is apart from the table so that a chip, which tells it by a
+/// compressed file that `build.rs` makes of it, need not hold it.
 #[derive(Clone, Copy, Debug)]
 pub struct Text {
     /// Unit, empty for a number or a choice.
     pub unit: &'static str,
     /// One sentence for a ground station.
     pub description: &'static str,
+    /// The values that it can take and what they mean, where it is a choice.
+    pub choices: &'static [(u8, &'static str)],
+    /// Whether a change applies at the next start.
+    pub restart: bool,
 }
 
-/// A row's optional word; any other does not compile.
+/// A row's optional words; any other does not compile.
 macro_rules! is_live {
     () => {
         false
     };
-    (live) => {
+    (live $($word:ident)*) => {
+        true
+    };
+    (restart) => {
+        false
+    };
+}
+macro_rules! is_at_restart {
+    () => {
+        false
+    };
+    (live $($word:ident)*) => {
+        is_at_restart!($($word)*)
+    };
+    (restart) => {
         true
     };
 }
 
 macro_rules! parameters {
     ($($key:literal $id:ident $name:literal $unit:literal $kind:ident
-       $min:literal .. $max:literal = $default:literal $($live:ident)? $description:literal;)*) => {
+       $min:literal .. $max:literal = $default:literal $($word:ident)* $description:literal
+       $($value:literal $choice:literal)*;)*) => {
         /// Names a row of [`TABLE`]; its order is the order on MAVLink.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum ParamId {
             $(
-                #[doc = $description]
+                #[doc = concat!($description $(, "; ", $value, " ", $choice)*)]
                 $id,
             )*
         }
@@ -75,7 +94,7 @@ macro_rules! parameters {
                 min: $min,
                 max: $max,
                 default: $default,
-                live: is_live!($($live)?),
+                live: is_live!($($word)*),
             },
         )*];
 
@@ -83,6 +102,8 @@ macro_rules! parameters {
             Text {
                 unit: $unit,
                 description: $description,
+                choices: &[$(($value, $choice)),*],
+                restart: is_at_restart!($($word)*),
             },
         )*];
 
@@ -99,12 +120,14 @@ macro_rules! parameters {
 }
 
 parameters! {
-    1 MavSysId "MAV_SYS_ID" "" Whole 1.0..255.0 = 1.0 live
-        "MAVLink system id; restart to apply";
-    2 MavCompId "MAV_COMP_ID" "" Whole 1.0..250.0 = 140.0 live
+    1 MavSysId "MAV_SYS_ID" "" Whole 1.0..255.0 = 1.0 live restart
+        "MAVLink system id";
+    2 MavCompId "MAV_COMP_ID" "" Whole 1.0..250.0 = 140.0 live restart
         "MAVLink component id as a peripheral; standalone it is 1";
-    3 MavRole "MAV_ROLE" "" Whole 0.0..1.0 = 0.0 live
-        "0 standalone, a vehicle of its own for a ground station; 1 peripheral beside an autopilot";
+    3 MavRole "MAV_ROLE" "" Whole 0.0..1.0 = 0.0 live restart
+        "What it is to a ground station"
+            0 "standalone, a vehicle of its own"
+            1 "peripheral beside an autopilot";
     10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 1.0..64.0 = 12.0
         "Pole pairs of the motor: half the number of its magnets";
     11 MotRMohm "MOT_R_MOHM" "mOhm" Real 1.0..10000.0 = 108.0
@@ -116,27 +139,49 @@ parameters! {
     14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" Real 0.1..10000000.0 = 1430.0
         "Moment of inertia of motor and load";
     15 MotDir "MOT_DIR" "" Whole 0.0..1.0 = 0.0
-        "Direction of rotation: 0 normal, 1 reversed";
+        "Direction of rotation"
+            0 "normal"
+            1 "reversed";
     16 MotKv "MOT_KV" "rpm/V" Derived 0.0..1000000.0 = 353.416
         "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only";
     17 MotStop "MOT_STOP" "" Whole 0.0..1.0 = 1.0
-        "At zero throttle and at loss of signal: 0 coast, 1 brake";
+        "At zero throttle and at loss of signal"
+            0 "coast"
+            1 "brake";
     18 MotToneA "MOT_TONE_A" "A" Real 0.0..10.0 = 1.5 live
         "Bound of tones' phase current, peak; up to a quarter more with R or L stated 30 % wrong; 0 is silent";
     20 CtlMode "CTL_MODE" "" Whole 0.0..2.0 = 0.0
-        "What throttle commands: 0 speed, 1 torque, 2 voltage";
+        "What throttle commands"
+            0 "speed"
+            1 "torque"
+            2 "voltage";
     21 CtlDrive "CTL_DRIVE" "" Whole 0.0..1.0 = 0.0
-        "Drive: 0 field-oriented, 1 six-step";
+        "Drive"
+            0 "field-oriented"
+            1 "six-step";
     22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..3.0 = 3.0
-        "Position observer: 0 adaptive back-EMF, 1 flux crossings, 2 Hall, 3 compensated flux with PLL";
+        "Position observer"
+            0 "adaptive back-EMF"
+            1 "flux crossings"
+            2 "Hall"
+            3 "compensated flux with PLL";
     23 CtlRegulator "CTL_REGULATOR" "" Whole 0.0..2.0 = 1.0
-        "Current regulator: 0 observer-based, 1 synchronous, 2 modified synchronous";
+        "Current regulator"
+            0 "observer-based"
+            1 "synchronous"
+            2 "modified synchronous";
     24 CtlModulation "CTL_MODULATION" "" Whole 0.0..1.0 = 0.0
-        "Modulation: 0 space vector, 1 sine";
+        "Modulation"
+            0 "space vector"
+            1 "sine";
     25 CtlObsCure "CTL_OBS_CURE" "" Whole 0.0..1.0 = 0.0
-        "Form of the adaptive back-EMF observer: 0 as published, 1 cured of its sensitivity to R, L";
+        "Form of the adaptive back-EMF observer"
+            0 "as published"
+            1 "cured of its sensitivity to R, L";
     26 CtlAdaptL "CTL_ADAPT_L" "" Whole 0.0..1.0 = 0.0
-        "Adaptation of the inductance by a square wave of i_d: 0 off, 1 on";
+        "Adaptation of the inductance by a square wave of i_d"
+            0 "off"
+            1 "on";
     27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
         "Mechanical speed at full throttle in speed mode";
     28 CtlRpmMin "CTL_RPM_MIN" "rpm" Real 100.0..200000.0 = 300.0
@@ -152,21 +197,45 @@ parameters! {
     33 CtlPosN "CTL_POS_N" "" Whole 1.0..4.0 = 1.0
         "Observers 1 and 2: electrical turns over which the speed is measured";
     34 CtlFluxForm "CTL_FLUX_FORM" "" Whole 0.0..3.0 = 1.0
-        "Flux integrators: 0 first order, 1 second order, limits as measured; 2, 3 limits as stated";
+        "Flux integrators"
+            0 "first order, limits as measured"
+            1 "second order, limits as measured"
+            2 "first order, limits as stated"
+            3 "second order, limits as stated";
     35 CtlHall "CTL_HALL" "" Whole 0.0..1.0 = 1.0
-        "Hall observer: 0 sensors alone, 1 merged with the flux crossings";
+        "Hall observer"
+            0 "sensors alone"
+            1 "merged with the flux crossings";
     36 CtlSpeed "CTL_SPEED" "" Whole 0.0..2.0 = 0.0
-        "Speed loop: 0 with feed-forward of the inertia, 1 PI with feed-forward of CTL_FF_A, 2 PI";
+        "Speed loop"
+            0 "with feed-forward of the inertia"
+            1 "PI with feed-forward of CTL_FF_A"
+            2 "PI";
     37 CtlFfA "CTL_FF_A" "A" Real 0.0..200.0 = 8.4 live
         "Steady current at CTL_RPM_MAX, fed forward with the square of the speed if CTL_SPEED is 1";
-    40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0
-        "PWM frequency; the control runs once a period; restart to apply";
-    41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0
-        "Time for which both switches of a phase stay off at each change; restart to apply";
+    40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0 restart
+        "PWM frequency; the control runs once a period";
+    41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0 restart
+        "Time for which both switches of a phase stay off at each change";
     50 InpProto "INP_PROTO" "" Whole 0.0..23.0 = 0.0
-        "Throttle protocol: 0 automatic, 1 servo, 2 OneShot125, 3 OneShot42, 4 Multishot, 10..13 DShot150..1200, 20..23 bidirectional";
+        "Throttle protocol"
+            0 "automatic"
+            1 "servo"
+            2 "OneShot125"
+            3 "OneShot42"
+            4 "Multishot"
+            10 "DShot150"
+            11 "DShot300"
+            12 "DShot600"
+            13 "DShot1200"
+            20 "bidirectional DShot150"
+            21 "bidirectional DShot300"
+            22 "bidirectional DShot600"
+            23 "bidirectional DShot1200";
     51 Inp3d "INP_3D" "" Whole 0.0..1.0 = 0.0
-        "Both directions by one throttle: 0 off, 1 on";
+        "Both directions by one throttle"
+            0 "off"
+            1 "on";
     52 InpArmMs "INP_ARM_MS" "ms" Real 10.0..5000.0 = 300.0
         "Time for which zero throttle must be received before the motor may turn";
     53 InpLossMs "INP_LOSS_MS" "ms" Real 5.0..2000.0 = 100.0
@@ -197,8 +266,8 @@ parameters! {
         "Mechanical speed at which the observer takes over from the ramp";
     80 TelRateHz "TEL_RATE_HZ" "Hz" Real 1.0..100.0 = 10.0 live
         "Rate of ESC_STATUS and ESC_TELEMETRY_1_TO_4";
-    81 TelBaud "TEL_BAUD" "bit/s" Whole 115200.0..921600.0 = 115200.0
-        "Speed of the board's serial MAVLink port; applies at the next start";
+    81 TelBaud "TEL_BAUD" "bit/s" Whole 115200.0..921600.0 = 115200.0 restart
+        "Speed of the board's serial MAVLink port";
 }
 
 #[cfg(test)]
@@ -214,6 +283,19 @@ mod tests {
             assert!(p.name.len() <= 16 && p.name.is_ascii(), "{}", p.name);
             assert!(p.min <= p.default && p.default <= p.max, "{}", p.name);
             assert!(!TEXTS[i].description.is_empty(), "{}", p.name);
+            let choices = TEXTS[i].choices;
+            for (value, meaning) in choices {
+                let value = f32::from(*value);
+                assert!(p.min <= value && value <= p.max, "{}", p.name);
+                assert!(!meaning.is_empty(), "{}", p.name);
+            }
+            let is_default = |choice: &(u8, _)| f32::from(choice.0) == p.default;
+            assert!(
+                choices.is_empty() || choices.iter().any(is_default),
+                "{}",
+                p.name
+            );
+            assert!(p.kind == Kind::Whole || choices.is_empty(), "{}", p.name);
             for other in &TABLE[i + 1..] {
                 assert_ne!(p.name, other.name);
                 assert_ne!(p.key, other.key, "{} and {}", p.name, other.name);

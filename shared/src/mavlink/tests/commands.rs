@@ -1,6 +1,4 @@
-use mavlink::dialects::ardupilotmega::{
-    COMMAND_ACK_DATA, COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA, MavResult,
-};
+use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavResult};
 
 use super::*;
 use crate::input::authority::Command;
@@ -421,31 +419,4 @@ fn a_ping_is_answered_and_an_answer_is_not() {
     payload[12..14].copy_from_slice(&[1, 1]);
     bench.receive(&frame(STATION, (4, 237), 0, &payload));
     assert_eq!(bench.answers().len(), 0);
-}
-
-#[test]
-fn files_are_refused_at_once() {
-    let mut bench = Bench::new();
-    // OpenFileRO is told that there is no file, an unknown request that it is not known, and to
-    // end a session there is nothing.
-    for (request, answer, error) in [(4, 129, 10), (15, 129, 7), (2, 129, 7), (1, 128, 0)] {
-        let mut message = FILE_TRANSFER_PROTOCOL_DATA {
-            target_system: 1,
-            target_component: 1,
-            ..FILE_TRANSFER_PROTOCOL_DATA::default()
-        };
-        message.payload[0..2].copy_from_slice(&300_u16.to_le_bytes());
-        message.payload[3] = request;
-        let sent = bench.ask(&message);
-        assert_eq!(sent.len(), 1);
-        let MavMessage::FILE_TRANSFER_PROTOCOL(reply) = &sent[0].message else {
-            panic!("{sent:?}");
-        };
-        assert_eq!((reply.target_system, reply.target_component), (255, 190));
-        assert_eq!(reply.payload[0..2], 301_u16.to_le_bytes());
-        assert_eq!((reply.payload[3], reply.payload[5]), (answer, request));
-        assert_eq!(reply.payload[12], error);
-        // An answer is not answered.
-        assert_eq!(bench.ask(reply).len(), 0);
-    }
 }

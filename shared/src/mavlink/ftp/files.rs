@@ -1,0 +1,162 @@
+//! The files, and the folders that they are in.
+
+use super::checksum::checksum;
+use super::packed::Selection;
+use super::sink::Sink;
+use super::text;
+use crate::params::Params;
+use crate::telemetry::Telemetry;
+
+static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
+static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
+
+/// Checksum of the general metadata, as COMPONENT_METADATA tells it.
+pub(in crate::mavlink) const GENERAL_CHECKSUM: u32 = checksum(
+    0,
+    include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz")),
+);
+
+/// What those files tell of that are made when they are read.
+#[derive(Clone, Copy)]
+pub(in crate::mavlink) struct View<'a> {
+    pub(in crate::mavlink) params: &'a Params,
+    pub(in crate::mavlink) telemetry: &'a Telemetry,
+    /// The last that a person was warned of; empty if there was none.
+    pub(in crate::mavlink) warning: &'a str,
+}
+
+/// What an entry is.
+#[derive(Debug)]
+enum Content {
+    Folder,
+    /// A file whose bytes are in the image.
+    Fixed(&'static [u8]),
+    /// The parameters, of which a path can choose.
+    Parameters,
+    /// A file that something writes.
+    Made(fn(&View, &mut Sink)),
+}
+
+/// An entry of a folder.
+#[derive(Debug)]
+pub(super) struct Entry {
+    /// The folder, as it stands before the name in a path.
+    folder: &'static str,
+    name: &'static str,
+    content: Content,
+}
+
+static ENTRIES: [Entry; 6] = [
+    Entry {
+        folder: "",
+        name: "general.json.xz",
+        content: Content::Fixed(GENERAL),
+    },
+    Entry {
+        folder: "",
+        name: "parameter.json.xz",
+        content: Content::Fixed(PARAMETER),
+    },
+    Entry {
+        folder: "",
+        name: "@PARAM",
+        content: Content::Folder,
+    },
+    Entry {
+        folder: "",
+        name: "@SYS",
+        content: Content::Folder,
+    },
+    Entry {
+        folder: "@PARAM/",
+        name: "param.pck",
+        content: Content::Parameters,
+    },
+    Entry {
+        folder: "@SYS/",
+        name: "faults.txt",
+        content: Content::Made(text::faults),
+    },
+];
+
+/// One file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct File {
+    entry: &'static Entry,
+    selection: Selection,
+}
+
+impl File {
+    /// The file of a path, with the root's slash or without it.
+    pub(super) fn find(path: &[u8]) -> Option<Self> {
+        let path = trim(path);
+        let query_at = path.iter().position(|byte| *byte == b'?');
+        let (path, query) = match query_at {
+            Some(at) => (path.get(..at)?, path.get(at + 1..)),
+            None => (path, None),
+        };
+        let entry = ENTRIES.iter().find(|entry| {
+            path.strip_prefix(entry.folder.as_bytes()) == Some(entry.name.as_bytes())
+        })?;
+        let selection = match (&entry.content, query) {
+            (Content::Parameters, Some(query)) => Selection::parse(query)?,
+            (Content::Folder, _) | (_, Some(_)) => return None,
+            (_, None) => Selection::ALL,
+        };
+        Some(Self { entry, selection })
+    }
+
+    pub(super) fn write(&self, view: &View, sink: &mut Sink) {
+        match self.entry.content {
+            Content::Folder => {}
+            Content::Fixed(bytes) => sink.put(bytes),
+            Content::Parameters => self.selection.write(view.params, sink),
+            Content::Made(write) => write(view, sink),
+        }
+    }
+
+    /// Its length and its checksum.
+    pub(super) fn measure(&self, view: &View) -> (u32, u32) {
+        let mut sink = Sink::default();
+        self.write(view, &mut sink);
+        (sink.len as u32, sink.checksum)
+    }
+}
+
+/// The entries of a path's folder, with the root's slash or without it; none when there is no such
+/// folder.
+pub(super) fn list(path: &[u8]) -> impl Iterator<Item = &'static Entry> {
+    let path = trim(path);
+    ENTRIES
+        .iter()
+        .filter(move |entry| trim(entry.folder.as_bytes()) == path)
+}
+
+impl Entry {
+    /// The entries of its folder from itself on, each as what it is, its name, for a file its length,
+    /// and a zero.
+    pub(super) fn write_rest(&'static self, view: &View, sink: &mut Sink) {
+        let from_here = ENTRIES
+            .iter()
+            .skip_while(|entry| !core::ptr::eq(*entry, self));
+        for entry in from_here.filter(|entry| entry.folder == self.folder) {
+            let is_folder = matches!(entry.content, Content::Folder);
+            sink.put(if is_folder { b"D" } else { b"F" });
+            sink.put(entry.name.as_bytes());
+            if !is_folder {
+                let selection = Selection::ALL;
+                sink.put(b"\t");
+                text::decimal(File { entry, selection }.measure(view).0, sink);
+            }
+            sink.put(b"\0");
+        }
+    }
+}
+
+/// A path without the slashes around it, and without a zero that ends it.
+fn trim(mut path: &[u8]) -> &[u8] {
+    while let [b'/', rest @ ..] | [rest @ .., b'/' | 0] = path {
+        path = rest;
+    }
+    path
+}

@@ -1,0 +1,29 @@
+//! Files that can be read over MAVLink: <https://mavlink.io/en/services/ftp.html>.
+//!
+//! | file | what it tells |
+//! |---|---|
+//! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: some 70 frames in four; `?withdefaults=1`, `?start=N&count=N` |
+//! | `@SYS/faults.txt` | faults and the last warning, in words |
+//! | `general.json.xz` | where the next one is ([`messages`](super::messages) names this one) |
+//! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
+//!
+//! The last two are made of the table of parameters when the crate is built (`build.rs`).
+//! The others are written anew for each answer, and of what is written only what was asked for is
+//! kept: no file is ever in memory. One reader at a time has a session; what it reads is of one
+//! moment, since a file that has changed can no longer be read. Bursts leave with the lists of
+//! parameters, in their half of the link.
+
+mod answer;
+mod checksum;
+mod files;
+mod packed;
+mod server;
+mod sink;
+mod text;
+
+pub(super) use answer::{Answer, PAYLOAD_MAX};
+pub(super) use files::{GENERAL_CHECKSUM, View};
+pub(super) use server::Server;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,101 @@
+//! `@PARAM/param.pck`: every parameter in one file, in ArduPilot's format.
+//!
+//! A header of three little-endian `u16`: 0x671B, or 0x671C with defaults; the parameters that follow;
+//! all that there are. For each parameter a byte of type (4: float) and above it the flag 1 if its
+//! default follows its value; a byte of how many letters the name has in common with the one before
+//! and above it how many differ, less 1; those letters; the value; the default if it is another.
+//! (ArduPilot, `AP_Filesystem_Param.cpp`.) It pads with zeros so that no value crosses the end of a
+//! read; that is not needed here, since a file that changes can no longer be read.
+
+use super::sink::Sink;
+use crate::params::{ParamId, Params};
+
+const MAGIC: u16 = 0x671B;
+const MAGIC_WITH_DEFAULTS: u16 = 0x671C;
+const FLOAT: u8 = 4;
+const WITH_DEFAULT: u8 = 1 << 4;
+/// `ParamId` is a byte: no more parameters can be asked for.
+const ALL: u8 = ParamId::ALL.len() as u8;
+
+/// Which parameters, and whether with their defaults.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Selection {
+    first: u8,
+    count: u8,
+    defaults: bool,
+}
+
+impl Selection {
+    pub(super) const ALL: Self = Self {
+        first: 0,
+        count: ALL,
+        defaults: false,
+    };
+
+    /// Reads `start=N&count=N&withdefaults=1`, in any order; a count of 0 is all of them. None when
+    /// it is something else, or there are no such parameters.
+    pub(super) fn parse(query: &[u8]) -> Option<Self> {
+        let mut selection = Self::ALL;
+        for part in query.split(|byte| *byte == b'&') {
+            if let Some(value) = part.strip_prefix(b"start=") {
+                selection.first = number(value)?;
+            } else if let Some(value) = part.strip_prefix(b"count=") {
+                selection.count = number(value)?;
+            } else {
+                selection.defaults = match part {
+                    b"withdefaults=1" => true,
+                    b"withdefaults=0" => false,
+                    _ => return None,
+                };
+            }
+        }
+        let rest = ALL.checked_sub(selection.first).filter(|rest| *rest > 0)?;
+        if selection.count == 0 || selection.count > rest {
+            selection.count = rest;
+        }
+        Some(selection)
+    }
+
+    pub(super) fn write(self, params: &Params, sink: &mut Sink) {
+        let magic = if self.defaults {
+            MAGIC_WITH_DEFAULTS
+        } else {
+            MAGIC
+        };
+        for word in [magic, self.count.into(), ALL.into()] {
+            sink.put(&word.to_le_bytes());
+        }
+        let mut before: &[u8] = &[];
+        let chosen = ParamId::ALL.iter().skip(self.first.into());
+        for id in chosen.take(self.count.into()) {
+            let entry = id.entry();
+            let name = entry.name.as_bytes();
+            let alike = name.iter().zip(before).take_while(|(a, b)| a == b).count();
+            // At least one letter is written; a name has 16 at the most.
+            let alike = alike.min(name.len() - 1);
+            let letters = name.get(alike..).unwrap_or_default();
+            let value = params.get(*id);
+            let default = self.defaults && value != entry.default;
+            sink.put(&[
+                FLOAT | if default { WITH_DEFAULT } else { 0 },
+                alike as u8 | (letters.len() as u8 - 1) << 4,
+            ]);
+            sink.put(letters);
+            sink.put(&value.to_le_bytes());
+            if default {
+                sink.put(&entry.default.to_le_bytes());
+            }
+            before = name;
+        }
+    }
+}
+
+/// A decimal number; one beyond all parameters is as good as any other.
+fn number(digits: &[u8]) -> Option<u8> {
+    let mut number: u8 = 0;
+    for digit in digits {
+        let worth = digit.checked_sub(b'0').filter(|worth| *worth <= 9)?;
+        number = number.saturating_mul(10).saturating_add(worth);
+    }
+    (!digits.is_empty()).then_some(number)
+}

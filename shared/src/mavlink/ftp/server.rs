@@ -1,0 +1,257 @@
+//! Who reads what: one session.
+
+use super::answer::{Answer, Content, DATA_MAX, Error};
+use super::files::{self, File, View};
+use super::sink::Sink;
+use crate::mavlink::identity::Address;
+use crate::mavlink::receiver::Frame;
+use crate::mavlink::sender::OVERHEAD_LEN;
+
+/// A session without a request for so long is over, µs: a client that is gone must not keep the next
+/// one out, and one that lives asks again within seconds.
+const SESSION_US: u64 = 10_000_000;
+
+/// Where the message has what; before it stand the network and the target.
+const SEQUENCE: usize = 3;
+const SESSION: usize = 5;
+const REQUEST: usize = 6;
+const SIZE: usize = 7;
+const OFFSET: usize = 11;
+const PATH: usize = 15;
+
+/// Numbers of the requests.
+mod request {
+    pub(super) const NONE: u8 = 0;
+    pub(super) const TERMINATE_SESSION: u8 = 1;
+    pub(super) const RESET_SESSIONS: u8 = 2;
+    pub(super) const LIST_DIRECTORY: u8 = 3;
+    pub(super) const OPEN_FILE_RO: u8 = 4;
+    pub(super) const READ_FILE: u8 = 5;
+    pub(super) const CREATE_FILE: u8 = 6;
+    pub(super) const RENAME: u8 = 13;
+    pub(super) const CALC_FILE_CRC32: u8 = 14;
+    pub(super) const BURST_READ_FILE: u8 = 15;
+    /// From here on it is an answer.
+    pub(super) const ACK: u8 = 128;
+}
+
+/// A file that someone reads.
+#[derive(Clone, Debug)]
+struct Session {
+    reader: Address,
+    /// As the reader has numbered it.
+    number: u8,
+    file: File,
+    /// As they were when it was opened.
+    len: u32,
+    checksum: u32,
+    used_us: u64,
+    burst: Option<Burst>,
+}
+
+/// What is still to be sent without being asked for, to the end of the file.
+#[derive(Clone, Debug)]
+struct Burst {
+    sequence: u16,
+    offset: u32,
+    size: u8,
+}
+
+impl Session {
+    /// What is read at an offset; what remains of the file if it is less than `size`.
+    fn read(&self, offset: u32, size: u8) -> Result<Content, Error> {
+        let left = self.len.saturating_sub(offset);
+        if left == 0 {
+            return Err(Error::EndOfFile);
+        }
+        let wanted = u32::from(size);
+        Ok(Content::Bytes {
+            len: left.min(wanted) as u8,
+            last: left <= wanted,
+        })
+    }
+}
+
+/// Serves files to one reader at a time.
+///
+/// Every request but one can be obeyed twice, so that one that is sent again gets the same answer and
+/// none has to be kept: opening a file anew begins the same session, and to end one that is not open
+/// is no error.
+#[derive(Clone, Debug, Default)]
+pub(in crate::mavlink) struct Server {
+    session: Option<Session>,
+}
+
+impl Server {
+    /// Obeys a request. None when the frame is an answer itself, or the answer comes in a burst.
+    ///
+    /// Never inlined: its stack is free for what else the component does.
+    #[inline(never)]
+    pub(in crate::mavlink) fn handle(
+        &mut self,
+        now_us: u64,
+        frame: &Frame,
+        view: &View,
+    ) -> Option<Answer> {
+        let request = frame.u8(REQUEST);
+        if request >= request::ACK {
+            return None;
+        }
+        let over = |session: &mut Session| now_us.saturating_sub(session.used_us) >= SESSION_US;
+        self.session.take_if(over);
+        let content = match self.obey(now_us, frame, request, view) {
+            Ok(content) => content?,
+            Err(error) => Content::Refused(error),
+        };
+        Some(Answer {
+            sequence: frame.u16(SEQUENCE).wrapping_add(1),
+            session: frame.u8(SESSION),
+            request,
+            offset: frame.u32(OFFSET),
+            content,
+        })
+    }
+
+    fn obey(
+        &mut self,
+        now_us: u64,
+        frame: &Frame,
+        request: u8,
+        view: &View,
+    ) -> Result<Option<Content>, Error> {
+        let (size, offset) = (frame.u8(SIZE), frame.u32(OFFSET));
+        if usize::from(size) > DATA_MAX {
+            return Err(Error::InvalidDataSize);
+        }
+        let path = frame.payload.get(PATH..).unwrap_or_default();
+        let path = path.get(..size.into()).unwrap_or(path);
+        Ok(Some(match request {
+            request::NONE => Content::Done,
+            request::TERMINATE_SESSION => {
+                if self.session.is_some() {
+                    self.session_of(frame)?;
+                }
+                self.session = None;
+                Content::Done
+            }
+            request::RESET_SESSIONS => {
+                self.session = None;
+                Content::Done
+            }
+            request::LIST_DIRECTORY => {
+                files::list(path).next().ok_or(Error::FileNotFound)?;
+                let entry = files::list(path).nth(offset as usize);
+                Content::Entries(entry.ok_or(Error::EndOfFile)?)
+            }
+            request::OPEN_FILE_RO => {
+                let file = File::find(path).ok_or(Error::FileNotFound)?;
+                if self
+                    .session
+                    .as_ref()
+                    .is_some_and(|s| s.reader != frame.from)
+                {
+                    return Err(Error::NoSessionsAvailable);
+                }
+                let (len, checksum) = file.measure(view);
+                self.session = Some(Session {
+                    reader: frame.from,
+                    number: frame.u8(SESSION),
+                    file,
+                    len,
+                    checksum,
+                    used_us: now_us,
+                    burst: None,
+                });
+                Content::Number(len)
+            }
+            request::CALC_FILE_CRC32 => {
+                let file = File::find(path).ok_or(Error::FileNotFound)?;
+                Content::Number(file.measure(view).1)
+            }
+            request::READ_FILE | request::BURST_READ_FILE => {
+                let session = self.session_of(frame)?;
+                session.used_us = now_us;
+                if size == 0 {
+                    return Err(Error::InvalidDataSize);
+                }
+                let content = session.read(offset, size)?;
+                if request == request::BURST_READ_FILE {
+                    session.burst = Some(Burst {
+                        sequence: frame.u16(SEQUENCE),
+                        offset,
+                        size,
+                    });
+                    return Ok(None);
+                }
+                content
+            }
+            request::CREATE_FILE..=request::RENAME => return Err(Error::FileProtected),
+            _ => return Err(Error::UnknownCommand),
+        }))
+    }
+
+    /// The session that this frame is of.
+    fn session_of(&mut self, frame: &Frame) -> Result<&mut Session, Error> {
+        self.session_with(frame.from, frame.u8(SESSION))
+    }
+
+    fn session_with(&mut self, reader: Address, number: u8) -> Result<&mut Session, Error> {
+        self.session
+            .as_mut()
+            .filter(|session| session.reader == reader && session.number == number)
+            .ok_or(Error::InvalidSession)
+    }
+
+    /// Bytes of the next frame of a burst, at the most; none when there is none.
+    pub(in crate::mavlink) fn burst_frame_len(&self) -> Option<usize> {
+        let burst = self.session.as_ref()?.burst.as_ref()?;
+        Some(OVERHEAD_LEN + PATH + usize::from(burst.size))
+    }
+
+    /// The next answer of a burst, and for whom it is.
+    pub(in crate::mavlink) fn next_of_burst(&mut self, now_us: u64) -> Option<(Address, Answer)> {
+        let session = self.session.as_mut()?;
+        let Burst {
+            sequence,
+            offset,
+            size,
+        } = session.burst.take()?;
+        let sequence = sequence.wrapping_add(1);
+        session.used_us = now_us;
+        let content = session.read(offset, size).ok()?;
+        if let Content::Bytes { last: false, .. } = content {
+            session.burst = Some(Burst {
+                sequence,
+                offset: offset + u32::from(size),
+                size,
+            });
+        }
+        let answer = Answer {
+            sequence,
+            session: session.number,
+            request: request::BURST_READ_FILE,
+            offset,
+            content,
+        };
+        Some((session.reader, answer))
+    }
+
+    /// The bytes of a file that an answer asks for. Those of a file that has changed since it was
+    /// opened are refused and its session is over, so that what someone has read is of one moment.
+    pub(super) fn read(
+        &mut self,
+        (reader, number): (Address, u8),
+        (offset, room): (u32, &mut [u8]),
+        view: &View,
+    ) -> Result<(), Error> {
+        let session = self.session_with(reader, number)?;
+        let mut sink = Sink::new(offset as usize, room);
+        session.file.write(view, &mut sink);
+        if sink.checksum != session.checksum {
+            room.fill(0);
+            self.session = None;
+            return Err(Error::InvalidSession);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,38 @@
+//! What becomes of a file while it is written.
+
+use super::checksum::checksum;
+
+/// Keeps of what is put into it what there is room for, from an offset on, and measures the whole.
+#[derive(Debug, Default)]
+pub(super) struct Sink<'a> {
+    skip: usize,
+    room: &'a mut [u8],
+    /// Of all that has been put in, bytes.
+    pub(super) len: usize,
+    /// Likewise.
+    pub(super) checksum: u32,
+}
+
+impl<'a> Sink<'a> {
+    /// `room` for what is put in from `skip` bytes on.
+    pub(super) fn new(skip: usize, room: &'a mut [u8]) -> Self {
+        Self {
+            skip,
+            room,
+            ..Self::default()
+        }
+    }
+
+    /// Never inlined: every piece of every file goes through it.
+    #[inline(never)]
+    pub(super) fn put(&mut self, bytes: &[u8]) {
+        self.checksum = checksum(self.checksum, bytes);
+        for byte in bytes {
+            let place = self.len.wrapping_sub(self.skip);
+            if let Some(to) = self.room.get_mut(place) {
+                *to = *byte;
+            }
+            self.len += 1;
+        }
+    }
+}
