@@ -1,7 +1,7 @@
 """Generates a Python dialect from the message definitions that ship inside the `mavlink` crate.
 
-The wheel of pymavlink lacks ESC_INFO (290), ESC_STATUS (291) and PARAM_ERROR (345). The crate that
-the control is built with has them, so tests and control read one and the same definition.
+The wheel of pymavlink lacks ESC_INFO (290) and ESC_STATUS (291). The crate that the control is built
+with has them, so tests and control read one and the same definition.
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 from pymavlink.generator import mavgen
 
 ROOT = Path(__file__).resolve().parent.parent
-NEEDED = ("ESC_INFO", "ESC_STATUS", "PARAM_ERROR")
+NEEDED = ("ESC_INFO", "ESC_STATUS")
 
 
 def definitions() -> Path:

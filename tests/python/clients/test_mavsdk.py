@@ -1,0 +1,116 @@
+"""MAVSDK, its Python wheel, by its blocking calls.
+
+It has no command to store the parameters, and for a refused value, which the ESC answers with the one
+in force, it tries again five times and then says TIMEOUT.
+"""
+
+import json
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+from mavsdk.component_type import ComponentType
+from mavsdk.mavsdk import Configuration, Mavsdk
+from mavsdk.plugins.component_metadata.component_metadata import ComponentMetadata, MetadataType
+from mavsdk.plugins.param.param import Param, ParamError, ParamResult
+
+import siskin_dialect as dialect
+from desk import Desk
+from esc import TIMEOUT_S
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    """It keeps a cache in the user's folder."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+
+
+@contextmanager
+def connect(desk: Desk):
+    """The ESC that it finds."""
+    station = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+    try:
+        station.add_any_connection_with_handle(desk.mavsdk)
+        esc = station.first_autopilot(TIMEOUT_S)
+        assert esc is not None, "no ESC found"
+        yield esc
+    finally:
+        station.destroy()
+
+
+def fetch(params: Param) -> dict[str, float]:
+    everything = params.get_all_params()
+    assert not everything.int_params and not everything.custom_params, "all are floats"
+    return {param.name: param.value for param in everything.float_params}
+
+
+def test_lists_sets_and_finds_again(desk):
+    with connect(desk) as esc:
+        params = Param(esc)
+        values = fetch(params)
+        assert values == desk.params()
+        params.set_param_float("CTL_RPM_MAX", 5432.5)
+        assert params.get_param_float("CTL_RPM_MAX") == 5432.5
+    desk.power_cycle()
+    with connect(desk) as esc:
+        params = Param(esc)
+        assert fetch(params) == {**values, "CTL_RPM_MAX": 5432.5}
+
+
+def test_what_is_missing_or_refused_is_an_error(desk):
+    with connect(desk) as esc:
+        params = Param(esc)
+        with pytest.raises(ParamError) as error:
+            params.get_param_float("NO_SUCH_NAME")
+        assert error.value.result == ParamResult.DOES_NOT_EXIST
+        with pytest.raises(ParamError) as error:
+            params.set_param_float("NO_SUCH_NAME", 1.0)
+        assert error.value.result == ParamResult.DOES_NOT_EXIST
+        with pytest.raises(ParamError) as error:
+            params.get_param_int("CTL_MODE")
+        assert error.value.result == ParamResult.WRONG_TYPE
+        with pytest.raises(ParamError):
+            params.set_param_float("MOT_KV", 400.0)
+        assert params.get_param_float("MOT_KV") == desk.params()["MOT_KV"]
+
+
+def test_a_lossy_path_ends_with_the_full_list_and_the_set_value(lossy_desk):
+    with connect(lossy_desk) as esc:
+        params = Param(esc)
+        values = fetch(params)
+        assert values == lossy_desk.params()
+        params.set_param_float("CTL_RPM_MAX", 5432.5)
+        assert fetch(params) == {**values, "CTL_RPM_MAX": 5432.5}
+
+
+def test_a_list_takes_3_s_at_57600_baud(slow_desk):
+    with connect(slow_desk) as esc:
+        params = Param(esc)
+        begin = time.monotonic()
+        values = fetch(params)
+        seconds = time.monotonic() - begin
+    assert values == slow_desk.params()
+    assert seconds <= 3.0
+
+
+def test_ftp_has_what_describes_the_parameters(desk):
+    with connect(desk) as esc:
+        values = fetch(Param(esc))
+        metadata, done = ComponentMetadata(esc), threading.Event()
+
+        def told(update, _) -> None:
+            if update.type == MetadataType.ALL_COMPLETED:
+                done.set()
+
+        metadata.subscribe_metadata_available(told)
+        metadata.request_autopilot_component()
+        assert done.wait(TIMEOUT_S)
+        found = metadata.get_metadata(dialect.MAV_COMP_ID_AUTOPILOT1, MetadataType.PARAMETER)
+    described = {param["name"]: param for param in json.loads(found.json_metadata)["parameters"]}
+    assert set(described) == set(values)
+    assert all(param["shortDesc"] for param in described.values())
+    defaults = {name: param["default"] for name, param in described.items() if "default" in param}
+    # What follows from others has none.
+    assert set(values) - set(defaults) == {"MOT_KV"}
+    assert defaults == pytest.approx({name: values[name] for name in defaults}, rel=1e-6)
