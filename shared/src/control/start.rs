@@ -119,8 +119,8 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     let omega_s = state.omega_s;
     let h_d = config
         .resistance
-        .held(i.d)
-        .minus(config.reactance.held(omega_s.top(i.q)))
+        .saturating_apply(i.d)
+        .minus(config.reactance.saturating_apply(omega_s.top(i.q)))
         .minus(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
     let rotor = config.xi_nominal.top(h_d).to_bits();
@@ -136,7 +136,7 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     }
     let target = config
         .yielding
-        .held(omega_s.minus(rotor))
+        .saturating_apply(omega_s.minus(rotor))
         .min(YIELDED_MAX)
         .max(-YIELDED_MAX);
     state.yielding = config.yield_rate.apply(target.minus(state.yielded));

@@ -29,6 +29,7 @@ pub(super) fn turn(config: &Config, state: &mut State, setpoint: &Setpoint) {
     state.turn = (state.turn + 1) % CYCLE as u8;
     match state.turn {
         0 | 8 | 16 | 24 => reference(config, state, setpoint),
+        2 => proceed(config, state),
         4 | 20 => {
             supply(state);
             if !state.phase.is_open_loop() {
@@ -43,7 +44,6 @@ pub(super) fn turn(config: &Config, state: &mut State, setpoint: &Setpoint) {
         }
         10 => supervise(config, state, setpoint),
         12 => pace(config, state),
-        18 => proceed(config, state),
         _ => {}
     }
 }

@@ -19,14 +19,13 @@ use crate::units::{AdcCounts, Duty};
 /// and nothing new is asked for. It is the same work as in any other, without the choices.
 #[inline(never)]
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
+    let same = setpoint.kind() == state.plain;
     match (&config.observer, &config.regulator) {
         (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
-            if state.plain != NOT_PLAIN =>
+            if same || state.plain != NOT_PLAIN && stays_plain(config, state, &setpoint) =>
         {
-            if setpoint.kind() == state.plain {
+            if same {
                 slow::turn(config, state, &setpoint);
-            } else if !stays_plain(config, state, &setpoint) {
-                return any(config, state, &sample, setpoint);
             }
             plain((observer, regulator), (config, state), &sample, &setpoint)
         }

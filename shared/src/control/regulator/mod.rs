@@ -221,8 +221,8 @@ impl Regulator for synchronous::Config {
 #[inline(always)]
 fn beyond(admittance: Gain<U28, U28>, cut: Dq<WideVoltage>) -> Dq<Current> {
     Dq {
-        d: admittance.held(narrow(cut.d)),
-        q: admittance.held(narrow(cut.q)),
+        d: admittance.saturating_apply(narrow(cut.d)),
+        q: admittance.saturating_apply(narrow(cut.q)),
     }
 }
 

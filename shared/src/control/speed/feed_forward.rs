@@ -42,11 +42,11 @@ impl Config {
         let error = omega_r.minus(omega);
         let i_q = state
             .sigma
-            .plus(self.k_p.held(error))
+            .plus(self.k_p.saturating_apply(error))
             .plus(self.propeller(omega_r));
         let bounded = input.bounds.hold(i_q);
         let over = i_q.minus(bounded).plus(input.missing);
-        let step = self.k_i.held(error);
+        let step = self.k_i.saturating_apply(error);
         if over == Current::ZERO || over.is_negative() != step.is_negative() {
             state.sigma = state.sigma.plus(step);
         }
@@ -56,7 +56,10 @@ impl Config {
                 q: bounded,
             },
             i_q_step: Current::ZERO,
-            u_q: self.k_ffv.held(omega_r).minus(self.own.held(omega)),
+            u_q: self
+                .k_ffv
+                .saturating_apply(omega_r)
+                .minus(self.own.saturating_apply(omega)),
         }
     }
 
@@ -69,6 +72,6 @@ impl Config {
     #[inline(always)]
     fn propeller(&self, omega_r: Speed) -> Current {
         let square = omega_r.top(omega_r.saturating_abs());
-        self.k_ffi.held(square)
+        self.k_ffi.saturating_apply(square)
     }
 }
