@@ -203,6 +203,9 @@ impl Esc {
         self.with_component(throttle, now_us, |component, context| {
             component.poll(context, send);
         });
+        if let Some(act) = self.component.take_act() {
+            self.act(throttle, now_us, act);
+        }
         self.command = throttle.reach(|throttle| throttle.command());
         let rests = self.command.rests();
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));

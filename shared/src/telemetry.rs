@@ -3,6 +3,7 @@
 use crate::drive::{Faults, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::input::signal::Signal;
+use crate::math::{SQRT_3, square_root};
 use crate::units::Scale;
 
 /// The state of the ESC as telemetry reports it.
@@ -32,7 +33,17 @@ pub struct Telemetry {
     pub bad_share: f32,
     /// The signal on the throttle wire; none before it has been identified, and on a silent wire.
     pub signal: Option<Signal>,
+    /// What of the control's inside can be streamed, in the order of [`SIGNALS`].
+    pub signals: [f32; SIGNALS.len()],
 }
+
+/// Names of what of the control's inside can be streamed, in the order of the bits of `TEL_SIGNALS`:
+/// mechanical speed and its reference, rpm; current and voltage in the rotor's frame, A and V;
+/// voltage as a share of what the supply gives without over-modulation; the supply's voltage and
+/// current as they are now, V and A.
+pub const SIGNALS: [&str; 9] = [
+    "rpm", "rpm_ref", "i_d", "i_q", "v_d", "v_q", "duty", "bus_v", "bus_a",
+];
 
 /// Below this the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
 /// speed that can be asked for (`CTL_RPM_MIN` goes down to it), and above the noise of an estimate
@@ -77,6 +88,7 @@ impl Telemetry {
             bad_frames: 0,
             bad_share: 0.0,
             signal: None,
+            signals: [0.0; SIGNALS.len()],
         }
     }
 
@@ -100,6 +112,25 @@ impl Telemetry {
         self.phase = snapshot.phase;
         self.faults = snapshot.faults;
         self.fault_count = snapshot.fault_count;
+        let (v_d, v_q) = (scale.volts(snapshot.u.d), scale.volts(snapshot.u.q));
+        let square = v_d * v_d + v_q * v_q;
+        // A root is of a number above 0, and without a supply there is no share of it.
+        let duty = if self.bus_v > 0.0 && square > 0.0 {
+            SQRT_3 * square_root(square) / self.bus_v
+        } else {
+            0.0
+        };
+        self.signals = [
+            self.rpm,
+            scale.rpm(snapshot.speed_reference),
+            scale.amperes(snapshot.i.d),
+            scale.amperes(snapshot.i.q),
+            v_d,
+            v_q,
+            duty,
+            self.bus_v,
+            bus_a,
+        ];
     }
 }
 
@@ -112,6 +143,10 @@ impl Default for Telemetry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::State;
+    use crate::math::Real;
+    use crate::params::{Board, Params, build};
+    use crate::units::Voltage;
 
     #[test]
     fn a_day_of_short_times_is_not_lost() {
@@ -122,5 +157,34 @@ mod tests {
         assert!((charge.mah() - 120_000.0).abs() < 1.0, "{}", charge.mah());
         charge.add(-5.0, 3_600_000_000);
         assert!((charge.mah() - 115_000.0).abs() < 1.0, "{}", charge.mah());
+    }
+
+    #[test]
+    fn signals_are_what_the_snapshot_says_in_si() {
+        let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
+        let scale = config.scale;
+        let mut snapshot = State::new(&config).snapshot();
+        let volts = |v: f32| Voltage::from_f32(v / scale.voltage_v);
+        snapshot.speed = scale.speed_from_rpm(-3000.0);
+        snapshot.speed_reference = scale.speed_from_rpm(-3100.0);
+        snapshot.i.d = scale.current_from_a(-0.5);
+        snapshot.i.q = scale.current_from_a(-4.0);
+        snapshot.u.d = volts(3.0);
+        snapshot.u.q = volts(-4.0);
+        snapshot.bus = volts(24.0);
+        snapshot.bus_current = scale.current_from_a(-1.25);
+        let mut telemetry = Telemetry::new();
+        telemetry.observe(&snapshot, &scale, 1000);
+        // 5 of 24/√3 V.
+        let duty = 5.0 * SQRT_3 / 24.0;
+        let wanted = [-3000.0, -3100.0, -0.5, -4.0, 3.0, -4.0, duty, 24.0, -1.25];
+        for ((name, found), wanted) in SIGNALS.iter().zip(telemetry.signals).zip(wanted) {
+            assert!((found - wanted).abs() < 1e-3, "{name}: {found}");
+        }
+        // What the messages for a person have is smoothed.
+        assert!(telemetry.bus_a > -0.1);
+        snapshot.bus = Voltage::ZERO;
+        telemetry.observe(&snapshot, &scale, 1000);
+        assert!(telemetry.signals.iter().all(|signal| signal.is_finite()));
     }
 }

@@ -163,6 +163,15 @@ impl Throttle {
         self.input.news(now_us)
     }
 
+    /// Begins a calibration by stick, or ends it.
+    pub(crate) fn calibrate(&mut self, now_us: u64, begin: bool) {
+        if begin {
+            self.input.calibrate(now_us);
+        } else {
+            self.input.end_calibration();
+        }
+    }
+
     /// The next order of the wire for the tasks.
     pub(crate) fn next_order(&mut self) -> Option<Order> {
         self.orders.pop_front()

@@ -15,6 +15,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use mavlink::{MavlinkVersion, Message, MessageData};
 
+mod actions;
 mod storage;
 
 const TICK_HZ: u32 = 170_000_000;

@@ -1,14 +1,15 @@
-//! What the ESC does by the throttle wire, beside turning the motor: it obeys DShot's commands, takes
-//! the stick's calibration, and tells a person what has happened.
+//! What the ESC does by the throttle wire or by command, beside turning the motor: it obeys DShot's
+//! commands, takes the stick's calibration, and tells a person what has happened.
 
 use super::Esc;
 use crate::input::News;
 use crate::input::calibration::Step;
 use crate::input::command::Order;
 use crate::input::endpoints::EndPoints;
+use crate::mavlink::Act;
 use crate::params::ParamId;
 use crate::throttle::{Reach, Throttle};
-use crate::tune::Tune;
+use crate::tune::{Beacon, Tune};
 
 impl Esc {
     /// Whether the light shall be on, by command.
@@ -27,6 +28,15 @@ impl Esc {
             if stopped {
                 self.obey(throttle, now_us, order);
             }
+        }
+    }
+
+    /// What a MAVLink command wants done.
+    pub(super) fn act(&mut self, throttle: &mut impl Reach, now_us: u64, act: Act) {
+        match act {
+            Act::Beep => self.sound.play(now_us, Tune::Beacon(Beacon::One)),
+            Act::Calibrate => throttle.reach(|throttle| throttle.calibrate(now_us, true)),
+            Act::EndCalibration => throttle.reach(|throttle| throttle.calibrate(now_us, false)),
         }
     }
 

@@ -3,6 +3,8 @@
 //! As with other ESCs: the ESC is powered up with the stick at full throttle and says after three
 //! seconds that it has measured it; the stick is then pulled to no throttle, and after one and a half
 //! seconds both ends are known. Anything else leaves them as they were, until the next power-up.
+//!
+//! A ground station may ask for the same at any time: the stick then has a minute to come up.
 
 use super::endpoints::EndPoints;
 use crate::math::quotient;
@@ -24,6 +26,8 @@ const NONE_US: u64 = 1_500_000;
 const STEADY_NS: u32 = 16_000;
 /// The longest way of the stick from one end to the other, µs.
 const WAY_US: u64 = 2_000_000;
+/// How long the stick is waited for that a ground station wants measured, µs.
+const WAIT_US: u64 = 60_000_000;
 
 /// What is to be told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,14 +36,16 @@ pub enum Step {
     Full,
     /// Both ends have been measured.
     Done(EndPoints),
-    /// After full throttle came something else than no throttle.
+    /// After full throttle came something else than no throttle, or nothing of what was asked for.
     Cancelled,
 }
 
-/// Watches the first signal after power-up.
+/// Watches the first signal after power-up, and any when it is asked to.
 #[derive(Clone, Debug, Default)]
 pub struct Calibration {
     stage: Stage,
+    /// When it was asked for, until it ends.
+    asked_us: Option<u64>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,23 +76,42 @@ struct Held {
 }
 
 impl Calibration {
-    /// A signal that was identified carries something else than pulses.
-    pub fn end(&mut self) {
-        self.stage = Stage::Over;
+    /// Waits for a stick at full throttle from now on.
+    pub fn ask(&mut self, now_us: u64) {
+        self.stage = Stage::Fresh;
+        self.asked_us = Some(now_us);
     }
 
-    /// Whether full throttle has been measured and no throttle is awaited.
+    /// It ends: the signal carries something else than pulses, or nobody wants it any more.
+    #[inline(never)]
+    pub fn end(&mut self) -> Option<Step> {
+        let cancelled = self.is_under_way().then_some(Step::Cancelled);
+        self.stage = Stage::Over;
+        self.asked_us = None;
+        cancelled
+    }
+
+    /// Whether what the stick shows is no throttle: it has been asked for, or full throttle has been
+    /// measured and no throttle is awaited.
     pub fn is_under_way(&self) -> bool {
-        matches!(self.stage, Stage::None { .. })
+        self.asked_us.is_some() || matches!(self.stage, Stage::None { .. })
     }
 
     /// The signal was lost, if there was an identified one.
     pub fn lost(&mut self) -> Option<Step> {
-        let cancelled = self.is_under_way().then_some(Step::Cancelled);
-        if !matches!(self.stage, Stage::Fresh) {
-            self.end();
+        match (&self.stage, self.asked_us) {
+            (Stage::Fresh, None) => None,
+            _ => self.end(),
         }
-        cancelled
+    }
+
+    /// Lets time pass: a stick that does not come up is not waited for any longer.
+    pub fn poll(&mut self, now_us: u64) -> Option<Step> {
+        let waits = matches!(self.stage, Stage::Fresh);
+        let asked_us = self.asked_us.filter(|_| waits)?;
+        (now_us.saturating_sub(asked_us) > WAIT_US)
+            .then(|| self.end())
+            .flatten()
     }
 
     /// A pulse of an identified signal, by the servo pulse that means the same.
@@ -105,7 +130,8 @@ impl Calibration {
                     return Some(Step::Full);
                 }
             }
-            Stage::Fresh | Stage::Full(_) => self.end(),
+            Stage::Fresh | Stage::Full(_) if self.asked_us.is_some() => self.stage = Stage::Fresh,
+            Stage::Fresh | Stage::Full(_) => return self.end(),
             Stage::None {
                 full_ns,
                 full_us,
@@ -131,8 +157,7 @@ impl Calibration {
                     *held = None;
                 }
                 if held.is_none() && now_us.saturating_sub(*full_us) > WAY_US {
-                    self.end();
-                    return Some(Step::Cancelled);
+                    return self.end();
                 }
             }
             Stage::Over => {}
@@ -274,6 +299,35 @@ mod tests {
             bench.hold(9_000, |_| 1200)[..],
             [(1_500, Step::Done(_))]
         ));
+    }
+
+    #[test]
+    fn one_that_is_asked_for_waits_for_the_stick() {
+        let mut bench = Bench::default();
+        // After the first signal, which was none.
+        bench.hold(1_000, |_| 1105);
+        bench.calibration.ask(bench.now_us);
+        assert!(bench.calibration.is_under_way());
+        assert_eq!(bench.hold(5_000, |_| 1105), []);
+        // Lowered too early: once more.
+        assert_eq!(bench.hold(2_000, |_| 1912), []);
+        assert_eq!(bench.hold(1_000, |_| 1105), []);
+        assert_eq!(bench.hold(3_020, |_| 1912), [(3_000, Step::Full)]);
+        assert_eq!(bench.hold(1_520, |_| 1105), [(1_500, DONE)]);
+        assert!(!bench.calibration.is_under_way());
+
+        // A stick that stays low is waited for a minute, and one that is up is taken.
+        for (up_ms, ended) in [(0, Some(Step::Cancelled)), (1_000, None)] {
+            bench.calibration.ask(bench.now_us);
+            assert_eq!(bench.hold(60_000, |_| 1105), []);
+            assert_eq!(bench.calibration.poll(bench.now_us), None);
+            bench.hold(up_ms, |_| 1912);
+            bench.now_us += 1;
+            assert_eq!(bench.calibration.poll(bench.now_us), ended);
+            assert_eq!(bench.calibration.is_under_way(), ended.is_none());
+        }
+        assert_eq!(bench.calibration.lost(), Some(Step::Cancelled));
+        assert_eq!(bench.calibration.end(), None);
     }
 
     #[test]

@@ -148,7 +148,8 @@ impl Input {
         }
         let order = match *event {
             Event::Frame { frame, .. } => {
-                self.calibration.end();
+                let cancelled = self.calibration.end();
+                self.announcer.calibration(cancelled);
                 // What comes while the motor turns is no command, however long it is repeated.
                 if self.stopped && self.authority.command().rests() {
                     self.commands.frame(now_us, frame)
@@ -178,7 +179,21 @@ impl Input {
         self.stopped = drive.stopped;
         self.expire(now_us);
         self.authority.fault(drive.faulted);
+        let cancelled = self.calibration.poll(now_us);
+        self.announcer.calibration(cancelled);
         self.tally.poll(now_us);
+    }
+
+    /// Begins a calibration by stick: from now on what it shows is no throttle, not even zero.
+    pub fn calibrate(&mut self, now_us: u64) {
+        self.calibration.ask(now_us);
+        self.authority.learn();
+    }
+
+    /// Ends a calibration by stick, if there is one.
+    pub fn end_calibration(&mut self) {
+        let cancelled = self.calibration.end();
+        self.announcer.calibration(cancelled);
     }
 
     /// Ends what the time has ended.

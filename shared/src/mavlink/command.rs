@@ -5,16 +5,22 @@ use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult, MavSeverity,
 };
 
-use super::component::{Context, Request};
+use super::component::{Act, Context, Request};
+use super::ftp;
 use super::identity::{Address, Identity, Role};
-use super::messages;
 use super::receiver::Frame;
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;
-use crate::input::authority::{self, DriveStatus, TestError};
+use crate::input::authority::{self, DriveStatus};
 
+mod calibration;
+mod motor;
+
+const DO_MOTOR_TEST: u16 = MavCmd::MAV_CMD_DO_MOTOR_TEST as u16;
 const ACTUATOR_TEST: u16 = MavCmd::MAV_CMD_ACTUATOR_TEST as u16;
+const CONFIGURE_ACTUATOR: u16 = MavCmd::MAV_CMD_CONFIGURE_ACTUATOR as u16;
+const PREFLIGHT_CALIBRATION: u16 = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION as u16;
 const PREFLIGHT_STORAGE: u16 = MavCmd::MAV_CMD_PREFLIGHT_STORAGE as u16;
 const PREFLIGHT_REBOOT_SHUTDOWN: u16 = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN as u16;
 const COMPONENT_ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
@@ -23,9 +29,10 @@ const GET_MESSAGE_INTERVAL: u16 = 510;
 const SET_MESSAGE_INTERVAL: u16 = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL as u16;
 const REQUEST_MESSAGE: u16 = MavCmd::MAV_CMD_REQUEST_MESSAGE as u16;
 
-const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
+pub(super) const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
+const CANCELLED: MavResult = MavResult::MAV_RESULT_CANCELLED;
 const DENIED: MavResult = MavResult::MAV_RESULT_DENIED;
-const FAILED: MavResult = MavResult::MAV_RESULT_FAILED;
+pub(super) const FAILED: MavResult = MavResult::MAV_RESULT_FAILED;
 const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;
 const TEMPORARILY_REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 const UNSUPPORTED: MavResult = MavResult::MAV_RESULT_UNSUPPORTED;
@@ -90,6 +97,7 @@ impl Command {
 
     /// Whether this is the same command sent again because its ACK did not arrive. Values are
     /// compared by their bits: NaN is a value here.
+    #[inline(never)]
     fn repeats(&self, earlier: &Self) -> bool {
         let most_us = match (self.confirmation, earlier.confirmation) {
             (Some(now), Some(then)) if now > then => REPEAT_US,
@@ -109,10 +117,14 @@ pub(super) struct Commands {
     role: Role,
     /// `ACTUATOR_OUTPUT_FUNCTION` of the motor.
     function: f32,
-    /// The storage command whose work is not done.
+    /// The command whose work is done when the parameters have been stored, loaded or erased.
     storage: Option<Command>,
+    /// The calibration that is under way.
+    calibration: Option<Command>,
     /// The last command that must not be obeyed twice, and its result.
     last: Option<(Command, MavResult)>,
+    act: Option<Act>,
+    params_changed: bool,
     request: Option<Request>,
     reboot: bool,
 }
@@ -123,7 +135,10 @@ impl Commands {
             role: identity.role,
             function: identity.place.motor_function(),
             storage: None,
+            calibration: None,
             last: None,
+            act: None,
+            params_changed: false,
             request: None,
             reboot: false,
         }
@@ -144,7 +159,9 @@ impl Commands {
         let earlier = self
             .last
             .filter(|(last, _)| command.repeats(last) && is_known(command, context));
-        let result = match (&self.storage, earlier) {
+        // One of the two at a time.
+        let pending = self.storage.as_ref().or(self.calibration.as_ref());
+        let result = match (pending, earlier) {
             (Some(pending), _) if command.repeats(pending) => Some(IN_PROGRESS),
             (_, Some((_, result))) => Some(result),
             _ => self.obey(command, drive, context, schedule, replies),
@@ -171,11 +188,13 @@ impl Commands {
     ) -> Option<MavResult> {
         let [p1, p2, ..] = command.params;
         Some(match command.number {
-            ACTUATOR_TEST => {
-                let result = self.actuator_test(command, drive, context);
+            DO_MOTOR_TEST | ACTUATOR_TEST => {
+                let result = self.test(command, drive, context);
                 self.last = Some((*command, result));
                 result
             }
+            CONFIGURE_ACTUATOR => return self.configure(command, drive, context, replies),
+            PREFLIGHT_CALIBRATION => self.calibrate(command, drive, context, replies),
             COMPONENT_ARM_DISARM => arm_disarm(p1, context),
             PREFLIGHT_STORAGE => return self.storage(command, drive),
             PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, replies),
@@ -192,25 +211,15 @@ impl Commands {
         })
     }
 
-    fn actuator_test(
-        &self,
-        command: &Command,
-        drive: DriveStatus,
-        context: &mut Context,
-    ) -> MavResult {
-        let [value, duration_s, _, _, function, ..] = command.params;
-        // No motor in particular is this one only where nobody else was asked.
-        if function != self.function && !(function == 0.0 && command.exact) {
-            return DENIED;
-        }
-        let tested = context
-            .authority
-            .actuator_test(context.now_us, value, duration_s, drive);
-        match tested {
-            Ok(()) => ACCEPTED,
-            Err(TestError::TemporarilyRejected) => TEMPORARILY_REJECTED,
-            Err(TestError::OutOfRange) => DENIED,
-        }
+    /// Whether something is under way that another command must not come between.
+    fn is_busy(&self) -> bool {
+        self.storage.is_some() || self.calibration.is_some() || self.reboot
+    }
+
+    /// Whether a command means the motor of this ESC by this number. None in particular is this one
+    /// only where nobody else was asked.
+    fn is_own(&self, function: f32, command: &Command) -> bool {
+        function == self.function || (function == 0.0 && command.exact)
     }
 
     /// Reading and writing the flash stalls the processor, and reading changes what the motor is
@@ -223,7 +232,7 @@ impl Commands {
             2.0 | 4.0 => Request::FactoryReset,
             _ => return Some(DENIED),
         };
-        if self.storage.is_some() || self.reboot || !drive.stopped {
+        if self.is_busy() || !drive.stopped {
             return Some(TEMPORARILY_REJECTED);
         }
         self.storage = Some(*command);
@@ -248,7 +257,7 @@ impl Commands {
             replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, text));
         }
         // A reset and a load change every value: clients should see the new ones.
-        code == ACCEPTED && command.params[0] != 1.0
+        code == ACCEPTED && command.number == PREFLIGHT_STORAGE && command.params[0] != 1.0
     }
 
     fn reboot(
@@ -263,7 +272,7 @@ impl Commands {
             // Shutting down and staying in a boot loader are not what an ESC can do.
             _ => return DENIED,
         }
-        if self.storage.is_some() || !drive.stopped {
+        if self.is_busy() || !drive.stopped {
             return TEMPORARILY_REJECTED;
         }
         self.reboot = true;
@@ -272,8 +281,16 @@ impl Commands {
         ACCEPTED
     }
 
+    /// The next thing for the ESC to do.
+    pub(super) fn take_act(&mut self) -> Option<Act> {
+        self.act.take()
+    }
+
     /// `replies_sent`: whether nothing waits to be sent. A reboot waits for its ACK.
     pub(super) fn take_request(&mut self, replies_sent: bool) -> Option<Request> {
+        if core::mem::take(&mut self.params_changed) {
+            return Some(Request::ParamsChanged);
+        }
         if let Some(request) = self.request.take() {
             return Some(request);
         }
@@ -289,7 +306,8 @@ impl Commands {
 /// says so, and where there is none, that the test which it asked for still runs.
 fn is_known(command: &Command, context: &mut Context) -> bool {
     let tests = matches!(context.authority.command(), authority::Command::Test(_));
-    command.confirmation.is_some() || (command.number == ACTUATOR_TEST && tests)
+    let is_test = matches!(command.number, DO_MOTOR_TEST | ACTUATOR_TEST);
+    command.confirmation.is_some() || (is_test && tests)
 }
 
 fn arm_disarm(arm: f32, context: &mut Context) -> MavResult {
@@ -311,13 +329,12 @@ fn message_id(value: f32) -> Option<u32> {
 fn request_message(command: &Command, schedule: &Schedule) -> MavResult {
     match message_id(command.params[0]) {
         Some(AUTOPILOT_VERSION_DATA::ID) => ACCEPTED,
-        Some(id) if messages::is_metadata(id) => ACCEPTED,
         // It is about another message, which parameter 2 names.
         Some(MESSAGE_INTERVAL_DATA::ID) => match message_id(command.params[1]) {
             Some(id) if u16::try_from(id).is_ok() => ACCEPTED,
             _ => DENIED,
         },
-        Some(id) if schedule.find(id).is_some() => ACCEPTED,
+        Some(id) if schedule.find(id).is_some() || ftp::is_metadata(id) => ACCEPTED,
         _ => DENIED,
     }
 }

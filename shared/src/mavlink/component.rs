@@ -1,32 +1,31 @@
 //! The ESC as others on MAVLink see it.
 
-use heapless::{Deque, String};
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, ESC_TELEMETRY_1_TO_4_DATA,
-    FILE_TRANSFER_PROTOCOL_DATA, MESSAGE_INTERVAL_DATA, MISSION_REQUEST_LIST_DATA, MavSeverity,
-    PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA,
-    SETUP_SIGNING_DATA,
+    FILE_TRANSFER_PROTOCOL_DATA, MESSAGE_INTERVAL_DATA, MISSION_REQUEST_LIST_DATA, MavParamError,
+    MavSeverity, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA, PARAM_SET_DATA,
+    PARAM_VALUE_DATA, SETUP_SIGNING_DATA,
 };
 use mavlink::{MavlinkVersion, MessageData};
 
-use super::command::{Command, Commands};
+use super::command::{ACCEPTED, Command, Commands, FAILED};
 use super::faults::{Announcer, News};
 use super::identity::{Address, Identity, Role};
 use super::pace::Pace;
 use super::parameter::{self, List};
 use super::receiver::Frame;
 use super::reply::{PING, Replies, Reply, Writer};
-use super::schedule::{Schedule, Stream};
-use super::sender::OVERHEAD_LEN;
+use super::schedule::{self, Schedule, Stream};
 use super::signing::{Kept, Signing, Trust};
-use super::{ftp, messages, news};
+use super::warnings::{Warning, Warnings};
+use super::{check, ftp, messages, news};
 use crate::drive::Faults;
 use crate::image::Image;
 use crate::input::News as WireNews;
 use crate::input::access::Access;
 use crate::input::authority::DriveStatus;
 use crate::params::{BuildError, ParamId, Params};
-use crate::telemetry::Telemetry;
+use crate::telemetry::{SIGNALS, Telemetry};
 
 const PING_ID: u32 = PING.0;
 /// FILE_TRANSFER_PROTOCOL.
@@ -35,9 +34,6 @@ const FILE: (u32, u8) = (
     FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC,
 );
 const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"), ", ");
-
-/// A text that is made up at run time; STATUSTEXT has room for 50 letters.
-pub type Warning = String<50>;
 
 /// What the component is told and may change.
 pub struct Context<'a> {
@@ -76,6 +72,17 @@ pub enum Request {
     Reboot,
 }
 
+/// What the ESC does at once, and tells of if it takes longer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Act {
+    /// Sound a beacon.
+    Beep,
+    /// Begin a calibration by stick; [`Component::tell`] tells its steps.
+    Calibrate,
+    /// End it.
+    EndCalibration,
+}
+
 /// One ESC on MAVLink. Frames may come from several links; what it sends goes to all of them.
 #[derive(Clone, Debug)]
 pub struct Component {
@@ -93,9 +100,7 @@ pub struct Component {
     infos: u16,
     telemetries: u16,
     image: Image,
-    warnings: Deque<Warning, 2>,
-    /// The last of them, for who reads it later.
-    last_warning: Warning,
+    warnings: Warnings,
     files: ftp::Server,
 }
 
@@ -126,8 +131,7 @@ impl Component {
             infos: 0,
             telemetries: 0,
             image: *image,
-            warnings: Deque::new(),
-            last_warning: Warning::new(),
+            warnings: Warnings::default(),
             files: ftp::Server::default(),
         }
     }
@@ -195,7 +199,7 @@ impl Component {
                 let view = ftp::View {
                     params: context.params,
                     telemetry: context.telemetry,
-                    warning: &self.last_warning,
+                    warning: self.warnings.last(),
                 };
                 if let Some(answer) = self.files.handle(context.now_us, frame, &view) {
                     self.replies.push(Reply::Ftp {
@@ -232,6 +236,9 @@ impl Component {
 
     /// Sends what waits and what is due, each frame by one call of `send`. To be called every
     /// millisecond or so.
+    ///
+    /// Never inlined: its stack is free for what the caller does next.
+    #[inline(never)]
     pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         self.writer.sender.signing.advance(context.now_us);
         self.tell_faults(context, send);
@@ -245,31 +252,29 @@ impl Component {
                 send,
             );
         }
-        while let Some(warning) = self.warnings.pop_front() {
+        while let Some(warning) = self.warnings.next() {
             self.text(MavSeverity::MAV_SEVERITY_WARNING, &[&warning], send);
         }
         while let Some(id) = self.replies.next_value() {
             self.send_value(context, id, send);
         }
-        while let Some(stream) = self.schedule.next_due(context.now_us, context.params) {
+        let overhead_len = self.writer.sender.overhead_len();
+        while let Some(stream) =
+            self.schedule
+                .next_due(context.now_us, context.params, overhead_len)
+        {
             self.send_stream(stream, context, send);
         }
         while !self.list.is_empty()
             && self
                 .list_pace
-                .take(context.now_us, OVERHEAD_LEN + PARAM_VALUE_DATA::ENCODED_LEN)
+                .take(context.now_us, overhead_len + PARAM_VALUE_DATA::ENCODED_LEN)
         {
             if let Some(id) = self.list.next() {
                 self.send_value(context, id, send);
             }
         }
-        while let Some(len) = self.files.burst_frame_len()
-            && self.list_pace.take(context.now_us, len)
-        {
-            if let Some((to, answer)) = self.files.next_of_burst(context.now_us) {
-                self.send_file(to, answer, context, send);
-            }
-        }
+        self.send_burst(context, send);
     }
 
     /// The next thing for the caller to do; to be asked after each poll until there is none.
@@ -278,6 +283,11 @@ impl Component {
             return Some(Request::ParamsChanged);
         }
         self.commands.take_request(self.replies.is_empty())
+    }
+
+    /// The next thing for the ESC to do, likewise.
+    pub fn take_act(&mut self) -> Option<Act> {
+        self.commands.take_act()
     }
 
     /// [`Request::Save`], [`Request::Load`] or [`Request::FactoryReset`] is done: whether what it
@@ -300,6 +310,9 @@ impl Component {
 
     /// Tells what the throttle wire has to tell.
     pub fn tell(&mut self, news: WireNews) {
+        if let WireNews::Calibration(step) = news {
+            self.commands.follow_stick(step, &mut self.replies);
+        }
         if let Some((severity, text)) = news::words(news) {
             self.replies.push(Reply::Text(severity, text));
         }
@@ -307,8 +320,7 @@ impl Component {
 
     /// Warns a person at the next poll. Two wait; of more, the first are told.
     pub fn warn(&mut self, warning: Warning) {
-        self.last_warning.clone_from(&warning);
-        let _ = self.warnings.push_back(warning);
+        self.warnings.push(warning);
     }
 
     /// Tells how a request for storage ended that did not come by MAVLink.
@@ -317,6 +329,8 @@ impl Component {
             Ok(()) => (MavSeverity::MAV_SEVERITY_INFO, "Parameters stored"),
             Err(reason) => (MavSeverity::MAV_SEVERITY_ERROR, reason),
         };
+        let result = if result.is_ok() { ACCEPTED } else { FAILED };
+        self.commands.end_calibration(result, &mut self.replies);
         self.replies.push(Reply::Text(severity, [text, ""]));
     }
 
@@ -349,14 +363,11 @@ impl Component {
                 let message = messages::autopilot_version(&self.image);
                 writer.sender.send(identity.address, &message, &[], send);
             }
-            Reply::Message(id) if messages::is_metadata(id) => {
-                let (message, payload) = messages::metadata(id, context.now_us);
-                let sender = &mut writer.sender;
-                sender.send_payload(identity.address, message, &payload, send);
-            }
             Reply::Message(id) => {
                 if let Some(stream) = self.schedule.find(id) {
                     self.send_stream(stream, context, send);
+                } else {
+                    self.send_metadata(id, context.now_us, send);
                 }
             }
             Reply::Interval(message) => self.send_interval(message, context.params, send),
@@ -369,19 +380,18 @@ impl Component {
                 writer.mission_count(identity, to, mission_type, send);
             }
             Reply::UnknownParam { to, name, index } => {
-                writer.unknown_param(identity, to, (name, index), send);
+                let error = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
+                writer.param_error(identity, to, (name, index), error, send);
             }
-            Reply::Refused {
-                id,
-                because,
-                reason,
-            } => {
-                let (other, colon) = because.map_or(("", ""), |b| (b.entry().name, ": "));
-                let pieces = [id.entry().name, " refused: ", other, colon, reason];
+            Reply::Refused { to, id, refusal } => {
+                let place = (messages::name_bytes(id), parameter::BY_NAME);
+                writer.param_error(identity, to, place, refusal.error, send);
+                let (other, colon) = refusal.because.map_or(("", ""), |b| (b.entry().name, ": "));
+                let pieces = [id.entry().name, " refused: ", other, colon, refusal.reason];
                 writer.text(identity, MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
             }
             Reply::Text(severity, text) => writer.text(identity, severity, &text, send),
-            Reply::Ftp { to, answer } => self.send_file(to, answer, context, send),
+            Reply::Ftp { to, ref answer } => self.send_file(to, answer, context, send),
         }
     }
 
@@ -402,8 +412,19 @@ impl Component {
                 sender.send(from, &message, &[], send);
             }
             Stream::BadFrames => {
-                let message = messages::bad_frames(context.now_us, telemetry);
+                let share = telemetry.bad_share * 100.0;
+                let message = messages::named_value(context.now_us, "bad_frames", share);
                 sender.send(from, &message, &[], send);
+            }
+            Stream::Signals => {
+                let chosen = schedule::signals(context.params);
+                for (bit, name) in SIGNALS.into_iter().enumerate() {
+                    if chosen >> bit & 1 != 0 {
+                        let value = telemetry.signals[bit];
+                        let message = messages::named_value(context.now_us, name, value);
+                        sender.send(from, &message, &[], send);
+                    }
+                }
             }
             Stream::EscStatus => {
                 let message = messages::esc_status(context.now_us, telemetry, place);
@@ -437,24 +458,45 @@ impl Component {
             .send(self.identity.address, &data, &[], send);
     }
 
-    /// Never inlined: its stack is free for what else is sent.
+    /// What the link has room for of the file that someone reads. Never inlined, as what follows: its
+    /// stack is free for what else is sent.
+    #[inline(never)]
+    fn send_burst(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
+        let overhead_len = self.writer.sender.overhead_len();
+        while let Some(len) = self.files.burst_payload_len()
+            && self.list_pace.take(context.now_us, overhead_len + len)
+        {
+            if let Some((to, answer)) = self.files.next_of_burst(context.now_us) {
+                self.send_file(to, &answer, context, send);
+            }
+        }
+    }
+
     #[inline(never)]
     fn send_file(
         &mut self,
         to: Address,
-        answer: ftp::Answer,
+        answer: &ftp::Answer,
         context: &Context,
         send: &mut dyn FnMut(&[u8]),
     ) {
         let view = ftp::View {
             params: context.params,
             telemetry: context.telemetry,
-            warning: &self.last_warning,
+            warning: self.warnings.last(),
         };
         let mut payload = [0; ftp::PAYLOAD_MAX];
         answer.write(to, &mut self.files, &view, &mut payload);
         let sender = &mut self.writer.sender;
         sender.send_payload(self.identity.address, FILE, &payload, send);
+    }
+
+    #[inline(never)]
+    fn send_metadata(&mut self, id: u32, now_us: u64, send: &mut dyn FnMut(&[u8])) {
+        let message = (id, check::extra_crc(id));
+        let payload = ftp::metadata(id, now_us);
+        let sender = &mut self.writer.sender;
+        sender.send_payload(self.identity.address, message, &payload, send);
     }
 
     fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {

@@ -1,14 +1,12 @@
 //! What the messages say of the ESC.
 
-use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, COMPONENT_METADATA_DATA, ESC_INFO_DATA, ESC_STATUS_DATA,
-    ESC_TELEMETRY_1_TO_4_DATA, EscConnectionType, EscFailureFlags, HEARTBEAT_DATA, MavModeFlag,
-    MavParamType, MavProtocolCapability, MavState, NAMED_VALUE_FLOAT_DATA, PARAM_VALUE_DATA,
+    AUTOPILOT_VERSION_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
+    EscConnectionType, EscFailureFlags, HEARTBEAT_DATA, MavModeFlag, MavParamType,
+    MavProtocolCapability, MavState, NAMED_VALUE_FLOAT_DATA, PARAM_VALUE_DATA,
 };
 use mavlink::types::CharArray;
 
-use super::ftp::GENERAL_CHECKSUM;
 use super::identity::Identity;
 use super::place::{Place, SLOTS};
 use crate::drive::{Fault, Faults};
@@ -20,14 +18,6 @@ use crate::telemetry::Telemetry;
 
 /// `ESC_INFO.temperature` of a slot without an ESC, or of one that does not know it.
 const NO_TEMPERATURE: i16 = i16::MAX;
-
-/// Message id and CRC seed of COMPONENT_INFORMATION, which the dialect marks as superseded.
-const COMPONENT_INFORMATION: (u32, u8) = (395, 0);
-
-/// Where the general metadata is. Without a component: it is the one that tells it.
-const GENERAL_URI: &str = "mftp:///general.json.xz";
-/// What is before the URI and it.
-const METADATA_LEN: usize = 12 + GENERAL_URI.len();
 
 pub(super) fn heartbeat(
     identity: &Identity,
@@ -91,13 +81,13 @@ fn connection_type(signal: Option<Signal>) -> EscConnectionType {
     }
 }
 
-/// The share of bad frames on the throttle wire, %.
-pub(super) fn bad_frames(now_us: u64, telemetry: &Telemetry) -> NAMED_VALUE_FLOAT_DATA {
+/// A value by a name of at most 10 characters.
+pub(super) fn named_value(now_us: u64, name: &str, value: f32) -> NAMED_VALUE_FLOAT_DATA {
     NAMED_VALUE_FLOAT_DATA {
         // The field wraps after 49 days.
         time_boot_ms: quotient(now_us, 1000),
-        value: telemetry.bad_share * 100.0,
-        name: CharArray::new(*b"bad_frames"),
+        value,
+        name: CharArray::new(padded(name)),
     }
 }
 
@@ -153,36 +143,6 @@ pub(super) fn autopilot_version(image: &Image) -> AUTOPILOT_VERSION_DATA {
     }
 }
 
-/// Whether [`metadata`] makes this message.
-pub(super) const fn is_metadata(id: u32) -> bool {
-    id == COMPONENT_METADATA_DATA::ID || id == COMPONENT_INFORMATION.0
-}
-
-/// COMPONENT_METADATA and what it has superseded, which older ground stations ask for: id and CRC
-/// seed, and the payload up to where only zeros follow.
-pub(super) fn metadata(id: u32, now_us: u64) -> ((u32, u8), [u8; METADATA_LEN]) {
-    let mut payload = [0; METADATA_LEN];
-    let (message, uri_at) = if id == COMPONENT_METADATA_DATA::ID {
-        let message = (
-            COMPONENT_METADATA_DATA::ID,
-            COMPONENT_METADATA_DATA::EXTRA_CRC,
-        );
-        (message, 8)
-    } else {
-        // A second checksum, that of metadata of peripherals, of which there is none.
-        (COMPONENT_INFORMATION, 12)
-    };
-    let time_ms = quotient(now_us, 1000).to_le_bytes();
-    let fields = time_ms.into_iter().chain(GENERAL_CHECKSUM.to_le_bytes());
-    for (to, byte) in payload.iter_mut().zip(fields) {
-        *to = byte;
-    }
-    for (to, byte) in payload.iter_mut().skip(uri_at).zip(GENERAL_URI.bytes()) {
-        *to = byte;
-    }
-    (message, payload)
-}
-
 pub(super) fn param_value(params: &Params, id: ParamId) -> PARAM_VALUE_DATA {
     PARAM_VALUE_DATA {
         param_value: params.get(id),
@@ -193,9 +153,14 @@ pub(super) fn param_value(params: &Params, id: ParamId) -> PARAM_VALUE_DATA {
     }
 }
 
-fn name_bytes(id: ParamId) -> [u8; 16] {
-    let mut bytes = [0; 16];
-    for (to, byte) in bytes.iter_mut().zip(id.entry().name.bytes()) {
+/// Its name, without a zero behind it where it has 16 characters.
+pub(super) fn name_bytes(id: ParamId) -> [u8; 16] {
+    padded(id.entry().name)
+}
+
+fn padded<const N: usize>(name: &str) -> [u8; N] {
+    let mut bytes = [0; N];
+    for (to, byte) in bytes.iter_mut().zip(name.bytes()) {
         *to = byte;
     }
     bytes

@@ -22,11 +22,13 @@ mod reply;
 mod schedule;
 mod sender;
 mod signing;
+mod warnings;
 
-pub use component::{Component, Context, Request, Warning};
+pub use component::{Act, Component, Context, Request};
 pub use identity::Address;
 pub use receiver::{Counters, Frame, Receiver};
 pub use signing::{Kept as KeptSigning, Key};
+pub use warnings::Warning;
 
 #[cfg(test)]
 mod tests;

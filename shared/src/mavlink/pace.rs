@@ -8,8 +8,8 @@ pub(super) struct Pace {
     free_us: u64,
 }
 
-/// The longest frame; it may always leave at once.
-const FRAME_MAX: usize = 280;
+/// What may always leave at once: the longest frame, or all signals of the control, signed.
+const AT_ONCE_MAX: usize = 400;
 
 /// What may leave at once otherwise, as time of the share.
 const BURST_US: u64 = 20_000;
@@ -27,10 +27,10 @@ impl Pace {
         (len as u32 * 1_000_000).div_ceil(self.bytes_per_s).into()
     }
 
-    /// Takes at most [`FRAME_MAX`] bytes if they may leave now.
+    /// Takes at most [`AT_ONCE_MAX`] bytes if they may leave now.
     pub(super) fn take(&mut self, now_us: u64, len: usize) -> bool {
         let free_us = self.free_us.max(now_us).saturating_add(self.time_us(len));
-        let may = free_us - now_us <= self.time_us(FRAME_MAX).max(BURST_US);
+        let may = free_us - now_us <= self.time_us(AT_ONCE_MAX).max(BURST_US);
         if may {
             self.free_us = free_us;
         }
@@ -53,14 +53,14 @@ mod tests {
         }
         // A second's share and the first burst.
         assert!(
-            (5760 - 37..=5760 + 280).contains(&sent_bytes),
+            (5760 - 37..=5760 + 400).contains(&sent_bytes),
             "{sent_bytes}"
         );
     }
 
     #[test]
-    fn a_slow_link_still_sends_the_longest_frame() {
-        assert!(Pace::new(1).take(0, 280));
-        assert!(!Pace::new(1).take(0, 281));
+    fn a_slow_link_still_sends_the_longest() {
+        assert!(Pace::new(1).take(0, 400));
+        assert!(!Pace::new(1).take(0, 401));
     }
 }

@@ -1,5 +1,7 @@
 //! The parameter protocol. Every value is REAL32: no encoding of integers works in every client.
 
+use mavlink::dialects::ardupilotmega::MavParamError;
+
 use super::component::Context;
 use super::identity::Address;
 use super::receiver::Frame;
@@ -8,7 +10,12 @@ use super::signing::Trust;
 use crate::params::{ParamId, SetError, TABLE};
 
 /// `PARAM_REQUEST_READ.param_index` when the name counts.
-const BY_NAME: i16 = -1;
+pub(super) const BY_NAME: i16 = -1;
+
+const OUT_OF_RANGE: MavParamError = MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE;
+const NOT_PERMITTED: MavParamError = MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED;
+const READ_ONLY: MavParamError = MavParamError::MAV_PARAM_ERROR_READ_ONLY;
+const WRONG_TYPE: MavParamError = MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH;
 
 /// The parameters that are still to be broadcast for PARAM_REQUEST_LIST.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +61,39 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
     }
 }
 
+/// Why a value was not taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Refusal {
+    /// For the one who asked.
+    pub(super) error: MavParamError,
+    /// The parameter that stands against it, where that is another.
+    pub(super) because: Option<ParamId>,
+    /// For a person.
+    pub(super) reason: &'static str,
+}
+
+impl Refusal {
+    const fn new(error: MavParamError, reason: &'static str) -> Self {
+        Self {
+            error,
+            because: None,
+            reason,
+        }
+    }
+}
+
+impl From<SetError> for Refusal {
+    fn from(error: SetError) -> Self {
+        let (error, reason) = match error {
+            SetError::NotFinite => (OUT_OF_RANGE, "not a finite number"),
+            SetError::OutOfRange => (OUT_OF_RANGE, "out of range"),
+            SetError::NotWhole => (OUT_OF_RANGE, "must be a whole number"),
+            SetError::ReadOnly => (READ_ONLY, "read-only"),
+        };
+        Self::new(error, reason)
+    }
+}
+
 /// PARAM_SET; whether the value was taken. The value is broadcast either way.
 ///
 /// The type that the sender names is not looked at: those that keep integers in floats mean the
@@ -77,49 +117,42 @@ pub(super) fn set(
     replies.value(id);
     let result = match trust {
         Trust::Full => take(id, frame.f32(0), stopped, context),
-        Trust::Read | Trust::None => Err((None, "it is not signed")),
+        Trust::Read | Trust::None => Err(Refusal::new(NOT_PERMITTED, "it is not signed")),
     };
-    if let Err((because, reason)) = result {
+    if let Err(refusal) = result {
         replies.push(Reply::Refused {
+            to: frame.from,
             id,
-            because,
-            reason,
+            refusal,
         });
     }
     result.is_ok()
 }
 
-fn take(
-    id: ParamId,
-    value: f32,
-    stopped: bool,
-    context: &mut Context,
-) -> Result<(), (Option<ParamId>, &'static str)> {
+fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result<(), Refusal> {
     if value.is_subnormal() {
-        return Err((None, "send it as REAL32"));
+        return Err(Refusal::new(WRONG_TYPE, "send it as REAL32"));
     }
     if !stopped && !id.entry().live {
-        return Err((None, "the motor turns; stop it first"));
+        let reason = "the motor turns; stop it first";
+        return Err(Refusal::new(NOT_PERMITTED, reason));
     }
+    change(id, value, context)
+}
+
+/// Changes a value if it is in its range and makes a drive.
+///
+/// Never inlined: a command calls it too.
+#[inline(never)]
+pub(super) fn change(id: ParamId, value: f32, context: &mut Context) -> Result<(), Refusal> {
     let mut params = context.params.clone();
-    params
-        .set(id, value)
-        .map_err(|error| (None, reason(error)))?;
-    (context.validate)(&params).map_err(|error| {
-        let because = Some(error.param).filter(|param| *param != id);
-        (because, error.reason)
+    params.set(id, value)?;
+    (context.validate)(&params).map_err(|error| Refusal {
+        because: Some(error.param).filter(|param| *param != id),
+        ..Refusal::new(OUT_OF_RANGE, error.reason)
     })?;
     *context.params = params;
     Ok(())
-}
-
-fn reason(error: SetError) -> &'static str {
-    match error {
-        SetError::NotFinite => "not a finite number",
-        SetError::OutOfRange => "out of range",
-        SetError::NotWhole => "must be a whole number",
-        SetError::ReadOnly => "read-only",
-    }
 }
 
 /// A name of 16 characters has no zero at its end.

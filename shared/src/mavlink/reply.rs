@@ -10,6 +10,7 @@ use mavlink::types::CharArray;
 
 use super::ftp;
 use super::identity::{Address, Identity};
+use super::parameter::Refusal;
 use super::sender::Sender;
 use super::signing::Signing;
 use crate::params::{ParamId, TABLE};
@@ -54,11 +55,11 @@ pub(super) enum Reply {
         name: [u8; 16],
         index: i16,
     },
-    /// Why a value was not taken; `because` is the parameter that stands against it.
+    /// A value was not taken.
     Refused {
+        to: Address,
         id: ParamId,
-        because: Option<ParamId>,
-        reason: &'static str,
+        refusal: Refusal,
     },
     /// A text in two pieces.
     Text(MavSeverity, [&'static str; 2]),
@@ -245,11 +246,12 @@ impl Writer {
             .send(identity.address, &message, &[mission_type], out);
     }
 
-    pub(super) fn unknown_param(
+    pub(super) fn param_error(
         &mut self,
         identity: &Identity,
         to: Address,
         (name, index): ([u8; 16], i16),
+        error: MavParamError,
         out: &mut dyn FnMut(&[u8]),
     ) {
         let message = PARAM_ERROR_DATA {
@@ -257,7 +259,7 @@ impl Writer {
             target_system: to.system,
             target_component: to.component,
             param_id: CharArray::new(name),
-            error: MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+            error,
         };
         self.sender.send(identity.address, &message, &[], out);
     }

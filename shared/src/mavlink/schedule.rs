@@ -8,7 +8,6 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::pace::Pace;
 use super::place::Place;
-use super::sender::OVERHEAD_LEN;
 use crate::params::{ParamId, Params};
 
 const SECOND_US: u64 = 1_000_000;
@@ -20,17 +19,20 @@ pub(super) enum Stream {
     EscInfo,
     EscStatus,
     EscTelemetry,
-    /// NAMED_VALUE_FLOAT, of which there is one.
+    /// NAMED_VALUE_FLOAT of the throttle wire: what this message's interval and requests mean.
     BadFrames,
+    /// NAMED_VALUE_FLOAT of the control's signals, all of one moment.
+    Signals,
 }
 
 impl Stream {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 6] = [
         Self::Heartbeat,
         Self::EscInfo,
         Self::EscStatus,
         Self::EscTelemetry,
         Self::BadFrames,
+        Self::Signals,
     ];
 
     const fn message(self, place: Place) -> u32 {
@@ -39,30 +41,41 @@ impl Stream {
             Self::EscInfo => ESC_INFO_DATA::ID,
             Self::EscStatus => ESC_STATUS_DATA::ID,
             Self::EscTelemetry => place.telemetry().0,
-            Self::BadFrames => NAMED_VALUE_FLOAT_DATA::ID,
+            Self::BadFrames | Self::Signals => NAMED_VALUE_FLOAT_DATA::ID,
         }
     }
 
-    /// The longest frame.
-    const fn frame_len(self) -> usize {
-        OVERHEAD_LEN
-            + match self {
-                Self::Heartbeat => HEARTBEAT_DATA::ENCODED_LEN,
-                Self::EscInfo => ESC_INFO_DATA::ENCODED_LEN,
-                Self::EscStatus => ESC_STATUS_DATA::ENCODED_LEN,
-                Self::EscTelemetry => ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN,
-                Self::BadFrames => NAMED_VALUE_FLOAT_DATA::ENCODED_LEN,
-            }
+    /// What its frames take at most, with what each has beside its payload.
+    fn frames_len(self, params: &Params, overhead_len: usize) -> usize {
+        let (frames, len) = match self {
+            Self::Heartbeat => (1, HEARTBEAT_DATA::ENCODED_LEN),
+            Self::EscInfo => (1, ESC_INFO_DATA::ENCODED_LEN),
+            Self::EscStatus => (1, ESC_STATUS_DATA::ENCODED_LEN),
+            Self::EscTelemetry => (1, ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN),
+            Self::BadFrames => (1, NAMED_VALUE_FLOAT_DATA::ENCODED_LEN),
+            Self::Signals => (
+                signals(params).count_ones(),
+                NAMED_VALUE_FLOAT_DATA::ENCODED_LEN,
+            ),
+        };
+        frames as usize * (overhead_len + len)
     }
 
-    fn default_interval_us(self, params: &Params) -> u64 {
-        match self {
-            Self::Heartbeat | Self::EscInfo | Self::BadFrames => SECOND_US,
-            Self::EscStatus | Self::EscTelemetry => {
-                u64::from((SECOND_US as f32 / params.get(ParamId::TelRateHz)) as u32)
-            }
-        }
+    /// None when it is off.
+    fn default_interval_us(self, params: &Params) -> Option<u64> {
+        let rate = match self {
+            Self::Heartbeat | Self::EscInfo | Self::BadFrames => return Some(SECOND_US),
+            Self::Signals if signals(params) == 0 => return None,
+            Self::Signals => ParamId::TelSigHz,
+            Self::EscStatus | Self::EscTelemetry => ParamId::TelRateHz,
+        };
+        Some(u64::from((SECOND_US as f32 / params.get(rate)) as u32))
     }
+}
+
+/// The signals that are streamed, a bit for each.
+pub(super) fn signals(params: &Params) -> u32 {
+    params.get(ParamId::TelSignals) as u32
 }
 
 /// How often a stream is sent.
@@ -105,7 +118,7 @@ impl Schedule {
         }
     }
 
-    /// The stream of this message.
+    /// The stream of this message, the first where several have it.
     pub(super) fn find(&self, message: u32) -> Option<Stream> {
         Stream::ALL
             .into_iter()
@@ -130,14 +143,20 @@ impl Schedule {
     /// Microseconds between two, none when it is off.
     pub(super) fn interval_us(&self, stream: Stream, params: &Params) -> Option<u64> {
         match self.timers[stream as usize].interval {
-            Interval::Default => Some(stream.default_interval_us(params)),
+            Interval::Default => stream.default_interval_us(params),
             Interval::Off => None,
             Interval::Us(interval_us) => Some(u64::from(interval_us)),
         }
     }
 
-    /// The next stream that is due now; each is due at most once at one `now_us`.
-    pub(super) fn next_due(&mut self, now_us: u64, params: &Params) -> Option<Stream> {
+    /// The next stream that is due now; each is due at most once at one `now_us`. `overhead_len` is
+    /// what a frame has beside its payload.
+    pub(super) fn next_due(
+        &mut self,
+        now_us: u64,
+        params: &Params,
+        overhead_len: usize,
+    ) -> Option<Stream> {
         let mut blocked = false;
         for offset in 0..Stream::ALL.len() {
             let index = (self.first + offset) % Stream::ALL.len();
@@ -154,7 +173,10 @@ impl Schedule {
             }
             // Who finds too little of the share left holds up those behind it: shorter messages
             // would otherwise take it all. Only the heartbeat passes.
-            blocked = blocked || !self.pace.take(now_us, stream.frame_len());
+            blocked = blocked
+                || !self
+                    .pace
+                    .take(now_us, stream.frames_len(params, overhead_len));
             if blocked && stream != Stream::Heartbeat {
                 continue;
             }

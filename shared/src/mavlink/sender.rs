@@ -7,8 +7,8 @@ use super::identity::Address;
 use super::receiver::SIGNED;
 use super::signing::{SIGNATURE_LEN, Signing};
 
-/// What a frame has beside its payload: header and check.
-pub(super) const OVERHEAD_LEN: usize = 12;
+/// Header and check.
+const OVERHEAD_LEN: usize = 12;
 const HEADER_LEN: usize = 10;
 const PAYLOAD_MAX: usize = 255;
 
@@ -25,6 +25,16 @@ impl Sender {
             sequence: 0,
             signing,
         }
+    }
+
+    /// What a frame has beside its payload.
+    pub(super) fn overhead_len(&self) -> usize {
+        OVERHEAD_LEN
+            + if self.signing.signs() {
+                SIGNATURE_LEN
+            } else {
+                0
+            }
     }
 
     /// Sends a message; `extension` are the bytes of its extension fields, which the generated

@@ -2,8 +2,10 @@
 
 mod commands;
 mod files;
+mod noise;
 mod parameters;
 mod receiving;
+mod signals;
 mod signing;
 mod streams;
 
@@ -18,7 +20,7 @@ use crate::drive::{Faults, Phase};
 use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
 use crate::params::{BuildError, ParamId, Params};
-use crate::telemetry::Telemetry;
+use crate::telemetry::{SIGNALS, Telemetry};
 
 pub(super) const TELEMETRY: Telemetry = Telemetry {
     rpm: 0.0,
@@ -33,6 +35,7 @@ pub(super) const TELEMETRY: Telemetry = Telemetry {
     bad_frames: 0,
     bad_share: 0.0,
     signal: None,
+    signals: [0.0; SIGNALS.len()],
 };
 
 /// The ground station of these tests.

@@ -19,6 +19,12 @@ def slow_desk(start, tmp_path) -> Desk:
 
 
 @pytest.fixture
+def peripheral_desk(start, tmp_path) -> Desk:
+    """An ESC as a flight controller's peripheral, component 140, without the flight controller."""
+    return Desk(start, "udp", tmp_path, "--param", "MAV_ROLE=1")
+
+
+@pytest.fixture
 def lossy_desk(start, tmp_path):
     """An ESC behind a path that loses, doubles and delays a fifth of all packets both ways."""
     desk = Desk(start, "udp", tmp_path)

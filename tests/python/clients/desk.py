@@ -14,8 +14,8 @@ WAYS = ("udp", "tcp", "pty")
 class Desk:
     """Its addresses are written as each client writes them; a restart may change them."""
 
-    def __init__(self, start, way: str, folder: Path, baud: int = 115_200):
-        self._start, self._way = start, way
+    def __init__(self, start, way: str, folder: Path, *options: str, baud: int = 115_200):
+        self._start, self._way, self._options = start, way, options
         self._flash = folder / "flash.bin"
         self._tty = folder / "ttyESC"
         self.baud = baud
@@ -28,7 +28,9 @@ class Desk:
             "tcp": (),
             "pty": ("--mavlink", f"pty:{self._tty}:{self.baud}"),
         }
-        self._emulator: Emulator = self._start(*endpoint[self._way], storage=self._flash)
+        self._emulator: Emulator = self._start(
+            *self._options, *endpoint[self._way], storage=self._flash
+        )
         if self._way == "tcp":
             self.port = self._emulator.port
 
@@ -54,7 +56,7 @@ class Desk:
 
     def params(self) -> dict[str, float]:
         """What the ESC has, by the tests' own client on a link of its own."""
-        with self._emulator.connect() as esc:
+        with self._emulator.connect(system=0, component=0) as esc:
             return esc.params()
 
     def power_cycle(self) -> None:

@@ -42,6 +42,17 @@ def test_an_unknown_name_and_a_refused_value_are_told(start, tmp_path):
         station.wait(r"Failed to set MOT_KV to 400 \(invalid returned value 353")
 
 
+def test_a_peripheral_is_reached_as_component_140(peripheral_desk, tmp_path):
+    with MavProxy(peripheral_desk, tmp_path / "station") as station:
+        # On a vehicle the system is the flight controller's.
+        station.say("set target_system 1")
+        station.say("set target_component 140")
+        values = station.listed()
+        assert values == peripheral_desk.params()
+        station.set("CTL_RPM_MAX", 5432.5)
+    assert peripheral_desk.params() == {**values, "CTL_RPM_MAX": 5432.5}
+
+
 def test_a_lossy_path_ends_with_the_full_list_and_the_set_value(lossy_desk, tmp_path):
     with MavProxy(lossy_desk, tmp_path / "station") as station:
         values = station.listed(timeout=30.0)

@@ -1,13 +1,13 @@
 """MAVSDK, its Python wheel, by its blocking calls.
 
-It has no command to store the parameters, and for a refused value, which the ESC answers with the one
-in force, it tries again five times and then says TIMEOUT.
+A component beside an autopilot can be selected, but this version of the wheel says that this failed
+when it has not.
 """
 
 import json
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from mavsdk.component_type import ComponentType
@@ -61,18 +61,17 @@ def test_lists_sets_and_finds_again(desk):
 def test_what_is_missing_or_refused_is_an_error(desk):
     with connect(desk) as esc:
         params = Param(esc)
-        with pytest.raises(ParamError) as error:
-            params.get_param_float("NO_SUCH_NAME")
-        assert error.value.result == ParamResult.DOES_NOT_EXIST
-        with pytest.raises(ParamError) as error:
-            params.set_param_float("NO_SUCH_NAME", 1.0)
-        assert error.value.result == ParamResult.DOES_NOT_EXIST
-        with pytest.raises(ParamError) as error:
-            params.get_param_int("CTL_MODE")
-        assert error.value.result == ParamResult.WRONG_TYPE
-        with pytest.raises(ParamError):
-            params.set_param_float("MOT_KV", 400.0)
-        assert params.get_param_float("MOT_KV") == desk.params()["MOT_KV"]
+        refused = [
+            (ParamResult.DOES_NOT_EXIST, params.get_param_float, ("NO_SUCH_NAME",)),
+            (ParamResult.DOES_NOT_EXIST, params.set_param_float, ("NO_SUCH_NAME", 1.0)),
+            (ParamResult.WRONG_TYPE, params.get_param_int, ("CTL_MODE",)),
+            (ParamResult.READ_ONLY, params.set_param_float, ("MOT_KV", 400.0)),
+            (ParamResult.VALUE_OUT_OF_RANGE, params.set_param_float, ("CTL_MODE", 9.0)),
+        ]
+        for result, call, arguments in refused:
+            with pytest.raises(ParamError) as error:
+                call(*arguments)
+            assert error.value.result == result, arguments
 
 
 def test_a_lossy_path_ends_with_the_full_list_and_the_set_value(lossy_desk):
@@ -80,7 +79,11 @@ def test_a_lossy_path_ends_with_the_full_list_and_the_set_value(lossy_desk):
         params = Param(esc)
         values = fetch(params)
         assert values == lossy_desk.params()
-        params.set_param_float("CTL_RPM_MAX", 5432.5)
+        for _ in range(5):
+            # Once in a hundred times all of its six tries are lost.
+            with suppress(ParamError):
+                params.set_param_float("CTL_RPM_MAX", 5432.5)
+                break
         assert fetch(params) == {**values, "CTL_RPM_MAX": 5432.5}
 
 

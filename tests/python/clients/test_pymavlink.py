@@ -3,7 +3,7 @@
 Its `mavparm` sets, saves and loads, but has no list: a script asks for the list, and for what is
 missing by its index. `mavset` takes any PARAM_VALUE of the name for its answer, so that one which
 comes late from a list passes for it: over a lossy path a script looks again. A refused value passes
-likewise; the ESC's STATUSTEXT tells why.
+likewise; the ESC's PARAM_ERROR tells why.
 """
 
 import time
@@ -90,8 +90,19 @@ def test_an_unknown_name_and_a_refused_value_are_told(desk):
         assert error.param_id == "NO_SUCH_NAME"
         assert error.error == mavutil.mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
         master.param_set_send("MOT_KV", 400.0)
-        reason = master.recv_match(type="STATUSTEXT", blocking=True, timeout=TIMEOUT_S)
-        assert reason.text == "MOT_KV refused: read-only"
+        error = master.recv_match(type="PARAM_ERROR", blocking=True, timeout=TIMEOUT_S)
+        assert error.param_id == "MOT_KV"
+        assert error.error == mavutil.mavlink.MAV_PARAM_ERROR_READ_ONLY
+
+
+def test_a_peripheral_answers_who_asks_nobody_in_particular(peripheral_desk):
+    with closing(connect(peripheral_desk)) as master:
+        # It takes no target from the heartbeat of what has no autopilot.
+        assert (master.target_system, master.target_component) == (0, 0)
+        params = fetch(master)
+        assert params == peripheral_desk.params()
+        assert params.mavset(master, "CTL_RPM_MAX", 5432.5)
+        assert named(download(master).params) == {**params, "CTL_RPM_MAX": 5432.5}
 
 
 def test_a_lossy_path_ends_with_the_full_list_and_the_set_value(lossy_desk):

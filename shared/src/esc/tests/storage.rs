@@ -16,7 +16,7 @@ const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 
 impl Bench {
     /// A message from a ground station.
-    fn message<D: MessageData>(&mut self, data: &D) {
+    pub(super) fn message<D: MessageData>(&mut self, data: &D) {
         let mut raw = MAVLinkV2MessageRaw::new();
         let header = MavHeader {
             system_id: 255,

@@ -10,7 +10,7 @@ pub(super) const fn checksum(before: u32, bytes: &[u8]) -> u32 {
         sum ^= bytes[at] as u32;
         let mut bit = 0;
         while bit < 8 {
-            sum = sum >> 1 ^ 0xEDB8_8320 * (sum & 1);
+            sum = (sum >> 1) ^ (0xEDB8_8320 * (sum & 1));
             bit += 1;
         }
         at += 1;

@@ -1,5 +1,6 @@
 //! The files, and the folders that they are in.
 
+use super::answer::Error;
 use super::checksum::checksum;
 use super::packed::Selection;
 use super::sink::Sink;
@@ -10,8 +11,8 @@ use crate::telemetry::Telemetry;
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
 static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
 
-/// Checksum of the general metadata, as COMPONENT_METADATA tells it.
-pub(in crate::mavlink) const GENERAL_CHECKSUM: u32 = checksum(
+/// Checksum of the general metadata.
+pub(super) const GENERAL_CHECKSUM: u32 = checksum(
     0,
     include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz")),
 );
@@ -33,8 +34,8 @@ enum Content {
     Fixed(&'static [u8]),
     /// The parameters, of which a path can choose.
     Parameters,
-    /// A file that something writes.
-    Made(fn(&View, &mut Sink)),
+    /// What has gone wrong, in words.
+    Faults,
 }
 
 /// An entry of a folder.
@@ -75,7 +76,7 @@ static ENTRIES: [Entry; 6] = [
     Entry {
         folder: "@SYS/",
         name: "faults.txt",
-        content: Content::Made(text::faults),
+        content: Content::Faults,
     },
 ];
 
@@ -111,7 +112,7 @@ impl File {
             Content::Folder => {}
             Content::Fixed(bytes) => sink.put(bytes),
             Content::Parameters => self.selection.write(view.params, sink),
-            Content::Made(write) => write(view, sink),
+            Content::Faults => text::faults(view, sink),
         }
     }
 
@@ -123,23 +124,33 @@ impl File {
     }
 }
 
-/// The entries of a path's folder, with the root's slash or without it; none when there is no such
-/// folder.
-pub(super) fn list(path: &[u8]) -> impl Iterator<Item = &'static Entry> {
-    let path = trim(path);
-    ENTRIES
-        .iter()
-        .filter(move |entry| trim(entry.folder.as_bytes()) == path)
-}
-
 impl Entry {
+    /// The entry with this number in a path's folder, with the root's slash or without it.
+    pub(super) fn find(path: &[u8], number: u32) -> Result<&'static Self, Error> {
+        let path = trim(path);
+        let mut before = 0;
+        let mut error = Error::FileNotFound;
+        for entry in &ENTRIES {
+            if trim(entry.folder.as_bytes()) == path {
+                if before == number {
+                    return Ok(entry);
+                }
+                before += 1;
+                error = Error::EndOfFile;
+            }
+        }
+        Err(error)
+    }
+
     /// The entries of its folder from itself on, each as what it is, its name, for a file its length,
     /// and a zero.
     pub(super) fn write_rest(&'static self, view: &View, sink: &mut Sink) {
-        let from_here = ENTRIES
-            .iter()
-            .skip_while(|entry| !core::ptr::eq(*entry, self));
-        for entry in from_here.filter(|entry| entry.folder == self.folder) {
+        let mut begun = false;
+        for entry in &ENTRIES {
+            begun |= core::ptr::eq(entry, self);
+            if !begun || entry.folder != self.folder {
+                continue;
+            }
             let is_folder = matches!(entry.content, Content::Folder);
             sink.put(if is_folder { b"D" } else { b"F" });
             sink.put(entry.name.as_bytes());

@@ -2,9 +2,9 @@
 //!
 //! | file | what it tells |
 //! |---|---|
-//! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: some 70 frames in four; `?withdefaults=1`, `?start=N&count=N` |
+//! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: 3 frames where the list takes 50; with `?withdefaults=1` or `?start=N&count=N` |
 //! | `@SYS/faults.txt` | faults and the last warning, in words |
-//! | `general.json.xz` | where the next one is ([`messages`](super::messages) names this one) |
+//! | `general.json.xz` | where the next one is ([`metadata()`] tells where this one is) |
 //! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
 //!
 //! The last two are made of the table of parameters when the crate is built (`build.rs`).
@@ -16,13 +16,15 @@
 mod answer;
 mod checksum;
 mod files;
+mod metadata;
 mod packed;
 mod server;
 mod sink;
 mod text;
 
 pub(super) use answer::{Answer, PAYLOAD_MAX};
-pub(super) use files::{GENERAL_CHECKSUM, View};
+pub(super) use files::View;
+pub(super) use metadata::{is_metadata, metadata};
 pub(super) use server::Server;
 
 #[cfg(test)]

@@ -70,9 +70,11 @@ impl Selection {
         for id in chosen.take(self.count.into()) {
             let entry = id.entry();
             let name = entry.name.as_bytes();
-            let alike = name.iter().zip(before).take_while(|(a, b)| a == b).count();
             // At least one letter is written; a name has 16 at the most.
-            let alike = alike.min(name.len() - 1);
+            let mut alike = 0;
+            while alike + 1 < name.len() && name.get(alike) == before.get(alike) {
+                alike += 1;
+            }
             let letters = name.get(alike..).unwrap_or_default();
             let value = params.get(*id);
             let default = self.defaults && value != entry.default;

@@ -1,11 +1,10 @@
 //! Who reads what: one session.
 
 use super::answer::{Answer, Content, DATA_MAX, Error};
-use super::files::{self, File, View};
+use super::files::{Entry, File, View};
 use super::sink::Sink;
 use crate::mavlink::identity::Address;
 use crate::mavlink::receiver::Frame;
-use crate::mavlink::sender::OVERHEAD_LEN;
 
 /// A session without a request for so long is over, µs: a client that is gone must not keep the next
 /// one out, and one that lives asks again within seconds.
@@ -74,9 +73,9 @@ impl Session {
 
 /// Serves files to one reader at a time.
 ///
-/// Every request but one can be obeyed twice, so that one that is sent again gets the same answer and
-/// none has to be kept: opening a file anew begins the same session, and to end one that is not open
-/// is no error.
+/// Every request can be obeyed twice, so that one that is sent again gets the same answer and none has
+/// to be kept: opening a file anew begins the same session, and to end one where there is none is no
+/// error.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mavlink) struct Server {
     session: Option<Session>,
@@ -138,21 +137,17 @@ impl Server {
                 self.session = None;
                 Content::Done
             }
-            request::LIST_DIRECTORY => {
-                files::list(path).next().ok_or(Error::FileNotFound)?;
-                let entry = files::list(path).nth(offset as usize);
-                Content::Entries(entry.ok_or(Error::EndOfFile)?)
-            }
-            request::OPEN_FILE_RO => {
+            request::LIST_DIRECTORY => Content::Entries(Entry::find(path, offset)?),
+            request::OPEN_FILE_RO | request::CALC_FILE_CRC32 => {
                 let file = File::find(path).ok_or(Error::FileNotFound)?;
-                if self
-                    .session
-                    .as_ref()
-                    .is_some_and(|s| s.reader != frame.from)
-                {
+                let (len, checksum) = file.measure(view);
+                if request == request::CALC_FILE_CRC32 {
+                    return Ok(Some(Content::Number(checksum)));
+                }
+                let others = |session: &Session| session.reader != frame.from;
+                if self.session.as_ref().is_some_and(others) {
                     return Err(Error::NoSessionsAvailable);
                 }
-                let (len, checksum) = file.measure(view);
                 self.session = Some(Session {
                     reader: frame.from,
                     number: frame.u8(SESSION),
@@ -163,10 +158,6 @@ impl Server {
                     burst: None,
                 });
                 Content::Number(len)
-            }
-            request::CALC_FILE_CRC32 => {
-                let file = File::find(path).ok_or(Error::FileNotFound)?;
-                Content::Number(file.measure(view).1)
             }
             request::READ_FILE | request::BURST_READ_FILE => {
                 let session = self.session_of(frame)?;
@@ -202,10 +193,10 @@ impl Server {
             .ok_or(Error::InvalidSession)
     }
 
-    /// Bytes of the next frame of a burst, at the most; none when there is none.
-    pub(in crate::mavlink) fn burst_frame_len(&self) -> Option<usize> {
+    /// Bytes of payload of the next frame of a burst, at the most; none when there is none.
+    pub(in crate::mavlink) fn burst_payload_len(&self) -> Option<usize> {
         let burst = self.session.as_ref()?.burst.as_ref()?;
-        Some(OVERHEAD_LEN + PATH + usize::from(burst.size))
+        Some(PATH + usize::from(burst.size))
     }
 
     /// The next answer of a burst, and for whom it is.

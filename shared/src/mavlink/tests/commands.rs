@@ -1,8 +1,12 @@
-use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavResult};
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavProtocolCapability, MavResult,
+};
 
 use super::*;
 use crate::input::authority::Command;
 
+mod calibration;
+mod motor;
 mod storage;
 
 const LONG: (u32, u8) = (COMMAND_LONG_DATA::ID, COMMAND_LONG_DATA::EXTRA_CRC);
@@ -202,6 +206,12 @@ fn a_message_is_sent_on_request() {
         .collect();
     let expected = parts.iter().fold(0, |all, part| all << 8 | part) << 8 | 255;
     assert_eq!(version.flight_sw_version, expected);
+    // COMMAND_INT, a float as the value itself, MAVLink 2: what other tests have served.
+    let served = MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP;
+    assert_eq!(version.capabilities, served);
 }
 
 fn interval(sent: &[Sent]) -> (u16, i32) {

@@ -3,8 +3,9 @@
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA};
 
 use super::*;
-use crate::drive::Fault;
 use crate::params::TABLE;
+
+mod contents;
 
 const FILE_TRANSFER_PROTOCOL: u32 = 110;
 const PACK: &str = "@PARAM/param.pck";
@@ -170,11 +171,11 @@ fn fetch(bench: &mut Bench, name: &str, size: u8) -> Vec<u8> {
 fn crc32(bytes: &[u8]) -> u32 {
     let row = |index: u32| {
         (0..8).fold(index, |c, _| {
-            c >> 1 ^ if c & 1 == 1 { 0xEDB8_8320 } else { 0 }
+            (c >> 1) ^ if c & 1 == 1 { 0xEDB8_8320 } else { 0 }
         })
     };
     bytes.iter().fold(0, |crc, byte| {
-        crc >> 8 ^ row((crc ^ u32::from(*byte)) & 255)
+        (crc >> 8) ^ row((crc ^ u32::from(*byte)) & 255)
     })
 }
 
@@ -280,7 +281,7 @@ fn a_burst_that_is_asked_for_again_begins_where_that_says() {
     let mut bench = Bench::with(Params::default(), 11_520);
     let len = ask(&mut bench, path(OPEN, PACK)).number();
     send(&mut bench, read(BURST, 0, 100));
-    assert!(told(&bench.run_ms(50)).len() < 5);
+    assert!(told(&bench.run_ms(20)).len() < 5);
     send(&mut bench, read(BURST, 300, 100));
     let told = told(&bench.run_ms(1000));
     assert_eq!((told[0].sequence, told[0].offset), (301, 300));
@@ -308,7 +309,7 @@ fn a_burst_takes_half_of_the_link_and_holds_up_no_answer() {
         assert_eq!(count(&bench.ask(&command), 77), 1);
     }
     // 0.4 s of 5760 bytes/s, and what could leave at once.
-    assert!((2304 - 266..=2304 + 280).contains(&bytes), "{bytes}");
+    assert!((2304 - 266..=2304 + 400).contains(&bytes), "{bytes}");
 }
 
 #[test]
@@ -451,65 +452,5 @@ fn what_cannot_be_done_is_refused_with_the_reason() {
     for code in [ACK, NAK, 255] {
         send(&mut bench, path(code, PACK));
         assert_eq!(bench.answers().len(), 0);
-    }
-}
-
-#[test]
-fn folders_are_listed() {
-    let mut bench = Bench::new();
-    let all = ask(&mut bench, path(LIST, "/"));
-    let names = |data: &[u8]| data.split(|byte| *byte == 0).count() - 1;
-    assert_eq!((all.offset, names(&all.data)), (0, 4));
-    let last = ask(
-        &mut bench,
-        Ask {
-            offset: 3,
-            ..path(LIST, "")
-        },
-    );
-    assert_eq!((last.offset, names(&last.data)), (3, 1));
-    assert!(all.data.ends_with(&last.data));
-}
-
-#[test]
-fn faults_are_told_in_words() {
-    let mut bench = Bench::new();
-    let text = |bench: &mut Bench| {
-        std::string::String::from_utf8(fetch(bench, "@SYS/faults.txt", 239)).expect("ASCII")
-    };
-    assert_eq!(text(&mut bench), "Faults since the start: 0\n");
-    bench.telemetry.faults.insert(Fault::OverCurrent);
-    bench.telemetry.faults.insert(Fault::Stuck);
-    bench.telemetry.fault_count = 12;
-    for warning in ["Restarted after a panic", "Throttle: 3 gaps"] {
-        bench.component.warn(warning.try_into().expect("it fits"));
-    }
-    assert_eq!(
-        text(&mut bench),
-        "Faults since the start: 12\nNow: over-current\nNow: motor does not start\n\
-         Last warning: Throttle: 3 gaps\n"
-    );
-}
-
-#[test]
-fn the_metadata_can_be_found() {
-    let mut bench = Bench::new();
-    let general = fetch(&mut bench, "general.json.xz", 239);
-    // COMPONENT_METADATA, and COMPONENT_INFORMATION, which was before it.
-    for (message, uri_at) in [(397, 8), (395, 12)] {
-        let command = COMMAND_LONG_DATA {
-            target_system: 1,
-            target_component: 1,
-            param1: message as f32,
-            command: mavlink::dialects::ardupilotmega::MavCmd::MAV_CMD_REQUEST_MESSAGE,
-            ..COMMAND_LONG_DATA::default()
-        };
-        let sent = bench.ask(&command);
-        assert_eq!(count(&sent, 77), 1);
-        let metadata = sent.iter().find(|s| s.message.message_id() == message);
-        let payload = &metadata.expect("it was asked for").payload;
-        assert_eq!(payload[..4], 1000_u32.to_le_bytes());
-        assert_eq!(payload[4..8], crc32(&general).to_le_bytes());
-        assert!(payload[uri_at..].starts_with(b"mftp:///general.json.xz\0"));
     }
 }

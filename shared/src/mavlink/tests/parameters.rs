@@ -31,6 +31,24 @@ pub(super) fn read(text: &str, index: i16) -> PARAM_REQUEST_READ_DATA {
     }
 }
 
+/// Why the value of this parameter was refused, as the one who asked is told.
+pub(super) fn refusal(sent: &[Sent], id: ParamId) -> MavParamError {
+    let errors: Vec<_> = sent
+        .iter()
+        .filter_map(|sent| match &sent.message {
+            MavMessage::PARAM_ERROR(error) => Some(error),
+            _ => None,
+        })
+        .collect();
+    let [error] = errors[..] else {
+        panic!("{sent:?}");
+    };
+    assert_eq!((error.target_system, error.target_component), (255, 190));
+    assert_eq!(error.param_id, name(id.entry().name));
+    assert_eq!(error.param_index, -1, "the name counts");
+    error.error
+}
+
 #[test]
 fn a_list_is_whole_and_takes_half_the_link() {
     let mut bench = Bench::with(Params::default(), 11_520);
@@ -59,12 +77,12 @@ fn a_list_is_whole_and_takes_half_the_link() {
     };
     assert_eq!(usize::from(first.param_count), TABLE.len());
     assert_eq!(first.param_type, MavParamType::MAV_PARAM_TYPE_REAL32);
-    // Within any 100 ms the list takes 576 bytes and the first burst of 280.
+    // Within any 100 ms the list takes 576 bytes and the first burst of 400.
     let half = f64::from(bench.link_bytes_per_s) / 2.0;
     for window in list.windows(16) {
         let bytes: usize = window.iter().map(|sent| sent.len).sum();
         let seconds = (window[15].at_us - window[0].at_us) as f64 * 1e-6;
-        assert!(bytes as f64 <= half * seconds + 280.0 + 37.0);
+        assert!(bytes as f64 <= half * seconds + 400.0 + 37.0);
     }
 }
 
@@ -104,13 +122,18 @@ fn every_name_is_found_whatever_its_length() {
         let got = values(&bench.ask(&read(id.entry().name, -1)));
         assert_eq!(got, [(id as u16, bench.params.get(id))]);
     }
-    // 16 characters and no zero: nothing of the next field is taken for the name.
-    let sixteen = "ABCDEFGHIJKLMNOP";
-    let sent = bench.ask(&read(sixteen, -1));
-    let MavMessage::PARAM_ERROR(error) = &sent[0].message else {
-        panic!("{sent:?}");
-    };
-    assert_eq!(error.param_id.to_str(), Ok(sixteen));
+    // 16 characters and no zero: nothing of the next field is taken for the name, and no name that
+    // it begins with is found.
+    for sixteen in ["ABCDEFGHIJKLMNOP", "MOT_POLE_PAIRS__"] {
+        for sent in [bench.ask(&read(sixteen, -1)), bench.ask(&set(sixteen, 7.0))] {
+            let MavMessage::PARAM_ERROR(error) = &sent[0].message else {
+                panic!("{sent:?}");
+            };
+            assert_eq!(sent.len(), 1);
+            assert_eq!(error.param_id.to_str(), Ok(sixteen));
+        }
+    }
+    assert!(ParamId::ALL.iter().any(|id| id.entry().name.len() == 16));
 }
 
 #[test]
@@ -150,18 +173,33 @@ fn a_set_value_is_taken_and_broadcast() {
 fn a_refused_value_is_answered_with_the_old_one_and_the_reason() {
     let mut bench = Bench::new();
     let before = bench.params.clone();
+    let out_of_range = MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE;
+    let read_only = MavParamError::MAV_PARAM_ERROR_READ_ONLY;
+    let mismatch = MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH;
     let cases = [
-        ("MOT_POLE_PAIRS", 6.5, "whole"),
-        ("LIM_PHASE_A", 1e9, "out of range"),
-        ("LIM_PHASE_A", f32::NAN, "finite"),
-        ("MOT_KV", 400.0, "read-only"),
+        ("MOT_POLE_PAIRS", 6.5, "whole", out_of_range),
+        ("LIM_PHASE_A", 1e9, "out of range", out_of_range),
+        // The least above its range: nothing is clamped.
+        (
+            "LIM_PHASE_A",
+            200.0_f32.next_up(),
+            "out of range",
+            out_of_range,
+        ),
+        ("LIM_PHASE_A", -0.0, "out of range", out_of_range),
+        ("LIM_PHASE_A", f32::NAN, "finite", out_of_range),
+        ("LIM_PHASE_A", f32::INFINITY, "finite", out_of_range),
+        ("LIM_PHASE_A", f32::NEG_INFINITY, "finite", out_of_range),
+        ("MOT_KV", 400.0, "read-only", read_only),
         // 7 as an integer's bytes.
-        ("PWM_DEADTIME_NS", f32::from_bits(7), "REAL32"),
+        ("PWM_DEADTIME_NS", f32::from_bits(7), "REAL32", mismatch),
     ];
-    for (text, value, reason) in cases {
+    for (text, value, reason, error) in cases {
         let id = ParamId::find(text).expect("in the table");
         let sent = bench.ask(&set(text, value));
+        assert_eq!(sent.len(), 3, "{sent:?}");
         assert_eq!(values(&sent), [(id as u16, before.get(id))]);
+        assert_eq!(refusal(&sent, id), error, "{text} = {value}");
         let text = texts(&sent)[0];
         assert!(
             text.starts_with(id.entry().name) && text.contains(reason),
@@ -180,6 +218,10 @@ fn a_value_that_makes_no_drive_is_refused_with_what_stands_against_it() {
     assert_eq!(
         values(&sent),
         [(ParamId::PwmFreqHz as u16, before.get(ParamId::PwmFreqHz))]
+    );
+    assert_eq!(
+        refusal(&sent, ParamId::PwmFreqHz),
+        MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
     );
     assert_eq!(bench.params, before);
     // Longer than one STATUSTEXT: chunks with one id, the last one not full.
@@ -229,6 +271,10 @@ fn the_motor_and_the_bridge_are_not_changed_while_it_turns() {
         let sent = bench.ask(&set(text, other));
         assert_eq!(values(&sent), [(id as u16, before)]);
         assert!(texts(&sent)[0].contains("the motor turns"));
+        assert_eq!(
+            refusal(&sent, id),
+            MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED
+        );
     }
     let sent = bench.ask(&set("CTL_BW_SPD_HZ", 5.0));
     assert_eq!(values(&sent), [(ParamId::CtlBwSpdHz as u16, 5.0)]);

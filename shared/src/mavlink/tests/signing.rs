@@ -1,17 +1,19 @@
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavResult, SETUP_SIGNING_DATA};
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_LONG_DATA, MavCmd, MavParamError, MavResult, SETUP_SIGNING_DATA,
+};
 use sha2::{Digest, Sha256};
 
-use super::parameters::{read, set};
+use super::parameters::{read, refusal, set};
 use super::*;
 
-const KEY: [u8; 32] = [
+pub(super) const KEY: [u8; 32] = [
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25,
     26, 27, 28, 29, 30, 31,
 ];
 
 /// 2026-11-22, in 10 µs since 2015.
-const TODAY: u64 = 37_542_528_000_000;
-const SECOND: u64 = 100_000;
+pub(super) const TODAY: u64 = 37_542_528_000_000;
+pub(super) const SECOND: u64 = 100_000;
 
 /// MOT_POLE_PAIRS = 7 from the station over link 3, signed by pymavlink 2.4.50 with [`KEY`] at the
 /// timestamp 0x0102030405.
@@ -21,7 +23,7 @@ const BY_PYMAVLINK: [u8; 48] = [
     0x09, 0x55, 0x34, 0x03, 0x05, 0x04, 0x03, 0x02, 0x01, 0x00, 0x80, 0x0b, 0x1f, 0xd2, 0xb1, 0x3e,
 ];
 
-fn setup(key: [u8; 32], timestamp: u64) -> SETUP_SIGNING_DATA {
+pub(super) fn setup(key: [u8; 32], timestamp: u64) -> SETUP_SIGNING_DATA {
     SETUP_SIGNING_DATA {
         initial_timestamp: timestamp,
         target_system: 1,
@@ -31,7 +33,7 @@ fn setup(key: [u8; 32], timestamp: u64) -> SETUP_SIGNING_DATA {
 }
 
 /// What was heard or sent at this time, with a hash of its own making.
-fn signed<D: MessageData>(
+pub(super) fn signed<D: MessageData>(
     from: Address,
     data: &D,
     key: &[u8],
@@ -61,7 +63,7 @@ fn command(number: MavCmd, param1: f32) -> COMMAND_LONG_DATA {
 }
 
 /// With a key as of today.
-fn keyed() -> Bench {
+pub(super) fn keyed() -> Bench {
     let mut bench = Bench::new();
     bench.receive(&encode(STATION, &setup(KEY, TODAY), &[]));
     let answers = bench.answers();
@@ -105,12 +107,19 @@ fn without_a_signature_one_may_ask_and_change_nothing() {
     let answers = bench.ask(&set("CTL_BW_SPD_HZ", 5.0));
     assert_eq!(values(&answers), [(ParamId::CtlBwSpdHz as u16, 7.9)]);
     assert_eq!(texts(&answers), ["CTL_BW_SPD_HZ refused: it is not signed"]);
+    assert_eq!(
+        refusal(&answers, ParamId::CtlBwSpdHz),
+        MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED
+    );
     for number in [
         MavCmd::MAV_CMD_PREFLIGHT_STORAGE,
         MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
         MavCmd::MAV_CMD_COMPONENT_ARM_DISARM,
         MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
         MavCmd::MAV_CMD_ACTUATOR_TEST,
+        MavCmd::MAV_CMD_DO_MOTOR_TEST,
+        MavCmd::MAV_CMD_CONFIGURE_ACTUATOR,
+        MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION,
     ] {
         let answers = bench.ask(&command(number, 1.0));
         let MavMessage::COMMAND_ACK(ack) = &answers[0].message else {
@@ -118,6 +127,7 @@ fn without_a_signature_one_may_ask_and_change_nothing() {
         };
         assert_eq!(ack.result, MavResult::MAV_RESULT_DENIED, "{number:?}");
         assert_eq!(bench.component.take_request(), None, "{number:?}");
+        assert_eq!(bench.component.take_act(), None, "{number:?}");
     }
     // Nor may one take the key away, or bring another.
     bench.receive(&encode(STATION, &setup([0; 32], TODAY), &[]));

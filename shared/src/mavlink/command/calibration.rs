@@ -1,0 +1,63 @@
+//! PREFLIGHT_CALIBRATION: of all that it names, an ESC has the end points of its throttle, which the
+//! stick teaches. It takes as long as the stick does, so it is acknowledged step by step.
+
+use mavlink::dialects::ardupilotmega::MavResult;
+
+use super::{
+    ACCEPTED, Act, CANCELLED, Command, Commands, Context, DENIED, DriveStatus, FAILED, IN_PROGRESS,
+    Replies, TEMPORARILY_REJECTED,
+};
+use crate::input::calibration::Step;
+use crate::input::signal::Signal;
+
+/// Parameter 7: the ESC.
+const ESC: f32 = 1.0;
+
+impl Commands {
+    /// All zeros end the one that is under way.
+    pub(super) fn calibrate(
+        &mut self,
+        command: &Command,
+        drive: DriveStatus,
+        context: &Context,
+        replies: &mut Replies,
+    ) -> MavResult {
+        let [others @ .., esc] = command.params;
+        let others = others.iter().any(|param| *param != 0.0);
+        if !others && esc == 0.0 {
+            if self.calibration.is_some() {
+                self.act = Some(Act::EndCalibration);
+                self.end_calibration(CANCELLED, replies);
+            }
+            return ACCEPTED;
+        }
+        // DShot's throttle has no ends to be taught.
+        let digital = matches!(context.telemetry.signal, Some(Signal::Dshot { .. }));
+        if others || esc != ESC || digital {
+            return DENIED;
+        }
+        if self.is_busy() || !drive.stopped {
+            return TEMPORARILY_REJECTED;
+        }
+        self.calibration = Some(*command);
+        self.act = Some(Act::Calibrate);
+        IN_PROGRESS
+    }
+
+    /// The stick has come a step further. What it has taught is stored before the end is told.
+    pub(in super::super) fn follow_stick(&mut self, step: Step, replies: &mut Replies) {
+        match (step, &self.calibration) {
+            (Step::Full, Some(command)) => replies.ack(command.from, command.number, IN_PROGRESS),
+            (Step::Cancelled, _) => self.end_calibration(FAILED, replies),
+            _ => {}
+        }
+    }
+
+    /// The calibration has this result, if there is one under way.
+    pub(in super::super) fn end_calibration(&mut self, result: MavResult, replies: &mut Replies) {
+        if let Some(command) = self.calibration.take() {
+            self.last = Some((command, result));
+            replies.ack(command.from, command.number, result);
+        }
+    }
+}

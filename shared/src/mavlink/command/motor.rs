@@ -1,0 +1,113 @@
+//! Commands that turn the motor for a moment, sound it, or say how it turns.
+
+use mavlink::dialects::ardupilotmega::{ActuatorConfiguration, MavResult, MotorTestThrottleType};
+
+use super::{
+    ACCEPTED, ACTUATOR_TEST, Act, Command, Commands, Context, DENIED, DriveStatus, Replies,
+    Request, TEMPORARILY_REJECTED,
+};
+use crate::input::authority::TestError;
+use crate::mavlink::parameter;
+use crate::params::{ParamId, Params};
+
+const PERCENT: f32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PERCENT as u8 as f32;
+const PWM: f32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PWM as u8 as f32;
+
+const NOTHING: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_NONE as u8 as f32;
+const BEEP: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_BEEP as u8 as f32;
+const TWO_DIRECTIONS: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_3D_MODE_ON as u8 as f32;
+const ONE_DIRECTION: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_3D_MODE_OFF as u8 as f32;
+const SPIN_1: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION1 as u8 as f32;
+const SPIN_2: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION2 as u8 as f32;
+
+impl Commands {
+    /// ACTUATOR_TEST and DO_MOTOR_TEST: the authority decides.
+    pub(super) fn test(
+        &self,
+        command: &Command,
+        drive: DriveStatus,
+        context: &mut Context,
+    ) -> MavResult {
+        let (motor, test) = if command.number == ACTUATOR_TEST {
+            let [value, duration_s, _, _, function, ..] = command.params;
+            (function, Some((value, duration_s)))
+        } else {
+            (command.params[0], motor_test(command, context.params))
+        };
+        let Some((value, duration_s)) = test.filter(|_| self.is_own(motor, command)) else {
+            return DENIED;
+        };
+        let tested = context
+            .authority
+            .actuator_test(context.now_us, value, duration_s, drive);
+        match tested {
+            Ok(()) => ACCEPTED,
+            Err(TestError::TemporarilyRejected) => TEMPORARILY_REJECTED,
+            Err(TestError::OutOfRange) => DENIED,
+        }
+    }
+
+    /// CONFIGURE_ACTUATOR: what DShot's commands do by the wire, and storing it. The ACK follows when
+    /// it has been stored.
+    pub(super) fn configure(
+        &mut self,
+        command: &Command,
+        drive: DriveStatus,
+        context: &mut Context,
+        replies: &mut Replies,
+    ) -> Option<MavResult> {
+        let [action, _, _, _, function, ..] = command.params;
+        if !self.is_own(function, command) {
+            return Some(DENIED);
+        }
+        let (id, value) = match action {
+            NOTHING | BEEP => (None, 0.0),
+            TWO_DIRECTIONS => (Some(ParamId::Inp3d), 1.0),
+            ONE_DIRECTION => (Some(ParamId::Inp3d), 0.0),
+            SPIN_1 => (Some(ParamId::MotDir), 0.0),
+            SPIN_2 => (Some(ParamId::MotDir), 1.0),
+            _ => return Some(DENIED),
+        };
+        if self.is_busy() || !drive.stopped {
+            return Some(TEMPORARILY_REJECTED);
+        }
+        let Some(id) = id else {
+            self.act = (action == BEEP).then_some(Act::Beep);
+            return Some(ACCEPTED);
+        };
+        if parameter::change(id, value, context).is_err() {
+            return Some(DENIED);
+        }
+        replies.value(id);
+        self.params_changed = true;
+        self.storage = Some(*command);
+        self.request = Some(Request::Save);
+        None
+    }
+}
+
+/// The value and the time of DO_MOTOR_TEST as ACTUATOR_TEST has them: a share of full throttle, or a
+/// pulse between the ends that the wire has. Nothing for a kind of throttle that is not served, and
+/// for several motors.
+fn motor_test(command: &Command, params: &Params) -> Option<(f32, f32)> {
+    let [_, kind, throttle, duration_s, motors, ..] = command.params;
+    let value = match kind {
+        PERCENT => throttle / 100.0,
+        PWM => {
+            let min_us = params.get(ParamId::InpPulseMinUs);
+            let share = (throttle - min_us) / (params.get(ParamId::InpPulseMaxUs) - min_us);
+            if params.get(ParamId::Inp3d) == 0.0 {
+                share
+            } else {
+                2.0 * share - 1.0
+            }
+        }
+        _ => return None,
+    };
+    if value.is_nan() || motors > 1.0 {
+        return None;
+    }
+    // Ground stations end a test by one of no throttle or no time; ACTUATOR_TEST does by NaN.
+    let ends = value == 0.0 || duration_s == 0.0;
+    Some((if ends { f32::NAN } else { value }, duration_s))
+}

@@ -1,0 +1,36 @@
+//! The messages that tell where a component's metadata are.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::COMPONENT_METADATA_DATA;
+
+use super::files::GENERAL_CHECKSUM;
+use super::sink::Sink;
+use crate::math::quotient;
+
+/// What COMPONENT_METADATA has superseded, and older ground stations ask for.
+const COMPONENT_INFORMATION_ID: u32 = 395;
+
+/// Without a component: it is the one that tells it.
+const GENERAL_URI: &str = "mftp:///general.json.xz";
+/// The URI and what is before it in the longer message; only zeros follow.
+const PAYLOAD_LEN: usize = 12 + GENERAL_URI.len();
+
+/// Whether [`metadata`] makes the message of this id.
+pub(in crate::mavlink) const fn is_metadata(id: u32) -> bool {
+    matches!(id, COMPONENT_METADATA_DATA::ID | COMPONENT_INFORMATION_ID)
+}
+
+/// The payload of one of these messages.
+pub(in crate::mavlink) fn metadata(id: u32, now_us: u64) -> [u8; PAYLOAD_LEN] {
+    let mut payload = [0; PAYLOAD_LEN];
+    let mut sink = Sink::new(0, &mut payload);
+    // The field wraps after 49 days.
+    sink.put(&quotient(now_us, 1000).to_le_bytes());
+    sink.put(&GENERAL_CHECKSUM.to_le_bytes());
+    if id == COMPONENT_INFORMATION_ID {
+        // The checksum of the metadata of peripherals, of which there are none.
+        sink.put(&[0; 4]);
+    }
+    sink.put(GENERAL_URI.as_bytes());
+    payload
+}

@@ -1,0 +1,45 @@
+//! What a person is warned of.
+
+use heapless::String;
+
+/// A text that is made up at run time; STATUSTEXT has room for 50 letters.
+pub type Warning = String<50>;
+
+/// The warnings that wait to be sent, two at the most, and the last one for who reads it later.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Warnings {
+    texts: [Warning; 2],
+    /// How many of them have come since all had been sent, and how many of those are sent.
+    come: usize,
+    sent: usize,
+    /// The place of the last one.
+    last: usize,
+}
+
+impl Warnings {
+    /// Of more than two at once, the first are told.
+    pub(super) fn push(&mut self, warning: Warning) {
+        if let Some(place) = self.texts.get_mut(self.come) {
+            *place = warning;
+            self.last = self.come;
+            self.come += 1;
+        }
+    }
+
+    /// The next to be sent.
+    pub(super) fn next(&mut self) -> Option<Warning> {
+        if self.sent == self.come {
+            self.come = 0;
+            self.sent = 0;
+            return None;
+        }
+        let next = self.texts.get(self.sent).cloned();
+        self.sent += 1;
+        next
+    }
+
+    /// The last one that has come, sent or not; empty if there was none.
+    pub(super) fn last(&self) -> &str {
+        self.texts.get(self.last).map_or("", String::as_str)
+    }
+}
