@@ -13,7 +13,7 @@ use std::{env, fs};
 use lzma_rust2::{CheckType, XzOptions, XzWriter};
 use table::{Kind, ParamId, TABLE};
 
-#[path = "src/mavlink/ftp/checksum.rs"]
+#[path = "src/checksum.rs"]
 mod checksum;
 
 #[allow(
@@ -30,7 +30,7 @@ const PARAMETER: u8 = 1;
 fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=src/params/table.rs");
-    println!("cargo::rerun-if-changed=src/mavlink/ftp/checksum.rs");
+    println!("cargo::rerun-if-changed=src/checksum.rs");
     let folder = env::var_os("OUT_DIR").expect("cargo sets it");
     let folder = Path::new(&folder);
     let parameter = compress(&parameters())?;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use siskin_control::drive::Setpoint;
-use siskin_control::esc::Esc;
+use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, BuildError, ParamId, Params};
 use siskin_control::store::{self, Integrity};
@@ -152,14 +152,11 @@ impl Device {
             faults,
             link_bytes_per_s,
         } = start;
-        let (mut params, integrity) = store::load(&mut flash, STORE);
-        let warning = match integrity {
-            Integrity::Sound | Integrity::Empty => None,
-            Integrity::Incomplete => {
-                Some("the stored parameters are not whole; an earlier save is in force")
-            }
-            Integrity::Corrupt | Integrity::Unreadable => return Err(StartError::CorruptStorage),
-        };
+        let mut loaded = store::load(&mut flash, STORE);
+        if matches!(loaded.integrity, Integrity::Corrupt | Integrity::Unreadable) {
+            return Err(StartError::CorruptStorage);
+        }
+        let params = &mut loaded.kept.params;
         let overrides: Vec<_> = overrides
             .into_iter()
             .map(|(id, value)| Override {
@@ -168,9 +165,10 @@ impl Device {
                 stored: params.get(id),
             })
             .collect();
-        apply(&overrides, &mut params);
+        apply(&overrides, params);
         let board = bench.sensing.board(bench.delay);
-        let (esc, throttle) = Esc::new(params, board, CAPTURE_HZ, link_bytes_per_s)?;
+        let (mut esc, throttle) = Esc::new(params.clone(), board, CAPTURE_HZ, link_bytes_per_s)?;
+        esc.recall(&loaded);
         wire.sow(bench.seed);
         let rig = Rig::new(bench, esc.config()?);
         let clock = Clock {
@@ -194,7 +192,7 @@ impl Device {
             task_due_ns: 0,
             faults: Timeline::new(faults),
         };
-        Ok((device, warning))
+        Ok((device, loaded.trouble()))
     }
 
     /// Simulated time since the start, ns.
@@ -355,16 +353,8 @@ impl Device {
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             match request {
                 Request::ParamsChanged => self.configure(),
-                Request::Save => {
-                    let result = self.save();
-                    self.esc.storage_done(&mut self.throttle, result);
-                }
-                Request::Load => {
-                    let result = self.load();
-                    self.esc.storage_done(&mut self.throttle, result);
-                }
-                Request::FactoryReset => {
-                    let result = self.factory_reset();
+                Request::Save | Request::Keep | Request::Load | Request::FactoryReset => {
+                    let result = self.store(request);
                     self.esc.storage_done(&mut self.throttle, result);
                 }
                 Request::Reboot => self.reboot(),
@@ -372,40 +362,32 @@ impl Device {
         }
     }
 
-    /// Stores the parameters; what the command line set stays unstored.
-    fn save(&mut self) -> Result<(), &'static str> {
-        let mut params = self.esc.params().clone();
+    /// Does what a request for storage asks for; what the command line set stays unstored.
+    fn store(&mut self, request: Request) -> Result<(), &'static str> {
+        let mut kept = self.esc.kept();
         for given in &self.overrides {
-            if params.get(given.id) == given.value {
+            if kept.params.get(given.id) == given.value {
                 // It was in range when it was stored.
-                let _ = params.set(given.id, given.stored);
+                let _ = kept.params.set(given.id, given.stored);
             }
         }
-        store::save(&mut self.flash, STORE, &params).map_err(store::StoreError::text)?;
-        self.persist()
-    }
-
-    /// The stored parameters under those of the command line, and how sound the former are.
-    fn stored(&mut self) -> (Params, Integrity) {
-        let (mut params, integrity) = store::load(&mut self.flash, STORE);
-        apply(&self.overrides, &mut params);
-        (params, integrity)
-    }
-
-    fn load(&mut self) -> Result<(), &'static str> {
-        let (params, integrity) = self.stored();
-        if matches!(integrity, Integrity::Corrupt | Integrity::Unreadable) {
-            return Err("storage: the stored parameters are corrupt");
+        let other = obey(request, &mut self.flash, STORE, &kept)?;
+        if let Some(mut kept) = other {
+            for given in &mut self.overrides {
+                given.stored = kept.params.get(given.id);
+            }
+            apply(&self.overrides, &mut kept.params);
+            self.esc
+                .replace(&mut self.throttle, &kept)
+                .map_err(|error| error.reason)?;
+            self.configure();
         }
-        self.replace(params)
-    }
-
-    fn factory_reset(&mut self) -> Result<(), &'static str> {
-        store::erase(&mut self.flash, STORE).map_err(store::StoreError::text)?;
-        let mut params = Params::default();
-        apply(&self.overrides, &mut params);
-        self.replace(params)?;
-        self.persist()
+        match request {
+            Request::Load => Ok(()),
+            // Nobody has asked whether it would survive a restart.
+            Request::Keep if !self.flash.is_persistent() => Ok(()),
+            _ => self.persist(),
+        }
     }
 
     fn persist(&self) -> Result<(), &'static str> {
@@ -417,14 +399,6 @@ impl Device {
             .map_err(|_| "storage: the file cannot be written")
     }
 
-    fn replace(&mut self, params: Params) -> Result<(), &'static str> {
-        self.esc
-            .replace_params(&mut self.throttle, params)
-            .map_err(|error| error.reason)?;
-        self.configure();
-        Ok(())
-    }
-
     fn configure(&mut self) {
         // Always, since what is in force has been built before.
         if let Ok(config) = self.esc.config() {
@@ -434,12 +408,19 @@ impl Device {
 
     /// Starts the ESC again; the shaft, the supply and the wire go on as they are.
     fn reboot(&mut self) {
-        let (params, _) = self.stored();
+        let mut loaded = store::load(&mut self.flash, STORE);
+        let params = &mut loaded.kept.params;
+        apply(&self.overrides, params);
         // What cannot be built now was never in force: the old values go on.
-        let Ok((esc, throttle)) = Esc::new(params, self.board, CAPTURE_HZ, self.link_bytes_per_s)
-        else {
+        let Ok((mut esc, throttle)) = Esc::new(
+            params.clone(),
+            self.board,
+            CAPTURE_HZ,
+            self.link_bytes_per_s,
+        ) else {
             return;
         };
+        esc.recall(&loaded);
         let Ok(config) = esc.config() else { return };
         self.esc = esc;
         self.throttle = throttle;

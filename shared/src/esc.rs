@@ -1,21 +1,27 @@
 //! The ESC outside the PWM interrupt: what the tasks of the firmware and the loop of the emulator
 //! share. It takes edges, frames and snapshots in, and gives set-points, frames and requests out.
 
+use heapless::Vec;
+
 use crate::answer::info::info;
 use crate::drive::{Config, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
+use crate::math::magnitude;
 use crate::mavlink::{Component, Context, Frame, Request, Warning};
 use crate::params::{Board, BuildError, ParamId, Params, build};
+use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Reach, Reached, Throttle, Told};
 use crate::tune::Tune;
 use crate::units::Scale;
 use sound::Sound;
-use storage::{Asker, Storage};
+use storage::{Asker, Storage, Unstored};
 
 mod sound;
 mod storage;
 mod wire;
+
+pub use storage::obey;
 
 /// Degrees below `LIM_TEMP_C` at which an over-temperature has ended.
 const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
@@ -33,6 +39,7 @@ pub struct Esc {
     component: Component,
     telemetry: Telemetry,
     charge: Charge,
+    recorder: Recorder,
     too_hot: bool,
     polled_us: Option<u64>,
     sound: Sound,
@@ -43,6 +50,8 @@ pub struct Esc {
     /// Whether the wire carried signals then.
     traffic: bool,
     storage: Storage,
+    /// There are two such commands.
+    unstored: Vec<Unstored, 2>,
 }
 
 /// What the drive runs with in place of the parameters.
@@ -136,6 +145,7 @@ impl Esc {
             component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),
+            recorder: Recorder::default(),
             params,
             too_hot: false,
             polled_us: None,
@@ -145,6 +155,7 @@ impl Esc {
             rests_since_us: None,
             traffic: false,
             storage: Storage::default(),
+            unstored: Vec::new(),
         }
     }
 
@@ -171,6 +182,13 @@ impl Esc {
         self.component.warn(warning);
     }
 
+    fn warn_of(&mut self, trouble: &str) {
+        let mut warning = Warning::new();
+        // Whatever is longer than a text on MAVLink would be cut there as well.
+        let _ = warning.push_str(trouble);
+        self.warn(warning);
+    }
+
     /// A frame that came in on any MAVLink link.
     pub fn receive(&mut self, throttle: &mut impl Reach, now_us: u64, frame: &Frame) {
         self.with_component(throttle, now_us, |component, context| {
@@ -191,7 +209,12 @@ impl Esc {
             self.sound.play(now_us, Tune::Start);
         }
         let before_us = self.polled_us.replace(now_us).unwrap_or(now_us);
-        self.observe(snapshot, temperature_c, now_us.saturating_sub(before_us));
+        self.observe(
+            now_us,
+            snapshot,
+            temperature_c,
+            now_us - before_us.min(now_us),
+        );
         let standing = throttle.reach(|throttle| throttle.poll(now_us, &self.telemetry));
         self.telemetry.armed = standing.armed;
         self.telemetry.signal = standing.signal;
@@ -218,7 +241,7 @@ impl Esc {
     }
 
     /// Takes in what the drive and the board tell.
-    fn observe(&mut self, snapshot: &Snapshot, temperature_c: f32, time_us: u64) {
+    fn observe(&mut self, now_us: u64, snapshot: &Snapshot, temperature_c: f32, time_us: u64) {
         let limit_c = self.params.get(ParamId::LimTempC);
         let limit_c = if self.too_hot {
             limit_c - TEMPERATURE_HYSTERESIS_C
@@ -232,26 +255,53 @@ impl Esc {
             .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();
         self.telemetry.temperature_c = temperature_c;
+        let sight = Sight {
+            phase: snapshot.phase,
+            faults: snapshot.faults,
+            temperature_c,
+            phase_a: self.scale.amperes(magnitude(snapshot.i.d, snapshot.i.q)),
+            time_us: u32::try_from(time_us).unwrap_or(u32::MAX),
+        };
+        let rests = self.recorder.look(&mut self.telemetry.statistics, &sight);
+        if rests {
+            self.storage.changed(now_us);
+        }
     }
 
     /// What only the caller can do. [`Request::ParamsChanged`] has been done as far as this side
     /// goes: the interrupt shall run with [`Esc::config`] from now on. A request for storage waits
     /// until the bridge rests and the one before has ended; nothing turns the motor from then on
-    /// until [`Esc::storage_done`].
+    /// until [`Esc::storage_done`]. A restart waits for storage.
     pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
+        let now_us = self.polled_us.unwrap_or(0);
         let request = self.component.take_request();
-        match request {
-            Some(Request::ParamsChanged) => self.apply(throttle),
-            Some(Request::Reboot) => {}
-            Some(Request::Save | Request::Load | Request::FactoryReset) | None => {
-                self.storage.ask(request);
-                if self.storage.waits() && self.may_store() && throttle.reach(Throttle::store) {
-                    return self.storage.take();
-                }
-                return None;
-            }
+        if self.component.take_changed() {
+            self.storage.changed(now_us);
         }
-        request
+        match request {
+            Some(Request::ParamsChanged) => {
+                self.apply(throttle);
+                return request;
+            }
+            Some(Request::Reboot) => self.storage.reboot(),
+            _ => self.storage.ask(request),
+        }
+        if self.storage.take_reboot() {
+            return Some(Request::Reboot);
+        }
+        if !self.drive().stopped && self.storage.cancel_reboot() {
+            self.component
+                .tell_stored(Err("No reboot: the motor turns"));
+        }
+        let stores = self.storage.waits(now_us) && self.may_store();
+        if stores && throttle.reach(Throttle::store) {
+            let request = self.storage.take(now_us);
+            if request != Some(Request::Keep) {
+                self.unstored.clear();
+            }
+            return request;
+        }
+        None
     }
 
     /// Flash stalls the chip for up to half a second, in which the bridge is off and nothing is
@@ -271,28 +321,12 @@ impl Esc {
         self.telemetry.drive(self.command)
     }
 
-    /// Puts other parameters in force, as loaded from storage. The interrupt shall run with
-    /// [`Esc::config`] afterwards.
-    ///
-    /// # Errors
-    /// The parameter that does not fit the board; nothing has changed then.
-    pub fn replace_params(
-        &mut self,
-        throttle: &mut impl Reach,
-        params: Params,
-    ) -> Result<(), BuildError> {
-        self.given.check(&params, &self.board)?;
-        self.params = params;
-        self.apply(throttle);
-        Ok(())
-    }
-
     /// Tells how a request for storage ended, so that it is acknowledged, and lets the motor turn
     /// again.
     pub fn storage_done(&mut self, throttle: &mut impl Reach, result: Result<(), &'static str>) {
         throttle.reach(Throttle::stored);
-        match self.storage.done() {
-            Some(Asker::Wire) => self.component.tell_stored(result),
+        match self.storage.done(result.is_ok()) {
+            Some(Asker::Wire | Asker::Nobody) => self.component.tell_stored(result),
             Some(Asker::Mavlink) => self.component.storage_done(result),
             None => {}
         }

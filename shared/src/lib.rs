@@ -7,11 +7,11 @@
 //! converter a bridge's next period ([`drive::step`]), by way of the papers' blocks ([`control`])
 //! and the limits ([`protection`]). What the drive has done becomes [`telemetry`], and that goes
 //! out by [`mavlink`]. [`params`] turns the table of parameters into the configuration that all of
-//! it reads, and [`store`] keeps them. [`tune`] has the tunes that the motor plays. [`throttle`] and
+//! it reads, and [`store`] keeps them, with [`statistics`] and what else survives. [`tune`] has the tunes that the motor plays. [`throttle`] and
 //! [`esc`] tie together what is outside the PWM interrupt.
 //!
 //! Dependencies run one way: `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
-//! `telemetry` ← {`throttle`, `mavlink`} ← `esc`. `params` builds the configurations of the others.
+//! {`telemetry`, `statistics`} ← {`throttle`, `mavlink`} ← `store` ← `esc`. `params` builds the configurations of the others.
 //!
 //! # Numbers
 //! Fixed point with the fraction bits in the type ([`math`]), in units in which a product needs
@@ -33,6 +33,7 @@
 extern crate std;
 
 pub mod answer;
+mod checksum;
 pub mod control;
 pub mod drive;
 pub mod esc;
@@ -43,6 +44,7 @@ pub mod mavlink;
 pub mod params;
 pub mod protection;
 pub mod setpoint;
+pub mod statistics;
 pub mod store;
 pub mod telemetry;
 pub mod throttle;

@@ -4,6 +4,7 @@ use crate::drive::{Faults, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::input::signal::Signal;
 use crate::math::{SQRT_3, square_root};
+use crate::statistics::Statistics;
 use crate::units::Scale;
 
 /// The state of the ESC as telemetry reports it.
@@ -35,6 +36,8 @@ pub struct Telemetry {
     pub signal: Option<Signal>,
     /// What of the control's inside can be streamed, in the order of [`SIGNALS`].
     pub signals: [f32; SIGNALS.len()],
+    /// What has happened in its life.
+    pub statistics: Statistics,
 }
 
 /// Names of what of the control's inside can be streamed, in the order of the bits of `TEL_SIGNALS`:
@@ -89,6 +92,7 @@ impl Telemetry {
             bad_share: 0.0,
             signal: None,
             signals: [0.0; SIGNALS.len()],
+            statistics: Statistics::NONE,
         }
     }
 

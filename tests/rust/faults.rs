@@ -122,6 +122,10 @@ impl Station {
             },
         );
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
+            if request == Request::Keep {
+                self.esc.storage_done(&mut self.throttle, Ok(()));
+                continue;
+            }
             assert_eq!(request, Request::ParamsChanged);
             let config = self.esc.config().expect("what is in force fits");
             self.rig.configure(config);

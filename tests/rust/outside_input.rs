@@ -11,6 +11,7 @@ use siskin_control::drive::{Setpoint, Snapshot, State};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, ParamId, Params};
+use siskin_control::store::Kept;
 use siskin_control::throttle::Throttle;
 use siskin_emulator::rig::Bench;
 use siskin_emulator::wire::Wire;
@@ -33,7 +34,7 @@ struct Desk {
     board: Board,
     esc: Esc,
     throttle: Throttle,
-    stored: Params,
+    stored: Kept,
     wire: Wire,
     receiver: Receiver,
     /// Reads what the ESC sends.
@@ -54,7 +55,7 @@ impl Desk {
             board,
             esc,
             throttle,
-            stored: Params::default(),
+            stored: Kept::default(),
             wire: Wire::detached(),
             receiver: Receiver::default(),
             listener: Receiver::default(),
@@ -108,26 +109,26 @@ impl Desk {
     fn answer(&mut self, request: Request) {
         let result = match request {
             Request::ParamsChanged => return,
-            Request::Save => {
-                self.stored = self.esc.params().clone();
+            Request::Save | Request::Keep => {
+                self.stored = self.esc.kept();
                 Ok(())
             }
             Request::Load => self.replace(self.stored.clone()),
             Request::FactoryReset => {
-                self.stored = Params::default();
-                self.replace(Params::default())
+                self.stored = Kept::default();
+                self.replace(Kept::default())
             }
             Request::Reboot => {
-                (self.esc, self.throttle) = Self::esc(self.stored.clone(), self.board);
+                (self.esc, self.throttle) = Self::esc(self.stored.params.clone(), self.board);
                 return;
             }
         };
         self.esc.storage_done(&mut self.throttle, result);
     }
 
-    fn replace(&mut self, params: Params) -> Result<(), &'static str> {
+    fn replace(&mut self, kept: Kept) -> Result<(), &'static str> {
         self.esc
-            .replace_params(&mut self.throttle, params)
+            .replace(&mut self.throttle, &kept)
             .map_err(|error| error.reason)
     }
 

@@ -34,9 +34,9 @@ fn run(device: &mut Device, until_ms: u64) -> u32 {
 }
 
 fn set(device: &mut Device, amps: f32) {
-    let mut params = device.esc.params().clone();
-    params.set(ParamId::LimPhaseA, amps).unwrap();
-    device.replace(params).unwrap();
+    let mut kept = device.esc.kept();
+    kept.params.set(ParamId::LimPhaseA, amps).unwrap();
+    device.esc.replace(&mut device.throttle, &kept).unwrap();
 }
 
 fn limit(device: &Device) -> f32 {
@@ -54,20 +54,20 @@ fn a_flash_that_refuses_keeps_what_was_stored() {
     };
     let mut device = device(flash, vec![fails]);
     set(&mut device, 15.0);
-    assert_eq!(device.save(), Ok(()));
+    assert_eq!(device.store(Request::Save), Ok(()));
 
     run(&mut device, 150);
     set(&mut device, 12.0);
-    let refused = device.save().unwrap_err();
+    let refused = device.store(Request::Save).unwrap_err();
     assert!(refused.starts_with("storage"), "{refused}");
-    assert!(device.factory_reset().is_err());
+    assert!(device.store(Request::FactoryReset).is_err());
     assert_eq!(limit(&device), 12.0, "in force until the restart");
     device.reboot();
     assert_eq!(limit(&device), 15.0);
 
     run(&mut device, 250);
     set(&mut device, 12.0);
-    assert_eq!(device.save(), Ok(()));
+    assert_eq!(device.store(Request::Save), Ok(()));
     device.reboot();
     assert_eq!(limit(&device), 12.0);
 }

@@ -8,17 +8,17 @@ use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Instant, Ticker};
-use siskin_control::esc::Esc;
+use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::ParamId;
 
+use super::health;
 use super::light::Light;
 use super::supervisor::Supervisor;
 use super::throttle::Port;
 use super::trouble::Teller;
-use super::{health, store};
 use crate::exchange::{ConfigWriter, SnapshotReader};
-use crate::storage::Storage;
+use crate::storage::{Storage, range};
 use crate::{interrupt, last_words};
 
 /// How often what is due is looked for.
@@ -126,7 +126,7 @@ impl Desk {
     fn obey(&mut self, request: Request) {
         match request {
             Request::ParamsChanged => self.changed = true,
-            Request::Save | Request::Load | Request::FactoryReset => {
+            Request::Save | Request::Keep | Request::Load | Request::FactoryReset => {
                 let result = self.store(request);
                 self.esc.storage_done(&mut self.throttle, result);
             }
@@ -136,12 +136,12 @@ impl Desk {
 
     #[inline(never)]
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
-        let Some(params) = store::obey(request, &mut self.flash, self.esc.params())? else {
+        let Some(kept) = obey(request, &mut self.flash, range(), &self.esc.kept())? else {
             return Ok(());
         };
         self.changed = true;
         self.esc
-            .replace_params(&mut self.throttle, params)
+            .replace(&mut self.throttle, &kept)
             .map_err(|error| error.reason)
     }
 

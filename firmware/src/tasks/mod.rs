@@ -12,7 +12,6 @@ pub(crate) mod kiss;
 pub(crate) mod light;
 pub(crate) mod mavlink;
 mod start;
-pub(crate) mod store;
 pub(crate) mod supervisor;
 pub(crate) mod throttle;
 pub(crate) mod trouble;

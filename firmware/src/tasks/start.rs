@@ -7,6 +7,7 @@ use siskin_control::esc::Esc;
 use siskin_control::image::Image;
 use siskin_control::mavlink::{Receiver, Warning};
 use siskin_control::params::{Board, ParamId, Params, build};
+use siskin_control::store;
 use siskin_control::throttle::Throttle;
 use static_cell::StaticCell;
 
@@ -16,10 +17,11 @@ use super::mavlink::Desk;
 use super::supervisor::Supervisor;
 use super::throttle::{Listener, Port};
 use super::trouble::Teller;
-use super::{kiss, mavlink, store, throttle};
+use super::{kiss, mavlink, throttle};
 use crate::board::wire::TICK_HZ;
 use crate::board::{BOARD, Bridge, Converters, Hardware};
 use crate::exchange::{InterruptEnd, SnapshotReader};
+use crate::storage::{Storage, range};
 use crate::text::push;
 use crate::{exchange, interrupt, last_words};
 
@@ -38,11 +40,7 @@ const LINE_BYTES: usize = 512;
 /// When it is called again, or the defaults do not fit the board.
 pub fn start(spawner: Spawner, hardware: Hardware) {
     let mut flash = hardware.flash;
-    let (params, trouble) = store::load(&mut flash);
-    let (esc, port) = power_up(&params);
-    if let Some(text) = trouble {
-        warn(esc, text);
-    }
+    let (esc, port) = recall(&mut flash);
     if let Some(text) = last_words::take() {
         esc.warn(text);
     }
@@ -99,6 +97,25 @@ fn warn(esc: &mut Esc, text: &str) {
     esc.warn(warning);
 }
 
+/// The ESC and its throttle as they were left. All that is stored is read twice: beside the ESC that is
+/// being made, the stack has room for the parameters alone.
+#[inline(never)]
+fn recall(flash: &mut Storage) -> (&'static mut Esc, Port) {
+    let (esc, port) = power_up(&stored_params(flash));
+    recall_rest(esc, flash);
+    (esc, port)
+}
+
+#[inline(never)]
+fn stored_params(flash: &mut Storage) -> Params {
+    store::load(flash, range()).kept.params
+}
+
+#[inline(never)]
+fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
+    esc.recall(&store::load(flash, range()));
+}
+
 /// The ESC and its throttle with these parameters or, where they do not fit the board, with the
 /// defaults.
 // Out of line, as what follows: the stack that one takes is free for the next.
@@ -112,17 +129,24 @@ fn power_up(params: &Params) -> (&'static mut Esc, Port) {
         ..BOARD
     };
     let defaults = Params::default();
-    let (params, config) = match build(params, &board) {
-        Ok(config) => (params, Ok(config)),
-        Err(_) => (&defaults, build(&defaults, &board)),
+    let params = if fits(params, &board) {
+        params
+    } else {
+        &defaults
     };
-    let config = config.expect("the defaults fit every board");
+    let config = build(params, &board).expect("the defaults fit every board");
     let (esc, port) = make(params, board, &config);
     if core::ptr::eq(params, &raw const defaults) {
         let text = "Parameters do not fit the board: defaults in force";
         warn(esc, text);
     }
     (esc, port)
+}
+
+/// A configuration takes 0.9 KB: the stack has room for one beside the ESC that is being made.
+#[inline(never)]
+fn fits(params: &Params, board: &Board) -> bool {
+    build(params, board).is_ok()
 }
 
 /// The two, made where they stay: they take 3 KB.

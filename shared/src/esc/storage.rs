@@ -1,6 +1,19 @@
-//! Requests for storage, one at a time: how each ends must reach the one who asked.
+//! Requests for storage, one at a time: how each ends must reach the one who asked. What has changed
+//! is stored without being asked for.
 
+use core::ops::Range;
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::Esc;
 use crate::mavlink::Request;
+use crate::params::{BuildError, ParamId};
+use crate::store::{self, Integrity, Kept, Loaded, StoreError};
+use crate::throttle::Reach;
+
+/// For how long nothing must have changed before what has is stored, µs: a client that writes a whole
+/// list of parameters wears the flash once.
+const QUIET_US: u64 = 1_000_000;
 
 /// Who has asked for storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +22,8 @@ pub(super) enum Asker {
     Wire,
     /// A MAVLink command, which is acknowledged.
     Mavlink,
+    /// Nobody: something has changed.
+    Nobody,
 }
 
 /// What waits, and what is under way.
@@ -17,8 +32,14 @@ pub(super) struct Storage {
     /// MAVLink has one at a time, and refuses others.
     mavlink: Option<Request>,
     save: bool,
+    /// When something changed that is to be stored, for the last time.
+    changed_us: Option<u64>,
+    /// Whether the ESC is to start again when nothing waits any more.
+    reboot: bool,
     /// Whose request the caller has been given.
     under_way: Option<Asker>,
+    /// Whether it has been told that what changes cannot be stored.
+    failed: bool,
 }
 
 impl Storage {
@@ -32,25 +53,166 @@ impl Storage {
         self.save = true;
     }
 
+    /// Something that is kept has changed.
+    pub(super) fn changed(&mut self, now_us: u64) {
+        self.changed_us = Some(now_us);
+    }
+
+    /// MAVLink asks for a restart, which waits for what waits to be stored.
+    pub(super) fn reboot(&mut self) {
+        self.reboot = true;
+    }
+
+    /// Whether the restart is due now.
+    pub(super) fn take_reboot(&mut self) -> bool {
+        let waits = self.under_way.is_some() || self.next(0).is_some();
+        !waits && core::mem::take(&mut self.reboot)
+    }
+
+    /// Gives the restart up; whether there was to be one.
+    pub(super) fn cancel_reboot(&mut self) -> bool {
+        core::mem::take(&mut self.reboot)
+    }
+
     /// Whether a request waits, and none is under way.
-    pub(super) fn waits(&self) -> bool {
-        self.under_way.is_none() && (self.mavlink.is_some() || self.save)
+    pub(super) fn waits(&self, now_us: u64) -> bool {
+        self.under_way.is_none() && self.next(now_us).is_some()
+    }
+
+    fn next(&self, now_us: u64) -> Option<(Asker, Request)> {
+        let quiet = |changed_us| self.reboot || now_us.saturating_sub(changed_us) >= QUIET_US;
+        if let Some(request) = self.mavlink {
+            Some((Asker::Mavlink, request))
+        } else if self.save {
+            Some((Asker::Wire, Request::Save))
+        } else {
+            let due = self.changed_us.is_some_and(quiet);
+            due.then_some((Asker::Nobody, Request::Keep))
+        }
     }
 
     /// The next request, which is under way now.
-    pub(super) fn take(&mut self) -> Option<Request> {
-        if let Some(request) = self.mavlink.take() {
-            self.under_way = Some(Asker::Mavlink);
-            return Some(request);
+    pub(super) fn take(&mut self, now_us: u64) -> Option<Request> {
+        let (asker, request) = self.next(now_us)?;
+        self.under_way = Some(asker);
+        match asker {
+            Asker::Mavlink => self.mavlink = None,
+            Asker::Wire => self.save = false,
+            Asker::Nobody => {}
         }
-        core::mem::take(&mut self.save).then(|| {
-            self.under_way = Some(Asker::Wire);
-            Request::Save
-        })
+        if request != Request::Load {
+            // All else is stored with it.
+            self.changed_us = None;
+        }
+        Some(request)
     }
 
-    /// The request that was under way has ended: whose it was.
-    pub(super) fn done(&mut self) -> Option<Asker> {
-        self.under_way.take()
+    /// The request that was under way has ended: who is to be told of it.
+    pub(super) fn done(&mut self, well: bool) -> Option<Asker> {
+        let asker = self.under_way.take()?;
+        let failed = core::mem::replace(&mut self.failed, !well && asker == Asker::Nobody);
+        // Once is enough where nobody has asked.
+        (asker != Asker::Nobody || (self.failed && !failed)).then_some(asker)
+    }
+}
+
+/// A value that a command on the throttle wire has set, which is not stored until that is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unstored {
+    pub(super) id: ParamId,
+    pub(super) value: f32,
+    /// What is stored meanwhile.
+    pub(super) stored: f32,
+}
+
+impl Unstored {
+    /// Puts the value that is stored in the place of the one in force, if that is still this one.
+    fn hide(self, kept: &mut Kept) {
+        if kept.params.get(self.id) == self.value {
+            // It was in force once.
+            let _ = kept.params.set(self.id, self.stored);
+        }
+    }
+}
+
+/// Does what a request for storage asks for, with what [`Esc::kept`] gives for it. Returns what shall
+/// be in force from now on, if that is something else.
+///
+/// # Errors
+/// A few words on why what it promises would not survive the loss of power.
+pub fn obey<F: NorFlash>(
+    request: Request,
+    flash: &mut F,
+    range: Range<u32>,
+    kept: &Kept,
+) -> Result<Option<Kept>, &'static str> {
+    match request {
+        Request::Save | Request::Keep => {
+            store::save(flash, range, kept).map_err(StoreError::text)?;
+            Ok(None)
+        }
+        Request::Load => {
+            let loaded = store::load(flash, range);
+            match (loaded.integrity, loaded.trouble()) {
+                (Integrity::Corrupt | Integrity::Unreadable, Some(trouble)) => Err(trouble),
+                _ => Ok(Some(Kept {
+                    statistics: kept.statistics,
+                    signing: kept.signing,
+                    ..loaded.kept
+                })),
+            }
+        }
+        Request::FactoryReset => {
+            let kept = Kept {
+                statistics: kept.statistics,
+                ..Kept::default()
+            };
+            store::replace(flash, range, &kept).map_err(StoreError::text)?;
+            Ok(Some(kept))
+        }
+        Request::ParamsChanged | Request::Reboot => Ok(None),
+    }
+}
+
+impl Esc {
+    /// Goes on from what was stored, at power-up. It has been made with the parameters of it already.
+    pub fn recall(&mut self, loaded: &Loaded) {
+        let kept = &loaded.kept;
+        self.component.keep_intervals(&kept.intervals);
+        self.component.keep_signing(kept.signing);
+        self.telemetry.statistics = kept.statistics;
+        if let Some(trouble) = loaded.trouble() {
+            self.warn_of(trouble);
+        }
+    }
+
+    /// What is to be stored now.
+    pub fn kept(&self) -> Kept {
+        let mut kept = Kept {
+            params: self.params.clone(),
+            intervals: self.component.kept_intervals(),
+            statistics: self.telemetry.statistics,
+            signing: self.component.kept_signing(),
+        };
+        for unstored in &self.unstored {
+            unstored.hide(&mut kept);
+        }
+        kept
+    }
+
+    /// Puts other values in force, as [`obey`] gives them. The interrupt shall run with
+    /// [`Esc::config`] afterwards.
+    ///
+    /// # Errors
+    /// The parameter that does not fit the board; nothing has changed then.
+    pub fn replace(&mut self, throttle: &mut impl Reach, kept: &Kept) -> Result<(), BuildError> {
+        self.given.check(&kept.params, &self.board)?;
+        self.params = kept.params.clone();
+        self.component.keep_intervals(&kept.intervals);
+        if kept.signing.is_none() {
+            self.component.forget_signing();
+        }
+        self.apply(throttle);
+        Ok(())
     }
 }

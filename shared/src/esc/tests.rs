@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::answer::{Answer, Ask};
-use crate::drive::{Direction, Setpoint, State};
+use crate::drive::{Direction, Fault, Faults, Setpoint, State};
 use crate::image::Image;
 use crate::input::dshot::{self, Rate, edges};
 use crate::input::signal::Signal;
@@ -16,6 +16,7 @@ use mavlink::dialects::ardupilotmega::{
 use mavlink::{MavlinkVersion, Message, MessageData};
 
 mod actions;
+mod keep;
 mod storage;
 
 const TICK_HZ: u32 = 170_000_000;
@@ -76,7 +77,7 @@ impl Bench {
             .poll(throttle, self.now_us, &self.snapshot, 25.0, &mut |frame| {
                 let mut id = [0; 4];
                 id[..3].copy_from_slice(&frame[7..10]);
-                let payload = &frame[10..frame.len() - 2];
+                let payload = &frame[10..][..usize::from(frame[1])];
                 let id = u32::from_le_bytes(id);
                 if ![
                     STATUSTEXT_DATA::ID,

@@ -2,6 +2,7 @@
 //! commands, takes the stick's calibration, and tells a person what has happened.
 
 use super::Esc;
+use super::storage::Unstored;
 use crate::input::News;
 use crate::input::calibration::Step;
 use crate::input::command::Order;
@@ -66,10 +67,10 @@ impl Esc {
         match order {
             Order::Beacon(beacon) => self.sound.play(now_us, Tune::Beacon(beacon)),
             Order::Direction { reversed } => {
-                self.change(&[(ParamId::MotDir, number(reversed))]);
+                self.change_for_now(ParamId::MotDir, number(reversed));
             }
             Order::TwoDirections(on) => {
-                self.change(&[(ParamId::Inp3d, number(on))]);
+                self.change_for_now(ParamId::Inp3d, number(on));
             }
             Order::Save => self.storage.save(),
             Order::Spin { opposite } => {
@@ -83,6 +84,28 @@ impl Esc {
             }
             Order::Silent => self.sound.toggle_silent(),
             Order::Info | Order::Extended(_) => {}
+        }
+    }
+
+    /// Sets a parameter until the next start, or until the wire asks for it to be stored.
+    fn change_for_now(&mut self, id: ParamId, value: f32) {
+        let before = self.params.get(id);
+        if !self.change(&[(id, value)]) {
+            return;
+        }
+        let known = self.unstored.iter_mut().find(|known| known.id == id);
+        match known {
+            // What has been set otherwise since is stored.
+            Some(known) if before == known.value => known.value = value,
+            Some(known) => (known.value, known.stored) = (value, before),
+            None => {
+                // There is room for both.
+                let _ = self.unstored.push(Unstored {
+                    id,
+                    value,
+                    stored: before,
+                });
+            }
         }
     }
 

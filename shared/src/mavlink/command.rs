@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::{
 use super::component::{Act, Context, Request};
 use super::ftp;
 use super::identity::{Address, Identity, Role};
-use super::receiver::Frame;
+use super::receiver::{Frame, is_signed};
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;
@@ -55,6 +55,7 @@ const REPEAT_INT_US: u64 = 1_000_000;
 pub(super) struct Command {
     from: Address,
     trust: Trust,
+    signed: bool,
     at_us: u64,
     /// Whether it names exactly this component of this system.
     exact: bool,
@@ -81,6 +82,7 @@ impl Command {
         Self {
             from: frame.from,
             trust,
+            signed: is_signed(frame.raw),
             at_us: now_us,
             exact,
             number: frame.u16(28),
@@ -91,8 +93,17 @@ impl Command {
 
     /// Whether its sender may have it obeyed: who may only ask gets messages.
     fn is_allowed(&self) -> bool {
-        let asks = matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL);
-        self.trust == Trust::Full || asks
+        self.trust == Trust::Full || self.asks()
+    }
+
+    fn asks(&self) -> bool {
+        matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL)
+    }
+
+    /// Whether there is something to be kept once it has been obeyed: an interval, and the time of a
+    /// signature, which must not be taken again after a reset.
+    fn leaves(&self) -> bool {
+        self.number == SET_MESSAGE_INTERVAL || (self.signed && !self.asks())
     }
 
     /// Whether this is the same command sent again because its ACK did not arrive. Values are
@@ -127,6 +138,8 @@ pub(super) struct Commands {
     params_changed: bool,
     request: Option<Request>,
     reboot: bool,
+    /// Whether one has left something to be kept.
+    left: bool,
 }
 
 impl Commands {
@@ -141,6 +154,7 @@ impl Commands {
             params_changed: false,
             request: None,
             reboot: false,
+            left: false,
         }
     }
 
@@ -166,6 +180,7 @@ impl Commands {
             (_, Some((_, result))) => Some(result),
             _ => self.obey(command, drive, context, schedule, replies),
         };
+        self.left |= command.leaves() && matches!(result, Some(ACCEPTED) | None);
         if let Some(result) = result {
             replies.ack(command.from, command.number, result);
         }
@@ -284,6 +299,11 @@ impl Commands {
     /// The next thing for the ESC to do.
     pub(super) fn take_act(&mut self) -> Option<Act> {
         self.act.take()
+    }
+
+    /// Whether one has left something to be kept since this was asked.
+    pub(super) fn take_left(&mut self) -> bool {
+        core::mem::take(&mut self.left)
     }
 
     /// `replies_sent`: whether nothing waits to be sent. A reboot waits for its ACK.

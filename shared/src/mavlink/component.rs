@@ -15,7 +15,7 @@ use super::pace::Pace;
 use super::parameter::{self, List};
 use super::receiver::Frame;
 use super::reply::{PING, Replies, Reply, Writer};
-use super::schedule::{self, Schedule, Stream};
+use super::schedule::{self, Intervals, Schedule, Stream};
 use super::signing::{Kept, Signing, Trust};
 use super::warnings::{Warning, Warnings};
 use super::{check, ftp, messages, news};
@@ -60,12 +60,14 @@ impl Context<'_> {
 pub enum Request {
     /// Put the parameters in force: build the drive's configuration anew.
     ParamsChanged,
-    /// Write the parameters to flash, then call [`Component::storage_done`].
+    /// Write what is kept to flash, then call [`Component::storage_done`].
     Save,
-    /// Read the parameters from flash and put them in force, then call
+    /// The same, but nobody has asked for it.
+    Keep,
+    /// Read the parameters and intervals from flash and put them in force, then call
     /// [`Component::storage_done`].
     Load,
-    /// Erase the stored parameters and put the defaults in force, then call
+    /// Erase all but the statistics and put the defaults in force, then call
     /// [`Component::storage_done`].
     FactoryReset,
     /// Start again; the ACK has been sent.
@@ -94,6 +96,10 @@ pub struct Component {
     schedule: Schedule,
     commands: Commands,
     params_changed: bool,
+    /// Whether something that is kept has changed.
+    keep: bool,
+    /// Whether the key is to go once the replies have left.
+    unsign: bool,
     announcer: Announcer,
     /// As of the last poll.
     faults: Faults,
@@ -126,6 +132,8 @@ impl Component {
             commands: Commands::new(&identity),
             identity,
             params_changed: false,
+            keep: false,
+            unsign: false,
             announcer: Announcer::new(),
             faults: Faults::NONE,
             infos: 0,
@@ -167,7 +175,7 @@ impl Component {
             PARAM_REQUEST_LIST_DATA::ID => self.list.start(),
             PARAM_REQUEST_READ_DATA::ID => parameter::read(frame, alone, &mut self.replies),
             PARAM_SET_DATA::ID => {
-                self.params_changed |= parameter::set(
+                let taken = parameter::set(
                     frame,
                     trust,
                     alone,
@@ -175,6 +183,8 @@ impl Component {
                     context,
                     &mut self.replies,
                 );
+                self.params_changed |= taken;
+                self.keep |= taken;
             }
             COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => self.commands.handle(
                 &Command::read(
@@ -215,6 +225,8 @@ impl Component {
     fn set_up_signing(&mut self, frame: &Frame) {
         let signing = &mut self.writer.sender.signing;
         signing.set_up(frame.bytes(10), frame.u64(0));
+        self.keep = true;
+        self.unsign = false;
         let text = if signing.signs() {
             "Signing: only who has the key may change anything"
         } else {
@@ -231,7 +243,27 @@ impl Component {
 
     /// The key and the time of signatures, to be kept over a loss of power.
     pub fn kept_signing(&self) -> Option<Kept> {
-        self.writer.sender.signing.kept()
+        self.writer.sender.signing.kept().filter(|_| !self.unsign)
+    }
+
+    /// Forgets the key, once the replies that wait have been signed with it.
+    pub fn forget_signing(&mut self) {
+        self.unsign = true;
+    }
+
+    /// How often messages are sent, as kept from before.
+    pub fn keep_intervals(&mut self, intervals: &Intervals) {
+        self.schedule.keep(intervals);
+    }
+
+    /// How often messages are sent, to be kept over a loss of power.
+    pub fn kept_intervals(&self) -> Intervals {
+        self.schedule.intervals()
+    }
+
+    /// Whether something that is kept has changed since this was asked.
+    pub fn take_changed(&mut self) -> bool {
+        core::mem::take(&mut self.keep) | self.commands.take_left()
     }
 
     /// Sends what waits and what is due, each frame by one call of `send`. To be called every
@@ -244,6 +276,9 @@ impl Component {
         self.tell_faults(context, send);
         while let Some(reply) = self.replies.next() {
             self.send_reply(reply, context, send);
+        }
+        if core::mem::take(&mut self.unsign) {
+            self.keep_signing(None);
         }
         if self.replies.take_overrun() {
             self.text(
@@ -290,7 +325,7 @@ impl Component {
         self.commands.take_act()
     }
 
-    /// [`Request::Save`], [`Request::Load`] or [`Request::FactoryReset`] is done: whether what it
+    /// A request for storage is done: whether what it
     /// promises would survive the loss of power now, or a few words on why not. The command is
     /// acknowledged with this.
     pub fn storage_done(&mut self, result: Result<(), &'static str>) {

@@ -27,6 +27,7 @@ mod warnings;
 pub use component::{Act, Component, Context, Request};
 pub use identity::Address;
 pub use receiver::{Counters, Frame, Receiver};
+pub use schedule::Intervals;
 pub use signing::{Kept as KeptSigning, Key};
 pub use warnings::Warning;
 

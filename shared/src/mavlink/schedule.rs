@@ -12,7 +12,7 @@ use crate::params::{ParamId, Params};
 
 const SECOND_US: u64 = 1_000_000;
 
-/// A message that is sent again and again.
+/// A message that is sent again and again. Their order is that in which intervals are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stream {
     Heartbeat,
@@ -89,6 +89,49 @@ pub(super) enum Interval {
     Us(u32),
 }
 
+impl Interval {
+    /// As it is stored.
+    fn bits(self) -> u32 {
+        match self {
+            Self::Default => 0,
+            Self::Off => u32::MAX,
+            Self::Us(interval_us) => interval_us,
+        }
+    }
+
+    fn from_bits(bits: u32) -> Option<Self> {
+        match bits {
+            0 => Some(Self::Default),
+            u32::MAX => Some(Self::Off),
+            // MESSAGE_INTERVAL is an i32.
+            _ => i32::try_from(bits).is_ok().then_some(Self::Us(bits)),
+        }
+    }
+}
+
+/// How often messages are sent, in place of what the parameters say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Intervals([u32; Stream::ALL.len()]);
+
+impl Intervals {
+    /// Words under which they are stored.
+    pub(crate) const WORDS: usize = Stream::ALL.len();
+
+    /// One of the words; zero is as the parameters say.
+    pub(crate) fn word(&self, word: usize) -> u32 {
+        self.0[word]
+    }
+
+    /// Takes a stored word; whether it can be one.
+    pub(crate) fn set_word(&mut self, word: usize, bits: u32) -> bool {
+        let fits = Interval::from_bits(bits).is_some();
+        if fits {
+            self.0[word] = bits;
+        }
+        fits
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Timer {
     interval: Interval,
@@ -138,6 +181,20 @@ impl Schedule {
         }
         self.timers[stream as usize].interval = interval;
         true
+    }
+
+    /// What is to be kept over a loss of power.
+    pub(super) fn intervals(&self) -> Intervals {
+        Intervals(self.timers.map(|timer| timer.interval.bits()))
+    }
+
+    /// Goes on with what was kept.
+    pub(super) fn keep(&mut self, intervals: &Intervals) {
+        for (stream, bits) in Stream::ALL.into_iter().zip(intervals.0) {
+            let interval = Interval::from_bits(bits).unwrap_or(Interval::Default);
+            // The heartbeat's stays as it is.
+            self.set(stream, interval);
+        }
     }
 
     /// Microseconds between two, none when it is off.

@@ -83,7 +83,7 @@ pub(super) struct Signing {
 impl Signing {
     /// With what was kept from before the start; no key means that nothing is signed.
     pub(super) fn new(kept: Option<Kept>) -> Self {
-        let floor = kept.map_or(0, |kept| (u64::from(kept.newest) + 1 << KEPT_SHIFT) - 1);
+        let floor = kept.map_or(0, |kept| ((u64::from(kept.newest) + 1) << KEPT_SHIFT) - 1);
         Self {
             key: kept.map(|kept| kept.key),
             newest: floor,
@@ -96,7 +96,7 @@ impl Signing {
 
     /// What is to be kept.
     pub(super) fn kept(&self) -> Option<Kept> {
-        let newest = u32::try_from(self.newest >> KEPT_SHIFT).unwrap_or(u32::MAX);
+        let newest = u32::try_from(self.clock() >> KEPT_SHIFT).unwrap_or(u32::MAX);
         self.key.map(|key| Kept { key, newest })
     }
 

@@ -36,6 +36,7 @@ pub(super) const TELEMETRY: Telemetry = Telemetry {
     bad_share: 0.0,
     signal: None,
     signals: [0.0; SIGNALS.len()],
+    statistics: crate::statistics::Statistics::NONE,
 };
 
 /// The ground station of these tests.

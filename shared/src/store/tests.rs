@@ -1,284 +1,238 @@
 use std::vec;
 use std::vec::Vec;
 
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
-};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
+use super::log::{Word, Writer};
 use super::*;
+use crate::mavlink::{Intervals, KeptSigning, Key};
+use crate::params::{Kind, ParamId, Params, TABLE};
+use crate::statistics::Statistics;
+use flash::{RANGE, RamFlash, WORD};
+use random::Random;
 
-const PAGE: usize = 2048;
-const WORD: usize = 8;
-const RANGE: Range<u32> = 0..2 * PAGE as u32;
+mod flash;
+mod power;
+mod random;
+mod rot;
+mod schema;
 
-/// Flash as on the STM32G4: pages of 2 KB, words of 8 bytes, each written once after an erase.
-#[derive(Clone)]
-struct RamFlash {
-    bytes: Vec<u8>,
-    erases: usize,
-    /// Words that can still be written before the power fails.
-    words_left: usize,
-}
-
-#[derive(Debug)]
-struct Refused;
-
-impl NorFlashError for Refused {
-    fn kind(&self) -> NorFlashErrorKind {
-        NorFlashErrorKind::Other
-    }
-}
-
-impl ErrorType for RamFlash {
-    type Error = Refused;
-}
-
-impl RamFlash {
-    fn new() -> Self {
-        Self::holding(vec![0xff; RANGE.end as usize])
-    }
-
-    fn holding(bytes: Vec<u8>) -> Self {
-        Self {
-            bytes,
-            erases: 0,
-            words_left: usize::MAX,
-        }
-    }
-}
-
-impl ReadNorFlash for RamFlash {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Refused> {
-        let offset = offset as usize;
-        bytes.copy_from_slice(&self.bytes[offset..offset + bytes.len()]);
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        self.bytes.len()
-    }
-}
-
-impl NorFlash for RamFlash {
-    const WRITE_SIZE: usize = WORD;
-    const ERASE_SIZE: usize = PAGE;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Refused> {
-        assert!((from as usize).is_multiple_of(PAGE) && (to as usize).is_multiple_of(PAGE));
-        if self.words_left == 0 {
-            return Err(Refused);
-        }
-        self.bytes[from as usize..to as usize].fill(0xff);
-        self.erases += 1;
-        Ok(())
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refused> {
-        assert!((offset as usize).is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD));
-        for (i, word) in bytes.chunks_exact(WORD).enumerate() {
-            self.words_left = self.words_left.checked_sub(1).ok_or(Refused)?;
-            let at = offset as usize + i * WORD;
-            let place = &mut self.bytes[at..at + WORD];
-            if place.iter().any(|byte| *byte != 0xff) {
-                return Err(Refused);
-            }
-            place.copy_from_slice(word);
-        }
-        Ok(())
-    }
-}
-
-fn changed() -> Params {
+fn changed() -> Kept {
     let mut params = Params::default();
     params.set(ParamId::MotPolePairs, 7.0).expect("in range");
     params.set(ParamId::LimPhaseA, 12.5).expect("in range");
-    params
+    Kept {
+        params,
+        ..Kept::default()
+    }
+}
+
+/// Every value another one than the default, as far as there are two in the table's range.
+fn everything(shift: f32) -> Kept {
+    let mut kept = Kept::default();
+    for id in ParamId::ALL {
+        let entry = id.entry();
+        let value = libm::floorf(entry.min + shift * (entry.max - entry.min));
+        if entry.kind != Kind::Derived {
+            kept.params
+                .set(id, value.max(entry.min))
+                .expect("between its ends");
+        }
+    }
+    for word in 0..Intervals::WORDS {
+        assert!(kept.intervals.set_word(word, 1_000 + word as u32));
+    }
+    for word in 0..Statistics::WORDS {
+        assert!(kept.statistics.set_word(word, (7.0 + shift).to_bits()));
+    }
+    kept.signing = Some(KeptSigning {
+        key: Key([(200.0 * shift) as u8; 32]),
+        newest: 99,
+    });
+    kept
+}
+
+fn sound(flash: &mut RamFlash) -> Kept {
+    let loaded = load(flash, RANGE);
+    assert_eq!(loaded.integrity, Integrity::Sound);
+    assert_eq!(loaded.trouble(), None);
+    loaded.kept
+}
+
+/// Stores words of any kind as the first set.
+fn store(flash: &mut RamFlash, words: &[(u16, u32)]) {
+    let mut writer = Writer::new(0, 1);
+    for (key, bits) in words {
+        writer.put(flash, *key, *bits).expect("fits");
+    }
+    writer.seal(flash).expect("fits");
+}
+
+/// The words of the newest set but for its seal.
+fn stored(flash: &mut RamFlash) -> Vec<(u16, u32)> {
+    let values = Log::open(flash, RANGE).expect("two pages").newest.values;
+    values
+        .step_by(WORD)
+        .map(|at| {
+            let word = Word::read(flash, at).expect("it can be read");
+            (word.key, word.bits)
+        })
+        .collect()
 }
 
 #[test]
 fn nothing_stored_gives_the_defaults() {
-    let found = load(&mut RamFlash::new(), RANGE);
-    assert_eq!(found, (Params::default(), Integrity::Empty));
+    let loaded = load(&mut RamFlash::new(), RANGE);
+    assert_eq!(
+        (loaded.kept, loaded.integrity),
+        (Kept::default(), Integrity::Empty)
+    );
 }
 
 #[test]
 fn values_survive_and_nothing_is_written_twice() {
     let mut flash = RamFlash::new();
-    save(&mut flash, RANGE, &Params::default()).expect("nothing to write");
+    save(&mut flash, RANGE, &Kept::default()).expect("nothing to write");
     assert_eq!(flash.bytes, RamFlash::new().bytes);
     save(&mut flash, RANGE, &changed()).expect("fits");
-    // Two values and the seal.
-    assert_eq!(flash.bytes[3 * WORD..], RamFlash::new().bytes[3 * WORD..]);
+    // The schema, two values and the seal.
+    assert_eq!(flash.bytes[4 * WORD..], RamFlash::new().bytes[4 * WORD..]);
     let before = flash.bytes.clone();
     save(&mut flash, RANGE, &changed()).expect("nothing to write");
     assert_eq!(flash.bytes, before);
     // MOT_KV follows though it is not stored.
-    let found = load(&mut flash, RANGE);
-    assert_eq!(found, (changed(), Integrity::Sound));
+    assert_eq!(sound(&mut flash), changed());
 
-    // A value that goes back to its default is written: the stored one must not come back.
-    save(&mut flash, RANGE, &Params::default()).expect("fits");
-    let found = load(&mut flash, RANGE);
-    assert_eq!(found, (Params::default(), Integrity::Sound));
+    // The stored value must not come back.
+    save(&mut flash, RANGE, &Kept::default()).expect("fits");
+    assert_eq!(sound(&mut flash), Kept::default());
 }
 
 #[test]
 fn halves_wrap_under_thousands_of_saves() {
     let mut flash = RamFlash::new();
-    let mut params = changed();
+    let mut kept = changed();
     // More than the numbers of the sets count to.
     for i in 0..70_000_u32 {
         let value = 100.0 + (i % 5000) as f32;
-        params.set(ParamId::CtlRpmMax, value).expect("in range");
-        save(&mut flash, RANGE, &params).expect("fits");
+        kept.params
+            .set(ParamId::CtlRpmMax, value)
+            .expect("in range");
+        save(&mut flash, RANGE, &kept).expect("fits");
         if i % 997 == 0 {
-            let found = load(&mut flash, RANGE);
-            assert_eq!(found, (params.clone(), Integrity::Sound), "{i}");
+            assert_eq!(sound(&mut flash), kept, "{i}");
         }
     }
-    // 32 bytes a set, and room for every value is kept: about 50 sets fit a half.
-    assert!(
-        (1300..1500).contains(&flash.erases),
-        "{} erases",
-        flash.erases
-    );
+    // 40 bytes a set: 51 sets fit a half.
+    assert_eq!(flash.erases, 70_000 / 51);
 }
 
+/// As the module's documentation says.
 #[test]
-fn the_whole_table_fits() {
+fn every_value_fits_twice_into_a_half() {
     let mut flash = RamFlash::new();
-    for _ in 0..20 {
-        for shift in [0.25, 0.75] {
-            let mut params = Params::default();
-            for id in ParamId::ALL {
-                let entry = id.entry();
-                let value = libm::floorf(entry.min + shift * (entry.max - entry.min));
-                let value = value.max(entry.min);
-                if entry.kind != Kind::Derived {
-                    params.set(id, value).expect("between its ends");
-                }
-            }
-            save(&mut flash, RANGE, &params).expect("fits");
-            assert_eq!(load(&mut flash, RANGE).0, params);
-        }
+    for i in 0..40 {
+        let kept = everything([0.25, 0.75][i % 2]);
+        save(&mut flash, RANGE, &kept).expect("fits");
+        assert_eq!(sound(&mut flash), kept);
     }
+    assert!(flash.erases < 40 / 2, "{}", flash.erases);
 }
 
 #[test]
-fn erased_values_are_forgotten() {
+fn what_is_replaced_is_nowhere_in_the_flash() {
     let mut flash = RamFlash::new();
-    save(&mut flash, RANGE, &changed()).expect("fits");
-    erase(&mut flash, RANGE).expect("works");
-    let (params, integrity) = load(&mut flash, RANGE);
-    assert_eq!(params, Params::default());
-    assert_eq!(integrity, Integrity::Empty);
-}
-
-#[test]
-fn what_another_firmware_stored_is_no_value_and_stays() {
-    let mut flash = RamFlash::new();
-    let pole_pairs = ParamId::MotPolePairs.entry().key;
-    let kv = ParamId::MotKv.entry().key;
-    let mut writer = Writer {
-        at: 0,
-        number: FIRST,
-        hash: HASH_BASIS,
+    store(&mut flash, &[(9999, 1)]);
+    for shift in [0.25, 0.5, 0.75] {
+        save(&mut flash, RANGE, &everything(shift)).expect("fits");
+    }
+    let rest = Kept {
+        statistics: everything(0.75).statistics,
+        ..Kept::default()
     };
-    for (key, value) in [(9999, 1.0_f32), (pole_pairs, -3.0), (kv, 5.0)] {
-        writer.put(&mut flash, key, value.to_bits()).expect("fits");
-    }
-    writer.put(&mut flash, SEAL, writer.hash).expect("fits");
-    let found = load(&mut flash, RANGE);
-    assert_eq!(found, (Params::default(), Integrity::Sound));
-
-    save(&mut flash, RANGE, &changed()).expect("fits");
-    assert_eq!(load(&mut flash, RANGE), (changed(), Integrity::Sound));
-    let halves = halves::<RamFlash>(RANGE).expect("two pages");
-    let newest = Found::look(&mut flash, &halves).expect("sound").newest;
-    let first = Word::read(&mut flash, newest.values.start).expect("sound");
-    assert_eq!((first.key, first.bits), (9999, 1.0_f32.to_bits()));
+    replace(&mut flash, RANGE, &rest).expect("fits");
+    assert_eq!(sound(&mut flash), rest);
+    // The schema, the statistics and the seal.
+    let written = flash
+        .bytes
+        .chunks(WORD)
+        .filter(|word| word != &[0xff; WORD]);
+    assert_eq!(written.count(), 2 + Statistics::WORDS);
 }
 
 #[test]
-fn a_loss_of_power_leaves_old_or_new_values_and_is_noticed() {
-    let mut before = RamFlash::new();
-    save(&mut before, RANGE, &Params::default()).expect("fits");
-    save(&mut before, RANGE, &changed()).expect("fits");
-    let mut wanted = changed();
-    wanted.set(ParamId::MotPolePairs, 14.0).expect("in range");
-    wanted.set(ParamId::CtlRpmMax, 5000.0).expect("in range");
-
-    let mut complete = 0;
-    for words in 0..20 {
-        let mut flash = before.clone();
-        flash.words_left = words;
-        let result = save(&mut flash, RANGE, &wanted);
-        flash.words_left = usize::MAX;
-        let (params, integrity) = load(&mut flash, RANGE);
-        assert!(params == wanted || params == changed(), "{words} words");
-        if result.is_ok() {
-            assert_eq!(params, wanted);
-            assert_eq!(integrity, Integrity::Sound);
-            complete += 1;
-        } else {
-            assert_eq!(result, Err(StoreError::Flash));
-            let noticed = if words == 0 {
-                Integrity::Sound
-            } else {
-                Integrity::Incomplete
-            };
-            assert_eq!((params, integrity), (changed(), noticed), "{words} words");
-        }
-        save(&mut flash, RANGE, &wanted).expect("the next save works");
-        assert_eq!(load(&mut flash, RANGE).0, wanted);
-    }
-    // Three values and the seal.
-    assert_eq!(complete, 20 - 4);
-}
-
-#[test]
-fn a_loss_of_power_within_the_very_first_save_is_not_taken_for_corruption() {
-    let mut everything = Params::default();
-    for id in ParamId::ALL {
-        let entry = id.entry();
-        if entry.kind != Kind::Derived {
-            everything.set(id, entry.max).expect("in range");
-        }
-    }
-    for wanted in [changed(), everything] {
-        let mut complete = false;
-        for words in 0..200 {
-            let mut flash = RamFlash::new();
-            flash.words_left = words;
-            complete = save(&mut flash, RANGE, &wanted).is_ok();
-            flash.words_left = usize::MAX;
-            let (params, integrity) = load(&mut flash, RANGE);
-            match integrity {
-                Integrity::Empty => assert_eq!(params, Params::default(), "{words} words"),
-                Integrity::Sound => assert_eq!(params, wanted, "{words} words"),
-                other => assert_eq!(other, Integrity::Incomplete, "{words} words"),
-            }
-            assert_eq!(complete, integrity == Integrity::Sound);
-            assert_eq!(words == 0, integrity == Integrity::Empty);
-        }
-        assert!(complete, "200 words hold every value");
-    }
-}
-
-#[test]
-fn a_value_that_rots_gives_way_to_an_earlier_save() {
+fn what_another_firmware_stored_is_told_and_stays() {
     let mut flash = RamFlash::new();
-    save(&mut flash, RANGE, &changed()).expect("fits");
-    save(&mut flash, RANGE, &Params::default()).expect("fits");
-    // The second set begins at the fourth word.
-    flash.bytes[3 * WORD + 4] ^= 1;
-    assert_eq!(load(&mut flash, RANGE), (changed(), Integrity::Incomplete));
-    save(&mut flash, RANGE, &changed()).expect("goes to the other half");
-    assert_eq!(load(&mut flash, RANGE), (changed(), Integrity::Sound));
+    let kv = ParamId::MotKv.entry().key;
+    let foreign = [(9999, 1), (kv, 5)];
+    store(&mut flash, &foreign);
+    let loaded = load(&mut flash, RANGE);
+    assert_eq!(loaded.kept, Kept::default());
+    assert!(loaded.unknown && !loaded.out_of_range);
+    assert_eq!(
+        loaded.trouble(),
+        Some("storage: values of another firmware are kept")
+    );
+
+    for kept in [changed(), everything(0.25), Kept::default()] {
+        save(&mut flash, RANGE, &kept).expect("fits");
+        assert_eq!(load(&mut flash, RANGE).kept, kept);
+        assert_eq!(stored(&mut flash)[1..3], foreign);
+    }
+}
+
+#[test]
+fn a_value_out_of_range_is_told_until_the_next_save() {
+    let id = ParamId::MotPolePairs;
+    let interval = 0x1100;
+    let temperature = 0x1202;
+    for (key, bits) in [
+        (id.entry().key, (-3.0_f32).to_bits()),
+        (id.entry().key, 7.5_f32.to_bits()),
+        (id.entry().key, f32::NAN.to_bits()),
+        (interval, 0x8000_0000),
+        (temperature, f32::INFINITY.to_bits()),
+    ] {
+        let mut flash = RamFlash::new();
+        let limit = ParamId::LimPhaseA.entry().key;
+        store(&mut flash, &[(key, bits), (limit, 12.5_f32.to_bits())]);
+        let loaded = load(&mut flash, RANGE);
+        assert!(loaded.out_of_range && !loaded.unknown, "{key}");
+        let trouble = "storage: out of range, some values are defaults";
+        assert_eq!(loaded.trouble(), Some(trouble));
+        let mut wanted = Kept::default();
+        wanted
+            .params
+            .set(ParamId::LimPhaseA, 12.5)
+            .expect("in range");
+        assert_eq!(loaded.kept, wanted, "{key}");
+
+        save(&mut flash, RANGE, &loaded.kept).expect("fits");
+        assert_eq!(sound(&mut flash), wanted);
+    }
+}
+
+#[test]
+fn every_trouble_fits_a_text() {
+    let mut loaded = load(&mut RamFlash::new(), RANGE);
+    loaded.unknown = true;
+    let mut count = 0;
+    for integrity in [
+        Integrity::Sound,
+        Integrity::Incomplete,
+        Integrity::Corrupt,
+        Integrity::Unreadable,
+    ] {
+        for out_of_range in [false, true] {
+            loaded.integrity = integrity;
+            loaded.out_of_range = out_of_range;
+            let trouble = loaded.trouble().expect("there is some");
+            assert!(trouble.len() <= 50, "{trouble}");
+            count += 1;
+        }
+    }
+    assert_eq!(count, 8);
 }
 
 #[test]
@@ -297,13 +251,39 @@ fn a_range_that_is_not_pages_is_refused() {
             save(&mut flash, range.clone(), &changed()),
             Err(StoreError::BadRange)
         );
-        assert_eq!(load(&mut flash, range).1, Integrity::Unreadable);
+        assert_eq!(load(&mut flash, range).integrity, Integrity::Unreadable);
     }
 }
 
 #[test]
-fn no_parameter_has_the_key_of_the_seal() {
-    assert!(TABLE.iter().all(|parameter| parameter.key != SEAL));
+fn a_flash_that_cannot_be_read_gives_the_defaults() {
+    let mut flash = RamFlash::new();
+    save(&mut flash, RANGE, &changed()).expect("fits");
+    // Whenever it begins.
+    let mut all = flash.clone();
+    assert_eq!(sound(&mut all), changed());
+    for reads in 0..all.reads - flash.reads {
+        let mut flash = flash.clone();
+        flash.reads_left = reads;
+        let loaded = load(&mut flash, RANGE);
+        let wanted = (Kept::default(), Integrity::Unreadable);
+        assert_eq!((loaded.kept, loaded.integrity), wanted, "{reads} reads");
+    }
+}
+
+#[test]
+fn keys_are_told_apart() {
+    assert!(
+        TABLE
+            .iter()
+            .all(|parameter| key::SEAL < parameter.key && parameter.key < key::SCHEMA)
+    );
+    for word in 0..Kept::WORDS {
+        let key = Kept::key(word);
+        assert!(key != key::SEAL && key != key::SCHEMA);
+        let derived = key == ParamId::MotKv.entry().key;
+        assert_eq!(Kept::find(key), (!derived).then_some(word));
+    }
 }
 
 proptest! {
@@ -323,16 +303,16 @@ proptest! {
         for (at, byte) in rot {
             flash.bytes[at] = byte;
         }
-        let (params, integrity) = load(&mut flash, RANGE);
-        if integrity == Integrity::Sound {
-            prop_assert_eq!(&params, &changed());
+        let loaded = load(&mut flash, RANGE);
+        if loaded.integrity == Integrity::Sound {
+            prop_assert_eq!(&loaded.kept, &changed());
         }
         let mut wanted = changed();
-        wanted.set(ParamId::CtlRpmMax, 5000.0).expect("in range");
+        wanted.params.set(ParamId::CtlRpmMax, 5000.0).expect("in range");
         save(&mut flash, RANGE, &wanted).expect("heals");
-        let (params, integrity) = load(&mut flash, RANGE);
-        prop_assert_eq!(integrity, Integrity::Sound);
-        prop_assert_eq!(params, wanted);
+        let loaded = load(&mut flash, RANGE);
+        prop_assert_eq!(loaded.integrity, Integrity::Sound);
+        prop_assert_eq!(loaded.kept, wanted);
     }
 
     #[test]
@@ -347,13 +327,11 @@ proptest! {
             }
         }
         let mut flash = RamFlash::holding(bytes);
-        let (params, integrity) = load(&mut flash, RANGE);
-        prop_assert_ne!(integrity, Integrity::Sound);
-        for id in ParamId::ALL {
-            prop_assert!(params.get(id).is_finite());
-        }
+        let loaded = load(&mut flash, RANGE);
+        prop_assert_ne!(loaded.integrity, Integrity::Sound);
+        prop_assert_eq!(loaded.kept, Kept::default());
         save(&mut flash, RANGE, &changed()).expect("erases what it cannot use");
-        prop_assert_eq!(load(&mut flash, RANGE).0, changed());
+        prop_assert_eq!(load(&mut flash, RANGE).kept, changed());
     }
 
     #[test]
@@ -374,9 +352,9 @@ proptest! {
         ],
     ) {
         prop_assume!(bytes.iter().any(|byte| *byte != 0xFF));
-        let (params, integrity) = load(&mut RamFlash::holding(bytes), RANGE);
-        prop_assert_ne!(integrity, Integrity::Empty);
-        prop_assert_ne!(integrity, Integrity::Sound);
-        prop_assert_eq!(params, Params::default());
+        let loaded = load(&mut RamFlash::holding(bytes), RANGE);
+        prop_assert_ne!(loaded.integrity, Integrity::Empty);
+        prop_assert_ne!(loaded.integrity, Integrity::Sound);
+        prop_assert_eq!(loaded.kept, Kept::default());
     }
 }

@@ -98,7 +98,7 @@ impl Desk {
             self.esc
                 .poll(throttle, now_us, &self.snapshot, 25.0, &mut |_| {});
             while let Some(request) = self.esc.take_request(throttle) {
-                if request == Request::Save {
+                if matches!(request, Request::Save | Request::Keep) {
                     self.esc.storage_done(throttle, Ok(()));
                 }
             }

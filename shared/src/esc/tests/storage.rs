@@ -7,11 +7,11 @@ use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavResult, PAR
 use mavlink::types::CharArray;
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 
-const STORAGE: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_STORAGE;
-const REBOOT: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN;
+pub(super) const STORAGE: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_STORAGE;
+pub(super) const REBOOT: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN;
 const ACTUATOR_TEST: MavCmd = MavCmd::MAV_CMD_ACTUATOR_TEST;
 
-const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
+pub(super) const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
 const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 
 impl Bench {
@@ -36,7 +36,7 @@ impl Bench {
         });
     }
 
-    fn command(&mut self, command: MavCmd, param1: f32) {
+    pub(super) fn command(&mut self, command: MavCmd, param1: f32) {
         self.message(&COMMAND_LONG_DATA {
             param1,
             param2: 1.0,

@@ -1,10 +1,10 @@
 //! The files, and the folders that they are in.
 
 use super::answer::Error;
-use super::checksum::checksum;
 use super::packed::Selection;
 use super::sink::Sink;
 use super::text;
+use crate::checksum::checksum;
 use crate::params::Params;
 use crate::telemetry::Telemetry;
 
@@ -36,6 +36,8 @@ enum Content {
     Parameters,
     /// What has gone wrong, in words.
     Faults,
+    /// What has happened in the life of the ESC, in words.
+    Statistics,
 }
 
 /// An entry of a folder.
@@ -47,7 +49,7 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 6] = [
+static ENTRIES: [Entry; 7] = [
     Entry {
         folder: "",
         name: "general.json.xz",
@@ -77,6 +79,11 @@ static ENTRIES: [Entry; 6] = [
         folder: "@SYS/",
         name: "faults.txt",
         content: Content::Faults,
+    },
+    Entry {
+        folder: "@SYS/",
+        name: "statistics.txt",
+        content: Content::Statistics,
     },
 ];
 
@@ -113,6 +120,7 @@ impl File {
             Content::Fixed(bytes) => sink.put(bytes),
             Content::Parameters => self.selection.write(view.params, sink),
             Content::Faults => text::faults(view, sink),
+            Content::Statistics => text::statistics(view, sink),
         }
     }
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: 3 frames where the list takes 50; with `?withdefaults=1` or `?start=N&count=N` |
 //! | `@SYS/faults.txt` | faults and the last warning, in words |
+//! | `@SYS/statistics.txt` | what has happened in the life of the ESC, in words |
 //! | `general.json.xz` | where the next one is ([`metadata()`] tells where this one is) |
 //! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
 //!
@@ -14,7 +15,6 @@
 //! parameters, in their half of the link.
 
 mod answer;
-mod checksum;
 mod files;
 mod metadata;
 mod packed;

@@ -1,6 +1,6 @@
 //! What becomes of a file while it is written.
 
-use super::checksum::checksum;
+use crate::checksum::checksum;
 
 /// Keeps of what is put into it what there is room for, from an offset on, and measures the whole.
 #[derive(Debug, Default)]

@@ -3,10 +3,10 @@
 use std::string::String;
 use std::vec::Vec;
 
-use super::checksum::checksum;
 use super::files::{Entry, File};
 use super::sink::Sink;
 use super::*;
+use crate::checksum::checksum;
 use crate::mavlink::tests::TELEMETRY;
 use crate::params::{ParamId, Params, TABLE};
 

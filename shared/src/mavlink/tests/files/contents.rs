@@ -6,6 +6,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::*;
 use crate::drive::Fault;
+use crate::statistics::Statistics;
 
 #[test]
 fn folders_are_listed() {
@@ -64,4 +65,24 @@ fn the_metadata_can_be_found() {
         assert_eq!(payload[4..8], crc32(&general).to_le_bytes());
         assert!(payload[uri_at..].starts_with(b"mftp:///general.json.xz\0"));
     }
+}
+
+#[test]
+fn statistics_are_told_in_words() {
+    let mut bench = Bench::new();
+    bench.telemetry.statistics = Statistics {
+        run_s: 3_661,
+        starts: 10,
+        faults: [0, 0, 0, u32::MAX, 0, 1, 0],
+        temperature_max_c: 61.6,
+        phase_max_a: 0.0,
+    };
+    let text = fetch(&mut bench, "@SYS/statistics.txt", 239);
+    let wanted = "Run time: 3661 s\n\
+                  Starts: 10\n\
+                  Highest temperature: 61 C\n\
+                  Highest phase current: 0 A\n\
+                  Fault, over-temperature: 4294967295\n\
+                  Fault, motor does not start: 1\n";
+    assert_eq!(String::from_utf8(text).expect("ASCII"), wanted);
 }

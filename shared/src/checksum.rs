@@ -1,9 +1,9 @@
-//! The checksum of a file, as MAVLink's file transfer and component metadata have it.
+//! One checksum for what is stored and for files, as MAVLink's file transfer has it.
 
 /// CRC-32 of IEEE 802.3, reflected, which begins at 0 and is not inverted at its end, so that a
 /// file's checksum goes on from that of what is before it (NuttX's `crc32part`, which PX4, ArduPilot
 /// and mavros use).
-pub(super) const fn checksum(before: u32, bytes: &[u8]) -> u32 {
+pub(crate) const fn checksum(before: u32, bytes: &[u8]) -> u32 {
     let mut sum = before;
     let mut at = 0;
     while at < bytes.len() {

@@ -1,0 +1,309 @@
+//! What is stored without being asked for, and when.
+
+use super::storage::{ACCEPTED, REBOOT, STORAGE};
+use super::*;
+use crate::mavlink::{KeptSigning, Key};
+use crate::statistics::Statistics;
+use crate::store::{Integrity, Kept, Loaded};
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_LONG_DATA, MavCmd, PARAM_SET_DATA, SETUP_SIGNING_DATA,
+};
+use mavlink::types::CharArray;
+
+const INTERVAL: MavCmd = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
+
+impl Bench {
+    fn set(&mut self, name: &str, value: f32) {
+        let mut id = [0; 16];
+        id[..name.len()].copy_from_slice(name.as_bytes());
+        self.message(&PARAM_SET_DATA {
+            param_value: value,
+            target_system: 1,
+            target_component: 1,
+            param_id: CharArray::new(id),
+            ..PARAM_SET_DATA::default()
+        });
+    }
+
+    /// Waits for a save, in steps of a millisecond; how long it took.
+    fn keeps_after_ms(&mut self) -> u32 {
+        for ms in 1..10_000 {
+            self.wait_ms(1);
+            if self.requests.contains(&Request::Keep) {
+                return ms;
+            }
+        }
+        panic!("nothing is kept: {:?}", self.requests);
+    }
+}
+
+/// At rest, with the tune of the start over.
+fn rested() -> Bench {
+    let mut bench = Bench::new();
+    bench.wait_ms(3_000);
+    assert_eq!(bench.requests, []);
+    bench.texts.clear();
+    bench
+}
+
+#[test]
+fn a_value_is_kept_after_a_quiet_second() {
+    let mut bench = rested();
+    bench.set("LIM_PHASE_A", 12.5);
+    bench.wait_ms(700);
+    bench.set("MOT_POLE_PAIRS", 7.0);
+    assert_eq!(bench.keeps_after_ms(), 1_001, "both at once");
+    let kept = bench.esc.kept();
+    assert_eq!(kept.params.get(ParamId::LimPhaseA), 12.5);
+    assert_eq!(kept.params.get(ParamId::MotPolePairs), 7.0);
+    bench.storage_done(Ok(()));
+    bench.requests.clear();
+    bench.wait_ms(5_000);
+    assert_eq!(bench.requests, [], "once");
+    assert_eq!(bench.texts, Vec::<String>::new(), "nobody has asked");
+}
+
+#[test]
+fn a_refused_value_is_none() {
+    let mut bench = rested();
+    bench.set("LIM_PHASE_A", -1.0);
+    bench.set("NO_SUCH", 1.0);
+    bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 0.0);
+    bench.command(INTERVAL, 999.0);
+    bench.wait_ms(5_000);
+    assert_eq!(bench.requests, []);
+}
+
+#[test]
+fn an_interval_and_the_key_are_kept_as_well() {
+    let mut bench = rested();
+    bench.message(&COMMAND_LONG_DATA {
+        param1: 291.0,
+        param2: 20_000.0,
+        command: INTERVAL,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::default()
+    });
+    assert_eq!(bench.keeps_after_ms(), 1_001);
+    let intervals = bench.esc.kept().intervals;
+    assert_ne!(intervals, Kept::default().intervals);
+    bench.storage_done(Ok(()));
+    bench.requests.clear();
+
+    bench.message(&SETUP_SIGNING_DATA {
+        initial_timestamp: 5 << 16,
+        target_system: 1,
+        target_component: 1,
+        secret_key: [7; 32],
+    });
+    assert_eq!(bench.keeps_after_ms(), 1_001);
+    let kept = bench.esc.kept();
+    let signing = kept.signing.expect("there is a key");
+    assert_eq!(signing.key, Key([7; 32]));
+    // 1 s is 1.5 of its units.
+    assert!((5..=7).contains(&signing.newest), "{}", signing.newest);
+
+    // So it goes on after a restart.
+    let loaded = Loaded {
+        kept: kept.clone(),
+        integrity: Integrity::Sound,
+        out_of_range: false,
+        unknown: false,
+    };
+    let mut other = Bench::new();
+    other.esc.recall(&loaded);
+    assert_eq!(other.esc.kept().intervals, intervals);
+    assert_eq!(
+        other.esc.kept().signing.map(|signing| signing.key),
+        Some(Key([7; 32]))
+    );
+}
+
+#[test]
+fn a_failure_is_told_once() {
+    let mut bench = rested();
+    for (value, result, texts) in [
+        (12.0, Err("storage: the flash failed"), 1),
+        (13.0, Err("storage: the flash failed"), 0),
+        (14.0, Ok(()), 0),
+        (15.0, Err("storage: the flash failed"), 1),
+    ] {
+        bench.set("LIM_PHASE_A", value);
+        bench.keeps_after_ms();
+        bench.storage_done(result);
+        bench.wait_ms(2_000);
+        assert_eq!(bench.texts.len(), texts, "{value}: {:?}", bench.texts);
+        assert_eq!(
+            bench.requests,
+            [Request::ParamsChanged, Request::Keep],
+            "no more"
+        );
+        bench.requests.clear();
+        bench.texts.clear();
+    }
+}
+
+#[test]
+fn a_restart_stores_first_what_waits() {
+    let mut bench = rested();
+    bench.set("LIM_PHASE_A", 12.5);
+    bench.command(REBOOT, 1.0);
+    bench.wait_ms(5);
+    assert_eq!(bench.requests, [Request::ParamsChanged, Request::Keep]);
+    assert_eq!(bench.results, [ACCEPTED]);
+    bench.wait_ms(50);
+    assert_eq!(bench.requests.len(), 2, "it is being stored");
+    bench.storage_done(Ok(()));
+    assert_eq!(bench.requests[2..], [Request::Reboot]);
+}
+
+#[test]
+fn a_restart_without_anything_to_store_is_made_at_once() {
+    let mut bench = rested();
+    bench.command(REBOOT, 1.0);
+    bench.wait_ms(2);
+    assert_eq!(bench.requests, [Request::Reboot]);
+}
+
+#[test]
+fn a_restart_that_waits_is_given_up_when_the_motor_turns() {
+    let mut bench = Bench::armed();
+    bench.frames(1, 1000);
+    bench.frames(10, 0);
+    bench.set("LIM_PHASE_A", 12.5);
+    bench.command(REBOOT, 1.0);
+    bench.frames(10, 0);
+    assert_eq!(
+        bench.requests,
+        [Request::ParamsChanged],
+        "not a second at rest"
+    );
+    bench.frames(50, 1000);
+    assert!(
+        bench
+            .texts
+            .contains(&"No reboot: the motor turns".to_string())
+    );
+    bench.frames(2_000, 0);
+    assert_eq!(bench.requests, [Request::ParamsChanged, Request::Keep]);
+    bench.storage_done(Ok(()));
+    bench.frames(100, 0);
+    assert_eq!(bench.requests.len(), 2, "no restart");
+}
+
+#[test]
+fn statistics_are_kept_when_the_motor_has_come_to_rest() {
+    let mut bench = Bench::armed();
+    let mut faults = Faults::NONE;
+    for phase in [Phase::Park, Phase::Ramp, Phase::Run] {
+        bench.snapshot.phase = phase;
+        bench.frames(1_000, 1_000);
+    }
+    faults.insert(Fault::UnderVoltage);
+    bench.snapshot.faults = faults;
+    bench.snapshot.phase = Phase::Idle;
+    bench.frames(900, 0);
+    assert_eq!(
+        bench.requests,
+        [],
+        "neither in flight nor before a quiet second"
+    );
+    bench.frames(200, 0);
+    assert_eq!(bench.requests, [Request::Keep]);
+    let statistics = bench.esc.kept().statistics;
+    assert_eq!((statistics.run_s, statistics.starts), (3, 1));
+    assert_eq!(statistics.faults, [0, 0, 1, 0, 0, 0, 0]);
+    assert_eq!(statistics.temperature_max_c, 25.0);
+    bench.storage_done(Ok(()));
+    bench.frames(5_000, 0);
+    assert_eq!(bench.requests.len(), 1, "not more often");
+}
+
+#[test]
+fn what_the_wire_has_set_waits_for_the_wire() {
+    let mut bench = Bench::armed();
+    bench.frames(10, 8);
+    assert_eq!(bench.get(ParamId::MotDir), 1.0);
+    bench.frames(5_000, 0);
+    assert_eq!(
+        bench.requests,
+        [Request::ParamsChanged],
+        "not stored by itself"
+    );
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 0.0);
+    // Nor with what is.
+    bench.set("LIM_PHASE_A", 12.5);
+    bench.frames(1_100, 0);
+    assert_eq!(bench.requests[1..], [Request::ParamsChanged, Request::Keep]);
+    let kept = bench.esc.kept().params;
+    assert_eq!(
+        (kept.get(ParamId::MotDir), kept.get(ParamId::LimPhaseA)),
+        (0.0, 12.5)
+    );
+    bench.storage_done(Ok(()));
+
+    bench.frames(10, 12);
+    assert_eq!(bench.requests[3..], [Request::Save]);
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 1.0);
+    bench.storage_done(Ok(()));
+    assert_eq!(
+        bench.esc.kept().params.get(ParamId::MotDir),
+        1.0,
+        "from now on"
+    );
+}
+
+#[test]
+fn a_value_set_by_mavlink_is_not_the_wires_any_more() {
+    let mut bench = Bench::armed();
+    bench.frames(10, 8);
+    bench.set("MOT_DIR", 0.0);
+    bench.frames(10, 8);
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 0.0);
+    bench.frames(10, 7);
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 0.0);
+    bench.set("MOT_DIR", 1.0);
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 1.0);
+}
+
+#[test]
+fn a_reset_to_the_factorys_settings_leaves_the_statistics_alone() {
+    let mut bench = rested();
+    let statistics = Statistics {
+        run_s: 77,
+        temperature_max_c: 61.0,
+        ..Statistics::NONE
+    };
+    bench.esc.recall(&Loaded {
+        kept: Kept {
+            statistics,
+            signing: Some(KeptSigning {
+                key: Key([7; 32]),
+                newest: 0,
+            }),
+            ..Kept::default()
+        },
+        integrity: Integrity::Sound,
+        out_of_range: false,
+        unknown: true,
+    });
+    bench.wait_ms(1);
+    let warning = "storage: values of another firmware are kept";
+    assert_eq!(bench.texts, [warning]);
+    bench.command(STORAGE, 2.0);
+    bench.wait_ms(1);
+    assert_eq!(bench.requests, [], "it is not signed");
+    let reset = Kept {
+        statistics,
+        ..Kept::default()
+    };
+    let Bench { esc, throttle, .. } = &mut bench;
+    esc.replace(throttle, &reset).expect("the defaults fit");
+    assert_eq!(esc.kept(), reset);
+    bench.wait_ms(1);
+    assert_eq!(bench.esc.kept(), reset, "the key is gone with the replies");
+    bench.command(STORAGE, 2.0);
+    bench.wait_ms(1);
+    assert_eq!(bench.requests, [Request::FactoryReset]);
+}

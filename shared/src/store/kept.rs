@@ -1,0 +1,116 @@
+//! What is kept, and the key of each value. A key is never given to another value.
+
+use crate::mavlink::{Intervals, KeptSigning, Key};
+use crate::params::{Kind, ParamId, Params, TABLE};
+use crate::statistics::Statistics;
+
+/// First key of the intervals of messages. Keys below 0x1000 are the parameters'.
+const INTERVALS: u16 = 0x1100;
+/// First key of the statistics.
+const STATISTICS: u16 = 0x1200;
+/// First key of the words of signing: eight of its key, and the newest timestamp.
+const SIGNING: u16 = 0x1300;
+const SIGNING_WORDS: usize = 9;
+
+/// What survives a loss of power.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Kept {
+    /// The parameters.
+    pub params: Params,
+    /// How often messages are sent.
+    pub intervals: Intervals,
+    /// What has happened so far.
+    pub statistics: Statistics,
+    /// The key of signatures, if there is one.
+    pub signing: Option<KeptSigning>,
+}
+
+/// Which value a word is of.
+#[derive(Clone, Copy)]
+enum Place {
+    Param(ParamId),
+    Interval(usize),
+    Statistic(usize),
+    Signing(usize),
+}
+
+impl Place {
+    /// That of one of the words, in the order in which they are stored.
+    fn of(mut word: usize) -> Self {
+        if let Some(id) = ParamId::ALL.get(word) {
+            return Self::Param(*id);
+        }
+        word -= TABLE.len();
+        if word < Intervals::WORDS {
+            return Self::Interval(word);
+        }
+        word -= Intervals::WORDS;
+        if word < Statistics::WORDS {
+            return Self::Statistic(word);
+        }
+        Self::Signing(word - Statistics::WORDS)
+    }
+}
+
+impl Kept {
+    /// Words in all.
+    pub(super) const WORDS: usize =
+        TABLE.len() + Intervals::WORDS + Statistics::WORDS + SIGNING_WORDS;
+
+    /// The key of a word.
+    pub(super) fn key(word: usize) -> u16 {
+        match Place::of(word) {
+            Place::Param(id) => id.entry().key,
+            Place::Interval(word) => INTERVALS + word as u16,
+            Place::Statistic(word) => STATISTICS + word as u16,
+            Place::Signing(word) => SIGNING + word as u16,
+        }
+    }
+
+    /// The word that has this key. Derived parameters have none.
+    pub(super) fn find(key: u16) -> Option<usize> {
+        (0..Self::WORDS).find(|word| {
+            let derived = |id: &ParamId| id.entry().kind == Kind::Derived;
+            Self::key(*word) == key && !ParamId::ALL.get(*word).is_some_and(derived)
+        })
+    }
+
+    /// The bits of a word, none if it is the default: zero, but for parameters.
+    pub(super) fn bits(&self, word: usize) -> Option<u32> {
+        let bits = match Place::of(word) {
+            Place::Param(id) => {
+                let (entry, value) = (id.entry(), self.params.get(id));
+                let stays = entry.kind == Kind::Derived || value == entry.default;
+                return (!stays).then_some(value.to_bits());
+            }
+            Place::Interval(word) => self.intervals.word(word),
+            Place::Statistic(word) => self.statistics.word(word),
+            Place::Signing(word) => {
+                let signing = self.signing.as_ref()?;
+                let part = signing.key.0.as_chunks().0.get(word);
+                part.map_or(signing.newest, |part| u32::from_le_bytes(*part))
+            }
+        };
+        (bits != 0).then_some(bits)
+    }
+
+    /// Takes a stored word; whether this firmware accepts it.
+    pub(super) fn set(&mut self, word: usize, bits: u32) -> bool {
+        match Place::of(word) {
+            Place::Param(id) => self.params.set(id, f32::from_bits(bits)).is_ok(),
+            Place::Interval(word) => self.intervals.set_word(word, bits),
+            Place::Statistic(word) => self.statistics.set_word(word, bits),
+            Place::Signing(word) => {
+                let signing = self.signing.get_or_insert(KeptSigning {
+                    key: Key([0; 32]),
+                    newest: 0,
+                });
+                match signing.key.0.as_chunks_mut().0.get_mut(word) {
+                    Some(part) => *part = bits.to_le_bytes(),
+                    None => signing.newest = bits,
+                }
+                true
+            }
+        }
+    }
+}
