@@ -4,6 +4,10 @@ from dataclasses import dataclass
 
 KB = 1024
 
+MAVLINK = 16 * KB
+"""What the MAVLink component may take of any flash, text and data, without the files that it serves and
+the signatures."""
+
 
 @dataclass(frozen=True)
 class Region:

@@ -8,10 +8,11 @@ Exit status 1 if anything is too large, not to be made out, or where it must not
 import sys
 from pathlib import Path
 
+import component
 import reach
 import sizes
 import stack
-from boards import BOARDS, Board
+from boards import BOARDS, MAVLINK, Board
 from calls import Calls, path
 from image import Image, Unreadable
 
@@ -38,6 +39,12 @@ def report(board: Board, image: Image) -> list[str]:
         print(f"  {name:<30}" + "".join(f"{size or '':>8}" for size in row))
 
     calls = Calls(image)
+    parts = {name: component.size(calls, names) for name, names in component.PARTS.items()}
+    rest = component.size(calls, component.MAVLINK) - sum(parts.values())
+    print(limited("MAVLink component", rest, MAVLINK, problems))
+    for name, size in parts.items():
+        print(f"  its {name:<20}{size:>8}")
+
     levels = stack.levels(calls, board)
     room = image.symbols["_stack_start"] - image.symbols["_stack_end"]
     print(limited("stack at most", sum(b.size for _, b in levels), room, problems))

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import lzma
+import random
 import re
 import struct
 import zlib
@@ -224,6 +225,18 @@ def test_what_is_not_served_is_refused(files):
     assert files.client.cmd_rm([PACK]).error_code == FtpError.FileProtected
     assert files.client.cmd_crc(["nothing"]).error_code == FtpError.FileNotFound
     assert files.client.cmd_crc([PACK]).error_code == FtpError.Success
+
+
+def test_files_are_whole_over_a_link_that_loses_a_fifth(files):
+    whole = {path: files.file(path) for path in (PACK, "parameter.json.xz")}
+    random.seed(1)
+    # Of what arrives at the client.
+    files.client.ftp_settings.pkt_loss_rx = 20
+    for path, data in whole.items():
+        for _ in range(5):
+            # The client opens a file three times and then gives up.
+            tries = (files.get(path) for _ in range(5))
+            assert next(read for code, read in tries if code == FtpError.Success) == data
 
 
 def test_two_read_one_after_the_other(start):

@@ -14,6 +14,7 @@ from small_image import LEVELS, VECTORS, build
 
 sys.path.insert(0, str(IMAGE_REPORT))
 
+import component  # noqa: E402
 import reach  # noqa: E402  (it needs the report's folder)
 import sizes  # noqa: E402
 from boards import BOARDS  # noqa: E402
@@ -138,6 +139,53 @@ def test_the_report_ends_well_or_says_why_not(tmp_path):
     far = report("b-g431b-esc1", build(tmp_path, LEAVES + VECTORS))
     assert far.returncode == 1
     assert "FAILED: the PWM interrupt needs 4 things from the flash" in far.stdout
+
+
+COMPONENT = LEVELS.replace(
+    "push {r4, lr}\n    pop {r4, pc}",
+    """push {r4, lr}
+    bl mavlink_entrance
+    bl shared
+    ldr r1, =both
+    pop {r4, pc}""",
+) + """
+    .section .text
+    function mavlink_entrance
+    push {r4, lr}
+    bl private
+    bl shared
+    ldr r1, =both
+    ldr r2, =alone
+    ldr r3, =leading
+    pop {r4, pc}
+    .ltorg
+    end mavlink_entrance
+    function private
+    nop
+    bx lr
+    end private
+    function shared
+    nop
+    bx lr
+    end shared
+    .section .rodata, "a", %progbits
+    .balign 4
+    both: .word 1, 2
+    alone: .word 3, 4, 5
+    leading: .word led, 6
+    led: .word 7
+"""
+
+
+def test_what_is_there_for_one_part_is_told_from_what_others_need_too(tmp_path):
+    calls = Calls(Image(build(tmp_path, COMPONENT + VECTORS)))
+    functions, data = component.contents(calls, ("mavlink_",))
+    assert [function.name for function in functions] == ["mavlink_entrance", "private"]
+    assert [end - begin for begin, end in data] == [12, 8, 4]
+    entrance, private = (function.size for function in functions)
+    assert private == 4
+    assert component.size(calls, ("mavlink_",)) == entrance + 4 + 24
+    assert component.size(calls, ("nobody_",)) == 0
 
 
 def test_too_much_is_told_by_memory(tmp_path):

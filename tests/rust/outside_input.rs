@@ -24,10 +24,11 @@ const MESSAGES: [u32; 10] = [0, 4, 20, 21, 23, 43, 75, 76, 110, 290];
 const COMMANDS: [u32; 2] = [75, 76];
 const PARAM_SET: u32 = 23;
 const COMMAND_OFFSET: usize = 28;
-/// The one command that may turn the motor.
-const ACTUATOR_TEST: u16 = 310;
-/// Commands that it obeys otherwise: storage, restart, arming, intervals and messages.
-const OBEYED: [u16; 5] = [245, 246, 400, 511, 512];
+/// The commands that may turn the motor: ACTUATOR_TEST and DO_MOTOR_TEST.
+const TESTS: [u16; 2] = [310, 209];
+/// Commands that it obeys otherwise: calibration, storage, restart, settings, arming, intervals and
+/// messages.
+const OBEYED: [u16; 7] = [241, 245, 246, 311, 400, 511, 512];
 
 /// An ESC with a wire and a link, at rest.
 struct Desk {
@@ -240,7 +241,8 @@ fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool)
         put(place, &bytes);
     }
     let command = body.get(COMMAND_OFFSET..COMMAND_OFFSET + 2);
-    if is_command(id) && command == Some(&ACTUATOR_TEST.to_le_bytes()) {
+    let tests = TESTS.map(|test| test.to_le_bytes());
+    if is_command(id) && command.is_some_and(|command| tests.iter().any(|test| test == command)) {
         body[COMMAND_OFFSET] ^= 1;
     }
     frame(id, &body)

@@ -91,6 +91,13 @@ impl Command {
         }
     }
 
+    /// A parameter that is a whole number from -1 on, or none of these.
+    fn choice(&self, parameter: usize) -> Option<i32> {
+        let value = self.params[parameter];
+        let whole = value as i32;
+        (whole as f32 == value && whole >= -1).then_some(whole)
+    }
+
     /// Whether its sender may have it obeyed: who may only ask gets messages.
     fn is_allowed(&self) -> bool {
         self.trust == Trust::Full || self.asks()
@@ -210,7 +217,7 @@ impl Commands {
             }
             CONFIGURE_ACTUATOR => return self.configure(command, drive, context, replies),
             PREFLIGHT_CALIBRATION => self.calibrate(command, drive, context, replies),
-            COMPONENT_ARM_DISARM => arm_disarm(p1, context),
+            COMPONENT_ARM_DISARM => arm_disarm(command.choice(0), context),
             PREFLIGHT_STORAGE => return self.storage(command, drive),
             PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, replies),
             REQUEST_MESSAGE => request_message(command, schedule),
@@ -240,11 +247,11 @@ impl Commands {
     /// Reading and writing the flash stalls the processor, and reading changes what the motor is
     /// driven with: both only at rest. The ACK follows when it is done.
     fn storage(&mut self, command: &Command, drive: DriveStatus) -> Option<MavResult> {
-        let request = match command.params[0] {
-            -1.0 => return Some(ACCEPTED),
-            0.0 => Request::Load,
-            1.0 => Request::Save,
-            2.0 | 4.0 => Request::FactoryReset,
+        let request = match command.choice(0) {
+            Some(-1) => return Some(ACCEPTED),
+            Some(0) => Request::Load,
+            Some(1) => Request::Save,
+            Some(2 | 4) => Request::FactoryReset,
             _ => return Some(DENIED),
         };
         if self.is_busy() || !drive.stopped {
@@ -272,7 +279,7 @@ impl Commands {
             replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, text));
         }
         // A reset and a load change every value: clients should see the new ones.
-        code == ACCEPTED && command.number == PREFLIGHT_STORAGE && command.params[0] != 1.0
+        code == ACCEPTED && command.number == PREFLIGHT_STORAGE && command.choice(0) != Some(1)
     }
 
     fn reboot(
@@ -281,9 +288,9 @@ impl Commands {
         drive: DriveStatus,
         replies: &mut Replies,
     ) -> MavResult {
-        match command.params[0] {
-            0.0 => return ACCEPTED,
-            1.0 => {}
+        match command.choice(0) {
+            Some(0) => return ACCEPTED,
+            Some(1) => {}
             // Shutting down and staying in a boot loader are not what an ESC can do.
             _ => return DENIED,
         }
@@ -330,15 +337,13 @@ fn is_known(command: &Command, context: &mut Context) -> bool {
     command.confirmation.is_some() || (is_test && tests)
 }
 
-fn arm_disarm(arm: f32, context: &mut Context) -> MavResult {
-    if arm == 0.0 {
-        context.authority.disarm();
-        ACCEPTED
-    } else if arm == 1.0 && context.authority.arm(context.now_us).is_ok() {
-        ACCEPTED
-    } else {
-        DENIED
+fn arm_disarm(arm: Option<i32>, context: &mut Context) -> MavResult {
+    match arm {
+        Some(0) => context.authority.disarm(),
+        Some(1) if context.authority.arm(context.now_us).is_ok() => {}
+        _ => return DENIED,
     }
+    ACCEPTED
 }
 
 fn message_id(value: f32) -> Option<u32> {

@@ -237,13 +237,10 @@ impl Writer {
         mission_type: u8,
         out: &mut dyn FnMut(&[u8]),
     ) {
-        let message = MISSION_COUNT_DATA {
-            count: 0,
-            target_system: to.system,
-            target_component: to.component,
-        };
+        let payload = [0, 0, to.system, to.component, mission_type];
+        let message = (MISSION_COUNT_DATA::ID, MISSION_COUNT_DATA::EXTRA_CRC);
         self.sender
-            .send(identity.address, &message, &[mission_type], out);
+            .send_payload(identity.address, message, &payload, out);
     }
 
     pub(super) fn param_error(
@@ -254,13 +251,13 @@ impl Writer {
         error: MavParamError,
         out: &mut dyn FnMut(&[u8]),
     ) {
-        let message = PARAM_ERROR_DATA {
-            param_index: index,
-            target_system: to.system,
-            target_component: to.component,
-            param_id: CharArray::new(name),
-            error,
-        };
-        self.sender.send(identity.address, &message, &[], out);
+        let [index_low, index_high] = index.to_le_bytes();
+        let mut payload = [0; PARAM_ERROR_DATA::ENCODED_LEN];
+        payload[..4].copy_from_slice(&[index_low, index_high, to.system, to.component]);
+        payload[4..20].copy_from_slice(&name);
+        payload[20] = error as u8;
+        let message = (PARAM_ERROR_DATA::ID, PARAM_ERROR_DATA::EXTRA_CRC);
+        self.sender
+            .send_payload(identity.address, message, &payload, out);
     }
 }

@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use siskin_control::drive::{Faults, Phase};
 use siskin_control::image::Image;
 use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request};
@@ -186,13 +185,8 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             bus_a: 3.5,
             consumed_mah: 12.0,
             temperature_c: 35.0,
-            phase: Phase::Idle,
-            faults: Faults::NONE,
-            fault_count: 0,
-            armed: false,
             bad_frames: 7,
-            bad_share: 0.0,
-            signal: None,
+            ..Telemetry::new()
         };
         let mut context = Context {
             now_us,

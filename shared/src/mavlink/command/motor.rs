@@ -10,15 +10,15 @@ use crate::input::authority::TestError;
 use crate::mavlink::parameter;
 use crate::params::{ParamId, Params};
 
-const PERCENT: f32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PERCENT as u8 as f32;
-const PWM: f32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PWM as u8 as f32;
+const PERCENT: i32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PERCENT as i32;
+const PWM: i32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PWM as i32;
 
-const NOTHING: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_NONE as u8 as f32;
-const BEEP: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_BEEP as u8 as f32;
-const TWO_DIRECTIONS: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_3D_MODE_ON as u8 as f32;
-const ONE_DIRECTION: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_3D_MODE_OFF as u8 as f32;
-const SPIN_1: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION1 as u8 as f32;
-const SPIN_2: f32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION2 as u8 as f32;
+const NOTHING: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_NONE as i32;
+const BEEP: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_BEEP as i32;
+const TWO_DIRECTIONS: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_3D_MODE_ON as i32;
+const ONE_DIRECTION: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_3D_MODE_OFF as i32;
+const SPIN_1: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION1 as i32;
+const SPIN_2: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION2 as i32;
 
 impl Commands {
     /// ACTUATOR_TEST and DO_MOTOR_TEST: the authority decides.
@@ -56,23 +56,23 @@ impl Commands {
         context: &mut Context,
         replies: &mut Replies,
     ) -> Option<MavResult> {
-        let [action, _, _, _, function, ..] = command.params;
-        if !self.is_own(function, command) {
+        if !self.is_own(command.params[4], command) {
             return Some(DENIED);
         }
+        let action = command.choice(0);
         let (id, value) = match action {
-            NOTHING | BEEP => (None, 0.0),
-            TWO_DIRECTIONS => (Some(ParamId::Inp3d), 1.0),
-            ONE_DIRECTION => (Some(ParamId::Inp3d), 0.0),
-            SPIN_1 => (Some(ParamId::MotDir), 0.0),
-            SPIN_2 => (Some(ParamId::MotDir), 1.0),
+            Some(NOTHING | BEEP) => (None, 0.0),
+            Some(TWO_DIRECTIONS) => (Some(ParamId::Inp3d), 1.0),
+            Some(ONE_DIRECTION) => (Some(ParamId::Inp3d), 0.0),
+            Some(SPIN_1) => (Some(ParamId::MotDir), 0.0),
+            Some(SPIN_2) => (Some(ParamId::MotDir), 1.0),
             _ => return Some(DENIED),
         };
         if self.is_busy() || !drive.stopped {
             return Some(TEMPORARILY_REJECTED);
         }
         let Some(id) = id else {
-            self.act = (action == BEEP).then_some(Act::Beep);
+            self.act = (action == Some(BEEP)).then_some(Act::Beep);
             return Some(ACCEPTED);
         };
         if parameter::change(id, value, context).is_err() {
@@ -90,10 +90,10 @@ impl Commands {
 /// pulse between the ends that the wire has. Nothing for a kind of throttle that is not served, and
 /// for several motors.
 fn motor_test(command: &Command, params: &Params) -> Option<(f32, f32)> {
-    let [_, kind, throttle, duration_s, motors, ..] = command.params;
-    let value = match kind {
-        PERCENT => throttle / 100.0,
-        PWM => {
+    let [_, _, throttle, duration_s, motors, ..] = command.params;
+    let value = match command.choice(1) {
+        Some(PERCENT) => throttle / 100.0,
+        Some(PWM) => {
             let min_us = params.get(ParamId::InpPulseMinUs);
             let share = (throttle - min_us) / (params.get(ParamId::InpPulseMaxUs) - min_us);
             if params.get(ParamId::Inp3d) == 0.0 {

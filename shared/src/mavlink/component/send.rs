@@ -1,0 +1,247 @@
+//! What leaves the component, and in what order: faults, answers, warnings, streams, and at last what
+//! can wait.
+
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, ESC_TELEMETRY_1_TO_4_DATA, FILE_TRANSFER_PROTOCOL_DATA,
+    MESSAGE_INTERVAL_DATA, MavParamError, MavSeverity, PARAM_VALUE_DATA,
+};
+use mavlink::{MavlinkVersion, MessageData};
+
+use super::{Component, Context};
+use crate::mavlink::faults::News;
+use crate::mavlink::identity::Address;
+use crate::mavlink::reply::Reply;
+use crate::mavlink::schedule::{self, Stream};
+use crate::mavlink::{check, ftp, messages, parameter};
+use crate::params::{ParamId, Params};
+use crate::telemetry::SIGNALS;
+
+/// FILE_TRANSFER_PROTOCOL.
+const FILE: (u32, u8) = (
+    FILE_TRANSFER_PROTOCOL_DATA::ID,
+    FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC,
+);
+
+impl Component {
+    /// Sends what waits and what is due, each frame by one call of `send`. To be called every
+    /// millisecond or so.
+    ///
+    /// Never inlined: its stack is free for what the caller does next.
+    #[inline(never)]
+    pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
+        self.writer.sender.signing.advance(context.now_us);
+        self.tell_faults(context, send);
+        while let Some(reply) = self.replies.next() {
+            self.send_reply(reply, context, send);
+        }
+        if core::mem::take(&mut self.unsign) {
+            self.keep_signing(None);
+        }
+        if self.replies.take_overrun() {
+            self.text(
+                MavSeverity::MAV_SEVERITY_WARNING,
+                &["MAVLink: too many requests at once"],
+                send,
+            );
+        }
+        while let Some(warning) = self.warnings.next() {
+            self.text(MavSeverity::MAV_SEVERITY_WARNING, &[&warning], send);
+        }
+        while let Some(id) = self.replies.next_value() {
+            self.send_value(context, id, send);
+        }
+        let overhead_len = self.writer.sender.overhead_len();
+        while let Some(stream) =
+            self.schedule
+                .next_due(context.now_us, context.params, overhead_len)
+        {
+            self.send_stream(stream, context, send);
+        }
+        while !self.list.is_empty()
+            && self
+                .list_pace
+                .take(context.now_us, overhead_len + PARAM_VALUE_DATA::ENCODED_LEN)
+        {
+            if let Some(id) = self.list.next() {
+                self.send_value(context, id, send);
+            }
+        }
+        self.send_burst(context, send);
+    }
+
+    /// In words, and by ESC_INFO at once: its flags would be up to a second late.
+    fn tell_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
+        let faults = context.telemetry.faults;
+        if core::mem::replace(&mut self.faults, faults) != faults {
+            self.schedule.hasten(Stream::EscInfo);
+        }
+        while let Some(news) = self.announcer.next(context.now_us, faults) {
+            let (severity, word, fault) = match news {
+                News::Began(fault) => (MavSeverity::MAV_SEVERITY_CRITICAL, "Fault: ", fault),
+                News::Ended(fault) => (MavSeverity::MAV_SEVERITY_NOTICE, "Fault ended: ", fault),
+            };
+            self.text(severity, &[word, fault.text()], send);
+        }
+    }
+
+    fn send_reply(&mut self, reply: Reply, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
+        let Self {
+            identity, writer, ..
+        } = self;
+        match reply {
+            Reply::Ack {
+                to,
+                command,
+                result,
+            } => writer.ack(identity, to, command, result, send),
+            Reply::Message(AUTOPILOT_VERSION_DATA::ID) => {
+                let message = messages::autopilot_version(&self.image);
+                writer.sender.send(identity.address, &message, &[], send);
+            }
+            Reply::Message(id) => {
+                if let Some(stream) = self.schedule.find(id) {
+                    self.send_stream(stream, context, send);
+                } else {
+                    self.send_metadata(id, context.now_us, send);
+                }
+            }
+            Reply::Interval(message) => self.send_interval(message, context.params, send),
+            Reply::Pong {
+                to,
+                time_us,
+                sequence,
+            } => writer.pong(identity, to, (time_us, sequence), send),
+            Reply::MissionCount { to, mission_type } => {
+                writer.mission_count(identity, to, mission_type, send);
+            }
+            Reply::UnknownParam { to, name, index } => {
+                let error = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
+                writer.param_error(identity, to, (name, index), error, send);
+            }
+            Reply::Refused { to, id, refusal } => {
+                let place = (messages::name_bytes(id), parameter::BY_NAME);
+                writer.param_error(identity, to, place, refusal.error, send);
+                let (other, colon) = refusal.because.map_or(("", ""), |b| (b.entry().name, ": "));
+                let pieces = [id.entry().name, " refused: ", other, colon, refusal.reason];
+                writer.text(identity, MavSeverity::MAV_SEVERITY_WARNING, &pieces, send);
+            }
+            Reply::Text(severity, text) => writer.text(identity, severity, &text, send),
+            Reply::Ftp { to, ref answer } => self.send_file(to, answer, context, send),
+        }
+    }
+
+    fn send_stream(&mut self, stream: Stream, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
+        let (from, place) = (self.identity.address, self.identity.place);
+        let sender = &mut self.writer.sender;
+        let telemetry = context.telemetry;
+        match stream {
+            Stream::Heartbeat => {
+                let armed = context.authority.armed();
+                let stopped = context.drive().stopped;
+                let message = messages::heartbeat(&self.identity, telemetry, armed, stopped);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::EscInfo => {
+                self.infos = self.infos.wrapping_add(1);
+                let message = messages::esc_info(context.now_us, telemetry, place, self.infos);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::BadFrames => {
+                let share = telemetry.bad_share * 100.0;
+                let message = messages::named_value(context.now_us, "bad_frames", share);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::Signals => {
+                let chosen = schedule::signals(context.params);
+                for (bit, name) in SIGNALS.into_iter().enumerate() {
+                    if chosen >> bit & 1 != 0 {
+                        let value = telemetry.signals[bit];
+                        let message = messages::named_value(context.now_us, name, value);
+                        sender.send(from, &message, &[], send);
+                    }
+                }
+            }
+            Stream::EscStatus => {
+                let message = messages::esc_status(context.now_us, telemetry, place);
+                sender.send(from, &message, &[], send);
+            }
+            Stream::EscTelemetry => {
+                self.telemetries = self.telemetries.wrapping_add(1);
+                let message = messages::esc_telemetry(telemetry, place, self.telemetries);
+                let mut payload = [0; ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN];
+                message.ser(MavlinkVersion::V2, &mut payload);
+                sender.send_payload(from, place.telemetry(), &payload, send);
+            }
+        }
+    }
+
+    /// MESSAGE_INTERVAL: -1 when it is off, 0 when there is no such stream.
+    fn send_interval(&mut self, message: u16, params: &Params, send: &mut dyn FnMut(&[u8])) {
+        let interval_us = match self.schedule.find(u32::from(message)) {
+            Some(stream) => self
+                .schedule
+                .interval_us(stream, params)
+                .map_or(-1, |us| i32::try_from(us).unwrap_or(i32::MAX)),
+            None => 0,
+        };
+        let data = MESSAGE_INTERVAL_DATA {
+            interval_us,
+            message_id: message,
+        };
+        self.writer
+            .sender
+            .send(self.identity.address, &data, &[], send);
+    }
+
+    /// What the link has room for of the file that someone reads. Never inlined, as what follows: its
+    /// stack is free for what else is sent.
+    #[inline(never)]
+    fn send_burst(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
+        let overhead_len = self.writer.sender.overhead_len();
+        while let Some(len) = self.files.burst_payload_len()
+            && self.list_pace.take(context.now_us, overhead_len + len)
+        {
+            if let Some((to, answer)) = self.files.next_of_burst(context.now_us) {
+                self.send_file(to, &answer, context, send);
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn send_file(
+        &mut self,
+        to: Address,
+        answer: &ftp::Answer,
+        context: &Context,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        let view = ftp::View {
+            params: context.params,
+            telemetry: context.telemetry,
+            warning: self.warnings.last(),
+        };
+        let mut payload = [0; ftp::PAYLOAD_MAX];
+        answer.write(to, &mut self.files, &view, &mut payload);
+        let sender = &mut self.writer.sender;
+        sender.send_payload(self.identity.address, FILE, &payload, send);
+    }
+
+    #[inline(never)]
+    fn send_metadata(&mut self, id: u32, now_us: u64, send: &mut dyn FnMut(&[u8])) {
+        let message = (id, check::extra_crc(id));
+        let payload = ftp::metadata(id, now_us);
+        let sender = &mut self.writer.sender;
+        sender.send_payload(self.identity.address, message, &payload, send);
+    }
+
+    fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {
+        let message = messages::param_value(context.params, id);
+        self.writer
+            .sender
+            .send(self.identity.address, &message, &[], send);
+    }
+
+    fn text(&mut self, severity: MavSeverity, pieces: &[&str], send: &mut dyn FnMut(&[u8])) {
+        self.writer.text(&self.identity, severity, pieces, send);
+    }
+}
