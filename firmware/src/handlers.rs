@@ -6,6 +6,7 @@ use core::panic::PanicInfo;
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use siskin_firmware::last_words::{DETAILS, Failure, fail, turn_off};
+use siskin_firmware::storage::take_torn_word;
 
 /// Names no file: nothing of what a panic says is in the image, only where it was.
 #[panic_handler]
@@ -72,6 +73,17 @@ extern "C" fn hard_fault(stack: u32) -> ! {
         // SAFETY: the processor has put the frame there, within the stack.
         let at = unsafe { *((stack + 24) as *const u32) };
         fail(Failure::HardFault, [at, status, 0, 0])
+    }
+}
+
+/// Of the exceptions of the processor.
+const NON_MASKABLE: i32 = -14;
+
+// SAFETY: it returns only where a word of the store was read, whose content is not trusted.
+#[exception]
+unsafe fn NonMaskableInt() {
+    if !take_torn_word() {
+        fail(Failure::UnexpectedInterrupt, [NON_MASKABLE as u32, 0, 0, 0]);
     }
 }
 

@@ -29,6 +29,12 @@ pub(crate) fn range() -> Range<u32> {
     0..place().len() as u32
 }
 
+/// Whether a non-maskable interrupt is for a word of the store that a loss of power has cut off. Who reads
+/// it goes on: its set has no seal, or a wrong one.
+pub fn take_torn_word() -> bool {
+    flash::take_torn_word(place())
+}
+
 /// The store's flash; offsets are from its beginning.
 pub struct Storage {
     _flash: Peri<'static, FLASH>,

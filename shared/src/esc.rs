@@ -119,21 +119,17 @@ impl Esc {
     ) -> Result<(Self, Throttle), BuildError> {
         let config = build(&params, &board)?;
         let throttle = Throttle::new(tick_hz, &params, &board, &config);
-        let esc = Self::with_config(params, board, &config, link_bytes_per_s);
+        let esc = Self::with_scale(params, board, config.scale, link_bytes_per_s);
         Ok((esc, throttle))
     }
 
-    /// An ESC at power-up whose configuration has been built, without its throttle.
+    /// An ESC at power-up, without its throttle, whose parameters have made a configuration of this
+    /// scale.
     ///
     /// Never inlined: on the chip it is made where it stays, by this and by [`Throttle::new`], since
     /// the two on their way through [`Esc::new`] take 10 KB of stack.
     #[inline(never)]
-    pub fn with_config(
-        params: Params,
-        board: Board,
-        config: &Config,
-        link_bytes_per_s: u32,
-    ) -> Self {
+    pub fn with_scale(params: Params, board: Board, scale: Scale, link_bytes_per_s: u32) -> Self {
         Self {
             board,
             given: Given {
@@ -141,7 +137,7 @@ impl Esc {
                 pwm_deadtime_ns: params.get(ParamId::PwmDeadtimeNs),
                 opposite: false,
             },
-            scale: config.scale,
+            scale,
             component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),

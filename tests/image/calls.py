@@ -40,7 +40,7 @@ class Calls:
     def _called_by_address(self) -> list[Function]:
         """All functions whose address is stored, outside of the vector table, or held by code."""
         stored = {value & ~1 for _, value in self.image.data_addresses() if value & 1}
-        held = {use & ~1 for code in self.code.values() for use in code.uses if use & 1}
+        held = {use & ~1 for code in self.code.values() for use in code.held() if use & 1}
         found = [self.image.functions[b] for b in sorted(stored | held) if b in self.image.functions]
         for function in found:
             if not indirect.is_foreseen(function.name):

@@ -31,7 +31,7 @@ def contents(calls: Calls, names: tuple[str, ...]) -> tuple[list[Function], list
     each piece of data."""
     image = calls.image
     functions = image.functions
-    held = {begin: {*code.uses, *(c.target for c in code.calls if c.target is not None)}
+    held = {begin: {*code.uses.values(), *(c.target for c in code.calls if c.target is not None)}
             for begin, code in calls.code.items()}
     stored = list(image.data_addresses())
     targets = {use for uses in held.values() for use in uses} | {value for _, value in stored}

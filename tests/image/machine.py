@@ -34,8 +34,14 @@ class Code:
     frame: int = 0
     """Most stack that it takes itself, bytes."""
     calls: list[Call] = field(default_factory=list)
-    uses: set[int] = field(default_factory=set)
-    """Addresses that it holds: of functions, odd, and of data."""
+    uses: dict[int, int] = field(default_factory=dict)
+    """Addresses that it holds, by the place of each: of functions, odd, and of data."""
+    called: set[int] = field(default_factory=set)
+    """Places of those among them that it calls: code for size has a call's target in a register."""
+
+    def held(self) -> set[int]:
+        """Addresses that it holds and does not only call."""
+        return {value for place, value in self.uses.items() if place not in self.called}
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,8 @@ class Number:
 
     value: int
     is_address: bool
+    place: int = field(default=0, compare=False)
+    """Where an address stands."""
 
 
 def code_of(image: Image, function: Function) -> Code:
@@ -118,6 +126,7 @@ class Walk:
         """The function that a register holds. The linker's own jumps have no relocation."""
         value = registers.get(register)
         if isinstance(value, Number) and value.value & ~1 in self.image.functions:
+            self.code.called.add(value.place)
             return value.value & ~1
         return None
 
@@ -131,12 +140,10 @@ class Walk:
         kind = instruction.id
         if kind == arm.ARM_INS_BL:
             self.call(instruction.address, depth, operands[0].imm)
-            lost = (arm.ARM_REG_R0, arm.ARM_REG_R1, arm.ARM_REG_R2, arm.ARM_REG_R3, arm.ARM_REG_R12)
-            kept = {r: v for r, v in registers.items() if r not in lost}
-            self.come_back(after, depth, kept)
+            self.come_back(after, depth, kept(registers))
         elif kind == arm.ARM_INS_BLX:
             self.call(instruction.address, depth, self.known(registers, operands[0].reg))
-            self.come_back(after, depth, {})
+            self.come_back(after, depth, kept(registers))
         elif kind in (arm.ARM_INS_CBZ, arm.ARM_INS_CBNZ):
             self.go(operands[1].imm, depth, registers)
             self.go(after, depth, registers)
@@ -211,7 +218,7 @@ class Walk:
             low = registers.get(operands[0].reg)
             if isinstance(low, Number):
                 value = low.value & 0xFFFF | operands[1].imm << 16
-                return self.number(value, instruction.address in self.image.addresses)
+                return self.number(value, instruction.address)
         if kind == arm.ARM_INS_BFC:
             # It aligns a copy of the stack pointer downwards.
             pointer = registers.get(operands[0].reg)
@@ -226,12 +233,19 @@ class Walk:
         if memory.base != arm.ARM_REG_PC or memory.index:
             return None
         place = (instruction.address & ~3) + 4 + memory.disp
-        return self.number(self.image.word(place), place in self.image.addresses)
+        return self.number(self.image.word(place), place)
 
-    def number(self, value: int, is_address: bool) -> Number:
+    def number(self, value: int, place: int) -> Number:
+        is_address = place in self.image.addresses
         if is_address:
-            self.code.uses.add(value)
-        return Number(value, is_address)
+            self.code.uses[place] = value
+        return Number(value, is_address, place)
+
+
+def kept(registers: dict) -> dict:
+    """What a function that is called leaves as it was."""
+    lost = (arm.ARM_REG_R0, arm.ARM_REG_R1, arm.ARM_REG_R2, arm.ARM_REG_R3, arm.ARM_REG_R12)
+    return {register: value for register, value in registers.items() if register not in lost}
 
 
 def sum_of(operands, registers: dict, subtract: bool):

@@ -30,7 +30,7 @@ def in_flash(calls: Calls, board: Board) -> list[str]:
     for function in callers:
         if function.begin in board.flash:
             found.append(f"{way(callers, function)}, {function.size} bytes")
-        for use in sorted(calls.code[function.begin].uses):
+        for use in sorted(set(calls.code[function.begin].uses.values())):
             # An odd one is a function, which is called or stored for later.
             if use in board.flash and use & ~1 not in image.functions:
                 found.append(f"{way(callers, function)} reads {use:#x}")

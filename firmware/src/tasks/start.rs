@@ -9,6 +9,7 @@ use siskin_control::mavlink::{Receiver, Warning};
 use siskin_control::params::{Board, ParamId, Params, build};
 use siskin_control::store;
 use siskin_control::throttle::Throttle;
+use siskin_control::units::Scale;
 use static_cell::StaticCell;
 
 use super::health::Health;
@@ -117,7 +118,7 @@ fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
 }
 
 /// The ESC and its throttle with these parameters or, where they do not fit the board, with the
-/// defaults.
+/// defaults; each is made where it stays.
 // Out of line, as what follows: the stack that one takes is free for the next.
 #[inline(never)]
 fn power_up(params: &Params) -> (&'static mut Esc, Port) {
@@ -128,45 +129,35 @@ fn power_up(params: &Params) -> (&'static mut Esc, Port) {
         },
         ..BOARD
     };
-    let defaults = Params::default();
-    let params = if fits(params, &board) {
-        params
-    } else {
-        &defaults
-    };
-    let config = build(params, &board).expect("the defaults fit every board");
-    let (esc, port) = make(params, board, &config);
-    if core::ptr::eq(params, &raw const defaults) {
-        let text = "Parameters do not fit the board: defaults in force";
-        warn(esc, text);
+    if let Some((port, scale)) = make_port(params, &board) {
+        return (make_esc(params.clone(), board, scale), port);
     }
+    let defaults = Params::default();
+    let (port, scale) = make_port(&defaults, &board).expect("the defaults fit every board");
+    let esc = make_esc(defaults, board, scale);
+    warn(esc, "Parameters do not fit the board: defaults in force");
     (esc, port)
 }
 
-/// A configuration takes 0.9 KB: the stack has room for one beside the ESC that is being made.
+/// The throttle, and the scale of the configuration, which takes 0.9 KB and is gone before the ESC is
+/// made.
 #[inline(never)]
-fn fits(params: &Params, board: &Board) -> bool {
-    build(params, board).is_ok()
-}
-
-/// The two, made where they stay: they take 3 KB.
-fn make(params: &Params, board: Board, config: &Config) -> (&'static mut Esc, Port) {
-    (
-        make_esc(params, board, config),
-        make_port(params, &board, config),
-    )
+fn make_port(params: &Params, board: &Board) -> Option<(Port, Scale)> {
+    let config = build(params, board);
+    let config = config.as_ref().ok()?;
+    Some((open_port(params, board, config), config.scale))
 }
 
 #[inline(never)]
-fn make_esc(params: &Params, board: Board, config: &Config) -> &'static mut Esc {
+fn open_port(params: &Params, board: &Board, config: &Config) -> Port {
+    Port::open(|| Throttle::new(TICK_HZ, params, board, config))
+}
+
+#[inline(never)]
+fn make_esc(params: Params, board: Board, scale: Scale) -> &'static mut Esc {
     static ESC: StaticCell<Esc> = StaticCell::new();
     let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
-    ESC.init_with(|| Esc::with_config(params.clone(), board, config, bytes_per_s))
-}
-
-#[inline(never)]
-fn make_port(params: &Params, board: &Board, config: &Config) -> Port {
-    Port::open(|| Throttle::new(TICK_HZ, params, board, config))
+    ESC.init_with(|| Esc::with_scale(params, board, scale, bytes_per_s))
 }
 
 /// The control's interrupt with what the parameters make.

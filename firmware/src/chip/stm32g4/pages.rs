@@ -1,5 +1,8 @@
 //! Words and pages of the flash (RM0440, section 3.3).
 
+use core::ops::Range;
+
+use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Cr;
 
 /// What is programmed at once.
@@ -21,4 +24,13 @@ pub(crate) fn erasing(page: usize) -> Cr {
     control.set_per(true);
     control.set_pnb(page as u8);
     control
+}
+
+/// Whether a word within these offsets was read that has two wrong bits or more, as one that a loss of
+/// power has cut off; the next one is told anew. It reads as it is.
+pub(crate) fn take_torn_word(offsets: Range<usize>) -> bool {
+    let status = FLASH.eccr().read();
+    // Flags are removed by ones.
+    FLASH.eccr().write_value(status);
+    status.eccd() && !status.sysf_ecc() && offsets.contains(&(status.addr_ecc() as usize))
 }

@@ -288,3 +288,39 @@ fn a_key_does_not_print() {
     let text = std::format!("{kept:?}");
     assert!(text.contains("Key(..)") && !text.contains("30"), "{text}");
 }
+
+/// So that what was recorded cannot be played again after a restart.
+#[test]
+fn whatever_is_obeyed_leaves_its_time_to_be_kept() {
+    let mut bench = keyed();
+    assert!(bench.component.take_changed(), "the key");
+    let mut now = TODAY;
+    let mut keeps = |number, param1, is_signed| {
+        now += SECOND;
+        let message = command(number, param1);
+        let bytes = if is_signed {
+            signed(STATION, &message, &KEY, 3, now)
+        } else {
+            encode(STATION, &message, &[])
+        };
+        bench.receive(&bytes);
+        bench.answers();
+        let newest = bench.component.kept_signing().expect("a key").newest;
+        (
+            bench.component.take_changed(),
+            u64::from(newest) >= now >> 16,
+        )
+    };
+    use MavCmd::*;
+    assert_eq!(keeps(MAV_CMD_COMPONENT_ARM_DISARM, 0.0, true), (true, true));
+    assert_eq!(keeps(MAV_CMD_PREFLIGHT_STORAGE, 0.0, true), (true, true));
+    assert!(!keeps(MAV_CMD_REQUEST_MESSAGE, 0.0, true).0);
+    assert!(!keeps(MAV_CMD_COMPONENT_ARM_DISARM, 2.0, true).0);
+    assert!(!keeps(MAV_CMD_COMPONENT_ARM_DISARM, 0.0, false).0);
+    assert!(!keeps(MAV_CMD_SET_MESSAGE_INTERVAL, 0.0, false).0);
+    now += SECOND;
+    assert!(takes(&mut bench, 5.0, STATION, 3, now));
+    assert!(bench.component.take_changed());
+    assert!(!takes(&mut bench, -5.0, STATION, 3, now + SECOND));
+    assert!(!bench.component.take_changed(), "refused");
+}

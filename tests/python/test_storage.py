@@ -1,0 +1,91 @@
+"""What survives a kill: at any moment all that was stored last, or all of the time before."""
+
+import random
+import time
+
+import pytest
+from test_ftp import Files
+
+import siskin_dialect as dialect
+
+ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+STORAGE = dialect.MAV_CMD_PREFLIGHT_STORAGE
+GET_INTERVAL = dialect.MAV_CMD_GET_MESSAGE_INTERVAL
+ESC_STATUS = 291
+HALF = 1048
+
+QUIET_S = 2.5
+"""Longer than the second for which nothing must have changed before it is stored, on a busy machine."""
+
+TUNE_S = 0.5
+
+
+@pytest.fixture
+def stored(start, tmp_path):
+    """Starts emulators with one storage, one after the other."""
+    return lambda: start(storage=tmp_path / "flash.bin")
+
+
+def test_what_is_set_is_stored_by_itself(stored):
+    emulator = stored()
+    with emulator.connect() as esc:
+        esc.set_param("LIM_PHASE_A", 12.5)
+        esc.stream(ESC_STATUS, 40_000)
+        time.sleep(QUIET_S)
+        told = [m.text for m in esc.since(0, "STATUSTEXT")]
+        assert not [text for text in told if "stor" in text], "nobody has asked"
+    emulator.kill()
+    with stored().connect() as esc:
+        assert esc.read_param("LIM_PHASE_A").param_value == 12.5
+        mark = esc.mark()
+        assert esc.command(GET_INTERVAL, ESC_STATUS) == ACCEPTED
+        assert esc.wait("MESSAGE_INTERVAL", since=mark).interval_us == 40_000
+        assert esc.command(STORAGE, 2) == ACCEPTED
+        assert esc.read_param("LIM_PHASE_A").param_value == 20.0
+        mark = esc.mark()
+        assert esc.command(GET_INTERVAL, ESC_STATUS) == ACCEPTED
+        assert esc.wait("MESSAGE_INTERVAL", since=mark).interval_us == 100_000
+
+
+def test_a_kill_while_values_are_stored_leaves_the_old_or_the_new_ones(stored):
+    chance = random.Random(1)
+    old = new = (20.0, 6000.0)
+    found_new = 0
+    for _ in range(20):
+        emulator = stored()
+        with emulator.connect() as esc:
+            # Nothing is stored as long as the tune of the start plays.
+            time.sleep(TUNE_S)
+            found = tuple(
+                esc.read_param(name).param_value for name in ("LIM_PHASE_A", "CTL_RPM_MAX")
+            )
+            assert found in (old, new)
+            found_new += found == new != old
+            texts = [m.text for m in esc.since(0, "STATUSTEXT")]
+            assert not [text for text in texts if "corrupt" in text or "defaults" in text], texts
+            old, new = found, (chance.randint(10, 29) + 0.5, float(chance.randint(4000, 5999)))
+            for name, value in zip(("LIM_PHASE_A", "CTL_RPM_MAX"), new):
+                esc.set_param(name, value)
+            esc.codec.command_long_send(1, 1, STORAGE, 0, 1, 0, 0, 0, 0, 0, 0)
+            time.sleep(chance.uniform(0.0, 0.01))
+            emulator.kill()
+    assert found_new > 0, "no save was made"
+
+
+def test_statistics_outlive_a_kill(stored):
+    emulator = stored()
+    with emulator.connect() as esc, emulator.throttle() as throttle:
+        esc.wait_armed()
+        throttle.value = HALF
+        esc.wait_rpm(3000, 3300)
+        throttle.value = 0
+        time.sleep(2 * QUIET_S)
+    emulator.kill()
+    with Files(stored().port) as files:
+        lines = dict(
+            line.split(": ") for line in files.file("@SYS/statistics.txt").decode().splitlines()
+        )
+    assert lines["Starts"] == "1"
+    assert int(lines["Run time"].removesuffix(" s")) >= 1
+    assert 1 <= int(lines["Highest phase current"].removesuffix(" A")) <= 28
+    assert not [name for name in lines if name.startswith("Fault")]
