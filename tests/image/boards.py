@@ -38,7 +38,7 @@ BOARDS = {
     "b-g431b-esc1": Board(
         # All but the store. Beside a boot loader of 12 KB, a second image and a store of 8 KB, as an
         # update in the field wants it, there are 52 KB.
-        flash=Region("flash", 0x0800_0000, 128 * KB, 124 * KB),
+        flash=Region("flash", 0x0800_0000, 128 * KB, 120 * KB),
         memories=(
             Region("CCM", 0x1000_0000, 10 * KB, 10 * KB),
             Region("SRAM", 0x2000_0000, 22 * KB, 20 * KB),

@@ -62,6 +62,18 @@ def test_it_monitors(siskin):
     assert sum("rpm" in sample for sample in samples) == 3
 
 
+def test_it_monitors_the_signals_that_were_chosen(siskin):
+    assert siskin("params", "set", "TEL_SIGNALS", 4 + 128, "TEL_SIG_HZ", 20).returncode == 0
+    monitored = siskin("monitor", "--json", "--count", 5)
+    lines = [json.loads(line) for line in monitored.stdout.splitlines()]
+    signals = [line for line in lines if "signal" in line]
+    assert {line["signal"] for line in signals} == {"i_d", "bus_v"}
+    volts = [line["value"] for line in signals if line["signal"] == "bus_v"]
+    assert all(23 < value < 25 for value in volts) and len(volts) >= 5
+    shown = siskin("monitor", "--count", 5)
+    assert "bus_v" in shown.stdout and "rpm_ref" not in shown.stdout
+
+
 def test_without_an_esc_it_says_so(siskin):
     ended = siskin("params", "list", "--connect", "tcp:127.0.0.1:1")
     assert ended.returncode == 2

@@ -3,8 +3,8 @@
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
     ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA, ESC_TELEMETRY_13_TO_16_DATA,
-    HEARTBEAT_DATA, MavAutopilot, MavSeverity, MavType, PARAM_ERROR_DATA, PARAM_VALUE_DATA,
-    STATUSTEXT_DATA,
+    HEARTBEAT_DATA, MavAutopilot, MavSeverity, MavType, NAMED_VALUE_FLOAT_DATA, PARAM_ERROR_DATA,
+    PARAM_VALUE_DATA, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 use mavlink::{MavlinkVersion, MessageData};
@@ -33,6 +33,7 @@ pub(crate) enum Message {
     EscInfo(ESC_INFO_DATA),
     EscStatus(ESC_STATUS_DATA),
     EscTelemetry(EscTelemetry),
+    Named(NAMED_VALUE_FLOAT_DATA),
 }
 
 /// One of the messages `ESC_TELEMETRY_*`, which are laid out alike.
@@ -163,6 +164,7 @@ impl Message {
             PARAM_VALUE_DATA::ID => typed(payload).map(Self::ParamValue),
             PARAM_ERROR_DATA::ID => typed(payload).map(Self::ParamError),
             COMMAND_ACK_DATA::ID => typed(payload).map(Self::CommandAck),
+            NAMED_VALUE_FLOAT_DATA::ID => typed(payload).map(Self::Named),
             STATUSTEXT_DATA::ID => StatusText::read(payload).map(Self::StatusText),
             ESC_INFO_DATA::ID => typed(payload).map(Self::EscInfo),
             ESC_STATUS_DATA::ID => typed(payload).map(Self::EscStatus),

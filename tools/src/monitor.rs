@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
-use mavlink::dialects::ardupilotmega::MavSeverity;
+use mavlink::dialects::ardupilotmega::{MavSeverity, NAMED_VALUE_FLOAT_DATA};
 use serde_json::{Value, json};
 use siskin_control::mavlink::Address;
+use siskin_control::telemetry::SIGNALS;
 
 use crate::cli::MonitorArgs;
 use crate::error::Error;
-use crate::message::{Message, StatusText, name_of};
+use crate::json::number;
+use crate::message::{Message, StatusText, name_of, text};
 use crate::sample::Source;
 use crate::session::Session;
 
@@ -72,6 +74,21 @@ pub(crate) fn run(
             Message::EscTelemetry(telemetry) => {
                 view.source(component, telemetry.index).telemetry = Some(telemetry.data);
             }
+            Message::Named(signal) => {
+                let name = text(&signal.name);
+                // What comes unasked is not shown: the share of bad frames.
+                let Some(number) = SIGNALS.iter().position(|signal| *signal == name) else {
+                    continue;
+                };
+                if args.json {
+                    writeln!(out, "{}", signal_json(component, &signal))?;
+                } else {
+                    view.latest.insert(
+                        Line::Signal(component, number),
+                        format!("      {name:<10} {:>12.4}", signal.value),
+                    );
+                }
+            }
             Message::StatusText(status) if args.json => {
                 writeln!(out, "{}", status_json(&status))?;
             }
@@ -88,13 +105,13 @@ pub(crate) fn run(
                         writeln!(out, "{}", row.json())?;
                     }
                 } else {
+                    view.latest
+                        .extend(rows.iter().map(|row| (Line::Esc(row.esc), row.line())));
+                    screen.show(out, &view.latest)?;
                     // A terminal keeps what other components sent; a pipe gets each sample once.
                     if !screen.in_place {
                         view.latest.clear();
                     }
-                    view.latest
-                        .extend(rows.iter().map(|row| (row.esc, row.line())));
-                    screen.show(out, &view.latest)?;
                 }
             }
             _ => {}
@@ -109,8 +126,17 @@ pub(crate) fn run(
 struct View {
     /// By component and `index`, the number of the first ESC of a message.
     sources: BTreeMap<(u8, u8), Source>,
-    /// The rows to show, by the ESC's number.
-    latest: BTreeMap<usize, String>,
+    /// The rows to show.
+    latest: BTreeMap<Line, String>,
+}
+
+/// What a row is about, in the order of the rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Line {
+    /// An ESC, by its number.
+    Esc(usize),
+    /// A signal of a component's control, by its bit in `TEL_SIGNALS`.
+    Signal(u8, usize),
 }
 
 impl View {
@@ -132,6 +158,15 @@ fn severity(status: &StatusText) -> &'static str {
     }
 }
 
+fn signal_json(component: u8, signal: &NAMED_VALUE_FLOAT_DATA) -> Value {
+    json!({
+        "component": component,
+        "time_s": f64::from(signal.time_boot_ms) / 1e3,
+        "signal": text(&signal.name),
+        "value": number(signal.value),
+    })
+}
+
 fn status_json(status: &StatusText) -> Value {
     json!({ "severity": severity(status), "text": status.text })
 }
@@ -145,7 +180,7 @@ struct Screen {
 
 impl Screen {
     /// Shows these rows in the place of those before.
-    fn show(&mut self, out: &mut dyn Write, rows: &BTreeMap<usize, String>) -> io::Result<()> {
+    fn show(&mut self, out: &mut dyn Write, rows: &BTreeMap<Line, String>) -> io::Result<()> {
         self.clear(out)?;
         for row in rows.values() {
             writeln!(out, "{row}")?;
@@ -175,7 +210,8 @@ mod tests {
             let mut out = Vec::new();
             let mut screen = Screen { in_place, shown: 0 };
             for rows in [&["a"][..], &["b", "c"]] {
-                let rows = rows.iter().map(|&row| row.to_owned()).enumerate().collect();
+                let rows = rows.iter().map(|&row| row.to_owned()).enumerate();
+                let rows = rows.map(|(esc, row)| (Line::Esc(esc), row)).collect();
                 screen.show(&mut out, &rows).expect("memory");
             }
             screen.clear(&mut out).expect("memory");

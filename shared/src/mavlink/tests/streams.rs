@@ -1,6 +1,9 @@
 use mavlink::dialects::ardupilotmega::{
-    HEARTBEAT_DATA, MISSION_REQUEST_LIST_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
+    HEARTBEAT_DATA, MISSION_REQUEST_LIST_DATA, MavAutopilot, MavModeFlag, MavSeverity, MavState,
+    MavType,
 };
+
+use std::borrow::ToOwned;
 
 use super::*;
 use crate::drive::Fault;
@@ -151,6 +154,35 @@ fn a_fault_is_told_when_it_appears_and_when_it_ends() {
     bench.telemetry.faults = Faults::NONE;
     let ended = ["Fault ended: over-current", "Fault ended: over-temperature"];
     assert_eq!(texts(&bench.answers()), ended);
+}
+
+#[test]
+fn every_fault_is_told_in_words_and_by_its_flag_and_so_is_its_end() {
+    let mut bench = Bench::new();
+    bench.run_ms(10);
+    for fault in Fault::ALL {
+        for (present, severity, word) in [
+            (true, MavSeverity::MAV_SEVERITY_CRITICAL, "Fault: "),
+            (false, MavSeverity::MAV_SEVERITY_NOTICE, "Fault ended: "),
+        ] {
+            bench.telemetry.faults = Faults::NONE;
+            if present {
+                bench.telemetry.faults.insert(fault);
+            }
+            let (mut told, mut flags) = (Vec::new(), None);
+            for sent in bench.run_ms(1) {
+                match sent.message {
+                    MavMessage::STATUSTEXT(text) => {
+                        told.push((text.severity, text.text.to_str().expect("ASCII").to_owned()));
+                    }
+                    MavMessage::ESC_INFO(info) => flags = Some(info.failure_flags[0] != 0),
+                    _ => {}
+                }
+            }
+            assert_eq!(told, [(severity, word.to_owned() + fault.text())]);
+            assert_eq!(flags, Some(present), "{fault:?}");
+        }
+    }
 }
 
 #[test]
