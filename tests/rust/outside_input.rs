@@ -241,7 +241,7 @@ fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool)
         put(place, &bytes);
     }
     let command = body.get(COMMAND_OFFSET..COMMAND_OFFSET + 2);
-    let tests = TESTS.map(|test| test.to_le_bytes());
+    let tests = TESTS.map(u16::to_le_bytes);
     if is_command(id) && command.is_some_and(|command| tests.iter().any(|test| test == command)) {
         body[COMMAND_OFFSET] ^= 1;
     }

@@ -184,6 +184,10 @@ pub(crate) fn set(session: &mut Session, name: &str, value: f32) -> Result<SetOu
             break;
         }
     }
+    // A refusal by an error, whose value was lost on its way.
+    if last.is_none() && reasons.error != Some(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST) {
+        last = Some(get(session, name)?);
+    }
     Ok(SetOutcome::Refused(reasons.told(last)))
 }
 

@@ -72,6 +72,58 @@ fn a_flash_that_refuses_keeps_what_was_stored() {
     assert_eq!(limit(&device), 12.0);
 }
 
+/// Nor by a reset to the factory's settings, after which it is still in force.
+#[test]
+fn what_the_command_line_set_is_not_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flash");
+    let start = |overrides| {
+        let started = Device::start(Start {
+            bench: Bench::default(),
+            wire: Wire::detached(),
+            flash: FileFlash::open(&path).unwrap(),
+            overrides,
+            faults: Vec::new(),
+            link_bytes_per_s: 11_520,
+        });
+        started.unwrap().0
+    };
+    let mut plain = start(Vec::new());
+    set(&mut plain, 15.0);
+    assert_eq!(plain.store(Request::Keep), Ok(()));
+    drop(plain);
+
+    let mut given = start(vec![
+        (ParamId::LimPhaseA, 12.0),
+        (ParamId::CtlRpmMax, 5000.0),
+    ]);
+    for (request, stored) in [
+        (Request::Keep, 15.0),
+        (Request::Save, 15.0),
+        (Request::Load, 15.0),
+        (Request::FactoryReset, 20.0),
+        (Request::Save, 20.0),
+    ] {
+        assert_eq!(given.store(request), Ok(()), "{request:?}");
+        assert_eq!(limit(&given), 12.0, "{request:?}");
+        let params = store::load(&mut given.flash, STORE).kept.params;
+        let found = (
+            params.get(ParamId::LimPhaseA),
+            params.get(ParamId::CtlRpmMax),
+        );
+        assert_eq!(found, (stored, 6000.0), "{request:?}");
+    }
+}
+
+#[test]
+fn without_a_file_only_who_has_asked_is_told() {
+    let mut device = device(FileFlash::in_memory(), Vec::new());
+    set(&mut device, 12.0);
+    assert_eq!(device.store(Request::Keep), Ok(()));
+    let refused = device.store(Request::Save).unwrap_err();
+    assert!(refused.contains("none"), "{refused}");
+}
+
 #[test]
 fn a_chip_in_reset_is_silent_and_forgets_that_it_was_armed() {
     let reset = Fault {

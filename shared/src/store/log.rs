@@ -5,51 +5,11 @@ use core::ops::Range;
 use embedded_storage::nor_flash::NorFlash;
 
 use super::schema::{self, Change};
+use super::word::{Check, Word, Writer};
 use super::{Content, Integrity, StoreError, key};
-use crate::checksum::checksum;
 
 /// Number of the first set in empty flash.
 const FIRST: u16 = 1;
-
-/// Where a set's check begins. One, two or three wrong bits in a set, and a single wrong byte, are always
-/// noticed; of all else, all but one in 2^32.
-const CHECK_ORIGIN: u32 = !0;
-
-/// What the flash is read and written by.
-pub(super) struct Word {
-    pub(super) key: u16,
-    /// That of its set.
-    number: u16,
-    /// A value's, or the check of the set.
-    pub(super) bits: u32,
-}
-
-impl Word {
-    pub(super) const BYTES: u32 = 8;
-
-    pub(super) fn read<F: NorFlash>(flash: &mut F, at: u32) -> Result<Self, StoreError> {
-        let mut bytes = [0; Self::BYTES as usize];
-        flash.read(at, &mut bytes).map_err(|_| StoreError::Flash)?;
-        let [a, b, c, d, e, f, g, h] = bytes;
-        Ok(Self {
-            key: u16::from_le_bytes([a, b]),
-            number: u16::from_le_bytes([c, d]),
-            bits: u32::from_le_bytes([e, f, g, h]),
-        })
-    }
-
-    fn bytes(&self) -> [u8; Self::BYTES as usize] {
-        let [a, b] = self.key.to_le_bytes();
-        let [c, d] = self.number.to_le_bytes();
-        let [e, f, g, h] = self.bits.to_le_bytes();
-        [a, b, c, d, e, f, g, h]
-    }
-
-    /// As an erase leaves it.
-    fn is_blank(&self) -> bool {
-        self.bytes() == [0xFF; Self::BYTES as usize]
-    }
-}
 
 /// Where in the flash a set is.
 #[derive(Clone)]
@@ -136,7 +96,7 @@ impl Log {
         for half in halves.clone() {
             let mut start = half.start;
             let mut number = FIRST;
-            let mut check = CHECK_ORIGIN;
+            let mut check = Check::ORIGIN;
             let mut whole = true;
             for at in half.step_by(Word::BYTES as usize) {
                 let word = Word::read(flash, at)?;
@@ -145,14 +105,14 @@ impl Log {
                 }
                 if whole || word.number != number {
                     all_whole &= whole;
-                    (start, number, check) = (at, word.number, CHECK_ORIGIN);
+                    (start, number, check) = (at, word.number, Check::ORIGIN);
                 }
                 // The last word may have been cut off with any number.
                 first &= !torn;
                 torn = number != FIRST;
                 // The check of nothing is zero, as are the words that an erase may leave.
-                whole = word.key == key::SEAL && at != start && word.bits == check;
-                check = checksum(check, &word.bytes());
+                whole = word.key == key::SEAL && at != start && word.bits == check.0;
+                check = check.over(&word);
                 let is_newer = number.wrapping_sub(newest.number).cast_signed() > 0;
                 if whole && (newest.values.is_empty() || is_newer) {
                     newest = Set {
@@ -286,49 +246,6 @@ impl Log {
         } else {
             Err(StoreError::NotStored)
         }
-    }
-}
-
-/// Writes a set.
-pub(super) struct Writer {
-    at: u32,
-    number: u16,
-    check: u32,
-}
-
-impl Writer {
-    pub(super) fn new(at: u32, number: u16) -> Self {
-        Self {
-            at,
-            number,
-            check: CHECK_ORIGIN,
-        }
-    }
-
-    #[inline(never)]
-    pub(super) fn put<F: NorFlash>(
-        &mut self,
-        flash: &mut F,
-        key: u16,
-        bits: u32,
-    ) -> Result<(), StoreError> {
-        const { assert!((Word::BYTES as usize).is_multiple_of(F::WRITE_SIZE)) }
-        let word = Word {
-            key,
-            number: self.number,
-            bits,
-        };
-        let bytes = word.bytes();
-        flash
-            .write(self.at, &bytes)
-            .map_err(|_| StoreError::Flash)?;
-        self.check = checksum(self.check, &bytes);
-        self.at += Word::BYTES;
-        Ok(())
-    }
-
-    pub(super) fn seal<F: NorFlash>(&mut self, flash: &mut F) -> Result<(), StoreError> {
-        self.put(flash, key::SEAL, self.check)
     }
 }
 

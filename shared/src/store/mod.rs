@@ -15,6 +15,7 @@
 mod kept;
 mod log;
 mod schema;
+mod word;
 
 use core::ops::Range;
 

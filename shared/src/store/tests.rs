@@ -4,7 +4,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use super::log::{Word, Writer};
+use super::word::{Word, Writer};
 use super::*;
 use crate::mavlink::{Intervals, KeptSigning, Key};
 use crate::params::{Kind, ParamId, Params, TABLE};
