@@ -50,7 +50,6 @@ pub(super) struct Values<'a> {
 
 impl Values<'_> {
     /// Key and bits of the next one.
-    #[inline(never)]
     pub(super) fn next<F: NorFlash>(
         &mut self,
         flash: &mut F,
@@ -152,7 +151,6 @@ impl Log {
     }
 
     /// Writes a set with this content behind the newest, if that has another.
-    #[inline(never)]
     pub(super) fn append<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -227,7 +225,6 @@ impl Log {
     }
 
     /// Writes a set, and looks whether it stands.
-    #[inline(never)]
     fn write<F: NorFlash>(
         &self,
         flash: &mut F,

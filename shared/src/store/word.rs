@@ -72,7 +72,6 @@ impl Writer {
         }
     }
 
-    #[inline(never)]
     pub(super) fn put<F: NorFlash>(
         &mut self,
         flash: &mut F,
