@@ -6,7 +6,7 @@
 //! period, with the current's sign.
 
 use fixed::FixedI32;
-use fixed::types::extra::{U25, U26, U28};
+use fixed::types::extra::{U20, U25, U28};
 use fixed::types::{I2F30, I6F26, I8F24};
 
 use super::modulator::Share;
@@ -18,7 +18,7 @@ use crate::units::Current;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Phase current over the least whose sign is certain.
-    pub certainty: Gain<U28, U26>,
+    pub certainty: Gain<U28, U20>,
     /// The whole compensation: dead time over period.
     pub duty: I2F30,
 }
@@ -31,21 +31,26 @@ pub type Certainty = Dq<FixedI32<U25>>;
 /// the width around zero in which the compensation is in proportion, because there a ripple crosses
 /// zero within the period. Taken every few periods, with the frame's turn until the voltage acts.
 pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certainty {
-    // Halved while it is too long for its type, 31: beyond that the width is wider in proportion.
-    let mut i = wanted;
-    loop {
-        let d: I6F26 = config.certainty.saturating_apply(i.d);
-        let q: I6F26 = config.certainty.saturating_apply(i.q);
-        let long = |x: I6F26| x.saturating_abs() >= LONGEST;
-        if !long(d) && !long(q) {
-            return turn(Dq { d, q }, ahead);
-        }
-        i.d >>= 1;
-        i.q >>= 1;
-    }
+    let d = config.certainty.saturating_apply(wanted.d).to_bits();
+    let q = config.certainty.saturating_apply(wanted.q).to_bits();
+    // By less where it is too long for its type, 32: beyond that the width is wider in proportion.
+    let room = (magnitude(d) | magnitude(q)).leading_zeros() - 1;
+    let shift = room.min(MORE_BITS);
+    let scaled = Dq {
+        d: I6F26::from_bits(d << shift),
+        q: I6F26::from_bits(q << shift),
+    };
+    turn(scaled, ahead)
 }
 
-const LONGEST: I6F26 = I6F26::lit("31");
+/// The fraction bits by which a certainty's type is finer than its gain's.
+const MORE_BITS: u32 = 6;
+
+/// The value, or for a negative one a bit less: what counts is its leading zeros.
+#[inline(always)]
+fn magnitude(bits: i32) -> u32 {
+    (bits ^ (bits >> 31)) as u32
+}
 
 impl Config {
     /// No dead time.
