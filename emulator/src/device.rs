@@ -447,7 +447,6 @@ fn rejected(receiver: &Receiver) -> u64 {
         counters.bad_checks,
         counters.incompatible,
         counters.unknown,
-        counters.signed,
         counters.incomplete,
     ]
     .map(u64::from)

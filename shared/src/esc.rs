@@ -260,7 +260,7 @@ impl Esc {
         };
         let rests = self.recorder.look(&mut self.telemetry.statistics, &sight);
         if rests {
-            self.storage.changed(now_us);
+            self.storage.recorded(now_us);
         }
     }
 
@@ -280,14 +280,22 @@ impl Esc {
                 return request;
             }
             Some(Request::Reboot) => self.storage.reboot(),
+            Some(Request::FactoryReset) => {
+                match self.given.check(&Params::default(), &self.board) {
+                    Ok(()) => self.storage.ask(request),
+                    Err(error) => self.component.storage_done(Err(error.reason)),
+                }
+            }
             _ => self.storage.ask(request),
-        }
-        if self.storage.take_reboot() {
-            return Some(Request::Reboot);
         }
         if !self.drive().stopped && self.storage.cancel_reboot() {
             self.component
                 .tell_stored(Err("No reboot: the motor turns"));
+        }
+        // Nothing turns the motor from then on.
+        if self.storage.reboots() && throttle.reach(Throttle::store) {
+            self.storage.cancel_reboot();
+            return Some(Request::Reboot);
         }
         let stores = self.storage.waits(now_us) && self.may_store();
         if stores && throttle.reach(Throttle::store) {

@@ -40,6 +40,8 @@ pub(super) struct Storage {
     under_way: Option<Asker>,
     /// Whether it has been told that what changes cannot be stored.
     failed: bool,
+    /// Whether what is stored is not in force, and stays until somebody changes something.
+    spared: bool,
 }
 
 impl Storage {
@@ -53,9 +55,22 @@ impl Storage {
         self.save = true;
     }
 
-    /// Something that is kept has changed.
+    /// Somebody has changed something that is kept.
     pub(super) fn changed(&mut self, now_us: u64) {
         self.changed_us = Some(now_us);
+        self.spared = false;
+    }
+
+    /// The statistics have changed.
+    pub(super) fn recorded(&mut self, now_us: u64) {
+        if !self.spared {
+            self.changed_us = Some(now_us);
+        }
+    }
+
+    /// Leaves what is stored alone until somebody changes something.
+    pub(super) fn spare(&mut self) {
+        self.spared = true;
     }
 
     /// MAVLink asks for a restart, which waits for what waits to be stored.
@@ -63,13 +78,12 @@ impl Storage {
         self.reboot = true;
     }
 
-    /// Whether the restart is due now.
-    pub(super) fn take_reboot(&mut self) -> bool {
-        let waits = self.under_way.is_some() || self.next(0).is_some();
-        !waits && core::mem::take(&mut self.reboot)
+    /// Whether a restart is due now.
+    pub(super) fn reboots(&self) -> bool {
+        self.reboot && self.under_way.is_none() && self.next(0).is_none()
     }
 
-    /// Gives the restart up; whether there was to be one.
+    /// The restart begins, or is given up; whether there was to be one.
     pub(super) fn cancel_reboot(&mut self) -> bool {
         core::mem::take(&mut self.reboot)
     }
@@ -181,9 +195,17 @@ impl Esc {
         self.component.keep_intervals(&kept.intervals);
         self.component.keep_signing(kept.signing);
         self.telemetry.statistics = kept.statistics;
+        if matches!(loaded.integrity, Integrity::Corrupt | Integrity::Unreadable) {
+            self.spare_stored();
+        }
         if let Some(trouble) = loaded.trouble() {
             self.warn_of(trouble);
         }
+    }
+
+    /// Leaves what is stored alone until somebody changes something: it is not what is in force.
+    pub fn spare_stored(&mut self) {
+        self.storage.spare();
     }
 
     /// What is to be stored now.

@@ -1,8 +1,9 @@
 //! What guards a frame.
 //!
-//! Each message's check has a seed of its own. A receiver must know it of the whole dialect, not only of what an ESC obeys: a frame that something
-//! else carries (a file, a tunnel) is not found then. The dialect's own look-up takes 2.7 KB of the
-//! chip's flash, these tables a quarter of it; a test holds them against it.
+//! Each message's check has a seed of its own. A receiver must know it of the whole dialect, not only
+//! of what an ESC obeys: a frame that something else carries (a file, a tunnel) is not found then. The
+//! dialect's own look-up takes 2.7 KB of the chip's flash, these tables a quarter of it; a test holds
+//! them against it.
 
 /// The first message of each span, and the `CRC_EXTRA` of it and of those that follow; 0 where there
 /// is no message.

@@ -107,10 +107,11 @@ impl Command {
         matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL)
     }
 
-    /// Whether there is something to be kept once it has been obeyed: an interval, and the time of a
-    /// signature, which must not be taken again after a reset.
-    fn leaves(&self) -> bool {
-        self.number == SET_MESSAGE_INTERVAL || (self.signed && !self.asks())
+    /// Whether there is something to be kept: an interval that was taken, and the time of a signature,
+    /// which must not be taken again after a reset, even if the command was refused before.
+    fn leaves(&self, result: Option<MavResult>) -> bool {
+        let is_interval = self.number == SET_MESSAGE_INTERVAL && result == Some(ACCEPTED);
+        is_interval || (self.signed && !self.asks())
     }
 
     /// Whether this is the same command sent again because its ACK did not arrive. Values are
@@ -174,7 +175,10 @@ impl Commands {
         replies: &mut Replies,
     ) {
         if !command.is_allowed() {
-            replies.ack(command.from, command.number, DENIED);
+            // Others may have been asked as well.
+            if command.exact || self.role == Role::Standalone {
+                replies.ack(command.from, command.number, DENIED);
+            }
             return;
         }
         let earlier = self
@@ -187,7 +191,7 @@ impl Commands {
             (_, Some((_, result))) => Some(result),
             _ => self.obey(command, drive, context, schedule, replies),
         };
-        self.left |= command.leaves() && matches!(result, Some(ACCEPTED) | None);
+        self.left |= command.leaves(result);
         if let Some(result) = result {
             replies.ack(command.from, command.number, result);
         }

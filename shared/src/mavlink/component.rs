@@ -12,7 +12,7 @@ use super::faults::Announcer;
 use super::identity::{Address, Identity, Role};
 use super::pace::Pace;
 use super::parameter::{self, List};
-use super::receiver::Frame;
+use super::receiver::{Frame, is_signed};
 use super::reply::{PING, Replies, Reply, Writer};
 use super::schedule::{Intervals, Schedule};
 use super::signing::{Kept, Signing, Trust};
@@ -149,17 +149,23 @@ impl Component {
         if frame.from == self.identity.address {
             return;
         }
+        let target = target(frame).filter(|target| self.identity.is_for(*target));
+        // Of what others say to others no stream is followed.
+        if target.is_none() && !self.identity.awaits(frame) {
+            return;
+        }
         let signing = &mut self.writer.sender.signing;
         signing.advance(context.now_us);
         let trust = signing.judge(frame);
-        match trust {
-            Trust::Full => self.identity.hear(frame),
-            Trust::Read => {}
-            Trust::None => return,
-        }
-        let Some(target) = target(frame).filter(|target| self.identity.is_for(*target)) else {
+        let Some(target) = target else {
+            if trust == Trust::Full {
+                self.identity.belong_to(frame.from);
+            }
             return;
         };
+        if trust == Trust::None {
+            return;
+        }
         // Whether nobody else has been asked, so that what does not exist is an error.
         let alone = target.component != 0 || self.identity.role == Role::Standalone;
         let drive = context.drive();
@@ -183,7 +189,8 @@ impl Component {
                     &mut self.replies,
                 );
                 self.params_changed |= taken;
-                self.keep |= taken;
+                // Even what is refused now must not be taken after a reset.
+                self.keep |= taken || is_signed(frame.raw);
             }
             COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => self.commands.handle(
                 &Command::read(
@@ -223,15 +230,18 @@ impl Component {
 
     fn set_up_signing(&mut self, frame: &Frame) {
         let signing = &mut self.writer.sender.signing;
-        signing.set_up(frame.bytes(10), frame.u64(0));
-        self.keep = true;
-        self.unsign = false;
-        let text = if signing.signs() {
-            "Signing: only who has the key may change anything"
+        let is_time = signing.set_up(frame.bytes(10), frame.u64(0));
+        let (severity, text) = if !is_time {
+            let text = "Signing refused: its time has more than 48 bits";
+            (MavSeverity::MAV_SEVERITY_WARNING, text)
+        } else if signing.signs() {
+            let text = "Signing: only who has the key may change anything";
+            (MavSeverity::MAV_SEVERITY_NOTICE, text)
         } else {
-            "Signing: off"
+            (MavSeverity::MAV_SEVERITY_NOTICE, "Signing: off")
         };
-        let severity = MavSeverity::MAV_SEVERITY_NOTICE;
+        self.keep |= is_time;
+        self.unsign &= !is_time;
         self.replies.push(Reply::Text(severity, [text, ""]));
     }
 
@@ -278,9 +288,8 @@ impl Component {
         self.commands.take_act()
     }
 
-    /// A request for storage is done: whether what it
-    /// promises would survive the loss of power now, or a few words on why not. The command is
-    /// acknowledged with this.
+    /// A request for storage is done: whether what it promises would survive the loss of power now, or
+    /// a few words on why not. The command is acknowledged with this.
     pub fn storage_done(&mut self, result: Result<(), &'static str>) {
         if self.commands.storage_done(result, &mut self.replies) {
             self.list.start();

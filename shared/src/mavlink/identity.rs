@@ -65,16 +65,19 @@ impl Identity {
             && (target.component == 0 || target.component == self.address.component)
     }
 
-    /// A peripheral belongs to the first autopilot that it hears, whatever its system id.
-    pub(super) fn hear(&mut self, frame: &Frame) {
+    /// Whether this is what a peripheral waits for: the first sign of an autopilot.
+    pub(super) fn awaits(&self, frame: &Frame) -> bool {
         // Offset 5 is the autopilot: of a ground station and of other peripherals it is INVALID.
         let from_autopilot = frame.id == HEARTBEAT_DATA::ID
             && frame.from.component == 1
             && frame.u8(5) != MavAutopilot::MAV_AUTOPILOT_INVALID as u8;
-        if self.role == Role::Peripheral && from_autopilot && !self.autopilot_heard {
-            self.autopilot_heard = true;
-            self.address.system = frame.from.system;
-        }
+        self.role == Role::Peripheral && from_autopilot && !self.autopilot_heard
+    }
+
+    /// A peripheral belongs to the first autopilot that it hears, whatever its system id.
+    pub(super) fn belong_to(&mut self, autopilot: Address) {
+        self.autopilot_heard = true;
+        self.address.system = autopilot.system;
     }
 
     pub(super) fn kind(&self) -> (MavType, MavAutopilot) {

@@ -4,8 +4,11 @@
 //! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a
 //! component and a link), and no stream may begin more than a minute behind the newest timestamp that
 //! was heard or sent. What was newest is kept over a loss of power with the key, so that what was
-//! recorded before cannot be played again after it.
+//! recorded before cannot be played again after it: it is stored with all else, so that what came in the
+//! last second, or since the motor began to turn, may be played again where the power fails then.
 
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::SETUP_SIGNING_DATA;
 use sha2::{Digest, Sha256};
 
 use super::identity::Address;
@@ -22,6 +25,7 @@ const LINK: u8 = 0;
 /// By how much a stream may begin behind the newest timestamp: a minute.
 const BEHIND_TICKS: u64 = 6_000_000;
 const TICK_US: u64 = 10;
+const TIMESTAMP_MAX: u64 = (1 << 48) - 1;
 
 /// Streams that are followed: ground stations, companions and an autopilot, each over two links.
 const STREAMS: usize = 8;
@@ -100,17 +104,27 @@ impl Signing {
         self.key.map(|key| Kept { key, newest })
     }
 
-    /// SETUP_SIGNING: a key from now on, or with a key of zeros none.
-    pub(super) fn set_up(&mut self, key: [u8; 32], timestamp: u64) {
-        let now_us = self.now_us;
+    /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False where its time is none.
+    ///
+    /// From key to key time does not run backwards, and what was heard by the same one is not heard
+    /// again.
+    #[inline(never)]
+    pub(super) fn set_up(&mut self, key: [u8; 32], timestamp: u64) -> bool {
+        if timestamp > TIMESTAMP_MAX {
+            return false;
+        }
         let key = Some(Key(key)).filter(|key| key.0 != [0; 32]);
-        *self = Self {
-            key,
-            newest: timestamp,
-            newest_at_us: now_us,
-            now_us,
-            ..Self::new(None)
-        };
+        let before = self.key.map_or(0, |_| self.clock());
+        if key.is_none() || key != self.key {
+            *self = Self {
+                key,
+                now_us: self.now_us,
+                ..Self::new(None)
+            };
+        }
+        self.newest = timestamp.max(before);
+        self.newest_at_us = self.now_us;
+        true
     }
 
     /// Time since the start, which does not run backwards.
@@ -124,9 +138,12 @@ impl Signing {
     }
 
     /// What the sender of this frame may do.
+    #[inline(never)]
     pub(super) fn judge(&mut self, frame: &Frame) -> Trust {
         match (self.key, signature(frame.raw)) {
             (None, None) => Trust::Full,
+            // A client that signs from its first try on may have to try again.
+            (None, Some(_)) if frame.id == SETUP_SIGNING_DATA::ID => Trust::Full,
             (None, Some(_)) => Trust::None,
             (Some(_), None) => Trust::Read,
             (Some(key), Some((signed, hash))) => {

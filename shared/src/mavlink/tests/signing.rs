@@ -291,7 +291,7 @@ fn a_key_does_not_print() {
 
 /// So that what was recorded cannot be played again after a restart.
 #[test]
-fn whatever_is_obeyed_leaves_its_time_to_be_kept() {
+fn whatever_would_change_something_leaves_its_time_to_be_kept() {
     let mut bench = keyed();
     assert!(bench.component.take_changed(), "the key");
     let mut now = TODAY;
@@ -315,12 +315,66 @@ fn whatever_is_obeyed_leaves_its_time_to_be_kept() {
     assert_eq!(keeps(MAV_CMD_COMPONENT_ARM_DISARM, 0.0, true), (true, true));
     assert_eq!(keeps(MAV_CMD_PREFLIGHT_STORAGE, 0.0, true), (true, true));
     assert!(!keeps(MAV_CMD_REQUEST_MESSAGE, 0.0, true).0);
-    assert!(!keeps(MAV_CMD_COMPONENT_ARM_DISARM, 2.0, true).0);
+    // What is refused now, too: it might be obeyed another time.
+    assert_eq!(keeps(MAV_CMD_COMPONENT_ARM_DISARM, 2.0, true), (true, true));
     assert!(!keeps(MAV_CMD_COMPONENT_ARM_DISARM, 0.0, false).0);
     assert!(!keeps(MAV_CMD_SET_MESSAGE_INTERVAL, 0.0, false).0);
     now += SECOND;
     assert!(takes(&mut bench, 5.0, STATION, 3, now));
     assert!(bench.component.take_changed());
     assert!(!takes(&mut bench, -5.0, STATION, 3, now + SECOND));
-    assert!(!bench.component.take_changed(), "refused");
+    assert!(bench.component.take_changed(), "refused");
+}
+
+#[test]
+fn the_same_key_again_opens_nothing_that_was_heard() {
+    let mut bench = keyed();
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + 100 * SECOND));
+    assert!(takes(&mut bench, 6.0, STATION, 1, TODAY + 101 * SECOND));
+    let again = signed(STATION, &setup(KEY, TODAY), &KEY, 1, TODAY + 102 * SECOND);
+    bench.receive(&again);
+    bench.answers();
+    assert!(!takes(&mut bench, 5.0, STATION, 1, TODAY + 100 * SECOND));
+    assert!(
+        !takes(&mut bench, 5.0, STATION, 2, TODAY + 2 * SECOND),
+        "time"
+    );
+    assert!(takes(&mut bench, 7.0, STATION, 1, TODAY + 103 * SECOND));
+}
+
+#[test]
+fn what_is_no_time_sets_no_key() {
+    for timestamp in [1 << 48, u64::MAX] {
+        let mut bench = Bench::new();
+        bench.receive(&encode(STATION, &setup(KEY, timestamp), &[]));
+        let answers = bench.answers();
+        assert!(texts(&answers)[0].starts_with("Signing refused: "));
+        assert_eq!(bench.component.kept_signing(), None);
+    }
+}
+
+#[test]
+fn what_others_say_to_others_leaves_room_for_a_station() {
+    let mut bench = keyed();
+    for component in 141..161 {
+        let other = Address {
+            system: 1,
+            component,
+        };
+        let mut heard = set("CTL_BW_SPD_HZ", 5.0);
+        heard.target_component = 200;
+        bench.receive(&signed(other, &heard, &KEY, 0, TODAY + SECOND));
+    }
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + SECOND));
+}
+
+#[test]
+fn a_key_may_be_set_by_a_frame_that_it_signs() {
+    let mut bench = Bench::new();
+    bench.receive(&signed(STATION, &setup(KEY, TODAY), &KEY, 0, TODAY));
+    bench.answers();
+    assert_eq!(
+        bench.component.kept_signing().map(|kept| kept.key.0),
+        Some(KEY)
+    );
 }

@@ -1,13 +1,13 @@
 //! Bits that have changed by themselves.
 
-use super::flash::PAGE;
+use super::flash::HALF;
 use super::*;
 
 /// Sets, the last of which is in the second half.
 fn sets() -> (RamFlash, Vec<Kept>) {
     let mut flash = RamFlash::new();
     let mut sets = Vec::new();
-    while flash.bytes[PAGE..PAGE + WORD] == [0xff; WORD] {
+    while flash.bytes[HALF..HALF + WORD] == [0xff; WORD] {
         let kept = everything([0.25, 0.5, 0.75][sets.len() % 3]);
         save(&mut flash, RANGE, &kept).expect("fits");
         sets.push(kept);
@@ -40,7 +40,7 @@ fn a_wrong_byte_anywhere_is_noticed() {
 fn two_and_three_wrong_bits_are_noticed() {
     let (mut flash, sets) = sets();
     let mut random = Random::new(3);
-    let begin = 8 * PAGE;
+    let begin = 8 * HALF;
     let bits = 8 * WORD * (stored(&mut flash).len() + 1);
     for i in 0..40_000 {
         let mut flash = flash.clone();
