@@ -21,7 +21,7 @@ fn main() {
     if env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none") {
         // Short for what depends on a board.
         println!("cargo::rustc-cfg=board");
-        let folder = env!("CARGO_MANIFEST_DIR");
+        let folder = env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");
         println!("cargo::rustc-link-arg-bins=-L{folder}/link");
         println!("cargo::rustc-link-arg-bins=-T{script}");
         println!("cargo::rustc-link-arg-bins=--nmagic");

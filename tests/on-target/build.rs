@@ -7,7 +7,8 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     if env::var_os("CARGO_FEATURE_CHIP").is_some() {
         // `link.x` of cortex-m-rt includes `memory.x` from here.
-        println!("cargo::rustc-link-search={}", env!("CARGO_MANIFEST_DIR"));
+        let folder = env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");
+        println!("cargo::rustc-link-search={folder}");
         println!("cargo::rustc-link-arg-bins=-Tlink.x");
     }
 }
