@@ -1,6 +1,7 @@
 //! One emulated ESC: its tasks' side, its drive on a bench, its throttle wire and its flash.
 
 mod answer;
+mod machine;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -16,10 +17,12 @@ use thiserror::Error;
 use crate::fault::{CHIP_V, Fault, Timeline};
 use crate::flash::{FLASH_BYTES, FileFlash};
 use crate::link::LinkId;
-use crate::rig::{Bench, Period, Rig};
+use crate::rig::{Bench, Rig};
 use crate::summary::Rejected;
 use crate::wire::Wire;
 use answer::Driven;
+
+pub use crate::machine::Onlooker;
 
 /// Rate of the timer that captures the wire's edges: that of the STM32G431.
 const CAPTURE_HZ: u32 = 170_000_000;
@@ -88,34 +91,6 @@ pub struct Device {
     clock: Clock,
     task_due_ns: u64,
     faults: Timeline,
-}
-
-/// Who looks on as a device runs. A closure sees the periods.
-pub trait Onlooker {
-    /// A control period that began at `t_s`.
-    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig);
-
-    /// The throttle wire's level changed at `time_ns`, before the next period and after all that
-    /// came before.
-    fn edge(&mut self, time_ns: u64, level: bool) {
-        let _ = (time_ns, level);
-    }
-
-    /// The ESC has answered the edges so far on the throttle wire or on its serial line, with this datagram.
-    fn answer(&mut self, datagram: &[u8]) {
-        let _ = datagram;
-    }
-
-    /// A whole MAVLink frame was sent, or was received and understood.
-    fn frame(&mut self, time_ns: u64, frame: &[u8]) {
-        let _ = (time_ns, frame);
-    }
-}
-
-impl<F: FnMut(f64, &Period, &Rig)> Onlooker for F {
-    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
-        self(t_s, period, rig);
-    }
 }
 
 /// A parameter from the command line, which is not stored.

@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 use siskin_control::params::ParamId;
 use thiserror::Error;
 
-use crate::device::{Device, Start, StartError};
+use crate::device::{Start, StartError};
 use crate::flash::FileFlash;
 use crate::interrupt;
 use crate::link::{Endpoint, Event, LinkError, Links};
+use crate::machine::{Machine, Stopped};
 use crate::record::Recorder;
 use crate::rig::Bench;
 use crate::summary::Report;
@@ -70,6 +71,9 @@ pub enum LiveError {
     /// The ESC does not start.
     #[error("{0}")]
     Start(#[from] StartError),
+    /// The ESC cannot start or go on, for a reason of its own.
+    #[error("{0}")]
+    Stopped(#[from] Stopped),
     /// The plant or the recording.
     #[error("{0}")]
     Watch(#[from] WatchError),
@@ -88,8 +92,16 @@ pub struct Opened {
     pub warning: Option<&'static str>,
 }
 
-/// Runs a session until its duration or an interrupt, and tells `opened` once all is open.
-pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Report, LiveError> {
+/// Runs a session until its duration or an interrupt: on what `start` makes, with a warning where what
+/// was stored is not whole. Tells `opened` once all is open; gives back what it was at the end.
+///
+/// # Errors
+/// The session cannot begin or go on.
+pub fn run<M: Machine>(
+    session: Session,
+    start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), LiveError>,
+    opened: impl FnOnce(&Opened, &M),
+) -> Result<(Report, M), LiveError> {
     let stop = interrupt::flag().map_err(LiveError::Interrupt)?;
     let mut links = Links::open(&session.mavlink)?;
     let wire = Wire::open(&session.signal, 0)?;
@@ -99,7 +111,7 @@ pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Re
     let recorder = session.record.as_deref().map(Recorder::live).transpose();
     let mut watch = Watch::new([window], recorder.map_err(WatchError::Record)?);
     let link_bytes_per_s = links.slowest_bytes_per_s();
-    let (mut device, warning) = Device::start(Start {
+    let (mut machine, warning) = start(Start {
         bench: session.bench,
         wire,
         flash: session.flash,
@@ -112,34 +124,36 @@ pub fn run(session: Session, opened: impl FnOnce(&Opened, &Device)) -> Result<Re
         signal,
         warning,
     };
-    opened(&about, &device);
+    opened(&about, &machine);
 
     let mut pacer = Pacer::new(session.pace);
     let end_ns = session.duration.map_or(u64::MAX, |d| d.as_nanos() as u64);
-    while !stop.load(Ordering::Relaxed) && device.is_before(end_ns) && !watch.failed() {
+    while !stop.load(Ordering::Relaxed) && machine.is_before(end_ns) && !watch.failed() {
         let now = pacer.began.elapsed();
         links.receive(now, |stream, event| match event {
-            Event::Bytes(bytes) => device.receive(stream, bytes, &mut watch),
-            Event::Ended => device.forget(stream),
+            Event::Bytes(bytes) => machine.receive(stream, bytes, &mut watch),
+            Event::Ended => machine.forget(stream),
         });
-        let now_ns = device.now_ns();
-        device.wire().poll(now_ns);
-        device.advance(
-            pacer.until_ns(now_ns).min(end_ns),
-            |_, _| None,
-            &mut watch,
-            &mut |frame| {
-                // A peer without room loses the frame, as on any datagram link.
-                links.send(frame);
-            },
-        );
-        pacer.wait(device.now_ns());
+        let now_ns = machine.now_ns();
+        machine.wire().poll(now_ns);
+        let until_ns = pacer.until_ns(now_ns).min(end_ns);
+        let advanced = machine.advance(until_ns, &mut watch, &mut |frame| {
+            // A peer without room loses the frame, as on any datagram link.
+            links.send(frame);
+        });
+        if let Err(stopped) = advanced {
+            // The recording of what led there is worth having.
+            watch.finish(0.0, 0.0)?;
+            return Err(stopped.into());
+        }
+        pacer.wait(machine.now_ns());
     }
-    let sim_s = device.now_ns() as f64 * 1e-9;
-    Ok(Report {
-        rejected: Some(device.rejected()),
+    let sim_s = machine.now_ns() as f64 * 1e-9;
+    let report = Report {
+        rejected: Some(machine.rejected()),
         ..watch.finish(sim_s, pacer.began.elapsed().as_secs_f64())?
-    })
+    };
+    Ok((report, machine))
 }
 
 /// Keeps simulated time in step with the wall's.

@@ -2,24 +2,21 @@
 #![forbid(unsafe_code)]
 
 mod cli;
-mod report;
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Duration;
 
 use clap::Parser;
 use indicatif::ProgressBar;
-use siskin_emulator::flash::FileFlash;
+use siskin_emulator::device::Device;
 use siskin_emulator::interrupt;
-use siskin_emulator::link::Endpoint;
-use siskin_emulator::live::{self, Session};
+use siskin_emulator::live;
 use siskin_emulator::measure;
+use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
 use siskin_emulator::plot;
+use siskin_emulator::report;
 use siskin_emulator::reproduce;
-use siskin_emulator::scenario::{self, Plan};
 
-use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs, RunArgs, ScenarioArgs};
+use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs};
 
 /// The status of what an interrupt has ended, as a shell has it.
 const INTERRUPTED: u8 = 130;
@@ -27,7 +24,7 @@ const INTERRUPTED: u8 = 130;
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => return usage(&error),
+        Err(error) => return options::usage("siskin-emulator", &error),
     };
     let result = match cli.command {
         None => run(cli.run),
@@ -46,56 +43,26 @@ fn main() -> ExitCode {
     }
 }
 
-/// Help and version as clap prints them; what is wrong in one line.
-fn usage(error: &clap::Error) -> ExitCode {
-    if !error.use_stderr() {
-        // Nobody to tell where standard output is closed.
-        let _ = error.print();
-        return ExitCode::SUCCESS;
-    }
-    let what = one_line(&error.to_string());
-    eprintln!("siskin-emulator: {what}; --help lists what there is");
-    ExitCode::from(2)
-}
-
-/// The argument parser's complaint and its hint on one line, without the usage that follows.
-fn one_line(message: &str) -> String {
-    let lines = message.lines().map(str::trim);
-    let said = lines.take_while(|line| !line.starts_with("Usage:"));
-    let said = said.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
-    let words = said.collect::<Vec<_>>().join(" ");
-    words.trim_start_matches("error: ").to_owned()
-}
-
 fn run(args: RunArgs) -> Result<ExitCode, String> {
     let line = |error: &dyn std::error::Error| error.to_string();
     let standing = args.standing().map_err(|error| line(&error))?;
-    let mut params = standing.params.clone();
-    params.extend(args.common.params());
-    let session = Session {
-        bench: standing.bench.clone(),
-        mavlink: if args.mavlink.is_empty() {
-            Endpoint::defaults()
-        } else {
-            args.mavlink.clone()
-        },
-        signal: args.signal.clone(),
-        pace: args.speed,
-        duration: args.duration.map(Duration::from_secs_f64),
-        flash: storage(args.storage.as_deref())?,
-        params,
-        record: args.common.record.clone(),
-    };
-    let report = live::run(session, |opened, device| {
+    let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
+    if let Some(warning) = warning {
+        eprintln!("siskin-emulator: {warning}");
+    }
+    let start = |start| Ok(Device::start(start)?);
+    let report = live::run(session, start, |opened, device| {
         if let Some(warning) = opened.warning {
             eprintln!("siskin-emulator: {warning}");
         }
         if !args.common.json {
             // Where nobody reads it, the ESC runs all the same.
-            let _ = report::print(&report::greeting(&args, &standing, opened, device));
+            let params = device.esc().params();
+            let greeting = report::greeting("emulated", &args, &standing, opened, params);
+            let _ = report::print(&greeting);
         }
     });
-    let report = report.map_err(|error| line(&error))?;
+    let (report, _) = report.map_err(|error| line(&error))?;
     report::print(&if args.common.json {
         report::json(&report)?
     } else {
@@ -104,43 +71,9 @@ fn run(args: RunArgs) -> Result<ExitCode, String> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The flash behind `--storage`, by default in the user's state folder.
-fn storage(given: Option<&Path>) -> Result<FileFlash, String> {
-    match given {
-        Some(path) if path == Path::new("none") => Ok(FileFlash::in_memory()),
-        Some(path) => FileFlash::open(path).map_err(|error| error.to_string()),
-        None => {
-            let Some(path) = state_file() else {
-                eprintln!("siskin-emulator: no home folder: settings are kept until the end only");
-                return Ok(FileFlash::in_memory());
-            };
-            FileFlash::open(&path).or_else(|error| {
-                eprintln!("siskin-emulator: {error}; settings are kept until the end only");
-                Ok(FileFlash::in_memory())
-            })
-        }
-    }
-}
-
-/// Where settings stay between runs: the state folder of the XDG base directories.
-fn state_file() -> Option<PathBuf> {
-    let absolute = |name| {
-        let path = PathBuf::from(std::env::var_os(name)?);
-        path.is_absolute().then_some(path)
-    };
-    let folder =
-        absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")));
-    Some(folder?.join("siskin/esc.flash"))
-}
-
 fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
-    let options = scenario::Options {
-        seeds: args.seeds.clone().or(args.seed.map(|seed| seed..=seed)),
-        set: args.keys(),
-        record: args.common.record.clone(),
-    };
     let line = |error| format!("{}: {error}", args.file.display());
-    let plan = Plan::read(&args.file, &options).map_err(line)?;
+    let plan = args.plan().map_err(line)?;
     if args.seeds.is_some() || plan.runs() > 1 {
         // On standard error, and nothing where that is no terminal.
         let bar = ProgressBar::new(plan.runs() as u64);

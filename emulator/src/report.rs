@@ -4,17 +4,19 @@
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 
-use siskin_control::params::ParamId;
-use siskin_emulator::bench::DEFAULT_MOTOR;
-use siskin_emulator::device::Device;
-use siskin_emulator::live::Opened;
-use siskin_emulator::scenario::{Outcome, Standing, Survey, Verdict};
-use siskin_emulator::summary::Report;
+use siskin_control::params::{ParamId, Params};
 
-use crate::cli::RunArgs;
+use crate::bench::DEFAULT_MOTOR;
+use crate::live::Opened;
+use crate::options::RunArgs;
+use crate::scenario::{Outcome, Standing, Survey, Verdict};
+use crate::summary::Report;
 
 /// Writes text to standard output. A reader that has gone is no error: it has what it wanted.
-pub(crate) fn print(text: &str) -> Result<(), String> {
+///
+/// # Errors
+/// Standard output cannot be written.
+pub fn print(text: &str) -> Result<(), String> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -25,22 +27,26 @@ pub(crate) fn print(text: &str) -> Result<(), String> {
 }
 
 /// One JSON object on a line.
-pub(crate) fn json(value: &impl serde::Serialize) -> Result<String, String> {
+///
+/// # Errors
+/// What cannot be spelt so.
+pub fn json(value: &impl serde::Serialize) -> Result<String, String> {
     let text = serde_json::to_string(value).map_err(|error| error.to_string())?;
     Ok(text + "\n")
 }
 
-/// The first screen: what is simulated, where it is reached, what to type next.
-pub(crate) fn greeting(
+/// The first screen: `what` runs, where it is reached, what to type next. `params` are in force.
+pub fn greeting(
+    what: &str,
     args: &RunArgs,
     standing: &Standing,
     opened: &Opened,
-    device: &Device,
+    params: &Params,
 ) -> String {
     let [motor, load] = &standing.names;
-    let param = |id| device.esc().params().get(id);
+    let param = |id| params.get(id);
     let mut lines = vec![
-        format!("Siskin ESC {}, emulated", env!("CARGO_PKG_VERSION")),
+        format!("Siskin ESC {}, {what}", env!("CARGO_PKG_VERSION")),
         String::new(),
         format!("  motor     {motor}"),
         format!("  load      {load}"),
@@ -80,13 +86,13 @@ pub(crate) fn greeting(
 }
 
 /// The figures of a run.
-pub(crate) fn figures(report: &Report) -> String {
+pub fn figures(report: &Report) -> String {
     let pace = report.sim_per_wall.unwrap_or_default();
     let mut text = format!(
         "{:.3} s simulated in {:.3} s ({pace:.1} times real time), {} control periods, trace {}\n",
         report.sim_s, report.wall_s, report.steps, report.trace_hash
     );
-    for fault in &report.faults {
+    for fault in report.faults.iter().flatten() {
         line(&mut text, format_args!("fault: {fault}"));
     }
     if let Some(refused) = report.rejected {
@@ -120,7 +126,7 @@ pub(crate) fn figures(report: &Report) -> String {
 }
 
 /// Whether a scenario's expectations held.
-pub(crate) fn verdicts(outcome: &Outcome) -> String {
+pub fn verdicts(outcome: &Outcome) -> String {
     let mut text = String::new();
     for (key, value) in &outcome.drawn {
         line(&mut text, format_args!("drawn: {key} = {value}"));
@@ -133,7 +139,7 @@ pub(crate) fn verdicts(outcome: &Outcome) -> String {
 }
 
 /// What many runs came to.
-pub(crate) fn survey(survey: &Survey) -> String {
+pub fn survey(survey: &Survey) -> String {
     let pace = survey.sim_per_wall.unwrap_or_default();
     let mut text = format!(
         "{} runs, {} failed; {:.1} s simulated in {:.2} s ({pace:.1} times real \

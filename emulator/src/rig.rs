@@ -8,9 +8,8 @@ use siskin_control::units::{Angle, Speed};
 
 use crate::bench::{Choice, DEFAULT_LOAD, DEFAULT_MOTOR, LoadTable, MotorTable};
 use crate::fault::InForce;
-use crate::plant::{
-    Bus, Extras, Fidelity, Flow, Load, Motor, Noise, Plant, Sensing, Supply, Thermal, Truth,
-};
+use crate::plant::{Extras, Fidelity, Load, Motor, Plant, Sensing, Supply};
+use crate::surroundings::{Motion, Surroundings};
 
 /// Where the control has the rotor's position from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -81,7 +80,7 @@ impl Default for Bench {
     }
 }
 
-/// The truth at a sample, and what flowed until the next.
+/// What was read and done at a sample, and what came of it until the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Period {
     /// What the converter read.
@@ -92,38 +91,18 @@ pub struct Period {
     pub bridge: Bridge,
     /// What the bridge did in each half, after the delay.
     pub halves: [Bridge; 2],
-    /// Electrical angle, turns, 0..1.
-    pub angle_turns: f64,
-    /// Mechanical speed, rad/s.
-    pub speed_rad_s: f64,
-    /// Currents into the phases, A.
-    pub currents_a: [f64; 3],
-    /// Supply voltage, V.
-    pub bus_v: f64,
-    /// Current from the supply, A.
-    pub bus_a: f64,
-    /// Means over the period.
-    pub flow: Flow,
+    /// The motor.
+    pub motion: Motion,
 }
 
 /// A drive on its bench.
 #[derive(Clone, Debug)]
 pub struct Rig {
-    bench: Bench,
+    around: Surroundings,
     config: Config,
     state: State,
-    plant: Plant,
-    thermal: Thermal,
-    noise: Noise,
     /// What the bridge does until the latest command takes effect.
     applied: Bridge,
-    bus: Bus,
-    /// The sensors as they are now.
-    sensing: Sensing,
-    /// What stuck current sensors show, A.
-    stuck_a: [Option<f64>; 3],
-    /// What stuck Hall sensors show.
-    hall_stuck: [Option<bool>; 3],
     /// Whether the chip is in reset.
     held: bool,
 }
@@ -131,30 +110,12 @@ pub struct Rig {
 impl Rig {
     /// The bench at its start, with the control at power-up.
     pub fn new(bench: Bench, config: Config) -> Self {
-        let mut plant = Plant::new(
-            bench.plant,
-            bench.motor,
-            bench.load,
-            bench.initial_rad_s,
-            bench.initial_angle_turns,
-        );
-        plant.fit(&bench.extras);
-        if let Some(speed_rad_s) = bench.imposed_rad_s {
-            plant.impose(speed_rad_s);
-        }
         let config = bench.observed(config);
         Self {
             state: State::new(&config),
-            plant,
-            thermal: Thermal::new(),
-            noise: Noise::new(bench.seed),
+            around: Surroundings::new(bench),
             applied: Bridge::Off,
-            bus: Bus::new(bench.supply),
-            sensing: bench.sensing,
-            stuck_a: [None; 3],
-            hall_stuck: [None; 3],
             held: false,
-            bench,
             config,
         }
     }
@@ -163,14 +124,14 @@ impl Rig {
     ///
     /// The period's length stays that of the start.
     pub fn configure(&mut self, config: Config) {
-        let config = self.bench.observed(config);
+        let config = self.around.bench().observed(config);
         self.state.adopt(&self.config, &config);
         self.config = config;
     }
 
     /// Starts the control anew, as after a reset of the chip; the plant goes on.
     pub fn restart(&mut self, config: Config) {
-        let config = self.bench.observed(config);
+        let config = self.around.bench().observed(config);
         self.state = State::new(&config);
         self.config = config;
         self.applied = Bridge::Off;
@@ -178,39 +139,16 @@ impl Rig {
 
     /// Lets other faults act than before.
     pub fn disturb(&mut self, before: &InForce, now: &InForce) {
-        if now.breaks != before.breaks {
-            self.plant.break_legs(&now.breaks, self.comparator_a());
-        }
-        if now.blocked != before.blocked {
-            self.plant.block(now.blocked);
-        }
-        self.plant.kick(now.kicked_rad_s - before.kicked_rad_s);
-        if now.wind_rad_s != before.wind_rad_s {
-            self.plant.set_wind_rad_s(now.wind_rad_s);
-        }
-        if now.torque_nm != before.torque_nm {
-            self.plant.set_extra_torque_nm(now.torque_nm);
-        }
-        self.bus.sag(now.sag_v);
-        self.bus.limit(now.brown_out_v);
-        self.bus.connect(!now.disconnected);
-        let sound = self.bench.sensing;
-        let offset = |phase: usize| sound.offset_a[phase] + now.drift_a[phase];
-        self.sensing = Sensing {
-            noise_a: libm::hypot(sound.noise_a, now.noise_a),
-            offset_a: [0, 1, 2].map(offset),
-            ..sound
-        };
-        self.stuck_a = now.stuck_a;
-        self.hall_stuck = now.hall;
+        self.around.disturb(before, now, self.comparator_a());
     }
 
     /// Where a board's comparators turn the bridge off: 1.6 times `LIM_PHASE_A` where the drive's own
     /// trip is at 1.4, and never above what the board can measure, A.
     fn comparator_a(&self) -> f64 {
         let trip_counts: f64 = self.config.protection.trip.to_num();
-        let per_count_a = f64::from(self.sensing.board(self.bench.delay).current_a_per_count);
-        (trip_counts * per_count_a * (1.6 / 1.4)).min(self.sensing.range_a)
+        let Bench { sensing, delay, .. } = self.around.bench();
+        let per_count_a = f64::from(sensing.board(*delay).current_a_per_count);
+        (trip_counts * per_count_a * (1.6 / 1.4)).min(sensing.range_a)
     }
 
     /// Holds the chip in reset, with the bridge off, or lets it run.
@@ -225,12 +163,12 @@ impl Rig {
 
     /// Voltage of the bus, V.
     pub fn bus_v(&self) -> f64 {
-        self.bus.volts()
+        self.around.bus_v()
     }
 
     /// Motor, load and inverter.
     pub fn plant(&self) -> &Plant {
-        &self.plant
+        self.around.plant()
     }
 
     /// The control's configuration.
@@ -259,7 +197,7 @@ impl Rig {
 
     /// Temperature of the board as its thermistor shows it, °C.
     pub fn temperature_c(&self) -> f32 {
-        self.thermal.measured_c()
+        self.around.temperature_c()
     }
 
     /// Length of a control period, s.
@@ -274,15 +212,17 @@ impl Rig {
 
     /// Dead time of the inverter, s.
     pub(crate) fn dead_time_s(&self) -> f64 {
-        self.bench.dead_time_s.unwrap_or_else(|| {
+        self.around.bench().dead_time_s.unwrap_or_else(|| {
             let share: f64 = self.config.dead_time.duty.to_num();
             share * self.period_s()
         })
     }
 
     /// Tells the control where the rotor is.
-    fn tell(&mut self, angle_turns: f64, speed_rad_s: f64) {
-        let pole_pairs = f64::from(self.bench.motor.pole_pairs);
+    fn tell(&mut self) {
+        let plant = self.around.plant();
+        let (angle_turns, speed_rad_s) = (plant.angle_turns(), plant.speed_rad_s());
+        let pole_pairs = f64::from(self.around.bench().motor.pole_pairs);
         let turns = speed_rad_s * pole_pairs * self.period_s() / TAU;
         let (theta, omega) = (
             Angle::wrapping_from_num(angle_turns),
@@ -293,33 +233,16 @@ impl Rig {
 
     /// The next control period.
     pub fn period(&mut self, setpoint: Setpoint) -> Period {
-        let setpoint = if self.plant.tripped() {
+        let setpoint = if self.around.plant().tripped() {
             Setpoint::Fault(Fault::OverCurrent)
         } else {
             setpoint
         };
-        let currents_a = self.plant.currents_a();
-        let (angle_turns, speed_rad_s) = (self.plant.angle_turns(), self.plant.speed_rad_s());
-        let truth = Truth {
-            currents_a: self.plant.shunts_a(currents_a),
-            low_s: self.plant.low_s(),
-            terminals_v: self.plant.terminals_v(),
-            bus_v: self.bus.volts(),
-            direction: self.plant.direction(),
-        };
-        let mut sample = self.sensing.sample(&truth, &mut self.noise);
-        for (counts, stuck_a) in sample.currents.iter_mut().zip(self.stuck_a) {
-            if let Some(stuck_a) = stuck_a {
-                *counts = self.sensing.stuck(stuck_a);
-            }
-        }
-        for (phase, stuck) in self.hall_stuck.into_iter().enumerate() {
-            if let Some(level) = stuck {
-                sample.hall = sample.hall & !(1 << phase) | u8::from(level) << phase;
-            }
-        }
-        if self.bench.position == Position::Ideal {
-            self.tell(angle_turns, speed_rad_s);
+        let sample = self.around.sample();
+        let bench = self.around.bench();
+        let (position, delay) = (bench.position, bench.delay);
+        if position == Position::Ideal {
+            self.tell();
         }
         let bridge = if self.held {
             Bridge::Off
@@ -333,30 +256,19 @@ impl Rig {
         } else {
             self.applied
         };
-        let halves = match self.bench.delay {
+        let halves = match delay {
             Delay::None => [bridge, bridge],
             Delay::Half => [before, bridge],
             Delay::One => [before, before],
         };
         self.applied = bridge;
-        let period_s = self.period_s();
-        let dead_time_s = self.dead_time_s();
-        let bus_v = self.bus.volts();
-        let flow = self.plant.period(halves, bus_v, period_s, dead_time_s);
-        self.bus.advance(period_s, flow.bus_a);
-        let current_square = flow.copper_w / (1.5 * self.plant.resistance_ohm());
-        self.thermal.advance(period_s, current_square);
+        let (period_s, dead_time_s) = (self.period_s(), self.dead_time_s());
         Period {
             sample,
             setpoint,
             bridge,
             halves,
-            angle_turns,
-            speed_rad_s,
-            currents_a,
-            bus_v,
-            bus_a: flow.bus_a,
-            flow,
+            motion: self.around.period(halves, period_s, dead_time_s),
         }
     }
 }
@@ -372,19 +284,14 @@ impl Bench {
 }
 
 impl Period {
-    /// Whether the plant's numbers have become none.
-    pub fn diverged(&self) -> bool {
-        !(self.speed_rad_s.is_finite() && self.flow.torque_nm.is_finite())
-    }
-
     /// Estimated less true electrical angle at the sample, degrees, ±180.
     pub fn angle_error_deg(&self, snapshot: &Snapshot) -> f64 {
-        let turns = snapshot.angle.to_num::<f64>() - self.angle_turns;
+        let turns = snapshot.angle.to_num::<f64>() - self.motion.angle_turns;
         (turns - libm::round(turns)) * 360.0
     }
 
     /// Mechanical speed, rpm.
     pub fn rpm(&self) -> f64 {
-        self.speed_rad_s * 60.0 / TAU
+        self.motion.rpm()
     }
 }

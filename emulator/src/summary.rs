@@ -9,14 +9,17 @@ use siskin_control::drive::{Fault, Faults, Phase};
 
 use crate::rig::{Period, Rig};
 use crate::shaft::Units;
+use crate::surroundings::Passage;
 use trace::Trace;
 pub use window::Figures;
-use window::{Look, Window};
+use window::{Control, Look, Window};
 
 /// Watches a run.
 pub struct Summary {
     trace: Trace,
     steps: u64,
+    /// Whether nobody sees the control.
+    blind: bool,
     faults: Faults,
     /// What the drive did in the period before.
     phase: Phase,
@@ -32,13 +35,13 @@ pub struct Report {
     pub wall_s: f64,
     /// Simulated seconds per wall second.
     pub sim_per_wall: Option<f64>,
-    /// Control periods.
+    /// Control periods, or those of the PWM where nobody sees the control.
     pub steps: u64,
     /// Hash over the control state of every step: 16 hexadecimal digits, equal for equal seed and
-    /// inputs on any machine.
+    /// inputs on any machine. Where nobody sees the control, over the motor's.
     pub trace_hash: String,
-    /// Faults that have turned the bridge off.
-    pub faults: Vec<&'static str>,
+    /// Faults that have turned the bridge off; `None` where nobody sees the control.
+    pub faults: Option<Vec<&'static str>>,
     /// What came in from outside and was refused; not for a scenario, where nothing does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejected>,
@@ -64,6 +67,7 @@ impl Summary {
         Self {
             trace: Trace::new(),
             steps: 0,
+            blind: false,
             faults: Faults::NONE,
             phase: Phase::Idle,
             windows: windows
@@ -87,10 +91,29 @@ impl Summary {
             if window.covers(t_s) {
                 window.add(&Look {
                     t_s,
-                    period,
-                    snapshot: &snapshot,
-                    units: Units::of(rig.config()),
-                    started,
+                    motion: &period.motion,
+                    control: Some(Control {
+                        period,
+                        snapshot: &snapshot,
+                        units: Units::of(rig.config()),
+                        started,
+                    }),
+                });
+            }
+        }
+    }
+
+    /// Takes in a period that began at `t_s` of a machine whose control nobody sees.
+    pub fn pass(&mut self, t_s: f64, passage: &Passage) {
+        self.steps += 1;
+        self.blind = true;
+        self.trace.pass(passage);
+        for window in &mut self.windows {
+            if window.covers(t_s) {
+                window.add(&Look {
+                    t_s,
+                    motion: &passage.motion,
+                    control: None,
                 });
             }
         }
@@ -104,7 +127,7 @@ impl Summary {
             sim_per_wall: (wall_s > 0.0).then(|| sim_s / wall_s),
             steps: self.steps,
             trace_hash: format!("{:016x}", self.trace.digest()),
-            faults: self.faults.iter().map(Fault::text).collect(),
+            faults: (!self.blind).then(|| self.faults.iter().map(Fault::text).collect()),
             rejected: None,
             windows: self.windows.iter().map(|w| w.figures(sim_s)).collect(),
         }

@@ -2,10 +2,12 @@
 
 use thiserror::Error;
 
-use crate::device::Onlooker;
+use crate::machine::Onlooker;
+use crate::plant::Gate;
 use crate::record::{RecordError, Recorder};
 use crate::rig::{Period, Rig};
 use crate::summary::{Report, Summary};
+use crate::surroundings::{Motion, Passage};
 
 /// Why a run cannot go on; one line.
 #[derive(Debug, Error)]
@@ -58,6 +60,12 @@ impl Watch {
 }
 
 impl Watch {
+    fn check(&mut self, motion: &Motion) {
+        if motion.diverged() {
+            self.failed = Some(WatchError::Diverged);
+        }
+    }
+
     fn record(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
         if let Some(recorder) = &mut self.recorder
             && self.failed.is_none()
@@ -70,10 +78,18 @@ impl Watch {
 impl Onlooker for Watch {
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.summary.add(t_s, period, rig);
-        if period.diverged() {
-            self.failed = Some(WatchError::Diverged);
-        }
+        self.check(&period.motion);
         self.record(|recorder| recorder.period(t_s, period, rig));
+    }
+
+    fn passage(&mut self, t_s: f64, passage: &Passage) {
+        self.summary.pass(t_s, passage);
+        self.check(&passage.motion);
+        self.record(|recorder| recorder.passage(t_s, passage));
+    }
+
+    fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
+        self.record(|recorder| recorder.gates(time_ns, leg, gate));
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

@@ -104,7 +104,7 @@ impl Flight {
                 &mut |_: f64, period: &Period, _: &Rig| {
                     seen.least_rpm = seen.least_rpm.min(period.rpm());
                     seen.most_rpm = seen.most_rpm.max(period.rpm());
-                    torques_nm += period.flow.torque_nm;
+                    torques_nm += period.motion.flow.torque_nm;
                     periods += 1;
                     let heard = matches!(period.setpoint, Setpoint::Tone(_));
                     seen.driven |= matches!(period.bridge, Bridge::Duty(_)) && !heard;

@@ -59,7 +59,7 @@ fn run(rig: &mut Rig, setpoint: Setpoint, time_s: f64) -> Seen {
         }
         seen.parks += u32::from(snapshot.phase == Phase::Park && before != Phase::Park);
         before = snapshot.phase;
-        for current_a in period.currents_a {
+        for current_a in period.motion.currents_a {
             seen.most_a = seen.most_a.max(current_a.abs());
         }
         if snapshot.phase == Phase::Run {

@@ -104,17 +104,17 @@ impl Stage {
         for _ in 0..(time_s / self.rig.period_s()) as u32 {
             let period = self.rig.period(setpoint(self.now_us(), &self.mapping));
             self.periods += 1;
-            let turns = period.angle_turns - self.angle_turns;
-            self.angle_turns = period.angle_turns;
+            let turns = period.motion.angle_turns - self.angle_turns;
+            self.angle_turns = period.motion.angle_turns;
             self.shaft_deg += (turns - turns.round()) * 360.0 / self.pole_pairs;
             seen.moved_deg = seen.moved_deg.max((self.shaft_deg - stood_deg).abs());
-            for current_a in period.currents_a {
+            for current_a in period.motion.currents_a {
                 seen.peak_a = seen.peak_a.max(current_a.abs());
             }
             if self.phase() == Phase::Tone {
                 seen.tone_s += self.rig.period_s();
             }
-            let current_a = period.currents_a[0];
+            let current_a = period.motion.currents_a[0];
             if current_a.abs() > BOUND_A / 3.0 {
                 let changed = positive.replace(current_a > 0.0) == Some(current_a < 0.0);
                 seen.crossings += u32::from(changed);

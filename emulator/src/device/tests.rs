@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::*;
 use crate::fault::Kind;
+use crate::rig::Period;
 use crate::wire::WireErrors;
 
 const MS_NS: u64 = 1_000_000;

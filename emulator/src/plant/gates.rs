@@ -84,4 +84,18 @@ impl Gate {
             low: on == Some(Rail::Low),
         }
     }
+
+    /// Whether both are on.
+    pub(super) fn shoots(self) -> bool {
+        self.high && self.low
+    }
+
+    /// The one that is on, if only one is.
+    pub(super) fn on(self) -> Option<Rail> {
+        match (self.low, self.high) {
+            (true, false) => Some(Rail::Low),
+            (false, true) => Some(Rail::High),
+            _ => None,
+        }
+    }
 }

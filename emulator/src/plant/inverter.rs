@@ -7,6 +7,8 @@
 //! current falls by e/L while the low sides are on, its mean would be missed by 0.06 A at 4500 rpm
 //! and 0.5 µs. The period runs from sample to sample.
 
+mod edges;
+
 use siskin_control::drive::Bridge;
 
 use super::machine::{Flow, Machine};
@@ -44,6 +46,8 @@ pub struct Plant {
     tripped: bool,
     /// Where all legs are, with none waiting.
     settled: Option<Rail>,
+    /// The longest stretch that the circuit's solution is prepared for between a period's own edges, s.
+    longest_s: f64,
 }
 
 impl Plant {
@@ -63,6 +67,7 @@ impl Plant {
             trip_a: f64::INFINITY,
             tripped: false,
             settled: None,
+            longest_s: 0.0,
         }
     }
 

@@ -97,17 +97,24 @@ impl Sensing {
         let per_a = 1.0 / self.range_a;
         let mut currents = [AdcCounts::ZERO; 3];
         for (phase, counts) in currents.iter_mut().enumerate() {
-            let mut current_a = self.shunt_a(truth, phase) + self.offset_a[phase];
-            if self.noise_a > 0.0 {
-                current_a += self.noise_a * noise.gaussian();
-            }
-            *counts = self.quantised(current_a * per_a);
+            *counts = self.quantised(self.shown_a(truth, phase, noise) * per_a);
         }
         Sample {
             currents,
             bus: self.voltage(truth.bus_v),
             terminals: truth.terminals_v.map(|terminal_v| self.voltage(terminal_v)),
             hall: self.hall(truth.direction),
+        }
+    }
+
+    /// What a phase's sensor shows before it is converted, A.
+    #[inline]
+    pub fn shown_a(&self, truth: &Truth, phase: usize, noise: &mut Noise) -> f64 {
+        let current_a = self.shunt_a(truth, phase) + self.offset_a[phase];
+        if self.noise_a > 0.0 {
+            current_a + self.noise_a * noise.gaussian()
+        } else {
+            current_a
         }
     }
 
@@ -147,7 +154,7 @@ impl Sensing {
 
     /// The Hall sensors' bits.
     #[inline(always)]
-    fn hall(&self, direction: [f64; 2]) -> u8 {
+    pub fn hall(&self, direction: [f64; 2]) -> u8 {
         let mut through = phases(direction);
         for (phase, through) in through.iter_mut().enumerate() {
             let error_deg = self.hall_error_deg[phase];

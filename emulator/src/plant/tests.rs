@@ -357,7 +357,7 @@ fn imbalance(mut rig: Rig) -> f64 {
         let rpm = if k < 40_000 { 4500.0 } else { 3000.0 };
         let setpoint = speed(&rig, rpm);
         let before = rig.plant().speed_rad_s();
-        let flow = rig.period(setpoint).flow;
+        let flow = rig.period(setpoint).motion.flow;
         let after = rig.plant().speed_rad_s();
         // The load's by the trapezoidal rule between samples.
         let load_w = |w: f64| load.damping_at(w) * w * w;
@@ -386,7 +386,7 @@ fn both_fidelities_make_the_same_torque() {
             rig.period(spin);
         }
         let hold = Setpoint::Torque(rig.config().scale.current_from_a(5.0));
-        let torques = (0..4_800).map(|_| rig.period(hold).flow.torque_nm);
+        let torques = (0..4_800).map(|_| rig.period(hold).motion.flow.torque_nm);
         torques.sum::<f64>() / 4_800.0
     };
     let [averaged, switching] = [Fidelity::Averaged, Fidelity::Switching].map(mean_torque);

@@ -53,6 +53,11 @@ impl Thermal {
         self.sensor_c += (self.board_c - self.sensor_c) * (time_s * (1.0 / SENSOR_S));
     }
 
+    /// Temperature of the sensor, °C.
+    pub fn sensor_c(&self) -> f64 {
+        self.sensor_c
+    }
+
     /// What the converter reads of the sensor's divider: 12 bits.
     fn counts(&self) -> AdcCounts {
         let per_k = 1.0 / (self.sensor_c + 273.15) - 1.0 / 298.15;

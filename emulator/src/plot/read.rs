@@ -86,19 +86,27 @@ impl Recording {
         // A half of a period keeps rounding from moving a sample across the edge of its column.
         let middle = share + 0.5 / self.periods as f64;
         let column = ((middle * columns as f64) as usize).min(columns - 1);
-        self.phases[column] = Some(row.phase);
-        self.faults[column] |= row.faults;
-        self.rpm.add(column, row.rpm);
-        self.rpm_ref.add(column, row.rpm_ref);
-        self.i_a_a.add(column, row.i_a_a);
-        self.i_d_a.add(column, row.i_d_a);
-        self.i_q_a.add(column, row.i_q_a);
-        self.u_d_v.add(column, row.u_d_v);
-        self.u_q_v.add(column, row.u_q_v);
-        self.u_max_v.add(column, row.bus_v / 3.0_f32.sqrt());
-        self.rpm_est.add(column, row.rpm_est);
-        if matches!(row.phase, Phase::Run | Phase::Stopping) {
-            self.angle_error_deg.add(column, row.angle_error_deg);
+        self.phases[column] = row.phase;
+        self.faults[column] |= row.faults.unwrap_or_default();
+        let leads = matches!(row.phase, Some(Phase::Run | Phase::Stopping));
+        for (trace, value) in [
+            (&mut self.rpm, Some(row.rpm)),
+            (&mut self.rpm_ref, row.rpm_ref),
+            (&mut self.i_a_a, Some(row.i_a_a)),
+            (&mut self.i_d_a, row.i_d_a),
+            (&mut self.i_q_a, row.i_q_a),
+            (&mut self.u_d_v, row.u_d_v),
+            (&mut self.u_q_v, row.u_q_v),
+            (&mut self.u_max_v, Some(row.bus_v / 3.0_f32.sqrt())),
+            (&mut self.rpm_est, row.rpm_est),
+            (
+                &mut self.angle_error_deg,
+                row.angle_error_deg.filter(|_| leads),
+            ),
+        ] {
+            if let Some(value) = value {
+                trace.add(column, value);
+            }
         }
     }
 

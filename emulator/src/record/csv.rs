@@ -5,6 +5,7 @@ use std::io;
 
 use super::{Row, Sink};
 use crate::rig::{Period, Rig};
+use crate::surroundings::Passage;
 
 /// Bytes between two writes to the file: a few hundred periods.
 const BUFFER_BYTES: usize = 64 * 1024;
@@ -27,6 +28,10 @@ impl Csv {
 impl Sink for Csv {
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) -> io::Result<()> {
         Ok(self.0.serialize(Row::of(t_s, period, rig))?)
+    }
+
+    fn passage(&mut self, t_s: f64, passage: &Passage) -> io::Result<()> {
+        Ok(self.0.serialize(Row::outside(t_s, &passage.motion))?)
     }
 
     fn finish(mut self: Box<Self>) -> io::Result<()> {

@@ -20,7 +20,9 @@ use std::time::{Duration, SystemTime};
 
 use thiserror::Error;
 
+use crate::plant::Gate;
 use crate::rig::{Period, Rig};
+use crate::surroundings::Passage;
 
 pub use row::Row;
 
@@ -55,6 +57,14 @@ pub(crate) const NO_PARQUET: &str = "this build has no Parquet; build it with --
 /// A format: it takes what it has a place for.
 trait Sink {
     fn period(&mut self, _t_s: f64, _period: &Period, _rig: &Rig) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn passage(&mut self, _t_s: f64, _passage: &Passage) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn gates(&mut self, _time_ns: u64, _leg: usize, _gate: Gate) -> io::Result<()> {
         Ok(())
     }
 
@@ -130,6 +140,24 @@ impl Recorder {
     /// The file cannot be written.
     pub fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) -> Result<(), RecordError> {
         let written = self.sink.period(t_s, period, rig);
+        written.map_err(|source| self.error(source))
+    }
+
+    /// Takes in the period of the PWM that began at `t_s`, of a machine whose control nobody sees.
+    ///
+    /// # Errors
+    /// The file cannot be written, or wants the control.
+    pub fn passage(&mut self, t_s: f64, passage: &Passage) -> Result<(), RecordError> {
+        let written = self.sink.passage(t_s, passage);
+        written.map_err(|source| self.error(source))
+    }
+
+    /// Takes in a change of a leg's gates, later than the start of the next such period to be told.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) -> Result<(), RecordError> {
+        let written = self.sink.gates(time_ns, leg, gate);
         written.map_err(|source| self.error(source))
     }
 

@@ -22,6 +22,7 @@ use serde::de::value::Error as NameError;
 
 use super::{Row, Sink};
 use crate::rig::{Period, Rig};
+use crate::surroundings::Passage;
 
 /// Rows that are kept in memory and written together: less than 10 MB.
 const GROUP_ROWS: usize = 65_536;
@@ -33,9 +34,11 @@ enum Column {
     Phase,
     Faults,
     Single(fn(&Row) -> f32),
+    /// Of the control, which every recording in this format has.
+    Inside(fn(&Row) -> Option<f32>),
     Optional(fn(&Row) -> Option<f32>),
 }
-use Column::{Double, Optional, Single};
+use Column::{Double, Inside, Optional, Single};
 
 /// The columns of [`Row`] in their order, each with its unit.
 const COLUMNS: [(&str, &str, Column); Row::COLUMNS.len()] = [
@@ -43,18 +46,18 @@ const COLUMNS: [(&str, &str, Column); Row::COLUMNS.len()] = [
     ("phase", "", Column::Phase),
     ("faults", "", Column::Faults),
     ("rpm", "rpm", Single(|row| row.rpm)),
-    ("rpm_est", "rpm", Single(|row| row.rpm_est)),
-    ("rpm_ref", "rpm", Single(|row| row.rpm_ref)),
+    ("rpm_est", "rpm", Inside(|row| row.rpm_est)),
+    ("rpm_ref", "rpm", Inside(|row| row.rpm_ref)),
     ("angle_deg", "deg", Single(|row| row.angle_deg)),
-    ("angle_est_deg", "deg", Single(|row| row.angle_est_deg)),
-    ("angle_error_deg", "deg", Single(|row| row.angle_error_deg)),
+    ("angle_est_deg", "deg", Inside(|row| row.angle_est_deg)),
+    ("angle_error_deg", "deg", Inside(|row| row.angle_error_deg)),
     ("i_a_a", "A", Single(|row| row.i_a_a)),
     ("i_b_a", "A", Single(|row| row.i_b_a)),
     ("i_c_a", "A", Single(|row| row.i_c_a)),
-    ("i_d_a", "A", Single(|row| row.i_d_a)),
-    ("i_q_a", "A", Single(|row| row.i_q_a)),
-    ("u_d_v", "V", Single(|row| row.u_d_v)),
-    ("u_q_v", "V", Single(|row| row.u_q_v)),
+    ("i_d_a", "A", Inside(|row| row.i_d_a)),
+    ("i_q_a", "A", Inside(|row| row.i_q_a)),
+    ("u_d_v", "V", Inside(|row| row.u_d_v)),
+    ("u_q_v", "V", Inside(|row| row.u_q_v)),
     ("duty_a", "1", Optional(|row| row.duty_a)),
     ("duty_b", "1", Optional(|row| row.duty_b)),
     ("duty_c", "1", Optional(|row| row.duty_c)),
@@ -106,6 +109,12 @@ impl Sink for Parquet {
         Ok(())
     }
 
+    fn passage(&mut self, _t_s: f64, _passage: &Passage) -> io::Result<()> {
+        Err(io::Error::other(
+            "this format wants the control; give a .csv",
+        ))
+    }
+
     fn finish(mut self: Box<Self>) -> io::Result<()> {
         if !self.rows.is_empty() {
             self.write()?;
@@ -128,11 +137,18 @@ impl Column {
         match self {
             Double(get) => fill::<DoubleType>(to, rows.iter().map(get))?,
             Single(get) => fill::<FloatType>(to, rows.iter().map(get))?,
-            Self::Faults => fill::<Int32Type>(to, rows.iter().map(|row| row.faults.into()))?,
+            Self::Faults => {
+                let bits = rows.iter().filter_map(|row| row.faults);
+                fill::<Int32Type>(to, bits.map(i32::from))?;
+            }
             Self::Phase => {
-                let names = rows.iter().map(|row| row.phase_name().into_bytes());
+                let names = rows
+                    .iter()
+                    .filter_map(Row::phase_name)
+                    .map(String::into_bytes);
                 fill::<ByteArrayType>(to, names.map(ByteArray::from))?;
             }
+            Inside(get) => fill::<FloatType>(to, rows.iter().filter_map(get))?,
             Optional(get) => {
                 let values: Vec<_> = rows.iter().filter_map(get).collect();
                 let there: Vec<_> = rows.iter().map(|row| get(row).is_some().into()).collect();
@@ -146,7 +162,7 @@ impl Column {
     const fn kind(self) -> &'static str {
         match self {
             Double(_) => "required double",
-            Single(_) => "required float",
+            Single(_) | Inside(_) => "required float",
             Optional(_) => "optional float",
             Self::Faults => "required int32",
             Self::Phase => "required binary",
@@ -157,7 +173,7 @@ impl Column {
         match self {
             Self::Faults => " (INTEGER(8, false))",
             Self::Phase => " (UTF8)",
-            Double(_) | Single(_) | Optional(_) => "",
+            Double(_) | Single(_) | Inside(_) | Optional(_) => "",
         }
     }
 }
@@ -232,21 +248,22 @@ fn row_of(
     Ok(Row {
         t_s: row.get_double(next())?,
         phase: Row::phase_named(row.get_string(next())?.as_str().into_deserializer())
+            .map(Some)
             .map_err(|error: NameError| ParquetError::General(error.to_string()))?,
-        faults: row.get_ubyte(next())?,
+        faults: Some(row.get_ubyte(next())?),
         rpm: row.get_float(next())?,
-        rpm_est: row.get_float(next())?,
-        rpm_ref: row.get_float(next())?,
+        rpm_est: Some(row.get_float(next())?),
+        rpm_ref: Some(row.get_float(next())?),
         angle_deg: row.get_float(next())?,
-        angle_est_deg: row.get_float(next())?,
-        angle_error_deg: row.get_float(next())?,
+        angle_est_deg: Some(row.get_float(next())?),
+        angle_error_deg: Some(row.get_float(next())?),
         i_a_a: row.get_float(next())?,
         i_b_a: row.get_float(next())?,
         i_c_a: row.get_float(next())?,
-        i_d_a: row.get_float(next())?,
-        i_q_a: row.get_float(next())?,
-        u_d_v: row.get_float(next())?,
-        u_q_v: row.get_float(next())?,
+        i_d_a: Some(row.get_float(next())?),
+        i_q_a: Some(row.get_float(next())?),
+        u_d_v: Some(row.get_float(next())?),
+        u_q_v: Some(row.get_float(next())?),
         duty_a: optional(row, next())?,
         duty_b: optional(row, next())?,
         duty_c: optional(row, next())?,

@@ -7,30 +7,32 @@ use siskin_control::drive::{Bridge, Phase};
 
 use crate::rig::{Period, Rig};
 use crate::shaft::Units;
+use crate::surroundings::Motion;
 
 /// One control period. The fields are the columns, in this order, with the unit as the last part
-/// of the name. Single precision holds more than any sensor, and halves the file.
+/// of the name. Single precision holds more than any sensor, and halves the file. What is of the control
+/// is empty where nobody sees it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Start of the period, s, to the nanosecond.
     pub t_s: f64,
     /// What the drive is doing, in small letters.
-    #[serde(with = "PhaseName")]
-    pub phase: Phase,
+    #[serde(with = "spelt")]
+    pub phase: Option<Phase>,
     /// Faults that hold the bridge off, one bit each.
-    pub faults: u8,
+    pub faults: Option<u8>,
     /// True mechanical speed, positive with the phases in the order a, b, c.
     pub rpm: f32,
     /// Estimated mechanical speed, likewise.
-    pub rpm_est: f32,
+    pub rpm_est: Option<f32>,
     /// Reference of the mechanical speed, likewise.
-    pub rpm_ref: f32,
+    pub rpm_ref: Option<f32>,
     /// True electrical angle, 0 to 360.
     pub angle_deg: f32,
     /// Estimated electrical angle, 0 to 360.
-    pub angle_est_deg: f32,
+    pub angle_est_deg: Option<f32>,
     /// Estimated less true electrical angle, ±180.
-    pub angle_error_deg: f32,
+    pub angle_error_deg: Option<f32>,
     /// True current into phase a.
     pub i_a_a: f32,
     /// True current into phase b.
@@ -38,13 +40,13 @@ pub struct Row {
     /// True current into phase c.
     pub i_c_a: f32,
     /// Measured current along the estimated rotor's axis.
-    pub i_d_a: f32,
+    pub i_d_a: Option<f32>,
     /// Measured current across it.
-    pub i_q_a: f32,
+    pub i_q_a: Option<f32>,
     /// Commanded voltage along the estimated rotor's axis.
-    pub u_d_v: f32,
+    pub u_d_v: Option<f32>,
     /// Commanded voltage across it.
-    pub u_q_v: f32,
+    pub u_q_v: Option<f32>,
     /// Share of the period for which phase a is high; empty while all switches are off, and while
     /// the low sides only charge the drivers.
     pub duty_a: Option<f32>,
@@ -73,6 +75,27 @@ enum PhaseName {
     Stopping,
     Brake,
     Tone,
+}
+
+/// The phase, or nothing.
+mod spelt {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::{Phase, PhaseName};
+
+    #[derive(Serialize, Deserialize)]
+    struct Name(#[serde(with = "PhaseName")] Phase);
+
+    pub(super) fn serialize<S: Serializer>(
+        phase: &Option<Phase>,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        phase.map(Name).serialize(to)
+    }
+
+    pub(super) fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Option<Phase>, D::Error> {
+        Ok(Option::<Name>::deserialize(from)?.map(|name| name.0))
+    }
 }
 
 impl Row {
@@ -104,8 +127,9 @@ impl Row {
 
     /// The phase as a recording spells it.
     #[cfg(feature = "parquet")]
-    pub(super) fn phase_name(&self) -> String {
-        format!("{:?}", self.phase).to_lowercase()
+    pub(super) fn phase_name(&self) -> Option<String> {
+        let phase = self.phase?;
+        Some(format!("{phase:?}").to_lowercase())
     }
 
     /// The phase that a recording spells so.
@@ -119,7 +143,6 @@ impl Row {
         let (snapshot, units) = (&rig.snapshot(), Units::of(rig.config()));
         let scale = units.scale;
         let turns = snapshot.angle.to_num::<f64>();
-        let [i_a_a, i_b_a, i_c_a] = period.currents_a.map(|current_a| current_a as f32);
         let duties = match period.bridge {
             Bridge::Off | Bridge::Charge(_) => [None; 3],
             Bridge::Legs(legs) => legs.map(|leg| leg.map(|duty| duty.to_num::<f32>())),
@@ -127,28 +150,49 @@ impl Row {
             Bridge::Duty(duties) => duties.map(|duty| Some(duty.to_num::<f32>())),
         };
         Self {
-            t_s: (t_s * 1e9).round() / 1e9,
-            phase: snapshot.phase,
-            faults: snapshot.faults.bits(),
-            rpm: period.rpm() as f32,
-            rpm_est: units.rpm(snapshot.speed) as f32,
-            rpm_ref: units.rpm(snapshot.speed_reference) as f32,
-            angle_deg: (period.angle_turns * 360.0) as f32,
-            angle_est_deg: ((turns - turns.floor()) * 360.0) as f32,
-            angle_error_deg: period.angle_error_deg(snapshot) as f32,
-            i_a_a,
-            i_b_a,
-            i_c_a,
-            i_d_a: scale.amperes(snapshot.i.d),
-            i_q_a: scale.amperes(snapshot.i.q),
-            u_d_v: scale.volts(snapshot.u.d),
-            u_q_v: scale.volts(snapshot.u.q),
+            phase: Some(snapshot.phase),
+            faults: Some(snapshot.faults.bits()),
+            rpm_est: Some(units.rpm(snapshot.speed) as f32),
+            rpm_ref: Some(units.rpm(snapshot.speed_reference) as f32),
+            angle_est_deg: Some(((turns - turns.floor()) * 360.0) as f32),
+            angle_error_deg: Some(period.angle_error_deg(snapshot) as f32),
+            i_d_a: Some(scale.amperes(snapshot.i.d)),
+            i_q_a: Some(scale.amperes(snapshot.i.q)),
+            u_d_v: Some(scale.volts(snapshot.u.d)),
+            u_q_v: Some(scale.volts(snapshot.u.q)),
             duty_a: duties[0],
             duty_b: duties[1],
             duty_c: duties[2],
-            bus_v: period.bus_v as f32,
-            bus_a: period.bus_a as f32,
-            torque_nm: period.flow.torque_nm as f32,
+            ..Self::outside(t_s, &period.motion)
+        }
+    }
+
+    /// The period that began at `t_s`, of a machine whose control nobody sees.
+    pub fn outside(t_s: f64, motion: &Motion) -> Self {
+        let [i_a_a, i_b_a, i_c_a] = motion.currents_a.map(|current_a| current_a as f32);
+        Self {
+            t_s: (t_s * 1e9).round() / 1e9,
+            phase: None,
+            faults: None,
+            rpm: motion.rpm() as f32,
+            rpm_est: None,
+            rpm_ref: None,
+            angle_deg: (motion.angle_turns * 360.0) as f32,
+            angle_est_deg: None,
+            angle_error_deg: None,
+            i_a_a,
+            i_b_a,
+            i_c_a,
+            i_d_a: None,
+            i_q_a: None,
+            u_d_v: None,
+            u_q_v: None,
+            duty_a: None,
+            duty_b: None,
+            duty_c: None,
+            bus_v: motion.bus_v as f32,
+            bus_a: motion.bus_a as f32,
+            torque_nm: motion.flow.torque_nm as f32,
         }
     }
 }

@@ -7,8 +7,12 @@ use siskin_control::params::{Params, build};
 use vcd::{Command, ScopeItem, Value};
 
 use super::{Recorder, Row};
+use crate::machine::Onlooker;
+use crate::plant::Gate;
 use crate::plant::Sensing;
 use crate::rig::{Bench, Period, Rig};
+use crate::surroundings::Surroundings;
+use crate::watch::Watch;
 
 fn rig() -> Rig {
     let sensing = Sensing::default();
@@ -67,13 +71,15 @@ fn a_csv_gives_back_each_period() {
         assert_eq!(row.duty_a.is_none(), high_off);
         let sum_a = row.i_a_a + row.i_b_a + row.i_c_a;
         assert!(sum_a.abs() < 1e-4, "{sum_a} A into the star's point");
-        let apart = row.angle_est_deg - row.angle_deg - row.angle_error_deg;
+        let [estimate_deg, error_deg] =
+            [row.angle_est_deg, row.angle_error_deg].map(Option::unwrap);
+        let apart = estimate_deg - row.angle_deg - error_deg;
         let turns = apart / 360.0;
         assert!(
             (turns - turns.round()).abs() < 1e-6,
             "{apart}° between the angles"
         );
-        assert!((0.0..=360.0).contains(&row.angle_est_deg));
+        assert!((0.0..=360.0).contains(&estimate_deg));
     }
     assert!(rows.iter().any(|row| row.duty_a.is_none()));
     assert!(rows.iter().any(|row| row.duty_a.is_some()));
@@ -104,7 +110,7 @@ fn a_parquet_gives_back_each_period_with_its_units() {
     for (row, (_, _, as_written)) in rows.iter().zip(&written) {
         assert_eq!(row.as_ref(), Ok(as_written));
     }
-    let phases: Vec<_> = written.iter().map(|(_, _, row)| row.phase).collect();
+    let phases: Vec<_> = written.iter().filter_map(|(_, _, row)| row.phase).collect();
     assert!(
         phases.contains(&Phase::Idle) && phases.contains(&Phase::Park),
         "{phases:?}"
@@ -133,7 +139,7 @@ fn a_parquet_gives_back_each_period_with_its_units() {
     }
 }
 
-#[cfg(feature = "parquet")]
+#[cfg(all(feature = "parquet", feature = "plot"))]
 #[test]
 fn both_tables_give_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,11 +268,11 @@ fn a_dump_has_the_bridge_and_the_throttle_to_the_nanosecond() {
             unreachable!()
         };
         let (from_ns, to_ns) = ((t_s * 1e9).round() as u64, (end_s * 1e9).round() as u64);
-        let phase = format!("{:?}", row.phase).to_lowercase();
+        let phase = format!("{:?}", row.phase.unwrap()).to_lowercase();
         assert_eq!(at(&wires[&phase], from_ns), 1, "{phase} at {from_ns} ns");
         assert_eq!(
             at(&wires["rotor_position_lost"], from_ns),
-            row.faults >> 4 & 1
+            row.faults.unwrap() >> 4 & 1
         );
         assert_eq!(at(&wires["hall_b"], from_ns), period.sample.hall >> 1 & 1);
         let [Bridge::Duty([_, b, _]), second] = period.halves else {
@@ -324,4 +330,53 @@ fn what_cannot_be_recorded_is_one_line_with_the_path() {
     }
     #[cfg(not(feature = "parquet"))]
     assert!(error("run.parquet").contains("--features parquet"));
+}
+
+/// A machine whose control nobody sees leaves the control's columns empty and its wires unknown, and the
+/// figures of the motor are there all the same.
+#[test]
+fn without_the_control_the_motor_is_recorded() {
+    let mut around = Surroundings::new(Bench {
+        initial_rad_s: 100.0,
+        ..Bench::default()
+    });
+    let low = Gate {
+        high: false,
+        low: true,
+    };
+    around.stretch([low, Gate::default(), Gate::default()], 50e-6);
+    let passage = around.end_period().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let [csv, vcd] = ["a.csv", "a.vcd"].map(|name| folder.path().join(name));
+    for path in [&csv, &vcd] {
+        let mut watch = Watch::new(
+            [("all".to_owned(), 0.0, 1.0)],
+            Some(Recorder::create(path).unwrap()),
+        );
+        watch.gates(10_000, 0, low);
+        watch.passage(0.0, &passage);
+        assert!(!watch.failed());
+        let report = watch.finish(50e-6, 1.0).unwrap();
+        assert_eq!((report.steps, &report.faults), (1, &None));
+        let figures = &report.windows[0];
+        let rpm = 100.0 * 60.0 / std::f64::consts::TAU;
+        assert!((figures.rpm_mean.unwrap() - rpm).abs() < 1e-9);
+        assert_eq!(figures.bus_v_mean, Some(24.0));
+        assert_eq!((figures.starts, figures.lock_lost), (None, None));
+        assert_eq!((figures.i_q_mean_a, figures.turned_back_deg), (None, None));
+    }
+    let rows = csv_rows(&csv);
+    let [row] = &rows[..] else {
+        panic!("{} rows", rows.len())
+    };
+    assert_eq!((row.phase, row.faults, row.i_q_a), (None, None, None));
+    assert!((row.rpm - 954.93).abs() < 0.01 && row.bus_v == 24.0);
+    let text = std::fs::read_to_string(&csv).unwrap();
+    let line = text.lines().nth(1).unwrap();
+    assert!(line.starts_with("0.0,,,954.9"), "{line}");
+    let text = std::fs::read_to_string(&vcd).unwrap();
+    // Six gates, the throttle and three Hall sensors begin; then a low side turns on.
+    let levels = |level| text.lines().filter(|line| line.starts_with(level)).count();
+    assert_eq!(levels('0') + levels('1'), 10 + 1, "{text}");
+    assert!(text.contains("#10000"), "{text}");
 }

@@ -10,8 +10,9 @@ use siskin_control::drive::{Fault, Phase};
 use vcd::{IdCode, TimescaleUnit, Writer};
 
 use super::Sink;
-use crate::plant::Gates;
+use crate::plant::{Gate, Gates};
 use crate::rig::{Period, Rig};
+use crate::surroundings::Passage;
 
 // The places of the wires.
 const BRIDGE: usize = 0;
@@ -146,6 +147,34 @@ impl Sink for Vcd {
                 change(time_ns, BRIDGE + 2 * leg + 1, gate.low);
             });
         self.end_ns = start_ns + (period_s * 1e9).round() as u64;
+        Ok(())
+    }
+
+    fn passage(&mut self, t_s: f64, passage: &Passage) -> io::Result<()> {
+        let start_ns = (t_s * 1e9).round() as u64;
+        // The control's wires stay unknown.
+        self.waiting.retain(|change| change.wire < PHASE);
+        self.write_before(start_ns)?;
+        self.waiting.extend((0..3).map(|phase| Change {
+            time_ns: start_ns,
+            wire: HALL + phase,
+            level: passage.hall >> phase & 1 != 0,
+        }));
+        self.end_ns = start_ns + (passage.length_s * 1e9).round() as u64;
+        Ok(())
+    }
+
+    fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) -> io::Result<()> {
+        self.waiting.extend(
+            [gate.high, gate.low]
+                .into_iter()
+                .enumerate()
+                .map(|(side, level)| Change {
+                    time_ns,
+                    wire: BRIDGE + 2 * leg + side,
+                    level,
+                }),
+        );
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use toml::Value;
 use super::lines::line_of;
 use crate::bench::BenchError;
 use crate::device::StartError;
+use crate::machine::Stopped;
 use crate::watch::WatchError;
 
 /// Why a scenario cannot run; one line without the file's name.
@@ -83,6 +84,9 @@ pub enum ScenarioError {
     /// The ESC does not start.
     #[error("{0}")]
     Start(#[from] StartError),
+    /// Another machine cannot start or go on.
+    #[error("{0}")]
+    Stopped(#[from] Stopped),
     /// The plant or the recording.
     #[error("{0}")]
     Watch(#[from] WatchError),
@@ -127,6 +131,7 @@ impl ScenarioError {
             | Self::Runs { .. }
             | Self::RecordsOne(_)
             | Self::Start(_)
+            | Self::Stopped(_)
             | Self::Watch(_) => None,
         }
     }

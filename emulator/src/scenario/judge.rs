@@ -34,7 +34,7 @@ pub(super) fn judge(expected: &Expectation, report: &Report) -> Result<Verdict, 
         problem,
     };
     let value = if expected.window == RUN && expected.key == "faults" {
-        Some(report.faults.len() as f64)
+        report.faults.as_ref().map(|faults| faults.len() as f64)
     } else {
         let window = report.windows.iter().find(|w| w.name == expected.window);
         let figures = window.ok_or_else(|| wrong("names no window"))?;

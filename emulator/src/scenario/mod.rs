@@ -43,6 +43,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::device::Start;
+use crate::machine::Machine;
 use crate::summary::Report;
 use course::Courses;
 pub use error::ScenarioError;
@@ -134,6 +136,27 @@ impl Plan {
             expectations,
             drawn: place.drawn,
         })
+    }
+
+    /// Plays the only run, or the first of several, on another machine, which `start` makes and `ended`
+    /// gets at the end.
+    ///
+    /// # Errors
+    /// Any [`ScenarioError`] that shows in the run, and a signal that goes past the wire.
+    pub fn play_on<M: Machine>(
+        &self,
+        start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), ScenarioError>,
+        ended: impl FnOnce(M),
+    ) -> Result<Outcome, ScenarioError> {
+        let Case { place, scenario } = self.case(0)?;
+        match play::play_on(&scenario, self.record.as_deref(), start, ended) {
+            Ok((report, expectations)) => Ok(Outcome {
+                report,
+                expectations,
+                drawn: place.drawn,
+            }),
+            Err(error) => Err(place.blame(error)),
+        }
     }
 
     /// Plays all runs on all processors; `each` is called after each of them. No run begins once

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use siskin_control::drive::Setpoint;
+use siskin_control::params::Params;
 use siskin_control::units::Scale;
 
 use super::RUN;
@@ -14,22 +15,70 @@ use super::judge::{Verdict, judge};
 use super::signal::{Demand, Signal, demand};
 use crate::device::{Device, Start};
 use crate::flash::FileFlash;
+use crate::machine::Machine;
 use crate::record::Recorder;
 use crate::rig::Rig;
 use crate::summary::{Report, Summary};
 use crate::watch::{Watch, WatchError};
 use crate::wire::Wire;
 
-/// Plays a scenario.
-pub(super) fn play(
+/// What a run came to, and whether that was expected.
+type Played = (Report, Vec<Verdict>);
+
+/// Plays a scenario on the emulator's own ESC.
+pub(super) fn play(scenario: &Scenario, record: Option<&Path>) -> Result<Played, ScenarioError> {
+    let signals = &scenario.signal;
+    let last = Cell::new((None, None));
+    let start = |start| Ok(Device::start(start)?);
+    let played = run(scenario, record, start, |device, until_ns, watch| {
+        let imposed = |t_s, rig: &Rig| past_the_wire(signals, t_s, rig, &last);
+        device.advance(until_ns, imposed, watch, &mut |_| {});
+        Ok(())
+    });
+    played.map(|(played, _)| played)
+}
+
+/// Plays a scenario on another machine, which is asked over its wire only.
+pub(super) fn play_on<M: Machine>(
     scenario: &Scenario,
     record: Option<&Path>,
-) -> Result<(Report, Vec<Verdict>), ScenarioError> {
+    start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), ScenarioError>,
+    ended: impl FnOnce(M),
+) -> Result<Played, ScenarioError> {
+    let signals = &scenario.signal;
+    for (index, signal) in signals.iter().enumerate() {
+        if !matches!(demand(signals, signal.at_s), Some(Demand::Throttle(_))) {
+            let problem = "goes past the wire, which only the emulator can; give throttle";
+            return Err(ScenarioError::of_key(format!("signal.{index}"), problem));
+        }
+    }
+    let (played, machine) = run(
+        scenario,
+        record,
+        start,
+        |machine: &mut M, until_ns, watch| Ok(machine.advance(until_ns, watch, &mut |_| {})?),
+    )?;
+    ended(machine);
+    Ok(played)
+}
+
+/// Plays a scenario on what `start` makes, with the wire's frames on time.
+fn run<M: Machine>(
+    scenario: &Scenario,
+    record: Option<&Path>,
+    start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), ScenarioError>,
+    mut advance: impl FnMut(&mut M, u64, &mut Watch) -> Result<(), ScenarioError>,
+) -> Result<(Played, M), ScenarioError> {
     let overrides = scenario.params()?;
+    let mut params = Params::default();
+    for (id, value) in &overrides {
+        // The scenario's own are in range.
+        let _ = params.set(*id, *value);
+    }
     let recorder = record.map(Recorder::create).transpose();
     let recorder = recorder.map_err(WatchError::Record)?;
     let mut watch = Watch::new(windows(scenario), recorder);
-    let (mut device, _) = Device::start(Start {
+    let (mut machine, _) = start(Start {
         bench: scenario.bench.bench()?,
         wire: Wire::detached(),
         flash: FileFlash::in_memory(),
@@ -39,33 +88,25 @@ pub(super) fn play(
     })?;
 
     let began = Instant::now();
-    let signals = &scenario.signal;
+    let wire = scenario.bench.wire;
     let end_ns = (scenario.bench.duration_s * 1e9) as u64;
-    let last = Cell::new((None, None));
     let mut slice_ns = 0;
     while slice_ns < end_ns && !watch.failed() {
-        if let Some(Demand::Throttle(throttle)) = demand(signals, slice_ns as f64 * 1e-9) {
-            let datagram = scenario
-                .bench
-                .wire
-                .datagram(throttle, device.esc().params());
+        let demand = demand(&scenario.signal, slice_ns as f64 * 1e-9);
+        if let Some(Demand::Throttle(throttle)) = demand {
+            let datagram = wire.datagram(throttle, &params);
             // The longest pulse and its rest take 2.34 of 2.5 ms: there is room.
-            let _ = device.wire().play(slice_ns, &datagram);
+            let _ = machine.wire().play(slice_ns, &datagram);
         }
-        slice_ns += scenario.bench.wire.interval_ns();
-        device.advance(
-            slice_ns.min(end_ns),
-            |t_s, rig| past_the_wire(signals, t_s, rig, &last),
-            &mut watch,
-            &mut |_| {},
-        );
+        slice_ns += wire.interval_ns();
+        advance(&mut machine, slice_ns.min(end_ns), &mut watch)?;
     }
-    let sim_s = device.now_ns() as f64 * 1e-9;
+    let sim_s = machine.now_ns() as f64 * 1e-9;
     let report = watch.finish(sim_s, began.elapsed().as_secs_f64())?;
     let expectations = scenario.expect.iter();
     let verdicts = expectations.map(|expected| judge(expected, &report));
     let verdicts = verdicts.collect::<Result<_, _>>()?;
-    Ok((report, verdicts))
+    Ok(((report, verdicts), machine))
 }
 
 /// Finds what is wrong with a scenario before it is played, so that a slip of the pen does not cost

@@ -113,7 +113,7 @@ impl Survey {
 
     fn add(&mut self, place: &Place, report: &Report, verdicts: Vec<Verdict>) {
         self.runs += 1;
-        for fault in &report.faults {
+        for fault in report.faults.iter().flatten() {
             *self.faults.entry(fault).or_default() += 1;
         }
         self.sim_s += report.sim_s;
@@ -133,7 +133,7 @@ impl Survey {
             self.failures.push(Failure {
                 place: place.clone(),
                 options: place.to_string(),
-                faults: report.faults.clone(),
+                faults: report.faults.clone().unwrap_or_default(),
                 expectations: broken,
             });
         }

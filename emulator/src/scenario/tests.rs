@@ -204,3 +204,38 @@ fn a_negative_speed_is_asked_for_as_such() {
         assert_eq!(outcome.held(), held, "{:?}", outcome.expectations);
     }
 }
+
+/// The emulator's own ESC, as if it were a machine that only its wire reaches, does the same; and what goes
+/// past the wire is refused.
+#[test]
+fn another_machine_plays_what_goes_over_the_wire() {
+    let text = r#"
+        [bench]
+        duration_s = 0.5
+        [[signal]]
+        at_s = 0.0
+        throttle = 0.0
+        [[signal]]
+        at_s = 0.35
+        throttle = 0.3
+        [[expect]]
+        window = "run"
+        key = "starts"
+        equals = 1
+    "#;
+    let start = |start| Ok(crate::device::Device::start(start)?);
+    let [there, here] = [
+        plan(text, &Options::default())
+            .unwrap()
+            .play_on(start, |_| {}),
+        plan(text, &Options::default()).unwrap().play(),
+    ]
+    .map(Result::unwrap);
+    assert!(there.held() && here.held());
+    assert_eq!(there.report.trace_hash, here.report.trace_hash);
+
+    let past = text.replace("throttle = 0.3", "rpm = 1000.0");
+    let plan = plan(&past, &Options::default()).unwrap();
+    let error = plan.play_on(start, |_| {}).err().unwrap().to_string();
+    assert!(error.starts_with("signal.1: goes past the wire"), "{error}");
+}

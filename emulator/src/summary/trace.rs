@@ -3,6 +3,7 @@
 use xxhash_rust::xxh3::Xxh3;
 
 use crate::rig::Rig;
+use crate::surroundings::{Motion, Passage};
 
 /// Bytes that wait to be hashed at once, at most: the hash's set-up costs more than a period's words.
 const BYTES: usize = 16_384;
@@ -38,11 +39,37 @@ impl Trace {
             room[len..len + 4].copy_from_slice(&word.to_le_bytes());
             len += 4;
         });
+        self.keep(len);
+    }
+
+    /// Takes in what the motor did in a period.
+    pub(super) fn pass(&mut self, passage: &Passage) {
+        let Motion {
+            angle_turns,
+            speed_rad_s,
+            currents_a: [a, b, c],
+            bus_v,
+            bus_a,
+            flow,
+        } = passage.motion;
+        let motor = [angle_turns, speed_rad_s, a, b, c, bus_v, bus_a];
+        let means = [passage.length_s, flow.torque_nm];
+        let mut len = 0;
+        for value in motor.into_iter().chain(means) {
+            self.room[len..len + 8].copy_from_slice(&value.to_le_bytes());
+            len += 8;
+        }
+        self.keep(len);
+    }
+
+    /// Keeps what is in the room to be hashed.
+    #[inline]
+    fn keep(&mut self, len: usize) {
         if self.bytes.len() + len > BYTES {
             self.hash.update(&self.bytes);
             self.bytes.clear();
         }
-        self.bytes.extend_from_slice(&room[..len]);
+        self.bytes.extend_from_slice(&self.room[..len]);
     }
 
     /// The hash so far.

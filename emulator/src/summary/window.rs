@@ -6,11 +6,13 @@ use siskin_control::drive::{Phase, Setpoint, Snapshot};
 use super::turning::Turning;
 use crate::rig::Period;
 use crate::shaft::Units;
+use crate::surroundings::Motion;
 
 /// Angle error within which the observer has locked: it costs 3.4 % of the torque.
 const LOCKED_DEG: f64 = 15.0;
 
-/// The figures of one measuring window; none is `None` but for lack of data.
+/// The figures of one measuring window; none is `None` but for lack of data, as of the control where
+/// nobody sees it.
 ///
 /// Speed and torque are those of the shaft, positive with the phases in the order a, b, c: with
 /// `MOT_DIR` 1 a motor that runs forward has a negative speed here, and so have the reference and the
@@ -78,9 +80,9 @@ pub struct Figures {
     /// last, s; `None` where it did not at the end.
     pub settled_s: Option<f64>,
     /// Times that the drive began a start (Park).
-    pub starts: u64,
+    pub starts: Option<u64>,
     /// Whether the angle error was 90° or more.
-    pub lock_lost: bool,
+    pub lock_lost: Option<bool>,
 }
 
 /// A period as the windows see it.
@@ -88,6 +90,15 @@ pub(super) struct Look<'a> {
     /// Its start, s.
     pub(super) t_s: f64,
     /// The truth.
+    pub(super) motion: &'a Motion,
+    /// The control, where it is seen.
+    pub(super) control: Option<Control<'a>>,
+}
+
+/// The control in a period.
+#[derive(Clone, Copy)]
+pub(super) struct Control<'a> {
+    /// What it was asked for, and the truth against its own.
     pub(super) period: &'a Period,
     /// What the control made of it.
     pub(super) snapshot: &'a Snapshot,
@@ -103,7 +114,9 @@ pub(super) struct Window {
     name: String,
     t0_s: f64,
     t1_s: f64,
-    all: Mean<9>,
+    all: Mean<7>,
+    /// i_q and i_d.
+    control: Mean<2>,
     reference: Mean<2>,
     leading: Mean<3>,
     rpm_min: f64,
@@ -170,6 +183,7 @@ impl Window {
             t0_s,
             t1_s,
             all: Mean::new(),
+            control: Mean::new(),
             reference: Mean::new(),
             leading: Mean::new(),
             rpm_min: f64::INFINITY,
@@ -193,30 +207,43 @@ impl Window {
     pub(super) fn add(&mut self, look: &Look) {
         let Look {
             t_s,
-            period,
-            snapshot,
-            units,
-            started,
+            motion,
+            control,
         } = *look;
-        let rpm = period.rpm();
-        let flow = &period.flow;
+        let rpm = motion.rpm();
+        let flow = &motion.flow;
         self.all.add([
             rpm,
             flow.torque_nm,
             flow.torque_square,
             flow.motor_w,
             flow.copper_w,
-            f64::from(units.scale.amperes(snapshot.i.q)),
-            f64::from(units.scale.amperes(snapshot.i.d)),
-            period.bus_v,
-            period.bus_a,
+            motion.bus_v,
+            motion.bus_a,
         ]);
-        self.drove |= snapshot.phase.drives();
         self.rpm_min = self.rpm_min.min(rpm);
         self.rpm_max = self.rpm_max.max(rpm);
-        for current_a in period.currents_a {
+        for current_a in motion.currents_a {
             self.current_max_a = self.current_max_a.max(current_a.abs());
         }
+        if let Some(control) = control {
+            self.add_control(t_s, rpm, control);
+        }
+    }
+
+    #[inline(always)]
+    fn add_control(&mut self, t_s: f64, rpm: f64, control: Control) {
+        let Control {
+            period,
+            snapshot,
+            units,
+            started,
+        } = control;
+        self.control.add([
+            f64::from(units.scale.amperes(snapshot.i.q)),
+            f64::from(units.scale.amperes(snapshot.i.d)),
+        ]);
+        self.drove |= snapshot.phase.drives();
         self.turning.add(t_s, rpm, period.setpoint, units);
         self.starts += u64::from(started);
         let leads = matches!(snapshot.phase, Phase::Run | Phase::Stopping);
@@ -244,6 +271,7 @@ impl Window {
     }
 
     pub(super) fn figures(&self, end_s: f64) -> Figures {
+        let seen = self.control.count == self.all.count;
         let torque_mean_nm = self.all.get(1);
         let p_motor_w = self.all.get(3);
         let p_copper_w = self.all.get(4);
@@ -285,16 +313,16 @@ impl Window {
                 .zip(p_copper_w)
                 .filter(|_| self.drove)
                 .and_then(|(motor, copper)| (motor > 0.0).then(|| 1.0 - copper / motor)),
-            i_q_mean_a: self.all.get(5),
-            i_d_mean_a: self.all.get(6),
+            i_q_mean_a: self.control.get(0),
+            i_d_mean_a: self.control.get(1),
             current_max_a: self.all.any(self.current_max_a),
-            bus_v_mean: self.all.get(7),
-            bus_a_mean: self.all.get(8),
-            turned_back_deg: self.all.any(self.turning.turned_back_deg()),
+            bus_v_mean: self.all.get(5),
+            bus_a_mean: self.all.get(6),
+            turned_back_deg: self.control.any(self.turning.turned_back_deg()),
             reached_s: self.turning.reached_at_s().map(|t_s| t_s - self.t0_s),
             settled_s: self.turning.settled_at_s().map(|t_s| t_s - self.t0_s),
-            starts: self.starts,
-            lock_lost: self.angle_error_max_deg >= 90.0,
+            starts: seen.then_some(self.starts),
+            lock_lost: seen.then_some(self.angle_error_max_deg >= 90.0),
         }
     }
 }

@@ -8,6 +8,7 @@
 //!   resistances: half the supply's voltage for the motor and, through both switches and the shunt,
 //!   V/(2·R_on) besides what the motor takes.
 
+use super::super::gates::Gate;
 use super::super::vector::{AXES, dot};
 use super::{Path, Rail, Stage};
 
@@ -55,10 +56,15 @@ impl Stage {
     /// What [`Stage::set`] does where something is broken, or has just been mended.
     #[cold]
     pub(super) fn set_broken(&mut self, leg: usize, on: Option<Rail>) {
+        self.connect_broken(leg, [Rail::Low, Rail::High].map(|rail| on == Some(rail)));
+    }
+
+    /// Connects a leg whose gates, low and high, are on or off.
+    fn connect_broken(&mut self, leg: usize, on: [bool; 2]) {
         let breaks = self.breaks.0[leg];
         let closed = |rail: Rail| {
             let index = rail as usize;
-            breaks.shorted[index] || (on == Some(rail) && !breaks.open[index])
+            breaks.shorted[index] || (on[index] && !breaks.open[index])
         };
         let path = match (closed(Rail::Low), closed(Rail::High)) {
             _ if breaks.wire => Path::Cut,
@@ -68,6 +74,23 @@ impl Stage {
             (false, false) => self.diode(leg),
         };
         self.rewire(leg, path);
+    }
+
+    /// Turns a leg's gates on or off, both on being a shoot-through.
+    #[inline(always)]
+    pub(in super::super) fn set_gates(&mut self, leg: usize, gate: Gate) {
+        if self.sound && !gate.shoots() {
+            self.set(leg, gate.on());
+        } else {
+            self.set_unsound(leg, gate);
+        }
+    }
+
+    /// See [`Stage::set_gates`]. A leg that shoots through makes the stage unsound as long as it does.
+    #[cold]
+    fn set_unsound(&mut self, leg: usize, gate: Gate) {
+        self.connect_broken(leg, [gate.low, gate.high]);
+        self.sound = self.breaks == Breaks::default() && !self.paths.contains(&Path::Both);
     }
 
     fn rewire(&mut self, leg: usize, path: Path) {

@@ -61,7 +61,7 @@ impl Foc {
             let mut means = Means::default();
             let periods = libm::round(time_s / f64::from(PHASES) * CARRIER_HZ) as u32;
             for _ in 0..periods {
-                means.add(&rig.period(setpoint).flow, rig.period_s());
+                means.add(&rig.period(setpoint).motion.flow, rig.period_s());
                 if rig.snapshot().phase != Phase::Run {
                     return Means::default();
                 }

@@ -106,7 +106,7 @@ impl Drive {
         let mut error_deg = 0.0;
         for _ in 0..measure {
             let period = rig.period(setpoint);
-            means.add(&period.flow, rig.period_s());
+            means.add(&period.motion.flow, rig.period_s());
             let snapshot = rig.snapshot();
             if snapshot.phase != Phase::Run {
                 return (Means::default(), f64::NAN);

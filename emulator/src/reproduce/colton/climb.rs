@@ -169,7 +169,7 @@ pub(super) fn flux_map() -> Reproduction {
     drive.run(fast, (to - from) / SWEEP_RPM_S + 0.3, |_, period, rig| {
         let row = (period.rpm() - from) / (to - from) * ROWS as f64;
         if rig.snapshot().phase == Phase::Run && (0.0..ROWS as f64).contains(&row) {
-            let column = (period.angle_turns * COLUMNS as f64) as usize % COLUMNS;
+            let column = (period.motion.angle_turns * COLUMNS as f64) as usize % COLUMNS;
             let (sum, count) = &mut cells[row as usize][column];
             *sum += rig.flux_linkages_wb()[0] * 1e3;
             *count += 1.0;

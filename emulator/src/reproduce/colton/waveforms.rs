@@ -47,7 +47,7 @@ fn ride() -> (Vec<Seen>, Drive) {
         if snapshot.phase == Phase::Run {
             seen.push(Seen {
                 rpm: period.rpm(),
-                turns: period.angle_turns,
+                turns: period.motion.angle_turns,
                 lambda_wb: rig.flux_linkages_wb(),
                 currents_a: period
                     .sample

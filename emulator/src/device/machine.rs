@@ -1,0 +1,43 @@
+//! The emulated ESC as a machine that runs: what the wire asks for counts.
+
+use super::Device;
+use crate::link::LinkId;
+use crate::machine::{Machine, Onlooker, Stopped};
+use crate::summary::Rejected;
+use crate::wire::Wire;
+
+impl Machine for Device {
+    fn now_ns(&self) -> u64 {
+        self.now_ns()
+    }
+
+    fn is_before(&self, until_ns: u64) -> bool {
+        self.is_before(until_ns)
+    }
+
+    fn wire(&mut self) -> &mut Wire {
+        self.wire()
+    }
+
+    fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
+        self.receive(stream, bytes, onlooker);
+    }
+
+    fn forget(&mut self, stream: LinkId) {
+        self.forget(stream);
+    }
+
+    fn advance(
+        &mut self,
+        until_ns: u64,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) -> Result<(), Stopped> {
+        self.advance(until_ns, |_, _| None, onlooker, send);
+        Ok(())
+    }
+
+    fn rejected(&self) -> Rejected {
+        self.rejected()
+    }
+}

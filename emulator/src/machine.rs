@@ -1,0 +1,85 @@
+//! What runs on the bench: an ESC in any form, as the links, the clock and those who look on see it.
+
+use thiserror::Error;
+
+use crate::link::LinkId;
+use crate::plant::Gate;
+use crate::rig::{Period, Rig};
+use crate::summary::Rejected;
+use crate::surroundings::Passage;
+use crate::wire::Wire;
+
+/// An ESC with all that is around it.
+pub trait Machine {
+    /// Simulated time since the start, ns.
+    fn now_ns(&self) -> u64;
+
+    /// Whether it has something left to do until this time.
+    fn is_before(&self, until_ns: u64) -> bool;
+
+    /// The throttle wire, to be polled or played.
+    fn wire(&mut self) -> &mut Wire;
+
+    /// Bytes that came in on a MAVLink stream.
+    fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker);
+
+    /// A MAVLink stream that has ended.
+    fn forget(&mut self, stream: LinkId);
+
+    /// Runs until `until_ns`; `send` gets every MAVLink frame.
+    ///
+    /// # Errors
+    /// It cannot go on.
+    fn advance(
+        &mut self,
+        until_ns: u64,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) -> Result<(), Stopped>;
+
+    /// What came in since the start and was refused.
+    fn rejected(&self) -> Rejected;
+}
+
+/// Why a machine cannot start or go on: one line.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct Stopped(pub String);
+
+/// Who looks on as a machine runs. A closure sees the periods.
+pub trait Onlooker {
+    /// A control period that began at `t_s`, of a machine whose control is at hand.
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig);
+
+    /// A period of the PWM that began at `t_s`, of a machine whose control nobody sees.
+    fn passage(&mut self, t_s: f64, passage: &Passage) {
+        let _ = (t_s, passage);
+    }
+
+    /// A leg's gates changed at `time_ns`, in the period that is told next, of such a machine.
+    fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
+        let _ = (time_ns, leg, gate);
+    }
+
+    /// The throttle wire's level changed at `time_ns`, before the next period and after all that
+    /// came before.
+    fn edge(&mut self, time_ns: u64, level: bool) {
+        let _ = (time_ns, level);
+    }
+
+    /// The ESC has answered the edges so far on the throttle wire or on its serial line, with this datagram.
+    fn answer(&mut self, datagram: &[u8]) {
+        let _ = datagram;
+    }
+
+    /// A whole MAVLink frame was sent, or was received and understood.
+    fn frame(&mut self, time_ns: u64, frame: &[u8]) {
+        let _ = (time_ns, frame);
+    }
+}
+
+impl<F: FnMut(f64, &Period, &Rig)> Onlooker for F {
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        self(t_s, period, rig);
+    }
+}

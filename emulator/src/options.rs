@@ -1,0 +1,297 @@
+//! The options of a run in real time and of a scenario, for every program that has one.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Args;
+use siskin_control::params::{ParamId, Preset};
+
+use crate::bench::library;
+use crate::flash::{FileFlash, StorageError};
+use crate::link::Endpoint;
+use crate::live::{Pace, Session};
+use crate::parameter;
+use crate::plant::Fidelity;
+use crate::rig::Bench;
+use crate::scenario::{self, Plan, ScenarioError, Standing};
+use crate::wire::SignalAddress;
+
+/// The help of `--mavlink`, whose brackets would be links in the documentation.
+const MAVLINK_HELP: &str = "MAVLink endpoint: udpout:H:P, udpin:H:P, tcpin:H:P, serial:PATH:BAUD, \
+    pty[:LINK[:BAUD]] or none; repeatable [default: udpout:127.0.0.1:14550 and tcpin:127.0.0.1:5760]";
+
+/// What one ESC in real time is run with.
+#[derive(Args, Debug)]
+pub struct RunArgs {
+    /// MAVLink endpoints.
+    #[arg(long, value_name = "ENDPOINT", help = MAVLINK_HELP)]
+    pub mavlink: Vec<Endpoint>,
+    /// Where the throttle wire listens
+    #[arg(long, value_name = "udp:H:P", default_value = "udp:127.0.0.1:14600")]
+    pub signal: SignalAddress,
+    /// A built-in bench or a TOML file
+    #[arg(long, value_name = "NAME|FILE", help = bench_help())]
+    pub bench: Option<String>,
+    /// A built-in motor or a TOML file [default: the bench's]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub motor: Option<String>,
+    /// A built-in load or a TOML file [default: the bench's]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub load: Option<String>,
+    /// Supply: volts, a battery as 4s or 6s, or a TOML file [default: the bench's]
+    #[arg(long, value_name = "VOLTS|Ns|FILE", allow_hyphen_values = true)]
+    pub bus: Option<String>,
+    /// How the inverter is simulated
+    #[arg(long, value_enum, default_value_t = Fidelity::Averaged)]
+    pub plant: Fidelity,
+    /// Simulated seconds a second, or max
+    #[arg(long, value_name = "X|max", default_value = "1", value_parser = pace)]
+    pub speed: Pace,
+    /// Simulated seconds after which to end
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub duration: Option<f64>,
+    /// Seed of all randomness
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// File behind the simulated flash, or none [default: a file in your state folder]
+    #[arg(long, value_name = "PATH|none")]
+    pub storage: Option<PathBuf>,
+    /// What runs in real time and offline have in common.
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// What a scenario is played with.
+#[derive(Args, Debug)]
+pub struct ScenarioArgs {
+    /// The scenario, a TOML file
+    pub file: PathBuf,
+    /// Another seed than the file's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Runs the scenario for each seed from A to B, both included
+    #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with = "seed")]
+    pub seeds: Option<RangeInclusive<u64>>,
+    /// Gives a key of the file one value, in place of what sweeps or draws it, as bench.scale.R=0.7
+    /// or signal.0.rpm=3000.0 (entries count from 0); repeatable
+    #[arg(long, value_name = "KEY=VALUE", value_parser = key)]
+    pub set: Vec<(String, toml::Value)>,
+    /// What runs in real time and offline have in common.
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// What both have.
+#[derive(Args, Debug)]
+pub struct CommonArgs {
+    /// Sets the parameters of a named set before the start, as --param does: bosso-table-iii is the
+    /// first paper's drive as published
+    #[arg(long, value_name = "NAME", value_parser = parameter::preset)]
+    pub preset: Option<&'static Preset>,
+    /// Sets a parameter before the start, over what is stored or in the file, without storing it; repeatable
+    #[arg(long, value_name = "NAME=VALUE", value_parser = parameter::assignment)]
+    pub param: Vec<(ParamId, f32)>,
+    /// Records to a file: each control period to .csv or .parquet, the wires to .vcd, MAVLink to .tlog
+    #[arg(long, value_name = "PATH")]
+    pub record: Option<PathBuf>,
+    /// Prints the summary as one JSON object at the end
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl ScenarioArgs {
+    /// The plan of the file with these options.
+    ///
+    /// # Errors
+    /// Any [`ScenarioError`] that shows before it is played.
+    pub fn plan(&self) -> Result<Plan, ScenarioError> {
+        let seeds = self.seeds.clone().or(self.seed.map(|seed| seed..=seed));
+        let options = scenario::Options {
+            seeds,
+            set: self.keys(),
+            record: self.common.record.clone(),
+        };
+        Plan::read(&self.file, &options)
+    }
+
+    /// The keys that are set, parameters among them: what repeats a run is then one list.
+    fn keys(&self) -> Vec<(String, toml::Value)> {
+        let of_param = |(id, value): (ParamId, f32)| {
+            // By way of its shortest text: 75.6 stays 75.6 as a double.
+            let value = value.to_string().parse().unwrap_or(f64::from(value));
+            let key = format!("params.{}", id.entry().name);
+            (key, toml::Value::Float(value))
+        };
+        let params = self.common.params().into_iter().map(of_param);
+        params.chain(self.set.iter().cloned()).collect()
+    }
+}
+
+impl RunArgs {
+    /// What stands on the bench.
+    ///
+    /// # Errors
+    /// What is named is not there, or makes no bench.
+    pub fn standing(&self) -> Result<Standing, ScenarioError> {
+        let given = [
+            ("motor", &self.motor),
+            ("load", &self.load),
+            ("bus", &self.bus),
+        ];
+        let given = given.into_iter().filter_map(|(key, text)| {
+            let text = text.clone()?;
+            Some((key.to_owned(), toml::Value::String(text)))
+        });
+        let base = self.bench.as_deref().unwrap_or(library::DEFAULT);
+        let standing = scenario::stand(base, given.collect())?;
+        Ok(Standing {
+            bench: Bench {
+                plant: self.plant,
+                seed: self.seed,
+                ..standing.bench
+            },
+            ..standing
+        })
+    }
+}
+
+impl RunArgs {
+    /// The session on what stands there, with a warning where settings do not outlive it and nobody has
+    /// asked for that.
+    ///
+    /// # Errors
+    /// The file behind `--storage` cannot serve.
+    pub fn session(&self, standing: &Standing) -> Result<(Session, Option<String>), StorageError> {
+        let (flash, warning) = storage(self.storage.as_deref())?;
+        let mut params = standing.params.clone();
+        params.extend(self.common.params());
+        let session = Session {
+            bench: standing.bench.clone(),
+            mavlink: if self.mavlink.is_empty() {
+                Endpoint::defaults()
+            } else {
+                self.mavlink.clone()
+            },
+            signal: self.signal.clone(),
+            pace: self.speed,
+            duration: self.duration.map(Duration::from_secs_f64),
+            flash,
+            params,
+            record: self.common.record.clone(),
+        };
+        Ok((session, warning))
+    }
+}
+
+impl CommonArgs {
+    /// The preset's parameters, and those given one by one over them.
+    pub fn params(&self) -> Vec<(ParamId, f32)> {
+        let preset = self.preset.map_or(&[][..], |preset| preset.settings);
+        preset.iter().chain(&self.param).copied().collect()
+    }
+}
+
+/// The flash behind `--storage`, by default in the user's state folder.
+///
+/// Returns it with a warning where settings do not outlive the run and nobody has asked for that.
+///
+/// # Errors
+/// The file that was given cannot serve.
+fn storage(given: Option<&Path>) -> Result<(FileFlash, Option<String>), StorageError> {
+    match given {
+        Some(path) if path == Path::new("none") => Ok((FileFlash::in_memory(), None)),
+        Some(path) => Ok((FileFlash::open(path)?, None)),
+        None => {
+            let why = match state_file().map(|path| FileFlash::open(&path)) {
+                Some(Ok(flash)) => return Ok((flash, None)),
+                Some(Err(error)) => format!("{error};"),
+                None => "no home folder:".to_owned(),
+            };
+            let warning = format!("{why} settings are kept until the end only");
+            Ok((FileFlash::in_memory(), Some(warning)))
+        }
+    }
+}
+
+/// Where settings stay between runs: the state folder of the XDG base directories.
+fn state_file() -> Option<PathBuf> {
+    let absolute = |name| {
+        let path = PathBuf::from(std::env::var_os(name)?);
+        path.is_absolute().then_some(path)
+    };
+    let folder =
+        absolute("XDG_STATE_HOME").or_else(|| Some(absolute("HOME")?.join(".local/state")));
+    Some(folder?.join("siskin/esc.flash"))
+}
+
+/// What comes of a command line that clap does not take, or that asks for help or the version: these as
+/// clap prints them, what is wrong in one line.
+pub fn usage(program: &str, error: &clap::Error) -> ExitCode {
+    if !error.use_stderr() {
+        // Nobody to tell where standard output is closed.
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let what = one_line(&error.to_string());
+    eprintln!("{program}: {what}; --help lists what there is");
+    ExitCode::from(2)
+}
+
+/// The argument parser's complaint and its hint on one line, without the usage that follows.
+fn one_line(message: &str) -> String {
+    let lines = message.lines().map(str::trim);
+    let said = lines.take_while(|line| !line.starts_with("Usage:"));
+    let said = said.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
+    let words = said.collect::<Vec<_>>().join(" ");
+    words.trim_start_matches("error: ").to_owned()
+}
+
+fn bench_help() -> String {
+    let names: Vec<_> = library::names().collect();
+    format!(
+        "A built-in bench ({}) or a TOML file: motor, load, supply and the parameters that the ESC \
+         needs for them, set before the start as --param does [default: {}, without setting any]",
+        names.join(", "),
+        library::DEFAULT
+    )
+}
+
+fn pace(text: &str) -> Result<Pace, String> {
+    if text == "max" {
+        return Ok(Pace::Max);
+    }
+    let times = text.parse().ok();
+    let times = times.filter(|times| (0.001..=1000.0).contains(times));
+    times
+        .map(Pace::Times)
+        .ok_or_else(|| "give 0.001 to 1000, or max".to_owned())
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok();
+    seconds
+        .filter(|seconds| (0.0..=1e7).contains(seconds))
+        .ok_or_else(|| "give seconds from 0 to 1e7".to_owned())
+}
+
+fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
+    let ends = text.split_once("..");
+    let ends = ends.and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    match ends {
+        Some((first, last)) if first <= last => Ok(first..=last),
+        _ => Err("give the first and the last seed, as 1..200".to_owned()),
+    }
+}
+
+/// A value is TOML, or else text: quotes are for what would be a number.
+fn key(text: &str) -> Result<(String, toml::Value), String> {
+    let (key, value) = text
+        .split_once('=')
+        .ok_or_else(|| "give a key of the file and its value, as bench.scale.R=0.7".to_owned())?;
+    let parsed = toml::from_str::<toml::Table>(&format!("value = {value}"));
+    let parsed = parsed.ok().and_then(|mut table| table.remove("value"));
+    let value = parsed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
+    Ok((key.to_owned(), value))
+}
