@@ -8,7 +8,8 @@
 //!
 //! | part | what it is |
 //! |---|---|
-//! | [`board`] | one file a board: pins, converters, what a count is worth; [how to add one](board#a-third-board-in-an-hour) |
+//! | [`board`] | one file a board: pins, converters; [how to add one](board#a-third-board-in-an-hour) |
+//! | [`circuit`] | one file a board: what a count is worth, for the control and for a PC that replays it |
 //! | `chip` | clock, converters' flags and comparators: what the HAL does not have, by its PAC |
 //! | [`interrupt`] | the control period: readings, set-point, `step`, duties; and its start |
 //! | [`exchange`] | the memory that the interrupt and the tasks share, proven with loom |
@@ -97,6 +98,7 @@ use defmt_rtt as _;
 pub mod board;
 #[cfg(board)]
 mod chip;
+pub mod circuit;
 pub mod exchange;
 pub mod image;
 pub mod interrupt;

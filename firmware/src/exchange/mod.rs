@@ -21,11 +21,7 @@ mod latest;
 )]
 mod swap;
 mod sync;
-#[cfg_attr(
-    not(any(board, test)),
-    expect(dead_code, reason = "for the boards; tested on the host")
-)]
-mod word;
+pub mod word;
 
 #[cfg(board)]
 mod cell;

@@ -23,7 +23,7 @@ const VALUE_SHIFT: u32 = 8;
 const VALUE_MASK: u32 = 0x00ff_ffff;
 
 /// The word of a set-point with a sequence number, of which the lowest five bits count.
-pub(super) fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
+pub fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
     let value = |bits: i32| (bits as u32) >> VALUE_SHIFT;
     let (kind, value) = match setpoint {
         Setpoint::Stop => (REST, 0),
@@ -39,7 +39,7 @@ pub(super) fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
 }
 
 /// The set-point of a word.
-pub(super) fn unpack(word: u32) -> Setpoint {
+pub fn unpack(word: u32) -> Setpoint {
     // The shift throws kind and sequence number away and brings the sign back to bit 31.
     let bits = (word << VALUE_SHIFT) as i32;
     match word >> KIND_SHIFT {
