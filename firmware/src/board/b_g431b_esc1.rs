@@ -237,7 +237,7 @@ impl Hardware {
     /// gate signals are low until the timer drives them. To be called once.
     #[inline(never)]
     pub fn claim() -> Self {
-        let p = embassy_stm32::init(chip::clock());
+        let p = chip::start();
         // Before any of them is used: critical sections rely on it.
         priority::lower_all(chip::INTERRUPTS);
         rcc::enable_and_reset::<TIM1>();

@@ -248,7 +248,7 @@ impl Hardware {
     /// once.
     #[inline(never)]
     pub fn claim() -> Self {
-        let p = embassy_stm32::init(chip::clock());
+        let p = chip::start();
         // Before any of them is used: critical sections rely on it.
         priority::lower_all(chip::INTERRUPTS);
         let enable = Output::new(p.PC10, Level::Low, Speed::Low);

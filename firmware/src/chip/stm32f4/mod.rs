@@ -2,7 +2,6 @@
 
 pub(crate) mod pages;
 
-use embassy_stm32::Config;
 use embassy_stm32::interrupt;
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::adc::regs::Sr;
@@ -10,6 +9,7 @@ use embassy_stm32::pac::{EXTI, RCC, SYSCFG};
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
 };
+use embassy_stm32::{Config, Peripherals};
 
 /// Clock of the timers on APB2; those on APB1 have half of it.
 pub const TIMER_HZ: u32 = 168_000_000;
@@ -35,8 +35,13 @@ pub(crate) fn acknowledge(converters: &[Adc; 2]) {
     converters[0].sr().write_value(others);
 }
 
+/// Starts the chip.
+pub(crate) fn start() -> Peripherals {
+    embassy_stm32::init(clock())
+}
+
 /// 168 MHz from the internal 16 MHz, as no source tells this board's crystal for sure.
-pub(crate) fn clock() -> Config {
+fn clock() -> Config {
     let mut config = Config::default();
     config.rcc.hsi = true;
     config.rcc.pll_src = PllSource::HSI;

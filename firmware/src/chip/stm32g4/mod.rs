@@ -3,11 +3,13 @@
 pub(crate) mod comparators;
 pub(crate) mod pages;
 
-use embassy_stm32::Config;
-use embassy_stm32::interrupt;
 use embassy_stm32::pac;
 use embassy_stm32::pac::adc::Adc;
-use embassy_stm32::rcc::{Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux::Adcsel};
+use embassy_stm32::pac::pwr::regs::Cr5;
+use embassy_stm32::rcc::{
+    self, Config, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux::Adcsel,
+};
+use embassy_stm32::{Peripherals, interrupt};
 
 /// Clock of the timers.
 pub const TIMER_HZ: u32 = 170_000_000;
@@ -27,11 +29,24 @@ pub(crate) fn acknowledge(converters: &[Adc; 2]) {
     converters[0].isr().write(|w| w.set_jeos(true));
 }
 
+/// Bit of PWR_CR5 that takes the core out of the boost which more than 150 MHz need (RM0440, 6.4.5).
+/// The HAL's register has it at bit 0, which is none.
+const R1MODE: u32 = 1 << 8;
+
+/// Starts the chip: by its oscillator, until the core's voltage is up for 170 MHz.
+pub(crate) fn start() -> Peripherals {
+    let mut peripherals = embassy_stm32::init(embassy_stm32::Config::default());
+    let supply = pac::PWR.cr5();
+    supply.write_value(Cr5(supply.read().0 & !R1MODE));
+    rcc::reinit(clock(), &mut peripherals.RCC);
+    peripherals
+}
+
 /// 170 MHz from the internal 16 MHz: sources disagree on the crystal's frequency.
-pub(crate) fn clock() -> Config {
-    let mut config = Config::default();
-    config.rcc.hsi = true;
-    config.rcc.pll = Some(Pll {
+fn clock() -> Config {
+    let mut config = Config::new();
+    config.hsi = true;
+    config.pll = Some(Pll {
         source: PllSource::HSI,
         prediv: PllPreDiv::DIV4,
         mul: PllMul::MUL85,
@@ -39,9 +54,9 @@ pub(crate) fn clock() -> Config {
         divq: None,
         divr: Some(PllRDiv::DIV2),
     });
-    config.rcc.sys = Sysclk::PLL1_R;
-    config.rcc.boost = true;
-    config.rcc.mux.adc12sel = Adcsel::SYS;
+    config.sys = Sysclk::PLL1_R;
+    config.boost = true;
+    config.mux.adc12sel = Adcsel::SYS;
     config
 }
 
