@@ -21,7 +21,9 @@ use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
 use siskin_control::units::AdcCounts;
 
 use crate::chip::{self, comparators};
-use crate::circuit::b_g431b_esc1::{GAIN, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT};
+use crate::circuit::b_g431b_esc1::{
+    BIAS_V, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT, ZERO_COUNTS,
+};
 use crate::interrupt::Registers;
 use crate::interrupt::gate_driver::Pins;
 use crate::interrupt::sample::{Slot, Wiring};
@@ -49,6 +51,7 @@ pub(crate) const PHASES: [usize; 3] = [0, 1, 2];
 /// The order of the sequences in [`Hardware::claim`].
 pub(crate) const WIRING: Wiring = Wiring {
     currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), Some(Slot(0, 1))],
+    zero: ZERO_COUNTS,
     // A current into the motor comes up through the low side's shunt and makes its voltage negative.
     rises: false,
     terminals: [Slot(1, 1), Slot(1, 2), Slot(0, 2)],
@@ -56,9 +59,9 @@ pub(crate) const WIRING: Wiring = Wiring {
     hall: Some(6),
 };
 
-/// The comparators' view: the bias is half the supply over the op-amp's gain.
+/// The comparators' view: they are at the op-amps' inputs.
 const TRIP: TripCircuit = TripCircuit {
-    bias_v: 3.3 / 2.0 / GAIN,
+    bias_v: BIAS_V,
     v_per_a: SHUNT_OHM * SHUNT_DIVIDER,
     rating_a: RATING_A,
     v_per_step: V_PER_COUNT,

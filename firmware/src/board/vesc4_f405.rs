@@ -26,6 +26,7 @@ use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
 use siskin_control::units::AdcCounts;
 
 use crate::chip;
+use crate::circuit::vesc4_f405::ZERO_COUNTS;
 use crate::interrupt::gate_driver::Pins;
 use crate::interrupt::sample::{Slot, Wiring};
 use crate::interrupt::{Registers, alarm};
@@ -58,6 +59,7 @@ pub(crate) const PHASES: [usize; 3] = [0, 2, 1];
 /// The order of the sequences in [`Hardware::claim`].
 pub(crate) const WIRING: Wiring = Wiring {
     currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), None],
+    zero: ZERO_COUNTS,
     // As the VESC's own firmware reads them.
     rises: true,
     terminals: [Slot(0, 1), Slot(1, 1), Slot(1, 2)],

@@ -16,11 +16,24 @@ pub const V_PER_COUNT: f32 = 3.3 / 4096.0;
 /// Each phase's shunt in the low side.
 pub const SHUNT_OHM: f32 = 0.003;
 
-/// From the shunt to the op-amp's input, by its resistors.
-pub const SHUNT_DIVIDER: f32 = 4.0 / 7.0;
+/// Siemens times 1000 from an op-amp's input to its shunt, to ground and to the 3.3 V supply: 1.5 kΩ,
+/// 2.2 kΩ and 22 kΩ (schematic of the MB1419, shunt sensing circuit).
+const INPUT_MS: [f32; 3] = [1.0 / 1.5, 1.0 / 2.2, 1.0 / 22.0];
+
+/// Of all three.
+const INPUT_SUM_MS: f32 = INPUT_MS[0] + INPUT_MS[1] + INPUT_MS[2];
+
+/// From the shunt to the op-amp's input: 4/7.
+pub const SHUNT_DIVIDER: f32 = INPUT_MS[0] / INPUT_SUM_MS;
+
+/// Volts at the op-amp's input without current: 0.1286.
+pub const BIAS_V: f32 = 3.3 * INPUT_MS[2] / INPUT_SUM_MS;
 
 /// The op-amp's.
 pub const GAIN: f32 = 16.0;
+
+/// Nominal reading without current: 2553 counts, of 2.06 V.
+pub const ZERO_COUNTS: i32 = (BIAS_V * GAIN / V_PER_COUNT + 0.5) as i32;
 
 /// From the supply to the converter.
 pub const BUS_DIVIDER: f32 = 18.0 / (18.0 + 169.0);
@@ -29,7 +42,7 @@ pub const BUS_DIVIDER: f32 = 18.0 / (18.0 + 169.0);
 /// 18.3 V.
 pub const TERMINAL_DIVIDER: f32 = 2.2 / (2.2 + 10.0);
 
-/// The board's rating, peak amperes. The converter shows more: ±60 A about the middle of its range.
+/// The board's rating, peak amperes. The converter shows more: 75 A into the motor, 45 A out of it.
 pub const RATING_A: f32 = 40.0;
 
 /// What the control must know of this board.
@@ -60,3 +73,36 @@ pub const NTC: Ntc = Ntc {
     pull_down: 0.47,
     beta_k: 3380.0,
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_zero_is_the_one_that_a_board_has_shown() {
+        // The three op-amps' means of 4096 readings without current, with a gain of 2 (bench log of
+        // aleonsa/tesis_maestria).
+        for shown in [317.0, 317.0, 319.0] {
+            let wanted = shown * GAIN / 2.0;
+            let off = ZERO_COUNTS as f32 / wanted - 1.0;
+            assert!(off.abs() < 0.02, "{ZERO_COUNTS} of {wanted}");
+        }
+    }
+
+    #[test]
+    fn the_range_is_shown_to_both_sides_of_any_sound_zero() {
+        // An offset of a tenth of the range is the greatest that is taken for sound.
+        let range = (1.1 * BOARD.current_range_a / BOARD.current_a_per_count) as i32;
+        assert!(ZERO_COUNTS - range > 0);
+        assert!(ZERO_COUNTS + range < 4095);
+    }
+
+    #[test]
+    fn an_amplifier_at_a_rail_is_no_sound_zero() {
+        let sound = (0.1 * BOARD.current_range_a / BOARD.current_a_per_count) as i32;
+        // Within 100 mV of its rails.
+        let near = (0.1 / V_PER_COUNT) as i32;
+        assert!(ZERO_COUNTS - sound > near);
+        assert!(ZERO_COUNTS + sound < 4095 - near);
+    }
+}

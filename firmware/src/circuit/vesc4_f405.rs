@@ -19,6 +19,9 @@ pub const SHUNT_OHM: f32 = 0.001;
 /// The gate driver's amplifiers.
 pub const GAIN: f32 = 10.0;
 
+/// Nominal reading without current, counts: the amplifiers' reference is half the supply.
+pub const ZERO_COUNTS: i32 = 2048;
+
 /// From the supply to the converter, and from a terminal.
 pub const DIVIDER: f32 = 2.2 / (2.2 + 39.0);
 

@@ -9,9 +9,6 @@ use crate::board::WIRING;
 /// Fraction bits of [`AdcCounts`].
 const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
 
-/// Nominal reading without current, the middle of 12 bits: the drive measures what it really is.
-const MIDDLE: i32 = 2048;
-
 /// Where a reading is: a converter and the rank in its sequence.
 #[derive(Clone, Copy)]
 pub(crate) struct Slot(pub(crate) usize, pub(crate) usize);
@@ -20,6 +17,8 @@ pub(crate) struct Slot(pub(crate) usize, pub(crate) usize);
 pub(crate) struct Wiring {
     /// Currents of the phases a, b, c; a phase without a shunt has none.
     pub(crate) currents: [Option<Slot>; 3],
+    /// Nominal reading without current, counts: the drive measures what it really is.
+    pub(crate) zero: i32,
     /// Whether a reading rises with the current into the motor.
     pub(crate) rises: bool,
     /// Voltages of the terminals a, b, c.
@@ -38,8 +37,8 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
         |Slot(converter, rank)| i32::from(registers.converters[converter].jdr(rank).read().jdata());
     let current = |slot: Option<Slot>| match slot {
         None => AdcCounts::ZERO,
-        Some(slot) if WIRING.rises => counts(reading(slot) - MIDDLE),
-        Some(slot) => counts(MIDDLE - reading(slot)),
+        Some(slot) if WIRING.rises => counts(reading(slot) - WIRING.zero),
+        Some(slot) => counts(WIRING.zero - reading(slot)),
     };
     let hall = match WIRING.hall {
         // Without sensors their pull-ups read 7.
@@ -66,7 +65,7 @@ pub(crate) fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
     let reading = |counts: AdcCounts| counts.to_num::<i32>();
     let current = move |counts: AdcCounts| {
         let counts = reading(counts);
-        MIDDLE + if WIRING.rises { counts } else { -counts }
+        WIRING.zero + if WIRING.rises { counts } else { -counts }
     };
     let currents = (WIRING.currents.into_iter().zip(sample.currents))
         .filter_map(move |(slot, counts)| Some((slot?, current(counts))));

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | one step of the DAC, 0.81 mV | 0.47 A, rounded down |
 //! | offset of DAC and comparator, ±9 mV and ±10 mV (data sheet of the STM32G431) | ±11 A at worst |
-//! | resistors of 1 % about the bias of 103 mV | ±1.2 A |
+//! | resistors of 1 % about the bias of 129 mV | ±1.5 A |
 //! | the vector's angle: a comparator sees a current out of the motor only, of which the largest of three is between half and all of the vector's length | 1 to 2 times the level |
 //! | the break's filter of 0.56 µs and the ringing that it keeps out | 0.56 µs of a rise of V/L |
 //!
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     const CIRCUIT: TripCircuit = TripCircuit {
-        bias_v: 0.1031,
+        bias_v: 0.1286,
         v_per_a: 0.003 * 4.0 / 7.0,
         rating_a: 40.0,
         v_per_step: 3.3 / 4096.0,

@@ -17,8 +17,8 @@ use crate::units::{AdcCounts, Duty, Speed};
 /// tenth of one reading's noise.
 const ZERO_S: f32 = 0.005;
 
-/// Greatest offset of a sound sensor, of the converter's range: 1 % resistors about its middle and
-/// an amplifier's 3 mV times 16 make up to 6 %.
+/// Greatest offset of a sound sensor, of the converter's range: 1 % resistors and an amplifier's 3 mV
+/// times 16 make up to 8 %.
 const OFFSET_SHARE: f32 = 0.1;
 
 /// The phase current from which its sign is certain; below, the dead time is compensated in
