@@ -299,11 +299,10 @@ impl Hardware {
         let mut hall_a = p.PB6;
         // Open collectors; without sensors the pulls read 7. The telemetry may take this one.
         mem::forget(Input::new(hall_a.reborrow(), Pull::Up));
-        // The thermistor, before the converter's injected sequence is armed: what is sampled how long
-        // may not be changed afterwards (RM0440, ADC_SMPR1).
         let thermistor = p.PB14.degrade_adc();
+        let converter = Adc::new(p.ADC1, AdcConfig::default());
         let temperature = Temperature {
-            reading: chip::Reading::new(thermistor.get_hw_channel()),
+            reading: chip::Reading::new(&converter, thermistor.get_hw_channel()),
         };
         // Dropped converters would stop, and dropped pins be given back. Hall sensor a's is also the
         // KISS telemetry's.
@@ -314,7 +313,7 @@ impl Hardware {
                 Exten::RISING_EDGE,
                 false,
             ),
-            Adc::new(p.ADC1, AdcConfig::default()).setup_injected_conversions(
+            converter.setup_injected_conversions(
                 first,
                 triggers::TIM1_TRGO,
                 Exten::RISING_EDGE,

@@ -3,9 +3,11 @@
 pub(crate) mod comparators;
 pub(crate) mod pages;
 
+use embassy_stm32::adc;
 use embassy_stm32::pac;
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::pwr::regs::Cr5;
+use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::rcc::{
     self, Config, Pll, PllMul, PllPreDiv, PllRDiv, PllSource, Sysclk, mux::Adcsel,
 };
@@ -71,9 +73,10 @@ pub(crate) struct Reading {
 }
 
 impl Reading {
-    /// Readings of a channel from 1 to 9 of the first converter, which the injected sequence has set
-    /// up.
-    pub(crate) fn new(channel: u8) -> Self {
+    /// Readings of a channel from 1 to 9. It takes the converter between the two steps of its set-up:
+    /// without a clock nothing is kept, and once the injected sequence is armed what is sampled how long
+    /// may not be changed (RM0440, ADC_SMPR1).
+    pub(crate) fn new(_converter: &adc::Adc<'_, ADC1>, channel: u8) -> Self {
         let converter = pac::ADC1;
         converter.sqr1().write(|w| w.set_sq(0, channel));
         converter.smpr().modify(|w| {
