@@ -46,11 +46,15 @@ impl Handler<<CaptureTimer as GeneralInstance1Channel>::CaptureCompareInterrupt>
     for CaptureInterrupt
 {
     unsafe fn on_interrupt() {
+        let wanted = CAPTURE.dier().read();
+        if !wanted.ccie(ALARM) {
+            // An edge that came before the interrupts were off asks once more.
+            return;
+        }
         // The DMA has read the edge's time by now, and its flag went with that: what is left tells of
         // the alarm.
         let alarm = CAPTURE.sr().read().ccif(ALARM);
-        let edge = CAPTURE.dier().read().ccie(0) && !alarm;
-        EDGE.store(edge, Ordering::Relaxed);
+        EDGE.store(wanted.ccie(0) && !alarm, Ordering::Relaxed);
         // Once is enough: the task says when it wants to be woken again.
         set_interrupts(false, false);
         WAKER.wake();
