@@ -39,9 +39,15 @@ pub(crate) async fn transmit(mut line: UartTx<'static, Async>) -> ! {
 }
 
 /// A whole frame, or, where the line is behind, nothing: half a frame would spoil the next as well.
-fn send(frame: &[u8]) {
-    if OUT.free_capacity() >= frame.len() {
-        let _ = OUT.try_write(frame);
+fn send(mut frame: &[u8]) {
+    if OUT.free_capacity() < frame.len() {
+        return;
+    }
+    // In two parts where the memory of those that wait begins anew.
+    while !frame.is_empty()
+        && let Ok(count) = OUT.try_write(frame)
+    {
+        frame = &frame[count..];
     }
 }
 
