@@ -103,6 +103,8 @@ pub mod exchange;
 pub mod image;
 pub mod interrupt;
 pub mod last_words;
+#[cfg(any(board, test))]
+mod pace;
 #[cfg(target_os = "none")]
 mod priority;
 #[cfg(board)]

@@ -10,6 +10,7 @@ use siskin_control::answer::Reply;
 
 use super::capture::Capture;
 use crate::board::wire::{PACE, PACE_HZ, PIN, PORT, PaceTimer, TICK_HZ};
+use crate::pace::delay_clocks;
 
 /// Bits of a reply, and the level at which the line is left.
 const WORDS: usize = 22;
@@ -55,7 +56,8 @@ impl Replier {
         // to the period is loaded by the next update. The control's interrupt would take 3 µs between
         // reading the time and the start: it waits for these 0.2 µs.
         let begun = cortex_m::interrupt::free(|_| {
-            let Some(delay) = delay_clocks(capture.now(), reply.at_ticks) else {
+            let ticks = reply.at_ticks.wrapping_sub(capture.now());
+            let Some(delay) = delay_clocks(ticks, PACE_HZ / TICK_HZ) else {
                 return false;
             };
             PACE.arr().write(|w| w.set_arr(delay));
@@ -73,14 +75,6 @@ impl Replier {
         PACE.cr1().modify(|w| w.set_cen(false));
         begun
     }
-}
-
-/// Clocks of the pacing timer from `now_ticks` until `at_ticks`, less one; none if that has passed, or
-/// is further off than any reply.
-fn delay_clocks(now_ticks: u32, at_ticks: u32) -> Option<u16> {
-    let ticks = at_ticks.wrapping_sub(now_ticks);
-    let clocks = ticks.checked_mul(PACE_HZ / TICK_HZ)?;
-    u16::try_from(clocks.checked_sub(1)?).ok()
 }
 
 fn set_mode(mode: Moder) {
