@@ -30,7 +30,7 @@
 //! | PWM: `ADC1_2` on the G431, `ADC` on the F405 | 0, alone | 107 instructions besides `step`, 102 more in every eighth period, and some 120 where the bridge is turned on or off | everything |
 //! | nFAULT of the gate driver: `EXTI15_10`, F405 | 1, alone | 20 instructions | all but the PWM |
 //! | clock (`TIM4`), serial lines, DMA, throttle's timer | 2 | a waker each, below 5 µs by their length | tasks; not each other |
-//! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4400 instructions for a DShot600 frame and its answer | the other tasks, and drivers' interrupts, not their DMA |
+//! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them behind it | the other tasks, and drivers' interrupts, not their DMA |
 //! | the other tasks | thread mode | | nothing |
 //!
 //! What runs at 0 and 1 uses no critical section, no lock, no log and no type of the executor. A

@@ -7,11 +7,12 @@
 use heapless::Deque;
 
 use crate::answer::info;
-use crate::answer::{Answer, Answers, Ask, Basis};
+use crate::answer::{self, Answer, Answers, Ask, Basis};
 use crate::drive::{Config, Fault, Setpoint, Snapshot};
 use crate::input::access::Access;
 use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
 use crate::input::command::Order;
+use crate::input::line::Event;
 use crate::input::signal::Signal;
 use crate::input::{Heard, Input, News};
 use crate::params::{self, Board, Params};
@@ -93,6 +94,21 @@ impl Throttle {
         self.heard(heard)
     }
 
+    /// Takes all edges of a DShot frame at once, by the first and the second of each bit, much sooner than
+    /// [`Throttle::edge`] does one by one; nothing, and none of them is taken, if they are none of the
+    /// signal that is known. What is found is to be given to [`Throttle::hear`], before its answer or, where
+    /// that cannot wait, behind it.
+    #[inline(always)]
+    pub fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
+        self.input.whole(bit)
+    }
+
+    /// Takes what [`Throttle::whole`] has found. Returns what [`Throttle::edge`] does.
+    pub fn hear(&mut self, now_us: u64, event: &Event) -> Option<Ask> {
+        let heard = self.input.heard(now_us, event)?;
+        self.heard(heard)
+    }
+
     /// Tells the time of the timer that captures the wire's edges, once a control period or more
     /// often. Returns what [`Throttle::edge`] does.
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Ask> {
@@ -114,8 +130,19 @@ impl Throttle {
 
     /// What is sent back to the flight controller, with the drive as it is now.
     pub fn answer(&mut self, ask: Ask, snapshot: &Snapshot) -> Answer {
+        let speed_bits = self.speed_bits(snapshot);
+        self.answer_with(ask, speed_bits, snapshot)
+    }
+
+    /// The bits of a reply that tells the speed, before anything has been asked.
+    pub fn speed_bits(&self, snapshot: &Snapshot) -> u32 {
+        answer::speed_bits(snapshot, &self.basis)
+    }
+
+    /// [`Throttle::answer`] with what has been made ready before.
+    pub fn answer_with(&mut self, ask: Ask, speed_bits: u32, snapshot: &Snapshot) -> Answer {
         self.answers
-            .answer(ask, snapshot, &self.basis, &self.telemetry)
+            .answer(ask, speed_bits, snapshot, &self.basis, &self.telemetry)
     }
 
     /// What the drive is asked for.

@@ -140,10 +140,12 @@ impl Answers {
         self.info = Some(info);
     }
 
-    /// What is sent for a frame, with the drive as it is now.
+    /// What is sent for a frame, with the drive as it is now. `speed_bits` are those of a reply with its
+    /// speed ([`speed_bits`]).
     pub fn answer(
         &mut self,
         ask: Ask,
+        speed_bits: u32,
         snapshot: &Snapshot,
         basis: &Basis,
         telemetry: &Telemetry,
@@ -163,7 +165,7 @@ impl Answers {
         Answer {
             reply: ask
                 .bidirectional
-                .then(|| self.reply(ask, snapshot, basis, telemetry)),
+                .then(|| self.reply(ask, speed_bits, telemetry)),
             kiss: kiss.then(|| {
                 let scale = &basis.scale;
                 let erpm = scale.rpm(snapshot.speed).abs() * scale.pole_pairs;
@@ -182,22 +184,16 @@ impl Answers {
         self.schedule.pass(ticks);
     }
 
-    fn reply(
-        &mut self,
-        ask: Ask,
-        snapshot: &Snapshot,
-        basis: &Basis,
-        telemetry: &Telemetry,
-    ) -> Reply {
-        let data = match self.extended(telemetry) {
+    fn reply(&mut self, ask: Ask, speed_bits: u32, telemetry: &Telemetry) -> Reply {
+        let bits = match self.extended(telemetry) {
             Some(word) => {
                 self.schedule.sends();
-                word.data()
+                gcr::encode(word.data())
             }
-            None => erpm::of_speed(snapshot.speed, &basis.scale),
+            None => speed_bits,
         };
         Reply {
-            bits: gcr::encode(data),
+            bits,
             bit_hz: reply_bit_hz(ask.rate),
             at_ticks: ask
                 .first_edge_ticks
@@ -226,6 +222,11 @@ impl Answers {
             Kind::Stress => self.health.stress(),
         })
     }
+}
+
+/// The bits of a reply that tells the speed.
+pub fn speed_bits(snapshot: &Snapshot, basis: &Basis) -> u32 {
+    gcr::encode(erpm::of_speed(snapshot.speed, &basis.scale))
 }
 
 /// Bits a second of the reply to a frame of this rate.

@@ -44,7 +44,14 @@ impl Rig {
             telemetry,
         };
         let answers = &mut self.answers;
-        answers.answer(ask, &self.snapshot, &self.basis, &self.telemetry)
+        let speed_bits = speed_bits(&self.snapshot, &self.basis);
+        answers.answer(
+            ask,
+            speed_bits,
+            &self.snapshot,
+            &self.basis,
+            &self.telemetry,
+        )
     }
 
     /// The data of the reply to the next frame.

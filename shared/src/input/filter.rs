@@ -84,6 +84,16 @@ impl Filter {
             .flatten()
     }
 
+    /// Whether the line is believed to be at this level, or nothing is known of it.
+    pub(super) fn rests_at(&self, level: bool) -> bool {
+        self.pending.is_none() && self.level.is_none_or(|believed| believed == level)
+    }
+
+    /// The line is at this level: its edges have been judged otherwise.
+    pub(super) fn settled(&mut self, level: bool) {
+        self.level = Some(level);
+    }
+
     /// The line has been silent: what its level was does not matter to the next edge.
     pub(super) fn rest(&mut self) {
         self.level = None;

@@ -120,6 +120,26 @@ impl Line {
         }
     }
 
+    /// Takes all edges of a DShot frame at once, the first and the second of each of its 16 bits, as
+    /// [`Line::edge`] would one by one; nothing, and none of
+    /// them is taken, if they are none of the signal that is known.
+    #[inline(always)]
+    pub fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
+        let Some(Signal::Dshot { bidirectional, .. }) = self.signal else {
+            return None;
+        };
+        // The line rests high if it is bidirectional.
+        if !self.filter.rests_at(bidirectional) {
+            return None;
+        }
+        let (_, end) = bit(15);
+        let event = self.frames.whole(bit)?;
+        self.edge_at = end;
+        self.silent = false;
+        self.filter.settled(bidirectional);
+        Some(event)
+    }
+
     /// Believes the last edge if the filter's time has passed since. To be called once a control
     /// period or more often, so that the end of a frame does not wait for the next one's edges.
     pub fn settle(&mut self, now_ticks: u32) -> Option<Event> {

@@ -122,6 +122,19 @@ impl Input {
         self.take(now_us, event.as_ref()?)
     }
 
+    /// Takes all edges of a DShot frame at once, by the first and the second of each bit; nothing, and none
+    /// of them is taken, if they are none of the signal that is known. What is found is to be given to
+    /// [`Input::heard`]; with that it is what [`Input::edge`] does edge by edge.
+    #[inline(always)]
+    pub fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
+        self.line.whole(bit)
+    }
+
+    /// Takes what [`Input::whole`] has found.
+    pub fn heard(&mut self, now_us: u64, event: &Event) -> Option<Heard> {
+        self.take(now_us, event)
+    }
+
     /// The time of the timer that captures the edges, once a control period or more often.
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Heard> {
         let event = self.line.settle(now_ticks);

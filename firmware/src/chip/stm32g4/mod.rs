@@ -41,6 +41,8 @@ pub(crate) fn start() -> Peripherals {
     let supply = pac::PWR.cr5();
     supply.write_value(Cr5(supply.read().0 & !R1MODE));
     rcc::reinit(clock(), &mut peripherals.RCC);
+    // Most of the program stands in the flash, which has four wait states and a small cache.
+    pac::FLASH.acr().modify(|w| w.set_prften(true));
     peripherals
 }
 

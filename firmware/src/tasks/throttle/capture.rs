@@ -4,24 +4,24 @@
 //! A third channel is an alarm clock: the processor looks at the rings when a frame should be whole.
 
 use core::future::poll_fn;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use core::task::Poll;
 
-use embassy_stm32::dma::{self, ReadableRingBuffer, TransferOptions};
+use embassy_stm32::dma;
 use embassy_stm32::interrupt::typelevel::{Handler, Interrupt};
 use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue};
 use embassy_stm32::timer::GeneralInstance1Channel;
 use embassy_sync::waitqueue::AtomicWaker;
-use heapless::Deque;
 use static_cell::StaticCell;
 
+use super::ring::{LEN, Memory, Ring};
 use crate::board::wire::{CAPTURE, CaptureTimer, PRESCALER, SIGNAL_CHANNEL, TICK_HZ, TIMER_BITS};
-
-/// Edges of one direction that the memory takes between two looks: two DShot frames.
-const RING_LEN: usize = 32;
 
 /// The alarm clock's channel; the edges have the first and the second.
 const ALARM: usize = 2;
+
+/// Bits of a DShot frame: so many edges of each direction.
+const BITS: usize = 16;
 
 /// An edge that is younger may not be in memory yet: the DMA takes some ten clocks of its bus, and
 /// more while it serves others. 0.5 µs.
@@ -75,9 +75,7 @@ fn set_interrupts(edges: bool, alarm: bool) {
 /// The edges of the wire.
 pub(crate) struct Capture {
     /// Rising, falling.
-    rings: [ReadableRingBuffer<'static, u32>; 2],
-    /// Edges that have been read from the rings and not given out yet.
-    held: [Deque<u32, RING_LEN>; 2],
+    rings: [Ring; 2],
     last_ticks: u32,
     settled_ticks: u32,
 }
@@ -86,8 +84,8 @@ impl Capture {
     /// Starts the timer, which belongs to this from now on, as do the DMA's channels: that of its
     /// first channel, and of its second. The pin leads to it.
     pub(crate) fn new(channels: [dma::Channel<'static>; 2], requests: [dma::Request; 2]) -> Self {
-        static MEMORY: StaticCell<[[u32; RING_LEN]; 2]> = StaticCell::new();
-        let [rising, falling] = MEMORY.init([[0; RING_LEN]; 2]);
+        static MEMORY: [Memory; 2] = [const { [const { AtomicU32::new(0) }; LEN] }; 2];
+        static CHANNELS: StaticCell<[dma::Channel<'static>; 2]> = StaticCell::new();
         embassy_stm32::rcc::enable_and_reset::<CaptureTimer>();
         CAPTURE.psc().write_value(PRESCALER - 1);
         CAPTURE.arr().write_value(COUNTER_MASK);
@@ -116,34 +114,19 @@ impl Capture {
             w.set_ccde(0, true);
             w.set_ccde(1, true);
         });
-        let ring = |index, channel, request, memory: &'static mut [u32; RING_LEN]| {
-            let register = CAPTURE.ccr(index).as_ptr();
-            // SAFETY: the register is one of a timer that this owns, and the ring has its memory
-            // for ever.
-            let mut ring = unsafe {
-                ReadableRingBuffer::new(
-                    channel,
-                    request,
-                    register.cast(),
-                    memory,
-                    TransferOptions::default(),
-                )
-            };
-            ring.start();
-            ring
+        let ring = |index, channel, request| {
+            let register = CAPTURE.ccr(index).as_ptr().cast();
+            // SAFETY: the register is one of a timer that this owns for ever.
+            unsafe { Ring::new(channel, request, register, &MEMORY[index]) }
         };
-        let [first, second] = channels;
-        let rings = [
-            ring(0, first, requests[0], rising),
-            ring(1, second, requests[1], falling),
-        ];
+        let [first, second] = CHANNELS.init(channels);
+        let rings = [ring(0, first, requests[0]), ring(1, second, requests[1])];
         CAPTURE.egr().write(|w| w.set_ug(true));
         CAPTURE.cr1().modify(|w| w.set_cen(true));
         // SAFETY: the handler touches nothing but the timer, and wakes a task.
         unsafe { <CaptureTimer as GeneralInstance1Channel>::CaptureCompareInterrupt::enable() };
         Self {
             rings,
-            held: [Deque::new(), Deque::new()],
             last_ticks: 0,
             settled_ticks: 0,
         }
@@ -204,28 +187,74 @@ impl Capture {
         .await;
     }
 
-    /// Gives out the edges that have come, with the level after each, in their order. False if some
-    /// were lost: the task was kept from its work for longer than the memory lasts.
-    pub(super) fn take(&mut self, mut give: impl FnMut(u32, bool)) -> bool {
-        let now_ticks = self.now();
-        self.settled_ticks = now_ticks.wrapping_sub(SETTLED_TICKS);
-        let mut whole = true;
-        for (ring, held) in self.rings.iter_mut().zip(&mut self.held) {
-            let mut times = [0; RING_LEN];
-            let Ok((count, _)) = ring.read(&mut times) else {
-                whole = false;
-                held.clear();
-                continue;
-            };
-            for ticks in &times[..count] {
-                let before_ticks = now_ticks.wrapping_sub(*ticks) & COUNTER_MASK;
-                whole &= held.push_back(now_ticks.wrapping_sub(before_ticks)).is_ok();
-            }
+    /// Takes in what has come. False if some were lost: the task was kept from its work for longer than
+    /// the memory lasts.
+    pub(super) fn fill(&mut self) -> bool {
+        self.settled_ticks = self.now().wrapping_sub(SETTLED_TICKS);
+        let [rising, falling] = &mut self.rings;
+        rising.fill() & falling.fill()
+    }
+
+    /// An edge's time, by what the timer showed then.
+    #[inline(always)]
+    fn time(&self, shown: u32) -> u32 {
+        let before_ticks = self.last_ticks.wrapping_sub(shown) & COUNTER_MASK;
+        self.last_ticks.wrapping_sub(before_ticks)
+    }
+
+    /// The next edge of a direction.
+    #[inline(always)]
+    fn front(&self, direction: usize) -> Option<u32> {
+        let ring = &self.rings[direction];
+        (ring.count() > 0).then(|| self.time(ring.word(0)))
+    }
+
+    /// The first edge that has come.
+    pub(super) fn first(&self) -> Option<u32> {
+        let age = |ticks: &u32| self.settled_ticks.wrapping_sub(*ticks) as i32;
+        let fronts = [self.front(0), self.front(1)];
+        fronts.into_iter().flatten().max_by_key(age)
+    }
+
+    /// The first and the second edge of each of 16 bits, if as many edges have come as a frame has.
+    #[inline(always)]
+    pub(super) fn frame(&self) -> Option<impl Fn(usize) -> (u32, u32) + '_> {
+        if !self.has_frame() {
+            return None;
         }
+        let [rising, falling] = &self.rings;
+        let since = falling.word(0).wrapping_sub(rising.word(0)) & COUNTER_MASK;
+        let (first, second) = if since <= COUNTER_MASK / 2 {
+            (rising, falling)
+        } else {
+            (falling, rising)
+        };
+        let (first, second) = (first.words(), second.words());
+        Some(move |bit| (self.time(first(bit)), self.time(second(bit))))
+    }
+
+    /// Whether as many edges have come as a frame has.
+    pub(super) fn has_frame(&self) -> bool {
+        self.rings.iter().all(|ring| ring.count() == BITS)
+    }
+
+    /// Whether this time was still to come at the last look.
+    pub(super) fn is_before(&self, until_ticks: u32) -> bool {
+        until_ticks.wrapping_sub(self.last_ticks) as i32 > 0
+    }
+
+    /// Leaves a frame's edges behind.
+    pub(super) fn skip_frame(&mut self) {
+        for ring in &mut self.rings {
+            ring.skip(BITS);
+        }
+    }
+
+    /// Gives out the edges that have come, with the level after each, in their order.
+    pub(super) fn take(&mut self, mut give: impl FnMut(u32, bool)) {
         while let Some((at_ticks, level)) = self.next() {
             give(at_ticks, level);
         }
-        whole
     }
 
     /// The time up to which [`Capture::take`] has given out every edge.
@@ -236,22 +265,23 @@ impl Capture {
     /// The next edge of both directions. One that is too young waits: an older one of the other
     /// direction may still be on its way into memory.
     fn next(&mut self) -> Option<(u32, bool)> {
-        let [rising, falling] = &self.held;
-        let age = |ticks: &u32| self.settled_ticks.wrapping_sub(*ticks) as i32;
-        let ages = [rising.front().map(age), falling.front().map(age)];
-        let level = ages[0] > ages[1];
-        if ages[usize::from(!level)]? < 0 {
+        let age = |ticks: u32| self.settled_ticks.wrapping_sub(ticks) as i32;
+        let fronts = [self.front(0), self.front(1)];
+        let [rising, falling] = fronts.map(|front| front.map(age));
+        let level = rising > falling;
+        let direction = usize::from(!level);
+        if [rising, falling][direction]? < 0 {
             return None;
         }
-        let ticks = self.held[usize::from(!level)].pop_front()?;
-        Some((ticks, level))
+        self.rings[direction].skip(1);
+        Some((fronts[direction]?, level))
     }
 
     /// Forgets the edges that have come.
     pub(super) fn forget(&mut self) {
-        for (ring, held) in self.rings.iter_mut().zip(&mut self.held) {
+        for ring in &mut self.rings {
+            ring.fill();
             ring.clear();
-            held.clear();
         }
     }
 }

@@ -6,7 +6,7 @@
 use embassy_stm32::dma::{self, TransferOptions};
 use embassy_stm32::pac::gpio::vals::Moder;
 use embassy_stm32::pac::timer::vals::Urs;
-use siskin_control::answer::Reply;
+use siskin_control::answer::{Reply, gcr};
 
 use super::capture::Capture;
 use crate::board::wire::{PACE, PACE_HZ, PIN, PORT, PaceTimer, TICK_HZ};
@@ -19,6 +19,8 @@ const WORDS: usize = 22;
 pub(crate) struct Replier {
     channel: dma::Channel<'static>,
     request: dma::Request,
+    /// What is written to the pin's port, bit by bit.
+    words: [u32; WORDS],
 }
 
 impl Replier {
@@ -33,16 +35,23 @@ impl Replier {
         PACE.dier().modify(|w| w.set_ude(true));
         // As the line rests, for when the pin is turned round.
         PORT.bsrr().write(|w| w.set_bs(PIN, true));
-        Self { channel, request }
+        Self {
+            channel,
+            request,
+            words: [1 << PIN; WORDS],
+        }
     }
 
-    /// Sends a reply at its time; false, and nothing is sent, if that has passed.
-    pub(super) async fn send(&mut self, capture: &mut Capture, reply: &Reply) -> bool {
-        let words: [u32; WORDS] = core::array::from_fn(|index| {
-            // Bit 20 comes first; after bit 0 the line rests high.
-            let high = index == WORDS - 1 || reply.bits >> (WORDS - 2 - index) & 1 == 1;
-            1 << if high { PIN } else { PIN + 16 }
-        });
+    /// Begins to send a reply at its time; nothing, if that has passed.
+    #[inline(never)]
+    pub(super) fn begin(&mut self, capture: &mut Capture, reply: &Reply) -> Option<Sending<'_>> {
+        // Bit 20 comes first; after bit 0 the line rests high, as the last word has it.
+        let mut bits = !reply.bits << (32 - gcr::BITS);
+        for word in &mut self.words[..WORDS - 1] {
+            // A zero resets the pin, by the upper half of the register.
+            *word = 1 << PIN << (bits >> 31 << 4);
+            bits <<= 1;
+        }
         PACE.cr1().modify(|w| w.set_cen(false));
         PACE.cnt().write(|w| w.set_cnt(0));
         // SAFETY: the register belongs to the port of this pin, and its words touch this pin alone;
@@ -50,7 +59,8 @@ impl Replier {
         let transfer = unsafe {
             let register = PORT.bsrr().as_ptr().cast::<u32>();
             let options = TransferOptions::default();
-            self.channel.write(self.request, &words, register, options)
+            self.channel
+                .write(self.request, &self.words, register, options)
         };
         // The first update comes at the reply's time and the others a bit apart each: what is written
         // to the period is loaded by the next update. The control's interrupt would take 3 µs between
@@ -65,15 +75,26 @@ impl Replier {
             PACE.arr()
                 .write(|w| w.set_arr((PACE_HZ / reply.bit_hz - 1) as u16));
             PACE.cr1().modify(|w| w.set_cen(true));
+            // Not after what would hold it up beyond the first bit.
+            set_mode(Moder::OUTPUT);
             true
         });
-        if begun {
-            set_mode(Moder::OUTPUT);
-            transfer.await;
-            set_mode(Moder::ALTERNATE);
-        }
+        // One that is dropped does not begin.
+        begun.then_some(Sending { transfer })
+    }
+}
+
+/// A reply that is on its way.
+pub(super) struct Sending<'a> {
+    transfer: dma::Transfer<'a>,
+}
+
+impl Sending<'_> {
+    /// Waits for its end, and lets the pin go.
+    pub(super) async fn end(self) {
+        self.transfer.await;
+        set_mode(Moder::ALTERNATE);
         PACE.cr1().modify(|w| w.set_cen(false));
-        begun
     }
 }
 
