@@ -7,6 +7,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
 PROGRAM = TARGET / "release" / "siskin-emulator"
 TOOL = TARGET / "release" / "siskin"
+VIRTUAL_BOARD = TARGET / "release" / "siskin-vboard"
 DIALECT = TARGET / "python"
 """Folder of the generated dialect, `siskin_dialect.py`."""
 SCENARIOS = ROOT / "tests" / "scenarios"

@@ -1,0 +1,119 @@
+"""The linked image on the virtual board, in real time: pymavlink over its serial line, DShot on its pin."""
+
+import json
+import random
+import subprocess
+import time
+
+import pytest
+from dshot import BIDIRECTIONAL_DSHOT600, HALF, erpm, is_extended
+from emulator import PATIENT
+from paths import IMAGES, VIRTUAL_BOARD
+
+import siskin_dialect as dialect
+
+IMAGE = IMAGES / "b-g431b-esc1.elf"
+ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+REQUEST_MESSAGE = dialect.MAV_CMD_REQUEST_MESSAGE
+STORAGE = dialect.MAV_CMD_PREFLIGHT_STORAGE
+POLE_PAIRS = 12
+"""Of the default bench's motor."""
+
+
+@pytest.fixture
+def board(start, tmp_path):
+    """Starts boards with one storage, one after the other."""
+    program = (VIRTUAL_BOARD, IMAGE)
+    return lambda *options: start(*options, program=program, storage=tmp_path / "flash.bin")
+
+
+def test_the_image_answers_and_lists_its_parameters(board):
+    with board().connect() as esc:
+        esc.next("HEARTBEAT")
+        assert esc.command(REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION) == ACCEPTED
+        version = esc.wait("AUTOPILOT_VERSION")
+        assert version.uid != 0, "the chip has a number"
+        assert esc.params()["PWM_FREQ_HZ"] == 24_000
+
+
+def test_what_is_stored_survives_kills_at_any_moment(board):
+    moments = random.Random(8)
+    value = 12.0
+    for attempt in range(4):
+        emulator = board()
+        with emulator.connect() as esc:
+            # Before it has started it hears nothing.
+            esc.next("HEARTBEAT")
+            found = esc.read_param("LIM_PHASE_A").param_value
+            assert found in ((20.0,) if attempt == 0 else (value, value - 0.5, 20.0))
+            value = 12.0 + attempt
+            esc.set_param("LIM_PHASE_A", value)
+            esc.codec.command_long_send(1, 1, STORAGE, 0, 1, 0, 0, 0, 0, 0, 0)
+            # A page takes 22 ms to erase, a set 8 ms to write.
+            time.sleep(moments.uniform(0.0, 0.08))
+        emulator.kill()
+    emulator = board()
+    with emulator.connect() as esc:
+        esc.next("HEARTBEAT")
+        esc.set_param("LIM_PHASE_A", 9.5)
+        assert esc.command(STORAGE, 1) == ACCEPTED
+    emulator.kill()
+    with board().connect() as esc:
+        esc.next("HEARTBEAT")
+        assert esc.read_param("LIM_PHASE_A").param_value == 9.5
+
+
+def test_the_motor_turns_and_frames_are_answered_in_time(board):
+    emulator = board(*PATIENT)
+    protocol = {"protocol": BIDIRECTIONAL_DSHOT600}
+    with emulator.connect() as esc, emulator.throttle(**protocol) as throttle:
+        esc.wait_armed()
+        throttle.value = HALF
+        esc.wait_rpm(3000, 3300)
+        since, sent = len(throttle.answers), throttle.sent
+        time.sleep(1.0)
+        told = [data for data in throttle.replies(since) if not is_extended(data)]
+        # Frames that arrive in one millisecond of the machine's time follow each other too closely for a
+        # reply between them. On an exact wire each is answered, as tests/virtual-board/tests shows.
+        assert len(told) >= 100, f"{len(told)} replies to {throttle.sent - sent} frames"
+        speeds = [erpm(data) / POLE_PAIRS for data in told]
+        assert all(3000 < rpm < 3300 for rpm in speeds), (min(speeds), max(speeds))
+        for answer in throttle.answers[since:]:
+            if answer[0] == BIDIRECTIONAL_DSHOT600:
+                after_ns = int.from_bytes(answer[5:9], "little")
+                assert 28_000 <= after_ns <= 32_000, after_ns
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess:
+    command = [str(part) for part in (VIRTUAL_BOARD, *arguments)]
+    return subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60
+    )
+
+
+def test_figures_of_the_processor_are_told_and_equal_runs_are_equal():
+    fixed = ("--storage", "none", "--mavlink", "none", "--signal", "udp:127.0.0.1:0")
+    runs = [run(IMAGE, *fixed, "--speed", "max", "--duration", "0.3", "--json") for _ in range(2)]
+    assert all(ended.returncode == 0 for ended in runs), runs[0].stderr
+    first, second = (json.loads(ended.stdout) for ended in runs)
+    assert first["processor"] == second["processor"]
+    assert first["trace_hash"] == second["trace_hash"]
+    assert 0.25 * 24_000 < first["processor"]["interrupts"] < 0.3 * 24_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nothing.elf",), "nothing.elf: cannot be read"),
+        ((__file__,), "no ELF file"),
+        ((VIRTUAL_BOARD,), "no ELF file of 32 bits"),
+        ((IMAGES / "vesc4-f405.elf",), "is not in the flash"),
+        ((IMAGE, "--speed", "fast"), "give 0.001 to 1000, or max"),
+    ],
+)
+def test_bad_input_gets_one_line(arguments, said):
+    ended = run(*arguments)
+    assert ended.returncode == 2
+    assert said in ended.stderr
+    assert ended.stderr.count("\n") == 1, ended.stderr
+    assert not ended.stdout

@@ -1,0 +1,182 @@
+//! The B-G431B-ESC1 outside its chip: what its resistors make of currents and voltages.
+//!
+//! Pins are (port, number), where 0 is port A.
+
+/// The supply of the chip and of the sensors, V.
+const SUPPLY_V: f64 = 3.3;
+
+/// Each leg's shunt, below its low side, Ω.
+const SHUNT_OHM: f64 = 0.003;
+
+/// An op-amp's input, kΩ: to the shunt, to ground, and to the chip's supply.
+const SHUNT_KOHM: [f64; 3] = [1.5, 2.2, 22.0];
+
+/// The supply's divider, kΩ: above and below the pin.
+const BUS_KOHM: [f64; 2] = [169.0, 18.0];
+
+/// The terminals' dividers, kΩ: above and below the pin.
+const TERMINAL_KOHM: [f64; 2] = [10.0, 2.2];
+
+/// The thermistor at 25 °C, kΩ.
+const THERMISTOR_KOHM: f64 = 10.0;
+
+/// Its β, K.
+const THERMISTOR_BETA_K: f64 = 3380.0;
+
+/// From it to ground, kΩ.
+const THERMISTOR_DOWN_KOHM: f64 = 4.7;
+
+/// 0 °C, K.
+const FREEZING_K: f64 = 273.15;
+
+/// The op-amps' inputs at the shunts of legs a, b and c: PA1, PA7 and PB0.
+pub const SHUNTS: [(u8, u8); 3] = [(0, 1), (0, 7), (1, 0)];
+
+/// The dividers of terminals a, b and c: PA4, PC4 and PB11.
+pub const TERMINALS: [(u8, u8); 3] = [(0, 4), (2, 4), (1, 11)];
+
+/// The supply's divider: PA0.
+pub const BUS: (u8, u8) = (0, 0);
+
+/// The thermistor: PB14.
+pub const THERMISTOR: (u8, u8) = (1, 14);
+
+/// While it is low, the terminals' dividers have a ground: PB5.
+pub const DIVIDERS_GROUND: (u8, u8) = (1, 5);
+
+/// Pins with the converter (1 or 2) and the channel at which each is (data sheet, pins).
+const CHANNELS: [((u8, u8), (u8, u8)); 8] = [
+    (BUS, (1, 1)),
+    (BUS, (2, 1)),
+    (THERMISTOR, (1, 5)),
+    (TERMINALS[0], (2, 17)),
+    (TERMINALS[1], (2, 5)),
+    (TERMINALS[2], (1, 14)),
+    (TERMINALS[2], (2, 14)),
+    (SHUNTS[1], (2, 4)),
+];
+
+/// The pin at a converter's channel; the op-amps' outputs are none of the board's.
+pub fn pin(converter: u8, channel: u8) -> Option<(u8, u8)> {
+    let mut channels = CHANNELS.iter();
+    let found = channels.find(|(_, at)| *at == (converter, channel));
+    found.map(|(pin, _)| *pin)
+}
+
+/// What the sensors are at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outside {
+    /// Currents down through the shunts of legs a, b, c, out of the motor, A: 0 while a leg's low side
+    /// conducts none.
+    pub shunts_a: [f64; 3],
+    /// Voltages of terminals a, b, c, V.
+    pub terminals_v: [f64; 3],
+    /// Voltage of the supply, V.
+    pub bus_v: f64,
+    /// The thermistor's temperature, °C.
+    pub temperature_c: f64,
+    /// Whether the chip holds [`DIVIDERS_GROUND`] low.
+    pub grounded: bool,
+}
+
+impl Outside {
+    /// Volts at a pin; nothing at one which has no sensor, and at the terminals' without a ground.
+    ///
+    /// The diodes that keep a pin near the supply are not there: the converter clamps as well.
+    pub fn volts(&self, pin: (u8, u8)) -> Option<f64> {
+        let among = |pins: [(u8, u8); 3]| pins.iter().position(|of| *of == pin);
+        if let Some(leg) = among(SHUNTS) {
+            return Some(shunt_input(self.shunts_a[leg]));
+        }
+        if let Some(leg) = among(TERMINALS) {
+            let volts = divided(self.terminals_v[leg], TERMINAL_KOHM);
+            return self.grounded.then_some(volts);
+        }
+        match pin {
+            BUS => Some(divided(self.bus_v, BUS_KOHM)),
+            THERMISTOR => {
+                let thermistor = thermistor_kohm(self.temperature_c);
+                Some(divided(SUPPLY_V, [thermistor, THERMISTOR_DOWN_KOHM]))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Where the three resistors meet, with this current through the shunt.
+fn shunt_input(current_a: f64) -> f64 {
+    let [shunt, ground, supply] = SHUNT_KOHM.map(|kohm| 1.0 / kohm);
+    let into = current_a * SHUNT_OHM * shunt + SUPPLY_V * supply;
+    into / (shunt + ground + supply)
+}
+
+fn divided(volts: f64, [above, below]: [f64; 2]) -> f64 {
+    volts * below / (above + below)
+}
+
+fn thermistor_kohm(celsius: f64) -> f64 {
+    let inverse = 1.0 / (FREEZING_K + celsius) - 1.0 / (FREEZING_K + 25.0);
+    THERMISTOR_KOHM * (THERMISTOR_BETA_K * inverse).exp()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OUTSIDE: Outside = Outside {
+        shunts_a: [35.0, -35.0, 0.0],
+        terminals_v: [12.2, 0.0, 6.1],
+        bus_v: 18.7,
+        temperature_c: 25.0,
+        grounded: true,
+    };
+
+    fn assert_volts(pin: (u8, u8), volts: f64) {
+        let shown = OUTSIDE.volts(pin).expect("it has a sensor");
+        assert!((shown - volts).abs() < 1e-4, "{pin:?}: {shown}");
+    }
+
+    #[test]
+    fn pins_have_what_the_resistors_make() {
+        // 3.3 V by 3 of 77 are 128.57 mV, and 4/7 of 105 mV for 35 A are 60 mV.
+        assert_volts((0, 1), 0.188571);
+        assert_volts((0, 7), 0.068571);
+        assert_volts((1, 0), 0.128571);
+        assert_volts((0, 4), 2.2);
+        assert_volts((2, 4), 0.0);
+        assert_volts((1, 11), 1.1);
+        assert_volts((0, 0), 1.8);
+        // 3.3 V by 4.7 of 14.7.
+        assert_volts((1, 14), 1.0551);
+        assert_eq!(OUTSIDE.volts((1, 12)), None);
+    }
+
+    #[test]
+    fn terminals_without_a_ground_have_no_reading() {
+        let outside = Outside {
+            grounded: false,
+            ..OUTSIDE
+        };
+        assert!(TERMINALS.iter().all(|pin| outside.volts(*pin).is_none()));
+    }
+
+    #[test]
+    fn a_warm_thermistor_has_less_resistance() {
+        // 3380·(1/373.15 − 1/298.15) = −2.2786: 1.0243 kΩ.
+        assert!((thermistor_kohm(100.0) - 1.0243).abs() < 1e-3);
+    }
+
+    #[test]
+    fn channels_lead_to_the_pins() {
+        for ((converter, channel), at) in [
+            ((1, 1), BUS),
+            ((1, 5), THERMISTOR),
+            ((2, 17), TERMINALS[0]),
+            ((2, 5), TERMINALS[1]),
+            ((1, 14), TERMINALS[2]),
+        ] {
+            assert_eq!(pin(converter, channel), Some(at));
+        }
+        assert_eq!(pin(1, 13), None);
+    }
+}

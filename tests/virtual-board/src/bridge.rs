@@ -1,0 +1,196 @@
+//! A watch on the bridge's gates, as a logic analyser at the pins would keep it: it knows nothing of the
+//! timer that makes them.
+
+use crate::time::{Cycles, NEVER};
+
+/// Legs of the bridge.
+const LEGS: usize = 3;
+
+/// Violations that are kept; the others are only counted.
+const KEPT: usize = 8;
+
+/// What must not be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// Both gates of a leg are on.
+    Both,
+    /// One gate went on so few cycles after the other had gone off.
+    Short(Cycles),
+}
+
+/// Something that must not be, where and when.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Violation {
+    /// The time.
+    pub at: Cycles,
+    /// The leg, from 0.
+    pub leg: usize,
+    /// What it is.
+    pub fault: Fault,
+}
+
+/// A leg's gates: high side, low side.
+#[derive(Clone, Copy, Debug, Default)]
+struct Leg {
+    on: [bool; 2],
+    off_at: [Option<Cycles>; 2],
+}
+
+/// The watch. All gates are off at first.
+#[derive(Clone, Debug)]
+pub struct Bridge {
+    dead_time: Cycles,
+    legs: [Leg; LEGS],
+    edges: u64,
+    off_since: Cycles,
+    kept: Vec<Violation>,
+    count: u64,
+}
+
+impl Bridge {
+    /// A watch over this least dead time.
+    pub fn new(dead_time: Cycles) -> Self {
+        Self {
+            dead_time,
+            legs: [Leg::default(); LEGS],
+            edges: 0,
+            off_since: 0,
+            kept: Vec::with_capacity(KEPT),
+            count: 0,
+        }
+    }
+
+    /// A leg's gates are now so.
+    pub fn gates(&mut self, leg: usize, high: bool, low: bool, now: Cycles) {
+        let was_off = self.is_off();
+        let on = [high, low];
+        let before = self.legs[leg].on;
+        for side in 0..2 {
+            self.edges += u64::from(on[side] != before[side]);
+            if before[side] && !on[side] {
+                self.legs[leg].off_at[side] = Some(now);
+            }
+        }
+        self.legs[leg].on = on;
+        if on == [true, true] {
+            if before != on {
+                self.note(leg, Fault::Both, now);
+            }
+        } else {
+            for side in 0..2 {
+                let other_off_at = self.legs[leg].off_at[1 - side];
+                if let Some(off_at) = other_off_at.filter(|_| on[side] && !before[side]) {
+                    let dead = now.saturating_sub(off_at);
+                    if dead < self.dead_time {
+                        self.note(leg, Fault::Short(dead), now);
+                    }
+                }
+            }
+        }
+        match (was_off, self.is_off()) {
+            (false, true) => self.off_since = now,
+            (true, false) => self.off_since = NEVER,
+            _ => {}
+        }
+    }
+
+    fn note(&mut self, leg: usize, fault: Fault, at: Cycles) {
+        self.count += 1;
+        if self.kept.len() < KEPT {
+            self.kept.push(Violation { at, leg, fault });
+        }
+    }
+
+    /// Whether all gates are off.
+    pub fn is_off(&self) -> bool {
+        self.legs.iter().all(|leg| leg.on == [false, false])
+    }
+
+    /// Since when all gates are off, if they are.
+    pub fn off_since(&self) -> Option<Cycles> {
+        self.is_off().then_some(self.off_since)
+    }
+
+    /// A leg's gates: high side, low side.
+    pub fn on(&self, leg: usize) -> [bool; 2] {
+        self.legs[leg].on
+    }
+
+    /// How often a gate has gone on or off.
+    pub fn edges(&self) -> u64 {
+        self.edges
+    }
+
+    /// How many violations there were.
+    pub fn violations(&self) -> u64 {
+        self.count
+    }
+
+    /// The first of them.
+    pub fn first(&self) -> &[Violation] {
+        &self.kept
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_proper_change_of_sides_is_none() {
+        let mut bridge = Bridge::new(85);
+        assert_eq!(bridge.off_since(), Some(0));
+        bridge.gates(0, false, true, 100);
+        assert_eq!(bridge.off_since(), None);
+        bridge.gates(0, false, false, 200);
+        bridge.gates(0, true, false, 285);
+        // The other leg's times do not matter.
+        bridge.gates(1, false, true, 286);
+        bridge.gates(0, false, false, 400);
+        // The same side may come back at once.
+        bridge.gates(0, true, false, 401);
+        bridge.gates(0, false, false, 500);
+        bridge.gates(1, false, false, 510);
+        assert_eq!(bridge.violations(), 0);
+        assert_eq!(bridge.edges(), 8);
+        assert_eq!(bridge.off_since(), Some(510));
+        bridge.gates(1, false, false, 600);
+        assert_eq!(bridge.off_since(), Some(510));
+    }
+
+    #[test]
+    fn an_overlap_is_noticed_once() {
+        let mut bridge = Bridge::new(85);
+        bridge.gates(2, true, false, 100);
+        bridge.gates(2, true, true, 130);
+        bridge.gates(2, true, true, 140);
+        let both = Violation {
+            at: 130,
+            leg: 2,
+            fault: Fault::Both,
+        };
+        assert_eq!((bridge.violations(), bridge.first()), (1, &[both][..]));
+    }
+
+    #[test]
+    fn a_short_dead_time_is_noticed() {
+        let mut bridge = Bridge::new(85);
+        bridge.gates(1, true, false, 100);
+        bridge.gates(1, false, false, 200);
+        bridge.gates(1, false, true, 284);
+        // In the same cycle.
+        bridge.gates(1, true, false, 400);
+        let faults: Vec<_> = bridge.first().iter().map(|v| (v.at, v.fault)).collect();
+        assert_eq!(faults, [(284, Fault::Short(84)), (400, Fault::Short(0))]);
+    }
+
+    #[test]
+    fn no_more_than_a_few_are_kept() {
+        let mut bridge = Bridge::new(85);
+        for number in 0..100 {
+            bridge.gates(0, number % 2 == 0, number % 2 == 1, 10 * number);
+        }
+        assert_eq!(bridge.violations(), 99);
+        assert_eq!(bridge.first().len(), KEPT);
+    }
+}

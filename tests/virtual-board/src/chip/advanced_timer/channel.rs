@@ -1,0 +1,121 @@
+//! A channel's comparison and its reference output.
+
+use stm32_metapac::timer::vals::Ocm;
+
+use super::ramp::Ramp;
+use crate::time::{Cycles, NEVER};
+
+/// One channel.
+#[derive(Clone, Debug)]
+pub(super) struct Channel {
+    mode: Ocm,
+    /// Whether what is written waits for an update.
+    preloaded: bool,
+    written: u16,
+    compare: u16,
+    /// What the comparison has said last.
+    below: bool,
+    reference: bool,
+}
+
+impl Channel {
+    /// As after a reset.
+    pub(super) const fn new() -> Self {
+        Self {
+            mode: Ocm::FROZEN,
+            preloaded: false,
+            written: 0,
+            compare: 0,
+            below: false,
+            reference: false,
+        }
+    }
+
+    /// Whether this mode is modelled.
+    pub(super) fn has(mode: Ocm) -> bool {
+        pwm(mode) || matches!(mode, Ocm::FROZEN | Ocm::FORCE_ACTIVE | Ocm::FORCE_INACTIVE)
+    }
+
+    /// The reference output.
+    pub(super) fn reference(&self) -> bool {
+        self.reference
+    }
+
+    /// The compare register, as it was written.
+    pub(super) fn written(&self) -> u16 {
+        self.written
+    }
+
+    /// The value that is compared with.
+    pub(super) fn compare(&self) -> u16 {
+        self.compare
+    }
+
+    /// Whether what is written to the compare register waits for an update.
+    pub(super) fn set_preloaded(&mut self, preloaded: bool) {
+        self.preloaded = preloaded;
+        self.write(self.written);
+    }
+
+    /// Writes the compare register.
+    pub(super) fn write(&mut self, value: u16) {
+        self.written = value;
+        if !self.preloaded {
+            self.compare = value;
+        }
+    }
+
+    /// An update: the compare register is taken.
+    pub(super) fn update(&mut self) {
+        self.compare = self.written;
+    }
+
+    /// Changes the mode. From one PWM mode to the other the reference stays until the comparison
+    /// changes its result; from any other mode it follows at once (RM0440, TIM1_CCMR1.OC1M).
+    pub(super) fn set_mode(&mut self, mode: Ocm) {
+        let before = std::mem::replace(&mut self.mode, mode);
+        match mode {
+            Ocm::FORCE_ACTIVE => self.reference = true,
+            Ocm::FORCE_INACTIVE => self.reference = false,
+            _ if pwm(mode) && !pwm(before) => self.follow(),
+            _ => {}
+        }
+    }
+
+    fn follow(&mut self) {
+        self.reference = self.below == (self.mode == Ocm::PWM_MODE1);
+    }
+
+    /// Compares with the counter; whether the result has changed.
+    pub(super) fn look(&mut self, ramp: &Ramp, now: Cycles) -> bool {
+        let (elapsed, compare) = (ramp.elapsed(now), Cycles::from(self.compare));
+        let below = if ramp.down() {
+            elapsed + compare >= ramp.top()
+        } else {
+            elapsed < compare
+        };
+        let changes = below != self.below;
+        if changes {
+            self.below = below;
+            if pwm(self.mode) {
+                self.follow();
+            }
+        }
+        changes
+    }
+
+    /// When the comparison changes its result next, before the counter turns.
+    pub(super) fn due(&self, ramp: &Ramp) -> Cycles {
+        let compare = Cycles::from(self.compare);
+        match ramp.turned_at() {
+            Some(_) if self.below == ramp.down() => NEVER,
+            Some(at) if ramp.down() && compare > 0 => at + ramp.top().saturating_sub(compare),
+            Some(at) if !ramp.down() && compare < ramp.top() => at + compare,
+            _ => NEVER,
+        }
+    }
+}
+
+fn pwm(mode: Ocm) -> bool {
+    matches!(mode, Ocm::PWM_MODE1 | Ocm::PWM_MODE2)
+}

@@ -1,0 +1,47 @@
+//! DBGMCU: what a debugger stops with the processor. None is connected, so that nothing follows from it.
+
+use stm32_metapac::dbgmcu::regs::{Apb2fzr, Cr};
+
+use super::{Context, Part, Unmodelled};
+
+/// The part.
+#[derive(Debug)]
+pub struct Debug {
+    control: Cr,
+    stopped_apb2: Apb2fzr,
+}
+
+impl Debug {
+    /// As it is after power-up: other resets leave it (RM0440, DBGMCU_CR).
+    pub fn new() -> Self {
+        Self {
+            control: Cr(0),
+            stopped_apb2: Apb2fzr(0),
+        }
+    }
+}
+
+impl Default for Debug {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Part for Debug {
+    fn read(&mut self, offset: u32, _: &mut Context) -> Result<u32, Unmodelled> {
+        match offset {
+            0x04 => Ok(self.control.0),
+            0x10 => Ok(self.stopped_apb2.0),
+            _ => Err(Unmodelled),
+        }
+    }
+
+    fn write(&mut self, offset: u32, value: u32, _: &mut Context) -> Result<(), Unmodelled> {
+        match offset {
+            0x04 => self.control = Cr(value),
+            0x10 => self.stopped_apb2 = Apb2fzr(value),
+            _ => return Err(Unmodelled),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,158 @@
+//! OPAMP1 to OPAMP3 as amplifiers by 2 to 64 of a pin's voltage.
+
+use stm32_metapac::opamp::regs::Csr;
+use stm32_metapac::opamp::vals::{PgaGain, VmSel, VpSel};
+
+use super::{Context, Part, Unmodelled};
+
+/// Its outputs reach the supply, V.
+const SUPPLY_V: f64 = 3.3;
+
+/// Pins (port, number; 0 is port A) at VP_SEL 0 to 2 (RM0440, op-amps' inputs).
+const INPUTS: [[(u8, u8); 3]; 3] = [
+    [(0, 1), (0, 3), (0, 7)],
+    [(0, 7), (1, 14), (1, 0)],
+    [(1, 0), (1, 13), (0, 1)],
+];
+
+/// Converters with their channels at the internal output (RM0440, ADC connectivity).
+const INSIDE: [(u8, u8); 3] = [(1, 13), (2, 16), (2, 18)];
+
+/// Converters with their channels at the output's pin: PA2, PA6 and PB1.
+const OUTSIDE: [(u8, u8); 3] = [(1, 3), (2, 3), (1, 12)];
+
+/// The op-amps. Their registers are a word each. The settling of their outputs is not modelled.
+#[derive(Clone, Debug, Default)]
+pub struct OpAmps {
+    controls: [Csr; 3],
+}
+
+impl OpAmps {
+    /// As they are after a reset.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The pin (port, number) at the input of an op-amp, from 0, while it is on.
+    pub fn pin(&self, which: usize) -> Option<(u8, u8)> {
+        let control = self.controls[which];
+        let pin = INPUTS[which][usize::from(control.vp_sel().to_bits())];
+        control.opampen().then_some(pin)
+    }
+
+    /// The output of an op-amp, from 0, with these volts at its input, while it is on.
+    pub fn output(&self, which: usize, volts: f64) -> Option<f64> {
+        let control = self.controls[which];
+        let output = (volts * gain(control)?).clamp(0.0, SUPPLY_V);
+        control.opampen().then_some(output)
+    }
+
+    /// The op-amp, from 0, whose output is at a channel of a converter (1 or 2): inside, or at its pin.
+    pub fn at(&self, converter: u8, channel: u8) -> Option<usize> {
+        let led = |&which: &usize| {
+            let control = self.controls[which];
+            let way = if control.opaintoen() { INSIDE } else { OUTSIDE };
+            control.opampen() && way[which] == (converter, channel)
+        };
+        (0..self.controls.len()).find(led)
+    }
+}
+
+/// The amplification; nothing if that is none of the modelled ones.
+fn gain(control: Csr) -> Option<f64> {
+    match control.vm_sel() {
+        VmSel::OUTPUT => Some(1.0),
+        VmSel::PGA => match control.pga_gain().to_bits() {
+            // 2 to 64, nothing else at the resistors.
+            bits @ 0..=5 => Some(f64::from(2_u8 << bits)),
+            _ => None,
+        },
+        VmSel::VINM0 | VmSel::VINM1 => None,
+    }
+}
+
+impl Part for OpAmps {
+    fn read(&mut self, offset: u32, _context: &mut Context) -> Result<u32, Unmodelled> {
+        let control = self.controls.get(offset as usize / 4).ok_or(Unmodelled)?;
+        Ok(control.0)
+    }
+
+    fn write(&mut self, offset: u32, value: u32, _context: &mut Context) -> Result<(), Unmodelled> {
+        let control = self.controls.get_mut(offset as usize / 4);
+        let control = control.ok_or(Unmodelled)?;
+        let (mut known, new) = (Csr(0), Csr(value));
+        known.set_opampen(true);
+        known.set_vp_sel(VpSel::from_bits(3));
+        known.set_vm_sel(VmSel::from_bits(3));
+        known.set_opahsm(true);
+        known.set_opaintoen(true);
+        known.set_pga_gain(PgaGain::from_bits(31));
+        let led = gain(new).is_some() && new.vp_sel() != VpSel::DAC3_CH1;
+        if value & !known.0 != 0 || new.opampen() && !led {
+            return Err(Unmodelled);
+        }
+        *control = new;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On, PGA, ×16, high speed.
+    const BY_16: u32 = 1 | 2 << 5 | 1 << 7 | 3 << 14;
+
+    /// Through the inside to the converter.
+    const INTERNAL: u32 = 1 << 8;
+
+    #[test]
+    fn the_board_has_its_three() {
+        let mut signals = Vec::new();
+        let mut context = Context {
+            now: 0,
+            signals: &mut signals,
+        };
+        let mut amps = OpAmps::new();
+        assert_eq!(amps.output(0, 0.1), None);
+        assert_eq!(amps.at(1, 13), None);
+        for (offset, value) in [(0, BY_16 | INTERNAL), (4, BY_16 | INTERNAL), (8, BY_16)] {
+            assert_eq!(amps.write(offset, value, &mut context), Ok(()));
+            assert_eq!(amps.read(offset, &mut context), Ok(value));
+        }
+        let pins = [0, 1, 2].map(|which| amps.pin(which));
+        assert_eq!(pins, [Some((0, 1)), Some((0, 7)), Some((1, 0))]);
+        assert_eq!(amps.at(1, 13), Some(0));
+        assert_eq!(amps.at(2, 16), Some(1));
+        assert_eq!(amps.at(1, 12), Some(2));
+        // The internal way of the third and the pins of the others are not used.
+        for (converter, channel) in [(2, 18), (1, 3), (2, 3)] {
+            assert_eq!(amps.at(converter, channel), None);
+        }
+        for (volts, output) in [(0.1, 1.6), (-0.1, 0.0), (0.3, 3.3)] {
+            let shown = amps.output(2, volts).expect("it is on");
+            assert!((shown - output).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_is_not_modelled_is_refused() {
+        let mut signals = Vec::new();
+        let mut context = Context {
+            now: 0,
+            signals: &mut signals,
+        };
+        let mut amps = OpAmps::new();
+        // Standalone, a bias at the resistors, the DAC's input, trimming, a fourth.
+        let refused = [
+            (0, 1),
+            (0, 1 | 2 << 5 | 11 << 14),
+            (0, BY_16 | 3 << 2),
+            (0, BY_16 | 1 << 4),
+            (12, BY_16),
+        ];
+        for (offset, value) in refused {
+            assert_eq!(amps.write(offset, value, &mut context), Err(Unmodelled));
+        }
+    }
+}

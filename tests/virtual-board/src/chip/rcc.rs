@@ -1,0 +1,256 @@
+//! RCC: clocks, resets and why there was one (RM0440, 7.4).
+//!
+//! Oscillators and the PLL are ready at once. The system clock is that of HSI or of the PLL behind it.
+
+mod clock;
+mod gates;
+
+use stm32_metapac::rcc::regs::{Bdcr, Ccipr, Cfgr, Cr, Crrcr, Csr, Pllcfgr};
+use stm32_metapac::rcc::vals::{Adcsel, Pllsrc, Ppre, Rtcsel, Sw};
+
+pub use clock::{ClockError, Supply};
+use gates::Gates;
+
+use super::{Cause, Context, Part, Unmodelled};
+
+/// The part.
+#[derive(Debug)]
+pub struct Rcc {
+    control: Cr,
+    configuration: Cfgr,
+    pll: Pllcfgr,
+    sources: Ccipr,
+    gates: Gates,
+    backup: Bdcr,
+    backup_open: bool,
+    status: Csr,
+    usb: Crrcr,
+}
+
+impl Rcc {
+    /// As it is at power-up.
+    pub fn new() -> Self {
+        let mut control = Cr(0);
+        control.set_hsion(true);
+        let mut configuration = Cfgr(0);
+        configuration.set_sw(Sw::HSI);
+        Self {
+            control,
+            configuration,
+            pll: Pllcfgr(0x1000),
+            sources: Ccipr(0),
+            gates: Gates::new(),
+            backup: Bdcr(0),
+            backup_open: false,
+            status: flags(Cause::Power),
+            usb: Crrcr(0),
+        }
+    }
+
+    /// After a reset of the chip. The causes add up until the program removes them, and the backup domain
+    /// keeps its registers, but for a loss of power.
+    pub fn reset(&mut self, cause: Cause) {
+        let (causes, backup) = match cause {
+            Cause::Power => (Csr(0), Bdcr(0)),
+            _ => (self.status, self.backup),
+        };
+        let mut kept = Csr(flags(cause).0 | causes.0);
+        kept.set_lsion(false);
+        kept.set_rmvf(false);
+        *self = Self {
+            status: kept,
+            backup,
+            ..Self::new()
+        };
+    }
+
+    /// Lets the backup domain be written, or no more: PWR's DBP.
+    pub fn open_backup(&mut self, open: bool) {
+        self.backup_open = open;
+    }
+
+    /// Whether the part at this address has a clock, or needs none.
+    pub fn has_clock(&self, address: u32) -> bool {
+        self.gates.open(address)
+    }
+
+    /// The processor's clock in Hz with this supply of the core and these wait states of the flash.
+    pub fn clock_hz(&self, supply: Supply) -> Result<u64, ClockError> {
+        clock::frequency(self.configuration, self.pll, supply)
+    }
+
+    /// Where the parts' own clocks come from.
+    pub fn sources(&self) -> Ccipr {
+        self.sources
+    }
+
+    fn write_control(&mut self, value: u32) -> Result<(), Unmodelled> {
+        let asked = Cr(value);
+        let mut wanted = Cr(0);
+        wanted.set_hsion(asked.hsion());
+        wanted.set_pllon(asked.pllon());
+        let mut known = wanted;
+        known.set_hsirdy(asked.hsirdy());
+        known.set_pllrdy(asked.pllrdy());
+        let on_pll = self.configuration.sw() == Sw::PLL1_R;
+        let starts = wanted.pllon() && !self.control.pllon();
+        // HSI is what all runs by; the PLL is not turned off under the system's clock.
+        if known.0 != value
+            || !wanted.hsion()
+            || on_pll && !wanted.pllon()
+            || starts && self.pll.pllsrc() != Pllsrc::HSI
+        {
+            return Err(Unmodelled);
+        }
+        self.control = wanted;
+        Ok(())
+    }
+
+    fn write_configuration(&mut self, value: u32) -> Result<(), Unmodelled> {
+        let asked = Cfgr(value);
+        let mut wanted = Cfgr(0);
+        wanted.set_sw(asked.sw());
+        wanted.set_hpre(asked.hpre());
+        let mut known = wanted;
+        known.set_sws(asked.sws());
+        let is_ready = match asked.sw() {
+            Sw::HSI => true,
+            Sw::PLL1_R => self.control.pllon() && self.pll.pllren(),
+            _ => false,
+        };
+        // The parts have the processor's clock.
+        let undivided = asked.ppre1() == Ppre::DIV1 && asked.ppre2() == Ppre::DIV1;
+        if known.0 != value || !undivided || !is_ready {
+            return Err(Unmodelled);
+        }
+        self.configuration = wanted;
+        Ok(())
+    }
+
+    fn write_pll(&mut self, value: u32) -> Result<(), Unmodelled> {
+        if self.control.pllon() && value != self.pll.0 {
+            return Err(Unmodelled);
+        }
+        self.pll = Pllcfgr(value);
+        Ok(())
+    }
+
+    /// The serial lines by their bus's clock, the converters by the system's.
+    fn write_sources(&mut self, value: u32) -> Result<(), Unmodelled> {
+        let asked = Ccipr(value);
+        let mut wanted = Ccipr(0);
+        wanted.set_adc12sel(asked.adc12sel());
+        // USB's and the random numbers': neither is there.
+        wanted.set_clk48sel(asked.clk48sel());
+        let converters = asked.adc12sel();
+        if value != wanted.0 || !matches!(converters, Adcsel::DISABLE | Adcsel::SYS) {
+            return Err(Unmodelled);
+        }
+        self.sources = wanted;
+        Ok(())
+    }
+
+    fn write_backup(&mut self, value: u32) -> Result<(), Unmodelled> {
+        let asked = Bdcr(value);
+        if asked.bdrst() {
+            self.backup = Bdcr(0);
+            self.backup.set_bdrst(true);
+            return Ok(());
+        }
+        let mut wanted = Bdcr(0);
+        wanted.set_rtcsel(asked.rtcsel());
+        wanted.set_rtcen(asked.rtcen());
+        let known = matches!(asked.rtcsel(), Rtcsel::DISABLE | Rtcsel::LSI);
+        if value != wanted.0 || !known {
+            return Err(Unmodelled);
+        }
+        // What the clock comes from is chosen once.
+        if self.backup.rtcsel() != Rtcsel::DISABLE {
+            wanted.set_rtcsel(self.backup.rtcsel());
+        }
+        self.backup = wanted;
+        Ok(())
+    }
+
+    fn write_status(&mut self, value: u32) {
+        let asked = Csr(value);
+        if asked.rmvf() {
+            self.status = Csr(0);
+        }
+        self.status.set_rmvf(asked.rmvf());
+        self.status.set_lsion(asked.lsion());
+    }
+}
+
+impl Default for Rcc {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What a reset leaves in CSR. Each one of the chip's own is seen at its reset pin too.
+fn flags(cause: Cause) -> Csr {
+    let mut flags = Csr(0);
+    flags.set_pinrstf(true);
+    match cause {
+        Cause::Power => flags.set_borrstf(true),
+        Cause::Software => flags.set_sftrstf(true),
+        Cause::Watchdog => flags.set_iwdgrstf(true),
+        Cause::Pin => {}
+    }
+    flags
+}
+
+impl Part for Rcc {
+    fn read(&mut self, offset: u32, _: &mut Context) -> Result<u32, Unmodelled> {
+        match offset {
+            0x00 => {
+                let mut value = self.control;
+                value.set_hsirdy(value.hsion());
+                value.set_pllrdy(value.pllon());
+                Ok(value.0)
+            }
+            0x08 => {
+                let mut value = self.configuration;
+                value.set_sws(value.sw());
+                Ok(value.0)
+            }
+            0x0c => Ok(self.pll.0),
+            0x88 => Ok(self.sources.0),
+            0x90 => Ok(self.backup.0),
+            0x94 => {
+                let mut value = self.status;
+                value.set_lsirdy(value.lsion());
+                Ok(value.0)
+            }
+            0x98 => {
+                let mut value = self.usb;
+                value.set_hsi48rdy(value.hsi48on());
+                Ok(value.0)
+            }
+            _ => self.gates.read(offset),
+        }
+    }
+
+    fn write(&mut self, offset: u32, value: u32, context: &mut Context) -> Result<(), Unmodelled> {
+        match offset {
+            0x00 => self.write_control(value),
+            0x08 => self.write_configuration(value),
+            0x0c => self.write_pll(value),
+            0x88 => self.write_sources(value),
+            0x90 if self.backup_open => self.write_backup(value),
+            0x94 => {
+                self.write_status(value);
+                Ok(())
+            }
+            0x98 => {
+                self.usb.set_hsi48on(Crrcr(value).hsi48on());
+                Ok(())
+            }
+            _ => self.gates.write(offset, value, context),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,114 @@
+//! The processor's clock.
+
+use stm32_metapac::rcc::regs::{Cfgr, Pllcfgr};
+use stm32_metapac::rcc::vals::Sw;
+use thiserror::Error;
+
+/// HSI's rate.
+const HSI_HZ: u64 = 16_000_000;
+
+/// The least and the greatest rate into the PLL (DS12589, PLL characteristics).
+const PLL_IN_HZ: [u64; 2] = [2_660_000, 16_000_000];
+
+/// The least and the greatest rate of the PLL's oscillator.
+const OSCILLATOR_HZ: [u64; 2] = [96_000_000, 344_000_000];
+
+/// What a clock's limits depend on.
+#[derive(Clone, Copy, Debug)]
+pub struct Supply {
+    /// Whether PWR's boost of voltage range 1 is on.
+    pub boost: bool,
+    /// The flash's wait states.
+    pub wait_states: u8,
+}
+
+/// Why the chip does not run so for sure.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum ClockError {
+    /// The PLL's own limits.
+    #[error("the PLL gets {input_hz} Hz and its oscillator {oscillator_hz} Hz: out of its range")]
+    Pll {
+        /// What it gets.
+        input_hz: u64,
+        /// What its oscillator makes of it.
+        oscillator_hz: u64,
+    },
+    /// The core's limit.
+    #[error(
+        "the core has {clock_hz} Hz, more than {greatest_hz} Hz of its voltage (PWR_CR5.R1MODE)"
+    )]
+    Core {
+        /// The clock.
+        clock_hz: u64,
+        /// The greatest.
+        greatest_hz: u64,
+    },
+    /// The flash's limit.
+    #[error(
+        "the flash is read at {clock_hz} Hz with {wait_states} wait states instead of {needed}"
+    )]
+    Flash {
+        /// The clock.
+        clock_hz: u64,
+        /// As they are set.
+        wait_states: u8,
+        /// As many as are needed.
+        needed: u64,
+    },
+}
+
+/// The processor's clock in Hz.
+pub(super) fn frequency(
+    configuration: Cfgr,
+    pll: Pllcfgr,
+    supply: Supply,
+) -> Result<u64, ClockError> {
+    let system_hz = match configuration.sw() {
+        Sw::PLL1_R => pll_hz(pll)?,
+        _ => HSI_HZ,
+    };
+    // RM0440, tables of the voltage ranges and of the flash's wait states.
+    let (greatest_hz, step_hz) = if supply.boost {
+        (170_000_000, 34_000_000)
+    } else {
+        (150_000_000, 30_000_000)
+    };
+    if system_hz > greatest_hz {
+        return Err(ClockError::Core {
+            clock_hz: system_hz,
+            greatest_hz,
+        });
+    }
+    let clock_hz = system_hz / divider(configuration);
+    let needed = (clock_hz - 1) / step_hz;
+    if u64::from(supply.wait_states) < needed {
+        return Err(ClockError::Flash {
+            clock_hz,
+            wait_states: supply.wait_states,
+            needed,
+        });
+    }
+    Ok(clock_hz)
+}
+
+fn pll_hz(pll: Pllcfgr) -> Result<u64, ClockError> {
+    let input_hz = HSI_HZ / (u64::from(pll.pllm().to_bits()) + 1);
+    let oscillator_hz = input_hz * u64::from(pll.plln().to_bits());
+    let within = |[least, greatest]: [u64; 2], hz| (least..=greatest).contains(&hz);
+    if !within(PLL_IN_HZ, input_hz) || !within(OSCILLATOR_HZ, oscillator_hz) {
+        return Err(ClockError::Pll {
+            input_hz,
+            oscillator_hz,
+        });
+    }
+    Ok(oscillator_hz / (2 * (u64::from(pll.pllr().to_bits()) + 1)))
+}
+
+/// AHB's prescaler: 2 to 16 from 8 on, then 64 to 512.
+fn divider(configuration: Cfgr) -> u64 {
+    match configuration.hpre().to_bits() {
+        bits @ 8..=11 => 2 << (bits - 8),
+        bits @ 12.. => 64 << (bits - 12),
+        _ => 1,
+    }
+}

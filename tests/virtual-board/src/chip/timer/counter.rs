@@ -1,0 +1,80 @@
+//! An up-counter behind a prescaler, by time.
+
+use crate::time::{Cycles, NEVER};
+
+/// The counter. It is reckoned from a moment at which its value was known.
+#[derive(Clone, Debug)]
+pub(super) struct Counter {
+    runs: bool,
+    /// Cycles a count.
+    every: Cycles,
+    /// The moment, while it runs.
+    since: Cycles,
+    /// Its value then.
+    from: u32,
+    /// Cycles that the prescaler had counted towards the next.
+    part: Cycles,
+}
+
+impl Counter {
+    /// Standing at 0.
+    pub(super) fn new() -> Self {
+        Self {
+            runs: false,
+            every: 1,
+            since: 0,
+            from: 0,
+            part: 0,
+        }
+    }
+
+    /// Its value. It must not have overflowed since the moment.
+    pub(super) fn count(&self, now: Cycles) -> u32 {
+        self.from + (self.passed(now) / self.every) as u32
+    }
+
+    fn passed(&self, now: Cycles) -> Cycles {
+        self.part + if self.runs { now - self.since } else { 0 }
+    }
+
+    /// When it comes to this value, if it is above the present one and nothing intervenes.
+    pub(super) fn arrival(&self, value: u32, now: Cycles) -> Cycles {
+        if !self.runs || value <= self.count(now) {
+            return NEVER;
+        }
+        self.overflow(value - 1)
+    }
+
+    /// When it has been at this value, which is not below the present one, for a count.
+    pub(super) fn overflow(&self, value: u32) -> Cycles {
+        if self.runs {
+            let counts = Cycles::from(value - self.from) + 1;
+            self.since + counts * self.every - self.part
+        } else {
+            NEVER
+        }
+    }
+
+    /// Lets it run or stand.
+    pub(super) fn run(&mut self, runs: bool, now: Cycles) {
+        let passed = self.passed(now);
+        self.from += (passed / self.every) as u32;
+        self.part = passed % self.every;
+        self.since = now;
+        self.runs = runs;
+    }
+
+    /// Sets its value; the prescaler goes on.
+    pub(super) fn set(&mut self, value: u32, now: Cycles) {
+        self.run(self.runs, now);
+        self.from = value;
+    }
+
+    /// Begins again at 0, with the prescaler.
+    pub(super) fn restart(&mut self, every: Cycles, now: Cycles) {
+        self.every = every;
+        self.since = now;
+        self.from = 0;
+        self.part = 0;
+    }
+}

@@ -1,0 +1,368 @@
+//! The general-purpose timers TIM2, TIM3 and TIM4 (RM0440): they count up, compare, and capture the
+//! edges of one pin.
+//!
+//! Their clock is the chip's 170 MHz. The start latency of the counter and the synchronisation of the
+//! pin, a few cycles, are neglected. A compare flag rises when the counter arrives at the value: one
+//! that is written as the counter has it comes a turn later.
+
+mod counter;
+#[cfg(test)]
+mod tests;
+
+use stm32_metapac::Interrupt;
+use stm32_metapac::timer::regs::{CcerGp16, CcmrInput2ch, Cr1Gp16, DierGp16, SrGp16};
+use stm32_metapac::timer::vals::{CcmrInputCcs, Urs};
+
+use self::counter::Counter;
+use super::filter::Filter;
+use super::timer_registers::{
+    ARR, CCER, CCMR1, CCMR2, CCR1, CCR4, CNT, CR1, DIER, EGR, PSC, SR, channel, only,
+};
+use super::{Context, Part, Signal, Unmodelled};
+use crate::time::{Cycles, NEVER};
+
+/// Channels that may capture: the first two.
+const CAPTURES: usize = 2;
+
+/// CR1: CEN, URS, ARPE.
+const CR1_BITS: u32 = 0x0085;
+/// DIER: UIE, CCxIE, UDE, CCxDE.
+const DIER_BITS: u32 = 0x1f1f;
+/// SR: UIF, CCxIF.
+const INTERRUPT_BITS: u32 = 0x001f;
+/// CCMR1 for inputs: CCxS, ICxF; the captures are not divided.
+const CCMR1_BITS: u32 = 0xf3f3;
+/// CCER: CCxE, CCxP of two channels.
+const CCER_BITS: u32 = 0x0033;
+/// EGR: UG.
+const EGR_BITS: u32 = 0x0001;
+
+/// What tells one of the timers from the others.
+#[derive(Clone, Copy, Debug)]
+struct Kind {
+    /// The highest value of its counter.
+    max: u32,
+    /// Its interrupt.
+    interrupt: Interrupt,
+    /// The requests of its channels at the DMA's multiplexer (stm32-metapac's metadata of the
+    /// STM32G431CB, after RM0440's table of them).
+    captured: [u8; 4],
+    /// The one of its update.
+    updated: u8,
+}
+
+/// One of the timers.
+pub struct Timer {
+    kind: Kind,
+    cr1: Cr1Gp16,
+    dier: DierGp16,
+    sr: SrGp16,
+    ccmr1: CcmrInput2ch,
+    ccer: CcerGp16,
+    psc: u16,
+    arr: u32,
+    /// The value after which it overflows.
+    top: u32,
+    compares: [u32; 4],
+    /// When the counter comes to each of them.
+    matches: [Cycles; 4],
+    counter: Counter,
+    /// Of the pin, as set for the first input; both channels are behind it.
+    filter: Filter,
+    /// Whether the interrupt's line is up.
+    line: bool,
+    due: Cycles,
+}
+
+impl Timer {
+    /// TIM2, with 32 bits.
+    pub fn tim2() -> Self {
+        Self::new(Kind {
+            max: u32::MAX,
+            interrupt: Interrupt::TIM2,
+            captured: [56, 57, 58, 59],
+            updated: 60,
+        })
+    }
+
+    /// TIM3.
+    pub fn tim3() -> Self {
+        Self::new(Kind {
+            max: 0xffff,
+            interrupt: Interrupt::TIM3,
+            captured: [61, 62, 63, 64],
+            updated: 65,
+        })
+    }
+
+    /// TIM4.
+    pub fn tim4() -> Self {
+        Self::new(Kind {
+            max: 0xffff,
+            interrupt: Interrupt::TIM4,
+            captured: [67, 68, 69, 70],
+            updated: 71,
+        })
+    }
+
+    fn new(kind: Kind) -> Self {
+        Self {
+            kind,
+            cr1: Cr1Gp16(0),
+            dier: DierGp16(0),
+            sr: SrGp16(0),
+            ccmr1: CcmrInput2ch(0),
+            ccer: CcerGp16(0),
+            psc: 0,
+            arr: kind.max,
+            top: kind.max,
+            compares: [0; 4],
+            matches: [NEVER; 4],
+            counter: Counter::new(),
+            filter: Filter::new(),
+            line: false,
+            due: NEVER,
+        }
+    }
+
+    /// Resets it; the pin's level stays.
+    pub fn reset(&mut self, context: &mut Context) {
+        let (line, level) = (self.line, self.filter.level());
+        *self = Self::new(self.kind);
+        self.line = line;
+        self.filter.input(level, context.now);
+        self.settle(context);
+    }
+
+    /// The level of the first channel's pin.
+    pub fn pin(&mut self, level: bool, context: &mut Context) {
+        self.catch_up(context);
+        self.filter.input(level, context.now);
+        self.settle(context);
+    }
+
+    /// Does what has been due before an access at this time.
+    fn catch_up(&mut self, context: &mut Context) {
+        if self.due <= context.now {
+            self.act(context);
+        }
+    }
+
+    /// Whether a channel captures.
+    fn captures(&self, channel: usize) -> bool {
+        channel < CAPTURES && self.ccmr1.ccs(channel) != CcmrInputCcs::_RESERVED_0
+    }
+
+    /// The counter runs if it is enabled; with a top of 0 it stands all the same.
+    fn run(&mut self, now: Cycles) {
+        self.counter.run(self.cr1.cen() && self.top > 0, now);
+    }
+
+    /// An update event; `requests` if it raises its flag.
+    fn update(&mut self, requests: bool, now: Cycles, context: &mut Context) {
+        self.top = self.arr;
+        self.counter.restart(Cycles::from(self.psc) + 1, now);
+        self.run(now);
+        if requests {
+            self.sr.set_uif(true);
+            if self.dier.ude() {
+                context.signals.push(Signal::Request(self.kind.updated));
+            }
+        }
+    }
+
+    /// A compare's match or a capture.
+    fn raise(&mut self, channel: usize, context: &mut Context) {
+        self.sr.set_ccif(channel, true);
+        if self.dier.ccde(channel) {
+            let request = self.kind.captured[channel];
+            context.signals.push(Signal::Request(request));
+        }
+    }
+
+    fn capture(&mut self, context: &mut Context) {
+        let level = self.filter.output();
+        for channel in 0..CAPTURES {
+            if self.captures(channel) && self.ccer.cce(channel) && self.ccer.ccp(channel) != level {
+                if self.sr.ccif(channel) {
+                    self.sr.set_ccof(channel, true);
+                }
+                self.compares[channel] = self.counter.count(context.now);
+                self.raise(channel, context);
+            }
+        }
+    }
+
+    /// The counter starts again from 0 by itself: a value above the top is met now.
+    fn overflow(&mut self, at: Cycles, context: &mut Context) {
+        let top = self.top;
+        self.update(true, at, context);
+        for channel in 0..4 {
+            let compare = self.compares[channel];
+            if !self.captures(channel) && (compare == 0 || compare > top) {
+                self.raise(channel, context);
+            }
+        }
+        self.expect(at);
+    }
+
+    /// The matches up to this time.
+    fn meet(&mut self, now: Cycles, context: &mut Context) {
+        for channel in 0..4 {
+            if self.matches[channel] <= now {
+                self.matches[channel] = NEVER;
+                self.raise(channel, context);
+            }
+        }
+    }
+
+    /// Finds when the counter comes to the compare values.
+    fn expect(&mut self, now: Cycles) {
+        for channel in 0..4 {
+            let compare = self.compares[channel];
+            self.matches[channel] = if self.captures(channel) || compare > self.top {
+                NEVER
+            } else {
+                self.counter.arrival(compare, now)
+            };
+        }
+    }
+
+    /// Says what has changed and finds what is due next.
+    fn settle(&mut self, context: &mut Context) {
+        if self.filter.act(context.now) {
+            self.capture(context);
+        }
+        let line = self.sr.0 & self.dier.0 & INTERRUPT_BITS != 0;
+        if line != self.line {
+            self.line = line;
+            let number = self.kind.interrupt as u16;
+            context.signals.push(Signal::Interrupt(number, line));
+        }
+        let due = self
+            .matches
+            .iter()
+            .fold(self.filter.due(), |due, at| due.min(*at));
+        self.due = due.min(self.counter.overflow(self.top));
+    }
+
+    fn write_cr1(&mut self, value: u32, now: Cycles) -> Result<(), Unmodelled> {
+        let new = Cr1Gp16(only(value, CR1_BITS)?);
+        if !new.arpe() && self.top != self.arr {
+            return Err(Unmodelled);
+        }
+        self.cr1 = new;
+        self.run(now);
+        Ok(())
+    }
+
+    fn write_ccmr1(&mut self, value: u32) -> Result<(), Unmodelled> {
+        let new = CcmrInput2ch(only(value, CCMR1_BITS)?);
+        // An input is the first pin, or there is none, and then the field's bits mean an output.
+        let direct = match new.ccs(0) {
+            CcmrInputCcs::TI4 => true,
+            CcmrInputCcs::_RESERVED_0 => value & 0xff == 0,
+            _ => false,
+        };
+        let crosswise = match new.ccs(1) {
+            CcmrInputCcs::TI3 => true,
+            CcmrInputCcs::_RESERVED_0 => value >> 8 == 0,
+            _ => false,
+        };
+        if !direct || !crosswise {
+            return Err(Unmodelled);
+        }
+        self.ccmr1 = new;
+        self.filter.set(new.icf(0));
+        Ok(())
+    }
+
+    fn write_arr(&mut self, value: u32, now: Cycles) -> Result<(), Unmodelled> {
+        let passed = !self.cr1.arpe() && value < self.counter.count(now);
+        if value > self.kind.max || passed {
+            return Err(Unmodelled);
+        }
+        self.arr = value;
+        if !self.cr1.arpe() {
+            self.top = value;
+            self.run(now);
+        }
+        Ok(())
+    }
+}
+
+impl Part for Timer {
+    fn read(&mut self, offset: u32, context: &mut Context) -> Result<u32, Unmodelled> {
+        self.catch_up(context);
+        Ok(match offset {
+            CR1 => self.cr1.0,
+            DIER => self.dier.0,
+            SR => self.sr.0,
+            CCMR1 => self.ccmr1.0,
+            CCMR2 => 0,
+            CCER => self.ccer.0,
+            CNT => self.counter.count(context.now),
+            PSC => self.psc.into(),
+            ARR => self.arr,
+            CCR1..=CCR4 => {
+                let channel = channel(offset);
+                if self.captures(channel) {
+                    self.sr.set_ccif(channel, false);
+                    self.settle(context);
+                }
+                self.compares[channel]
+            }
+            _ => return Err(Unmodelled),
+        })
+    }
+
+    fn write(&mut self, offset: u32, value: u32, context: &mut Context) -> Result<(), Unmodelled> {
+        self.catch_up(context);
+        let now = context.now;
+        match offset {
+            CR1 => self.write_cr1(value, now)?,
+            DIER => self.dier = DierGp16(only(value, DIER_BITS)?),
+            // Zeros clear.
+            SR => self.sr.0 &= value,
+            EGR => {
+                if only(value, EGR_BITS)? != 0 {
+                    let requests = self.cr1.urs() == Urs::ANY_EVENT;
+                    self.update(requests, now, context);
+                }
+            }
+            CCMR1 => self.write_ccmr1(value)?,
+            CCMR2 => {
+                only(value, 0)?;
+            }
+            CCER => self.ccer = CcerGp16(only(value, CCER_BITS)?),
+            CNT if value <= self.top => self.counter.set(value, now),
+            PSC => self.psc = u16::try_from(value).map_err(|_| Unmodelled)?,
+            ARR => self.write_arr(value, now)?,
+            CCR1..=CCR4 => {
+                let channel = channel(offset);
+                // What has been captured cannot be written.
+                if self.captures(channel) || value > self.kind.max {
+                    return Err(Unmodelled);
+                }
+                self.compares[channel] = value;
+            }
+            _ => return Err(Unmodelled),
+        }
+        self.expect(now);
+        self.settle(context);
+        Ok(())
+    }
+
+    fn due(&self) -> Cycles {
+        self.due
+    }
+
+    fn act(&mut self, context: &mut Context) {
+        while let Some(at) = Some(self.counter.overflow(self.top)).filter(|at| *at <= context.now) {
+            self.meet(at, context);
+            self.overflow(at, context);
+        }
+        self.meet(context.now, context);
+        self.settle(context);
+    }
+}

@@ -1,0 +1,46 @@
+//! The image that is flashed, executed on a PC against the simulated motor.
+//!
+//! ```text
+//! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features b-g431b-esc1
+//! cargo run --release -p siskin-vboard -- target/thumbv7em-none-eabihf/release/siskin-firmware
+//! ```
+//!
+//! | part | what it is |
+//! |---|---|
+//! | [`image`] | the linker's file: what is flashed where |
+//! | [`memory`] | memory that the processor and the DMA share |
+//! | [`processor`] | the Cortex-M4F: an engine that translates, one that interprets, and what an instruction costs |
+//! | [`chip`] | the STM32G431's parts, one file each, at the level of their registers |
+//! | [`board`] | the B-G431B-ESC1's resistors between the chip's pins and the bench |
+//! | [`world`] | chip and bench together: time, signals, gates, samples |
+//! | [`bridge`] | an independent check of the gates: overlap and dead time |
+//! | [`throttle`], [`serial`] | the far ends of the wires |
+//! | [`load`] | figures of the PWM interrupt |
+//! | [`machine`] | all this as the emulator's library runs it |
+//!
+//! # What is simulated how
+//! The chip is what its registers say: nothing of the firmware but its image is used. A register that is
+//! not modelled ends the run with its address and the instruction's; so does one whose part has no clock,
+//! and a clock beyond the chip's limits.
+//!
+//! Time advances by the instructions that are executed, with [an estimate of their
+//! cycles](processor#what-code-costs), and by what the parts do at their own times. Motor, inverter and
+//! supply are the emulator's; they follow the gates edge by edge, and are looked at when a converter's
+//! sampling ends. Equal inputs give equal bits.
+//!
+//! # Licence
+//! The engine that translates is QEMU's, under the GPL, version 2: so is this crate, and nothing else in
+//! the workspace links it.
+
+pub mod board;
+pub mod bridge;
+pub mod chip;
+pub mod image;
+pub mod load;
+pub mod machine;
+pub mod memory;
+pub mod processor;
+pub mod serial;
+pub mod throttle;
+pub mod time;
+pub mod world;

@@ -1,0 +1,324 @@
+//! The virtual board as a machine that the emulator's library runs: on its links, by its clock.
+
+mod faults;
+
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+use siskin_control::esc::obey;
+use siskin_control::mavlink::Request;
+use siskin_control::params::Params;
+use siskin_control::store;
+use siskin_emulator::device::Start;
+use siskin_emulator::fault::Timeline;
+use siskin_emulator::flash::{FLASH_BYTES, FileFlash, PAGE_BYTES};
+use siskin_emulator::link::LinkId;
+use siskin_emulator::machine::{Machine, Onlooker, Stopped};
+use siskin_emulator::summary::Rejected;
+use siskin_emulator::surroundings::Surroundings as Bench;
+use siskin_emulator::wire::Wire;
+
+use crate::chip::flash::{Change, Flash};
+use crate::chip::{CODE, Cause, STORE};
+use crate::image::Image;
+use crate::load::Figures;
+use crate::memory::Memory;
+use crate::processor::unicorn::Translator;
+use crate::processor::{Mapped, Processor, Stop, Surroundings};
+use crate::serial::{Mavlink, Telemetry};
+use crate::time::{ns, of_ns};
+use crate::world::{Event, World};
+
+/// All of the store, in the file's offsets.
+const ALL: std::ops::Range<u32> = 0..FLASH_BYTES as u32;
+
+/// Fast memory and SRAM, to whole pages of the engine: 2 KB more than the chip has, each.
+const CCM: (u32, usize) = (0x1000_0000, 12 * 1024);
+const SRAM: (u32, usize) = (0x2000_0000, 24 * 1024);
+
+/// MAVLink's line; the other one is the telemetry's.
+const MAVLINK: u8 = 2;
+
+/// A board with an image in its flash, by the engine that translates or another one.
+pub struct VirtualBoard<P = Translator<World>> {
+    processor: P,
+    /// Those at the start.
+    params: Params,
+    now_ns: u64,
+    locked_up: bool,
+    faults: Timeline,
+    /// Held in reset, and for want of a supply.
+    held: bool,
+    starved: bool,
+    wire: Wire,
+    flash: FileFlash,
+    mavlink: Mavlink,
+    telemetry: Telemetry,
+}
+
+impl<P: Processor<World>> VirtualBoard<P> {
+    /// A board with this image at power-up, on what `start` has; with a warning where what was stored is
+    /// not whole.
+    ///
+    /// The image knows no command line: parameters that are set over the stored ones are put into its
+    /// flash before, and are stored with the others when it stores.
+    ///
+    /// # Errors
+    /// The parameters cannot be put there.
+    pub fn new(image: &Image, start: Start) -> Result<(Self, Option<&'static str>), Stopped> {
+        let Start {
+            bench,
+            mut wire,
+            mut flash,
+            overrides,
+            faults,
+            ..
+        } = start;
+        wire.sow(bench.seed);
+        let loaded = store::load(&mut flash, ALL);
+        let warning = loaded.trouble();
+        let mut stored = bytes(&mut flash);
+        let mut kept = loaded.kept;
+        if !overrides.is_empty() {
+            for (id, value) in overrides {
+                // It was checked when it was given.
+                let _ = kept.params.set(id, value);
+            }
+            let mut other = FileFlash::in_memory();
+            obey(Request::Save, &mut other, ALL, &kept)
+                .map_err(|reason| Stopped(format!("the parameters cannot be stored: {reason}")))?;
+            stored = bytes(&mut other);
+        }
+
+        let code = Memory::new(CODE.start, CODE.len(), 0xff);
+        for segment in &image.segments {
+            code.load(segment.address, &segment.bytes);
+        }
+        let store = Memory::new(STORE.start, STORE.len(), 0xff);
+        store.load(STORE.start, &stored);
+        let rams = [CCM, SRAM].map(|(origin, bytes)| Memory::new(origin, bytes, 0));
+        let writable = |memory: &Memory| Mapped {
+            memory: memory.clone(),
+            writable: true,
+        };
+        let mapped = [
+            Mapped {
+                memory: code,
+                writable: false,
+            },
+            writable(&rams[0]),
+            writable(&rams[1]),
+        ];
+        let setpoint = image.symbol(&["exchange", "ends", "SETPOINT"]);
+        let world = World::new(
+            Flash::new(store, STORE),
+            rams.to_vec(),
+            Bench::new(bench),
+            setpoint.map(|(address, _)| address),
+        );
+        let mut processor = P::new(world, &mapped);
+        processor.reset(CODE.start);
+        let board = Self {
+            processor,
+            params: kept.params,
+            now_ns: 0,
+            locked_up: false,
+            faults: Timeline::new(faults),
+            held: false,
+            starved: false,
+            wire,
+            flash,
+            mavlink: Mavlink::default(),
+            telemetry: Telemetry::default(),
+        };
+        Ok((board, warning))
+    }
+
+    /// Chip and bench.
+    pub fn world(&mut self) -> &mut World {
+        self.processor.surroundings()
+    }
+
+    /// The processor.
+    pub fn processor(&mut self) -> &mut P {
+        &mut self.processor
+    }
+
+    /// The parameters that its flash has at the start.
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
+    /// Figures of the PWM interrupt so far.
+    pub fn figures(&mut self) -> Option<Figures> {
+        let world = self.world();
+        world.load.figures(world.now())
+    }
+
+    /// Resets the chip; the bench goes on.
+    pub fn reset(&mut self, cause: Cause) {
+        let world = self.processor.surroundings();
+        world.restart(cause);
+        if cause == Cause::Power {
+            world.forget_memory();
+        }
+        self.locked_up = false;
+        self.processor.reset(CODE.start);
+    }
+
+    /// Runs until a time.
+    fn run(&mut self, until_ns: u64) -> Result<(), Stopped> {
+        let until = of_ns(until_ns);
+        self.world().until = until;
+        while self.world().now() < until {
+            let stop = if self.locked_up || self.held {
+                self.world().idle(until);
+                Stop::Asked
+            } else {
+                self.processor.run()
+            };
+            let world = self.processor.surroundings();
+            if let Some(stopped) = world.failed.clone() {
+                return Err(stopped);
+            }
+            match stop {
+                Stop::Asked => {}
+                Stop::Reset => world.reset = Some(Cause::Software),
+                Stop::LockedUp => {
+                    world.lock_up();
+                    self.locked_up = true;
+                }
+                Stop::Unmodelled {
+                    address,
+                    pc,
+                    written,
+                } => {
+                    let what = match written {
+                        Some(value) => format!("{value:#x} is written to"),
+                        None => "what is read is".to_owned(),
+                    };
+                    return Err(Stopped(format!(
+                        "{what} {address:#010x} at pc {pc:#010x}, which is not modelled"
+                    )));
+                }
+                Stop::Undefined { pc } => {
+                    return Err(Stopped(format!(
+                        "the engine does not know the instruction at pc {pc:#010x}"
+                    )));
+                }
+            }
+            if let Some(cause) = self.world().reset.take() {
+                self.reset(cause);
+            }
+        }
+        Ok(())
+    }
+
+    /// Hands on what has happened.
+    fn tell(&mut self, onlooker: &mut impl Onlooker, send: &mut dyn FnMut(&[u8])) {
+        let world = self.processor.surroundings();
+        let now = world.now();
+        for event in std::mem::take(&mut world.happened) {
+            match event {
+                Event::Passage(t_s, passage) => onlooker.passage(t_s, &passage),
+                Event::Gates(at, leg, gate) => onlooker.gates(ns(at), leg, gate),
+                Event::Edge(at, level) => onlooker.edge(ns(at), level),
+                Event::Reply(reply) => {
+                    let datagram = reply.datagram();
+                    onlooker.answer(&datagram);
+                    self.wire.send(reply.asked_ns, &datagram);
+                }
+                Event::Byte(at, MAVLINK, byte) => self.mavlink.sent(at, byte, |frame| {
+                    onlooker.frame(ns(at), frame);
+                    send(frame);
+                }),
+                Event::Byte(at, _, byte) => self.telemetry.sent(at, byte),
+            }
+        }
+        if let Some(datagram) = self.telemetry.take(now) {
+            onlooker.answer(&datagram);
+            let asked_ns = self.processor.surroundings().throttle.frame_ns();
+            self.wire.send(asked_ns.unwrap_or(0), &datagram);
+        }
+    }
+
+    /// Puts what the chip has changed in its store into the file.
+    fn persist(&mut self) -> Result<(), Stopped> {
+        let changes = self.processor.surroundings().parts().flash.take_changes();
+        let failed =
+            |error: &dyn std::fmt::Display| Stopped(format!("--storage: {error}; free some room"));
+        let changed = !changes.is_empty();
+        for change in changes {
+            let written = match change {
+                Change::Erased { offset } => self.flash.erase(offset, offset + PAGE_BYTES as u32),
+                Change::Programmed { offset, bytes } => self.flash.write(offset, &bytes),
+            };
+            written.map_err(|error| failed(&error))?;
+        }
+        if changed {
+            self.flash.sync().map_err(|error| failed(&error))?;
+        }
+        Ok(())
+    }
+}
+
+impl<P: Processor<World>> Machine for VirtualBoard<P> {
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn is_before(&self, until_ns: u64) -> bool {
+        self.now_ns < until_ns
+    }
+
+    fn wire(&mut self) -> &mut Wire {
+        &mut self.wire
+    }
+
+    fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
+        let world = self.processor.surroundings();
+        let now = world.now();
+        let waiting = world.parts().usart2.waiting();
+        let mut frames = Vec::new();
+        self.mavlink.receive(stream, now, bytes, waiting, |frame| {
+            onlooker.frame(ns(now), frame);
+            frames.extend_from_slice(frame);
+        });
+        world.serial(&frames);
+    }
+
+    fn forget(&mut self, stream: LinkId) {
+        self.mavlink.forget(stream);
+    }
+
+    fn advance(
+        &mut self,
+        until_ns: u64,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) -> Result<(), Stopped> {
+        let world = self.processor.surroundings();
+        world.throttle.take(&mut self.wire, until_ns);
+        world.edges_come();
+        let ran = self.play(until_ns);
+        self.tell(onlooker, send);
+        self.persist()?;
+        ran
+    }
+
+    fn rejected(&self) -> Rejected {
+        let wire = self.wire.counts();
+        Rejected {
+            wire_datagrams: wire.rejected + wire.dropped,
+            // What the chip refuses it tells by MAVLink.
+            wire_frames: 0,
+            mavlink_frames: self.mavlink.refused(),
+        }
+    }
+}
+
+/// All bytes of the file.
+fn bytes(flash: &mut FileFlash) -> Vec<u8> {
+    let mut bytes = vec![0; FLASH_BYTES];
+    // All of it can be read: it is in memory.
+    let _ = flash.read(0, &mut bytes);
+    bytes
+}

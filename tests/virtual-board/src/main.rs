@@ -1,0 +1,131 @@
+//! The virtual board's command line: the linked image in real time, with the emulator's options.
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use serde::Serialize;
+use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
+use siskin_emulator::scenario::Outcome;
+use siskin_emulator::summary::Report;
+use siskin_emulator::{live, report};
+use siskin_vboard::image::Image;
+use siskin_vboard::load::Figures;
+use siskin_vboard::machine::VirtualBoard;
+
+/// The image that is flashed, on a simulated B-G431B-ESC1 that turns a simulated motor.
+#[derive(Debug, Parser)]
+#[command(name = "siskin-vboard", version)]
+struct Cli {
+    /// The linked image, an ELF file. It knows no command line: what --param, --preset and --bench set is
+    /// put into its flash before it starts, and is stored with the rest when it stores
+    image: PathBuf,
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Plays a scenario from a file, offline: one that asks for throttle, not for speed or current
+    Scenario(ScenarioArgs),
+}
+
+/// What is printed at the end as JSON.
+#[derive(Serialize)]
+struct Summary {
+    #[serde(flatten)]
+    report: Report,
+    processor: Option<Figures>,
+}
+
+/// The same of a scenario.
+#[derive(Serialize)]
+struct Played {
+    #[serde(flatten)]
+    outcome: Outcome,
+    processor: Option<Figures>,
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return options::usage("siskin-vboard", &error),
+    };
+    let ended = match &cli.command {
+        None => run(&cli),
+        Some(Command::Scenario(args)) => scenario(&cli.image, args),
+    };
+    match ended {
+        Ok(status) => status,
+        Err(line) => {
+            eprintln!("siskin-vboard: {line}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(cli: &Cli) -> Result<ExitCode, String> {
+    let args = &cli.run;
+    let line = |error: &dyn std::error::Error| error.to_string();
+    let image = Image::read(&cli.image).map_err(|error| line(&error))?;
+    let standing = args.standing().map_err(|error| line(&error))?;
+    let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
+    if let Some(warning) = warning {
+        eprintln!("siskin-vboard: {warning}");
+    }
+    let start = |start| Ok(VirtualBoard::new(&image, start)?);
+    let ended = live::run(session, start, |opened, board: &VirtualBoard| {
+        if let Some(warning) = opened.warning {
+            eprintln!("siskin-vboard: {warning}");
+        }
+        if !args.common.json {
+            // Where nobody reads it, the board runs all the same.
+            let what = "image on a virtual board";
+            let greeting = report::greeting(what, args, &standing, opened, board.params());
+            let _ = report::print(&greeting);
+        }
+    });
+    let (report, mut board) = ended.map_err(|error| line(&error))?;
+    let processor = board.figures();
+    let text = if args.common.json {
+        report::json(&Summary { report, processor })?
+    } else {
+        report::figures(&report) + &of_processor(processor)
+    };
+    report::print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn scenario(image: &Path, args: &ScenarioArgs) -> Result<ExitCode, String> {
+    let image = Image::read(image).map_err(|error| error.to_string())?;
+    let line = |error| format!("{}: {error}", args.file.display());
+    let plan = args.plan().map_err(line)?;
+    if args.seeds.is_some() || plan.runs() > 1 {
+        let what = "the scenario has several runs; give --seed N and --set KEY=VALUE for one";
+        return Err(format!("{}: {what}", args.file.display()));
+    }
+    let mut processor = None;
+    let start = |start| Ok(VirtualBoard::new(&image, start)?);
+    let played = plan.play_on(start, |mut board: VirtualBoard| processor = board.figures());
+    let outcome = played.map_err(line)?;
+    let held = outcome.held();
+    let text = if args.common.json {
+        report::json(&Played { outcome, processor })?
+    } else {
+        let of_outcome = report::figures(&outcome.report) + &report::verdicts(&outcome);
+        of_outcome + &of_processor(processor)
+    };
+    report::print(&text)?;
+    Ok(if held {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(1)
+    })
+}
+
+fn of_processor(figures: Option<Figures>) -> String {
+    figures.map_or_else(String::new, |figures| figures.to_string())
+}

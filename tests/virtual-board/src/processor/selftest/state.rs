@@ -1,0 +1,137 @@
+//! What an engine tells of itself, and that it goes on where it was.
+
+use std::iter::repeat_n;
+
+use super::super::Register;
+use super::{Bed, Processor, RAM, STACK, Stop, assemble, marks, on_every_engine, run};
+
+on_every_engine!(
+    its_registers_can_be_read,
+    instructions_are_counted,
+    it_goes_on_where_it_was,
+    code_that_the_program_writes_is_executed,
+    code_that_is_changed_from_outside_is_executed,
+);
+
+fn its_registers_can_be_read<P: Processor<Bed>>() {
+    let program = "
+        main: mov32 r0, 0x20000800
+        msr psp, r0
+        mov r0, #0x60
+        msr basepri, r0
+        cpsid i
+        mov r0, #0x100
+        mov r8, #0x108
+        mov r12, #0x10c
+        mov32 lr, 0x1010f
+        push {r0, r1}
+        mov32 r1, 0x60000000
+        msr apsr, r1
+        b stop
+    ";
+    let ran = run::<P>(program);
+    let wanted = [
+        (Register::R(0), 0x100),
+        (Register::R(8), 0x108),
+        (Register::R(10), super::BED),
+        (Register::R(12), 0x10c),
+        (Register::Sp, STACK - 8),
+        (Register::Lr, 0x1010f),
+        (Register::Pc, ran.code.labels["halt"]),
+        (Register::Xpsr, 0x6100_0000),
+        (Register::Msp, STACK - 8),
+        (Register::Psp, RAM + 0x800),
+        (Register::Primask, 1),
+        (Register::Basepri, 0x60),
+        (Register::Control, 0),
+    ];
+    for (register, value) in wanted {
+        let found = ran.processor.register(register);
+        assert_eq!(found, value, "{register:?}: {found:#x}");
+    }
+}
+
+fn instructions_are_counted<P: Processor<Bed>>() {
+    let count = |program: &str| run::<P>(program).processor.instructions();
+    let straight: String = repeat_n("nop\n", 300).collect();
+    let base = count("main: mov r0, #0\nb stop");
+    assert_eq!(
+        count(&format!("main: mov r0, #0\n{straight}b stop")),
+        base + 300
+    );
+    // 100 turns of a loop; those that a condition holds back count too.
+    let turns = "
+        main: mov r0, #100
+        turn: subs r0, #1
+        ite eq
+        mov r1, #1
+        mov r1, #2
+        cmp r0, #0
+        bne turn
+        b stop
+    ";
+    assert_eq!(count(turns), base + 600);
+}
+
+fn it_goes_on_where_it_was<P: Processor<Bed>>() {
+    let program = "
+        main: mark #1
+        str r0, [r10, #4]
+        sync
+        mark #2
+        b stop
+    ";
+    let mut ran = run::<P>(program);
+    assert_eq!(ran.stop, Stop::Asked);
+    assert_eq!(ran.processor.surroundings().marks, [1]);
+    ran.processor.surroundings().stopped = false;
+    assert_eq!(ran.processor.run(), Stop::Asked);
+    assert_eq!(ran.processor.surroundings().marks, [1, 2]);
+}
+
+fn code_that_the_program_writes_is_executed<P: Processor<Bed>>() {
+    let program = "
+        main: mov32 r4, 0x20000101
+        mov32 r5, 0x20000100
+        mov32 r0, 0x47703001    ; adds r0, #1; bx lr
+        str r0, [r5]
+        dsb
+        isb
+        mov r0, #0x10
+        blx r4
+        str r0, [r10]
+        mov32 r0, 0x47703801    ; subs r0, #1; bx lr
+        str r0, [r5]
+        dsb
+        isb
+        mov r0, #0x10
+        blx r4
+        str r0, [r10]
+        b stop
+    ";
+    assert_eq!(marks::<P>(program), [0x11, 0xf]);
+}
+
+fn code_that_is_changed_from_outside_is_executed<P: Processor<Bed>>() {
+    let program = "
+        main: mov32 r4, 0x20000101
+        mov32 r5, 0x20000100
+        mov32 r0, 0x47703001    ; adds r0, #1; bx lr
+        str r0, [r5]
+        dsb
+        isb
+        turn: mov r0, #0x10
+        blx r4
+        str r0, [r10]
+        str r0, [r10, #4]
+        b turn
+    ";
+    let mut ran = run::<P>(program);
+    assert_eq!(ran.processor.surroundings().marks, [0x11]);
+    let code = assemble("subs r0, #2\nbx lr", 0).bytes;
+    ran.ram.load(RAM + 0x100, &code);
+    ran.processor.forget_code(RAM + 0x100..RAM + 0x104);
+    ran.processor.surroundings().stopped = false;
+    assert_eq!(ran.processor.run(), Stop::Asked);
+    assert_eq!(ran.processor.surroundings().marks, [0x11, 0xe]);
+}

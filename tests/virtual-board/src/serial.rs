@@ -1,0 +1,111 @@
+//! The serial lines' far ends: MAVLink's, which all links share, and the telemetry's.
+
+use std::collections::BTreeMap;
+
+use siskin_control::answer::{info, kiss};
+use siskin_control::mavlink::Receiver;
+use siskin_emulator::link::LinkId;
+
+use crate::time::{CLOCK_HZ, Cycles, ns};
+
+/// Bytes that may wait for the line, of all links: more is lost whole frame by whole frame, as by a
+/// radio. 0.7 s at 57600 baud.
+const WAITING_MAX: usize = 4096;
+
+/// Byte 0 of a datagram with KISS telemetry, and of one with the ESC's information.
+const KISS: u8 = 30;
+const INFO: u8 = 31;
+
+/// The MAVLink line: frames from any link go to the chip one after the other, and what it sends goes to
+/// all of them.
+#[derive(Default)]
+pub struct Mavlink {
+    /// What each link has sent so far of a frame.
+    links: BTreeMap<LinkId, Receiver>,
+    /// What the chip has sent of one.
+    chip: Receiver,
+    /// Refused on links that are gone.
+    refused: u64,
+}
+
+impl Mavlink {
+    /// Bytes from a link. Whole frames go to `forward`, unless too many bytes wait already.
+    pub fn receive(
+        &mut self,
+        stream: LinkId,
+        now: Cycles,
+        bytes: &[u8],
+        mut waiting: usize,
+        mut forward: impl FnMut(&[u8]),
+    ) {
+        let receiver = self.links.entry(stream).or_default();
+        receiver.push(ns(now) / 1000, bytes, |frame| {
+            if waiting + frame.raw.len() <= WAITING_MAX {
+                waiting += frame.raw.len();
+                forward(frame.raw);
+            }
+        });
+    }
+
+    /// A link that has ended.
+    pub fn forget(&mut self, stream: LinkId) {
+        if let Some(receiver) = self.links.remove(&stream) {
+            self.refused += refused(&receiver);
+        }
+    }
+
+    /// A byte from the chip; a frame that is whole with it goes to `send`.
+    pub fn sent(&mut self, now: Cycles, byte: u8, mut send: impl FnMut(&[u8])) {
+        self.chip
+            .push(ns(now) / 1000, &[byte], |frame| send(frame.raw));
+    }
+
+    /// Frames of the links that were refused.
+    pub fn refused(&self) -> u64 {
+        self.refused + self.links.values().map(refused).sum::<u64>()
+    }
+}
+
+fn refused(receiver: &Receiver) -> u64 {
+    let counters = receiver.counters();
+    [
+        counters.bad_checks,
+        counters.incompatible,
+        counters.unknown,
+        counters.incomplete,
+    ]
+    .map(u64::from)
+    .iter()
+    .sum()
+}
+
+/// The telemetry's line: frames end with a quiet time.
+#[derive(Debug, Default)]
+pub struct Telemetry {
+    bytes: Vec<u8>,
+    last: Cycles,
+}
+
+impl Telemetry {
+    /// A byte of the chip.
+    pub fn sent(&mut self, now: Cycles, byte: u8) {
+        self.bytes.push(byte);
+        self.last = now;
+    }
+
+    /// The datagram of a frame that has ended by now.
+    pub fn take(&mut self, now: Cycles) -> Option<Vec<u8>> {
+        // Three bytes at 115200 baud.
+        let quiet = CLOCK_HZ * 30 / 115_200;
+        if self.bytes.is_empty() || now - self.last < quiet {
+            return None;
+        }
+        let bytes = std::mem::take(&mut self.bytes);
+        let code = match bytes.len() {
+            kiss::BYTES => KISS,
+            info::BYTES => INFO,
+            _ => return None,
+        };
+        Some([&[code], bytes.as_slice()].concat())
+    }
+}

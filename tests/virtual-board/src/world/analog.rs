@@ -1,0 +1,206 @@
+//! The bench at the chip's pins: gates out; currents, voltages and comparators in.
+
+use siskin_emulator::plant::Gate;
+use siskin_emulator::surroundings::Surroundings as Bench;
+use stm32_metapac::gpio::vals::Moder;
+
+use super::{Event, World};
+use crate::board::{self, Outside};
+use crate::bridge::Bridge;
+use crate::chip::Context;
+use crate::time::{CLOCK_HZ, Cycles, seconds};
+
+/// Without PWM the bench comes to an end of a period so often.
+const IDLE_PERIOD: Cycles = CLOCK_HZ / 1000;
+
+/// The least dead time that the bridge's transistors take: 0.2 µs, in cycles.
+const DEAD_TIME: Cycles = CLOCK_HZ / 5_000_000;
+
+/// The gates' pins with the alternate functions at which TIM1 has them: high sides, low sides (data
+/// sheet, table 13).
+const GATE_PINS: [[((u8, u8), u8); 2]; 3] = [
+    [((0, 8), 6), ((2, 13), 4)],
+    [((0, 9), 6), ((0, 12), 6)],
+    [((0, 10), 6), ((1, 15), 4)],
+];
+
+/// The Hall sensors' pins.
+const HALL_PINS: [(u8, u8); 3] = [(1, 6), (1, 7), (1, 8)];
+
+/// The comparators that may break.
+const COMPARATORS: [u8; 3] = [1, 2, 4];
+
+/// The bench with where it is in time.
+pub(super) struct Coupling {
+    pub(super) bench: Bench,
+    pub(super) bridge: Bridge,
+    gates: [Gate; 3],
+    /// Up to here the bench has been simulated.
+    at: Cycles,
+    /// When its period began.
+    began: Cycles,
+    /// What the comparators tell the timer.
+    breaks: bool,
+    /// When they last began to ask for a break.
+    pub(super) tripped: Option<Cycles>,
+}
+
+impl Coupling {
+    pub(super) fn new(bench: Bench) -> Self {
+        Self {
+            bench,
+            bridge: Bridge::new(DEAD_TIME),
+            gates: [Gate::default(); 3],
+            at: 0,
+            began: 0,
+            breaks: false,
+            tripped: None,
+        }
+    }
+
+    /// When a period of the bench ends without PWM.
+    pub(super) fn due(&self) -> Cycles {
+        self.began + IDLE_PERIOD
+    }
+
+    /// Takes the bench to a time.
+    fn reach(&mut self, now: Cycles) {
+        if now > self.at {
+            self.bench.stretch(self.gates, seconds(now - self.at));
+            self.at = now;
+        }
+    }
+}
+
+impl World {
+    /// Takes the bench to the present, and lets the comparators look at it.
+    fn reach(&mut self) {
+        self.coupling.reach(self.now);
+        let [first, second, third] = self.parts.tim1.break_comparators();
+        let may = [first, second, third];
+        if may == [false; 3] && !self.coupling.breaks {
+            return;
+        }
+        let outside = self.outside();
+        let parts = &mut self.parts;
+        let mut breaks = false;
+        for (number, may) in COMPARATORS.into_iter().zip(may) {
+            let volts = parts
+                .comparators
+                .pin(number)
+                .and_then(|pin| outside.volts(pin));
+            let trips =
+                volts.is_some_and(|volts| parts.comparators.level(number, volts, &parts.dac));
+            breaks |= may && trips;
+        }
+        if breaks != self.coupling.breaks {
+            self.coupling.breaks = breaks;
+            if breaks {
+                self.coupling.tripped = Some(self.now);
+            }
+            let mut context = Context {
+                now: self.now,
+                signals: &mut self.signals,
+            };
+            self.parts.tim1.set_break(breaks, &mut context);
+        }
+    }
+
+    /// What the sensors are at now, before any noise.
+    fn outside(&self) -> Outside {
+        let truth = self.coupling.bench.truth();
+        // Only a low side that conducts has a current in its shunt; out of the motor it comes down.
+        let shunt_a = |leg: usize| truth.low_s[leg].map_or(0.0, |_| -truth.currents_a[leg]);
+        let (port, pin) = board::DIVIDERS_GROUND;
+        let ground = &self.parts.ports[usize::from(port)];
+        Outside {
+            shunts_a: [0, 1, 2].map(shunt_a),
+            terminals_v: truth.terminals_v,
+            bus_v: truth.bus_v,
+            temperature_c: self.coupling.bench.sensor_c(),
+            grounded: ground.mode(pin) == Moder::OUTPUT && !ground.level(pin),
+        }
+    }
+
+    /// A leg's gates change, as far as the timer's outputs reach the pins.
+    pub(super) fn gates(&mut self, leg: usize, high: bool, low: bool) {
+        let reaches = |((port, pin), function): ((u8, u8), u8)| {
+            self.parts.ports[usize::from(port)].alternate(pin) == Some(function)
+        };
+        let [of_high, of_low] = GATE_PINS[leg];
+        let gate = Gate {
+            high: high && reaches(of_high),
+            low: low && reaches(of_low),
+        };
+        self.set_gate(leg, gate);
+    }
+
+    /// The pull-downs of the gates act.
+    pub(super) fn gates_off(&mut self) {
+        for leg in 0..3 {
+            self.set_gate(leg, Gate::default());
+        }
+    }
+
+    fn set_gate(&mut self, leg: usize, gate: Gate) {
+        if self.coupling.gates[leg] != gate {
+            self.reach();
+            self.coupling.gates[leg] = gate;
+            let Gate { high, low } = gate;
+            self.coupling.bridge.gates(leg, high, low, self.now);
+            self.happened.push(Event::Gates(self.now, leg, gate));
+        }
+    }
+
+    /// The PWM timer has triggered the converters: a period ends and the next begins.
+    pub(super) fn trigger(&mut self) {
+        self.end_period();
+        self.load.duties(self.now);
+        let hall = self.coupling.bench.hall();
+        for (phase, (port, pin)) in HALL_PINS.into_iter().enumerate() {
+            self.parts.ports[usize::from(port)].set_input(pin, Some(hall >> phase & 1 != 0));
+        }
+        let mut context = Context {
+            now: self.now,
+            signals: &mut self.signals,
+        };
+        self.parts.converters.trigger(&mut context);
+    }
+
+    /// A period of the bench ends, by the PWM or since there is none.
+    pub(super) fn end_period(&mut self) {
+        self.reach();
+        let coupling = &mut self.coupling;
+        if let Some(passage) = coupling.bench.end_period() {
+            let began_s = seconds(coupling.began);
+            self.happened.push(Event::Passage(began_s, passage));
+        }
+        coupling.began = self.now;
+    }
+
+    /// A converter's sampling ends.
+    pub(super) fn sample(&mut self, converter: u8, channel: u8) {
+        self.reach();
+        let volts = self.volts(converter, channel).unwrap_or(0.0);
+        self.parts.converters.sampled(converter, volts);
+    }
+
+    /// The voltage at a converter's channel.
+    fn volts(&mut self, converter: u8, channel: u8) -> Option<f64> {
+        let outside = self.outside();
+        let Some(which) = self.parts.op_amps.at(converter, channel) else {
+            return outside.volts(board::pin(converter, channel)?);
+        };
+        let pin = self.parts.op_amps.pin(which)?;
+        let shunts = board::SHUNTS.iter();
+        let leg = shunts.enumerate().find(|(_, shunt)| **shunt == pin)?.0;
+        // What the amplifier shows, with its settling, its errors and its noise.
+        let mut shunts_a = outside.shunts_a;
+        shunts_a[leg] = -self.coupling.bench.shown_a(leg);
+        let shown = Outside {
+            shunts_a,
+            ..outside
+        };
+        self.parts.op_amps.output(which, shown.volts(pin)?)
+    }
+}

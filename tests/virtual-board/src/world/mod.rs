@@ -1,0 +1,436 @@
+//! Chip and bench together, as the processor stands in them.
+//!
+//! Time moves from one thing that happens to the next: a part of the chip that is due, an edge on the
+//! throttle wire. What parts tell each other goes through `signals`; the bench follows the gates edge
+//! by edge, and is looked at where a converter samples (`analog`).
+
+mod analog;
+mod signals;
+
+use siskin_emulator::machine::Stopped;
+use siskin_emulator::plant::Gate;
+use siskin_emulator::surroundings::{Passage, Surroundings as Bench};
+
+use crate::bridge::Bridge;
+use crate::chip::flash::Flash;
+use crate::chip::parts::Parts;
+use crate::chip::rcc::Supply;
+use crate::chip::{Cause, Context, Part, STORE, Signal, UNIQUE_ID};
+use crate::load::Load;
+use crate::memory::Memory;
+use crate::processor::{BusError, HandlerEvent, Lines, Surroundings, Width};
+use crate::throttle::{Reply, Throttle};
+use crate::time::{CLOCK_HZ, Cycles};
+use analog::Coupling;
+
+/// The interrupt at the converters' end, by its position in the vector table.
+const CONVERTED: u16 = 18;
+
+/// The first exception that is an interrupt.
+const INTERRUPTS: u16 = 16;
+
+/// Reserved up to the SRAM (RM0440, table 3): a stack that leaves its memory comes there.
+const RESERVED: std::ops::Range<u32> = 0x1fff_8000..0x2000_0000;
+
+/// The processor's clock after a reset: the internal oscillator.
+const RESET_HZ: u64 = 16_000_000;
+
+/// The chip's number, as a serial one has it: its text's bytes.
+const ID: [u32; 3] = [0x5156_0001, 0x3143_5307, 0x2038_3153];
+
+/// What has happened, for those who look on.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// A period of the PWM that began at a time, s.
+    Passage(f64, Passage),
+    /// A leg's gates changed.
+    Gates(Cycles, usize, Gate),
+    /// The throttle wire's level changed, whoever drove it.
+    Edge(Cycles, bool),
+    /// The chip has replied on the throttle wire.
+    Reply(Reply),
+    /// A serial line, by its number, has sent a byte.
+    Byte(Cycles, u8, u8),
+}
+
+/// The chip on its bench.
+pub struct World {
+    now: Cycles,
+    /// When something happens by itself next.
+    next: Cycles,
+    /// When the run stops.
+    pub(crate) until: Cycles,
+    /// A cycle of the processor, in eighths of one of the 170 MHz; and what of one is over.
+    eighths: u64,
+    rest: u64,
+    lines: Lines,
+    parts: Parts,
+    memories: Vec<Memory>,
+    signals: Vec<Signal>,
+    coupling: Coupling,
+    pub(crate) throttle: Throttle,
+    pub(crate) happened: Vec<Event>,
+    /// Why the chip was reset, if it was.
+    pub(crate) reset: Option<Cause>,
+    /// What cannot go on.
+    pub(crate) failed: Option<Stopped>,
+    /// Figures of the PWM interrupt.
+    pub load: Load,
+    /// Where the image has its set-point's word, if that is known.
+    setpoint_at: Option<u32>,
+    /// What looks at each control period's beginning and end.
+    probe: Option<Probe>,
+}
+
+/// Who looks on at each control period.
+type Probe = Box<dyn FnMut(Moment, &Probed)>;
+
+/// A moment of the control interrupt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moment {
+    /// It is entered.
+    Entered,
+    /// It has returned.
+    Left,
+}
+
+/// What a probe may look at.
+pub struct Probed<'a> {
+    /// The chip's parts.
+    pub parts: &'a Parts,
+    /// SRAM and CCM.
+    pub memories: &'a [Memory],
+    /// The time.
+    pub now: Cycles,
+}
+
+impl Probed<'_> {
+    /// Bytes of the memory.
+    pub fn bytes(&self, address: u32, count: u32) -> Option<Vec<u8>> {
+        let mut memories = self.memories.iter();
+        let memory = memories.find(|memory| memory.holds(address, count))?;
+        Some(memory.bytes(address, count as usize))
+    }
+
+    /// What the injected sequences of the two converters have read, by rank.
+    pub fn injected(&self) -> [[u16; 4]; 2] {
+        self.parts.converters.injected()
+    }
+
+    /// The levels at the pins of port B.
+    pub fn port_b(&self) -> u32 {
+        self.parts.ports[1].input()
+    }
+
+    /// TIM1's compare values of the legs, as they were written.
+    pub fn compares(&self) -> [u16; 3] {
+        self.parts.tim1.compares()
+    }
+
+    /// Whether TIM1's break has turned the bridge off (BIF), and whether the main output is on (MOE).
+    pub fn broken_and_on(&self) -> (bool, bool) {
+        self.parts.tim1.broken_and_on()
+    }
+}
+
+impl World {
+    /// A chip with this flash and these memories on its bench, at power-up.
+    pub fn new(
+        flash: Flash,
+        memories: Vec<Memory>,
+        bench: Bench,
+        setpoint_at: Option<u32>,
+    ) -> Self {
+        let mut world = Self {
+            now: 0,
+            next: 0,
+            until: 0,
+            eighths: 8 * CLOCK_HZ / RESET_HZ,
+            rest: 0,
+            lines: Lines::default(),
+            parts: Parts::new(flash),
+            memories,
+            signals: Vec::new(),
+            coupling: Coupling::new(bench),
+            throttle: Throttle::default(),
+            happened: Vec::new(),
+            reset: None,
+            failed: None,
+            load: Load::default(),
+            setpoint_at,
+            probe: None,
+        };
+        world.forget_memory();
+        world.settle();
+        world
+    }
+
+    /// Lets a closure look on at each control period.
+    pub fn probe(&mut self, probe: impl FnMut(Moment, &Probed) + 'static) {
+        self.probe = Some(Box::new(probe));
+    }
+
+    /// The chip is reset: its gates are off, and all but flash, RAM and what keeps the cause is as at
+    /// power-up.
+    pub fn restart(&mut self, cause: Cause) {
+        let mut context = Context {
+            now: self.now,
+            signals: &mut self.signals,
+        };
+        self.parts.reset(cause, &mut context);
+        self.signals.clear();
+        self.lines = Lines::default();
+        self.eighths = 8 * CLOCK_HZ / RESET_HZ;
+        self.gates_off();
+        self.throttle.drive(self.now, None);
+        self.settle();
+    }
+
+    /// What memory held is lost: it is nobody's.
+    pub fn forget_memory(&mut self) {
+        let mut state = 1_u32;
+        for cell in self.memories.iter().flat_map(Memory::cells) {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            cell.set((state >> 24) as u8);
+        }
+    }
+
+    /// The processor has locked up.
+    pub fn lock_up(&mut self) {
+        if self.parts.syscfg.lock_up_breaks() {
+            let mut context = Context {
+                now: self.now,
+                signals: &mut self.signals,
+            };
+            self.parts.tim1.set_break(true, &mut context);
+            self.settle();
+        }
+    }
+
+    /// The chip's parts.
+    pub fn parts(&mut self) -> &mut Parts {
+        &mut self.parts
+    }
+
+    /// SRAM and CCM.
+    pub fn memories(&self) -> &[Memory] {
+        &self.memories
+    }
+
+    /// The bench.
+    pub fn bench(&mut self) -> &mut Bench {
+        &mut self.coupling.bench
+    }
+
+    /// The independent check of the gates.
+    pub fn bridge(&self) -> &Bridge {
+        &self.coupling.bridge
+    }
+
+    /// When a comparator last began to ask for a break, if one ever did.
+    pub fn tripped(&self) -> Option<Cycles> {
+        self.coupling.tripped
+    }
+
+    /// Bytes come in on MAVLink's line.
+    pub fn serial(&mut self, bytes: &[u8]) {
+        self.parts.usart2.queue(bytes, self.now);
+        self.settle();
+    }
+
+    /// Edges were added to the throttle wire.
+    pub fn edges_come(&mut self) {
+        self.settle();
+    }
+
+    /// Lets time pass without a processor.
+    pub fn idle(&mut self, until: Cycles) {
+        while self.now < until && self.reset.is_none() {
+            let next = self.next.min(until);
+            self.go(next);
+        }
+    }
+
+    /// Comes to a time, with all that happens until then.
+    fn go(&mut self, target: Cycles) {
+        while self.next <= target {
+            self.now = self.now.max(self.next);
+            let mut context = Context {
+                now: self.now,
+                signals: &mut self.signals,
+            };
+            self.parts.act(&mut context);
+            if self.throttle.due() <= self.now {
+                self.edge();
+            }
+            if self.coupling.due() <= self.now {
+                self.end_period();
+            }
+            self.settle();
+        }
+        self.now = self.now.max(target);
+    }
+
+    /// Deals with what parts have told, and finds out what happens next.
+    fn settle(&mut self) {
+        self.deal();
+        let of_bench = self.coupling.due();
+        self.next = self.parts.due().min(self.throttle.due()).min(of_bench);
+    }
+
+    /// The processor's clock may have changed.
+    fn reclock(&mut self) {
+        let supply = Supply {
+            boost: self.parts.pwr.boost(),
+            wait_states: self.parts.flash.wait_states(),
+        };
+        match self.parts.rcc.clock_hz(supply) {
+            Ok(hz) => self.eighths = (8 * CLOCK_HZ).div_ceil(hz.max(1)),
+            Err(error) => self.fail(&error),
+        }
+        self.parts.rcc.open_backup(self.parts.pwr.backup_open());
+    }
+
+    fn fail(&mut self, error: &dyn std::fmt::Display) {
+        let at_ms = 1e3 * crate::time::seconds(self.now);
+        let stopped = || Stopped(format!("the chip at {at_ms:.3} ms: {error}"));
+        self.failed.get_or_insert_with(stopped);
+    }
+
+    fn access<T>(
+        &mut self,
+        address: u32,
+        access: impl FnOnce(&mut dyn Part, u32, &mut Context) -> Result<T, crate::chip::Unmodelled>,
+    ) -> Result<T, BusError> {
+        if self.parts.at(address).is_some() && !self.parts.rcc.has_clock(address) {
+            self.fail(&format_args!(
+                "a register at {address:#010x}, whose part has no clock (RCC's enable registers), is used"
+            ));
+            return Err(BusError::Unmodelled);
+        }
+        let mut context = Context {
+            now: self.now,
+            signals: &mut self.signals,
+        };
+        let (part, offset) = self.parts.at(address).ok_or(BusError::Unmodelled)?;
+        access(part, offset & !3, &mut context).map_err(|_| BusError::Unmodelled)
+    }
+}
+
+impl Surroundings for World {
+    fn now(&self) -> Cycles {
+        self.now
+    }
+
+    fn read(&mut self, address: u32, width: Width) -> Result<u32, BusError> {
+        if RESERVED.contains(&address) {
+            return Err(BusError::Nothing);
+        }
+        let shift = 8 * (address & 3);
+        let value = if STORE.contains(&address) {
+            let mut context = Context {
+                now: self.now,
+                signals: &mut self.signals,
+            };
+            let value = self.parts.flash.array_read(address, width, &mut context);
+            self.settle();
+            return value.map_err(|_| BusError::Unmodelled);
+        } else if UNIQUE_ID.contains(&address) {
+            ID[((address - UNIQUE_ID.start) / 4) as usize]
+        } else {
+            let value = self.access(address, |part, offset, context| part.read(offset, context))?;
+            self.settle();
+            value
+        };
+        Ok(match width {
+            Width::Byte => value >> shift & 0xff,
+            Width::Half => value >> shift & 0xffff,
+            Width::Word => value,
+        })
+    }
+
+    fn write(&mut self, address: u32, width: Width, value: u32) -> Result<(), BusError> {
+        if RESERVED.contains(&address) {
+            return Err(BusError::Nothing);
+        }
+        if address & 3 != 0 {
+            return Err(BusError::Unmodelled);
+        }
+        if STORE.contains(&address) {
+            let mut context = Context {
+                now: self.now,
+                signals: &mut self.signals,
+            };
+            let written = self
+                .parts
+                .flash
+                .array_write(address, width, value, &mut context);
+            self.settle();
+            return written.map_err(|_| BusError::Unmodelled);
+        }
+        self.access(address, |part, offset, context| {
+            part.write(offset, value, context)
+        })?;
+        // RCC, the flash's wait states and the supply of the core.
+        if matches!(address >> 12, 0x4_0021 | 0x4_0022 | 0x4_0007) {
+            self.reclock();
+        }
+        self.offer_requests();
+        self.settle();
+        Ok(())
+    }
+
+    fn pass(&mut self, cycles: Cycles) {
+        let eighths = cycles * self.eighths + self.rest;
+        self.rest = eighths % 8;
+        let target = self.now + eighths / 8;
+        if self.next <= target {
+            self.go(target);
+        } else {
+            self.now = target;
+        }
+    }
+
+    fn next(&self) -> Cycles {
+        self.next.min(self.until)
+    }
+
+    fn lines(&self) -> &Lines {
+        &self.lines
+    }
+
+    fn asks_to_stop(&self) -> bool {
+        self.now >= self.until || self.reset.is_some() || self.failed.is_some()
+    }
+
+    fn flash_busy_until(&self) -> Cycles {
+        self.parts.flash.busy_until()
+    }
+
+    fn flash_prefetches(&self) -> bool {
+        self.parts.flash.prefetches()
+    }
+
+    fn exception(&mut self, passage: &HandlerEvent) {
+        if passage.exception != INTERRUPTS + CONVERTED {
+            return;
+        }
+        let instructions = passage.instructions;
+        let moment = if passage.entered {
+            self.load.entered(self.now, instructions, passage.since);
+            self.hear();
+            Moment::Entered
+        } else {
+            self.load.left(self.now, instructions);
+            Moment::Left
+        };
+        if let Some(probe) = &mut self.probe {
+            let probed = Probed {
+                parts: &self.parts,
+                memories: &self.memories,
+                now: self.now,
+            };
+            probe(moment, &probed);
+        }
+    }
+}

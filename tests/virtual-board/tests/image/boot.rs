@@ -1,0 +1,60 @@
+//! The image starts, speaks on its serial port, and runs alike each time. Run with `--release`.
+
+use std::hash::Hasher;
+
+use crate::common::{Board, MS, Throttle, image};
+use siskin_vboard::processor::Processor;
+use siskin_vboard::world::World;
+
+/// 115200 baud as the 170 MHz divide to: bits of eight data bits, start and stop.
+const BYTE_NS: u64 = 10 * 1_000_000_000 / 115_200;
+
+#[test]
+fn it_starts_and_answers() {
+    let mut board = Board::new(&image(), &[]);
+    board.run(2_300 * MS);
+    let beats = board.heard.heartbeats();
+    println!(
+        "heartbeats at {beats:?} ns, texts {:?}",
+        board.heard.texts()
+    );
+    assert!(beats.len() >= 2, "{beats:?}");
+    for two in beats.windows(2) {
+        assert!((two[1] - two[0]).abs_diff(1000 * MS) < 20 * MS, "{beats:?}");
+    }
+    let texts = board.heard.texts();
+    let greets = |text: &String| text.starts_with("Siskin ESC ") && text.ends_with("b-g431b-esc1");
+    assert!(texts.len() == 1 && texts.iter().all(greets), "{texts:?}");
+    // What a frame of 20 bytes takes on the line, and some ms of telemetry before it.
+    let (value, took_ns) = board.param("LIM_PHASE_A", 100 * MS).expect("an answer");
+    println!("parameter after {took_ns} ns");
+    assert_eq!(value, 20.0);
+    assert!(took_ns > 20 * BYTE_NS * 2);
+    let bridge = board.world().bridge();
+    assert_eq!((bridge.violations(), bridge.is_off()), (0, true));
+    let figures = board.board.figures().expect("the control runs");
+    // 24 kHz, but for the start.
+    assert!((50_000..=55_200).contains(&figures.interrupts), "{figures}");
+}
+
+/// Runs with the motor and MAVLink; what came of it.
+fn run() -> (u64, u64, u64) {
+    let mut board = Board::turning(&image());
+    board.param("MOT_KV", 100 * MS).expect("an answer");
+    board.throttle = Throttle::Dshot(700);
+    board.run(100 * MS);
+    let instructions = Processor::<World>::instructions(board.board.processor());
+    (
+        instructions,
+        board.world().bridge().edges(),
+        board.heard.hash.finish(),
+    )
+}
+
+#[test]
+fn equal_inputs_give_equal_bits() {
+    let first = run();
+    println!("instructions, edges, hash: {first:?}");
+    assert!(first.0 > 10_000_000 && first.1 > 10_000, "{first:?}");
+    assert_eq!(first, run());
+}

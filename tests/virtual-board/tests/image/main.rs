@@ -1,0 +1,25 @@
+//! The image that is flashed, on the virtual board. Run with `--release`.
+//!
+//! | module | what it shows |
+//! |---|---|
+//! | [`boot`] | it starts, answers by MAVLink, and two runs are equal |
+//! | [`throttle`] | DShot and pulses turn the motor, and each frame is answered at its time |
+//! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
+//! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
+//! | [`engines`] | the interpreting engine does what the translating one does |
+//! | [`agreement`] | the control's state and the motor are those of the emulator |
+//!
+//! The image is `SISKIN_IMAGE`, else what this makes:
+//!
+//! ```text
+//! cargo run --release -p siskin -- image --board b-g431b-esc1 --output target/images
+//! ```
+#![forbid(unsafe_code)]
+
+mod agreement;
+mod boot;
+mod common;
+mod engines;
+mod failures;
+mod storage;
+mod throttle;

@@ -1,0 +1,104 @@
+//! The motor turns by what the flight controller sends, and its replies tell the speed. Run with `--release`.
+
+use crate::common::{Board, MS, Throttle, image};
+use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
+use siskin_control::answer::{REPLY_DELAY_NS, gcr};
+
+/// The period that a reply tells, µs: `eeemmmmmmmmm`, m·2^e; none for a shaft that stands.
+fn period_us(bits: u32) -> Option<u32> {
+    let data = gcr::decode(bits).expect("a reply that decodes");
+    (data != 0xfff).then(|| u32::from(data & 0x1ff) << (data >> 9))
+}
+
+/// Looks at the replies of a time: each frame has one, at its time, with the plant's speed.
+fn answered(board: &mut Board, for_ns: u64) {
+    let pole_pairs = f64::from(board.world().bench().bench().motor.pole_pairs);
+    let (played, replied) = (board.played, board.heard.replies.len());
+    board.run(for_ns);
+    // The last one's reply may still be on the wire.
+    board.run(MS / 10);
+    let frames = board.played - played;
+    let replies = board.heard.replies[replied..].to_vec();
+    let times = replies.iter().map(|reply| reply.after_ns);
+    println!(
+        "{} frames, {} replies, {:?} to {:?} ns after the frame",
+        frames,
+        replies.len(),
+        times.clone().min(),
+        times.clone().max()
+    );
+    assert!(replies.len().abs_diff(frames) <= 1);
+    for after_ns in times {
+        assert!(after_ns.abs_diff(REPLY_DELAY_NS) <= 2_000, "{after_ns} ns");
+    }
+    for reply in &replies {
+        period_us(reply.bits);
+    }
+    let told_us = replies.last().and_then(|reply| period_us(reply.bits));
+    let told = 60e6 / f64::from(told_us.expect("it turns"));
+    let turns = board.rpm() * pole_pairs;
+    // A word has 8 bits or 9; the control's estimate strays by some tenths of a percent.
+    assert!((told / turns - 1.0).abs() < 0.02, "{told} of {turns} eRPM");
+}
+
+#[test]
+fn each_frame_is_answered_at_its_time() {
+    let mut board = Board::new(&image(), &[]);
+    board.spin_up();
+    board.run(1_000 * MS);
+    answered(&mut board, 200 * MS);
+    board.heard.frames.clear();
+    let Throttle::Dshot(_) = board.throttle else {
+        panic!("it is driven by DShot");
+    };
+    let (target_system, target_component) = (board.heard.from.system, board.heard.from.component);
+    board.send(&PARAM_REQUEST_LIST_DATA {
+        target_system,
+        target_component,
+    });
+    answered(&mut board, 300 * MS);
+    let values = board.heard.messages::<PARAM_VALUE_DATA>();
+    println!("{} values meanwhile", values.len());
+    assert!(values.len() > 20, "{}", values.len());
+}
+
+/// DShot arms it and turns it to a speed that the throttle sets, without a fault.
+#[test]
+fn dshot_turns_the_motor() {
+    let mut board = Board::new(&image(), &[]);
+    board.spin_up();
+    board.run(1_500 * MS);
+    let half = board.rpm();
+    board.throttle = Throttle::Dshot(1500);
+    board.run(1_000 * MS);
+    let more = board.rpm();
+    board.throttle = Throttle::Dshot(0);
+    board.run(500 * MS);
+    println!(
+        "{half:.0} rpm at 1000, {more:.0} at 1500, {:?}",
+        board.heard.texts()
+    );
+    let texts = board.heard.texts();
+    assert!(
+        !texts.iter().any(|text| text.contains("Fault")),
+        "{texts:?}"
+    );
+    // The speed is what is commanded: CTL_RPM_MIN to CTL_RPM_MAX over 48 to 2047.
+    for (rpm, value) in [(half, 1000.0), (more, 1500.0)] {
+        let commanded = 300.0 + 5700.0 * (value - 48.0) / 1999.0;
+        assert!((rpm / commanded - 1.0).abs() < 0.03, "{rpm} of {commanded}");
+    }
+    assert_eq!(board.world().bridge().violations(), 0);
+}
+
+#[test]
+fn pulses_turn_the_motor() {
+    let mut board = Board::new(&image(), &[]);
+    board.throttle = Throttle::Pulse(1_000_000);
+    board.run(1_000 * MS);
+    board.throttle = Throttle::Pulse(1_500_000);
+    let fast = board.run_until(10 * MS, 4_000 * MS, |board| board.rpm() > 1500.0);
+    println!("1500 rpm after {fast:?} ns, {:?}", board.heard.texts());
+    assert!(fast.is_some(), "{} rpm", board.rpm());
+    assert_eq!(board.world().bridge().violations(), 0);
+}
