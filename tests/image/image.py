@@ -1,13 +1,13 @@
 """A linked image: its sections, functions, and which words are addresses."""
 
 import bisect
-import re
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 from elftools.common.exceptions import ELFError
 from elftools.elf.elffile import ELFFile
+
+from names import demangled
 
 SHF_ALLOC = 2
 
@@ -152,16 +152,3 @@ class Image:
             stored = section and section.bits is not None and section.name != ".vector_table"
             if stored and not self.function_at(place):
                 yield place, self.word(place)
-
-
-def demangled(names: list[str]) -> list[str]:
-    """Names as the source has them, without the hash that Rust puts behind them; the linker's jumps
-    to functions far away, by the function's name."""
-    text = subprocess.run(
-        ["c++filt", "-s", "rust"],
-        input="\n".join(re.sub(r"\.llvm\.\d+$|^__Thumbv7\w+Thunk_", "", name) for name in names),
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
-    return [re.sub(r"::h[0-9a-f]{16}$|\[[0-9a-f]{16}\]", "", name) for name in text.split("\n")]

@@ -8,7 +8,7 @@ line, having looked.
 import re
 
 WAKER = r"^embassy_executor::raw::waker::(clone|wake|drop)$"
-TASK = r"::TaskStorage<F>::poll$"
+TASK = r"::TaskStorage::poll$"
 EXITED = r"^embassy_executor::raw::poll_exited$"
 
 LEADS_TO = [
@@ -23,14 +23,14 @@ LEADS_TO = [
     ),
     # MAVLink asks the throttle's side, checks parameters and hands out bytes by what it is given.
     (r"^siskin_control::mavlink::", r" as siskin_control::input::access::Access>::"),
-    (r"^siskin_control::mavlink::", r"^siskin_control::esc::Esc::with_component::{{closure}}$"),
+    (r"^siskin_control::mavlink::", r"^siskin_control::esc::Esc::with_component::{closure}$"),
 ]
 
 NEVER_CALLED = [
     # They stand in tables beside those above; nothing here owns a value of unknown kind, whose end or
     # only call these would be.
-    r"^core::ptr::drop_in_place<",
-    r"^core::ops::function::FnOnce::call_once{{vtable.shim}}$",
+    r"^core::ptr::drop_in_place$",
+    r"core::ops::function::FnOnce>?::call_once{vtable.shim}$",
 ]
 
 

@@ -15,7 +15,7 @@ HARD_FAULT = 3
 """Its handler begins the stack anew."""
 BEFORE = "siskin_firmware::tasks::start::power_up"
 """Makes the ESC, returns before the control's interrupt is started, and is not called again."""
-TASK = "embassy_executor::raw::TaskStorage<F>::poll"
+TASK = "embassy_executor::raw::TaskStorage::poll"
 THROTTLE = "siskin_firmware::tasks::throttle::Listener::"
 """The throttle's task has an executor of its own, in an interrupt, which runs no other."""
 

@@ -62,12 +62,17 @@ LEVELS = """
 """
 
 
-def build(folder: Path, text: str, options: tuple[str, ...] = ("--emit-relocs",)) -> Path:
+def build(
+    folder: Path,
+    text: str,
+    options: tuple[str, ...] = ("--emit-relocs",),
+    script: Path = SOURCES / "link.x",
+) -> Path:
     """An image of `text`, which begins in the flash, defines `Reset`, and may lay out further sections:
-    `.control`, which stands in the fast memory, `.rodata`, and `.vector_table`."""
+    with the small script `.control`, which stands in the fast memory, `.rodata`, and `.vector_table`."""
     assembly, image = folder / "text.s", folder / "image.elf"
     assembly.write_text(HEAD + text)
-    arguments = [f"-T{SOURCES / 'link.x'}", "--nmagic", *options]
+    arguments = [f"-T{script}", "--nmagic", *options]
     subprocess.run(
         [
             *("rustc", "--edition=2024", "--target=thumbv7em-none-eabihf", "-Cpanic=abort"),
@@ -76,6 +81,8 @@ def build(folder: Path, text: str, options: tuple[str, ...] = ("--emit-relocs",)
         ],
         env={**os.environ, "ASSEMBLY": str(assembly)},
         check=True,
+        capture_output=True,
+        text=True,
         timeout=120,
     )
     return image

@@ -20,6 +20,7 @@ import sizes  # noqa: E402
 from boards import BOARDS  # noqa: E402
 from calls import FRAME_BYTES, Calls  # noqa: E402
 from image import Image, Unreadable  # noqa: E402
+from names import demangled  # noqa: E402
 
 BOARD = BOARDS["b-g431b-esc1"]
 
@@ -113,6 +114,41 @@ def test_sizes_are_those_of_the_memories(tmp_path):
 )
 def test_a_name_tells_its_module(name, module):
     assert sizes.module(name) == module
+
+
+@pytest.mark.parametrize(
+    ("legacy", "v0", "name"),
+    [
+        (
+            "_ZN15siskin_firmware9interrupt6period9Interrupt7control17hf41d562fdb85dc23E",
+            "_RNvMNtNtCs3qNHHVFI430_15siskin_firmware9interrupt6periodNtB2_9Interrupt7control",
+            "siskin_firmware::interrupt::period::Interrupt::control",
+        ),
+        (
+            "_ZN14siskin_control5drive4turn5watch17h6db78d1cc8cf9248E",
+            "_RINvNtNtCs6RWeDgMq4dC_14siskin_control5drive4turn5watchNtNtNtB6_7control8observer6ConfigEB6_",
+            "siskin_control::drive::turn::watch",
+        ),
+        (
+            "_ZN105_$LT$siskin_control..control..observer..Config$u20$as$u20$siskin_control..control..observer"
+            "..Observer$GT$7advance17h20e4fbe98b0ea955E",
+            "_RNvXs_NtNtCs6RWeDgMq4dC_14siskin_control7control8observerNtB4_6ConfigNtB4_8Observer7advance",
+            "<siskin_control::control::observer::Config as siskin_control::control::observer::Observer>::advance",
+        ),
+        (
+            "_ZN14siskin_control5drive6launch9commanded28_$u7b$$u7b$closure$u7d$$u7d$17h417c90db411156ceE",
+            "_RNCNvNtNtCs6RWeDgMq4dC_14siskin_control5drive6launch9commanded0B7_",
+            "siskin_control::drive::launch::commanded::{closure}",
+        ),
+        (
+            "__Thumbv7ABSLongThunk__ZN15siskin_firmware10last_words4fail4fail17h0d8db502260d9a5dE",
+            "__Thumbv7ABSLongThunk__RNvNtNtCs3qNHHVFI430_15siskin_firmware10last_words4fail4fail",
+            "siskin_firmware::last_words::fail::fail",
+        ),
+    ],
+)
+def test_both_ways_to_spell_a_name_give_the_same(legacy, v0, name):
+    assert demangled([legacy, v0]) == [name, name]
 
 
 def report(*arguments) -> subprocess.CompletedProcess:
