@@ -70,7 +70,7 @@
 //! | event | what turns the bridge off | what is told |
 //! |---|---|---|
 //! | current above the hardware's trip, G431 | comparators over the timer's break, without the processor | over-current |
-//! | over-current, F405 | the gate driver turns that transistor off until its next edge, by itself | nothing; the control's own trip |
+//! | over-current, F405 | the control's own trip, within two periods; the gate driver's limiter is a strap and not counted on | over-current |
 //! | low supply of the gates, over-temperature of the driver, F405 | the gate driver; its nFAULT also the timer and the driver's enable | over-current |
 //! | set-point not renewed | the control, by `Stop` | loss of signal, by the tasks |
 //! | overrun, three in a row or more than one in 100 periods for long | [`last_words`] | after the reset |
@@ -83,8 +83,7 @@
 //! `stm32-metapac` (the HAL's types would not take others); that the comparators' inputs, DAC3's
 //! channels and the break's bits are as `chip` has them is from the reference manual alone. Of the
 //! boards, these could not be checked: the order and the sign of the VESC's two shunts, the amplifiers'
-//! settling times, what a DRV8301 does with over-current when it is not set up, and the thermistor of
-//! the B-G431B-ESC1.
+//! settling times, how the straps of a DRV8302 are set, and the thermistor of the B-G431B-ESC1.
 #![cfg_attr(not(test), no_std)]
 
 #[cfg(all(feature = "b-g431b-esc1", feature = "vesc4-f405"))]

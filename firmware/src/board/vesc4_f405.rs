@@ -1,12 +1,13 @@
-//! VESC 4.10 class: STM32F405, gate driver DRV8301, two low-side shunts.
+//! VESC 4.10 class: STM32F405, gate driver DRV8302, two low-side shunts.
 //!
 //! Phases a, b, c of the control are the timer's channels 1, 3 and 2: the shunts are those of a and b
 //! (the VESC's own firmware drives two-shunt boards in this order).
 //!
-//! The DRV8301 is not set up over SPI, whose pins this class of boards does not have in common. It
-//! keeps what it wakes up with: six inputs, its over-current threshold of 60 mV across a transistor,
-//! and *current limit*, by which a transistor is turned off until the next edge of its input. So its
-//! nFAULT tells of what it cannot limit: a supply of the gates that is too low, and over-temperature.
+//! A DRV8302 has no SPI: six inputs or three, its over-current threshold, whether it then limits or
+//! turns itself off, and the amplifiers' gain are straps (SLES267, pins M_PWM, OC_ADJ, M_OC, GAIN), which
+//! makers of this class of boards set differently. So nothing here counts on its limiter: the control's
+//! own trip is what bounds the current. nFAULT tells of whatever has turned the driver off: a supply of
+//! the gates that is too low, over-temperature, and over-current where it is strapped so.
 
 use core::mem;
 
@@ -27,7 +28,7 @@ use siskin_control::units::AdcCounts;
 
 use crate::chip;
 use crate::circuit::vesc4_f405::ZERO_COUNTS;
-use crate::interrupt::gate_driver::Pins;
+use crate::interrupt::gate_driver::{Pins, hear};
 use crate::interrupt::sample::{Slot, Wiring};
 use crate::interrupt::{Registers, alarm};
 use crate::priority;
@@ -41,17 +42,17 @@ pub use crate::circuit::vesc4_f405::{BOARD, NAME, NTC};
 /// the timer's 168 MHz.
 pub(crate) const SAMPLING_CLOCKS: u16 = 120;
 
-/// The gate driver turns itself off; nothing breaks the PWM.
+/// Nothing breaks the PWM: nFAULT is at PC12, and the timer's break at PA6 and PB12 only (DS8626,
+/// alternate functions).
 pub(crate) const BREAKS: bool = false;
 
 /// On port C.
-pub(crate) const GATE_DRIVER: Option<Pins> = Some(Pins {
-    enable: 10,
-    fault: FAULT,
-});
+pub(crate) const GATE_DRIVER: Option<Pins> = Some(DRIVER);
 
-/// nFAULT's pin.
-const FAULT: usize = 12;
+const DRIVER: Pins = Pins {
+    enable: 10,
+    fault: 12,
+};
 
 /// The phases, from 0, on the timer's channels 1, 2, 3.
 pub(crate) const PHASES: [usize; 3] = [0, 2, 1];
@@ -342,7 +343,8 @@ pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
     bridge.enable.set_high();
     mem::forget((bridge, converters));
     cortex_m::asm::delay(TIMER_HZ / 50);
-    chip::listen(FAULT);
+    chip::detect(DRIVER.fault);
+    hear(DRIVER, true);
     priority::set(chip::ALARM as usize, priority::ALARM);
     // SAFETY: what the handler needs is in place, and no critical section relies on its being
     // masked.
@@ -350,7 +352,7 @@ pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
     Registers::CHIP
 }
 
-/// The gate driver has a trip of its own.
+/// No hardware trips at a level that could be set.
 pub(crate) fn set_trip(_phase_a: f32) {}
 
 /// nFAULT, at priority 1: not even the tasks' critical sections hold it up.
@@ -358,5 +360,5 @@ pub(crate) fn set_trip(_phase_a: f32) {}
 #[unsafe(link_section = ".control")]
 fn EXTI15_10() {
     alarm(Registers::CHIP);
-    chip::heard(FAULT);
+    chip::heard(DRIVER.fault);
 }

@@ -38,7 +38,7 @@ pub const BOARD: Board = Board {
     delay: Delay::One,
     // Half of the sampling window, 0.36 µs, and 1.5 µs for the amplifier to settle before the top.
     low_side_on_s: 3.7e-6,
-    // The DRV8301's bootstrap capacitors are charged through its diodes, without resistors.
+    // The DRV8302's bootstrap capacitors are charged through its diodes, without resistors.
     refresh_s: 1.0e-6,
     charge_s: 50e-6,
 };

@@ -1,14 +1,17 @@
 //! The gate driver: what it says of itself, and when the bridge may be turned on.
 //!
-//! A DRV8301 turns its gates off by itself and pulls nFAULT low. The pin's interrupt ([`alarm`])
+//! A DRV8302 turns its gates off by itself and pulls nFAULT low. The pin's interrupt ([`alarm`])
 //! then turns the bridge off and the driver with it; the PWM interrupt reads the pin too, each
-//! period, and lets the driver come up again when some time has passed.
+//! period, and lets the driver come up again when some time has passed. Until then the pin's interrupt
+//! is masked: a driver that comes up pulls nFAULT low as well.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
+use embassy_stm32::pac::EXTI;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::Idr;
 
+use super::rest::{Order, Rest};
 use crate::board::GATE_DRIVER;
 
 /// The pins of a gate driver on its port.
@@ -20,20 +23,13 @@ pub(crate) struct Pins {
     pub(crate) fault: usize,
 }
 
-/// Control periods for which it rests after an alarm: 11 ms at the fastest PWM, 80 ms at the slowest.
-const REST_PERIODS: u16 = 640;
-
-/// Control periods before the end of the rest at which it is enabled again. It takes up to 10 ms, and
-/// says that all is not well until then.
-const WAKE_PERIODS: u16 = 620;
-
 /// Whether the alarm's interrupt has turned the driver off since the last period.
 static ALARMED: AtomicBool = AtomicBool::new(false);
 
 /// The gate driver as the PWM interrupt knows it. A board without one is always ready.
 pub(crate) struct GateDriver {
     port: Gpio,
-    rest_periods: u16,
+    rest: Rest,
 }
 
 impl GateDriver {
@@ -41,7 +37,7 @@ impl GateDriver {
     pub(crate) fn new(port: Gpio) -> Self {
         Self {
             port,
-            rest_periods: 0,
+            rest: Rest::default(),
         }
     }
 
@@ -52,30 +48,37 @@ impl GateDriver {
             return true;
         };
         let alarm = self.port.idr().read().idr(pins.fault) == Idr::LOW;
-        if self.rest_periods == 0 && !alarm && !ALARMED.load(Ordering::Relaxed) {
+        if self.rest.is_over() && !alarm && !ALARMED.load(Ordering::Relaxed) {
             return true;
         }
-        self.rest(pins, alarm);
+        self.attend(pins, alarm);
         false
     }
 
     #[cold]
     #[inline(never)]
-    fn rest(&mut self, pins: Pins, alarm: bool) {
-        if ALARMED.load(Ordering::Relaxed) || self.rest_periods == 0 {
-            ALARMED.store(false, Ordering::Relaxed);
-            disable(self.port, pins);
-            self.rest_periods = REST_PERIODS;
-        }
-        self.rest_periods -= 1;
-        if self.rest_periods == WAKE_PERIODS {
-            self.port.bsrr().write(|w| w.set_bs(pins.enable, true));
-        } else if self.rest_periods == 0 && alarm {
-            // What has come up with an alarm is tried again and again: its cause may end.
-            disable(self.port, pins);
-            self.rest_periods = REST_PERIODS;
+    fn attend(&mut self, pins: Pins, alarm: bool) {
+        match self.rest.step(alarm) {
+            Order::Sleep => {
+                hear(pins, false);
+                disable(self.port, pins);
+            }
+            Order::Wait => {}
+            Order::Wake => self.port.bsrr().write(|w| w.set_bs(pins.enable, true)),
+            Order::Listen => {
+                ALARMED.store(false, Ordering::Relaxed);
+                hear(pins, true);
+            }
         }
     }
+}
+
+/// Lets a falling edge of the alarm's line ask for its interrupt from now on, or no more. This line is
+/// the only one of EXTI that is used.
+pub(crate) fn hear(pins: Pins, hears: bool) {
+    // What came unheard is not told later: the level is read each period.
+    EXTI.pr(0).write(|w| w.set_line(pins.fault, true));
+    EXTI.imr(0).modify(|w| w.set_line(pins.fault, hears));
 }
 
 fn disable(port: Gpio, pins: Pins) {

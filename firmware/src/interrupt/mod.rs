@@ -11,6 +11,11 @@ mod overruns;
     not(any(board, test)),
     expect(dead_code, reason = "for the boards; tested on the host")
 )]
+mod rest;
+#[cfg_attr(
+    not(any(board, test)),
+    expect(dead_code, reason = "for the boards; tested on the host")
+)]
 pub(crate) mod timing;
 #[cfg_attr(
     not(any(feature = "stm32g431", test)),

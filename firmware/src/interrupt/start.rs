@@ -47,8 +47,8 @@ pub fn start(
 }
 
 /// Sets the hardware's over-current trip for a bound of `phase_a` on the phase currents, peak
-/// amperes: 1.6 times that, and no more than the board's rating. A board whose gate driver has a
-/// trip of its own keeps that.
+/// amperes: 1.6 times that, and no more than the board's rating. A board without such a trip has the
+/// software's alone.
 pub fn set_trip(phase_a: f32) {
     board::set_trip(phase_a);
 }

@@ -59,12 +59,11 @@ fn clock() -> Config {
     config
 }
 
-/// Lets a falling edge of a pin of port C, from 10 to 15, ask for [`ALARM`].
-pub(crate) fn listen(pin: usize) {
+/// Makes a falling edge of a pin of port C, from 10 to 15, one that may ask for [`ALARM`].
+pub(crate) fn detect(pin: usize) {
     RCC.apb2enr().modify(|w| w.set_syscfgen(true));
     SYSCFG.exticr(pin / 4).modify(|w| w.set_exti(pin % 4, 2));
     EXTI.ftsr(0).modify(|w| w.set_line(pin, true));
-    EXTI.imr(0).modify(|w| w.set_line(pin, true));
 }
 
 /// Takes that request back.
