@@ -132,8 +132,19 @@ pub fn verdicts(outcome: &Outcome) -> String {
         line(&mut text, format_args!("drawn: {key} = {value}"));
     }
     for verdict in &outcome.expectations {
-        let held = if verdict.held { "held" } else { "FAILED" };
-        line(&mut text, format_args!("{held}: {}", sentence(verdict)));
+        match verdict.held {
+            Some(held) => {
+                let held = if held { "held" } else { "FAILED" };
+                line(&mut text, format_args!("{held}: {}", sentence(verdict)));
+            }
+            None => line(
+                &mut text,
+                format_args!(
+                    "not seen: {}.{}, wanted {}: it is inside the machine",
+                    verdict.window, verdict.key, verdict.wanted
+                ),
+            ),
+        }
     }
     text
 }

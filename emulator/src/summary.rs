@@ -133,3 +133,45 @@ impl Summary {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::Flow;
+    use crate::surroundings::Motion;
+
+    #[test]
+    fn figures_that_a_machine_does_not_show_are_those_of_its_control() {
+        let mut summary = Summary::new([("all".to_owned(), 0.0, 1.0)]);
+        let flow = Flow {
+            torque_nm: 0.1,
+            torque_square: 0.02,
+            motor_w: 10.0,
+            copper_w: 1.0,
+            ..Flow::default()
+        };
+        let motion = Motion {
+            angle_turns: 0.0,
+            speed_rad_s: 100.0,
+            currents_a: [1.0, -1.0, 0.0],
+            bus_v: 24.0,
+            bus_a: 0.5,
+            flow,
+        };
+        let passage = Passage {
+            length_s: 1e-4,
+            motion,
+            hall: 1,
+        };
+        summary.pass(0.5, &passage);
+        let report = summary.report(1.0, 1.0);
+        let figures = serde_json::to_value(&report.windows[0]).unwrap();
+        let figures = figures.as_object().unwrap().iter();
+        let unseen: Vec<_> = figures.filter(|(_, value)| value.is_null()).collect();
+        let mut unseen: Vec<_> = unseen.iter().map(|(key, _)| key.as_str()).collect();
+        let mut of_control = Figures::OF_CONTROL.to_vec();
+        unseen.sort_unstable();
+        of_control.sort_unstable();
+        assert_eq!(unseen, of_control);
+    }
+}

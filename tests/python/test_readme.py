@@ -9,7 +9,7 @@ import pytest
 
 from dshot import HALF
 from emulator import PATIENT
-from paths import ROOT
+from readme import blocks
 
 SCRIPT = """
 from pymavlink import mavutil
@@ -53,19 +53,13 @@ def test_the_wheel_alone_reads_the_telemetry(start):
     assert all(abs(value - 24.0) < 0.5 for value in volts), volts
 
 
-def readme_scripts() -> list[str]:
-    """The Python blocks of README.md."""
-    readme = (ROOT / "README.md").read_text()
-    return re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-
-
 def test_readme_has_a_script_that_reads_the_telemetry():
-    assert any("ESC_TELEMETRY_1_TO_4" in script for script in readme_scripts())
+    assert any("ESC_TELEMETRY_1_TO_4" in script for script in blocks("python"))
 
 
-@pytest.mark.parametrize("index", range(len(readme_scripts())))
+@pytest.mark.parametrize("index", range(len(blocks("python"))))
 def test_a_script_of_the_readme_works_as_pasted(start, index):
     # A busy machine is no lost signal.
-    printed = run_script(readme_scripts()[index], start(*PATIENT))
+    printed = run_script(blocks("python")[index], start(*PATIENT))
     rpm = [int(number) for number in re.findall(r"(-?\d+) rpm", printed)]
     assert abs(rpm[-1] - 3150) <= 32, f"half throttle: {rpm}"

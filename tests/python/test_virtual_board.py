@@ -8,7 +8,8 @@ import time
 import pytest
 from dshot import BIDIRECTIONAL_DSHOT600, HALF, erpm, is_extended
 from emulator import PATIENT
-from paths import IMAGES, VIRTUAL_BOARD
+from paths import IMAGES, ROOT, VIRTUAL_BOARD
+from readme import commands
 
 import siskin_dialect as dialect
 
@@ -87,7 +88,7 @@ def test_the_motor_turns_and_frames_are_answered_in_time(board):
 def run(*arguments: object) -> subprocess.CompletedProcess:
     command = [str(part) for part in (VIRTUAL_BOARD, *arguments)]
     return subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, cwd=ROOT
     )
 
 
@@ -99,6 +100,18 @@ def test_figures_of_the_processor_are_told_and_equal_runs_are_equal():
     assert first["processor"] == second["processor"]
     assert first["trace_hash"] == second["trace_hash"]
     assert 0.25 * 24_000 < first["processor"]["interrupts"] < 0.3 * 24_000
+
+
+def test_the_scenario_of_the_readme_holds_and_what_nobody_sees_is_no_failure():
+    (command,) = commands("siskin-vboard", "scenario")
+    elf = command.index("--") + 1
+    ended = run(IMAGE, *command[elf + 1 :], "--json")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    held = {(e["window"], e["key"]): e["held"] for e in json.loads(ended.stdout)["expectations"]}
+    assert held["held", "rpm_mean"] is True
+    # The estimated angle is inside the image.
+    assert held["held", "angle_error_mean_deg"] is None
+    assert False not in held.values()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::RUN;
 use super::error::ScenarioError;
 use super::file::Expectation;
-use crate::summary::Report;
+use crate::summary::{Figures, Report};
 
 /// Whether an expectation held.
 #[derive(Clone, Debug, Serialize)]
@@ -19,11 +19,19 @@ pub struct Verdict {
     pub value: Option<f64>,
     /// What it must be.
     pub wanted: String,
-    /// Whether it is.
-    pub held: bool,
-    /// By how much it could be worse; −∞ without a figure.
+    /// Whether it is; `None` of the control's inside where nobody sees that, as on a machine that is asked
+    /// over its wire only.
+    pub held: Option<bool>,
+    /// By how much it could be worse; −∞ without a figure, ∞ of one that nobody sees.
     #[serde(skip)]
     pub(super) slack: f64,
+}
+
+impl Verdict {
+    /// Whether the figure is another than it must be.
+    pub fn failed(&self) -> bool {
+        self.held == Some(false)
+    }
 }
 
 /// Compares a figure with what is expected of it.
@@ -33,7 +41,10 @@ pub(super) fn judge(expected: &Expectation, report: &Report) -> Result<Verdict, 
         key: expected.key.clone(),
         problem,
     };
-    let value = if expected.window == RUN && expected.key == "faults" {
+    let of_faults = expected.window == RUN && expected.key == "faults";
+    let seen = report.faults.is_some()
+        || !of_faults && !Figures::OF_CONTROL.contains(&expected.key.as_str());
+    let value = if of_faults {
         report.faults.as_ref().map(|faults| faults.len() as f64)
     } else {
         let window = report.windows.iter().find(|w| w.name == expected.window);
@@ -77,11 +88,11 @@ pub(super) fn judge(expected: &Expectation, report: &Report) -> Result<Verdict, 
         key: expected.key.clone(),
         value,
         wanted: wanted.join(" and "),
-        held,
-        slack: if value.is_some() {
-            slack
-        } else {
-            f64::NEG_INFINITY
+        held: seen.then_some(held),
+        slack: match value {
+            Some(_) => slack,
+            None if seen => f64::NEG_INFINITY,
+            None => f64::INFINITY,
         },
     })
 }

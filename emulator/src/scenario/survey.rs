@@ -124,7 +124,7 @@ impl Survey {
                 Some(expected) => expected.add(place, verdict),
             }
         }
-        let broken: Vec<_> = verdicts.into_iter().filter(|v| !v.held).collect();
+        let broken: Vec<_> = verdicts.into_iter().filter(Verdict::failed).collect();
         if broken.is_empty() {
             return;
         }
@@ -150,7 +150,7 @@ impl Expected {
             window: verdict.window.clone(),
             key: verdict.key.clone(),
             wanted: verdict.wanted.clone(),
-            failed: usize::from(!verdict.held),
+            failed: usize::from(verdict.failed()),
             worst: verdict.value,
             place: place.clone(),
             options: place.to_string(),
@@ -159,7 +159,7 @@ impl Expected {
     }
 
     fn add(&mut self, place: &Place, verdict: &Verdict) {
-        self.failed += usize::from(!verdict.held);
+        self.failed += usize::from(verdict.failed());
         if verdict.slack < self.slack {
             self.slack = verdict.slack;
             self.worst = verdict.value;

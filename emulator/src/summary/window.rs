@@ -85,6 +85,30 @@ pub struct Figures {
     pub lock_lost: Option<bool>,
 }
 
+impl Figures {
+    /// The keys of those that are of the control, or need to know what it did.
+    pub const OF_CONTROL: [&str; 18] = [
+        "rpm_ref_mean",
+        "speed_error_rms_rpm",
+        "speed_error_max_rpm",
+        "speed_estimate_error_rms_rpm",
+        "angle_error_mean_deg",
+        "angle_error_rms_deg",
+        "angle_error_std_deg",
+        "angle_error_max_deg",
+        "lock_s",
+        "torque_ripple_pct",
+        "efficiency",
+        "i_q_mean_a",
+        "i_d_mean_a",
+        "turned_back_deg",
+        "reached_s",
+        "settled_s",
+        "starts",
+        "lock_lost",
+    ];
+}
+
 /// A period as the windows see it.
 pub(super) struct Look<'a> {
     /// Its start, s.
