@@ -3,6 +3,8 @@
 //! One thread: it wakes each millisecond, takes in what has come on the sockets, simulates up to
 //! the present and sends. An answer leaves within two milliseconds.
 
+mod keeping;
+
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -20,6 +22,7 @@ use crate::rig::Bench;
 use crate::summary::Report;
 use crate::watch::{Watch, WatchError};
 use crate::wire::{SignalAddress, Wire, WireError};
+use keeping::Keeping;
 
 /// Wall time between two looks at the sockets.
 const SLICE: Duration = Duration::from_millis(1);
@@ -88,12 +91,11 @@ pub struct Opened {
     pub links: Vec<String>,
     /// Where the throttle wire listens.
     pub signal: Option<std::net::SocketAddr>,
-    /// What was amiss with the storage.
-    pub warning: Option<&'static str>,
 }
 
 /// Runs a session until its duration or an interrupt: on what `start` makes, with a warning where what
-/// was stored is not whole. Tells `opened` once all is open; gives back what it was at the end.
+/// was stored is not whole. Tells `opened` once all is open, and `warn` in a line what a person should know
+/// then or later; gives back what it was at the end.
 ///
 /// # Errors
 /// The session cannot begin or go on.
@@ -101,6 +103,7 @@ pub fn run<M: Machine>(
     session: Session,
     start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), LiveError>,
     opened: impl FnOnce(&Opened, &M),
+    warn: impl Fn(&str),
 ) -> Result<(Report, M), LiveError> {
     let stop = interrupt::flag().map_err(LiveError::Interrupt)?;
     let mut links = Links::open(&session.mavlink)?;
@@ -122,11 +125,14 @@ pub fn run<M: Machine>(
     let about = Opened {
         links: links.describe(),
         signal,
-        warning,
     };
+    if let Some(warning) = warning {
+        warn(warning);
+    }
     opened(&about, &machine);
 
     let mut pacer = Pacer::new(session.pace);
+    let mut keeping = Keeping::new(session.pace);
     let end_ns = session.duration.map_or(u64::MAX, |d| d.as_nanos() as u64);
     while !stop.load(Ordering::Relaxed) && machine.is_before(end_ns) && !watch.failed() {
         let now = pacer.began.elapsed();
@@ -147,6 +153,10 @@ pub fn run<M: Machine>(
             return Err(stopped.into());
         }
         pacer.wait(machine.now_ns());
+        let played = machine.wire().counts().played;
+        if let Some(line) = keeping.look(pacer.began.elapsed(), machine.now_ns(), played) {
+            warn(&line);
+        }
     }
     let sim_s = machine.now_ns() as f64 * 1e-9;
     let report = Report {

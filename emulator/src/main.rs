@@ -9,7 +9,7 @@ use clap::Parser;
 use indicatif::ProgressBar;
 use siskin_emulator::device::Device;
 use siskin_emulator::interrupt;
-use siskin_emulator::live;
+use siskin_emulator::live::{self, Opened};
 use siskin_emulator::measure;
 use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
 use siskin_emulator::plot;
@@ -47,22 +47,19 @@ fn run(args: RunArgs) -> Result<ExitCode, String> {
     let line = |error: &dyn std::error::Error| error.to_string();
     let standing = args.standing().map_err(|error| line(&error))?;
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
-    if let Some(warning) = warning {
-        eprintln!("siskin-emulator: {warning}");
-    }
+    let warn = |warning: &str| eprintln!("siskin-emulator: {warning}");
+    warning.as_deref().into_iter().for_each(warn);
     let start = |start| Ok(Device::start(start)?);
-    let report = live::run(session, start, |opened, device| {
-        if let Some(warning) = opened.warning {
-            eprintln!("siskin-emulator: {warning}");
-        }
+    let opened = |opened: &Opened, device: &Device| {
         if !args.common.json {
             // Where nobody reads it, the ESC runs all the same.
             let params = device.esc().params();
             let greeting = report::greeting("emulated", &args, &standing, opened, params);
             let _ = report::print(&greeting);
         }
-    });
-    let (report, _) = report.map_err(|error| line(&error))?;
+    };
+    let ended = live::run(session, start, opened, warn);
+    let (report, _) = ended.map_err(|error| line(&error))?;
     report::print(&if args.common.json {
         report::json(&report)?
     } else {

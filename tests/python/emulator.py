@@ -51,11 +51,17 @@ def scenario(path: Path, *arguments: object) -> tuple[int, dict]:
 class Emulator:
     """One ESC in real time, on ports of its own: the emulator's, or another program's with its options."""
 
-    def __init__(self, *options: object, storage: object = "none", program: tuple = (PROGRAM,)):
+    def __init__(
+        self,
+        *options: object,
+        storage: object = "none",
+        program: tuple = (PROGRAM,),
+        speed: object = 1,
+    ):
         self.port = free_port()
         self.signal_port = free_port(socket.SOCK_DGRAM)
         self._output = tempfile.TemporaryFile("w+")
-        command = [*program, "--signal", f"udp:127.0.0.1:{self.signal_port}", "--speed", "1"]
+        command = [*program, "--signal", f"udp:127.0.0.1:{self.signal_port}", "--speed", speed]
         # The server stands last: when it answers, the endpoints among the options are open.
         command += ["--storage", storage, *options, "--mavlink", f"tcpin:127.0.0.1:{self.port}"]
         self.process = subprocess.Popen(

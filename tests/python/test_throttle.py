@@ -243,3 +243,22 @@ def test_a_fault_latches_until_zero_throttle(start):
         esc.wait_rpm(-STANDS_RPM, STANDS_RPM)
         throttle.value = HALF
         esc.wait_rpm(3100, 3200)
+
+
+def test_a_sender_that_simulated_time_outruns_is_told_so(start):
+    emulator = start(speed="max")
+    with emulator.throttle():
+        deadline = time.monotonic() + 20.0
+        while "lost signal" not in emulator.output() and time.monotonic() < deadline:
+            time.sleep(0.1)
+    told = [line for line in emulator.output().splitlines() if "lost signal" in line]
+    assert len(told) == 1 and "give --speed 1" in told[0], emulator.output()
+
+
+def test_a_machine_that_falls_behind_real_time_says_so(start):
+    # So fast no machine is.
+    emulator = start(speed=1000)
+    deadline = time.monotonic() + 20.0
+    while "too slow" not in emulator.output() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert "of the speed asked for" in emulator.output()

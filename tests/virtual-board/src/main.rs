@@ -6,10 +6,11 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use siskin_emulator::live::{self, Opened};
 use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
+use siskin_emulator::report;
 use siskin_emulator::scenario::Outcome;
 use siskin_emulator::summary::Report;
-use siskin_emulator::{live, report};
 use siskin_vboard::image::Image;
 use siskin_vboard::load::Figures;
 use siskin_vboard::machine::VirtualBoard;
@@ -73,21 +74,18 @@ fn run(cli: &Cli) -> Result<ExitCode, String> {
     let image = Image::read(&cli.image).map_err(|error| line(&error))?;
     let standing = args.standing().map_err(|error| line(&error))?;
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
-    if let Some(warning) = warning {
-        eprintln!("siskin-vboard: {warning}");
-    }
+    let warn = |warning: &str| eprintln!("siskin-vboard: {warning}");
+    warning.as_deref().into_iter().for_each(warn);
     let start = |start| Ok(VirtualBoard::new(&image, start)?);
-    let ended = live::run(session, start, |opened, board: &VirtualBoard| {
-        if let Some(warning) = opened.warning {
-            eprintln!("siskin-vboard: {warning}");
-        }
+    let opened = |opened: &Opened, board: &VirtualBoard| {
         if !args.common.json {
             // Where nobody reads it, the board runs all the same.
             let what = "image on a virtual board";
             let greeting = report::greeting(what, args, &standing, opened, board.params());
             let _ = report::print(&greeting);
         }
-    });
+    };
+    let ended = live::run(session, start, opened, warn);
     let (report, mut board) = ended.map_err(|error| line(&error))?;
     let processor = board.figures();
     let text = if args.common.json {
