@@ -84,7 +84,7 @@ pub fn aligned(config: &Config, state: &State) -> bool {
 pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) -> bool {
     let over = aligned(config, state);
     state.charge += I36F28::from(current) * i64::from(periods);
-    let sweeping = state.charge < config.park_charge / 2;
+    let sweeping = state.charge < config.park_charge >> 1;
     state.omega_s = if sweeping {
         config.sweep.apply(current)
     } else {

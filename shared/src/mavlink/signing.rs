@@ -13,6 +13,7 @@ use sha2::{Digest, Sha256};
 
 use super::identity::Address;
 use super::receiver::{Frame, is_signed};
+use crate::math::divide;
 
 /// Link, timestamp and hash, behind the check of a frame.
 pub(super) const SIGNATURE_LEN: usize = 13;
@@ -24,7 +25,7 @@ const LINK: u8 = 0;
 
 /// By how much a stream may begin behind the newest timestamp: a minute.
 const BEHIND_TICKS: u64 = 6_000_000;
-const TICK_US: u64 = 10;
+const TICK_US: u32 = 10;
 const TIMESTAMP_MAX: u64 = (1 << 48) - 1;
 
 /// Streams that are followed: ground stations, companions and an autopilot, each over two links.
@@ -194,7 +195,7 @@ impl Signing {
 
     /// The time now, as far as it is known here.
     fn clock(&self) -> u64 {
-        self.newest + self.now_us.saturating_sub(self.newest_at_us) / TICK_US
+        self.newest + divide(self.now_us.saturating_sub(self.newest_at_us), TICK_US)
     }
 
     /// Signs a frame: from its start to its check, with the flag set and the check over it. The
