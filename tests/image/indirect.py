@@ -21,9 +21,11 @@ LEADS_TO = [
         r"|^<embassy_sync::blocking_mutex::raw::\w+ as embassy_sync::blocking_mutex::raw::RawMutex>::lock$",
         WAKER,
     ),
-    # MAVLink asks the throttle's side, checks parameters and hands out bytes by what it is given.
-    (r"^siskin_control::mavlink::", r" as siskin_control::input::access::Access>::"),
-    (r"^siskin_control::mavlink::", r"^siskin_control::esc::Esc::with_component::{closure}$"),
+    # MAVLink asks the throttle's side and checks a changed parameter by what it is given.
+    (r"^siskin_control::mavlink::component::", r" as siskin_control::input::access::Access>::"),
+    (r"^siskin_control::mavlink::parameter::change$", r"^siskin_control::esc::Esc::with_component::{closure}$"),
+    # What it hands bytes to is known when it is linked: the serial line's pipe, which wakes its task.
+    (r"^siskin_control::mavlink::sender::Sender::send_payload$", WAKER),
 ]
 
 NEVER_CALLED = [
