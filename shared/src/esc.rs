@@ -219,6 +219,9 @@ impl Esc {
         self.traffic = standing.traffic;
         self.command = standing.command;
         self.follow_wire(throttle, now_us);
+        if self.storage.reminds(now_us) {
+            self.warn_of("Settings lost: set and store them before arming");
+        }
         self.with_component(throttle, now_us, |component, context| {
             component.poll(context, send);
         });
@@ -232,6 +235,7 @@ impl Esc {
         let told = Told {
             note: self.sound.note(),
             too_hot: self.too_hot,
+            barred: self.storage.is_lost(),
         };
         throttle.reach(|throttle| throttle.tell(told));
     }
@@ -260,7 +264,7 @@ impl Esc {
         };
         let rests = self.recorder.look(&mut self.telemetry.statistics, &sight);
         if rests {
-            self.storage.recorded(now_us);
+            self.storage.changed(now_us, false);
         }
     }
 
@@ -272,7 +276,8 @@ impl Esc {
         let now_us = self.polled_us.unwrap_or(0);
         let request = self.component.take_request();
         if self.component.take_changed() {
-            self.storage.changed(now_us);
+            self.storage
+                .changed(now_us, request == Some(Request::ParamsChanged));
         }
         match request {
             Some(Request::ParamsChanged) => {

@@ -43,6 +43,8 @@ pub(crate) struct Told {
     pub(crate) note: Option<Note>,
     /// Whether the temperature is past its limit.
     pub(crate) too_hot: bool,
+    /// Whether nothing may turn the motor.
+    pub(crate) barred: bool,
 }
 
 /// How the wire stands.
@@ -207,6 +209,7 @@ impl Throttle {
     /// Takes what the tasks say.
     pub(crate) fn tell(&mut self, told: Told) {
         self.told = told;
+        self.input.authority_mut().bar(told.barred);
     }
 
     /// Takes what is sent when the wire asks for the ESC's information.

@@ -89,3 +89,28 @@ def test_statistics_outlive_a_kill(stored):
     assert int(lines["Run time"].removesuffix(" s")) >= 1
     assert 1 <= int(lines["Highest phase current"].removesuffix(" A")) <= 28
     assert not [name for name in lines if name.startswith("Fault")]
+
+
+WORD = 8
+
+
+def test_a_bit_that_rots_changes_no_setting(stored, tmp_path):
+    """Each save stands twice: else one bit would leave another motor's settings, and arm."""
+    path = tmp_path / "flash.bin"
+    emulator = stored()
+    with emulator.connect() as esc:
+        esc.set_param("LIM_PHASE_A", 12.5)
+        time.sleep(QUIET_S)
+    emulator.kill()
+    content = path.read_bytes()
+    words = [content[at : at + WORD] for at in range(0, len(content), WORD)]
+    used = [at for at, word in enumerate(words) if word != b"\xff" * WORD]
+    chance = random.Random(2)
+    for at in (used[0], used[len(used) // 2 - 1], used[-1]):
+        rotten = bytearray(content)
+        rotten[at * WORD + chance.randrange(WORD)] ^= 1 << chance.randrange(8)
+        path.write_bytes(rotten)
+        emulator = stored()
+        with emulator.connect() as esc:
+            assert esc.read_param("LIM_PHASE_A").param_value == 12.5, at
+        emulator.kill()

@@ -135,7 +135,7 @@ fn power_up(params: &Params) -> (&'static mut Esc, Port) {
     let defaults = Params::default();
     let (port, scale) = make_port(&defaults, &board).expect("the defaults fit every board");
     let esc = make_esc(defaults, board, scale);
-    esc.spare_stored();
+    esc.lose_stored();
     warn(esc, "Parameters do not fit the board: defaults in force");
     (esc, port)
 }

@@ -8,12 +8,15 @@ use embedded_storage::nor_flash::NorFlash;
 use super::Esc;
 use crate::mavlink::Request;
 use crate::params::{BuildError, ParamId};
-use crate::store::{self, Integrity, Kept, Loaded, StoreError};
+use crate::store::{self, Kept, Loaded, StoreError};
 use crate::throttle::Reach;
 
 /// For how long nothing must have changed before what has is stored, µs: a client that writes a whole
 /// list of parameters wears the flash once.
 const QUIET_US: u64 = 1_000_000;
+
+/// How often a person is told that settings were lost, µs: a station may have come since.
+const REMIND_US: u64 = 10_000_000;
 
 /// Who has asked for storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,11 +40,14 @@ pub(super) struct Storage {
     /// Whether the ESC is to start again when nothing waits any more.
     reboot: bool,
     /// Whose request the caller has been given.
-    under_way: Option<Asker>,
+    under_way: Option<(Asker, Request)>,
     /// Whether it has been told that what changes cannot be stored.
     failed: bool,
-    /// Whether what is stored is not in force, and stays until somebody changes something.
-    spared: bool,
+    /// Whether what is stored cannot be in force: it stays, and nothing turns the motor, until settings are
+    /// stored.
+    lost: bool,
+    /// When a person was last told so.
+    reminded_us: u64,
 }
 
 impl Storage {
@@ -55,22 +61,31 @@ impl Storage {
         self.save = true;
     }
 
-    /// Somebody has changed something that is kept.
-    pub(super) fn changed(&mut self, now_us: u64) {
-        self.changed_us = Some(now_us);
-        self.spared = false;
-    }
-
-    /// The statistics have changed.
-    pub(super) fn recorded(&mut self, now_us: u64) {
-        if !self.spared {
+    /// Something that is kept has changed. Where settings were lost only a parameter counts: a station that
+    /// asks for another interval has set none.
+    pub(super) fn changed(&mut self, now_us: u64, is_parameter: bool) {
+        if is_parameter || !self.lost {
             self.changed_us = Some(now_us);
         }
     }
 
-    /// Leaves what is stored alone until somebody changes something.
-    pub(super) fn spare(&mut self) {
-        self.spared = true;
+    /// Settings were lost.
+    pub(super) fn lose(&mut self) {
+        self.lost = true;
+    }
+
+    /// Whether settings were lost, and none have been stored since.
+    pub(super) fn is_lost(&self) -> bool {
+        self.lost
+    }
+
+    /// Whether a person is to be told so now.
+    pub(super) fn reminds(&mut self, now_us: u64) -> bool {
+        let due = self.lost && now_us.saturating_sub(self.reminded_us) >= REMIND_US;
+        if due {
+            self.reminded_us = now_us;
+        }
+        due
     }
 
     /// MAVLink asks for a restart, which waits for what waits to be stored.
@@ -108,7 +123,7 @@ impl Storage {
     /// The next request, which is under way now.
     pub(super) fn take(&mut self, now_us: u64) -> Option<Request> {
         let (asker, request) = self.next(now_us)?;
-        self.under_way = Some(asker);
+        self.under_way = Some((asker, request));
         match asker {
             Asker::Mavlink => self.mavlink = None,
             Asker::Wire => self.save = false,
@@ -123,7 +138,8 @@ impl Storage {
 
     /// The request that was under way has ended: who is to be told of it.
     pub(super) fn done(&mut self, well: bool) -> Option<Asker> {
-        let asker = self.under_way.take()?;
+        let (asker, request) = self.under_way.take()?;
+        self.lost &= !well || request == Request::Load;
         let failed = core::mem::replace(&mut self.failed, !well && asker == Asker::Nobody);
         // Once is enough where nobody has asked.
         (asker != Asker::Nobody || (self.failed && !failed)).then_some(asker)
@@ -167,8 +183,8 @@ pub fn obey<F: NorFlash>(
         }
         Request::Load => {
             let loaded = store::load(flash, range);
-            match (loaded.integrity, loaded.trouble()) {
-                (Integrity::Corrupt | Integrity::Unreadable, Some(trouble)) => Err(trouble),
+            match loaded.trouble() {
+                Some(trouble) if loaded.integrity.is_lost() => Err(trouble),
                 _ => Ok(Some(Kept {
                     statistics: kept.statistics,
                     signing: kept.signing,
@@ -195,17 +211,18 @@ impl Esc {
         self.component.keep_intervals(&kept.intervals);
         self.component.keep_signing(kept.signing);
         self.telemetry.statistics = kept.statistics;
-        if matches!(loaded.integrity, Integrity::Corrupt | Integrity::Unreadable) {
-            self.spare_stored();
+        if loaded.integrity.is_lost() {
+            self.lose_stored();
         }
         if let Some(trouble) = loaded.trouble() {
             self.warn_of(trouble);
         }
     }
 
-    /// Leaves what is stored alone until somebody changes something: it is not what is in force.
-    pub fn spare_stored(&mut self) {
-        self.storage.spare();
+    /// What is stored is not what is in force: it is left alone, and the motor off, until settings are
+    /// stored.
+    pub fn lose_stored(&mut self) {
+        self.storage.lose();
     }
 
     /// What is to be stored now.

@@ -57,7 +57,7 @@ pub struct DriveStatus {
     pub faulted: bool,
 }
 
-/// Arming was refused: the wire does not hold valid zero throttle.
+/// Arming was refused: the wire does not hold valid zero throttle, or nothing may turn the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Denied;
 
@@ -66,7 +66,8 @@ pub struct Denied;
 pub enum TestError {
     /// A value outside 0 to 1, or −1 to 1 with two directions, or a time outside 0 to 3 s.
     OutOfRange,
-    /// The motor turns, a fault holds, or the wire is neither silent nor at valid zero.
+    /// The motor turns, a fault holds, the wire is neither silent nor at valid zero, or nothing may turn
+    /// the motor.
     TemporarilyRejected,
 }
 
@@ -84,6 +85,8 @@ pub struct Authority {
     test: Option<Test>,
     /// Disarmed by command while a fault held.
     forgiven: bool,
+    /// Whether nothing may turn the motor, whoever asks.
+    barred: bool,
 }
 
 /// Zero throttle since some time.
@@ -122,6 +125,17 @@ impl Authority {
             event_us: None,
             test: None,
             forgiven: false,
+            barred: false,
+        }
+    }
+
+    /// Lets nothing turn the motor from now on, neither the wire nor a test, or lets them again. The wire
+    /// must be armed anew then.
+    pub fn bar(&mut self, barred: bool) {
+        self.barred = barred;
+        if barred {
+            self.restart();
+            self.test = None;
         }
     }
 
@@ -184,7 +198,8 @@ impl Authority {
             Signal::Dshot { .. } => ARMING_FRAMES,
             Signal::Pulse(_) => ARMING_PULSES,
         };
-        if valid.identified && arming.zeros >= least && held_us >= self.timing.arm_us {
+        let held = arming.zeros >= least && held_us >= self.timing.arm_us;
+        if valid.identified && held && !self.barred {
             self.armed = true;
             self.arming = None;
         }
@@ -273,9 +288,10 @@ impl Authority {
     /// held for its time, arms it.
     ///
     /// # Errors
-    /// [`Denied`] unless the last valid frame is zero throttle and not older than the loss time.
+    /// [`Denied`] unless the last valid frame is zero throttle and not older than the loss time, and the
+    /// wire may turn the motor.
     pub fn arm(&self, now_us: u64) -> Result<(), Denied> {
-        if self.holds_zero(now_us) {
+        if self.holds_zero(now_us) && !self.barred {
             Ok(())
         } else {
             Err(Denied)
@@ -311,7 +327,8 @@ impl Authority {
             return Err(TestError::OutOfRange);
         }
         let silent = !self.within_loss(now_us, self.event_us);
-        if !drive.stopped || drive.faulted || !(silent || self.holds_zero(now_us)) {
+        let rests = drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us));
+        if self.barred || !rests {
             return Err(TestError::TemporarilyRejected);
         }
         let duration_us = u64::from((duration_s * 1e6) as u32);

@@ -11,6 +11,14 @@ const STATISTICS: u16 = 0x1200;
 /// First key of the words of signing: eight of its key, and the newest timestamp.
 const SIGNING: u16 = 0x1300;
 const SIGNING_WORDS: usize = 9;
+/// Key of the newest timestamp.
+const TIME: u16 = SIGNING + SIGNING_WORDS as u16 - 1;
+
+/// Whether somebody has set what has this key, so that an older value in its place is a wrong one. The
+/// statistics and the time of signatures change by themselves.
+pub(super) fn is_setting(key: u16) -> bool {
+    !(STATISTICS..SIGNING).contains(&key) && key != TIME
+}
 
 /// What survives a loss of power.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,9 +1,10 @@
-//! Sets of words, appended to two halves of the flash.
+//! Sets of words, appended to two halves of the flash, so that the settings always stand in two sets.
 
 use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlash;
 
+use super::kept::is_setting;
 use super::schema::{self, Change};
 use super::word::{Check, Word, Writer};
 use super::{Content, Integrity, StoreError, key};
@@ -29,6 +30,42 @@ impl Set {
         after: 0,
         number: FIRST - 1,
     };
+
+    /// Whether it was written after that one, or there is no such one.
+    fn is_newer(&self, than: &Self) -> bool {
+        let later = self.number.wrapping_sub(than.number).cast_signed() > 0;
+        than.values.is_empty() || later
+    }
+
+    /// Whether its words are those of the content, in their order, or at least the settings among them.
+    fn has<F: NorFlash>(
+        &self,
+        flash: &mut F,
+        content: &Content,
+        only_settings: bool,
+    ) -> Result<bool, StoreError> {
+        let counts = |key| !only_settings || is_setting(key);
+        let mut content = content.clone();
+        let mut words = self.values.clone().step_by(Word::BYTES as usize);
+        loop {
+            let wanted = loop {
+                match content.next(flash)? {
+                    Some((key, _)) if !counts(key) => {}
+                    next => break next,
+                }
+            };
+            let found = loop {
+                let Some(at) = words.next() else { break None };
+                let word = Word::read(flash, at)?;
+                if counts(word.key) {
+                    break Some((word.key, word.bits));
+                }
+            };
+            if wanted != found || wanted.is_none() {
+                return Ok(wanted == found);
+            }
+        }
+    }
 
     /// Every value in it, as this firmware has it.
     pub(super) fn values<'a>(&self, changes: &'a [Change]) -> Values<'a> {
@@ -77,6 +114,7 @@ pub(super) struct Log {
     halves: [Range<u32>; 2],
     /// Of the sets with their seals; without words if there is none.
     pub(super) newest: Set,
+    before: Set,
     /// Whether all that is written belongs to such a set.
     whole: bool,
     /// Whether all that is written may belong to a first set.
@@ -90,7 +128,7 @@ impl Log {
     }
 
     fn look<F: NorFlash>(flash: &mut F, halves: [Range<u32>; 2]) -> Result<Self, StoreError> {
-        let mut newest = Set::NONE;
+        let (mut newest, mut before) = (Set::NONE, Set::NONE);
         let (mut all_whole, mut first, mut torn) = (true, true, false);
         for half in halves.clone() {
             let mut start = half.start;
@@ -112,13 +150,18 @@ impl Log {
                 // The check of nothing is zero, as are the words that an erase may leave.
                 whole = word.key == key::SEAL && at != start && word.bits == check.0;
                 check = check.over(&word);
-                let is_newer = number.wrapping_sub(newest.number).cast_signed() > 0;
-                if whole && (newest.values.is_empty() || is_newer) {
-                    newest = Set {
-                        values: start..at,
-                        after: at + Word::BYTES,
-                        number,
-                    };
+                if !whole {
+                    continue;
+                }
+                let set = Set {
+                    values: start..at,
+                    after: at + Word::BYTES,
+                    number,
+                };
+                if set.is_newer(&newest) {
+                    before = core::mem::replace(&mut newest, set);
+                } else if set.is_newer(&before) {
+                    before = set;
                 }
             }
             all_whole &= whole;
@@ -126,6 +169,7 @@ impl Log {
         Ok(Self {
             halves,
             newest,
+            before,
             whole: all_whole,
             first,
         })
@@ -135,8 +179,9 @@ impl Log {
         match (self.newest.values.is_empty(), self.whole) {
             (false, true) => Integrity::Sound,
             (true, true) => Integrity::Empty,
-            (true, false) if !self.first => Integrity::Corrupt,
-            (_, false) => Integrity::Incomplete,
+            (false, false) => Integrity::Incomplete,
+            (true, false) if self.first => Integrity::Unfinished,
+            (true, false) => Integrity::Corrupt,
         }
     }
 
@@ -150,31 +195,35 @@ impl Log {
         }
     }
 
-    /// Writes a set with this content behind the newest, if that has another.
+    /// Writes a set with this content behind the newest, unless that has it and the set before has its
+    /// settings; whether it did.
     pub(super) fn append<F: NorFlash>(
         &self,
         flash: &mut F,
         content: &Content,
-    ) -> Result<(), StoreError> {
+    ) -> Result<bool, StoreError> {
         let newest = &self.newest;
-        let (len, same) = self.compare(flash, content)?;
+        let len = length(flash, content)?;
         // Where nothing is stored, a schema without values says no more.
         let nothing = newest.values.is_empty() && len == 2 * Word::BYTES;
-        if self.whole && (same || nothing) {
-            return Ok(());
+        if self.whole
+            && (nothing
+                || (newest.has(flash, content, false)? && self.before.has(flash, content, true)?))
+        {
+            return Ok(false);
         }
         let [here, there] = self.order();
         let behind = newest.after.max(here.start);
         if self.whole && here.end - behind >= len {
-            return self.write(flash, content, behind);
+            self.write(flash, content, behind)?;
+            return Ok(true);
         }
         self.move_to(flash, content, there, len)?;
         // What is not whole would be found again.
-        if self.whole {
-            Ok(())
-        } else {
-            wipe(flash, here)
+        if !self.whole {
+            wipe(flash, here)?;
         }
+        Ok(true)
     }
 
     /// Leaves nothing else than this in the flash.
@@ -183,30 +232,10 @@ impl Log {
         flash: &mut F,
         content: &Content,
     ) -> Result<(), StoreError> {
-        let (len, _) = self.compare(flash, content)?;
+        let len = length(flash, content)?;
         let [here, there] = self.order();
         self.move_to(flash, content, there, len)?;
         wipe(flash, here)
-    }
-
-    /// How long a set is with its seal, and whether it has what the newest has.
-    fn compare<F: NorFlash>(
-        &self,
-        flash: &mut F,
-        content: &Content,
-    ) -> Result<(u32, bool), StoreError> {
-        let Range { start, end } = self.newest.values;
-        let mut content = content.clone();
-        let mut at = start;
-        let mut same = true;
-        while let Some(wanted) = content.next(flash)? {
-            if same && at < end {
-                let word = Word::read(flash, at)?;
-                same = (word.key, word.bits) == wanted;
-            }
-            at += Word::BYTES;
-        }
-        Ok((at - start + Word::BYTES, same && at == end))
     }
 
     /// Writes a set of this length where nothing else stays.
@@ -244,6 +273,16 @@ impl Log {
             Err(StoreError::NotStored)
         }
     }
+}
+
+/// How long a set with this content is, with its seal.
+fn length<F: NorFlash>(flash: &mut F, content: &Content) -> Result<u32, StoreError> {
+    let mut content = content.clone();
+    let mut len = Word::BYTES;
+    while content.next(flash)?.is_some() {
+        len += Word::BYTES;
+    }
+    Ok(len)
 }
 
 fn wipe<F: NorFlash>(flash: &mut F, half: &Range<u32>) -> Result<(), StoreError> {

@@ -2,15 +2,18 @@
 //!
 //! A save appends all values as one set, of 8 bytes a value, and ends it with a seal over them. The
 //! newest set with its seal counts, so a loss of power leaves the values of this save or of the one
-//! before, all of them. The flash is used in two halves: where one has no more room, or anything
+//! before, all of them. Where a setting has changed the set is written twice, so that a bit that rots
+//! in one leaves the other; where only the statistics or the time of signatures have, the set before
+//! has the same settings. The flash is used in two halves: where one has no more room, or anything
 //! written is not whole, the other is erased for the set. What it replaces stays until the new one
 //! stands.
 //!
 //! # Wear
 //! A set with twenty changed parameters, the statistics and a key has 42 words, 336 bytes. On the
 //! STM32G431, whose pages last for 10 000 erases (DS12589) and of which a half has two of 2 KB, 12 sets
-//! fit a half: it lasts for 240 000 saves, and with every value changed for 80 000 at least. The two
-//! sectors of the STM32F405 (10 000 erases, DS8626) last for 960 000.
+//! fit a half: it lasts for 240 000 saves of statistics, or 120 000 changes of settings. Up to 40 changed
+//! parameters it is at least 80 000 changes, and with every value changed 40 000. The two sectors of the
+//! STM32F405 (10 000 erases, DS8626) last four times as long.
 
 mod kept;
 mod log;
@@ -33,6 +36,9 @@ mod key {
     pub(super) const SCHEMA: u16 = 0x1000;
 }
 
+/// Sets that have the settings which were saved last.
+const COPIES: usize = 2;
+
 /// How sound what is stored was.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrity {
@@ -40,13 +46,23 @@ pub enum Integrity {
     Sound,
     /// Nothing was stored: the values are the defaults.
     Empty,
-    /// A save was interrupted, or a value has rotted: the values are those of an earlier save, or the
-    /// defaults if there is none.
+    /// A save was interrupted, or a value has rotted: the values are those of an earlier save, or of the
+    /// other copy of this one.
     Incomplete,
+    /// The first save of all was interrupted: the values are the defaults.
+    Unfinished,
     /// No order was found in the flash: the values are the defaults.
     Corrupt,
     /// The flash could not be read: the values are the defaults.
     Unreadable,
+}
+
+impl Integrity {
+    /// Whether there was something and nothing of it can be used: the defaults may be those of another
+    /// motor than the one that was set up.
+    pub const fn is_lost(self) -> bool {
+        matches!(self, Self::Unfinished | Self::Corrupt | Self::Unreadable)
+    }
 }
 
 /// What was stored.
@@ -67,6 +83,7 @@ impl Loaded {
     pub const fn trouble(&self) -> Option<&'static str> {
         match self.integrity {
             Integrity::Incomplete => Some("storage: not whole, an earlier save is in force"),
+            Integrity::Unfinished => Some("storage: the first save was cut off"),
             Integrity::Corrupt => Some("storage: corrupt, all values are the defaults"),
             Integrity::Unreadable => Some("storage: unreadable, all values are the defaults"),
             _ if self.out_of_range => Some("storage: out of range, some values are defaults"),
@@ -127,16 +144,21 @@ fn load_changed<F: NorFlash>(flash: &mut F, range: Range<u32>, changes: &[Change
     loaded
 }
 
-/// Writes a new set if the values are not those that are stored, and looks whether it stands. When it
-/// is done the values survive the loss of power.
+/// Writes what is not stored yet, and looks whether it stands. When it is done the values survive the
+/// loss of power, and the settings of it stand twice.
 ///
 /// Defaults are not written; what this firmware does not know is kept.
 ///
 /// # Errors
 /// Any [`StoreError`]; what was stored before is still there then, or these values are.
 pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, kept: &Kept) -> Result<(), StoreError> {
-    let log = Log::open(flash, range)?;
-    log.append(flash, &Content::new(kept, log.newest.values(CHANGES)))
+    for _ in 0..COPIES {
+        let log = Log::open(flash, range.clone())?;
+        if !log.append(flash, &Content::new(kept, log.newest.values(CHANGES)))? {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Leaves nothing in the flash but these values: not what this firmware does not know, and no earlier
@@ -149,8 +171,9 @@ pub fn replace<F: NorFlash>(
     range: Range<u32>,
     kept: &Kept,
 ) -> Result<(), StoreError> {
-    let log = Log::open(flash, range)?;
-    log.replace(flash, &Content::new(kept, Set::NONE.values(CHANGES)))
+    let log = Log::open(flash, range.clone())?;
+    log.replace(flash, &Content::new(kept, Set::NONE.values(CHANGES)))?;
+    save(flash, range, kept)
 }
 
 /// The words of a set that is to be written, but for its seal: the schema, what this firmware does not

@@ -307,3 +307,85 @@ fn a_reset_to_the_factorys_settings_leaves_the_statistics_alone() {
     bench.wait_ms(1);
     assert_eq!(bench.requests, [Request::FactoryReset]);
 }
+
+fn loaded(integrity: Integrity) -> Loaded {
+    Loaded {
+        kept: Kept::default(),
+        integrity,
+        out_of_range: false,
+        unknown: false,
+    }
+}
+
+/// The defaults may be another motor's.
+#[test]
+fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
+    for integrity in [
+        Integrity::Unfinished,
+        Integrity::Corrupt,
+        Integrity::Unreadable,
+    ] {
+        let mut bench = Bench::new();
+        bench.esc.recall(&loaded(integrity));
+        bench.frames(12_000, 0);
+        assert!(!bench.esc.telemetry().armed, "{integrity:?}");
+        let lost = "Settings lost: set and store them before arming";
+        let told = |text: &&String| text.as_str() == lost;
+        assert_eq!(bench.texts.iter().filter(told).count(), 1);
+        assert!(bench.texts[1].starts_with("storage: "), "{:?}", bench.texts);
+        bench.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
+        bench.command(MavCmd::MAV_CMD_ACTUATOR_TEST, 0.1);
+        bench.wait_ms(1);
+        let rejected = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
+        assert_eq!(bench.results, [MavResult::MAV_RESULT_DENIED, rejected]);
+        bench.frames(10, 1_000);
+        assert_eq!(bench.throttle.setpoint(), Setpoint::Stop);
+
+        // A station that has only asked for a stream has set nothing.
+        bench.message(&COMMAND_LONG_DATA {
+            param1: 291.0,
+            param2: 20_000.0,
+            command: INTERVAL,
+            target_system: 1,
+            target_component: 1,
+            ..COMMAND_LONG_DATA::default()
+        });
+        bench.frames(5_000, 0);
+        assert_eq!(bench.requests, []);
+        for result in [Err("storage: the flash failed"), Ok(())] {
+            bench.set("LIM_PHASE_A", 12.5);
+            bench.frames(2_000, 0);
+            assert_eq!(bench.requests, [Request::ParamsChanged, Request::Keep]);
+            assert!(!bench.esc.telemetry().armed, "{integrity:?}");
+            bench.requests.clear();
+            bench.storage_done(result);
+            bench.frames(1_000, 0);
+            assert_eq!(bench.esc.telemetry().armed, result.is_ok());
+        }
+    }
+}
+
+#[test]
+fn where_nothing_was_lost_the_wire_arms() {
+    for integrity in [Integrity::Sound, Integrity::Empty, Integrity::Incomplete] {
+        let mut bench = Bench::new();
+        bench.esc.recall(&loaded(integrity));
+        bench.frames(1_000, 0);
+        assert!(bench.esc.telemetry().armed, "{integrity:?}");
+    }
+}
+
+#[test]
+fn what_is_asked_for_stores_settings_that_were_lost() {
+    for (action, request) in [(1.0, Request::Save), (2.0, Request::FactoryReset)] {
+        let mut bench = Bench::new();
+        bench.esc.recall(&loaded(Integrity::Corrupt));
+        bench.frames(2_000, 0);
+        bench.command(STORAGE, action);
+        bench.frames(10, 0);
+        assert_eq!(bench.requests, [request]);
+        bench.storage_done(Ok(()));
+        bench.frames(1_000, 0);
+        assert!(bench.esc.telemetry().armed);
+    }
+}

@@ -71,8 +71,8 @@ fn every_loss_of_power_leaves_all_old_or_all_new_values() {
             old = new;
         }
     }
-    // Most cuts are before the seal; the rest tells that later ones are cut as well.
-    assert!(olds > 20_000 && news > 100, "{olds} old, {news} new");
+    // Cuts are before the seal of the first copy, or behind it.
+    assert!(olds > 10_000 && news > 10_000, "{olds} old, {news} new");
     assert!(wrecks > 100, "{wrecks}");
 }
 
@@ -91,8 +91,14 @@ fn the_first_save_is_not_taken_for_corruption() {
                 assert_eq!((loaded.kept, loaded.integrity), (wanted, Integrity::Sound));
                 break;
             }
-            assert_eq!(loaded.kept, Kept::default());
-            assert_eq!(loaded.integrity, Integrity::Incomplete, "{steps} steps");
+            // Of the copies the first, or none.
+            let wanted = if loaded.integrity == Integrity::Unfinished {
+                Kept::default()
+            } else {
+                wanted.clone()
+            };
+            assert_ne!(loaded.integrity, Integrity::Corrupt, "{steps} steps");
+            assert_eq!(loaded.kept, wanted, "{steps} steps");
             steps += 1;
         }
         assert!(steps > 4, "{steps}");

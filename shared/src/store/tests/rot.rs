@@ -29,7 +29,7 @@ fn a_wrong_byte_anywhere_is_noticed() {
             let loaded = load(&mut flash, RANGE);
             let trouble = "storage: not whole, an earlier save is in force";
             assert_eq!(loaded.trouble(), Some(trouble), "{byte:#x} at {at}");
-            assert!(sets.contains(&loaded.kept), "{byte:#x} at {at}");
+            assert_eq!(Some(&loaded.kept), sets.last(), "{byte:#x} at {at}");
         }
     }
 }
@@ -40,8 +40,12 @@ fn a_wrong_byte_anywhere_is_noticed() {
 fn two_and_three_wrong_bits_are_noticed() {
     let (mut flash, sets) = sets();
     let mut random = Random::new(3);
-    let begin = 8 * HALF;
-    let bits = 8 * WORD * (stored(&mut flash).len() + 1);
+    let newest = Log::open(&mut flash, RANGE)
+        .expect("two pages")
+        .newest
+        .values;
+    let begin = 8 * newest.start as usize;
+    let bits = 8 * (newest.len() + WORD);
     for i in 0..40_000 {
         let mut flash = flash.clone();
         let before = flash.bytes.clone();
@@ -54,17 +58,54 @@ fn two_and_three_wrong_bits_are_noticed() {
         }
         let loaded = load(&mut flash, RANGE);
         assert_eq!(loaded.integrity, Integrity::Incomplete, "{i}");
-        assert_eq!(loaded.kept, sets[sets.len() - 2], "{i}");
+        assert_eq!(Some(&loaded.kept), sets.last(), "{i}: the other copy");
+    }
+}
+
+/// So that no motor is driven with the settings of another one.
+#[test]
+fn a_wrong_bit_in_the_only_save_changes_nothing_that_was_set() {
+    let mut flash = RamFlash::new();
+    save(&mut flash, RANGE, &changed()).expect("fits");
+    let written = flash.bytes.iter().filter(|byte| **byte != 0xff).count();
+    assert!(written > 2 * 4 * WORD / 2, "{written}");
+    for bit in 0..8 * flash.bytes.len() {
+        let mut flash = flash.clone();
+        flash.bytes[bit / 8] ^= 1 << (bit % 8);
+        let loaded = load(&mut flash, RANGE);
+        assert_eq!(loaded.kept, changed(), "{bit}");
+        assert_eq!(loaded.integrity, Integrity::Incomplete, "{bit}");
+        // The next save, of whatever, makes two of them again.
+        save(&mut flash, RANGE, &loaded.kept).expect("goes to the other half");
+        assert_eq!(sound(&mut flash), changed());
     }
 }
 
 #[test]
-fn a_value_that_rots_gives_way_to_an_earlier_save() {
+fn where_both_copies_of_the_only_save_rot_all_is_lost() {
+    let mut flash = RamFlash::new();
+    save(&mut flash, RANGE, &changed()).expect("fits");
+    let copy = 8 * 4 * WORD;
+    for (a, b) in (0..copy).zip((copy..2 * copy).rev()) {
+        let mut flash = flash.clone();
+        for bit in [a, b] {
+            flash.bytes[bit / 8] ^= 1 << (bit % 8);
+        }
+        let loaded = load(&mut flash, RANGE);
+        assert_eq!(loaded.kept, Kept::default());
+        assert!(loaded.integrity.is_lost(), "{a} {b}: {loaded:?}");
+    }
+}
+
+#[test]
+fn where_both_copies_rot_an_earlier_save_is_in_force() {
     let mut flash = RamFlash::new();
     save(&mut flash, RANGE, &changed()).expect("fits");
     save(&mut flash, RANGE, &Kept::default()).expect("fits");
-    // The second set begins at the fifth word.
-    flash.bytes[4 * WORD + 4] ^= 1;
+    // Four words twice, then two words twice.
+    for at in [8, 10] {
+        flash.bytes[at * WORD + 4] ^= 1;
+    }
     let loaded = load(&mut flash, RANGE);
     assert_eq!(loaded.kept, changed());
     assert_eq!(loaded.integrity, Integrity::Incomplete);
