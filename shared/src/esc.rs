@@ -304,11 +304,7 @@ impl Esc {
         }
         let stores = self.storage.waits(now_us) && self.may_store();
         if stores && throttle.reach(Throttle::store) {
-            let request = self.storage.take(now_us);
-            if request != Some(Request::Keep) {
-                self.unstored.clear();
-            }
-            return request;
+            return self.storage.take(now_us);
         }
         None
     }
@@ -334,10 +330,14 @@ impl Esc {
     /// again.
     pub fn storage_done(&mut self, throttle: &mut impl Reach, result: Result<(), &'static str>) {
         throttle.reach(Throttle::stored);
-        match self.storage.done(result.is_ok()) {
-            Some(Asker::Wire | Asker::Nobody) => self.component.tell_stored(result),
-            Some(Asker::Mavlink) => self.component.storage_done(result),
-            None => {}
+        if self.storage.takes_all() && result.is_ok() {
+            self.unstored.clear();
+        }
+        match (self.storage.done(result.is_ok()), result) {
+            (Some(Asker::Wire), _) => self.component.tell_stored(result),
+            (Some(Asker::Mavlink), _) => self.component.storage_done(result),
+            (Some(Asker::Nobody), Err(reason)) => self.warn_of(reason),
+            _ => {}
         }
     }
 

@@ -14,6 +14,16 @@ use crate::throttle::Reach;
 /// For how long nothing must have changed before what has is stored, µs: a client that writes a whole
 /// list of parameters wears the flash once.
 const QUIET_US: u64 = 1_000_000;
+/// For how long what has changed may wait at most because more changes, µs: so much of what was signed may
+/// be played again after a loss of power.
+const LATEST_US: u64 = 2_000_000;
+
+/// Saves that nobody has asked for and that may follow one another so soon. An evening of trying one value
+/// after another takes as many.
+const SAVES_AT_ONCE: u64 = 100;
+/// The time that gives one of them back, µs. A client that changes a value again and again, for a day,
+/// costs 100 + 480 of the flash's 80 000 saves, 0.7 %.
+const SAVE_EVERY_US: u64 = 180_000_000;
 
 /// How often a person is told that settings were lost, µs: a station may have come since.
 const REMIND_US: u64 = 10_000_000;
@@ -35,8 +45,10 @@ pub(super) struct Storage {
     /// MAVLink has one at a time, and refuses others.
     mavlink: Option<Request>,
     save: bool,
-    /// When something changed that is to be stored, for the last time.
-    changed_us: Option<u64>,
+    /// When something changed that is to be stored, for the first and the last time.
+    changed_us: Option<(u64, u64)>,
+    /// When the saves that nobody has asked for are all given back.
+    spent_us: u64,
     /// Whether the ESC is to start again when nothing waits any more.
     reboot: bool,
     /// Whose request the caller has been given.
@@ -65,7 +77,8 @@ impl Storage {
     /// asks for another interval has set none.
     pub(super) fn changed(&mut self, now_us: u64, is_parameter: bool) {
         if is_parameter || !self.lost {
-            self.changed_us = Some(now_us);
+            let first_us = self.changed_us.map_or(now_us, |(first_us, _)| first_us);
+            self.changed_us = Some((first_us, now_us));
         }
     }
 
@@ -109,13 +122,18 @@ impl Storage {
     }
 
     fn next(&self, now_us: u64) -> Option<(Asker, Request)> {
-        let quiet = |changed_us| self.reboot || now_us.saturating_sub(changed_us) >= QUIET_US;
+        let is_due = |(first_us, last_us)| {
+            let quiet = now_us.saturating_sub(last_us) >= QUIET_US
+                || now_us.saturating_sub(first_us) >= LATEST_US;
+            let spent_us = self.spent_us.saturating_sub(now_us);
+            self.reboot || (quiet && spent_us <= (SAVES_AT_ONCE - 1) * SAVE_EVERY_US)
+        };
         if let Some(request) = self.mavlink {
             Some((Asker::Mavlink, request))
         } else if self.save {
             Some((Asker::Wire, Request::Save))
         } else {
-            let due = self.changed_us.is_some_and(quiet);
+            let due = self.changed_us.is_some_and(is_due);
             due.then_some((Asker::Nobody, Request::Keep))
         }
     }
@@ -127,13 +145,19 @@ impl Storage {
         match asker {
             Asker::Mavlink => self.mavlink = None,
             Asker::Wire => self.save = false,
-            Asker::Nobody => {}
+            Asker::Nobody => self.spent_us = self.spent_us.max(now_us) + SAVE_EVERY_US,
         }
         if request != Request::Load {
             // All else is stored with it.
             self.changed_us = None;
         }
         Some(request)
+    }
+
+    /// Whether what is stored now has all that is in force.
+    pub(super) fn takes_all(&self) -> bool {
+        self.under_way
+            .is_some_and(|(_, request)| request != Request::Keep)
     }
 
     /// The request that was under way has ended: who is to be told of it.
@@ -233,8 +257,10 @@ impl Esc {
             statistics: self.telemetry.statistics,
             signing: self.component.kept_signing(),
         };
-        for unstored in &self.unstored {
-            unstored.hide(&mut kept);
+        if !self.storage.takes_all() {
+            for unstored in &self.unstored {
+                unstored.hide(&mut kept);
+            }
         }
         kept
     }

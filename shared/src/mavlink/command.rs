@@ -107,11 +107,10 @@ impl Command {
         matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL)
     }
 
-    /// Whether there is something to be kept: an interval that was taken, and the time of a signature,
-    /// which must not be taken again after a reset, even if the command was refused before.
-    fn leaves(&self, result: Option<MavResult>) -> bool {
-        let is_interval = self.number == SET_MESSAGE_INTERVAL && result == Some(ACCEPTED);
-        is_interval || (self.signed && !self.asks())
+    /// Whether there is something to be kept once it is obeyed: an interval, and the time of a
+    /// signature, so that what was obeyed is not obeyed again after a reset.
+    fn leaves(&self) -> bool {
+        self.number == SET_MESSAGE_INTERVAL || (self.signed && !self.asks())
     }
 
     /// Whether this is the same command sent again because its ACK did not arrive. Values are
@@ -191,7 +190,9 @@ impl Commands {
             (_, Some((_, result))) => Some(result),
             _ => self.obey(command, drive, context, schedule, replies),
         };
-        self.left |= command.leaves(result);
+        let waits = result.is_none() && self.storage.is_some();
+        let is_taken = waits || matches!(result, Some(ACCEPTED | IN_PROGRESS));
+        self.left |= is_taken && command.leaves();
         if let Some(result) = result {
             replies.ack(command.from, command.number, result);
         }

@@ -12,7 +12,7 @@ use super::faults::Announcer;
 use super::identity::{Address, Identity, Role};
 use super::pace::Pace;
 use super::parameter::{self, List};
-use super::receiver::{Frame, is_signed};
+use super::receiver::Frame;
 use super::reply::{PING, Replies, Reply, Writer};
 use super::schedule::{Intervals, Schedule};
 use super::signing::{Kept, Signing, Trust};
@@ -189,8 +189,7 @@ impl Component {
                     &mut self.replies,
                 );
                 self.params_changed |= taken;
-                // Even what is refused now must not be taken after a reset.
-                self.keep |= taken || is_signed(frame.raw);
+                self.keep |= taken;
             }
             COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => self.commands.handle(
                 &Command::read(

@@ -2,6 +2,7 @@
 
 use super::storage::{ACCEPTED, REBOOT, STORAGE};
 use super::*;
+use crate::esc::storage::Storage;
 use crate::mavlink::{KeptSigning, Key};
 use crate::statistics::Statistics;
 use crate::store::{Integrity, Kept, Loaded};
@@ -388,4 +389,84 @@ fn what_is_asked_for_stores_settings_that_were_lost() {
         bench.frames(1_000, 0);
         assert!(bench.esc.telemetry().armed);
     }
+}
+
+#[test]
+fn changes_without_end_are_stored_every_two_seconds() {
+    let mut bench = rested();
+    let mut stored_ms = Vec::new();
+    for step in 0..50 {
+        bench.set("LIM_PHASE_A", 10.0 + step as f32 / 10.0);
+        for ms in 0..400 {
+            bench.wait_ms(1);
+            if bench.requests.contains(&Request::Keep) {
+                stored_ms.push(400 * step + ms);
+                bench.storage_done(Ok(()));
+                bench.requests.clear();
+            }
+        }
+    }
+    let first = stored_ms.first().copied().expect("there are some");
+    assert!(first <= 2_001, "{stored_ms:?}");
+    // What is stored waits for the next change, and so 0.4 s more.
+    assert!(
+        stored_ms.windows(2).all(|pair| pair[1] - pair[0] <= 2_401),
+        "{stored_ms:?}"
+    );
+}
+
+/// The flash lasts for 80 000 saves.
+#[test]
+fn a_day_of_changes_costs_the_flash_a_hundredth_of_its_life() {
+    let mut storage = Storage::default();
+    let mut saves = 0;
+    let mut now_us = 0;
+    let mut change = |storage: &mut Storage| {
+        storage.changed(now_us, true);
+        now_us += 1_200_000;
+        if storage.waits(now_us) {
+            saves += 1;
+            assert_eq!(storage.take(now_us), Some(Request::Keep));
+            storage.done(true);
+        }
+        (now_us, saves)
+    };
+    for person in 1..=100 {
+        let (_, saves) = change(&mut storage);
+        assert_eq!(saves, person, "who tries values sees each of them stored");
+    }
+    let mut made = 0;
+    while change(&mut storage).0 < 86_400_000_000 {
+        made = change(&mut storage).1;
+    }
+    assert!((500..=800).contains(&made), "{made}");
+}
+
+#[test]
+fn a_failed_save_that_nobody_asked_for_ends_no_calibration() {
+    let mut bench = rested();
+    bench.set("LIM_PHASE_A", 12.5);
+    bench.message(&COMMAND_LONG_DATA {
+        param7: 1.0,
+        command: MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION,
+        target_system: 1,
+        target_component: 1,
+        ..COMMAND_LONG_DATA::default()
+    });
+    bench.keeps_after_ms();
+    let results = bench.results.clone();
+    bench.storage_done(Err("storage: the flash failed"));
+    bench.wait_ms(5);
+    assert_eq!(bench.results, results);
+}
+
+#[test]
+fn what_the_wire_has_set_is_not_stored_by_itself_after_its_own_save_has_failed() {
+    let mut bench = Bench::armed();
+    bench.frames(10, 8);
+    bench.frames(10, 12);
+    assert_eq!(bench.requests, [Request::ParamsChanged, Request::Save]);
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 1.0);
+    bench.storage_done(Err("storage: the flash failed"));
+    assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 0.0);
 }
