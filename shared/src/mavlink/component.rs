@@ -231,7 +231,7 @@ impl Component {
         let signing = &mut self.writer.sender.signing;
         let is_time = signing.set_up(frame.bytes(10), frame.u64(0));
         let (severity, text) = if !is_time {
-            let text = "Signing refused: its time has more than 48 bits";
+            let text = "Signing refused: its time is too far ahead";
             (MavSeverity::MAV_SEVERITY_WARNING, text)
         } else if signing.signs() {
             let text = "Signing: only who has the key may change anything";

@@ -2,10 +2,17 @@
 //! change anything.
 //!
 //! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a
-//! component and a link), and no stream may begin more than a minute behind the newest timestamp that
-//! was heard or sent. What was newest is kept over a loss of power with the key, so that what was
-//! recorded before cannot be played again after it: it is stored with all else, so that what came in the
-//! last second, or since the motor began to turn, may be played again where the power fails then.
+//! component and a link), whatever key signs it, and no stream may begin more than a minute behind the
+//! newest timestamp that was heard or sent, nor before its key. What was newest is kept over a loss of
+//! power with the key, so that what was recorded before cannot be played again after it. It is stored
+//! with all else: what came in the last two seconds, or since the motor began to turn, may be played
+//! again where the power fails then, and what was refused since the last save.
+//!
+//! The ESC has no clock, so those who sign tell it the time: SETUP_SIGNING does, and each frame that is
+//! newer. A frame may be dated at most a minute ahead. The first one after a start, and the next one
+//! after a minute without any, may be further ahead, since the time that has passed is not known or may
+//! be wrong; it tells the time then, but no more than five years at once. A wrong clock that is further
+//! off locks nobody out.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SETUP_SIGNING_DATA;
@@ -23,10 +30,18 @@ const HASH_LEN: usize = 6;
 /// The link that this ESC signs for: it sends the same frames on all of them.
 const LINK: u8 = 0;
 
-/// By how much a stream may begin behind the newest timestamp: a minute.
-const BEHIND_TICKS: u64 = 6_000_000;
+/// By how much a stream may begin behind the newest timestamp, and be ahead of it: a minute.
+const MINUTE_TICKS: u64 = 6_000_000;
 const TICK_US: u32 = 10;
-const TIMESTAMP_MAX: u64 = (1 << 48) - 1;
+const MINUTE_US: u64 = MINUTE_TICKS * TICK_US as u64;
+const YEAR_TICKS: u64 = 36_525 * 864 * 1_000_000 / TICK_US as u64;
+/// By how much a frame may be ahead of the newest timestamp that is known, where the time is not: an ESC
+/// may have lain without power for so long.
+const FIRST_TICKS: u64 = 5 * YEAR_TICKS;
+/// No clock that is right tells less: 2026, in which this was written.
+const PAST: u64 = 11 * YEAR_TICKS;
+/// The greatest timestamp of a SETUP_SIGNING, in 2099: others must be able to follow in 48 bits.
+const SET_UP_MOST: u64 = (1 << 48) - 1 - FIRST_TICKS;
 
 /// Streams that are followed: ground stations, companions and an autopilot, each over two links.
 const STREAMS: usize = 8;
@@ -76,11 +91,16 @@ struct Stream {
 #[derive(Clone, Debug)]
 pub(super) struct Signing {
     key: Option<Key>,
-    /// The newest timestamp that was heard or sent, and when that was.
+    /// The newest timestamp that was heard, and when that was.
     newest: u64,
-    newest_at_us: u64,
-    /// Up to here, everything may have been heard before the start.
+    newest_us: u64,
+    /// The last timestamp that was sent.
+    sent: u64,
+    /// When the last frame that was signed was taken, or a SETUP_SIGNING that tells the time.
+    told_us: Option<u64>,
+    /// Up to here, everything may have been heard before the start or before the key.
     floor: u64,
+    /// Kept from key to key: one that comes back finds what it has signed before.
     streams: [Option<Stream>; STREAMS],
     now_us: u64,
 }
@@ -92,7 +112,9 @@ impl Signing {
         Self {
             key: kept.map(|kept| kept.key),
             newest: floor,
-            newest_at_us: 0,
+            newest_us: 0,
+            sent: 0,
+            told_us: None,
             floor,
             streams: [None; STREAMS],
             now_us: 0,
@@ -105,26 +127,27 @@ impl Signing {
         self.key.map(|key| Kept { key, newest })
     }
 
-    /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False where its time is none.
+    /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False where its time cannot be.
     ///
-    /// From key to key time does not run backwards, and what was heard by the same one is not heard
-    /// again.
+    /// From key to key time does not run backwards, and what was heard is not heard again.
     #[inline(never)]
     pub(super) fn set_up(&mut self, key: [u8; 32], timestamp: u64) -> bool {
-        if timestamp > TIMESTAMP_MAX {
+        let most = self.key.map_or(SET_UP_MOST, |_| self.latest());
+        if timestamp > most.min(SET_UP_MOST) {
             return false;
         }
         let key = Some(Key(key)).filter(|key| key.0 != [0; 32]);
-        let before = self.key.map_or(0, |_| self.clock());
-        if key.is_none() || key != self.key {
-            *self = Self {
-                key,
-                now_us: self.now_us,
-                ..Self::new(None)
-            };
+        if key.is_some() && key != self.key {
+            self.floor = self.floor.max(timestamp.saturating_sub(1));
         }
-        self.newest = timestamp.max(before);
-        self.newest_at_us = self.now_us;
+        self.key = key;
+        // What has not begun does not pass.
+        let known = self.newest > 0;
+        self.newest = timestamp.max(if known { self.clock() } else { 0 });
+        self.newest_us = self.now_us;
+        if timestamp > PAST {
+            self.told_us = Some(self.now_us);
+        }
         true
     }
 
@@ -163,7 +186,10 @@ impl Signing {
             return false;
         };
         let timestamp = u64::from_le_bytes([a, b, c, d, e, f, 0, 0]);
-        let oldest = self.floor.max(self.clock().saturating_sub(BEHIND_TICKS));
+        if timestamp > self.latest() {
+            return false;
+        }
+        let oldest = self.floor.max(self.clock().saturating_sub(MINUTE_TICKS));
         let mine = |stream: &Option<Stream>| {
             stream.is_some_and(|stream| stream.from == from && stream.link == link)
         };
@@ -188,23 +214,34 @@ impl Signing {
         });
         if timestamp > self.clock() {
             self.newest = timestamp;
-            self.newest_at_us = self.now_us;
+            self.newest_us = self.now_us;
         }
+        self.told_us = Some(self.now_us);
         true
     }
 
     /// The time now, as far as it is known here.
     fn clock(&self) -> u64 {
-        self.newest + divide(self.now_us.saturating_sub(self.newest_at_us), TICK_US)
+        let passed = divide(self.now_us.saturating_sub(self.newest_us), TICK_US);
+        self.sent.max(self.newest + passed)
+    }
+
+    /// The latest time at which somebody else may believe to be.
+    fn latest(&self) -> u64 {
+        let known = |told_us| self.now_us.saturating_sub(told_us) < MINUTE_US;
+        if self.told_us.is_some_and(known) {
+            self.clock() + MINUTE_TICKS
+        } else {
+            self.clock().max(PAST) + FIRST_TICKS
+        }
     }
 
     /// Signs a frame: from its start to its check, with the flag set and the check over it. The
     /// signature stands behind it; nothing without a key.
     pub(super) fn sign(&mut self, frame: &[u8]) -> Option<[u8; SIGNATURE_LEN]> {
         let key = self.key?;
-        let timestamp = self.clock().max(self.newest + 1);
-        self.newest = timestamp;
-        self.newest_at_us = self.now_us;
+        let timestamp = self.clock().max(self.sent + 1);
+        self.sent = timestamp;
         let mut signature = [0; SIGNATURE_LEN];
         signature[0] = LINK;
         signature[1..=TIMESTAMP_LEN].copy_from_slice(&timestamp.to_le_bytes()[..TIMESTAMP_LEN]);

@@ -176,6 +176,7 @@ fn a_frame_is_obeyed_once_and_in_its_order() {
     // Another link has an order of its own, within a minute.
     assert!(takes(&mut bench, 7.0, STATION, 2, TODAY + SECOND));
     let later = TODAY + 100 * SECOND;
+    bench.now_us += 97_000_000;
     assert!(takes(&mut bench, 8.0, STATION, 1, later));
     assert!(!takes(&mut bench, 9.0, STATION, 3, later - 61 * SECOND));
     assert!(takes(&mut bench, 9.0, STATION, 3, later - 59 * SECOND));
@@ -205,6 +206,7 @@ fn more_streams_than_can_be_followed_push_out_none_that_could_be_played_again() 
     assert!(!takes(&mut bench, 20.0, STATION, 8, TODAY + 2 * SECOND));
     // A minute later they are too old to begin anew, and make room.
     let later = TODAY + 62 * SECOND;
+    bench.now_us += 61_000_000;
     assert!(takes(&mut bench, 20.0, STATION, 7, later));
     assert!(takes(&mut bench, 21.0, STATION, 8, later));
     assert!(!takes(&mut bench, 5.0, STATION, 0, TODAY + SECOND), "again");
@@ -332,6 +334,7 @@ fn whatever_would_change_something_leaves_its_time_to_be_kept() {
 #[test]
 fn the_same_key_again_opens_nothing_that_was_heard() {
     let mut bench = keyed();
+    bench.now_us += 100_000_000;
     assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + 100 * SECOND));
     assert!(takes(&mut bench, 6.0, STATION, 1, TODAY + 101 * SECOND));
     let again = signed(STATION, &setup(KEY, TODAY), &KEY, 1, TODAY + 102 * SECOND);
@@ -346,8 +349,8 @@ fn the_same_key_again_opens_nothing_that_was_heard() {
 }
 
 #[test]
-fn what_is_no_time_sets_no_key() {
-    for timestamp in [1 << 48, u64::MAX] {
+fn what_leaves_no_time_for_others_sets_no_key() {
+    for timestamp in [(1 << 48) - 1, 1 << 48, u64::MAX] {
         let mut bench = Bench::new();
         bench.receive(&encode(STATION, &setup(KEY, timestamp), &[]));
         let answers = bench.answers();
@@ -380,4 +383,118 @@ fn a_key_may_be_set_by_a_frame_that_it_signs() {
         bench.component.kept_signing().map(|kept| kept.key.0),
         Some(KEY)
     );
+}
+
+const YEAR: u64 = 365 * 86_400 * SECOND;
+const LAST: u64 = (1 << 48) - 1;
+
+/// Gives another key, or none, by a frame that the one before signs.
+fn give(bench: &mut Bench, key: [u8; 32], by: &[u8], timestamp: u64) {
+    let message = setup(key, timestamp);
+    if by == [0; 32] {
+        bench.receive(&encode(STATION, &message, &[]));
+    } else {
+        bench.receive(&signed(STATION, &message, by, 1, timestamp));
+    }
+    bench.answers();
+    let kept = bench.component.kept_signing();
+    assert_eq!(kept.map_or([0; 32], |kept| kept.key.0), key);
+}
+
+#[test]
+fn a_key_that_comes_back_opens_nothing_that_was_heard() {
+    for other in [[7; 32], [0; 32]] {
+        // Those who set it say what time it is, or that they do not know.
+        for returns in [TODAY + 12 * SECOND, TODAY] {
+            let mut bench = keyed();
+            for (value, link, after) in [(5.0, 1, 5), (6.0, 2, 6), (7.0, 1, 7)] {
+                let at = TODAY + after * SECOND;
+                assert!(takes(&mut bench, value, STATION, link, at));
+            }
+            bench.now_us += 10_000_000;
+            give(&mut bench, other, &KEY, TODAY + 10 * SECOND);
+            if other == [0; 32] {
+                give(&mut bench, KEY, &other, returns);
+            } else {
+                give(&mut bench, KEY, &other, TODAY + 12 * SECOND);
+            }
+            for (value, link, after) in [(5.0, 1, 5), (6.0, 2, 6), (7.0, 1, 7)] {
+                let at = TODAY + after * SECOND;
+                bench
+                    .params
+                    .set(ParamId::CtlBwSpdHz, 3.0)
+                    .expect("in range");
+                assert!(!takes(&mut bench, value, STATION, link, at), "{after}");
+            }
+            assert!(takes(&mut bench, 8.0, STATION, 2, TODAY + 13 * SECOND));
+        }
+    }
+}
+
+/// Also over a loss of power in which there was none.
+#[test]
+fn what_was_signed_before_a_key_was_set_is_not_obeyed() {
+    let mut bench = Bench::new();
+    bench.receive(&encode(STATION, &setup(KEY, TODAY), &[]));
+    bench.answers();
+    assert!(!takes(&mut bench, 5.0, STATION, 1, TODAY - SECOND));
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY));
+}
+
+#[test]
+fn a_time_ahead_locks_nobody_out() {
+    let mut bench = keyed();
+    for ahead in [61 * SECOND, YEAR, 10 * YEAR, LAST - TODAY] {
+        assert!(
+            !takes(&mut bench, 5.0, STATION, 1, TODAY + ahead),
+            "{ahead}"
+        );
+        let off = setup([0; 32], TODAY + ahead);
+        bench.receive(&signed(STATION, &off, &KEY, 1, TODAY + ahead));
+        // By a frame that is taken.
+        let far = setup(KEY, TODAY + ahead);
+        bench.receive(&signed(STATION, &far, &KEY, 9, TODAY + ahead / YEAR));
+        let refused = bench.answers();
+        let text = "Signing refused: its time is too far ahead";
+        assert_eq!(texts(&refused), [text], "{ahead}");
+    }
+    assert!(takes(&mut bench, 6.0, STATION, 2, TODAY + SECOND));
+    assert!(takes(&mut bench, 7.0, STATION, 1, TODAY + 60 * SECOND));
+}
+
+/// The ESC has no clock.
+#[test]
+fn the_first_frame_after_a_start_tells_the_time_within_five_years() {
+    let kept = keyed().component.kept_signing();
+    let started = || {
+        let mut bench = Bench::new();
+        bench.component.keep_signing(kept);
+        bench
+    };
+    for ahead in [10 * YEAR, LAST - TODAY] {
+        let mut bench = started();
+        assert!(
+            !takes(&mut bench, 5.0, STATION, 1, TODAY + ahead),
+            "{ahead}"
+        );
+        let later = TODAY + 20 * SECOND;
+        assert!(takes(&mut bench, 5.0, STATION, 1, later));
+        assert!(!takes(&mut bench, 6.0, STATION, 1, later + 61 * SECOND));
+        assert!(takes(&mut bench, 7.0, STATION, 2, later + 60 * SECOND));
+    }
+    let mut bench = started();
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + 4 * YEAR));
+}
+
+/// A frame from a recording that was never heard may come first, and a machine may sleep.
+#[test]
+fn a_minute_without_a_frame_lets_one_tell_the_time_again() {
+    let mut bench = keyed();
+    bench.run_ms(59_000);
+    let hour = TODAY + 3_600 * SECOND;
+    assert!(!takes(&mut bench, 5.0, STATION, 1, hour));
+    assert!(!takes(&mut bench, 5.0, STATION, 1, LAST));
+    bench.run_ms(2_000);
+    assert!(!takes(&mut bench, 5.0, STATION, 1, LAST), "never");
+    assert!(takes(&mut bench, 5.0, STATION, 1, hour));
 }
