@@ -312,6 +312,21 @@ fn a_log_has_each_frame_after_its_time() {
     assert_eq!(std::fs::read(&path).unwrap(), expected);
 }
 
+/// A log is handed on to others.
+#[test]
+fn a_log_has_no_key_of_signatures() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.tlog");
+    let mut recorder = Recorder::create(&path).unwrap();
+    // SETUP_SIGNING is message 256, PARAM_SET 23.
+    let frame = |id: [u8; 3]| [&[0xfd, 42, 0, 0, 1, 255, 190][..], &id, &[7; 44]].concat();
+    recorder.frame(1_000_000, &frame([0, 1, 0])).unwrap();
+    recorder.frame(2_000_000, &frame([23, 0, 0])).unwrap();
+    recorder.finish().unwrap();
+    let written = std::fs::read(&path).unwrap();
+    assert_eq!(written[8..], frame([23, 0, 0]));
+}
+
 #[test]
 fn what_cannot_be_recorded_is_one_line_with_the_path() {
     let folder = tempfile::tempdir().unwrap();
