@@ -15,7 +15,7 @@ use siskin_control::throttle::Throttle;
 use thiserror::Error;
 
 use crate::fault::{CHIP_V, Fault, Timeline};
-use crate::flash::{FLASH_BYTES, FileFlash};
+use crate::flash::{FLASH_BYTES, FileFlash, FlashError};
 use crate::link::LinkId;
 use crate::rig::{Bench, Rig};
 use crate::summary::Rejected;
@@ -339,6 +339,7 @@ impl Device {
 
     /// Does what a request for storage asks for; what the command line set stays unstored.
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
+        self.flash.check().map_err(|error| reason(&error))?;
         let mut kept = self.esc.kept();
         for given in &self.overrides {
             if kept.params.get(given.id) == given.value {
@@ -369,9 +370,7 @@ impl Device {
         if !self.flash.is_persistent() {
             return Err("storage: none, nothing would survive a restart");
         }
-        self.flash
-            .sync()
-            .map_err(|_| "storage: the file cannot be written")
+        self.flash.sync().map_err(|error| reason(&error))
     }
 
     fn configure(&mut self) {
@@ -407,6 +406,14 @@ impl Device {
             period_ns: self.rig.period_s() * 1e9,
             periods: 0,
         };
+    }
+}
+
+/// Why nothing is stored, for a person behind MAVLink.
+fn reason(error: &FlashError) -> &'static str {
+    match error {
+        FlashError::Gone => "storage: the file was removed or cut",
+        _ => "storage: the file cannot be written",
     }
 }
 

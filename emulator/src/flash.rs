@@ -24,13 +24,21 @@ pub const WORD_BYTES: usize = 8;
 
 const ERASED: u8 = 0xFF;
 
-/// Flash behind which a file stands. What has been written or erased is in the file when the call
-/// returns: it survives a kill of the program, and after [`FileFlash::sync`] a loss of power.
+/// Flash behind which a file stands, which nobody else may read: a key of signatures is in it. What has
+/// been written or erased is in the file when the call returns: it survives a kill of the program, and
+/// after [`FileFlash::sync`] a loss of power.
 #[derive(Debug)]
 pub struct FileFlash {
     content: Box<[u8; FLASH_BYTES]>,
-    file: Option<File>,
+    backing: Option<Backing>,
     fails: bool,
+}
+
+/// A file, and where it stands unless somebody has moved it.
+#[derive(Debug)]
+struct Backing {
+    file: File,
+    path: PathBuf,
 }
 
 /// Why the file cannot serve as flash: one line, with what to do.
@@ -87,8 +95,11 @@ pub enum FlashError {
     #[error("the flash refuses to change")]
     Refused,
     /// The file cannot be written.
-    #[error("the storage file cannot be written ({0})")]
+    #[error("the storage file cannot be written ({0}); free some room")]
     Io(#[from] io::Error),
+    /// Somebody has removed the file, put another in its place or changed its length.
+    #[error("the storage file was removed or cut; start again")]
+    Gone,
 }
 
 impl FileFlash {
@@ -96,7 +107,7 @@ impl FileFlash {
     pub fn in_memory() -> Self {
         Self {
             content: Box::new([ERASED; FLASH_BYTES]),
-            file: None,
+            backing: None,
             fails: false,
         }
     }
@@ -125,6 +136,7 @@ impl FileFlash {
         if !lock(&file).map_err(failed)? {
             return Err(StorageError::InUse(path.to_owned()));
         }
+        keep_private(&file).map_err(failed)?;
         let corrupt = |bytes| StorageError::Corrupt {
             path: path.to_owned(),
             bytes,
@@ -137,22 +149,42 @@ impl FileFlash {
         io::Read::read_exact(&mut &file, content.as_mut_slice()).map_err(failed)?;
         Ok(Self {
             content,
-            file: Some(file),
+            backing: Some(Backing {
+                file,
+                path: path.to_owned(),
+            }),
             fails: false,
         })
     }
 
     /// Whether what is written outlives the program.
     pub fn is_persistent(&self) -> bool {
-        self.file.is_some()
+        self.backing.is_some()
+    }
+
+    /// Looks whether what was written will be found at the next start.
+    ///
+    /// # Errors
+    /// [`FlashError::Gone`] where somebody has removed the file or changed its length.
+    pub fn check(&self) -> Result<(), FlashError> {
+        let stands = self.backing.as_ref().is_none_or(Backing::stands);
+        if stands {
+            Ok(())
+        } else {
+            Err(FlashError::Gone)
+        }
     }
 
     /// Waits until all that was written is on the disk.
-    pub fn sync(&self) -> io::Result<()> {
-        match &self.file {
-            Some(file) => file.sync_data(),
-            None => Ok(()),
+    ///
+    /// # Errors
+    /// As of [`FileFlash::check`], and where the system refuses it.
+    pub fn sync(&self) -> Result<(), FlashError> {
+        self.check()?;
+        if let Some(backing) = &self.backing {
+            backing.file.sync_data()?;
         }
+        Ok(())
     }
 
     /// Puts `bytes` into the file, then into memory: if the file refuses, nothing has changed.
@@ -160,7 +192,7 @@ impl FileFlash {
         if self.fails {
             return Err(FlashError::Refused);
         }
-        if let Some(file) = &mut self.file {
+        if let Some(Backing { file, .. }) = &mut self.backing {
             file.seek(SeekFrom::Start(offset as u64))?;
             file.write_all(bytes)?;
         }
@@ -169,7 +201,47 @@ impl FileFlash {
     }
 }
 
-/// Makes an erased file whole: one that a kill cut short would be found corrupt at the next start.
+impl Backing {
+    /// Whether the file is still what its path leads to, and whole.
+    fn stands(&self) -> bool {
+        let (Ok(there), Ok(own)) = (fs::metadata(&self.path), self.file.metadata()) else {
+            return false;
+        };
+        is_same(&there, &own) && own.len() == FLASH_BYTES as u64
+    }
+}
+
+#[cfg(unix)]
+fn is_same(a: &fs::Metadata, b: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    (a.dev(), a.ino()) == (b.dev(), b.ino())
+}
+
+/// Files have no numbers here that the standard library tells; an open one cannot be removed.
+#[cfg(not(unix))]
+fn is_same(_a: &fs::Metadata, _b: &fs::Metadata) -> bool {
+    true
+}
+
+/// Takes from others what right they have to the file.
+#[cfg(unix)]
+fn keep_private(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    let mode = file.metadata()?.permissions().mode();
+    if mode & 0o077 == 0 {
+        return Ok(());
+    }
+    file.set_permissions(fs::Permissions::from_mode(mode & 0o700))
+}
+
+/// A folder of the user's is private here.
+#[cfg(not(unix))]
+fn keep_private(_file: &File) -> io::Result<()> {
+    Ok(())
+}
+
+/// Makes an erased file whole: one that a kill cut short would be found corrupt at the next start. Of two
+/// that start at once both find the file of the first.
 fn create(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
@@ -177,12 +249,20 @@ fn create(path: &Path) -> io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(format!(".new-{}", std::process::id()));
     let new = path.with_file_name(name);
-    fs::write(&new, [ERASED; FLASH_BYTES])
-        .and_then(|()| fs::rename(&new, path))
-        .inspect_err(|_| {
-            // The error that counts is the one that brought us here.
-            let _ = fs::remove_file(&new);
+    let made = File::create(&new)
+        .and_then(|mut file| {
+            keep_private(&file)?;
+            file.write_all(&[ERASED; FLASH_BYTES])
         })
+        .and_then(|()| match fs::hard_link(&new, path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+            // Some file systems have no links.
+            Err(_) => fs::rename(&new, path),
+            Ok(()) => Ok(()),
+        });
+    // The error that counts is the one that brought us here, and what was renamed is gone.
+    let _ = fs::remove_file(&new);
+    made
 }
 
 /// Keeps other emulators from the file until it is closed. False when one has it already.
@@ -222,7 +302,9 @@ impl NorFlashError for FlashError {
         match self {
             Self::NotAligned => NorFlashErrorKind::NotAligned,
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
-            Self::NotErased(_) | Self::Refused | Self::Io(_) => NorFlashErrorKind::Other,
+            Self::NotErased(_) | Self::Refused | Self::Io(_) | Self::Gone => {
+                NorFlashErrorKind::Other
+            }
         }
     }
 }
@@ -369,5 +451,45 @@ mod tests {
         fs::remove_file(&path).unwrap();
         let _first = FileFlash::open(&path).unwrap();
         assert!(line(&path).contains("another emulator"));
+    }
+
+    #[test]
+    fn a_file_that_is_removed_replaced_or_cut_is_noticed() {
+        type Harm = fn(&Path);
+        let harms: [Harm; 4] = [
+            |path| fs::remove_file(path).unwrap(),
+            |path| fs::rename(path, path.with_extension("old")).unwrap(),
+            |path| {
+                fs::remove_file(path).unwrap();
+                fs::write(path, [ERASED; FLASH_BYTES]).unwrap();
+            },
+            |path| {
+                let file = OpenOptions::new().write(true).open(path).unwrap();
+                file.set_len(100).unwrap();
+            },
+        ];
+        for harm in harms {
+            let folder = tempdir().unwrap();
+            let path = folder.path().join("flash");
+            let flash = FileFlash::open(&path).unwrap();
+            flash.sync().unwrap();
+            harm(&path);
+            assert!(matches!(flash.check(), Err(FlashError::Gone)));
+            assert!(matches!(flash.sync(), Err(FlashError::Gone)));
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nobody_else_may_read_the_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempdir().unwrap();
+        let path = folder.path().join("flash");
+        let mode = || fs::metadata(&path).unwrap().permissions().mode() & 0o777;
+        drop(FileFlash::open(&path).unwrap());
+        assert_eq!(mode(), 0o600, "new");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o644)).unwrap();
+        drop(FileFlash::open(&path).unwrap());
+        assert_eq!(mode(), 0o600, "of an earlier version");
     }
 }

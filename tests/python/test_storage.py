@@ -1,14 +1,18 @@
 """What survives a kill: at any moment all that was stored last, or all of the time before."""
 
+import os
 import random
 import time
+from pathlib import Path
 
 import pytest
 from test_ftp import Files
 
 import siskin_dialect as dialect
+from emulator import run
 
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
+FAILED = dialect.MAV_RESULT_FAILED
 STORAGE = dialect.MAV_CMD_PREFLIGHT_STORAGE
 GET_INTERVAL = dialect.MAV_CMD_GET_MESSAGE_INTERVAL
 ESC_STATUS = 291
@@ -114,3 +118,37 @@ def test_a_bit_that_rots_changes_no_setting(stored, tmp_path):
         with emulator.connect() as esc:
             assert esc.read_param("LIM_PHASE_A").param_value == 12.5, at
         emulator.kill()
+
+
+@pytest.mark.parametrize("harm", [os.remove, lambda path: os.truncate(path, 100)])
+def test_a_file_that_is_gone_is_told_to_who_stores(stored, tmp_path, harm):
+    path = tmp_path / "flash.bin"
+    emulator = stored()
+    with emulator.connect() as esc:
+        assert esc.command(STORAGE, 1) == ACCEPTED
+        harm(path)
+        # Whether there is something to be written or not.
+        for value in (None, 12.5):
+            if value:
+                esc.set_param("LIM_PHASE_A", value)
+            assert esc.command(STORAGE, 1) == FAILED
+        texts = [m.text for m in esc.since(0, "STATUSTEXT")]
+        assert "storage: the file was removed or cut" in texts
+        # Another start makes a new file; that this one has lost its own does not change.
+        if not path.exists():
+            with stored().connect():
+                assert esc.command(STORAGE, 1) == FAILED
+
+
+def test_a_second_emulator_on_one_file_is_refused(stored, tmp_path):
+    path = tmp_path / "flash.bin"
+    with stored().connect():
+        second = run("--storage", path, "--mavlink", "none", "--signal", "udp:127.0.0.1:0")
+    assert second.returncode == 2
+    assert second.stderr.count("\n") == 1, second.stderr
+    assert str(path) in second.stderr and "another emulator uses it" in second.stderr
+
+
+def test_nobody_else_may_read_what_is_stored(stored, tmp_path):
+    with stored().connect():
+        assert Path(tmp_path / "flash.bin").stat().st_mode & 0o777 == 0o600

@@ -243,8 +243,7 @@ impl<P: Processor<World>> VirtualBoard<P> {
     /// Puts what the chip has changed in its store into the file.
     fn persist(&mut self) -> Result<(), Stopped> {
         let changes = self.processor.surroundings().parts().flash.take_changes();
-        let failed =
-            |error: &dyn std::fmt::Display| Stopped(format!("--storage: {error}; free some room"));
+        let failed = |error: &dyn std::fmt::Display| Stopped(format!("--storage: {error}"));
         let changed = !changes.is_empty();
         for change in changes {
             let written = match change {
