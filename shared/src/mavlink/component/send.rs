@@ -30,6 +30,7 @@ impl Component {
     #[inline(never)]
     pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         self.writer.sender.signing.advance(context.now_us);
+        self.files.rest();
         self.tell_faults(context, send);
         while let Some(reply) = self.replies.next() {
             self.send_reply(reply, context, send);

@@ -10,9 +10,9 @@
 //!
 //! The last two are made of the table of parameters when the crate is built (`build.rs`).
 //! The others are written anew for each answer, and of what is written only what was asked for is
-//! kept: no file is ever in memory. One reader at a time has a session; what it reads is of one
-//! moment, since a file that has changed can no longer be read. Bursts leave with the lists of
-//! parameters, in their half of the link.
+//! kept: no file is ever in memory. One reader at a time has a session, which nobody else can end; what
+//! it reads is of one moment, since a file that has changed can no longer be read. Bursts leave with the
+//! lists of parameters, in their half of the link, and of a flood of requests few are answered.
 
 mod answer;
 mod files;

@@ -4,11 +4,15 @@ use super::answer::{Answer, Content, DATA_MAX, Error};
 use super::files::{Entry, File, View};
 use super::sink::Sink;
 use crate::mavlink::identity::Address;
-use crate::mavlink::receiver::Frame;
+use crate::mavlink::receiver::{Frame, is_signed};
 
 /// A session without a request for so long is over, µs: a client that is gone must not keep the next
 /// one out, and one that lives asks again within seconds.
 const SESSION_US: u64 = 10_000_000;
+
+/// What requests may cost between two polls. A client that waits for each answer asks once, since answers
+/// leave at a poll; of more, those that find nothing left are as if they had been lost.
+const COST_MOST: u8 = 5;
 
 /// Where the message has what; before it stand the network and the target.
 const SEQUENCE: usize = 3;
@@ -38,6 +42,8 @@ mod request {
 #[derive(Clone, Debug)]
 struct Session {
     reader: Address,
+    /// Whether the reader has opened it by a frame that is signed; nobody else can have.
+    signed: bool,
     /// As the reader has numbered it.
     number: u8,
     file: File,
@@ -57,6 +63,11 @@ struct Burst {
 }
 
 impl Session {
+    /// Whether this frame is the reader's: anybody may send what is not signed under his address.
+    fn is_of(&self, frame: &Frame) -> bool {
+        self.reader == frame.from && (!self.signed || is_signed(frame.raw))
+    }
+
     /// What is read at an offset; what remains of the file if it is less than `size`.
     fn read(&self, offset: u32, size: u8) -> Result<Content, Error> {
         let left = self.len.saturating_sub(offset);
@@ -79,9 +90,16 @@ impl Session {
 #[derive(Clone, Debug, Default)]
 pub(in crate::mavlink) struct Server {
     session: Option<Session>,
+    /// What requests have cost since the last poll.
+    cost: u8,
 }
 
 impl Server {
+    /// A poll: requests may cost something again.
+    pub(in crate::mavlink) fn rest(&mut self) {
+        self.cost = 0;
+    }
+
     /// Obeys a request. None when the frame is an answer itself, or the answer comes in a burst.
     ///
     /// Never inlined: its stack is free for what else the component does.
@@ -96,6 +114,11 @@ impl Server {
         if request >= request::ACK {
             return None;
         }
+        let cost = self.cost + cost(request);
+        if cost > COST_MOST {
+            return None;
+        }
+        self.cost = cost;
         let over = |session: &mut Session| now_us.saturating_sub(session.used_us) >= SESSION_US;
         self.session.take_if(over);
         let content = match self.obey(now_us, frame, request, view) {
@@ -134,7 +157,7 @@ impl Server {
                 Content::Done
             }
             request::RESET_SESSIONS => {
-                self.session = None;
+                self.session.take_if(|session| session.is_of(frame));
                 Content::Done
             }
             request::LIST_DIRECTORY => Content::Entries(Entry::find(path, offset)?),
@@ -144,12 +167,13 @@ impl Server {
                 if request == request::CALC_FILE_CRC32 {
                     return Ok(Some(Content::Number(checksum)));
                 }
-                let others = |session: &Session| session.reader != frame.from;
-                if self.session.as_ref().is_some_and(others) {
+                let own = |session: &Session| session.is_of(frame);
+                if !self.session.as_ref().is_none_or(own) {
                     return Err(Error::NoSessionsAvailable);
                 }
                 self.session = Some(Session {
                     reader: frame.from,
+                    signed: is_signed(frame.raw),
                     number: frame.u8(SESSION),
                     file,
                     len,
@@ -183,13 +207,13 @@ impl Server {
 
     /// The session that this frame is of.
     fn session_of(&mut self, frame: &Frame) -> Result<&mut Session, Error> {
-        self.session_with(frame.from, frame.u8(SESSION))
+        self.session_if(|session| session.is_of(frame) && session.number == frame.u8(SESSION))
     }
 
-    fn session_with(&mut self, reader: Address, number: u8) -> Result<&mut Session, Error> {
+    fn session_if(&mut self, own: impl Fn(&Session) -> bool) -> Result<&mut Session, Error> {
         self.session
             .as_mut()
-            .filter(|session| session.reader == reader && session.number == number)
+            .filter(|session| own(session))
             .ok_or(Error::InvalidSession)
     }
 
@@ -235,7 +259,8 @@ impl Server {
         (offset, room): (u32, &mut [u8]),
         view: &View,
     ) -> Result<(), Error> {
-        let session = self.session_with(reader, number)?;
+        let session =
+            self.session_if(|session| session.reader == reader && session.number == number)?;
         let mut sink = Sink::new(offset as usize, room);
         session.file.write(view, &mut sink);
         if sink.checksum != session.checksum {
@@ -244,5 +269,14 @@ impl Server {
             return Err(Error::InvalidSession);
         }
         Ok(())
+    }
+}
+
+/// What a request costs: a file is made and summed up as a whole to be opened, and again for each answer.
+fn cost(request: u8) -> u8 {
+    match request {
+        request::LIST_DIRECTORY | request::OPEN_FILE_RO | request::CALC_FILE_CRC32 => COST_MOST,
+        request::READ_FILE => 1,
+        _ => 0,
     }
 }

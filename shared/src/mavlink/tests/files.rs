@@ -88,7 +88,8 @@ fn read(code: u8, offset: u32, size: u8) -> Ask<'static> {
     }
 }
 
-fn send(bench: &mut Bench, ask: Ask) {
+/// Who sends a request, and its message.
+fn message(ask: Ask) -> (Address, FILE_TRANSFER_PROTOCOL_DATA) {
     let mut message = FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 1,
         target_component: 1,
@@ -98,7 +99,12 @@ fn send(bench: &mut Bench, ask: Ask) {
     message.payload[2..5].copy_from_slice(&[ask.session, ask.code, ask.size]);
     message.payload[8..12].copy_from_slice(&ask.offset.to_le_bytes());
     message.payload[12..12 + ask.path.len()].copy_from_slice(ask.path.as_bytes());
-    bench.receive(&encode(ask.from, &message, &[]));
+    (ask.from, message)
+}
+
+fn send(bench: &mut Bench, ask: Ask) {
+    let (from, message) = message(ask);
+    bench.receive(&encode(from, &message, &[]));
 }
 
 fn told(sent: &[Sent]) -> Vec<Told> {
@@ -348,11 +354,53 @@ fn one_reads_at_a_time_and_the_next_waits_until_he_is_silent() {
     refused(&mut bench, read(READ, 0, 80), INVALID_SESSION);
     assert_eq!(ask(&mut bench, other(path(OPEN, PACK))).code, ACK);
     refused(&mut bench, path(OPEN, PACK), NO_SESSIONS_AVAILABLE);
-    // A reset ends every session, and whoever has one may open another file in its place.
+    // A reset ends the sessions of the one who sends it, and whoever has one may open another file in its
+    // place.
     assert_eq!(ask(&mut bench, read(RESET, 0, 0)).code, ACK);
+    refused(&mut bench, path(OPEN, PACK), NO_SESSIONS_AVAILABLE);
+    assert_eq!(ask(&mut bench, other(read(READ, 0, 80))).code, ACK);
+    assert_eq!(ask(&mut bench, other(read(RESET, 0, 0))).code, ACK);
     assert_eq!(ask(&mut bench, path(OPEN, PACK)).code, ACK);
     let faults = ask(&mut bench, path(OPEN, "@SYS/faults.txt")).number();
     assert_eq!(rest(&mut bench, 239).len(), faults as usize);
+}
+
+/// Of a station that signs, another that takes its address and has no key ends nothing.
+#[test]
+fn a_session_of_one_who_signs_is_not_for_who_does_not() {
+    let mut bench = signing::keyed();
+    let (_, open) = message(path(OPEN, PACK));
+    let at = signing::TODAY + signing::SECOND;
+    bench.receive(&signing::signed(STATION, &open, &signing::KEY, 1, at));
+    assert_eq!(told(&bench.answers())[0].code, ACK);
+    refused(&mut bench, path(OPEN, PACK), NO_SESSIONS_AVAILABLE);
+    refused(&mut bench, read(TERMINATE, 0, 0), INVALID_SESSION);
+    assert_eq!(ask(&mut bench, read(RESET, 0, 0)).code, ACK);
+    let (_, read) = message(read(READ, 0, 80));
+    let at = at + signing::SECOND;
+    bench.receive(&signing::signed(STATION, &read, &signing::KEY, 1, at));
+    assert_eq!(told(&bench.answers())[0].code, ACK);
+}
+
+/// Each makes a whole file: what comes between two polls must not hold up the next.
+#[test]
+fn of_a_flood_of_requests_few_are_answered_at_a_poll() {
+    let mut bench = Bench::new();
+    for (request, answered) in [
+        (path(CRC, "parameter.json.xz"), 1),
+        (path(OPEN, PACK), 1),
+        (path(LIST, ""), 1),
+        (read(READ, 0, 80), 5),
+    ] {
+        for _ in 0..3 {
+            for _ in 0..70 {
+                send(&mut bench, request);
+            }
+            let answers = told(&bench.answers());
+            assert_eq!(answers.len(), answered, "{}", request.code);
+            assert!(answers.iter().all(|told| told.code == ACK));
+        }
+    }
 }
 
 #[test]
