@@ -3,11 +3,16 @@
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::time::Duration;
 
 use super::{Endpoint, Event, HostPort, Inbox, Link, LinkError, LinkId, is_pending};
 
-/// Clients at once. One more is turned away.
+/// Clients at once. One more takes the place of the one that has been silent for longest, if any is, and
+/// is turned away otherwise.
 const MAX_CLIENTS: usize = 32;
+
+/// Silence after which a client makes room for another: stations send a heartbeat each second.
+const SILENT: Duration = Duration::from_secs(5);
 
 /// Bytes that wait for a slow client, a minute of telemetry; one that lets more pile up is dropped.
 const MAX_PENDING_BYTES: usize = 256 * 1024;
@@ -27,6 +32,8 @@ struct Client {
     stream: TcpStream,
     id: LinkId,
     pending: VecDeque<u8>,
+    /// When it has connected, or bytes came from it.
+    heard: Duration,
 }
 
 impl TcpServer {
@@ -60,14 +67,32 @@ impl TcpServer {
             let ready = stream
                 .set_nonblocking(true)
                 .and_then(|()| stream.set_nodelay(true));
-            if ready.is_ok() && self.clients.len() < MAX_CLIENTS {
+            if ready.is_ok() && self.has_room(inbox.now) {
                 self.clients.push(Client {
                     stream,
                     id: inbox.ids.next(),
                     pending: VecDeque::new(),
+                    heard: inbox.now,
                 });
             }
         }
+    }
+
+    /// Whether there is room for one client more, which is made where one is silent.
+    fn has_room(&mut self, now: Duration) -> bool {
+        if self.clients.len() < MAX_CLIENTS {
+            return true;
+        }
+        let clients = self.clients.iter().enumerate();
+        let quietest = clients.min_by_key(|(_, client)| client.heard);
+        let Some(place) = quietest.map(|(place, _)| place) else {
+            return false;
+        };
+        if now.saturating_sub(self.clients[place].heard) < SILENT {
+            return false;
+        }
+        self.ended.push(self.clients.remove(place).id);
+        true
     }
 
     /// Keeps the clients for which `works` holds; the others are reported by the next `receive`.
@@ -89,6 +114,7 @@ impl Client {
         match self.stream.read(&mut inbox.buffer[..READ_BYTES]) {
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(length) => {
+                self.heard = inbox.now;
                 (inbox.handle)(self.id, Event::Bytes(&inbox.buffer[..length]));
                 Ok(())
             }

@@ -282,6 +282,30 @@ fn clients_beyond_the_limit_are_turned_away() {
 }
 
 #[test]
+fn a_silent_client_makes_room_for_the_next() {
+    let mut bench = Bench::open(&["tcpin:127.0.0.1:0"]);
+    let mut clients = Vec::new();
+    for index in 0..32_u8 {
+        let mut client = bench.connect(0);
+        client.write_all(&[index]).unwrap();
+        bench.until(MS, |b| b.heard(&[index]));
+        clients.push(client);
+    }
+    bench.now += Duration::from_secs(6);
+    for client in clients.iter_mut().skip(1) {
+        client.write_all(b".").unwrap();
+    }
+    bench.until(MS, |b| {
+        b.streams.values().filter(|bytes| bytes.len() == 2).count() == 31
+    });
+    let mut late = bench.connect(0);
+    late.write_all(b"late").unwrap();
+    bench.until(MS, |b| b.heard(b"late"));
+    assert_eq!(clients[0].read(&mut [0]).unwrap(), 0, "it was closed");
+    assert_eq!((bench.streams.len(), bench.ended.len()), (32, 1));
+}
+
+#[test]
 fn a_frame_goes_to_every_link() {
     let (station, port) = udp_socket();
     let udpout = format!("udpout:localhost:{port}");
