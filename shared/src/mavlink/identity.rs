@@ -67,8 +67,10 @@ impl Identity {
 
     /// Whether this is what a peripheral waits for: the first sign of an autopilot.
     pub(super) fn awaits(&self, frame: &Frame) -> bool {
-        // Offset 5 is the autopilot: of a ground station and of other peripherals it is INVALID.
+        // Offset 5 is the autopilot: of a ground station and of other peripherals it is INVALID. System 0
+        // stands for all, and is nobody's.
         let from_autopilot = frame.id == HEARTBEAT_DATA::ID
+            && frame.from.system != 0
             && frame.from.component == 1
             && frame.u8(5) != MavAutopilot::MAV_AUTOPILOT_INVALID as u8;
         self.role == Role::Peripheral && from_autopilot && !self.autopilot_heard

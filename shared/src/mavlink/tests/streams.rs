@@ -212,7 +212,7 @@ fn a_peripheral_follows_the_first_autopilot_it_hears() {
         autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
         ..HEARTBEAT_DATA::default()
     };
-    for system in [3, 4] {
+    for (system, wanted) in [(0, 5), (3, 3), (4, 3)] {
         bench.receive(&encode(
             Address {
                 system,
@@ -221,7 +221,7 @@ fn a_peripheral_follows_the_first_autopilot_it_hears() {
             &autopilot,
             &[],
         ));
-        assert_eq!(system_of(&mut bench), 3);
+        assert_eq!(system_of(&mut bench), wanted);
     }
 }
 
