@@ -25,7 +25,7 @@ fn main() {
         println!("cargo::rustc-link-arg-bins=-L{folder}/link");
         println!("cargo::rustc-link-arg-bins=-T{script}");
         println!("cargo::rustc-link-arg-bins=--nmagic");
-        // The checks of the image ask what refers to what.
+        // `siskin image` and the tests ask what refers to what.
         println!("cargo::rustc-link-arg-bins=--emit-relocs");
         if has("DEFMT") {
             println!("cargo::rustc-link-arg-bins=-Tdefmt.x");

@@ -64,7 +64,7 @@
 //! An erase stalls what is fetched from the flash, 22 ms a page on the G431 and half a second a sector
 //! on the F405. It is made only with the motor at rest, by code in RAM with all interrupts held off but
 //! the PWM's and the gate driver's; and the PWM interrupt then only holds the bridge, by functions that
-//! lie in RAM. The image is linked with its relocations, by which this is checked.
+//! lie in RAM. The image is linked with its relocations, by which `siskin image` checks this.
 //!
 //! # When something goes wrong
 //! | event | what turns the bridge off | what is told |

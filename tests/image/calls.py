@@ -89,20 +89,6 @@ class Calls:
             self._bounds[key] = most
         return self._bounds[key]
 
-    def reached(
-        self, function: Function, without: str | None = None
-    ) -> dict[Function, Function | None]:
-        """Every function that it leads to, itself included, each with one that calls it; but not the
-        one of a name, nor what only that leads to."""
-        callers, waiting = {function: None}, [function]
-        while waiting:
-            caller = waiting.pop()
-            for _, callee in self.callees(caller):
-                if callee not in callers and callee.name != without:
-                    callers[callee] = caller
-                    waiting.append(callee)
-        return callers
-
 
 def path(functions: Iterable[Function]) -> str:
     """Names on a way of calls, in turn, without those of far jumps: they are as their targets'."""

@@ -1,15 +1,15 @@
-"""Sizes, stack and reach of a linked image, against what its board allows.
+"""Sizes and stack of a linked image, against what its board allows. What its PWM interrupt reaches,
+`siskin image` judges.
 
     report.py BOARD ELF
 
-Exit status 1 if anything is too large, not to be made out, or where it must not be.
+Exit status 1 if anything is too large or not to be made out.
 """
 
 import sys
 from pathlib import Path
 
 import component
-import reach
 import sizes
 import stack
 from boards import BOARDS, MAVLINK, Board
@@ -50,19 +50,6 @@ def report(board: Board, image: Image) -> list[str]:
     print(limited("stack at most", sum(b.size for _, b in levels), room, problems))
     for name, bound in levels:
         print(f"  {name:<22}{bound.size:>8}  {path(bound.path)}")
-
-    for when, writing in [("while the flash is written", True), ("in any other period", False)]:
-        called = reach.called(calls, board, writing)
-        total = sum(function.size for function in called)
-        stored = sum(function.size for function in called if function.begin in board.flash)
-        print(f"the PWM interrupt calls {when} {len(called)} functions, {total} bytes", end="")
-        print(f", {stored} of them in the flash")
-    found = reach.in_flash(calls, board)
-    print(f"and needs from the flash while that is written: {'' if found else 'nothing'}")
-    for line in found:
-        print(f"  {line}")
-    if found:
-        problems.append(f"the PWM interrupt needs {len(found)} things from the flash while that is written")
     return problems + calls.problems
 
 

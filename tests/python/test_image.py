@@ -10,7 +10,6 @@ from small_image import LEVELS, VECTORS, build
 sys.path.insert(0, str(IMAGE_REPORT))
 
 import indirect  # noqa: E402  (it needs the report's folder)
-import reach  # noqa: E402
 import stack  # noqa: E402
 from boards import BOARDS  # noqa: E402
 from calls import FRAME_BYTES, Calls  # noqa: E402
@@ -158,7 +157,6 @@ def test_the_levels_stand_on_each_other_and_equals_do_not(tmp_path):
         "PWM interrupt": FRAME_BYTES + 56,
     }
     assert calls.problems == []
-    assert reach.in_flash(calls, BOARD) == []
 
 
 RECURSION = """

@@ -30,6 +30,14 @@ impl Board {
         }
     }
 
+    /// The PWM interrupt, by the name of its vector.
+    pub(crate) fn pwm_interrupt(self) -> &'static str {
+        match self {
+            Self::BG431bEsc1 => "ADC1_2",
+            Self::Vesc4F405 => "ADC",
+        }
+    }
+
     /// What probe-rs calls its chip.
     pub(crate) fn chip(self) -> &'static str {
         match self {

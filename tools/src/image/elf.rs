@@ -7,6 +7,7 @@ use object::LittleEndian;
 use object::elf::{EM_ARM, FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader, ProgramHeader};
 
+use super::reach::{self, Reach};
 use super::{Board, Tag};
 use crate::error::Error;
 
@@ -43,11 +44,13 @@ pub(crate) struct Image {
     pub(crate) entry: u32,
     /// Its parts in the order of their addresses; there is one at least.
     pub(crate) pieces: Vec<Piece>,
+    /// What its PWM interrupt reaches.
+    pub(crate) reach: Reach,
 }
 
 impl Image {
-    /// Reads an ELF file, and checks that it is for a board, for the wanted one if any, and that it
-    /// fits.
+    /// Reads an ELF file, and checks that it is for a board, for the wanted one if any, that it fits, and
+    /// that its PWM interrupt needs nothing from the flash while that is written.
     ///
     /// # Errors
     /// [`Error::File`] that names the file and what is wrong.
@@ -111,6 +114,7 @@ impl Image {
             board,
             entry,
             pieces,
+            reach: reach::judge(bytes, board)?,
         })
     }
 

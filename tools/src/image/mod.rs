@@ -4,6 +4,7 @@ mod board;
 mod build;
 mod elf;
 mod files;
+mod reach;
 mod tag;
 
 use std::io::Write;
@@ -35,7 +36,7 @@ pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
 }
 
 impl Image {
-    /// Board, version, build and size, a line each.
+    /// Board, version, build, size and reach, a line each.
     pub(crate) fn description(&self) -> String {
         let Tag {
             board,
@@ -46,8 +47,8 @@ impl Image {
         let flash = self.board.flash().len();
         format!(
             "board    {board}\nversion  {version}\nbuild    {build}\n\
-             size     {size} of {flash} bytes, from {:#010x}\n",
-            self.pieces[0].at
+             size     {size} of {flash} bytes, from {:#010x}\nreach    {}\n",
+            self.pieces[0].at, self.reach
         )
     }
 }

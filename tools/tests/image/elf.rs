@@ -1,4 +1,4 @@
-//! ELF files, byte by byte: what a linker makes, as far as a loader looks at it.
+//! ELF files, byte by byte: what a linker makes, as far as `siskin` looks at it.
 
 /// An image's tag as the firmware lays it out.
 pub(crate) fn tag(board: &str) -> Vec<u8> {
@@ -39,33 +39,99 @@ impl Elf {
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {
-        const HEADER_BYTES: u32 = 52;
-        const SEGMENT_BYTES: u32 = 32;
+        let sections = self.sections();
         let count = self.segments.len() as u32;
+        let data = self.segments.iter().map(|(.., data)| data.len() as u32);
+        let sections_at = HEADER_BYTES + count * SEGMENT_BYTES + data.sum::<u32>();
         let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
         let half = |file: &mut Vec<u8>, value: u16| file.extend(value.to_le_bytes());
-        let word = |file: &mut Vec<u8>, value: u32| file.extend(value.to_le_bytes());
         half(&mut file, 2);
         half(&mut file, self.machine);
         // Version, entry, segments and sections from the file's start, flags.
-        for value in [1, 0x0800_0401, HEADER_BYTES, 0, 0x0500_0400] {
-            word(&mut file, value);
-        }
-        for value in [HEADER_BYTES, SEGMENT_BYTES, count, 40, 0, 0] {
+        words(
+            &mut file,
+            &[1, 0x0800_0401, HEADER_BYTES, sections_at, 0x0500_0400],
+        );
+        let names = sections.len() as u32 - 1;
+        let table = [SECTION_BYTES, sections.len() as u32, names];
+        for value in [HEADER_BYTES, SEGMENT_BYTES, count]
+            .into_iter()
+            .chain(table)
+        {
             half(&mut file, value as u16);
         }
         let mut at = HEADER_BYTES + count * SEGMENT_BYTES;
         for (kind, address, data) in &self.segments {
             let length = data.len() as u32;
             // A run-time address that differs, as initialised data has it.
-            for value in [*kind, at, 0x2000_0000, *address, length, length, 5, 4] {
-                word(&mut file, value);
-            }
+            words(
+                &mut file,
+                &[*kind, at, 0x2000_0000, *address, length, length, 5, 4],
+            );
             at += length;
         }
         for (.., data) in &self.segments {
             file.extend(data);
         }
+        let mut at = sections_at + SECTION_BYTES * sections.len() as u32;
+        for (name, [kind, flags, address, link, info, entry], data) in &sections {
+            let name = NAMES.find(name).expect("a name of the table") as u32;
+            let length = data.len() as u32;
+            words(
+                &mut file,
+                &[
+                    name, *kind, *flags, *address, at, length, *link, *info, 4, *entry,
+                ],
+            );
+            at += length;
+        }
+        for (.., data) in &sections {
+            file.extend(data);
+        }
         file
     }
+
+    /// An interrupt in RAM that calls nothing but itself, by a relocation. Of each section: name; kind,
+    /// flags, address, section that it is linked with, information, bytes of an entry; contents.
+    fn sections(&self) -> Vec<(&'static str, [u32; 6], Vec<u8>)> {
+        // bl to itself.
+        let code = [0xFF, 0xF7, 0xFE, 0xFF].to_vec();
+        let symbol = |name: &str, value: u32, bytes: u32, kind: u16| {
+            let name = NAMES.find(name).expect("a name of the table") as u32;
+            let mut symbol = Vec::new();
+            words(&mut symbol, &[name, value, bytes]);
+            symbol.extend([kind, 1].iter().flat_map(|half| half.to_le_bytes()));
+            symbol
+        };
+        // Global; a function by the names of both boards, and a place.
+        let symbols = [
+            vec![0; SYMBOL_BYTES as usize],
+            symbol("ADC1_2", CONTROL + 1, 4, 0x12),
+            symbol("ADC\0", CONTROL + 1, 4, 0x12),
+            symbol("__ram_vectors", CONTROL, 0, 0x10),
+        ];
+        let mut call = Vec::new();
+        words(&mut call, &[CONTROL, 1 << 8 | 10]);
+        vec![
+            ("\0", [0; 6], Vec::new()),
+            (".control", [1, 6, CONTROL, 0, 0, 0], code),
+            (".symtab", [2, 0, 0, 4, 1, SYMBOL_BYTES], symbols.concat()),
+            (".rel", [9, 0, 0, 2, 1, 8], call),
+            (".names", [3, 0, 0, 0, 0, 0], NAMES.into()),
+        ]
+    }
+}
+
+const HEADER_BYTES: u32 = 52;
+const SEGMENT_BYTES: u32 = 32;
+const SECTION_BYTES: u32 = 40;
+const SYMBOL_BYTES: u32 = 16;
+
+/// Where the interrupt stands.
+const CONTROL: u32 = 0x1000_0000;
+
+const NAMES: &str = "\0.control\0.symtab\0.rel\0.names\0ADC1_2\0ADC\0__ram_vectors\0";
+
+fn words(bytes: &mut Vec<u8>, words: &[u32]) {
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
 }

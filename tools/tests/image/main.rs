@@ -40,6 +40,7 @@ fn one_command_writes_elf_bin_and_hex() {
             "size     {} of 1048576 bytes, from 0x08000000\n",
             wanted.len()
         ),
+        "reach    1 functions, 4 bytes while the flash is written, none of them in it;",
         &format!("wrote    {output}/vesc4-f405.hex\n"),
     ] {
         assert!(ended.out.contains(told), "{told}: {}", ended.out);

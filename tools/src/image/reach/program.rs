@@ -1,0 +1,248 @@
+//! A linked image as far as its control flow goes: functions, and what they hold the addresses of.
+//! The linker keeps that with `--emit-relocs`.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use object::elf::{
+    R_ARM_ABS32, R_ARM_NONE, R_ARM_PREL31, R_ARM_THM_JUMP24, R_ARM_THM_MOVT_ABS,
+    R_ARM_THM_MOVW_ABS_NC, R_ARM_THM_PC22, SHF_ALLOC,
+};
+use object::read::elf::ElfFile32;
+use object::{
+    LittleEndian, Object, ObjectSection, ObjectSymbol, RelocationFlags, RelocationTarget,
+    SectionFlags, SymbolKind,
+};
+use rustc_demangle::demangle;
+
+use super::thumb::{Branch, branches};
+
+/// A function; addresses are without the bit that says Thumb.
+#[derive(Debug)]
+pub(super) struct Function {
+    /// As the source has it, and the same whichever way the compiler spells it.
+    pub(super) name: String,
+    pub(super) place: Range<u32>,
+    /// The linker's way to a function that is too far for a branch. Whoever goes there names that
+    /// function itself.
+    pub(super) is_jump: bool,
+}
+
+/// The image.
+pub(super) struct Program<'a> {
+    sections: Vec<(Range<u32>, &'a [u8])>,
+    functions: BTreeMap<u32, Function>,
+    symbols: BTreeMap<String, u32>,
+    /// Which words hold an address, and which instructions call one.
+    held: BTreeMap<u32, u32>,
+    called: BTreeMap<u32, u32>,
+    /// Where instructions begin (true), and where data do.
+    kinds: BTreeMap<u32, bool>,
+}
+
+impl<'a> Program<'a> {
+    /// Reads an ELF file.
+    ///
+    /// # Errors
+    /// What it lacks.
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, String> {
+        let file = ElfFile32::<LittleEndian>::parse(bytes).map_err(|e| e.to_string())?;
+        let mut program = Self {
+            sections: Vec::new(),
+            functions: BTreeMap::new(),
+            symbols: BTreeMap::new(),
+            held: BTreeMap::new(),
+            called: BTreeMap::new(),
+            kinds: BTreeMap::new(),
+        };
+        let mut relocations = Vec::new();
+        for section in file.sections() {
+            let is_loaded = matches!(
+                section.flags(), SectionFlags::Elf { sh_flags, .. } if sh_flags.contains(SHF_ALLOC)
+            );
+            if !is_loaded || section.size() == 0 {
+                continue;
+            }
+            let place = section.address() as u32..(section.address() + section.size()) as u32;
+            let data = section.data().map_err(|e| e.to_string())?;
+            program.sections.push((place, data));
+            relocations.extend(section.relocations());
+        }
+        program.read_symbols(&file);
+        if relocations.is_empty() {
+            return Err("what refers to what is not in it; link it with --emit-relocs".to_owned());
+        }
+        let mut low = BTreeMap::new();
+        for (place, relocation) in relocations {
+            let place = place as u32;
+            let (RelocationFlags::Elf { r_type }, RelocationTarget::Symbol(symbol)) =
+                (relocation.flags(), relocation.target())
+            else {
+                continue;
+            };
+            let symbol_at = file.symbol_by_index(symbol).map_err(|e| e.to_string())?;
+            match r_type {
+                R_ARM_ABS32 => {
+                    let held = program.word(place)?;
+                    program.held.insert(place, held);
+                }
+                R_ARM_THM_PC22 | R_ARM_THM_JUMP24 => {
+                    program.called.insert(place, symbol_at.address() as u32);
+                }
+                R_ARM_THM_MOVW_ABS_NC => {
+                    low.insert(symbol.0, immediate(program.word(place)?));
+                }
+                R_ARM_THM_MOVT_ABS => {
+                    let high = immediate(program.word(place)?);
+                    let low = low.get(&symbol.0).copied().unwrap_or(0);
+                    program.held.insert(place, high << 16 | low);
+                }
+                R_ARM_NONE | R_ARM_PREL31 => {}
+                other => return Err(format!("a relocation of kind {other} is not understood")),
+            }
+        }
+        Ok(program)
+    }
+
+    fn read_symbols(&mut self, file: &ElfFile32<'_, LittleEndian>) {
+        for symbol in file.symbols() {
+            let (Ok(name), at) = (symbol.name(), symbol.address() as u32) else {
+                continue;
+            };
+            if name.starts_with("$t") || name.starts_with("$d") {
+                self.kinds.insert(at, name.starts_with("$t"));
+                continue;
+            }
+            self.symbols.insert(name.to_owned(), at);
+            if symbol.kind() == SymbolKind::Text && symbol.is_definition() {
+                let (begin, end) = (at & !1, (at & !1) + symbol.size() as u32);
+                // Of several names for one function, one that tells its size.
+                if self
+                    .functions
+                    .get(&begin)
+                    .is_none_or(|f| f.place.is_empty())
+                {
+                    self.functions.insert(begin, function(name, begin..end));
+                }
+            }
+        }
+        // One in assembly may not tell its size: it ends where another begins, or its section.
+        let begins: Vec<u32> = self.functions.keys().copied().collect();
+        for (index, begin) in begins.iter().enumerate() {
+            let section = self.section(*begin).map_or(*begin, |(place, _)| place.end);
+            if let Some(function) = self.functions.get_mut(begin)
+                && function.place.is_empty()
+            {
+                let next = begins.get(index + 1).copied().unwrap_or(section);
+                function.place.end = next.min(section);
+            }
+        }
+    }
+
+    /// The value of a symbol.
+    pub(super) fn symbol(&self, name: &str) -> Option<u32> {
+        self.symbols.get(name).copied()
+    }
+
+    /// The function that begins at an address.
+    pub(super) fn function(&self, address: u32) -> Option<&Function> {
+        self.functions.get(&(address & !1))
+    }
+
+    /// The function that an address is in.
+    fn function_around(&self, address: u32) -> Option<&Function> {
+        let (_, function) = self.functions.range(..=address & !1).next_back()?;
+        function.place.contains(&(address & !1)).then_some(function)
+    }
+
+    /// Addresses that a function calls or holds, and whether it goes where none of them tells.
+    pub(super) fn leads(&self, function: &Function) -> (Vec<u32>, bool) {
+        if function.is_jump {
+            return (Vec::new(), false);
+        }
+        let place = function.place.clone();
+        let of = |table: &BTreeMap<u32, u32>| -> Vec<u32> {
+            table.range(place.clone()).map(|(_, to)| *to).collect()
+        };
+        let held = of(&self.held);
+        let holds_function = held.iter().any(|to| self.function(*to).is_some());
+        let mut computed = false;
+        let mut addresses = [held, of(&self.called)].concat();
+        for (begin, code) in self.code(&place) {
+            for branch in branches(begin, code) {
+                match branch {
+                    // Within a function no relocation is needed, nor to its neighbour in assembly.
+                    Branch::To(to) if place.contains(&to) => {}
+                    Branch::To(to) => {
+                        let function = self.function_around(to);
+                        addresses.push(function.map_or(to, |function| function.place.start));
+                    }
+                    // Code for size has a call's target in a register.
+                    Branch::Computed => computed |= !holds_function,
+                }
+            }
+        }
+        (addresses, computed)
+    }
+
+    /// The pieces of a function that are instructions, and not data.
+    fn code(&self, place: &Range<u32>) -> Vec<(u32, &'a [u8])> {
+        let Some((section, bytes)) = self.section(place.start) else {
+            return Vec::new();
+        };
+        let before = self.kinds.range(..=place.start).next_back();
+        let mut begins = vec![(place.start, before.is_none_or(|(_, is_code)| *is_code))];
+        let within = self.kinds.range(place.start + 1..place.end);
+        begins.extend(within.map(|(at, is_code)| (*at, *is_code)));
+        let ends = begins.iter().skip(1).map(|(at, _)| *at).chain([place.end]);
+        let pieces = begins.iter().zip(ends).filter(|((_, is_code), _)| *is_code);
+        pieces
+            .filter_map(|((begin, _), end)| {
+                let piece = (begin - section.start) as usize..(end - section.start) as usize;
+                Some((*begin, bytes.get(piece)?))
+            })
+            .collect()
+    }
+
+    /// Places and addresses of the words that hold one, in the section around an address and outside of
+    /// functions.
+    pub(super) fn data_beside(&self, address: u32) -> Vec<(u32, u32)> {
+        let Some((section, _)) = self.section(address) else {
+            return Vec::new();
+        };
+        let held = self.held.range(section.clone());
+        held.filter(|(place, _)| self.function_around(**place).is_none())
+            .map(|(place, to)| (*place, *to))
+            .collect()
+    }
+
+    fn section(&self, address: u32) -> Option<&(Range<u32>, &'a [u8])> {
+        let mut sections = self.sections.iter();
+        sections.find(|(place, _)| place.contains(&address))
+    }
+
+    fn word(&self, address: u32) -> Result<u32, String> {
+        let word = self.section(address).and_then(|(place, bytes)| {
+            let bytes = bytes.get((address - place.start) as usize..)?;
+            bytes.first_chunk().map(|word| u32::from_le_bytes(*word))
+        });
+        word.ok_or_else(|| format!("nothing stands at {address:#010x}, which holds an address"))
+    }
+}
+
+fn function(symbol: &str, place: Range<u32>) -> Function {
+    let thunk = symbol.strip_prefix("__Thumbv7");
+    let target = thunk.and_then(|rest| Some(rest.split_once("Thunk_")?.1));
+    Function {
+        // v0 has a method's type in brackets.
+        name: format!("{:#}", demangle(target.unwrap_or(symbol))).replace(['<', '>'], ""),
+        place,
+        is_jump: target.is_some(),
+    }
+}
+
+/// The 16 bits of a movw or a movt.
+fn immediate(code: u32) -> u32 {
+    let (first, second) = (code & 0xFFFF, code >> 16);
+    (first & 0xF) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF
+}
