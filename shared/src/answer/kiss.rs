@@ -10,11 +10,13 @@ pub const BYTES: usize = 10;
 pub const SPACING_US: u32 = 1000;
 
 /// The frame: °C, 0.01 V, 0.01 A, mAh and hundreds of electrical rpm, each held at the ends of its
-/// range, and a check sum. A negative current, of braking, is sent as 0: it has no sign.
+/// range, and a check sum. A negative current, of braking, is sent as 0: it has no sign. So is a
+/// temperature below 0 °C: the protocol gives it a sign, but Betaflight, PX4 and ArduPilot read the
+/// byte without one, and took −10 °C for 246.
 pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
     let mut frame = [0; BYTES];
     // A float's conversion saturates, and makes 0 of what is no number.
-    frame[0] = round(telemetry.temperature_c) as i8 as u8;
+    frame[0] = (round(telemetry.temperature_c) as i8).max(0) as u8;
     let words = [
         telemetry.bus_v * 100.0,
         telemetry.bus_a * 100.0,
@@ -78,7 +80,7 @@ mod tests {
             temperature_c: -10.0,
             ..Telemetry::new()
         };
-        assert_eq!(frame(&cold, 0.0)[0] as i8, -10);
+        assert_eq!(frame(&cold, 0.0)[0], 0);
         let unknown = Telemetry {
             temperature_c: f32::NAN,
             ..Telemetry::new()
