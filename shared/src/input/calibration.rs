@@ -1,6 +1,6 @@
 //! The end points of pulses, taught by the stick.
 //!
-//! As with other ESCs: the ESC is powered up with the stick at full throttle and says after three
+//! As with other ESCs: the ESC is powered up with the stick at full throttle and says after two
 //! seconds that it has measured it; the stick is then pulled to no throttle, and after one and a half
 //! seconds both ends are known. Anything else leaves them as they were, until the next power-up.
 //!
@@ -17,8 +17,9 @@ const NONE_NS: core::ops::RangeInclusive<u32> = 800_000..=1_300_000;
 /// The least distance of the two ends, ns.
 const SPAN_NS: u32 = 500_000;
 
-/// How long full throttle is held, µs.
-const FULL_US: u64 = 3_000_000;
+/// How long full throttle is held, µs. PX4 holds it for 3.00 to 3.05 s from the battery on, ArduPilot
+/// for 5 s; the ESC's start and the signal's identification, 0.1 s each, come off that.
+const FULL_US: u64 = 2_200_000;
 /// How long no throttle is held, µs.
 const NONE_US: u64 = 1_500_000;
 /// The most that a held stick strays from where it was when it came to rest, ns: receivers jitter by
@@ -236,9 +237,9 @@ mod tests {
     });
 
     #[test]
-    fn high_for_three_seconds_then_low_for_one_and_a_half_is_taken() {
+    fn full_throttle_for_2_2_s_then_low_for_one_and_a_half_is_taken() {
         let mut bench = Bench::default();
-        assert_eq!(bench.hold(5_000, |_| 1912), [(3_000, Step::Full)]);
+        assert_eq!(bench.hold(5_000, |_| 1912), [(2_200, Step::Full)]);
         assert_eq!(bench.hold(400, |n| 1900 - n as u32 * 40), []);
         assert_eq!(bench.hold(2_000, |_| 1105), [(1_500, DONE)]);
         // Once: nothing that comes later is a calibration.
@@ -252,7 +253,7 @@ mod tests {
         let jitter = |n: u64| (n % 7) as u32 * 2;
         assert_eq!(
             bench.hold(3_020, |n| 1906 + jitter(n)),
-            [(3_000, Step::Full)]
+            [(2_200, Step::Full)]
         );
         assert_eq!(bench.hold(1_520, |n| 1099 + jitter(n)), [(1_500, DONE)]);
     }
@@ -261,7 +262,7 @@ mod tests {
     fn a_stick_that_moves_at_its_end_is_waited_for() {
         let mut bench = Bench::default();
         assert_eq!(bench.hold(2_900, |n| 1750 + n as u32), []);
-        assert_eq!(bench.hold(3_020, |_| 1912), [(3_000, Step::Full)]);
+        assert_eq!(bench.hold(3_020, |_| 1912), [(2_200, Step::Full)]);
         assert_eq!(bench.hold(1_400, |_| 1200), []);
         assert_eq!(bench.hold(1_520, |_| 1105), [(1_500, DONE)]);
     }
@@ -276,7 +277,7 @@ mod tests {
         }
         // High, but lowered too early.
         let mut bench = Bench::default();
-        bench.hold(2_980, |_| 1912);
+        bench.hold(2_180, |_| 1912);
         assert_eq!(bench.hold(5_000, |_| 1105), []);
         assert_eq!(bench.hold(5_000, |_| 1912), []);
     }
@@ -312,7 +313,7 @@ mod tests {
         // Lowered too early: once more.
         assert_eq!(bench.hold(2_000, |_| 1912), []);
         assert_eq!(bench.hold(1_000, |_| 1105), []);
-        assert_eq!(bench.hold(3_020, |_| 1912), [(3_000, Step::Full)]);
+        assert_eq!(bench.hold(3_020, |_| 1912), [(2_200, Step::Full)]);
         assert_eq!(bench.hold(1_520, |_| 1105), [(1_500, DONE)]);
         assert!(!bench.calibration.is_under_way());
 
