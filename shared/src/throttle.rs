@@ -119,6 +119,7 @@ impl Throttle {
     }
 
     fn heard(&mut self, heard: Heard) -> Option<Ask> {
+        self.follow_loss();
         match heard.order {
             Some(Order::Info) => self.answers.send_info(self.info),
             Some(Order::Extended(on)) => self.answers.set_extended(on),
@@ -128,6 +129,13 @@ impl Throttle {
             None => {}
         }
         Ask::of(&heard.event)
+    }
+
+    /// Forgets what the sender of a lost signal has asked for.
+    fn follow_loss(&mut self) {
+        if self.input.take_loss() {
+            self.answers.lost();
+        }
     }
 
     /// What is sent back to the flight controller, with the drive as it is now.
@@ -176,6 +184,7 @@ impl Throttle {
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
         self.input.poll(now_us, telemetry.drive(self.command()));
+        self.follow_loss();
         let authority = self.input.authority();
         Standing {
             command: authority.command(),

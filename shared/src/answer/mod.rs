@@ -135,6 +135,14 @@ impl Answers {
         self.health.begin();
     }
 
+    /// The signal is lost: whoever comes back on the wire has not asked for anything, and takes every word
+    /// for a speed until it has.
+    pub fn lost(&mut self) {
+        self.extended = false;
+        self.announcement = None;
+        self.info = None;
+    }
+
     /// Sends the ESC's information with the next answer for which the serial line is free.
     pub fn send_info(&mut self, info: [u8; info::BYTES]) {
         self.info = Some(info);

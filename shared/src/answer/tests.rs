@@ -173,6 +173,21 @@ fn extended_telemetry_is_announced_told_and_ended() {
 }
 
 #[test]
+fn with_the_signal_all_that_was_asked_for_is_forgotten() {
+    let mut rig = Rig::new();
+    rig.answers.set_extended(true);
+    assert_eq!(rig.data(125), 0xE00);
+    rig.answers.set_extended(true);
+    rig.answers.send_info([7; info::BYTES]);
+    rig.answers.lost();
+    assert!((0..8000).all(|_| rig.data(125) == erpm::STOPPED));
+    assert_eq!(rig.ask(2000, Rate::Dshot300, false, true).info, None);
+    // Who asks anew gets it.
+    rig.answers.set_extended(true);
+    assert_eq!(rig.data(125), 0xE00);
+}
+
+#[test]
 fn an_announcement_does_not_follow_an_extended_word_at_once() {
     let mut rig = Rig::new();
     rig.answers.set_extended(true);

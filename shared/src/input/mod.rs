@@ -83,6 +83,8 @@ pub struct Input {
     announcer: Announcer,
     /// As of the last poll.
     stopped: bool,
+    /// A signal was lost since this was last asked.
+    lost: bool,
 }
 
 impl Input {
@@ -101,6 +103,7 @@ impl Input {
             tally: Tally::default(),
             announcer: Announcer::default(),
             stopped: false,
+            lost: false,
         }
     }
 
@@ -213,12 +216,18 @@ impl Input {
     fn expire(&mut self, now_us: u64) {
         let armed = self.authority.armed();
         if self.authority.poll(now_us) {
+            self.lost = true;
             self.line.lost();
             self.commands.interrupt();
             let cancelled = self.calibration.lost();
             self.announcer.calibration(cancelled);
             self.announcer.lost(armed);
         }
+    }
+
+    /// Whether a signal has been lost since this was last asked: who sends the next one may be another.
+    pub fn take_loss(&mut self) -> bool {
+        core::mem::take(&mut self.lost)
     }
 
     /// The next thing to tell a person; to be asked after each poll until there is none.

@@ -3,8 +3,15 @@
 mod sender;
 mod serial;
 
-use sender::FlightController;
+use sender::{FlightController, STOP};
 use siskin_control::params::ParamId;
+
+const EXTENDED_ON: u16 = 13;
+
+/// A word of extended telemetry: neither a speed nor the 0xFFF of standstill.
+fn is_extended(word: &u16) -> bool {
+    word >> 8 != 0 && word & 0x100 == 0
+}
 
 /// PX4 calibrates pulses: full throttle for 3.00 s from the battery's connection on, and then none.
 #[test]
@@ -16,4 +23,19 @@ fn a_calibration_by_px4_is_taken() {
     assert!(fc.said("Stick calibration: both ends taken"));
     let ends = [ParamId::InpPulseMinUs, ParamId::InpPulseMaxUs].map(|id| fc.param(id));
     assert_eq!(ends, [1_060.0, 1_940.0]);
+}
+
+/// Betaflight restarts, and nobody asks for extended telemetry: it would take the words for speeds.
+#[test]
+fn extended_telemetry_ends_with_the_signal() {
+    let mut fc = FlightController::armed(&[]);
+    fc.blocking(EXTENDED_ON);
+    assert!(fc.replies().contains(&0xE00));
+    fc.frames(1_000, STOP);
+    assert!(fc.replies().iter().any(is_extended));
+    fc.wait_us(150_000);
+    fc.frames(2_000, STOP);
+    let words = fc.replies();
+    assert!(words.len() > 1_800, "{} replies", words.len());
+    assert!(!words.iter().any(is_extended));
 }
