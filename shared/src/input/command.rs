@@ -17,12 +17,15 @@
 //! is an audio stream, 32 to 35 switch a telemetry that bidirectional DShot has replaced, and the
 //! rest has no meaning.
 //!
-//! A command is obeyed only while the motor stands, and once for all its repeats: flight controllers
-//! send most of them ten times. One that counts at once may be another frame whose errors the check
-//! sum has not shown, so it does not where frames have been bad of late: there it needs six like the
-//! rest. Flight controllers send a beacon once. What this cannot prevent: on a wire that has shown no
-//! bad frame for a second, or none yet, one frame whose errors pass the check sum can sound a beacon,
-//! send the information or switch the light. What changes something always takes six.
+//! A command is obeyed only while the motor stands, and once for all its repeats: flight controllers send
+//! most of them ten times. A single bad frame between two of them, or before the first, does not end the row:
+//! the line's rise, when a flight controller starts, spoils one. Two do.
+//!
+//! One that counts at once may be another frame whose errors the check sum has not shown. So it needs six
+//! like the rest just after a bad frame, and longer after two within half a second. Flight controllers send
+//! a beacon once, and a bad frame now and then must not silence all of them. What this cannot prevent: on any
+//! other wire one frame whose errors pass the check sum can sound a beacon, send the information or switch
+//! the light; of random words it is one in 4096. What changes something always takes six.
 
 use super::dshot::Frame;
 use crate::tune::Beacon;
@@ -31,7 +34,11 @@ use crate::tune::Beacon;
 const REPEATS: u8 = 6;
 
 /// For how long a bad frame makes the wire one whose single frames prove nothing, µs.
-const DOUBT_US: u64 = 1_000_000;
+const DOUBT_US: u64 = 50_000;
+/// The same for two of them.
+const DOUBT_OF_TWO_US: u64 = 1_000_000;
+/// The longest time between those two, µs.
+const BAD_APART_US: u64 = 500_000;
 
 /// The least time between two beacons, which flight controllers leave too, µs.
 const BEACON_APART_US: u64 = 260_000;
@@ -115,7 +122,11 @@ pub struct Commands {
     count: u8,
     /// Whether this value has been obeyed since it came.
     done: bool,
+    /// Whether the last frame was bad.
+    spoilt: bool,
     bad_us: Option<u64>,
+    /// Whether another bad frame came shortly before that.
+    doubted: bool,
     beacon_us: Option<u64>,
 }
 
@@ -126,9 +137,15 @@ impl Commands {
             self.interrupt();
             self.value = frame.value;
         }
+        self.spoilt = false;
         self.count = REPEATS.min(self.count + 1);
         let order = Order::of(frame.value)?;
-        let doubted = within(now_us, self.bad_us, DOUBT_US);
+        let doubt_us = if self.doubted {
+            DOUBT_OF_TWO_US
+        } else {
+            DOUBT_US
+        };
+        let doubted = within(now_us, self.bad_us, doubt_us);
         let enough = if doubted { REPEATS } else { order.repeats() };
         if self.done || self.count < enough {
             return None;
@@ -143,10 +160,13 @@ impl Commands {
         Some(order)
     }
 
-    /// A bad frame: the next ones are in a row only with each other.
+    /// A bad frame. After a second one at once the next are in a row only with each other.
     pub fn bad(&mut self, now_us: u64) {
+        self.doubted = within(now_us, self.bad_us, BAD_APART_US);
         self.bad_us = Some(now_us);
-        self.count = 0;
+        if core::mem::replace(&mut self.spoilt, true) {
+            self.count = 0;
+        }
     }
 
     /// The signal was lost, or the motor turns: nothing has been heard.
@@ -256,19 +276,51 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_frame_breaks_a_row_and_does_not_make_a_second_one() {
+    fn a_single_bad_frame_does_not_end_a_row_and_two_do() {
+        let order = Order::Spin { opposite: true };
+        for place in 0..6 {
+            let mut bench = Bench::new();
+            bench.play(place, 21);
+            bench.bad();
+            assert_eq!(bench.play(5 - place, 21), [], "{place}");
+            assert_eq!(bench.play(1, 21), [(1, order)], "{place}");
+        }
+        let mut bench = Bench::new();
+        for _ in 0..5 {
+            assert_eq!(bench.play(1, 21), []);
+            bench.bad();
+        }
+        assert_eq!(bench.play(1, 21), [(1, order)], "one between any two");
+
         let mut bench = Bench::new();
         assert_eq!(bench.play(5, 21), []);
         bench.bad();
-        assert_eq!(bench.play(5, 21), []);
-        assert_eq!(bench.play(1, 21), [(1, Order::Spin { opposite: true })]);
         bench.bad();
-        assert_eq!(bench.play(100, 21), []);
+        assert_eq!(bench.play(5, 21), []);
+        assert_eq!(bench.play(1, 21), [(1, order)]);
+        bench.bad();
+        bench.bad();
+        assert_eq!(bench.play(100, 21), [], "the same row");
     }
 
     #[test]
-    fn for_a_second_after_a_bad_frame_a_beacon_takes_six() {
+    fn one_bad_frame_now_and_then_does_not_silence_beacons() {
         let mut bench = Bench::new();
+        for _ in 0..10 {
+            bench.bad();
+            bench.play(48, 0);
+            assert_eq!(bench.play(1, 3), [], "just after");
+            bench.play(351, 0);
+            assert_eq!(bench.play(1, 3), [(1, Order::Beacon(Beacon::Three))]);
+            bench.play(498, 0);
+        }
+    }
+
+    #[test]
+    fn for_a_second_after_two_bad_frames_a_beacon_takes_six() {
+        let mut bench = Bench::new();
+        bench.bad();
+        bench.play(499, 0);
         bench.bad();
         assert_eq!(bench.play(5, 3), []);
         assert_eq!(bench.play(5, 3), [(1, Order::Beacon(Beacon::Three))]);

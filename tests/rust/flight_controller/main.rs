@@ -6,6 +6,7 @@ mod serial;
 use sender::{FlightController, STOP};
 use siskin_control::params::ParamId;
 
+const BEACON: u16 = 1;
 const EXTENDED_ON: u16 = 13;
 
 /// A word of extended telemetry: neither a speed nor the 0xFFF of standstill.
@@ -38,4 +39,38 @@ fn extended_telemetry_ends_with_the_signal() {
     let words = fc.replies();
     assert!(words.len() > 1_800, "{} replies", words.len());
     assert!(!words.iter().any(is_extended));
+}
+
+/// The line is low while the flight controller starts, and the first frame begins with its rise; later
+/// every tenth frame or so is spoilt, as Betaflight sends a command ten times.
+#[test]
+fn a_command_survives_single_bad_frames() {
+    let mut fc = FlightController::armed(&[]);
+    for bad in 0..10 {
+        let direction = if fc.param(ParamId::MotDir) == 0.0 {
+            8
+        } else {
+            7
+        };
+        for place in 0..10 {
+            fc.word(sender::frame(direction) ^ u16::from(place == bad), 1_000);
+        }
+        fc.frames(2, STOP);
+        assert_eq!(fc.param(ParamId::MotDir) == 1.0, direction == 8, "{bad}");
+    }
+}
+
+/// One bad frame every 0.9 s, and a beacon after each of them.
+#[test]
+fn a_beacon_is_heard_on_a_wire_with_a_bad_frame_now_and_then() {
+    let mut fc = FlightController::armed(&[]);
+    for _ in 0..5 {
+        fc.word(sender::frame(STOP) ^ 1, 1_000);
+        fc.frames(400, STOP);
+        fc.heard();
+        fc.frames(1, BEACON);
+        fc.frames(300, STOP);
+        assert!(fc.heard());
+        fc.frames(198, STOP);
+    }
 }
