@@ -4,6 +4,8 @@
 //! On the chip it belongs to a task that interrupts the one with [`Esc`](crate::esc::Esc), which
 //! gets at it by [`Reach`], for a moment at a time. What either needs of the other is copied then.
 
+use core::mem::discriminant;
+
 use heapless::Deque;
 
 use crate::answer::info;
@@ -30,8 +32,9 @@ pub struct Throttle {
     telemetry: Telemetry,
     info: [u8; info::BYTES],
     told: Told,
-    /// What DShot commands have ordered since the last poll.
-    orders: Deque<Order, 4>,
+    /// What DShot commands have ordered since the last poll, or wait to be done: one of each kind, and there
+    /// are seven for the tasks.
+    orders: Deque<Order, 7>,
     /// While the flash is written: the bridge must stay at rest until the processor is back.
     storing: bool,
 }
@@ -119,22 +122,29 @@ impl Throttle {
     }
 
     fn heard(&mut self, heard: Heard) -> Option<Ask> {
-        self.follow_loss();
+        self.follow_wire();
         match heard.order {
             Some(Order::Info) => self.answers.send_info(self.info),
             Some(Order::Extended(on)) => self.answers.set_extended(on),
-            // Most orders take six frames: more than four between two polls are noise, and one
-            // that finds no room is as if it had not been heard.
-            Some(order) => drop(self.orders.push_back(order)),
+            Some(order) => {
+                // The latest of its kind holds.
+                let kind = discriminant(&order);
+                self.orders.retain(|known| discriminant(known) != kind);
+                let _ = self.orders.push_back(order);
+            }
             None => {}
         }
         Ask::of(&heard.event)
     }
 
-    /// Forgets what the sender of a lost signal has asked for.
-    fn follow_loss(&mut self) {
+    /// Forgets what the sender of a lost signal has asked for, and what waits for a motor at rest when it is
+    /// asked to turn.
+    fn follow_wire(&mut self) {
         if self.input.take_loss() {
             self.answers.lost();
+        }
+        if !self.input.authority().rests_by_wire() {
+            self.orders.clear();
         }
     }
 
@@ -184,7 +194,7 @@ impl Throttle {
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
         self.input.poll(now_us, telemetry.drive(self.command()));
-        self.follow_loss();
+        self.follow_wire();
         let authority = self.input.authority();
         Standing {
             command: authority.command(),
@@ -210,9 +220,14 @@ impl Throttle {
         }
     }
 
-    /// The next order of the wire for the tasks.
-    pub(crate) fn next_order(&mut self) -> Option<Order> {
-        self.orders.pop_front()
+    /// The next order of the wire for the tasks, where the motor stands; else some wait, and the others are
+    /// dropped.
+    pub(crate) fn next_order(&mut self, stopped: bool) -> Option<Order> {
+        if stopped {
+            return self.orders.pop_front();
+        }
+        self.orders.retain(|order| order.waits());
+        None
     }
 
     /// Takes what the tasks say.

@@ -7,6 +7,7 @@ use super::*;
 use crate::answer::{Answer, Ask};
 use crate::drive::{Direction, Fault, Faults, Setpoint, State};
 use crate::image::Image;
+use crate::input::access::Access;
 use crate::input::dshot::{self, Rate, edges};
 use crate::input::signal::Signal;
 use crate::tune::{Beacon, Note, Player};
@@ -256,6 +257,63 @@ fn a_turning_motor_obeys_no_command() {
     assert!(!bench.esc.light());
     assert!(bench.answers.iter().all(|answer| answer.info.is_none()));
     assert_eq!(bench.notes, []);
+}
+
+/// Directions wait for a motor at rest, the latest of each kind, and the save behind them.
+#[test]
+fn what_waits_is_done_once_when_the_motor_stands() {
+    let mut bench = Bench::armed();
+    bench.snapshot.phase = Phase::Run;
+    bench.wait_ms(1);
+    for command in [8, 7, 8, 12, 21] {
+        bench.frames(10, command);
+    }
+    bench.frames(1_000, 0);
+    assert_eq!(bench.requests, []);
+    bench.snapshot.phase = Phase::Idle;
+    bench.frames(2, 0);
+    assert_eq!(bench.get(ParamId::MotDir), 1.0);
+    assert_eq!(
+        bench.config().direction,
+        Direction::Normal,
+        "against MOT_DIR"
+    );
+    assert_eq!(bench.values, [(ParamId::MotDir as u16, 1.0)], "once");
+    assert!(
+        bench.requests.contains(&Request::Save),
+        "{:?}",
+        bench.requests
+    );
+    bench.requests.clear();
+    bench.frames(1_000, 0);
+    assert_eq!(bench.requests, []);
+}
+
+#[test]
+fn what_waits_is_forgotten_at_throttle_at_a_test_and_with_the_signal() {
+    for end in 0..3 {
+        let mut bench = Bench::armed();
+        bench.snapshot.phase = Phase::Run;
+        bench.wait_ms(1);
+        bench.frames(10, 8);
+        match end {
+            0 => bench.frames(1, 1000),
+            1 => {
+                let drive = DriveStatus {
+                    stopped: true,
+                    faulted: false,
+                };
+                let mut authority = Reached(&mut bench.throttle);
+                let tested = authority.actuator_test(bench.now_us, 0.1, 0.005, drive);
+                assert_eq!(tested, Ok(()));
+                bench.frames(1, 0);
+            }
+            _ => bench.wait_ms(310),
+        }
+        bench.snapshot.phase = Phase::Idle;
+        bench.frames(400, 0);
+        assert_eq!(bench.get(ParamId::MotDir), 0.0, "{end}");
+    }
 }
 
 #[test]

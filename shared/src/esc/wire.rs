@@ -9,7 +9,7 @@ use crate::input::command::Order;
 use crate::input::endpoints::EndPoints;
 use crate::mavlink::Act;
 use crate::params::ParamId;
-use crate::throttle::{Reach, Throttle};
+use crate::throttle::Reach;
 use crate::tune::{Beacon, Tune};
 
 impl Esc {
@@ -25,10 +25,8 @@ impl Esc {
         }
         // The motor may have been asked to turn since it was ordered.
         let stopped = self.drive().stopped;
-        while let Some(order) = throttle.reach(Throttle::next_order) {
-            if stopped {
-                self.obey(throttle, now_us, order);
-            }
+        while let Some(order) = throttle.reach(|throttle| throttle.next_order(stopped)) {
+            self.obey(throttle, now_us, order);
         }
     }
 

@@ -259,6 +259,12 @@ impl Authority {
         }
     }
 
+    /// Whether the wire shows zero throttle, and no test runs.
+    pub fn rests_by_wire(&self) -> bool {
+        let zero = |valid: Valid| valid.identified && valid.demand == Demand::Zero;
+        self.test.is_none() && self.valid.is_some_and(zero)
+    }
+
     /// Whether a throttle on the wire would turn the motor.
     pub fn armed(&self) -> bool {
         self.armed

@@ -4,11 +4,11 @@
 //! |---|---|---|
 //! | 1 to 5 | beacon, the motor as a loudspeaker | 1 |
 //! | 6 | the ESC's information on the serial line | 1 |
-//! | 7, 8 | direction 1 or 2: `MOT_DIR` 0 or 1 | 6 |
+//! | 7, 8 | direction 1 or 2: `MOT_DIR` 0 or 1 | 6, waits |
 //! | 9, 10 | one direction of throttle or two: `INP_3D` 0 or 1 | 6 |
-//! | 12 | save the settings | 6 |
-//! | 13, 14 | extended telemetry on, off | 6 |
-//! | 20, 21 | turn as `MOT_DIR` says, or against it, until the next start | 6 |
+//! | 12 | save the settings | 6, waits |
+//! | 13, 14 | extended telemetry on, off | 6, at once |
+//! | 20, 21 | turn as `MOT_DIR` says, or against it, until the next start | 6, waits |
 //! | 22, 26 | the light on, off | 1 |
 //! | 31 | silent mode on, off: no tunes but beacons | 6 |
 //!
@@ -17,9 +17,15 @@
 //! is an audio stream, 32 to 35 switch a telemetry that bidirectional DShot has replaced, and the
 //! rest has no meaning.
 //!
-//! A command is obeyed only while the motor stands, and once for all its repeats: flight controllers send
-//! most of them ten times. A single bad frame between two of them, or before the first, does not end the row:
-//! the line's rise, when a flight controller starts, spoils one. Two do.
+//! A command counts at zero throttle. While the motor still turns then, extended telemetry is switched at
+//! once, since Betaflight asks for it at each arming and a pilot may arm again before the propeller has run
+//! down. A direction and the save behind it wait until the motor stands, as long as the wire stays at zero:
+//! Betaflight's configurator sends them 400 ms after a stop, and a motor that coasts takes longer. Within
+//! 100 ms of throttle they count as little as under it. The others are obeyed only while the motor stands.
+//!
+//! A command is obeyed once for all its repeats: flight controllers send most of them ten times. A
+//! single bad frame between two of them, or before the first, does not end the row: the line's rise, when
+//! a flight controller starts, spoils one. Two do.
 //!
 //! One that counts at once may be another frame whose errors the check sum has not shown. So it needs six
 //! like the rest just after a bad frame, and longer after two within half a second. Flight controllers send
@@ -39,6 +45,9 @@ const DOUBT_US: u64 = 50_000;
 const DOUBT_OF_TWO_US: u64 = 1_000_000;
 /// The longest time between those two, µs.
 const BAD_APART_US: u64 = 500_000;
+
+/// How long the wire has been at zero throttle before a command waits for a motor that still turns, µs.
+const SETTLED_US: u64 = 100_000;
 
 /// The least time between two beacons, which flight controllers leave too, µs.
 const BEACON_APART_US: u64 = 260_000;
@@ -98,6 +107,19 @@ impl Order {
         })
     }
 
+    /// Whether it waits until the motor stands, where it comes before.
+    pub(crate) fn waits(self) -> bool {
+        matches!(
+            self,
+            Self::Direction { .. } | Self::Spin { .. } | Self::Save
+        )
+    }
+
+    /// Whether it may be given now: the motor stands, or the wire has been at zero throttle for so long, µs.
+    pub(super) fn is_in_time(self, stopped: bool, zero_us: u64) -> bool {
+        stopped || matches!(self, Self::Extended(_)) || self.waits() && zero_us >= SETTLED_US
+    }
+
     /// Frames in a row that it takes. One is enough where what it does ends by itself or is only to
     /// be seen.
     fn repeats(self) -> u8 {
@@ -131,7 +153,7 @@ pub struct Commands {
 }
 
 impl Commands {
-    /// A valid frame while the motor stands. The telemetry bit makes no difference.
+    /// A valid frame while its command may be given. The telemetry bit makes no difference.
     pub fn frame(&mut self, now_us: u64, frame: Frame) -> Option<Order> {
         if frame.value != self.value {
             self.interrupt();
@@ -169,7 +191,7 @@ impl Commands {
         }
     }
 
-    /// The signal was lost, or the motor turns: nothing has been heard.
+    /// The signal was lost, or what came is no command now: nothing has been heard.
     pub fn interrupt(&mut self) {
         self.value = 0;
         self.count = 0;

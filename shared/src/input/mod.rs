@@ -83,6 +83,8 @@ pub struct Input {
     announcer: Announcer,
     /// As of the last poll.
     stopped: bool,
+    /// Since when the wire has been at zero throttle.
+    zero_since_us: Option<u64>,
     /// A signal was lost since this was last asked.
     lost: bool,
 }
@@ -103,6 +105,7 @@ impl Input {
             tally: Tally::default(),
             announcer: Announcer::default(),
             stopped: false,
+            zero_since_us: None,
             lost: false,
         }
     }
@@ -166,8 +169,14 @@ impl Input {
             Event::Frame { frame, .. } => {
                 let cancelled = self.calibration.end();
                 self.announcer.calibration(cancelled);
-                // What comes while the motor turns is no command, however long it is repeated.
-                if self.stopped && self.authority.command().rests() {
+                let rests = self.authority.rests_by_wire();
+                self.zero_since_us = rests.then(|| self.zero_since_us.unwrap_or(now_us));
+                let in_time = self.zero_since_us.zip(Order::of(frame.value));
+                let in_time = in_time.is_some_and(|(since_us, order)| {
+                    order.is_in_time(self.stopped, now_us.saturating_sub(since_us))
+                });
+                // What comes at another time is no command, however long it is repeated.
+                if in_time {
                     self.commands.frame(now_us, frame)
                 } else {
                     self.commands.interrupt();
@@ -217,6 +226,7 @@ impl Input {
         let armed = self.authority.armed();
         if self.authority.poll(now_us) {
             self.lost = true;
+            self.zero_since_us = None;
             self.line.lost();
             self.commands.interrupt();
             let cancelled = self.calibration.lost();

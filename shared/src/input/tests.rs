@@ -252,6 +252,24 @@ fn commands_between_throttle_are_zero_throttle_and_not_obeyed() {
 }
 
 #[test]
+fn some_commands_count_at_zero_throttle_while_the_motor_turns() {
+    for value in 1..48 {
+        let at_once = matches!(value, 13 | 14);
+        let waits = matches!(value, 7 | 8 | 12 | 20 | 21);
+        let mut bench = Bench::armed();
+        bench.drive = TURNING;
+        bench.frames(1, 1000);
+        bench.frames(20, value);
+        assert_eq!(bench.orders.len(), usize::from(at_once), "{value}");
+        bench.frames(1, 1000);
+        bench.orders.clear();
+        bench.frames(101, 0);
+        bench.frames(20, value);
+        assert_eq!(bench.orders.len(), usize::from(at_once || waits), "{value}");
+    }
+}
+
+#[test]
 fn a_command_in_a_test_of_the_motor_is_not_obeyed() {
     let mut bench = Bench::armed();
     let now_us = bench.now_us;

@@ -6,8 +6,15 @@ mod serial;
 use sender::{FlightController, STOP};
 use siskin_control::params::ParamId;
 
+/// An eighth of the throttle's range.
+const LOW: u16 = 300;
 const BEACON: u16 = 1;
 const EXTENDED_ON: u16 = 13;
+const EXTENDED_OFF: u16 = 14;
+const DIRECTION_2: u16 = 8;
+const SAVE: u16 = 12;
+const REVERSED: u16 = 21;
+const COAST: (ParamId, f32) = (ParamId::MotStop, 0.0);
 
 /// A word of extended telemetry: neither a speed nor the 0xFFF of standstill.
 fn is_extended(word: &u16) -> bool {
@@ -39,6 +46,72 @@ fn extended_telemetry_ends_with_the_signal() {
     let words = fc.replies();
     assert!(words.len() > 1_800, "{} replies", words.len());
     assert!(!words.iter().any(is_extended));
+}
+
+/// Betaflight asks for extended telemetry at each arming, and a pilot who arms again at once does so while
+/// the propeller still runs down.
+#[test]
+fn extended_telemetry_is_answered_while_the_motor_runs_down() {
+    for (command, answer) in [(EXTENDED_ON, 0xE00), (EXTENDED_OFF, 0xEFF)] {
+        let mut fc = FlightController::armed(&[COAST]);
+        fc.frames(1_500, LOW);
+        fc.frames(20, STOP);
+        fc.replies();
+        fc.blocking(command);
+        fc.frames(5, STOP);
+        assert!(fc.rpm() > 500.0, "it still turns");
+        assert!(fc.replies().contains(&answer), "{answer:03x}");
+        // Under throttle it is no command.
+        fc.frames(500, LOW);
+        fc.replies();
+        fc.frames(5, command);
+        fc.frames(5, LOW);
+        assert!(!fc.replies().contains(&answer), "{answer:03x}");
+    }
+}
+
+/// Betaflight's configurator stops the motor, waits 400 ms, and sends the direction and then the save.
+#[test]
+fn the_configurator_sets_the_direction_of_a_motor_that_coasts() {
+    let mut fc = FlightController::armed(&[COAST]);
+    fc.frames(2_000, LOW);
+    fc.frames(400, STOP);
+    assert!(fc.rpm() > 200.0, "it still turns");
+    fc.blocking(DIRECTION_2);
+    fc.blocking(SAVE);
+    assert_eq!(fc.param(ParamId::MotDir), 0.0, "not while it turns");
+    for _ in 0..25 {
+        fc.frames(1_000, STOP);
+    }
+    assert_eq!(fc.param(ParamId::MotDir), 1.0);
+    // The save came behind it: this bench has nothing to store on.
+    assert!(fc.said("storage: none, nothing would survive a restart"));
+    fc.frames(1_500, LOW);
+    assert!(fc.rpm() < -200.0, "{} rpm", fc.rpm());
+}
+
+/// What waits for a motor at rest is forgotten when the wire asks for something else before.
+#[test]
+fn a_command_that_waits_is_forgotten_at_throttle_and_with_the_signal() {
+    for lost in [false, true] {
+        let mut fc = FlightController::armed(&[COAST]);
+        fc.frames(2_000, LOW);
+        fc.frames(150, STOP);
+        fc.blocking(DIRECTION_2);
+        fc.blocking(REVERSED);
+        if lost {
+            fc.wait_us(350_000);
+        } else {
+            fc.frames(1_000, LOW);
+        }
+        for _ in 0..20 {
+            fc.frames(1_000, STOP);
+        }
+        assert!(fc.rpm().abs() < 1.0, "it rests");
+        assert_eq!(fc.param(ParamId::MotDir), 0.0);
+        fc.frames(1_500, LOW);
+        assert!(fc.rpm() > 200.0, "{} rpm", fc.rpm());
+    }
 }
 
 /// The line is low while the flight controller starts, and the first frame begins with its rise; later
