@@ -5,6 +5,7 @@
 //! or a pulse, can change what the motor is asked to do.
 
 use super::Share;
+use super::command::within;
 use super::demand::{Demand, Reading};
 use super::line::Event;
 use super::signal::Signal;
@@ -14,6 +15,10 @@ use crate::math::Real;
 const ARMING_FRAMES: u32 = 30;
 /// The same for pulses, of which a servo's come 50 times a second.
 const ARMING_PULSES: u32 = 5;
+
+/// The longest silence behind a DShot command that is no loss, µs. The protocol leaves 260 ms behind a
+/// beacon, and Betaflight's loop, which waits for it, 110 ms until the next frame.
+const COMMAND_GAP_US: u64 = 300_000;
 
 /// The longest test, s.
 const TEST_MOST_S: f32 = 3.0;
@@ -105,6 +110,8 @@ struct Valid {
     /// Whether the wire was known to carry this signal, and it means what it says.
     identified: bool,
     demand: Demand,
+    /// Whether it was a DShot command.
+    command: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -174,6 +181,7 @@ impl Authority {
             signal,
             identified: identified.is_some(),
             demand,
+            command: matches!(event, Event::Frame { frame, .. } if frame.is_command()),
         };
         self.valid = Some(valid);
         match demand {
@@ -278,9 +286,14 @@ impl Authority {
         open && !self.armed
     }
 
-    /// Whether a valid frame or pulse has come within the loss time.
+    /// Whether a valid frame or pulse has come within the loss time. An armed wire that rests by a command
+    /// may be silent for longer behind it: that stops nothing which has not been stopped.
     pub fn signal_present(&self, now_us: u64) -> bool {
-        self.within_loss(now_us, self.valid.map(|valid| valid.at_us))
+        let loss_us = match self.valid {
+            Some(valid) if self.armed && valid.command => self.timing.loss_us.max(COMMAND_GAP_US),
+            _ => self.timing.loss_us,
+        };
+        within(now_us, self.valid.map(|valid| valid.at_us), loss_us)
     }
 
     /// Stops the motor, whatever turns it. The wire must be armed anew by its zero throttle.
@@ -332,7 +345,7 @@ impl Authority {
         if !(least..=1.0).contains(&value) || !(0.0..=TEST_MOST_S).contains(&duration_s) {
             return Err(TestError::OutOfRange);
         }
-        let silent = !self.within_loss(now_us, self.event_us);
+        let silent = !within(now_us, self.event_us, self.timing.loss_us);
         let rests = drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us));
         if self.barred || !rests {
             return Err(TestError::TemporarilyRejected);
@@ -361,10 +374,6 @@ impl Authority {
             .valid
             .is_some_and(|valid| valid.identified && valid.demand == Demand::Zero);
         zero && self.signal_present(now_us)
-    }
-
-    fn within_loss(&self, now_us: u64, since_us: Option<u64>) -> bool {
-        since_us.is_some_and(|since_us| now_us.saturating_sub(since_us) <= self.timing.loss_us)
     }
 }
 

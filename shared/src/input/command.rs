@@ -200,7 +200,7 @@ impl Commands {
 }
 
 /// Whether it is at most `most_us` since some time.
-fn within(now_us: u64, since_us: Option<u64>, most_us: u64) -> bool {
+pub(super) fn within(now_us: u64, since_us: Option<u64>, most_us: u64) -> bool {
     since_us.is_some_and(|since_us| now_us.saturating_sub(since_us) <= most_us)
 }
 

@@ -54,6 +54,11 @@ impl Frame {
         data << 4 | check_sum(data)
     }
 
+    /// Whether it is a command: a value from 1 to 47.
+    pub fn is_command(self) -> bool {
+        (1..FIRST_THROTTLE).contains(&self.value)
+    }
+
     /// What the value means, where throttle has two directions (`INP_3D`) or one.
     pub fn kind(self, two_directions: bool) -> Kind {
         match self.value {

@@ -16,6 +16,8 @@ pub const CAPTURE_HZ: u32 = 170_000_000;
 /// What `INP_ARM_MS` and `INP_LOSS_MS` are by default.
 const ARM_NS: u64 = 300_000_000;
 const LOSS_NS: u64 = 100_000_000;
+/// How long an armed wire may be silent behind a DShot command.
+const COMMAND_GAP_NS: u64 = 300_000_000;
 
 /// Frames and pulses of zero throttle that arm.
 const ARMING_FRAMES: u32 = 30;
@@ -131,6 +133,8 @@ struct Judge {
     zeros: u32,
     since_ns: u64,
     last_ns: u64,
+    /// Whether the last frame was a command, or may have been one.
+    command: bool,
     /// The last edge, which no time has let the ESC believe yet.
     waits_ns: Option<u64>,
     has_armed: bool,
@@ -156,6 +160,7 @@ impl Judge {
             zeros: 0,
             since_ns: 0,
             last_ns: 0,
+            command: false,
             waits_ns: None,
             has_armed: false,
             has_lapsed: false,
@@ -170,7 +175,7 @@ impl Judge {
             }
             None => {
                 self.waits_ns = Some(now_ns);
-                self.zero(now_ns);
+                self.zero(now_ns, true);
             }
         }
     }
@@ -180,7 +185,7 @@ impl Judge {
         self.event(now_ns, event);
         // What an edge has ended counts from when it is believed.
         if let Some(edge_ns) = self.waits_ns {
-            self.zero(now_ns);
+            self.zero(now_ns, true);
             if now_ns - edge_ns >= LONGEST_FILTER_NS {
                 self.waits_ns = None;
             }
@@ -192,16 +197,19 @@ impl Judge {
             Some(Event::Frame { frame, .. }) if frame.value >= 48 => {
                 self.expire(now_ns);
                 self.last_ns = now_ns;
+                self.command = false;
                 self.zeros = 0;
             }
+            Some(Event::Frame { frame, .. }) => self.zero(now_ns, frame.is_command()),
             // The pulses' end points may have been calibrated: each might be zero.
-            Some(Event::Frame { .. } | Event::Pulse { .. }) => self.zero(now_ns),
+            Some(Event::Pulse { .. }) => self.zero(now_ns, false),
             Some(Event::Bad) | None => {}
         }
     }
 
-    fn zero(&mut self, now_ns: u64) {
+    fn zero(&mut self, now_ns: u64, command: bool) {
         self.expire(now_ns);
+        self.command = command;
         if self.zeros == 0 {
             self.since_ns = now_ns;
         }
@@ -218,10 +226,16 @@ impl Judge {
 
     /// Begins to count anew after too long a silence.
     fn expire(&mut self, now_ns: u64) {
-        if now_ns - self.last_ns > LOSS_NS + 1000 {
+        let silence_ns = now_ns - self.last_ns;
+        let lapse_ns = if self.command {
+            COMMAND_GAP_NS
+        } else {
+            LOSS_NS
+        };
+        if silence_ns > LOSS_NS + 1000 {
             self.zeros = 0;
-            self.has_lapsed = true;
         }
+        self.has_lapsed |= silence_ns > lapse_ns + 1000;
     }
 
     /// The tasks look, and find a silence.

@@ -114,6 +114,26 @@ fn a_command_that_waits_is_forgotten_at_throttle_and_with_the_signal() {
     }
 }
 
+/// Betaflight's loop stands for 100 ms after a beacon, and 10 ms more before the next command.
+#[test]
+fn the_command_after_a_blocking_beacon_is_obeyed() {
+    let mut fc = FlightController::armed(&[]);
+    fc.blocking(BEACON);
+    fc.blocking(DIRECTION_2);
+    fc.wait_us(1_000);
+    assert_eq!(fc.param(ParamId::MotDir), 1.0);
+    assert!(fc.is_armed());
+    assert!(!fc.said("Throttle: signal lost while armed"));
+    // What is silent for longer is lost, and so is one that has not just sent a command.
+    fc.frames(10, BEACON);
+    fc.wait_us(350_000);
+    assert!(!fc.is_armed());
+    fc.frames(400, STOP);
+    assert!(fc.is_armed());
+    fc.wait_us(102_000);
+    assert!(!fc.is_armed());
+}
+
 /// The line is low while the flight controller starts, and the first frame begins with its rise; later
 /// every tenth frame or so is spoilt, as Betaflight sends a command ten times.
 #[test]

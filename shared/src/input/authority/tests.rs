@@ -227,6 +227,38 @@ fn a_lost_signal_stops_and_disarms() {
 }
 
 #[test]
+fn an_armed_wire_may_be_silent_behind_a_command() {
+    for (value, most_us) in [(0, 100_000), (1, 300_000), (47, 300_000), (48, 100_000)] {
+        let mut bench = Bench::armed();
+        bench.play(10, event(value));
+        bench.wait(most_us);
+        assert!(bench.authority.armed(), "{value}");
+        assert!(bench.authority.signal_present(bench.now_us), "{value}");
+        bench.wait(1);
+        assert!(!bench.authority.armed(), "{value}");
+    }
+    // A longer time of loss holds as it is.
+    let mut bench = Bench::armed();
+    bench.authority.set_timing(Timing {
+        loss_us: 500_000,
+        ..TIMING
+    });
+    bench.play(1, event(1));
+    bench.wait(500_000);
+    assert!(bench.authority.armed());
+    bench.wait(1);
+    assert!(!bench.authority.armed());
+    // One that is not armed begins anew.
+    let mut bench = Bench::new();
+    bench.play(300, event(1));
+    bench.after(100_001, event(1));
+    bench.play(299, event(1));
+    assert!(!bench.authority.armed());
+    bench.play(1, event(1));
+    assert!(bench.authority.armed());
+}
+
+#[test]
 fn disarming_stops_until_zero_was_held_anew() {
     let mut bench = Bench::armed();
     bench.after(1_000, event(1000));
