@@ -2,13 +2,15 @@
 //!
 //! The wire is armed by zero throttle held for a time, in a signal that has been identified; it
 //! loses that with its signal, and never turns a motor before. Only a frame whose check sum is right,
-//! or a pulse, can change what the motor is asked to do.
+//! or a pulse, can change what the motor is asked to do; and such a frame only where not nearly all the
+//! others fail theirs, as random words do: one of those in sixteen is right by chance.
 
 use super::Share;
 use super::command::within;
 use super::demand::{Demand, Reading};
 use super::line::Event;
 use super::signal::Signal;
+use super::trust::Trust;
 use crate::math::Real;
 
 /// Zero-throttle frames that arm a wire, at least.
@@ -86,6 +88,7 @@ pub struct Authority {
     armed: bool,
     arming: Option<Arming>,
     valid: Option<Valid>,
+    trust: Trust,
     event_us: Option<u64>,
     test: Option<Test>,
     /// Disarmed by command while a fault held.
@@ -129,6 +132,7 @@ impl Authority {
             armed: false,
             arming: None,
             valid: None,
+            trust: Trust::default(),
             event_us: None,
             test: None,
             forgiven: false,
@@ -173,6 +177,17 @@ impl Authority {
         if identified.is_some_and(|identified| identified != signal) {
             return self.count_failure();
         }
+        if matches!(demand, Demand::Throttle(_)) {
+            self.arming = None;
+            self.test = None;
+        }
+        if matches!(signal, Signal::Dshot { .. }) && !self.trust.good() {
+            // It keeps no signal and opens no throttle. To stop is right in either case.
+            if let (Some(valid), Demand::Zero) = (&mut self.valid, demand) {
+                valid.demand = demand;
+            }
+            return;
+        }
         if self.valid.is_some_and(|valid| valid.signal != signal) {
             self.restart();
         }
@@ -184,13 +199,8 @@ impl Authority {
             command: matches!(event, Event::Frame { frame, .. } if frame.is_command()),
         };
         self.valid = Some(valid);
-        match demand {
-            Demand::Throttle(_) => {
-                self.arming = None;
-                self.test = None;
-            }
-            Demand::Zero if !self.armed => self.count_zero(&valid),
-            Demand::Zero => {}
+        if demand == Demand::Zero && !self.armed {
+            self.count_zero(&valid);
         }
     }
 
@@ -215,6 +225,7 @@ impl Authority {
 
     /// More bad frames than good ones: what arrives may be noise, and zero by chance.
     fn count_failure(&mut self) {
+        self.trust.bad();
         if let Some(arming) = &mut self.arming {
             arming.failed = arming.failed.saturating_add(1);
             if arming.failed > arming.zeros {

@@ -25,6 +25,7 @@ mod news;
 mod pulse;
 pub mod signal;
 mod tally;
+mod trust;
 
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! What flight controllers send, with their own timing, and what the ESC makes of it.
 
+mod noise;
 mod sender;
 mod serial;
 

@@ -175,12 +175,57 @@ fn bad_frames_alone_neither_arm_nor_keep_a_signal() {
 
 #[test]
 fn bad_frames_do_not_disturb_an_armed_wire() {
-    let mut bench = Bench::armed();
-    for _ in 0..1_000 {
-        bench.after(1_000, event(1000));
-        bench.play(9, Event::Bad);
-        assert!(bench.turns());
+    for bad in 0..=3 {
+        let mut bench = Bench::armed();
+        for _ in 0..1_000 {
+            bench.after(1_000, event(1000));
+            bench.play(bad, Event::Bad);
+            assert!(bench.turns(), "{bad}");
+        }
     }
+}
+
+/// The bad frames outweigh the good ones after at most 24, and the good ones are then no signal.
+#[test]
+fn a_wire_whose_frames_mostly_fail_is_lost() {
+    for bad in [6, 9, 15] {
+        let mut bench = Bench::armed();
+        bench.after(1_000, event(1000));
+        let mut lost_ms = None;
+        for ms in 0..1_000 {
+            if ms % (bad + 1) == bad {
+                bench.after(1_000, event(2047));
+            } else {
+                bench.after(1_000, Event::Bad);
+            }
+            if !bench.authority.armed() {
+                lost_ms.get_or_insert(ms);
+            }
+            assert!(!bench.turns() || lost_ms.is_none(), "{bad}");
+        }
+        let lost_ms = lost_ms.expect("it is lost");
+        assert!((100..=125).contains(&lost_ms), "{bad}: {lost_ms} ms");
+        // The link is well again.
+        bench.play(4, event(0));
+        bench.play(301, event(0));
+        assert!(bench.authority.armed());
+    }
+}
+
+#[test]
+fn a_stop_is_obeyed_on_a_wire_that_is_not_believed() {
+    let mut bench = Bench::armed();
+    bench.after(1_000, event(1000));
+    let held = bench.authority.command();
+    bench.play(50, Event::Bad);
+    bench.after(1_000, event(2047));
+    assert_eq!(bench.authority.command(), held, "no other throttle");
+    bench.after(1_000, event(0));
+    assert_eq!(bench.authority.command(), Command::Zero);
+    bench.after(1_000, event(2047));
+    assert_eq!(bench.authority.command(), Command::Zero);
+    bench.play(2, event(2047));
+    assert!(bench.turns(), "believed again");
 }
 
 #[test]

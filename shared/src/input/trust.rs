@@ -1,0 +1,101 @@
+//! Whether a wire's frames are somebody's, or noise that passes the check now and then.
+//!
+//! Four check bits let one random word in sixteen pass, and nearly all of those are throttle. So a good
+//! frame is evidence of its wire, and a bad one against it: of a link in which half of the frames are good,
+//! a good one is 8 times as likely as of noise (1/2 to 1/16), and a bad one half as likely (1/2 to 15/16).
+//! The logarithms of the two are as 3 to −1 (2.08 and −0.63), and a count of them, held between two ends, is
+//! weighed against a bound.
+//!
+//! In random words the count falls by 3/4 each and then stays near 0: it reaches the bound with one in
+//! 143 000, so that at 1 kHz the wire is silent to all that count for 0.1 s: within 0.2 s of the first in
+//! all but one case of 26 000. It rises where more than a quarter of the frames are good. Of a link in which
+//! half are, one good frame in 2760 is missed, and a tenth of a second of silence at 1 kHz comes once in
+//! three years. Twelve bad frames in a row cost none of the good ones behind them, any number at most four.
+
+/// What a good frame adds; a bad one takes 1.
+const GOOD: u8 = 3;
+/// From here on frames are believed.
+const BELIEVED: u8 = 15;
+/// The end of the count: what has been good for long is doubted after twelve bad frames in a row.
+const MOST: u8 = 24;
+
+/// The count of what a wire's frames were.
+#[derive(Clone, Debug)]
+pub(super) struct Trust(u8);
+
+impl Default for Trust {
+    /// Of a wire that nothing bad has been heard of.
+    fn default() -> Self {
+        Self(MOST)
+    }
+}
+
+impl Trust {
+    /// Takes in a frame with a right check sum; whether it is to be believed.
+    pub(super) fn good(&mut self) -> bool {
+        self.0 = MOST.min(self.0 + GOOD);
+        self.0 >= BELIEVED
+    }
+
+    /// Takes in one that fails it.
+    pub(super) fn bad(&mut self) {
+        self.0 = self.0.saturating_sub(1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec;
+    use std::vec::Vec;
+
+    /// How likely each count is after many frames of which this share is good, in any order.
+    fn counts(good: f64) -> Vec<f64> {
+        let mut counts = vec![0.0; usize::from(MOST) + 1];
+        counts[usize::from(MOST)] = 1.0;
+        for _ in 0..5_000 {
+            let mut next = vec![0.0; counts.len()];
+            for (count, likely) in (0..=MOST).zip(&counts) {
+                let (mut risen, mut fallen) = (Trust(count), Trust(count));
+                risen.good();
+                fallen.bad();
+                next[usize::from(risen.0)] += likely * good;
+                next[usize::from(fallen.0)] += likely * (1.0 - good);
+            }
+            counts = next;
+        }
+        counts
+    }
+
+    /// The share of frames that are good and believed.
+    fn believed(good: f64) -> f64 {
+        let counts = counts(good);
+        let believes = |count: u8| Trust(count).good();
+        let likely = (0..=MOST).filter(|count| believes(*count));
+        good * likely.map(|count| counts[usize::from(count)]).sum::<f64>()
+    }
+
+    #[test]
+    fn of_random_words_one_in_143_000_is_believed() {
+        let share = believed(1.0 / 16.0);
+        assert!((1.0 / share - 143_000.0).abs() < 1_000.0, "{share:e}");
+    }
+
+    #[test]
+    fn of_a_link_that_half_fails_one_good_frame_in_2760_is_missed() {
+        for (good, missed) in [(1.0 / 3.0, 0.061), (0.5, 1.0 / 2_758.0), (0.73, 5e-8)] {
+            let share = 1.0 - believed(good) / good;
+            assert!((share / missed - 1.0).abs() < 0.02, "{good}: {share:e}");
+        }
+    }
+
+    #[test]
+    fn twelve_bad_frames_cost_nothing_and_any_number_four_good_ones() {
+        for (bad, cost) in [(12, 0), (13, 1), (1_000, 4)] {
+            let mut trust = Trust::default();
+            (0..bad).for_each(|_| trust.bad());
+            let missed = (0..100).take_while(|_| !trust.good()).count();
+            assert_eq!(missed, cost, "{bad}");
+        }
+    }
+}
