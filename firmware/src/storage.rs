@@ -5,6 +5,7 @@
 //! held off meanwhile, since they are in the flash.
 
 use core::ops::Range;
+use core::sync::atomic::{AtomicBool, Ordering, compiler_fence};
 
 use embassy_stm32::Peri;
 use embassy_stm32::peripherals::FLASH;
@@ -14,6 +15,13 @@ use embedded_storage::nor_flash::{
 };
 
 use crate::chip::flash::{self, PAGE_BYTES, WORD_BYTES};
+use crate::chip::pages;
+
+/// Whether the store is being read.
+static READING: AtomicBool = AtomicBool::new(false);
+
+/// Within so many cycles of a read the flash has told that the word is torn: some times what its bus takes.
+const READ_TOLD_CYCLES: u32 = 32;
 
 /// Where it is, as the linker script says: from the beginning of the flash.
 fn place() -> Range<usize> {
@@ -29,10 +37,11 @@ pub(crate) fn range() -> Range<u32> {
     0..place().len() as u32
 }
 
-/// Whether a non-maskable interrupt is for a word of the store that a loss of power has cut off. Who reads
-/// it goes on: its set has no seal, or a wrong one.
+/// Whether a non-maskable interrupt is for a word of the store that a loss of power has cut off: any torn
+/// word that the flash tells while the store is read. Who reads it goes on: its set has no seal, or a wrong
+/// one.
 pub fn take_torn_word() -> bool {
-    flash::take_torn_word(place())
+    pages::take_torn_word() && READING.load(Ordering::Relaxed)
 }
 
 /// The store's flash; offsets are from its beginning.
@@ -79,9 +88,14 @@ impl ReadNorFlash for Storage {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), StorageError> {
         check_read(self, offset, bytes.len()).map_err(StorageError::Misplaced)?;
         let from = (self.place.start + offset as usize) as *const u8;
+        READING.store(true, Ordering::Relaxed);
+        compiler_fence(Ordering::SeqCst);
         // SAFETY: within the store, which is mapped into memory; its words change only by `write` and
         // `erase`, for which this must be borrowed as well.
         unsafe { from.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) };
+        // The last word's interrupt may come some cycles after the word.
+        cortex_m::asm::delay(READ_TOLD_CYCLES);
+        READING.store(false, Ordering::Relaxed);
         Ok(())
     }
 

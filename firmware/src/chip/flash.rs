@@ -1,14 +1,13 @@
 //! Programming and erasing the flash, alike on these chips but for their words and pages.
 
-use core::ops::Range;
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use embassy_stm32::pac::flash::regs::{Cr, Sr};
 use embassy_stm32::pac::iwdg::vals::Key;
 use embassy_stm32::pac::{FLASH, IWDG};
 
-use super::pages::{self, erasing, programming};
 pub(crate) use super::pages::{PAGE_BYTES, WORD_BYTES};
+use super::pages::{erasing, programming};
 use crate::interrupt::set_writing;
 
 /// The beginning of the flash.
@@ -16,11 +15,6 @@ const ORIGIN: usize = 0x0800_0000;
 
 /// The flash has reported an error.
 pub(crate) struct Failed;
-
-/// Whether the non-maskable interrupt is for a word of this place that a loss of power has cut off.
-pub(crate) fn take_torn_word(place: Range<usize>) -> bool {
-    pages::take_torn_word(place.start - ORIGIN..place.end - ORIGIN)
-}
 
 /// Programs a word where nothing has been since the last erase.
 ///

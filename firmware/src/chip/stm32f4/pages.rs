@@ -1,7 +1,5 @@
 //! Words and sectors of the flash (RM0090, section 3.6).
 
-use core::ops::Range;
-
 use embassy_stm32::pac::flash::regs::Cr;
 use embassy_stm32::pac::flash::vals::Psize;
 
@@ -29,6 +27,6 @@ pub(crate) fn erasing(sector: usize) -> Cr {
 }
 
 /// Words of this flash have no bits that tell of others.
-pub(crate) fn take_torn_word(_: Range<usize>) -> bool {
+pub(crate) fn take_torn_word() -> bool {
     false
 }

@@ -1,7 +1,5 @@
 //! Words and pages of the flash (RM0440, section 3.3).
 
-use core::ops::Range;
-
 use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Cr;
 
@@ -26,11 +24,14 @@ pub(crate) fn erasing(page: usize) -> Cr {
     control
 }
 
-/// Whether a word within these offsets was read that has two wrong bits or more, as one that a loss of
-/// power has cut off; the next one is told anew. It reads as it is.
-pub(crate) fn take_torn_word(offsets: Range<usize>) -> bool {
+/// Whether a word of the main flash was read that has two wrong bits or more, as one that a loss of power
+/// has cut off; the next one is told anew. It reads as it is.
+///
+/// Which word it was is not looked at: RM0440 (3.7.7) does not say whether ADDR_ECC counts bytes or double
+/// words.
+pub(crate) fn take_torn_word() -> bool {
     let status = FLASH.eccr().read();
     // Flags are removed by ones.
     FLASH.eccr().write_value(status);
-    status.eccd() && !status.sysf_ecc() && offsets.contains(&(status.addr_ecc() as usize))
+    status.eccd() && !status.sysf_ecc()
 }

@@ -53,6 +53,10 @@ pub struct Flash {
     control: Cr,
     status: Sr,
     torn: Eccr,
+    /// Whether ADDR_ECC counts double words and not bytes.
+    torn_by_words: bool,
+    /// How often the program has removed ECCD.
+    torn_removed: u32,
     lock: Lock,
     /// The first half of a double word, with its address.
     first: Option<(u32, u32)>,
@@ -80,6 +84,8 @@ impl Flash {
             control,
             status: Sr(0),
             torn: Eccr(0),
+            torn_by_words: false,
+            torn_removed: 0,
             lock: Lock::Closed,
             first: None,
             work: None,
@@ -98,6 +104,8 @@ impl Flash {
         let [line, torn] = [self.line, self.torn.eccd()];
         *self = Self {
             fails: self.fails,
+            torn_by_words: self.torn_by_words,
+            torn_removed: self.torn_removed,
             line,
             ..Self::around(self.array.clone())
         };
@@ -110,6 +118,17 @@ impl Flash {
     /// Lets every write and erase fail from now on, or no more, as a worn-out or protected flash.
     pub fn fail(&mut self, fails: bool) {
         self.fails = fails;
+    }
+
+    /// Lets ADDR_ECC count double words from now on, or bytes as it does at first: RM0440 (3.7.7) does not
+    /// say which of them a chip does.
+    pub fn tell_torn_by_words(&mut self, by_words: bool) {
+        self.torn_by_words = by_words;
+    }
+
+    /// How often the program has been told of a torn double word, and has said that it knows.
+    pub fn torn_removed(&self) -> u32 {
+        self.torn_removed
     }
 
     /// Until when the array cannot be read.
@@ -146,7 +165,9 @@ impl Flash {
         let value = self.array.read(address, width)?;
         // The first one is told until its flag is removed.
         if self.array.is_torn(address) && !self.torn.eccd() {
-            self.torn.set_addr_ecc((address - ORIGIN) & !7);
+            let bytes = (address - ORIGIN) & !7;
+            let counted = if self.torn_by_words { bytes / 8 } else { bytes };
+            self.torn.set_addr_ecc(counted);
             self.torn.set_eccd(true);
             context.signals.push(Signal::NonMaskable(true));
         }
@@ -319,6 +340,7 @@ impl Flash {
         // Flags are removed by ones.
         if asked.eccd() && self.torn.eccd() {
             self.torn.set_eccd(false);
+            self.torn_removed += 1;
             context.signals.push(Signal::NonMaskable(false));
         }
         Ok(())

@@ -212,6 +212,11 @@ impl World {
         &mut self.parts
     }
 
+    /// The flash.
+    pub fn flash(&mut self) -> &mut Flash {
+        &mut self.parts.flash
+    }
+
     /// SRAM and CCM.
     pub fn memories(&self) -> &[Memory] {
         &self.memories

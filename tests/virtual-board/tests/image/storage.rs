@@ -57,9 +57,11 @@ fn random(state: &mut u64) -> u64 {
     mixed ^ mixed >> 31
 }
 
-/// Interrupts a command to the store in each of its works, and looks what is kept after that.
-fn interrupt(cause: Cause, what: f32) {
+/// Interrupts a command to the store in each of its works, and looks what is kept after that. Words that a
+/// loss of power has torn are told by their addresses in bytes, or in double words.
+fn interrupt(cause: Cause, what: f32, by_words: bool) {
     let mut board = Board::new(&image(), &[]);
+    board.world().flash().tell_torn_by_words(by_words);
     board.run(30 * MS);
     let mut seed = 1;
     let mut kept = DEFAULT;
@@ -109,6 +111,9 @@ fn interrupt(cause: Cause, what: f32) {
         if is_last {
             println!("{cause:?}: {cuts} cuts in {work} works, {taken} found the new value");
             assert!(work >= 2, "{work}");
+            let told = board.world().flash().torn_removed();
+            println!("the handler has been told of a torn word {told} times");
+            assert!(cause != Cause::Power || told > 0);
             break;
         }
     }
@@ -116,15 +121,20 @@ fn interrupt(cause: Cause, what: f32) {
 
 #[test]
 fn a_loss_of_power_in_a_save() {
-    interrupt(Cause::Power, SAVE);
+    interrupt(Cause::Power, SAVE, false);
+}
+
+#[test]
+fn a_loss_of_power_in_a_save_on_a_chip_that_counts_double_words() {
+    interrupt(Cause::Power, SAVE, true);
 }
 
 #[test]
 fn a_loss_of_power_in_an_erase() {
-    interrupt(Cause::Power, FORGET);
+    interrupt(Cause::Power, FORGET, false);
 }
 
 #[test]
 fn a_reset_in_a_save() {
-    interrupt(Cause::Pin, SAVE);
+    interrupt(Cause::Pin, SAVE, false);
 }
