@@ -6,18 +6,23 @@ mod clock;
 mod gates;
 
 use stm32_metapac::rcc::regs::{Bdcr, Ccipr, Cfgr, Cr, Crrcr, Csr, Pllcfgr};
-use stm32_metapac::rcc::vals::{Adcsel, Pllsrc, Ppre, Rtcsel, Sw};
+use stm32_metapac::rcc::vals::{Adcsel, Pllsrc, Ppre, Rtcsel, Sw, Uartsel, Usart1sel};
 
 pub use clock::{ClockError, Supply};
 use gates::Gates;
 
 use super::{Cause, Context, Part, Unmodelled};
+use crate::time::Cycles;
 
 /// The part.
 #[derive(Debug)]
 pub struct Rcc {
     control: Cr,
     configuration: Cfgr,
+    /// Since when the system has had the PLL's clock and the processor a part of it.
+    divided_since: Option<Cycles>,
+    /// Whether the processor has got the PLL's clock in one step.
+    in_one_step: bool,
     pll: Pllcfgr,
     sources: Ccipr,
     gates: Gates,
@@ -37,6 +42,8 @@ impl Rcc {
         Self {
             control,
             configuration,
+            divided_since: None,
+            in_one_step: false,
             pll: Pllcfgr(0x1000),
             sources: Ccipr(0),
             gates: Gates::new(),
@@ -76,7 +83,7 @@ impl Rcc {
 
     /// The processor's clock in Hz with this supply of the core and these wait states of the flash.
     pub fn clock_hz(&self, supply: Supply) -> Result<u64, ClockError> {
-        clock::frequency(self.configuration, self.pll, supply)
+        clock::frequency(self.configuration, self.pll, supply, self.in_one_step)
     }
 
     /// Where the parts' own clocks come from.
@@ -106,7 +113,7 @@ impl Rcc {
         Ok(())
     }
 
-    fn write_configuration(&mut self, value: u32) -> Result<(), Unmodelled> {
+    fn write_configuration(&mut self, value: u32, now: Cycles) -> Result<(), Unmodelled> {
         let asked = Cfgr(value);
         let mut wanted = Cfgr(0);
         wanted.set_sw(asked.sw());
@@ -123,6 +130,17 @@ impl Rcc {
         if known.0 != value || !undivided || !is_ready {
             return Err(Unmodelled);
         }
+        let is_divided = clock::divider(wanted) > 1;
+        if wanted.sw() != Sw::PLL1_R {
+            (self.divided_since, self.in_one_step) = (None, false);
+        } else if is_divided {
+            self.divided_since.get_or_insert(now);
+            self.in_one_step = false;
+        } else {
+            let long = |since| now - since >= clock::HALVED;
+            self.in_one_step |= self.configuration.sw() != Sw::PLL1_R
+                || self.divided_since.take().is_some_and(|since| !long(since));
+        }
         self.configuration = wanted;
         Ok(())
     }
@@ -135,15 +153,19 @@ impl Rcc {
         Ok(())
     }
 
-    /// The serial lines by their bus's clock, the converters by the system's.
+    /// The serial lines by their bus's clock or the system's, which are equal; the converters by the system's.
     fn write_sources(&mut self, value: u32) -> Result<(), Unmodelled> {
         let asked = Ccipr(value);
         let mut wanted = Ccipr(0);
         wanted.set_adc12sel(asked.adc12sel());
         // USB's and the random numbers': neither is there.
         wanted.set_clk48sel(asked.clk48sel());
-        let converters = asked.adc12sel();
-        if value != wanted.0 || !matches!(converters, Adcsel::DISABLE | Adcsel::SYS) {
+        wanted.set_usart1sel(asked.usart1sel());
+        wanted.set_usart2sel(asked.usart2sel());
+        let first = matches!(asked.usart1sel(), Usart1sel::PCLK2 | Usart1sel::SYS);
+        let second = matches!(asked.usart2sel(), Uartsel::PCLK1 | Uartsel::SYS);
+        let converters = matches!(asked.adc12sel(), Adcsel::DISABLE | Adcsel::SYS);
+        if value != wanted.0 || !(first && second && converters) {
             return Err(Unmodelled);
         }
         self.sources = wanted;
@@ -235,7 +257,7 @@ impl Part for Rcc {
     fn write(&mut self, offset: u32, value: u32, context: &mut Context) -> Result<(), Unmodelled> {
         match offset {
             0x00 => self.write_control(value),
-            0x08 => self.write_configuration(value),
+            0x08 => self.write_configuration(value, context.now),
             0x0c => self.write_pll(value),
             0x88 => self.write_sources(value),
             0x90 if self.backup_open => self.write_backup(value),

@@ -4,6 +4,8 @@ use stm32_metapac::rcc::regs::{Cfgr, Pllcfgr};
 use stm32_metapac::rcc::vals::Sw;
 use thiserror::Error;
 
+use crate::time::Cycles;
+
 /// HSI's rate.
 const HSI_HZ: u64 = 16_000_000;
 
@@ -12,6 +14,12 @@ const PLL_IN_HZ: [u64; 2] = [2_660_000, 16_000_000];
 
 /// The least and the greatest rate of the PLL's oscillator.
 const OSCILLATOR_HZ: [u64; 2] = [96_000_000, 344_000_000];
+
+/// The greatest clock of the core without PWR's boost.
+const UNBOOSTED_HZ: u64 = 150_000_000;
+
+/// For how long a faster one must have been halved, in cycles of 170 MHz: 1 µs (RM0440, 6.1.5).
+pub(super) const HALVED: Cycles = 170;
 
 /// What a clock's limits depend on.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +51,14 @@ pub enum ClockError {
         /// The greatest.
         greatest_hz: u64,
     },
+    /// The core's supply gets no time.
+    #[error(
+        "the core comes to {clock_hz} Hz in one step: above 150 MHz it wants half of it for 1 us first"
+    )]
+    Step {
+        /// The clock.
+        clock_hz: u64,
+    },
     /// The flash's limit.
     #[error(
         "the flash is read at {clock_hz} Hz with {wait_states} wait states instead of {needed}"
@@ -62,6 +78,7 @@ pub(super) fn frequency(
     configuration: Cfgr,
     pll: Pllcfgr,
     supply: Supply,
+    in_one_step: bool,
 ) -> Result<u64, ClockError> {
     let system_hz = match configuration.sw() {
         Sw::PLL1_R => pll_hz(pll)?,
@@ -71,7 +88,7 @@ pub(super) fn frequency(
     let (greatest_hz, step_hz) = if supply.boost {
         (170_000_000, 34_000_000)
     } else {
-        (150_000_000, 30_000_000)
+        (UNBOOSTED_HZ, 30_000_000)
     };
     if system_hz > greatest_hz {
         return Err(ClockError::Core {
@@ -80,6 +97,9 @@ pub(super) fn frequency(
         });
     }
     let clock_hz = system_hz / divider(configuration);
+    if in_one_step && clock_hz > UNBOOSTED_HZ {
+        return Err(ClockError::Step { clock_hz });
+    }
     let needed = (clock_hz - 1) / step_hz;
     if u64::from(supply.wait_states) < needed {
         return Err(ClockError::Flash {
@@ -105,7 +125,7 @@ fn pll_hz(pll: Pllcfgr) -> Result<u64, ClockError> {
 }
 
 /// AHB's prescaler: 2 to 16 from 8 on, then 64 to 512.
-fn divider(configuration: Cfgr) -> u64 {
+pub(super) fn divider(configuration: Cfgr) -> u64 {
     match configuration.hpre().to_bits() {
         bits @ 8..=11 => 2 << (bits - 8),
         bits @ 12.. => 64 << (bits - 12),

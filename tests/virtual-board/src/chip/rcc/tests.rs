@@ -2,9 +2,18 @@ use super::*;
 use crate::chip::Signal;
 
 fn write(rcc: &mut Rcc, offset: u32, value: u32) -> Result<Vec<Signal>, Unmodelled> {
+    write_at(0, rcc, offset, value)
+}
+
+fn write_at(
+    now: Cycles,
+    rcc: &mut Rcc,
+    offset: u32,
+    value: u32,
+) -> Result<Vec<Signal>, Unmodelled> {
     let mut signals = Vec::new();
     let mut context = Context {
-        now: 0,
+        now,
         signals: &mut signals,
     };
     rcc.write(offset, value, &mut context)?;
@@ -28,12 +37,42 @@ const BOOST: Supply = Supply {
 /// PLLM 4, PLLN 85, PLLR 2 with its output on, from HSI.
 const PLL: u32 = 1 << 24 | 85 << 8 | 3 << 4 | 2;
 
-fn at_170_mhz() -> Rcc {
+/// Half of the PLL's clock.
+const HALF: u32 = 8 << 4 | 3;
+
+fn with_pll() -> Rcc {
     let mut rcc = Rcc::new();
     write(&mut rcc, 0x0c, PLL).unwrap();
     write(&mut rcc, 0x00, 1 << 24 | 0x500).unwrap();
-    write(&mut rcc, 0x08, 3).unwrap();
     rcc
+}
+
+fn at_170_mhz() -> Rcc {
+    let mut rcc = with_pll();
+    write(&mut rcc, 0x08, HALF).unwrap();
+    write_at(170, &mut rcc, 0x08, 3).unwrap();
+    rcc
+}
+
+#[test]
+fn the_last_half_of_170_mhz_comes_a_microsecond_after_the_first() {
+    let step = Err(ClockError::Step {
+        clock_hz: 170_000_000,
+    });
+    let mut rcc = with_pll();
+    write(&mut rcc, 0x08, 3).unwrap();
+    assert_eq!(rcc.clock_hz(BOOST), step);
+
+    let mut rcc = with_pll();
+    write_at(1000, &mut rcc, 0x08, HALF).unwrap();
+    assert_eq!(rcc.clock_hz(BOOST), Ok(85_000_000));
+    write_at(1169, &mut rcc, 0x08, 3).unwrap();
+    assert_eq!(rcc.clock_hz(BOOST), step);
+    // From HSI anew.
+    write_at(2000, &mut rcc, 0x08, 1).unwrap();
+    write_at(2000, &mut rcc, 0x08, HALF).unwrap();
+    write_at(2170, &mut rcc, 0x08, 3).unwrap();
+    assert_eq!(rcc.clock_hz(BOOST), Ok(170_000_000));
 }
 
 #[test]
@@ -73,7 +112,7 @@ fn the_clock_is_170_mhz_with_boost_and_four_wait_states() {
         })
     );
     // Half of it by AHB's prescaler.
-    write(&mut rcc, 0x08, 8 << 4 | 3).unwrap();
+    write(&mut rcc, 0x08, HALF).unwrap();
     assert_eq!(rcc.clock_hz(BOOST), Ok(85_000_000));
 }
 
@@ -98,13 +137,13 @@ fn what_runs_is_not_changed_and_other_oscillators_are_refused() {
         (0x00, 1 << 24 | 1 << 16 | 0x500),
         (0x08, 2),
         (0x08, 4 << 8 | 3),
-        (0x88, 1),
+        (0x88, 2),
         (0x10, 0),
     ] {
         let written = write(&mut rcc, offset, value);
         assert_eq!(written, Err(Unmodelled), "{offset:#x} {value:#x}");
     }
-    write(&mut rcc, 0x88, 2 << 28).unwrap();
+    write(&mut rcc, 0x88, 2 << 28 | 0b0101).unwrap();
     assert_eq!(rcc.sources().adc12sel(), Adcsel::SYS);
 }
 
