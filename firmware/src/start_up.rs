@@ -24,6 +24,14 @@ global_asm!(
     ".type __pre_init, %function",
     ".thumb_func",
     "__pre_init:",
+    // A memory's first write after a reset may be lost, unless it has been read (ES0431): SRAM1, SRAM2 and
+    // the CCM SRAM of the G431. The F405 has memory there too.
+    "ldr r0, =0x20000000",
+    "ldr r1, [r0]",
+    "ldr r0, =0x20004000",
+    "ldr r1, [r0]",
+    "ldr r0, =0x10000000",
+    "ldr r1, [r0]",
     "copy_part __control",
     "copy_part __control_more",
     "copy_part __control_rest",

@@ -207,7 +207,7 @@ pub struct Temperature {
 }
 
 impl Temperature {
-    /// The thermistor's reading, for [`NTC`]; it waits 10 µs for it.
+    /// The thermistor's reading, for [`NTC`]; it waits 15 µs for it.
     pub fn read(&mut self) -> AdcCounts {
         AdcCounts::from_num(self.reading.counts())
     }

@@ -43,9 +43,19 @@ impl Converters {
 
     /// A reset of the block by RCC.
     pub fn reset(&mut self, context: &mut Context) {
-        self.converters = Default::default();
+        for converter in &mut self.converters {
+            converter.reset();
+        }
         self.common = Ccr::default();
         self.update(context);
+    }
+
+    /// Lets the first regular conversion behind each injected sequence be one of channel 0, as ES0431 (2.5.8)
+    /// says that it may.
+    pub fn mislead(&mut self) {
+        for converter in &mut self.converters {
+            converter.mislead();
+        }
     }
 
     /// TIM1's trigger output has risen.

@@ -82,6 +82,9 @@ impl<S: Surroundings + 'static> Processor<S> for Interpreter<S> {
         self.deferred = None;
         self.locked_up = false;
         self.pended.clear();
+        if let Some(scene) = &mut self.scene {
+            scene.reset();
+        }
     }
 
     fn run(&mut self) -> Stop {
@@ -145,6 +148,12 @@ impl<S: Surroundings + 'static> Processor<S> for Interpreter<S> {
 }
 
 impl<S> Interpreter<S> {
+    /// How many memories were written since a reset before they were read: the chip may not have taken the
+    /// first write (ES0431).
+    pub fn written_first(&self) -> u32 {
+        self.scene.as_ref().map_or(0, |scene| scene.written_first)
+    }
+
     fn step(&mut self) -> Option<Stop> {
         if with(|scene| scene.surroundings.asks_to_stop()) {
             return Some(Stop::Asked);

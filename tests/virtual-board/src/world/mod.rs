@@ -212,6 +212,13 @@ impl World {
         &mut self.parts
     }
 
+    /// Lets the converters err as [`Converters::mislead`] says.
+    ///
+    /// [`Converters::mislead`]: crate::chip::adc::Converters::mislead
+    pub fn mislead_converters(&mut self) {
+        self.parts.converters.mislead();
+    }
+
     /// The flash.
     pub fn flash(&mut self) -> &mut Flash {
         &mut self.parts.flash

@@ -40,7 +40,7 @@ impl Onlooker for Nobody {
     fn period(&mut self, _: f64, _: &Period, _: &Rig) {}
 }
 
-fn run<P: Processor<World>>() -> Done {
+fn board<P: Processor<World>>() -> VirtualBoard<P> {
     let start = Start {
         bench: Bench::default(),
         wire: Wire::detached(),
@@ -49,7 +49,12 @@ fn run<P: Processor<World>>() -> Done {
         faults: Vec::new(),
         link_bytes_per_s: 11_520,
     };
-    let (mut board, _) = VirtualBoard::<P>::new(&image(), start).expect("a board");
+    let (board, _) = VirtualBoard::new(&image(), start).expect("a board");
+    board
+}
+
+fn run<P: Processor<World>>() -> Done {
+    let mut board = board::<P>();
     let mut frames = Vec::new();
     for at_ms in 0..RUN_MS {
         board.wire().play(at_ms * MS, &REST).expect("room");
@@ -72,6 +77,16 @@ fn run<P: Processor<World>>() -> Done {
         violations: bridge.violations(),
         instructions,
     }
+}
+
+/// ES0431: the first write to a memory after a reset may be lost, unless it has been read.
+#[test]
+fn no_memory_is_written_before_it_is_read() {
+    let mut board = board::<Interpreter<World>>();
+    let advanced = board.advance(2 * MS, &mut Nobody, &mut |_: &[u8]| {});
+    advanced.expect("it goes on");
+    assert!(board.processor().instructions() > 10_000);
+    assert_eq!(board.processor().written_first(), 0);
 }
 
 #[test]

@@ -90,6 +90,9 @@ pub(super) struct Converter {
     enabled_not_before: Cycles,
     held: u16,
     ignored: u64,
+    /// Whether it errs as ES0431 (2.5.8) says, and is about to.
+    misleads: bool,
+    errs: bool,
 }
 
 impl Default for Converter {
@@ -111,11 +114,25 @@ impl Default for Converter {
             enabled_not_before: 0,
             held: 0,
             ignored: 0,
+            misleads: false,
+            errs: false,
         }
     }
 }
 
 impl Converter {
+    pub(super) fn reset(&mut self) {
+        *self = Self {
+            misleads: self.misleads,
+            ..Self::default()
+        };
+    }
+
+    /// Lets the first regular conversion behind each injected sequence be one of channel 0.
+    pub(super) fn mislead(&mut self) {
+        self.misleads = true;
+    }
+
     pub(super) fn flags(&self) -> u32 {
         self.flags.0
     }
@@ -291,6 +308,7 @@ impl Converter {
         if !self.control.jadstart() {
             return;
         }
+        self.errs = self.misleads;
         let latency = match self.phase {
             Phase::Sampling(Group::Injected(_), _) | Phase::Converting(Group::Injected(_), _) => {
                 self.ignored += 1;
@@ -355,6 +373,9 @@ impl Converter {
                 // The flag is the regular conversion's (RM0440, end of sampling phase).
                 if group == Group::Regular {
                     self.flags.set_eosmp(true);
+                    if std::mem::take(&mut self.errs) {
+                        return Some(0);
+                    }
                 }
                 return Some(self.channel(group));
             }

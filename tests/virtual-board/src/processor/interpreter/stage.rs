@@ -5,6 +5,7 @@
 
 use std::any::Any;
 use std::cell::RefCell;
+use std::ops::Range;
 
 use rsemu::core::BusError as Refusal;
 use rsemu::core::space::{MemAttrs, MemOps, MemResult};
@@ -20,6 +21,13 @@ pub(super) trait Around: Surroundings + Any {}
 
 impl<S: Surroundings + Any> Around for S {}
 
+/// The chip's memories, each a part of its own: SRAM1, SRAM2 and the CCM SRAM (RM0440, 2.2.2).
+const RAMS: [Range<u32>; 3] = [
+    0x2000_0000..0x2000_4000,
+    0x2000_4000..0x2000_5800,
+    0x1000_0000..0x1000_2800,
+];
+
 /// What an interpreter stands in, and what its bus has seen of the step under way.
 pub(super) struct Scene {
     pub(super) surroundings: Box<dyn Around>,
@@ -30,6 +38,10 @@ pub(super) struct Scene {
     pub(super) last_read: Option<u32>,
     /// Whether a write found nothing.
     pub(super) write_lost: bool,
+    /// The memories that nothing has been done with since the reset.
+    untouched: [bool; RAMS.len()],
+    /// How many of them were written first, which a chip may not have taken (ES0431).
+    pub(super) written_first: u32,
     /// An access that is not modelled: its address, and what was written.
     pub(super) unmodelled: Option<(u32, Option<u32>)>,
 }
@@ -42,8 +54,21 @@ impl Scene {
             fetched: None,
             last_read: None,
             write_lost: false,
+            untouched: [true; RAMS.len()],
+            written_first: 0,
             unmodelled: None,
         }
+    }
+
+    /// The chip is reset.
+    pub(super) fn reset(&mut self) {
+        self.untouched = [true; RAMS.len()];
+    }
+
+    /// Whether this is the first that is done with a memory since the reset.
+    fn touches(&mut self, address: u32) -> bool {
+        let ram = RAMS.iter().position(|ram| ram.contains(&address));
+        ram.is_some_and(|ram| std::mem::take(&mut self.untouched[ram]))
     }
 
     /// Forgets the step before.
@@ -67,6 +92,7 @@ impl Scene {
 
     fn read(&mut self, address: u32, width: Width) -> Result<u32, BusError> {
         self.last_read = Some(address);
+        self.touches(address);
         match self.memory(address, width.bytes()) {
             Some(mapped) => Ok(mapped.memory.read(address, width.bytes())),
             None => self.surroundings.read(address, width),
@@ -77,6 +103,7 @@ impl Scene {
         match self.memory(address, width.bytes()) {
             Some(mapped) if mapped.writable => {
                 mapped.memory.write(address, width.bytes(), value);
+                self.written_first += u32::from(self.touches(address));
                 Ok(())
             }
             _ => self.surroundings.write(address, width, value),
