@@ -76,7 +76,17 @@
 //! | overrun, three in a row or more than one in 100 periods for long | [`last_words`] | after the reset |
 //! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
 //! | processor locked up, G431 | the timer's break | after the watchdog's reset |
+//! | a debugger halts the processor | the timer, which stops with it ([below](#a-debuggers-halt)) | nothing |
 //! | tasks or interrupt stand still | the watchdog's reset: the gates' pull-downs | after the reset |
+//!
+//! # A debugger's halt
+//! With DBG_TIM1_STOP the counter stops with the processor, and "the outputs are disabled (as if the MOE bit
+//! was reset)" (RM0440, debug mode of TIM1; RM0090, 38.16.2); OSSI then drives them to their idle level,
+//! low. So both switches of each phase are off. MOE itself stays: where the processor goes on, so does the
+//! PWM with its last duties, and the motor has meanwhile done as it likes; what the current does then is the
+//! trips'. The watchdog does not stop, and resets a chip that is halted for longer than 1.6 s. The bit is
+//! set when the program starts and outlives all resets but a power-up; before, the gates have their
+//! pull-downs. A debugger may clear it, or stop the watchdog. No board has shown any of this yet.
 //!
 //! # What no board has shown yet
 //! None of this has run on a board. Pins and alternate functions agree with the metadata of

@@ -244,7 +244,7 @@ impl Hardware {
         // Before any of them is used: critical sections rely on it.
         priority::lower_all(chip::INTERRUPTS);
         rcc::enable_and_reset::<TIM1>();
-        // A breakpoint stops the timer, and a stopped timer turns its outputs off.
+        // A debugger that halts the processor stops the timer, and so the bridge is off.
         pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
         comparators::set_up(TRIP.level(RATING_A));
         chip::break_on_lock_up();

@@ -256,7 +256,7 @@ impl Hardware {
         priority::lower_all(chip::INTERRUPTS);
         let enable = Output::new(p.PC10, Level::Low, Speed::Low);
         rcc::enable_and_reset::<TIM1>();
-        // A breakpoint stops the timer, and a stopped timer turns its outputs off.
+        // A debugger that halts the processor stops the timer, and so the bridge is off.
         pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
 
         // The pull keeps the gates off while nothing drives the pin.

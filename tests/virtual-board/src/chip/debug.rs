@@ -1,4 +1,4 @@
-//! DBGMCU: what a debugger stops with the processor. None is connected, so that nothing follows from it.
+//! DBGMCU: what stops with the processor when a debugger halts it.
 
 use stm32_metapac::dbgmcu::regs::{Apb2fzr, Cr};
 
@@ -18,6 +18,13 @@ impl Debug {
             control: Cr(0),
             stopped_apb2: Apb2fzr(0),
         }
+    }
+}
+
+impl Debug {
+    /// Whether TIM1 stops with the processor, and turns its outputs off (RM0440, TIM1's debug mode).
+    pub fn stops_tim1(&self) -> bool {
+        self.stopped_apb2.tim1()
     }
 }
 

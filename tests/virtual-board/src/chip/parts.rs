@@ -51,7 +51,7 @@ pub struct Parts {
     pub(crate) mux: DmaMux,
     pub(crate) ports: Vec<Port>,
     exti: Exti,
-    debug: Debug,
+    pub(crate) debug: Debug,
 }
 
 impl Parts {

@@ -195,6 +195,18 @@ impl World {
         }
     }
 
+    /// A debugger halts the processor, which does not run from then on.
+    pub fn halt(&mut self) {
+        if self.parts.debug.stops_tim1() {
+            let mut context = Context {
+                now: self.now,
+                signals: &mut self.signals,
+            };
+            self.parts.tim1.halt(&mut context);
+            self.settle();
+        }
+    }
+
     /// The processor has locked up.
     pub fn lock_up(&mut self) {
         if self.parts.syscfg.lock_up_breaks() {

@@ -153,6 +153,19 @@ fn too_much_current_while_the_processor_stands() {
     assert_eq!(board.world().bridge().violations(), 0);
 }
 
+/// A breakpoint: nothing of the program runs any more.
+#[test]
+fn a_debugger_that_halts_the_processor() {
+    let mut board = Board::turning(&image());
+    board.stop_in(THREAD);
+    let world = board.world();
+    world.halt();
+    assert!(world.bridge().is_off(), "at once");
+    let until = Surroundings::now(world) + 10 * PWM_PERIOD;
+    world.idle(until);
+    assert!(world.bridge().is_off(), "and so it stays");
+}
+
 /// A fault in the hard fault's handler, before its first instruction: the processor does nothing any more,
 /// and the timer's break acts.
 #[test]

@@ -68,6 +68,7 @@ pub struct AdvancedTimer {
     filter: Filter,
     /// The level of the trigger output.
     trigger: bool,
+    halted: bool,
     due: Cycles,
 }
 
@@ -98,6 +99,7 @@ impl AdvancedTimer {
             legs: [const { Leg::new() }; LEGS],
             filter: Filter::new(),
             trigger: false,
+            halted: false,
             due: NEVER,
         }
     }
@@ -115,6 +117,14 @@ impl AdvancedTimer {
     pub fn set_break(&mut self, level: bool, context: &mut Context) {
         self.catch_up(context);
         self.filter.input(level, context.now);
+        self.settle(context);
+    }
+
+    /// It stops with the processor: the outputs are off as if MOE were, which stays as it is (RM0440, debug
+    /// mode). That its counter stands is not modelled: nothing hears it.
+    pub fn halt(&mut self, context: &mut Context) {
+        self.catch_up(context);
+        self.halted = true;
         self.settle(context);
     }
 
@@ -202,13 +212,14 @@ impl AdvancedTimer {
             due = due.min(channel.due(&self.ramp));
         }
         let dead_time = dead_time(self.bdtr.dtg());
+        let main = self.bdtr.moe() && !self.halted;
         let legs = self.legs.iter_mut().zip(&self.channels).zip(&self.enables);
         for (leg, ((generator, channel), enables)) in legs.enumerate() {
             generator.follow(channel.reference(), dead_time, now);
             if generator.due() > now {
                 due = due.min(generator.due());
             }
-            if let Some([high, low]) = generator.drive(self.bdtr.moe(), *enables, now) {
+            if let Some([high, low]) = generator.drive(main, *enables, now) {
                 context.signals.push(Signal::Gates { leg, high, low });
             }
         }
