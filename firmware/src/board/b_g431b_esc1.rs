@@ -8,6 +8,7 @@ use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, Exten, SampleTime};
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
+use embassy_stm32::pac::opamp::vals::PgaGain;
 use embassy_stm32::peripherals::{
     DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, IWDG, PA15, PB3, PB4, PB6, TIM1,
     TIM2, TIM3, USART1, USART2,
@@ -275,10 +276,15 @@ impl Hardware {
         let mut c_out = p.PB1;
         c.pga_ext(p.PB0, c_out.reborrow(), OpAmpGain::Mul16);
         let c = c_out.degrade_adc();
-        // A dropped output turns its op-amp off, and `degrade_adc` drops what it is given
-        // (embassy-stm32 0.6).
+        // They amplify from the shunts' grounds, which the board brings to PA3, PA5 and PB2 (inverting
+        // input 0, analogue since the reset), and not from the chip's: the HAL has no name for it. And a
+        // dropped output turns its op-amp off, and `degrade_adc` drops what it is given (embassy-stm32
+        // 0.6).
         for amplifier in [pac::OPAMP1, pac::OPAMP2, pac::OPAMP3] {
-            amplifier.csr().modify(|w| w.set_opampen(true));
+            amplifier.csr().modify(|w| {
+                w.set_pga_gain(PgaGain::GAIN16_INPUT_VINM0);
+                w.set_opampen(true);
+            });
         }
 
         // Low, it is the ground of the terminals' dividers. A dropped pin would be given back.

@@ -29,7 +29,13 @@ pub const SHUNT_DIVIDER: f32 = INPUT_MS[0] / INPUT_SUM_MS;
 /// Volts at the op-amp's input without current: 0.1286.
 pub const BIAS_V: f32 = 3.3 * INPUT_MS[2] / INPUT_SUM_MS;
 
-/// The op-amp's.
+/// The op-amp's, from the shunt's ground: 16 times the input less 15 times the ground (RM0440, PGA with
+/// inverting input 0 and bias). So are ST's motor-control project, SimpleFOC and Recoil set up for this board.
+///
+/// That ground comes to the op-amp without a resistor (schematic, Vshunt−), so zero and gain are those
+/// of the resistors at its input: 2.06 V, and 16 · 4/7 = 64/7 of the shunt's voltage, as SimpleFOC has
+/// it. What changes is a shift of the ground against the chip's: a millivolt read as 0.56 A, or as 0.33 A
+/// if the 2.2 kΩ should end at the chip's ground, and now reads as 0.014 A, or −0.21 A.
 pub const GAIN: f32 = 16.0;
 
 /// Nominal reading without current: 2553 counts, of 2.06 V.

@@ -8,7 +8,8 @@ const SUPPLY_V: f64 = 3.3;
 /// Each leg's shunt, below its low side, Ω.
 const SHUNT_OHM: f64 = 0.003;
 
-/// An op-amp's input, kΩ: to the shunt, to ground, and to the chip's supply.
+/// An op-amp's input, kΩ: to the shunt, to the shunts' ground, and to the chip's supply. The schematic says
+/// "GND" of the second; ended at the chip's ground, it would show 4/7 of a shift instead of all but 4 %.
 const SHUNT_KOHM: [f64; 3] = [1.5, 2.2, 22.0];
 
 /// The supply's divider, kΩ: above and below the pin.
@@ -31,6 +32,10 @@ const FREEZING_K: f64 = 273.15;
 
 /// The op-amps' inputs at the shunts of legs a, b and c: PA1, PA7 and PB0.
 pub const SHUNTS: [(u8, u8); 3] = [(0, 1), (0, 7), (1, 0)];
+
+/// The op-amps' feet at the grounds of these shunts: PA3, PA5 and PB2, without a resistor (schematic of the
+/// MB1419, shunt sensing circuit: Vshunt−).
+pub const GROUNDS: [(u8, u8); 3] = [(0, 3), (0, 5), (1, 2)];
 
 /// The dividers of terminals a, b and c: PA4, PC4 and PB11.
 pub const TERMINALS: [(u8, u8); 3] = [(0, 4), (2, 4), (1, 11)];
@@ -69,6 +74,8 @@ pub struct Outside {
     /// Currents down through the shunts of legs a, b, c, out of the motor, A: 0 while a leg's low side
     /// conducts none.
     pub shunts_a: [f64; 3],
+    /// Voltages of these shunts' grounds above the chip's, V: what their currents make of the copper between.
+    pub grounds_v: [f64; 3],
     /// Voltages of terminals a, b, c, V.
     pub terminals_v: [f64; 3],
     /// Voltage of the supply, V.
@@ -86,7 +93,10 @@ impl Outside {
     pub fn volts(&self, pin: (u8, u8)) -> Option<f64> {
         let among = |pins: [(u8, u8); 3]| pins.iter().position(|of| *of == pin);
         if let Some(leg) = among(SHUNTS) {
-            return Some(shunt_input(self.shunts_a[leg]));
+            return Some(shunt_input(self.shunts_a[leg], self.grounds_v[leg]));
+        }
+        if let Some(leg) = among(GROUNDS) {
+            return Some(self.grounds_v[leg]);
         }
         if let Some(leg) = among(TERMINALS) {
             let volts = divided(self.terminals_v[leg], TERMINAL_KOHM);
@@ -103,10 +113,11 @@ impl Outside {
     }
 }
 
-/// Where the three resistors meet, with this current through the shunt.
-fn shunt_input(current_a: f64) -> f64 {
+/// Where the three resistors meet, with this current through the shunt and this voltage below it.
+fn shunt_input(current_a: f64, ground_v: f64) -> f64 {
     let [shunt, ground, supply] = SHUNT_KOHM.map(|kohm| 1.0 / kohm);
-    let into = current_a * SHUNT_OHM * shunt + SUPPLY_V * supply;
+    let above_v = ground_v + current_a * SHUNT_OHM;
+    let into = above_v * shunt + ground_v * ground + SUPPLY_V * supply;
     into / (shunt + ground + supply)
 }
 
@@ -125,6 +136,7 @@ mod tests {
 
     const OUTSIDE: Outside = Outside {
         shunts_a: [35.0, -35.0, 0.0],
+        grounds_v: [0.0, 0.0, 0.01],
         terminals_v: [12.2, 0.0, 6.1],
         bus_v: 18.7,
         temperature_c: 25.0,
@@ -141,7 +153,10 @@ mod tests {
         // 3.3 V by 3 of 77 are 128.57 mV, and 4/7 of 105 mV for 35 A are 60 mV.
         assert_volts((0, 1), 0.188571);
         assert_volts((0, 7), 0.068571);
-        assert_volts((1, 0), 0.128571);
+        // And 37/38.5 of 10 mV below it.
+        assert_volts((1, 0), 0.138182);
+        assert_volts((1, 2), 0.01);
+        assert_volts((0, 3), 0.0);
         assert_volts((0, 4), 2.2);
         assert_volts((2, 4), 0.0);
         assert_volts((1, 11), 1.1);

@@ -1,4 +1,4 @@
-//! OPAMP1 to OPAMP3 as amplifiers by 2 to 64 of a pin's voltage.
+//! OPAMP1 to OPAMP3 as amplifiers by 2 to 64 of a pin's voltage, above the chip's ground or another pin's.
 
 use stm32_metapac::opamp::regs::Csr;
 use stm32_metapac::opamp::vals::{PgaGain, VmSel, VpSel};
@@ -14,6 +14,9 @@ const INPUTS: [[(u8, u8); 3]; 3] = [
     [(0, 7), (1, 14), (1, 0)],
     [(1, 0), (1, 13), (0, 1)],
 ];
+
+/// Pins at VINM0.
+const FEET: [(u8, u8); 3] = [(0, 3), (0, 5), (1, 2)];
 
 /// Converters with their channels at the internal output (RM0440, ADC connectivity).
 const INSIDE: [(u8, u8); 3] = [(1, 13), (2, 16), (2, 18)];
@@ -40,10 +43,16 @@ impl OpAmps {
         control.opampen().then_some(pin)
     }
 
-    /// The output of an op-amp, from 0, with these volts at its input, while it is on.
-    pub fn output(&self, which: usize, volts: f64) -> Option<f64> {
+    /// The pin (port, number) at which an op-amp's resistors end, from 0, where that is not the chip's ground.
+    pub fn foot(&self, which: usize) -> Option<(u8, u8)> {
+        matches!(gain(self.controls[which]), Some((_, Foot::Pin))).then_some(FEET[which])
+    }
+
+    /// The output of an op-amp, from 0, with these volts at its input and its foot, while it is on.
+    pub fn output(&self, which: usize, volts: f64, foot_v: f64) -> Option<f64> {
         let control = self.controls[which];
-        let output = (volts * gain(control)?).clamp(0.0, SUPPLY_V);
+        let (gain, _) = gain(control)?;
+        let output = (foot_v + gain * (volts - foot_v)).clamp(0.0, SUPPLY_V);
         control.opampen().then_some(output)
     }
 
@@ -58,13 +67,23 @@ impl OpAmps {
     }
 }
 
+/// Where the resistors of the amplification end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Foot {
+    /// The chip's ground.
+    Ground,
+    /// VINM0.
+    Pin,
+}
+
 /// The amplification; nothing if that is none of the modelled ones.
-fn gain(control: Csr) -> Option<f64> {
+fn gain(control: Csr) -> Option<(f64, Foot)> {
     match control.vm_sel() {
-        VmSel::OUTPUT => Some(1.0),
+        VmSel::OUTPUT => Some((1.0, Foot::Ground)),
         VmSel::PGA => match control.pga_gain().to_bits() {
-            // 2 to 64, nothing else at the resistors.
-            bits @ 0..=5 => Some(f64::from(2_u8 << bits)),
+            // 2 to 64, the resistors' end at the chip's ground; from 8 on at VINM0 (RM0440, PGA_GAIN).
+            bits @ 0..=5 => Some((f64::from(2_u8 << bits), Foot::Ground)),
+            bits @ 8..=13 => Some((f64::from(2_u8 << (bits - 8)), Foot::Pin)),
             _ => None,
         },
         VmSel::VINM0 | VmSel::VINM1 => None,
@@ -114,7 +133,7 @@ mod tests {
             signals: &mut signals,
         };
         let mut amps = OpAmps::new();
-        assert_eq!(amps.output(0, 0.1), None);
+        assert_eq!(amps.output(0, 0.1, 0.0), None);
         assert_eq!(amps.at(1, 13), None);
         for (offset, value) in [(0, BY_16 | INTERNAL), (4, BY_16 | INTERNAL), (8, BY_16)] {
             assert_eq!(amps.write(offset, value, &mut context), Ok(()));
@@ -130,9 +149,26 @@ mod tests {
             assert_eq!(amps.at(converter, channel), None);
         }
         for (volts, output) in [(0.1, 1.6), (-0.1, 0.0), (0.3, 3.3)] {
-            let shown = amps.output(2, volts).expect("it is on");
+            let shown = amps.output(2, volts, 0.0).expect("it is on");
             assert!((shown - output).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn a_foot_at_a_pin_is_what_is_amplified_from() {
+        let mut signals = Vec::new();
+        let mut context = Context {
+            now: 0,
+            signals: &mut signals,
+        };
+        let mut amps = OpAmps::new();
+        assert_eq!(amps.write(0, BY_16 | 8 << 14, &mut context), Ok(()));
+        assert_eq!(amps.write(4, BY_16, &mut context), Ok(()));
+        assert_eq!(amps.foot(0), Some((0, 3)));
+        assert_eq!(amps.foot(1), None);
+        // 16 times the one less 15 times the other.
+        let shown = amps.output(0, 0.11, 0.01).expect("it is on");
+        assert!((shown - 1.61).abs() < 1e-9, "{shown}");
     }
 
     #[test]
@@ -143,10 +179,10 @@ mod tests {
             signals: &mut signals,
         };
         let mut amps = OpAmps::new();
-        // Standalone, a bias at the resistors, the DAC's input, trimming, a fourth.
+        // Standalone, a filter at the resistors, the DAC's input, trimming, a fourth.
         let refused = [
             (0, 1),
-            (0, 1 | 2 << 5 | 11 << 14),
+            (0, 1 | 2 << 5 | 19 << 14),
             (0, BY_16 | 3 << 2),
             (0, BY_16 | 1 << 4),
             (12, BY_16),

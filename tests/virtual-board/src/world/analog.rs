@@ -35,6 +35,8 @@ pub(super) struct Coupling {
     pub(super) bench: Bench,
     pub(super) bridge: Bridge,
     gates: [Gate; 3],
+    /// Voltages of the shunts' grounds above the chip's, V.
+    pub(super) grounds_v: [f64; 3],
     /// Up to here the bench has been simulated.
     at: Cycles,
     /// When its period began.
@@ -51,6 +53,7 @@ impl Coupling {
             bench,
             bridge: Bridge::new(DEAD_TIME),
             gates: [Gate::default(); 3],
+            grounds_v: [0.0; 3],
             at: 0,
             began: 0,
             breaks: false,
@@ -115,6 +118,7 @@ impl World {
         let ground = &self.parts.ports[usize::from(port)];
         Outside {
             shunts_a: [0, 1, 2].map(shunt_a),
+            grounds_v: self.coupling.grounds_v,
             terminals_v: truth.terminals_v,
             bus_v: truth.bus_v,
             temperature_c: self.coupling.bench.sensor_c(),
@@ -201,6 +205,8 @@ impl World {
             shunts_a,
             ..outside
         };
-        self.parts.op_amps.output(which, shown.volts(pin)?)
+        let foot = self.parts.op_amps.foot(which);
+        let foot_v = foot.and_then(|pin| shown.volts(pin)).unwrap_or(0.0);
+        self.parts.op_amps.output(which, shown.volts(pin)?, foot_v)
     }
 }

@@ -224,6 +224,16 @@ impl World {
         &mut self.parts
     }
 
+    /// Moves the grounds of the three shunts above the chip's, V: currents beside them do so on a board.
+    pub fn shift_grounds(&mut self, grounds_v: [f64; 3]) {
+        self.coupling.grounds_v = grounds_v;
+    }
+
+    /// What the injected sequences of the two converters have read last, by rank.
+    pub fn injected(&self) -> [[u16; 4]; 2] {
+        self.parts.converters.injected()
+    }
+
     /// Lets the converters err as [`Converters::mislead`] says.
     ///
     /// [`Converters::mislead`]: crate::chip::adc::Converters::mislead

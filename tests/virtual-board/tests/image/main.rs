@@ -5,7 +5,7 @@
 //! | [`boot`] | it starts, answers by MAVLink, and two runs are equal |
 //! | [`throttle`] | DShot and pulses turn the motor, and each frame is answered at its time |
 //! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
-//! | [`readings`] | a chip's errors do not show in what it reads |
+//! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
 //! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
 //! | [`engines`] | the interpreting engine does what the translating one does |
 //! | [`agreement`] | the control's state and the motor are those of the emulator |

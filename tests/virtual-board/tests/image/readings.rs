@@ -2,8 +2,40 @@
 //! `--release`.
 
 use mavlink::dialects::ardupilotmega::ESC_INFO_DATA;
+use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
 
-use crate::common::{Board, MS, image};
+use crate::common::{Board, MS, US, image};
+
+/// Converter and rank of the currents of a, b and c.
+const CURRENTS: [(usize, usize); 3] = [(0, 0), (1, 0), (0, 1)];
+
+/// Amperes into the motor that the phases' readings tell on the mean, with no current at all.
+fn shown_a(board: &mut Board) -> [f64; 3] {
+    const PERIODS: u32 = 200;
+    let mut sums = [0; 3];
+    for _ in 0..PERIODS {
+        board.run(50 * US);
+        let readings = board.world().injected();
+        for (sum, (converter, rank)) in sums.iter_mut().zip(CURRENTS) {
+            *sum += ZERO_COUNTS - i32::from(readings[converter][rank]);
+        }
+    }
+    sums.map(|sum| f64::from(sum) / f64::from(PERIODS) * f64::from(BOARD.current_a_per_count))
+}
+
+/// The shunts' grounds are some mV above the chip's under load: a tenth of a millivolt an ampere, or more.
+#[test]
+fn a_shift_of_the_shunts_grounds_is_no_current() {
+    let mut board = Board::new(&image(), &[]);
+    board.run(60 * MS);
+    for grounds_v in [[0.0; 3], [0.005; 3], [0.01, -0.01, 0.0]] {
+        board.world().shift_grounds(grounds_v);
+        let shown = shown_a(&mut board);
+        println!("{grounds_v:?} V: {shown:.2?} A");
+        // The rounding of counts and 0.014 A/mV, which the resistor to the supply leaves.
+        assert!(shown.iter().all(|a| a.abs() < 0.2), "{shown:?}");
+    }
+}
 
 /// ES0431 2.5.8: a regular conversion beside injected ones may be one of channel 0.
 #[test]
