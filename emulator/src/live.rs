@@ -89,6 +89,8 @@ pub enum LiveError {
 pub struct Opened {
     /// A line on each MAVLink link.
     pub links: Vec<String>,
+    /// The MAVLink endpoints as they came to be.
+    pub endpoints: Vec<Endpoint>,
     /// Where the throttle wire listens.
     pub signal: Option<std::net::SocketAddr>,
 }
@@ -124,6 +126,7 @@ pub fn run<M: Machine>(
     })?;
     let about = Opened {
         links: links.describe(),
+        endpoints: links.endpoints(),
         signal,
     };
     if let Some(warning) = warning {

@@ -7,6 +7,7 @@ use std::io::{self, Write as _};
 use siskin_control::params::{ParamId, Params};
 
 use crate::bench::DEFAULT_MOTOR;
+use crate::link::Endpoint;
 use crate::live::Opened;
 use crate::options::RunArgs;
 use crate::scenario::{Outcome, Standing, Survey, Verdict};
@@ -74,15 +75,32 @@ pub fn greeting(
         lines.push("  The ESC's MOT_ parameters are not set by --motor: use --param.".to_owned());
     }
     lines.push(String::new());
-    lines.push("Next, in another terminal:".to_owned());
-    lines.push("  cargo run --release -p siskin -- params list".to_owned());
-    lines.push("  cargo run --release -p siskin -- monitor".to_owned());
+    if let Some(connect) = connect(&opened.endpoints) {
+        lines.push("Next, in another terminal:".to_owned());
+        let siskin = format!("  cargo run --release -p siskin --{connect}");
+        lines.push(format!("{siskin} params list"));
+        lines.push(format!("{siskin} monitor"));
+    }
     lines.push(format!(
         "Zero throttle for {:.0} ms arms; then throttle turns the motor.",
         param(ParamId::InpArmMs)
     ));
     lines.push("README.md has a script that does so. Ctrl-C ends.".to_owned());
     lines.join("\n") + "\n"
+}
+
+/// The option with which `siskin` reaches one of these, a server before others; empty for the one that it
+/// looks for by itself.
+fn connect(endpoints: &[Endpoint]) -> Option<String> {
+    let usual = Endpoint::defaults();
+    let is_server = |endpoint: &&Endpoint| matches!(endpoint, Endpoint::TcpIn(_));
+    if endpoints.iter().any(|e| is_server(&e) && usual.contains(e)) {
+        return Some(String::new());
+    }
+    let servers = endpoints.iter().filter(is_server);
+    let mut all = servers.chain(endpoints);
+    let other = all.find_map(Endpoint::opposite)?;
+    Some(format!(" --connect {other}"))
 }
 
 /// The figures of a run.

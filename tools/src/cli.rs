@@ -87,6 +87,30 @@ pub(crate) enum ParamsCommand {
         #[arg(required = true, value_name = "NAME")]
         names: Vec<String>,
     },
+    /// Tell what parameters mean: unit, range, value from the factory.
+    Describe {
+        /// Names in any case; without, all.
+        #[arg(value_name = "NAME")]
+        names: Vec<String>,
+    },
+    /// Show which parameters are not as they come from the factory, or not as in a file.
+    Diff {
+        /// File to compare with, as 'siskin params load' reads it.
+        file: Option<PathBuf>,
+    },
+    /// Give parameters back their values from the factory.
+    Reset {
+        /// Store all parameters in the ESC afterwards.
+        #[arg(long)]
+        store: bool,
+        /// Reset all of them, and forget what else is stored, but for the statistics: the key of
+        /// signatures too. It is stored at once.
+        #[arg(long, conflicts_with_all = ["store", "names"])]
+        all: bool,
+        /// Names in any case.
+        #[arg(required_unless_present = "all", value_name = "NAME")]
+        names: Vec<String>,
+    },
     /// Change parameters; they last until power-off unless stored.
     Set {
         /// Store all parameters in the ESC afterwards.

@@ -21,6 +21,7 @@ mod monitor;
 mod param_commands;
 mod param_file;
 mod param_load;
+mod param_text;
 mod params;
 mod program;
 mod sample;
@@ -29,8 +30,9 @@ mod session;
 use std::io;
 use std::process::ExitCode;
 
-use clap::Parser;
-use clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+use clap::error::ErrorKind::{DisplayHelpOnMissingArgumentOrSubcommand, UnknownArgument};
+use clap::parser::ValueSource;
+use clap::{Arg, CommandFactory, FromArgMatches};
 
 use cli::{Cli, Command};
 use error::Error;
@@ -40,7 +42,7 @@ use session::Session;
 
 /// Does what the program's arguments say.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match parse() {
         Ok(cli) => cli,
         Err(e) if e.use_stderr() && e.kind() != DisplayHelpOnMissingArgumentOrSubcommand => {
             eprintln!("siskin: {}", one_line(&e.to_string()));
@@ -59,6 +61,39 @@ pub fn main() -> ExitCode {
             code
         }
     }
+}
+
+/// Commands that work without an ESC, and what of the options that choose one means nothing to them.
+const WITHOUT_ESC: [(&str, &[&str]); 4] = [
+    ("decode", &["connect", "system", "component"]),
+    // Of a file of several ESCs --component chooses one.
+    ("budget", &["connect", "system"]),
+    ("image", &["connect", "system", "component"]),
+    ("flash", &["connect", "system", "component"]),
+];
+
+/// The arguments; an option that a command has no use for is neither shown in its help nor taken.
+fn parse() -> Result<Cli, clap::Error> {
+    let refusal = |name: &str, id: &str| format!("'{name}' needs no ESC: leave out --{id}");
+    let mut command = Cli::command();
+    for (name, idle) in WITHOUT_ESC {
+        // An option of the command's own stands in the way of that of all commands.
+        let own = idle.iter().map(|id| {
+            let refused = move |_: &str| Err::<String, _>(refusal(name, id));
+            Arg::new(*id).long(*id).hide(true).value_parser(refused)
+        });
+        command = command.mut_subcommand(name, |sub| sub.args(own));
+    }
+    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    for (name, idle) in WITHOUT_ESC {
+        let given = |id: &&&str| matches.value_source(id) == Some(ValueSource::CommandLine);
+        if matches.subcommand_name() == Some(name)
+            && let Some(id) = idle.iter().find(given)
+        {
+            return Err(command.error(UnknownArgument, refusal(name, id)));
+        }
+    }
+    Cli::from_arg_matches(&matches)
 }
 
 fn run(cli: &Cli) -> Result<(), Error> {

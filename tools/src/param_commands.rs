@@ -10,8 +10,9 @@ use crate::cli::ParamsCommand;
 use crate::error::Error;
 use crate::json::number;
 use crate::param_file::{self, Line};
-use crate::param_load::load;
-use crate::params::{self, Param, SetOutcome};
+use crate::param_load::{load, same};
+use crate::param_text;
+use crate::params::{self, Param, SetOutcome, Storage};
 use crate::session::Session;
 
 /// Work on parameters whose input has been checked, so that nothing is sent where any of it is bad.
@@ -22,6 +23,18 @@ pub(crate) enum Task<'a> {
     Get {
         names: Vec<String>,
         json: bool,
+    },
+    Describe {
+        names: Vec<String>,
+    },
+    Diff {
+        /// A file with its sound lines; without, the factory's values.
+        against: Option<(&'a Path, Vec<Line>)>,
+    },
+    Reset {
+        /// With their values from the factory; without, all.
+        params: Option<Vec<Param>>,
+        store: bool,
     },
     Set {
         params: Vec<Param>,
@@ -56,19 +69,37 @@ impl<'a> Task<'a> {
                     json: *json,
                 }
             }
+            ParamsCommand::Describe { names } => {
+                let names = names.iter().map(|name| checked_name(name));
+                Self::Describe {
+                    names: names.collect::<Result<_, _>>()?,
+                }
+            }
+            ParamsCommand::Diff { file } => Self::Diff {
+                against: match file {
+                    Some(file) => Some((file, read(file, complaints)?)),
+                    None => None,
+                },
+            },
+            ParamsCommand::Reset { store, all, names } => Self::Reset {
+                params: if *all {
+                    None
+                } else {
+                    let params = names.iter().map(|name| factory_param(name));
+                    Some(params.collect::<Result<_, _>>()?)
+                },
+                store: *store,
+            },
             ParamsCommand::Set { store, pairs } => Self::Set {
                 params: names_and_values(pairs)?,
                 store: *store,
             },
             ParamsCommand::Save { file } => Self::Save { file },
-            ParamsCommand::Load { store, file } => {
-                let content = fs::read_to_string(file).map_err(|e| file_error(file, &e))?;
-                Self::Load {
-                    file,
-                    lines: sound_lines(file, &content, complaints)?,
-                    store: *store,
-                }
-            }
+            ParamsCommand::Load { store, file } => Self::Load {
+                file,
+                lines: read(file, complaints)?,
+                store: *store,
+            },
         })
     }
 
@@ -84,8 +115,42 @@ impl<'a> Task<'a> {
     ) -> Result<(), Error> {
         match self {
             Self::List { json } => print(&params::list(session)?, json, out),
-            Self::Get { names, json } => get(session, &names, json, out, complaints),
-            Self::Set { params, store } => {
+            Self::Get { names, json } => {
+                let (found, ended) = get(session, &names, complaints)?;
+                print(&found, json, out)?;
+                ended
+            }
+            Self::Describe { names } => {
+                let (found, ended) = if names.is_empty() {
+                    (params::list(session)?, Ok(()))
+                } else {
+                    get(session, &names, complaints)?
+                };
+                for param in &found {
+                    param_text::describe(param, out)?;
+                }
+                ended
+            }
+            Self::Diff { against: None } => diff_to_factory(&params::list(session)?, out),
+            Self::Diff {
+                against: Some((file, lines)),
+            } => {
+                let lines = lines_for(session, file, lines)?;
+                diff_to_file(&params::list(session)?, file, &lines, out)
+            }
+            Self::Reset {
+                params: None,
+                store: _,
+            } => {
+                params::storage(session, Storage::Reset)?;
+                writeln!(out, "all parameters are the factory's, and stored")?;
+                Ok(())
+            }
+            Self::Set { params, store }
+            | Self::Reset {
+                params: Some(params),
+                store,
+            } => {
                 let refused = set(session, &params, out, complaints)?;
                 finish(session, store, refused, params.len(), out)
             }
@@ -97,14 +162,7 @@ impl<'a> Task<'a> {
                 Ok(())
             }
             Self::Load { file, lines, store } => {
-                let component = session.target().component;
-                let lines = param_file::for_component(lines, component);
-                if lines.is_empty() {
-                    return Err(Error::File {
-                        path: file.display().to_string(),
-                        reason: format!("it has no setting for component {component}"),
-                    });
-                }
+                let lines = lines_for(session, file, lines)?;
                 let refused = load(session, &lines, out, complaints)?;
                 finish(session, store, refused, lines.len(), out)
             }
@@ -124,8 +182,22 @@ fn checked_name(name: &str) -> Result<String, Error> {
     )))
 }
 
-fn sound_lines(file: &Path, content: &str, complaints: &mut dyn Write) -> Result<Vec<Line>, Error> {
-    param_file::read(content).or_else(|bad| {
+/// A parameter with its value from the factory.
+fn factory_param(name: &str) -> Result<Param, Error> {
+    let name = checked_name(name)?;
+    match param_text::factory(&name) {
+        Some(value) => Ok(Param { name, value }),
+        None => Err(Error::Usage(format!(
+            "{name} has no value from the factory that this program knows; 'siskin params describe' \
+             shows those that have"
+        ))),
+    }
+}
+
+/// The settings of a file, if all its lines make sense.
+fn read(file: &Path, complaints: &mut dyn Write) -> Result<Vec<Line>, Error> {
+    let content = fs::read_to_string(file).map_err(|e| file_error(file, &e))?;
+    param_file::read(&content).or_else(|bad| {
         for text in &bad {
             writeln!(complaints, "{}: {text}", file.display())?;
         }
@@ -134,6 +206,19 @@ fn sound_lines(file: &Path, content: &str, complaints: &mut dyn Write) -> Result
             reason: format!("{} bad; nothing was sent", counted(bad.len(), "line")),
         })
     })
+}
+
+/// Those for the ESC that is being talked to.
+fn lines_for(session: &Session, file: &Path, lines: Vec<Line>) -> Result<Vec<Line>, Error> {
+    let component = session.target().component;
+    let lines = param_file::for_component(lines, component);
+    if lines.is_empty() {
+        return Err(Error::File {
+            path: file.display().to_string(),
+            reason: format!("it has no setting for component {component}"),
+        });
+    }
+    Ok(lines)
 }
 
 /// `1 line`, `2 lines`.
@@ -181,19 +266,63 @@ pub(crate) fn print(params: &[Param], json: bool, out: &mut dyn Write) -> Result
         writeln!(out, "{}", Value::Object(object))?;
     } else {
         for Param { name, value } in params {
+            let value = param_text::value(name, *value);
             writeln!(out, "{name:<width$} {value}", width = params::NAME_LENGTH)?;
         }
     }
     Ok(())
 }
 
+/// Prints what differs from the factory's values.
+fn diff_to_factory(params: &[Param], out: &mut dyn Write) -> Result<(), Error> {
+    let pairs = params.iter().filter_map(|param| {
+        let factory = param_text::factory(&param.name)?;
+        Some((param, factory))
+    });
+    diff(pairs, "from the factory", out)
+}
+
+/// Prints what differs from a file's settings, and which of these the ESC does not have.
+fn diff_to_file(
+    params: &[Param],
+    file: &Path,
+    lines: &[Line],
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let of = |line: &Line| params.iter().find(|param| param.name == line.param.name);
+    let pairs = lines
+        .iter()
+        .filter_map(|line| Some((of(line)?, line.param.value)));
+    diff(pairs, &format!("in {}", file.display()), out)?;
+    for line in lines.iter().filter(|line| of(line).is_none()) {
+        writeln!(out, "{}: the ESC has none", line.param.name)?;
+    }
+    Ok(())
+}
+
+fn diff<'a>(
+    pairs: impl Iterator<Item = (&'a Param, f32)>,
+    place: &str,
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let mut differ = 0;
+    for (Param { name, value }, other) in pairs.filter(|(param, other)| !same(param.value, *other))
+    {
+        let (width, other) = (params::NAME_LENGTH, param_text::value(name, other));
+        let value = param_text::value(name, *value);
+        writeln!(out, "{name:<width$} {value}, {place} {other}")?;
+        differ += 1;
+    }
+    writeln!(out, "{differ} different")?;
+    Ok(())
+}
+
+/// Those of the names that the ESC has, and how that ended; each of the others is a complaint.
 fn get(
     session: &mut Session,
     names: &[String],
-    json: bool,
-    out: &mut dyn Write,
     complaints: &mut dyn Write,
-) -> Result<(), Error> {
+) -> Result<(Vec<Param>, Result<(), Error>), Error> {
     let mut found = Vec::new();
     for name in names {
         match params::get(session, name) {
@@ -205,15 +334,16 @@ fn get(
             Err(other) => return Err(other),
         }
     }
-    print(&found, json, out)?;
     let missing = names.len() - found.len();
-    if missing > 0 {
-        return Err(Error::Partly(format!(
+    let ended = if missing > 0 {
+        Err(Error::Partly(format!(
             "{missing} of {} not read",
             counted(names.len(), "parameter")
-        )));
-    }
-    Ok(())
+        )))
+    } else {
+        Ok(())
+    };
+    Ok((found, ended))
 }
 
 /// Sends each value; the number of those refused.
@@ -230,7 +360,8 @@ fn set(
             SetOutcome::Taken => print(std::slice::from_ref(param), false, out)?,
             SetOutcome::Refused(reason) => {
                 refused += 1;
-                writeln!(complaints, "{name} {value}: refused: {reason}")?;
+                let remedy = param_text::remedy(name, *value);
+                writeln!(complaints, "{name} {value}: refused: {reason}{remedy}")?;
             }
         }
     }
@@ -253,7 +384,7 @@ fn finish(
         )));
     }
     if store {
-        params::store(session)?;
+        params::storage(session, Storage::Write)?;
         writeln!(out, "stored")?;
     }
     Ok(())

@@ -6,6 +6,7 @@ use std::io::Write;
 use crate::error::Error;
 use crate::param_commands::print;
 use crate::param_file::Line;
+use crate::param_text;
 use crate::params::{self, Param, SetOutcome};
 use crate::session::Session;
 
@@ -64,7 +65,12 @@ pub(crate) fn load(
     refused.sort_by_key(|(line, _)| line.number);
     for (line, reason) in &refused {
         let Param { name, value } = &line.param;
-        writeln!(complaints, "line {}: {name} {value}: {reason}", line.number)?;
+        let remedy = param_text::remedy(name, *value);
+        writeln!(
+            complaints,
+            "line {}: {name} {value}: {reason}{remedy}",
+            line.number
+        )?;
     }
     writeln!(
         out,
@@ -75,7 +81,7 @@ pub(crate) fn load(
 }
 
 /// Whether two values are the same but for the last digits that a file may have lost.
-fn same(a: f32, b: f32) -> bool {
+pub(crate) fn same(a: f32, b: f32) -> bool {
     (a - b).abs() <= 2.0 * f32::EPSILON * a.abs().max(b.abs())
 }
 

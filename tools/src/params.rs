@@ -245,25 +245,40 @@ fn complaint(status: StatusText) -> Option<String> {
     (status.severity as u32 <= MavSeverity::MAV_SEVERITY_NOTICE as u32).then_some(status.text)
 }
 
-/// Has the ESC write its parameters to its storage, and waits until they would survive a loss of
-/// power.
+/// What the ESC is to do with its storage: parameter 1 of the command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Storage {
+    /// Write the parameters.
+    Write,
+    /// Forget all but the statistics, and take the factory's values.
+    Reset,
+}
+
+/// Has the ESC do something with its storage, and waits until that would survive a loss of power.
 ///
 /// # Errors
 /// [`Error::Refused`] with the ESC's reason, [`Error::NoAnswer`] when it is silent.
-pub(crate) fn store(session: &mut Session) -> Result<(), Error> {
+pub(crate) fn storage(session: &mut Session, what: Storage) -> Result<(), Error> {
     const COMMAND: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_STORAGE;
     const BUSY: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
     let target = session.target();
     let attempts = Cell::new(0);
     let busy = Cell::new(false);
     let mut reason = None;
+    let (name, param1, failed) = match what {
+        Storage::Write => (
+            "storing",
+            1.0,
+            "failed; the values hold until power-off only",
+        ),
+        Storage::Reset => ("the reset", 2.0, "failed"),
+    };
     let answer = session.ask(
-        "storing",
+        name,
         || {
             attempts.set(attempts.get() + 1);
             COMMAND_LONG_DATA {
-                // 1: write the parameters.
-                param1: 1.0,
+                param1,
                 command: COMMAND,
                 target_system: target.system,
                 target_component: target.component,
@@ -308,10 +323,10 @@ pub(crate) fn store(session: &mut Session) -> Result<(), Error> {
         BUSY => "not now; stop the motor and try again",
         MavResult::MAV_RESULT_DENIED => "denied",
         MavResult::MAV_RESULT_UNSUPPORTED => "this component stores nothing",
-        _ => "failed; the values hold until power-off only",
+        _ => failed,
     };
     Err(Error::Refused {
-        what: "storing".into(),
+        what: name.into(),
         reason: reason.map_or_else(|| why.into(), |reason| format!("{why} ({reason})")),
     })
 }

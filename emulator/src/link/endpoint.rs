@@ -87,6 +87,25 @@ impl Endpoint {
         };
         vec![Self::UdpOut(local(14550)), Self::TcpIn(local(5760))]
     }
+
+    /// What `siskin --connect` takes to reach it; nothing for a port whose other end is elsewhere.
+    pub fn opposite(&self) -> Option<String> {
+        // What listens on every interface is reached on this machine too.
+        let here = |address: &HostPort| match address.host.as_str() {
+            "0.0.0.0" | "::" => format!("127.0.0.1:{}", address.port),
+            _ => address.to_string(),
+        };
+        match self {
+            Self::TcpIn(address) => Some(format!("tcp:{}", here(address))),
+            Self::UdpOut(address) => Some(format!("udpin:{address}")),
+            Self::UdpIn(address) => Some(format!("udpout:{}", here(address))),
+            Self::Pty {
+                link: Some(link),
+                baud,
+            } => Some(format!("serial:{}:{baud}", link.display())),
+            Self::Pty { link: None, .. } | Self::Serial { .. } | Self::None => None,
+        }
+    }
 }
 
 impl FromStr for Endpoint {
@@ -193,6 +212,22 @@ mod tests {
         assert_eq!(read("pty:/tmp/esc:9600"), pty("/tmp/esc", 9600));
         assert_eq!(read("pty::9600"), pty("", 9600));
         assert_eq!(read("none"), Endpoint::None);
+    }
+
+    #[test]
+    fn the_other_end_is_told() {
+        for (text, other) in [
+            ("tcpin:0.0.0.0:5761", Some("tcp:127.0.0.1:5761")),
+            ("tcpin:[::1]:5761", Some("tcp:[::1]:5761")),
+            ("udpout:127.0.0.1:14551", Some("udpin:127.0.0.1:14551")),
+            ("udpin:127.0.0.1:14551", Some("udpout:127.0.0.1:14551")),
+            ("pty:/tmp/esc:57600", Some("serial:/tmp/esc:57600")),
+            ("serial:/dev/ttyUSB0:57600", None),
+            ("none", None),
+        ] {
+            let endpoint: Endpoint = text.parse().unwrap();
+            assert_eq!(endpoint.opposite().as_deref(), other, "{text}");
+        }
     }
 
     #[test]

@@ -1,0 +1,138 @@
+//! What a person reads of a parameter: unit, range, choices and sentence, from the table with which this
+//! program was built. An ESC of another version may have others: of these there is the value alone.
+
+use std::fmt::Write as _;
+use std::io::Write;
+
+use siskin_control::params::{Kind, ParamId};
+
+use crate::error::Error;
+use crate::params::{NAME_LENGTH, Param};
+
+/// A value with its unit, or with what it means where it is a choice: `20 A`, `1 (brake)`.
+pub(crate) fn value(name: &str, value: f32) -> String {
+    let Some(text) = ParamId::find(name).map(ParamId::text) else {
+        return value.to_string();
+    };
+    let mut choices = text.choices.iter();
+    match choices.find(|(number, _)| f32::from(*number) == value) {
+        Some((_, meaning)) => format!("{value} ({meaning})"),
+        None if text.unit.is_empty() => value.to_string(),
+        None => format!("{value} {}", text.unit),
+    }
+}
+
+/// Why a value cannot be taken, where that is for its range: `; give 1 to 60 A`.
+pub(crate) fn remedy(name: &str, value: f32) -> String {
+    let Some(id) = ParamId::find(name) else {
+        return String::new();
+    };
+    let entry = id.entry();
+    let fits = (entry.min..=entry.max).contains(&value)
+        && (entry.kind != Kind::Whole || value.fract() == 0.0);
+    match entry.kind {
+        // The ESC has said that nobody sets it.
+        Kind::Derived => String::new(),
+        _ if fits => String::new(),
+        _ => format!("; give {}", range(id)),
+    }
+}
+
+/// The value from the factory, of a parameter that has one of its own.
+pub(crate) fn factory(name: &str) -> Option<f32> {
+    let entry = ParamId::find(name)?.entry();
+    (entry.kind != Kind::Derived).then_some(entry.default)
+}
+
+/// Prints a parameter with all that is known of it.
+pub(crate) fn describe(param: &Param, out: &mut dyn Write) -> Result<(), Error> {
+    let Param { name, value: now } = param;
+    writeln!(out, "{name:<NAME_LENGTH$} {}", value(name, *now))?;
+    let Some(id) = ParamId::find(name) else {
+        writeln!(out, "    not known to this program")?;
+        return Ok(());
+    };
+    let mut facts = String::new();
+    if let Some(factory) = factory(name) {
+        // A String takes all that is written to it.
+        let _ = write!(
+            facts,
+            "{}; from the factory {}",
+            range(id),
+            value(name, factory)
+        );
+        if !id.entry().live {
+            facts.push_str("; taken at rest only");
+        }
+    }
+    if id.text().restart {
+        facts.push_str("; applies at the next start");
+    }
+    writeln!(out, "    {}", id.text().description)?;
+    if !facts.is_empty() {
+        writeln!(out, "    {facts}")?;
+    }
+    Ok(())
+}
+
+/// `1 to 60 A`, `a whole number from 1 to 64`, `0 (coast) or 1 (brake)`.
+fn range(id: ParamId) -> String {
+    let (entry, text) = (id.entry(), id.text());
+    if let Some(((last, meaning), others)) = text.choices.split_last() {
+        let others = others.iter().map(|(n, meaning)| format!("{n} ({meaning})"));
+        let others: Vec<_> = others.collect();
+        return format!("{} or {last} ({meaning})", others.join(", "));
+    }
+    let whole = match entry.kind {
+        Kind::Whole => "a whole number from ",
+        Kind::Real | Kind::Derived => "",
+    };
+    let range = format!("{whole}{} to {}", entry.min, entry.max);
+    match text.unit {
+        "" => range,
+        unit => format!("{range} {unit}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_their_unit_or_their_meaning() {
+        assert_eq!(value("LIM_PHASE_A", 20.0), "20 A");
+        assert_eq!(value("MOT_STOP", 1.0), "1 (brake)");
+        assert_eq!(value("MOT_POLE_PAIRS", 7.0), "7");
+        assert_eq!(value("OF_ANOTHER_ESC", 0.5), "0.5");
+    }
+
+    #[test]
+    fn a_value_beyond_its_range_is_told_the_range() {
+        let entry = ParamId::LimPhaseA.entry();
+        let told = format!("; give {} to {} A", entry.min, entry.max);
+        assert_eq!(remedy("LIM_PHASE_A", -1.0), told);
+        assert_eq!(remedy("LIM_PHASE_A", 20.0), "");
+        assert_eq!(remedy("MOT_STOP", 2.0), "; give 0 (coast) or 1 (brake)");
+        assert_eq!(
+            remedy("MOT_POLE_PAIRS", 6.5),
+            "; give a whole number from 1 to 64"
+        );
+        assert_eq!(remedy("MOT_KV", 1.0), "");
+    }
+
+    #[test]
+    fn every_parameter_can_be_described() {
+        for id in ParamId::ALL {
+            let mut text = Vec::new();
+            let entry = id.entry();
+            let param = Param {
+                name: entry.name.to_owned(),
+                value: entry.default,
+            };
+            describe(&param, &mut text).unwrap();
+            let text = String::from_utf8(text).unwrap();
+            assert!(text.contains(id.text().description), "{text}");
+            assert!(text.lines().count() >= 2, "{text}");
+        }
+    }
+}
