@@ -250,10 +250,7 @@ impl Device {
             if now_ns >= self.task_due_ns {
                 self.task_due_ns = now_ns - now_ns % TASK_NS + TASK_NS;
                 if !self.rig.is_held() {
-                    self.tasks(now_ns, &mut |frame| {
-                        onlooker.frame(now_ns, frame);
-                        send(frame);
-                    });
+                    self.tasks(now_ns, onlooker, send);
                 }
             }
             // Past the wire or not, a task that has found a fault is heard.
@@ -312,19 +309,24 @@ impl Device {
         self.rig.hold(held);
     }
 
-    fn tasks(&mut self, now_ns: u64, send: &mut dyn FnMut(&[u8])) {
+    fn tasks(&mut self, now_ns: u64, onlooker: &mut impl Onlooker, send: &mut dyn FnMut(&[u8])) {
         // No bytes tell a receiver that time has passed: what a false start held back is searched.
         let now_us = now_ns / 1000;
         for receiver in self.receivers.values_mut() {
             receiver.push(now_us, &[], |frame| {
+                onlooker.frame(now_ns, frame.raw);
                 self.esc.receive(&mut self.throttle, now_us, frame);
             });
         }
         let snapshot = self.rig.snapshot();
         let temperature_c = self.rig.temperature_c();
         let throttle = &mut self.throttle;
+        let mut send = |frame: &[u8]| {
+            onlooker.frame(now_ns, frame);
+            send(frame);
+        };
         self.esc
-            .poll(throttle, now_us, &snapshot, temperature_c, send);
+            .poll(throttle, now_us, &snapshot, temperature_c, &mut send);
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             match request {
                 Request::ParamsChanged => self.configure(),

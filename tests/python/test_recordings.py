@@ -55,6 +55,22 @@ def test_a_log_of_a_live_run_has_both_directions_and_the_time_of_day(tmp_path):
     assert kinds["COMMAND_LONG"] != kinds["COMMAND_ACK"] == kinds["HEARTBEAT"]
 
 
+def test_a_log_has_what_a_false_start_has_held_back(tmp_path):
+    path = tmp_path / "held.tlog"
+    emulator = Emulator("--record", path)
+    with emulator.connect() as esc:
+        mark = esc.mark()
+        # A start byte in noise claims 255 bytes: the frame behind it is found when nothing more has come.
+        request = dialect.MAVLink_param_request_read_message(1, 1, b"MOT_STOP", -1)
+        esc.write(b"\xfd\xff" + request.pack(esc.codec))
+        answer = esc.wait("PARAM_VALUE", lambda m: m.param_id == "MOT_STOP", mark)
+        assert answer is not None
+    emulator.process.send_signal(signal.SIGINT)
+    assert emulator.process.wait(timeout=10.0) == 0, emulator.output()
+    asked = [message for message in messages(path) if message.get_type() == "PARAM_REQUEST_READ"]
+    assert [message.param_id for message in asked] == ["MOT_STOP"]
+
+
 def test_a_dump_of_a_scenario_has_its_wires(tmp_path):
     path = tmp_path / "wires.vcd"
     scenario(SCENARIOS / "half-throttle.toml", "--record", path, "--set", "bench.duration_s=0.4")
