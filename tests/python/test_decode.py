@@ -11,7 +11,7 @@ from paths import SCENARIOS, TOOL
 
 def test_it_shows_what_a_scenario_sent(tmp_path):
     path = tmp_path / "wires.vcd"
-    scenario(SCENARIOS / "half-throttle.toml", "--record", path, "--set", "bench.duration_s=0.4")
+    scenario(SCENARIOS / "opening.toml", "--record", path)
     command = [str(TOOL), "decode", str(path), "--channel", "signal", "--json"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert ended.returncode == 0, ended.stderr

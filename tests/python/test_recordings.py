@@ -73,7 +73,7 @@ def test_a_log_has_what_a_false_start_has_held_back(tmp_path):
 
 def test_a_dump_of_a_scenario_has_its_wires(tmp_path):
     path = tmp_path / "wires.vcd"
-    scenario(SCENARIOS / "half-throttle.toml", "--record", path, "--set", "bench.duration_s=0.4")
+    scenario(SCENARIOS / "opening.toml", "--record", path)
     header, changes = path.read_text().split("$enddefinitions $end\n")
     assert "$timescale 1 ns $end" in header
     wires = {}

@@ -114,7 +114,14 @@ fn run<M: Machine>(
 pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
     scenario.bench.bench()?;
     scenario.params()?;
-    scenario.faults()?;
+    let end_s = scenario.bench.duration_s;
+    let after = |what: &str| format!("{what} after the end of the scenario, duration_s = {end_s}");
+    for (index, fault) in scenario.faults()?.iter().enumerate() {
+        if fault.at_s >= end_s {
+            let key = format!("fault.{index}.at_s");
+            return Err(ScenarioError::of_key(key, after("begins")));
+        }
+    }
     let mut last_s = f64::NEG_INFINITY;
     for (index, signal) in scenario.signal.iter().enumerate() {
         let wrong = |(key, problem): (&str, &str)| {
@@ -132,7 +139,7 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
         last_s = signal.at_s;
     }
     for (index, window) in scenario.window.iter().enumerate() {
-        let wrong = |key: &str, problem| {
+        let wrong = |key: &str, problem: &str| {
             let problem = format!("the window {} {problem}", window.name);
             ScenarioError::of_key(format!("window.{index}.{key}"), problem)
         };
@@ -143,6 +150,10 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
         // Written so that NaN is refused too.
         if window.t0_s.partial_cmp(&window.t1_s) != Some(std::cmp::Ordering::Less) {
             return Err(wrong("t1_s", "has no time between t0_s and t1_s"));
+        }
+        // What it is to show would be that of a part of it, or of nothing.
+        if window.t1_s > end_s {
+            return Err(wrong("t1_s", &after("ends")));
         }
     }
     let report = Summary::new(windows(scenario)).report(0.0, 0.0);

@@ -135,7 +135,7 @@ fn a_run_without_the_figure_is_the_worst() {
         [[window]]
         name = "w"
         t0_s = 0.0
-        t1_s = 1.0
+        t1_s = 0.01
         [[expect]]
         window = "w"
         key = "rpm_mean"
@@ -188,7 +188,7 @@ fn a_negative_speed_is_asked_for_as_such() {
         [[window]]
         name = "all"
         t0_s = 0.0
-        t1_s = 1.0
+        t1_s = 0.02
         [[expect]]
         window = "all"
         key = "reached_s"

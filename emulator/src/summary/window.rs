@@ -295,7 +295,7 @@ impl Window {
     }
 
     pub(super) fn figures(&self, end_s: f64) -> Figures {
-        let seen = self.control.count == self.all.count;
+        let seen = self.all.count > 0 && self.control.count == self.all.count;
         let torque_mean_nm = self.all.get(1);
         let p_motor_w = self.all.get(3);
         let p_copper_w = self.all.get(4);
