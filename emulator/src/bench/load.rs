@@ -30,12 +30,13 @@ impl Choice<LoadTable> {
     /// One line that names the load or its key.
     pub fn load(&self) -> Result<Load, BenchError> {
         let table = self.find("load")?;
-        let check = |key, value, unit| range("load", key, value, [0.0, 1e3], unit);
+        // What such an ESC turns, up to a vehicle's wheel: numbers in other units are beyond.
+        let check = |key, value, most, unit| range("load", key, value, [0.0, most], unit);
         Ok(Load {
-            c1: check("c1", table.c1, "Nms")?,
-            c2: check("c2", table.c2, "Nms^2")?,
-            torque_nm: check("torque_nm", table.torque_nm, "Nm")?,
-            inertia_kgm2: check("J", table.j, "kg m^2")?,
+            c1: check("c1", table.c1, 1.0, "Nms")?,
+            c2: check("c2", table.c2, 0.1, "Nms^2")?,
+            torque_nm: check("torque_nm", table.torque_nm, 100.0, "Nm")?,
+            inertia_kgm2: check("J", table.j, 20.0, "kg m^2")?,
         })
     }
 }

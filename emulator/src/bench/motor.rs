@@ -5,6 +5,25 @@ use serde::Deserialize;
 use super::{BenchError, Choice, range};
 use crate::plant::{Cogging, Drag, Extras, Harmonic, Motor, Winding};
 
+/// Resistance of one phase, Ω. Ranges are those of motors that an ESC of 1 to 200 A turns, so that a number
+/// in a unit with another prefix is beyond: 33 for 33 mΩ.
+const R_OHM: [f64; 2] = [1e-3, 10.0];
+
+/// Inductance of one phase, H.
+const L_H: [f64; 2] = [5e-7, 1e-2];
+
+/// Peak flux linkage of one phase, Wb: a seventh of it is a hub motor's of 10 rpm/V and 15 pole pairs.
+const FLUX_WB: [f64; 2] = [1e-5, 0.2];
+
+/// Inertia of the rotor, kg·m².
+const J_KGM2: [f64; 2] = [0.0, 1.0];
+
+/// What friction, iron and detents take, Nm.
+const TORQUE_MAX_NM: f64 = 10.0;
+
+/// The same for each rad/s, Nms.
+const VISCOUS_MAX_NMS: f64 = 1.0;
+
 /// A motor in SI units.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -83,35 +102,34 @@ impl Choice<MotorTable> {
 impl MotorTable {
     fn motor(&self) -> Result<Motor, BenchError> {
         let [d, q] = self.inductances_h()?;
-        let pairs = check("pole_pairs", f64::from(self.pole_pairs), 1.0, 64.0, "")?;
+        let pairs = check("pole_pairs", f64::from(self.pole_pairs), [1.0, 64.0], "")?;
         Ok(Motor {
-            resistance_ohm: check("R", self.r, 1e-5, 1e3, "ohm")?,
+            resistance_ohm: check("R", self.r, R_OHM, "ohm")?,
             inductance_h: if d == q { d } else { 0.5 * (d + q) },
-            flux_wb: check("flux", self.flux, 1e-6, 10.0, "Wb")?,
+            flux_wb: check("flux", self.flux, FLUX_WB, "Wb")?,
             pole_pairs: pairs as u32,
-            inertia_kgm2: check("J", self.j, 0.0, 1e3, "kg m^2")?,
+            inertia_kgm2: check("J", self.j, J_KGM2, "kg m^2")?,
         })
     }
 
     fn inductances_h(&self) -> Result<[f64; 2], BenchError> {
         match (self.l, self.l_d, self.l_q) {
             (Some(l), None, None) => {
-                let l = check("L", l, 1e-8, 1.0, "H")?;
+                let l = check("L", l, L_H, "H")?;
                 Ok([l, l])
             }
-            (None, Some(d), Some(q)) => Ok([
-                check("L_d", d, 1e-8, 1.0, "H")?,
-                check("L_q", q, 1e-8, 1.0, "H")?,
-            ]),
+            (None, Some(d), Some(q)) => {
+                Ok([check("L_d", d, L_H, "H")?, check("L_q", q, L_H, "H")?])
+            }
             _ => Err(BenchError::Inductances),
         }
     }
 
     fn extras(&self) -> Result<Extras, BenchError> {
         let [d, q] = self.inductances_h()?;
-        let torque = |key, value| check(key, value, 0.0, 1e3, "Nm");
-        let viscous = |key, value| check(key, value, 0.0, 1e3, "Nms");
-        let saturation = |value| check("saturation_a", value, 1.0, 1e6, "A");
+        let torque = |key, value| check(key, value, [0.0, TORQUE_MAX_NM], "Nm");
+        let viscous = |key, value| check(key, value, [0.0, VISCOUS_MAX_NMS], "Nms");
+        let saturation = |value| check("saturation_a", value, [1.0, 1e6], "A");
         // Without a torque there are no detents to count.
         let least = if self.cogging_nm > 0.0 { 1.0 } else { 0.0 };
         let order = f64::from(self.cogging_order);
@@ -131,7 +149,7 @@ impl MotorTable {
             },
             cogging: Cogging {
                 torque_nm: torque("cogging_nm", self.cogging_nm)?,
-                order: check("cogging_order", order, least, 1e4, "detents a turn")? as u32,
+                order: check("cogging_order", order, [least, 1e4], "detents a turn")? as u32,
             },
             winding: self.winding.as_ref().map(WindingTable::read).transpose()?,
         })
@@ -140,12 +158,11 @@ impl MotorTable {
 
 impl HarmonicTable {
     fn read(&self) -> Result<Harmonic, BenchError> {
-        let order = check("harmonics.order", f64::from(self.order), 2.0, 49.0, "")?;
+        let order = check("harmonics.order", f64::from(self.order), [2.0, 49.0], "")?;
         let phase_deg = check(
             "harmonics.phase_deg",
             self.phase_deg,
-            -360.0,
-            360.0,
+            [-360.0, 360.0],
             "degrees",
         )?;
         Ok(Harmonic {
@@ -153,8 +170,7 @@ impl HarmonicTable {
             share: check(
                 "harmonics.share",
                 self.share,
-                0.0,
-                1.0,
+                [0.0, 1.0],
                 "of the fundamental",
             )?,
             phase_rad: phase_deg.to_radians(),
@@ -165,8 +181,8 @@ impl HarmonicTable {
 impl WindingTable {
     fn read(&self) -> Result<Winding, BenchError> {
         Ok(Winding {
-            resistance_k_per_w: check("winding.k_per_w", self.k_per_w, 1e-3, 1e3, "K/W")?,
-            capacity_j_per_k: check("winding.j_per_k", self.j_per_k, 1e-2, 1e6, "J/K")?,
+            resistance_k_per_w: check("winding.k_per_w", self.k_per_w, [1e-3, 1e3], "K/W")?,
+            capacity_j_per_k: check("winding.j_per_k", self.j_per_k, [1e-2, 1e6], "J/K")?,
         })
     }
 }
@@ -174,9 +190,8 @@ impl WindingTable {
 fn check(
     key: &'static str,
     value: f64,
-    least: f64,
-    most: f64,
+    ends: [f64; 2],
     unit: &'static str,
 ) -> Result<f64, BenchError> {
-    range("motor", key, value, [least, most], unit)
+    range("motor", key, value, ends, unit)
 }
