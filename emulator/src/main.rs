@@ -18,9 +18,6 @@ use siskin_emulator::reproduce;
 
 use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs};
 
-/// The status of what an interrupt has ended, as a shell has it.
-const INTERRUPTED: u8 = 130;
-
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
@@ -71,11 +68,11 @@ fn run(args: RunArgs) -> Result<ExitCode, String> {
 fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
     let line = |error| format!("{}: {error}", args.file.display());
     let plan = args.plan().map_err(line)?;
+    let stop = interrupt::flag();
+    let stop = stop.map_err(|error| format!("cannot listen for interrupts: {error}"))?;
     if args.seeds.is_some() || plan.runs() > 1 {
         // On standard error, and nothing where that is no terminal.
         let bar = ProgressBar::new(plan.runs() as u64);
-        let stop = interrupt::flag();
-        let stop = stop.map_err(|error| format!("cannot listen for interrupts: {error}"))?;
         let survey = plan.survey(&stop, || bar.inc(1));
         bar.finish_and_clear();
         let survey = survey.map_err(line)?;
@@ -84,27 +81,15 @@ fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
         } else {
             report::survey(&survey)
         })?;
-        return Ok(match survey.left_out {
-            0 => verdict(survey.held()),
-            _ => ExitCode::from(INTERRUPTED),
-        });
+        return Ok(ExitCode::from(survey.exit_status()));
     }
-    let outcome = plan.play().map_err(line)?;
+    let outcome = plan.play(&stop).map_err(line)?;
     report::print(&if args.common.json {
         report::json(&outcome)?
     } else {
         report::figures(&outcome.report) + &report::verdicts(&outcome)
     })?;
-    Ok(verdict(outcome.held()))
-}
-
-/// The status of a scenario whose expectations held, or did not.
-fn verdict(held: bool) -> ExitCode {
-    if held {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(1)
-    }
+    Ok(ExitCode::from(outcome.exit_status()))
 }
 
 fn reproduce(args: &ReproduceArgs) -> Result<ExitCode, String> {

@@ -146,6 +146,9 @@ pub fn figures(report: &Report) -> String {
 /// Whether a scenario's expectations held.
 pub fn verdicts(outcome: &Outcome) -> String {
     let mut text = String::new();
+    if outcome.interrupted {
+        text.push_str("interrupted: what was played until then\n");
+    }
     for (key, value) in &outcome.drawn {
         line(&mut text, format_args!("drawn: {key} = {value}"));
     }
@@ -158,7 +161,7 @@ pub fn verdicts(outcome: &Outcome) -> String {
             None => line(
                 &mut text,
                 format_args!(
-                    "not seen: {}.{}, wanted {}: it is inside the machine",
+                    "not seen: {}.{}, wanted {}",
                     verdict.window, verdict.key, verdict.wanted
                 ),
             ),

@@ -2,6 +2,7 @@
 
 import random
 import socket
+import time
 
 import pytest
 
@@ -200,6 +201,32 @@ def test_a_scenario_that_makes_no_sense_is_refused(tmp_path, text, names):
     path.write_text(text)
     line = refused("scenario", path)
     assert f"{path}: {names}" in line
+
+
+@pytest.mark.parametrize(
+    "entry, remedy",
+    [
+        ("[[fault]]\nat_s = 0.0\nkind = 'reset'\n", "fault: 10001 entries"),
+        ("[[signal]]\nat_s = 0.0\nrpm = 0.0\n", "signal: 10001 entries"),
+    ],
+)
+def test_a_scenario_has_so_many_entries_and_no_more(tmp_path, entry, remedy):
+    path = tmp_path / "many.toml"
+    path.write_text("[bench]\nduration_s = 0.001\n" + 10_000 * entry)
+    began = time.monotonic()
+    ended = run("scenario", path)
+    assert ended.returncode == 0, ended.stderr
+    # It took 39 s for ten times as many.
+    assert time.monotonic() - began < 10.0
+    path.write_text(10_001 * entry)
+    line = refused("scenario", path)
+    assert remedy in line and 'shape = "file"' in line
+
+
+def test_a_scenario_that_is_too_long_is_refused_unread(tmp_path):
+    path = tmp_path / "long.toml"
+    path.write_text(100_000 * "[[signal]]\nat_s = 0.0\nrpm = 0.0\n")
+    assert "more than 1000000 bytes" in refused("scenario", path)
 
 
 def test_a_bad_line_of_a_course_is_named(tmp_path):

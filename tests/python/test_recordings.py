@@ -1,6 +1,8 @@
 """Recordings: other programs can read them."""
 
+import json
 import signal
+import subprocess
 import time
 
 import pytest
@@ -8,7 +10,7 @@ from pymavlink import mavutil
 
 import siskin_dialect as dialect
 from emulator import Emulator, run, scenario
-from paths import SCENARIOS
+from paths import PROGRAM, SCENARIOS
 
 # When an offline run begins by its log: 2020-01-01 00:00 UTC.
 OFFLINE_START_S = 1_577_836_800.0
@@ -69,6 +71,59 @@ def test_a_log_has_what_a_false_start_has_held_back(tmp_path):
     assert emulator.process.wait(timeout=10.0) == 0, emulator.output()
     asked = [message for message in messages(path) if message.get_type() == "PARAM_REQUEST_READ"]
     assert [message.param_id for message in asked] == ["MOT_STOP"]
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_an_interrupted_scenario_keeps_what_was_played_however_often_it_is_asked(tmp_path, several):
+    file, path = tmp_path / "long.toml", tmp_path / "long.csv"
+    file.write_text(
+        """
+        [bench]
+        duration_s = 10000.0
+        [[signal]]
+        at_s = 0.0
+        throttle = 0.0
+        [[window]]
+        name = "first"
+        t0_s = 0.0
+        t1_s = 0.01
+        [[window]]
+        name = "all"
+        t0_s = 0.0
+        t1_s = 10000.0
+        [[expect]]
+        window = "first"
+        key = "rpm_mean"
+        equals = 0.0
+        [[expect]]
+        window = "all"
+        key = "rpm_mean"
+        equals = 0.0
+        """
+    )
+    how = ["--seeds", "1..50"] if several else ["--record", str(path)]
+    command = [str(PROGRAM), "scenario", str(file), "--json", *how]
+    played = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if several:
+        time.sleep(1.0)
+    else:
+        deadline = time.monotonic() + 30.0
+        while not path.exists() or path.stat().st_size < 1e5:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+    played.send_signal(signal.SIGINT)
+    played.send_signal(signal.SIGTERM)
+    told, complaint = played.communicate(timeout=30.0)
+    assert played.returncode == 130, complaint
+    summary = json.loads(told)
+    if several:
+        assert (summary["runs"], summary["left_out"]) == (0, 50)
+        return
+    assert summary["interrupted"] is True and 0.0 < summary["sim_s"] < 10000.0
+    assert [expected["held"] for expected in summary["expectations"]] == [True, None]
+    lines = path.read_text().splitlines()
+    assert len(lines) == summary["steps"] + 1
+    assert {line.count(",") for line in lines} == {lines[0].count(",")}
 
 
 def test_a_dump_of_a_scenario_has_its_wires(tmp_path):

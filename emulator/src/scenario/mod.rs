@@ -35,6 +35,8 @@ mod survey;
 mod vary;
 mod wire;
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,9 +52,14 @@ use course::Courses;
 pub use error::ScenarioError;
 pub use judge::Verdict;
 pub use place::Place;
+use play::Played;
 pub use stand::{Standing, stand};
 pub use survey::{Expected, Failure, Survey};
 use vary::{Case, Variations};
+
+/// The longest file, bytes: one of a hundred times the usual length. An entry takes a few KB while it is
+/// understood.
+const TEXT_MAX: u64 = 1_000_000;
 
 /// The window that an expectation names for the whole run.
 const RUN: &str = "run";
@@ -65,15 +72,38 @@ pub struct Outcome {
     pub report: Report,
     /// What was expected of them.
     pub expectations: Vec<Verdict>,
+    /// Whether an interrupt has ended the run before its time.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub interrupted: bool,
     /// What the seed drew, if anything.
     #[serde(serialize_with = "place::map", skip_serializing_if = "Vec::is_empty")]
     pub drawn: Vec<(String, toml::Value)>,
 }
 
 impl Outcome {
+    fn new(played: Played, place: Place) -> Self {
+        let Played {
+            report,
+            verdicts,
+            interrupted,
+        } = played;
+        Self {
+            report,
+            expectations: verdicts,
+            interrupted,
+            drawn: place.drawn,
+        }
+    }
+
     /// Whether no expectation failed.
     pub fn held(&self) -> bool {
         !self.expectations.iter().any(Verdict::failed)
+    }
+
+    /// What a program that played it ends with: 0, 1 where an expectation failed, 130 where it was
+    /// interrupted.
+    pub fn exit_status(&self) -> u8 {
+        exit_status(self.interrupted, self.held())
     }
 }
 
@@ -101,7 +131,7 @@ impl Plan {
     /// # Errors
     /// Any [`ScenarioError`] that shows before a run; that of the first run that has one.
     pub fn read(path: &Path, options: &Options) -> Result<Self, ScenarioError> {
-        let text = std::fs::read_to_string(path).map_err(ScenarioError::Read)?;
+        let text = text(path).map_err(ScenarioError::Read)?;
         let in_file = |error: ScenarioError| error.in_file(&text, &options.set);
         let folder = path.parent().unwrap_or(Path::new(""));
         let variations = Variations::read(&text, &options.set, options.seeds.clone(), folder);
@@ -125,42 +155,36 @@ impl Plan {
         self.variations.runs()
     }
 
-    /// Plays the only run, or the first of several.
+    /// Plays the only run, or the first of several, to its end or until `stop` is set: what was played
+    /// until then is kept.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in the run.
-    pub fn play(&self) -> Result<Outcome, ScenarioError> {
-        let (place, report, expectations) = self.play_one(0)?;
-        Ok(Outcome {
-            report,
-            expectations,
-            drawn: place.drawn,
-        })
+    pub fn play(&self, stop: &AtomicBool) -> Result<Outcome, ScenarioError> {
+        let (place, played) = self.play_one(0, stop)?;
+        Ok(Outcome::new(played, place))
     }
 
     /// Plays the only run, or the first of several, on another machine, which `start` makes and `ended`
-    /// gets at the end.
+    /// gets at the end or once `stop` is set.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in the run, and a signal that goes past the wire.
     pub fn play_on<M: Machine>(
         &self,
+        stop: &AtomicBool,
         start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), ScenarioError>,
         ended: impl FnOnce(M),
     ) -> Result<Outcome, ScenarioError> {
         let Case { place, scenario } = self.case(0)?;
-        match play::play_on(&scenario, self.record.as_deref(), start, ended) {
-            Ok((report, expectations)) => Ok(Outcome {
-                report,
-                expectations,
-                drawn: place.drawn,
-            }),
+        match play::play_on(&scenario, self.record.as_deref(), stop, start, ended) {
+            Ok(played) => Ok(Outcome::new(played, place)),
             Err(error) => Err(place.blame(error)),
         }
     }
 
-    /// Plays all runs on all processors; `each` is called after each of them. No run begins once
-    /// `stop` is set: the survey is of those that have been played.
+    /// Plays all runs on all processors; `each` is called after each of them. Once `stop` is set none
+    /// begins or goes on: the survey is of those that have been played to their end.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in a run.
@@ -174,7 +198,10 @@ impl Plan {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
-            let played = self.play_one(index);
+            let played = self.play_one(index, stop);
+            if matches!(&played, Ok((_, played)) if played.interrupted) {
+                return None;
+            }
             each();
             Some(played)
         });
@@ -188,10 +215,10 @@ impl Plan {
         play::check(&scenario).map_err(|error| place.blame(error))
     }
 
-    fn play_one(&self, index: usize) -> Result<(Place, Report, Vec<Verdict>), ScenarioError> {
+    fn play_one(&self, index: usize, stop: &AtomicBool) -> Result<(Place, Played), ScenarioError> {
         let Case { place, scenario } = self.case(index)?;
-        match play::play(&scenario, self.record.as_deref()) {
-            Ok((report, verdicts)) => Ok((place, report, verdicts)),
+        match play::play(&scenario, self.record.as_deref(), stop) {
+            Ok(played) => Ok((place, played)),
             Err(error) => Err(place.blame(error)),
         }
     }
@@ -202,6 +229,31 @@ impl Plan {
         filled.map_err(|error| case.place.blame(error))?;
         Ok(case)
     }
+}
+
+/// As shells have it.
+fn exit_status(interrupted: bool, held: bool) -> u8 {
+    match (interrupted, held) {
+        (true, _) => 130,
+        (false, true) => 0,
+        (false, false) => 1,
+    }
+}
+
+/// The text of a scenario's file.
+fn text(path: &Path) -> io::Result<String> {
+    let mut text = String::new();
+    let length = File::open(path)?
+        .take(TEXT_MAX + 1)
+        .read_to_string(&mut text)?;
+    if length as u64 > TEXT_MAX {
+        let what = format!(
+            "a scenario of more than {TEXT_MAX} bytes is not taken; a long course of a signal goes into a file \
+             of its own, by shape = \"file\""
+        );
+        return Err(io::Error::other(what));
+    }
+    Ok(text)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use siskin_control::drive::Setpoint;
@@ -22,15 +23,29 @@ use crate::summary::{Report, Summary};
 use crate::watch::{Watch, WatchError};
 use crate::wire::Wire;
 
-/// What a run came to, and whether that was expected.
-type Played = (Report, Vec<Verdict>);
+/// Most entries of one kind: signals, faults, windows or expectations. Some of what looks through them takes
+/// the square of their number.
+const ENTRIES_MAX: usize = 10_000;
 
-/// Plays a scenario on the emulator's own ESC.
-pub(super) fn play(scenario: &Scenario, record: Option<&Path>) -> Result<Played, ScenarioError> {
+/// What a run came to.
+pub(super) struct Played {
+    pub(super) report: Report,
+    /// Whether that was expected.
+    pub(super) verdicts: Vec<Verdict>,
+    /// It was stopped before its end.
+    pub(super) interrupted: bool,
+}
+
+/// Plays a scenario on the emulator's own ESC, to its end or until `stop` is set.
+pub(super) fn play(
+    scenario: &Scenario,
+    record: Option<&Path>,
+    stop: &AtomicBool,
+) -> Result<Played, ScenarioError> {
     let signals = &scenario.signal;
     let last = Cell::new((None, None));
     let start = |start| Ok(Device::start(start)?);
-    let played = run(scenario, record, start, |device, until_ns, watch| {
+    let played = run(scenario, record, stop, start, |device, until_ns, watch| {
         let imposed = |t_s, rig: &Rig| past_the_wire(signals, t_s, rig, &last);
         device.advance(until_ns, imposed, watch, &mut |_| {});
         Ok(())
@@ -38,10 +53,11 @@ pub(super) fn play(scenario: &Scenario, record: Option<&Path>) -> Result<Played,
     played.map(|(played, _)| played)
 }
 
-/// Plays a scenario on another machine, which is asked over its wire only.
+/// Plays a scenario on another machine, which is asked over its wire only, as [`play`] does.
 pub(super) fn play_on<M: Machine>(
     scenario: &Scenario,
     record: Option<&Path>,
+    stop: &AtomicBool,
     start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), ScenarioError>,
     ended: impl FnOnce(M),
 ) -> Result<Played, ScenarioError> {
@@ -55,6 +71,7 @@ pub(super) fn play_on<M: Machine>(
     let (played, machine) = run(
         scenario,
         record,
+        stop,
         start,
         |machine: &mut M, until_ns, watch| Ok(machine.advance(until_ns, watch, &mut |_| {})?),
     )?;
@@ -66,6 +83,7 @@ pub(super) fn play_on<M: Machine>(
 fn run<M: Machine>(
     scenario: &Scenario,
     record: Option<&Path>,
+    stop: &AtomicBool,
     start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), ScenarioError>,
     mut advance: impl FnMut(&mut M, u64, &mut Watch) -> Result<(), ScenarioError>,
 ) -> Result<(Played, M), ScenarioError> {
@@ -91,7 +109,8 @@ fn run<M: Machine>(
     let wire = scenario.bench.wire;
     let end_ns = (scenario.bench.duration_s * 1e9) as u64;
     let mut slice_ns = 0;
-    while slice_ns < end_ns && !watch.failed() {
+    let mut interrupted = false;
+    while slice_ns < end_ns && !watch.failed() && !interrupted {
         let demand = demand(&scenario.signal, slice_ns as f64 * 1e-9);
         if let Some(Demand::Throttle(throttle)) = demand {
             let datagram = wire.datagram(throttle, &params);
@@ -100,18 +119,47 @@ fn run<M: Machine>(
         }
         slice_ns += wire.interval_ns();
         advance(&mut machine, slice_ns.min(end_ns), &mut watch)?;
+        interrupted = stop.load(Ordering::Relaxed) && slice_ns < end_ns;
     }
     let sim_s = machine.now_ns() as f64 * 1e-9;
     let report = watch.finish(sim_s, began.elapsed().as_secs_f64())?;
     let expectations = scenario.expect.iter();
     let verdicts = expectations.map(|expected| judge(expected, &report));
-    let verdicts = verdicts.collect::<Result<_, _>>()?;
-    Ok(((report, verdicts), machine))
+    let mut verdicts = verdicts.collect::<Result<Vec<_>, _>>()?;
+    if interrupted {
+        // Nobody has seen all of a window that goes on.
+        let whole = |name: &str| {
+            let mut windows = scenario.window.iter();
+            windows.any(|window| window.name == name && window.t1_s <= sim_s)
+        };
+        let cut = verdicts.iter_mut().filter(|v| !whole(&v.window));
+        cut.for_each(|verdict| verdict.held = None);
+    }
+    let played = Played {
+        report,
+        verdicts,
+        interrupted,
+    };
+    Ok((played, machine))
 }
 
 /// Finds what is wrong with a scenario before it is played, so that a slip of the pen does not cost
 /// its time.
 pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
+    for (key, entries) in [
+        ("signal", scenario.signal.len()),
+        ("fault", scenario.fault.len()),
+        ("window", scenario.window.len()),
+        ("expect", scenario.expect.len()),
+    ] {
+        if entries > ENTRIES_MAX {
+            let problem = format!(
+                "{entries} entries are more than the {ENTRIES_MAX} that are taken; a long course of a \
+                 signal goes into a file of its own, by shape = \"file\""
+            );
+            return Err(ScenarioError::of_key(key, problem));
+        }
+    }
     scenario.bench.bench()?;
     scenario.params()?;
     let end_s = scenario.bench.duration_s;

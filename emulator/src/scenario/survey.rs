@@ -7,6 +7,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::judge::Verdict;
 use super::place::Place;
+use super::play::Played;
 use crate::summary::Report;
 
 /// Failed runs that are listed one by one.
@@ -79,7 +80,7 @@ pub struct Failure {
 impl Survey {
     /// The summary of these runs, in their order.
     pub(super) fn of(
-        runs: impl IntoIterator<Item = (Place, Report, Vec<Verdict>)>,
+        runs: impl IntoIterator<Item = (Place, Played)>,
         left_out: usize,
         wall_s: f64,
     ) -> Self {
@@ -97,9 +98,9 @@ impl Survey {
             failures: Vec::new(),
         };
         let mut hash = Xxh3::new();
-        for (place, report, verdicts) in runs {
-            hash.update(report.trace_hash.as_bytes());
-            survey.add(&place, &report, verdicts);
+        for (place, played) in runs {
+            hash.update(played.report.trace_hash.as_bytes());
+            survey.add(&place, &played.report, played.verdicts);
         }
         survey.trace_hash = format!("{:016x}", hash.digest());
         survey.sim_per_wall = (wall_s > 0.0).then(|| survey.sim_s / wall_s);
@@ -109,6 +110,11 @@ impl Survey {
     /// Whether every expectation held in every run.
     pub fn held(&self) -> bool {
         self.failed == 0
+    }
+
+    /// As [`Outcome::exit_status`](super::Outcome::exit_status).
+    pub fn exit_status(&self) -> u8 {
+        super::exit_status(self.left_out > 0, self.held())
     }
 
     fn add(&mut self, place: &Place, report: &Report, verdicts: Vec<Verdict>) {

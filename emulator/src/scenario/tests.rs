@@ -29,6 +29,9 @@ const FILE: &str = r#"
     "bench.initial_angle_deg" = [-180.0, 180.0]
 "#;
 
+/// Nobody interrupts.
+static ON: AtomicBool = AtomicBool::new(false);
+
 fn plan(text: &str, options: &Options) -> Result<Plan, ScenarioError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scenario.toml");
@@ -74,7 +77,7 @@ fn a_survey_counts_and_names_the_worst_run() {
         set: current.place.set.clone(),
         ..seeds(current.place.seed, current.place.seed)
     };
-    let outcome = self::plan(FILE, &alone).unwrap().play().unwrap();
+    let outcome = self::plan(FILE, &alone).unwrap().play(&ON).unwrap();
     assert_eq!(outcome.expectations[0].value, current.worst);
     assert_eq!(outcome.drawn, current.place.drawn);
 }
@@ -89,11 +92,27 @@ fn an_interrupt_keeps_what_has_been_played() {
         stop.store(true, Ordering::Relaxed);
     });
     let survey = survey.unwrap();
-    // Runs that go on beside the first end too.
+    // Runs beside the first are cut short, unless they have ended too.
     assert_eq!(survey.runs, played.into_inner());
     assert_eq!(survey.runs + survey.left_out, 12);
     assert!((1..12).contains(&survey.runs), "{} runs", survey.runs);
     assert_eq!(survey.expectations.len(), 2);
+}
+
+/// With what was played until then, and no verdict on what was not.
+#[test]
+fn an_interrupted_run_keeps_what_has_been_played() {
+    let text = FILE.split("[sweep]").next().unwrap();
+    let plan = plan(text, &Options::default()).unwrap();
+    let outcome = plan.play(&AtomicBool::new(true)).unwrap();
+    assert!(outcome.interrupted);
+    let sim_s = outcome.report.sim_s;
+    assert!((0.0009..0.0011).contains(&sim_s), "{sim_s}");
+    assert!(outcome.report.steps > 20);
+    assert_eq!(outcome.report.windows[0].rpm_mean, Some(0.0));
+    let held: Vec<_> = outcome.expectations.iter().map(|v| v.held).collect();
+    assert_eq!(held, [None, None]);
+    assert!(!plan.play(&ON).unwrap().interrupted);
 }
 
 #[test]
@@ -200,7 +219,7 @@ fn a_negative_speed_is_asked_for_as_such() {
             "duration_s",
             &format!("imposed_rpm = {imposed}\nduration_s"),
         );
-        let outcome = plan(&text, &Options::default()).unwrap().play().unwrap();
+        let outcome = plan(&text, &Options::default()).unwrap().play(&ON).unwrap();
         assert_eq!(outcome.held(), held, "{:?}", outcome.expectations);
     }
 }
@@ -227,8 +246,8 @@ fn another_machine_plays_what_goes_over_the_wire() {
     let [there, here] = [
         plan(text, &Options::default())
             .unwrap()
-            .play_on(start, |_| {}),
-        plan(text, &Options::default()).unwrap().play(),
+            .play_on(&ON, start, |_| {}),
+        plan(text, &Options::default()).unwrap().play(&ON),
     ]
     .map(Result::unwrap);
     assert!(there.held() && here.held());
@@ -236,6 +255,6 @@ fn another_machine_plays_what_goes_over_the_wire() {
 
     let past = text.replace("throttle = 0.3", "rpm = 1000.0");
     let plan = plan(&past, &Options::default()).unwrap();
-    let error = plan.play_on(start, |_| {}).err().unwrap().to_string();
+    let error = plan.play_on(&ON, start, |_| {}).err().unwrap().to_string();
     assert!(error.starts_with("signal.1: goes past the wire"), "{error}");
 }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use siskin_emulator::interrupt;
 use siskin_emulator::live::{self, Opened};
 use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
 use siskin_emulator::report;
@@ -105,11 +106,15 @@ fn scenario(image: &Path, args: &ScenarioArgs) -> Result<ExitCode, String> {
         let what = "the scenario has several runs; give --seed N and --set KEY=VALUE for one";
         return Err(format!("{}: {what}", args.file.display()));
     }
+    let stop = interrupt::flag();
+    let stop = stop.map_err(|error| format!("cannot listen for interrupts: {error}"))?;
     let mut processor = None;
     let start = |start| Ok(VirtualBoard::new(&image, start)?);
-    let played = plan.play_on(start, |mut board: VirtualBoard| processor = board.figures());
+    let played = plan.play_on(&stop, start, |mut board: VirtualBoard| {
+        processor = board.figures()
+    });
     let outcome = played.map_err(line)?;
-    let held = outcome.held();
+    let status = outcome.exit_status();
     let text = if args.common.json {
         report::json(&Played { outcome, processor })?
     } else {
@@ -117,11 +122,7 @@ fn scenario(image: &Path, args: &ScenarioArgs) -> Result<ExitCode, String> {
         of_outcome + &of_processor(processor)
     };
     report::print(&text)?;
-    Ok(if held {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::from(1)
-    })
+    Ok(ExitCode::from(status))
 }
 
 fn of_processor(figures: Option<Figures>) -> String {
