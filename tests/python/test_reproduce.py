@@ -21,10 +21,27 @@ BOSSO = {
 }
 
 
+def assert_compared(items: list[dict]) -> None:
+    """Each item has a verdict that follows from its bound, and a reason."""
+    for item in items:
+        assert {"name", "paper", "measured", "unit", "note", "verdict", "bound", "reason"} == set(item)
+        assert item["reason"], item
+        if item["paper"] is None:
+            assert (item["verdict"], item["bound"]) == ("open", None), item
+            continue
+        low, high = item["bound"]
+        within = low <= item["measured"] <= high
+        assert item["verdict"] == ("agrees" if within else "differs"), item
+
+
 def test_bosso_shows_what_the_paper_printed(tmp_path):
     ended = run("reproduce", "bosso", "--json", "-o", tmp_path)
     assert ended.returncode == 0, ended.stderr
-    items = {item["name"]: item for item in json.loads(ended.stdout)["items"]}
+    items = json.loads(ended.stdout)["items"]
+    assert_compared(items)
+    items = {item["name"]: item for item in items}
+    assert items["fig7_efficiency_diff_3000"]["verdict"] == "differs", "it has the other sign"
+    assert items["efficiency_diff_3000"]["verdict"] == "agrees"
     assert all(item["measured"] is not None for item in items.values())
     for name, (paper, within) in BOSSO.items():
         assert items[name]["paper"] == pytest.approx(paper, abs=1e-4), name
@@ -44,7 +61,7 @@ def test_colton_stays_within_the_papers_bounds():
     ended = run("reproduce", "colton", "--json")
     assert ended.returncode == 0, ended.stderr
     items = json.loads(ended.stdout)["items"]
-    assert all(set(item) == {"name", "paper", "measured", "unit", "note"} for item in items)
+    assert_compared(items)
     names = {item["name"] for item in items}
     assert {"fig28_error_1000_to_3400", "fig28_error_500_to_7300"} <= names
     assert {"fig27_error_1000", "fig30_error_from_2000"} <= names

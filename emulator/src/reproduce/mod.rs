@@ -2,9 +2,11 @@
 
 mod bosso;
 mod colton;
+mod verdict;
 
 pub use bosso::bosso;
 pub use colton::colton;
+pub use verdict::{Comparison, Verdict};
 
 use std::fmt;
 
@@ -35,6 +37,9 @@ pub struct Item {
     pub unit: &'static str,
     /// What they are, in a line.
     pub note: String,
+    /// Whether that is the same, within which bound and why.
+    #[serde(flatten)]
+    pub comparison: Comparison,
 }
 
 /// What the paper says or its formula gives, beside what was measured; what is not finite was not.
@@ -45,10 +50,13 @@ fn item(
     unit: &'static str,
     note: impl Into<String>,
 ) -> Item {
+    let name = name.into();
+    let measured = measured.into().filter(|value| value.is_finite());
     Item {
-        name: name.into(),
+        comparison: Comparison::of(&name, paper, measured),
+        name,
         paper,
-        measured: measured.into().filter(|value| value.is_finite()),
+        measured,
         unit,
         note: note.into(),
     }
@@ -61,17 +69,40 @@ impl fmt::Display for Reproduction {
         let show = |value: Option<f64>| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.2}"))
         };
-        writeln!(f, "{:width$} {:>9} {:>9}", "", "paper", "measured")?;
+        writeln!(
+            f,
+            "{:width$} {:>9} {:>9}      verdict",
+            "", "paper", "measured"
+        )?;
         for item in &self.items {
             writeln!(
                 f,
-                "{:width$} {:>9} {:>9} {:4} {}",
+                "{:width$} {:>9} {:>9} {:4} {:7} {}",
                 item.name,
                 show(item.paper),
                 show(item.measured),
                 item.unit,
+                match item.comparison.verdict {
+                    Verdict::Agrees => "agrees",
+                    Verdict::Differs => "DIFFERS",
+                    Verdict::Open => "-",
+                },
                 item.note
             )?;
+        }
+        for item in &self.items {
+            let Comparison {
+                verdict,
+                bound,
+                reason,
+            } = item.comparison;
+            if let (Verdict::Differs, Some([low, high])) = (verdict, bound) {
+                let (name, unit) = (&item.name, item.unit);
+                writeln!(
+                    f,
+                    "{name} differs: not within {low:.2} to {high:.2} {unit}: {reason}"
+                )?;
+            }
         }
         Ok(())
     }
