@@ -86,6 +86,21 @@ pub struct Map {
     pub y: Vec<f64>,
     /// Rows of values from the lowest y, in each from the lowest x; what is not finite is left blank.
     pub rows: Vec<Vec<f64>>,
+    /// What the colours span; `None` is what the values do.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Map {
+    /// Two maps to be compared, in the colours of one scale.
+    pub fn alike(mut self, mut other: Self) -> [Self; 2] {
+        let values = self.rows.iter().chain(&other.rows).flatten();
+        let finite = values.filter(|value| value.is_finite());
+        let range = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(*value), high.max(*value))
+        });
+        (self.range, other.range) = (Some(range), Some(range));
+        [self, other]
+    }
 }
 
 impl Panel {

@@ -41,7 +41,11 @@ impl Map {
     /// The values that the colours span.
     pub(super) fn scale(&self) -> Scale {
         let values = self.rows.iter().flatten().copied();
-        Scale::new(&Axis::new(&*self.label), values, 0.0)
+        let axis = Axis {
+            range: self.range,
+            ..Axis::new(&*self.label)
+        };
+        Scale::new(&axis, values, 0.0)
     }
 
     /// Draws the colours on the area within the axes.

@@ -60,6 +60,7 @@ fn map() -> Panel {
             x: x.clone(),
             y,
             rows,
+            range: None,
         }),
         ..Panel::new(
             "A map with a load's curve, and a title that is so long that it does not fit on one line",
@@ -70,6 +71,22 @@ fn map() -> Panel {
                 Curve::dots("operating points", [(3000.0, 0.0432), (4500.0, 0.0972)]),
             ],
         )
+    }
+}
+
+#[test]
+fn maps_that_are_compared_have_one_scale() {
+    let map = |rows: Vec<Vec<f64>>| Map {
+        label: "ripple (%)".to_owned(),
+        x: vec![1.0, 2.0],
+        y: vec![1.0],
+        rows,
+        range: None,
+    };
+    let (small, great) = (vec![vec![2.0, f64::NAN]], vec![vec![3.0, 90.0]]);
+    for map in map(small).alike(map(great)) {
+        let scale = map.scale();
+        assert_eq!((scale.low, scale.high), (2.0, 90.0));
     }
 }
 

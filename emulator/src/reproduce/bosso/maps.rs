@@ -125,6 +125,7 @@ fn map(label: &str, value: impl Fn(usize, usize) -> Option<f64>) -> Map {
         rows: rows.collect(),
         x,
         y,
+        range: None,
     }
 }
 
@@ -188,6 +189,9 @@ fn efficiency(bldc: &Grid, foc: &Grid) -> Figure {
     let power = |grid: &Grid| grid.map("motor power (W)", |reading| reading.motor_w);
     let losses = |grid: &Grid| grid.map("copper losses (W)", |reading| reading.copper_w);
     let efficiency = |grid: &Grid| grid.map("efficiency (%)", Reading::efficiency_pct);
+    let [bldc_power, foc_power] = power(bldc).alike(power(foc));
+    let [bldc_losses, foc_losses] = losses(bldc).alike(losses(foc));
+    let [bldc_efficiency, foc_efficiency] = efficiency(bldc).alike(efficiency(foc));
     let better = foc.against("difference (points)", bldc, |foc, bldc| {
         foc.efficiency_pct() - bldc.efficiency_pct()
     });
@@ -201,13 +205,13 @@ fn efficiency(bldc: &Grid, foc: &Grid) -> Figure {
             .to_owned(),
         columns: 4,
         panels: vec![
-            over_speed("(a) six-step: power", power(bldc)),
-            over_speed("(b) six-step: losses", losses(bldc)),
-            over_speed("(c) six-step: efficiency", efficiency(bldc)),
+            over_speed("(a) six-step: power", bldc_power),
+            over_speed("(b) six-step: losses", bldc_losses),
+            over_speed("(c) six-step: efficiency", bldc_efficiency),
             over_speed("(d) efficiency, FOC less six-step", better),
-            over_speed("(e) FOC: power", power(foc)),
-            over_speed("(f) FOC: losses", losses(foc)),
-            over_speed("(g) FOC: efficiency", efficiency(foc)),
+            over_speed("(e) FOC: power", foc_power),
+            over_speed("(f) FOC: losses", foc_losses),
+            over_speed("(g) FOC: efficiency", foc_efficiency),
             over_speed("(h) losses, six-step over FOC", more),
         ],
     }
@@ -216,6 +220,7 @@ fn efficiency(bldc: &Grid, foc: &Grid) -> Figure {
 fn ripple(bldc: &Grid, foc: &Grid) -> Figure {
     let (rpm, torque_nm) = (4500.0, load_nm(4500.0));
     let map = |grid: &Grid| grid.map("torque ripple (%)", |reading| reading.ripple_pct);
+    let [bldc_ripple, foc_ripple] = map(bldc).alike(map(foc));
     let waveform = |title: &str, points: Vec<(f64, f64)>| {
         let points: Vec<_> = points
             .into_iter()
@@ -248,12 +253,12 @@ fn ripple(bldc: &Grid, foc: &Grid) -> Figure {
             .to_owned(),
         columns: 2,
         panels: vec![
-            over_speed("(a) six-step: ripple", map(bldc)),
+            over_speed("(a) six-step: ripple", bldc_ripple),
             waveform(
                 "(b) six-step: torque at 4500 rpm, 0.0972 Nm",
                 six_step.waveform(WAVEFORM_S),
             ),
-            over_speed("(c) FOC: ripple", map(foc)),
+            over_speed("(c) FOC: ripple", foc_ripple),
             waveform(
                 "(d) FOC: torque at 4500 rpm, 0.0972 Nm",
                 drive.waveform(WAVEFORM_S),

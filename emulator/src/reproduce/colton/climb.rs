@@ -203,6 +203,7 @@ pub(super) fn flux_map() -> Reproduction {
             .collect(),
         y: (0..ROWS).map(speed).collect(),
         rows,
+        range: None,
     };
     let (x, y) = (
         between("rotor electrical angle (degrees)", 0.0, 360.0),
