@@ -45,7 +45,7 @@ impl Config {
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let length = self.length(state, wanted, fb);
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
-        let phase = bounded(state.phase.plus(self.phase_k_p.saturating_apply(e_d)));
+        let phase = bounded(state.phase.plus(self.phase_k_p.held(e_d)));
         let SinCos { cos, sin } = SinCos::of(phase);
         // 28 + 31 − 32 fraction bits; the length bounds both.
         Dq {
@@ -58,10 +58,7 @@ impl Config {
     #[inline(always)]
     fn length(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Voltage {
         let e_q = wanted.i.q.minus(fb.i.q);
-        let length = state
-            .length
-            .plus(self.k_p.saturating_apply(e_q))
-            .plus(wanted.u_q);
+        let length = state.length.plus(self.k_p.held(e_q)).plus(wanted.u_q);
         // Twice the lowest product would not fit.
         length.max(-Voltage::MAX)
     }
@@ -77,17 +74,17 @@ impl Config {
     ) -> Current {
         let wanted = wanted.with_i_q(Current::ZERO);
         let without = self.length(state, &wanted, fb);
-        self.admittance.saturating_apply(u_q.minus(without))
+        self.admittance.held(u_q.minus(without))
     }
 
     /// Takes the integrators on by a period.
     #[inline(always)]
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        let step = self.k_i.saturating_apply(wanted.i.q.minus(fb.i.q));
+        let step = self.k_i.held(wanted.i.q.minus(fb.i.q));
         // The limit keeps the part along d: while it cuts, the phase alone holds i_d.
         let length = self.length(state, wanted, fb);
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
-        let turn = self.phase_k_i.saturating_apply(e_d);
+        let turn = self.phase_k_i.held(e_d);
         state.length = state.length.plus(step);
         state.phase = bounded(state.phase.plus(turn));
     }
@@ -95,7 +92,7 @@ impl Config {
     /// Takes back what the length has gone on by for the voltage that is cut off.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let beyond = beyond(self.admittance, cut);
-        state.length = state.length.minus(self.k_i.saturating_apply(beyond.q));
+        state.length = state.length.minus(self.k_i.held(beyond.q));
     }
 
     /// Sets the integrators so that the voltage is `u`, where that lies within a quarter of a turn
@@ -104,7 +101,7 @@ impl Config {
         state.set(u);
         let length = state.length;
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
-        let phase = state.phase.minus(self.phase_k_p.saturating_apply(e_d));
+        let phase = state.phase.minus(self.phase_k_p.held(e_d));
         let without = self.length(&State::default(), wanted, fb);
         *state = State {
             length: length.minus(without),

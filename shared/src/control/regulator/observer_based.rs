@@ -84,16 +84,16 @@ impl Config {
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.minus(self.k_ie.saturating_apply(e.d));
-        sigma.q = sigma.q.minus(self.k_ie.saturating_apply(e.q));
+        sigma.d = sigma.d.minus(self.k_ie.held(e.d));
+        sigma.q = sigma.q.minus(self.k_ie.held(e.q));
     }
 
     /// Takes back what the integrators have gone on by for the voltage that is cut off.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let beyond = beyond(self.admittance, cut);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.minus(self.k_ie.saturating_apply(beyond.d));
-        sigma.q = sigma.q.minus(self.k_ie.saturating_apply(beyond.q));
+        sigma.d = sigma.d.minus(self.k_ie.held(beyond.d));
+        sigma.q = sigma.q.minus(self.k_ie.held(beyond.q));
     }
 
     /// Sets the integrators so that the voltage is `u`.

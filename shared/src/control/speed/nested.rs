@@ -56,7 +56,7 @@ impl Config {
     ) -> Reference {
         let told = &input.told;
         let wanted = planner.reference.plus(step);
-        let half_trust = self.trust.saturating_apply(input.speed).max(Speed::ZERO);
+        let half_trust = self.trust.held(input.speed).max(Speed::ZERO);
         let error = input.speed.minus(wanted);
         let error = if half_trust < ALMOST_HALF {
             Speed::from_bits(error.top(half_trust).to_bits() << 1)
@@ -65,9 +65,9 @@ impl Config {
         };
         let torque = state
             .sigma
-            .minus(self.k_p.saturating_apply(error))
-            .plus(self.inertia.saturating_apply(step));
-        let integral_step = self.k_i.saturating_apply(error);
+            .minus(self.k_p.held(error))
+            .plus(self.inertia.held(step));
+        let integral_step = self.k_i.held(error);
         let i_q = told.xi.top(torque);
         let bounded = input.bounds.hold(i_q);
         if bounded != i_q || input.missing != Current::ZERO {
@@ -85,7 +85,7 @@ impl Config {
         let periods = PERIODS as i32;
         let torque_step = self
             .k_p
-            .saturating_apply((step / periods).minus(told.omega_bar_step))
+            .held((step / periods).minus(told.omega_bar_step))
             .minus(integral_step / periods);
         Reference {
             i: Dq {
@@ -108,7 +108,7 @@ impl Config {
         over: Current,
         integral_step: Torque,
     ) -> Speed {
-        let less = self.inertia_inverse.saturating_apply(torque(over));
+        let less = self.inertia_inverse.held(torque(over));
         let free = step.minus(less);
         let taken = free.min(slew).max(-slew);
         let conditioned = taken == free && self.inertia_inverse != Gain::ZERO;
