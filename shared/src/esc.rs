@@ -286,7 +286,9 @@ impl Esc {
             }
             Some(Request::Reboot) => self.storage.reboot(),
             Some(Request::FactoryReset) => {
-                match self.given.check(&Params::default(), &self.board) {
+                let mut defaults = Params::default();
+                defaults.fit(&self.board);
+                match self.given.check(&defaults, &self.board) {
                     Ok(()) => self.storage.ask(request),
                     Err(error) => self.component.storage_done(Err(error.reason)),
                 }

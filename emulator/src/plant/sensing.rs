@@ -4,7 +4,7 @@ use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::Sample;
 use siskin_control::image::Image;
-use siskin_control::params::Board;
+use siskin_control::params::{Board, LeastDeadTime};
 use siskin_control::units::AdcCounts;
 
 use super::Noise;
@@ -88,6 +88,7 @@ impl Sensing {
             low_side_on_s: 1e-6,
             refresh_s: 1e-6,
             charge_s: 63e-6,
+            least_dead_time: LeastDeadTime::NONE,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::params::Board;
+use siskin_control::params::{Board, LeastDeadTime};
 use siskin_control::protection::Ntc;
 
 use crate::image;
@@ -66,11 +66,17 @@ pub const BOARD: Board = Board {
     low_side_on_s: 2.3e-6,
     // The MOSFETs' gates take up to 80 nC a period, which the L6387 gives back to the bootstrap
     // capacitor through 125 Ω while the low side is on: 3 V less of gate supply with this, in a
-    // phase that stays at the greatest duty. It also leaves 2.15 µs after the top with the default
+    // phase that stays at the greatest duty. It also leaves 2.4 µs after the top with the least
     // dead time, by when the terminals have been sampled.
     refresh_s: 3.3e-6,
     // Five time constants of 125 Ω and 100 nF.
     charge_s: 63e-6,
+    // The L6387E has none of its own, and 33 Ω stand before gates of 80 nC: as ST's motor-control project
+    // and Recoil have it for this board, DTG 128 of 170 MHz.
+    least_dead_time: LeastDeadTime {
+        ns: 750.0,
+        refusal: "below this board's 750 ns",
+    },
 };
 
 /// The thermistor: 10 kΩ at 25 °C over 4.7 kΩ, which are 1.055 V at 25 °C as ST's motor control kit
@@ -83,6 +89,15 @@ pub const NTC: Ntc = Ntc {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_refusal_of_a_dead_time_names_the_least() {
+        for least in [BOARD, super::super::vesc4_f405::BOARD].map(|board| board.least_dead_time) {
+            assert!(least.refusal.contains(&format!(" {} ns", least.ns)));
+            // Behind the parameter's name in a text of 50 bytes, with what has been done.
+            assert!("PWM_DEADTIME_NS , raised".len() + least.refusal.len() <= 50);
+        }
+    }
 
     #[test]
     fn the_zero_is_the_one_that_a_board_has_shown() {

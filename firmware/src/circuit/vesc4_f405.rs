@@ -2,7 +2,7 @@
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::params::Board;
+use siskin_control::params::{Board, LeastDeadTime};
 use siskin_control::protection::Ntc;
 
 use crate::image;
@@ -41,6 +41,11 @@ pub const BOARD: Board = Board {
     // The DRV8302's bootstrap capacitors are charged through its diodes, without resistors.
     refresh_s: 1.0e-6,
     charge_s: 50e-6,
+    // As the VESC's own firmware has it for this class; the DRV8302 adds some by its strap DTC.
+    least_dead_time: LeastDeadTime {
+        ns: 360.0,
+        refusal: "below this board's 360 ns",
+    },
 };
 
 /// The transistors' thermistor.

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
     use siskin_control::control::delay::Delay;
     use siskin_control::control::sensing::Shunts;
-    use siskin_control::params::{Board, ParamId, Params, build};
+    use siskin_control::params::{Board, LeastDeadTime, ParamId, Params, build};
 
     /// Any board.
     const BOARD: Board = Board {
@@ -67,6 +67,7 @@ mod tests {
         low_side_on_s: 2e-6,
         refresh_s: 3e-6,
         charge_s: 60e-6,
+        least_dead_time: LeastDeadTime::NONE,
     };
 
     /// Clocks of a code, as the reference manuals state them (RM0440 and RM0090, TIM1_BDTR.DTG).

@@ -102,7 +102,7 @@ fn warn(esc: &mut Esc, text: &str) {
 /// being made, the stack has room for the parameters alone.
 #[inline(never)]
 fn recall(flash: &mut Storage) -> (&'static mut Esc, Port) {
-    let (esc, port) = power_up(&stored_params(flash));
+    let (esc, port) = power_up(&mut stored_params(flash));
     recall_rest(esc, flash);
     (esc, port)
 }
@@ -121,7 +121,7 @@ fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
 /// defaults; each is made where it stays.
 // Out of line, as what follows: the stack that one takes is free for the next.
 #[inline(never)]
-fn power_up(params: &Params) -> (&'static mut Esc, Port) {
+fn power_up(params: &mut Params) -> (&'static mut Esc, Port) {
     let board = Board {
         image: Image {
             serial: uid(),
@@ -129,10 +129,20 @@ fn power_up(params: &Params) -> (&'static mut Esc, Port) {
         },
         ..BOARD
     };
+    let raised = params.fit(&board);
     if let Some((port, scale)) = make_port(params, &board) {
-        return (make_esc(params.clone(), board, scale), port);
+        let esc = make_esc(params.clone(), board, scale);
+        if raised {
+            let mut warning = Warning::new();
+            push(&mut warning, "PWM_DEADTIME_NS ");
+            push(&mut warning, board.least_dead_time.refusal);
+            push(&mut warning, ", raised");
+            esc.warn(warning);
+        }
+        return (esc, port);
     }
-    let defaults = Params::default();
+    let mut defaults = Params::default();
+    defaults.fit(&board);
     let (port, scale) = make_port(&defaults, &board).expect("the defaults fit every board");
     let esc = make_esc(defaults, board, scale);
     esc.lose_stored();

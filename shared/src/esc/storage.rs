@@ -271,8 +271,10 @@ impl Esc {
     /// # Errors
     /// The parameter that does not fit the board; nothing has changed then.
     pub fn replace(&mut self, throttle: &mut impl Reach, kept: &Kept) -> Result<(), BuildError> {
-        self.given.check(&kept.params, &self.board)?;
-        self.params = kept.params.clone();
+        let mut params = kept.params.clone();
+        params.fit(&self.board);
+        self.given.check(&params, &self.board)?;
+        self.params = params;
         self.component.keep_intervals(&kept.intervals);
         if kept.signing.is_none() {
             self.component.forget_signing();

@@ -6,7 +6,7 @@ mod table;
 
 use crate::math::SQRT_3;
 
-pub use build::{Board, BuildError, FluxSettings, build, input};
+pub use build::{Board, BuildError, FluxSettings, LeastDeadTime, build, input};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE, Text};
 
@@ -84,6 +84,18 @@ impl Params {
         self.values[id as usize] = value;
         self.derive();
         Ok(())
+    }
+
+    /// Raises what is below the board's least, as the table's default may be; whether it was another value,
+    /// which somebody has chosen.
+    pub fn fit(&mut self, board: &Board) -> bool {
+        let (id, least_ns) = (ParamId::PwmDeadtimeNs, board.least_dead_time.ns);
+        let given_ns = self.get(id);
+        if given_ns >= least_ns {
+            return false;
+        }
+        self.values[id as usize] = least_ns;
+        given_ns != id.entry().default
     }
 
     fn derive(&mut self) {

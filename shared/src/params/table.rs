@@ -216,7 +216,7 @@ parameters! {
     40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0 restart
         "PWM frequency; the control runs once a period";
     41 PwmDeadtimeNs "PWM_DEADTIME_NS" "ns" Real 0.0..3000.0 = 500.0 restart
-        "Time for which both switches of a phase stay off at each change";
+        "Time for which both switches of a phase stay off at each change; a board has its least";
     50 InpProto "INP_PROTO" "" Whole 0.0..23.0 = 0.0
         "Throttle protocol"
             0 "automatic"

@@ -5,7 +5,7 @@ use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::{Fault, Sample, Setpoint};
 use siskin_control::image::Image;
-use siskin_control::params::{Board, ParamId, Params, TABLE};
+use siskin_control::params::{Board, LeastDeadTime, ParamId, Params, TABLE};
 use siskin_control::units::{AdcCounts, Current, Speed};
 
 /// Words of the parameters and the board.
@@ -29,6 +29,8 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
         low_side_on_s,
         refresh_s,
         charge_s,
+        // Whoever asks has built it before.
+        least_dead_time: _,
     } = *board;
     let mut words = [0; SET_UP_WORDS];
     let (table, rest) = words.split_at_mut(TABLE.len());
@@ -75,6 +77,7 @@ pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
             word if word == Delay::Half as u32 => Delay::Half,
             _ => Delay::One,
         },
+        least_dead_time: LeastDeadTime::NONE,
     };
     (params, board)
 }

@@ -57,6 +57,25 @@ pub struct Board {
     /// For how long the low sides must be on in all before the high sides' drivers are supplied
     /// after a time off, s.
     pub charge_s: f32,
+    /// `PWM_DEADTIME_NS` at least, which is its default where the table's is shorter.
+    pub least_dead_time: LeastDeadTime,
+}
+
+/// The shortest dead time that the drivers and transistors of a board take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeastDeadTime {
+    /// In ns.
+    pub ns: f32,
+    /// Why a shorter one is refused: its number is in it.
+    pub refusal: &'static str,
+}
+
+impl LeastDeadTime {
+    /// Any will do, and none.
+    pub const NONE: Self = Self {
+        ns: 0.0,
+        refusal: "",
+    };
 }
 
 /// Why the parameters do not make a drive.
@@ -254,6 +273,11 @@ fn refuse_contradictions(p: &Si) {
         get(ParamId::LimPhaseA) * TRIP_SHARE > SHOWN_SHARE * p.board.current_range_a,
         ParamId::LimPhaseA,
         "the trip at 1.4 times this is beyond the board",
+    );
+    p.refuse_if(
+        get(ParamId::PwmDeadtimeNs) < p.board.least_dead_time.ns,
+        ParamId::PwmDeadtimeNs,
+        p.board.least_dead_time.refusal,
     );
     let turns = get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0;
     p.refuse_if(
@@ -454,6 +478,7 @@ impl Board {
         low_side_on_s: 1e-6,
         refresh_s: 1e-6,
         charge_s: 63e-6,
+        least_dead_time: LeastDeadTime::NONE,
     };
 }
 
@@ -478,6 +503,41 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_dead_time_below_the_boards_is_refused_and_raised_at_the_start() {
+        let board = Board {
+            least_dead_time: LeastDeadTime {
+                ns: 750.0,
+                refusal: "below this board's 750 ns",
+            },
+            ..Board::BENCH
+        };
+        let mut params = Params::default();
+        for short_ns in [0.0, 500.0, 749.0] {
+            params
+                .set(ParamId::PwmDeadtimeNs, short_ns)
+                .expect("in range");
+            let error = build(&params, &board).expect_err("too short");
+            assert_eq!(error.param, ParamId::PwmDeadtimeNs);
+            assert_eq!(error.reason, "below this board's 750 ns");
+        }
+        // The emulator's bench takes any.
+        params.set(ParamId::PwmDeadtimeNs, 0.0).expect("in range");
+        build(&params, &Board::BENCH).expect("an ideal inverter");
+
+        // What was chosen is told; the table's default, which nobody chose, is not.
+        assert!(params.fit(&board));
+        assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
+        let mut params = Params::default();
+        assert!(!params.fit(&board));
+        assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
+        build(&params, &board).expect("the board's default");
+        // What is long enough stays.
+        params.set(ParamId::PwmDeadtimeNs, 900.0).expect("in range");
+        assert!(!params.fit(&board));
+        assert_eq!(params.get(ParamId::PwmDeadtimeNs), 900.0);
     }
 
     #[test]

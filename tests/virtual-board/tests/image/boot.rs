@@ -3,6 +3,8 @@
 use std::hash::Hasher;
 
 use crate::common::{Board, MS, Throttle, image};
+use mavlink::dialects::ardupilotmega::MavCmd;
+use siskin_control::params::ParamId;
 use siskin_vboard::processor::Processor;
 use siskin_vboard::world::World;
 
@@ -35,6 +37,38 @@ fn it_starts_and_answers() {
     let figures = board.board.figures().expect("the control runs");
     // 24 kHz, but for the start.
     assert!((50_000..=55_200).contains(&figures.interrupts), "{figures}");
+}
+
+/// The board's least dead time is its default, also after a reset to the defaults, and nothing shorter is
+/// taken.
+#[test]
+fn a_dead_time_below_the_boards_is_refused() {
+    let id = "PWM_DEADTIME_NS";
+    let mut board = Board::new(&image(), &[]);
+    board.run(30 * MS);
+    assert_eq!(board.param(id, 100 * MS).expect("an answer").0, 750.0);
+    assert!(board.heard.texts().is_empty(), "{:?}", board.heard.texts());
+    board.set_param(id, 500.0);
+    board.hear("below this board's 750 ns", 100 * MS);
+    assert_eq!(board.param(id, 100 * MS).expect("an answer").0, 750.0);
+    board.set_param(id, 1_000.0);
+    board.run(10 * MS);
+    assert_eq!(board.param(id, 100 * MS).expect("an answer").0, 1_000.0);
+    board.command(MavCmd::MAV_CMD_PREFLIGHT_STORAGE, 2.0);
+    board.run(1_500 * MS);
+    assert_eq!(board.param(id, 100 * MS).expect("an answer").0, 750.0);
+}
+
+/// What an image before has stored is raised, and that is told.
+#[test]
+fn a_stored_dead_time_below_the_boards_is_raised() {
+    let mut board = Board::new(&image(), &[(ParamId::PwmDeadtimeNs, 300.0)]);
+    board.hear(
+        "PWM_DEADTIME_NS below this board's 750 ns, raised",
+        500 * MS,
+    );
+    let (value, _) = board.param("PWM_DEADTIME_NS", 100 * MS).expect("an answer");
+    assert_eq!(value, 750.0);
 }
 
 /// Runs with the motor and MAVLink; what came of it.

@@ -56,7 +56,9 @@ pub(crate) struct Mirror {
 impl Mirror {
     /// The chip's with the default parameters, before its first interrupt.
     pub(crate) fn new() -> Self {
-        let config = build(&Params::default(), &BOARD).expect("the defaults fit the board");
+        let mut params = Params::default();
+        params.fit(&BOARD);
+        let config = build(&params, &BOARD).expect("the defaults fit the board");
         let period_s = config.scale.period_s;
         Self {
             state: State::new(&config),

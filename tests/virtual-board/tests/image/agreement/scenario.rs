@@ -2,6 +2,7 @@
 
 use siskin_control::input::dshot::{Frame, Rate, check_mask};
 use siskin_control::input::signal::Signal;
+use siskin_control::params::ParamId;
 use siskin_emulator::device::Start;
 use siskin_emulator::flash::FileFlash;
 use siskin_emulator::machine::{Machine, Onlooker};
@@ -89,7 +90,8 @@ pub(crate) fn start() -> Start {
         },
         wire: Wire::detached(),
         flash: FileFlash::in_memory(),
-        overrides: Vec::new(),
+        // As short as the board takes it, for the emulator too.
+        overrides: vec![(ParamId::PwmDeadtimeNs, BOARD.least_dead_time.ns)],
         faults: Vec::new(),
         link_bytes_per_s: LINK_BYTES_PER_S,
     }
