@@ -69,8 +69,9 @@ pub const BOARD: Board = Board {
     // phase that stays at the greatest duty. It also leaves 2.4 µs after the top with the least
     // dead time, by when the terminals have been sampled.
     refresh_s: 3.3e-6,
-    // Five time constants of 125 Ω and 100 nF.
-    charge_s: 63e-6,
+    // Five time constants of the L6387E's 125 Ω and 1.6 µF. ST's motor control holds the low sides on for
+    // 10 ms at each start, whatever the capacitors.
+    charge_s: 1e-3,
     // The L6387E has none of its own, and 33 Ω stand before gates of 80 nC: as ST's motor-control project
     // and Recoil have it for this board, DTG 128 of 170 MHz.
     least_dead_time: LeastDeadTime {

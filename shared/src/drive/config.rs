@@ -37,6 +37,8 @@ pub struct Charge {
     pub duty: Duty,
     /// Periods that it takes.
     pub periods: u32,
+    /// Of these, how many are left out where the rotor turns, which it does unseen meanwhile.
+    pub spared_periods: u32,
 }
 
 /// How often a start is tried.

@@ -156,7 +156,10 @@ fn sense(config: &Config, state: &mut State, sample: &Sample) {
             state.looks += 1;
             if state.rotor != Rotor::Unknown || state.looks >= LOOKS {
                 state.phase = Phase::Charge;
-                state.charge_periods = 0;
+                state.charge_periods = match state.rotor {
+                    Rotor::Turning { .. } => config.charge.spared_periods,
+                    Rotor::Unknown | Rotor::Standing => 0,
+                };
             }
         }
     }

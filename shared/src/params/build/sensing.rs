@@ -25,6 +25,10 @@ const OFFSET_SHARE: f32 = 0.1;
 /// proportion.
 const SIGN_CERTAIN_A: f32 = 0.3;
 
+/// For how long a rotor that turns may do so unseen, s: a propeller at full speed is 2° behind by then, where
+/// it would be tens of degrees behind after a long charge. The bridge supplies the drivers as it switches.
+const UNSEEN_S: f32 = 0.002;
+
 /// What one charging pulse may add to the current of a rotor at `CTL_RPM_MAX`, of `LIM_PHASE_A`:
 /// the low sides short its back-EMF, and a few pulses may add up.
 const CHARGE_CURRENT_SHARE: f32 = 0.125;
@@ -139,9 +143,11 @@ pub(super) fn charge(p: &Si) -> Charge {
     let rise_a_s = rad_s * p.flux_wb / p.inductance_h;
     let allowed_s = CHARGE_CURRENT_SHARE * p.get(ParamId::LimPhaseA) / rise_a_s;
     let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * p.period_s);
+    let periods = (p.board.charge_s / pulse_s) as u32 + 1;
     Charge {
         duty: Duty::from_f32(pulse_s / p.period_s),
-        periods: (p.board.charge_s / pulse_s) as u32 + 1,
+        periods,
+        spared_periods: periods.saturating_sub(p.periods(UNSEEN_S)),
     }
 }
 
@@ -154,6 +160,28 @@ mod tests {
     use crate::params::{Board, Params, build};
     use crate::units::Voltage;
     use fixed::types::{I6F26, I8F24};
+
+    #[test]
+    fn the_drivers_are_charged_for_their_time_and_a_turning_rotor_is_not_lost() {
+        let board = Board {
+            charge_s: 1e-3,
+            ..Board::BENCH
+        };
+        let params = Params::default();
+        let config = build(&params, &board).expect("it makes a drive");
+        let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
+        let charged = |periods: u32| periods as f32 * config.charge.duty.to_num::<f32>() * period_s;
+        let all = config.charge.periods;
+        assert!((1e-3..1.02e-3).contains(&charged(all)), "{}", charged(all));
+        let turning_s = (all - config.charge.spared_periods) as f32 * period_s;
+        assert!((1.9e-3..=2.0e-3).contains(&turning_s), "{turning_s}");
+        // Where little is to be charged, all of it is.
+        let config = build(&params, &Board::BENCH).expect("it makes a drive");
+        assert_eq!(
+            (config.charge.periods, config.charge.spared_periods),
+            (9, 0)
+        );
+    }
 
     /// A board on which the windows decide, not the drivers' supply.
     const SLOW_AMPLIFIERS: Board = Board {

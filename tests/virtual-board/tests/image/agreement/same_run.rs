@@ -10,6 +10,7 @@
 //! | duty in the timer's clocks | 1/3542, rounded down | 7 mV at a terminal |
 //! | a current's zero, measured | half a count of 29 mA | copper loss below 1 mW |
 //! | supply's reading | 8 mV a count, not 17 mV | voltage within 0.05 % |
+//! | the drivers are charged for 1 ms of pulses of 7.8 µs, not for 63 µs | 120 periods | a start 5 ms later |
 //! | when a frame is heard | a period | 0.04 ms |
 
 use siskin_emulator::device::Device;
@@ -27,9 +28,9 @@ const WINDOW_S: f64 = 0.25;
 /// Share of a change of speed until which its time is taken.
 const RISEN: f64 = 0.9;
 
-/// The start's phases last as many periods in both; the hand-over to the observer may come an electrical
-/// turn later, 10 ms at 500 rpm.
-const START_WITHIN_S: f64 = 0.01;
+/// The start's phases last as many periods in both, but that the board charges its drivers for 5 ms more; the
+/// hand-over to the observer may come an electrical turn later, 10 ms at 500 rpm.
+const START_WITHIN_S: f64 = 0.015;
 
 /// A frame's millisecond, and 0.1 % of the speed at the slowest ramp.
 const CHANGE_WITHIN_S: f64 = 0.003;
