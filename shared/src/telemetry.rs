@@ -26,6 +26,8 @@ pub struct Telemetry {
     pub faults: Faults,
     /// How often a fault has turned the bridge off since the start.
     pub fault_count: u32,
+    /// Starts in a row that have failed: the motor is tried again, a few times.
+    pub failed_starts: u8,
     /// Whether the throttle may turn the motor.
     pub armed: bool,
     /// Frames on the throttle wire that failed their check, since the start.
@@ -87,6 +89,7 @@ impl Telemetry {
             phase: Phase::Idle,
             faults: Faults::NONE,
             fault_count: 0,
+            failed_starts: 0,
             armed: false,
             bad_frames: 0,
             bad_share: 0.0,
@@ -116,6 +119,7 @@ impl Telemetry {
         self.phase = snapshot.phase;
         self.faults = snapshot.faults;
         self.fault_count = snapshot.fault_count;
+        self.failed_starts = snapshot.failed_starts;
         let (v_d, v_q) = (scale.volts(snapshot.u.d), scale.volts(snapshot.u.q));
         let square = v_d * v_d + v_q * v_q;
         // A root is of a number above 0, and without a supply there is no share of it.

@@ -341,6 +341,8 @@ fn the_default_observer_keeps_that_rotor() {
     }
 }
 
+const FAILED: &str = "Start failed: the motor is tried again";
+
 #[test]
 fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {
     let mut station = Station::on(
@@ -353,17 +355,21 @@ fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {
     station.run(400, STOP);
     let mut starts = 0;
     let mut before = Phase::Idle;
-    for _ in 0..6_000 {
+    for ms in 0..6_000 {
         station.run(1, HALF);
         let phase = station.rig.snapshot().phase;
         starts += u32::from(phase == Phase::Park && before != Phase::Park);
         before = phase;
+        assert!(ms < 1_500 || station.texts().contains(&FAILED), "{ms} ms");
         if station.has(Fault::Stuck) {
             break;
         }
     }
     assert!(station.has(Fault::Stuck), "after {starts} starts");
     assert!((2..=5).contains(&starts), "{starts} starts");
+    // Each failed one but the last, which is the fault.
+    let failed = station.texts().into_iter().filter(|text| *text == FAILED);
+    assert_eq!(failed.count(), starts as usize - 1);
     assert!(!station.run(1_100, HALF).on);
     assert!(station.texts().contains(&"Fault: motor does not start"));
     let stuck = EscFailureFlags::ESC_FAILURE_MOTOR_STUCK;

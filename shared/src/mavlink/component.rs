@@ -99,6 +99,7 @@ pub struct Component {
     announcer: Announcer,
     /// As of the last poll.
     faults: Faults,
+    failed_starts: u8,
     infos: u16,
     telemetries: u16,
     image: Image,
@@ -132,6 +133,7 @@ impl Component {
             unsign: false,
             announcer: Announcer::new(),
             faults: Faults::NONE,
+            failed_starts: 0,
             infos: 0,
             telemetries: 0,
             image: *image,

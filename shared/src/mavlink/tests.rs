@@ -31,6 +31,7 @@ pub(super) const TELEMETRY: Telemetry = Telemetry {
     phase: Phase::Idle,
     faults: Faults::NONE,
     fault_count: 0,
+    failed_starts: 0,
     armed: false,
     bad_frames: 0,
     bad_share: 0.0,

@@ -83,6 +83,12 @@ impl Component {
             };
             self.text(severity, &[word, fault.text()], send);
         }
+        // Until the last one, which is a fault, nothing else tells why the motor does not turn.
+        let failed = context.telemetry.failed_starts;
+        if failed > core::mem::replace(&mut self.failed_starts, failed) && faults.is_empty() {
+            let text = "Start failed: the motor is tried again";
+            self.text(MavSeverity::MAV_SEVERITY_WARNING, &[text], send);
+        }
     }
 
     fn send_reply(&mut self, reply: Reply, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
