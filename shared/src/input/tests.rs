@@ -270,6 +270,18 @@ fn some_commands_count_at_zero_throttle_while_the_motor_turns() {
 }
 
 #[test]
+fn a_frame_that_breaks_off_does_not_end_a_row() {
+    for cut in (2..32).step_by(2) {
+        let mut bench = Bench::armed();
+        bench.frames(5, 21);
+        bench.cut_frames(1, 21, cut);
+        assert_eq!(bench.orders, [], "{cut}");
+        bench.frames(1, 21);
+        assert_eq!(bench.orders, [Order::Spin { opposite: true }], "{cut}");
+    }
+}
+
+#[test]
 fn a_command_in_a_test_of_the_motor_is_not_obeyed() {
     let mut bench = Bench::armed();
     let now_us = bench.now_us;
