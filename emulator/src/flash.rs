@@ -231,7 +231,11 @@ fn keep_private(file: &File) -> io::Result<()> {
     if mode & 0o077 == 0 {
         return Ok(());
     }
-    file.set_permissions(fs::Permissions::from_mode(mode & 0o700))
+    match file.set_permissions(fs::Permissions::from_mode(mode & 0o700)) {
+        // Another's file, or a file system without rights: whoever has put it there knows.
+        Err(error) if error.kind() == io::ErrorKind::PermissionDenied => Ok(()),
+        tightened => tightened,
+    }
 }
 
 /// A folder of the user's is private here.
