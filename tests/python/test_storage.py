@@ -152,3 +152,22 @@ def test_a_second_emulator_on_one_file_is_refused(stored, tmp_path):
 def test_nobody_else_may_read_what_is_stored(stored, tmp_path):
     with stored().connect():
         assert Path(tmp_path / "flash.bin").stat().st_mode & 0o777 == 0o600
+
+
+def test_an_esc_that_has_lost_its_settings_arms_once_some_are_stored(stored, tmp_path):
+    """The first save of all, cut off in its second word."""
+    path = tmp_path / "flash.bin"
+    emulator = stored()
+    with emulator.connect() as esc:
+        esc.set_param("LIM_PHASE_A", 12.5)
+        time.sleep(QUIET_S)
+    emulator.kill()
+    content = path.read_bytes()
+    path.write_bytes(content[: 2 * WORD] + b"\xff" * (len(content) - 2 * WORD))
+    emulator = stored()
+    with emulator.connect() as esc, emulator.throttle():
+        time.sleep(QUIET_S)
+        assert not esc.armed()
+        assert esc.read_param("LIM_PHASE_A").param_value == 20.0
+        esc.set_param("LIM_PHASE_A", 12.5)
+        esc.wait_armed()
