@@ -20,7 +20,8 @@ const MS_NS: u64 = 1_000_000;
 const CAPTURE_HZ: u32 = 170_000_000;
 
 /// Messages that the ESC obeys; the last is one that it does not.
-const MESSAGES: [u32; 10] = [0, 4, 20, 21, 23, 43, 75, 76, 110, 290];
+const MESSAGES: [u32; 11] = [0, 4, 20, 21, 23, 43, 75, 76, 110, SETUP_SIGNING, 290];
+const SETUP_SIGNING: u32 = 256;
 const COMMANDS: [u32; 2] = [75, 76];
 const PARAM_SET: u32 = 23;
 const COMMAND_OFFSET: usize = 28;
@@ -224,6 +225,7 @@ fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool)
         23 => (Some(4), Some(6)),
         75 | 76 => (Some(30), None),
         110 => (Some(1), None),
+        SETUP_SIGNING => (Some(8), None),
         _ => (None, None),
     };
     let mut put = |offset: usize, bytes: &[u8]| {
@@ -233,6 +235,10 @@ fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool)
     };
     if let (Some(target), true) = (target, addressed) {
         put(target, &[1, 1]);
+    }
+    if id == SETUP_SIGNING {
+        // A time that is one: it has 48 bits.
+        put(5, &[0; 3]);
     }
     if let (Some(place), Some(id)) = (place, name) {
         let mut bytes = [0; 16];
