@@ -159,8 +159,9 @@ fn a_run_without_the_figure_is_the_worst() {
         window = "w"
         key = "rpm_mean"
         below = 1.0
+        # The last 10 us, in which no period begins.
         [sweep]
-        "window.0.t0_s" = [0.0, 0.5]
+        "window.0.t0_s" = [0.0, 0.00999]
     "#;
     let survey = plan(text, &Options::default())
         .unwrap()
@@ -169,7 +170,7 @@ fn a_run_without_the_figure_is_the_worst() {
     assert_eq!((survey.failed, survey.expectations[0].worst), (1, None));
     assert_eq!(
         survey.expectations[0].options,
-        "--seed 1 --set window.0.t0_s=0.5"
+        "--seed 1 --set window.0.t0_s=0.00999"
     );
 }
 
