@@ -4,7 +4,9 @@ import json
 
 import pytest
 
+import readme
 from emulator import run
+from paths import ROOT
 
 # What was printed, and within what the simulation must show it.
 BOSSO = {
@@ -21,6 +23,11 @@ BOSSO = {
 }
 
 
+PICTURES = ROOT / "emulator" / "pictures"
+
+REDRAW = "README's picture is not what its commands draw: draw it again by them, and look at it"
+
+
 def assert_compared(items: list[dict]) -> None:
     """Each item has a verdict that follows from its bound, and a reason."""
     for item in items:
@@ -34,6 +41,18 @@ def assert_compared(items: list[dict]) -> None:
         assert item["verdict"] == ("agrees" if within else "differs"), item
 
 
+def test_the_first_spin_is_the_one_in_the_readme(tmp_path):
+    commands = readme.commands("--", "scenario", "--record") + readme.commands("--", "plot")
+    assert [command[command.index("--") + 1] for command in commands] == ["scenario", "plot"]
+    for command in commands:
+        words = [word.replace("target/", f"{tmp_path}/") for word in command[command.index("--") + 1 :]]
+        words = [word.replace("emulator/pictures/", f"{tmp_path}/") for word in words]
+        ended = run(*words)
+        assert ended.returncode == 0, ended.stderr
+    drawn = (tmp_path / "first-spin.svg").read_bytes()
+    assert drawn == (PICTURES / "first-spin.svg").read_bytes(), REDRAW
+
+
 def test_bosso_shows_what_the_paper_printed(tmp_path):
     ended = run("reproduce", "bosso", "--json", "-o", tmp_path)
     assert ended.returncode == 0, ended.stderr
@@ -42,6 +61,7 @@ def test_bosso_shows_what_the_paper_printed(tmp_path):
     items = {item["name"]: item for item in items}
     assert items["fig7_efficiency_diff_3000"]["verdict"] == "differs", "it has the other sign"
     assert items["efficiency_diff_3000"]["verdict"] == "agrees"
+    assert (tmp_path / "bosso-4.svg").read_bytes() == (PICTURES / "bosso-4.svg").read_bytes(), REDRAW
     assert all(item["measured"] is not None for item in items.values())
     for name, (paper, within) in BOSSO.items():
         assert items[name]["paper"] == pytest.approx(paper, abs=1e-4), name
