@@ -71,39 +71,88 @@ impl fmt::Display for Reproduction {
         };
         writeln!(
             f,
-            "{:width$} {:>9} {:>9}      verdict",
-            "", "paper", "measured"
+            "{:width$} {:>9} {:>9}      {:7} {:20}",
+            "", "paper", "measured", "", "agrees from, to"
         )?;
         for item in &self.items {
+            let verdict = match item.comparison.verdict {
+                Verdict::Agrees => "agrees",
+                Verdict::Differs => "DIFFERS",
+                Verdict::Open => "-",
+            };
+            let bound = item.comparison.bound;
+            let bound = bound.map(|[low, high]| format!("{low:.2} {high:.2}"));
             writeln!(
                 f,
-                "{:width$} {:>9} {:>9} {:4} {:7} {}",
+                "{:width$} {:>9} {:>9} {:4} {verdict:7} {:20} {}",
                 item.name,
                 show(item.paper),
                 show(item.measured),
                 item.unit,
-                match item.comparison.verdict {
-                    Verdict::Agrees => "agrees",
-                    Verdict::Differs => "DIFFERS",
-                    Verdict::Open => "-",
-                },
+                bound.unwrap_or_default(),
                 item.note
             )?;
         }
-        for item in &self.items {
-            let Comparison {
-                verdict,
-                bound,
-                reason,
-            } = item.comparison;
-            if let (Verdict::Differs, Some([low, high])) = (verdict, bound) {
-                let (name, unit) = (&item.name, item.unit);
-                writeln!(
-                    f,
-                    "{name} differs: not within {low:.2} to {high:.2} {unit}: {reason}"
-                )?;
-            }
+        self.differences(f)
+    }
+}
+
+impl Reproduction {
+    /// Why each bound is as it is where an item does not keep it: items of one kind have one reason.
+    fn differences(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let differs = |item: &&Item| item.comparison.verdict == Verdict::Differs;
+        let differing: Vec<&Item> = self.items.iter().filter(differs).collect();
+        let of_reason = |a: &&Item, b: &&Item| a.comparison.reason == b.comparison.reason;
+        for kind in differing.chunk_by(of_reason) {
+            let names: Vec<_> = kind.iter().map(|item| item.name.as_str()).collect();
+            let reasons = kind.first().map(|item| item.comparison.reason);
+            let reason = reasons.unwrap_or_default();
+            writeln!(f, "\ndiffering: {}: {reason}", names.join(", "))?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_stands_out_with_its_reason() {
+        let reproduction = Reproduction {
+            items: vec![
+                item(
+                    "fig7_efficiency_diff_3000",
+                    Some(0.4),
+                    -1.12,
+                    "pt",
+                    "figure 7(c)",
+                ),
+                item(
+                    "fig7_efficiency_diff_4500",
+                    Some(0.77),
+                    0.19,
+                    "pt",
+                    "figure 7(c)",
+                ),
+                item("ripple_foc_4500", Some(32.7), 30.35, "%", "figure 4(d)"),
+                item("angle_error_3000", None, 0.29, "deg", "no figure"),
+            ],
+            figures: Vec::new(),
+        };
+        let text = reproduction.to_string();
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines[1].contains("-1.12 pt   DIFFERS 0.20 0.60"), "{text}");
+        assert!(
+            lines[3].contains("30.35 %    agrees  29.43 35.97"),
+            "{text}"
+        );
+        assert!(lines[4].contains("0.29 deg  -  "), "{text}");
+        let [reason] = lines[6..] else {
+            panic!("{text}")
+        };
+        let names =
+            "differing: fig7_efficiency_diff_3000, fig7_efficiency_diff_4500: an experiment";
+        assert!(reason.starts_with(names), "{text}");
     }
 }

@@ -72,8 +72,9 @@ const RULES: &[(&str, Bound, &str)] = &[
         "fig7_efficiency_diff_",
         Share(0.5),
         "an experiment with one motor, whose losses the paper does not print: half of it, and so the sign. \
-         Losses in the iron and harmonics cost six-step more: without them (a sinusoidal motor) its 40 kHz \
-         win at low speed, with estimates of them (real_motor) a part of the paper's gain is there",
+         Losses in the iron and harmonics cost six-step more: without them (a sinusoidal motor) 15 kHz gain \
+         little on its 40 kHz, or lose, and with estimates of them (real_motor) a part of the paper's gain is \
+         there",
     ),
     (
         "fig7_power_offset_",
