@@ -111,7 +111,7 @@ fn scenario(image: &Path, args: &ScenarioArgs) -> Result<ExitCode, String> {
     let mut processor = None;
     let start = |start| Ok(VirtualBoard::new(&image, start)?);
     let played = plan.play_on(&stop, start, |mut board: VirtualBoard| {
-        processor = board.figures()
+        processor = board.figures();
     });
     let outcome = played.map_err(line)?;
     let status = outcome.exit_status();
