@@ -12,10 +12,16 @@ use crate::math::{Real, settled, square_root};
 use crate::params::{ParamId, Params};
 use crate::units::{Angle, Flux, Speed};
 
-/// τ_int·ω at the least speed: there the first-order integrator leads by 10° (2.2.2).
+/// τ_int·ω where Run ends with the defaults, at half of `STA_RUN_RPM`: there the first-order integrator
+/// leads by 10° (2.2.2).
+///
+/// A `CTL_RPM_MIN` below `STA_RUN_RPM` does not lengthen it. What a start leaves in the integrals, and
+/// what one period of them winds up behind an angle that is wrong, must be forgotten within some turns
+/// of the speed at which Run begins, or neither ever goes: with three times the time constant the drive
+/// swings about 640 rpm whatever is asked for. The greater lead at such speeds is known, and taken off.
 const TAU_INT: f32 = 5.671;
 
-/// τ_HPFS over τ_int, much above 1 (figure 21): at the least speed it adds 1° of lead.
+/// τ_HPFS over τ_int, much above 1 (figure 21): where the lead is 10° it adds 1°.
 const HIGH_PASS_SHARE: f32 = 10.0;
 
 /// Half the deadband of the flux, as a share of its amplitude: 3° of the rotor (2.3.2).
@@ -67,7 +73,7 @@ impl FluxSettings {
     /// greatest acceleration that the drive asks for.
     pub fn new(params: &Params) -> Self {
         let get = |id| params.get(id);
-        let tau_int_s = TAU_INT / slow_rad_s(params);
+        let tau_int_s = TAU_INT / rad_s(params, SLOW_SHARE * get(ParamId::StaRunRpm));
         let (n, a_e) = (get(ParamId::CtlPosN), get(ParamId::CtlAe));
         let alpha = get(ParamId::CtlSlewRpmS) * get(ParamId::MotPolePairs) / 60.0;
         // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures anew, and
@@ -88,11 +94,12 @@ impl FluxSettings {
     }
 }
 
-/// The least electrical speed that the flux is followed to, rad/s.
-fn slow_rad_s(params: &Params) -> f32 {
-    slow_rpm(params) * params.get(ParamId::MotPolePairs) * TAU / 60.0
+/// The electrical speed of mechanical rpm, rad/s.
+fn rad_s(params: &Params, rpm: f32) -> f32 {
+    rpm * params.get(ParamId::MotPolePairs) * TAU / 60.0
 }
 
+/// The least speed that the flux is followed to, rpm.
 fn slow_rpm(params: &Params) -> f32 {
     SLOW_SHARE
         * params
@@ -136,7 +143,8 @@ pub(super) fn edges(p: &Si) -> Config {
             deadband: I0F32::from_f32(DEADBAND),
             deadband_angle: Angle::from_f32(libm::asinf(DEADBAND) / TAU),
             hold_off: U0F32::from_f32(settings.hold_off_turns),
-            patience: (PATIENCE * A_TURNS * TAU / (slow_rad_s(p.params) * p.period_s)) as u32,
+            patience: (PATIENCE * A_TURNS * TAU
+                / (rad_s(p.params, slow_rpm(p.params)) * p.period_s)) as u32,
         },
         position: estimator(p, &settings),
         hall: hall::Config {
