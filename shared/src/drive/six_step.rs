@@ -24,7 +24,7 @@ use crate::control::six_step::commutation::{HALF_SEXTANT, Legs, SEXTANT};
 use crate::control::six_step::tracking::KNOWN;
 use crate::control::six_step::{crossing, duty};
 use crate::control::speed::Bounds;
-use crate::math::{Gain, TopProduct};
+use crate::math::{Gain, Held, TopProduct};
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
 /// Sextants in a row without a crossing after which the rotor is lost: two turns.
@@ -37,6 +37,9 @@ const IMPATIENCE: u8 = 4;
 /// Readings up to which there is no current: noise, and what is left of an offset. On the bench 0.3 A
 /// are 20 rpm.
 const NO_CURRENT: AdcCounts = AdcCounts::lit("16");
+
+/// What a shaft may gain in speed while it is to stop, as a part of the least that it has had.
+const GAINED_PART: i32 = 64;
 
 /// Periods in a row without a current after which the shaft stands.
 const STILL_PERIODS: u16 = 1000;
@@ -152,7 +155,10 @@ fn follow(config: &super::Config, six_step: &Config, state: &mut super::State, s
         }
         Phase::Sense | Phase::Charge if too_fast => state.rest(Phase::Idle),
         Phase::Park | Phase::Ramp if !along(config, state, setpoint) => end(config, state),
-        Phase::Run if resting => state.phase = Phase::Stopping,
+        Phase::Run if resting => {
+            state.phase = Phase::Stopping;
+            run_from_here(state);
+        }
         _ => {}
     }
 }
@@ -342,12 +348,12 @@ fn run(
     setpoint: Setpoint,
 ) {
     let bounds = state.protection.bounds;
-    let bounds = Bounds {
-        min: bounds.min.max(-six_step.braking),
-        max: bounds.max,
-    };
     let reversed = state.reversed;
     let s = &mut state.six_step;
+    let bounds = Bounds {
+        min: bounds.min.max(-six_step.braking),
+        max: bounds.max.minus(s.duty.ripple()).max(bounds.max / 2),
+    };
     let steady = |current: Current| {
         let held = current.min(bounds.max).max(bounds.min);
         Bounds {
@@ -372,11 +378,27 @@ fn run(
         }
         Demand::Current(current) => regulate(six_step, s, i, steady(current)),
         Demand::Rest => {
+            // A current of none is one of some mA: what a shaft without a load gains by it is taken
+            // back.
+            let slowest = s.planner.reference.min(s.tracking.omega_bar);
+            let gained = s.tracking.omega_bar.saturating_sub(slowest) > slowest / GAINED_PART;
             let current = match config.stop {
                 Stop::Coast => Current::ZERO,
                 Stop::Brake => bounds.min,
             };
-            regulate(six_step, s, i, steady(current));
+            let current = if gained {
+                current.min(turn::reading(NO_CURRENT).saturating_neg())
+            } else {
+                current
+            };
+            let held = Bounds {
+                min: current,
+                max: current,
+            };
+            regulate(six_step, s, i, held);
+            s.planner = planner::State::begin(slowest);
+            duty::take_over(&mut s.duty);
+            return;
         }
     }
     s.planner = planner::State::begin(s.tracking.omega_bar);

@@ -13,6 +13,10 @@ use crate::control::speed::Bounds;
 use crate::math::{Gain, Held};
 use crate::units::{Current, Duty, Speed};
 
+/// Time constant with which the current's peak is forgotten, in periods, as a power of two: longer
+/// than a sextant where its ripple is too fast to be regulated away.
+const PEAK_SHIFT: u32 = 6;
+
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
@@ -35,6 +39,8 @@ pub struct State {
     pub sigma: I1F31,
     /// The current behind a low-pass filter of eight periods.
     pub smoothed: Current,
+    /// The greatest magnitude of the current, which is forgotten slowly.
+    pub peak: Current,
 }
 
 /// Between what the duty may be in this period.
@@ -47,6 +53,14 @@ pub struct Range {
 }
 
 impl State {
+    /// By how much the current's peaks exceed its mean: a bound of the phase currents is one of their
+    /// peaks. Between two commutations the back-EMF falls and rises, and with it the current.
+    pub fn ripple(&self) -> Current {
+        self.peak
+            .minus(self.smoothed.saturating_abs())
+            .max(Current::ZERO)
+    }
+
     /// The duty for the bridge.
     pub fn for_bridge(&self) -> Duty {
         Duty::from_bits(self.duty.max(I1F31::ZERO).to_bits() as u32)
@@ -65,6 +79,8 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
     state.smoothed = state
         .smoothed
         .plus(Current::from_bits(change.to_bits() >> 3));
+    let forgotten = Current::from_bits(state.peak.to_bits() >> PEAK_SHIFT);
+    state.peak = state.peak.minus(forgotten).max(i.saturating_abs());
     let ahead = i.plus(change.saturating_mul_int(3));
     let until = |bound: Current| {
         let step = config.k_b.held(bound.minus(ahead));

@@ -52,7 +52,11 @@ pub(super) fn park(
         low,
         floating,
     } = s.sector.legs(currents.map(reading));
-    hold(six_step, s, switching, wanted);
+    // A rotor that swings drives a current through the other two, which may be the greatest.
+    let greatest = switching
+        .max(low.saturating_abs())
+        .max(floating.saturating_abs());
+    hold(six_step, s, greatest, wanted);
     // By the first attempt's current: a greater one does not damp the swing any sooner. After a
     // start that has failed, twice as long.
     s.charge += I36F28::from(wanted.min(six_step.start_current));

@@ -88,6 +88,7 @@ impl State {
                     duty,
                     sigma,
                     smoothed,
+                    peak,
                 },
             charge,
             swing,
@@ -103,7 +104,7 @@ impl State {
             (word(span.first), word(span.last))
         });
         let charge = charge.to_bits();
-        let words: [i32; 30] = [
+        let words: [i32; 31] = [
             *sector as i32,
             i32::from(*samples),
             i32::from(*side),
@@ -126,6 +127,7 @@ impl State {
             duty.to_bits(),
             sigma.to_bits(),
             smoothed.to_bits(),
+            peak.to_bits(),
             charge as i32,
             (charge >> 32) as i32,
             swing.to_bits(),

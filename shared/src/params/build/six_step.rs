@@ -29,8 +29,13 @@ const PROPORTIONAL: f32 = 1.0;
 /// bench's shaft has a time constant of 46 ms under a constant duty.
 const CORNER_SHARE: f32 = 0.4;
 
-/// How fast the duty changes while the current has all of `LIM_PHASE_A` left, 1/s.
+/// How fast the duty changes while the current has all of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], left,
+/// 1/s.
 const BOUND_RATE: f32 = 320.0;
+
+/// The least bound, A, that the loop's gain grows for: a lower one makes a motor's current answer no
+/// slower. On the bench, at 5 A the loop would ring by half of it.
+const BOUND_LEAST_A: f32 = 20.0;
 
 /// For how long a start waits for a crossing, s: under its ramp's current a rotor with ten times the
 /// bench's inertia takes 0.08 s.
@@ -55,7 +60,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32) -> Config {
     let count_v = p.board.terminal_v_per_count;
     let k_p = PROPORTIONAL / fastest;
     let corner = CORNER_SHARE * TAU * get(ParamId::CtlBwSpdHz);
-    let bound = BOUND_RATE * p.period_s * p.scale.current_a / limit_a;
+    let bound = BOUND_RATE * p.period_s * p.scale.current_a / limit_a.max(BOUND_LEAST_A);
     let step = get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
     Config {
         planner: outer::planner(p, p.period_s),
