@@ -139,13 +139,15 @@ impl Rig {
 
     /// Lets other faults act than before.
     pub fn disturb(&mut self, before: &InForce, now: &InForce) {
-        self.around.disturb(before, now, self.comparator_a());
+        self.around.disturb(before, now);
     }
 
     /// Where a board's comparators turn the bridge off: 1.6 times `LIM_PHASE_A` where the drive's own
-    /// trip is at 1.4, and never above what the board can measure, A.
+    /// trip is at 1.4, and never above what the board can measure, A. They go up with the limit, and
+    /// down with the drive's trip.
     fn comparator_a(&self) -> f64 {
-        let trip_counts: f64 = self.config.protection.trip.to_num();
+        let trip = self.config.protection.trip.max(self.state.trip_level());
+        let trip_counts: f64 = trip.to_num();
         let Bench { sensing, delay, .. } = self.around.bench();
         let per_count_a = f64::from(sensing.board(*delay).current_a_per_count);
         (trip_counts * per_count_a * (1.6 / 1.4)).min(sensing.range_a)
@@ -263,6 +265,7 @@ impl Rig {
         };
         self.applied = bridge;
         let (period_s, dead_time_s) = (self.period_s(), self.dead_time_s());
+        self.around.set_comparator_a(self.comparator_a());
         Period {
             sample,
             setpoint,
@@ -293,5 +296,39 @@ impl Period {
     /// Mechanical speed, rpm.
     pub fn rpm(&self) -> f64 {
         self.motion.rpm()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use siskin_control::params::{ParamId, Params, build};
+
+    use super::*;
+
+    fn limited_to(limit_a: f32) -> Config {
+        let mut params = Params::default();
+        params.set(ParamId::LimPhaseA, limit_a).expect("in range");
+        let bench = Bench::default();
+        build(&params, &bench.sensing.board(bench.delay)).expect("it fits the bench")
+    }
+
+    #[test]
+    fn the_comparators_go_down_behind_the_current_and_up_at_once() {
+        let mut rig = Rig::new(Bench::default(), limited_to(20.0));
+        let near = |rig: &Rig, wanted_a: f64| (rig.comparator_a() - wanted_a).abs() < 0.1;
+        let fast = Setpoint::Speed(rig.config().scale.speed_from_rpm(5000.0));
+        for _ in 0..48_000 {
+            rig.period(fast);
+        }
+        rig.configure(limited_to(2.0));
+        rig.period(fast);
+        assert!(near(&rig, 32.0), "{}", rig.comparator_a());
+        for _ in 0..1000 {
+            rig.period(fast);
+        }
+        assert!(near(&rig, 3.2), "{}", rig.comparator_a());
+        rig.configure(limited_to(10.0));
+        assert!(near(&rig, 16.0), "{}", rig.comparator_a());
+        assert!(rig.snapshot().faults.is_empty());
     }
 }

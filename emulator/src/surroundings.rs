@@ -245,11 +245,15 @@ impl Surroundings {
         }
     }
 
-    /// Lets other faults act than before. In whole periods of the control, comparators turn the bridge
-    /// off at `comparator_a`.
-    pub fn disturb(&mut self, before: &InForce, now: &InForce, comparator_a: f64) {
+    /// Sets the level, A, at which comparators turn the bridge off in whole periods of the control.
+    pub fn set_comparator_a(&mut self, level_a: f64) {
+        self.plant.set_comparator_a(level_a);
+    }
+
+    /// Lets other faults act than before.
+    pub fn disturb(&mut self, before: &InForce, now: &InForce) {
         if now.breaks != before.breaks {
-            self.plant.break_legs(&now.breaks, comparator_a);
+            self.plant.break_legs(&now.breaks);
         }
         if now.blocked != before.blocked {
             self.plant.block(now.blocked);

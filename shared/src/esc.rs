@@ -6,9 +6,9 @@ use heapless::Vec;
 use crate::answer::info::info;
 use crate::drive::{Config, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
-use crate::math::magnitude;
+use crate::math::{Real, magnitude};
 use crate::mavlink::{Component, Context, Frame, Request, Warning};
-use crate::params::{Board, BuildError, ParamId, Params, build};
+use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build};
 use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Reach, Reached, Throttle, Told};
@@ -166,6 +166,13 @@ impl Esc {
     /// The parameters in force.
     pub fn params(&self) -> &Params {
         &self.params
+    }
+
+    /// The bound of the phase currents that a board's own trip is to stand above, peak A:
+    /// `LIM_PHASE_A`, and while the control's trip has not come down to it, the one before.
+    pub fn phase_limit_a(&self, snapshot: &Snapshot) -> f32 {
+        let trip_a = snapshot.trip.to_f32() * self.board.current_a_per_count;
+        self.params.get(ParamId::LimPhaseA).max(trip_a / TRIP_SHARE)
     }
 
     /// The state as telemetry reports it.

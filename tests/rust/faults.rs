@@ -11,6 +11,7 @@ use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Frame, Receiver, Request};
 use siskin_control::params::{ParamId, Params};
 use siskin_control::throttle::Throttle;
+use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_emulator::wire::Wire;
 
@@ -19,6 +20,8 @@ const MS_NS: u64 = 1_000_000;
 const STOP: u16 = 0;
 /// Maps onto 3150 rpm.
 const HALF: u16 = 1048;
+/// Maps onto 6000 rpm.
+const FULL: u16 = 2047;
 const ROOM_C: f32 = 25.0;
 
 /// An ESC on its bench, with a flight controller that sends a frame a millisecond.
@@ -268,17 +271,57 @@ fn above_lim_temp_c_the_bridge_is_off_until_5_degrees_below_it_and_zero_throttle
 }
 
 #[test]
+fn a_limit_that_is_lowered_in_flight_stops_no_motor() {
+    for drive in [0.0, 1.0] {
+        let mut params = Params::default();
+        for (id, value) in [(ParamId::CtlDrive, drive), (ParamId::PwmFreqHz, 40_000.0)] {
+            params.set(id, value).expect("in range");
+        }
+        let mut station = Station::on(
+            Bench {
+                plant: Fidelity::Switching,
+                ..Bench::default()
+            },
+            params,
+        );
+        station.run(400, STOP);
+        let fast = station.run(2_000, FULL);
+        assert!((fast.rpm - 6000.0).abs() < 60.0, "{drive}: {fast:?}");
+        let limit_a = |station: &Station| station.esc.phase_limit_a(&station.rig.snapshot());
+        for lowered_a in [5.0, 2.0] {
+            let before_a = limit_a(&station);
+            station.set(ParamId::LimPhaseA, lowered_a);
+            // Neither does the board's own trip go below a current that still flows.
+            assert!(limit_a(&station) > 0.99 * before_a, "{drive}, {lowered_a}");
+            let slower = station.run(1_000, FULL);
+            assert!(
+                station.rig.snapshot().fault_count == 0,
+                "{drive}, {lowered_a}: {:?}",
+                station.texts()
+            );
+            assert!(slower.rpm > 1000.0, "{drive}, {lowered_a}: {slower:?}");
+            let now_a = limit_a(&station);
+            assert!((now_a - lowered_a).abs() < 0.05, "{drive}: {now_a}");
+        }
+        station.set(ParamId::LimPhaseA, 20.0);
+        assert_eq!(limit_a(&station), 20.0);
+        let fast = station.run(2_000, FULL);
+        assert!((fast.rpm - 6000.0).abs() < 60.0, "{drive}: {fast:?}");
+        assert_eq!(station.rig.snapshot().fault_count, 0, "{drive}");
+    }
+}
+
+#[test]
 fn a_motor_is_not_tested_while_its_shaft_turns_after_a_fault() {
     let mut station = Station::turning();
-    // Half throttle takes 3 A, and 1.4 times the bound trips.
-    station.set(ParamId::LimPhaseA, 0.5);
+    station.temperature_c = 101.0;
     station.run(10, HALF);
-    assert!(station.has(Fault::OverCurrent));
-    station.set(ParamId::LimPhaseA, 20.0);
+    assert!(station.has(Fault::OverTemperature));
+    station.temperature_c = ROOM_C;
     assert_eq!(station.test(), MavResult::MAV_RESULT_TEMPORARILY_REJECTED);
 
     let cleared = station.run(500, STOP);
-    assert!(!station.has(Fault::OverCurrent));
+    assert!(!station.has(Fault::OverTemperature));
     assert!(cleared.rpm > 500.0, "it coasts: {cleared:?}");
     let mut refused = 0;
     loop {

@@ -74,12 +74,16 @@ impl Plant {
     /// Breaks parts of the stage and mends all others.
     ///
     /// While something is broken every switch edge is simulated, and a comparator at each low side's
-    /// shunt turns all switches off where it sees more than `trip_a`. It looks at each edge, and acts
+    /// shunt turns all switches off where it sees more than its level. It looks at each edge, and acts
     /// a microsecond later: with a sound stage the drive's own trip at the samples comes first.
-    pub fn break_legs(&mut self, breaks: &Breaks, trip_a: f64) {
-        self.trip_a = trip_a;
+    pub fn break_legs(&mut self, breaks: &Breaks) {
         let on = [0, 1, 2].map(|leg| self.timers[leg].on());
         self.stage.break_legs(breaks, on);
+    }
+
+    /// Sets the comparators' level, A; it is infinite at the start.
+    pub fn set_comparator_a(&mut self, level_a: f64) {
+        self.trip_a = level_a;
     }
 
     /// Whether the comparators hold all switches off, until the drive turns them off as well.

@@ -8,9 +8,9 @@ use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Instant, Ticker};
+use siskin_control::drive::Snapshot;
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
-use siskin_control::params::ParamId;
 
 use super::health;
 use super::light::Light;
@@ -70,6 +70,8 @@ pub(crate) struct Desk {
     pub(crate) supervisor: Supervisor,
     /// Whether the interrupt is still to be given the configuration in force.
     pub(crate) changed: bool,
+    /// The bound of the phase currents that the hardware's trip stands above, A.
+    pub(crate) limit_a: f32,
     /// Polls until the chip restarts, if it is to.
     pub(crate) restart_polls: Option<u8>,
 }
@@ -124,6 +126,7 @@ impl Desk {
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.obey(request);
         }
+        self.limit(&snapshot);
         self.configure();
         self.restart();
     }
@@ -174,6 +177,14 @@ impl Desk {
         if let Ok(config) = self.esc.config() {
             self.changed = self.config.offer(config).is_err();
         }
-        interrupt::set_trip(self.esc.params().get(ParamId::LimPhaseA));
+    }
+
+    /// Has the hardware's trip follow `LIM_PHASE_A`: up before the control does, and down after it.
+    fn limit(&mut self, snapshot: &Snapshot) {
+        let limit_a = self.esc.phase_limit_a(snapshot);
+        if limit_a != self.limit_a {
+            self.limit_a = limit_a;
+            interrupt::set_trip(limit_a);
+        }
     }
 }

@@ -53,6 +53,7 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
     let ends = exchange::open(stale_periods).expect("opened here and nowhere else");
     static SNAPSHOT: StaticCell<SnapshotReader> = StaticCell::new();
     let snapshot = &*SNAPSHOT.init(ends.snapshot);
+    let limit_a = esc.params().get(ParamId::LimPhaseA);
     start_interrupt(esc, hardware.bridge, hardware.converters, ends.interrupt);
     let (capture, replier) = hardware.throttle.open();
     throttle::start(Listener {
@@ -80,6 +81,7 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
         light: Light::new(hardware.light),
         supervisor: Supervisor::new(hardware.watchdog),
         changed: false,
+        limit_a,
         restart_polls: None,
     });
 

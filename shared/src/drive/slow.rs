@@ -111,6 +111,7 @@ fn reach(config: &Config, state: &mut State) {
 #[inline(never)]
 fn bounds(config: &Config, state: &mut State) {
     let seen = &state.seen;
+    protection::follow_limit(&config.protection, &mut state.protection, seen.i);
     protection::bound(
         &config.protection,
         &mut state.protection,

@@ -12,7 +12,7 @@ use crate::control::{
 };
 use crate::math::SinCos;
 use crate::protection;
-use crate::units::{Angle, Current, Duty, Flux, Speed, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Duty, Flux, Speed, Voltage};
 
 /// The sample at which the bridge is turned off, and one for a period of delay.
 const SETTLING_PERIODS: u8 = 2;
@@ -123,6 +123,8 @@ pub struct Snapshot {
     pub bus: Voltage,
     /// Current from the supply, 1.5·(v·i)/V_bus; negative while braking.
     pub bus_current: Current,
+    /// Magnitude of a phase's reading that turns the bridge off.
+    pub trip: AdcCounts,
     /// The adapted inductance over the one that the parameters state.
     pub inductance: Factor,
     /// Whether a position sensor is at fault.
@@ -213,6 +215,12 @@ impl State {
         self.observer.given.place(theta, omega);
     }
 
+    /// Magnitude of a phase's reading that turns the bridge off now.
+    #[inline(always)]
+    pub fn trip_level(&self) -> AdcCounts {
+        self.protection.trip
+    }
+
     /// What the tasks may know.
     // Made where it is put, not copied there.
     #[inline(always)]
@@ -235,6 +243,7 @@ impl State {
             u: self.seen.u,
             bus: self.protection.bus,
             bus_current: self.seen.bus_current,
+            trip: self.trip_level(),
             inductance: self.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.observer),
             failed_starts: self.failed_starts.max(failed),
@@ -321,6 +330,7 @@ impl State {
             planned.to_bits(),
             i_q.to_bits(),
             missing.to_bits(),
+            protection.trip.to_bits(),
             protection.bus.to_bits(),
             protection.bounds.min.to_bits(),
             protection.bounds.max.to_bits(),

@@ -6,6 +6,7 @@ mod table;
 
 use crate::math::SQRT_3;
 
+pub(crate) use build::TRIP_SHARE;
 pub use build::{Board, BuildError, FluxSettings, LeastDeadTime, build, input};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE, Text};

@@ -9,7 +9,8 @@ pub use ntc::Ntc;
 use fixed::types::extra::U28;
 
 use crate::control::speed::Bounds;
-use crate::math::{Gain, Held, Multiplier};
+use crate::control::transform::Dq;
+use crate::math::{Gain, Held, Multiplier, magnitude};
 use crate::units::{AdcCounts, Current, Voltage};
 
 /// Samples in a row above the trip level that are an over-current, so that one disturbed reading
@@ -19,7 +20,8 @@ const OVER_CURRENT_SAMPLES: u8 = 2;
 /// Thresholds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`.
+    /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`. Where that was lowered, the
+    /// trip in force is [`State::trip`].
     pub trip: AdcCounts,
     /// Least supply voltage.
     pub bus_min: Voltage,
@@ -42,6 +44,9 @@ pub struct Config {
 /// What is remembered from sample to sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
+    /// Magnitude of a phase's reading that trips now: [`Config::trip`], or that of the limit before,
+    /// until the current has come down to one that was lowered.
+    pub trip: AdcCounts,
     /// Samples in a row above the trip.
     pub over_current_samples: u8,
     /// Supply voltage behind a low-pass filter.
@@ -54,6 +59,7 @@ impl State {
     /// At power-up: full bounds, and a supply in the middle of its range until samples tell.
     pub fn new(config: &Config) -> Self {
         Self {
+            trip: config.trip,
             over_current_samples: 0,
             bus: config.bus_min / 2 + config.bus_max / 2,
             bounds: config.full_bounds(),
@@ -84,7 +90,10 @@ pub fn check(
     // Both are from 0 to 8, the type is of ±8: nothing here wraps.
     state.bus = state.bus.wrapping_add(bus.wrapping_sub(state.bus) >> 3);
 
-    if currents.is_some_and(|currents| beyond(config.trip, currents)) {
+    if currents.is_none() {
+        state.trip = config.trip;
+    }
+    if currents.is_some_and(|currents| beyond(state.trip, currents)) {
         state.over_current_samples = state.over_current_samples.saturating_add(1);
         if state.over_current_samples >= OVER_CURRENT_SAMPLES {
             return Some(Fault::OverCurrent);
@@ -111,6 +120,19 @@ fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     let far = |current: AdcCounts| current.to_bits().wrapping_add(trip) as u32 > 2 * trip as u32;
     let [a, b, c] = currents;
     far(a) || far(b) || far(c)
+}
+
+/// Lets the trip follow `LIM_PHASE_A`: at once where that was raised, and where it was lowered when
+/// the current vector `i` has come down to within a quarter above it. Else to lower a limit would be a
+/// reason to trip.
+pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {
+    if state.trip == config.trip {
+        return;
+    }
+    let down = magnitude(i.d, i.q) <= config.phase.plus(config.phase / 4);
+    if down || state.trip < config.trip {
+        state.trip = config.trip;
+    }
 }
 
 /// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw` and takes no more than

@@ -37,7 +37,7 @@ fn compare_broken(
     command: impl Fn(u32, &Plant) -> [Bridge; 2],
 ) {
     let mut plant = held(fidelity, rpm, 0.1);
-    plant.break_legs(&breaks, f64::INFINITY);
+    plant.break_legs(&breaks);
     let mut brute = BruteForce::new(*MOTOR, &[], &plant, DEAD_TIME_S);
     brute.breaks = breaks;
     compare_brute(brute, plant, 24.0, 30, command);
@@ -84,7 +84,7 @@ fn six_step_commutation_with_an_open_wire_is_as_by_brute_force() {
 #[test]
 fn a_divider_of_two_switches_is_as_by_brute_force() {
     let mut plant = held(Fidelity::Switching, 1000.0, 0.1);
-    plant.break_legs(&shorted(LOW), f64::INFINITY);
+    plant.break_legs(&shorted(LOW));
     let mut brute = BruteForce::new(*MOTOR, &[], &plant, DEAD_TIME_S);
     brute.breaks = shorted(LOW);
     for _ in 0..10 {
@@ -113,7 +113,7 @@ fn a_current_ends_where_its_wire_opens_and_comes_back_with_it() {
         plant.period(command, 24.0, PERIOD_S, DEAD_TIME_S);
     }
     let before = plant.currents_a();
-    plant.break_legs(&wire(), f64::INFINITY);
+    plant.break_legs(&wire());
     let [a, b, c] = plant.currents_a();
     let kept_a = 0.5 * (before[0] - before[2]);
     assert!(before[1].abs() > 1.0 && b.abs() < 1e-9, "{before:?} {b}");
@@ -122,7 +122,7 @@ fn a_current_ends_where_its_wire_opens_and_comes_back_with_it() {
         "{a} {c}"
     );
 
-    plant.break_legs(&Breaks::default(), f64::INFINITY);
+    plant.break_legs(&Breaks::default());
     for _ in 0..5 {
         plant.period(command, 24.0, PERIOD_S, DEAD_TIME_S);
     }
@@ -135,7 +135,8 @@ fn a_current_ends_where_its_wire_opens_and_comes_back_with_it() {
 fn a_shoot_through_trips_the_comparator() {
     for (switch, seen_at_sample) in [(LOW, false), (HIGH, true)] {
         let mut plant = held(Fidelity::Averaged, 0.0, 0.1);
-        plant.break_legs(&shorted(switch), 32.0);
+        plant.set_comparator_a(32.0);
+        plant.break_legs(&shorted(switch));
         let command = [duties([0.5; 3]); 2];
         let flow = plant.period(command, 24.0, PERIOD_S, DEAD_TIME_S);
         assert!(plant.tripped());
@@ -147,7 +148,8 @@ fn a_shoot_through_trips_the_comparator() {
         assert!(!plant.tripped());
 
         // Without a comparator a shunt shows it where the low sides are on at the sample.
-        plant.break_legs(&shorted(switch), f64::INFINITY);
+        plant.set_comparator_a(f64::INFINITY);
+        plant.break_legs(&shorted(switch));
         plant.period(command, 24.0, PERIOD_S, DEAD_TIME_S);
         let shunts_a = plant.shunts_a(plant.currents_a());
         assert_eq!(shunts_a[1] < -1000.0, seen_at_sample, "{shunts_a:?}");

@@ -47,6 +47,11 @@ pub(super) fn tell(
         q: Voltage::from_bits(along.top(from_middle.cos).to_bits() << 1),
     };
     let measured = park(clarke(currents), SinCos::of(angle));
+    let peak = Dq {
+        d: Current::ZERO,
+        q: s.duty.peak,
+    };
+    protection::follow_limit(&config.protection, &mut state.protection, peak);
     let speed = match (parked, s.tracking.crossings) {
         (true, _) => Speed::ZERO,
         (false, 0) => s.tracking.omega,

@@ -145,7 +145,7 @@ const BANDWIDTH_SHARE: f32 = 0.05;
 const SPEED_SHARE: f32 = 0.2;
 
 /// Software trip over `LIM_PHASE_A`.
-const TRIP_SHARE: f32 = 1.4;
+pub(crate) const TRIP_SHARE: f32 = 1.4;
 
 /// What of the converter's range a trip may take: offsets and the uneven ends of the range stay
 /// below the rest.

@@ -40,7 +40,7 @@ impl<P: Processor<World>> VirtualBoard<P> {
         self.wire.disturb(now.wire);
         let world = self.processor.surroundings();
         // The chip's own comparators act.
-        world.bench().disturb(&before, &now, f64::INFINITY);
+        world.bench().disturb(&before, &now);
         world.parts().flash.fail(now.flash_fails);
         let starved = now.bus_weakened && world.bench().bus_v() < CHIP_V;
         if self.starved && !starved {

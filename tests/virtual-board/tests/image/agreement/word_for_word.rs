@@ -164,7 +164,7 @@ fn the_chip_s_control_state_is_the_shared_code_s_word_for_word() {
     for (now, steps) in trouble() {
         // The comparators are the chip's.
         let bench = chip.world().bench();
-        bench.disturb(&before, &now, f64::INFINITY);
+        bench.disturb(&before, &now);
         play(&mut chip, &steps, &mut nobody);
         before = now;
     }
