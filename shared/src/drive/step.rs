@@ -130,6 +130,10 @@ fn any(config: &Config, state: &mut State, sample: &Sample, setpoint: Setpoint) 
     if rest::is_off(config, state) {
         return rest::off(config, state, sample, setpoint);
     }
+    if state.phase.drives() && config.six_step.is_none() {
+        // As in a plain period: of the supply that the sample before has shown.
+        slow::turn(config, state, &setpoint);
+    }
     let off = matches!(state.phase, Phase::Idle | Phase::Sense);
     if state.unread == 0 && state.switched() {
         state.unread = 1;
@@ -222,7 +226,6 @@ fn healthy(
         return Bridge::Charge(config.charge.duty);
     }
     if state.phase.drives() {
-        slow::turn(config, state, &setpoint);
         if state.phase.is_open_loop() {
             launch::impose(config, state, &setpoint);
         } else if let Some(adapt) = &config.adapt_l {

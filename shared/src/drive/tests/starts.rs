@@ -4,6 +4,7 @@ use super::*;
 use crate::control::observer::sector::Sector;
 use crate::drive::launch;
 use crate::drive::slow::CYCLE;
+use crate::drive::state::NOT_PLAIN;
 use crate::units::Angle;
 use fixed::types::I1F31;
 
@@ -316,4 +317,34 @@ fn what_flows_as_the_bridge_is_turned_off_is_no_offset() {
     bench.run(2, sample([13.5, 0.0, -13.5], 24.0), turn);
     bench.until(Phase::Charge, turn);
     assert_eq!(bench.state.sensing.offsets, [AdcCounts::ZERO; 3]);
+}
+
+/// With the supply in motion, so that a look at another sample of it shows.
+#[test]
+fn a_period_is_the_same_whether_it_is_a_plain_one_or_not() {
+    let (mut plain, mut general) = (Bench::new(&[]), Bench::new(&[]));
+    let turn = plain.turn();
+    let mut driven = 0;
+    for k in 0..20_000 {
+        let bus_v = 24.0 + 0.5 * (f64::from(k) * 0.01).sin();
+        let angle = f64::from(k) * 0.02;
+        let current = |shift: f64| 2.0 * (angle - shift * TAU / 3.0).sin();
+        let sample = sample([current(0.0), current(1.0), current(2.0)], bus_v);
+        let sample = match plain.phase() {
+            Phase::Idle | Phase::Sense => self::sample([0.0; 3], bus_v),
+            _ => sample,
+        };
+        general.state.plain = NOT_PLAIN;
+        let bridges = (plain.run(1, sample, turn), general.run(1, sample, turn));
+        if driven > 0 && !plain.state.phase.drives() {
+            // These currents are no rotor's: the start has failed.
+            break;
+        }
+        assert_eq!(bridges.0, bridges.1, "{k}: {:?}", plain.phase());
+        assert_eq!(plain.state.seen, general.state.seen, "{k}");
+        assert_eq!(plain.state.supply, general.state.supply, "{k}");
+        assert_eq!(plain.state.bounds, general.state.bounds, "{k}");
+        driven += u32::from(plain.state.plain != NOT_PLAIN);
+    }
+    assert!(driven > 5_000, "{driven}");
 }
