@@ -231,6 +231,35 @@ fn the_current_is_bounded_by_means_too_with_r_and_l_stated_wrongly() {
 }
 
 #[test]
+fn the_current_is_bounded_with_r_or_l_stated_far_too_high() {
+    // 145 times the bench's own, which only some observers take; and eight times theirs.
+    let l = vec![(ParamId::MotLUh, 4437.0), (ParamId::CtlObserver, 1.0)];
+    let eightfold = |name| {
+        let standing = stand(name, Default::default()).expect("a built-in bench");
+        let mut stated = Params::default();
+        for (id, value) in &standing.params {
+            stated.set(*id, *value).expect("in range");
+        }
+        let r_mohm = 8.0 * stated.get(ParamId::MotRMohm);
+        (name, vec![(ParamId::MotRMohm, r_mohm)])
+    };
+    for (name, wrong) in BENCHES.map(eightfold).into_iter().chain([("bosso", l)]) {
+        for plant in PLANTS {
+            let mut stage = Stage::at_rest(name, &wrong, |bench| {
+                askew(bench);
+                bench.plant = plant;
+            });
+            for hz in [587, 1319, 3000] {
+                let seen = stage.hum(hz, 0.2);
+                let case = format!("{name}, {plant:?}, {wrong:?}, {hz} Hz: {seen:?}");
+                assert!(seen.peak_a < BOUND_A * 1.25, "{case}");
+                assert!(seen.peak_a > BOUND_A * 0.6, "{case}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_current_has_the_note_s_frequency() {
     for name in BENCHES {
         for plant in PLANTS {

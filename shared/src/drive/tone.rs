@@ -10,6 +10,10 @@
 //! the share that is missing and falls by half of the share that is too much: so it is soon there,
 //! and the greatest of the half cycles stays near what is wanted. For a sensor that shows nothing,
 //! the amplitude itself is bounded: by what twice the current and the dead time need.
+//!
+//! What the current needs is not taken from R and L as stated, one of which may be a hundred times
+//! the true one, but learnt: it begins at the lesser of what each alone would take, and is doubled
+//! where twice as much has not brought the current. What both as stated would take is the most.
 
 use fixed::types::extra::{U28, U31, U32};
 use fixed::types::{I1F31, I6F26};
@@ -29,6 +33,10 @@ use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 /// Highest pitch, turns a period: with eight samples a cycle the greatest of them is at most 8 %
 /// below the current's peak.
 pub const PITCH_MAX: Speed = Speed::lit("0.125");
+
+/// The least that a current is taken to need, of what the dead time takes: crossing that in steps of a
+/// quarter of so much takes some 30 half cycles.
+const DEAD_SHIFT: u32 = 3;
 
 /// The period behind Charge in which a tone begins; those before it look at the supply.
 const READY_PERIODS: u32 = 3;
@@ -59,6 +67,8 @@ pub(super) struct Playing {
     amplitude: Voltage,
     /// Greatest phase current since the last half cycle began.
     peak: Current,
+    /// Voltage that the peak current needs beside the dead time's, as far as has been learnt.
+    needed: Voltage,
     /// The low sides were on before, and will be again: at once where a tone has been played, else
     /// when the rotor is seen to stand.
     pub(super) braked: bool,
@@ -72,12 +82,14 @@ impl Playing {
             angle,
             amplitude,
             peak,
+            needed,
             braked,
         } = self;
         out(pitch.to_bits() as u32);
         out(angle.to_bits() as u32);
         out(amplitude.to_bits() as u32);
         out(peak.to_bits() as u32);
+        out(needed.to_bits() as u32);
         out(u32::from(*braked));
     }
 }
@@ -203,7 +215,10 @@ fn play(
 /// The amplitude of the coming half cycle.
 fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
     let reactive = tone.reactive.held(playing.pitch);
-    let needed = magnitude(tone.resistive, reactive);
+    let stated = magnitude(tone.resistive, reactive);
+    let dead = Voltage::from_bits(tone.dead.top(supply.bus).to_bits() << 1);
+    let least = tone.resistive.min(reactive).max(dead >> DEAD_SHIFT);
+    let needed = playing.needed.max(least).min(stated);
     let missing = tone.share.held(tone.peak.minus(playing.peak));
     // 28 + 31 − 32 fraction bits are half of it with 28.
     let half = needed.top(missing);
@@ -212,8 +227,13 @@ fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
     } else {
         half.top(missing).to_bits()
     });
-    let dead = Voltage::from_bits(tone.dead.top(supply.bus).to_bits() << 1);
+    let wanted = playing.amplitude.plus(step).max(Voltage::ZERO);
     let most = needed.plus(needed).plus(dead).min(supply.longest.length());
-    playing.amplitude = playing.amplitude.plus(step).max(Voltage::ZERO).min(most);
+    playing.needed = if wanted > most {
+        needed.plus(needed)
+    } else {
+        needed
+    };
+    playing.amplitude = wanted.min(most);
     playing.peak = Current::ZERO;
 }

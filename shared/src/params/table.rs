@@ -149,7 +149,7 @@ parameters! {
             0 "coast"
             1 "brake";
     18 MotToneA "MOT_TONE_A" "A" Real 0.0..10.0 = 1.5 live
-        "Bound of tones' phase current, peak; up to a quarter more with R or L stated 30 % wrong; 0 is silent";
+        "Bound of tones' phase current, peak; up to a quarter more with R or L stated wrongly; 0 is silent";
     20 CtlMode "CTL_MODE" "" Whole 0.0..2.0 = 0.0
         "What throttle commands"
             0 "speed"
