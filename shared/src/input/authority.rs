@@ -185,6 +185,7 @@ impl Authority {
             // It keeps no signal and opens no throttle. To stop is right in either case.
             if let (Some(valid), Demand::Zero) = (&mut self.valid, demand) {
                 valid.demand = demand;
+                valid.command = false;
             }
             return;
         }

@@ -304,6 +304,18 @@ fn an_armed_wire_may_be_silent_behind_a_command() {
 }
 
 #[test]
+fn a_stop_that_is_not_believed_ends_the_silence_behind_a_command() {
+    let mut bench = Bench::armed();
+    bench.after(1_000, event(1));
+    bench.play(20, Event::Bad);
+    bench.after(1_000, event(0));
+    bench.wait(79_000);
+    assert!(bench.authority.armed());
+    bench.wait(1);
+    assert!(!bench.authority.armed(), "100 ms behind the command");
+}
+
+#[test]
 fn disarming_stops_until_zero_was_held_anew() {
     let mut bench = Bench::armed();
     bench.after(1_000, event(1000));
