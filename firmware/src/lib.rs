@@ -17,7 +17,8 @@
 //! | [`storage`] | the flash that keeps the parameters |
 //! | [`last_words`] | a failure turns the bridge off, and what happened is kept over the reset |
 //! | `priority` | priorities, and critical sections that never hold up the PWM |
-//! | [`image`] | board, version and commit in the image |
+//! | [`image`] | board, version and commit in the image, and whether it is whole |
+//! | [`damaged`] | the start of an image that is not |
 //! | `link/` | the linker script: a file a chip for its memories, one for what stands where |
 //!
 //! Parts that need no chip are tested on the host: `cargo test -p siskin-firmware --lib`.
@@ -74,6 +75,7 @@
 //! | low supply of the gates, over-temperature of the driver, F405 | the gate driver; its nFAULT also the timer and the driver's enable | over-current |
 //! | set-point not renewed | the control, by `Stop` | loss of signal, by the tasks |
 //! | overrun, three in a row or more than one in 100 periods for long | [`last_words`] | after the reset |
+//! | damage to a stamped image | its start, which never turns it on | at 115200 baud, and by the light |
 //! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
 //! | processor locked up, G431 | the timer's break | after the watchdog's reset |
 //! | a debugger halts the processor | the timer, which stops with it ([below](#a-debuggers-halt)) | nothing |
@@ -108,6 +110,8 @@ pub mod board;
 #[cfg(board)]
 mod chip;
 pub mod circuit;
+#[cfg(any(board, test))]
+pub mod damaged;
 pub mod exchange;
 pub mod image;
 pub mod interrupt;

@@ -11,8 +11,8 @@ mod start_up;
 
 use embassy_executor::Spawner;
 use siskin_firmware::board::{Hardware, NAME};
-use siskin_firmware::image::Image;
-use siskin_firmware::tasks;
+use siskin_firmware::image::{Image, is_whole};
+use siskin_firmware::{damaged, tasks};
 
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".image")]
@@ -20,5 +20,10 @@ static IMAGE: Image = Image::of(NAME);
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
-    tasks::start(spawner, Hardware::claim());
+    // Its pins keep the gates off until the control drives them.
+    let hardware = Hardware::claim();
+    if !is_whole() {
+        damaged::tell(hardware);
+    }
+    tasks::start(spawner, hardware);
 }

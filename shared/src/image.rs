@@ -27,6 +27,17 @@ impl Image {
     };
 }
 
+/// The check sum of no words.
+pub const NO_WORDS: u32 = 0x811C_9DC5;
+
+/// The check sum of an image's words in flash, going on from that of what is before them. Each step can be
+/// undone, so that damage within one word never goes unseen; any other does once in 2^32.
+pub fn check_sum(before: u32, words: &[u32]) -> u32 {
+    words.iter().fold(before, |sum, word| {
+        (sum.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
+    })
+}
+
 const fn version() -> [u8; 3] {
     let text = env!("CARGO_PKG_VERSION").as_bytes();
     let mut parts = [0; 3];
@@ -47,6 +58,21 @@ const fn version() -> [u8; 3] {
 mod tests {
     use super::*;
     use std::format;
+
+    #[test]
+    fn one_damaged_word_changes_the_sum() {
+        let words: [u32; 50] = core::array::from_fn(|at| (at as u32).wrapping_mul(0x9E37_79B9));
+        let whole = check_sum(NO_WORDS, &words);
+        let (first, rest) = words.split_at(20);
+        assert_eq!(check_sum(check_sum(NO_WORDS, first), rest), whole);
+        for at in 0..words.len() {
+            for damage in (0..32).map(|bit| 1 << bit).chain([u32::MAX, 0x8000_0001]) {
+                let mut damaged = words;
+                damaged[at] ^= damage;
+                assert_ne!(check_sum(NO_WORDS, &damaged), whole, "{at}, {damage:#x}");
+            }
+        }
+    }
 
     #[test]
     fn the_version_is_that_of_the_package() {

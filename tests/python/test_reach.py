@@ -11,13 +11,16 @@ from small_image import LEVELS, VECTORS, build
 TAG = """
     .section .rodata, "a", %progbits
     .balign 4
-    .ascii "SISKIN\\0\\1"
+    .ascii "SISKIN\\0\\2"
     .ascii "b-g431b-esc1"
     .space 12
     .ascii "0.1.0"
     .space 19
     .ascii "unknown"
     .space 17
+    .word 0x08000000, sum, behind, __image_end
+    sum: .word 0xffffffff, 0xffffffff
+    behind:
 """
 
 FLASH = """

@@ -60,9 +60,11 @@ pub(crate) enum Command {
     /// Make the files that go onto a board: BOARD.elf, BOARD.bin and BOARD.hex.
     ///
     /// Prints for which board they are, which version, from which commit (+ behind it where files
-    /// differed), and how much of the flash they take.
+    /// differed), how much of the flash they take, and what the PWM interrupt reaches. An image in which
+    /// that needs the flash while it is written is refused. The files hold a check sum, by which 'siskin
+    /// flash' and each start of the ESC see damage.
     Image(ImageArgs),
-    /// Write an image into a board's flash, once it is known to be that board's.
+    /// Write an image into a board's flash, once it is known to be that board's and whole.
     ///
     /// By the program probe-rs through a debug probe (the B-G431B-ESC1 has one on it), or by dfu-util
     /// over USB with BOOT0 at 3.3 V. Stored parameters and option bytes stay.

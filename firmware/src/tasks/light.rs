@@ -5,7 +5,7 @@ use embassy_time::{Duration, Instant};
 use siskin_control::drive::Snapshot;
 
 /// Flashes once when all is well, and n + 2 times for the fault with the lowest number n; then comes
-/// a pause. Dark: the control does not run.
+/// a pause. Dark: the control does not run. Even blinking is not from here: [`crate::damaged`].
 pub(crate) struct Light {
     pin: Output<'static>,
     due: Instant,

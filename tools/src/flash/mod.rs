@@ -1,4 +1,4 @@
-//! `siskin flash`: an image into a board's flash, once it is known to be that board's.
+//! `siskin flash`: an image into a board's flash, once it is known to be that board's and whole.
 //!
 //! What the image does not cover stays as it is: the stored parameters, and the option bytes,
 //! without which the B-G431B-ESC1 does not start.
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &FlashArgs, out: &mut dyn Write) -> Result<(), Error> {
             "written and read back; release BOOT0 and power the board up anew"
         )?;
     } else {
-        probe::write(board.chip(), &args.elf, args.probe.as_deref())?;
+        probe::write(&image, args.probe.as_deref())?;
         writeln!(out, "written, verified and started")?;
     }
     Ok(())

@@ -1,8 +1,9 @@
 //! Through a debug probe, by probe-rs.
 
-use std::path::Path;
+use std::fs;
 
 use crate::error::Error;
+use crate::image::Image;
 use crate::program::Program;
 
 const PROBE_RS: Program = Program {
@@ -10,18 +11,23 @@ const PROBE_RS: Program = Program {
     remedy: "install it as https://probe.rs says",
 };
 
-/// Writes the ELF file, reads it back, and resets the chip. Only the pages of the image are erased.
+/// Writes the image as an ELF file, reads it back, and resets the chip. Only the pages of the image are
+/// erased.
 ///
 /// # Errors
-/// [`Error::Missing`] or [`Error::Program`].
-pub(super) fn write(chip: &str, elf: &Path, probe: Option<&str>) -> Result<(), Error> {
+/// [`Error::Missing`] or [`Error::Program`]; [`Error::Output`] if there is no room for the file in between.
+pub(super) fn write(image: &Image, probe: Option<&str>) -> Result<(), Error> {
+    let folder = tempfile::tempdir()?;
+    let elf = folder.path().join("image.elf");
+    fs::write(&elf, &image.file)?;
+    let chip = image.board.chip();
     let command = |name| {
         let mut command = PROBE_RS.command();
         command.args([name, "--chip", chip]);
         command.args(probe.into_iter().flat_map(|probe| ["--probe", probe]));
         command
     };
-    PROBE_RS.run(command("download").arg("--verify").arg(elf))?;
+    PROBE_RS.run(command("download").arg("--verify").arg(&elf))?;
     PROBE_RS.run(&mut command("reset"))?;
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! A linked image: what goes into the flash, and for which board.
 
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 use object::LittleEndian;
@@ -8,11 +9,12 @@ use object::elf::{EM_ARM, FileHeader32, PT_LOAD};
 use object::read::elf::{FileHeader, ProgramHeader};
 
 use super::reach::{self, Reach};
+use super::seal::Seal;
 use super::{Board, Tag};
 use crate::error::Error;
 
 /// What an erased flash holds.
-const ERASED: u8 = 0xFF;
+pub(super) const ERASED: u8 = 0xFF;
 
 /// Bytes between two segments that are written as erased. A larger hole is left as it is: on the
 /// VESC the stored parameters lie in one, between the vectors and the code.
@@ -28,7 +30,7 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
-    fn end(&self) -> u32 {
+    pub(super) fn end(&self) -> u32 {
         self.at + self.bytes.len() as u32
     }
 }
@@ -46,11 +48,14 @@ pub(crate) struct Image {
     pub(crate) pieces: Vec<Piece>,
     /// What its PWM interrupt reaches.
     pub(crate) reach: Reach,
+    /// The whole file; as the parts, with its check sum.
+    pub(crate) file: Vec<u8>,
 }
 
 impl Image {
-    /// Reads an ELF file, and checks that it is for a board, for the wanted one if any, that it fits, and
-    /// that its PWM interrupt needs nothing from the flash while that is written.
+    /// Reads an ELF file, and checks that it is for a board, for the wanted one if any, that it fits, that
+    /// its PWM interrupt needs nothing from the flash while that is written, and that it is whole. One that
+    /// has no check sum yet gets it.
     ///
     /// # Errors
     /// [`Error::File`] that names the file and what is wrong.
@@ -73,18 +78,19 @@ impl Image {
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
         let (mut segments, entry) = segments(bytes)?;
-        segments.sort_by_key(|segment| segment.0);
+        segments.sort_by_key(|segment| segment.at);
         if segments.is_empty() {
             return Err("nothing in it goes into the flash".to_owned());
         }
         // Before anything is laid out: an address may be anything.
-        let tag = segments.iter().find_map(|(_, data)| Tag::find(data));
-        let tag = tag.ok_or("no tag of a Siskin image in it")?;
+        let found = segments.iter();
+        let mut found = found.filter_map(|segment| Some((segment.at, Tag::find(segment.data)?)));
+        let (tag_from, tag) = found.next().ok_or("no tag of a Siskin image in it")?;
         let board = Board::named(&tag.board)
             .ok_or_else(|| format!("made for '{}', which is no board known here", tag.board))?;
         let flash = board.flash();
         let mut pieces: Vec<Piece> = Vec::new();
-        for (at, data) in segments {
+        for &Segment { at, data, .. } in &segments {
             let end = u64::from(at) + data.len() as u64;
             if at < flash.start || end > u64::from(flash.end) {
                 return Err(format!(
@@ -109,12 +115,21 @@ impl Image {
                 }),
             }
         }
+        let seal = Seal::of(&tag, tag_from, &pieces)?;
+        let mut file = bytes.to_vec();
+        for piece in &mut pieces {
+            seal.stamp(piece.at, &mut piece.bytes);
+        }
+        for segment in &segments {
+            seal.stamp(segment.at, &mut file[segment.place.clone()]);
+        }
         Ok(Self {
             tag,
             board,
             entry,
             pieces,
             reach: reach::judge(bytes, board)?,
+            file,
         })
     }
 
@@ -129,8 +144,12 @@ impl Image {
     }
 }
 
-/// A piece that is to be loaded, with its address in the flash.
-type Segment<'a> = (u32, &'a [u8]);
+/// A piece that is to be loaded: its address in the flash, its bytes, and their place in the file.
+struct Segment<'a> {
+    at: u32,
+    data: &'a [u8],
+    place: Range<usize>,
+}
 
 /// What is to be loaded, and the entry's address.
 fn segments(bytes: &[u8]) -> Result<(Vec<Segment<'_>>, u32), String> {
@@ -145,7 +164,12 @@ fn segments(bytes: &[u8]) -> Result<(Vec<Segment<'_>>, u32), String> {
         if segment.p_type(endian) == PT_LOAD && segment.p_filesz(endian) > 0 {
             let data = segment.data(endian, bytes);
             let data = data.map_err(|()| "the file is cut off".to_owned())?;
-            segments.push((segment.p_paddr(endian), data));
+            let begin = segment.p_offset(endian) as usize;
+            segments.push(Segment {
+                at: segment.p_paddr(endian),
+                data,
+                place: begin..begin + data.len(),
+            });
         }
     }
     Ok((segments, header.e_entry(endian)))

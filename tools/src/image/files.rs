@@ -20,21 +20,20 @@ const PAGE_BYTES: u32 = 1 << 16;
 ///
 /// # Errors
 /// [`Error::File`] for what cannot be written.
-pub(super) fn write(image: &Image, elf: &Path, folder: &Path) -> Result<[PathBuf; 3], Error> {
+pub(super) fn write(image: &Image, folder: &Path) -> Result<[PathBuf; 3], Error> {
     let failed = |path: &Path, reason: String| Error::File {
         path: path.display().to_string(),
         reason,
     };
     fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
     let name = |extension| folder.join(image.board.name()).with_extension(extension);
-    let [elf_copy, bin, hex] = [name("elf"), name("bin"), name("hex")];
+    let [elf, bin, hex] = [name("elf"), name("bin"), name("hex")];
 
-    let original = fs::read(elf).map_err(|e| failed(elf, e.to_string()))?;
-    fs::write(&elf_copy, original).map_err(|e| failed(&elf_copy, e.to_string()))?;
+    fs::write(&elf, &image.file).map_err(|e| failed(&elf, e.to_string()))?;
     fs::write(&bin, image.contents()).map_err(|e| failed(&bin, e.to_string()))?;
     let text = intel_hex(image).map_err(|e| failed(&hex, e))?;
     fs::write(&hex, text).map_err(|e| failed(&hex, e.to_string()))?;
-    Ok([elf_copy, bin, hex])
+    Ok([elf, bin, hex])
 }
 
 fn intel_hex(image: &Image) -> Result<String, String> {

@@ -5,6 +5,7 @@ mod build;
 mod elf;
 mod files;
 mod reach;
+mod seal;
 mod tag;
 
 use std::io::Write;
@@ -29,7 +30,7 @@ pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
     };
     let image = Image::read(&elf, args.board)?;
     write!(out, "{}", image.description())?;
-    for file in files::write(&image, &elf, &args.output)? {
+    for file in files::write(&image, &args.output)? {
         writeln!(out, "wrote    {}", file.display())?;
     }
     Ok(())
@@ -42,6 +43,7 @@ impl Image {
             board,
             version,
             build,
+            ..
         } = &self.tag;
         let size: usize = self.pieces.iter().map(|piece| piece.bytes.len()).sum();
         let flash = self.board.flash().len();

@@ -1,14 +1,20 @@
 //! ELF files, byte by byte: what a linker makes, as far as `siskin` looks at it.
 
-/// An image's tag as the firmware lays it out.
-pub(crate) fn tag(board: &str) -> Vec<u8> {
-    let mut tag = b"SISKIN\x00\x01".to_vec();
+/// An image's tag as the firmware and its linker script lay it out: texts, two ranges of addresses for the
+/// check sum, and room for that.
+pub(crate) fn tag(board: &str, ranges: [u32; 4]) -> Vec<u8> {
+    let mut tag = b"SISKIN\x00\x02".to_vec();
     for field in [board, "0.1.0", "0123456789ab+"] {
         tag.extend_from_slice(field.as_bytes());
         tag.resize(tag.len() + 24 - field.len(), 0);
     }
+    words(&mut tag, &ranges);
+    words(&mut tag, &[u32::MAX; 2]);
     tag
 }
+
+/// Where the sum stands: behind the vectors, the texts and the ranges.
+const SUM_AT: u32 = 0x1D8 + 96;
 
 /// One file: its machine, and what it loads.
 #[derive(Clone)]
@@ -22,20 +28,42 @@ pub(crate) struct Elf {
 impl Elf {
     /// Vectors and tag, a hole of 12 bytes, and 70 000 bytes of code that cross a border of 64 KB.
     pub(crate) fn of(board: &str) -> Self {
+        Self::with_code_at(board, FLASH + SUM_AT + 8 + 12)
+    }
+
+    /// The same with the code elsewhere.
+    pub(crate) fn with_code_at(board: &str, code_at: u32) -> Self {
+        const CODE_BYTES: u32 = 70_000;
         let mut first = vec![0x55; 0x1D8];
-        first.extend(tag(board));
-        let code_at = 0x0800_0000 + first.len() as u32 + 12;
-        let code = (0..70_000_u32).map(|i| (i * 7 % 251) as u8).collect();
+        let ranges = [FLASH, FLASH + SUM_AT, code_at, code_at + CODE_BYTES];
+        first.extend(tag(board, ranges));
+        let code = (0..CODE_BYTES).map(|i| (i * 7 % 251) as u8).collect();
         Self {
             machine: 40,
             // Not in order, with a segment that only takes memory, and one that is no load.
             segments: vec![
                 (1, code_at, code),
                 (1, 0x2000_0000, Vec::new()),
-                (1, 0x0800_0000, first),
+                (1, FLASH, first),
                 (0x6474_E551, 0x2000_0000, vec![1, 2, 3, 4]),
             ],
         }
+    }
+
+    /// With its check sum.
+    pub(crate) fn stamped(mut self) -> Self {
+        let [code, _, first, _] = &mut self.segments[..] else {
+            panic!("four segments")
+        };
+        let summed = [&first.2[..SUM_AT as usize], &code.2].concat();
+        let mut sum = 0x811C_9DC5_u32;
+        for word in summed.chunks_exact(4) {
+            let word = u32::from_le_bytes(word.try_into().expect("four bytes"));
+            sum = (sum.rotate_left(5) ^ word).wrapping_mul(0x0100_0193);
+        }
+        first.2.truncate(SUM_AT as usize);
+        words(&mut first.2, &[sum, !sum]);
+        self
     }
 
     pub(crate) fn bytes(&self) -> Vec<u8> {
@@ -126,6 +154,8 @@ const HEADER_BYTES: u32 = 52;
 const SEGMENT_BYTES: u32 = 32;
 const SECTION_BYTES: u32 = 40;
 const SYMBOL_BYTES: u32 = 16;
+
+const FLASH: u32 = 0x0800_0000;
 
 /// Where the interrupt stands.
 const CONTROL: u32 = 0x1000_0000;

@@ -30,7 +30,7 @@ fn one_command_writes_elf_bin_and_hex() {
     let image = bench.image("vesc4-f405");
     let ended = bench.siskin(&["image", &image, "-o", output]);
     assert_eq!((ended.status, ended.err.as_str()), (0, ""));
-    let elf = Elf::of("vesc4-f405");
+    let elf = Elf::of("vesc4-f405").stamped();
     let wanted = flash(&elf);
     for told in [
         "board    vesc4-f405\n",
@@ -113,7 +113,7 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
         ..good.clone()
     };
     let untagged = with(vec![(1, 0x0800_0000, vec![0x55; 1000])]);
-    let tagged = |address| with(vec![(1, address, tag("b-g431b-esc1"))]);
+    let tagged = |address| with(vec![(1, address, tag("b-g431b-esc1", [0; 4]))]);
     vec![
         (Vec::new(), "no ELF file"),
         (b":10000000".to_vec(), "no ELF file"),
@@ -126,6 +126,7 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
         (tagged(0x0801_DFF0).bytes(), "0x0801e000"),
         (tagged(0x1000_0000).bytes(), "0x10000000"),
         (tagged(0xFFFF_FFF0).bytes(), "0xfffffff0"),
+        (tagged(0x0800_0000).bytes(), "damaged"),
     ]
 }
 
@@ -144,6 +145,34 @@ fn what_is_no_image_is_refused_in_one_line_by_both() {
             assert!(ended.err.contains(&image), "{}", ended.err);
         }
         assert!(bench.asked().is_empty() && !folder.exists(), "{named}");
+    }
+}
+
+#[test]
+fn a_flipped_bit_of_a_stamped_image_is_refused() {
+    let bench = Bench::with(&["probe-rs"]);
+    let stamped = Elf::of("vesc4-f405").stamped().bytes();
+    let image = bench.file("image", &stamped);
+    assert_eq!(bench.siskin(&["flash", &image]).status, 0);
+    let asked = bench.asked();
+    // Behind the headers: the code, then vectors and tag, all of whose words are taken.
+    let loaded = 52 + 4 * 32;
+    let tag = loaded + 70_000;
+    let sampled = (0..70_000).step_by(1009).map(|byte| loaded + byte);
+    for (number, byte) in sampled.chain((tag..tag + 576).step_by(7)).enumerate() {
+        let mut damaged = stamped.clone();
+        damaged[byte] ^= 1 << (number % 8);
+        let ended = bench.siskin(&["flash", &bench.file("image", &damaged)]);
+        assert_eq!((ended.status, ended.out.as_str()), (2, ""), "byte {byte}");
+        assert_eq!(ended.err.lines().count(), 1, "{}", ended.err);
+    }
+    assert_eq!(bench.asked(), asked, "nothing more is written");
+
+    let mut damaged = stamped;
+    damaged[loaded + 12_345] ^= 1;
+    let ended = bench.siskin(&["flash", &bench.file("image", &damaged)]);
+    for named in ["damaged", "check sum", "siskin image"] {
+        assert!(ended.err.contains(named), "{named}: {}", ended.err);
     }
 }
 

@@ -7,6 +7,7 @@
 //! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
 //! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
 //! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
+//! | [`damaged`] | a damaged image never turns the bridge on |
 //! | [`engines`] | the interpreting engine does what the translating one does |
 //! | [`agreement`] | the control's state and the motor are those of the emulator |
 //!
@@ -20,6 +21,7 @@
 mod agreement;
 mod boot;
 mod common;
+mod damaged;
 mod engines;
 mod failures;
 mod readings;
