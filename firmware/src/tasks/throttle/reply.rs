@@ -32,7 +32,6 @@ impl Replier {
             // An update that the program makes, to load the first period, is no request to the DMA.
             w.set_urs(Urs::COUNTER_ONLY);
         });
-        PACE.dier().modify(|w| w.set_ude(true));
         // As the line rests, for when the pin is turned round.
         PORT.bsrr().write(|w| w.set_bs(PIN, true));
         Self {
@@ -52,7 +51,6 @@ impl Replier {
             *word = 1 << PIN << (bits >> 31 << 4);
             bits <<= 1;
         }
-        PACE.cr1().modify(|w| w.set_cen(false));
         PACE.cnt().write(|w| w.set_cnt(0));
         // SAFETY: the register belongs to the port of this pin, and its words touch this pin alone;
         // the words live until the transfer has ended.
@@ -74,6 +72,7 @@ impl Replier {
             PACE.egr().write(|w| w.set_ug(true));
             PACE.arr()
                 .write(|w| w.set_arr((PACE_HZ / reply.bit_hz - 1) as u16));
+            request_updates(true);
             PACE.cr1().modify(|w| w.set_cen(true));
             // Not after what would hold it up beyond the first bit.
             set_mode(Moder::OUTPUT);
@@ -95,7 +94,15 @@ impl Sending<'_> {
         self.transfer.await;
         set_mode(Moder::ALTERNATE);
         PACE.cr1().modify(|w| w.set_cen(false));
+        // The counter has gone on behind the last word, and a request that nothing serves stands until it
+        // is not enabled any more: the next reply would begin with it, whenever that is to be.
+        request_updates(false);
     }
+}
+
+/// Whether the counter's updates ask the DMA for the next word.
+fn request_updates(on: bool) {
+    PACE.dier().modify(|w| w.set_ude(on));
 }
 
 fn set_mode(mode: Moder) {

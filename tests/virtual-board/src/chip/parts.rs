@@ -127,6 +127,21 @@ impl Parts {
         Some((part, address - base))
     }
 
+    /// The requests for the DMA that stand until they are served.
+    pub(crate) fn standing(&self) -> impl Iterator<Item = u8> {
+        let lines = [&self.usart1, &self.usart2];
+        let timers = [&self.tim2, &self.tim3, &self.tim4];
+        let of_lines = lines.into_iter().flat_map(Usart::requests);
+        of_lines.chain(timers.into_iter().flat_map(Timer::requests))
+    }
+
+    /// The DMA has served a request. A serial line needs not be told: its data register was read or written.
+    pub(crate) fn served(&mut self, number: u8) {
+        for timer in [&mut self.tim2, &mut self.tim3, &mut self.tim4] {
+            timer.served(number);
+        }
+    }
+
     /// When any of them does something by itself next.
     pub(crate) fn due(&self) -> Cycles {
         let of_timers = self.tim1.due().min(self.tim2.due()).min(self.tim3.due());

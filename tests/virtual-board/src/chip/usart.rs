@@ -144,10 +144,10 @@ impl Usart {
         self.coming.len()
     }
 
-    /// Whether the DMA's request of this number is up.
-    pub fn requests(&self, number: u8) -> bool {
-        let mut both = self.identity.requests.iter().zip(self.needs());
-        both.any(|(own, needed)| *own == number && needed)
+    /// The DMA's requests that are up, by their numbers at the multiplexer.
+    pub fn requests(&self) -> impl Iterator<Item = u8> + use<> {
+        let both = self.identity.requests.into_iter().zip(self.needs());
+        both.filter_map(|(number, needed)| needed.then_some(number))
     }
 
     fn receives(&self) -> bool {

@@ -5,9 +5,6 @@ use crate::chip::dma::Transfer;
 use crate::chip::{Context, Signal};
 use crate::processor::{BusError, Width};
 
-/// The requests of the serial lines, which stand until they are served (RM0440, table 91).
-const STANDING: [u8; 4] = [24, 25, 26, 27];
-
 /// The throttle wire's pin: PA15, with TIM2's first channel.
 const WIRE: (u8, u8) = (0, 15);
 const WIRE_FUNCTION: u8 = 1;
@@ -53,12 +50,14 @@ impl World {
         }
     }
 
-    /// A part of the chip asks for a datum to be moved.
+    /// A part of the chip asks for a datum to be moved. A request that finds its channel off, or all of its
+    /// data moved, stands until that is turned on again.
     fn request(&mut self, number: u8) {
         let channel = self.parts.mux.channel(number);
         let Some(transfer) = channel.and_then(|channel| self.parts.dma.request(channel)) else {
             return;
         };
+        self.parts.served(number);
         let moved = self.fetch(&transfer);
         let moved = moved.and_then(|datum| self.put(&transfer, datum));
         if moved.is_err() {
@@ -104,19 +103,14 @@ impl World {
 
     /// A channel that has been turned on finds the requests that stand already.
     pub(super) fn offer_requests(&mut self) {
-        for number in STANDING {
-            let stands = |world: &Self| {
-                let parts = &world.parts;
-                parts.usart1.requests(number) || parts.usart2.requests(number)
-            };
-            let channel = self.parts.mux.channel(number);
-            // The request is not told again where it stood before: the part tells the next ones.
-            if let Some(channel) = channel
-                && stands(self)
-                && self.parts.dma.request(channel).is_some()
-            {
-                self.request(number);
-            }
+        // The request is not told again where it stood before: the part tells the next ones.
+        let ready = |number: &u8| {
+            let channel = self.parts.mux.channel(*number);
+            channel.is_some_and(|channel| self.parts.dma.request(channel).is_some())
+        };
+        let offered: Vec<u8> = self.parts.standing().filter(ready).collect();
+        for number in offered {
+            self.request(number);
         }
     }
 

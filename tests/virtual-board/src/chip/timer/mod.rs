@@ -24,6 +24,14 @@ use crate::time::{Cycles, NEVER};
 /// Channels that may capture: the first two.
 const CAPTURES: usize = 2;
 
+/// What it may ask the DMA for: its update, and after it each channel.
+const REQUESTS: usize = 5;
+const UPDATE: usize = 0;
+const CHANNEL: usize = 1;
+
+/// DIER's first enable of a request, UDE; those of the channels follow.
+const REQUEST_ENABLES: u32 = 8;
+
 /// CR1: CEN, URS, ARPE.
 const CR1_BITS: u32 = 0x0085;
 /// DIER: UIE, CCxIE, UDE, CCxDE.
@@ -44,11 +52,9 @@ struct Kind {
     max: u32,
     /// Its interrupt.
     interrupt: Interrupt,
-    /// The requests of its channels at the DMA's multiplexer (stm32-metapac's metadata of the
-    /// STM32G431CB, after RM0440's table of them).
-    captured: [u8; 4],
-    /// The one of its update.
-    updated: u8,
+    /// The requests of its update and of its channels at the DMA's multiplexer (stm32-metapac's metadata
+    /// of the STM32G431CB, after RM0440's table of them).
+    requests: [u8; REQUESTS],
 }
 
 /// One of the timers.
@@ -69,6 +75,8 @@ pub struct Timer {
     counter: Counter,
     /// Of the pin, as set for the first input; both channels are behind it.
     filter: Filter,
+    /// Requests that the DMA has not served, a bit each.
+    asks: u32,
     /// Whether the interrupt's line is up.
     line: bool,
     due: Cycles,
@@ -80,8 +88,7 @@ impl Timer {
         Self::new(Kind {
             max: u32::MAX,
             interrupt: Interrupt::TIM2,
-            captured: [56, 57, 58, 59],
-            updated: 60,
+            requests: [60, 56, 57, 58, 59],
         })
     }
 
@@ -90,8 +97,7 @@ impl Timer {
         Self::new(Kind {
             max: 0xffff,
             interrupt: Interrupt::TIM3,
-            captured: [61, 62, 63, 64],
-            updated: 65,
+            requests: [65, 61, 62, 63, 64],
         })
     }
 
@@ -100,8 +106,7 @@ impl Timer {
         Self::new(Kind {
             max: 0xffff,
             interrupt: Interrupt::TIM4,
-            captured: [67, 68, 69, 70],
-            updated: 71,
+            requests: [71, 67, 68, 69, 70],
         })
     }
 
@@ -120,6 +125,7 @@ impl Timer {
             matches: [NEVER; 4],
             counter: Counter::new(),
             filter: Filter::new(),
+            asks: 0,
             line: false,
             due: NEVER,
         }
@@ -165,19 +171,37 @@ impl Timer {
         self.run(now);
         if requests {
             self.sr.set_uif(true);
-            if self.dier.ude() {
-                context.signals.push(Signal::Request(self.kind.updated));
-            }
+            self.ask(UPDATE, context);
         }
+    }
+
+    /// Asks the DMA for a transfer, if that is enabled. The request stands until it is served or its enable
+    /// is taken away.
+    fn ask(&mut self, request: usize, context: &mut Context) {
+        if self.dier.0 >> REQUEST_ENABLES >> request & 1 == 1 {
+            self.asks |= 1 << request;
+            let number = self.kind.requests[request];
+            context.signals.push(Signal::Request(number));
+        }
+    }
+
+    /// The requests that stand, by their numbers at the multiplexer.
+    pub fn requests(&self) -> impl Iterator<Item = u8> + use<> {
+        let (asks, numbers) = (self.asks, self.kind.requests);
+        let stands = move |request: &usize| asks >> request & 1 == 1;
+        (0..REQUESTS).filter(stands).map(move |request| numbers[request])
+    }
+
+    /// The DMA has served a request, if it is one of these.
+    pub fn served(&mut self, number: u8) {
+        let request = self.kind.requests.iter().position(|own| *own == number);
+        self.asks &= !request.map_or(0, |request| 1 << request);
     }
 
     /// A compare's match or a capture.
     fn raise(&mut self, channel: usize, context: &mut Context) {
         self.sr.set_ccif(channel, true);
-        if self.dier.ccde(channel) {
-            let request = self.kind.captured[channel];
-            context.signals.push(Signal::Request(request));
-        }
+        self.ask(CHANNEL + channel, context);
     }
 
     fn capture(&mut self, context: &mut Context) {
@@ -321,7 +345,10 @@ impl Part for Timer {
         let now = context.now;
         match offset {
             CR1 => self.write_cr1(value, now)?,
-            DIER => self.dier = DierGp16(only(value, DIER_BITS)?),
+            DIER => {
+                self.dier = DierGp16(only(value, DIER_BITS)?);
+                self.asks &= value >> REQUEST_ENABLES;
+            }
             // Zeros clear.
             SR => self.sr.0 &= value,
             EGR => {

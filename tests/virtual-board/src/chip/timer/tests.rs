@@ -240,6 +240,27 @@ fn updates_request_at_the_period_that_was_loaded() {
 }
 
 #[test]
+fn a_request_stands_until_it_is_served_or_its_enable_is_taken_away() {
+    let mut bench = pacing(5100, 227);
+    let standing = |bench: &Bench<Timer>| bench.part.requests().last();
+    bench.until(START + 5099);
+    assert_eq!(standing(&bench), None);
+    bench.until(START + 5100);
+    assert_eq!(standing(&bench), Some(65));
+    bench.part.served(64);
+    assert_eq!(standing(&bench), Some(65));
+    bench.part.served(65);
+    assert_eq!(standing(&bench), None);
+    // One that nobody serves, however often it is asked again, is one.
+    bench.until(START + 20_000);
+    bench.write(CR1, 0x84);
+    assert_eq!(bench.part.requests().collect::<Vec<_>>(), [65]);
+    bench.write(DIER, 0);
+    bench.write(DIER, 0x100);
+    assert_eq!(standing(&bench), None);
+}
+
+#[test]
 fn a_period_of_nothing_stands() {
     let mut bench = pacing(1, 227);
     assert_eq!(bench.part.due(), NEVER);
