@@ -12,6 +12,7 @@
 //! | [`circuit`] | one file a board: what a count is worth, for the control and for a PC that replays it |
 //! | `chip` | clock, converters' flags and comparators: what the HAL does not have, by its PAC |
 //! | [`interrupt`] | the control period: readings, set-point, `step`, duties; and its start |
+//! | `edges` | the throttle wire's edges as the DMA leaves them in memory |
 //! | [`exchange`] | the memory that the interrupt and the tasks share, proven with loom |
 //! | [`tasks`] | throttle, MAVLink, storage, temperature, light, serial telemetry, watchdog |
 //! | [`storage`] | the flash that keeps the parameters |
@@ -31,7 +32,7 @@
 //! | PWM: `ADC1_2` on the G431, `ADC` on the F405 | 0, alone | 107 instructions besides `step`, 102 more in every eighth period, and some 120 where the bridge is turned on or off | everything |
 //! | nFAULT of the gate driver: `EXTI15_10`, F405 | 1, alone | 20 instructions | all but the PWM |
 //! | clock (`TIM4`), serial lines, DMA, throttle's timer | 2 | a waker each, below 5 µs by their length | tasks; not each other |
-//! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them behind it | the other tasks, and drivers' interrupts, not their DMA |
+//! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them behind it or before the frame; up to 5 µs of waiting for a frame's last edge | the other tasks, and drivers' interrupts, not their DMA; the PWM for the 0.4 µs in which a reply is begun |
 //! | the other tasks | thread mode | | nothing |
 //!
 //! What runs at 0 and 1 uses no critical section, no lock, no log and no type of the executor. A
@@ -112,6 +113,8 @@ mod chip;
 pub mod circuit;
 #[cfg(any(board, test))]
 pub mod damaged;
+#[cfg(any(board, test))]
+mod edges;
 pub mod exchange;
 pub mod image;
 pub mod interrupt;

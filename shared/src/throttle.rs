@@ -9,7 +9,7 @@ use core::mem::discriminant;
 use heapless::Deque;
 
 use crate::answer::info;
-use crate::answer::{self, Answer, Answers, Ask, Basis};
+use crate::answer::{self, Answer, Answers, Ask, Basis, Reply, Serial};
 use crate::drive::{Config, Fault, Setpoint, Snapshot};
 use crate::input::access::Access;
 use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
@@ -148,21 +148,28 @@ impl Throttle {
         }
     }
 
-    /// What is sent back to the flight controller, with the drive as it is now.
+    /// What is sent back to the flight controller, with the drive as it is now: on the throttle wire and on the
+    /// serial line.
     pub fn answer(&mut self, ask: Ask, snapshot: &Snapshot) -> Answer {
-        let speed_bits = self.speed_bits(snapshot);
-        self.answer_with(ask, speed_bits, snapshot)
+        let reply = self.reply(ask, self.speed_bits(snapshot));
+        let Serial { kiss, info } = self.serial(ask, snapshot);
+        Answer { reply, kiss, info }
+    }
+
+    /// The reply of [`Throttle::answer`], with the speed's bits made ready before; the rest is to follow.
+    pub fn reply(&mut self, ask: Ask, speed_bits: u32) -> Option<Reply> {
+        self.answers.reply(ask, speed_bits, &self.telemetry)
+    }
+
+    /// The rest of [`Throttle::answer`].
+    pub fn serial(&mut self, ask: Ask, snapshot: &Snapshot) -> Serial {
+        self.answers
+            .serial(ask, snapshot, &self.basis, &self.telemetry)
     }
 
     /// The bits of a reply that tells the speed, before anything has been asked.
     pub fn speed_bits(&self, snapshot: &Snapshot) -> u32 {
         answer::speed_bits(snapshot, &self.basis)
-    }
-
-    /// [`Throttle::answer`] with what has been made ready before.
-    pub fn answer_with(&mut self, ask: Ask, speed_bits: u32, snapshot: &Snapshot) -> Answer {
-        self.answers
-            .answer(ask, speed_bits, snapshot, &self.basis, &self.telemetry)
     }
 
     /// What the drive is asked for.

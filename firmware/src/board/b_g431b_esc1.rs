@@ -83,6 +83,7 @@ bind_interrupts!(struct Interrupts {
 pub(crate) mod wire {
     use embassy_stm32::pac;
     use embassy_stm32::pac::gpio::Gpio;
+    use embassy_stm32::pac::gpio::vals::Moder;
     use embassy_stm32::pac::timer::{TimGp16, TimGp32};
     use embassy_stm32::peripherals::{TIM2, TIM3};
 
@@ -105,9 +106,27 @@ pub(crate) mod wire {
     /// Its rate.
     pub(crate) const PACE_HZ: u32 = super::TIMER_HZ;
     /// The pin's port.
-    pub(crate) const PORT: Gpio = pac::GPIOA;
+    const PORT: Gpio = pac::GPIOA;
     /// The pin's number there.
-    pub(crate) const PIN: usize = 15;
+    const PIN: usize = 15;
+
+    /// What the DMA writes to while the pin is driven: the port's set and reset register.
+    pub(crate) fn level_register() -> *mut u32 {
+        PORT.bsrr().as_ptr().cast()
+    }
+
+    /// What it writes there for a level.
+    pub(crate) fn level_word(level: bool) -> u32 {
+        // A zero resets the pin, by the upper half of the register.
+        1 << if level { PIN } else { PIN + 16 }
+    }
+
+    /// Drives the pin, high at first, or lets it go.
+    pub(crate) fn drive_pin(on: bool) {
+        PORT.bsrr().write(|w| w.set_bs(PIN, true));
+        let mode = if on { Moder::OUTPUT } else { Moder::ALTERNATE };
+        PORT.moder().modify(|w| w.set_moder(PIN, mode));
+    }
 }
 
 /// The interrupt in which the throttle's task runs: one whose unit is not used.

@@ -56,13 +56,13 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
     let limit_a = esc.params().get(ParamId::LimPhaseA);
     start_interrupt(esc, hardware.bridge, hardware.converters, ends.interrupt);
     let (capture, replier) = hardware.throttle.open();
-    throttle::start(Listener {
+    let listener = Listener {
         port,
         capture,
-        replier,
         setpoint: ends.setpoint,
         snapshot,
-    });
+    };
+    throttle::start(listener, replier);
 
     let (out, line) = hardware.mavlink.open(baud).split();
     static BYTES: StaticCell<[u8; LINE_BYTES]> = StaticCell::new();

@@ -27,7 +27,9 @@ const fn nibbles() -> [u8; 32] {
     nibbles
 }
 
-/// The 21 levels of 12 bits of data: bit 20, the start bit, comes first; 1 is high.
+/// The 21 levels of 12 bits of data: bit 20, the start bit, comes first; 1 is high. The last one is high in
+/// every reply: a group has an even number of ones where the lowest three bits of its nibble have an odd one,
+/// and the check bits see to it that an odd number of the four nibbles do.
 pub fn encode(data: u16) -> u32 {
     let data = data & 0xFFF;
     let word = data << 4 | check_sum(data);
@@ -64,6 +66,14 @@ fn check_sum(data: u16) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_reply_begins_low_and_ends_high() {
+        for data in 0..0x1000 {
+            let levels = encode(data);
+            assert_eq!((levels >> (BITS - 1), levels & 1), (0, 1), "{data:#05x}");
+        }
+    }
 
     #[test]
     fn a_known_reply() {

@@ -51,6 +51,15 @@ pub struct Answer {
     pub info: Option<[u8; info::BYTES]>,
 }
 
+/// What is sent on the serial line, as in [`Answer`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Serial {
+    /// A frame of KISS telemetry.
+    pub kiss: Option<[u8; kiss::BYTES]>,
+    /// The ESC's information.
+    pub info: Option<[u8; info::BYTES]>,
+}
+
 /// A reply on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
@@ -148,17 +157,36 @@ impl Answers {
         self.info = Some(info);
     }
 
-    /// What is sent for a frame, with the drive as it is now. `speed_bits` are those of a reply with its
-    /// speed ([`speed_bits`]).
-    pub fn answer(
+    /// The reply to a frame on its wire, if it asks for one: what has little time. `speed_bits` are those of a
+    /// reply with the drive's speed ([`speed_bits`]). [`Answers::serial`] is to follow.
+    pub fn reply(&mut self, ask: Ask, speed_bits: u32, telemetry: &Telemetry) -> Option<Reply> {
+        self.pass(ask.first_edge_ticks);
+        ask.bidirectional.then(|| {
+            let bits = match self.extended(telemetry) {
+                Some(word) => {
+                    self.schedule.sends();
+                    gcr::encode(word.data())
+                }
+                None => speed_bits,
+            };
+            let reply_ticks = self.reply_ticks[ask.rate as usize];
+            Reply {
+                bits,
+                bit_hz: reply_bit_hz(ask.rate),
+                at_ticks: ask.first_edge_ticks.wrapping_add(reply_ticks),
+            }
+        })
+    }
+
+    /// What is sent for a frame on the serial line, with the drive as it is now, of which the next words of
+    /// extended telemetry tell.
+    pub fn serial(
         &mut self,
         ask: Ask,
-        speed_bits: u32,
         snapshot: &Snapshot,
         basis: &Basis,
         telemetry: &Telemetry,
-    ) -> Answer {
-        self.pass(ask.first_edge_ticks);
+    ) -> Serial {
         self.health.observe(snapshot, basis);
         let free = self.busy_ticks == 0;
         let info = self.info.take_if(|_| free);
@@ -170,10 +198,7 @@ impl Answers {
         } else if kiss {
             self.busy_ticks = self.kiss_ticks;
         }
-        Answer {
-            reply: ask
-                .bidirectional
-                .then(|| self.reply(ask, speed_bits, telemetry)),
+        Serial {
             kiss: kiss.then(|| {
                 let scale = &basis.scale;
                 let erpm = scale.rpm(snapshot.speed).abs() * scale.pole_pairs;
@@ -190,23 +215,6 @@ impl Answers {
         let ticks = now_ticks.wrapping_sub(before_ticks);
         self.busy_ticks = self.busy_ticks.saturating_sub(ticks);
         self.schedule.pass(ticks);
-    }
-
-    fn reply(&mut self, ask: Ask, speed_bits: u32, telemetry: &Telemetry) -> Reply {
-        let bits = match self.extended(telemetry) {
-            Some(word) => {
-                self.schedule.sends();
-                gcr::encode(word.data())
-            }
-            None => speed_bits,
-        };
-        Reply {
-            bits,
-            bit_hz: reply_bit_hz(ask.rate),
-            at_ticks: ask
-                .first_edge_ticks
-                .wrapping_add(self.reply_ticks[ask.rate as usize]),
-        }
     }
 
     /// The extended word that this reply shall be, if any.

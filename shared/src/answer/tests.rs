@@ -45,13 +45,10 @@ impl Rig {
         };
         let answers = &mut self.answers;
         let speed_bits = speed_bits(&self.snapshot, &self.basis);
-        answers.answer(
-            ask,
-            speed_bits,
-            &self.snapshot,
-            &self.basis,
-            &self.telemetry,
-        )
+        let reply = answers.reply(ask, speed_bits, &self.telemetry);
+        let Serial { kiss, info } =
+            answers.serial(ask, &self.snapshot, &self.basis, &self.telemetry);
+        Answer { reply, kiss, info }
     }
 
     /// The data of the reply to the next frame.

@@ -7,7 +7,6 @@
 
 mod capture;
 mod reply;
-mod ring;
 
 use core::cell::RefCell;
 
@@ -16,7 +15,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::Instant;
 use heapless::Vec;
-use siskin_control::answer::{Answer, Ask};
+use siskin_control::answer::{Ask, Reply, Serial};
 use siskin_control::drive::{Setpoint, Snapshot};
 use siskin_control::input::dshot::Rate;
 use siskin_control::input::line::Event;
@@ -31,6 +30,7 @@ use crate::board;
 use crate::board::wire::TICK_HZ;
 use crate::exchange::{SetpointWriter, SnapshotReader};
 pub(crate) use capture::{Capture, CaptureInterrupt};
+use reply::Armed;
 pub(crate) use reply::Replier;
 
 static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
@@ -42,9 +42,9 @@ pub(crate) fn run_executor() {
 }
 
 /// Starts the task.
-pub(crate) fn start(listener: Listener) {
+pub(crate) fn start(listener: Listener, replier: Replier) {
     let spawner = EXECUTOR.start(board::EXECUTOR);
-    spawner.spawn(listen(listener).expect("spawned here and nowhere else"));
+    spawner.spawn(listen(listener, replier).expect("spawned here and nowhere else"));
 }
 
 /// The throttle's side of the ESC, which tasks reach one at a time.
@@ -79,39 +79,59 @@ const UNKNOWN_LOOK_US: u32 = 30;
 const FRAME_LOOK_EIGHTHS: u32 = 129;
 const LATE_LOOK_EIGHTHS: u32 = 144;
 
+/// From the first edge of a bit to that of the next in the same frame it is never as long, in eighths of a bit.
+const FRAME_APART_EIGHTHS: u32 = 16;
+
 /// How long it takes from the alarm to the look, as a rule: it then waits for the last edge.
 const WAKING_US: u32 = 5;
 
-/// What the task owns.
+/// What the task owns, besides what sends replies.
 pub(crate) struct Listener {
     pub(crate) port: Port,
     pub(crate) capture: Capture,
-    pub(crate) replier: Replier,
     pub(crate) setpoint: SetpointWriter,
     pub(crate) snapshot: &'static SnapshotReader,
 }
 
 /// Listens for ever.
 #[embassy_executor::task]
-pub(crate) async fn listen(mut listener: Listener) -> ! {
+pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
     let renewal_ticks = capture::ticks_of_us(RENEWAL_US);
     loop {
+        // What can be done before a frame comes is not to be done while it does, nor behind it: it is told as
+        // it was at the frame before, or `RENEWAL_US` ago.
+        let ready = listener.ready();
+        let replies = ready.as_ref().filter(|ready| ready.may_reply);
+        let mut armed = replies.map(|ready| replier.arm(ready.speed_bits));
         let due_ticks = listener.capture.now().wrapping_add(renewal_ticks);
-        let mut looks = if listener.capture.wait_for_edge(due_ticks).await {
-            listener.begin()
-        } else {
-            Looks::at_once()
-        };
+        let edge = listener.capture.wait_for_edge(due_ticks).await;
+        let mut looks = listener.begin(edge);
         while let Some(after_ticks) = looks.next() {
             let at_ticks = looks.begin_ticks.wrapping_add(after_ticks);
             if after_ticks > 0 {
                 listener.capture.wait_until(at_ticks).await;
             }
-            if let Some(ask) = listener.look(&mut looks) {
-                listener.answer(ask, &looks).await;
+            let asked = listener.look(&mut looks, ready.as_ref());
+            if let Some((asked, ready)) = asked.zip(ready.as_ref()) {
+                listener.answer(asked, &looks, ready, armed.take()).await;
             }
         }
     }
+}
+
+/// What is known before a frame comes.
+struct Ready {
+    snapshot: Snapshot,
+    /// A reply's bits for its speed.
+    speed_bits: u32,
+    /// Whether the signal is one that is answered on its wire, as far as is known.
+    may_reply: bool,
+}
+
+/// What a frame asks for, and the reply to it on the wire.
+struct Asked {
+    ask: Ask,
+    reply: Option<Reply>,
 }
 
 /// When the wire is looked at, from the first edge that has come.
@@ -121,8 +141,6 @@ struct Looks {
     after_ticks: Vec<u32, 2>,
     /// Whether a whole frame is expected, and nothing else taken.
     frame: bool,
-    /// The drive as the answer shall tell of it, and the reply's bits for that.
-    ready: Option<(Snapshot, u32)>,
     /// Until when the last edges of an expected frame are waited for.
     until_ticks: u32,
     /// A frame whose answer cannot wait until it has been heard.
@@ -130,53 +148,72 @@ struct Looks {
 }
 
 impl Looks {
-    /// Once, at once.
-    fn at_once() -> Self {
-        Self {
-            begin_ticks: 0,
-            after_ticks: Vec::from([0]),
-            frame: false,
-            ready: None,
-            until_ticks: 0,
-            unheard: None,
-        }
-    }
-
     fn next(&mut self) -> Option<u32> {
         self.after_ticks.pop()
     }
 }
 
 impl Listener {
-    /// A first edge has come: what follows is looked at until the line is quiet.
+    /// The drive as the next answer shall tell of it; nothing before the control has told anything.
     #[inline(never)]
-    fn begin(&mut self) -> Looks {
+    fn ready(&mut self) -> Option<Ready> {
+        let snapshot = self.snapshot.read()?;
+        let (speed_bits, signal) = self
+            .port
+            .reach(|throttle| (throttle.speed_bits(&snapshot), throttle.signal()));
+        Some(Ready {
+            snapshot,
+            speed_bits,
+            may_reply: !matches!(
+                signal,
+                Some(
+                    Signal::Pulse(_)
+                        | Signal::Dshot {
+                            bidirectional: false,
+                            ..
+                        }
+                )
+            ),
+        })
+    }
+
+    /// A first edge has come: what follows is looked at until the line is quiet. Without one it is once, at
+    /// once.
+    #[inline(never)]
+    fn begin(&mut self, edge: bool) -> Looks {
         let signal = self.port.reach(|throttle| throttle.signal());
         self.fill();
-        let begin_ticks = match self.capture.first() {
+        if let Some(Signal::Dshot {
+            rate,
+            bidirectional,
+        }) = signal
+        {
+            let apart_ticks = eighths_ticks(rate, FRAME_APART_EIGHTHS);
+            let first = usize::from(bidirectional);
+            // Edge by edge a frame takes 140 µs: who is behind would stay behind.
+            if self.capture.edges.skip_to_last_frame(first, apart_ticks) {
+                TROUBLE.lost_edges();
+            }
+        }
+        let begin_ticks = match self.capture.edges.first() {
             Some(first_ticks) => first_ticks,
             None => self.capture.now(),
         };
         let unknown_ticks = capture::ticks_of_us(UNKNOWN_LOOK_US);
         let (last_ticks, after_ticks) = match signal {
+            _ if !edge => (0, Vec::from([0])),
             Some(Signal::Dshot { rate, .. }) => {
                 let [late, last] = [LATE_LOOK_EIGHTHS, FRAME_LOOK_EIGHTHS]
                     .map(|eighths| eighths_ticks(rate, eighths));
-                (last, [late, last - capture::ticks_of_us(WAKING_US)])
+                let waking_ticks = last.saturating_sub(capture::ticks_of_us(WAKING_US));
+                (last, Vec::from([late, waking_ticks]))
             }
-            _ => (0, [2 * unknown_ticks, unknown_ticks]),
+            _ => (0, Vec::from([2 * unknown_ticks, unknown_ticks])),
         };
-        let frame = last_ticks > 0;
-        // What can be done before the frame has ended is not to be done after it.
-        let ready = self.snapshot.read().map(|snapshot| {
-            let speed_bits = self.port.reach(|throttle| throttle.speed_bits(&snapshot));
-            (snapshot, speed_bits)
-        });
         Looks {
             begin_ticks,
-            after_ticks: Vec::from(after_ticks),
-            frame,
-            ready,
+            after_ticks,
+            frame: last_ticks > 0,
             until_ticks: begin_ticks.wrapping_add(last_ticks),
             unheard: None,
         }
@@ -191,45 +228,59 @@ impl Listener {
     /// Takes in what has come, and does what follows from it: a whole frame of the known signal at once,
     /// which is soon enough for an answer in time, and all else edge by edge.
     #[inline(never)]
-    fn look(&mut self, looks: &mut Looks) -> Option<Ask> {
+    fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Asked> {
         self.fill();
         let waits = core::mem::take(&mut looks.frame);
-        while waits && !self.capture.has_frame() && self.capture.is_before(looks.until_ticks) {
+        while waits
+            && !self.capture.edges.has_frame()
+            && self.capture.edges.is_before(looks.until_ticks)
+        {
             self.fill();
         }
-        let now_us = Instant::now().as_micros();
-        let capture = &mut self.capture;
-        let (ask, setpoint) = self.port.reach(|throttle| {
+        let edges = &mut self.capture.edges;
+        let (asked, setpoint) = self.port.reach(|throttle| {
             if throttle.is_storing() {
-                capture.forget();
+                edges.forget();
                 return Some((None, Some(throttle.setpoint())));
             }
-            let whole = capture.frame();
-            if let Some(event) = whole.and_then(|bit| throttle.whole(bit)) {
-                capture.skip_frame();
+            let whole = edges.frame();
+            let event = whole.and_then(|bit| throttle.whole(bit));
+            let ask = if let Some(event) = event {
                 looks.after_ticks.clear();
-                let ask = Ask::of(&event);
-                if ask.is_some_and(|ask| ask.bidirectional) && looks.ready.is_some() {
-                    looks.unheard = Some(event);
-                    return Some((ask, None));
+                if !edges.skip_frame() {
+                    // It may be none; the next look tells of what is lost.
+                    return None;
                 }
-                let ask = throttle.hear(now_us, &event);
-                return Some((ask, Some(throttle.setpoint())));
-            }
-            if waits {
+                let ask = Ask::of(&event);
+                if ask.is_some_and(|ask| ask.bidirectional) && ready.is_some() {
+                    looks.unheard = Some(event);
+                    ask
+                } else {
+                    throttle.hear(now_us(), &event)
+                }
+            } else if waits {
                 return None;
-            }
-            let mut ask = None;
-            capture.take(|at_ticks, level| {
-                ask = throttle.edge(now_us, at_ticks, level).or(ask);
+            } else {
+                let (mut ask, now_us) = (None, now_us());
+                edges.take(|at_ticks, level| {
+                    ask = throttle.edge(now_us, at_ticks, level).or(ask);
+                });
+                throttle.settle(now_us, edges.settled()).or(ask)
+            };
+            let asked = ask.zip(ready).map(|(ask, ready)| Asked {
+                ask,
+                reply: throttle.reply(ask, ready.speed_bits),
             });
-            ask = throttle.settle(now_us, capture.settled()).or(ask);
-            Some((ask, Some(throttle.setpoint())))
+            if ask.is_some_and(|ask| ask.bidirectional) && asked.is_none() {
+                TROUBLE.late_reply();
+            }
+            let heard = looks.unheard.is_none();
+            Some((asked, heard.then(|| throttle.setpoint())))
         })?;
         if let Some(setpoint) = setpoint {
             self.renew(setpoint);
         }
-        ask
+        asked
     }
 
     /// Gives the interrupt what it is to do.
@@ -238,38 +289,49 @@ impl Listener {
         throttle_lives();
     }
 
-    async fn answer(&mut self, ask: Ask, looks: &Looks) {
-        let Some((snapshot, speed_bits)) = &looks.ready else {
-            return;
-        };
-        let Answer { reply, kiss, info } =
-            (self.port).reach(|throttle| throttle.answer_with(ask, *speed_bits, snapshot));
-        let sent = reply.map(|reply| self.replier.begin(&mut self.capture, &reply));
+    async fn answer(
+        &mut self,
+        asked: Asked,
+        looks: &Looks,
+        ready: &Ready,
+        armed: Option<Armed<'_>>,
+    ) {
+        let Asked { ask, reply } = asked;
+        let sending = reply
+            .as_ref()
+            .zip(armed)
+            .and_then(|(reply, armed)| armed.begin(&mut self.capture, reply));
+        if reply.is_some() && sending.is_none() {
+            TROUBLE.late_reply();
+        }
         if let Some(event) = &looks.unheard {
-            let now_us = Instant::now().as_micros();
             let setpoint = self.port.reach(|throttle| {
                 // What it asks for is being sent.
-                let _ = throttle.hear(now_us, event);
+                let _ = throttle.hear(now_us(), event);
                 throttle.setpoint()
             });
-            self.setpoint.write(setpoint);
-            throttle_lives();
+            self.renew(setpoint);
         }
+        let Serial { kiss, info } =
+            (self.port).reach(|throttle| throttle.serial(ask, &ready.snapshot));
         if let Some(frame) = kiss {
             kiss::send(&frame);
         }
         if let Some(information) = info {
             kiss::send(&information);
         }
-        if let Some(sent) = sent {
-            match sent {
-                Some(sent) => sent.end().await,
-                None => TROUBLE.late_reply(),
-            }
-            // What it has heard of itself.
-            self.capture.forget();
+        if let Some(sending) = sending {
+            let over_ticks = sending.end(&mut self.capture).await;
+            // What it has heard of itself. What came later is the next frame's, which may have begun.
+            self.fill();
+            self.capture.edges.skip_before(over_ticks);
         }
     }
+}
+
+/// The time of the tasks.
+fn now_us() -> u64 {
+    Instant::now().as_micros()
 }
 
 /// So many eighths of a bit of a frame; 144 are the most.

@@ -1,0 +1,179 @@
+//! The edges of the throttle wire that the capturing timer has seen, in two rings, with times of 32 bits
+//! whatever the timer has.
+//!
+//! Nothing here touches the chip: what it shows is asked for by closures.
+
+mod ring;
+#[cfg(test)]
+mod tests;
+
+use ring::Ring;
+pub(crate) use ring::{LEN, Memory};
+
+/// Bits of a DShot frame: so many edges of each direction.
+const BITS: usize = 16;
+
+/// The edges, by a timer of so many bits.
+pub(crate) struct Edges<const TIMER_BITS: u32> {
+    /// Rising, falling.
+    rings: [Ring; 2],
+    /// An edge that is younger may not be in memory yet.
+    settling_ticks: u32,
+    last_ticks: u32,
+    settled_ticks: u32,
+}
+
+impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
+    /// What the timer's counter can show.
+    const MASK: u32 = u32::MAX >> (32 - TIMER_BITS);
+
+    /// None yet. An edge is in its memory, that of the rising or that of the falling ones, so many ticks after
+    /// it at the latest.
+    pub(crate) fn new(memories: [&'static Memory; 2], settling_ticks: u32) -> Self {
+        Self {
+            rings: memories.map(Ring::new),
+            settling_ticks,
+            last_ticks: 0,
+            settled_ticks: 0,
+        }
+    }
+
+    /// The time, which wraps after 32 bits, by what the counter shows. A timer with fewer is extended: this
+    /// must be called within each of its turns.
+    pub(crate) fn now(&mut self, shown: u32) -> u32 {
+        let passed = shown.wrapping_sub(self.last_ticks) & Self::MASK;
+        self.last_ticks = self.last_ticks.wrapping_add(passed);
+        self.last_ticks
+    }
+
+    /// Takes in what has come, by what the counter shows and how many times the DMA of each ring has left.
+    /// False if some were lost: the task was kept from its work for longer than the memory lasts.
+    pub(crate) fn fill(&mut self, shown: impl Fn() -> u32, left: impl Fn(usize) -> usize) -> bool {
+        // The edges up to here are in memory by then.
+        self.settled_ticks = self.now(shown()).wrapping_sub(self.settling_ticks);
+        let [rising, falling] = &mut self.rings;
+        let whole = rising.fill(left(0)) & falling.fill(left(1));
+        // And none of them comes after this: it would be dated a turn of the counter back.
+        self.now(shown());
+        whole
+    }
+
+    /// An edge's time, by what the timer showed then.
+    #[inline(always)]
+    fn time(&self, shown: u32) -> u32 {
+        let before_ticks = self.last_ticks.wrapping_sub(shown) & Self::MASK;
+        self.last_ticks.wrapping_sub(before_ticks)
+    }
+
+    /// The next edge of a direction.
+    #[inline(always)]
+    fn front(&self, direction: usize) -> Option<u32> {
+        let ring = &self.rings[direction];
+        (ring.count() > 0).then(|| self.time(ring.word(0)))
+    }
+
+    /// The first edge that has come.
+    pub(crate) fn first(&self) -> Option<u32> {
+        let age = |ticks: &u32| self.settled_ticks.wrapping_sub(*ticks) as i32;
+        let fronts = [self.front(0), self.front(1)];
+        fronts.into_iter().flatten().max_by_key(age)
+    }
+
+    /// The first and the second edge of each of 16 bits, if as many edges have come as a frame has.
+    #[inline(always)]
+    pub(crate) fn frame(&self) -> Option<impl Fn(usize) -> (u32, u32) + '_> {
+        if !self.has_frame() {
+            return None;
+        }
+        let [rising, falling] = &self.rings;
+        let since = falling.word(0).wrapping_sub(rising.word(0)) & Self::MASK;
+        let (first, second) = if since <= Self::MASK / 2 {
+            (rising, falling)
+        } else {
+            (falling, rising)
+        };
+        let (first, second) = (first.words(), second.words());
+        Some(move |bit| (self.time(first(bit)), self.time(second(bit))))
+    }
+
+    /// Whether as many edges have come as a frame has.
+    pub(crate) fn has_frame(&self) -> bool {
+        self.rings.iter().all(|ring| ring.count() >= BITS)
+    }
+
+    /// Whether this time was still to come at the last look.
+    pub(crate) fn is_before(&self, until_ticks: u32) -> bool {
+        until_ticks.wrapping_sub(self.last_ticks) as i32 > 0
+    }
+
+    /// Leaves a frame's edges behind. False if they were overwritten while they were read.
+    pub(crate) fn skip_frame(&mut self) -> bool {
+        let whole = !self.rings.iter().any(Ring::is_torn);
+        for ring in &mut self.rings {
+            ring.skip(BITS);
+        }
+        whole
+    }
+
+    /// Leaves behind what came before the last frame that has begun, if more than a frame waits: whether it
+    /// did. A frame begins with an edge of this direction, and within it the next of those never comes so
+    /// late.
+    pub(crate) fn skip_to_last_frame(&mut self, direction: usize, apart_ticks: u32) -> bool {
+        let count = self.rings[direction].count();
+        if count <= BITS {
+            return false;
+        }
+        let word = self.rings[direction].words();
+        let begins =
+            |index: &usize| word(*index).wrapping_sub(word(index - 1)) & Self::MASK >= apart_ticks;
+        let Some(first) = (1..count).rev().find(begins) else {
+            return false;
+        };
+        self.skip_before(self.time(word(first)));
+        true
+    }
+
+    /// Leaves behind the edges before a time.
+    pub(crate) fn skip_before(&mut self, ticks: u32) {
+        for direction in 0..2 {
+            let is_before = |at: u32| (at.wrapping_sub(ticks) as i32) < 0;
+            while self.front(direction).is_some_and(is_before) {
+                self.rings[direction].skip(1);
+            }
+        }
+    }
+
+    /// Gives out the edges that have come, with the level after each, in their order.
+    pub(crate) fn take(&mut self, mut give: impl FnMut(u32, bool)) {
+        while let Some((at_ticks, level)) = self.next() {
+            give(at_ticks, level);
+        }
+    }
+
+    /// The time up to which [`Edges::take`] has given out every edge.
+    pub(crate) fn settled(&self) -> u32 {
+        self.settled_ticks
+    }
+
+    /// The next edge of both directions. One that is too young waits: an older one of the other
+    /// direction may still be on its way into memory. None as well where it was overwritten meanwhile.
+    fn next(&mut self) -> Option<(u32, bool)> {
+        let age = |ticks: u32| self.settled_ticks.wrapping_sub(ticks) as i32;
+        let fronts = [self.front(0), self.front(1)];
+        let [rising, falling] = fronts.map(|front| front.map(age));
+        let level = rising > falling;
+        let direction = usize::from(!level);
+        if [rising, falling][direction]? < 0 || self.rings.iter().any(Ring::is_torn) {
+            return None;
+        }
+        self.rings[direction].skip(1);
+        Some((fronts[direction]?, level))
+    }
+
+    /// Forgets the edges that have come.
+    pub(crate) fn forget(&mut self) {
+        for ring in &mut self.rings {
+            ring.clear();
+        }
+    }
+}
