@@ -15,8 +15,8 @@ use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, Exten, InjectedAdc, Sam
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{
-    ADC1, ADC2, ADC3, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA2_CH1, DMA2_CH2, DMA2_CH6, IWDG, PB5, PB10,
-    PC6, PC7, TIM1, TIM3, TIM8, USART3, USART6,
+    ADC1, ADC2, ADC3, DMA1_CH1, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA2_CH2, DMA2_CH6, IWDG, PB5, PB10,
+    PC6, PC7, TIM1, TIM3, TIM6, USART3, USART6,
 };
 use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::input_capture::CapturePin;
@@ -71,10 +71,10 @@ pub(crate) const WIRING: Wiring = Wiring {
 
 bind_interrupts!(struct Interrupts {
     USART6 => usart::InterruptHandler<USART6>;
+    DMA1_STREAM1 => dma::InterruptHandler<DMA1_CH1>;
     DMA1_STREAM3 => dma::InterruptHandler<DMA1_CH3>;
     DMA1_STREAM4 => dma::InterruptHandler<DMA1_CH4>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
-    DMA2_STREAM1 => dma::InterruptHandler<DMA2_CH1>;
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
     DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
     TIM3 => CaptureInterrupt;
@@ -83,10 +83,12 @@ bind_interrupts!(struct Interrupts {
 /// The throttle wire's timers and pin.
 pub(crate) mod wire {
     use embassy_stm32::pac;
-    use embassy_stm32::pac::gpio::Gpio;
-    use embassy_stm32::pac::gpio::vals::Moder;
+    use embassy_stm32::pac::timer::regs::CcerGp16;
+    use embassy_stm32::pac::timer::vals::{CcmrOutputCcs, Ocm};
     use embassy_stm32::pac::timer::{TimGp16, TimGp32};
-    use embassy_stm32::peripherals::{TIM3, TIM8};
+    use embassy_stm32::peripherals::{TIM3, TIM6};
+
+    use super::throttle;
 
     /// Captures the edges.
     pub(crate) type CaptureTimer = TIM3;
@@ -102,34 +104,46 @@ pub(crate) mod wire {
     pub(crate) const TICK_HZ: u32 = super::TIMER_HZ / 2 / PRESCALER as u32;
     /// Its channel at the pin, from 0.
     pub(crate) const SIGNAL_CHANNEL: usize = 1;
-    /// Paces replies: of the timers that reach the DMA which reaches the ports, one that is free.
-    pub(crate) type PaceTimer = TIM8;
+    /// Paces replies: of the timers whose update the first DMA serves, one without channels.
+    pub(crate) type PaceTimer = TIM6;
     /// Its registers.
     // SAFETY: the same block, of which this view has the part that every timer has.
-    pub(crate) const PACE: TimGp16 = unsafe { TimGp16::from_ptr(pac::TIM8.as_ptr()) };
+    pub(crate) const PACE: TimGp16 = unsafe { TimGp16::from_ptr(pac::TIM6.as_ptr()) };
     /// Its rate.
-    pub(crate) const PACE_HZ: u32 = super::TIMER_HZ;
-    /// The pin's port.
-    const PORT: Gpio = pac::GPIOB;
-    /// The pin's number there.
-    const PIN: usize = 5;
+    pub(crate) const PACE_HZ: u32 = super::TIMER_HZ / 2;
 
-    /// What the DMA writes to while the pin is driven: the port's set and reset register.
+    /// What the DMA writes to while the pin is driven: the capturing timer's CCER.
+    ///
+    /// Not a port's: only the second DMA reaches the ports, and one that serves an AHB peripheral beside one
+    /// of APB2, as is the serial line, corrupts data (ES0182, 2.1.10). The first DMA cannot reach a port at
+    /// all, and its transfers to timers are what the HAL's types allow for this one.
     pub(crate) fn level_register() -> *mut u32 {
-        PORT.bsrr().as_ptr().cast()
+        CAPTURE.ccer().as_ptr().cast()
     }
 
-    /// What it writes there for a level.
+    /// What it writes there for a level: the channel's output is forced to be active, and its polarity, by
+    /// which it captures falling edges otherwise, makes that low. The other channel goes on.
     pub(crate) fn level_word(level: bool) -> u32 {
-        // A zero resets the pin, by the upper half of the register.
-        1 << if level { PIN } else { PIN + 16 }
+        let mut enable = CcerGp16(0);
+        enable.set_cce(0, true);
+        enable.set_cce(SIGNAL_CHANNEL, true);
+        enable.set_ccp(SIGNAL_CHANNEL, !level);
+        enable.0
     }
 
-    /// Drives the pin, high at first, or lets it go.
+    /// Drives the pin, high at first, or lets it go and captures its edges.
     pub(crate) fn drive_pin(on: bool) {
-        PORT.bsrr().write(|w| w.set_bs(PIN, true));
-        let mode = if on { Moder::OUTPUT } else { Moder::ALTERNATE };
-        PORT.moder().modify(|w| w.set_moder(PIN, mode));
+        // What a channel is may be changed only while it is off (RM0090, 18.4.7).
+        CAPTURE.ccer().modify(|w| w.set_cce(SIGNAL_CHANNEL, false));
+        if on {
+            CAPTURE.ccmr_output(0).modify(|w| {
+                w.set_ccs(SIGNAL_CHANNEL, CcmrOutputCcs::OUTPUT);
+                w.set_ocm(SIGNAL_CHANNEL, Ocm::FORCE_ACTIVE);
+            });
+        } else {
+            throttle::capture_on(SIGNAL_CHANNEL);
+        }
+        CAPTURE.ccer().write_value(CcerGp16(level_word(on)));
     }
 }
 
@@ -165,10 +179,10 @@ pub struct Converters {
 /// The throttle wire.
 pub struct Throttle {
     pin: Peri<'static, PB5>,
-    _timers: (Peri<'static, TIM3>, Peri<'static, TIM8>),
+    _timers: (Peri<'static, TIM3>, Peri<'static, TIM6>),
     rising: Peri<'static, DMA1_CH4>,
     falling: Peri<'static, DMA1_CH5>,
-    reply: Peri<'static, DMA2_CH1>,
+    reply: Peri<'static, DMA1_CH1>,
 }
 
 impl Throttle {
@@ -184,7 +198,7 @@ impl Throttle {
             dma::Channel::new(self.rising, Interrupts),
             dma::Channel::new(self.falling, Interrupts),
         ];
-        let update = UpDma::<TIM8>::request(&*self.reply);
+        let update = UpDma::<TIM6>::request(&*self.reply);
         let reply = dma::Channel::new(self.reply, Interrupts);
         (
             Capture::new(channels, requests),
@@ -331,10 +345,10 @@ impl Hardware {
             light: Output::new(p.PC4, Level::Low, Speed::Low),
             throttle: Throttle {
                 pin: p.PB5,
-                _timers: (p.TIM3, p.TIM8),
+                _timers: (p.TIM3, p.TIM6),
                 rising: p.DMA1_CH4,
                 falling: p.DMA1_CH5,
-                reply: p.DMA2_CH1,
+                reply: p.DMA1_CH1,
             },
             mavlink: Mavlink {
                 uart: p.USART6,

@@ -76,7 +76,7 @@ fn set_interrupts(edges: bool, alarm: bool) {
 }
 
 /// Lets a channel, which is off, capture the pin's edges.
-fn capture_on(channel: usize) {
+pub(crate) fn capture_on(channel: usize) {
     CAPTURE.ccmr_input(0).modify(|w| {
         // Both channels see the one pin: its own directly, its neighbour crosswise.
         w.set_ccs(

@@ -29,6 +29,8 @@ use super::trouble::TROUBLE;
 use crate::board;
 use crate::board::wire::TICK_HZ;
 use crate::exchange::{SetpointWriter, SnapshotReader};
+#[cfg(feature = "vesc4-f405")]
+pub(crate) use capture::capture_on;
 pub(crate) use capture::{Capture, CaptureInterrupt};
 use reply::Armed;
 pub(crate) use reply::Replier;
