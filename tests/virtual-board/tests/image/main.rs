@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`boot`] | it starts, answers by MAVLink, and two runs are equal |
 //! | [`throttle`] | DShot and pulses turn the motor, and each frame is answered at its time |
+//! | [`replies`] | a flight controller's decoder reads each reply at DShot300, 600 and 1200 |
 //! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
 //! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
 //! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
@@ -24,6 +25,8 @@ mod common;
 mod damaged;
 mod engines;
 mod failures;
+mod flight_controller;
 mod readings;
+mod replies;
 mod storage;
 mod throttle;

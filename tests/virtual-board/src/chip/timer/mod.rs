@@ -189,7 +189,9 @@ impl Timer {
     pub fn requests(&self) -> impl Iterator<Item = u8> + use<> {
         let (asks, numbers) = (self.asks, self.kind.requests);
         let stands = move |request: &usize| asks >> request & 1 == 1;
-        (0..REQUESTS).filter(stands).map(move |request| numbers[request])
+        (0..REQUESTS)
+            .filter(stands)
+            .map(move |request| numbers[request])
     }
 
     /// The DMA has served a request, if it is one of these.

@@ -22,7 +22,7 @@ use siskin_emulator::flash::FileFlash;
 use siskin_emulator::machine::{Machine, Onlooker};
 use siskin_emulator::plant::Gate;
 use siskin_emulator::rig::{Bench, Period, Rig};
-use siskin_emulator::surroundings::Passage;
+use siskin_emulator::surroundings::{Motion, Passage};
 use siskin_emulator::wire::Wire;
 use siskin_vboard::chip::Cause;
 use siskin_vboard::image::Image;
@@ -38,10 +38,12 @@ pub(crate) const MS: u64 = 1_000_000;
 /// A period of the PWM at its 24 kHz.
 pub(crate) const PWM_PERIOD: Cycles = CLOCK_HZ / 24_000;
 
-/// The protocols of the throttle wire (`emulator/README.md`): a pulse of 1 to 2 ms, and DShot600 in both
-/// directions.
+/// The protocols of the throttle wire (`emulator/README.md`): a pulse of 1 to 2 ms, and DShot300, 600 and 1200
+/// in both directions.
 const PULSE: u8 = 1;
-const DSHOT600_BIDIRECTIONAL: u8 = 22;
+pub(crate) const BIDIRECTIONAL_300: u8 = 21;
+pub(crate) const BIDIRECTIONAL_600: u8 = 22;
+pub(crate) const BIDIRECTIONAL_1200: u8 = 23;
 
 /// The image to test. Paths that are not absolute begin at the workspace.
 pub(crate) fn image() -> Image {
@@ -67,7 +69,8 @@ pub(crate) fn image() -> Image {
 pub(crate) enum Throttle {
     /// Nothing.
     Silent,
-    /// DShot600 in both directions, at 1.96 kHz so that frames come at all phases of the PWM: 0 is stop, 48 to 2047 are throttle.
+    /// DShot in both directions, at 1.96 kHz so that frames come at all phases of the PWM: 0 is stop, 48 to
+    /// 2047 are throttle.
     Dshot(u16),
     /// Pulses so long, ns, at 400 Hz.
     Pulse(u32),
@@ -81,7 +84,8 @@ impl Throttle {
         }
     }
 
-    fn datagram(self) -> Option<Vec<u8>> {
+    /// The frame that is sent, DShot by this protocol.
+    fn datagram(self, protocol: u8) -> Option<Vec<u8>> {
         Some(match self {
             Self::Silent => return None,
             Self::Dshot(value) => {
@@ -91,7 +95,7 @@ impl Throttle {
                 };
                 let bits = frame.to_bits() ^ check_mask(true);
                 let [low, high] = bits.to_le_bytes();
-                vec![DSHOT600_BIDIRECTIONAL, low, high]
+                vec![protocol, low, high]
             }
             Self::Pulse(width_ns) => [&[PULSE], width_ns.to_le_bytes().as_slice()].concat(),
         })
@@ -116,6 +120,17 @@ pub(crate) struct Heard {
     pub(crate) replies: Vec<Reply>,
     /// All gates' and the wire's edges, frames and replies so far.
     pub(crate) hash: DefaultHasher,
+    /// The throttle wire's levels and the motor, where a test looks at them.
+    pub(crate) scope: Option<Scope>,
+}
+
+/// What a probe at the board has seen.
+#[derive(Debug, Default)]
+pub(crate) struct Scope {
+    /// The throttle wire's edges: when, ns, and the level after each.
+    pub(crate) line: Vec<(u64, bool)>,
+    /// The motor and the supply at the beginning of each period of the PWM: when, ns.
+    pub(crate) motor: Vec<(u64, Motion)>,
 }
 
 impl Default for Heard {
@@ -128,6 +143,7 @@ impl Default for Heard {
             frames: Vec::new(),
             replies: Vec::new(),
             hash: DefaultHasher::new(),
+            scope: None,
         }
     }
 }
@@ -162,6 +178,9 @@ impl Onlooker for Heard {
         let motion = &passage.motion;
         let [a, b, c] = motion.currents_a.map(f64::to_bits);
         (t_s.to_bits(), a, b, c, motion.speed_rad_s.to_bits()).hash(&mut self.hash);
+        if let Some(scope) = &mut self.scope {
+            scope.motor.push(((t_s * 1e9) as u64, *motion));
+        }
     }
 
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
@@ -170,11 +189,14 @@ impl Onlooker for Heard {
 
     fn edge(&mut self, time_ns: u64, level: bool) {
         (time_ns, level).hash(&mut self.hash);
+        if let Some(scope) = &mut self.scope {
+            scope.line.push((time_ns, level));
+        }
     }
 
     fn answer(&mut self, datagram: &[u8]) {
         datagram.hash(&mut self.hash);
-        if let [DSHOT600_BIDIRECTIONAL, rest @ ..] = datagram
+        if let [BIDIRECTIONAL_300..=BIDIRECTIONAL_1200, rest @ ..] = datagram
             && let Some((bits, after)) = rest.split_first_chunk()
         {
             self.replies.push(Reply {
@@ -200,6 +222,8 @@ pub(crate) struct Board {
     pub(crate) board: VirtualBoard<Translator<World>>,
     pub(crate) heard: Heard,
     pub(crate) throttle: Throttle,
+    /// By which DShot is sent.
+    pub(crate) protocol: u8,
     /// Frames played on the throttle wire.
     pub(crate) played: usize,
     /// When the next one comes.
@@ -224,6 +248,7 @@ impl Board {
             board,
             heard: Heard::default(),
             throttle: Throttle::Silent,
+            protocol: BIDIRECTIONAL_600,
             played: 0,
             due_ns: 0,
             sequence: 0,
@@ -270,7 +295,7 @@ impl Board {
         while self.now_ns() < until_ns {
             let now_ns = self.now_ns();
             if now_ns >= self.due_ns {
-                if let Some(datagram) = self.throttle.datagram() {
+                if let Some(datagram) = self.throttle.datagram(self.protocol) {
                     self.board.wire().play(now_ns, &datagram).expect("a frame");
                     self.played += 1;
                 }
@@ -280,7 +305,8 @@ impl Board {
         }
     }
 
-    fn advance(&mut self, until_ns: u64) {
+    /// Runs until a time with nothing new on the throttle wire.
+    pub(crate) fn advance(&mut self, until_ns: u64) {
         let ran = self
             .board
             .advance(until_ns, &mut self.heard, &mut |_: &[u8]| {});

@@ -1,0 +1,138 @@
+//! A [flight controller's decoder](crate::flight_controller) reads the reply to each frame: at DShot300, 600 and
+//! 1200, frames as close as they may come and frames with gaps, the motor turning and the parameter list
+//! being sent meanwhile. Run with `--release`.
+
+use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
+
+use crate::common::{
+    BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200, Board, MS, Scope, Throttle, image,
+};
+use crate::flight_controller::{DELAY_NS, Exchange, FlightController, Told};
+
+const FRAMES: usize = 10_000;
+
+/// The throttle.
+const VALUE: u16 = 1000;
+
+/// By how much more frames with gaps are apart at most.
+const GAP_NS: f64 = 400_000.0;
+
+/// By how much the control's estimate of the speed may stray from the plant's.
+const SPEED_ERROR: f64 = 0.002;
+
+/// DShot's command that turns extended telemetry on.
+const EXTENDED_ON: u16 = 13;
+
+/// What a window of frames has shown.
+#[derive(Debug, Default)]
+struct Seen {
+    missing: usize,
+    garbled: usize,
+    wrong: usize,
+    extended: [usize; 16],
+    after_ns: Option<(f64, f64)>,
+    worst_speed: f64,
+}
+
+impl Seen {
+    fn take(&mut self, exchange: &Exchange, scope: &Scope, pole_pairs: f64) {
+        let (Some(at_ns), Some(after_ns)) = (exchange.at_ns, exchange.after_ns) else {
+            self.missing += 1;
+            return;
+        };
+        let (least, most) = self.after_ns.unwrap_or((after_ns, after_ns));
+        self.after_ns = Some((least.min(after_ns), most.max(after_ns)));
+        let Some(word) = exchange.word() else {
+            self.garbled += 1;
+            return;
+        };
+        let passed = scope.motor.partition_point(|(at, _)| *at <= at_ns);
+        let (_, motion) = scope.motor[passed - 1];
+        let right = match Told::of(word) {
+            Told::Stopped => false,
+            Told::Turn { period_us, step_us } => {
+                let turn_us = 1e6 * std::f64::consts::TAU / (motion.speed_rad_s * pole_pairs);
+                let off_us = (f64::from(period_us) - turn_us).abs() - f64::from(step_us) / 2.0;
+                self.worst_speed = self.worst_speed.max(off_us / turn_us);
+                off_us < SPEED_ERROR * turn_us
+            }
+            Told::Extended { kind, value } => {
+                self.extended[usize::from(kind)] += 1;
+                let value = f64::from(value);
+                match kind {
+                    // Room temperature; volts in quarters; amperes, whose ripple a mean leaves out; no stress;
+                    // nothing to report.
+                    0x2 => (15.0..40.0).contains(&value),
+                    0x4 => (value / 4.0 - motion.bus_v).abs() < 0.5,
+                    0x6 => value <= 3.0,
+                    0xc | 0xe => value == 0.0,
+                    _ => false,
+                }
+            }
+        };
+        self.wrong += usize::from(!right);
+    }
+}
+
+/// `close_ns` is how far frames are apart that are as close as this is to hold for; so many replies of each
+/// 10 000 may be too late to be sent.
+fn every_reply_is_read(protocol: u8, bit_hz: f64, close_ns: f64, late: usize) {
+    let controller = FlightController { bit_hz };
+    let mut board = Board::new(&image(), &[]);
+    let pole_pairs = f64::from(board.world().bench().bench().motor.pole_pairs);
+    board.protocol = protocol;
+    board.throttle = Throttle::Dshot(0);
+    board.run(400 * MS);
+    board.throttle = Throttle::Dshot(EXTENDED_ON);
+    board.run(10 * MS);
+    board.spin_up();
+    board.run(1_000 * MS);
+    let gap_ns = |frame: usize| close_ns + GAP_NS * (frame as f64 * 0.569_840).fract();
+    let (target_system, target_component) = (board.heard.from.system, board.heard.from.component);
+    for apart_ns in [&|_| close_ns, &gap_ns as &dyn Fn(usize) -> f64] {
+        board.heard.frames.clear();
+        board.send(&PARAM_REQUEST_LIST_DATA {
+            target_system,
+            target_component,
+        });
+        let exchanges = controller.fly(&mut board, VALUE, FRAMES, apart_ns);
+        let scope = board.heard.scope.take().expect("it was begun");
+        let mut seen = Seen::default();
+        for exchange in &exchanges {
+            seen.take(exchange, &scope, pole_pairs);
+        }
+        let values = board.heard.messages::<PARAM_VALUE_DATA>().len();
+        println!("{bit_hz} bit/s, {close_ns:.0} ns: {seen:?}, {values} parameters meanwhile");
+        if std::env::var_os("APART").is_some() {
+            continue;
+        }
+        assert_eq!((seen.garbled, seen.wrong), (0, 0));
+        assert!(seen.missing <= late, "{} of {FRAMES}", seen.missing);
+        let (least_ns, most_ns) = seen.after_ns.expect("replies");
+        assert!(least_ns > DELAY_NS - 2_000.0 && most_ns < DELAY_NS + 2_000.0);
+        // Some 16 a second.
+        assert!(seen.extended.iter().sum::<usize>() > 5);
+        assert!(values > 20, "{values}");
+    }
+    assert_eq!(board.world().bridge().violations(), 0);
+}
+
+// Betaflight sends no closer than every 200 µs at DShot300 and every 100 µs at DShot600 where it wants replies.
+// A frame, the delay and the reply take 139, 85 and 57 µs.
+
+#[test]
+fn every_reply_is_read_at_dshot300() {
+    every_reply_is_read(BIDIRECTIONAL_300, 300e3, 160_000.0, 0);
+}
+
+#[test]
+fn every_reply_is_read_at_dshot600() {
+    every_reply_is_read(BIDIRECTIONAL_600, 600e3, 100_000.0, 0);
+}
+
+#[test]
+fn every_reply_is_read_at_dshot1200() {
+    // From a frame's first edge to its reply are 43 µs, of which the task takes 30 and the PWM interrupt up to 11:
+    // it is too late where others come together with these, 7 times of 20 000.
+    every_reply_is_read(BIDIRECTIONAL_1200, 1.2e6, 90_000.0, 20);
+}
