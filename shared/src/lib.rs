@@ -50,3 +50,7 @@ pub mod telemetry;
 pub mod throttle;
 pub mod tune;
 pub mod units;
+
+/// Whether there is a self-test, by the feature `self-test`. Without it the command for one is UNSUPPORTED, and
+/// nothing is kept for it.
+pub const SELF_TEST: bool = cfg!(any(test, feature = "self-test"));

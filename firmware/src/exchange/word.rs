@@ -1,7 +1,7 @@
 //! The set-point in one word, which an atomic store hands over whole.
 
 use fixed::types::I1F31;
-use siskin_control::drive::{Fault, Setpoint};
+use siskin_control::drive::{Fault, Pull, Setpoint};
 use siskin_control::units::{Current, Speed};
 
 /// Kind of set-point, in the word's bits 31 to 29.
@@ -12,6 +12,7 @@ const TORQUE: u32 = 2;
 const TEST: u32 = 3;
 const VOLTAGE: u32 = 4;
 const TONE: u32 = 5;
+const PULL: u32 = 6;
 
 /// The sequence number's place: bits 28 to 24.
 const SEQUENCE_SHIFT: u32 = 24;
@@ -33,6 +34,7 @@ pub fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
         Setpoint::Torque(current) => (TORQUE, value(current.to_bits())),
         Setpoint::Test(current) => (TEST, value(current.to_bits())),
         Setpoint::Tone(pitch) => (TONE, value(pitch.to_bits())),
+        Setpoint::Pull(pull) => (PULL, pull as u32),
         Setpoint::Voltage(share) => (VOLTAGE, value(share.to_bits())),
     };
     kind << KIND_SHIFT | (sequence & SEQUENCE_MASK) << SEQUENCE_SHIFT | value
@@ -47,6 +49,7 @@ pub fn unpack(word: u32) -> Setpoint {
         TORQUE => Setpoint::Torque(Current::from_bits(bits)),
         TEST => Setpoint::Test(Current::from_bits(bits)),
         TONE => Setpoint::Tone(Speed::from_bits(bits)),
+        PULL => Setpoint::Pull(Pull::from_number(word as u8)),
         VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
         _ => rest(word & VALUE_MASK),
     }
@@ -84,6 +87,7 @@ mod tests {
             Setpoint::Voltage(I1F31::from_num(-0.75)),
             Setpoint::Speed(Speed::from_bits(-0x1234_5600)),
         ];
+        all.extend(Pull::ALL.map(Setpoint::Pull));
         all.extend(Fault::ALL.map(Setpoint::Fault));
         for setpoint in all {
             for number in [0, 1, 31] {
@@ -107,7 +111,7 @@ mod tests {
     #[test]
     fn a_word_that_nobody_writes_is_stop() {
         assert_eq!(unpack(9), Setpoint::Stop);
-        assert_eq!(unpack(6 << KIND_SHIFT | 77), Setpoint::Stop);
+        assert_eq!(unpack(7 << KIND_SHIFT | 77), Setpoint::Stop);
         assert_eq!(unpack(0), Setpoint::Stop);
     }
 }

@@ -40,7 +40,11 @@ pub(super) fn wish(config: &Config, setpoint: Setpoint) -> Wish {
         Setpoint::Speed(speed) => speed.to_bits(),
         Setpoint::Torque(current) | Setpoint::Test(current) => current.to_bits(),
         Setpoint::Voltage(share) => share.to_bits(),
-        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) | Setpoint::Tone(_) => 0,
+        Setpoint::Stop
+        | Setpoint::Zero
+        | Setpoint::Fault(_)
+        | Setpoint::Tone(_)
+        | Setpoint::Pull(_) => 0,
     };
     // A test is of either direction; else the other way is for who has asked for both.
     let both_ways = config.both_ways || matches!(setpoint, Setpoint::Test(_));

@@ -3,6 +3,7 @@
 mod config;
 mod launch;
 mod phase;
+mod pull;
 mod rest;
 pub mod six_step;
 mod slow;
@@ -14,6 +15,7 @@ mod turn;
 pub use crate::protection::{Fault, Faults};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop};
 pub use phase::Phase;
+pub use pull::Pull;
 pub use state::{Snapshot, State};
 pub use step::step;
 
@@ -56,6 +58,8 @@ pub enum Setpoint {
     Tone(Speed),
     /// Hold this current i_q for a test; the start uses no more than a test may either.
     Test(Current),
+    /// Pull half-bridges to the supply's poles without turning the motor, once it is seen to stand.
+    Pull(Pull),
 }
 
 /// What the inverter does until the next period.

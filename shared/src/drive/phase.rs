@@ -20,7 +20,7 @@ pub enum Phase {
     Stopping,
     /// All low sides are on.
     Brake,
-    /// The phases switch to be heard; the rotor stands.
+    /// The phases switch to be heard, or to be tested; the rotor stands.
     Tone,
 }
 

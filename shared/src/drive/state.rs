@@ -1,6 +1,6 @@
 //! What a control period remembers, and what of it the tasks may know.
 
-use super::{Config, Fault, Faults, Phase, six_step, tone};
+use super::{Config, Fault, Faults, Phase, pull, six_step, tone};
 use crate::control::catch::Rotor;
 use crate::control::inductance::Factor;
 use crate::control::modulator::Supply;
@@ -78,6 +78,7 @@ pub struct State {
     pub(super) missing: Current,
     pub(super) start: start::State,
     pub(super) tone: tone::Playing,
+    pub(super) pulling: pull::Pulling,
     pub(super) protection: protection::State,
     pub(super) six_step: six_step::State,
     /// The voltages of the last two commands in the stator's frame, the latest first.
@@ -165,6 +166,7 @@ impl State {
             speed: speed::State::default(),
             start: start::State::default(),
             tone: tone::Playing::default(),
+            pulling: pull::Pulling::default(),
             inductance: inductance::State::default(),
             planned: Speed::ZERO,
             torque: torque::State::default(),
@@ -298,6 +300,7 @@ impl State {
             missing,
             start,
             tone,
+            pulling,
             protection,
             six_step,
             commanded,
@@ -386,6 +389,7 @@ impl State {
         if config.six_step.is_some() {
             six_step.trace(out);
         }
+        pulling.trace(out);
     }
 
     /// ω* of the drive in use; that of the other rests at zero.
@@ -456,6 +460,7 @@ impl State {
         self.sensing.restart();
         self.looks = 0;
         self.tone = tone::Playing::default();
+        self.pulling = pull::Pulling::default();
     }
 
     /// Until the open terminals tell the shaft's speed, what is reported falls as slowly as a large

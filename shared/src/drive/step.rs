@@ -262,6 +262,7 @@ impl Setpoint {
             Self::Voltage(_) => 5,
             Self::Tone(_) => 6,
             Self::Test(_) => 7,
+            Self::Pull(_) => 8,
         }
     }
 
@@ -272,7 +273,7 @@ impl Setpoint {
             Self::Torque(current) => Self::Torque(current.saturating_neg()),
             Self::Voltage(share) => Self::Voltage(share.saturating_neg()),
             Self::Test(current) => Self::Test(current.saturating_neg()),
-            Self::Stop | Self::Zero | Self::Fault(_) | Self::Tone(_) => self,
+            Self::Stop | Self::Zero | Self::Fault(_) | Self::Tone(_) | Self::Pull(_) => self,
         }
     }
 }

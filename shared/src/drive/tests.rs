@@ -9,6 +9,7 @@ use crate::params::{Board, ParamId, Params, build};
 
 mod any;
 mod at_rest;
+mod pull;
 mod starts;
 mod tones;
 

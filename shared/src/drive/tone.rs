@@ -22,7 +22,8 @@ use super::launch::{self, Wish};
 use super::slow::{self, CYCLE};
 use super::state::Seen;
 use super::turn::{bus_current, reading};
-use super::{Bridge, Phase, Setpoint, State};
+use super::{Bridge, Phase, Setpoint, State, pull};
+use crate::SELF_TEST;
 use crate::control::catch::Rotor;
 use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
@@ -94,16 +95,19 @@ impl Playing {
     }
 }
 
-/// Changes the phase for a tone that is asked for, or that has ended, and where nothing that was to
-/// begin is asked for any more. False where the set-point and the phase have nothing to do with that.
+/// Changes the phase for a tone or a test that is asked for, or that has ended, and where nothing that
+/// was to begin is asked for any more. False where the set-point and the phase have nothing to do with that.
 #[cold]
 pub(super) fn follow(config: &super::Config, state: &mut State, setpoint: Setpoint) -> bool {
-    let plays = config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
+    let pulls = SELF_TEST && matches!(setpoint, Setpoint::Pull(_));
+    let plays = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
     let rests = launch::wish(config, setpoint) == Wish::Rest;
     let braked = state.tone.braked;
     let stands = state.rotor == Rotor::Standing;
     match state.phase {
         Phase::Tone | Phase::Sense if plays => {}
+        // A test charges what it needs, and is to find a short circuit before all low sides are on.
+        Phase::Charge if pulls && stands => state.phase = Phase::Tone,
         Phase::Charge if plays && stands => {}
         Phase::Idle if plays && stands => to(state, Phase::Sense, braked),
         Phase::Brake if plays && state.seen.speed == Speed::ZERO => to(state, Phase::Sense, true),
@@ -124,7 +128,7 @@ fn to(state: &mut State, phase: Phase, braked: bool) {
     state.tone.braked = braked;
 }
 
-/// A period in which a tone may be played: `None` where none is asked for.
+/// A period in which a tone or a test may be played: `None` where none is asked for.
 #[cold]
 pub(super) fn period(
     config: &super::Config,
@@ -132,6 +136,9 @@ pub(super) fn period(
     currents: [AdcCounts; 3],
     setpoint: Setpoint,
 ) -> Option<Bridge> {
+    if SELF_TEST && let Setpoint::Pull(pull) = setpoint {
+        return Some(pull::period(config, state, currents, pull));
+    }
     let (Some(tone), Setpoint::Tone(pitch)) = (&config.tone, setpoint) else {
         return None;
     };

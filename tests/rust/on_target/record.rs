@@ -150,6 +150,6 @@ fn exchanged(setpoint: Setpoint) -> Setpoint {
         Setpoint::Voltage(share) => Setpoint::Voltage(I1F31::from_bits(upper(share.to_bits()))),
         Setpoint::Tone(pitch) => Setpoint::Tone(Speed::from_bits(upper(pitch.to_bits()))),
         Setpoint::Test(i_q) => Setpoint::Test(Current::from_bits(upper(i_q.to_bits()))),
-        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) => setpoint,
+        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) | Setpoint::Pull(_) => setpoint,
     }
 }
