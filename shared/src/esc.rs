@@ -4,6 +4,7 @@
 use heapless::Vec;
 
 use crate::answer::info::info;
+use crate::check::Check;
 use crate::drive::{Config, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
@@ -17,6 +18,7 @@ use crate::units::Scale;
 use sound::Sound;
 use storage::{Asker, Storage, Unstored};
 
+mod check;
 mod sound;
 mod storage;
 mod wire;
@@ -43,6 +45,7 @@ pub struct Esc {
     too_hot: bool,
     polled_us: Option<u64>,
     sound: Sound,
+    check: Check,
     light: bool,
     /// What the motor was to do at the last poll, and since when it has been nothing.
     command: Command,
@@ -146,6 +149,7 @@ impl Esc {
             too_hot: false,
             polled_us: None,
             sound: Sound::default(),
+            check: Check::new(&board),
             light: false,
             command: Command::Stop,
             rests_since_us: None,
@@ -241,8 +245,9 @@ impl Esc {
         self.sound.look(now_us, snapshot, rests);
         let told = Told {
             note: self.sound.note(),
+            pull: self.check.pull(),
             too_hot: self.too_hot,
-            barred: self.storage.is_lost(),
+            barred: self.storage.is_lost() || !self.check.report.may_turn(&self.params),
         };
         throttle.reach(|throttle| throttle.tell(told));
     }
@@ -375,6 +380,7 @@ impl Esc {
             now_us,
             params: &mut self.params,
             telemetry: &self.telemetry,
+            check: &self.check.report,
             authority: &mut Reached(throttle),
             validate: &|params| given.check(params, &board),
         };

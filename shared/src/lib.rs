@@ -7,11 +7,11 @@
 //! converter a bridge's next period ([`drive::step`]), by way of the papers' blocks ([`control`])
 //! and the limits ([`protection`]). What the drive has done becomes [`telemetry`], and that goes
 //! out by [`mavlink`]. [`params`] turns the table of parameters into the configuration that all of
-//! it reads, and [`store`] keeps them, with [`statistics`] and what else survives. [`tune`] has the tunes that the motor plays. [`throttle`] and
-//! [`esc`] tie together what is outside the PWM interrupt.
+//! it reads, and [`store`] keeps them, with [`statistics`] and what else survives. [`tune`] has the tunes that the motor plays. [`check`] is
+//! the self-test. [`throttle`] and [`esc`] tie together what is outside the PWM interrupt.
 //!
 //! Dependencies run one way: `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
-//! {`telemetry`, `statistics`} ← {`throttle`, `mavlink`} ← `store` ← `esc`. `params` builds the configurations of the others.
+//! {`telemetry`, `statistics`} ← `check` ← {`throttle`, `mavlink`} ← `store` ← `esc`. `params` builds the configurations of the others.
 //!
 //! # Numbers
 //! Fixed point with the fraction bits in the type ([`math`]), in units in which a product needs
@@ -33,6 +33,7 @@
 extern crate std;
 
 pub mod answer;
+pub mod check;
 mod checksum;
 pub mod control;
 pub mod drive;
@@ -51,6 +52,6 @@ pub mod throttle;
 pub mod tune;
 pub mod units;
 
-/// Whether there is a self-test, by the feature `self-test`. Without it the command for one is UNSUPPORTED, and
-/// nothing is kept for it.
+/// Whether there is a self-test ([`check`]), by the feature `self-test`. Without it the command for one is
+/// UNSUPPORTED, and nothing is kept for it.
 pub const SELF_TEST: bool = cfg!(any(test, feature = "self-test"));

@@ -10,7 +10,7 @@ use heapless::Deque;
 
 use crate::answer::info;
 use crate::answer::{self, Answer, Answers, Ask, Basis, Reply, Serial};
-use crate::drive::{Config, Fault, Setpoint, Snapshot};
+use crate::drive::{Config, Fault, Pull, Setpoint, Snapshot};
 use crate::input::access::Access;
 use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
 use crate::input::command::Order;
@@ -44,6 +44,8 @@ pub struct Throttle {
 pub(crate) struct Told {
     /// The note that is due, to be played while nothing turns the motor.
     pub(crate) note: Option<Note>,
+    /// What the self-test pulls, likewise, and in place of notes.
+    pub(crate) pull: Option<Pull>,
     /// Whether the temperature is past its limit.
     pub(crate) too_hot: bool,
     /// Whether nothing may turn the motor.
@@ -181,8 +183,9 @@ impl Throttle {
             return Setpoint::Stop;
         }
         let command = self.command();
-        match self.told.note {
-            Some(note) if command.rests() => self.mapping.tone(note),
+        match (self.told.pull, self.told.note) {
+            (Some(pull), _) if command.rests() => Setpoint::Pull(pull),
+            (None, Some(note)) if command.rests() => self.mapping.tone(note),
             _ => self.mapping.setpoint(command),
         }
     }
@@ -308,5 +311,9 @@ impl<R: Reach> Access for Reached<'_, R> {
         drive: DriveStatus,
     ) -> Result<(), TestError> {
         self.authority(|authority| authority.actuator_test(now_us, value, duration_s, drive))
+    }
+
+    fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool {
+        self.authority(|authority| authority.may_test(now_us, drive))
     }
 }

@@ -22,6 +22,16 @@ pub enum Shunts {
     Two,
 }
 
+impl Shunts {
+    /// How many phases have one, from the first.
+    pub const fn count(self) -> usize {
+        match self {
+            Self::Three => 3,
+            Self::Two => 2,
+        }
+    }
+}
+
 /// What the reconstruction must know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {

@@ -30,6 +30,9 @@ pub trait Access {
         duration_s: f32,
         drive: DriveStatus,
     ) -> Result<(), TestError>;
+
+    /// As [`Authority::may_test`].
+    fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool;
 }
 
 impl Access for Authority {
@@ -57,5 +60,9 @@ impl Access for Authority {
         drive: DriveStatus,
     ) -> Result<(), TestError> {
         Authority::actuator_test(self, now_us, value, duration_s, drive)
+    }
+
+    fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool {
+        Authority::may_test(self, now_us, drive)
     }
 }

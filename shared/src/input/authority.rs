@@ -357,9 +357,7 @@ impl Authority {
         if !(least..=1.0).contains(&value) || !(0.0..=TEST_MOST_S).contains(&duration_s) {
             return Err(TestError::OutOfRange);
         }
-        let silent = !within(now_us, self.event_us, self.timing.loss_us);
-        let rests = drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us));
-        if self.barred || !rests {
+        if self.barred || !self.may_test(now_us, drive) {
             return Err(TestError::TemporarilyRejected);
         }
         let duration_us = u64::from((duration_s * 1e6) as u32);
@@ -369,6 +367,13 @@ impl Authority {
             ends_us: now_us.saturating_add(duration_us),
         });
         Ok(())
+    }
+
+    /// Whether something else than the wire may use the motor: it rests without a fault, and the wire is
+    /// silent or at valid zero. Where nothing may turn it, a self-test still may tell why.
+    pub fn may_test(&self, now_us: u64, drive: DriveStatus) -> bool {
+        let silent = !within(now_us, self.event_us, self.timing.loss_us);
+        drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us))
     }
 
     /// Told, at each look, whether a fault holds the bridge off: it ends a test, and what a

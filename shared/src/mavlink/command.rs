@@ -12,9 +12,11 @@ use super::receiver::{Frame, is_signed};
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;
+use crate::SELF_TEST;
 use crate::input::authority::{self, DriveStatus};
 
 mod calibration;
+mod check;
 mod motor;
 
 const DO_MOTOR_TEST: u16 = MavCmd::MAV_CMD_DO_MOTOR_TEST as u16;
@@ -23,6 +25,7 @@ const CONFIGURE_ACTUATOR: u16 = MavCmd::MAV_CMD_CONFIGURE_ACTUATOR as u16;
 const PREFLIGHT_CALIBRATION: u16 = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION as u16;
 const PREFLIGHT_STORAGE: u16 = MavCmd::MAV_CMD_PREFLIGHT_STORAGE as u16;
 const PREFLIGHT_REBOOT_SHUTDOWN: u16 = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN as u16;
+const RUN_PREARM_CHECKS: u16 = MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16;
 const COMPONENT_ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
 /// By number: the dialect marks it as superseded, but clients still send it.
 const GET_MESSAGE_INTERVAL: u16 = 510;
@@ -137,8 +140,8 @@ pub(super) struct Commands {
     function: f32,
     /// The command whose work is done when the parameters have been stored, loaded or erased.
     storage: Option<Command>,
-    /// The calibration that is under way.
-    calibration: Option<Command>,
+    /// The calibration or the self-test that is under way.
+    under_way: Option<Command>,
     /// The last command that must not be obeyed twice, and its result.
     last: Option<(Command, MavResult)>,
     act: Option<Act>,
@@ -155,7 +158,7 @@ impl Commands {
             role: identity.role,
             function: identity.place.motor_function(),
             storage: None,
-            calibration: None,
+            under_way: None,
             last: None,
             act: None,
             params_changed: false,
@@ -184,7 +187,7 @@ impl Commands {
             .last
             .filter(|(last, _)| command.repeats(last) && is_known(command, context));
         // One of the two at a time.
-        let pending = self.storage.as_ref().or(self.calibration.as_ref());
+        let pending = self.storage.as_ref().or(self.under_way.as_ref());
         let result = match (pending, earlier) {
             (Some(pending), _) if command.repeats(pending) => Some(IN_PROGRESS),
             (_, Some((_, result))) => Some(result),
@@ -222,6 +225,9 @@ impl Commands {
             }
             CONFIGURE_ACTUATOR => return self.configure(command, drive, context, replies),
             PREFLIGHT_CALIBRATION => self.calibrate(command, drive, context, replies),
+            RUN_PREARM_CHECKS if SELF_TEST && (command.exact || self.role == Role::Standalone) => {
+                self.check(command, drive, context)
+            }
             COMPONENT_ARM_DISARM => arm_disarm(command.choice(0), context),
             PREFLIGHT_STORAGE => return self.storage(command, drive),
             PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, replies),
@@ -240,7 +246,7 @@ impl Commands {
 
     /// Whether something is under way that another command must not come between.
     fn is_busy(&self) -> bool {
-        self.storage.is_some() || self.calibration.is_some() || self.reboot
+        self.storage.is_some() || self.under_way.is_some() || self.reboot
     }
 
     /// Whether a command means the motor of this ESC by this number. None in particular is this one
@@ -306,6 +312,14 @@ impl Commands {
         let text = ["Rebooting", ""];
         replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
         ACCEPTED
+    }
+
+    /// What was under way by this command has this result, if it was.
+    fn end(&mut self, number: u16, result: MavResult, replies: &mut Replies) {
+        if let Some(command) = self.under_way.take_if(|command| command.number == number) {
+            self.last = Some((command, result));
+            replies.ack(command.from, command.number, result);
+        }
     }
 
     /// The next thing for the ESC to do.

@@ -18,6 +18,7 @@ use super::schedule::{Intervals, Schedule};
 use super::signing::{Kept, Signing, Trust};
 use super::warnings::{Warning, Warnings};
 use super::{ftp, news};
+use crate::check::Report;
 use crate::drive::Faults;
 use crate::image::Image;
 use crate::input::News as WireNews;
@@ -39,6 +40,8 @@ pub struct Context<'a> {
     pub params: &'a mut Params,
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
+    /// What the last self-test has found.
+    pub check: &'a Report,
     /// What decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
     /// Whether values make a drive; a value that breaks it is refused with the reason.
@@ -79,6 +82,8 @@ pub enum Act {
     Calibrate,
     /// End it.
     EndCalibration,
+    /// Begin a self-test; [`Component::tell_progress`] and [`Component::check_done`] tell of it.
+    Check,
 }
 
 /// One ESC on MAVLink. Frames may come from several links; what it sends goes to all of them.
@@ -216,6 +221,7 @@ impl Component {
                 let view = ftp::View {
                     params: context.params,
                     telemetry: context.telemetry,
+                    check: context.check,
                     warning: self.warnings.last(),
                 };
                 if let Some(answer) = self.files.handle(context.now_us, frame, &view) {
@@ -314,6 +320,17 @@ impl Component {
         if let Some((severity, text)) = news::words(news) {
             self.replies.push(Reply::Text(severity, text));
         }
+    }
+
+    /// A self-test is so far, percent.
+    pub fn tell_progress(&mut self, percent: u8) {
+        self.commands.check_progress(percent, &mut self.replies);
+    }
+
+    /// A self-test has ended, and the command for it, if there was one, is acknowledged.
+    pub fn check_done(&mut self, passed: bool) {
+        let result = if passed { ACCEPTED } else { FAILED };
+        self.commands.end_check(result, &mut self.replies);
     }
 
     /// Warns a person at the next poll. Two wait; of more, the first are told.

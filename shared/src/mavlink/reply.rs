@@ -35,6 +35,8 @@ pub(super) enum Reply {
         to: Address,
         command: u16,
         result: MavResult,
+        /// Percent, or [`PROGRESS_UNKNOWN`].
+        progress: u8,
     },
     /// One of the messages that can be asked for; the id is known to be one of them.
     Message(u32),
@@ -98,10 +100,26 @@ impl Replies {
     }
 
     pub(super) fn ack(&mut self, to: Address, command: u16, result: MavResult) {
+        let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS {
+            PROGRESS_UNKNOWN
+        } else {
+            0
+        };
         self.push(Reply::Ack {
             to,
             command,
             result,
+            progress,
+        });
+    }
+
+    /// A command goes on, and so many percent of it are done.
+    pub(super) fn progress(&mut self, to: Address, command: u16, percent: u8) {
+        self.push(Reply::Ack {
+            to,
+            command,
+            result: MavResult::MAV_RESULT_IN_PROGRESS,
+            progress: percent,
         });
     }
 
@@ -150,15 +168,10 @@ impl Writer {
         identity: &Identity,
         to: Address,
         command: u16,
-        result: MavResult,
+        (result, progress): (MavResult, u8),
         out: &mut dyn FnMut(&[u8]),
     ) {
         let [low, high] = command.to_le_bytes();
-        let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS {
-            PROGRESS_UNKNOWN
-        } else {
-            0
-        };
         let payload = [
             low,
             high,

@@ -16,6 +16,7 @@ use mavlink::{
 use std::vec::Vec;
 
 use super::*;
+use crate::check::Report;
 use crate::drive::{Faults, Phase};
 use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
@@ -107,10 +108,12 @@ impl Bench {
             component,
             ..
         } = self;
+        let check = Report::new(40.0, 0.02);
         let mut context = Context {
             now_us: *now_us,
             params,
             telemetry,
+            check: &check,
             authority,
             validate: &refuse_slow_pwm,
         };
@@ -128,10 +131,12 @@ impl Bench {
 
     /// What leaves at this poll, frame by frame.
     fn poll_bytes(&mut self, frames: &mut Vec<Vec<u8>>) {
+        let check = Report::new(40.0, 0.02);
         let mut context = Context {
             now_us: self.now_us,
             params: &mut self.params,
             telemetry: &self.telemetry,
+            check: &check,
             authority: &mut self.authority,
             validate: &refuse_slow_pwm,
         };

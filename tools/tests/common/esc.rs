@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use siskin_control::check::Report;
 use siskin_control::image::Image;
 use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request};
@@ -192,6 +193,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             now_us,
             params: &mut params,
             telemetry: &telemetry,
+            check: &Report::new(40.0, 0.02),
             authority: &mut authority,
             validate: &validate,
         };

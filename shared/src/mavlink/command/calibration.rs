@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::MavResult;
 
 use super::{
     ACCEPTED, Act, CANCELLED, Command, Commands, Context, DENIED, DriveStatus, FAILED, IN_PROGRESS,
-    Replies, TEMPORARILY_REJECTED,
+    PREFLIGHT_CALIBRATION, Replies, TEMPORARILY_REJECTED,
 };
 use crate::input::calibration::Step;
 use crate::input::signal::Signal;
@@ -25,7 +25,7 @@ impl Commands {
         let [others @ .., esc] = command.params;
         let others = others.iter().any(|param| *param != 0.0);
         if !others && esc == 0.0 {
-            if self.calibration.is_some() {
+            if self.calibrates().is_some() {
                 self.act = Some(Act::EndCalibration);
                 self.end_calibration(CANCELLED, replies);
             }
@@ -39,14 +39,14 @@ impl Commands {
         if self.is_busy() || !drive.stopped {
             return TEMPORARILY_REJECTED;
         }
-        self.calibration = Some(*command);
+        self.under_way = Some(*command);
         self.act = Some(Act::Calibrate);
         IN_PROGRESS
     }
 
     /// The stick has come a step further. What it has taught is stored before the end is told.
     pub(in super::super) fn follow_stick(&mut self, step: Step, replies: &mut Replies) {
-        match (step, &self.calibration) {
+        match (step, self.calibrates()) {
             (Step::Full, Some(command)) => replies.ack(command.from, command.number, IN_PROGRESS),
             (Step::Cancelled, _) => self.end_calibration(FAILED, replies),
             _ => {}
@@ -55,9 +55,11 @@ impl Commands {
 
     /// The calibration has this result, if there is one under way.
     pub(in super::super) fn end_calibration(&mut self, result: MavResult, replies: &mut Replies) {
-        if let Some(command) = self.calibration.take() {
-            self.last = Some((command, result));
-            replies.ack(command.from, command.number, result);
-        }
+        self.end(PREFLIGHT_CALIBRATION, result, replies);
+    }
+
+    fn calibrates(&self) -> Option<&Command> {
+        let under_way = self.under_way.as_ref();
+        under_way.filter(|command| command.number == PREFLIGHT_CALIBRATION)
     }
 }

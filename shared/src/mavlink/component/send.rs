@@ -100,7 +100,8 @@ impl Component {
                 to,
                 command,
                 result,
-            } => writer.ack(identity, to, command, result, send),
+                progress,
+            } => writer.ack(identity, to, command, (result, progress), send),
             Reply::Message(AUTOPILOT_VERSION_DATA::ID) => {
                 let message = messages::autopilot_version(&self.image);
                 writer.sender.send(identity.address, &message, &[], send);
@@ -225,6 +226,7 @@ impl Component {
         let view = ftp::View {
             params: context.params,
             telemetry: context.telemetry,
+            check: context.check,
             warning: self.warnings.last(),
         };
         let mut payload = [0; ftp::PAYLOAD_MAX];

@@ -4,6 +4,8 @@ use super::answer::Error;
 use super::packed::Selection;
 use super::sink::Sink;
 use super::text;
+use crate::SELF_TEST;
+use crate::check::Report;
 use crate::checksum::checksum;
 use crate::params::Params;
 use crate::telemetry::Telemetry;
@@ -22,6 +24,8 @@ pub(super) const GENERAL_CHECKSUM: u32 = checksum(
 pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) params: &'a Params,
     pub(in crate::mavlink) telemetry: &'a Telemetry,
+    /// What the last self-test has found.
+    pub(in crate::mavlink) check: &'a Report,
     /// The last that a person was warned of; empty if there was none.
     pub(in crate::mavlink) warning: &'a str,
 }
@@ -38,6 +42,8 @@ enum Content {
     Faults,
     /// What has happened in the life of the ESC, in words.
     Statistics,
+    /// What the last self-test has found.
+    Check,
 }
 
 /// An entry of a folder.
@@ -49,7 +55,7 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 7] = [
+static ENTRIES: [Entry; 8] = [
     Entry {
         folder: "",
         name: "general.json.xz",
@@ -85,7 +91,18 @@ static ENTRIES: [Entry; 7] = [
         name: "statistics.txt",
         content: Content::Statistics,
     },
+    Entry {
+        folder: "@SYS/",
+        name: "check.txt",
+        content: Content::Check,
+    },
 ];
+
+/// Those that there are: the last one with the self-test.
+fn entries() -> &'static [Entry] {
+    let [others @ .., _] = &ENTRIES;
+    if SELF_TEST { &ENTRIES } else { others }
+}
 
 /// One file.
 #[derive(Clone, Copy, Debug)]
@@ -103,7 +120,7 @@ impl File {
             Some(at) => (path.get(..at)?, path.get(at + 1..)),
             None => (path, None),
         };
-        let entry = ENTRIES.iter().find(|entry| {
+        let entry = entries().iter().find(|entry| {
             path.strip_prefix(entry.folder.as_bytes()) == Some(entry.name.as_bytes())
         })?;
         let selection = match (&entry.content, query) {
@@ -121,6 +138,8 @@ impl File {
             Content::Parameters => self.selection.write(view.params, sink),
             Content::Faults => text::faults(view, sink),
             Content::Statistics => text::statistics(view, sink),
+            Content::Check if SELF_TEST => text::check(view, sink),
+            Content::Check => {}
         }
     }
 
@@ -138,7 +157,7 @@ impl Entry {
         let path = trim(path);
         let mut before = 0;
         let mut error = Error::FileNotFound;
-        for entry in &ENTRIES {
+        for entry in entries() {
             if trim(entry.folder.as_bytes()) == path {
                 if before == number {
                     return Ok(entry);
@@ -154,7 +173,7 @@ impl Entry {
     /// and a zero.
     pub(super) fn write_rest(&'static self, view: &View, sink: &mut Sink) {
         let mut begun = false;
-        for entry in &ENTRIES {
+        for entry in entries() {
             begun |= core::ptr::eq(entry, self);
             if !begun || entry.folder != self.folder {
                 continue;

@@ -6,14 +6,18 @@ use std::vec::Vec;
 use super::files::{Entry, File};
 use super::sink::Sink;
 use super::*;
+use crate::check::Report;
 use crate::checksum::checksum;
 use crate::mavlink::tests::TELEMETRY;
 use crate::params::{ParamId, Params, TABLE};
+
+static CHECK: Report = Report::new(40.0, 0.02);
 
 fn view(params: &Params) -> View<'_> {
     View {
         params,
         telemetry: &TELEMETRY,
+        check: &CHECK,
         warning: "",
     }
 }

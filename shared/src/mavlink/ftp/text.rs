@@ -53,6 +53,43 @@ pub(super) fn statistics(view: &View, sink: &mut Sink) {
     }
 }
 
+/// `@SYS/check.txt`: a line for each item that was measured, with its name, value, unit, bounds and
+/// whether it is within them; `-` is a value that a sensor does not give.
+pub(super) fn check(view: &View, sink: &mut Sink) {
+    view.check.tell(view.params, |line| {
+        for piece in [line.name[0], line.name[1], " "] {
+            sink.put(piece.as_bytes());
+        }
+        thousandths(line.value, sink);
+        sink.put(line.unit.as_bytes());
+        sink.put(b" ");
+        thousandths(line.low, sink);
+        thousandths(line.high, sink);
+        sink.put(if line.ok() { b"ok\n" } else { b"FAILED\n" });
+    });
+}
+
+/// A number with three decimals, and a space.
+#[inline(never)]
+fn thousandths(number: f32, sink: &mut Sink) {
+    let thousandths = (number.abs() * 1000.0 + 0.5) as u32;
+    if !number.is_finite() {
+        return sink.put(b"- ");
+    }
+    if number < 0.0 {
+        sink.put(b"-");
+    }
+    decimal(thousandths / 1000, sink);
+    sink.put(b".");
+    // Behind a digit that is left out, so that zeros stand.
+    let mut digits = [0; 4];
+    let mut place = Sink::new(0, &mut digits);
+    decimal(1000 + thousandths % 1000, &mut place);
+    digits[0] = b' ';
+    digits.rotate_left(1);
+    sink.put(&digits);
+}
+
 /// A number in decimal. The formatting of the core library would take 3 KB of a chip's image.
 pub(super) fn decimal(number: u32, sink: &mut Sink) {
     let mut worth = 1_000_000_000;

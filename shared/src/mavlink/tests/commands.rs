@@ -6,6 +6,7 @@ use super::*;
 use crate::input::authority::Command;
 
 mod calibration;
+mod check;
 mod motor;
 mod storage;
 

@@ -1,0 +1,273 @@
+//! The lines of the self-test: names, units, bounds.
+//!
+//! | name | unit | bounds | what it tells |
+//! |---|---|---|---|
+//! | `supply` | V | `LIM_BUS_V_MIN` to `LIM_BUS_V_MAX` | the supply, as its divider shows it |
+//! | `reference` | V | 3.2 to 3.4 | the converter's full scale, by the chip's own reference |
+//! | `temperature` | degC | −20 to `LIM_TEMP_C` | the thermistor |
+//! | `clock` | kHz | 29.5 to 34 | the chip's slow oscillator of 32 kHz, counted by the clock that times the PWM and the wire. The bounds are the slow one's (data sheet of the STM32G431, LSI) |
+//! | `option_bytes` | 1 | 1 | 1 where the chip starts from its flash whatever its BOOT0 pin says |
+//! | `comparator_a`.. | A | ± 0.4 of the range | where the comparator trips without current: its level is searched between 0, which must trip, and full scale, which must not |
+//! | `zero_a`.. | A | ± 0.1 of the range | mean of the current's readings without current: the drive takes no greater one for sound |
+//! | `noise_a`.. | A | 0.1 counts to 0.01 of the range | standard deviation of the same; readings that never change are no readings |
+//! | `rest_a`.. | % | −1 to 10 | the terminal with all switches off |
+//! | `high_a`.. | % | 90 to 110 | the terminal with its high side on |
+//! | `motor_a`.. | % | 90 to 110 | the terminal with the high side of another phase on |
+//! | `low_a`.. | A | −1 to −0.1 of `LIM_PHASE_A` | the current that comes back through the low side, as its shunt shows it |
+//! | `off_a`.. | A | ± 0.1 of `LIM_PHASE_A` | the current through a phase that is off, while another is pulled up |
+//!
+//! Percents are of the supply or, where the divider ends below it, of the most that it shows: of 18.3 V on
+//! the B-G431B-ESC1, above which a reading is a clamp that tells no more than that it is above.
+
+use core::ops::Range;
+
+use crate::SELF_TEST;
+use crate::params::{ParamId, Params};
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// The supply's voltage, V.
+    Supply,
+    /// The converters' full scale, V.
+    Reference,
+    /// Temperature of the board, °C.
+    Temperature,
+    /// The slow oscillator's rate by the fast one, kHz.
+    Clock,
+    /// Whether the chip is set to start from its flash, 1 or 0.
+    OptionBytes,
+    /// Current at which a phase's comparator would trip with its level moved to where it does, A.
+    Comparator,
+    /// Mean of a phase's readings without current, A.
+    Zero,
+    /// Their standard deviation, A.
+    Noise,
+    /// A terminal with all switches off, percent of the supply.
+    Rest,
+    /// A terminal with its high side on, percent of the supply.
+    High,
+    /// A terminal with another's high side on, percent of the supply.
+    Motor,
+    /// Current out of the motor through a low side, A, negative as all that flows out.
+    Low,
+    /// Current into a phase that is off, A.
+    Off,
+}
+
+/// Kinds of which there is one; of the others there is one for each phase.
+const SINGLE: usize = Kind::Comparator as usize;
+
+const ROWS_LEN: usize = Kind::Off as usize + 1;
+
+/// What bounds are in.
+#[derive(Clone, Copy)]
+enum Basis {
+    /// The item's unit.
+    One,
+    /// The board's range.
+    Range,
+    /// `LIM_PHASE_A`.
+    Limit,
+}
+
+/// A kind's row: name, unit, bounds. Some bounds are parameters instead.
+struct Row {
+    name: &'static str,
+    unit: &'static str,
+    low: f32,
+    high: f32,
+    of: Basis,
+}
+
+const fn row(name: &'static str, unit: &'static str, (low, high): (f32, f32), of: Basis) -> Row {
+    Row {
+        name,
+        unit,
+        low,
+        high,
+        of,
+    }
+}
+
+/// In the order of [`Kind`].
+static ROWS: [Row; ROWS_LEN] = [
+    row("supply", "V", (0.0, 0.0), Basis::One),
+    row("reference", "V", (3.2, 3.4), Basis::One),
+    row("temperature", "degC", (-20.0, 0.0), Basis::One),
+    row("clock", "kHz", (29.5, 34.0), Basis::One),
+    row("option_bytes", "1", (1.0, 1.0), Basis::One),
+    row("comparator", "A", (-0.4, 0.4), Basis::Range),
+    row("zero", "A", (-0.1, 0.1), Basis::Range),
+    row("noise", "A", (0.0, 0.01), Basis::Range),
+    row("rest", "%", (-1.0, 10.0), Basis::One),
+    row("high", "%", (90.0, 110.0), Basis::One),
+    row("motor", "%", (90.0, 110.0), Basis::One),
+    row("low", "A", (-1.0, -0.1), Basis::Limit),
+    row("off", "A", (-0.1, 0.1), Basis::Limit),
+];
+
+/// None where there is no self-test, so that nothing is kept for it.
+const ITEMS: usize = if SELF_TEST {
+    SINGLE + 3 * (ROWS_LEN - SINGLE)
+} else {
+    0
+};
+
+/// One line's subject.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Item {
+    /// What is measured.
+    pub kind: Kind,
+    /// Of which phase, 0, 1, 2 for a, b, c; 0 where there is but one.
+    pub phase: u8,
+}
+
+impl Item {
+    /// Those that only the board can measure.
+    pub const OWN: [Self; 6] = [
+        Self::of(Kind::Reference, 0),
+        Self::of(Kind::Clock, 0),
+        Self::of(Kind::OptionBytes, 0),
+        Self::of(Kind::Comparator, 0),
+        Self::of(Kind::Comparator, 1),
+        Self::of(Kind::Comparator, 2),
+    ];
+
+    const fn of(kind: Kind, phase: u8) -> Self {
+        Self { kind, phase }
+    }
+
+    const fn place(self) -> usize {
+        let kind = self.kind as usize;
+        if kind < SINGLE {
+            kind
+        } else {
+            SINGLE + 3 * (kind - SINGLE) + self.phase as usize
+        }
+    }
+}
+
+/// What a self-test has found.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Not a number where nothing was measured.
+    values: [f32; ITEMS],
+    /// The greatest current that the board can show, and a count of it, A.
+    scale_a: [(f32, f32); SELF_TEST as usize],
+}
+
+/// A line of a self-test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Its name, in two pieces.
+    pub name: [&'static str; 2],
+    /// What was measured.
+    pub value: f32,
+    /// In this unit; 1 is none.
+    pub unit: &'static str,
+    /// The least value that is well.
+    pub low: f32,
+    /// The greatest.
+    pub high: f32,
+}
+
+impl Line {
+    /// Whether the value is within its bounds; one that is no number is not.
+    pub fn ok(&self) -> bool {
+        (self.low..=self.high).contains(&self.value)
+    }
+}
+
+impl Report {
+    /// One without a line, of a board whose converter shows currents up to `range_a` in steps of
+    /// `count_a`, A.
+    pub const fn new(range_a: f32, count_a: f32) -> Self {
+        Self {
+            values: [f32::NAN; ITEMS],
+            scale_a: [(range_a, count_a); SELF_TEST as usize],
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.values = [f32::NAN; ITEMS];
+    }
+
+    /// What was measured, or not a number.
+    pub(super) fn get(&self, kind: Kind, phase: u8) -> f32 {
+        self.values[Item::of(kind, phase).place()]
+    }
+
+    pub(crate) fn set(&mut self, kind: Kind, phase: u8, value: f32) {
+        // A sensor without a reading has been read: its line must not be missing.
+        let value = if value.is_nan() { f32::INFINITY } else { value };
+        self.values[Item::of(kind, phase).place()] = value;
+    }
+
+    /// Tells the lines of what was measured, with the bounds that these parameters make.
+    pub fn tell(&self, params: &Params, mut tell: impl FnMut(&Line)) {
+        for place in 0..ITEMS {
+            if let Some(line) = self.line(place, params) {
+                tell(&line);
+            }
+        }
+    }
+
+    /// Whether all that was measured is within its bounds.
+    pub(super) fn fits(&self, params: &Params) -> bool {
+        self.fit(0..ITEMS, params)
+    }
+
+    /// Whether the motor may turn: comparators that do not trip where they should protect nothing, and
+    /// those of revisions Z and Y of the STM32G431 are not fully tested in production (ES0431).
+    pub fn may_turn(&self, params: &Params) -> bool {
+        self.holds(Kind::Comparator, params)
+    }
+
+    /// Whether what was measured of a kind that each phase has is within its bounds.
+    pub(super) fn holds(&self, kind: Kind, params: &Params) -> bool {
+        let first = Item::of(kind, 0).place();
+        !SELF_TEST || self.fit(first..first + 3, params)
+    }
+
+    #[inline(never)]
+    fn fit(&self, places: Range<usize>, params: &Params) -> bool {
+        let mut lines = places.map(|place| self.line(place, params));
+        lines.all(|line| line.is_none_or(|line| line.ok()))
+    }
+
+    #[inline(never)]
+    fn line(&self, place: usize, params: &Params) -> Option<Line> {
+        let value = *self.values.get(place).filter(|value| !value.is_nan())?;
+        let (kind, phase) = if place < SINGLE {
+            (place, "")
+        } else {
+            let phase = (place - SINGLE) % 3;
+            (SINGLE + (place - SINGLE) / 3, ["_a", "_b", "_c"][phase])
+        };
+        let (range_a, count_a) = self.scale_a.first().copied().unwrap_or_default();
+        let row = &ROWS[kind];
+        let base = match row.of {
+            Basis::One => 1.0,
+            Basis::Range => range_a,
+            Basis::Limit => params.get(ParamId::LimPhaseA),
+        };
+        let mut line = Line {
+            name: [row.name, phase],
+            value,
+            unit: row.unit,
+            low: row.low * base,
+            high: row.high * base,
+        };
+        if kind == Kind::Supply as usize {
+            line.low = params.get(ParamId::LimBusVMin);
+            line.high = params.get(ParamId::LimBusVMax);
+        } else if kind == Kind::Temperature as usize {
+            line.high = params.get(ParamId::LimTempC);
+        } else if kind == Kind::Noise as usize {
+            line.low = 0.1 * count_a;
+        }
+        Some(line)
+    }
+}

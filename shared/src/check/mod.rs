@@ -1,0 +1,317 @@
+//! The self-test: what a person should know of a board before its motor turns.
+//!
+//! Each [`Item`] has a value, a unit and bounds ([`items`]); what a board cannot measure is left out. At
+//! power-up those are measured that need neither time nor the bridge. MAV_CMD_RUN_PREARM_CHECKS asks for
+//! all of them, and is obeyed under the rule of what may turn a motor: at rest, without a fault, the wire
+//! silent or at valid zero. It is acknowledged by IN_PROGRESS with a percentage, and at last by ACCEPTED
+//! or, where an item is out of its bounds, FAILED, with a STATUSTEXT that names such items. All lines are
+//! in `@SYS/check.txt` on MAVLink FTP, as `siskin check` shows them. Any throttle or fault ends it, as
+//! failed.
+//!
+//! The motor does not turn, and no switch closes before what its neighbours do is known:
+//!
+//! | step | the bridge | what is seen |
+//! |---|---|---|
+//! | listen, 64 ms | off | `supply`, `reference`, `temperature`, `clock`, `option_bytes`, `comparator_*`, which are all that is measured at power-up; `zero_*`, `noise_*`, `rest_*`: a terminal that is not at ground has a shorted high side, and nothing is pulled |
+//! | pull a, b, c up | one leg from duty 0 to the whole, the others off ([`Pull`]) | `high_*`: its terminal comes to the supply, so its high side and the supply of its driver work. `motor_*`: the others follow it through the windings. `off_*`: no current, so no low side is shorted |
+//! | a to b, b to c, c to a | one leg up to a quarter, the low side of the next on, until a test's current flows | `low_*`: it comes back through that low side and its shunt, with the right sign |
+//!
+//! A terminal with all switches off lies at ground by its divider, so the low sides show by their current
+//! alone.
+
+mod items;
+
+pub use items::{Item, Kind, Line, Report};
+
+use crate::SELF_TEST;
+use crate::drive::{Phase, Pull, Sample, Snapshot};
+use crate::math::{Real, square_root};
+use crate::params::{Board, Params};
+use crate::units::{AdcCounts, Scale};
+
+/// What a board measures for the self-test.
+pub trait Probe {
+    /// The latest sample that the control has, or could have, had.
+    fn sample(&mut self) -> Sample;
+
+    /// The value of an item that only the board knows, in its unit; nothing where it has no means:
+    /// [`Kind::Reference`], [`Kind::Clock`], [`Kind::OptionBytes`] and [`Kind::Comparator`]. It may take
+    /// a millisecond.
+    fn own(&mut self, item: Item) -> Option<f32>;
+}
+
+/// Looks in which nothing is read: the set-point is on its way, and so is what comes of it.
+const LATENCY: u8 = 8;
+
+/// Looks at power-up until the supply's filter has come to what it shows.
+const POWER_UP_LOOKS: u8 = 3;
+
+/// Looks whose readings make a zero and its noise.
+const LISTENED: u8 = 64;
+
+/// Looks for which the drive may look whether the shaft stands.
+const SHAFT_LOOKS: u8 = 200;
+
+/// Looks for which a leg is pulled up, at most: at 8 kHz it takes 32 ms.
+const UP_LOOKS: u8 = 60;
+
+/// Looks for which a current through two legs is waited for.
+const THROUGH_LOOKS: u8 = 20;
+
+/// Percent of the supply from which a leg has come up.
+const UP_PERCENT: f32 = 90.0;
+
+/// The greatest reading of a terminal, counts.
+const FULL_SCALE: f32 = 4095.0;
+
+/// Phases whose currents are summed; none where there is no self-test.
+const SUMMED: usize = if SELF_TEST { 3 } else { 0 };
+
+/// Where a self-test is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// Nowhere: there is none.
+    Over,
+    /// What needs neither time nor the bridge, and then the end.
+    PowerUp,
+    /// The same, and the sensors without current.
+    Listen,
+    /// The shaft is to stand.
+    Shaft,
+    /// A leg is pulled.
+    Pull(Pull),
+}
+
+/// What has come of a look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It goes on, so many percent being done.
+    Progress(u8),
+    /// It has ended.
+    Done {
+        /// Whether all has been measured, and is within its bounds.
+        passed: bool,
+    },
+}
+
+/// What the drive does at a look.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<'a> {
+    /// Of the drive.
+    pub snapshot: &'a Snapshot,
+    /// Its units.
+    pub scale: &'a Scale,
+    /// Temperature of the board, °C.
+    pub temperature_c: f32,
+    /// Whether nothing else asks the motor to turn.
+    pub rests: bool,
+}
+
+/// A self-test and its results.
+#[derive(Clone, Debug)]
+pub struct Check {
+    step: Step,
+    /// Looks in this step.
+    looks: u8,
+    /// Sums of the readings of the currents, and of their squares, A.
+    sums: [f32; SUMMED],
+    squares: [f32; SUMMED],
+    /// What has been found.
+    pub report: Report,
+}
+
+impl Check {
+    /// That of power-up, of this board.
+    pub fn new(board: &Board) -> Self {
+        Self {
+            step: Step::PowerUp,
+            looks: 0,
+            sums: [0.0; SUMMED],
+            squares: [0.0; SUMMED],
+            report: Report::new(board.current_range_a, board.current_a_per_count),
+        }
+    }
+
+    /// Begins a whole one.
+    pub fn begin(&mut self) {
+        self.report.clear();
+        self.go(Step::Listen);
+    }
+
+    /// What is asked of the drive, while nothing turns the motor.
+    pub fn pull(&self) -> Option<Pull> {
+        match self.step {
+            _ if !SELF_TEST => None,
+            Step::Over | Step::PowerUp => None,
+            Step::Listen | Step::Shaft => Some(Pull::Open),
+            Step::Pull(pull) => Some(pull),
+        }
+    }
+
+    /// Goes on, about each millisecond. Returns what is to be told.
+    // Out of line: its stack is free for what the caller does next.
+    #[inline(never)]
+    pub fn look(
+        &mut self,
+        sight: &Sight,
+        (board, params): (&Board, &Params),
+        probe: &mut impl Probe,
+    ) -> Option<Outcome> {
+        if self.step == Step::Over {
+            return None;
+        }
+        if self.step == Step::PowerUp {
+            // Before the tune, and after some readings of the supply.
+            self.looks += 1;
+            if self.looks < POWER_UP_LOOKS {
+                return None;
+            }
+            self.own(sight, probe);
+            return Some(self.end(params, true));
+        }
+        if !sight.rests {
+            return Some(self.end(params, false));
+        }
+        let faulted = !sight.snapshot.faults.is_empty();
+        self.looks = self.looks.saturating_add(1);
+        let looks = self.looks;
+        let next = match self.step {
+            Step::Over | Step::PowerUp => return None,
+            Step::Listen => {
+                let sample = probe.sample();
+                if looks > LATENCY {
+                    for (phase, counts) in sample.currents.into_iter().enumerate() {
+                        self.listen(phase, counts.to_f32() * board.current_a_per_count);
+                    }
+                }
+                if looks < LATENCY + LISTENED {
+                    return None;
+                }
+                self.own(sight, probe);
+                for phase in 0..board.shunts.count() {
+                    self.judge(phase);
+                }
+                let share = terminals(board, &sample);
+                for phase in 0..3 {
+                    self.report
+                        .set(Kind::Rest, phase, share[usize::from(phase)]);
+                }
+                let grounded = self.report.holds(Kind::Rest, params);
+                grounded.then_some(Step::Shaft)
+            }
+            Step::Shaft => {
+                let stands = sight.snapshot.phase == Phase::Tone;
+                if !stands && !faulted && looks <= SHAFT_LOOKS {
+                    return None;
+                }
+                stands.then_some(Step::Pull(Pull::UpA))
+            }
+            Step::Pull(pull) => {
+                let share = terminals(board, &probe.sample());
+                let (leg, i) = (pull.leg(), sight.snapshot.i);
+                let [next_a, last_a] = [i.d, i.q].map(|i| sight.scale.amperes(i));
+                let [next, last] = [(leg + 1) % 3, (leg + 2) % 3];
+                let up = looks > LATENCY && share[usize::from(leg)] >= UP_PERCENT;
+                let most = if pull.is_through() {
+                    THROUGH_LOOKS
+                } else {
+                    UP_LOOKS
+                };
+                if !up && !faulted && looks <= most {
+                    return None;
+                }
+                if pull.is_through() {
+                    self.report.set(Kind::Low, next, next_a);
+                } else {
+                    self.report.set(Kind::High, leg, share[usize::from(leg)]);
+                    self.followed(next, &share, next_a);
+                    self.followed(last, &share, last_a);
+                }
+                if pull == Pull::ThroughC && !faulted {
+                    return Some(self.end(params, true));
+                }
+                // A leg whose low side is shorted must not switch.
+                let may = !faulted && self.report.holds(Kind::Off, params);
+                may.then_some(Step::Pull(Pull::from_number(pull as u8 + 1)))
+            }
+        };
+        Some(match next {
+            Some(step) => self.go(step),
+            None => self.end(params, false),
+        })
+    }
+
+    fn go(&mut self, step: Step) -> Outcome {
+        self.step = step;
+        self.looks = 0;
+        self.sums = [0.0; SUMMED];
+        self.squares = [0.0; SUMMED];
+        Outcome::Progress(match step {
+            Step::Over | Step::PowerUp | Step::Listen => 0,
+            Step::Shaft => 30,
+            Step::Pull(pull) => 30 + 10 * pull as u8,
+        })
+    }
+
+    fn end(&mut self, params: &Params, whole: bool) -> Outcome {
+        self.go(Step::Over);
+        Outcome::Done {
+            passed: whole && self.report.fits(params),
+        }
+    }
+
+    /// What needs neither time nor the bridge.
+    fn own(&mut self, sight: &Sight, probe: &mut impl Probe) {
+        let bus_v = sight.scale.volts(sight.snapshot.bus);
+        self.report.set(Kind::Supply, 0, bus_v);
+        self.report.set(Kind::Temperature, 0, sight.temperature_c);
+        for item in Item::OWN {
+            if let Some(value) = probe.own(item) {
+                self.report.set(item.kind, item.phase, value);
+            }
+        }
+    }
+
+    /// Takes a reading of a current. Out of line, as what follows for each phase: a loop would be unrolled,
+    /// and all of it be there three times.
+    #[inline(never)]
+    fn listen(&mut self, phase: usize, current_a: f32) {
+        self.sums[phase] += current_a;
+        self.squares[phase] += current_a * current_a;
+    }
+
+    #[inline(never)]
+    fn judge(&mut self, phase: usize) {
+        let [mean_a, square] =
+            [self.sums, self.squares].map(|sums| sums[phase] / f32::from(LISTENED));
+        self.report.set(Kind::Zero, phase as u8, mean_a);
+        let variance = (square - mean_a * mean_a).max(0.0);
+        self.report
+            .set(Kind::Noise, phase as u8, square_root(variance));
+    }
+
+    /// What a phase does that is off while another one is pulled up.
+    #[inline(never)]
+    fn followed(&mut self, phase: u8, share: &[f32; 3], current_a: f32) {
+        // An open wire follows none of the others; a shorted switch shows at any.
+        let before = self.report.get(Kind::Motor, phase);
+        let follows = before.max(share[usize::from(phase % 3)]);
+        self.report.set(Kind::Motor, phase, follows);
+        let before_a = self.report.get(Kind::Off, phase);
+        if before_a.is_nan() || before_a.abs() < current_a.abs() {
+            self.report.set(Kind::Off, phase, current_a);
+        }
+    }
+}
+
+/// The terminals' voltages, percent of the supply or of the most that they show.
+#[inline(never)]
+fn terminals(board: &Board, sample: &Sample) -> [f32; 3] {
+    let bus_v = sample.bus.to_f32() * board.bus_v_per_count;
+    let whole = (bus_v / board.terminal_v_per_count)
+        .min(FULL_SCALE)
+        .max(1.0);
+    sample
+        .terminals
+        .map(|counts: AdcCounts| 100.0 * counts.to_f32() / whole)
+}
