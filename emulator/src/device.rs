@@ -6,7 +6,8 @@ mod machine;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use siskin_control::drive::Setpoint;
+use siskin_control::check::{Item, Probe};
+use siskin_control::drive::{Sample, Setpoint};
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, BuildError, ParamId, Params};
@@ -81,6 +82,8 @@ pub struct Device {
     rig: Rig,
     wire: Wire,
     driven: Driven,
+    /// What the converters have last read; nothing before the first period.
+    latest: Option<Sample>,
     flash: FileFlash,
     overrides: Vec<Override>,
     board: Board,
@@ -99,6 +102,19 @@ struct Override {
     value: f32,
     /// What is stored, and stays so.
     stored: f32,
+}
+
+/// The simulated chip for the self-test: it has converters, and neither comparators nor clocks.
+struct Latest(Sample);
+
+impl Probe for Latest {
+    fn sample(&mut self) -> Sample {
+        self.0
+    }
+
+    fn own(&mut self, _item: Item) -> Option<f32> {
+        None
+    }
 }
 
 /// Simulated time: whole control periods since the start or the last restart.
@@ -157,6 +173,7 @@ impl Device {
             rig,
             wire,
             driven: Driven::default(),
+            latest: None,
             flash,
             overrides,
             board,
@@ -259,6 +276,7 @@ impl Device {
                 (setpoint, imposed) => imposed.unwrap_or(setpoint),
             };
             let period = self.rig.period(setpoint);
+            self.latest = Some(period.sample);
             onlooker.period(t_s, &period, &self.rig);
             self.clock.periods += 1;
         }
@@ -327,6 +345,9 @@ impl Device {
         };
         self.esc
             .poll(throttle, now_us, &snapshot, temperature_c, &mut send);
+        if let Some(mut latest) = self.latest.map(Latest) {
+            self.esc.test_itself(&snapshot, &mut latest);
+        }
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             match request {
                 Request::ParamsChanged => self.configure(),

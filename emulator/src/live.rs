@@ -13,6 +13,7 @@ use siskin_control::params::ParamId;
 use thiserror::Error;
 
 use crate::device::{Start, StartError};
+use crate::fault::Fault;
 use crate::flash::FileFlash;
 use crate::interrupt;
 use crate::link::{Endpoint, Event, LinkError, Links};
@@ -58,6 +59,8 @@ pub struct Session {
     pub flash: FileFlash,
     /// Parameters over the stored ones.
     pub params: Vec<(ParamId, f32)>,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
     /// Where each period is written.
     pub record: Option<PathBuf>,
 }
@@ -121,7 +124,7 @@ pub fn run<M: Machine>(
         wire,
         flash: session.flash,
         overrides: session.params,
-        faults: Vec::new(),
+        faults: session.faults,
         link_bytes_per_s,
     })?;
     let about = Opened {

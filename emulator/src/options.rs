@@ -9,6 +9,7 @@ use clap::Args;
 use siskin_control::params::{ParamId, Preset};
 
 use crate::bench::library;
+use crate::fault::Fault;
 use crate::flash::{FileFlash, StorageError};
 use crate::link::Endpoint;
 use crate::live::{Pace, Session};
@@ -58,6 +59,9 @@ pub struct RunArgs {
     /// File behind the simulated flash, or none [default: a file in your state folder]
     #[arg(long, value_name = "PATH|none")]
     pub storage: Option<PathBuf>,
+    /// A fault as a scenario has it, from the start on where it says no at_s, as kind = "mosfet_open", phase = 1; repeatable
+    #[arg(long, value_name = "KEYS", value_parser = scenario::fault)]
+    pub fault: Vec<Fault>,
     /// What runs in real time and offline have in common.
     #[command(flatten)]
     pub common: CommonArgs,
@@ -179,6 +183,7 @@ impl RunArgs {
             duration: self.duration.map(Duration::from_secs_f64),
             flash,
             params,
+            faults: self.fault.clone(),
             record: self.common.record.clone(),
         };
         Ok((session, warning))

@@ -29,7 +29,7 @@ const SOCKET_BYTES_PER_S: u32 = 1_000_000;
 
 /// One byte stream: a TCP client, a UDP peer, a serial line while someone is there. A number is
 /// never used again, so a peer that comes back gets another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct LinkId(u64);
 
 /// What happened on a stream.

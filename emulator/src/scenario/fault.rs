@@ -70,6 +70,20 @@ enum Name {
     Jitter,
 }
 
+/// A fault as it stands in a command line: its keys and values, at the start where it says no other time.
+pub fn from_text(text: &str) -> Result<Fault, String> {
+    let how = |reason: &str| format!("{reason}; give a fault as kind = \"mosfet_open\", phase = 1");
+    let wrong = |error: toml::de::Error| how(error.message());
+    let mut table: toml::Table = toml::from_str(&format!("fault = {{ {text} }}")).map_err(wrong)?;
+    let fault = table.get_mut("fault").and_then(toml::Value::as_table_mut);
+    let fault = fault.ok_or_else(|| how("this is no fault"))?;
+    fault.entry("at_s").or_insert(toml::Value::Float(0.0));
+    let fault: FaultTable = fault.clone().try_into().map_err(wrong)?;
+    fault
+        .fault()
+        .map_err(|(key, what)| format!("{key}: {what}"))
+}
+
 impl FaultTable {
     /// What it means.
     pub(super) fn fault(&self) -> Result<Fault, Problem> {

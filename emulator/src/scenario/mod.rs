@@ -50,6 +50,7 @@ use crate::machine::Machine;
 use crate::summary::Report;
 use course::Courses;
 pub use error::ScenarioError;
+pub use fault::from_text as fault;
 pub use judge::Verdict;
 pub use place::Place;
 use play::Played;
