@@ -8,7 +8,7 @@ use crate::decode;
 use crate::endpoint::Endpoint;
 use crate::image::Board;
 
-/// Parameters and live telemetry of a Siskin ESC over MAVLink, images for its boards, captures of a
+/// Self-test, parameters and live telemetry of a Siskin ESC over MAVLink, images for its boards, captures of a
 /// throttle wire, and the limits of a motor.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
@@ -38,6 +38,15 @@ pub(crate) struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Have the ESC test itself at rest: supply, sensors, switches and clock, each with its bounds.
+    ///
+    /// The motor does not turn; a current of a fifth of LIM_PHASE_A flows through it for some
+    /// milliseconds. The exit status is 1 where something is out of its bounds.
+    Check {
+        /// One JSON object: items, a list of name, value, unit, low, high and ok.
+        #[arg(long)]
+        json: bool,
+    },
     /// Read, change, save and load parameters.
     #[command(subcommand)]
     Params(ParamsCommand),

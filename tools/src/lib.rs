@@ -1,4 +1,4 @@
-//! The command line of the Siskin ESC: parameters and live telemetry over MAVLink, images for boards,
+//! The command line of the Siskin ESC: its self-test, parameters and live telemetry over MAVLink, images for boards,
 //! captures of a throttle wire, and the limits of a motor.
 //!
 //! Results go to standard output. Complaints go to standard error, one line each; where another
@@ -8,11 +8,13 @@
 #![forbid(unsafe_code)]
 
 mod budget;
+mod check;
 mod cli;
 pub mod decode;
 mod endpoint;
 mod error;
 mod flash;
+mod ftp;
 mod image;
 mod json;
 mod link;
@@ -105,6 +107,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
             let task = Task::check(command, &mut complaints)?;
             task.run(&mut find()?, &mut out, &mut complaints)
         }
+        Command::Check { json } => check::run(&mut find()?, *json, &mut out),
         Command::Decode(args) => decode::run(&args.capture, &args.options, &mut out),
         Command::Budget(args) => budget::run(args, cli.component, &mut out),
         Command::Image(args) => image::run(args, &mut out),

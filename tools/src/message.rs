@@ -3,8 +3,8 @@
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
     ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA, ESC_TELEMETRY_13_TO_16_DATA,
-    HEARTBEAT_DATA, MavAutopilot, MavSeverity, MavType, NAMED_VALUE_FLOAT_DATA, PARAM_ERROR_DATA,
-    PARAM_VALUE_DATA, STATUSTEXT_DATA,
+    FILE_TRANSFER_PROTOCOL_DATA, HEARTBEAT_DATA, MavAutopilot, MavSeverity, MavType,
+    NAMED_VALUE_FLOAT_DATA, PARAM_ERROR_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA,
 };
 use mavlink::types::CharArray;
 use mavlink::{MavlinkVersion, MessageData};
@@ -34,6 +34,8 @@ pub(crate) enum Message {
     EscStatus(ESC_STATUS_DATA),
     EscTelemetry(EscTelemetry),
     Named(NAMED_VALUE_FLOAT_DATA),
+    /// An answer of MAVLink FTP, as it is.
+    File([u8; 251]),
 }
 
 /// One of the messages `ESC_TELEMETRY_*`, which are laid out alike.
@@ -165,6 +167,9 @@ impl Message {
             PARAM_ERROR_DATA::ID => typed(payload).map(Self::ParamError),
             COMMAND_ACK_DATA::ID => typed(payload).map(Self::CommandAck),
             NAMED_VALUE_FLOAT_DATA::ID => typed(payload).map(Self::Named),
+            FILE_TRANSFER_PROTOCOL_DATA::ID => {
+                typed(payload).map(|data: FILE_TRANSFER_PROTOCOL_DATA| Self::File(data.payload))
+            }
             STATUSTEXT_DATA::ID => StatusText::read(payload).map(Self::StatusText),
             ESC_INFO_DATA::ID => typed(payload).map(Self::EscInfo),
             ESC_STATUS_DATA::ID => typed(payload).map(Self::EscStatus),

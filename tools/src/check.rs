@@ -1,0 +1,202 @@
+//! `siskin check`: the ESC tests itself, and says what it has found.
+
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavResult};
+use serde_json::{Value, json};
+
+use crate::error::Error;
+use crate::message::Message;
+use crate::session::{ATTEMPTS, Session};
+use crate::{ftp, json};
+
+const COMMAND: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;
+
+/// Where the ESC has what it has found.
+const REPORT: &str = "@SYS/check.txt";
+
+/// How long the next acknowledgement is waited for: each step of the test has one, and takes 0.3 s at
+/// the most.
+const STEP_TIMEOUT: Duration = Duration::from_millis(800);
+
+/// A line of the report.
+#[derive(Debug, PartialEq)]
+struct Item {
+    name: String,
+    /// Nothing where a sensor gives no value.
+    value: Option<f32>,
+    unit: String,
+    low: f32,
+    high: f32,
+    ok: bool,
+}
+
+/// Runs the self-test and prints its lines.
+///
+/// # Errors
+/// [`Error::Refused`] where the ESC does not test itself now, [`Error::Partly`] where something is wrong
+/// with it.
+pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> Result<(), Error> {
+    let (result, texts) = command(session)?;
+    let passed = match result {
+        MavResult::MAV_RESULT_ACCEPTED => true,
+        MavResult::MAV_RESULT_FAILED => false,
+        other => {
+            return Err(Error::Refused {
+                what: "self-test".into(),
+                reason: why(other).into(),
+            });
+        }
+    };
+    let report = String::from_utf8_lossy(&ftp::read(session, REPORT)?).into_owned();
+    let items = report.lines().map(Item::parse);
+    let items = items.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
+        what: REPORT.into(),
+        reason: "it is not understood; is the image newer than this program?".into(),
+    })?;
+    if as_json {
+        let items: Vec<_> = items.iter().map(Item::json).collect();
+        writeln!(out, "{}", json!({ "items": items }))?;
+    } else {
+        for item in &items {
+            writeln!(out, "{}", item.line())?;
+        }
+    }
+    let wrong: Vec<_> = items.iter().filter(|item| !item.ok).collect();
+    if passed && wrong.is_empty() {
+        return Ok(());
+    }
+    let mut summary = if wrong.is_empty() {
+        "self-test: not done to its end; is the throttle at zero, and the shaft at rest?".to_owned()
+    } else {
+        let names: Vec<_> = wrong.iter().map(|item| item.name.as_str()).collect();
+        format!("self-test: {} out of bounds", names.join(", "))
+    };
+    for text in texts {
+        summary += &format!(" ({text})");
+    }
+    Err(Error::Partly(summary))
+}
+
+/// Has the ESC test itself: how it ended, and of which faults it has told meanwhile.
+fn command(session: &mut Session) -> Result<(MavResult, Vec<String>), Error> {
+    let target = session.target();
+    let mut texts = Vec::new();
+    let mut silent = 0;
+    let mut confirmation = 0;
+    while silent < ATTEMPTS {
+        session.send(&COMMAND_LONG_DATA {
+            command: COMMAND,
+            target_system: target.system,
+            target_component: target.component,
+            // Those after the first ask how far it is.
+            confirmation,
+            ..COMMAND_LONG_DATA::DEFAULT
+        })?;
+        silent += 1;
+        confirmation = confirmation.saturating_add(1);
+        let mut deadline = Instant::now() + STEP_TIMEOUT;
+        while let Some(message) = session.next_of_target(deadline)? {
+            match message {
+                Message::CommandAck(ack) if ack.command == COMMAND => {
+                    if ack.result != MavResult::MAV_RESULT_IN_PROGRESS {
+                        return Ok((ack.result, texts));
+                    }
+                    silent = 0;
+                    deadline = Instant::now() + STEP_TIMEOUT;
+                }
+                Message::StatusText(status) if status.text.starts_with("Fault: ") => {
+                    texts.push(status.text);
+                }
+                _ => {}
+            }
+        }
+    }
+    Err(Error::NoAnswer {
+        what: "self-test".into(),
+        attempts: ATTEMPTS,
+    })
+}
+
+fn why(result: MavResult) -> &'static str {
+    match result {
+        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => {
+            "not now; it needs a shaft at rest, no fault, and the throttle at zero or unplugged"
+        }
+        MavResult::MAV_RESULT_UNSUPPORTED => {
+            "this component has none; is its image older than this program?"
+        }
+        MavResult::MAV_RESULT_DENIED => "denied; is the link signed with a key?",
+        _ => "ended by the ESC",
+    }
+}
+
+impl Item {
+    /// Reads a line: name, value, unit, bounds, verdict.
+    fn parse(line: &str) -> Option<Self> {
+        let mut words = line.split(' ');
+        let name = words.next()?.to_owned();
+        let value = match words.next()? {
+            "-" => None,
+            value => Some(value.parse().ok()?),
+        };
+        let unit = words.next()?.to_owned();
+        let mut bound = || words.next()?.parse().ok();
+        let (low, high) = (bound()?, bound()?);
+        let ok = match words.next()? {
+            "ok" => true,
+            "FAILED" => false,
+            _ => return None,
+        };
+        Some(Self {
+            name,
+            value,
+            unit,
+            low,
+            high,
+            ok,
+        })
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "name": self.name,
+            "value": self.value.map_or(Value::Null, json::number),
+            "unit": self.unit,
+            "low": json::number(self.low),
+            "high": json::number(self.high),
+            "ok": self.ok,
+        })
+    }
+
+    fn line(&self) -> String {
+        let value = self
+            .value
+            .map_or_else(|| "-".to_owned(), |value| format!("{value:.3}"));
+        let verdict = if self.ok { "ok" } else { "FAILED" };
+        format!(
+            "{:<13} {value:>10} {:<4} {:>9.3} to {:>9.3}  {verdict}",
+            self.name, self.unit, self.low, self.high
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_read_as_the_esc_writes_it() {
+        let item = Item::parse("zero_b -0.125 A -4.000 4.000 ok").expect("a line");
+        assert_eq!(item.name, "zero_b");
+        assert_eq!((item.value, item.low, item.high), (Some(-0.125), -4.0, 4.0));
+        assert!(item.ok);
+        let item = Item::parse("temperature - degC -20.000 100.000 FAILED").expect("a line");
+        assert_eq!(item.json()["value"], Value::Null);
+        assert!(!item.ok);
+        for line in ["", "zero_b", "zero_b x A 0 1 ok", "zero_b 0 A 0 1 fine"] {
+            assert_eq!(Item::parse(line), None, "{line}");
+        }
+    }
+}
