@@ -3,7 +3,12 @@
 
 use embassy_time::{Duration, Instant};
 
+use siskin_control::check::{Item, Probe};
+use siskin_control::drive::Sample;
+
 use crate::board::{NTC, Temperature};
+use crate::interrupt::Registers;
+use crate::interrupt::sample::sample;
 
 /// How often it is read: the board's copper takes seconds to warm.
 const EVERY: Duration = Duration::from_millis(10);
@@ -37,5 +42,18 @@ impl Health {
     /// has not been read.
     pub(crate) fn temperature_c(&self) -> f32 {
         self.temperature_c
+    }
+}
+
+/// For the self-test.
+impl Probe for Health {
+    fn sample(&mut self) -> Sample {
+        // The converters read anew once a period, also between two of these readings.
+        sample(&Registers::CHIP)
+    }
+
+    fn own(&mut self, _item: Item) -> Option<f32> {
+        // The board that has the self-test has neither comparators nor such options.
+        None
     }
 }

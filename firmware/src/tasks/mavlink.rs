@@ -123,6 +123,7 @@ impl Desk {
             self.health.temperature_c(),
             &mut |frame| send(frame),
         );
+        self.esc.test_itself(&snapshot, &mut self.health);
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.obey(request);
         }
