@@ -308,9 +308,7 @@ impl Check {
 #[inline(never)]
 fn terminals(board: &Board, sample: &Sample) -> [f32; 3] {
     let bus_v = sample.bus.to_f32() * board.bus_v_per_count;
-    let whole = (bus_v / board.terminal_v_per_count)
-        .min(FULL_SCALE)
-        .max(1.0);
+    let whole = (bus_v / board.terminal_v_per_count).clamp(1.0, FULL_SCALE);
     sample
         .terminals
         .map(|counts: AdcCounts| 100.0 * counts.to_f32() / whole)
