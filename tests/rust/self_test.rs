@@ -200,9 +200,8 @@ fn a_sound_esc_passes_and_its_motor_does_not_turn() {
 
 #[test]
 fn each_defect_is_named() {
-    let phases = ["a", "b", "c"];
-    for phase in 0..3 {
-        let own = |kind: &str| format!("{kind}_{}", phases[phase]);
+    for (phase, letter) in ["a", "b", "c"].into_iter().enumerate() {
+        let own = |kind: &str| format!("{kind}_{letter}");
         for (kind, item) in [
             (Kind::MosfetOpen(phase, Side::High), own("high")),
             (Kind::MosfetOpen(phase, Side::Low), own("low")),
