@@ -210,6 +210,7 @@ def test_folders_are_listed_and_what_is_in_them_can_be_read(files):
         f"/{PACK}",
         "/@SYS/faults.txt",
         "/@SYS/statistics.txt",
+        "/@SYS/check.txt",
     }
     for path, size in sizes.items():
         assert len(files.file(path)) == size, path
