@@ -35,7 +35,7 @@ mod tests {
     fn what_is_told_are_two_sound_frames() {
         let mut told = Vec::new();
         Receiver::new().push(0, &TOLD, |frame| {
-            told.push((frame.id, frame.payload.to_vec()))
+            told.push((frame.id, frame.payload.to_vec()));
         });
         let text = [b"\x02".as_slice(), b"Image damaged: flash it anew"].concat();
         assert_eq!(told.len(), 2);
