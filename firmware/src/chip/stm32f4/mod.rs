@@ -40,16 +40,21 @@ pub(crate) fn start() -> Peripherals {
     let peripherals = embassy_stm32::init(clock());
     // The HAL has written the register whole, with the wait states alone (embassy-stm32 0.6). A fetch of four
     // instructions or more takes six clocks then, of which the caches and the prefetch save most (RM0090, 3.5).
+    let id = DBGMCU.idcode().read();
     FLASH.acr().modify(|w| {
         w.set_icen(true);
         w.set_dcen(true);
-        w.set_prften(DBGMCU.idcode().read().rev_id() != FIRST_REVISION);
+        w.set_prften(id.dev_id() == STM32F405 && id.rev_id() != REVISION_A);
     });
     peripherals
 }
 
-/// Revision A, whose prefetch must stay off (ES0182).
-const FIRST_REVISION: u16 = 0x1000;
+/// Device of these chips (RM0090, DBGMCU_IDCODE). Those of revision A, whose prefetch must stay off
+/// (ES0182), can show another: 0x411, with 0x2000 for the revision.
+const STM32F405: u16 = 0x413;
+
+/// Revision A as RM0090 has it.
+const REVISION_A: u16 = 0x1000;
 
 /// 168 MHz from the internal 16 MHz, as no source tells this board's crystal for sure.
 fn clock() -> Config {
