@@ -96,7 +96,10 @@
 //! `stm32-metapac` (the HAL's types would not take others); that the comparators' inputs, DAC3's
 //! channels and the break's bits are as `chip` has them is from the reference manual alone. Of the
 //! boards, these could not be checked: the order and the sign of the VESC's two shunts, the amplifiers'
-//! settling times, how the straps of a DRV8302 are set, and the thermistor of the B-G431B-ESC1.
+//! settling times, how the straps of a DRV8302 are set, the thermistor of the B-G431B-ESC1, and what its
+//! second resistor of each shunt's ground goes to. A reply's end takes it that a timer whose UDE is cleared
+//! asks for no word any more (RM0440 does not say it); the VESC's reply, by TIM3's forced output, runs on
+//! no virtual board.
 #![cfg_attr(not(test), no_std)]
 
 #[cfg(all(feature = "b-g431b-esc1", feature = "vesc4-f405"))]

@@ -1,9 +1,11 @@
 //! Half-bridges pulled by a self-test, without turning the motor.
 //!
 //! The duty of one leg rises from zero by the same step each period, and all ends as soon as a phase
-//! carries the current of a test: a switch that is shorted shows as a current of a few amperes where it
-//! is, not as the trip of an over-current. What flowed last stays to be read, at a period's pace or
-//! slower.
+//! carries the current of a test: a low side that is shorted shows as a current of a few amperes through
+//! the windings, not as the trip of an over-current. Not so that of the first leg to be pulled: its own
+//! high side works against it, in pulses that end before a sample sees them. There only the supply's
+//! limit and the gate driver's hold the current. What flowed last stays to be read, at a period's pace
+//! or slower.
 
 use super::turn::reading;
 use super::{Bridge, Config, Phase, State};

@@ -54,7 +54,8 @@ impl Replier {
         options.complete_transfer_ir = false;
         let words = ptr::slice_from_raw_parts(self.words.as_ptr().cast::<u32>(), WORDS);
         // SAFETY: what is written to the register moves the throttle's pin alone; the words live until the
-        // transfer has ended, and may change before.
+        // transfer has ended. They may change before it begins: they are read as they go out, but for the
+        // first, which the F405's stream may take at once and which is the start bit in every reply.
         let transfer = unsafe {
             self.channel
                 .write_raw(self.request, words, level_register(), options)
