@@ -82,7 +82,7 @@ impl Loaded {
     /// What a person must know of it.
     pub const fn trouble(&self) -> Option<&'static str> {
         match self.integrity {
-            Integrity::Incomplete => Some("storage: not whole, an earlier save is in force"),
+            Integrity::Incomplete => Some("storage: not whole, a sound copy is in force"),
             Integrity::Unfinished => Some("storage: the first save was cut off"),
             Integrity::Corrupt => Some("storage: corrupt, all values are the defaults"),
             Integrity::Unreadable => Some("storage: unreadable, all values are the defaults"),

@@ -27,7 +27,7 @@ fn a_wrong_byte_anywhere_is_noticed() {
             let mut flash = flash.clone();
             flash.bytes[at] = byte;
             let loaded = load(&mut flash, RANGE);
-            let trouble = "storage: not whole, an earlier save is in force";
+            let trouble = "storage: not whole, a sound copy is in force";
             assert_eq!(loaded.trouble(), Some(trouble), "{byte:#x} at {at}");
             assert_eq!(Some(&loaded.kept), sets.last(), "{byte:#x} at {at}");
         }
