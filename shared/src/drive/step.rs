@@ -97,7 +97,7 @@ fn open_loop(
     switching(true, parts, (config, state), sample)
 }
 
-/// A plain period in which the phases cease to switch. The observer goes on in the next one.
+/// A period in which the phases cease to switch. The observer goes on in the next one.
 #[cold]
 fn ended(config: &Config, state: &mut State, sample: &Sample) -> Bridge {
     let brakes = state.phase == Phase::Brake;
@@ -130,9 +130,13 @@ fn any(config: &Config, state: &mut State, sample: &Sample, setpoint: Setpoint) 
     if rest::is_off(config, state) {
         return rest::off(config, state, sample, setpoint);
     }
-    if state.phase.drives() && config.six_step.is_none() {
+    let trips = matches!(setpoint, Setpoint::Fault(_));
+    if state.phase.drives() && config.six_step.is_none() && !trips {
         // As in a plain period: of the supply that the sample before has shown.
         slow::turn(config, state, &setpoint);
+        if !state.phase.drives() {
+            return ended(config, state, sample);
+        }
     }
     let off = matches!(state.phase, Phase::Idle | Phase::Sense);
     if state.unread == 0 && state.switched() {

@@ -331,15 +331,12 @@ fn a_period_is_the_same_whether_it_is_a_plain_one_or_not() {
         let current = |shift: f64| 2.0 * (angle - shift * TAU / 3.0).sin();
         let sample = sample([current(0.0), current(1.0), current(2.0)], bus_v);
         let sample = match plain.phase() {
+            // These currents are no rotor's, so that each start fails.
             Phase::Idle | Phase::Sense => self::sample([0.0; 3], bus_v),
             _ => sample,
         };
         general.state.plain = NOT_PLAIN;
         let bridges = (plain.run(1, sample, turn), general.run(1, sample, turn));
-        if driven > 0 && !plain.state.phase.drives() {
-            // These currents are no rotor's: the start has failed.
-            break;
-        }
         assert_eq!(bridges.0, bridges.1, "{k}: {:?}", plain.phase());
         assert_eq!(plain.state.seen, general.state.seen, "{k}");
         assert_eq!(plain.state.supply, general.state.supply, "{k}");
