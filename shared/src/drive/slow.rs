@@ -38,6 +38,7 @@ pub(super) fn turn(config: &Config, state: &mut State, setpoint: &Setpoint) {
         }
         4 => pace(config, state),
         6 | 22 => {
+            limit(config, state);
             bounds(config, state);
             if !state.phase.is_open_loop() {
                 share(config, state);
@@ -52,7 +53,10 @@ pub(super) fn turn(config: &Config, state: &mut State, setpoint: &Setpoint) {
 /// What a drive that begins must know before its first period, in five pieces.
 pub(super) fn begin(config: &Config, state: &mut State, n: u32) {
     match n {
-        1 => supply(state),
+        1 => {
+            limit(config, state);
+            supply(state);
+        }
         2 => reach(config, state),
         3 => bounds(config, state),
         4 => share(config, state),
@@ -93,6 +97,12 @@ fn proceed(config: &Config, state: &mut State) {
     }
 }
 
+/// The trip follows its limit.
+#[inline(always)]
+fn limit(config: &Config, state: &mut State) {
+    protection::follow_limit(&config.protection, &mut state.protection, state.seen.i);
+}
+
 /// What the supply gives.
 #[inline(never)]
 fn supply(state: &mut State) {
@@ -111,7 +121,6 @@ fn reach(config: &Config, state: &mut State) {
 #[inline(never)]
 fn bounds(config: &Config, state: &mut State) {
     let seen = &state.seen;
-    protection::follow_limit(&config.protection, &mut state.protection, seen.i);
     protection::bound(
         &config.protection,
         &mut state.protection,

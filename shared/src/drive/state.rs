@@ -459,7 +459,7 @@ impl State {
         self.settling_periods = SETTLING_PERIODS;
         self.sensing.restart();
         self.looks = 0;
-        self.tone = tone::Playing::default();
+        self.tone.end();
         self.pulling = pull::Pulling::default();
     }
 

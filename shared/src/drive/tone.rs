@@ -76,6 +76,12 @@ pub(super) struct Playing {
 }
 
 impl Playing {
+    /// No tone, and no low sides to go back to; all else is begun by the next one.
+    pub(super) fn end(&mut self) {
+        self.pitch = Speed::ZERO;
+        self.braked = false;
+    }
+
     /// Every word.
     pub(super) fn trace(&self, out: &mut impl FnMut(u32)) {
         let Self {

@@ -45,7 +45,7 @@ pub struct Config {
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Magnitude of a phase's reading that trips now: [`Config::trip`], or that of the limit before,
-    /// until the current has come down to one that was lowered.
+    /// until the current has come down to one that was lowered, or a drive or a tone begins.
     pub trip: AdcCounts,
     /// Samples in a row above the trip.
     pub over_current_samples: u8,
@@ -90,9 +90,6 @@ pub fn check(
     // Both are from 0 to 8, the type is of ±8: nothing here wraps.
     state.bus = state.bus.wrapping_add(bus.wrapping_sub(state.bus) >> 3);
 
-    if currents.is_none() {
-        state.trip = config.trip;
-    }
     if currents.is_some_and(|currents| beyond(state.trip, currents)) {
         state.over_current_samples = state.over_current_samples.saturating_add(1);
         if state.over_current_samples >= OVER_CURRENT_SAMPLES {
