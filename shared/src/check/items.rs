@@ -190,8 +190,14 @@ impl Report {
         }
     }
 
+    /// Forgets all but what bars the motor, which stands until it is measured again.
     pub(super) fn clear(&mut self) {
-        self.values = [f32::NAN; ITEMS];
+        let first = Item::of(Kind::Comparator, 0).place();
+        for (place, value) in self.values.iter_mut().enumerate() {
+            if !(first..first + 3).contains(&place) {
+                *value = f32::NAN;
+            }
+        }
     }
 
     /// What was measured, or not a number.

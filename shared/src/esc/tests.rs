@@ -17,6 +17,7 @@ use mavlink::dialects::ardupilotmega::{
 use mavlink::{MavlinkVersion, Message, MessageData};
 
 mod actions;
+mod check;
 mod keep;
 mod storage;
 

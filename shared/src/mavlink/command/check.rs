@@ -31,6 +31,12 @@ impl Commands {
         }
     }
 
+    /// Whether a self-test was asked for, and goes on.
+    pub(super) fn checks(&self) -> bool {
+        let under_way = self.under_way.as_ref();
+        under_way.is_some_and(|command| command.number == RUN_PREARM_CHECKS)
+    }
+
     /// The self-test has this result, if one was asked for.
     pub(in super::super) fn end_check(&mut self, result: MavResult, replies: &mut Replies) {
         self.end(RUN_PREARM_CHECKS, result, replies);

@@ -21,7 +21,7 @@ const SPIN_1: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION
 const SPIN_2: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION2 as i32;
 
 impl Commands {
-    /// ACTUATOR_TEST and DO_MOTOR_TEST: the authority decides.
+    /// ACTUATOR_TEST and DO_MOTOR_TEST: the authority decides, but not during a self-test.
     pub(super) fn test(
         &self,
         command: &Command,
@@ -37,6 +37,9 @@ impl Commands {
         let Some((value, duration_s)) = test.filter(|_| self.is_own(motor, command)) else {
             return DENIED;
         };
+        if self.checks() {
+            return TEMPORARILY_REJECTED;
+        }
         let tested = context
             .authority
             .actuator_test(context.now_us, value, duration_s, drive);

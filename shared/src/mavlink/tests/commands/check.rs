@@ -25,6 +25,8 @@ fn a_self_test_is_acknowledged_step_by_step() {
         assert_eq!(bench.component.take_act(), None);
         assert_eq!(bench.result(RUN, &[]), REJECTED as u8);
         assert_eq!(bench.result(245, &[1.0]), REJECTED as u8);
+        let test = [0.1, 1.0, 0.0, 0.0, 1.0];
+        assert_eq!(bench.result(310, &test), REJECTED as u8);
         assert_eq!(bench.result(241, &[0.0; 7]), ACCEPTED as u8);
         bench.component.tell_stored(Ok(()));
         assert_eq!(acks(&bench.answers()), []);
