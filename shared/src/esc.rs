@@ -231,7 +231,7 @@ impl Esc {
         self.command = standing.command;
         self.follow_wire(throttle, now_us);
         if self.storage.reminds(now_us) {
-            self.warn_of("Settings lost: set and store them before arming");
+            self.warn_of("Settings lost: set and store them, or reset them");
         }
         self.with_component(throttle, now_us, |component, context| {
             component.poll(context, send);
@@ -276,7 +276,7 @@ impl Esc {
         };
         let rests = self.recorder.look(&mut self.telemetry.statistics, &sight);
         if rests {
-            self.storage.changed(now_us, false);
+            self.storage.changed(now_us);
         }
     }
 
@@ -288,8 +288,7 @@ impl Esc {
         let now_us = self.polled_us.unwrap_or(0);
         let request = self.component.take_request();
         if self.component.take_changed() {
-            self.storage
-                .changed(now_us, request == Some(Request::ParamsChanged));
+            self.storage.changed(now_us);
         }
         match request {
             Some(Request::ParamsChanged) => {

@@ -154,7 +154,7 @@ def test_nobody_else_may_read_what_is_stored(stored, tmp_path):
         assert Path(tmp_path / "flash.bin").stat().st_mode & 0o777 == 0o600
 
 
-def test_an_esc_that_has_lost_its_settings_arms_once_some_are_stored(stored, tmp_path):
+def test_an_esc_that_has_lost_its_settings_arms_once_somebody_stores_some(stored, tmp_path):
     """The first save of all, cut off in its second word."""
     path = tmp_path / "flash.bin"
     emulator = stored()
@@ -170,4 +170,7 @@ def test_an_esc_that_has_lost_its_settings_arms_once_some_are_stored(stored, tmp
         assert not esc.armed()
         assert esc.read_param("LIM_PHASE_A").param_value == 20.0
         esc.set_param("LIM_PHASE_A", 12.5)
+        time.sleep(QUIET_S)
+        assert not esc.armed(), "a value alone restores nothing"
+        assert esc.command(STORAGE, 1) == ACCEPTED
         esc.wait_armed()

@@ -55,8 +55,8 @@ pub(super) struct Storage {
     under_way: Option<(Asker, Request)>,
     /// Whether it has been told that what changes cannot be stored.
     failed: bool,
-    /// Whether what is stored cannot be in force: it stays, and nothing turns the motor, until settings are
-    /// stored.
+    /// Whether what is stored cannot be in force: it stays, and nothing turns the motor, until somebody
+    /// asks for settings to be stored or reset.
     lost: bool,
     /// When a person was last told so.
     reminded_us: u64,
@@ -73,13 +73,10 @@ impl Storage {
         self.save = true;
     }
 
-    /// Something that is kept has changed. Where settings were lost only a parameter counts: a station that
-    /// asks for another interval has set none.
-    pub(super) fn changed(&mut self, now_us: u64, is_parameter: bool) {
-        if is_parameter || !self.lost {
-            let first_us = self.changed_us.map_or(now_us, |(first_us, _)| first_us);
-            self.changed_us = Some((first_us, now_us));
-        }
+    /// Something that is kept has changed.
+    pub(super) fn changed(&mut self, now_us: u64) {
+        let first_us = self.changed_us.map_or(now_us, |(first_us, _)| first_us);
+        self.changed_us = Some((first_us, now_us));
     }
 
     /// Settings were lost.
@@ -133,7 +130,8 @@ impl Storage {
         } else if self.save {
             Some((Asker::Wire, Request::Save))
         } else {
-            let due = self.changed_us.is_some_and(is_due);
+            // Where settings were lost, what a companion sets at each start restores none of them.
+            let due = !self.lost && self.changed_us.is_some_and(is_due);
             due.then_some((Asker::Nobody, Request::Keep))
         }
     }
@@ -243,8 +241,8 @@ impl Esc {
         }
     }
 
-    /// What is stored is not what is in force: it is left alone, and the motor off, until settings are
-    /// stored.
+    /// What is stored is not what is in force: it is left alone, and the motor off, until somebody asks
+    /// for settings to be stored or reset.
     pub fn lose_stored(&mut self) {
         self.storage.lose();
     }

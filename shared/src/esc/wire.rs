@@ -42,7 +42,7 @@ impl Esc {
         }
     }
 
-    fn hear(&mut self, now_us: u64, news: News) {
+    pub(super) fn hear(&mut self, now_us: u64, news: News) {
         let news = match news {
             News::Calibration(Step::Done(ends)) if !self.calibrate(ends) => {
                 News::Calibration(Step::Cancelled)
@@ -110,12 +110,14 @@ impl Esc {
         }
     }
 
-    /// Takes the stick's end points, and has them stored; whether they fit.
+    /// Takes the stick's end points, and has them stored; whether they fit. Where settings were lost they
+    /// do not: storing them would store other settings than those that were lost.
     fn calibrate(&mut self, ends: EndPoints) -> bool {
-        let fit = self.change(&[
-            (ParamId::InpPulseMinUs, f32::from(ends.min_us)),
-            (ParamId::InpPulseMaxUs, f32::from(ends.max_us)),
-        ]);
+        let fit = !self.storage.is_lost()
+            && self.change(&[
+                (ParamId::InpPulseMinUs, f32::from(ends.min_us)),
+                (ParamId::InpPulseMaxUs, f32::from(ends.max_us)),
+            ]);
         if fit {
             self.storage.save();
         }

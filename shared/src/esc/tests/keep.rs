@@ -3,6 +3,9 @@
 use super::storage::{ACCEPTED, REBOOT, STORAGE};
 use super::*;
 use crate::esc::storage::Storage;
+use crate::input::News;
+use crate::input::calibration::Step;
+use crate::input::endpoints::EndPoints;
 use crate::mavlink::{KeptSigning, Key};
 use crate::statistics::Statistics;
 use crate::store::{Integrity, Kept, Loaded};
@@ -330,7 +333,7 @@ fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
         bench.esc.recall(&loaded(integrity));
         bench.frames(12_000, 0);
         assert!(!bench.esc.telemetry().armed, "{integrity:?}");
-        let lost = "Settings lost: set and store them before arming";
+        let lost = "Settings lost: set and store them, or reset them";
         let told = |text: &&String| text.as_str() == lost;
         assert_eq!(bench.texts.iter().filter(told).count(), 1);
         assert!(bench.texts[1].starts_with("storage: "), "{:?}", bench.texts);
@@ -342,7 +345,7 @@ fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
         bench.frames(10, 1_000);
         assert_eq!(bench.throttle.setpoint(), Setpoint::Stop);
 
-        // A station that has only asked for a stream has set nothing.
+        // What a station or a companion sets by itself restores nothing, nor does what a stick teaches.
         bench.message(&COMMAND_LONG_DATA {
             param1: 291.0,
             param2: 20_000.0,
@@ -351,12 +354,21 @@ fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
             target_component: 1,
             ..COMMAND_LONG_DATA::default()
         });
+        bench.set("TEL_RATE_HZ", 20.0);
+        let ends = News::Calibration(Step::Done(EndPoints {
+            min_us: 1_100,
+            max_us: 1_900,
+        }));
+        bench.esc.hear(bench.now_us, ends);
         bench.frames(5_000, 0);
-        assert_eq!(bench.requests, []);
+        assert_eq!(bench.requests, [Request::ParamsChanged]);
+        assert!(!bench.esc.telemetry().armed, "{integrity:?}");
+        bench.requests.clear();
         for result in [Err("storage: the flash failed"), Ok(())] {
             bench.set("LIM_PHASE_A", 12.5);
+            bench.command(STORAGE, 1.0);
             bench.frames(2_000, 0);
-            assert_eq!(bench.requests, [Request::ParamsChanged, Request::Keep]);
+            assert_eq!(bench.requests, [Request::ParamsChanged, Request::Save]);
             assert!(!bench.esc.telemetry().armed, "{integrity:?}");
             bench.requests.clear();
             bench.storage_done(result);
@@ -422,7 +434,7 @@ fn a_day_of_changes_costs_the_flash_a_hundredth_of_its_life() {
     let mut saves = 0;
     let mut now_us = 0;
     let mut change = |storage: &mut Storage| {
-        storage.changed(now_us, true);
+        storage.changed(now_us);
         now_us += 1_200_000;
         if storage.waits(now_us) {
             saves += 1;
