@@ -2,8 +2,8 @@
 //! change anything.
 //!
 //! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a
-//! component and a link), whatever key signs it, and no stream may begin more than a minute behind the
-//! newest timestamp that was heard or sent, nor before its key. What was newest is kept over a loss of
+//! component and a link), whatever key signs it, and may be at most a minute behind the newest
+//! timestamp that was heard or sent, and not before its key. What was newest is kept over a loss of
 //! power with the key, so that what was recorded before cannot be played again after it. It is stored
 //! with all else: what came in the last two seconds, or since the motor began to turn, may be played
 //! again where the power fails then, and what was refused since the last save.
@@ -186,10 +186,11 @@ impl Signing {
             return false;
         };
         let timestamp = u64::from_le_bytes([a, b, c, d, e, f, 0, 0]);
-        if timestamp > self.latest() {
+        let oldest = self.floor.max(self.clock().saturating_sub(MINUTE_TICKS));
+        // A recording that is played slowly falls behind, and does not keep the time for long.
+        if timestamp <= oldest || timestamp > self.latest() {
             return false;
         }
-        let oldest = self.floor.max(self.clock().saturating_sub(MINUTE_TICKS));
         let mine = |stream: &Option<Stream>| {
             stream.is_some_and(|stream| stream.from == from && stream.link == link)
         };
@@ -198,11 +199,10 @@ impl Signing {
                 self.streams[*place].is_none_or(|stream| timestamp > stream.timestamp)
             }),
             // A stream is forgotten when its frames are too old to begin one.
-            None if timestamp > oldest => self
+            None => self
                 .streams
                 .iter()
                 .position(|stream| stream.is_none_or(|stream| stream.timestamp <= oldest)),
-            None => None,
         };
         let Some(place) = place else {
             return false;

@@ -498,3 +498,23 @@ fn a_minute_without_a_frame_lets_one_tell_the_time_again() {
     assert!(!takes(&mut bench, 5.0, STATION, 1, LAST), "never");
     assert!(takes(&mut bench, 5.0, STATION, 1, hour));
 }
+
+/// An hour that was never heard, one frame a second, from a day before: while it is played nobody who is
+/// right is heard, and no longer.
+#[test]
+fn a_recording_that_is_played_slowly_locks_out_for_its_own_length_at_most() {
+    let mut bench = keyed();
+    bench.now_us += 61_000_000;
+    let begin = TODAY + 3_600 * SECOND;
+    let mut played = 0;
+    for frame in 0..3_600 {
+        let at = begin + frame * SECOND;
+        if takes(&mut bench, 5.0 + frame as f32 / 1000.0, STATION, 1, at) {
+            played += 1;
+            bench.now_us += 59_000_000;
+        }
+    }
+    assert!((60..=63).contains(&played), "{played}");
+    bench.now_us += 2_000_000;
+    assert!(takes(&mut bench, 8.0, STATION, 2, TODAY + 86_400 * SECOND));
+}
