@@ -518,3 +518,18 @@ fn a_recording_that_is_played_slowly_locks_out_for_its_own_length_at_most() {
     bench.now_us += 2_000_000;
     assert!(takes(&mut bench, 8.0, STATION, 2, TODAY + 86_400 * SECOND));
 }
+
+/// No clock is known before it.
+#[test]
+fn a_first_key_from_a_clock_ahead_goes_with_its_station_and_a_restart() {
+    let mut bench = Bench::new();
+    let ahead = TODAY + 10 * YEAR;
+    give(&mut bench, KEY, &[0; 32], ahead);
+    assert!(!takes(&mut bench, 5.0, STATION, 1, TODAY));
+    give(&mut bench, [0; 32], &KEY, ahead + SECOND);
+    let kept = bench.component.kept_signing();
+    let mut bench = Bench::new();
+    bench.component.keep_signing(kept);
+    give(&mut bench, KEY, &[0; 32], TODAY);
+    assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + SECOND));
+}
