@@ -227,9 +227,9 @@ pub struct Temperature {
 }
 
 impl Temperature {
-    /// The thermistor's reading, for [`NTC`]; it waits 15 µs for it.
+    /// The thermistor's reading, for [`NTC`]; it waits some 8 µs for it.
     pub fn read(&mut self) -> AdcCounts {
-        AdcCounts::from_num(self.reading.counts())
+        AdcCounts::from_num(self.reading.counts(crate::interrupt::periods))
     }
 }
 

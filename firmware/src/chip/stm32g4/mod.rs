@@ -96,9 +96,13 @@ pub(crate) fn break_on_lock_up() {
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
 }
 
+/// How often a reading is tried, so that a task is not held up for ever.
+const TRIES: u32 = 8;
+
 /// A reading of one of the first converter's pins, between its injected ones.
 pub(crate) struct Reading {
-    _private: (),
+    /// The last one that no injected conversion came near.
+    counts: u16,
 }
 
 impl Reading {
@@ -111,18 +115,26 @@ impl Reading {
         converter.smpr().modify(|w| {
             w.set_smp(channel.into(), pac::adc::vals::SampleTime::CYCLES92_5);
         });
-        Self { _private: () }
+        Self { counts: 0 }
     }
 
-    /// The reading, of 4096. For the tasks: it waits for it, some 15 µs.
+    /// The reading, of 4096. For the tasks: it waits for it, some 8 µs, or as often as it is disturbed.
+    /// `periods` counts the control periods, each of which follows injected conversions.
     ///
-    /// A regular conversion behind injected ones may be one of channel 0 (ES0431, 2.5.8): the first of four
-    /// is not looked at, and the middle of the others counts. All four take less than the fastest PWM's
-    /// period, so injected ones come between them once at most.
-    pub(crate) fn counts(&mut self) -> u16 {
-        self.convert();
-        let [a, b, c] = [self.convert(), self.convert(), self.convert()];
-        a.min(b).max(a.max(b).min(c))
+    /// A regular conversion behind injected ones may be one of channel 0 (ES0431, 2.5.8): it counts where
+    /// another stands before it and no period has gone by since. Both take half of the fastest PWM's
+    /// period; where something else holds them up each time, the reading before stands.
+    pub(crate) fn counts(&mut self, periods: impl Fn() -> u32) -> u16 {
+        for _ in 0..TRIES {
+            let before = periods();
+            self.convert();
+            let counts = self.convert();
+            if periods() == before {
+                self.counts = counts;
+                break;
+            }
+        }
+        self.counts
     }
 
     fn convert(&mut self) -> u16 {

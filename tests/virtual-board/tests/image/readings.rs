@@ -2,9 +2,10 @@
 //! `--release`.
 
 use mavlink::dialects::ardupilotmega::ESC_INFO_DATA;
+use siskin_control::params::ParamId;
 use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
 
-use crate::common::{Board, MS, US, image};
+use crate::common::{Board, MS, Throttle, US, image};
 
 /// Converter and rank of the currents of a, b and c.
 const CURRENTS: [(usize, usize); 3] = [(0, 0), (1, 0), (0, 1)];
@@ -37,10 +38,18 @@ fn a_shift_of_the_shunts_grounds_is_no_current() {
     }
 }
 
-/// ES0431 2.5.8: a regular conversion beside injected ones may be one of channel 0.
+/// ES0431 2.5.8: a regular conversion beside injected ones may be one of channel 0. The more of them there
+/// are, and the more often the task that reads is held up, the more often.
 #[test]
 fn the_thermistor_is_read_beside_the_currents() {
-    let mut board = Board::new(&image(), &[]);
+    for (pwm_hz, throttle) in [(24_000.0, Throttle::Silent), (48_000.0, Throttle::Dshot(0))] {
+        the_thermistor_is_read(pwm_hz, throttle);
+    }
+}
+
+fn the_thermistor_is_read(pwm_hz: f32, throttle: Throttle) {
+    let mut board = Board::new(&image(), &[(ParamId::PwmFreqHz, pwm_hz)]);
+    board.throttle = throttle;
     board.world().mislead_converters();
     board.run(2_500 * MS);
     let infos = board.heard.messages::<ESC_INFO_DATA>();
