@@ -213,7 +213,7 @@ impl Report {
 
     /// Tells the lines of what was measured, with the bounds that these parameters make.
     pub fn tell(&self, params: &Params, mut tell: impl FnMut(&Line)) {
-        for place in 0..ITEMS {
+        for place in 0..self.values.len() {
             if let Some(line) = self.line(place, params) {
                 tell(&line);
             }
@@ -222,7 +222,7 @@ impl Report {
 
     /// Whether all that was measured is within its bounds.
     pub(super) fn fits(&self, params: &Params) -> bool {
-        self.fit(0..ITEMS, params)
+        self.fit(0..self.values.len(), params)
     }
 
     /// Whether the motor may turn: comparators that do not trip where they should protect nothing, and
