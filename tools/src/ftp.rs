@@ -11,7 +11,8 @@ const OPEN_FILE_RO: u8 = 4;
 const READ_FILE: u8 = 5;
 const ACK: u8 = 128;
 
-/// The refusal that tells the end of a file.
+/// The refusals (MAVLink FTP's error codes): another has a file open, and the end of the file.
+const NO_SESSIONS_AVAILABLE: u8 = 5;
 const END_OF_FILE: u8 = 6;
 
 /// Bytes of a message before its data.
@@ -29,11 +30,15 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
         sequence += 1;
         ask(session, path, (sequence, opcode), (offset, data, size))
     };
-    let refused = |_| Error::Refused {
+    let refused = |number| Error::Refused {
         what: path.into(),
-        reason: "this component does not have it; is its image older than this program?".into(),
+        reason: match number {
+            NO_SESSIONS_AVAILABLE => "another program reads a file of it; try again in 10 s",
+            _ => "this component does not have it; is its image older than this program?",
+        }
+        .into(),
     };
-    // One that another program has left open would be in the way.
+    // One that a run of this program has left open would be in the way.
     request(RESET_SESSIONS, 0, &[], 0)?.map_err(refused)?;
     request(OPEN_FILE_RO, 0, path.as_bytes(), path.len())?.map_err(refused)?;
     let mut file = Vec::new();
