@@ -1,6 +1,6 @@
 //! The self-test: what a person should know of a board before its motor turns.
 //!
-//! Each [`Item`] has a value, a unit and bounds ([`items`]); what a board cannot measure is left out. At
+//! Each [`Item`] has a value, a unit and bounds; what a board cannot measure is left out. At
 //! power-up those are measured that need neither time nor the bridge. MAV_CMD_RUN_PREARM_CHECKS asks for
 //! all of them, and is obeyed under the rule of what may turn a motor: at rest, without a fault, the wire
 //! silent or at valid zero. It is acknowledged by IN_PROGRESS with a percentage, and at last by ACCEPTED
