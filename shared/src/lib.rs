@@ -10,7 +10,7 @@
 //! it reads, and [`store`] keeps them, with [`statistics`] and what else survives. [`tune`] has the tunes that the motor plays. [`check`] is
 //! the self-test. [`throttle`] and [`esc`] tie together what is outside the PWM interrupt.
 //!
-//! Dependencies run one way: `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
+//! Dependencies run one way: `trace` ← `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
 //! {`telemetry`, `statistics`} ← `check` ← {`throttle`, `mavlink`} ← `store` ← `esc`. `params` builds the configurations of the others.
 //!
 //! # Numbers
@@ -49,6 +49,7 @@ pub mod statistics;
 pub mod store;
 pub mod telemetry;
 pub mod throttle;
+pub mod trace;
 pub mod tune;
 pub mod units;
 

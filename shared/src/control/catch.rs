@@ -31,6 +31,7 @@ mod learn;
 use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
 
 use crate::math::{SinCos, TopProduct, atan2_turns};
+use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Speed};
 use compare::Difference;
 
@@ -83,56 +84,60 @@ pub enum Rotor {
     },
 }
 
-/// What a period does for a look.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Turn {
-    /// It compares the readings with the prediction.
-    Look,
-    /// It finds by how much angle and speed are to be corrected for what differs.
-    Weigh,
-    /// It corrects them, and the amplitude.
-    Correct,
-    /// It sees whether all fits.
-    Judge,
+traced! {
+    /// What a period does for a look.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Turn {
+        /// It compares the readings with the prediction.
+        Look,
+        /// It finds by how much angle and speed are to be corrected for what differs.
+        Weigh,
+        /// It corrects them, and the amplitude.
+        Correct,
+        /// It sees whether all fits.
+        Judge,
+    }
 }
 
-/// What is remembered from sample to sample.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// Mean of the highest reading.
-    level: AdcCounts,
-    /// What this period is to do.
-    turn: Turn,
-    /// Sum of the readings after the last look.
-    readings: [I17F15; 3],
-    /// Looks of this observation; 0 while there is none.
-    looks: u32,
-    /// θ_e, the angle of the back-EMF's vector at this sample.
-    theta: Angle,
-    /// ω.
-    omega: Speed,
-    /// E, in counts.
-    amplitude: AdcCounts,
-    /// S_0.
-    weight: I20F12,
-    /// S_1 and S_2, 12 fraction bits.
-    ages: [i64; 2],
-    /// Sum of the weights of E.
-    amplitude_weight: I20F12,
-    /// Sum of the squared ages about their mean, looks².
-    spread: u32,
-    /// Mean of the errors' magnitudes, summed over the phases.
-    residual: I17F15,
-    /// What the last look has told.
-    told: Difference,
-    /// k_ω, 30 fraction bits.
-    speed_gain: i32,
-    /// S_1/S_0, looks with 12 fraction bits.
-    mean_age: i32,
-    /// Looks in a row for which all fitted.
-    fitting: u32,
-    /// Looks for which something did not.
-    unfitting: u32,
+traced! {
+    /// What is remembered from sample to sample.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct State {
+        /// Mean of the highest reading.
+        level: AdcCounts,
+        /// What this period is to do.
+        turn: Turn,
+        /// Sum of the readings after the last look.
+        readings: [I17F15; 3],
+        /// Looks of this observation; 0 while there is none.
+        looks: u32,
+        /// θ_e, the angle of the back-EMF's vector at this sample.
+        theta: Angle,
+        /// ω.
+        omega: Speed,
+        /// E, in counts.
+        amplitude: AdcCounts,
+        /// S_0.
+        weight: I20F12,
+        /// S_1 and S_2, 12 fraction bits.
+        ages: [i64; 2],
+        /// Sum of the weights of E.
+        amplitude_weight: I20F12,
+        /// Sum of the squared ages about their mean, looks².
+        spread: u32,
+        /// Mean of the errors' magnitudes, summed over the phases.
+        residual: I17F15,
+        /// What the last look has told.
+        told: Difference,
+        /// k_ω, 30 fraction bits.
+        speed_gain: i32,
+        /// S_1/S_0, looks with 12 fraction bits.
+        mean_age: i32,
+        /// Looks in a row for which all fitted.
+        fitting: u32,
+        /// Looks for which something did not.
+        unfitting: u32,
+    }
 }
 
 impl State {
@@ -168,55 +173,6 @@ impl State {
         self.residual = I17F15::ZERO;
         self.fitting = 0;
         self.unfitting = 0;
-    }
-
-    /// Hands out every word.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            level,
-            turn,
-            readings,
-            looks,
-            theta,
-            omega,
-            amplitude,
-            weight,
-            ages: [s_1, s_2],
-            amplitude_weight,
-            spread,
-            residual,
-            told,
-            speed_gain,
-            mean_age,
-            fitting,
-            unfitting,
-        } = self;
-        out(level.to_bits() as u32);
-        out(*turn as u32);
-        for sum in readings {
-            out(sum.to_bits() as u32);
-        }
-        out(*looks);
-        out(theta.to_bits() as u32);
-        out(omega.to_bits() as u32);
-        out(amplitude.to_bits() as u32);
-        out(weight.to_bits() as u32);
-        for wide in [s_1, s_2] {
-            out(*wide as u32);
-            out((wide >> 32) as u32);
-        }
-        out(amplitude_weight.to_bits() as u32);
-        out(*spread);
-        out(residual.to_bits() as u32);
-        out(told.by_angle.to_bits() as u32);
-        out(told.angle_weight.to_bits() as u32);
-        out(told.by_amplitude.to_bits() as u32);
-        out(told.amplitude_weight.to_bits() as u32);
-        out(told.misfit.to_bits() as u32);
-        out(*speed_gain as u32);
-        out(*mean_age as u32);
-        out(*fitting);
-        out(*unfitting);
     }
 }
 

@@ -9,11 +9,14 @@ use fixed::types::extra::{U28, U30, Unsigned};
 use fixed::types::{I0F32, I2F30};
 
 use crate::math::{Gain, Multiplier, divide};
+use crate::trace::traced;
 use crate::units::{Current, Flux};
 
-/// L over the inductance that the parameters state, within 0.5 to 1.7.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factor(I2F30);
+traced! {
+    /// L over the inductance that the parameters state, within 0.5 to 1.7.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Factor(I2F30);
+}
 
 impl Factor {
     /// As stated.
@@ -57,28 +60,32 @@ pub struct Config {
     pub gain: Gain<U28, U30>,
 }
 
-/// The wave, its sums and the factor.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// The factor of the inductance.
-    pub factor: Factor,
-    /// Periods since the wave's last edge.
-    count: u32,
-    /// Whether the wave is at its upper level.
-    high: bool,
-    /// Whether a half wave has ended since the begin.
-    compares: bool,
-    /// Over the last periods of this half wave.
-    now: Sums,
-    /// Of the half wave before.
-    before: Sums,
+traced! {
+    /// The wave, its sums and the factor.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct State {
+        /// The factor of the inductance.
+        pub factor: Factor,
+        /// Periods since the wave's last edge.
+        count: u32,
+        /// Whether the wave is at its upper level.
+        high: bool,
+        /// Whether a half wave has ended since the begin.
+        compares: bool,
+        /// Over the last periods of this half wave.
+        now: Sums,
+        /// Of the half wave before.
+        before: Sums,
+    }
 }
 
-/// Sums over the same samples, in 2^-20 of a unit: 512 samples of 4 units fit.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Sums {
-    i_d: i32,
-    flux: i32,
+traced! {
+    /// Sums over the same samples, in 2^-20 of a unit: 512 samples of 4 units fit.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    struct Sums {
+        i_d: i32,
+        flux: i32,
+    }
 }
 
 /// Greatest number of samples in a mean.
@@ -111,31 +118,6 @@ impl State {
             factor: self.factor,
             ..Self::default()
         };
-    }
-
-    /// Hands out every word.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        // Taken apart in full, so that a new field is not forgotten here.
-        let Self {
-            factor: Factor(factor),
-            count,
-            high,
-            compares,
-            now,
-            before,
-        } = self;
-        for word in [
-            factor.to_bits(),
-            *count as i32,
-            i32::from(*high),
-            i32::from(*compares),
-            now.i_d,
-            now.flux,
-            before.i_d,
-            before.flux,
-        ] {
-            out(word as u32);
-        }
     }
 }
 

@@ -8,6 +8,7 @@ use fixed::types::{I0F32, I1F31, I4F28, I6F26, I8F24, I16F16};
 use super::dead_time;
 use super::transform::{AlphaBeta, Dq, Order, phases_in};
 use crate::math::{Held, Multiplier, Real, SQRT_3, TopProduct, TopSum, other_leg};
+use crate::trace::traced;
 use crate::units::{Duty, Voltage, WideVoltage, wide};
 
 /// How the phases' common voltage is chosen.
@@ -58,30 +59,34 @@ impl Config {
     }
 }
 
-/// The supply and its reciprocal, taken every few periods.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Supply {
-    /// Voltage.
-    pub bus: Voltage,
-    /// 1/V with 28 fraction bits, held at 8.
-    pub reciprocal: I4F28,
-    /// Longest voltage vector that can be had.
-    pub longest: Longest,
-    /// Square of the length up to which every phase can be read.
-    pub readable: I16F16,
+traced! {
+    /// The supply and its reciprocal, taken every few periods.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Supply {
+        /// Voltage.
+        pub bus: Voltage,
+        /// 1/V with 28 fraction bits, held at 8.
+        pub reciprocal: I4F28,
+        /// Longest voltage vector that can be had.
+        pub longest: Longest,
+        /// Square of the length up to which every phase can be read.
+        pub readable: I16F16,
+    }
 }
 
-/// The longest voltage vector that can be had, and its part along q near some part along d.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Longest {
-    length: Voltage,
-    square: I16F16,
-    /// Square of that part along d.
-    d_square: I8F24,
-    /// What is left along q.
-    q: WideVoltage,
-    /// What of the square's change q loses, 1/(2·q).
-    slope: Multiplier<U24, U20>,
+traced! {
+    /// The longest voltage vector that can be had, and its part along q near some part along d.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Longest {
+        length: Voltage,
+        square: I16F16,
+        /// Square of that part along d.
+        d_square: I8F24,
+        /// What is left along q.
+        q: WideVoltage,
+        /// What of the square's change q loses, 1/(2·q).
+        slope: Multiplier<U24, U20>,
+    }
 }
 
 impl Longest {

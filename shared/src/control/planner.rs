@@ -8,6 +8,7 @@
 use fixed::types::extra::U32;
 
 use crate::math::{Gain, Held};
+use crate::trace::traced;
 use crate::units::Speed;
 
 /// Limits of the trajectory.
@@ -21,15 +22,17 @@ pub struct Config {
     pub approach: Gain<U32, U32>,
 }
 
-/// Where the trajectory is.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// ω*.
-    pub reference: Speed,
-    /// Ω* of the last period.
-    command: Speed,
-    /// ω*'s last step.
-    step: Speed,
+traced! {
+    /// Where the trajectory is.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// ω*.
+        pub reference: Speed,
+        /// Ω* of the last period.
+        command: Speed,
+        /// ω*'s last step.
+        step: Speed,
+    }
 }
 
 impl State {
@@ -68,20 +71,6 @@ impl State {
     pub fn advance(&mut self, step: Speed) {
         self.reference = self.reference.plus(step);
         self.step = step;
-    }
-
-    /// Hands out every word.
-    // Two drives have a planner: left as a call, it would keep the whole trace out of registers.
-    #[inline(always)]
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            reference,
-            command,
-            step,
-        } = self;
-        out(reference.to_bits() as u32);
-        out(command.to_bits() as u32);
-        out(step.to_bits() as u32);
     }
 }
 

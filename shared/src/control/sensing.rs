@@ -10,6 +10,7 @@
 use fixed::types::I16F16;
 
 use crate::math::Held;
+use crate::trace::traced;
 use crate::units::{AdcCounts, Duty};
 
 /// Which phases have a shunt.
@@ -45,15 +46,17 @@ pub struct Config {
     pub offset_max: AdcCounts,
 }
 
-/// The offsets, and what is known of the next ones.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Readings without current, subtracted from all later ones.
-    pub offsets: [AdcCounts; 3],
-    /// Mean of the readings so far, as if those to come were zero.
-    pub partial: [AdcCounts; 3],
-    /// Readings so far.
-    pub readings: u32,
+traced! {
+    /// The offsets, and what is known of the next ones.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Readings without current, subtracted from all later ones.
+        pub offsets: [AdcCounts; 3],
+        /// Mean of the readings so far, as if those to come were zero.
+        pub partial: [AdcCounts; 3],
+        /// Readings so far.
+        pub readings: u32,
+    }
 }
 
 /// How far the measurement of the offsets is.
@@ -72,19 +75,6 @@ impl State {
     pub fn restart(&mut self) {
         self.partial = [AdcCounts::ZERO; 3];
         self.readings = 0;
-    }
-
-    /// Hands out every word.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            offsets,
-            partial,
-            readings,
-        } = self;
-        for counts in offsets.iter().chain(partial) {
-            out(counts.to_bits() as u32);
-        }
-        out(*readings);
     }
 }
 
@@ -164,7 +154,6 @@ pub fn currents(
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::vec::Vec;
 
     fn config(shunts: Shunts) -> Config {
         Config {
@@ -282,12 +271,5 @@ mod tests {
                 zero(&config, &mut state, raw);
             }
         }
-    }
-
-    #[test]
-    fn the_trace_has_every_word() {
-        let mut words = Vec::new();
-        State::default().trace(&mut |word| words.push(word));
-        assert_eq!(words.len(), 7);
     }
 }

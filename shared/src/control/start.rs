@@ -9,6 +9,7 @@ use fixed::types::extra::{U28, U32};
 
 use super::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
+use crate::trace::traced;
 use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -40,24 +41,26 @@ pub struct Config {
     pub xi_nominal: InverseFlux,
 }
 
-/// What Park and Ramp remember.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// The frame's angle at the coming sample.
-    /// Current along q of the first frame, a quarter of a turn back, is along phase a.
-    pub frame: Angle,
-    /// ∫I_qr in Park, in periods.
-    pub charge: I36F28,
-    /// ω_s, the speed of the frame but for its yielding.
-    pub omega_s: Speed,
-    /// Its change in a period.
-    pub acceleration: Speed,
-    /// Angle by which the frame yields to the rotor's swing.
-    pub yielded: Angle,
-    /// Its change in a period.
-    pub yielding: Speed,
-    /// Periods in which the rotor has turned too slowly, less those in which it has not.
-    pub astray: u32,
+traced! {
+    /// What Park and Ramp remember.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct State {
+        /// The frame's angle at the coming sample.
+        /// Current along q of the first frame, a quarter of a turn back, is along phase a.
+        pub frame: Angle,
+        /// ∫I_qr in Park, in periods.
+        pub charge: I36F28,
+        /// ω_s, the speed of the frame but for its yielding.
+        pub omega_s: Speed,
+        /// Its change in a period.
+        pub acceleration: Speed,
+        /// Angle by which the frame yields to the rotor's swing.
+        pub yielded: Angle,
+        /// Its change in a period.
+        pub yielding: Speed,
+        /// Periods in which the rotor has turned too slowly, less those in which it has not.
+        pub astray: u32,
+    }
 }
 
 impl Default for State {
@@ -148,29 +151,7 @@ pub fn lost(config: &Config, state: &State) -> bool {
     state.astray > config.astray_periods
 }
 
-impl State {
-    /// Every word of the state.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            frame,
-            charge,
-            omega_s,
-            acceleration,
-            yielded,
-            yielding,
-            astray,
-        } = self;
-        let charge = charge.to_bits();
-        out(frame.to_bits() as u32);
-        out(charge as u32);
-        out((charge >> 32) as u32);
-        out(omega_s.to_bits() as u32);
-        out(acceleration.to_bits() as u32);
-        out(yielded.to_bits() as u32);
-        out(yielding.to_bits() as u32);
-        out(*astray);
-    }
-}
+impl State {}
 
 /// Where the speeds end, half a turn, with 28 fraction bits.
 const SPEED_END: i32 = 1 << 27;

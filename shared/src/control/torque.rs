@@ -7,6 +7,7 @@
 use super::regulator::Reference;
 use super::speed::Bounds;
 use crate::math::Held;
+use crate::trace::traced;
 use crate::units::Current;
 
 /// Limit of the change.
@@ -16,11 +17,13 @@ pub struct Config {
     pub slew: Current,
 }
 
-/// What is remembered: i_q* of the last period.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// i_q*.
-    pub i_q: Current,
+traced! {
+    /// What is remembered: i_q* of the last period.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// i_q*.
+        pub i_q: Current,
+    }
 }
 
 /// `wanted` with its i_q* within the bounds, and not far from the last one.

@@ -7,24 +7,29 @@ use fixed::types::extra::{Diff, Sum, U31, U32, Unsigned};
 use fixed::types::{I0F32, I4F28, I5F27, I6F26};
 
 use crate::math::{Held, SinCos, TopProduct, TopSum};
+use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Voltage};
 
-/// A vector in the stator's frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AlphaBeta<T> {
-    /// Along the axis of phase a.
-    pub alpha: T,
-    /// A quarter of a turn ahead of it.
-    pub beta: T,
+traced! {
+    /// A vector in the stator's frame.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct AlphaBeta<T> {
+        /// Along the axis of phase a.
+        pub alpha: T,
+        /// A quarter of a turn ahead of it.
+        pub beta: T,
+    }
 }
 
-/// A vector in the frame of the (estimated) rotor.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Dq<T> {
-    /// Along the rotor's flux.
-    pub d: T,
-    /// A quarter of a turn ahead of it.
-    pub q: T,
+traced! {
+    /// A vector in the frame of the (estimated) rotor.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Dq<T> {
+        /// Along the rotor's flux.
+        pub d: T,
+        /// A quarter of a turn ahead of it.
+        pub q: T,
+    }
 }
 
 /// The order in which three phases follow one another.

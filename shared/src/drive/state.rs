@@ -12,6 +12,7 @@ use crate::control::{
 };
 use crate::math::SinCos;
 use crate::protection;
+use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Current, Duty, Flux, Speed, Voltage};
 
 /// The sample at which the bridge is turned off, and one for a period of delay.

@@ -6,6 +6,7 @@ use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
 use super::gain;
+use crate::trace::Trace;
 
 /// A factor that turns a number with `A` fraction bits into one with `B`.
 ///
@@ -50,6 +51,13 @@ impl<A, B> Multiplier<A, B> {
     /// The same factor as [`Multiplier::from_bits`] takes it.
     pub const fn to_bits(self) -> i32 {
         self.bits
+    }
+}
+
+impl<A, B> Trace for Multiplier<A, B> {
+    #[inline]
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        self.bits.trace(out);
     }
 }
 

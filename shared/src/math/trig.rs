@@ -5,14 +5,17 @@ use fixed::types::extra::U31;
 use fixed::types::{I0F32, I1F31, I4F28};
 
 use super::TopProduct;
+use crate::trace::traced;
 
-/// Cosine and sine of one angle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SinCos {
-    /// Cosine, −1 to 1 − 2^-31.
-    pub cos: I1F31,
-    /// Sine, likewise.
-    pub sin: I1F31,
+traced! {
+    /// Cosine and sine of one angle.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct SinCos {
+        /// Cosine, −1 to 1 − 2^-31.
+        pub cos: I1F31,
+        /// Sine, likewise.
+        pub sin: I1F31,
+    }
 }
 
 impl SinCos {

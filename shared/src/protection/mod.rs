@@ -11,6 +11,7 @@ use fixed::types::extra::U28;
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, Multiplier, magnitude};
+use crate::trace::traced;
 use crate::units::{AdcCounts, Current, Voltage};
 
 /// Samples in a row above the trip level that are an over-current, so that one disturbed reading
@@ -41,18 +42,20 @@ pub struct Config {
     pub bound_rate: Multiplier<U28, U28>,
 }
 
-/// What is remembered from sample to sample.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// Magnitude of a phase's reading that trips now: [`Config::trip`], or that of the limit before,
-    /// until the current has come down to one that was lowered, or a drive or a tone begins.
-    pub trip: AdcCounts,
-    /// Samples in a row above the trip.
-    pub over_current_samples: u8,
-    /// Supply voltage behind a low-pass filter.
-    pub bus: Voltage,
-    /// Bounds of i_q*, moved by what the supply gives and takes.
-    pub bounds: Bounds,
+traced! {
+    /// What is remembered from sample to sample.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct State {
+        /// Magnitude of a phase's reading that trips now: [`Config::trip`], or that of the limit before,
+        /// until the current has come down to one that was lowered, or a drive or a tone begins.
+        pub trip: AdcCounts,
+        /// Samples in a row above the trip.
+        pub over_current_samples: u8,
+        /// Supply voltage behind a low-pass filter.
+        pub bus: Voltage,
+        /// Bounds of i_q*, moved by what the supply gives and takes.
+        pub bounds: Bounds,
+    }
 }
 
 impl State {

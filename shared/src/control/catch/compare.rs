@@ -4,24 +4,27 @@ use fixed::types::{I2F30, I4F28, I17F15, I19F13};
 
 use crate::control::transform::{AlphaBeta, phases};
 use crate::math::{SinCos, TopProduct};
+use crate::trace::traced;
 use crate::units::{AdcCounts, Angle};
 
 /// The highest reading of the converter's 12 bits: it may be a clamp.
 const CLAMP: I17F15 = I17F15::lit("4094");
 
-/// The readings against the prediction, in terms of what would correct it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Difference {
-    /// Sum of the errors, in counts, each times its derivative by the angle over E.
-    pub(super) by_angle: I19F13,
-    /// Sum of the squares of these derivatives.
-    pub(super) angle_weight: I4F28,
-    /// The same of the derivatives by E.
-    pub(super) by_amplitude: I19F13,
-    /// Likewise.
-    pub(super) amplitude_weight: I4F28,
-    /// Sum of the errors' magnitudes.
-    pub(super) misfit: I17F15,
+traced! {
+    /// The readings against the prediction, in terms of what would correct it.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub(super) struct Difference {
+        /// Sum of the errors, in counts, each times its derivative by the angle over E.
+        pub(super) by_angle: I19F13,
+        /// Sum of the squares of these derivatives.
+        pub(super) angle_weight: I4F28,
+        /// The same of the derivatives by E.
+        pub(super) by_amplitude: I19F13,
+        /// Likewise.
+        pub(super) amplitude_weight: I4F28,
+        /// Sum of the errors' magnitudes.
+        pub(super) misfit: I17F15,
+    }
 }
 
 /// A phase: what it sees of a vector of length one, how that changes with the vector's angle, and

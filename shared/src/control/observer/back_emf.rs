@@ -9,6 +9,7 @@ use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, divide, magnitude};
+use crate::trace::traced;
 use crate::units::{Angle, Current, Flux, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
@@ -55,23 +56,25 @@ pub struct Cure {
     pub integral: Gain<U28, U32>,
 }
 
-/// What the observer remembers from period to period.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// θ̂ at this sample; the type wraps it (25).
-    pub theta: Angle,
-    /// î at this sample, as the last period predicted it.
-    pub i: Dq<Current>,
-    /// ĥ at this sample.
-    pub h: Dq<Voltage>,
-    /// ξ̂.
-    pub xi: InverseFlux,
-    /// ω̂_f of the filter (28).
-    pub omega_f: Speed,
-    /// Integrator of the loop that is the cure.
-    pub omega_i: Speed,
-    /// Voltage that was commanded in the last period.
-    pub u_before: Dq<Voltage>,
+traced! {
+    /// What the observer remembers from period to period.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// θ̂ at this sample; the type wraps it (25).
+        pub theta: Angle,
+        /// î at this sample, as the last period predicted it.
+        pub i: Dq<Current>,
+        /// ĥ at this sample.
+        pub h: Dq<Voltage>,
+        /// ξ̂.
+        pub xi: InverseFlux,
+        /// ω̂_f of the filter (28).
+        pub omega_f: Speed,
+        /// Integrator of the loop that is the cure.
+        pub omega_i: Speed,
+        /// Voltage that was commanded in the last period.
+        pub u_before: Dq<Voltage>,
+    }
 }
 
 /// The observer in a moment in which the frame's angle and speed are known, or imposed.
@@ -242,34 +245,7 @@ pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<A
     Some(lead)
 }
 
-impl State {
-    /// Every word of the state.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            theta,
-            i,
-            h,
-            xi,
-            omega_f,
-            omega_i,
-            u_before,
-        } = self;
-        for bits in [
-            theta.to_bits(),
-            i.d.to_bits(),
-            i.q.to_bits(),
-            h.d.to_bits(),
-            h.q.to_bits(),
-            xi.to_bits(),
-            omega_f.to_bits(),
-            omega_i.to_bits(),
-            u_before.d.to_bits(),
-            u_before.q.to_bits(),
-        ] {
-            out(bits as u32);
-        }
-    }
-}
+impl State {}
 
 /// Where the rotor is, as seen from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
 ///

@@ -15,6 +15,7 @@ use super::{Estimate, Input, Told};
 use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq};
 use crate::math::{EIGHTH_PI, Gain, Held, Multiplier, SinCos, TopProduct, TopSum, sin_cos};
+use crate::trace::traced;
 use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
@@ -41,46 +42,50 @@ pub struct Config {
     pub quarter_per_flux: Multiplier<U27, U27>,
 }
 
-/// What the observer remembers from period to period.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// θ̂ at the coming sample.
-    pub theta: Angle,
-    /// ω̂_i, the loop's integrator.
-    pub omega_i: Speed,
-    /// φ̂.
-    pub phi: Flux,
-    /// z_d at the last sample, with which a rotor that is lost shows.
-    z_d: Flux,
-    /// ψ, the stator's flux.
-    psi: AlphaBeta<Flux>,
-    /// What ω̂ has above ω̂_i, smoothed.
-    smooth: Speed,
-    /// Current at the last sample.
-    i_before: AlphaBeta<Current>,
-    /// What the speed makes of the coefficients.
-    pace: Pace,
+traced! {
+    /// What the observer remembers from period to period.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct State {
+        /// θ̂ at the coming sample.
+        pub theta: Angle,
+        /// ω̂_i, the loop's integrator.
+        pub omega_i: Speed,
+        /// φ̂.
+        pub phi: Flux,
+        /// z_d at the last sample, with which a rotor that is lost shows.
+        z_d: Flux,
+        /// ψ, the stator's flux.
+        psi: AlphaBeta<Flux>,
+        /// What ω̂ has above ω̂_i, smoothed.
+        smooth: Speed,
+        /// Current at the last sample.
+        i_before: AlphaBeta<Current>,
+        /// What the speed makes of the coefficients.
+        pace: Pace,
+    }
 }
 
-/// Coefficients that follow the speed, and the inductance: taken anew by [`pace`] every few periods.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Pace {
-    /// L, with what is known of it.
-    inductance: Multiplier<U28, U24>,
-    /// 0.5·ω⁺·T_s.
-    leak: I0F32,
-    /// The same less β·ω⁺²·T_s.
-    held: I0F32,
-    /// Rate of φ̂, 0.15·ω⁺·T_s.
-    phi: I0F32,
-    /// ω_n²·T_s, for half of ε.
-    integral: Speed,
-    /// 1.8·ω_n, for half of ε.
-    proportional: Speed,
-    /// φ̂, speed to back-EMF.
-    emf: Multiplier<U32, U24>,
-    /// ω̄̂ when these were taken.
-    omega_bar: Speed,
+traced! {
+    /// Coefficients that follow the speed, and the inductance: taken anew by [`pace`] every few periods.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    struct Pace {
+        /// L, with what is known of it.
+        inductance: Multiplier<U28, U24>,
+        /// 0.5·ω⁺·T_s.
+        leak: I0F32,
+        /// The same less β·ω⁺²·T_s.
+        held: I0F32,
+        /// Rate of φ̂, 0.15·ω⁺·T_s.
+        phi: I0F32,
+        /// ω_n²·T_s, for half of ε.
+        integral: Speed,
+        /// 1.8·ω_n, for half of ε.
+        proportional: Speed,
+        /// φ̂, speed to back-EMF.
+        emf: Multiplier<U32, U24>,
+        /// ω̄̂ when these were taken.
+        omega_bar: Speed,
+    }
 }
 
 impl Default for State {
@@ -325,51 +330,6 @@ impl State {
     #[inline(always)]
     fn omega_bar(&self) -> Speed {
         self.omega_i.plus(self.smooth)
-    }
-
-    /// Every word of the state.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            theta,
-            omega_i,
-            phi,
-            z_d,
-            psi,
-            smooth,
-            i_before,
-            pace,
-        } = self;
-        let Pace {
-            inductance,
-            leak,
-            held,
-            phi: phi_rate,
-            integral,
-            proportional,
-            emf,
-            omega_bar,
-        } = pace;
-        for bits in [
-            theta.to_bits(),
-            omega_i.to_bits(),
-            phi.to_bits(),
-            psi.alpha.to_bits(),
-            psi.beta.to_bits(),
-            smooth.to_bits(),
-            i_before.alpha.to_bits(),
-            i_before.beta.to_bits(),
-            z_d.to_bits(),
-            inductance.to_bits(),
-            leak.to_bits(),
-            held.to_bits(),
-            phi_rate.to_bits(),
-            integral.to_bits(),
-            proportional.to_bits(),
-            emf.to_bits(),
-            omega_bar.to_bits(),
-        ] {
-            out(bits as u32);
-        }
     }
 }
 

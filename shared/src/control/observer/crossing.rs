@@ -7,6 +7,7 @@ use super::flux_linkage::{AMPLITUDE_MAX, AMPLITUDE_MIN, measure};
 use super::position::{Periods, turned};
 use super::sector::Sector;
 use crate::math::{Held, TopProduct, divide};
+use crate::trace::traced;
 use crate::units::{Angle, Flux, Speed};
 
 /// What keeps noise from being taken for a crossing (2.3.2).
@@ -23,17 +24,19 @@ pub struct Config {
     pub patience: u32,
 }
 
-/// What the comparator remembers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// The sector that the last crossing has begun.
-    pub sector: Sector,
-    /// Periods since the sample of that crossing.
-    pub since: u32,
-    /// How much the crossings are to be trusted, 0 to 12: a sound one adds one, another takes three.
-    pub sound: u8,
-    /// Whether they tell where the rotor is.
-    pub tracks: bool,
+traced! {
+    /// What the comparator remembers.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// The sector that the last crossing has begun.
+        pub sector: Sector,
+        /// Periods since the sample of that crossing.
+        pub since: u32,
+        /// How much the crossings are to be trusted, 0 to 12: a sound one adds one, another takes three.
+        pub sound: u8,
+        /// Whether they tell where the rotor is.
+        pub tracks: bool,
+    }
 }
 
 /// A crossing of the one phase and direction that was next.
@@ -153,19 +156,6 @@ impl State {
     /// Whether a whole turn of crossings has been sound.
     pub fn trusted(&self) -> bool {
         self.tracks && self.sound >= SOUND
-    }
-
-    /// Every word of it.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            sector,
-            since,
-            sound,
-            tracks,
-        } = *self;
-        out(sector.word());
-        out(since);
-        out(u32::from(sound) | u32::from(tracks) << 8);
     }
 }
 

@@ -7,6 +7,7 @@ use super::crossing::{self, Crossing};
 use super::flux_linkage;
 use super::hall::{self, Step};
 use super::position::{self, Periods};
+use crate::trace::traced;
 use crate::units::{Angle, Current, Speed, Voltage};
 
 /// Where edges come from.
@@ -40,30 +41,34 @@ pub struct Config {
     pub hall_below: Speed,
 }
 
-/// What triggers the position estimator at present.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Source {
-    /// Hall sensors.
-    #[default]
-    Hall,
-    /// Flux crossings.
-    Flux,
+traced! {
+    /// What triggers the position estimator at present.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Source {
+        /// Hall sensors.
+        #[default]
+        Hall,
+        /// Flux crossings.
+        Flux,
+    }
 }
 
-/// What the estimation remembers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// What triggers the position estimator.
-    pub source: Source,
-    /// Flux observers.
-    pub flux: flux_linkage::State,
-    /// Comparator.
-    pub crossing: crossing::State,
-    /// Position estimator.
-    pub position: position::State,
-    /// Hall sensors.
-    pub hall: hall::State,
+traced! {
+    /// What the estimation remembers.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// What triggers the position estimator.
+        pub source: Source,
+        /// Flux observers.
+        pub flux: flux_linkage::State,
+        /// Comparator.
+        pub crossing: crossing::State,
+        /// Position estimator.
+        pub position: position::State,
+        /// Hall sensors.
+        pub hall: hall::State,
+    }
 }
 
 /// What is known of the rotor at a sample.
@@ -259,23 +264,7 @@ pub fn found(state: &State) -> Option<Angle> {
     known.then(|| position.theta.wrapping_add(position.omega))
 }
 
-impl State {
-    /// Every word of it.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            source,
-            flux,
-            crossing,
-            position,
-            hall,
-        } = self;
-        out(*source as u32);
-        flux.trace(out);
-        crossing.trace(out);
-        position.trace(out);
-        hall.trace(out);
-    }
-}
+impl State {}
 
 #[cfg(test)]
 mod tests;

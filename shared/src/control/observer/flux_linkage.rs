@@ -6,6 +6,7 @@ use fixed::FixedI32;
 use fixed::types::extra::{U28, U32};
 
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
+use crate::trace::traced;
 use crate::units::{Angle, Current, Flux, Speed, Voltage};
 
 use super::sector::Sector;
@@ -46,21 +47,23 @@ pub struct HighPass {
     pub corner: Speed,
 }
 
-/// What the observers of the three phases remember.
-#[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    /// Integral of v − i·R.
-    pub psi: [Flux; 3],
-    /// Its slow mean, which the high-pass takes away.
-    pub mean: [Flux; 3],
-    /// λ̂ of the phases at this sample.
-    pub lambda: [Flux; 3],
-    /// λ̂ at the sample before.
-    pub lambda_before: [Flux; 3],
-    /// Currents at the last sample.
-    pub i_before: [Current; 3],
-    /// Amplitude of λ̂, from which limits and deadband are taken.
-    pub amplitude: Flux,
+traced! {
+    /// What the observers of the three phases remember.
+    #[derive(Clone, Debug, PartialEq)]
+    pub struct State {
+        /// Integral of v − i·R.
+        pub psi: [Flux; 3],
+        /// Its slow mean, which the high-pass takes away.
+        pub mean: [Flux; 3],
+        /// λ̂ of the phases at this sample.
+        pub lambda: [Flux; 3],
+        /// λ̂ at the sample before.
+        pub lambda_before: [Flux; 3],
+        /// Currents at the last sample.
+        pub i_before: [Current; 3],
+        /// Amplitude of λ̂, from which limits and deadband are taken.
+        pub amplitude: Flux,
+    }
 }
 
 impl Default for State {
@@ -183,23 +186,7 @@ fn shortened(flux: Flux, angle: Angle) -> Flux {
     Flux::from_bits(flux.top(SinCos::of(angle).cos).to_bits() << 1)
 }
 
-impl State {
-    /// Every word of it.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            psi,
-            mean,
-            lambda,
-            lambda_before,
-            i_before,
-            amplitude,
-        } = self;
-        for three in [psi, mean, lambda, lambda_before, i_before] {
-            three.iter().for_each(|word| out(word.to_bits() as u32));
-        }
-        out(amplitude.to_bits() as u32);
-    }
-}
+impl State {}
 
 #[cfg(test)]
 mod tests;

@@ -2,17 +2,20 @@
 
 use super::{Estimate, Told};
 use crate::math::SinCos;
+use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
-/// What was told of the rotor at the coming sample, with the phases in the order a, b, c.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Electrical angle.
-    pub theta: Angle,
-    /// Electrical speed.
-    pub omega: Speed,
-    /// Its change since what was told before.
-    pub omega_step: Speed,
+traced! {
+    /// What was told of the rotor at the coming sample, with the phases in the order a, b, c.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Electrical angle.
+        pub theta: Angle,
+        /// Electrical speed.
+        pub omega: Speed,
+        /// Its change since what was told before.
+        pub omega_step: Speed,
+    }
 }
 
 impl State {
@@ -30,18 +33,6 @@ impl State {
             (self.theta.wrapping_neg(), self.omega.saturating_neg())
         } else {
             (self.theta, self.omega)
-        }
-    }
-
-    /// Every word of it.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            theta,
-            omega,
-            omega_step,
-        } = self;
-        for word in [theta.to_bits(), omega.to_bits(), omega_step.to_bits()] {
-            out(word as u32);
         }
     }
 }

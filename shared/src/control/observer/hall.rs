@@ -2,6 +2,7 @@
 //! can be believed.
 
 use super::sector::Sector;
+use crate::trace::traced;
 
 /// What the sensors must show.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,21 +11,23 @@ pub struct Config {
     pub patience: u32,
 }
 
-/// What is remembered of the sensors.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Code of the last sample.
-    pub code: u8,
-    /// Code that two samples in a row had.
-    pub held: u8,
-    /// Sector of the last valid one.
-    pub sector: Option<Sector>,
-    /// Periods for which it has been invalid.
-    pub invalid: u32,
-    /// What speaks against the sensors.
-    pub evidence: u8,
-    /// Whether a sensor is at fault. It stays so.
-    pub fault: bool,
+traced! {
+    /// What is remembered of the sensors.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Code of the last sample.
+        pub code: u8,
+        /// Code that two samples in a row had.
+        pub held: u8,
+        /// Sector of the last valid one.
+        pub sector: Option<Sector>,
+        /// Periods for which it has been invalid.
+        pub invalid: u32,
+        /// What speaks against the sensors.
+        pub evidence: u8,
+        /// Whether a sensor is at fault. It stays so.
+        pub fault: bool,
+    }
 }
 
 /// A change of the sensors' sector.
@@ -116,22 +119,6 @@ impl State {
     /// The sector, while the sensors can be believed.
     pub fn believed(&self) -> Option<Sector> {
         self.sector.filter(|_| !self.fault)
-    }
-
-    /// Every word of it.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            code,
-            held,
-            sector,
-            invalid,
-            evidence,
-            fault,
-        } = *self;
-        out(u32::from(code) | u32::from(held) << 8 | u32::from(evidence) << 16);
-        out(sector.map_or(u32::MAX, Sector::word));
-        out(invalid);
-        out(u32::from(fault));
     }
 }
 

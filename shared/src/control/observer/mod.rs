@@ -17,6 +17,7 @@ use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
 use crate::math::{EIGHTH_PI, SinCos, TopProduct};
+use crate::trace::{Trace, traced};
 use crate::units::{
     Angle, Current, FLUX_NOMINAL, Flux, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage,
     WideVoltage, wide,
@@ -80,17 +81,19 @@ pub struct Estimate {
     pub omega_bar: Speed,
 }
 
-/// What an observer says besides, for what is not done in every period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
-    /// The change of ω̄̂ in a period.
-    pub omega_bar_step: Speed,
-    /// ξ̂, the inverse of the flux.
-    pub xi: InverseFlux,
-    /// Change of ξ̂ in a period.
-    pub xi_step: InverseFlux,
-    /// Whether the observer's state is out of its range: the rotor may be elsewhere.
-    pub lost: bool,
+traced! {
+    /// What an observer says besides, for what is not done in every period.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub struct Told {
+        /// The change of ω̄̂ in a period.
+        pub omega_bar_step: Speed,
+        /// ξ̂, the inverse of the flux.
+        pub xi: InverseFlux,
+        /// Change of ξ̂ in a period.
+        pub xi_step: InverseFlux,
+        /// Whether the observer's state is out of its range: the rotor may be elsewhere.
+        pub lost: bool,
+    }
 }
 
 impl Default for Told {
@@ -386,14 +389,7 @@ impl State {
             given,
             told,
         } = self;
-        for word in [
-            told.omega_bar_step.to_bits(),
-            told.xi.to_bits(),
-            told.xi_step.to_bits(),
-            i32::from(told.lost),
-        ] {
-            out(word as u32);
-        }
+        told.trace(out);
         match config {
             Config::BackEmf(_) => back_emf.trace(out),
             Config::Edges(_) => edges.trace(out),

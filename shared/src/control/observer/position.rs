@@ -10,6 +10,7 @@ use fixed::types::extra::U32;
 
 use super::sector::Sector;
 use crate::math::{Gain, divide};
+use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
 /// A time in control periods.
@@ -32,31 +33,33 @@ pub struct Config {
     pub compensates: bool,
 }
 
-/// What the estimator remembers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// θ̂ at this sample.
-    pub theta: Angle,
-    /// θ_inc, the angle extrapolated since the last edge: 0 to 90°.
-    pub theta_inc: Angle,
-    /// ω̂.
-    pub omega: Speed,
-    /// Change of ω̂ in a period, between the last two measurements.
-    pub omega_step: Speed,
-    /// Periods since the sample that saw the last edge.
-    pub since: u32,
-    /// How long before that sample the edge was.
-    pub late: Periods,
-    /// The last intervals between edges, a ring.
-    pub intervals: [Periods; EDGES_MAX],
-    /// Where the next one goes.
-    pub next: u8,
-    /// How many there are, at most those of N turns.
-    pub edges: u8,
-    /// Their sum.
-    pub window: Periods,
-    /// Whether the last edge was seen, so that the next interval is one.
-    pub timed: bool,
+traced! {
+    /// What the estimator remembers.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// θ̂ at this sample.
+        pub theta: Angle,
+        /// θ_inc, the angle extrapolated since the last edge: 0 to 90°.
+        pub theta_inc: Angle,
+        /// ω̂.
+        pub omega: Speed,
+        /// Change of ω̂ in a period, between the last two measurements.
+        pub omega_step: Speed,
+        /// Periods since the sample that saw the last edge.
+        pub since: u32,
+        /// How long before that sample the edge was.
+        pub late: Periods,
+        /// The last intervals between edges, a ring.
+        pub intervals: [Periods; EDGES_MAX],
+        /// Where the next one goes.
+        pub next: u8,
+        /// How many there are, at most those of N turns.
+        pub edges: u8,
+        /// Their sum.
+        pub window: Periods,
+        /// Whether the last edge was seen, so that the next interval is one.
+        pub timed: bool,
+    }
 }
 
 /// Edges in the greatest N.
@@ -211,34 +214,7 @@ pub fn begin(state: &mut State, theta: Angle, omega: Speed) {
     };
 }
 
-impl State {
-    /// Every word of it.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            theta,
-            theta_inc,
-            omega,
-            omega_step,
-            since,
-            late,
-            intervals,
-            next,
-            edges,
-            window,
-            timed,
-        } = *self;
-        for word in [theta, theta_inc, omega, omega_step] {
-            out(word.to_bits() as u32);
-        }
-        out(since);
-        out(late.to_bits());
-        intervals
-            .iter()
-            .for_each(|interval| out(interval.to_bits()));
-        out(window.to_bits());
-        out(u32::from(next) | u32::from(edges) << 8 | u32::from(timed) << 16);
-    }
-}
+impl State {}
 
 #[cfg(test)]
 mod tests;

@@ -1,12 +1,15 @@
 //! The sixths of an electrical turn that the signs of three fluxes tell apart (second paper, figures
 //! 22 and 24): what flux crossings and Hall sensors have in common.
 
+use crate::trace::traced;
 use crate::units::Angle;
 
-/// One of six sectors of 60°, numbered in the positive direction; the first has its middle at 0°,
-/// where the rotor's flux lies along phase a.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sector(u8);
+traced! {
+    /// One of six sectors of 60°, numbered in the positive direction; the first has its middle at 0°,
+    /// where the rotor's flux lies along phase a.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub struct Sector(u8);
+}
 
 /// The zero crossing with which a sector begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,11 +79,6 @@ impl Sector {
             phase: usize::from(2 - self.0 % 3),
             rising: self.0 & 1 == 1,
         }
-    }
-
-    /// As a word of a trace.
-    pub fn word(self) -> u32 {
-        u32::from(self.0)
     }
 }
 

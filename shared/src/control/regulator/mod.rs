@@ -13,17 +13,20 @@ use fixed::types::extra::U28;
 use super::inductance::Factor;
 use super::transform::Dq;
 use crate::math::Gain;
+use crate::trace::traced;
 use crate::units::{Current, Speed, Voltage, WideVoltage, narrow, wide};
 
-/// The current that is wanted.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reference {
-    /// i_d* and i_q*.
-    pub i: Dq<Current>,
-    /// p_q*, its change in a period.
-    pub i_q_step: Current,
-    /// Voltage along q that the speed's reference alone asks for (second paper, figure 47).
-    pub u_q: Voltage,
+traced! {
+    /// The current that is wanted.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Reference {
+        /// i_d* and i_q*.
+        pub i: Dq<Current>,
+        /// p_q*, its change in a period.
+        pub i_q_step: Current,
+        /// Voltage along q that the speed's reference alone asks for (second paper, figure 47).
+        pub u_q: Voltage,
+    }
 }
 
 impl Reference {
@@ -89,12 +92,14 @@ pub enum Config {
     Modified(modified::Config),
 }
 
-/// The integrators of all regulators; those of the others rest.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    observer_based: observer_based::State,
-    synchronous: synchronous::State,
-    modified: modified::State,
+traced! {
+    /// The integrators of all regulators; those of the others rest.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        observer_based: observer_based::State,
+        synchronous: synchronous::State,
+        modified: modified::State,
+    }
 }
 
 impl Config {
@@ -226,32 +231,4 @@ fn beyond(admittance: Gain<U28, U28>, cut: Dq<WideVoltage>) -> Dq<Current> {
     }
 }
 
-impl State {
-    /// Hands out every word.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        // Taken apart in full, so that a new field is not forgotten here.
-        let Self {
-            observer_based: observer_based::State { sigma },
-            synchronous:
-                synchronous::State {
-                    sigma: integral,
-                    model,
-                    cross,
-                },
-            modified: modified::State { length, phase },
-        } = self;
-        for word in [
-            sigma.d.to_bits(),
-            sigma.q.to_bits(),
-            integral.d.to_bits(),
-            integral.q.to_bits(),
-            model.d.to_bits(),
-            model.q.to_bits(),
-            cross.to_bits(),
-            length.to_bits(),
-            phase.to_bits(),
-        ] {
-            out(word as u32);
-        }
-    }
-}
+impl State {}

@@ -11,6 +11,7 @@ use fixed::types::extra::{U28, U32};
 use super::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
+use crate::trace::traced;
 use crate::units::{Angle, Current, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
@@ -28,13 +29,15 @@ pub struct Config {
     pub admittance: Gain<U28, U28>,
 }
 
-/// The integrators.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Of the length V, which is negative against a back-EMF that is.
-    pub length: Voltage,
-    /// Of the phase δ, within a quarter of a turn.
-    pub phase: Angle,
+traced! {
+    /// The integrators.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Of the length V, which is negative against a back-EMF that is.
+        pub length: Voltage,
+        /// Of the phase δ, within a quarter of a turn.
+        pub phase: Angle,
+    }
 }
 
 const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);

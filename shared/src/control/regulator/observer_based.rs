@@ -5,6 +5,7 @@ use fixed::types::extra::U28;
 use super::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
+use crate::trace::traced;
 use crate::units::{Current, Voltage, WideVoltage, narrow};
 
 /// Coefficients for one sample period T_s.
@@ -24,11 +25,13 @@ pub struct Config {
     pub admittance: Gain<U28, U28>,
 }
 
-/// The integrators.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// σ_d and σ_q.
-    pub sigma: Dq<Voltage>,
+traced! {
+    /// The integrators.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// σ_d and σ_q.
+        pub sigma: Dq<Voltage>,
+    }
 }
 
 impl Config {

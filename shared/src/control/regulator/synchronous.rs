@@ -10,6 +10,7 @@ use super::{Feedback, Reference};
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, Multiplier};
+use crate::trace::traced;
 use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 
 /// Coefficients for one sample period T_s.
@@ -27,16 +28,18 @@ pub struct Config {
     pub admittance: Gain<U24, U28>,
 }
 
-/// The integrators.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Of the voltage along d and q.
-    pub sigma: Dq<WideVoltage>,
-    /// The currents that the references bring, at the loop's first order: what is decoupled. They
-    /// have no noise, and the references themselves would cross the axes at a step.
-    pub model: Dq<Current>,
-    /// ω̂·L.
-    pub cross: Multiplier<U28, U24>,
+traced! {
+    /// The integrators.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Of the voltage along d and q.
+        pub sigma: Dq<WideVoltage>,
+        /// The currents that the references bring, at the loop's first order: what is decoupled. They
+        /// have no noise, and the references themselves would cross the axes at a step.
+        pub model: Dq<Current>,
+        /// ω̂·L.
+        pub cross: Multiplier<U28, U24>,
+    }
 }
 
 impl Config {

@@ -1,24 +1,27 @@
 //! The six sextants: which leg does what, and where the rotor is meanwhile.
 
+use crate::trace::traced;
 use crate::units::Angle;
 
-/// A sextant, named after the leg that switches and the leg that is held low. The current's vector
-/// stands at 30°, 90° and so on, a quarter of a turn ahead of the rotor in the sextant's middle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Sector {
-    /// Current from a to c: the rotor is within 30° of 300°.
-    Ac,
-    /// From b to c: about 0°.
-    Bc,
-    /// From b to a: about 60°.
-    Ba,
-    /// From c to a: about 120°.
-    Ca,
-    /// From c to b: about 180°.
-    Cb,
-    /// From a to b: about 240°.
-    Ab,
+traced! {
+    /// A sextant, named after the leg that switches and the leg that is held low. The current's vector
+    /// stands at 30°, 90° and so on, a quarter of a turn ahead of the rotor in the sextant's middle.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Sector {
+        /// Current from a to c: the rotor is within 30° of 300°.
+        Ac,
+        /// From b to c: about 0°.
+        Bc,
+        /// From b to a: about 60°.
+        Ba,
+        /// From c to a: about 120°.
+        Ca,
+        /// From c to b: about 180°.
+        Cb,
+        /// From a to b: about 240°.
+        Ab,
+    }
 }
 
 /// One thing for each leg, by what the leg does.

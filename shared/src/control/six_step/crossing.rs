@@ -15,6 +15,7 @@
 use fixed::types::I16F16;
 
 use crate::math::{Held, divide};
+use crate::trace::traced;
 use crate::units::Voltage;
 
 /// Thresholds.
@@ -28,33 +29,37 @@ pub struct Config {
     pub delayed: u16,
 }
 
-/// What the sextant has shown.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Samples of this sextant.
-    pub samples: u16,
-    /// The last reading was above the threshold.
-    pub side: bool,
-    /// Readings in a row on that side.
-    pub run: u16,
-    /// It is certain to have been below the threshold, and the phase is one that rises.
-    pub below: bool,
-    /// The first and the last reading above the threshold.
-    pub above: Option<Span>,
-    /// The crossing has been found.
-    pub found: bool,
-    /// What the reading changes in a period near the crossing, of the sextants before; 0 where it
-    /// is not known.
-    pub slope: Voltage,
+traced! {
+    /// What the sextant has shown.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Samples of this sextant.
+        pub samples: u16,
+        /// The last reading was above the threshold.
+        pub side: bool,
+        /// Readings in a row on that side.
+        pub run: u16,
+        /// It is certain to have been below the threshold, and the phase is one that rises.
+        pub below: bool,
+        /// The first and the last reading above the threshold.
+        pub above: Option<Span>,
+        /// The crossing has been found.
+        pub found: bool,
+        /// What the reading changes in a period near the crossing, of the sextants before; 0 where it
+        /// is not known.
+        pub slope: Voltage,
+    }
 }
 
-/// Two readings of one sextant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
-    /// Samples of the sextant until the first, and its value.
-    pub first: (u16, Voltage),
-    /// Likewise for the last.
-    pub last: (u16, Voltage),
+traced! {
+    /// Two readings of one sextant.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Span {
+        /// Samples of the sextant until the first, and its value.
+        pub first: (u16, Voltage),
+        /// Likewise for the last.
+        pub last: (u16, Voltage),
+    }
 }
 
 impl State {

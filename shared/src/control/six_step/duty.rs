@@ -11,6 +11,7 @@ use fixed::types::extra::{U28, U31, U32};
 
 use crate::control::speed::Bounds;
 use crate::math::{Gain, Held};
+use crate::trace::traced;
 use crate::units::{Current, Duty, Speed};
 
 /// Time constant with which the current's peak is forgotten, in periods, as a power of two: longer
@@ -30,17 +31,19 @@ pub struct Config {
     pub duty_max: I1F31,
 }
 
-/// What the loop remembers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// The duty of the period before, 0 to `duty_max`.
-    pub duty: I1F31,
-    /// The speed regulator's integral.
-    pub sigma: I1F31,
-    /// The current behind a low-pass filter of eight periods.
-    pub smoothed: Current,
-    /// The greatest magnitude of the current, which is forgotten slowly.
-    pub peak: Current,
+traced! {
+    /// What the loop remembers.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// The duty of the period before, 0 to `duty_max`.
+        pub duty: I1F31,
+        /// The speed regulator's integral.
+        pub sigma: I1F31,
+        /// The current behind a low-pass filter of eight periods.
+        pub smoothed: Current,
+        /// The greatest magnitude of the current, which is forgotten slowly.
+        pub peak: Current,
+    }
 }
 
 /// Between what the duty may be in this period.

@@ -5,31 +5,34 @@ use fixed::types::I16F16;
 use super::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::delay::Delay;
 use crate::math::{Held, divide};
+use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
 /// Crossings in a row after which the rotor's motion is known well enough to be smoothed.
 pub const KNOWN: u8 = 6;
 
-/// What is known of the rotor.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Angle past the middle of the present sextant.
-    pub delta: Angle,
-    /// ω: its step a period.
-    pub omega: Speed,
-    /// ω's step a period while the rotor is started; then 0.
-    pub acceleration: Speed,
-    /// ω̄, smoothed over some four sextants: a commutation falls on a period's boundary, and what
-    /// that does to the crossing after it is not in the rotor's speed.
-    pub omega_bar: Speed,
-    /// Periods since the last crossing, or since the rotor stood.
-    pub elapsed: I16F16,
-    /// Sextants since then.
-    pub sextants: u8,
-    /// It has not crossed since it stood.
-    pub from_rest: bool,
-    /// Crossings in a row, up to [`KNOWN`].
-    pub crossings: u8,
+traced! {
+    /// What is known of the rotor.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Angle past the middle of the present sextant.
+        pub delta: Angle,
+        /// ω: its step a period.
+        pub omega: Speed,
+        /// ω's step a period while the rotor is started; then 0.
+        pub acceleration: Speed,
+        /// ω̄, smoothed over some four sextants: a commutation falls on a period's boundary, and what
+        /// that does to the crossing after it is not in the rotor's speed.
+        pub omega_bar: Speed,
+        /// Periods since the last crossing, or since the rotor stood.
+        pub elapsed: I16F16,
+        /// Sextants since then.
+        pub sextants: u8,
+        /// It has not crossed since it stood.
+        pub from_rest: bool,
+        /// Crossings in a row, up to [`KNOWN`].
+        pub crossings: u8,
+    }
 }
 
 /// At least three periods a sextant: with fewer there is no reading left between the dying current

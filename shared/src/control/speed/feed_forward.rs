@@ -8,6 +8,7 @@ use super::Input;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
+use crate::trace::traced;
 use crate::units::{Current, Speed};
 
 /// Coefficients for one period of the outer loops, here T_s.
@@ -26,11 +27,13 @@ pub struct Config {
     pub own: Gain<U32, U28>,
 }
 
-/// The integrator.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// Of the current.
-    pub sigma: Current,
+traced! {
+    /// The integrator.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// Of the current.
+        pub sigma: Current,
+    }
 }
 
 impl Config {

@@ -6,6 +6,7 @@ pub mod nested;
 use super::observer::Told;
 use super::planner;
 use super::regulator::Reference;
+use crate::trace::traced;
 use crate::units::{Current, Speed, Torque};
 
 /// The planner and one of the laws.
@@ -26,12 +27,14 @@ pub enum Law {
     FeedForward(feed_forward::Config),
 }
 
-/// The trajectory, and the integrators of both laws.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    planner: planner::State,
-    nested: nested::State,
-    feed_forward: feed_forward::State,
+traced! {
+    /// The trajectory, and the integrators of both laws.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        planner: planner::State,
+        nested: nested::State,
+        feed_forward: feed_forward::State,
+    }
 }
 
 /// What one period of speed control, [`PERIODS`](super::PERIODS) of the drive, reads.
@@ -50,13 +53,15 @@ pub struct Input {
     pub missing: Current,
 }
 
-/// Bounds of i_q*; by default no current.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bounds {
-    /// Least i_q*, at most zero: what braking may return.
-    pub min: Current,
-    /// Greatest i_q*.
-    pub max: Current,
+traced! {
+    /// Bounds of i_q*; by default no current.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Bounds {
+        /// Least i_q*, at most zero: what braking may return.
+        pub min: Current,
+        /// Greatest i_q*.
+        pub max: Current,
+    }
 }
 
 impl Bounds {
@@ -101,19 +106,6 @@ impl State {
     /// ω*.
     pub fn reference(&self) -> Speed {
         self.planner.reference
-    }
-
-    /// Hands out every word.
-    pub fn trace(&self, out: &mut impl FnMut(u32)) {
-        // Taken apart in full, so that a new field is not forgotten here.
-        let Self {
-            planner,
-            nested: nested::State { sigma },
-            feed_forward: feed_forward::State { sigma: current },
-        } = self;
-        planner.trace(out);
-        out(sigma.to_bits() as u32);
-        out(current.to_bits() as u32);
     }
 }
 

@@ -11,6 +11,7 @@ use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
 use crate::control::{PERIODS, planner};
 use crate::math::{Gain, Held, TopProduct};
+use crate::trace::traced;
 use crate::units::{Current, Speed, Torque, Voltage};
 
 /// From here on the error is acted on in full.
@@ -35,11 +36,13 @@ pub struct Config {
     pub with_step: bool,
 }
 
-/// The integrator.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State {
-    /// σ_ω.
-    pub sigma: Torque,
+traced! {
+    /// The integrator.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub struct State {
+        /// σ_ω.
+        pub sigma: Torque,
+    }
 }
 
 impl Config {

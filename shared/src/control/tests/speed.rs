@@ -7,6 +7,7 @@ use crate::control::PERIODS;
 use crate::control::observer::Told;
 use crate::control::speed::{Bounds, Input, State};
 use crate::params::ParamId;
+use crate::trace::Trace;
 use crate::units::{Current, Torque};
 
 /// `CTL_SPEED`.

@@ -6,6 +6,7 @@ use super::start::FIRST_PARK;
 use crate::control::planner;
 use crate::control::six_step::commutation::Sector;
 use crate::control::six_step::{crossing, duty, tracking};
+use crate::trace::Trace;
 use crate::units::{Current, Voltage};
 
 /// What the six-step drive remembers.

@@ -360,21 +360,6 @@ fn at_low_speed_too_a_failed_sensor_is_noticed_and_a_start_without_it_works() {
     assert!(bench.step().sensor_fault);
 }
 
-#[test]
-fn the_trace_has_every_word() {
-    let mut bench = Bench::running(Sensors::Merged, &[], 1000.0);
-    let words = |state: &State| {
-        let mut words = Vec::new();
-        state.trace(&mut |word| words.push(word));
-        words
-    };
-    let before = words(&bench.state);
-    bench.step();
-    let after = words(&bench.state);
-    assert_eq!(before.len(), after.len());
-    assert_ne!(before, after);
-}
-
 proptest! {
     #[test]
     fn any_input_is_survived(
