@@ -35,11 +35,23 @@ pub fn narrow(u: WideVoltage) -> Voltage {
     Voltage::from_bits(u.to_bits().clamp(i32::MIN >> 4, i32::MAX >> 4) << 4)
 }
 
+/// A square of a voltage.
+pub type VoltageSquare = I8F24;
+
+/// ω·i: how fast a current changes in a frame that turns, in units of current a period, over 2π.
+pub type CurrentRate = I4F28;
+
+/// A square of a speed.
+pub type SpeedSquare = I0F32;
+
 /// A torque in units of [`Scale::torque_nm`].
 pub type Torque = I4F28;
 
 /// A flux linkage in units of [`Scale::flux_wb`]: what a unit of voltage adds in a period.
 pub type Flux = I4F28;
+
+/// A flux linkage with room for that of a current.
+pub type WideFlux = I8F24;
 
 /// The motor's stated flux, 2/π: the voltage base makes it so for every motor.
 pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);

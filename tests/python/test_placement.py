@@ -35,7 +35,7 @@ OTHERS = {
     ("siskin_firmware", "interrupt", "pwm", "Pwm", "start"): (".once", 4),
     ("siskin_firmware", "exchange", "ends", "ConfigWriter", "write"): (".once", 4),
     ("siskin_control", "drive", "slow", "reference"): (".control", 0x1800),
-    ("siskin_control", "math", "root", "other_leg"): (".control_more", 0x800),
+    ("siskin_control", "math", "root", "leg"): (".control_more", 0x800),
     ("siskin_control", "drive", "step", "any"): (".control_rest", 0x5000),
     ("siskin_control", "control", "speed", "Config", "begin"): (".control_rest", 4),
     ("siskin_control", "params", "build", "build"): (".text", 4),

@@ -6,8 +6,8 @@
 //! period, with the current's sign.
 
 use fixed::FixedI32;
-use fixed::types::extra::{U20, U25, U28};
-use fixed::types::{I2F30, I6F26, I8F24};
+use fixed::types::extra::U25;
+use fixed::types::{I2F30, I6F26, I8F24, I12F20};
 
 use super::modulator::Share;
 use super::transform::{Dq, turn};
@@ -18,7 +18,7 @@ use crate::units::Current;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Phase current over the least whose sign is certain.
-    pub certainty: Gain<U28, U20>,
+    pub certainty: Gain<Current, I12F20>,
     /// The whole compensation: dead time over period.
     pub duty: I2F30,
 }

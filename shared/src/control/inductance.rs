@@ -4,11 +4,9 @@
 //! i_d* carries a square wave. Along d an observer that takes ψ − L̂·i for the rotor's flux sees
 //! φ̂ = φ + (L − L̂)·i_d, so each of the wave's edges shows the inductance's error: Δφ̂/Δi_d.
 
-use fixed::FixedI32;
-use fixed::types::extra::{U28, U30, Unsigned};
 use fixed::types::{I0F32, I2F30};
 
-use crate::math::{Gain, Multiplier, divide};
+use crate::math::{Gain, Multiplier, Number, divide};
 use crate::trace::traced;
 use crate::units::{Current, Flux};
 
@@ -42,7 +40,7 @@ impl Factor {
 
     /// The product with `x`, held at the ends of its type.
     #[inline(always)]
-    pub fn of<A: Unsigned>(self, x: FixedI32<A>) -> FixedI32<A> {
+    pub fn of<T: Number>(self, x: T) -> T {
         Gain::from_parts(self.0.to_bits(), 2).saturating_apply(x)
     }
 }
@@ -57,7 +55,7 @@ pub struct Config {
     /// Periods at the end of it over which current and flux are averaged.
     pub mean_periods: u32,
     /// Flux over current to what the factor moves by: the gain of a step, over the stated L.
-    pub gain: Gain<U28, U30>,
+    pub gain: Gain<Flux, I2F30>,
 }
 
 traced! {

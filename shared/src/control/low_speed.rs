@@ -3,8 +3,6 @@
 //! There the back-EMF is small against what is not known: the dead time's loss around zero current,
 //! and the drop across a resistance that may be stated wrongly.
 
-use fixed::types::extra::{U28, U32};
-
 use super::speed::Bounds;
 use crate::math::{Gain, Held, other_leg};
 use crate::units::{Current, Speed};
@@ -15,11 +13,11 @@ pub struct Config {
     /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
     i_d: Current,
     /// What the speed takes of it.
-    i_d_slope: Gain<U32, U28>,
+    i_d_slope: Gain<Speed, Current>,
     /// Bound of i_q at standstill.
     i_q: Current,
     /// Bound of i_q over the speed, where that is more.
-    i_q_slope: Gain<U32, U28>,
+    i_q_slope: Gain<Speed, Current>,
     /// `LIM_PHASE_A`, which bounds both.
     phase: Current,
     /// The last speed at which anything is done.
@@ -30,8 +28,8 @@ impl Config {
     /// `i_d` along d at standstill and `i_d_slope` less over the speed; at most `i_q` along q, or
     /// `i_q_slope` times the speed, where that is more. No slope is negative.
     pub fn new(
-        (i_d, i_d_slope): (Current, Gain<U32, U28>),
-        (i_q, i_q_slope): (Current, Gain<U32, U28>),
+        (i_d, i_d_slope): (Current, Gain<Speed, Current>),
+        (i_q, i_q_slope): (Current, Gain<Speed, Current>),
         phase: Current,
     ) -> Self {
         let mut config = Self {

@@ -2,14 +2,14 @@
 //! on-time, and the compensation of the dead time.
 
 use fixed::FixedI32;
-use fixed::types::extra::{U20, U22, U24};
-use fixed::types::{I0F32, I1F31, I4F28, I6F26, I8F24, I16F16};
+use fixed::types::extra::U22;
+use fixed::types::{I0F32, I1F31, I4F28, I6F26, I8F24, I12F20, I16F16};
 
 use super::dead_time;
 use super::transform::{AlphaBeta, Dq, Order, phases_in};
 use crate::math::{Held, Multiplier, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use crate::trace::traced;
-use crate::units::{Duty, Voltage, WideVoltage, wide};
+use crate::units::{Duty, Voltage, VoltageSquare, WideVoltage, wide};
 
 /// How the phases' common voltage is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ traced! {
         /// What is left along q.
         q: WideVoltage,
         /// What of the square's change q loses, 1/(2·q).
-        slope: Multiplier<U24, U20>,
+        slope: Multiplier<VoltageSquare, I12F20>,
     }
 }
 

@@ -5,8 +5,6 @@
 //! inertia be wrong. A command that moves within the slew is followed without a lag. The slew is
 //! reached in some milliseconds: the torque that it takes is no jump for the current loop.
 
-use fixed::types::extra::U32;
-
 use crate::math::{Gain, Held};
 use crate::trace::traced;
 use crate::units::Speed;
@@ -19,7 +17,7 @@ pub struct Config {
     /// Greatest change of that from period to period.
     pub jerk: Speed,
     /// λ·T_s, the share of what is left that a period takes at the end; one lands at full slew.
-    pub approach: Gain<U32, U32>,
+    pub approach: Gain<Speed, Speed>,
 }
 
 traced! {

@@ -5,12 +5,11 @@
 //! at the hand-over it tells where the rotor really is.
 
 use fixed::types::I36F28;
-use fixed::types::extra::{U28, U32};
 
 use super::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
-use crate::units::{Angle, Current, InverseFlux, Speed, Voltage};
+use crate::units::{Angle, Current, CurrentRate, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,20 +20,20 @@ pub struct Config {
     pub park_charge: I36F28,
     /// Current to the frame's speed in the first half of Park. It turns the current's vector by a
     /// quarter of a turn, so that a rotor that stood opposite to it does not stay there.
-    pub sweep: Gain<U28, U32>,
+    pub sweep: Gain<Current, Speed>,
     /// K_s, current to the frame's acceleration in a period: ω_s = K_s·∫I_qr dt (3.2.3).
-    pub k_s: Gain<U28, U32>,
+    pub k_s: Gain<Current, Speed>,
     /// Speed to angle: how far the frame yields to a rotor that swings.
-    pub yielding: Gain<U32, U32>,
+    pub yielding: Gain<Speed, Angle>,
     /// Share of that angle that is taken in a period, as speed to speed.
-    pub yield_rate: Gain<U32, U32>,
+    pub yield_rate: Gain<Angle, Speed>,
     /// Periods in which the rotor has turned too slowly, less those in which it has not, after which
     /// it has lost the frame.
     pub astray_periods: u32,
     /// R.
-    pub resistance: Gain<U28, U28>,
+    pub resistance: Gain<Current, Voltage>,
     /// L, for speed times current.
-    pub reactance: Gain<U28, U28>,
+    pub reactance: Gain<CurrentRate, Voltage>,
     /// ω_cl, the speed at which Run begins.
     pub run_speed: Speed,
     /// ξ of the stated flux.

@@ -1,12 +1,8 @@
 //! Clarke's and Park's transforms, preserving the amplitude (11), (12).
 
-use core::ops::{Add, Sub};
+use fixed::types::{I0F32, I1F31, I6F26};
 
-use fixed::FixedI32;
-use fixed::types::extra::{Diff, Sum, U31, U32, Unsigned};
-use fixed::types::{I0F32, I4F28, I5F27, I6F26};
-
-use crate::math::{Held, SinCos, TopProduct, TopSum};
+use crate::math::{Held, Number, SinCos, TopProduct, TopSum};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Voltage};
 
@@ -93,10 +89,15 @@ pub fn voltages(v: AlphaBeta<I6F26>) -> AlphaBeta<Voltage> {
     }
 }
 
-/// Park's transform (12): the stator's vector as the rotor sees it. Components are held within ±8.
+/// Park's transform (12): the stator's vector as the rotor sees it. Components are held at the ends of
+/// their type.
 #[inline(always)]
-pub fn park(v: AlphaBeta<I4F28>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
-    let double = |x: I5F27| I4F28::from_bits(x.plus(x).to_bits());
+pub fn park<T>(v: AlphaBeta<T>, SinCos { cos, sin }: SinCos) -> Dq<T>
+where
+    T: Number + TopProduct<I1F31, Output: Number>,
+{
+    // The sine takes a fraction bit.
+    let double = |x: T::Output| T::from_bits(x.plus(x).to_bits());
     Dq {
         d: double(v.alpha.top(cos).plus_top(v.beta, sin)),
         q: double(v.beta.top(cos).minus_top(v.alpha, sin)),
@@ -105,14 +106,9 @@ pub fn park(v: AlphaBeta<I4F28>, SinCos { cos, sin }: SinCos) -> Dq<I4F28> {
 
 /// The inverse of Park's transform (11); the sine takes a fraction bit.
 #[inline(always)]
-pub fn inverse_park<A>(
-    v: Dq<FixedI32<A>>,
-    SinCos { cos, sin }: SinCos,
-) -> AlphaBeta<FixedI32<Diff<Sum<A, U31>, U32>>>
+pub fn inverse_park<T>(v: Dq<T>, SinCos { cos, sin }: SinCos) -> AlphaBeta<T::Output>
 where
-    A: Unsigned + Add<U31>,
-    Sum<A, U31>: Unsigned + Sub<U32>,
-    Diff<Sum<A, U31>, U32>: Unsigned,
+    T: Number + TopProduct<I1F31, Output: Number>,
 {
     AlphaBeta {
         alpha: v.d.top(cos).minus_top(v.q, sin),
@@ -122,11 +118,9 @@ where
 
 /// Turns a vector of the rotor's frame ahead by an angle; the sine takes a fraction bit.
 #[inline(always)]
-pub fn turn<A>(v: Dq<FixedI32<A>>, ahead: SinCos) -> Dq<FixedI32<Diff<Sum<A, U31>, U32>>>
+pub fn turn<T>(v: Dq<T>, ahead: SinCos) -> Dq<T::Output>
 where
-    A: Unsigned + Add<U31>,
-    Sum<A, U31>: Unsigned + Sub<U32>,
-    Diff<Sum<A, U31>, U32>: Unsigned,
+    T: Number + TopProduct<I1F31, Output: Number>,
 {
     let AlphaBeta { alpha, beta } = inverse_park(v, ahead);
     Dq { d: alpha, q: beta }
@@ -134,28 +128,31 @@ where
 
 /// The three phases' values of a vector (11).
 #[inline(always)]
-pub fn phases<F>(v: AlphaBeta<FixedI32<F>>) -> [FixedI32<F>; 3] {
+pub fn phases<T: Number>(v: AlphaBeta<T>) -> [T; 3] {
     phases_in(Order::NORMAL, v)
 }
 
 /// The same of phases in this order.
 #[inline(always)]
-pub fn phases_in<F>(order: Order, v: AlphaBeta<FixedI32<F>>) -> [FixedI32<F>; 3] {
+pub fn phases_in<T: Number>(order: Order, v: AlphaBeta<T>) -> [T; 3] {
     let alpha = v.alpha.to_bits();
     // √3/2 = 2·√3/4, and the product keeps the top half.
     let product = i64::from(v.beta.to_bits()) * i64::from(order.root_3_quarter.to_bits());
     let beta = ((product >> 32) as i32) << 1;
     let half = alpha >> 1;
     [
-        FixedI32::from_bits(alpha),
-        FixedI32::from_bits(beta - half),
-        FixedI32::from_bits(-beta - half),
+        T::from_bits(alpha),
+        T::from_bits(beta - half),
+        T::from_bits(-beta - half),
     ]
 }
 
 /// Turns a rotor-frame vector against the frame: the vector as a frame sees it that leads by the
-/// angle. Components are held within ±8.
-pub fn rotate_frame(v: Dq<I4F28>, ahead: SinCos) -> Dq<I4F28> {
+/// angle. Components are held at the ends of their type.
+pub fn rotate_frame<T>(v: Dq<T>, ahead: SinCos) -> Dq<T>
+where
+    T: Number + TopProduct<I1F31, Output: Number>,
+{
     park(
         AlphaBeta {
             alpha: v.d,
@@ -171,6 +168,7 @@ mod tests {
     use crate::math::sin_cos;
     use crate::units::Angle;
     use core::f64::consts::TAU;
+    use fixed::types::I4F28;
 
     /// A balanced vector of the given counts and angle as three readings.
     fn readings(counts: f64, turns: f64) -> [AdcCounts; 3] {

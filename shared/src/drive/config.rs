@@ -1,7 +1,5 @@
 //! Everything that a control period reads and does not change.
 
-use fixed::types::extra::{U16, U24, U32};
-
 use super::{six_step, tone};
 use crate::control::delay::Delay;
 use crate::control::{
@@ -10,7 +8,7 @@ use crate::control::{
 };
 use crate::math::{Gain, Multiplier};
 use crate::protection;
-use crate::units::{Current, Duty, Scale, Speed};
+use crate::units::{AdcCounts, Current, Duty, Scale, Speed, WideVoltage};
 
 /// Direction of rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +48,7 @@ pub struct Config {
     /// What the control's units are worth.
     pub scale: Scale,
     /// Counts of the supply's converter to voltage.
-    pub bus: Multiplier<U16, U24>,
+    pub bus: Multiplier<AdcCounts, WideVoltage>,
     /// Direction of rotation.
     pub direction: Direction,
     /// How the motor is stopped.
@@ -78,7 +76,7 @@ pub struct Config {
     /// Speed below which the observer no longer leads.
     pub slow: Speed,
     /// Share of the reported speed that a period with the bridge off takes away.
-    pub coast: Gain<U32, U32>,
+    pub coast: Gain<Speed, Speed>,
     /// Modulator.
     pub modulator: modulator::Config,
     /// Current sensors.

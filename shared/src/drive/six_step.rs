@@ -13,7 +13,6 @@ mod tell;
 
 pub use state::State;
 
-use fixed::types::extra::{U16, U28, U32};
 use fixed::types::{I1F31, I36F28};
 
 use super::launch::{self, Wish};
@@ -25,7 +24,7 @@ use crate::control::six_step::tracking::KNOWN;
 use crate::control::six_step::{crossing, duty};
 use crate::control::speed::Bounds;
 use crate::math::{Gain, Held, TopProduct};
-use crate::units::{AdcCounts, Current, Duty, Speed};
+use crate::units::{AdcCounts, Current, Duty, Speed, Voltage};
 
 /// Sextants in a row without a crossing after which the rotor is lost: two turns.
 pub(crate) const LOST_SEXTANTS: u8 = 12;
@@ -48,7 +47,7 @@ const STILL_PERIODS: u16 = 1000;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Counts of a terminal's converter to voltage.
-    pub terminal: Gain<U16, U28>,
+    pub terminal: Gain<AdcCounts, Voltage>,
     /// Zero crossings.
     pub crossing: crossing::Config,
     /// From the command to ω*, period by period.
@@ -68,7 +67,7 @@ pub struct Config {
     /// long.
     pub park_charge: I36F28,
     /// Current to the change of Ramp's speed in a period.
-    pub ramp: Gain<U28, U32>,
+    pub ramp: Gain<Current, Speed>,
     /// Samples for which Ramp waits for a crossing that is to come.
     pub patience: u16,
     /// Periods after which a Ramp that has not seen a turn of crossings in a row has failed.

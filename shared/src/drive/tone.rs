@@ -15,7 +15,6 @@
 //! the true one, but learnt: it begins at the lesser of what each alone would take, and is doubled
 //! where twice as much has not brought the current. What both as stated would take is the most.
 
-use fixed::types::extra::{U28, U31, U32};
 use fixed::types::{I1F31, I6F26};
 
 use super::launch::{self, Wish};
@@ -48,11 +47,11 @@ pub struct Config {
     /// Peak that the greatest phase current is led to.
     pub peak: Current,
     /// Current to its share of that.
-    pub share: Gain<U28, U31>,
+    pub share: Gain<Current, I1F31>,
     /// R times the peak.
     pub resistive: Voltage,
     /// Pitch to ωL times the peak.
-    pub reactive: Gain<U32, U28>,
+    pub reactive: Gain<Speed, Voltage>,
     /// What the dead time takes of a vector along a phase, of the supply.
     pub dead: I1F31,
 }

@@ -4,12 +4,12 @@ mod factor;
 
 use core::marker::PhantomData;
 
-use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
+use super::Number;
 use factor::Factor;
 
-/// A factor that turns a number with `A` fraction bits into one with `B`.
+/// A factor that turns an `A` into a `B`: a current into a voltage, say.
 ///
 /// It is held with the largest mantissa that fits and a power of two of its own, so that 2^-31 to
 /// 2^30 (in bits out per bit in) can be had with 30 bits of precision near the top of each range.
@@ -33,7 +33,7 @@ impl<A, B> PartialEq for Gain<A, B> {
     }
 }
 
-impl<A: Unsigned, B: Unsigned> Gain<A, B> {
+impl<A: Number, B: Number> Gain<A, B> {
     /// The factor zero.
     pub const ZERO: Self = Self::from_parts(0, 0);
 
@@ -41,7 +41,7 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
-        let (mantissa, shift) = parts(k, B::I32 - A::I32)?;
+        let (mantissa, shift) = parts(k, B::Frac::I32 - A::Frac::I32)?;
         Some(Self::from_parts(mantissa, shift))
     }
 
@@ -59,21 +59,21 @@ impl<A: Unsigned, B: Unsigned> Gain<A, B> {
     /// The result wraps where it leaves its type: the caller bounds `x`, or uses
     /// [`Gain::saturating_apply`].
     #[inline(always)]
-    pub fn apply(self, x: FixedI32<A>) -> FixedI32<B> {
-        FixedI32::from_bits(self.factor.wrapping(x.to_bits()))
+    pub fn apply(self, x: A) -> B {
+        B::from_bits(self.factor.wrapping(x.to_bits()))
     }
 
     /// [`Gain::saturating_apply`] where it is called and not inlined, for what is not in the way of
     /// the default drive: that takes half of the chip's flash.
     #[inline(always)]
-    pub fn held(self, x: FixedI32<A>) -> FixedI32<B> {
-        FixedI32::from_bits(held(self.factor, x.to_bits()))
+    pub fn held(self, x: A) -> B {
+        B::from_bits(held(self.factor, x.to_bits()))
     }
 
     /// The product with `x`, held at the ends of its type.
     #[inline(always)]
-    pub fn saturating_apply(self, x: FixedI32<A>) -> FixedI32<B> {
-        FixedI32::from_bits(self.factor.saturating(x.to_bits()))
+    pub fn saturating_apply(self, x: A) -> B {
+        B::from_bits(self.factor.saturating(x.to_bits()))
     }
 }
 
@@ -116,14 +116,13 @@ pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, u32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fixed::types::extra::{U28, U32};
     use fixed::types::{I0F32, I4F28};
 
     #[test]
     fn small_and_large_factors_are_precise() {
         let x = I4F28::from_num(0.001);
         for k in [1e-6_f32, -0.3, 0.49, 1.0, -7.5, 1000.0] {
-            let gain = Gain::<U28, U28>::new(k).expect("in range");
+            let gain = Gain::<I4F28, I4F28>::new(k).expect("in range");
             let wanted = f64::from(k) * 0.001;
             let error = (gain.apply(x).to_num::<f64>() - wanted).abs();
             // One bit of 2^-28 before the shift, which is at most four times the factor.
@@ -134,7 +133,7 @@ mod tests {
 
     #[test]
     fn fraction_bits_are_converted() {
-        let gain = Gain::<U32, U28>::new(16.0).expect("in range");
+        let gain = Gain::<I0F32, I4F28>::new(16.0).expect("in range");
         let y: I4F28 = gain.apply(I0F32::from_num(0.125));
         assert_eq!(y, I4F28::from_num(2));
     }
@@ -167,13 +166,13 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        assert_eq!(Gain::<U28, U28>::new(f32::NAN), None);
-        assert_eq!(Gain::<U28, U28>::new(1e30), None);
+        assert_eq!(Gain::<I4F28, I4F28>::new(f32::NAN), None);
+        assert_eq!(Gain::<I4F28, I4F28>::new(1e30), None);
     }
 
     #[test]
     fn saturation_holds_the_ends() {
-        let gain = Gain::<U28, U28>::new(100.0).expect("in range");
+        let gain = Gain::<I4F28, I4F28>::new(100.0).expect("in range");
         assert!(gain.saturating_apply(I4F28::from_num(1)) > I4F28::from_num(7.9));
         assert!(gain.saturating_apply(I4F28::from_num(-1)) < I4F28::from_num(-7.9));
     }

@@ -1,6 +1,6 @@
 //! Sums that are held at the ends of their type.
 
-use fixed::FixedI32;
+use super::Number;
 
 /// Sum and difference, held at the ends of the type: `saturating_add` and `saturating_sub` in fewer
 /// letters, and on a PC in fewer cycles.
@@ -17,7 +17,7 @@ pub trait Held {
     fn minus(self, rhs: Self) -> Self;
 }
 
-impl<F> Held for FixedI32<F> {
+impl<T: Number> Held for T {
     #[inline(always)]
     fn plus(self, rhs: Self) -> Self {
         let (a, b) = (self.to_bits(), rhs.to_bits());

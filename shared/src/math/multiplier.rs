@@ -2,17 +2,16 @@
 
 use core::marker::PhantomData;
 
-use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
-use super::gain;
+use super::{Number, gain};
 use crate::trace::Trace;
 
-/// A factor that turns a number with `A` fraction bits into one with `B`.
+/// A factor that turns an `A` into a `B`.
 ///
-/// Its magnitude is below 2^(A − B − 1): then the product is one SMMUL, and with a sum one SMMLA or
-/// SMMLS. What needs another range takes other fraction bits. [`super::Gain`] has a range of its
-/// own, at four times the price.
+/// Its magnitude is below 2^(a − b − 1), where these have a and b fraction bits: then the product is
+/// one SMMUL, and with a sum one SMMLA or SMMLS. What needs another range takes other fraction bits.
+/// [`super::Gain`] has a range of its own, at four times the price.
 #[derive(Debug)]
 pub struct Multiplier<A, B> {
     bits: i32,
@@ -61,12 +60,12 @@ impl<A, B> Trace for Multiplier<A, B> {
     }
 }
 
-impl<A: Unsigned, B: Unsigned> Multiplier<A, B> {
+impl<A: Number, B: Number> Multiplier<A, B> {
     /// The factor of value `k`, or `None` where its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
-        match gain::parts(k, B::I32 - A::I32)? {
+        match gain::parts(k, B::Frac::I32 - A::Frac::I32)? {
             (mantissa, 0) => Some(Self::from_bits(mantissa)),
             _ => None,
         }
@@ -74,41 +73,40 @@ impl<A: Unsigned, B: Unsigned> Multiplier<A, B> {
 
     /// The product with `x`, rounded towards minus infinity.
     #[inline(always)]
-    pub fn of(self, x: FixedI32<A>) -> FixedI32<B> {
-        FixedI32::from_bits(((i64::from(self.bits) * i64::from(x.to_bits())) >> 32) as i32)
+    pub fn of(self, x: A) -> B {
+        B::from_bits(((i64::from(self.bits) * i64::from(x.to_bits())) >> 32) as i32)
     }
 
     /// `sum` and the product with `x`; it wraps, so the caller knows the range of both.
     #[inline(always)]
-    pub fn added(self, sum: FixedI32<B>, x: FixedI32<A>) -> FixedI32<B> {
-        sum.wrapping_add(self.of(x))
+    pub fn added(self, sum: B, x: A) -> B {
+        B::from_bits(sum.to_bits().wrapping_add(self.of(x).to_bits()))
     }
 
     /// `sum` less the product with `x`, likewise.
     #[inline(always)]
-    pub fn taken(self, sum: FixedI32<B>, x: FixedI32<A>) -> FixedI32<B> {
-        FixedI32::from_bits(super::product::less(sum.to_bits(), self.bits, x.to_bits()))
+    pub fn taken(self, sum: B, x: A) -> B {
+        B::from_bits(super::product::less(sum.to_bits(), self.bits, x.to_bits()))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fixed::types::extra::{U24, U28};
     use fixed::types::{I4F28, I8F24};
 
     #[test]
     fn the_range_is_that_of_the_fraction_bits() {
-        assert!(Multiplier::<U28, U28>::new(0.49).is_some());
-        assert_eq!(Multiplier::<U28, U28>::new(0.5), None);
-        assert!(Multiplier::<U28, U24>::new(-7.9).is_some());
-        assert_eq!(Multiplier::<U28, U24>::new(8.0), None);
-        assert_eq!(Multiplier::<U28, U28>::new(f32::NAN), None);
+        assert!(Multiplier::<I4F28, I4F28>::new(0.49).is_some());
+        assert_eq!(Multiplier::<I4F28, I4F28>::new(0.5), None);
+        assert!(Multiplier::<I4F28, I8F24>::new(-7.9).is_some());
+        assert_eq!(Multiplier::<I4F28, I8F24>::new(8.0), None);
+        assert_eq!(Multiplier::<I4F28, I4F28>::new(f32::NAN), None);
     }
 
     #[test]
     fn sums_are_right_to_a_bit() {
-        let gain = Multiplier::<U28, U24>::new(-3.3).expect("in range");
+        let gain = Multiplier::<I4F28, I8F24>::new(-3.3).expect("in range");
         let sum = I8F24::from_num(20);
         for x in [-7.5, -0.001, 0.0, 0.3, 7.9] {
             let product = -3.3 * x;

@@ -6,6 +6,8 @@ use fixed::FixedI32;
 use fixed::types::I0F32;
 use fixed::types::extra::{Diff, Sum, U32, Unsigned};
 
+use super::Number;
+
 /// π/8: a factor of products must be below a half.
 pub const EIGHTH_PI: I0F32 = I0F32::lit("0.392699081699");
 
@@ -39,33 +41,30 @@ where
 /// Sums with a product that keeps its top half: one SMMLA or SMMLS each.
 ///
 /// They wrap: the caller knows the range of what it adds.
-pub trait TopSum<A, B> {
+pub trait TopSum: Number {
     /// self + a·b.
+    #[inline(always)]
     #[must_use]
-    fn plus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self;
+    fn plus_top<A, B>(self, a: A, b: B) -> Self
+    where
+        A: TopProduct<B, Output = Self>,
+    {
+        Self::from_bits(self.to_bits().wrapping_add(a.top(b).to_bits()))
+    }
 
     /// self − a·b.
+    #[inline(always)]
     #[must_use]
-    fn minus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self;
-}
-
-impl<A, B> TopSum<A, B> for FixedI32<Diff<Sum<A, B>, U32>>
-where
-    A: Unsigned + Add<B>,
-    B: Unsigned,
-    Sum<A, B>: Unsigned + Sub<U32>,
-    Diff<Sum<A, B>, U32>: Unsigned,
-{
-    #[inline(always)]
-    fn plus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self {
-        self.wrapping_add(a.top(b))
-    }
-
-    #[inline(always)]
-    fn minus_top(self, a: FixedI32<A>, b: FixedI32<B>) -> Self {
-        FixedI32::from_bits(less(self.to_bits(), a.to_bits(), b.to_bits()))
+    fn minus_top<A, B>(self, a: A, b: B) -> Self
+    where
+        A: Number + TopProduct<B, Output = Self>,
+        B: Number,
+    {
+        Self::from_bits(less(self.to_bits(), a.to_bits(), b.to_bits()))
     }
 }
+
+impl<T: Number> TopSum for T {}
 
 /// The top half of 2^32·sum − a·b, which is what SMMLS makes: it rounds the product up.
 #[inline(always)]

@@ -1,7 +1,9 @@
 //! Fixed point from and to floating point.
 
 use fixed::types::extra::Unsigned;
-use fixed::{FixedI32, FixedI64, FixedU32};
+use fixed::{FixedI64, FixedU32};
+
+use super::Number;
 
 /// The same numbers as the [`fixed`] crate's `saturating_from_num` and `to_num`, but that NaN is 0
 /// and no panic, in a tenth of the chip's flash: single precision alone, and once for all types.
@@ -13,13 +15,13 @@ pub trait Real {
     fn to_f32(self) -> f32;
 }
 
-impl<F: Unsigned> Real for FixedI32<F> {
+impl<T: Number> Real for T {
     fn from_f32(value: f32) -> Self {
-        Self::from_bits(whole(value, F::I32))
+        Self::from_bits(whole(value, T::Frac::I32))
     }
 
     fn to_f32(self) -> f32 {
-        self.to_bits() as f32 * power_of_two(-F::I32)
+        self.to_bits() as f32 * power_of_two(-T::Frac::I32)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Square root without a division.
 
-use fixed::types::I4F28;
+use super::Number;
 
 /// 1/√m at the middle of each section of m in 1/4..1, less one, 8 fraction bits: right to 0.9 %.
 static RECIPROCAL_ROOT: [u8; 96] = reciprocal_root_table();
@@ -8,24 +8,35 @@ static RECIPROCAL_ROOT: [u8; 96] = reciprocal_root_table();
 /// √(x² + y²), held at the type's end.
 ///
 /// The error is at most 2^-25 of the value and one bit.
-#[inline(never)]
-pub fn magnitude(x: I4F28, y: I4F28) -> I4F28 {
-    let length = root(square(x) + square(y));
-    I4F28::from_bits(length.min(i32::MAX as u32) as i32)
+#[inline(always)]
+pub fn magnitude<T: Number>(x: T, y: T) -> T {
+    T::from_bits(hypotenuse(x.to_bits(), y.to_bits()))
 }
 
 /// The other leg of a right triangle, √(c² − a²), or 0 where the leg `a` is the longer.
 ///
 /// The error is as that of [`magnitude`].
+#[inline(always)]
+pub fn other_leg<T: Number>(c: T, a: T) -> T {
+    T::from_bits(leg(c.to_bits(), a.to_bits()))
+}
+
+/// Once for all types, as [`leg`].
 #[inline(never)]
-pub fn other_leg(c: I4F28, a: I4F28) -> I4F28 {
+fn hypotenuse(x: i32, y: i32) -> i32 {
+    let length = root(square(x) + square(y));
+    length.min(i32::MAX as u32) as i32
+}
+
+#[inline(never)]
+fn leg(c: i32, a: i32) -> i32 {
     // Below 2^31, since c² is at most 2^62.
-    I4F28::from_bits(root(square(c).saturating_sub(square(a))).min(i32::MAX as u32) as i32)
+    root(square(c).saturating_sub(square(a))).min(i32::MAX as u32) as i32
 }
 
 #[inline(always)]
-fn square(x: I4F28) -> u64 {
-    let x = u64::from(x.to_bits().unsigned_abs());
+fn square(x: i32) -> u64 {
+    let x = u64::from(x.unsigned_abs());
     x * x
 }
 
@@ -75,6 +86,7 @@ const fn reciprocal_root_table() -> [u8; 96] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fixed::types::I4F28;
     use proptest::prelude::*;
 
     fn bound(value: f64) -> f64 {

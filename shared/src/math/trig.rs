@@ -2,9 +2,9 @@
 
 use fixed::FixedI32;
 use fixed::types::extra::U31;
-use fixed::types::{I0F32, I1F31, I4F28};
+use fixed::types::{I0F32, I1F31};
 
-use super::TopProduct;
+use super::{Number, TopProduct};
 use crate::trace::traced;
 
 traced! {
@@ -68,10 +68,16 @@ pub fn sin_cos(angle: I0F32) -> SinCos {
 ///
 /// A polynomial over one octant with an error below 0.02°. It divides, so it is for the events of
 /// a start, not for each period.
-pub fn atan2_turns(y: I4F28, x: I4F28) -> I0F32 {
-    let (ax, ay) = (x.unsigned_abs().to_bits(), y.unsigned_abs().to_bits());
+#[inline(always)]
+pub fn atan2_turns<T: Number>(y: T, x: T) -> I0F32 {
+    I0F32::from_bits(direction(y.to_bits(), x.to_bits()))
+}
+
+/// Once for all types.
+fn direction(y: i32, x: i32) -> i32 {
+    let (ax, ay) = (x.unsigned_abs(), y.unsigned_abs());
     if ax == 0 && ay == 0 {
-        return I0F32::ZERO;
+        return 0;
     }
     let steep = ay > ax;
     let (small, large) = if steep { (ax, ay) } else { (ay, ax) };
@@ -94,7 +100,7 @@ pub fn atan2_turns(y: I4F28, x: I4F28) -> I0F32 {
     };
     let turns = if y.is_negative() { -half } else { half };
     // Half a turn wraps to minus half a turn: the same angle.
-    I0F32::from_bits(turns as i32)
+    turns as i32
 }
 
 const fn table() -> [I1F31; TABLE_SIZE + QUARTER] {
@@ -136,6 +142,7 @@ const fn sine(radians: f64) -> f64 {
 mod tests {
     use super::*;
     use core::f64::consts::TAU;
+    use fixed::types::I4F28;
 
     #[test]
     fn sine_and_cosine_are_within_a_ten_thousandth_of_a_degree() {

@@ -6,8 +6,6 @@ mod ntc;
 pub use fault::{Fault, Faults};
 pub use ntc::Ntc;
 
-use fixed::types::extra::U28;
-
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, Multiplier, magnitude};
@@ -37,9 +35,9 @@ pub struct Config {
     /// Supply voltage from which less is returned.
     pub bus_return_v: Voltage,
     /// Volts above that to current.
-    pub bus_return_slope: Gain<U28, U28>,
+    pub bus_return_slope: Gain<Voltage, Current>,
     /// Bus current's excess to the bound's change in a period.
-    pub bound_rate: Multiplier<U28, U28>,
+    pub bound_rate: Multiplier<Current, Current>,
 }
 
 traced! {

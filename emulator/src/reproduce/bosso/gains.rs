@@ -3,12 +3,11 @@
 
 use std::f64::consts::TAU;
 
-use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 use siskin_control::control::PERIODS;
 use siskin_control::control::delay::Delay;
 use siskin_control::control::{observer, regulator, speed};
-use siskin_control::math::Gain;
+use siskin_control::math::{Gain, Number};
 use siskin_control::params::{BOSSO_TABLE_III, Params, build};
 use siskin_control::units::Scale;
 
@@ -56,11 +55,11 @@ const PRINTED_ROOTS: [[f64; 2]; 4] = [
 ];
 
 /// A gain's value from one unit to the other, by what it does.
-fn value<A: Unsigned, B: Unsigned>(gain: Gain<A, B>) -> f64 {
-    let x = FixedI32::<A>::from_bits(1 << 22);
-    let y: FixedI32<B> = gain.apply(x);
+fn value<A: Number, B: Number>(gain: Gain<A, B>) -> f64 {
+    let x = A::from_bits(1 << 22);
+    let y = gain.apply(x);
     let bits_per_bit = f64::from(y.to_bits()) / f64::from(x.to_bits());
-    libm::scalbn(bits_per_bit, A::I32 - B::I32)
+    libm::scalbn(bits_per_bit, A::Frac::I32 - B::Frac::I32)
 }
 
 impl Gains {

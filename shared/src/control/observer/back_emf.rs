@@ -2,7 +2,7 @@
 //!
 //! Forward Euler, and the matrix exponential for the estimated currents, as its section V says.
 
-use fixed::types::extra::{U28, U32};
+use fixed::types::I4F28;
 
 use super::{Estimate, Told};
 use crate::control::delay::Delay;
@@ -10,7 +10,7 @@ use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, divide, magnitude};
 use crate::trace::traced;
-use crate::units::{Angle, Current, Flux, InverseFlux, Speed, Voltage};
+use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,21 +18,21 @@ pub struct Config {
     /// Voltage commanded to voltage applied.
     pub delay: Delay,
     /// 1 − e^(−R·T_s/L).
-    pub decay: Gain<U28, U28>,
+    pub decay: Gain<Current, Current>,
     /// Voltage to current: (1 − e^(−R·T_s/L))/R.
-    pub admittance: Gain<U28, U28>,
+    pub admittance: Gain<Voltage, Current>,
     /// Speed times current to current: (1 − e^(−R·T_s/L))·L/R.
-    pub rotation: Gain<U28, U28>,
+    pub rotation: Gain<CurrentRate, Current>,
     /// k_p.
-    pub k_p: Gain<U28, U28>,
+    pub k_p: Gain<Current, Current>,
     /// k_i.
-    pub k_i: Gain<U28, U28>,
+    pub k_i: Gain<Current, Voltage>,
     /// k_η.
-    pub k_eta: Gain<U28, U32>,
+    pub k_eta: Gain<Voltage, Speed>,
     /// γ.
-    pub gamma: Gain<U28, U32>,
+    pub gamma: Gain<Voltage, InverseFlux>,
     /// k_f.
-    pub k_f: Gain<U32, U32>,
+    pub k_f: Gain<Speed, Speed>,
     /// Inverse of the flux that the parameters state.
     pub xi_nominal: InverseFlux,
     /// Least ξ̂: a flux twice the stated one.
@@ -51,9 +51,9 @@ pub struct Config {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cure {
     /// 2·ω_n.
-    pub proportional: Gain<U28, U32>,
+    pub proportional: Gain<I4F28, Speed>,
     /// ω_n².
-    pub integral: Gain<U28, U32>,
+    pub integral: Gain<I4F28, Speed>,
 }
 
 traced! {

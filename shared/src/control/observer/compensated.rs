@@ -8,7 +8,7 @@
 //! In the control's units a voltage for one period is a flux, and the stated flux φ is 2/π.
 
 use fixed::FixedI32;
-use fixed::types::extra::{U24, U27, U28, U29, U32};
+use fixed::types::extra::U29;
 use fixed::types::{I0F32, I5F27};
 
 use super::{Estimate, Input, Told};
@@ -16,18 +16,21 @@ use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq};
 use crate::math::{EIGHTH_PI, Gain, Held, Multiplier, SinCos, TopProduct, TopSum, sin_cos};
 use crate::trace::traced;
-use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, Voltage, WideVoltage};
+use crate::units::{
+    Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
+    WideVoltage,
+};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// R·T_s/2, current to flux.
-    pub half_resistance: Multiplier<U28, U28>,
+    pub half_resistance: Multiplier<Current, Flux>,
     /// L, current to flux.
-    pub inductance: Multiplier<U28, U24>,
+    pub inductance: Multiplier<Current, WideFlux>,
     /// β·ω²·T_s over the speed's square. The mean of a period's current is not the mean of its two
     /// ends: without β that is 0.56° at 6000 rpm on the bench.
-    pub bias: Gain<U32, U32>,
+    pub bias: Gain<SpeedSquare, I0F32>,
     /// Least ω⁺, the leak's corner towards standstill.
     pub omega_min: Speed,
     /// Least ω_n of the loop, in turns a period.
@@ -35,11 +38,11 @@ pub struct Config {
     /// Greatest ω_n.
     pub omega_n_max: Speed,
     /// Share of a new sample in what ω̂ has above ω̂_i.
-    pub smoothing: Multiplier<U32, U32>,
+    pub smoothing: Multiplier<Speed, Speed>,
     /// ξ of the stated flux.
     pub xi_nominal: InverseFlux,
     /// A quarter over the stated flux: along q to ε.
-    pub quarter_per_flux: Multiplier<U27, U27>,
+    pub quarter_per_flux: Multiplier<I5F27, I5F27>,
 }
 
 traced! {
@@ -70,7 +73,7 @@ traced! {
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     struct Pace {
         /// L, with what is known of it.
-        inductance: Multiplier<U28, U24>,
+        inductance: Multiplier<Current, WideFlux>,
         /// 0.5·ω⁺·T_s.
         leak: I0F32,
         /// The same less β·ω⁺²·T_s.
@@ -82,7 +85,7 @@ traced! {
         /// 1.8·ω_n, for half of ε.
         proportional: Speed,
         /// φ̂, speed to back-EMF.
-        emf: Multiplier<U32, U24>,
+        emf: Multiplier<Speed, WideVoltage>,
         /// ω̄̂ when these were taken.
         omega_bar: Speed,
     }
@@ -272,7 +275,10 @@ pub fn told(config: &Config, state: &State, periods: u32) -> Told {
 
 /// L·i.
 #[inline(always)]
-fn stator_flux(inductance: Multiplier<U28, U24>, i: AlphaBeta<Current>) -> AlphaBeta<Flux> {
+fn stator_flux(
+    inductance: Multiplier<Current, WideFlux>,
+    i: AlphaBeta<Current>,
+) -> AlphaBeta<Flux> {
     let flux = |i: Current| Flux::from_bits(inductance.of(i).to_bits() << 4);
     AlphaBeta {
         alpha: flux(i.alpha),

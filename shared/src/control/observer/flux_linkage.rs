@@ -3,7 +3,7 @@
 //! a bias.
 
 use fixed::FixedI32;
-use fixed::types::extra::{U28, U32};
+use fixed::types::extra::U32;
 
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
 use crate::trace::traced;
@@ -23,11 +23,11 @@ pub const AMPLITUDE_MAX: Flux = Flux::from_bits(341_782_638);
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// R: current to voltage.
-    pub resistance: Gain<U28, U28>,
+    pub resistance: Gain<Current, Voltage>,
     /// L_s: current to flux.
-    pub inductance: Gain<U28, U28>,
+    pub inductance: Gain<Current, Flux>,
     /// 1 − e^(−T_s/τ_int): what the integrator forgets in a period.
-    pub forget: Gain<U28, U28>,
+    pub forget: Gain<Flux, Flux>,
     /// 1/τ_int as a speed: the integrator's corner.
     pub corner: Speed,
     /// The further high-pass of the second-order form.
@@ -42,7 +42,7 @@ pub struct Config {
 #[derive(Clone, Debug, PartialEq)]
 pub struct HighPass {
     /// 1 − e^(−T_s/τ_HPFS).
-    pub share: Gain<U28, U28>,
+    pub share: Gain<Flux, Flux>,
     /// 1/τ_HPFS as a speed.
     pub corner: Speed,
 }

@@ -6,7 +6,6 @@
 //! (3N + 0.5)·60° instead of up to (9N − 0.5)·60°, which is what the error of appendix A comes from.
 
 use fixed::types::U20F12;
-use fixed::types::extra::U32;
 
 use super::sector::Sector;
 use crate::math::{Gain, divide};
@@ -25,7 +24,7 @@ pub struct Config {
     /// too much. Zero is never.
     pub whole_turns_above: Speed,
     /// A_e, the share of the extrapolated angle that an edge leaves (2.4.2), 0 to below 1.
-    pub a_e: Gain<U32, U32>,
+    pub a_e: Gain<Angle, Angle>,
     /// The speed above which A_e counts.
     pub filter_above: Speed,
     /// Whether what is known of an edge's angle and of its time before the sample is taken into

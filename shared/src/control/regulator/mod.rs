@@ -8,8 +8,6 @@ pub mod modified;
 pub mod observer_based;
 pub mod synchronous;
 
-use fixed::types::extra::U28;
-
 use super::inductance::Factor;
 use super::transform::Dq;
 use crate::math::Gain;
@@ -224,7 +222,7 @@ impl Regulator for synchronous::Config {
 
 /// The current that the voltage that is cut off would have brought, by the loop's first order.
 #[inline(always)]
-fn beyond(admittance: Gain<U28, U28>, cut: Dq<WideVoltage>) -> Dq<Current> {
+fn beyond(admittance: Gain<Voltage, Current>, cut: Dq<WideVoltage>) -> Dq<Current> {
     Dq {
         d: admittance.saturating_apply(narrow(cut.d)),
         q: admittance.saturating_apply(narrow(cut.q)),

@@ -6,8 +6,6 @@
 //! the d axis has the bandwidth that is asked for at the greatest speed, where V is greatest, and
 //! less of it below, where there is less to decouple.
 
-use fixed::types::extra::{U28, U32};
-
 use super::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
@@ -18,15 +16,15 @@ use crate::units::{Angle, Current, Voltage, WideVoltage};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// k_p of the length, bandwidth·L.
-    pub k_p: Gain<U28, U28>,
+    pub k_p: Gain<Current, Voltage>,
     /// k_i·T_s of the length, bandwidth·R·T_s.
-    pub k_i: Gain<U28, U28>,
+    pub k_i: Gain<Current, Voltage>,
     /// k_p of the phase, bandwidth·L over the back-EMF at `CTL_RPM_MAX`.
-    pub phase_k_p: Gain<U28, U32>,
+    pub phase_k_p: Gain<Current, Angle>,
     /// k_i·T_s of the phase, bandwidth·R·T_s over the same.
-    pub phase_k_i: Gain<U28, U32>,
+    pub phase_k_i: Gain<Current, Angle>,
     /// 1/k_p of the length.
-    pub admittance: Gain<U28, U28>,
+    pub admittance: Gain<Voltage, Current>,
 }
 
 traced! {

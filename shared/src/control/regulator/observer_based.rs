@@ -1,28 +1,26 @@
 //! The observer-based current regulator of the first paper (10).
 
-use fixed::types::extra::U28;
-
 use super::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
-use crate::units::{Current, Voltage, WideVoltage, narrow};
+use crate::units::{Current, CurrentRate, Voltage, WideVoltage, narrow};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// R.
-    pub resistance: Gain<U28, U28>,
+    pub resistance: Gain<Current, Voltage>,
     /// L, for speed times current.
-    pub reactance: Gain<U28, U28>,
+    pub reactance: Gain<CurrentRate, Voltage>,
     /// L/T_s, for a current's step in a period.
-    pub inductance: Gain<U28, U28>,
+    pub inductance: Gain<Current, Voltage>,
     /// L·k_pe.
-    pub k_pe: Gain<U28, U28>,
+    pub k_pe: Gain<Current, Voltage>,
     /// k_ie·T_s.
-    pub k_ie: Gain<U28, U28>,
+    pub k_ie: Gain<Current, Voltage>,
     /// 1/(R + L·k_pe).
-    pub admittance: Gain<U28, U28>,
+    pub admittance: Gain<Voltage, Current>,
 }
 
 traced! {

@@ -4,8 +4,6 @@
 //! With the zero of each PI on the winding's pole (k_i/k_p = R/L) the loop is of first order, at
 //! the bandwidth that k_p = bandwidth·L sets.
 
-use fixed::types::extra::{U24, U28, U32};
-
 use super::{Feedback, Reference};
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
@@ -17,15 +15,15 @@ use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// k_p, bandwidth·L.
-    pub k_p: Multiplier<U28, U24>,
+    pub k_p: Multiplier<Current, WideVoltage>,
     /// k_i·T_s, bandwidth·R·T_s.
-    pub k_i: Multiplier<U28, U24>,
+    pub k_i: Multiplier<Current, WideVoltage>,
     /// L, speed to voltage over current.
-    pub reactance: Gain<U32, U28>,
+    pub reactance: Gain<Speed, Voltage>,
     /// Bandwidth·T_s.
-    pub rate: Multiplier<U28, U28>,
+    pub rate: Multiplier<Current, Current>,
     /// 1/k_p.
-    pub admittance: Gain<U24, U28>,
+    pub admittance: Gain<WideVoltage, Current>,
 }
 
 traced! {
@@ -38,7 +36,7 @@ traced! {
         /// have no noise, and the references themselves would cross the axes at a step.
         pub model: Dq<Current>,
         /// ω̂·L.
-        pub cross: Multiplier<U28, U24>,
+        pub cross: Multiplier<Current, WideVoltage>,
     }
 }
 

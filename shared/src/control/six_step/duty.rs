@@ -7,7 +7,6 @@
 //! to the current's bound, not to the motor.
 
 use fixed::types::I1F31;
-use fixed::types::extra::{U28, U31, U32};
 
 use crate::control::speed::Bounds;
 use crate::math::{Gain, Held};
@@ -22,11 +21,11 @@ const PEAK_SHIFT: u32 = 6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Speed to duty.
-    pub k_p: Gain<U32, U31>,
+    pub k_p: Gain<Speed, I1F31>,
     /// Speed to duty in a period.
-    pub k_i: Gain<U32, U31>,
+    pub k_i: Gain<Speed, I1F31>,
     /// What the current has left to its bound, to what the duty may change in a period.
-    pub k_b: Gain<U28, U31>,
+    pub k_b: Gain<Current, I1F31>,
     /// Greatest duty: what is left is the low sides' on-time in which the sample falls.
     pub duty_max: I1F31,
 }

@@ -2,29 +2,27 @@
 //! the square of the commanded speed, which is what a propeller takes, and a voltage in proportion
 //! to it, past the current regulator.
 
-use fixed::types::extra::{U28, U32};
-
 use super::Input;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
-use crate::units::{Current, Speed};
+use crate::units::{Current, Speed, SpeedSquare, Voltage};
 
 /// Coefficients for one period of the outer loops, here T_s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Proportional gain, speed to current.
-    pub k_p: Gain<U32, U28>,
+    pub k_p: Gain<Speed, Current>,
     /// Integral gain times T_s.
-    pub k_i: Gain<U32, U28>,
+    pub k_i: Gain<Speed, Current>,
     /// K_FFi, the square of the speed to current.
-    pub k_ffi: Gain<U32, U28>,
+    pub k_ffi: Gain<SpeedSquare, Current>,
     /// K_FFv, speed to voltage: the flux.
-    pub k_ffv: Gain<U32, U28>,
+    pub k_ffv: Gain<Speed, Voltage>,
     /// What of K_FFv times the measured speed the current regulator's own feed-forward brings
     /// already; zero for the modified one, which has none.
-    pub own: Gain<U32, U28>,
+    pub own: Gain<Speed, Voltage>,
 }
 
 traced! {

@@ -4,7 +4,7 @@
 //! conditioned: where the current is at a bound or the voltage is, ω* moves only as fast as the
 //! torque that is left lets it, so that nothing winds up. Without inertia it is (8) as published.
 
-use fixed::types::extra::{U28, U32};
+use fixed::types::I0F32;
 
 use super::{Input, torque};
 use crate::control::regulator::Reference;
@@ -21,17 +21,17 @@ const ALMOST_HALF: Speed = Speed::from_bits(i32::MAX - (1 << 26));
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// k_pω.
-    pub k_p: Gain<U32, U28>,
+    pub k_p: Gain<Speed, Torque>,
     /// k_iω·T_s.
-    pub k_i: Gain<U32, U28>,
+    pub k_i: Gain<Speed, Torque>,
     /// J/T_s: ω*'s step to torque.
-    pub inertia: Gain<U32, U28>,
+    pub inertia: Gain<Speed, Torque>,
     /// T_s/J; zero without conditioning.
-    pub inertia_inverse: Gain<U28, U32>,
+    pub inertia_inverse: Gain<Torque, Speed>,
     /// Speed to half of the share of the error that is acted on, where that is below one. At low
     /// speed an R stated too high closes a loop through the estimate, and its gain is that of the
     /// regulator.
-    pub trust: Gain<U32, U32>,
+    pub trust: Gain<Speed, I0F32>,
     /// Whether the current regulator reads p_q*, the change of i_q*.
     pub with_step: bool,
 }

@@ -27,7 +27,7 @@ use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Stop};
 use crate::image::Image;
 use crate::input::signal::Signal;
-use crate::math::{Gain, Multiplier, Real, gain_parts};
+use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
 use crate::protection;
 use crate::units::{AdcCounts, Scale, Speed, Voltage};
 
@@ -379,14 +379,14 @@ impl<'a> Si<'a> {
     }
 
     /// The gain of value `k`; where there is none, the parameter is refused.
-    fn gain<A: Unsigned, B: Unsigned>(&self, param: ParamId, k: f32) -> Gain<A, B> {
-        let (mantissa, shift) = self.gain_parts(param, k, B::I32 - A::I32);
+    fn gain<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Gain<A, B> {
+        let (mantissa, shift) = self.gain_parts(param, k, B::Frac::I32 - A::Frac::I32);
         Gain::from_parts(mantissa, shift)
     }
 
     /// The factor of value `k`; where it leaves its type's range, the parameter is refused.
-    fn factor<A: Unsigned, B: Unsigned>(&self, param: ParamId, k: f32) -> Multiplier<A, B> {
-        Multiplier::from_bits(self.factor_bits(param, k, B::I32 - A::I32))
+    fn factor<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Multiplier<A, B> {
+        Multiplier::from_bits(self.factor_bits(param, k, B::Frac::I32 - A::Frac::I32))
     }
 
     #[inline(never)]

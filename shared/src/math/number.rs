@@ -1,0 +1,31 @@
+//! What the arithmetic needs of a number.
+
+use fixed::FixedI32;
+use fixed::types::extra::Unsigned;
+
+/// A signed number of 32 bits whose fraction bits stand in its type.
+pub trait Number: Copy {
+    /// The fraction bits.
+    type Frac: Unsigned;
+
+    /// The number of these bits.
+    fn from_bits(bits: i32) -> Self;
+
+    /// Its bits.
+    fn to_bits(self) -> i32;
+}
+
+// Inlined: each is no instruction at all.
+impl<F: Unsigned> Number for FixedI32<F> {
+    type Frac = F;
+
+    #[inline(always)]
+    fn from_bits(bits: i32) -> Self {
+        Self::from_bits(bits)
+    }
+
+    #[inline(always)]
+    fn to_bits(self) -> i32 {
+        self.to_bits()
+    }
+}
