@@ -1,11 +1,21 @@
-//! The Siskin ESC's control against a simulated motor, inverter, battery and wire.
-//!
-//! [`rig`] runs the control's step against the [`plant`], period by period. [`device`] puts the
-//! tasks' side of the ESC, the throttle [`wire`] and the [`flash`] around it. [`live`] runs that in
-//! real time on the MAVLink [`link`]s, and [`scenario`] runs it offline from a file. [`watch`] looks on
-//! for the [`summary`] and for the [`record`], in the [`shaft`]'s own direction, and [`plot`] draws.
-//! A [`fault`] breaks something of all this at a given time. [`reproduce`] measures the papers' own
-//! figures, [`measure`] how fast all this is against a [`yardstick`].
+//! [`rig`]: crate::rig
+//! [`plant`]: crate::plant
+//! [`device`]: crate::device
+//! [`wire`]: crate::wire
+//! [`flash`]: crate::flash
+//! [`live`]: crate::live
+//! [`link`]: crate::link
+//! [`scenario`]: crate::scenario
+//! [`watch`]: crate::watch
+//! [`summary`]: crate::summary
+//! [`record`]: crate::record
+//! [`shaft`]: crate::shaft
+//! [`fault`]: crate::fault
+//! [`measure`]: crate::measure
+//! [`yardstick`]: crate::yardstick
+#![cfg_attr(feature = "plot", doc = "[`plot`]: crate::plot")]
+#![cfg_attr(feature = "plot", doc = "[`reproduce`]: crate::reproduce")]
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 pub mod bench;
@@ -23,6 +33,8 @@ pub mod plant;
 #[cfg(feature = "plot")]
 pub mod plot;
 pub mod record;
+#[cfg(test)]
+mod reference;
 pub mod report;
 #[cfg(feature = "plot")]
 pub mod reproduce;

@@ -138,7 +138,22 @@ impl Summary {
 mod tests {
     use super::*;
     use crate::plant::Flow;
+    use crate::reference::{code, rows};
     use crate::surroundings::Motion;
+
+    #[test]
+    fn the_reference_has_every_figure() {
+        let summary = Summary::new([("all".to_owned(), 0.0, 1.0)]);
+        let report = summary.report(1.0, 1.0);
+        let figures = serde_json::to_value(&report.windows[0]).unwrap();
+        let figures: Vec<_> = figures.as_object().unwrap().keys().cloned().collect();
+        let mut listed: Vec<_> = rows("Window figures")
+            .iter()
+            .filter_map(|row| code(&row[0]).map(str::to_owned))
+            .collect();
+        listed.sort();
+        assert_eq!(listed, figures, "window figures in README.md");
+    }
 
     #[test]
     fn figures_that_a_machine_does_not_show_are_those_of_its_control() {

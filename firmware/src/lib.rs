@@ -1,5 +1,8 @@
-//! Siskin on a board: the control crate's [`step`](siskin_control::drive::step) in the PWM
-//! interrupt, and tasks around it.
+#![doc = include_str!("../README.md")]
+//!
+//! # Inside the crate
+//! The control crate's [`step`](siskin_control::drive::step) runs in the PWM interrupt, and tasks around it.
+//! The image alone, without the stamp that `siskin image` adds:
 //!
 //! ```text
 //! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features b-g431b-esc1

@@ -1,21 +1,41 @@
-"""What README.md tells a person to type."""
+"""What the READMEs tell a person to type."""
 
 import re
 import shlex
+from pathlib import Path
 
 from paths import ROOT
 
+FRONT = ROOT / "README.md"
+READMES = [FRONT, *(ROOT / crate / "README.md" for crate in ("emulator", "firmware", "shared", "tools"))]
+READMES += [ROOT / "tests" / "virtual-board" / "README.md"]
 
-def blocks(language: str) -> list[str]:
-    """Its blocks of code in a language."""
-    readme = (ROOT / "README.md").read_text()
+
+def blocks(language: str, *readmes: Path) -> list[str]:
+    """The blocks of code in a language, of some READMEs or of all."""
     # Those of a list stand under its text.
     pattern = rf"^ *```{language}\n(.*?)^ *```"
-    return re.findall(pattern, readme, re.MULTILINE | re.DOTALL)
+    texts = (readme.read_text() for readme in readmes or READMES)
+    return [block for text in texts for block in re.findall(pattern, text, re.MULTILINE | re.DOTALL)]
 
 
-def commands(*words: str) -> list[list[str]]:
-    """The words of each shell command in it that has all of `words`."""
-    lines = [line for block in blocks("sh") for line in block.replace("\\\n", " ").splitlines()]
-    split = [shlex.split(line, comments=True) for line in lines]
-    return [command for command in split if set(words) <= set(command)]
+def _split(block: str) -> list[list[str]]:
+    lines = block.replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def commands(*words: str, of: Path | None = None) -> list[list[str]]:
+    """The words of each shell command that has all of `words`, each once, in its order, with what an alias
+    stands for; of one README, or of all."""
+    found = []
+    for readme in [of] if of else READMES:
+        aliases: dict[str, list[str]] = {}
+        for command in (command for block in blocks("sh", readme) for command in _split(block)):
+            if command[0] == "alias":
+                name, _, meaning = command[1].partition("=")
+                aliases[name] = shlex.split(meaning)
+                continue
+            command = aliases.get(command[0], command[:1]) + command[1:]
+            if set(words) <= set(command) and command not in found:
+                found.append(command)
+    return found

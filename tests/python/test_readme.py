@@ -1,15 +1,18 @@
-"""Scripts with nothing but the wheel of pymavlink, as a person pastes them."""
+"""What the READMEs have a person type: every command and script, as it is pasted."""
 
 import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import test_scenarios
 from dshot import HALF
-from emulator import PATIENT
-from readme import blocks
+from emulator import PATIENT, run
+from paths import PROGRAM, ROOT, SCENARIOS, TOOL, VIRTUAL_BOARD
+from readme import FRONT, READMES, blocks, commands
 
 SCRIPT = """
 from pymavlink import mavutil
@@ -54,13 +57,135 @@ def test_the_wheel_alone_reads_the_telemetry(start):
 
 
 def test_readme_has_a_script_that_reads_the_telemetry():
-    assert any("ESC_TELEMETRY_1_TO_4" in script for script in blocks("python"))
+    assert any("ESC_TELEMETRY_1_TO_4" in script for script in blocks("python", FRONT))
 
 
 @pytest.mark.parametrize("speed", [1, 0.6])
 @pytest.mark.parametrize("index", range(len(blocks("python"))))
-def test_a_script_of_the_readme_works_as_pasted(start, index, speed):
+def test_a_script_of_a_readme_works_as_pasted(start, index, speed):
     # A busy machine is no lost signal. The virtual board runs below real time on a slow one.
     printed = run_script(blocks("python")[index], start(*PATIENT, speed=speed))
     rpm = [int(number) for number in re.findall(r"(-?\d+) rpm", printed)]
     assert abs(rpm[-1] - 3150) <= 32, f"half throttle: {rpm}"
+
+
+# The programs that `cargo run` starts, by what stands behind -p.
+PROGRAMS = {None: PROGRAM, "siskin": TOOL, "siskin-vboard": VIRTUAL_BOARD}
+
+# A bench on which a README's commands make sense, where it is not the default one.
+BENCHES = {"firmware": ("--bench", "bare", "--bus", "12")}
+
+PROBE_RS = """#!/bin/sh
+echo "probe-rs $*" >>"$0.log"
+"""
+
+
+def program(command: list[str]) -> tuple[Path | None, list[str]]:
+    """The program that a command runs, and its arguments; none for what is no `cargo run`."""
+    if command[:3] != ["cargo", "run", "--release"]:
+        return None, command
+    options, _, arguments = " ".join(command[3:]).partition("--")
+    package = options.split()[-1] if options.split() else None
+    arguments = command[command.index("--") + 1 :] if "--" in command else []
+    return PROGRAMS[package], arguments
+
+
+def is_run_elsewhere(command: list[str]) -> bool:
+    """True for what another test runs as it stands in the README."""
+    path, words = program(command)
+    if path is None:
+        # This test is a part of it.
+        return words == ["tests/run"]
+    if path == VIRTUAL_BOARD:
+        # test_virtual_board.py
+        return True
+    if path == TOOL or not words:
+        return False
+    if words == ["bench"]:
+        return "cargo run --release -- bench" in (ROOT / "tests" / "run").read_text()
+    if words[0] == "scenario" and "--record" not in words:
+        scenario = ROOT / words[1]
+        assert scenario.parent == SCENARIOS and scenario.exists(), words
+        seeds = test_scenarios.SEEDS.get(scenario.stem)
+        assert words[2:] == (["--seeds", seeds] if seeds else []), f"test_scenarios.py plays {seeds}"
+        return True
+    # test_reproduce.py
+    return words[0] in ("reproduce", "plot") or "target/first-spin.csv" in words
+
+
+def first_has(readme: Path) -> list[list[str]]:
+    """The commands of a README that no README before it has."""
+    before = [command for other in READMES[: READMES.index(readme)] for command in commands(of=other)]
+    return [command for command in commands(of=readme) if command not in before]
+
+
+@pytest.mark.parametrize("readme", READMES, ids=lambda path: path.parent.name)
+def test_every_command_of_a_readme_ends_well(start, tmp_path, readme):
+    # They are typed one after the other: some read what others have written.
+    todo = [command for command in first_has(readme) if not is_run_elsewhere(command)]
+    if not todo:
+        return
+    standing_in = tmp_path / "bin" / "probe-rs"
+    standing_in.parent.mkdir()
+    standing_in.write_text(PROBE_RS)
+    standing_in.chmod(0o755)
+    environment = {**os.environ, "PATH": f"{standing_in.parent}:{os.environ['PATH']}"}
+    emulator = start(*BENCHES.get(readme.parent.name, ()), storage=tmp_path / "flash")
+    for command in todo:
+        path, words = program(command)
+        if path is not None:
+            words = [str(path), *(word.replace("target/", f"{tmp_path}/") for word in words)]
+        if path == TOOL and "--connect" in words:
+            # A board's serial line.
+            del words[words.index("--connect") : words.index("--connect") + 2]
+        if path == TOOL and not {"image", "flash", "decode", "budget"} & set(words):
+            words[1:1] = ["--connect", f"tcp:127.0.0.1:{emulator.port}"]
+        if "monitor" in words and "--count" not in words:
+            # Until Ctrl-C.
+            words += ["--count", "3"]
+        if path == PROGRAM and "scenario" not in words:
+            # Until Ctrl-C, at the usual addresses.
+            words += ["--duration", "0.2", "--mavlink", "none", "--signal", "udp:127.0.0.1:0"]
+            words += ["--storage", "none"]
+        ended = subprocess.run(
+            words,
+            cwd=ROOT,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=600,
+        )
+        assert ended.returncode == 0, f"{' '.join(command)}\n{ended.stdout}{ended.stderr}"
+    if any("flash" in command for command in todo):
+        assert "probe-rs download" in standing_in.with_suffix(".log").read_text()
+
+
+def test_every_toml_block_is_part_of_a_scenario_that_holds(tmp_path):
+    whole, *parts = blocks("toml")
+    for part in ["", *parts]:
+        scenario = tmp_path / "readme.toml"
+        scenario.write_text(f"{whole}\n{part}")
+        ended = run("scenario", scenario)
+        assert ended.returncode == 0, f"{part}\n{ended.stdout}{ended.stderr}"
+
+
+def anchors(text: str) -> set[str]:
+    """The addresses of a file's headings, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("file", [*READMES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=str)
+def test_every_link_leads_somewhere(file):
+    text = re.sub(r"^ *```.*?^ *```", "", file.read_text(), flags=re.MULTILINE | re.DOTALL)
+    links = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r"^\[[^\]]+\]: (\S+)$", text, re.MULTILINE)
+    assert links
+    for link in links:
+        if link.startswith("https://"):
+            continue
+        path, _, anchor = link.partition("#")
+        there = file.parent / path if path else file
+        assert there.exists(), link
+        if anchor:
+            assert anchor in anchors(there.read_text()), link

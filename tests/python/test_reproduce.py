@@ -25,7 +25,7 @@ BOSSO = {
 
 PICTURES = ROOT / "emulator" / "pictures"
 
-REDRAW = "README's picture is not what its commands draw: draw it again by them, and look at it"
+REDRAW = "the README's picture is not what its commands draw: draw it again by them, and look at it"
 
 
 def assert_compared(items: list[dict]) -> None:
@@ -41,8 +41,15 @@ def assert_compared(items: list[dict]) -> None:
         assert item["verdict"] == ("agrees" if within else "differs"), item
 
 
+def reproduce(paper: str, folder: object) -> list[str]:
+    """The README's command for a paper, which draws into this folder."""
+    (command,) = readme.commands("reproduce", paper)
+    words = command[command.index("--") + 1 :]
+    return [word.replace(f"target/{paper}", str(folder)) for word in words]
+
+
 def test_the_first_spin_is_the_one_in_the_readme(tmp_path):
-    commands = readme.commands("--", "scenario", "--record") + readme.commands("--", "plot")
+    commands = readme.commands("scenario", "target/first-spin.csv") + readme.commands("--", "plot")
     assert [command[command.index("--") + 1] for command in commands] == ["scenario", "plot"]
     for command in commands:
         words = [word.replace("target/", f"{tmp_path}/") for word in command[command.index("--") + 1 :]]
@@ -54,7 +61,7 @@ def test_the_first_spin_is_the_one_in_the_readme(tmp_path):
 
 
 def test_bosso_shows_what_the_paper_printed(tmp_path):
-    ended = run("reproduce", "bosso", "--json", "-o", tmp_path)
+    ended = run(*reproduce("bosso", tmp_path), "--json")
     assert ended.returncode == 0, ended.stderr
     items = json.loads(ended.stdout)["items"]
     assert_compared(items)
@@ -77,8 +84,8 @@ def test_bosso_shows_what_the_paper_printed(tmp_path):
     assert pictures == {f"bosso-{n}.{end}" for n in numbers for end in ("png", "svg")}
 
 
-def test_colton_stays_within_the_papers_bounds():
-    ended = run("reproduce", "colton", "--json")
+def test_colton_stays_within_the_papers_bounds(tmp_path):
+    ended = run(*reproduce("colton", tmp_path), "--json")
     assert ended.returncode == 0, ended.stderr
     items = json.loads(ended.stdout)["items"]
     assert_compared(items)

@@ -1,10 +1,4 @@
-//! The command line of the Siskin ESC: its self-test, parameters and live telemetry over MAVLink, images for boards,
-//! captures of a throttle wire, and the limits of a motor.
-//!
-//! Results go to standard output. Complaints go to standard error, one line each; where another
-//! program does the work, what that says stands before them. The exit status is 0 when everything
-//! was done, 1 when the ESC or another program refused something or did not answer, and 2 for bad
-//! input, no connection or a program that is not installed.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 mod budget;

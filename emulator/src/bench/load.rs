@@ -40,3 +40,14 @@ impl Choice<LoadTable> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::assert_has_all;
+
+    #[test]
+    fn the_reference_has_every_key() {
+        assert_has_all::<LoadTable>("`[bench.load]`");
+    }
+}

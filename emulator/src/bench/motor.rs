@@ -195,3 +195,16 @@ fn check(
 ) -> Result<f64, BenchError> {
     range("motor", key, value, ends, unit)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::assert_has_all;
+
+    #[test]
+    fn the_reference_has_every_key() {
+        assert_has_all::<MotorTable>("`[bench.motor]`");
+        assert_has_all::<HarmonicTable>("`[[bench.motor.harmonics]]`");
+        assert_has_all::<WindingTable>("`[bench.motor.winding]`");
+    }
+}

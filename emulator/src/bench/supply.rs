@@ -103,6 +103,12 @@ impl SupplyTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reference::assert_has_all;
+
+    #[test]
+    fn the_reference_has_every_key() {
+        assert_has_all::<SupplyTable>("`[bench.bus]`");
+    }
 
     fn supply(toml: &str) -> Result<Supply, BenchError> {
         #[derive(Deserialize)]

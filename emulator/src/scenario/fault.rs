@@ -1,28 +1,6 @@
 //! A fault as a scenario gives it.
 //!
-//! | `kind` | keys | what it does from `at_s`, for `for_s` or to the end |
-//! |---|---|---|
-//! | `rotor_blocked` | | holds the shaft at standstill |
-//! | `rotor_kick` | `value`, rpm | adds to the speed: at once, or spread over `for_s` |
-//! | `gust` | `value`, rpm | moves the air as the propeller would at this speed |
-//! | `strike` | `value`, Nm | turns the shaft by this torque, backward where negative |
-//! | `phase_open` | `phase` | opens the phase's wire |
-//! | `mosfet_open` | `phase`, `side`, high if left out | a switch never turns on; its diode is sound |
-//! | `mosfet_short` | `phase`, `side` | a switch is always on |
-//! | `sensor_stuck` | `phase`, `value`, A | a current sensor shows this |
-//! | `offset_drift` | `phase`, `value`, A | moves a current sensor's zero over `for_s`; it stays |
-//! | `noise` | `value`, A rms | adds noise to the currents |
-//! | `hall_stuck` | `phase`, `value`, 0 or 1 | a Hall sensor shows this level |
-//! | `bus_sag` | `value`, V | the supply gives so much less |
-//! | `bus_disconnect` | | leaves the bus to its capacitor |
-//! | `brown_out` | `value`, V | the supply gives no more |
-//! | `reset` | | starts the chip anew; held in reset for `for_s`, if given |
-//! | `flash_fail` | | the flash refuses to change |
-//! | `signal_loss` | | nothing comes over the wire |
-//! | `bit_errors` | `value`, 0..1 | flips each bit of a frame with this probability |
-//! | `jitter` | `value`, ns rms | displaces each edge on the wire |
-//!
-//! Once a fault of the bus has begun, the chip is in reset while the bus is below 4.5 V.
+//! The kinds and their keys are in the reference of `emulator/README.md`.
 
 use std::f64::consts::TAU;
 
@@ -191,6 +169,7 @@ impl FaultTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reference::{assert_has_all, code, rows};
 
     fn read(entry: &str) -> Result<Fault, String> {
         let table = toml::from_str::<FaultTable>(&entry.replace("; ", "\n"));
@@ -257,6 +236,34 @@ mod tests {
                 error.contains(said) && !error.contains('\n'),
                 "{entry}: {error}"
             );
+        }
+    }
+
+    #[test]
+    fn the_reference_has_every_kind() {
+        assert_has_all::<FaultTable>("`[[fault]]`");
+        assert_has_all::<Name>("Kinds of faults");
+    }
+
+    #[test]
+    fn a_kind_takes_the_keys_that_the_reference_lists_and_no_other() {
+        for row in rows("Kinds of faults") {
+            let kind = code(&row[0]).unwrap();
+            for given in 0..8_u8 {
+                let keys = [("phase", "1"), ("side", "'low'"), ("value", "1.0")];
+                let mut entry = format!("at_s = 0.0; kind = '{kind}'");
+                let mut wanted = true;
+                for (bit, (key, value)) in keys.into_iter().enumerate() {
+                    let listed = row[1].contains(&format!("`{key}`"));
+                    let given = given & 1 << bit != 0;
+                    if given {
+                        entry += &format!("; {key} = {value}");
+                    }
+                    let has_default = kind == "mosfet_open" && key == "side";
+                    wanted &= given == listed || listed && has_default;
+                }
+                assert_eq!(read(&entry).is_ok(), wanted, "{entry}");
+            }
         }
     }
 }

@@ -153,7 +153,7 @@ impl Default for BenchTable {
 }
 
 /// The truth against the named motor and load.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Factors {
     #[serde(rename = "R")]

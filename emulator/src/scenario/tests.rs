@@ -3,6 +3,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use super::*;
 
+mod reference;
+
 /// A fifth of a second of the start, where half of the combinations are asked for too much.
 const FILE: &str = r#"
     [bench]

@@ -85,7 +85,7 @@ macro_rules! parameters {
         }
 
         /// Every parameter that there is. MAVLink, storage, the documentation and
-        /// [`build`](super::build) read it.
+        /// [`build`](super::build()) read it.
         pub const TABLE: &[Parameter; [$(ParamId::$id),*].len()] = &[$(
             Parameter {
                 key: $key,

@@ -1,10 +1,6 @@
-//! The image that is flashed, executed on a PC against the simulated motor.
+#![doc = include_str!("../README.md")]
 //!
-//! ```text
-//! cargo build -p siskin-firmware --release --target thumbv7em-none-eabihf --features b-g431b-esc1
-//! cargo run --release -p siskin-vboard -- target/thumbv7em-none-eabihf/release/siskin-firmware
-//! ```
-//!
+//! # Inside the crate
 //! | part | what it is |
 //! |---|---|
 //! | [`image`] | the linker's file: what is flashed where |
@@ -27,10 +23,6 @@
 //! cycles](processor#what-code-costs), and by what the parts do at their own times. Motor, inverter and
 //! supply are the emulator's; they follow the gates edge by edge, and are looked at when a converter's
 //! sampling ends. Equal inputs give equal bits.
-//!
-//! # Licence
-//! The engine that translates is QEMU's, under the GPL, version 2: so is this crate, and nothing else in
-//! the workspace links it.
 
 pub mod board;
 pub mod bridge;
