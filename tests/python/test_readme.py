@@ -14,6 +14,8 @@ from emulator import PATIENT, run
 from paths import PROGRAM, ROOT, SCENARIOS, TOOL, VIRTUAL_BOARD
 from readme import FRONT, READMES, blocks, commands
 
+CONTRIBUTING = ROOT / "CONTRIBUTING.md"
+
 SCRIPT = """
 from pymavlink import mavutil
 
@@ -176,7 +178,7 @@ def anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("file", [*READMES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"], ids=str)
+@pytest.mark.parametrize("file", [*READMES, CONTRIBUTING, ROOT / "CHANGELOG.md"], ids=str)
 def test_every_link_leads_somewhere(file):
     text = re.sub(r"^ *```.*?^ *```", "", file.read_text(), flags=re.MULTILINE | re.DOTALL)
     links = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r"^\[[^\]]+\]: (\S+)$", text, re.MULTILINE)
@@ -189,3 +191,11 @@ def test_every_link_leads_somewhere(file):
         assert there.exists(), link
         if anchor:
             assert anchor in anchors(there.read_text()), link
+
+
+def test_the_files_that_contributors_are_led_to_are_there():
+    named = re.findall(r"`([\w./-]+/[\w./-]*)`", CONTRIBUTING.read_text())
+    assert len(named) > 20
+    # NAME is that of a board or a bench to come.
+    absent = [name for name in named if "NAME" not in name and not (ROOT / name).exists()]
+    assert absent == []
