@@ -1,5 +1,6 @@
 //! The bytes of the files, at every place of them.
 
+use std::format;
 use std::string::String;
 use std::vec::Vec;
 
