@@ -4,9 +4,13 @@
 //! top half. Conversion from and to SI happens when the configuration is built and in telemetry,
 //! never in a control period.
 
+pub mod dimension;
+
+use fixed::types::extra::{U24, U28, U32};
 use fixed::types::{I0F32, I4F28, I8F24, I16F16};
 
-use crate::math::Real;
+use crate::math::{Quantity, Real};
+use dimension::{NewtonMetre, PerWeber, Weber};
 
 /// An electrical angle in turns; it wraps.
 pub type Angle = I0F32;
@@ -44,20 +48,26 @@ pub type CurrentRate = I4F28;
 /// A square of a speed.
 pub type SpeedSquare = I0F32;
 
+/// What a voltage adds to a flux linkage in a period.
+#[inline(always)]
+pub fn over_period(u: Voltage) -> Flux {
+    Flux::from_bits(u.to_bits())
+}
+
 /// A torque in units of [`Scale::torque_nm`].
-pub type Torque = I4F28;
+pub type Torque = Quantity<NewtonMetre, U28>;
 
 /// A flux linkage in units of [`Scale::flux_wb`]: what a unit of voltage adds in a period.
-pub type Flux = I4F28;
+pub type Flux = Quantity<Weber, U28>;
 
 /// A flux linkage with room for that of a current.
-pub type WideFlux = I8F24;
+pub type WideFlux = Quantity<Weber, U24>;
 
 /// The motor's stated flux, 2/π: the voltage base makes it so for every motor.
 pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);
 
 /// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
-pub type InverseFlux = I0F32;
+pub type InverseFlux = Quantity<PerWeber, U32>;
 
 /// The inverse of the motor's stated flux, ξ = 1/4: the voltage base makes it so for every motor.
 pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);

@@ -7,19 +7,24 @@
 //!
 //! In the control's units a voltage for one period is a flux, and the stated flux φ is 2/π.
 
-use fixed::FixedI32;
-use fixed::types::extra::U29;
+use crate::units::dimension::Weber;
+use fixed::types::extra::{U27, U29};
 use fixed::types::{I0F32, I5F27};
 
 use super::{Estimate, Input, Told};
 use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq};
-use crate::math::{EIGHTH_PI, Gain, Held, Multiplier, SinCos, TopProduct, TopSum, sin_cos};
+use crate::math::{
+    EIGHTH_PI, Gain, Held, Multiplier, Quantity, SinCos, TopProduct, TopSum, sin_cos,
+};
 use crate::trace::traced;
 use crate::units::{
     Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
-    WideVoltage,
+    WideVoltage, over_period,
 };
+
+/// A flux along an axis of the estimated frame: the sine takes a fraction bit.
+type Component = Quantity<Weber, U27>;
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +47,7 @@ pub struct Config {
     /// ξ of the stated flux.
     pub xi_nominal: InverseFlux,
     /// A quarter over the stated flux: along q to ε.
-    pub quarter_per_flux: Multiplier<I5F27, I5F27>,
+    pub quarter_per_flux: Multiplier<Component, I5F27>,
 }
 
 traced! {
@@ -198,7 +203,9 @@ pub fn estimate(
 
     // ψ += T_s·u − R·T_s/2·(i_k + i_{k−1}), ψ_r = ψ − L·i.
     let step = |v: Voltage, now: Current, before: Current| {
-        config.half_resistance.taken(v, now.plus(before))
+        config
+            .half_resistance
+            .taken(over_period(v), now.plus(before))
     };
     let psi = AlphaBeta {
         alpha: state
@@ -217,14 +224,14 @@ pub fn estimate(
         beta: psi.beta.minus(own.beta),
     };
     // 28 + 31 − 32 fraction bits.
-    let z: Dq<I5F27> = Dq {
+    let z: Dq<Component> = Dq {
         d: psi_r.alpha.top(frame.cos).plus_top(psi_r.beta, frame.sin),
         q: psi_r.beta.top(frame.cos).minus_top(psi_r.alpha, frame.sin),
     };
     state.z_d = Flux::from_bits(z.d.plus(z.d).to_bits());
 
     // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})). The leak is below a half: a bit is free.
-    let led = FixedI32::<U29>::from_bits(state.phi.top(pace.leak).to_bits() << 1);
+    let led: Quantity<Weber, U29> = state.phi.top(pace.leak).scaled();
     state.psi = AlphaBeta {
         alpha: psi
             .alpha
@@ -279,7 +286,7 @@ fn stator_flux(
     inductance: Multiplier<Current, WideFlux>,
     i: AlphaBeta<Current>,
 ) -> AlphaBeta<Flux> {
-    let flux = |i: Current| Flux::from_bits(inductance.of(i).to_bits() << 4);
+    let flux = |i: Current| inductance.of(i).scaled();
     AlphaBeta {
         alpha: flux(i.alpha),
         beta: flux(i.beta),
@@ -290,16 +297,15 @@ fn stator_flux(
 #[inline(always)]
 fn rotor_flux(phi: Flux, frame: SinCos) -> AlphaBeta<Flux> {
     // φ̂ is at most twice the stated flux: a bit is free.
-    let double = |x: I5F27| Flux::from_bits(x.to_bits() << 1);
     AlphaBeta {
-        alpha: double(phi.top(frame.cos)),
-        beta: double(phi.top(frame.sin)),
+        alpha: phi.top(frame.cos).scaled(),
+        beta: phi.top(frame.sin).scaled(),
     }
 }
 
 /// ε/2: z_q over the stated flux, held at ±1, and all of that where the rotor points backwards.
 #[inline(always)]
-fn half_epsilon(config: &Config, z: Dq<I5F27>) -> I0F32 {
+fn half_epsilon(config: &Config, z: Dq<Component>) -> I0F32 {
     let quarter = config.quarter_per_flux.of(z.q).to_bits();
     let held = if z.d.is_negative() {
         whole(quarter)

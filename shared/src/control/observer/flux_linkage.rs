@@ -7,7 +7,7 @@ use fixed::types::extra::U32;
 
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
 use crate::trace::traced;
-use crate::units::{Angle, Current, Flux, Speed, Voltage};
+use crate::units::{Angle, Current, Flux, Speed, Voltage, over_period};
 
 use super::sector::Sector;
 
@@ -90,7 +90,7 @@ pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current;
         let mean_i = (i[phase] >> 1) + (state.i_before[phase] >> 1);
         let drive = v[phase].minus(config.resistance.held(mean_i));
         let psi = state.psi[phase];
-        let psi = (psi - config.forget.apply(psi)).plus(drive);
+        let psi = (psi - config.forget.apply(psi)).plus(over_period(drive));
         let psi = psi.min(psi_max).max(-psi_max);
         state.psi[phase] = psi;
         let integral = match &config.high_pass {
@@ -145,9 +145,7 @@ fn lead_of(corner: Speed, omega: Speed) -> Angle {
     if omega <= Speed::ZERO {
         return Angle::ZERO;
     }
-    // Only the ratio counts, so that the numbers may be read in another type.
-    let read = |speed: Speed| Flux::from_bits(speed.to_bits());
-    atan2_turns(read(corner), read(omega))
+    atan2_turns(corner, omega)
 }
 
 /// Begins as if the rotor had turned at `omega` for long and its flux were now at `theta`.
@@ -183,7 +181,7 @@ const THIRD_TURN: i32 = 1_431_655_765;
 /// The flux times the angle's cosine.
 fn shortened(flux: Flux, angle: Angle) -> Flux {
     // 28 + 31 − 32 fraction bits.
-    Flux::from_bits(flux.top(SinCos::of(angle).cos).to_bits() << 1)
+    flux.top(SinCos::of(angle).cos).scaled()
 }
 
 impl State {}

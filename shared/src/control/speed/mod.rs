@@ -112,5 +112,5 @@ impl State {
 /// The torque of a current with the stated flux, ξ = 1/4.
 #[inline(always)]
 fn torque(i_q: Current) -> Torque {
-    i_q.saturating_mul_int(4)
+    Torque::from_bits(i_q.to_bits().saturating_mul(4))
 }

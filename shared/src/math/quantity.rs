@@ -1,0 +1,377 @@
+//! Numbers with a dimension: a current is not a voltage, though both have the same bits.
+//!
+//! Each operator is one instruction or none: they are inlined where a caller is not optimised for
+//! speed, too, since a call would be longer.
+
+use core::fmt;
+use core::marker::PhantomData;
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Shr, Sub, SubAssign};
+
+use fixed::FixedI32;
+use fixed::traits::{FromFixed, ToFixed};
+use fixed::types::extra::{Diff, LeEqU32, Sum, U32, Unsigned};
+
+use super::{Number, TopProduct};
+use crate::trace::Trace;
+
+/// A number of dimension `D` with `F` fraction bits.
+///
+/// It adds to its like alone. A product with a plain number has the same dimension, and what two
+/// dimensions make is what [`Times`] says; no other product compiles.
+#[repr(transparent)]
+pub struct Quantity<D, F> {
+    number: FixedI32<F>,
+    dimension: PhantomData<D>,
+}
+
+/// The product of two dimensions, written once for each that has a meaning.
+pub trait Times<Rhs> {
+    /// The product with `F` fraction bits.
+    type Product<F: Unsigned>: Number;
+}
+
+impl<D, F> Quantity<D, F> {
+    /// Nothing.
+    pub const ZERO: Self = Self::from_bits(0);
+    /// The least step of the type.
+    pub const DELTA: Self = Self::from_bits(1);
+    /// The lower end of the type.
+    pub const MIN: Self = Self::from_bits(i32::MIN);
+    /// The upper end of the type.
+    pub const MAX: Self = Self::from_bits(i32::MAX);
+
+    /// The plain number as one of this dimension.
+    const fn of(number: FixedI32<F>) -> Self {
+        Self {
+            number,
+            dimension: PhantomData,
+        }
+    }
+
+    /// The quantity of these bits.
+    #[inline(always)]
+    pub const fn from_bits(bits: i32) -> Self {
+        Self::of(FixedI32::from_bits(bits))
+    }
+
+    /// Its bits.
+    #[inline(always)]
+    pub const fn to_bits(self) -> i32 {
+        self.number.to_bits()
+    }
+
+    /// Whether it is below zero.
+    #[inline(always)]
+    pub const fn is_negative(self) -> bool {
+        self.to_bits() < 0
+    }
+
+    /// self + rhs, wrapped.
+    #[inline(always)]
+    #[must_use]
+    pub const fn wrapping_add(self, rhs: Self) -> Self {
+        Self::from_bits(self.to_bits().wrapping_add(rhs.to_bits()))
+    }
+
+    /// self − rhs, wrapped.
+    #[inline(always)]
+    #[must_use]
+    pub const fn wrapping_sub(self, rhs: Self) -> Self {
+        Self::from_bits(self.to_bits().wrapping_sub(rhs.to_bits()))
+    }
+
+    /// −self, wrapped.
+    #[inline(always)]
+    #[must_use]
+    pub const fn wrapping_neg(self) -> Self {
+        Self::from_bits(self.to_bits().wrapping_neg())
+    }
+
+    /// −self, held at the ends of the type.
+    #[inline(always)]
+    #[must_use]
+    pub const fn saturating_neg(self) -> Self {
+        Self::from_bits(self.to_bits().saturating_neg())
+    }
+
+    /// |self|, held at the end of the type.
+    #[inline(always)]
+    #[must_use]
+    pub const fn saturating_abs(self) -> Self {
+        Self::from_bits(self.to_bits().saturating_abs())
+    }
+
+    /// |self|.
+    #[inline(always)]
+    #[must_use]
+    pub const fn abs(self) -> Self {
+        Self::from_bits(self.to_bits().abs())
+    }
+
+    /// |self| in bits.
+    #[inline(always)]
+    pub const fn magnitude_bits(self) -> u32 {
+        self.to_bits().unsigned_abs()
+    }
+}
+
+impl<D, F: Unsigned> Quantity<D, F> {
+    /// Its fraction bits.
+    pub const FRAC_NBITS: u32 = F::U32;
+
+    /// The same quantity with `G` fraction bits: of fewer the last are left out, and what more leave
+    /// no room for wraps.
+    #[inline(always)]
+    #[must_use]
+    pub const fn scaled<G: Unsigned>(self) -> Quantity<D, G> {
+        let bits = self.to_bits();
+        Quantity::from_bits(if G::U32 >= F::U32 {
+            bits << (G::U32 - F::U32)
+        } else {
+            bits >> (F::U32 - G::U32)
+        })
+    }
+}
+
+impl<D, F: LeEqU32> Quantity<D, F> {
+    /// The quantity of a decimal number, for constants.
+    pub const fn lit(number: &str) -> Self {
+        Self::of(FixedI32::<F>::lit(number))
+    }
+
+    /// The nearest quantity to a number that the type can hold, for tests and simulations.
+    pub fn from_num<N: ToFixed>(number: N) -> Self {
+        Self::of(FixedI32::from_num(number))
+    }
+
+    /// The same of any number, wrapped.
+    pub fn wrapping_from_num<N: ToFixed>(number: N) -> Self {
+        Self::of(FixedI32::wrapping_from_num(number))
+    }
+
+    /// The same of any number, held at the ends of the type.
+    pub fn saturating_from_num<N: ToFixed>(number: N) -> Self {
+        Self::of(FixedI32::saturating_from_num(number))
+    }
+
+    /// Its number, for tests and simulations.
+    pub fn to_num<N: FromFixed>(self) -> N {
+        self.number.to_num()
+    }
+}
+
+impl<D, F: Unsigned> Number for Quantity<D, F> {
+    type Frac = F;
+
+    #[inline(always)]
+    fn from_bits(bits: i32) -> Self {
+        Self::from_bits(bits)
+    }
+
+    #[inline(always)]
+    fn to_bits(self) -> i32 {
+        self.to_bits()
+    }
+}
+
+impl<D, F> Trace for Quantity<D, F> {
+    #[inline]
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        self.number.trace(out);
+    }
+}
+
+// By hand: what is derived would ask the same of the dimension.
+impl<D, F> Clone for Quantity<D, F> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<D, F> Copy for Quantity<D, F> {}
+
+impl<D, F> Default for Quantity<D, F> {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl<D, F> PartialEq for Quantity<D, F> {
+    #[inline(always)]
+    fn eq(&self, other: &Self) -> bool {
+        self.to_bits() == other.to_bits()
+    }
+}
+
+impl<D, F> Eq for Quantity<D, F> {}
+
+impl<D, F> PartialOrd for Quantity<D, F> {
+    #[inline(always)]
+    fn partial_cmp(&self, other: &Self) -> Option<core::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+
+    #[inline(always)]
+    fn lt(&self, other: &Self) -> bool {
+        self.to_bits() < other.to_bits()
+    }
+
+    #[inline(always)]
+    fn le(&self, other: &Self) -> bool {
+        self.to_bits() <= other.to_bits()
+    }
+
+    #[inline(always)]
+    fn gt(&self, other: &Self) -> bool {
+        self.to_bits() > other.to_bits()
+    }
+
+    #[inline(always)]
+    fn ge(&self, other: &Self) -> bool {
+        self.to_bits() >= other.to_bits()
+    }
+}
+
+impl<D, F> Ord for Quantity<D, F> {
+    #[inline(always)]
+    fn cmp(&self, other: &Self) -> core::cmp::Ordering {
+        self.to_bits().cmp(&other.to_bits())
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self::from_bits(self.to_bits().max(other.to_bits()))
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self::from_bits(self.to_bits().min(other.to_bits()))
+    }
+}
+
+impl<D, F: LeEqU32> fmt::Debug for Quantity<D, F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.number.fmt(f)
+    }
+}
+
+impl<D, F: LeEqU32> fmt::Display for Quantity<D, F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.number.fmt(f)
+    }
+}
+
+impl<D, F> Add for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, rhs: Self) -> Self {
+        Self::of(self.number + rhs.number)
+    }
+}
+
+impl<D, F> Sub for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, rhs: Self) -> Self {
+        Self::of(self.number - rhs.number)
+    }
+}
+
+impl<D, F> Neg for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self::of(-self.number)
+    }
+}
+
+impl<D, F> AddAssign for Quantity<D, F> {
+    #[inline(always)]
+    fn add_assign(&mut self, rhs: Self) {
+        *self = *self + rhs;
+    }
+}
+
+impl<D, F> SubAssign for Quantity<D, F> {
+    #[inline(always)]
+    fn sub_assign(&mut self, rhs: Self) {
+        *self = *self - rhs;
+    }
+}
+
+impl<D, F> Mul<i32> for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, rhs: i32) -> Self {
+        Self::from_bits(self.to_bits() * rhs)
+    }
+}
+
+impl<D, F> Div<i32> for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn div(self, rhs: i32) -> Self {
+        Self::from_bits(self.to_bits() / rhs)
+    }
+}
+
+impl<D, F> Shr<u32> for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn shr(self, rhs: u32) -> Self {
+        Self::from_bits(self.to_bits() >> rhs)
+    }
+}
+
+impl<D, A, B> TopProduct<FixedI32<B>> for Quantity<D, A>
+where
+    A: Unsigned + Add<B>,
+    B: Unsigned,
+    Sum<A, B>: Unsigned + Sub<U32>,
+    Diff<Sum<A, B>, U32>: Unsigned,
+{
+    type Output = Quantity<D, Diff<Sum<A, B>, U32>>;
+
+    #[inline(always)]
+    fn top(self, rhs: FixedI32<B>) -> Self::Output {
+        Quantity::of(self.number.top(rhs))
+    }
+}
+
+impl<D, A, B> TopProduct<Quantity<D, B>> for FixedI32<A>
+where
+    A: Unsigned + Add<B>,
+    B: Unsigned,
+    Sum<A, B>: Unsigned + Sub<U32>,
+    Diff<Sum<A, B>, U32>: Unsigned,
+{
+    type Output = Quantity<D, Diff<Sum<A, B>, U32>>;
+
+    #[inline(always)]
+    fn top(self, rhs: Quantity<D, B>) -> Self::Output {
+        Quantity::of(self.top(rhs.number))
+    }
+}
+
+impl<D, E, A, B> TopProduct<Quantity<E, B>> for Quantity<D, A>
+where
+    D: Times<E>,
+    A: Unsigned + Add<B>,
+    B: Unsigned,
+    Sum<A, B>: Unsigned + Sub<U32>,
+    Diff<Sum<A, B>, U32>: Unsigned,
+{
+    type Output = D::Product<Diff<Sum<A, B>, U32>>;
+
+    #[inline(always)]
+    fn top(self, rhs: Quantity<E, B>) -> Self::Output {
+        D::Product::from_bits(self.number.top(rhs.number).to_bits())
+    }
+}
