@@ -1,8 +1,8 @@
-//! How others than the wire get at the authority, which may belong to a task that interrupts them.
+//! The authority as others than the wire use it. It may belong to a task that interrupts them.
 
 use super::authority::{Authority, Command, Denied, DriveStatus, TestError};
 
-/// What others than the wire may ask of the [`Authority`], each at one moment.
+/// The requests that others than the wire may make of the [`Authority`], each at one moment.
 pub trait Access {
     /// As [`Authority::command`].
     fn command(&mut self) -> Command;

@@ -1,4 +1,5 @@
-//! What may turn a motor: an armed wire, or a test of limited time. Nothing else.
+//! Decides whether the motor may turn: by an armed wire, or by a test of limited time. Nothing else
+//! turns it.
 //!
 //! The wire is armed by zero throttle held for a time, in a signal that has been identified; it
 //! loses that with its signal, and never turns a motor before. Only a frame whose check sum is right,
@@ -15,7 +16,7 @@ use crate::math::Real;
 
 /// Zero-throttle frames that arm a wire, at least.
 const ARMING_FRAMES: u32 = 30;
-/// The same for pulses, of which a servo's come 50 times a second.
+/// Pulses that arming takes; a servo's come 50 times a second.
 const ARMING_PULSES: u32 = 5;
 
 /// The longest silence behind a DShot command that is no loss, µs. The protocol leaves 260 ms behind a
@@ -28,13 +29,13 @@ const TEST_MOST_S: f32 = 3.0;
 /// Times of the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// How long zero throttle arms, µs.
+    /// Time for which zero throttle must be held to arm, µs.
     pub arm_us: u64,
     /// The longest time without a valid frame; past it the signal is lost, µs.
     pub loss_us: u64,
 }
 
-/// What the motor is to do.
+/// The command to the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     /// Do not turn.
@@ -49,13 +50,13 @@ pub enum Command {
 }
 
 impl Command {
-    /// Whether nothing turns the motor.
+    /// Returns true if nothing turns the motor.
     pub fn rests(self) -> bool {
         matches!(self, Self::Stop | Self::Zero)
     }
 }
 
-/// What the drive is doing, for those who may test only a motor at rest.
+/// The drive's state, for those who may test only a motor at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveStatus {
     /// The drive does not turn the motor, nothing asks it to, and the shaft is at rest.
@@ -93,7 +94,7 @@ pub struct Authority {
     test: Option<Test>,
     /// Disarmed by command while a fault held.
     forgiven: bool,
-    /// Whether nothing may turn the motor, whoever asks.
+    /// True if nothing may turn the motor, whoever asks.
     barred: bool,
 }
 
@@ -110,10 +111,10 @@ struct Arming {
 struct Valid {
     at_us: u64,
     signal: Signal,
-    /// Whether the wire was known to carry this signal, and it means what it says.
+    /// True if the wire was known to carry this signal, and it means what it says.
     identified: bool,
     demand: Demand,
-    /// Whether it was a DShot command.
+    /// True if it was a DShot command.
     command: bool,
 }
 
@@ -266,7 +267,7 @@ impl Authority {
         lost
     }
 
-    /// What the motor is to do, as of the last [`Authority::poll`] or event.
+    /// The command to the motor, as of the last [`Authority::poll`] or event.
     pub fn command(&self) -> Command {
         if let Some(test) = self.test {
             return Command::Test(test.value);
@@ -279,18 +280,18 @@ impl Authority {
         }
     }
 
-    /// Whether the wire shows zero throttle, and no test runs.
+    /// Returns true if the wire shows zero throttle, and no test runs.
     pub fn rests_by_wire(&self) -> bool {
         let zero = |valid: Valid| valid.identified && valid.demand == Demand::Zero;
         self.test.is_none() && self.valid.is_some_and(zero)
     }
 
-    /// Whether a throttle on the wire would turn the motor.
+    /// Returns true if a throttle on the wire would turn the motor.
     pub fn armed(&self) -> bool {
         self.armed
     }
 
-    /// Whether the wire asks the motor to turn, and may not.
+    /// Returns true if the wire asks the motor to turn, and may not.
     pub fn refuses(&self) -> bool {
         let open = self
             .valid
@@ -298,8 +299,8 @@ impl Authority {
         open && !self.armed
     }
 
-    /// Whether a valid frame or pulse has come within the loss time. An armed wire that rests by a command
-    /// may be silent for longer behind it: that stops nothing which has not been stopped.
+    /// Returns true if a valid frame or pulse has come within the loss time. After a command an armed
+    /// wire at rest may be silent for longer: that stops nothing which is not stopped already.
     pub fn signal_present(&self, now_us: u64) -> bool {
         let loss_us = match self.valid {
             Some(valid) if self.armed && valid.command => self.timing.loss_us.max(COMMAND_GAP_US),
@@ -369,8 +370,9 @@ impl Authority {
         Ok(())
     }
 
-    /// Whether something else than the wire may use the motor: it rests without a fault, and the wire is
-    /// silent or at valid zero. Where nothing may turn it, a self-test still may tell why.
+    /// Returns true if something else than the wire may use the motor: it rests without a fault, and
+    /// the wire is silent or at valid zero. Even if nothing may turn the motor, a self-test may still
+    /// find out why.
     pub fn may_test(&self, now_us: u64, drive: DriveStatus) -> bool {
         let silent = !within(now_us, self.event_us, self.timing.loss_us);
         drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us))

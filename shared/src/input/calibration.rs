@@ -17,20 +17,20 @@ const NONE_NS: core::ops::RangeInclusive<u32> = 800_000..=1_300_000;
 /// The least distance of the two ends, ns.
 const SPAN_NS: u32 = 500_000;
 
-/// How long full throttle is held, µs. PX4 holds it for 3.00 to 3.05 s from the battery on, ArduPilot
-/// for 5 s; the ESC's start and the signal's identification, 0.1 s each, come off that.
+/// Time for which full throttle must be held, µs. PX4 holds it for 3.00 to 3.05 s from the battery on,
+/// ArduPilot for 5 s; the ESC's start and the signal's identification, 0.1 s each, come off that.
 const FULL_US: u64 = 2_200_000;
-/// How long no throttle is held, µs.
+/// Time for which no throttle must be held, µs.
 const NONE_US: u64 = 1_500_000;
 /// The most that a held stick strays from where it was when it came to rest, ns: receivers jitter by
 /// some µs.
 const STEADY_NS: u32 = 16_000;
 /// The longest way of the stick from one end to the other, µs.
 const WAY_US: u64 = 2_000_000;
-/// How long the stick is waited for that a ground station wants measured, µs.
+/// Timeout for the stick once a ground station has asked for a calibration, µs.
 const WAIT_US: u64 = 60_000_000;
 
-/// What is to be told.
+/// A step to report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Full throttle has been measured; no throttle is awaited.
@@ -92,8 +92,8 @@ impl Calibration {
         cancelled
     }
 
-    /// Whether what the stick shows is no throttle: it has been asked for, or full throttle has been
-    /// measured and no throttle is awaited.
+    /// Returns true if the stick calibrates and is no throttle: a calibration has been asked for, or
+    /// full throttle has been measured and no throttle is awaited.
     pub fn is_under_way(&self) -> bool {
         self.asked_us.is_some() || matches!(self.stage, Stage::None { .. })
     }
@@ -219,7 +219,7 @@ mod tests {
     }
 
     impl Bench {
-        /// What is told, and how many ms after the first of these pulses.
+        /// The steps reported, each with the ms since the first of these pulses.
         fn hold(&mut self, ms: u64, width_us: impl Fn(u64) -> u32) -> Vec<(u64, Step)> {
             let mut steps = Vec::new();
             for pulse in 0..ms / 20 {

@@ -55,7 +55,7 @@ pub(super) struct Decoder {
     unread: u8,
 }
 
-/// What one rate's bits may take.
+/// The durations that one rate's bits may have.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     rate: Rate,
@@ -193,12 +193,12 @@ impl Decoder {
         self.unread = 0;
     }
 
-    /// Whether the line has come to rest after edges that have not been reported.
+    /// Returns true if the line has come to rest after edges that have not been reported.
     fn rests(&self, now_ticks: u32) -> bool {
         self.unread > 0 && since(now_ticks, self.back(0)) >= self.rest_ticks
     }
 
-    /// What the run becomes by an edge at this time.
+    /// The run of edges with one more at this time.
     fn run_with(&self, at_ticks: u32) -> u8 {
         if at_ticks.wrapping_sub(self.back(0)) >= self.rest_least {
             1
@@ -276,7 +276,7 @@ impl Decoder {
     }
 }
 
-/// What 16 bits say, of which the whole ones take `span`, by the first and the second edge of each.
+/// Reads 16 bits, of which the whole ones take `span`, from the first and the second edge of each.
 #[inline(always)]
 fn read(span: u32, bit: impl Fn(usize) -> (u32, u32)) -> Option<u16> {
     // Whole ticks on the inner side of so many shares of the mean bit. A span is below 500 000.

@@ -41,18 +41,19 @@ const REPEATS: u8 = 6;
 
 /// For how long a bad frame makes the wire one whose single frames prove nothing, µs.
 const DOUBT_US: u64 = 50_000;
-/// The same for two of them.
+/// The time for two of them.
 const DOUBT_OF_TWO_US: u64 = 1_000_000;
 /// The longest time between those two, µs.
 const BAD_APART_US: u64 = 500_000;
 
-/// How long the wire has been at zero throttle before a command waits for a motor that still turns, µs.
+/// Time for which the wire must be at zero throttle before a command waits for a motor that still
+/// turns, µs.
 const SETTLED_US: u64 = 100_000;
 
 /// The least time between two beacons, which flight controllers leave too, µs.
 const BEACON_APART_US: u64 = 260_000;
 
-/// What a command wants done.
+/// The order that a command gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// Sound a beacon.
@@ -61,7 +62,7 @@ pub enum Order {
     Info,
     /// Set `MOT_DIR`, to 1 if reversed.
     Direction {
-        /// Whether it is the other direction.
+        /// True for the other direction.
         reversed: bool,
     },
     /// Set `INP_3D`.
@@ -72,7 +73,7 @@ pub enum Order {
     Extended(bool),
     /// Turn as `MOT_DIR` says or against it, until the next start.
     Spin {
-        /// Whether it is against `MOT_DIR`.
+        /// True if it is against `MOT_DIR`.
         opposite: bool,
     },
     /// Turn the light on or off.
@@ -82,7 +83,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// What this value means.
+    /// The order of this value.
     pub(crate) fn of(value: u16) -> Option<Self> {
         Some(match value {
             1 => Self::Beacon(Beacon::One),
@@ -107,7 +108,7 @@ impl Order {
         })
     }
 
-    /// Whether it waits until the motor stands, where it comes before.
+    /// Returns true if it waits until the motor stands, if it comes before.
     pub(crate) fn waits(self) -> bool {
         matches!(
             self,
@@ -115,7 +116,8 @@ impl Order {
         )
     }
 
-    /// Whether it may be given now: the motor stands, or the wire has been at zero throttle for so long, µs.
+    /// Returns true if it may be given now: the motor stands, or the wire has been at zero throttle for
+    /// so long, µs.
     pub(super) fn is_in_time(self, stopped: bool, zero_us: u64) -> bool {
         stopped || matches!(self, Self::Extended(_)) || self.waits() && zero_us >= SETTLED_US
     }
@@ -142,12 +144,12 @@ pub struct Commands {
     value: u16,
     /// Valid frames of this value in a row; it stops at [`REPEATS`].
     count: u8,
-    /// Whether this value has been obeyed since it came.
+    /// True if this value has been obeyed since it came.
     done: bool,
-    /// Whether the last frame was bad.
+    /// True if the last frame was bad.
     spoilt: bool,
     bad_us: Option<u64>,
-    /// Whether another bad frame came shortly before that.
+    /// True if another bad frame came shortly before that.
     doubted: bool,
     beacon_us: Option<u64>,
 }
@@ -199,7 +201,7 @@ impl Commands {
     }
 }
 
-/// Whether it is at most `most_us` since some time.
+/// Returns true if at most `most_us` have passed since some time.
 pub(super) fn within(now_us: u64, since_us: Option<u64>, most_us: u64) -> bool {
     since_us.is_some_and(|since_us| now_us.saturating_sub(since_us) <= most_us)
 }
@@ -223,7 +225,7 @@ mod tests {
             }
         }
 
-        /// What is ordered, and by which of these frames, counted from 1.
+        /// The orders, each with the frame that gave it, counted from 1.
         fn play(&mut self, count: usize, value: u16) -> Vec<(usize, Order)> {
             let mut orders = Vec::new();
             for number in 1..=count {

@@ -1,11 +1,11 @@
-//! What a frame or a pulse asks of the motor.
+//! The demand on the motor that a frame or a pulse makes.
 
 use super::Share;
 use super::dshot::Kind;
 use super::endpoints::EndPoints;
 use super::line::Event;
 
-/// What is asked of the motor.
+/// The demand on the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
     /// Not to turn. So do DShot's stop and its commands.
@@ -14,10 +14,10 @@ pub enum Demand {
     Throttle(Share),
 }
 
-/// How frames and pulses are read.
+/// The way frames and pulses are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
-    /// Whether throttle has two directions (`INP_3D`).
+    /// True if throttle has two directions (`INP_3D`).
     pub two_directions: bool,
     /// The ends of the pulses' range.
     pub ends: EndPoints,
@@ -37,7 +37,7 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// What an event asks for; a bad one asks for nothing.
+    /// The demand of an event; a bad one has none.
     pub fn demand(&self, event: &Event) -> Option<Demand> {
         Some(match *event {
             Event::Frame { frame, .. } => match frame.kind(self.two_directions) {

@@ -6,15 +6,15 @@
 use super::line::Event;
 use super::signal::{Pulse, Signal};
 
-/// How often a signal must have been found, and for how long, before it is believed. At 50 Hz four
-/// pulses take 60 ms, and the first one may come 20 ms late.
+/// Hits after which a signal is believed, with the time below. At 50 Hz four pulses take 60 ms, and the
+/// first one may come 20 ms late.
 const HITS: u32 = 4;
 const HELD_MS: u32 = 50;
 
 /// The longest time between two hits, ms.
 const GAP_MS: u32 = 100;
 
-/// What the width of a pulse may differ from the one before, as a part of its range: a stick that
+/// Greatest difference between the widths of two pulses, as a part of the range: that of a stick that
 /// goes from end to end in 0.16 s, at 50 Hz. Random edges differ by more.
 const STEADY_PART: u32 = 8;
 

@@ -11,22 +11,22 @@ const LAST_THROTTLE: u16 = 2047;
 /// The first value of the second direction, where throttle has two.
 const FIRST_FORWARD: u16 = 1048;
 
-/// What makes of a frame's bits those of this kind of wire, by exclusive or: a bidirectional one
-/// inverts all four bits of the check sum.
+/// The bits to flip in a frame on this kind of wire: a bidirectional one inverts all four bits of the
+/// check sum.
 pub const fn check_mask(bidirectional: bool) -> u16 {
     if bidirectional { 0xF } else { 0 }
 }
 
-/// What a frame carries.
+/// The contents of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// 0 stop, 1 to 47 commands, 48 to 2047 throttle; higher bits are not sent.
     pub value: u16,
-    /// Whether the sender asks for telemetry.
+    /// True if the sender asks for telemetry.
     pub telemetry: bool,
 }
 
-/// What a frame's value means.
+/// The meaning of a frame's value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Stop the motor: value 0.
@@ -54,12 +54,12 @@ impl Frame {
         data << 4 | check_sum(data)
     }
 
-    /// Whether it is a command: a value from 1 to 47.
+    /// Returns true for a command: a value from 1 to 47.
     pub fn is_command(self) -> bool {
         (1..FIRST_THROTTLE).contains(&self.value)
     }
 
-    /// What the value means, where throttle has two directions (`INP_3D`) or one.
+    /// The meaning of the value, if throttle has two directions (`INP_3D`) or one.
     pub fn kind(self, two_directions: bool) -> Kind {
         match self.value {
             0 => Kind::Stop,
@@ -73,7 +73,7 @@ impl Frame {
     }
 }
 
-/// Where a value stands between the first and the last one.
+/// The share of the way from the first to the last value.
 fn share(value: u16, first: u16, last: u16) -> Share {
     let (step, steps) = (u32::from(value.min(last) - first), u32::from(last - first));
     // step·2^31/steps in 32 bits: the whole part of 2^31/steps, and its rest.

@@ -50,7 +50,7 @@ impl Pulse {
 }
 
 impl EndPoints {
-    /// What a pulse asks for. Beyond an end it is as at the end.
+    /// The demand of a pulse. Beyond an end it is as at the end.
     pub fn demand(self, kind: Pulse, width_ns: u32, two_directions: bool) -> Demand {
         let width_ns = kind.servo_ns(width_ns);
         let min_ns = u32::from(self.min_us) * NS_PER_US;
@@ -76,7 +76,7 @@ impl EndPoints {
     }
 }
 
-/// How far a width is above the widest that is zero, as a share of the way to full throttle.
+/// The share of the way to full throttle by which a width is above the widest that is zero.
 fn above(width_ns: u32, zero_ns: u32, full_ns: u32) -> Option<Share> {
     let over_ns = width_ns.min(full_ns).checked_sub(zero_ns)?;
     if over_ns == 0 {

@@ -12,7 +12,7 @@ pub(super) struct Edge {
     pub(super) level: bool,
 }
 
-/// What an edge told.
+/// The result of an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Told {
     /// The edge before, if this one confirms it.
@@ -24,7 +24,7 @@ pub(super) struct Told {
 /// The filter of one line.
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
-    /// How long a level must last, ticks.
+    /// Time for which a level must last, ticks.
     pub(super) time_ticks: u32,
     /// The level that is believed; nothing before the first edge.
     level: Option<bool>,
@@ -84,7 +84,7 @@ impl Filter {
             .flatten()
     }
 
-    /// Whether the line is believed to be at this level, or nothing is known of it.
+    /// Returns true if the line is believed to be at this level, or nothing is known of it.
     pub(super) fn rests_at(&self, level: bool) -> bool {
         self.pending.is_none() && self.level.is_none_or(|believed| believed == level)
     }
@@ -123,7 +123,8 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// What a filter of 10 ticks believes of these edges, the last of them long before the end.
+    /// The levels that a filter of 10 ticks believes for these edges, the last of them long before the
+    /// end.
     fn believed(edges: &[(u32, bool)]) -> Vec<(u32, bool)> {
         let mut filter = Filter::new(10);
         let mut believed: Vec<_> = edges

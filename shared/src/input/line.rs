@@ -11,7 +11,7 @@ use crate::math::quotient;
 /// A line without an edge for so long is at rest, whatever was on it. At 50 Hz pulses leave 19 ms.
 const SILENCE_MS: u32 = 100;
 
-/// What has been found on the wire.
+/// A finding on the wire.
 ///
 /// In whole words, tag and all: a chip copies it in a few instructions at every edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,11 +19,11 @@ const SILENCE_MS: u32 = 100;
 pub enum Event {
     /// A DShot frame with a right check sum.
     Frame {
-        /// How fast it was sent.
+        /// Its rate.
         rate: Rate,
-        /// Whether the line rests high and the check sum is inverted.
+        /// True if the line rests high and the check sum is inverted.
         bidirectional: bool,
-        /// What it carries.
+        /// Its contents.
         frame: Frame,
         /// When its first edge came, in ticks of the capturing timer.
         first_edge_ticks: u32,
@@ -225,7 +225,7 @@ impl Line {
     }
 }
 
-/// How long a level must last to be believed.
+/// Time for which a level must last to be believed, ticks.
 fn filter_ticks(tick_hz: u32, signal: Option<Signal>) -> u32 {
     let time_ns = match signal {
         // A sixteenth of a bit. The shortest level of DShot1200 with its errors is 66 ns.

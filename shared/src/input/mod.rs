@@ -52,23 +52,23 @@ pub const fn reverse(throttle: Share) -> Share {
     Share::from_bits(!throttle.to_bits())
 }
 
-/// What the parameters say of the wire.
+/// The settings of the wire, from the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// The signal that is taken and no other (`INP_PROTO`); any if there is none.
     pub protocol: Option<Signal>,
-    /// How long what takes.
+    /// Durations.
     pub timing: Timing,
-    /// How frames and pulses are read.
+    /// The way frames and pulses are read.
     pub reading: Reading,
 }
 
-/// What an edge has brought.
+/// The result of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heard {
     /// A frame or pulse of the signal that the wire is known to carry.
     pub event: Event,
-    /// What the frame orders.
+    /// The order of the frame, if it gives one.
     pub order: Option<Order>,
 }
 
@@ -236,7 +236,8 @@ impl Input {
         }
     }
 
-    /// Whether a signal has been lost since this was last asked: who sends the next one may be another.
+    /// Returns true if a signal has been lost since the last call: the next one may come from another
+    /// sender.
     pub fn take_loss(&mut self) -> bool {
         core::mem::take(&mut self.lost)
     }
@@ -262,12 +263,12 @@ impl Input {
         self.line.signal()
     }
 
-    /// What may turn the motor.
+    /// The authority over the motor.
     pub fn authority(&self) -> &Authority {
         &self.authority
     }
 
-    /// The same, for those who may disarm it or test.
+    /// The authority, for those who may disarm it or test.
     pub fn authority_mut(&mut self) -> &mut Authority {
         &mut self.authority
     }

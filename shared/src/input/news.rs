@@ -1,4 +1,4 @@
-//! What the wire has to tell a person, and when.
+//! The wire's news for a person.
 
 use super::calibration::Step;
 use super::signal::Signal;
@@ -19,7 +19,7 @@ pub enum News {
     Identified(Signal),
     /// The signal is gone.
     Lost {
-        /// Whether the wire was armed.
+        /// True if the wire was armed.
         armed: bool,
     },
     /// The wire is armed.
@@ -30,17 +30,17 @@ pub enum News {
     Calibration(Step),
 }
 
-/// How things stand on the wire.
+/// The present state of the wire.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
     /// The signal that has been identified and is there.
     pub(super) signal: Option<Signal>,
     pub(super) armed: bool,
-    /// Whether the wire asks the motor to turn, may not, and this is nobody's calibration.
+    /// True if the wire asks the motor to turn, may not, and this is nobody's calibration.
     pub(super) open: bool,
 }
 
-/// What has been told.
+/// News that has been reported.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Announcer {
     signal: Option<Signal>,

@@ -31,7 +31,7 @@ pub(super) struct Decoder {
     fall_at: u32,
     /// From the pulse before to the latest one, ticks.
     spacing: Option<Spacing>,
-    /// Whether the last pulse was one.
+    /// True if the last pulse was one.
     sound: bool,
 }
 

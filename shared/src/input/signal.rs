@@ -35,7 +35,7 @@ impl Pulse {
     }
 }
 
-/// What a wire carries.
+/// A signal that a wire may carry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
     /// Pulses.
@@ -44,8 +44,8 @@ pub enum Signal {
     Dshot {
         /// Their bit rate.
         rate: Rate,
-        /// Whether the line rests high, the check sum is inverted and each frame is answered on
-        /// the same wire.
+        /// True if the line rests high, the check sum is inverted and each frame is answered on the
+        /// same wire.
         bidirectional: bool,
     },
 }
@@ -85,7 +85,7 @@ impl Signal {
         Some(row.0)
     }
 
-    /// Whether the line is high between its frames.
+    /// Returns true if the line is high between its frames.
     pub fn rests_high(self) -> bool {
         matches!(
             self,

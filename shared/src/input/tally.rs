@@ -1,4 +1,4 @@
-//! How many of the frames on the wire are bad.
+//! The share of the frames on the wire that are bad.
 
 /// The time over which a share is taken, µs.
 const WINDOW_US: u64 = 1_000_000;

@@ -1,4 +1,4 @@
-//! Whether a wire's frames are somebody's, or noise that passes the check now and then.
+//! Tells a sender's frames from noise that passes the check now and then.
 //!
 //! Four check bits let one random word in sixteen pass, and nearly all of those are throttle. So a good
 //! frame is evidence of its wire, and a bad one against it: of a link in which half of the frames are good,
@@ -12,7 +12,7 @@
 //! half are, one good frame in 2760 is missed, and a tenth of a second of silence at 1 kHz comes once in
 //! three years. Twelve bad frames in a row cost none of the good ones behind them, any number at most four.
 
-/// What a good frame adds; a bad one takes 1.
+/// Evidence of a good frame; a bad one takes 1.
 const GOOD: u8 = 3;
 /// From here on frames are believed.
 const BELIEVED: u8 = 15;
@@ -49,7 +49,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// How likely each count is after many frames of which this share is good, in any order.
+    /// The probability of each count after many frames of which this share is good, in any order.
     fn counts(good: f64) -> Vec<f64> {
         let mut counts = vec![0.0; usize::from(MOST) + 1];
         counts[usize::from(MOST)] = 1.0;

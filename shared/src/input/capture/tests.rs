@@ -69,7 +69,7 @@ impl Wire {
         check_mask(self.bidirectional)
     }
 
-    /// What a frame of these bits is, the first edge of which came at `start_ns`.
+    /// The event for a frame of these bits, the first edge of which came at `start_ns`.
     fn wanted(&self, bits: u16, rate: Rate, start_ns: f64) -> Option<Event> {
         Frame::from_bits(bits).map(|frame| Event::Frame {
             rate,
@@ -79,7 +79,7 @@ impl Wire {
         })
     }
 
-    /// Whether a frame of `WORD` is found at its last edge, and nothing before.
+    /// Returns true if a frame of `WORD` is found at its last edge, and nothing before.
     fn finds(&mut self, rate: Rate) -> bool {
         let wanted = self.wanted(WORD, rate, self.now_ns);
         at_the_end(&self.frame(WORD, rate, 1.0), wanted)
@@ -346,7 +346,7 @@ fn rates_and_timers() -> impl Strategy<Value = (Rate, u32)> {
     ]
 }
 
-/// What an edge strays, ns: often all of it.
+/// Displacements of edges, ns: often as far as they may go.
 fn jitters() -> impl Strategy<Value = Vec<f64>> {
     let one = prop_oneof![Just(-60.0), Just(60.0), -60.0..60.0];
     prop::collection::vec(one, 32)

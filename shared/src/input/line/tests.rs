@@ -107,7 +107,7 @@ fn width_ns(kind: Pulse) -> u32 {
     least_ns + (most_ns - least_ns) / 8
 }
 
-/// Whether the events are one, and a frame or pulse of this signal that was sent whole.
+/// Returns true for exactly one event, a frame or pulse of this signal that was sent whole.
 fn whole(events: &[Event], signal: Signal) -> bool {
     let [event] = events else { return false };
     let right = match *event {
