@@ -47,7 +47,7 @@ impl<A, B> Multiplier<A, B> {
         }
     }
 
-    /// The same factor as [`Multiplier::from_bits`] takes it.
+    /// The factor's bits, as [`Multiplier::from_bits`] takes them.
     pub const fn to_bits(self) -> i32 {
         self.bits
     }

@@ -1,4 +1,4 @@
-//! What the arithmetic needs of a number.
+//! The properties of a number that the arithmetic needs.
 
 use fixed::FixedI32;
 use fixed::types::extra::Unsigned;

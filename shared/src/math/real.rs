@@ -5,8 +5,8 @@ use fixed::{FixedI64, FixedU32};
 
 use super::Number;
 
-/// The same numbers as the [`fixed`] crate's `saturating_from_num` and `to_num`, but that NaN is 0
-/// and no panic, in a tenth of the chip's flash: single precision alone, and once for all types.
+/// Conversions as the [`fixed`] crate's `saturating_from_num` and `to_num`, but with NaN as 0 and no
+/// panic, in a tenth of the chip's flash: single precision alone, and once for all types.
 pub trait Real {
     /// The nearest number, of two the even one, held at the ends of the type.
     fn from_f32(value: f32) -> Self;

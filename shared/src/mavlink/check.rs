@@ -1,4 +1,4 @@
-//! What guards a frame.
+//! The seeds of the messages' checksums.
 //!
 //! Each message's check has a seed of its own. A receiver must know it of the whole dialect, not only
 //! of what an ESC obeys: a frame that something else carries (a file, a tunnel) is not found then. The

@@ -48,8 +48,8 @@ const INTERVAL_MAX_US: f32 = 2_147_483_520.0;
 
 /// For how long a command that is sent again is the same one; clients give up after 3 s or less.
 const REPEAT_US: u64 = 5_000_000;
-/// The same for COMMAND_INT, which has no number of its transmission: as long as a client waits for
-/// an ACK, and hardly as long as a person takes to ask for the same again.
+/// That time for COMMAND_INT, which has no number of its transmission: as long as a client waits for an
+/// ACK, and hardly as long as a person takes to ask for the same again.
 const REPEAT_INT_US: u64 = 1_000_000;
 
 /// A command as COMMAND_LONG and COMMAND_INT carry it. The number is read as it is: it may be one
@@ -60,7 +60,7 @@ pub(super) struct Command {
     trust: Trust,
     signed: bool,
     at_us: u64,
-    /// Whether it names exactly this component of this system.
+    /// True if it names exactly this component of this system.
     exact: bool,
     number: u16,
     /// Number of the transmission, which COMMAND_INT does not have.
@@ -101,7 +101,7 @@ impl Command {
         (whole as f32 == value && whole >= -1).then_some(whole)
     }
 
-    /// Whether its sender may have it obeyed: who may only ask gets messages.
+    /// Returns true if its sender may have it obeyed: those who may only ask get messages.
     fn is_allowed(&self) -> bool {
         self.trust == Trust::Full || self.asks()
     }
@@ -110,13 +110,13 @@ impl Command {
         matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL)
     }
 
-    /// Whether there is something to be kept once it is obeyed: an interval, and the time of a
+    /// Returns true if something must be kept once it is obeyed: an interval, and the time of a
     /// signature, so that what was obeyed is not obeyed again after a reset.
     fn leaves(&self) -> bool {
         self.number == SET_MESSAGE_INTERVAL || (self.signed && !self.asks())
     }
 
-    /// Whether this is the same command sent again because its ACK did not arrive. Values are
+    /// Returns true if this is the same command sent again because its ACK did not arrive. Values are
     /// compared by their bits: NaN is a value here.
     #[inline(never)]
     fn repeats(&self, earlier: &Self) -> bool {
@@ -148,7 +148,7 @@ pub(super) struct Commands {
     params_changed: bool,
     request: Option<Request>,
     reboot: bool,
-    /// Whether one has left something to be kept.
+    /// True if a command has left something to be kept.
     left: bool,
 }
 
@@ -244,13 +244,13 @@ impl Commands {
         })
     }
 
-    /// Whether something is under way that another command must not come between.
+    /// Returns true if something is under way that another command must not come between.
     fn is_busy(&self) -> bool {
         self.storage.is_some() || self.under_way.is_some() || self.reboot
     }
 
-    /// Whether a command means the motor of this ESC by this number. None in particular is this one
-    /// only where nobody else was asked.
+    /// Returns true if a command means the motor of this ESC by this number. No number in particular
+    /// means this one only if nobody else was asked.
     fn is_own(&self, function: f32, command: &Command) -> bool {
         function == self.function || (function == 0.0 && command.exact)
     }
@@ -314,7 +314,7 @@ impl Commands {
         ACCEPTED
     }
 
-    /// What was under way by this command has this result, if it was.
+    /// Ends what was under way by this command with a result, if anything was.
     fn end(&mut self, number: u16, result: MavResult, replies: &mut Replies) {
         if let Some(command) = self.under_way.take_if(|command| command.number == number) {
             self.last = Some((command, result));
@@ -327,7 +327,7 @@ impl Commands {
         self.act.take()
     }
 
-    /// Whether one has left something to be kept since this was asked.
+    /// Returns true if a command has left something to be kept since the last call.
     pub(super) fn take_left(&mut self) -> bool {
         core::mem::take(&mut self.left)
     }
@@ -348,8 +348,8 @@ impl Commands {
     }
 }
 
-/// Whether a command that looks like an earlier one is that one: the number of the transmission
-/// says so, and where there is none, that the test which it asked for still runs.
+/// Returns true if a command that looks like an earlier one is that one: by the number of the
+/// transmission, or without one if the test that it asked for still runs.
 fn is_known(command: &Command, context: &mut Context) -> bool {
     let tests = matches!(context.authority.command(), authority::Command::Test(_));
     let is_test = matches!(command.number, DO_MOTOR_TEST | ACTUATOR_TEST);

@@ -32,7 +32,7 @@ mod send;
 const PING_ID: u32 = PING.0;
 const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"), ", ");
 
-/// What the component is told and may change.
+/// The component's surroundings: what it reads and may change.
 pub struct Context<'a> {
     /// Time since the start, µs; it does not run backwards.
     pub now_us: u64,
@@ -40,11 +40,11 @@ pub struct Context<'a> {
     pub params: &'a mut Params,
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
-    /// What the last self-test has found.
+    /// The result of the last self-test.
     pub check: &'a Report,
-    /// What decides whether the motor may turn.
+    /// Decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
-    /// Whether values make a drive; a value that breaks it is refused with the reason.
+    /// Checks that values make a drive; a value that breaks it is refused with the reason.
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
 }
 
@@ -54,14 +54,14 @@ impl Context<'_> {
     }
 }
 
-/// What only the caller can do.
+/// A request that only the caller can carry out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Put the parameters in force: build the drive's configuration anew.
     ParamsChanged,
     /// Write what is kept to flash, then call [`Component::storage_done`].
     Save,
-    /// The same, but nobody has asked for it.
+    /// Save without being asked.
     Keep,
     /// Read the parameters and intervals from flash and put them in force, then call
     /// [`Component::storage_done`].
@@ -73,7 +73,7 @@ pub enum Request {
     Reboot,
 }
 
-/// What the ESC does at once, and tells of if it takes longer.
+/// An act that the ESC does at once. It reports progress if the act takes longer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
     /// Sound a beacon.
@@ -97,9 +97,9 @@ pub struct Component {
     schedule: Schedule,
     commands: Commands,
     params_changed: bool,
-    /// Whether something that is kept has changed.
+    /// True if something that is kept has changed.
     keep: bool,
-    /// Whether the key is to go once the replies have left.
+    /// True if the key is to go once the replies have left.
     unsign: bool,
     announcer: Announcer,
     /// As of the last poll.
@@ -267,17 +267,17 @@ impl Component {
         self.unsign = true;
     }
 
-    /// How often messages are sent, as kept from before.
+    /// Sets the intervals of messages to those kept from before.
     pub fn keep_intervals(&mut self, intervals: &Intervals) {
         self.schedule.keep(intervals);
     }
 
-    /// How often messages are sent, to be kept over a loss of power.
+    /// The intervals of messages, to be kept over a loss of power.
     pub fn kept_intervals(&self) -> Intervals {
         self.schedule.intervals()
     }
 
-    /// Whether something that is kept has changed since this was asked.
+    /// Returns true if something that is kept has changed since the last call.
     pub fn take_changed(&mut self) -> bool {
         core::mem::take(&mut self.keep) | self.commands.take_left()
     }

@@ -13,7 +13,7 @@ pub(super) enum News {
     Ended(Fault),
 }
 
-/// What has been told of each fault.
+/// The state of each fault as reported last.
 #[derive(Clone, Debug)]
 pub(super) struct Announcer {
     told: [bool; Fault::ALL.len()],

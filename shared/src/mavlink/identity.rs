@@ -16,7 +16,7 @@ pub struct Address {
     pub component: u8,
 }
 
-/// What the ESC is to a ground station (`MAV_ROLE`).
+/// The ESC's role to a ground station (`MAV_ROLE`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// A vehicle of its own, component 1: ground stations show nothing else.
@@ -59,13 +59,13 @@ impl Identity {
         }
     }
 
-    /// Whether something for this target is for this ESC.
+    /// Returns true if something for this target is for this ESC.
     pub(super) fn is_for(&self, target: Address) -> bool {
         (target.system == 0 || target.system == self.address.system)
             && (target.component == 0 || target.component == self.address.component)
     }
 
-    /// Whether this is what a peripheral waits for: the first sign of an autopilot.
+    /// Returns true for what a peripheral waits for: the first sign of an autopilot.
     pub(super) fn awaits(&self, frame: &Frame) -> bool {
         // Offset 5 is the autopilot: of a ground station and of other peripherals it is INVALID. System 0
         // stands for all, and is nobody's.

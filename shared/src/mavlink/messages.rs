@@ -1,4 +1,4 @@
-//! What the messages say of the ESC.
+//! Messages about the ESC.
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,

@@ -1,11 +1,11 @@
-//! What the throttle wire has to tell, in words.
+//! The throttle wire's news in words.
 
 use mavlink::dialects::ardupilotmega::MavSeverity;
 
 use crate::input::News;
 use crate::input::calibration::Step;
 
-/// How grave it is and what it says, in two pieces; nothing for what only a tune tells.
+/// Severity and text of news, in two pieces; `None` for news that only a tune tells.
 pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
     Some(match news {
         News::Identified(signal) => (

@@ -8,10 +8,10 @@ pub(super) struct Pace {
     free_us: u64,
 }
 
-/// What may always leave at once: the longest frame, or all signals of the control, signed.
+/// Bytes that may always leave at once: the longest frame, or all signals of the control, signed.
 const AT_ONCE_MAX: usize = 400;
 
-/// What may leave at once otherwise, as time of the share.
+/// Bytes that may leave at once otherwise, as time of the share.
 const BURST_US: u64 = 20_000;
 
 impl Pace {

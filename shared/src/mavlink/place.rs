@@ -34,7 +34,7 @@ impl Place {
         self.0 - self.0 % SLOTS as u8
     }
 
-    /// How many ESCs there are at least. It is not known here; readers ignore what is above it.
+    /// The least number of ESCs that there are. It is not known here; readers ignore what is above it.
     pub(super) const fn count(self) -> u8 {
         self.0 + 1
     }

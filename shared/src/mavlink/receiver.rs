@@ -15,7 +15,7 @@ pub(super) const SIGNED: u8 = 0x01;
 /// a frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
 const IDLE_US: u64 = 100_000;
 
-/// What a receiver has seen since the start; each counter stops at its greatest value.
+/// Counts since the start; each counter stops at its greatest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames handed on.
@@ -95,7 +95,7 @@ impl Frame<'_> {
     }
 }
 
-/// What stands at the front of the bytes that wait.
+/// The front of the bytes that wait.
 enum Front {
     /// Nothing that could be a frame yet, or not all of it.
     Wait,
@@ -149,7 +149,7 @@ impl Receiver {
         }
     }
 
-    /// What it has seen since the start.
+    /// The counts since the start.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
@@ -266,7 +266,7 @@ impl Receiver {
     }
 }
 
-/// Whether a frame whose header is complete has a signature.
+/// Returns true if a frame whose header is complete has a signature.
 pub(super) fn is_signed(bytes: &[u8]) -> bool {
     matches!(*bytes, [MAV_STX_V2, _, flags, ..] if flags & SIGNED != 0)
 }

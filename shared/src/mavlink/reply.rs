@@ -1,4 +1,4 @@
-//! What waits to be sent at the next poll.
+//! Replies that wait for the next poll.
 
 use heapless::Deque;
 use mavlink::MessageData;
@@ -137,7 +137,7 @@ impl Replies {
         ParamId::ALL.get(index).copied()
     }
 
-    /// Whether replies were dropped since it was last asked.
+    /// Returns true if replies were dropped since the last call.
     pub(super) fn take_overrun(&mut self) -> bool {
         core::mem::take(&mut self.overrun)
     }

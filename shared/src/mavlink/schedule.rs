@@ -45,7 +45,7 @@ impl Stream {
         }
     }
 
-    /// What its frames take at most, with what each has beside its payload.
+    /// The most bytes that its frames take, each with its overhead.
     fn frames_len(self, params: &Params, overhead_len: usize) -> usize {
         let (frames, len) = match self {
             Self::Heartbeat => (1, HEARTBEAT_DATA::ENCODED_LEN),
@@ -78,7 +78,7 @@ pub(super) fn signals(params: &Params) -> u32 {
     params.get(ParamId::TelSignals) as u32
 }
 
-/// How often a stream is sent.
+/// The interval of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interval {
     /// As the parameters say.
@@ -109,7 +109,7 @@ impl Interval {
     }
 }
 
-/// How often messages are sent, in place of what the parameters say.
+/// Intervals of messages that take the place of those from the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Intervals([u32; Stream::ALL.len()]);
 
@@ -183,7 +183,7 @@ impl Schedule {
         true
     }
 
-    /// What is to be kept over a loss of power.
+    /// The intervals to keep over a loss of power.
     pub(super) fn intervals(&self) -> Intervals {
         Intervals(self.timers.map(|timer| timer.interval.bits()))
     }

@@ -27,7 +27,7 @@ impl Sender {
         }
     }
 
-    /// What a frame has beside its payload.
+    /// The bytes of a frame beside its payload.
     pub(super) fn overhead_len(&self) -> usize {
         OVERHEAD_LEN
             + if self.signing.signs() {

@@ -49,7 +49,7 @@ const STREAMS: usize = 8;
 /// Places of a timestamp that are not kept over a loss of power: 0.66 s.
 const KEPT_SHIFT: u32 = 16;
 
-/// What two sides share. It is never sent or printed.
+/// The secret that two sides share. It is never sent or printed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key(pub(crate) [u8; 32]);
 
@@ -59,7 +59,7 @@ impl core::fmt::Debug for Key {
     }
 }
 
-/// What survives a loss of power.
+/// The part that survives a loss of power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// The key.
@@ -68,7 +68,7 @@ pub struct Kept {
     pub newest: u32,
 }
 
-/// What the sender of a frame may do.
+/// The rights of a frame's sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trust {
     /// Everything.
@@ -121,7 +121,7 @@ impl Signing {
         }
     }
 
-    /// What is to be kept.
+    /// The part to be kept.
     pub(super) fn kept(&self) -> Option<Kept> {
         let newest = u32::try_from(self.clock() >> KEPT_SHIFT).unwrap_or(u32::MAX);
         self.key.map(|key| Kept { key, newest })
@@ -156,12 +156,12 @@ impl Signing {
         self.now_us = now_us;
     }
 
-    /// Whether what leaves is signed.
+    /// Returns true if frames that leave are signed.
     pub(super) fn signs(&self) -> bool {
         self.key.is_some()
     }
 
-    /// What the sender of this frame may do.
+    /// Judges the rights of this frame's sender.
     #[inline(never)]
     pub(super) fn judge(&mut self, frame: &Frame) -> Trust {
         match (self.key, signature(frame.raw)) {
@@ -180,7 +180,7 @@ impl Signing {
         }
     }
 
-    /// Whether a frame whose hash fits is younger than all of its stream, and takes note of it.
+    /// Returns true if a frame whose hash fits is younger than all of its stream, and takes note of it.
     fn is_new(&mut self, from: Address, signed: &[u8]) -> bool {
         let [.., link, a, b, c, d, e, f] = *signed else {
             return false;
@@ -251,7 +251,7 @@ impl Signing {
     }
 }
 
-/// What a signed frame's hash is over beside the key, and that hash.
+/// The bytes that a signed frame's hash is over beside the key, and that hash.
 fn signature(raw: &[u8]) -> Option<(&[u8], &[u8; HASH_LEN])> {
     is_signed(raw)
         .then(|| raw.split_last_chunk::<HASH_LEN>())

@@ -129,7 +129,7 @@ impl Bench {
         sent.collect()
     }
 
-    /// What leaves at this poll, frame by frame.
+    /// Collects the frames that leave at this poll.
     fn poll_bytes(&mut self, frames: &mut Vec<Vec<u8>>) {
         let check = Report::new(40.0, 0.02);
         let mut context = Context {

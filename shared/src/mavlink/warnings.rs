@@ -1,4 +1,4 @@
-//! What a person is warned of.
+//! Warnings for a person.
 
 use heapless::String;
 
@@ -9,7 +9,7 @@ pub type Warning = String<50>;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Warnings {
     texts: [Warning; 2],
-    /// How many of them have come since all had been sent, and how many of those are sent.
+    /// Number of warnings that have come since all had been sent, and number of those sent.
     come: usize,
     sent: usize,
     /// The place of the last one.

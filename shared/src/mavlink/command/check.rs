@@ -31,7 +31,7 @@ impl Commands {
         }
     }
 
-    /// Whether a self-test was asked for, and goes on.
+    /// Returns true if a self-test was asked for, and goes on.
     pub(super) fn checks(&self) -> bool {
         let under_way = self.under_way.as_ref();
         under_way.is_some_and(|command| command.number == RUN_PREARM_CHECKS)

@@ -1,5 +1,5 @@
-//! What leaves the component, and in what order: faults, answers, warnings, streams, and at last what
-//! can wait.
+//! Sends what leaves the component, in this order: faults, answers, warnings, streams, and at last the
+//! rest.
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, ESC_TELEMETRY_1_TO_4_DATA, FILE_TRANSFER_PROTOCOL_DATA,
@@ -201,8 +201,8 @@ impl Component {
             .send(self.identity.address, &data, &[], send);
     }
 
-    /// What the link has room for of the file that someone reads. Never inlined, as what follows: its
-    /// stack is free for what else is sent.
+    /// Sends as much of the file that someone reads as the link has room for. Never inlined, nor are
+    /// those below: their stack is free for the rest of what is sent.
     #[inline(never)]
     fn send_burst(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
         let overhead_len = self.writer.sender.overhead_len();

@@ -27,7 +27,7 @@ pub(super) enum Error {
     FileNotFound = 10,
 }
 
-/// What an answer says.
+/// The contents of an answer.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Content {
     /// Nothing more than that the request was obeyed.
@@ -35,7 +35,7 @@ pub(super) enum Content {
     Refused(Error),
     /// The length of a file, or its checksum.
     Number(u32),
-    /// What a folder has in it from this entry on.
+    /// The entries of a folder from this one on.
     Entries(&'static Entry),
     /// Bytes of the session's file; `last` when they are the last ones of it.
     Bytes {

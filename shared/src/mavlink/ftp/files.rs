@@ -19,18 +19,18 @@ pub(super) const GENERAL_CHECKSUM: u32 = checksum(
     include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz")),
 );
 
-/// What those files tell of that are made when they are read.
+/// The sources of those files that are made when they are read.
 #[derive(Clone, Copy)]
 pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) params: &'a Params,
     pub(in crate::mavlink) telemetry: &'a Telemetry,
-    /// What the last self-test has found.
+    /// The result of the last self-test.
     pub(in crate::mavlink) check: &'a Report,
     /// The last that a person was warned of; empty if there was none.
     pub(in crate::mavlink) warning: &'a str,
 }
 
-/// What an entry is.
+/// The kind of an entry.
 #[derive(Debug)]
 enum Content {
     Folder,
@@ -38,11 +38,11 @@ enum Content {
     Fixed(&'static [u8]),
     /// The parameters, of which a path can choose.
     Parameters,
-    /// What has gone wrong, in words.
+    /// Present faults, in words.
     Faults,
-    /// What has happened in the life of the ESC, in words.
+    /// Statistics over the life of the ESC, in words.
     Statistics,
-    /// What the last self-test has found.
+    /// The result of the last self-test.
     Check,
 }
 

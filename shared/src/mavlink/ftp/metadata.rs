@@ -7,7 +7,7 @@ use super::files::GENERAL_CHECKSUM;
 use super::sink::Sink;
 use crate::math::quotient;
 
-/// What COMPONENT_METADATA has superseded, and older ground stations ask for.
+/// COMPONENT_INFORMATION, which COMPONENT_METADATA has superseded; older ground stations ask for it.
 const COMPONENT_INFORMATION_ID: u32 = 395;
 
 /// Without a component: it is the one that tells it.
@@ -15,7 +15,7 @@ const GENERAL_URI: &str = "mftp:///general.json.xz";
 /// The URI and what is before it in the longer message; only zeros follow.
 const PAYLOAD_LEN: usize = 12 + GENERAL_URI.len();
 
-/// Whether [`metadata`] makes the message of this id.
+/// Returns true if [`metadata`] makes the message of this id.
 pub(in crate::mavlink) const fn is_metadata(id: u32) -> bool {
     matches!(id, COMPONENT_METADATA_DATA::ID | COMPONENT_INFORMATION_ID)
 }

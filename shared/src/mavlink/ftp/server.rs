@@ -10,11 +10,11 @@ use crate::mavlink::receiver::{Frame, is_signed};
 /// one out, and one that lives asks again within seconds.
 const SESSION_US: u64 = 10_000_000;
 
-/// What requests may cost between two polls. A client that waits for each answer asks once, since answers
-/// leave at a poll; of more, those that find nothing left are as if they had been lost.
+/// Most that requests may cost between two polls. A client that waits for each answer asks once, since
+/// answers leave at a poll; of more, those that find nothing left are as if they had been lost.
 const COST_MOST: u8 = 5;
 
-/// Where the message has what; before it stand the network and the target.
+/// Offsets in the message; before these stand the network and the target.
 const SEQUENCE: usize = 3;
 const SESSION: usize = 5;
 const REQUEST: usize = 6;
@@ -42,7 +42,7 @@ mod request {
 #[derive(Clone, Debug)]
 struct Session {
     reader: Address,
-    /// Whether the reader has opened it by a frame that is signed; nobody else can have.
+    /// True if the reader has opened it by a signed frame; nobody else can have.
     signed: bool,
     /// As the reader has numbered it.
     number: u8,
@@ -54,7 +54,7 @@ struct Session {
     burst: Option<Burst>,
 }
 
-/// What is still to be sent without being asked for, to the end of the file.
+/// The rest of the file, which is sent without being asked for.
 #[derive(Clone, Debug)]
 struct Burst {
     sequence: u16,
@@ -63,12 +63,13 @@ struct Burst {
 }
 
 impl Session {
-    /// Whether this frame is the reader's: anybody may send what is not signed under his address.
+    /// Returns true if this frame is the reader's: anybody may send what is not signed under his
+    /// address.
     fn is_of(&self, frame: &Frame) -> bool {
         self.reader == frame.from && (!self.signed || is_signed(frame.raw))
     }
 
-    /// What is read at an offset; what remains of the file if it is less than `size`.
+    /// Reads at an offset; the rest of the file if that is less than `size`.
     fn read(&self, offset: u32, size: u8) -> Result<Content, Error> {
         let left = self.len.saturating_sub(offset);
         if left == 0 {
@@ -90,7 +91,7 @@ impl Session {
 #[derive(Clone, Debug, Default)]
 pub(in crate::mavlink) struct Server {
     session: Option<Session>,
-    /// What requests have cost since the last poll.
+    /// Cost of the requests since the last poll.
     cost: u8,
 }
 
@@ -272,7 +273,8 @@ impl Server {
     }
 }
 
-/// What a request costs: a file is made and summed up as a whole to be opened, and again for each answer.
+/// The cost of a request: a file is made and summed up as a whole to be opened, and again for each
+/// answer.
 fn cost(request: u8) -> u8 {
     match request {
         request::LIST_DIRECTORY | request::OPEN_FILE_RO | request::CALC_FILE_CRC32 => COST_MOST,

@@ -1,4 +1,4 @@
-//! What becomes of a file while it is written.
+//! Takes the bytes of a file while it is written.
 
 use crate::checksum::checksum;
 
@@ -9,7 +9,7 @@ pub(super) struct Sink<'a> {
     room: &'a mut [u8],
     /// Of all that has been put in, bytes.
     pub(super) len: usize,
-    /// Likewise.
+    /// Its checksum so far.
     pub(super) checksum: u32,
 }
 

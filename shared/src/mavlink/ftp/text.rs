@@ -1,4 +1,4 @@
-//! What is told in words, and numbers in decimal.
+//! Texts in words, and numbers in decimal.
 
 use super::files::View;
 use super::sink::Sink;

@@ -55,7 +55,7 @@ impl Bench {
         self.answers()
     }
 
-    /// Whether a test turns the motor.
+    /// Returns true if a test turns the motor.
     fn tests(&self) -> bool {
         matches!(self.authority.command(), Command::Test(_))
     }

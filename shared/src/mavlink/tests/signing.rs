@@ -32,7 +32,7 @@ pub(super) fn setup(key: [u8; 32], timestamp: u64) -> SETUP_SIGNING_DATA {
     }
 }
 
-/// What was heard or sent at this time, with a hash of its own making.
+/// A frame that was heard or sent at this time, with a hash of its own making.
 pub(super) fn signed<D: MessageData>(
     from: Address,
     data: &D,

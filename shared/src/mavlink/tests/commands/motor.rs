@@ -11,7 +11,7 @@ const PERCENT: f32 = 0.0;
 const PWM: f32 = 1.0;
 
 impl Bench {
-    /// What a test turns the motor by.
+    /// The throttle of the test that turns the motor, if any.
     fn tested(&self) -> Option<f32> {
         match self.authority.command() {
             Command::Test(share) => Some(share.to_num()),

@@ -1,4 +1,4 @@
-//! What folders and files tell, and where they are.
+//! The contents of folders and files, and their places.
 
 use std::string::String;
 
