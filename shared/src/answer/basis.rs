@@ -1,4 +1,4 @@
-//! What answers need to know of the drive's configuration.
+//! The part of the drive's configuration that answers need.
 
 use crate::drive::{ATTEMPTS, Config, Fault, Snapshot, six_step};
 use crate::units::{Current, Scale};
@@ -6,7 +6,7 @@ use crate::units::{Current, Scale};
 /// The little of a [`Config`] that is needed to read a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Basis {
-    /// What the control's units are worth.
+    /// The control's units in SI.
     pub scale: Scale,
     /// Bound of the current's vector, `LIM_PHASE_A`.
     pub(super) phase: Current,
@@ -24,7 +24,7 @@ impl Basis {
         }
     }
 
-    /// How near the drive is to giving the rotor up: 0 where all is well, 255 where it has.
+    /// Doubt of the rotor's position: 0 if all is well, 255 if the drive has given it up.
     ///
     /// It is the greatest share that has been used of what is allowed: of the attempts of a start,
     /// of the periods without an estimate, and of the six-step drive's sextants without a crossing.
@@ -42,8 +42,8 @@ impl Basis {
             )) as u8
     }
 
-    /// Whether the current's vector is within a sixteenth of its bound: the regulator holds it there
-    /// within its ripple.
+    /// Returns true if the current's vector is within a sixteenth of its bound: the regulator holds it
+    /// there within its ripple.
     pub(super) fn at_limit(&self, snapshot: &Snapshot) -> bool {
         let square = |bits: i32| i64::from(bits) * i64::from(bits);
         let bound = self.phase.to_bits();

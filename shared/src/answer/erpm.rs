@@ -6,7 +6,7 @@
 
 use crate::units::{Scale, Speed};
 
-/// What stands for a shaft that stands, or turns in 65.3 ms or more: below 919 eRPM.
+/// The word for a shaft that stands, or turns in 65.3 ms or more: below 919 eRPM.
 pub const STOPPED: u16 = 0xFFF;
 
 /// The period from which the nearest word would be 511·2^7 µs, which is [`STOPPED`].

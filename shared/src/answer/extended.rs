@@ -1,7 +1,7 @@
 //! Extended DShot telemetry 2.0.0: words that no normalised speed has
 //! (<https://github.com/bird-sanctuary/extended-dshot-telemetry>).
 
-/// What an extended word says.
+/// The contents of an extended word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extended {
     /// Temperature, °C.
@@ -12,12 +12,12 @@ pub enum Extended {
     Current(u8),
     /// For whoever writes the ESC's program; Siskin sends neither.
     Debug1(u8),
-    /// Likewise.
+    /// A second value for debugging.
     Debug2(u8),
-    /// How hard it is to keep the motor turning: 0 no trouble, 255 it cannot be done.
+    /// The effort to keep the motor turning: 0 no trouble, 255 it cannot be done.
     Stress(u8),
-    /// What has happened since the word of this kind before; see [`Status`]. It also announces
-    /// that extended telemetry is on ([`ENABLED`]) or off ([`DISABLED`]).
+    /// Events since the last word of this kind; see [`Status`]. It also announces that extended
+    /// telemetry is on ([`ENABLED`]) or off ([`DISABLED`]).
     Status(u8),
 }
 
@@ -27,7 +27,7 @@ pub const ENABLED: Extended = Extended::Status(0);
 /// Answer to the command that turns it off.
 pub const DISABLED: Extended = Extended::Status(0xFF);
 
-/// What [`Extended::Status`] says.
+/// The events in [`Extended::Status`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// Bit 7: something to be counted.
@@ -56,7 +56,7 @@ impl Extended {
         kind << 8 | value as u16
     }
 
-    /// What 12 bits of data say; nothing where they are a speed.
+    /// The word in 12 bits of data; `None` if they are a speed.
     pub const fn from_data(data: u16) -> Option<Self> {
         let value = data as u8;
         Some(match data >> 8 & 0xF {
@@ -83,7 +83,7 @@ impl Status {
         )
     }
 
-    /// What the value of a word says.
+    /// The status in the value of a word.
     pub const fn from_value(value: u8) -> Self {
         Self {
             alert: value & 1 << 7 != 0,

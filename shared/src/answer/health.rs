@@ -1,4 +1,4 @@
-//! How well the drive fares, as the status and stress words of extended telemetry tell it.
+//! The drive's health, for the status and stress words of extended telemetry.
 //!
 //! The specification calls stress the effort to keep commutation going: 0 is perfect, and the end
 //! of the range is that it cannot be kept. Here it is [`Basis::doubt`]: how near the drive is to
@@ -20,7 +20,7 @@ use crate::drive::Snapshot;
 /// that has failed. A crossing that the current hides now and then is none.
 const SUSPECT: u8 = 63;
 
-/// What has happened since it was last told.
+/// Events since the last report.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Health {
     status: Status,

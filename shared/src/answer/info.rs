@@ -88,7 +88,7 @@ mod tests {
         ..Image::EMULATOR
     };
 
-    /// What Betaflight makes of it: `printEscInfo` of its command line.
+    /// As Betaflight reads it: `printEscInfo` of its command line.
     #[test]
     fn a_flight_controller_reads_it() {
         let mut params = Params::default();

@@ -1,4 +1,4 @@
-//! What the ESC sends back to the flight controller: on the throttle wire and on a serial line.
+//! Answers to the flight controller: on the throttle wire and on a serial line.
 //!
 //! A bidirectional frame is answered on its own wire ([`gcr`]) with the speed ([`erpm`]) or a word
 //! of extended telemetry ([`extended`]); a frame with its telemetry bit set, on the serial line
@@ -27,20 +27,20 @@ use schedule::{Kind, Schedule};
 /// From the end of a frame to its reply, ns, at every rate.
 pub const REPLY_DELAY_NS: u32 = 30_000;
 
-/// What a frame may ask the ESC to send.
+/// The answers that a frame may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ask {
     /// When the frame's first edge came, in ticks of the capturing timer.
     pub first_edge_ticks: u32,
-    /// How fast it was sent.
+    /// The frame's rate.
     pub rate: Rate,
-    /// Whether it is to be answered on its wire.
+    /// True if it is to be answered on its wire.
     pub bidirectional: bool,
-    /// Whether telemetry is to be sent on the serial line.
+    /// True if telemetry is to be sent on the serial line.
     pub telemetry: bool,
 }
 
-/// What is sent.
+/// The answer to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// On the wire.
@@ -51,7 +51,7 @@ pub struct Answer {
     pub info: Option<[u8; info::BYTES]>,
 }
 
-/// What is sent on the serial line, as in [`Answer`].
+/// The part that goes to the serial line, as in [`Answer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Serial {
     /// A frame of KISS telemetry.
@@ -72,7 +72,7 @@ pub struct Reply {
 }
 
 impl Ask {
-    /// What the sender of a frame or pulse may want; nothing, if nothing.
+    /// The answers that the sender of a frame or pulse may want; `None` if none.
     pub fn of(event: &Event) -> Option<Self> {
         let Event::Frame {
             rate,
@@ -93,7 +93,7 @@ impl Ask {
     }
 }
 
-/// What is remembered from answer to answer.
+/// State from answer to answer.
 #[derive(Clone, Debug)]
 pub struct Answers {
     /// From a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
@@ -103,7 +103,7 @@ pub struct Answers {
     info_ticks: u32,
     /// When the frame before began.
     asked_at_ticks: Option<u32>,
-    /// How long the serial line is still taken.
+    /// Time for which the serial line is still taken.
     busy_ticks: u32,
     extended: bool,
     /// The answer to the command that turned extended telemetry on or off.
@@ -178,8 +178,8 @@ impl Answers {
         })
     }
 
-    /// What is sent for a frame on the serial line, with the drive as it is now, of which the next words of
-    /// extended telemetry tell.
+    /// The bytes for the serial line that answer a frame, with the drive's present state, of which the
+    /// next words of extended telemetry tell too.
     pub fn serial(
         &mut self,
         ask: Ask,

@@ -33,7 +33,7 @@ pub(super) struct Schedule {
     /// Ticks since the slot of the last extended word began.
     since_ticks: u32,
     next: usize,
-    /// Whether the last reply was an extended word: another must not follow at once.
+    /// True if the last reply was an extended word: another must not follow at once.
     was_extended: bool,
 }
 
@@ -59,7 +59,7 @@ impl Schedule {
         self.since_ticks = self.since_ticks.saturating_add(ticks);
     }
 
-    /// Whether this reply may be an extended word. To be asked once a reply.
+    /// Returns true if this reply may be an extended word. To be asked once a reply.
     pub(super) fn is_free(&mut self) -> bool {
         !core::mem::take(&mut self.was_extended)
     }
