@@ -24,7 +24,7 @@ use core::ops::Range;
 use crate::SELF_TEST;
 use crate::params::{ParamId, Params};
 
-/// What is measured.
+/// A kind of measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -36,7 +36,7 @@ pub enum Kind {
     Temperature,
     /// The slow oscillator's rate by the fast one, kHz.
     Clock,
-    /// Whether the chip is set to start from its flash, 1 or 0.
+    /// 1 if the chip is set to start from its flash, else 0.
     OptionBytes,
     /// Current at which a phase's comparator would trip with its level moved to where it does, A.
     Comparator,
@@ -61,7 +61,7 @@ const SINGLE: usize = Kind::Comparator as usize;
 
 const ROWS_LEN: usize = Kind::Off as usize + 1;
 
-/// What bounds are in.
+/// The basis of bounds.
 #[derive(Clone, Copy)]
 enum Basis {
     /// The item's unit.
@@ -118,7 +118,7 @@ const ITEMS: usize = if SELF_TEST {
 /// One line's subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// What is measured.
+    /// The kind of measurement.
     pub kind: Kind,
     /// Of which phase, 0, 1, 2 for a, b, c; 0 where there is but one.
     pub phase: u8,
@@ -149,7 +149,7 @@ impl Item {
     }
 }
 
-/// What a self-test has found.
+/// The results of a self-test.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Not a number where nothing was measured.
@@ -163,7 +163,7 @@ pub struct Report {
 pub struct Line {
     /// Its name, in two pieces.
     pub name: [&'static str; 2],
-    /// What was measured.
+    /// The value measured.
     pub value: f32,
     /// In this unit; 1 is none.
     pub unit: &'static str,
@@ -174,7 +174,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Whether the value is within its bounds; one that is no number is not.
+    /// Returns true if the value is within its bounds; a value that is no number is not.
     pub fn ok(&self) -> bool {
         (self.low..=self.high).contains(&self.value)
     }
@@ -200,7 +200,7 @@ impl Report {
         }
     }
 
-    /// What was measured, or not a number.
+    /// The value measured, or NaN.
     pub(super) fn get(&self, kind: Kind, phase: u8) -> f32 {
         self.values[Item::of(kind, phase).place()]
     }
@@ -220,18 +220,19 @@ impl Report {
         }
     }
 
-    /// Whether all that was measured is within its bounds.
+    /// Returns true if all values measured are within their bounds.
     pub(super) fn fits(&self, params: &Params) -> bool {
         self.fit(0..self.values.len(), params)
     }
 
-    /// Whether the motor may turn: comparators that do not trip where they should protect nothing, and
-    /// those of revisions Z and Y of the STM32G431 are not fully tested in production (ES0431).
+    /// Returns true if the motor may turn. Comparators that do not trip where they should protect
+    /// nothing, and those of revisions Z and Y of the STM32G431 are not fully tested in production
+    /// (ES0431).
     pub fn may_turn(&self, params: &Params) -> bool {
         self.holds(Kind::Comparator, params)
     }
 
-    /// Whether what was measured of a kind that each phase has is within its bounds.
+    /// Returns true if the values of a kind that each phase has are within their bounds.
     pub(super) fn holds(&self, kind: Kind, params: &Params) -> bool {
         let first = Item::of(kind, 0).place();
         !SELF_TEST || self.fit(first..first + 3, params)

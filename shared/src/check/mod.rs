@@ -29,7 +29,7 @@ use crate::math::{Real, square_root};
 use crate::params::{Board, Params};
 use crate::units::{AdcCounts, Scale};
 
-/// What a board measures for the self-test.
+/// The measurements that a board makes for the self-test.
 pub trait Probe {
     /// The latest sample that the control has, or could have, had.
     fn sample(&mut self) -> Sample;
@@ -67,14 +67,14 @@ const FULL_SCALE: f32 = 4095.0;
 /// Phases whose currents are summed; none where there is no self-test.
 const SUMMED: usize = if SELF_TEST { 3 } else { 0 };
 
-/// Where a self-test is.
+/// The step of a self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
     /// Nowhere: there is none.
     Over,
-    /// What needs neither time nor the bridge, and then the end.
+    /// Measurements that need neither time nor the bridge, and then the end.
     PowerUp,
-    /// The same, and the sensors without current.
+    /// The same measurements, and the sensors without current.
     Listen,
     /// The shaft is to stand.
     Shaft,
@@ -82,19 +82,19 @@ enum Step {
     Pull(Pull),
 }
 
-/// What has come of a look.
+/// The outcome of a look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// It goes on, so many percent being done.
     Progress(u8),
     /// It has ended.
     Done {
-        /// Whether all has been measured, and is within its bounds.
+        /// True if everything has been measured, and is within its bounds.
         passed: bool,
     },
 }
 
-/// What the drive does at a look.
+/// The drive's state at a look.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
     /// Of the drive.
@@ -103,7 +103,7 @@ pub struct Sight<'a> {
     pub scale: &'a Scale,
     /// Temperature of the board, °C.
     pub temperature_c: f32,
-    /// Whether nothing else asks the motor to turn.
+    /// True if nothing else asks the motor to turn.
     pub rests: bool,
 }
 
@@ -116,7 +116,7 @@ pub struct Check {
     /// Sums of the readings of the currents, and of their squares, A.
     sums: [f32; SUMMED],
     squares: [f32; SUMMED],
-    /// What has been found.
+    /// The results so far.
     pub report: Report,
 }
 
@@ -138,7 +138,7 @@ impl Check {
         self.go(Step::Listen);
     }
 
-    /// What is asked of the drive, while nothing turns the motor.
+    /// The pull that is asked of the drive, while nothing turns the motor.
     pub fn pull(&self) -> Option<Pull> {
         match self.step {
             _ if !SELF_TEST => None,
@@ -260,7 +260,7 @@ impl Check {
         }
     }
 
-    /// What needs neither time nor the bridge.
+    /// Makes the measurements that need neither time nor the bridge.
     fn own(&mut self, sight: &Sight, probe: &mut impl Probe) {
         let bus_v = sight.scale.volts(sight.snapshot.bus);
         self.report.set(Kind::Supply, 0, bus_v);
@@ -290,7 +290,7 @@ impl Check {
             .set(Kind::Noise, phase as u8, square_root(variance));
     }
 
-    /// What a phase does that is off while another one is pulled up.
+    /// Records a phase that is off while another one is pulled up.
     #[inline(never)]
     fn followed(&mut self, phase: u8, share: &[f32; 3], current_a: f32) {
         // An open wire follows none of the others; a shorted switch shows at any.
