@@ -4,7 +4,7 @@ use crate::drive::Snapshot;
 use crate::tune::{Note, Player, Tune};
 use crate::units::Speed;
 
-/// What is heard of the motor.
+/// The sounds of the motor.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sound {
     player: Player,

@@ -25,7 +25,7 @@ const SAVES_AT_ONCE: u64 = 100;
 /// costs 100 + 480 of the flash's 80 000 saves, 0.7 %.
 const SAVE_EVERY_US: u64 = 180_000_000;
 
-/// How often a person is told that settings were lost, µs: a station may have come since.
+/// Time between two reminders that settings were lost, µs: a station may have come since.
 const REMIND_US: u64 = 10_000_000;
 
 /// Who has asked for storage.
@@ -39,7 +39,7 @@ pub(super) enum Asker {
     Nobody,
 }
 
-/// What waits, and what is under way.
+/// Requests that wait, and the one under way.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Storage {
     /// MAVLink has one at a time, and refuses others.
@@ -49,14 +49,14 @@ pub(super) struct Storage {
     changed_us: Option<(u64, u64)>,
     /// When the saves that nobody has asked for are all given back.
     spent_us: u64,
-    /// Whether the ESC is to start again when nothing waits any more.
+    /// True if the ESC is to restart when nothing waits any more.
     reboot: bool,
     /// Whose request the caller has been given.
     under_way: Option<(Asker, Request)>,
-    /// Whether it has been told that what changes cannot be stored.
+    /// True if it has been reported that changes cannot be stored.
     failed: bool,
-    /// Whether what is stored cannot be in force: it stays, and nothing turns the motor, until somebody
-    /// asks for settings to be stored or reset.
+    /// True if the stored settings cannot be in force: they stay, and nothing turns the motor, until
+    /// somebody asks for settings to be stored or reset.
     lost: bool,
     /// When a person was last told so.
     reminded_us: u64,
@@ -84,12 +84,12 @@ impl Storage {
         self.lost = true;
     }
 
-    /// Whether settings were lost, and none have been stored since.
+    /// Returns true if settings were lost, and none have been stored since.
     pub(super) fn is_lost(&self) -> bool {
         self.lost
     }
 
-    /// Whether a person is to be told so now.
+    /// Returns true if a reminder is due now.
     pub(super) fn reminds(&mut self, now_us: u64) -> bool {
         let due = self.lost && now_us.saturating_sub(self.reminded_us) >= REMIND_US;
         if due {
@@ -103,7 +103,7 @@ impl Storage {
         self.reboot = true;
     }
 
-    /// Whether a restart is due now.
+    /// Returns true if a restart is due now.
     pub(super) fn reboots(&self) -> bool {
         self.reboot && self.under_way.is_none() && self.next(0).is_none()
     }
@@ -113,7 +113,7 @@ impl Storage {
         core::mem::take(&mut self.reboot)
     }
 
-    /// Whether a request waits, and none is under way.
+    /// Returns true if a request waits, and none is under way.
     pub(super) fn waits(&self, now_us: u64) -> bool {
         self.under_way.is_none() && self.next(now_us).is_some()
     }
@@ -152,7 +152,7 @@ impl Storage {
         Some(request)
     }
 
-    /// Whether what is stored now has all that is in force.
+    /// Returns true if the flash now has all that is in force.
     pub(super) fn takes_all(&self) -> bool {
         self.under_way
             .is_some_and(|(_, request)| request != Request::Keep)
@@ -173,7 +173,7 @@ impl Storage {
 pub(super) struct Unstored {
     pub(super) id: ParamId,
     pub(super) value: f32,
-    /// What is stored meanwhile.
+    /// The value stored meanwhile.
     pub(super) stored: f32,
 }
 
@@ -241,13 +241,13 @@ impl Esc {
         }
     }
 
-    /// What is stored is not what is in force: it is left alone, and the motor off, until somebody asks
-    /// for settings to be stored or reset.
+    /// Leaves the stored settings alone because they are not those in force, and keeps the motor off,
+    /// until somebody asks for settings to be stored or reset.
     pub fn lose_stored(&mut self) {
         self.storage.lose();
     }
 
-    /// What is to be stored now.
+    /// The values to be stored now.
     pub fn kept(&self) -> Kept {
         let mut kept = Kept {
             params: self.params.clone(),

@@ -1,5 +1,5 @@
-//! What the ESC does by the throttle wire or by command, beside turning the motor: it obeys DShot's
-//! commands, takes the stick's calibration, and tells a person what has happened.
+//! Acts of the ESC by the throttle wire or by command, beside turning the motor: it obeys DShot's
+//! commands, takes the stick's calibration, and reports what has happened.
 
 use super::Esc;
 use super::storage::Unstored;
@@ -14,12 +14,12 @@ use crate::throttle::Reach;
 use crate::tune::{Beacon, Tune};
 
 impl Esc {
-    /// Whether the light shall be on, by command.
+    /// Returns true if the light shall be on, by command.
     pub fn light(&self) -> bool {
         self.light
     }
 
-    /// What the tasks do for the wire.
+    /// Does the tasks' work for the wire.
     pub(super) fn follow_wire(&mut self, throttle: &mut impl Reach, now_us: u64) {
         while let Some(news) = throttle.reach(|throttle| throttle.news(now_us)) {
             self.hear(now_us, news);
@@ -31,7 +31,7 @@ impl Esc {
         }
     }
 
-    /// What a MAVLink command wants done.
+    /// Carries out a MAVLink command.
     pub(super) fn act(&mut self, throttle: &mut impl Reach, now_us: u64, act: Act) {
         match act {
             Act::Beep => self.sound.play(now_us, Tune::Beacon(Beacon::One)),

@@ -1,4 +1,4 @@
-//! What a ground station asks an ESC to do beside turning its motor: as the wire would, at rest.
+//! Requests of a ground station beside turning the motor: as the wire would make them, at rest.
 
 use super::*;
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};

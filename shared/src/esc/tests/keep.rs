@@ -1,4 +1,4 @@
-//! What is stored without being asked for, and when.
+//! Settings that are stored without being asked for, and the times at which they are.
 
 use super::storage::{ACCEPTED, REBOOT, STORAGE};
 use super::*;
