@@ -1,4 +1,4 @@
-//! What is kept, and the key of each value. A key is never given to another value.
+//! The values that are kept, and the key of each. A key is never given to another value.
 
 use crate::mavlink::{Intervals, KeptSigning, Key};
 use crate::params::{Kind, ParamId, Params, TABLE};
@@ -14,20 +14,20 @@ const SIGNING_WORDS: usize = 9;
 /// Key of the newest timestamp.
 const TIME: u16 = SIGNING + SIGNING_WORDS as u16 - 1;
 
-/// Whether somebody has set what has this key, so that an older value in its place is a wrong one. The
-/// statistics and the time of signatures change by themselves.
+/// Returns true if the value with this key is set by somebody, so that an older value in its place is a
+/// wrong one. The statistics and the time of signatures change by themselves.
 pub(super) fn is_setting(key: u16) -> bool {
     !(STATISTICS..SIGNING).contains(&key) && key != TIME
 }
 
-/// What survives a loss of power.
+/// The values that survive a loss of power.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Kept {
     /// The parameters.
     pub params: Params,
-    /// How often messages are sent.
+    /// The intervals of messages.
     pub intervals: Intervals,
-    /// What has happened so far.
+    /// The statistics so far.
     pub statistics: Statistics,
     /// The key of signatures, if there is one.
     pub signing: Option<KeptSigning>,

@@ -12,7 +12,7 @@ use super::{Content, Integrity, StoreError, key};
 /// Number of the first set in empty flash.
 const FIRST: u16 = 1;
 
-/// Where in the flash a set is.
+/// The place of a set in the flash.
 #[derive(Clone)]
 pub(super) struct Set {
     /// Its words but for the seal.
@@ -31,13 +31,14 @@ impl Set {
         number: FIRST - 1,
     };
 
-    /// Whether it was written after that one, or there is no such one.
+    /// Returns true if it was written after that one, or there is no such one.
     fn is_newer(&self, than: &Self) -> bool {
         let later = self.number.wrapping_sub(than.number).cast_signed() > 0;
         than.values.is_empty() || later
     }
 
-    /// Whether its words are those of the content, in their order, or at least the settings among them.
+    /// Returns true if its words are those of the content, in their order, or at least the settings
+    /// among them.
     fn has<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -109,15 +110,15 @@ impl Values<'_> {
     }
 }
 
-/// What the flash holds.
+/// The contents of the flash.
 pub(super) struct Log {
     halves: [Range<u32>; 2],
     /// Of the sets with their seals; without words if there is none.
     pub(super) newest: Set,
     before: Set,
-    /// Whether all that is written belongs to such a set.
+    /// True if all that is written belongs to such a set.
     whole: bool,
-    /// Whether all that is written may belong to a first set.
+    /// True if all that is written may belong to a first set.
     first: bool,
 }
 
@@ -275,7 +276,7 @@ impl Log {
     }
 }
 
-/// How long a set with this content is, with its seal.
+/// The length of a set with this content, with its seal.
 fn length<F: NorFlash>(flash: &mut F, content: &Content) -> Result<u32, StoreError> {
     let mut content = content.clone();
     let mut len = Word::BYTES;

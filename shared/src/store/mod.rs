@@ -1,4 +1,4 @@
-//! What survives a loss of power, in flash.
+//! Storage that survives a loss of power, in flash.
 //!
 //! A save appends all values as one set, of 8 bytes a value, and ends it with a seal over them. The
 //! newest set with its seal counts, so a loss of power leaves the values of this save or of the one
@@ -39,7 +39,7 @@ mod key {
 /// Sets that have the settings which were saved last.
 const COPIES: usize = 2;
 
-/// How sound what is stored was.
+/// The integrity of the stored values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrity {
     /// Every value is the one that was saved.
@@ -58,28 +58,28 @@ pub enum Integrity {
 }
 
 impl Integrity {
-    /// Whether there was something and nothing of it can be used: the defaults may be those of another
-    /// motor than the one that was set up.
+    /// Returns true if there was something and nothing of it can be used: the defaults may be those of
+    /// another motor than the one that was set up.
     pub const fn is_lost(self) -> bool {
         matches!(self, Self::Unfinished | Self::Corrupt | Self::Unreadable)
     }
 }
 
-/// What was stored.
+/// The stored values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// The values; one that was not stored, or is not accepted, is the default.
     pub kept: Kept,
-    /// How sound they were.
+    /// Their integrity.
     pub integrity: Integrity,
-    /// Whether a value is not accepted; the next save drops it.
+    /// True if a value is not accepted; the next save drops it.
     pub out_of_range: bool,
-    /// Whether there are values that this firmware does not know; saves keep them.
+    /// True if there are values that this firmware does not know; saves keep them.
     pub unknown: bool,
 }
 
 impl Loaded {
-    /// What a person must know of it.
+    /// The trouble that a person must know of, if any.
     pub const fn trouble(&self) -> Option<&'static str> {
         match self.integrity {
             Integrity::Incomplete => Some("storage: not whole, a sound copy is in force"),

@@ -1,9 +1,9 @@
-//! How values of older firmware become values of this one.
+//! The conversion of older firmware's values to this one's.
 
 /// Number of what keys and values mean now. It grows with each new row of [`CHANGES`].
 pub(super) const SCHEMA: u32 = 1;
 
-/// What has been renamed or rescaled since the first schema, in that order.
+/// Values renamed or rescaled since the first schema, in that order.
 pub(super) const CHANGES: &[Change] = &[];
 
 /// A parameter that has another key or unit than it once had.

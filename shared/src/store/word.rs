@@ -5,7 +5,7 @@ use embedded_storage::nor_flash::NorFlash;
 use super::{StoreError, key};
 use crate::checksum::checksum;
 
-/// What the flash is read and written by.
+/// The unit by which the flash is read and written.
 pub(super) struct Word {
     pub(super) key: u16,
     /// That of its set.

@@ -26,7 +26,7 @@ pub(super) struct RamFlash {
     pub(super) reads_left: usize,
     /// Words and pages until the power fails, within the next one.
     pub(super) steps_left: usize,
-    /// What is left where the power failed.
+    /// Decides what is left after the power failed.
     pub(super) chance: Random,
 }
 
@@ -59,7 +59,7 @@ impl RamFlash {
         }
     }
 
-    /// Whether the next step is done as a whole; an error after the power has failed.
+    /// Returns true if the next step is done as a whole; an error after the power has failed.
     fn step(&mut self) -> Result<bool, Refused> {
         match self.steps_left {
             // It has failed before.
