@@ -7,7 +7,7 @@ use super::ParamId;
 pub struct Preset {
     /// Name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub description: &'static str,
     /// The parameters and their values, each within the table's range.
     pub settings: &'static [(ParamId, f32)],

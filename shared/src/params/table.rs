@@ -1,6 +1,6 @@
 //! The one table of parameters.
 
-/// Whether a parameter takes fractions, whole numbers, or is computed from others.
+/// The kind of a parameter: fractions, whole numbers, or computed from others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Any value in range.
@@ -27,13 +27,13 @@ pub struct Parameter {
     /// Value from the factory: the bench of the first paper, an Antigravity 4006 KV380 with a
     /// 13×4.4 propeller at 24 V.
     pub default: f32,
-    /// Whether it may change while the motor turns. All others describe the motor, the bridge, the
-    /// wire or the way it is driven, and wait until it stands.
+    /// True if it may change while the motor turns. All others describe the motor, the bridge, the wire
+    /// or the way it is driven, and wait until it stands.
     pub live: bool,
 }
 
-/// What a person reads of a parameter. It is apart from the table so that a chip, which tells it by a
-/// compressed file that `build.rs` makes of it, need not hold it.
+/// A parameter's words for a person. They are apart from the table so that a chip, which serves them in
+/// a compressed file that `build.rs` makes, need not hold them.
 #[derive(Clone, Copy, Debug)]
 pub struct Text {
     /// Unit, empty for a number or a choice.
@@ -42,7 +42,7 @@ pub struct Text {
     pub description: &'static str,
     /// The values that it can take and what they mean, where it is a choice.
     pub choices: &'static [(u8, &'static str)],
-    /// Whether a change applies at the next start.
+    /// True if a change applies at the next start.
     pub restart: bool,
 }
 
@@ -111,7 +111,7 @@ macro_rules! parameters {
             /// All parameters in the order of the table.
             pub const ALL: [Self; TABLE.len()] = [$(Self::$id),*];
 
-            /// What a person reads of this parameter.
+            /// This parameter's words for a person.
             pub const fn text(self) -> &'static Text {
                 &TEXTS[self as usize]
             }

@@ -59,12 +59,12 @@ impl Faults {
         self.0 |= 1 << fault as u8;
     }
 
-    /// Whether it is in the set.
+    /// Returns true if the fault is in the set.
     pub const fn contains(self, fault: Fault) -> bool {
         self.0 & (1 << fault as u8) != 0
     }
 
-    /// Whether there is none.
+    /// Returns true if there is none.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }

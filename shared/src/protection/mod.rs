@@ -1,4 +1,4 @@
-//! What turns the bridge off, and what bounds the current so that it need not.
+//! Turns the bridge off, and bounds the current so that it need not.
 
 mod fault;
 mod ntc;
@@ -41,7 +41,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What is remembered from sample to sample.
+    /// State from sample to sample.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// Magnitude of a phase's reading that trips now: [`Config::trip`], or that of the limit before,
@@ -110,7 +110,7 @@ pub fn check(
     }
 }
 
-/// Whether a phase's current is beyond ±`trip`.
+/// Returns true if a phase's current is beyond ±`trip`.
 #[inline(always)]
 fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     let trip = trip.to_bits();

@@ -46,8 +46,8 @@ const A_TURNS: f32 = 1.0 / 6.0;
 /// the paper has 0.44 for it, it is smaller.
 const K_MAX: f32 = 0.265;
 
-/// What the parameters make of the second paper's time constants and filters: what its Table 1 is
-/// computed from ([`limits`](crate::control::observer::limits)).
+/// The second paper's time constants and filters from the parameters: the input of its Table 1
+/// ([`limits`](crate::control::observer::limits)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxSettings {
     /// τ_int, s (2.2.2).
@@ -69,8 +69,8 @@ pub struct FluxSettings {
 impl FluxSettings {
     /// Those of a drive with these parameters.
     ///
-    /// Where whole turns and the filter begin follows from the errors that the paper gives for the
-    /// greatest acceleration that the drive asks for.
+    /// The speeds from which whole turns and the filter are used follow from the errors that the paper
+    /// gives for the greatest acceleration that the drive asks for.
     pub fn new(params: &Params) -> Self {
         let get = |id| params.get(id);
         let tau_int_s = TAU_INT / rad_s(params, SLOW_SHARE * get(ParamId::StaRunRpm));

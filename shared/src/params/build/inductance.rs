@@ -10,7 +10,7 @@ const AMPLITUDE_SHARE: f32 = 0.05;
 /// Half a wave, s: 50 Hz.
 const HALF_S: f32 = 0.01;
 
-/// What one half wave takes of the error that it shows.
+/// Share of the error shown that one half wave corrects.
 const STEP: f32 = 0.1;
 
 /// The adaptation, where `CTL_ADAPT_L` asks for it.

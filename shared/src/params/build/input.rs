@@ -1,4 +1,4 @@
-//! What the parameters say of the throttle wire.
+//! The settings of the throttle wire from the parameters.
 
 use crate::input::Settings;
 use crate::input::authority::Timing;
@@ -7,7 +7,7 @@ use crate::input::endpoints::EndPoints;
 use crate::input::signal::Signal;
 use crate::params::{ParamId, Params};
 
-/// How the throttle wire is read.
+/// The way the throttle wire is read.
 pub fn input(params: &Params) -> Settings {
     let time_us = |id| u64::from((params.get(id) * 1000.0) as u32);
     let width_us = |id| params.get(id) as u16;

@@ -31,10 +31,10 @@ use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
 use crate::protection;
 use crate::units::{AdcCounts, Scale, Speed, Voltage};
 
-/// What the control must know of the board.
+/// The properties of the board that the control must know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Board {
-    /// What the program says it is.
+    /// The program's name and version.
     pub image: Image,
     /// Amperes of one count of the current converter.
     pub current_a_per_count: f32,
@@ -83,14 +83,14 @@ impl LeastDeadTime {
 pub struct BuildError {
     /// The parameter to change.
     pub param: ParamId,
-    /// What is wrong with it.
+    /// The reason.
     pub reason: &'static str,
 }
 
 /// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
 
-/// What a test of the motor may use of `LIM_PHASE_A`.
+/// Share of `LIM_PHASE_A` that a test of the motor may use.
 const TEST_SHARE: f32 = 0.2;
 
 /// The supply may be at most this many units of voltage, of the eight that the type holds.
@@ -129,7 +129,7 @@ const BIAS_END: f32 = 16.0;
 /// Least bound of i_q over `STA_RAMP_A`.
 const TORQUE_LEAST_SHARE: f32 = 0.5;
 
-/// What the resistive drop of i_q may be of the back-EMF: with R stated 30 % too high, three times
+/// Greatest resistive drop of i_q as a share of the back-EMF: with R stated 30 % too high, three times
 /// that leaves no estimate; and with more, the start accelerates faster than the loop can follow.
 const TORQUE_DROP_SHARE: f32 = 0.5;
 
@@ -147,14 +147,14 @@ const SPEED_SHARE: f32 = 0.2;
 /// Software trip over `LIM_PHASE_A`.
 pub(crate) const TRIP_SHARE: f32 = 1.4;
 
-/// What of the converter's range a trip may take: offsets and the uneven ends of the range stay
+/// Share of the converter's range that a trip may take: offsets and the uneven ends of the range stay
 /// below the rest.
 const SHOWN_SHARE: f32 = 0.97;
 
 /// Volts below `LIM_BUS_V_MAX` over which the returned current is brought to zero.
 const RETURN_BAND_V: f32 = 1.0;
 
-/// How fast the bounds of i_q follow the bus current, 1/s.
+/// Rate at which the bounds of i_q follow the bus current, 1/s.
 const BOUND_RATE: f32 = 600.0;
 
 /// Computes the drive's coefficients from SI values.
@@ -302,8 +302,8 @@ fn refuse_contradictions(p: &Si) {
 /// Why most coefficients are refused.
 const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
 
-/// What the coefficients are computed from: the parameters that several blocks need in SI, and all
-/// else that there is.
+/// The source of the coefficients: the parameters that several blocks need in SI, and all else that
+/// there is.
 struct Si<'a> {
     params: &'a Params,
     board: &'a Board,
@@ -411,13 +411,13 @@ impl<'a> Si<'a> {
         }
     }
 
-    /// What has been refused so far.
+    /// The first refusal, if any.
     fn verdict(&self) -> Result<(), BuildError> {
         self.refused.get().map_or(Ok(()), Err)
     }
 }
 
-/// What keeps an observer that lives by the back-EMF in lock where there is little of it.
+/// Keeps an observer that lives by the back-EMF in lock where there is little of it.
 fn low_speed(p: &Si) -> low_speed::Config {
     let limit_a = p.get(ParamId::LimPhaseA);
     let phase = p.scale.current_from_a(limit_a);

@@ -29,7 +29,7 @@ const SIGN_CERTAIN_A: f32 = 0.3;
 /// it would be tens of degrees behind after a long charge. The bridge supplies the drivers as it switches.
 const UNSEEN_S: f32 = 0.002;
 
-/// What one charging pulse may add to the current of a rotor at `CTL_RPM_MAX`, of `LIM_PHASE_A`:
+/// Most that one charging pulse may add to the current of a rotor at `CTL_RPM_MAX`, of `LIM_PHASE_A`:
 /// the low sides short its back-EMF, and a few pulses may add up.
 const CHARGE_CURRENT_SHARE: f32 = 0.125;
 

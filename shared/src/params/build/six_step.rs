@@ -29,8 +29,7 @@ const PROPORTIONAL: f32 = 1.0;
 /// bench's shaft has a time constant of 46 ms under a constant duty.
 const CORNER_SHARE: f32 = 0.4;
 
-/// How fast the duty changes while the current has all of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], left,
-/// 1/s.
+/// Rate of the duty while the current has all of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], left, 1/s.
 const BOUND_RATE: f32 = 320.0;
 
 /// The least bound, A, that the loop's gain grows for: a lower one makes a motor's current answer no

@@ -20,14 +20,14 @@ const YIELD_RATE_SHARE: f32 = 5.0;
 /// Greatest rate a period: all that is missing in the two periods until the next look.
 const YIELD_RATE_MAX: f32 = 0.5;
 
-/// What the ramp takes of the torque that its current has: the rest is for the load and for a
-/// rotor that swings.
+/// Share of the torque of its current that the ramp uses: the rest is for the load and for a rotor that
+/// swings.
 const TORQUE_SHARE: f32 = 0.3;
 
-/// What an attempt has more of current than the one before.
+/// Current of an attempt over that of the one before.
 const CURRENT_GROWTH: f32 = 1.5;
 
-/// What an attempt takes the inertia for, over the stated one.
+/// Inertia that each attempt assumes, over the stated one.
 const INERTIA: [f32; ATTEMPTS] = [1.0, 10.0, 20.0, 40.0];
 
 /// Least length of Park in periods of the rotor's swing: half of it sweeps, and in the other half a

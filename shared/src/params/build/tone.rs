@@ -10,7 +10,7 @@ use crate::math::Real;
 use crate::params::ParamId;
 use crate::units::Voltage;
 
-/// What of `MOT_TONE_A` the peaks are led to. How much of a half cycle the dead time takes depends on
+/// Share of `MOT_TONE_A` that the peaks are led to. The dead time's part of a half cycle depends on
 /// where the samples fall in it, so they vary by up to a quarter from one to the next.
 const LED_SHARE: f32 = 0.75;
 
@@ -18,8 +18,8 @@ const LED_SHARE: f32 = 0.75;
 /// that a sensor without a reading leaves in place, the limit still holds.
 const LIMIT_SHARE: f32 = 0.5;
 
-/// What the dead time takes of a vector along a phase, of what it takes of one phase: the current
-/// flows in by one and out by two, 1 + 1/3.
+/// Loss to the dead time of a vector along a phase, over that of one phase: the current flows in by one
+/// and out by two, 1 + 1/3.
 const DEAD_TIME_VECTOR: f32 = 4.0 / 3.0;
 
 /// The tones of `MOT_TONE_A`; none where it is 0.
