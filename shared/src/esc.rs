@@ -47,24 +47,24 @@ pub struct Esc {
     sound: Sound,
     check: Check,
     light: bool,
-    /// What the motor was to do at the last poll, and since when it has been nothing.
+    /// The motor's command at the last poll.
     command: Command,
     rests_since_us: Option<u64>,
-    /// Whether the wire carried signals then.
+    /// True if the wire carried signals then.
     traffic: bool,
     storage: Storage,
     /// There are two such commands.
     unstored: Vec<Unstored, 2>,
 }
 
-/// What the drive runs with in place of the parameters.
+/// The values that the drive runs with in place of the parameters.
 #[derive(Clone, Copy, Debug)]
 struct Given {
     /// As it was at the start: the timer runs with it.
     pwm_freq_hz: f32,
-    /// Likewise.
+    /// Dead time, ns.
     pwm_deadtime_ns: f32,
-    /// Whether a command has turned the direction against `MOT_DIR`.
+    /// True if a command has turned the direction against `MOT_DIR`.
     opposite: bool,
 }
 
@@ -92,14 +92,14 @@ impl Given {
         running
     }
 
-    /// Whether these parameters make a drive, here and after the next start.
+    /// Checks that these parameters make a drive, here and after the next start.
     fn check(self, params: &Params, board: &Board) -> Result<(), BuildError> {
         check(params, board)?;
         check(&self.running(params), board)
     }
 }
 
-/// Whether parameters make a drive. Never inlined: a configuration takes 0.9 KB of stack.
+/// Checks that parameters make a drive. Never inlined: a configuration takes 0.9 KB of stack.
 #[inline(never)]
 fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
     build(params, board)?;
@@ -159,7 +159,7 @@ impl Esc {
         }
     }
 
-    /// What the interrupt shall run with, computed anew at each call: it is larger than all else.
+    /// The configuration for the interrupt, computed anew at each call: it is larger than all else.
     ///
     /// # Errors
     /// Never with the parameters in force, which have been tried before.
@@ -203,7 +203,8 @@ impl Esc {
         });
     }
 
-    /// What is due, about each millisecond: time-outs, telemetry, and frames to every link.
+    /// Does the work that is due, about each millisecond: time-outs, telemetry, and frames to every
+    /// link.
     pub fn poll(
         &mut self,
         throttle: &mut impl Reach,
@@ -280,10 +281,11 @@ impl Esc {
         }
     }
 
-    /// What only the caller can do. [`Request::ParamsChanged`] has been done as far as this side
-    /// goes: the interrupt shall run with [`Esc::config`] from now on. A request for storage waits
-    /// until the bridge rests and the one before has ended; nothing turns the motor from then on
-    /// until [`Esc::storage_done`]. A restart waits for storage.
+    /// The next request that only the caller can carry out.
+    ///
+    /// After [`Request::ParamsChanged`] the interrupt shall run with [`Esc::config`]; this side has done its
+    /// part. A request for storage waits until the bridge rests and the one before has ended; nothing turns
+    /// the motor from then on until [`Esc::storage_done`]. A restart waits for storage.
     pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
         let now_us = self.polled_us.unwrap_or(0);
         let request = self.component.take_request();

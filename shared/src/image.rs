@@ -1,5 +1,5 @@
-//! What a program says it is: to ground stations by AUTOPILOT_VERSION, to flight controllers by
-//! DShot's command 6.
+//! The program's identity: for ground stations by AUTOPILOT_VERSION, for flight controllers by DShot's
+//! command 6.
 
 /// Version of every program here: major, minor, patch.
 pub const VERSION: [u8; 3] = version();

@@ -47,6 +47,6 @@ pub mod trace;
 pub mod tune;
 pub mod units;
 
-/// Whether there is a self-test ([`check`]), by the feature `self-test`. Without it the command for one is
+/// True with the self-test ([`check`]), by the feature `self-test`. Without it the command for one is
 /// UNSUPPORTED, and nothing is kept for it.
 pub const SELF_TEST: bool = cfg!(any(test, feature = "self-test"));

@@ -8,7 +8,7 @@ use crate::params::{ParamId, Params};
 use crate::tune::Note;
 use crate::units::{Current, Speed};
 
-/// How throttle maps, by `CTL_MODE`.
+/// The mapping of throttle, by `CTL_MODE`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mapping {
     mode: Mode,

@@ -1,4 +1,4 @@
-//! What has happened to the ESC in its life.
+//! Statistics over the ESC's life.
 
 use crate::drive::{Fault, Faults, Phase};
 
@@ -9,9 +9,9 @@ const SECOND_US: u32 = 1_000_000;
 pub struct Statistics {
     /// Time for which the motor has been turned, s.
     pub run_s: u32,
-    /// How often the motor has been brought to run.
+    /// Number of times that the motor has been brought to run.
     pub starts: u32,
-    /// How often each fault has begun, in the order of [`Fault::ALL`].
+    /// Number of times that each fault has begun, in the order of [`Fault::ALL`].
     pub faults: [u32; Fault::ALL.len()],
     /// Highest temperature of the board, °C; 0 if it has never been above.
     pub temperature_max_c: f32,
@@ -59,18 +59,19 @@ impl Statistics {
     }
 }
 
-/// What is seen of the drive from one look to the next.
+/// State from one look at the drive to the next.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Recorder {
     faults: Faults,
-    /// Whether the motor was turned, and whether that was a start that worked.
+    /// True if the motor was turned.
     driven: bool,
+    /// True if that was a start that worked.
     started: bool,
     /// Time that is no whole second yet.
     run_us: u32,
 }
 
-/// What the drive and the board show.
+/// The state that the drive and the board show.
 pub(crate) struct Sight {
     pub(crate) phase: Phase,
     pub(crate) faults: Faults,

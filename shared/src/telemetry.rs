@@ -1,4 +1,4 @@
-//! What the ESC tells of itself, in SI.
+//! The ESC's state in SI.
 
 use crate::drive::{Faults, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
@@ -20,15 +20,15 @@ pub struct Telemetry {
     pub consumed_mah: f32,
     /// Temperature of the board, °C.
     pub temperature_c: f32,
-    /// What the drive is doing.
+    /// The drive's phase.
     pub phase: Phase,
     /// Faults that hold the bridge off.
     pub faults: Faults,
-    /// How often a fault has turned the bridge off since the start.
+    /// Number of times that a fault has turned the bridge off since the start.
     pub fault_count: u32,
     /// Starts in a row that have failed: the motor is tried again, a few times.
     pub failed_starts: u8,
-    /// Whether the throttle may turn the motor.
+    /// True if the throttle may turn the motor.
     pub armed: bool,
     /// Frames on the throttle wire that failed their check, since the start.
     pub bad_frames: u32,
@@ -36,9 +36,9 @@ pub struct Telemetry {
     pub bad_share: f32,
     /// The signal on the throttle wire; none before it has been identified, and on a silent wire.
     pub signal: Option<Signal>,
-    /// What of the control's inside can be streamed, in the order of [`SIGNALS`].
+    /// Signals of the control that can be streamed, in the order of [`SIGNALS`].
     pub signals: [f32; SIGNALS.len()],
-    /// What has happened in its life.
+    /// Statistics over its life.
     pub statistics: Statistics,
 }
 
@@ -99,8 +99,8 @@ impl Telemetry {
         }
     }
 
-    /// Whether the motor is at rest and sound, with what it is asked to do now: a start begins with
-    /// phases that do not turn it yet.
+    /// The state that decides on tests: at rest, and sound, with the present command. A start begins
+    /// with phases that do not turn the motor yet.
     pub fn drive(&self, command: Command) -> DriveStatus {
         let at_rest = !self.phase.drives() && self.rpm.abs() < AT_REST_RPM;
         DriveStatus {

@@ -32,33 +32,33 @@ pub struct Throttle {
     telemetry: Telemetry,
     info: [u8; info::BYTES],
     told: Told,
-    /// What DShot commands have ordered since the last poll, or wait to be done: one of each kind, and there
-    /// are seven for the tasks.
+    /// Orders of DShot commands since the last poll, and those that wait to be done: one of each kind,
+    /// and there are seven for the tasks.
     orders: Deque<Order, 7>,
     /// While the flash is written: the bridge must stay at rest until the processor is back.
     storing: bool,
 }
 
-/// What the tasks say of each poll.
+/// The tasks' part of each poll.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Told {
     /// The note that is due, to be played while nothing turns the motor.
     pub(crate) note: Option<Note>,
-    /// What the self-test pulls, likewise, and in place of notes.
+    /// The pull of the self-test, if any, in place of notes.
     pub(crate) pull: Option<Pull>,
-    /// Whether the temperature is past its limit.
+    /// True if the temperature is past its limit.
     pub(crate) too_hot: bool,
-    /// Whether nothing may turn the motor.
+    /// True if nothing may turn the motor.
     pub(crate) barred: bool,
 }
 
-/// How the wire stands.
+/// The state of the wire.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Standing {
     pub(crate) command: Command,
     pub(crate) armed: bool,
     pub(crate) signal: Option<Signal>,
-    /// Whether valid frames or pulses come in.
+    /// True if valid frames or pulses come in.
     pub(crate) traffic: bool,
     pub(crate) bad_frames: u32,
     pub(crate) bad_share: f32,
@@ -150,8 +150,8 @@ impl Throttle {
         }
     }
 
-    /// What is sent back to the flight controller, with the drive as it is now: on the throttle wire and on the
-    /// serial line.
+    /// The answer to the flight controller, on the throttle wire and on the serial line, with the
+    /// drive's present state.
     pub fn answer(&mut self, ask: Ask, snapshot: &Snapshot) -> Answer {
         let reply = self.reply(ask, self.speed_bits(snapshot));
         let Serial { kiss, info } = self.serial(ask, snapshot);
@@ -174,7 +174,7 @@ impl Throttle {
         answer::speed_bits(snapshot, &self.basis)
     }
 
-    /// What the drive is asked for.
+    /// The drive's set-point.
     pub fn setpoint(&self) -> Setpoint {
         if self.told.too_hot {
             return Setpoint::Fault(Fault::OverTemperature);
@@ -190,7 +190,7 @@ impl Throttle {
         }
     }
 
-    /// What the motor is to do by the wire or by a test.
+    /// The motor's command by the wire or by a test.
     pub fn command(&self) -> Command {
         self.input.authority().command()
     }
@@ -265,8 +265,8 @@ impl Throttle {
         self.storing
     }
 
-    /// Whether the flash is being written. Edges are stale then: the processor may have been stalled for
-    /// longer than the capturing timer counts.
+    /// Returns true while the flash is being written. Edges are stale then: the processor may have been
+    /// stalled for longer than the capturing timer counts.
     pub fn is_storing(&self) -> bool {
         self.storing
     }

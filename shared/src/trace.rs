@@ -4,7 +4,7 @@
 
 use fixed::{FixedI32, FixedI64, FixedU32};
 
-/// What can hand out every word of itself.
+/// A state that hands out every word of itself.
 pub trait Trace {
     /// Hands out the words, as many and in the same order at all times: a word's place tells what it is.
     fn trace(&self, out: &mut impl FnMut(u32));
@@ -137,7 +137,7 @@ impl<T: Trace, U: Trace> Trace for (T, U) {
 }
 
 impl<T: Trace + Copy + Default> Trace for Option<T> {
-    /// Whether there is one, and what it is; without one, the default's words.
+    /// One word for its presence, then its own words, or those of the default.
     #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.is_some().trace(out);

@@ -3,7 +3,7 @@
 //! A tune tells a user what the ESC has found, so each sounds unlike the others. The drive plays a
 //! note without turning the motor; see [`Setpoint::Tone`](crate::drive::Setpoint::Tone).
 
-/// What the motor is heard to say.
+/// The tunes of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tune {
     /// Powered up: three rising notes, over before a wire can be armed with the defaults.
@@ -71,7 +71,8 @@ const G6: u16 = 1568;
 const B6: u16 = 1976;
 const C7: u16 = 2093;
 
-/// What ends every tune: a pause, in which the low sides brake what the last note has left of a movement.
+/// The end of every tune: a pause, in which the low sides brake the movement that the last note has
+/// left.
 const END: Timed = rest(20);
 
 impl Tune {

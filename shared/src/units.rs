@@ -69,7 +69,7 @@ pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);
 /// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
 pub type InverseFlux = Quantity<PerWeber, U32>;
 
-/// The inverse of the motor's stated flux, ξ = 1/4: the voltage base makes it so for every motor.
+/// The control's units in SI.
 pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
 
 /// A reading of the converter in counts, signed and without its offset. The chip's are whole; a
