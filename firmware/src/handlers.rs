@@ -1,4 +1,4 @@
-//! What ends everything: a panic, a hard fault, an unexpected interrupt.
+//! The handlers that end everything: of a panic, a hard fault, an unexpected interrupt.
 
 use core::arch::{asm, naked_asm};
 use core::panic::PanicInfo;
@@ -20,8 +20,8 @@ unsafe extern "C" {
     static _stack_start: u32;
 }
 
-/// Where the innermost calls return to. On this target every function keeps in r7 the address of two
-/// words: its caller's r7, and where it returns to.
+/// The addresses to which the innermost calls return. On this target every function keeps in r7 the
+/// address of two words: its caller's r7, and its own return address.
 #[inline(always)]
 fn return_addresses() -> [u32; DETAILS] {
     let stack = &raw const _stack_end as u32..&raw const _stack_start as u32 - 4;

@@ -36,7 +36,7 @@ impl Image {
     }
 }
 
-/// Whether the flash holds what was stamped; so it is taken to, if nothing was.
+/// Returns true if the flash holds what was stamped, or nothing was stamped.
 #[cfg(board)]
 pub fn is_whole() -> bool {
     unsafe extern "C" {
@@ -73,7 +73,7 @@ const fn field(text: &str) -> [u8; FIELD_BYTES] {
     field
 }
 
-/// What the program says it is on MAVLink; the chip's serial number is added when it runs.
+/// The program's identity on MAVLink; the chip's serial number is added when it runs.
 pub const fn identity(board: &'static str, board_number: u16) -> siskin_control::image::Image {
     siskin_control::image::Image {
         board,

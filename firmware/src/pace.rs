@@ -1,4 +1,4 @@
-//! How long the timer that paces replies waits for the first bit.
+//! The time that the timer which paces replies waits for the first bit.
 
 /// Clocks of the pacing timer for these ticks of the capturing one, less one: what its period is set to. None
 /// if the time has passed, is further off than any reply, or is so near that the period would be 0, with which

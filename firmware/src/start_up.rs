@@ -1,5 +1,5 @@
-//! What comes before the memory is set up: the control's code goes where no erase of the flash holds
-//! it up, and its state is cleared.
+//! The work before the memory is set up: the control's code goes where no erase of the flash holds it
+//! up, and its state is cleared.
 
 use core::arch::global_asm;
 

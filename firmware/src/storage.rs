@@ -17,13 +17,13 @@ use embedded_storage::nor_flash::{
 use crate::chip::flash::{self, PAGE_BYTES, WORD_BYTES};
 use crate::chip::pages;
 
-/// Whether the store is being read.
+/// True while the store is being read.
 static READING: AtomicBool = AtomicBool::new(false);
 
 /// Within so many cycles of a read the flash has told that the word is torn: some times what its bus takes.
 const READ_TOLD_CYCLES: u32 = 32;
 
-/// Where it is, as the linker script says: from the beginning of the flash.
+/// The place of the store, as the linker script has it: from the beginning of the flash.
 fn place() -> Range<usize> {
     unsafe extern "C" {
         static __store: u8;
@@ -37,9 +37,9 @@ pub(crate) fn range() -> Range<u32> {
     0..place().len() as u32
 }
 
-/// Whether a non-maskable interrupt is for a word of the store that a loss of power has cut off: any torn
-/// word that the flash tells while the store is read. Who reads it goes on: its set has no seal, or a wrong
-/// one.
+/// Returns true if a non-maskable interrupt is for a word of the store that a loss of power has cut
+/// off: any torn word that the flash reports while the store is read. The reader goes on: that word's
+/// set has no seal, or a wrong one.
 pub fn take_torn_word() -> bool {
     pages::take_torn_word() && READING.load(Ordering::Relaxed)
 }

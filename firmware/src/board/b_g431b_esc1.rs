@@ -93,7 +93,7 @@ pub(crate) mod wire {
     pub(crate) const CAPTURE: TimGp32 = pac::TIM2;
     /// Bits of its counter.
     pub(crate) const TIMER_BITS: u32 = 32;
-    /// What its clock is divided by.
+    /// Divider of its clock.
     pub(crate) const PRESCALER: u16 = 1;
     /// Its rate.
     pub(crate) const TICK_HZ: u32 = super::TIMER_HZ;
@@ -110,12 +110,12 @@ pub(crate) mod wire {
     /// The pin's number there.
     const PIN: usize = 15;
 
-    /// What the DMA writes to while the pin is driven: the port's set and reset register.
+    /// The register that the DMA writes while the pin is driven: the port's set and reset register.
     pub(crate) fn level_register() -> *mut u32 {
         PORT.bsrr().as_ptr().cast()
     }
 
-    /// What it writes there for a level.
+    /// The word to write there for a level.
     pub(crate) fn level_word(level: bool) -> u32 {
         // A zero resets the pin, by the upper half of the register.
         1 << if level { PIN } else { PIN + 16 }
@@ -375,7 +375,8 @@ impl Hardware {
     }
 }
 
-/// What the interrupt is at, from then on its own. It waits 1 ms for the amplifiers to settle.
+/// Prepares the registers that belong to the interrupt from then on. It waits 1 ms for the amplifiers
+/// to settle.
 pub(crate) fn prepare(_bridge: Bridge, _converters: Converters) -> Registers {
     cortex_m::asm::delay(TIMER_HZ / 1000);
     Registers::CHIP

@@ -98,7 +98,7 @@ pub(crate) mod wire {
     pub(crate) const CAPTURE: TimGp32 = unsafe { TimGp32::from_ptr(pac::TIM3.as_ptr()) };
     /// Bits of its counter.
     pub(crate) const TIMER_BITS: u32 = 16;
-    /// What its clock is divided by: 16 bits are 3.1 ms.
+    /// Divider of its clock: 16 bits are 3.1 ms.
     pub(crate) const PRESCALER: u16 = 4;
     /// Its rate.
     pub(crate) const TICK_HZ: u32 = super::TIMER_HZ / 2 / PRESCALER as u32;
@@ -112,7 +112,7 @@ pub(crate) mod wire {
     /// Its rate.
     pub(crate) const PACE_HZ: u32 = super::TIMER_HZ / 2;
 
-    /// What the DMA writes to while the pin is driven: the capturing timer's CCER.
+    /// The register that the DMA writes while the pin is driven: the capturing timer's CCER.
     ///
     /// Not a port's: only the second DMA reaches the ports, and one that serves an AHB peripheral beside one
     /// of APB2, as is the serial line, corrupts data (ES0182, 2.1.10). The first DMA cannot reach a port at
@@ -121,7 +121,8 @@ pub(crate) mod wire {
         CAPTURE.ccer().as_ptr().cast()
     }
 
-    /// What it writes there for a level: the channel's output is forced to be active, and its polarity, by
+    /// The word to write there for a level: the channel's output is forced to be active, and its
+    /// polarity, by
     /// which it captures falling edges otherwise, makes that low. The other channel goes on.
     pub(crate) fn level_word(level: bool) -> u32 {
         let mut enable = CcerGp16(0);
@@ -370,8 +371,9 @@ impl Hardware {
     }
 }
 
-/// What the interrupt is at, from then on its own. It enables the gate driver and waits 20 ms: the
-/// driver takes up to 10 ms, and its amplifiers must have settled before their zeros are measured.
+/// Prepares the registers that belong to the interrupt from then on. It enables the gate driver and
+/// waits 20 ms: the driver takes up to 10 ms, and its amplifiers must have settled before their zeros
+/// are measured.
 pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
     bridge.enable.set_high();
     mem::forget((bridge, converters));

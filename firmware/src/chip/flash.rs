@@ -65,7 +65,7 @@ fn with_unlocked(act: impl FnOnce()) -> Result<(), Failed> {
     })
 }
 
-/// What is no error.
+/// The status that is no error.
 fn ended() -> Sr {
     let mut flags = Sr(0);
     flags.set_eop(true);

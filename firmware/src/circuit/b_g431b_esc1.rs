@@ -51,7 +51,7 @@ pub const TERMINAL_DIVIDER: f32 = 2.2 / (2.2 + 10.0);
 /// The board's rating, peak amperes. The converter shows more: 75 A into the motor, 45 A out of it.
 pub const RATING_A: f32 = 40.0;
 
-/// What the control must know of this board.
+/// The board as the control must know it.
 pub const BOARD: Board = Board {
     image: image::identity(NAME, 1),
     current_a_per_count: V_PER_COUNT / (SHUNT_OHM * SHUNT_DIVIDER * GAIN),

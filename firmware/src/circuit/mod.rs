@@ -1,4 +1,4 @@
-//! What a count is worth on each board: its circuit from shunts, terminals and supply to the converter.
+//! The worth of a count on each board: its circuit from shunts, terminals and supply to the converter.
 //!
 //! Plain numbers, which a PC needs as well to replay what the chip has done.
 

@@ -25,7 +25,7 @@ pub const ZERO_COUNTS: i32 = 2048;
 /// From the supply to the converter, and from a terminal.
 pub const DIVIDER: f32 = 2.2 / (2.2 + 39.0);
 
-/// What the control must know of this board. Its times are estimates until they are measured.
+/// The board as the control must know it. Its times are estimates until they are measured.
 pub const BOARD: Board = Board {
     image: image::identity(NAME, 2),
     current_a_per_count: V_PER_COUNT / (SHUNT_OHM * GAIN),

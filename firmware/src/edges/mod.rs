@@ -24,7 +24,7 @@ pub(crate) struct Edges<const TIMER_BITS: u32> {
 }
 
 impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
-    /// What the timer's counter can show.
+    /// The greatest value of the timer's counter.
     const MASK: u32 = u32::MAX >> (32 - TIMER_BITS);
 
     /// None yet. An edge is in its memory, that of the rising or that of the falling ones, so many ticks after
@@ -96,12 +96,12 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
         Some(move |bit| (self.time(first(bit)), self.time(second(bit))))
     }
 
-    /// Whether as many edges have come as a frame has.
+    /// Returns true if as many edges have come as a frame has.
     pub(crate) fn has_frame(&self) -> bool {
         self.rings.iter().all(|ring| ring.count() >= BITS)
     }
 
-    /// Whether this time was still to come at the last look.
+    /// Returns true if this time was still to come at the last look.
     pub(crate) fn is_before(&self, until_ticks: u32) -> bool {
         until_ticks.wrapping_sub(self.last_ticks) as i32 > 0
     }

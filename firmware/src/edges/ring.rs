@@ -15,7 +15,7 @@ pub(crate) type Memory = [AtomicU32; LEN];
 /// The ring.
 pub(super) struct Ring {
     memory: &'static Memory,
-    /// Where the next time is, and where the DMA was at the last look.
+    /// The place of the next time, and that of the DMA at the last look.
     at: usize,
     end: usize,
     /// The time before the next one: another there tells that the DMA has come round.
@@ -49,7 +49,7 @@ impl Ring {
         whole
     }
 
-    /// Whether the DMA has come round: what was read last may be any edge's.
+    /// Returns true if the DMA has come round: what was read last may be any edge's.
     pub(super) fn is_torn(&self) -> bool {
         self.torn || self.word(LEN - 1) != self.before
     }
@@ -67,7 +67,7 @@ impl Ring {
         self.before = self.word(LEN - 1);
     }
 
-    /// How many times it has.
+    /// The number of times that it has.
     pub(super) fn count(&self) -> usize {
         (self.end + LEN - self.at) % LEN
     }

@@ -14,7 +14,7 @@ const BIT: u32 = 280;
 /// The timer and its DMA: edges come at their times, whoever looks at what.
 struct Chip {
     memories: [&'static Memory; 2],
-    /// How many times have gone into each.
+    /// The number of times that have gone into each.
     counts: [Cell<usize>; 2],
     now: Cell<u64>,
     /// Edges to come: when, and the level after each.

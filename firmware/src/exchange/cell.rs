@@ -1,4 +1,4 @@
-//! What an interrupt works on.
+//! The memory that an interrupt works on.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;

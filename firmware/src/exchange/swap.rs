@@ -1,5 +1,5 @@
-//! What a task replaces as a whole, and the interrupt reads in place: two slots, of which one is in
-//! use. The other belongs to the task until it offers what it has put there.
+//! A value that a task replaces as a whole, and the interrupt reads in place: two slots, of which one
+//! is in use. The other belongs to the task until it offers the value that it has put there.
 
 use core::mem::MaybeUninit;
 
@@ -91,7 +91,7 @@ impl<T> Swap<T> {
         }
     }
 
-    /// What is in use.
+    /// Works with the value in use.
     #[inline(always)]
     pub(crate) fn with<R>(&self, hand: &User, work: impl FnOnce(&T) -> R) -> R {
         self.look(hand.used, work)
@@ -137,7 +137,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::sync::Mutex;
 
-    /// What three periods use while a task offers 1 and then, if it may, 2. Loom goes another way
+    /// Three periods use the values while a task offers 1 and then, if it may, 2. Loom goes another way
     /// where a thread yields between two of its steps, so both are tried.
     #[test]
     fn a_period_uses_one_whole_value_and_changes_over_in_order() {
@@ -158,7 +158,7 @@ mod tests {
         assert_eq!(taken, 6, "{seen:?}");
     }
 
-    /// Whether the value could be offered.
+    /// Offers the value; false if it could not be offered.
     fn offer<T>(swap: &Swap<T>, hand: &mut Offerer, value: T) -> bool {
         let free = swap.free(hand);
         let is_free = free.is_some();

@@ -55,7 +55,7 @@ pub fn unpack(word: u32) -> Setpoint {
     }
 }
 
-/// What does not turn the motor.
+/// A set-point that does not turn the motor.
 fn rest(number: u32) -> Setpoint {
     // Written out: a look-up would be a table in flash.
     match number {

@@ -23,7 +23,7 @@ pub(crate) struct Pins {
     pub(crate) fault: usize,
 }
 
-/// Whether the alarm's interrupt has turned the driver off since the last period.
+/// True if the alarm's interrupt has turned the driver off since the last period.
 static ALARMED: AtomicBool = AtomicBool::new(false);
 
 /// The gate driver as the PWM interrupt knows it. A board without one is always ready.
@@ -41,7 +41,7 @@ impl GateDriver {
         }
     }
 
-    /// Whether the bridge may be turned on.
+    /// Returns true if the bridge may be turned on.
     #[inline(always)]
     pub(crate) fn ready(&mut self) -> bool {
         let Some(pins) = GATE_DRIVER else {

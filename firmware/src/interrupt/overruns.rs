@@ -1,6 +1,6 @@
 //! Periods that were not done with when the next was due.
 
-/// What an overrun counts, in periods without one.
+/// Weight of an overrun, in periods without one.
 const WEIGHT: u32 = 100;
 
 /// Overruns in a row that end the drive; more than one in 100 periods do so in time too.

@@ -17,7 +17,7 @@ use crate::chip;
 use crate::exchange::{InterruptEnd, RunningEnd};
 use crate::last_words::{Failure, fail};
 
-/// Whether the flash is being written.
+/// True while the flash is being written.
 static WRITING: AtomicBool = AtomicBool::new(false);
 
 static PERIODS: AtomicU32 = AtomicU32::new(0);
@@ -50,11 +50,11 @@ pub struct Interrupt {
     gate_driver: GateDriver,
     state: State,
     end: RunningEnd,
-    /// What the control is told where the hardware has turned the bridge off: it does what it does
-    /// after a fault that it finds itself.
+    /// The control's set-point if the hardware has turned the bridge off: it does the same as after a
+    /// fault that it finds itself.
     trip: Setpoint,
     overruns: Overruns,
-    /// Whether the gate driver has given an alarm while the flash was written.
+    /// True if the gate driver has given an alarm while the flash was written.
     alarmed: bool,
 }
 

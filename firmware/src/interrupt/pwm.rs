@@ -4,7 +4,7 @@
 //! value, so the top is in the middle of the low sides' on-time. There channel 4 triggers the
 //! converters. New duties are written after the top and taken at the next one, one period later.
 //!
-//! What a phase does ([`Leg`]) is in the channels' modes and enable bits. These are preloaded too
+//! The state of a phase ([`Leg`]) is in the channels' modes and enable bits. These are preloaded too
 //! (CCPC), but the timer takes them at its commutation event, not at the top: the control interrupt
 //! causes one as its first act, 3 µs after the top at which the duties that go with them were
 //! taken. In between the old switches see the new duties: a phase that is let go keeps its low side
@@ -33,9 +33,9 @@ pub(crate) struct Pwm {
     timer: TimAdv,
     /// The counter's top.
     top: u16,
-    /// What the last [`apply`](Self::apply) has written.
+    /// The low sides as the last [`apply`](Self::apply) has written them.
     low_sides: LowSides,
-    /// What follows, in the next commutation, on all switches off.
+    /// The legs that follow, in the next commutation, on all switches off.
     deferred: Option<[Leg; 3]>,
 }
 
@@ -116,7 +116,7 @@ impl Pwm {
         }
     }
 
-    /// Whether the break has turned the bridge off since [`clear_break`](Self::clear_break).
+    /// Returns true if the break has turned the bridge off since [`clear_break`](Self::clear_break).
     #[inline(always)]
     pub(crate) fn broken(&self) -> bool {
         self.timer.sr().read().bif(0)
@@ -234,7 +234,7 @@ impl Pwm {
     }
 }
 
-/// What a phase does for a period.
+/// The state of a phase for a period.
 #[derive(Clone, Copy)]
 enum Leg {
     /// Both switches are off.
@@ -245,7 +245,7 @@ enum Leg {
     Switching(Duty),
 }
 
-/// How the low sides are driven.
+/// The state of the low sides.
 #[derive(Clone, Copy, PartialEq)]
 enum LowSides {
     /// Not at all: all switches are off.

@@ -1,4 +1,4 @@
-//! Where the interrupt reads and writes: the blocks of registers, which may also be plain memory.
+//! The registers that the interrupt reads and writes: their blocks may also be plain memory.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

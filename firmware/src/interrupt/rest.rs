@@ -1,5 +1,5 @@
-//! How a gate driver that has given an alarm is brought back: it sleeps, it wakes, and only when it has
-//! had time to come up is its alarm heard again.
+//! Brings a gate driver back that has given an alarm: it sleeps, it wakes, and only when it has had
+//! time to come up is its alarm heard again.
 
 /// Control periods for which it rests after an alarm: 11 ms at the fastest PWM, 80 ms at the slowest.
 const REST_PERIODS: u16 = 640;
@@ -8,7 +8,7 @@ const REST_PERIODS: u16 = 640;
 /// says that all is not well until then.
 const WAKE_PERIODS: u16 = 620;
 
-/// What is to be done with the driver in a period.
+/// The order to the driver in a period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
     /// Disable it, and take no interrupt from its alarm.
@@ -28,7 +28,7 @@ pub(crate) struct Rest {
 }
 
 impl Rest {
-    /// Whether there is none.
+    /// Returns true if there is none.
     #[inline(always)]
     pub(crate) fn is_over(&self) -> bool {
         self.periods == 0

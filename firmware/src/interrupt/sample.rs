@@ -9,17 +9,17 @@ use crate::board::WIRING;
 /// Fraction bits of [`AdcCounts`].
 const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
 
-/// Where a reading is: a converter and the rank in its sequence.
+/// The place of a reading: a converter and the rank in its sequence.
 #[derive(Clone, Copy)]
 pub(crate) struct Slot(pub(crate) usize, pub(crate) usize);
 
-/// How a board's signals come to the converters and pins.
+/// The wiring of a board's signals to the converters and pins.
 pub(crate) struct Wiring {
     /// Currents of the phases a, b, c; a phase without a shunt has none.
     pub(crate) currents: [Option<Slot>; 3],
     /// Nominal reading without current, counts: the drive measures what it really is.
     pub(crate) zero: i32,
-    /// Whether a reading rises with the current into the motor.
+    /// True if a reading rises with the current into the motor.
     pub(crate) rises: bool,
     /// Voltages of the terminals a, b, c.
     pub(crate) terminals: [Slot; 3],

@@ -3,7 +3,7 @@
 use siskin_control::drive::Config;
 use siskin_control::units::Duty;
 
-/// What the timer is set to.
+/// The timer's settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Timing {
     /// The counter's top: half a period.

@@ -18,7 +18,7 @@
 /// Of `LIM_PHASE_A`.
 const TRIP_SHARE: f32 = 1.6;
 
-/// How a board's comparators see a current out of the motor.
+/// A board's comparators as they see a current out of the motor.
 #[derive(Clone, Copy)]
 pub(crate) struct TripCircuit {
     /// Volts at the comparator without current.

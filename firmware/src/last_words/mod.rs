@@ -1,4 +1,4 @@
-//! What ends everything, and what the next start knows of it.
+//! Ends everything after a failure, and tells the next start why.
 //!
 //! A failure turns the bridge off first; then it writes its cause to memory that start-up does not
 //! clear, and resets the chip. The next start takes the record and tells it.

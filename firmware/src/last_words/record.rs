@@ -29,7 +29,7 @@ pub enum Failure {
     Standstill = 6,
 }
 
-/// What is left for the next start.
+/// The record that is left for the next start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub(super) struct Record {
@@ -67,7 +67,7 @@ impl Record {
             .fold(mix(0x5151_3c1e, self.failure), |sum, word| mix(sum, *word))
     }
 
-    /// What happened, for a person; `None` where nothing is recorded.
+    /// The text for a person; `None` if nothing is recorded.
     pub(super) fn text(&self) -> Option<String<TEXT_BYTES>> {
         if self.check != self.sum() {
             return None;

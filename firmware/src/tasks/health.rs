@@ -10,10 +10,10 @@ use crate::board::{NTC, Temperature};
 use crate::interrupt::Registers;
 use crate::interrupt::sample::sample;
 
-/// How often it is read: the board's copper takes seconds to warm.
+/// Time between two readings: the board's copper takes seconds to warm.
 const EVERY: Duration = Duration::from_millis(10);
 
-/// What has been read.
+/// The readings.
 pub(crate) struct Health {
     sensor: Temperature,
     due: Instant,

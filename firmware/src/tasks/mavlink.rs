@@ -21,7 +21,7 @@ use crate::exchange::{ConfigWriter, SnapshotReader};
 use crate::storage::{Storage, range};
 use crate::{interrupt, last_words};
 
-/// How often what is due is looked for.
+/// Time between two looks for what is due.
 const POLL: Duration = Duration::from_millis(1);
 
 /// Bytes that wait to be sent: replies to a burst of requests, 90 ms of the slowest link.
@@ -55,7 +55,7 @@ fn send(mut frame: &[u8]) {
 /// 6 ms at the lowest speed.
 const RESTART_POLLS: u8 = 10;
 
-/// What the task owns.
+/// The task's own state.
 pub(crate) struct Desk {
     pub(crate) esc: &'static mut Esc,
     pub(crate) throttle: Port,
@@ -68,7 +68,7 @@ pub(crate) struct Desk {
     pub(crate) teller: Teller,
     pub(crate) light: Light,
     pub(crate) supervisor: Supervisor,
-    /// Whether the interrupt is still to be given the configuration in force.
+    /// True if the interrupt is still to be given the configuration in force.
     pub(crate) changed: bool,
     /// The bound of the phase currents that the hardware's trip stands above, A.
     pub(crate) limit_a: f32,

@@ -1,4 +1,4 @@
-//! What runs beside the control's interrupt.
+//! The tasks beside the control's interrupt.
 //!
 //! | task | does | where |
 //! |---|---|---|

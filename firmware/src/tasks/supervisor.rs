@@ -16,7 +16,7 @@ use crate::last_words::{DETAILS, Failure, fail};
 /// (DS8626, table 40), and as much again.
 const WATCHDOG_US: u32 = 1_600_000;
 
-/// How often the others are looked at; each shows within that time that it lives.
+/// Time between two looks at the others; each shows within it that it lives.
 const LOOK: Duration = Duration::from_millis(50);
 
 static THROTTLE: AtomicU32 = AtomicU32::new(0);
@@ -26,7 +26,7 @@ pub(crate) fn throttle_lives() {
     THROTTLE.fetch_add(1, Ordering::Relaxed);
 }
 
-/// What feeds the watchdog.
+/// The state of the task that feeds the watchdog.
 pub(crate) struct Supervisor {
     watchdog: IndependentWatchdog<'static, IWDG>,
     due: Instant,

@@ -1,4 +1,4 @@
-//! What goes wrong with the throttle wire on this chip: counted where it happens, told by the tasks.
+//! Trouble with the throttle wire on this chip: counted where it happens, reported by the tasks.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,7 +16,7 @@ pub(crate) struct Trouble {
     late_replies: AtomicU32,
 }
 
-/// Where they are counted.
+/// The counts.
 pub(crate) static TROUBLE: Trouble = Trouble {
     lost_edges: AtomicU32::new(0),
     late_replies: AtomicU32::new(0),
@@ -49,7 +49,7 @@ impl Teller {
         }
     }
 
-    /// What is to be told now.
+    /// The warning that is due, if any.
     pub(crate) fn next(&mut self, now: Instant) -> Option<Warning> {
         let counts =
             [&TROUBLE.lost_edges, &TROUBLE.late_replies].map(|count| count.load(Ordering::Relaxed));

@@ -87,7 +87,7 @@ pub(crate) fn heard(pin: usize) {
     EXTI.pr(0).write(|w| w.set_line(pin, true));
 }
 
-/// Whether the watchdog has caused the last reset; to be asked once.
+/// Returns true if the watchdog has caused the last reset; to be asked once.
 pub(crate) fn take_watchdog_reset() -> bool {
     let starved = RCC.csr().read().wdgrstf();
     // The flags stay until they are removed.

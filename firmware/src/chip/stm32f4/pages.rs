@@ -3,10 +3,10 @@
 use embassy_stm32::pac::flash::regs::Cr;
 use embassy_stm32::pac::flash::vals::Psize;
 
-/// What is programmed at once.
+/// Bytes programmed at once.
 pub(crate) const WORD_BYTES: usize = 4;
 
-/// What is erased at once, of the sectors 0 to 3: it takes a quarter to half a second.
+/// Bytes erased at once, in the sectors 0 to 3: it takes a quarter to half a second.
 pub(crate) const PAGE_BYTES: usize = 0x4000;
 
 /// The control register while words are programmed.

@@ -96,7 +96,7 @@ pub(crate) fn break_on_lock_up() {
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
 }
 
-/// How often a reading is tried, so that a task is not held up for ever.
+/// Tries of a reading, so that a task is not held up for ever.
 const TRIES: u32 = 8;
 
 /// A reading of one of the first converter's pins, between its injected ones.
@@ -145,7 +145,7 @@ impl Reading {
     }
 }
 
-/// Whether the watchdog has caused the last reset; to be asked once.
+/// Returns true if the watchdog has caused the last reset; to be asked once.
 pub(crate) fn take_watchdog_reset() -> bool {
     let starved = pac::RCC.csr().read().iwdgrstf();
     // The flags stay until they are removed.

@@ -3,10 +3,10 @@
 use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Cr;
 
-/// What is programmed at once.
+/// Bytes programmed at once.
 pub(crate) const WORD_BYTES: usize = 8;
 
-/// What is erased at once: 22 ms.
+/// Bytes erased at once: 22 ms.
 pub(crate) const PAGE_BYTES: usize = 2048;
 
 /// The control register while words are programmed.
@@ -24,8 +24,8 @@ pub(crate) fn erasing(page: usize) -> Cr {
     control
 }
 
-/// Whether a word of the main flash was read that has two wrong bits or more, as one that a loss of power
-/// has cut off; the next one is told anew. It reads as it is.
+/// Returns true if a word of the main flash was read that has two wrong bits or more, as one that a
+/// loss of power has cut off, and clears the flag for the next one. The word reads as it is.
 ///
 /// Which word it was is not looked at: RM0440 (3.7.7) does not say whether ADDR_ECC counts bytes or double
 /// words.

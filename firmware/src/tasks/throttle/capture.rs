@@ -25,11 +25,11 @@ const ALARM: usize = 2;
 /// more while it serves others. 0.5 µs.
 const SETTLED_TICKS: u32 = TICK_HZ / 2_000_000;
 
-/// What the timer's counter can show.
+/// The greatest value of the timer's counter.
 const COUNTER_MASK: u32 = u32::MAX >> (32 - TIMER_BITS);
 
 static WAKER: AtomicWaker = AtomicWaker::new();
-/// Whether an edge was what woke.
+/// True if it was an edge that woke the task.
 static EDGE: AtomicBool = AtomicBool::new(false);
 
 /// Ticks of a time.

@@ -84,10 +84,10 @@ const LATE_LOOK_EIGHTHS: u32 = 144;
 /// From the first edge of a bit to that of the next in the same frame it is never as long, in eighths of a bit.
 const FRAME_APART_EIGHTHS: u32 = 16;
 
-/// How long it takes from the alarm to the look, as a rule: it then waits for the last edge.
+/// Usual time from the alarm to the look: it then waits for the last edge.
 const WAKING_US: u32 = 5;
 
-/// What the task owns, besides what sends replies.
+/// The task's own state, besides that of the replies.
 pub(crate) struct Listener {
     pub(crate) port: Port,
     pub(crate) capture: Capture,
@@ -121,16 +121,16 @@ pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
     }
 }
 
-/// What is known before a frame comes.
+/// The state before a frame comes.
 struct Ready {
     snapshot: Snapshot,
     /// A reply's bits for its speed.
     speed_bits: u32,
-    /// Whether the signal is one that is answered on its wire, as far as is known.
+    /// True if the signal is one that is answered on its wire, as far as is known.
     may_reply: bool,
 }
 
-/// What a frame asks for, and the reply to it on the wire.
+/// The requests of a frame, and the reply to it on the wire.
 struct Asked {
     ask: Ask,
     reply: Option<Reply>,
@@ -141,7 +141,7 @@ struct Looks {
     begin_ticks: u32,
     /// Times of those to come, ticks.
     after_ticks: Vec<u32, 2>,
-    /// Whether a whole frame is expected, and nothing else taken.
+    /// True if a whole frame is expected, and nothing else taken.
     frame: bool,
     /// Until when the last edges of an expected frame are waited for.
     until_ticks: u32,

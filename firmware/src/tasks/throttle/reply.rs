@@ -22,11 +22,11 @@ use crate::pace::delay_clocks;
 /// Bits of a reply, of which the last one is high in each, as the line rests ([`gcr::encode`]).
 const WORDS: usize = gcr::BITS as usize;
 
-/// What sends replies.
+/// Sends replies.
 pub(crate) struct Replier {
     channel: dma::Channel<'static>,
     request: dma::Request,
-    /// What is written to the pin, bit by bit.
+    /// The words written to the pin, bit by bit.
     words: [AtomicU32; WORDS],
 }
 
