@@ -54,7 +54,7 @@ impl Mapping {
         };
         let mut pitch = Speed::from_f32(f32::from(hz) * self.period_s);
         while pitch > tone::PITCH_MAX {
-            pitch /= 2;
+            pitch = pitch / 2;
         }
         Setpoint::Tone(pitch)
     }

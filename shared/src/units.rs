@@ -3,20 +3,36 @@
 //! Inside the control every quantity is a fraction of a base, so that a product needs only its
 //! top half. Conversion from and to SI happens when the configuration is built and in telemetry,
 //! never in a control period.
+//!
+//! Each is a [`Quantity`], which adds to its like alone. An angle takes on what a speed turns it by in
+//! a period:
+//!
+//! ```
+//! # use siskin_control::units::{Angle, Speed};
+//! let (theta, omega) = (Angle::lit("0.25"), Speed::lit("0.01"));
+//! assert!(theta.wrapping_add(omega.over_period()) > theta);
+//! ```
+//!
+//! but not a speed:
+//!
+//! ```compile_fail,E0308
+//! # use siskin_control::units::{Angle, Speed};
+//! let (theta, omega) = (Angle::lit("0.25"), Speed::lit("0.01"));
+//! theta.wrapping_add(omega);
+//! ```
 
 pub mod dimension;
 
 use fixed::types::extra::{U24, U28, U32};
-use fixed::types::{I0F32, I4F28, I8F24, I16F16};
+use fixed::types::{I4F28, I8F24, I16F16};
 
 use crate::math::{Quantity, Real};
-use dimension::{NewtonMetre, PerWeber, Weber};
 
-/// An electrical angle in turns; it wraps.
-pub type Angle = I0F32;
+pub use crate::math::Angle;
+use dimension::{NewtonMetre, PerWeber, TurnPerPeriod, TurnPerPeriodSquare, Weber};
 
 /// An electrical speed in turns a control period: the angle's step.
-pub type Speed = I0F32;
+pub type Speed = Quantity<TurnPerPeriod, U32>;
 
 /// A current in units of [`Scale::current_a`].
 pub type Current = I4F28;
@@ -43,10 +59,10 @@ pub fn narrow(u: WideVoltage) -> Voltage {
 pub type VoltageSquare = I8F24;
 
 /// ω·i: how fast a current changes in a frame that turns, in units of current a period, over 2π.
-pub type CurrentRate = I4F28;
+pub type CurrentRate = Quantity<TurnPerPeriod, U28>;
 
 /// A square of a speed.
-pub type SpeedSquare = I0F32;
+pub type SpeedSquare = Quantity<TurnPerPeriodSquare, U32>;
 
 /// What a voltage adds to a flux linkage in a period.
 #[inline(always)]

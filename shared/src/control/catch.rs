@@ -179,7 +179,7 @@ impl State {
 /// Takes one sample of the terminals a, b, c with the bridge off and says what is known by now.
 #[inline(never)]
 pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) -> Rotor {
-    state.theta = state.theta.wrapping_add(state.omega);
+    state.theta = state.theta.wrapping_add(state.omega.over_period());
     // 12 bits and their fraction, whatever is above.
     let held = |v: AdcCounts| I17F15::from_bits(v.to_bits() >> 1 & ((1 << 27) - 1));
     let [a, b, c] = terminals;
@@ -253,7 +253,7 @@ fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     if state.looks == 1 {
         begin(config, state);
     } else {
-        state.omega = theta.wrapping_sub(before);
+        state.omega = theta.wrapping_sub(before).per_period();
         // Two looks of weight 1.5 each, a quarter of the usual time apart.
         state.weight = const { I20F12::lit("3") };
         state.ages = [3 << (SUM_FRACTION - 3), 3 << (SUM_FRACTION - 5)];
@@ -329,7 +329,7 @@ fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
         ];
         // Between the second and the third of them.
         let back = state.omega.wrapping_add(state.omega >> 1);
-        (state.theta.wrapping_sub(back), mean)
+        (state.theta.wrapping_sub(back.over_period()), mean)
     } else {
         (state.theta, readings)
     };

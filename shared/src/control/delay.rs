@@ -18,11 +18,11 @@ impl Delay {
     /// speed: (0.5 + delay) periods.
     #[inline(always)]
     pub fn advance(self, speed: Speed) -> Angle {
-        let half = Angle::from_bits(speed.to_bits() >> 1);
+        let half = speed.over_half_period();
         match self {
             Self::None => half,
-            Self::Half => speed,
-            Self::One => speed.wrapping_add(half),
+            Self::Half => speed.over_period(),
+            Self::One => speed.over_period().wrapping_add(half),
         }
     }
 

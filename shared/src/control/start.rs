@@ -105,7 +105,7 @@ pub fn ramp(config: &Config, state: &mut State, current: Current) {
 pub fn advance(state: &mut State) -> Speed {
     state.omega_s = state.omega_s.plus(state.acceleration);
     let omega = state.omega_s.plus(state.yielding);
-    state.frame = state.frame.wrapping_add(omega);
+    state.frame = state.frame.wrapping_add(omega.over_period());
     omega
 }
 
@@ -117,7 +117,9 @@ pub fn advance(state: &mut State) -> Speed {
 /// Called every so many `periods`, which are few against those of a swing.
 #[inline(always)]
 pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage>), periods: u32) {
-    state.yielded = state.yielded.plus(state.yielding * periods as i32);
+    state.yielded = state
+        .yielded
+        .plus((state.yielding * periods as i32).over_period());
     let omega_s = state.omega_s;
     let h_d = config
         .resistance

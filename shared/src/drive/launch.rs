@@ -106,7 +106,7 @@ pub(super) fn begin(
     match (n, caught) {
         (1..=5, _) => slow::begin(config, state, n),
         (6, Some((theta, omega))) => {
-            let theta = theta.wrapping_add(omega.wrapping_mul_int(periods));
+            let theta = theta.wrapping_add(omega.over_periods(periods));
             let rest = AlphaBeta::default();
             observer::begin(&config.observer, &mut state.observer, (theta, omega), rest);
         }
@@ -116,7 +116,7 @@ pub(super) fn begin(
         }
         (8, Some((_, omega))) => regulate(config, state, omega),
         (9, Some((theta, omega))) => {
-            let theta = theta.wrapping_add(omega.wrapping_mul_int(periods));
+            let theta = theta.wrapping_add(omega.over_periods(periods));
             state.commanded = commanded(config, theta, omega);
         }
         (READY_PERIODS, _) => {
@@ -209,11 +209,17 @@ fn regulate(config: &Config, state: &mut State, omega: Speed) {
 /// The back-EMF has been at the terminals, as if it had been commanded: the last two commands, for a
 /// rotor that is at `theta` at the first period's sample.
 fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
-    let to_middle = config.delay.advance(omega).wrapping_sub(omega);
+    let to_middle = config
+        .delay
+        .advance(omega)
+        .wrapping_sub(omega.over_period());
     let frame = SinCos::of(theta);
     let emf = emf(omega);
     let at = |middle: Angle| voltages(inverse_park(turn(emf, SinCos::of(middle)), frame));
-    [at(to_middle), at(to_middle.wrapping_sub(omega))]
+    [
+        at(to_middle),
+        at(to_middle.wrapping_sub(omega.over_period())),
+    ]
 }
 
 /// Drives on from the speed and the current that there are.

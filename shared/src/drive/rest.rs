@@ -168,7 +168,7 @@ fn sense(config: &Config, state: &mut State, sample: &Sample) {
 /// Charge: the low sides supply the drivers, and the rotor turns on unseen. False when it is done.
 fn charge(config: &Config, state: &mut State) -> bool {
     if let Rotor::Turning { theta, omega } = &mut state.rotor {
-        *theta = theta.wrapping_add(*omega);
+        *theta = theta.wrapping_add(omega.over_period());
         state.seen.angle = *theta;
     }
     state.charge_periods += 1;

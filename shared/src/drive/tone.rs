@@ -216,7 +216,7 @@ fn play(
     }
     playing.peak = playing.peak.max(greatest);
     let before = playing.angle;
-    playing.angle = before.wrapping_add(pitch);
+    playing.angle = before.wrapping_add(pitch.over_period());
     if playing.angle.is_negative() != before.is_negative() {
         regulate(tone, playing, supply);
     }

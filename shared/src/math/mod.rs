@@ -27,4 +27,4 @@ pub use quantity::{Quantity, Times};
 pub use quotient::{divide, quotient};
 pub use real::{Real, round};
 pub use root::{magnitude, other_leg};
-pub use trig::{SinCos, atan2_turns, sin_cos};
+pub use trig::{Angle, SinCos, Turn, atan2_turns, sin_cos};

@@ -66,6 +66,12 @@ impl<D, F> Quantity<D, F> {
         self.to_bits() < 0
     }
 
+    /// Whether it is above zero.
+    #[inline(always)]
+    pub const fn is_positive(self) -> bool {
+        self.to_bits() > 0
+    }
+
     /// self + rhs, wrapped.
     #[inline(always)]
     #[must_use]
@@ -78,6 +84,27 @@ impl<D, F> Quantity<D, F> {
     #[must_use]
     pub const fn wrapping_sub(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().wrapping_sub(rhs.to_bits()))
+    }
+
+    /// self + rhs, held at the ends of the type.
+    #[inline(always)]
+    #[must_use]
+    pub const fn saturating_add(self, rhs: Self) -> Self {
+        Self::from_bits(self.to_bits().saturating_add(rhs.to_bits()))
+    }
+
+    /// self − rhs, held at the ends of the type.
+    #[inline(always)]
+    #[must_use]
+    pub const fn saturating_sub(self, rhs: Self) -> Self {
+        Self::from_bits(self.to_bits().saturating_sub(rhs.to_bits()))
+    }
+
+    /// self·rhs, wrapped.
+    #[inline(always)]
+    #[must_use]
+    pub const fn wrapping_mul_int(self, rhs: i32) -> Self {
+        Self::from_bits(self.to_bits().wrapping_mul(rhs))
     }
 
     /// −self, wrapped.

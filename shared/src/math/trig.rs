@@ -1,11 +1,18 @@
 //! Sine and cosine by table and one rotation; the angle of a vector.
 
 use fixed::FixedI32;
-use fixed::types::extra::U31;
-use fixed::types::{I0F32, I1F31};
+use fixed::types::I1F31;
+use fixed::types::extra::{U31, U32};
 
-use super::{Number, TopProduct};
+use super::{Number, Quantity, TopProduct};
 use crate::trace::traced;
+
+/// The dimension of an angle.
+#[derive(Clone, Copy, Debug)]
+pub enum Turn {}
+
+/// An angle in turns, an electrical one unless it is said otherwise; it wraps.
+pub type Angle = Quantity<Turn, U32>;
 
 traced! {
     /// Cosine and sine of one angle.
@@ -22,7 +29,7 @@ impl SinCos {
     /// Those of an angle in turns: [`sin_cos`] where it is called and not inlined, for what is not in
     /// the way of the default drive.
     #[inline(never)]
-    pub fn of(angle: I0F32) -> Self {
+    pub fn of(angle: Angle) -> Self {
         sin_cos(angle)
     }
 }
@@ -46,7 +53,7 @@ const EIGHTH_TURN: I1F31 = I1F31::from_bits(1_686_629_713);
 ///
 /// The error is at most 0.0001° in direction; the length is 1 − 8e-5 to 1.
 #[inline(always)]
-pub fn sin_cos(angle: I0F32) -> SinCos {
+pub fn sin_cos(angle: Angle) -> SinCos {
     let bits = angle.to_bits() as u32;
     let half_section = 1 << (31 - TABLE_BITS);
     let near = (bits.wrapping_add(half_section) >> (32 - TABLE_BITS)) as usize;
@@ -69,8 +76,8 @@ pub fn sin_cos(angle: I0F32) -> SinCos {
 /// A polynomial over one octant with an error below 0.02°. It divides, so it is for the events of
 /// a start, not for each period.
 #[inline(always)]
-pub fn atan2_turns<T: Number>(y: T, x: T) -> I0F32 {
-    I0F32::from_bits(direction(y.to_bits(), x.to_bits()))
+pub fn atan2_turns<T: Number>(y: T, x: T) -> Angle {
+    Angle::from_bits(direction(y.to_bits(), x.to_bits()))
 }
 
 /// Once for all types.
@@ -149,7 +156,7 @@ mod tests {
         let mut worst_deg = 0.0_f64;
         let mut worst_length = 0.0_f64;
         for i in 0..100_000_u32 {
-            let angle = I0F32::from_bits(i.wrapping_mul(42_949).wrapping_mul(3) as i32);
+            let angle = Angle::from_bits(i.wrapping_mul(42_949).wrapping_mul(3) as i32);
             let turns = angle.to_num::<f64>();
             let SinCos { cos, sin } = sin_cos(angle);
             let (c, s) = (cos.to_num::<f64>(), sin.to_num::<f64>());
@@ -163,8 +170,8 @@ mod tests {
 
     #[test]
     fn the_ends_of_a_turn_meet() {
-        let below = sin_cos(I0F32::from_bits(-1));
-        let above = sin_cos(I0F32::ZERO);
+        let below = sin_cos(Angle::from_bits(-1));
+        let above = sin_cos(Angle::ZERO);
         assert!((below.cos - above.cos).abs() < I1F31::from_num(1e-6));
         assert!((below.sin - above.sin).abs() < I1F31::from_num(1e-6));
     }
@@ -178,6 +185,6 @@ mod tests {
             let error = (got.to_num::<f64>() - turns + 0.5).rem_euclid(1.0) - 0.5;
             assert!((error * 360.0).abs() < 0.02, "{turns}: {error}");
         }
-        assert_eq!(atan2_turns(I4F28::ZERO, I4F28::ZERO), I0F32::ZERO);
+        assert_eq!(atan2_turns(I4F28::ZERO, I4F28::ZERO), Angle::ZERO);
     }
 }

@@ -4,7 +4,7 @@
 use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
-use crate::math::Times;
+use crate::math::{Quantity, Times, Turn};
 
 /// Declares dimensions.
 macro_rules! dimensions {
@@ -22,6 +22,10 @@ dimensions! {
     PerWeber,
     /// Of a torque.
     NewtonMetre,
+    /// Of a speed.
+    TurnPerPeriod,
+    /// Of the square of a speed.
+    TurnPerPeriodSquare,
 }
 
 /// Declares what two dimensions make, in either order.
@@ -41,4 +45,46 @@ macro_rules! products {
 products! {
     /// (9): i_q = ξ·T.
     NewtonMetre, PerWeber => FixedI32;
+    /// The voltage that a flux induces, ω·φ.
+    TurnPerPeriod, Weber => FixedI32;
+}
+
+impl Times<Self> for TurnPerPeriod {
+    type Product<F: Unsigned> = Quantity<TurnPerPeriodSquare, F>;
+}
+
+impl<F> Quantity<TurnPerPeriod, F> {
+    /// The angle that the rotor turns by in a period.
+    #[inline(always)]
+    pub const fn over_period(self) -> Quantity<Turn, F> {
+        Quantity::from_bits(self.to_bits())
+    }
+
+    /// The angle of half a period.
+    #[inline(always)]
+    pub const fn over_half_period(self) -> Quantity<Turn, F> {
+        Quantity::from_bits(self.to_bits() >> 1)
+    }
+
+    /// The angle of so many periods; it wraps.
+    #[inline(always)]
+    pub const fn over_periods(self, periods: i32) -> Quantity<Turn, F> {
+        Quantity::from_bits(self.to_bits().wrapping_mul(periods))
+    }
+}
+
+impl<F> Quantity<Turn, F> {
+    /// The speed that turns by the angle in a period.
+    #[inline(always)]
+    pub const fn per_period(self) -> Quantity<TurnPerPeriod, F> {
+        Quantity::from_bits(self.to_bits())
+    }
+}
+
+impl<F> Quantity<TurnPerPeriodSquare, F> {
+    /// The change of a speed in a period: of ω²·T_s one turn is a number, as a radian is.
+    #[inline(always)]
+    pub const fn over_period(self) -> Quantity<TurnPerPeriod, F> {
+        Quantity::from_bits(self.to_bits())
+    }
 }

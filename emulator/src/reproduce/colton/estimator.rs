@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use fixed::types::I0F32;
 use siskin_control::control::delay::Delay;
 use siskin_control::control::observer;
 use siskin_control::control::observer::edges::{self, Sensors};
@@ -70,7 +71,7 @@ pub(super) fn config(a_e: f64, compensates: bool) -> edges::Config {
             ..edges.flux
         },
         crossing: crossing::Config {
-            deadband: Angle::ZERO,
+            deadband: I0F32::ZERO,
             deadband_angle: Angle::ZERO,
             patience: u32::MAX,
             ..edges.crossing

@@ -130,7 +130,7 @@ fn correct(state: &mut State) {
 #[inline(always)]
 fn judge(config: &Config, state: &mut State) {
     state.residual += (state.told.misfit - state.residual) >> RESIDUAL_SHIFT;
-    let omega = state.omega.unsigned_abs().to_bits();
+    let omega = state.omega.magnitude_bits();
     let a_look = omega.min(u32::MAX >> LOOK_SHIFT) << LOOK_SHIFT;
     let amplitude = state.amplitude.to_bits() as u32;
     // The speed's standard deviation is σ/(E·√spread) radians a look: (E·ω)² > WANTED/spread with ω in turns a look, four times that a period. 16 fraction bits, and at most 64 counts: with as

@@ -203,7 +203,7 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
         d: i.d.minus(state.i.d),
         q: i.q.minus(state.i.q),
     };
-    let next = |i_hat: Current, h: Voltage, u: Voltage, cross: Current, error: Current| {
+    let next = |i_hat: Current, h: Voltage, u: Voltage, cross: CurrentRate, error: Current| {
         i_hat
             .minus(config.decay.apply(i_hat))
             .plus(config.admittance.held(h.plus(u)))
@@ -218,7 +218,7 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
         d: state.h.d.plus(config.k_i.held(error.d)),
         q: state.h.q.plus(config.k_i.held(error.q)),
     };
-    state.theta = state.theta.wrapping_add(omega);
+    state.theta = state.theta.wrapping_add(omega.over_period());
 }
 
 /// φ̂ = 1/ξ̂, with a division.

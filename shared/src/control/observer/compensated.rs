@@ -141,7 +141,10 @@ pub fn place(
     i: AlphaBeta<Current>,
 ) {
     // ψ is that of the sample before: the voltage since then is still to be added.
-    let rotor = rotor_flux(FLUX_NOMINAL, sin_cos(theta.wrapping_sub(omega)));
+    let rotor = rotor_flux(
+        FLUX_NOMINAL,
+        sin_cos(theta.wrapping_sub(omega.over_period())),
+    );
     let own = stator_flux(config.inductance, i);
     *state = State {
         theta,
@@ -176,7 +179,7 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor) {
         leak,
         held: leak.minus(config.bias.apply(omega_plus.top(omega_plus))),
         phi: I0F32::from_bits(omega_plus.top(PHI_RATE_HALF).to_bits() << 1),
-        integral: four_pi_omega_n.top(omega_n),
+        integral: four_pi_omega_n.top(omega_n).over_period(),
         proportional: Speed::from_bits(omega_n.top(DAMPING).to_bits() << 3),
         // A speed in turns takes 2π: 16·π/8, and a voltage with 24 fraction bits has a sixteenth.
         emf: Multiplier::from_bits(state.phi.top(EIGHTH_PI).to_bits()),
@@ -260,7 +263,7 @@ pub fn estimate(
         .smoothing
         .added(state.smooth, proportional.minus(state.smooth));
     let theta = state.theta;
-    state.theta = theta.wrapping_add(omega);
+    state.theta = theta.wrapping_add(omega.over_period());
     Estimate {
         theta,
         frame,

@@ -261,7 +261,7 @@ pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
 pub fn found(state: &State) -> Option<Angle> {
     let position = &state.position;
     let known = state.crossing.tracks && position.omega.is_positive();
-    known.then(|| position.theta.wrapping_add(position.omega))
+    known.then(|| position.theta.wrapping_add(position.omega.over_period()))
 }
 
 impl State {}

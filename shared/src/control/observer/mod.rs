@@ -319,7 +319,7 @@ pub fn begin(
         Config::BackEmf(config) => state.back_emf = back_emf::begin(config, theta, omega),
         Config::Edges(config) => {
             // Its state is that of the sample before.
-            let before = theta.wrapping_sub(omega);
+            let before = theta.wrapping_sub(omega.over_period());
             edges::begin(config, &mut state.edges, before, omega, phases(i));
         }
         Config::Compensated(config) => {

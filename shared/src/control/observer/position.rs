@@ -86,7 +86,7 @@ pub(super) fn turned(periods: u32, omega: Speed) -> u64 {
 /// One period without news: extrapolates (2.4.1).
 #[inline(always)]
 pub fn advance(state: &mut State) {
-    let step = state.omega.min(LIMIT - state.theta_inc);
+    let step = state.omega.over_period().min(LIMIT - state.theta_inc);
     state.theta = state.theta.wrapping_add(step);
     state.theta_inc += step;
     state.since = state.since.saturating_add(1);
@@ -97,7 +97,7 @@ pub fn advance(state: &mut State) {
 
 #[cold]
 fn overdue(state: &mut State) {
-    state.omega >>= 1;
+    state.omega = state.omega >> 1;
     state.omega_step = Speed::ZERO;
     forget(state);
 }

@@ -56,7 +56,7 @@ impl State {
     #[inline]
     pub fn advance(&mut self) {
         self.omega = self.omega.plus(self.acceleration).min(FASTEST);
-        self.delta = self.delta.plus(self.omega);
+        self.delta = self.delta.plus(self.omega.over_period());
         self.elapsed = self.elapsed.plus(I16F16::ONE);
     }
 
@@ -83,7 +83,7 @@ impl State {
                 // The mean is the speed in the interval's middle. While the rotor is slow a crossing
                 // may be seen some degrees early or late: half of what that tells is taken.
                 let gained = times(self.acceleration, interval) >> 1;
-                let middle = self.omega.minus(bounded(gained));
+                let middle = self.omega.minus(bounded(gained).per_period());
                 self.omega += half(mean.minus(middle));
             }
             self.omega_bar = self.omega;

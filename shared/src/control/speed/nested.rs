@@ -15,7 +15,7 @@ use crate::trace::traced;
 use crate::units::{Current, Speed, Torque, Voltage};
 
 /// From here on the error is acted on in full.
-const ALMOST_HALF: Speed = Speed::from_bits(i32::MAX - (1 << 26));
+const ALMOST_HALF: I0F32 = I0F32::from_bits(i32::MAX - (1 << 26));
 
 /// Coefficients for one period of the outer loops, here T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl Config {
     ) -> Reference {
         let told = &input.told;
         let wanted = planner.reference.plus(step);
-        let half_trust = self.trust.held(input.speed).max(Speed::ZERO);
+        let half_trust = self.trust.held(input.speed).max(I0F32::ZERO);
         let error = input.speed.minus(wanted);
         let error = if half_trust < ALMOST_HALF {
             Speed::from_bits(error.top(half_trust).to_bits() << 1)
