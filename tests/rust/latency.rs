@@ -81,13 +81,13 @@ fn pulse(protocol: u8, width_ns: u32) -> [u8; 5] {
     [protocol, a, b, c, d]
 }
 
-/// Arms, and then changes the throttle a thousand times at all phases against the PWM.
+/// Arms, opens, and then changes the throttle a thousand times at all phases against the PWM.
 ///
 /// Returns the longest time to the set-point less a control period, s.
 fn beyond_a_period(spacing_ns: u64, datagram: impl Fn(u64) -> Vec<u8>) -> f64 {
     let mut device = device();
     let mut latency = Latency::default();
-    for number in 0..1400_u64 {
+    for number in 0..1403_u64 {
         if number == 400 {
             latency = Latency::default();
         }

@@ -225,7 +225,7 @@ fn ten_seconds_of_any_command_at_1_khz_reset_nothing_and_turn_nothing() {
         let means_something = matches!(value, 1..=10 | 12..=14 | 20..=22 | 26 | 31);
         assert_eq!(bench.orders.len(), usize::from(means_something), "{value}");
         // Its throttle is obeyed as ever.
-        bench.frames(1, 1000);
+        bench.frames(4, 1000);
         assert!(bench.turns());
     }
 }
@@ -235,7 +235,7 @@ fn commands_between_throttle_are_zero_throttle_and_not_obeyed() {
     let mut bench = Bench::armed();
     bench.drive = TURNING;
     for _ in 0..1_000 {
-        bench.frames(1, 1000);
+        bench.frames(4, 1000);
         assert!(bench.turns());
         bench.frames(9, 21);
         assert_eq!(bench.input.authority().command(), Command::Zero);
@@ -258,10 +258,10 @@ fn some_commands_count_at_zero_throttle_while_the_motor_turns() {
         let waits = matches!(value, 7 | 8 | 12 | 20 | 21);
         let mut bench = Bench::armed();
         bench.drive = TURNING;
-        bench.frames(1, 1000);
+        bench.frames(4, 1000);
         bench.frames(20, value);
         assert_eq!(bench.orders.len(), usize::from(at_once), "{value}");
-        bench.frames(1, 1000);
+        bench.frames(4, 1000);
         bench.orders.clear();
         bench.frames(101, 0);
         bench.frames(20, value);
@@ -335,6 +335,7 @@ fn a_line_that_sticks_or_is_cut_in_a_frame_stops_the_motor() {
 #[test]
 fn the_frame_rate_may_change_in_flight() {
     let mut bench = Bench::armed();
+    bench.frames(3, 1000);
     for gap_ms in [0, 1, 2, 20, 50, 90, 0, 90] {
         for _ in 0..20 {
             bench.frames(1, 1000);
@@ -412,7 +413,7 @@ fn frames_first_and_pulses_later_are_no_calibration() {
 #[test]
 fn another_protocol_must_be_armed_anew() {
     let mut bench = Bench::armed();
-    bench.frames(1, 1000);
+    bench.frames(4, 1000);
     let mut settings = bench.input.settings;
     bench.input.set(settings);
     assert!(bench.turns(), "nothing has changed");

@@ -41,6 +41,11 @@ impl Trust {
     pub(super) fn bad(&mut self) {
         self.0 = self.0.saturating_sub(1);
     }
+
+    #[cfg(test)]
+    pub(super) fn count(&self) -> u8 {
+        self.0
+    }
 }
 
 #[cfg(test)]

@@ -37,6 +37,8 @@ fn random_words_on_an_armed_wire_are_a_lost_signal() {
             while fc.is_armed() {
                 fc.word((chance.next() >> 48) as u16, period_us);
                 armed_us += period_us;
+                // The peak: the shaft was at rest, and stays.
+                assert!(turns || fc.rpm().abs() < 1.0, "{} rpm", fc.rpm());
                 assert!(armed_us < 1_000_000, "seed {seed}, {period_us} µs");
             }
             assert!(fc.said("Throttle: signal lost while armed"));

@@ -4,6 +4,7 @@ use super::*;
 use crate::input::dshot::{Frame, Rate};
 use proptest::prelude::*;
 
+mod opening;
 mod signals;
 
 const TIMING: Timing = Timing {
@@ -53,6 +54,14 @@ impl Bench {
         bench
     }
 
+    /// Armed, and opened to this throttle.
+    fn open(value: u16) -> Self {
+        let mut bench = Self::armed();
+        bench.play(OPENING_FRAMES.into(), event(value));
+        assert!(bench.turns());
+        bench
+    }
+
     fn after(&mut self, us: u64, event: Event) {
         self.now_us += us;
         self.authority.wire(self.now_us, event, IDENTIFIED);
@@ -93,7 +102,7 @@ fn zero_throttle_arms_at_the_exact_time() {
     bench.after(1, event(0));
     assert!(bench.authority.armed(), "300 ms");
     assert!(!bench.turns());
-    bench.after(1_000, event(2047));
+    bench.play(4, event(2047));
     assert_eq!(bench.authority.command(), Command::Throttle(Share::MAX));
     bench.after(1_000, event(48));
     assert_eq!(bench.authority.command(), Command::Throttle(Share::ZERO));
@@ -163,8 +172,7 @@ fn bad_frames_alone_neither_arm_nor_keep_a_signal() {
     assert!(!bench.authority.armed());
     assert!(!bench.authority.signal_present(bench.now_us));
 
-    let mut bench = Bench::armed();
-    bench.after(1_000, event(1000));
+    let mut bench = Bench::open(1000);
     bench.play(100, Event::Bad);
     assert!(bench.turns() && bench.authority.armed(), "100 ms");
     bench.play(1, Event::Bad);
@@ -176,7 +184,7 @@ fn bad_frames_alone_neither_arm_nor_keep_a_signal() {
 #[test]
 fn bad_frames_do_not_disturb_an_armed_wire() {
     for bad in 0..=3 {
-        let mut bench = Bench::armed();
+        let mut bench = Bench::open(1000);
         for _ in 0..1_000 {
             bench.after(1_000, event(1000));
             bench.play(bad, Event::Bad);
@@ -189,8 +197,7 @@ fn bad_frames_do_not_disturb_an_armed_wire() {
 #[test]
 fn a_wire_whose_frames_mostly_fail_is_lost() {
     for bad in [6, 9, 15] {
-        let mut bench = Bench::armed();
-        bench.after(1_000, event(1000));
+        let mut bench = Bench::open(1000);
         let mut lost_ms = None;
         for ms in 0..1_000 {
             if ms % (bad + 1) == bad {
@@ -214,8 +221,7 @@ fn a_wire_whose_frames_mostly_fail_is_lost() {
 
 #[test]
 fn a_stop_is_obeyed_on_a_wire_that_is_not_believed() {
-    let mut bench = Bench::armed();
-    bench.after(1_000, event(1000));
+    let mut bench = Bench::open(1000);
     let held = bench.authority.command();
     bench.play(50, Event::Bad);
     bench.after(1_000, event(2047));
@@ -224,7 +230,7 @@ fn a_stop_is_obeyed_on_a_wire_that_is_not_believed() {
     assert_eq!(bench.authority.command(), Command::Zero);
     bench.after(1_000, event(2047));
     assert_eq!(bench.authority.command(), Command::Zero);
-    bench.play(2, event(2047));
+    bench.play(3, event(2047));
     assert!(bench.turns(), "believed again");
 }
 
@@ -249,8 +255,7 @@ fn more_than_half_bad_restarts_the_count() {
 #[test]
 fn a_lost_signal_stops_and_disarms() {
     for polled in [true, false] {
-        let mut bench = Bench::armed();
-        bench.after(1_000, event(1000));
+        let mut bench = Bench::open(1000);
         if polled {
             bench.wait(100_000);
             assert!(bench.turns());
@@ -266,7 +271,7 @@ fn a_lost_signal_stops_and_disarms() {
         bench.play(300, event(0));
         assert!(!bench.authority.armed());
         bench.play(1, event(0));
-        bench.play(1, event(1000));
+        bench.play(4, event(1000));
         assert!(bench.turns());
     }
 }
@@ -317,8 +322,7 @@ fn a_stop_that_is_not_believed_ends_the_silence_behind_a_command() {
 
 #[test]
 fn disarming_stops_until_zero_was_held_anew() {
-    let mut bench = Bench::armed();
-    bench.after(1_000, event(1000));
+    let mut bench = Bench::open(1000);
     bench.authority.disarm();
     assert!(!bench.turns());
     bench.play(1_000, event(1000));
@@ -390,6 +394,8 @@ fn a_test_ends_at_throttle_fault_disarming_and_nan() {
         match end {
             0 => {
                 bench.play(1, event(48));
+                assert!(!bench.turns());
+                bench.play(3, event(48));
                 assert_eq!(bench.turns(), armed);
                 bench.play(1, event(0));
             }
@@ -535,7 +541,7 @@ fn with_two_directions_either_turns_and_a_test_may_be_negative() {
         ..Reading::default()
     });
     bench.play(301, event(0));
-    bench.after(1_000, event(48));
+    bench.play(4, event(48));
     let least = Share::from_bits(-1);
     assert_eq!(bench.authority.command(), Command::Throttle(least));
     bench.after(1_000, event(1048));
