@@ -121,9 +121,8 @@ pub(crate) mod wire {
         CAPTURE.ccer().as_ptr().cast()
     }
 
-    /// The word to write there for a level: the channel's output is forced to be active, and its
-    /// polarity, by
-    /// which it captures falling edges otherwise, makes that low. The other channel goes on.
+    /// The word to write there for a level: the channel's output is forced to be active, and its polarity,
+    /// by which it captures falling edges otherwise, makes that low. The other channel goes on.
     pub(crate) fn level_word(level: bool) -> u32 {
         let mut enable = CcerGp16(0);
         enable.set_cce(0, true);
