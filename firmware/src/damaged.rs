@@ -15,7 +15,7 @@ pub fn tell(hardware: crate::board::Hardware) -> ! {
     let mut light = hardware.light;
     let (mut out, _line) = hardware.mavlink.open(BAUD).split();
     loop {
-        // There is nobody to tell of an error.
+        // An error cannot be reported.
         let _ = out.blocking_write(&TOLD);
         // A heartbeat a second.
         for _ in 0..10 {

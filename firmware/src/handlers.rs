@@ -40,7 +40,7 @@ fn return_addresses() -> [u32; DETAILS] {
     addresses
 }
 
-/// A hard fault, by its raw vector: the stack may be what is at fault, so it begins anew.
+/// A hard fault, by its raw vector: the stack may be at fault, so the handler begins a new one.
 ///
 /// # Safety
 /// For the processor.

@@ -1,6 +1,6 @@
 //! Which image this is: text right behind the vector table, where a tool finds it. And whether it is whole.
 //!
-//! Behind the tag the linker script puts the addresses that a check sum is of, and room for the sum and its
+//! After the tag the linker script puts the addresses that a checksum is of, and room for the sum and its
 //! inverse. The linker leaves both erased: such an image is not stamped, and its start takes it as it is,
 //! so that what cargo builds runs. `siskin image` stamps, `siskin flash` stamps what is not and refuses what
 //! is damaged, and the start of a stamped image that is damaged goes no further than [`damaged`](crate::damaged).
@@ -12,7 +12,7 @@ use siskin_control::image::{NO_WORDS, check_sum};
 /// Begins the tag; the last byte is the version of its layout.
 const MARK: [u8; 8] = *b"SISKIN\x00\x02";
 
-/// Bytes of each text, zeros behind it.
+/// Bytes of each text, padded with zeros.
 const FIELD_BYTES: usize = 24;
 
 /// The tag: a mark, then board, version and git commit.

@@ -23,7 +23,7 @@
 //! | `priority` | priorities, and critical sections that never hold up the PWM |
 //! | [`image`] | board, version and commit in the image, and whether it is whole |
 //! | [`damaged`] | the start of an image that is not |
-//! | `link/` | the linker script: a file a chip for its memories, one for what stands where |
+//! | `link/` | the linker script: a file a chip for its memories, one for the placement |
 //!
 //! Parts that need no chip are tested on the host: `cargo test -p siskin-firmware --lib`.
 //!
@@ -72,7 +72,7 @@
 //! lie in RAM. The image is linked with its relocations, by which `siskin image` checks this.
 //!
 //! # When something goes wrong
-//! | event | what turns the bridge off | what is told |
+//! | event | what turns the bridge off | what is reported |
 //! |---|---|---|
 //! | current above the hardware's trip, G431 | comparators over the timer's break, without the processor | over-current |
 //! | over-current, F405 | the control's own trip, within two periods; the gate driver's limiter is a strap and not counted on | over-current |
@@ -83,7 +83,7 @@
 //! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
 //! | processor locked up, G431 | the timer's break | after the watchdog's reset |
 //! | a debugger halts the processor | the timer, which stops with it ([below](#a-debuggers-halt)) | nothing |
-//! | tasks or interrupt stand still | the watchdog's reset: the gates' pull-downs | after the reset |
+//! | tasks or interrupt stop | the watchdog's reset: the gates' pull-downs | after the reset |
 //!
 //! # A debugger's halt
 //! With DBG_TIM1_STOP the counter stops with the processor, and "the outputs are disabled (as if the MOE bit

@@ -1,4 +1,4 @@
-//! The image for a board; the library's documentation tells what it is.
+//! The image for a board; see the library's documentation.
 #![no_std]
 #![no_main]
 

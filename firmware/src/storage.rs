@@ -20,7 +20,7 @@ use crate::chip::pages;
 /// True while the store is being read.
 static READING: AtomicBool = AtomicBool::new(false);
 
-/// Within so many cycles of a read the flash has told that the word is torn: some times what its bus takes.
+/// Within so many cycles of a read the flash reports that the word is torn: some times what its bus takes.
 const READ_TOLD_CYCLES: u32 = 32;
 
 /// The place of the store, as the linker script has it: from the beginning of the flash.

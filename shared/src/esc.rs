@@ -29,7 +29,7 @@ pub use storage::obey;
 const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 
 /// For how long a wire with signals must have asked for rest before the flash is written, µs: what
-/// is written stalls the processor, and so a flight controller's frames are not heard.
+/// is written stalls the processor, and so a flight controller's frames are missed.
 const REST_US: u64 = 1_000_000;
 
 /// One ESC without its interrupt and its throttle.
@@ -159,7 +159,7 @@ impl Esc {
         }
     }
 
-    /// The configuration for the interrupt, computed anew at each call: it is larger than all else.
+    /// The configuration for the interrupt, computed again at each call: it is larger than all else.
     ///
     /// # Errors
     /// Never with the parameters in force, which have been tried before.
@@ -253,7 +253,7 @@ impl Esc {
         throttle.reach(|throttle| throttle.tell(told));
     }
 
-    /// Takes in what the drive and the board tell.
+    /// Takes in the state of the drive and the board.
     fn observe(&mut self, now_us: u64, snapshot: &Snapshot, temperature_c: f32, time_us: u64) {
         let limit_c = self.params.get(ParamId::LimTempC);
         let limit_c = if self.too_hot {

@@ -7,11 +7,11 @@ pub const VERSION: [u8; 3] = version();
 /// A program as it was built for a board, and the chip that it runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Name of the board, as the build calls it; of its first letters 24 are told.
+    /// Name of the board, as the build calls it; its first 24 letters are reported.
     pub board: &'static str,
     /// The board's number, `board_version` of AUTOPILOT_VERSION; 0 is the emulator.
     pub board_number: u16,
-    /// The first eight bytes of what tells this build from others; zeros if it is not known.
+    /// The first eight bytes of the commit; zeros if it is not known.
     pub build: [u8; 8],
     /// Serial number of the microcontroller; zeros if there is none.
     pub serial: [u8; 12],
@@ -27,10 +27,10 @@ impl Image {
     };
 }
 
-/// The check sum of no words.
+/// The checksum of no words.
 pub const NO_WORDS: u32 = 0x811C_9DC5;
 
-/// The check sum of an image's words in flash, going on from that of what is before them. Each step can be
+/// The checksum of an image's words in flash, going on from that of what is before them. Each step can be
 /// undone, so that damage within one word never goes unseen; any other does once in 2^32.
 pub fn check_sum(before: u32, words: &[u32]) -> u32 {
     words.iter().fold(before, |sum, word| {

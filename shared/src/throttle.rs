@@ -28,7 +28,7 @@ pub struct Throttle {
     answers: Answers,
     mapping: Mapping,
     basis: Basis,
-    /// As the tasks last told it, for answers.
+    /// The state from the tasks, for answers.
     telemetry: Telemetry,
     info: [u8; info::BYTES],
     told: Told,
@@ -195,7 +195,7 @@ impl Throttle {
         self.input.authority().command()
     }
 
-    /// The signal that the wire is known to carry, or has been told to carry.
+    /// The signal that the wire is known to carry, or has been forced to.
     pub fn signal(&self) -> Option<Signal> {
         self.input.known()
     }
@@ -216,7 +216,7 @@ impl Throttle {
         }
     }
 
-    /// The next thing that the wire has to tell a person.
+    /// The wire's next news for a person.
     pub(crate) fn news(&mut self, now_us: u64) -> Option<News> {
         self.input.news(now_us)
     }

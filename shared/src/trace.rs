@@ -6,7 +6,7 @@ use fixed::{FixedI32, FixedI64, FixedU32};
 
 /// A state that hands out every word of itself.
 pub trait Trace {
-    /// Hands out the words, as many and in the same order at all times: a word's place tells what it is.
+    /// Hands out the words, as many and in the same order at all times: a word is known by its place.
     fn trace(&self, out: &mut impl FnMut(u32));
 }
 

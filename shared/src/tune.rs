@@ -1,6 +1,6 @@
 //! Tunes that the motor plays: which notes each has, and which note is due.
 //!
-//! A tune tells a user what the ESC has found, so each sounds unlike the others. The drive plays a
+//! A tune tells a user what the ESC has found, so no two sound alike. The drive plays a
 //! note without turning the motor; see [`Setpoint::Tone`](crate::drive::Setpoint::Tone).
 
 /// The tunes of the motor.
@@ -147,7 +147,7 @@ impl Player {
         }
     }
 
-    /// The motor cannot be heard now: the tune begins anew, from now on.
+    /// The motor cannot be heard now: the tune starts over now.
     pub fn wait(&mut self, now_us: u64) {
         if self.note(now_us).is_some()
             && let Some(playing) = &mut self.playing

@@ -18,7 +18,7 @@ pub(super) struct Ring {
     /// The place of the next time, and that of the DMA at the last look.
     at: usize,
     end: usize,
-    /// The time before the next one: another there tells that the DMA has come round.
+    /// The time before the next one: a change there shows that the DMA has come round.
     before: u32,
     /// The DMA had come round when times were left behind.
     torn: bool,
@@ -38,7 +38,7 @@ impl Ring {
         ring
     }
 
-    /// Takes in what has come, the DMA having so many times left until it begins anew. False if more came than
+    /// Takes in what has come, the DMA being so many times from its wrap. False if more came than
     /// the memory takes, since the last look or while it was read: what the ring has is forgotten.
     pub(super) fn fill(&mut self, left: usize) -> bool {
         self.end = (LEN - left) % LEN;

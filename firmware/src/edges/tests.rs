@@ -89,7 +89,7 @@ fn taken<const BITS: u32>(edges: &mut Edges<BITS>) -> Vec<(u64, bool)> {
 
 #[test]
 fn an_edge_while_it_is_looked_is_dated_right() {
-    // Whenever it comes within the look, also as the counter of 16 bits begins anew.
+    // Whenever it comes within the look, also as the counter of 16 bits wraps.
     for begin in [20_000, 65_510] {
         for after in 0..40 {
             let chip = Chip::new(16);

@@ -22,7 +22,7 @@ pub struct Ends {
     pub interrupt: InterruptEnd,
     /// For the task that decides what the motor does.
     pub setpoint: SetpointWriter,
-    /// For the tasks that tell what it does.
+    /// For the tasks that report its state.
     pub snapshot: SnapshotReader,
     /// For the task that keeps the parameters.
     pub config: ConfigWriter,
@@ -147,7 +147,7 @@ impl SetpointWriter {
     }
 }
 
-/// The end of the tasks that tell what the motor does. They share it by reference, and read one at a
+/// The end of the tasks that report the motor's state. They share it by reference, and read one at a
 /// time.
 pub struct SnapshotReader {
     hand: Mutex<CriticalSectionRawMutex, RefCell<latest::Reader>>,

@@ -90,7 +90,7 @@ impl Interrupt {
     }
 
     /// A period while the flash is written, when nothing can be fetched from it: the bridge, which was
-    /// at rest, is off. An alarm of the hardware in the meantime is told in the first period after.
+    /// at rest, is off. An alarm of the hardware in the meantime is reported in the first period after.
     #[cold]
     #[inline(never)]
     fn hold(&mut self) {

@@ -50,7 +50,7 @@ impl Record {
         record
     }
 
-    /// A record that tells nothing.
+    /// An empty record.
     pub(super) const fn empty() -> Self {
         Self {
             failure: 0,

@@ -48,7 +48,7 @@ impl Health {
 /// For the self-test.
 impl Probe for Health {
     fn sample(&mut self) -> Sample {
-        // The converters read anew once a period, also between two of these readings.
+        // The converters read again once a period, also between two of these readings.
         sample(&Registers::CHIP)
     }
 

@@ -26,7 +26,7 @@ pub(crate) fn send(frame: &[u8]) {
 pub(crate) async fn transmit(mut line: UartTx<'static, Async>) -> ! {
     loop {
         let frame = NEXT.receive().await;
-        // There is nobody to tell of an error on a line that only sends.
+        // An error on a line that only sends cannot be reported.
         let _ = line.write(&frame).await;
     }
 }

@@ -33,7 +33,7 @@ pub(crate) async fn transmit(mut line: UartTx<'static, Async>) -> ! {
     let mut bytes = [0; 64];
     loop {
         let count = OUT.read(&mut bytes).await;
-        // There is nobody to tell of an error on the line to those who would be told.
+        // An error on the line itself cannot be reported over it.
         let _ = line.write(&bytes[..count]).await;
     }
 }
@@ -43,7 +43,7 @@ fn send(mut frame: &[u8]) {
     if OUT.free_capacity() < frame.len() {
         return;
     }
-    // In two parts where the memory of those that wait begins anew.
+    // In two parts if it goes over the end of the ring.
     while !frame.is_empty()
         && let Ok(count) = OUT.try_write(frame)
     {
@@ -85,7 +85,7 @@ pub(crate) async fn attend(desk: &'static mut Desk) -> ! {
         match select(ticker.next(), desk.line.read(&mut bytes)).await {
             Either::First(()) => desk.poll(),
             Either::Second(Ok(count)) => desk.receive(&bytes[..count]),
-            // Bytes were lost or garbled: the frame's check sum tells.
+            // Bytes were lost or garbled: the frame's checksum shows it.
             Either::Second(Err(_)) => {}
         }
     }

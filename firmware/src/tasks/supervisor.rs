@@ -1,6 +1,6 @@
 //! The watchdog, fed only by proof of life from the control's interrupt and from the throttle's task,
-//! in the task that attends to the rest: if one of them stands still, the chip starts anew, and the
-//! bridge is off. An interrupt that stands still is not waited for that long.
+//! in the task that attends to the rest: if one of them stops, the chip restarts, and the
+//! bridge is off. An interrupt that stops is noticed sooner.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

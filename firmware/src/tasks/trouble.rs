@@ -41,7 +41,7 @@ pub(crate) struct Teller {
 }
 
 impl Teller {
-    /// One that has told nothing yet.
+    /// One that has reported nothing yet.
     pub(crate) const fn new() -> Self {
         Self {
             told: [0; 2],

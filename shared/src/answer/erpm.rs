@@ -36,7 +36,7 @@ fn of_period_us(period_us: f32) -> u16 {
     }
 }
 
-/// The period of a word, µs; nothing where the shaft stands, and for 0, which is never sent.
+/// The period of a word, µs; `None` if the shaft stands, and for 0, which is never sent.
 pub fn period_us(data: u16) -> Option<u32> {
     let period_us = u32::from(data & 0x1FF) << (data >> 9 & 7);
     (data & 0xFFF != STOPPED && period_us != 0).then_some(period_us)

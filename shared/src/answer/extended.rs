@@ -10,7 +10,7 @@ pub enum Extended {
     Voltage(u8),
     /// Supply current, A.
     Current(u8),
-    /// For whoever writes the ESC's program; Siskin sends neither.
+    /// For the ESC's developer; Siskin sends neither.
     Debug1(u8),
     /// A second value for debugging.
     Debug2(u8),

@@ -10,7 +10,7 @@ const CODE: [u8; 16] = [
     0x19, 0x1B, 0x12, 0x13, 0x1D, 0x15, 0x16, 0x17, 0x1A, 0x09, 0x0A, 0x0B, 0x1E, 0x0D, 0x0E, 0x0F,
 ];
 
-/// The nibble of each group code, and what stands where there is none.
+/// The nibble of each group code, and a marker if there is none.
 const NIBBLE: [u8; 32] = nibbles();
 const NONE: u8 = 0xFF;
 
@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn a_known_reply() {
-        // 0x000 has the check sum 0xF: 11001 11001 11001 01111, and the line toggles at each 1.
+        // 0x000 has the checksum 0xF: 11001 11001 11001 01111, and the line toggles at each 1.
         assert_eq!(encode(0x000), 0b0_10001_01110_10001_10101);
         assert_eq!(decode(0b0_10001_01110_10001_10101), Some(0x000));
     }

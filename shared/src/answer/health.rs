@@ -2,15 +2,15 @@
 //!
 //! The specification calls stress the effort to keep commutation going: 0 is perfect, and the end
 //! of the range is that it cannot be kept. Here it is [`Basis::doubt`]: how near the drive is to
-//! giving the rotor up. It tells nothing of load, which the current tells.
+//! giving the rotor up. It says nothing of load, which the current shows.
 //!
 //! | event | raised by |
 //! |---|---|
-//! | alert | the current stands at `LIM_PHASE_A`: there is no more torque to be had |
+//! | alert | the current is at `LIM_PHASE_A`: there is no more torque |
 //! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a Hall sensor is at fault |
 //! | error | a fault has turned the bridge off |
 //!
-//! An event is told once, by the next status word, and again as long as it lasts.
+//! An event is reported once, by the next status word, and again as long as it lasts.
 
 use super::Basis;
 use super::extended::{Extended, Status};

@@ -15,7 +15,7 @@
 //! | 19 | limit of the current in A, 0 off |
 //! | 20 to 23 | lights 0 to 3: 0 off, 1 on, 255 there is none |
 //! | 31 to 62 | name and board, zeros to the end |
-//! | 63 | check sum, as of a KISS frame |
+//! | 63 | checksum, as of a KISS frame |
 
 use super::kiss::crc8;
 use crate::image::{Image, VERSION};

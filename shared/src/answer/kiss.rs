@@ -10,7 +10,7 @@ pub const BYTES: usize = 10;
 pub const SPACING_US: u32 = 1000;
 
 /// The frame: °C, 0.01 V, 0.01 A, mAh and hundreds of electrical rpm, each held at the ends of its
-/// range, and a check sum. A negative current, of braking, is sent as 0: it has no sign. So is a
+/// range, and a checksum. A negative current, of braking, is sent as 0: it has no sign. So is a
 /// temperature below 0 °C: the protocol gives it a sign, but Betaflight, PX4 and ArduPilot read the
 /// byte without one, and took −10 °C for 246.
 pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
@@ -30,7 +30,7 @@ pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
     frame
 }
 
-/// The check sum of KISS frames: polynomial 0x07, from 0.
+/// The checksum of KISS frames: polynomial 0x07, from 0.
 pub fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ byte, |crc, _| {

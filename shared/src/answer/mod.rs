@@ -240,7 +240,7 @@ impl Answers {
     }
 }
 
-/// The bits of a reply that tells the speed.
+/// The bits of a reply that carries the speed.
 pub fn speed_bits(snapshot: &Snapshot, basis: &Basis) -> u32 {
     gcr::encode(erpm::of_speed(snapshot.speed, &basis.scale))
 }

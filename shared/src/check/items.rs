@@ -1,6 +1,6 @@
 //! The lines of the self-test: names, units, bounds.
 //!
-//! | name | unit | bounds | what it tells |
+//! | name | unit | bounds | what it shows |
 //! |---|---|---|---|
 //! | `supply` | V | `LIM_BUS_V_MIN` to `LIM_BUS_V_MAX` | the supply, as its divider shows it |
 //! | `reference` | V | 3.2 to 3.4 | the converter's full scale, by the chip's own reference |
@@ -17,7 +17,7 @@
 //! | `off_a`.. | A | ± 0.1 of `LIM_PHASE_A` | the current through a phase that is off, while another is pulled up |
 //!
 //! Percents are of the supply or, where the divider ends below it, of the most that it shows: of 18.3 V on
-//! the B-G431B-ESC1, above which a reading is a clamp that tells no more than that it is above.
+//! the B-G431B-ESC1, above which a reading is clamped and shows no more than that.
 
 use core::ops::Range;
 
@@ -190,7 +190,7 @@ impl Report {
         }
     }
 
-    /// Forgets all but what bars the motor, which stands until it is measured again.
+    /// Forgets all results but those that bar the motor, which hold until measured again.
     pub(super) fn clear(&mut self) {
         let first = Item::of(Kind::Comparator, 0).place();
         for (place, value) in self.values.iter_mut().enumerate() {

@@ -76,7 +76,7 @@ enum Step {
     PowerUp,
     /// The same measurements, and the sensors without current.
     Listen,
-    /// The shaft is to stand.
+    /// The shaft must stand.
     Shaft,
     /// A leg is pulled.
     Pull(Pull),
@@ -148,7 +148,7 @@ impl Check {
         }
     }
 
-    /// Goes on, about each millisecond. Returns what is to be told.
+    /// Goes on, about each millisecond. Returns the news to report.
     // Out of line: its stack is free for what the caller does next.
     #[inline(never)]
     pub fn look(

@@ -1,4 +1,4 @@
-//! The self-test as the ESC runs it and tells of it.
+//! The self-test as the ESC runs and reports it.
 
 use super::Esc;
 use crate::SELF_TEST;

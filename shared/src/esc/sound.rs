@@ -15,7 +15,7 @@ pub(super) struct Sound {
 }
 
 impl Sound {
-    /// Begins a tune. A beacon is heard in silent mode too: whoever asks for it looks for the craft.
+    /// Begins a tune. A beacon sounds in silent mode too: whoever asks for it is looking for the craft.
     pub(super) fn play(&mut self, now_us: u64, tune: Tune) {
         if !self.silent || matches!(tune, Tune::Beacon(_)) {
             self.player.play(now_us, tune);
@@ -34,7 +34,7 @@ impl Sound {
     }
 
     /// Finds the note that is due. Throttle, a test and a fault end a tune; one that begins while the
-    /// shaft turns is heard when it has stopped.
+    /// shaft turns is played when it has stopped.
     pub(super) fn look(&mut self, now_us: u64, snapshot: &Snapshot, rests: bool) {
         let turns = snapshot.phase.drives() || snapshot.speed != Speed::ZERO;
         if !rests || !snapshot.faults.is_empty() {

@@ -18,7 +18,7 @@ const QUIET_US: u64 = 1_000_000;
 /// be played again after a loss of power.
 const LATEST_US: u64 = 2_000_000;
 
-/// Saves that nobody has asked for and that may follow one another so soon. An evening of trying one value
+/// Saves without a request that may follow one another at once. An evening of trying one value
 /// after another takes as many.
 const SAVES_AT_ONCE: u64 = 100;
 /// The time that gives one of them back, µs. A client that changes a value again and again, for a day,
@@ -47,7 +47,7 @@ pub(super) struct Storage {
     save: bool,
     /// When something changed that is to be stored, for the first and the last time.
     changed_us: Option<(u64, u64)>,
-    /// When the saves that nobody has asked for are all given back.
+    /// Time at which all saves without a request are available again.
     spent_us: u64,
     /// True if the ESC is to restart when nothing waits any more.
     reboot: bool,
@@ -58,7 +58,7 @@ pub(super) struct Storage {
     /// True if the stored settings cannot be in force: they stay, and nothing turns the motor, until
     /// somebody asks for settings to be stored or reset.
     lost: bool,
-    /// When a person was last told so.
+    /// Time of the last reminder.
     reminded_us: u64,
 }
 
@@ -158,12 +158,12 @@ impl Storage {
             .is_some_and(|(_, request)| request != Request::Keep)
     }
 
-    /// The request that was under way has ended: who is to be told of it.
+    /// The request that was under way has ended; returns who must be told.
     pub(super) fn done(&mut self, well: bool) -> Option<Asker> {
         let (asker, request) = self.under_way.take()?;
         self.lost &= !well || request == Request::Load;
         let failed = core::mem::replace(&mut self.failed, !well && asker == Asker::Nobody);
-        // Once is enough where nobody has asked.
+        // Once is enough without a request.
         (asker != Asker::Nobody || (self.failed && !failed)).then_some(asker)
     }
 }

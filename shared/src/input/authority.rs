@@ -2,7 +2,7 @@
 //! turns it.
 //!
 //! The wire is armed by zero throttle held for a time, in a signal that has been identified; it
-//! loses that with its signal, and never turns a motor before. Only a frame whose check sum is right,
+//! loses that with its signal, and never turns a motor before. Only a frame whose checksum is right,
 //! or a pulse, can change what the motor is asked to do; and such a frame only where not nearly all the
 //! others fail theirs, as random words do: one of those in sixteen is right by chance. That judgement takes
 //! some twelve frames, so a wire at zero opens only by several throttles in a row: of armed wires that become
@@ -25,11 +25,11 @@ const ARMING_PULSES: u32 = 5;
 /// that their check does not show: these stop the motor until the next throttle.
 const CLOSING_FRAMES: u8 = 10;
 /// DShot throttles in a row, with no bad frame between, that open it again: 0.75 ms later than the first at
-/// 4 kHz, 3 ms at 1 kHz. A pulse has no check sum to be right by chance: it opens at once. Edges that pass for
+/// 4 kHz, 3 ms at 1 kHz. A pulse has no checksum to be right by chance: it opens at once. Edges that pass for
 /// pulses do so in a row too, and spikes never do.
 const OPENING_FRAMES: u8 = 4;
 
-/// The longest silence behind a DShot command that is no loss, µs. The protocol leaves 260 ms behind a
+/// The longest silence after a DShot command that is no loss, µs. The protocol leaves 260 ms after a
 /// beacon, and Betaflight's loop, which waits for it, 110 ms until the next frame.
 const COMMAND_GAP_US: u64 = 300_000;
 
@@ -50,8 +50,8 @@ pub struct Timing {
 pub enum Command {
     /// Do not turn.
     Stop,
-    /// Do not turn, because the armed wire holds zero throttle, or somebody has disarmed: what was wrong
-    /// before is forgiven.
+    /// Do not turn, because the armed wire holds zero throttle, or somebody has disarmed: an earlier fault
+    /// is forgiven.
     Zero,
     /// Turn, by the wire's throttle.
     Throttle(Share),
@@ -120,7 +120,7 @@ struct Arming {
     failed: u32,
 }
 
-/// The last frame with a right check sum, or pulse.
+/// The last frame with a right checksum, or pulse.
 #[derive(Clone, Copy, Debug)]
 struct Valid {
     at_us: u64,
@@ -158,7 +158,7 @@ impl Authority {
     }
 
     /// Lets nothing turn the motor from now on, neither the wire nor a test, or lets them again. The wire
-    /// must be armed anew then.
+    /// must be armed again then.
     pub fn bar(&mut self, barred: bool) {
         self.barred = barred;
         if barred {
@@ -173,7 +173,7 @@ impl Authority {
     }
 
     /// Changes how frames and pulses are read, and the directions of tests. What was zero may be
-    /// full throttle now: the wire must be armed anew if anything changes.
+    /// full throttle now: the wire must be armed again if anything changes.
     pub fn set_reading(&mut self, reading: Reading) {
         if self.reading != reading {
             self.reading = reading;
@@ -274,7 +274,7 @@ impl Authority {
         }
     }
 
-    /// The wire must be armed anew.
+    /// The wire must be armed again.
     pub fn restart(&mut self) {
         self.armed = false;
         self.arming = None;
@@ -347,7 +347,7 @@ impl Authority {
         within(now_us, self.valid.map(|valid| valid.at_us), loss_us)
     }
 
-    /// Stops the motor, whatever turns it. The wire must be armed anew by its zero throttle.
+    /// Stops the motor, whatever turns it. The wire must be armed again by its zero throttle.
     pub fn disarm(&mut self) {
         self.restart();
         self.test = None;

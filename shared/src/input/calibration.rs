@@ -83,7 +83,7 @@ impl Calibration {
         self.asked_us = Some(now_us);
     }
 
-    /// It ends: the signal carries something else than pulses, or nobody wants it any more.
+    /// It ends: the signal carries something else than pulses, or it is no longer wanted.
     #[inline(never)]
     pub fn end(&mut self) -> Option<Step> {
         let cancelled = self.is_under_way().then_some(Step::Cancelled);
@@ -177,7 +177,7 @@ impl Held {
         }
     }
 
-    /// One more pulse; a stick that has moved begins anew.
+    /// One more pulse; a stick that has moved starts over.
     fn add(&mut self, now_us: u64, width_ns: u32) {
         if self.first_ns.abs_diff(width_ns) > STEADY_NS {
             *self = Self::new(now_us, width_ns);

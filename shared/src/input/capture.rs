@@ -1,7 +1,7 @@
 //! From believed edges to DShot frames.
 //!
 //! The last 32 edges are a frame if the line rested before them, if they lie as evenly as a frame's
-//! and if the check sum fits. A frame is reported at its last edge. Edges that belong to none are
+//! and if the checksum fits. A frame is reported at its last edge. Edges that belong to none are
 //! reported once for every 32 of them, or when the line comes to rest.
 
 use super::dshot::{Frame, Rate, check_mask};
@@ -179,7 +179,7 @@ impl Decoder {
     /// An edge was missed before `at_ticks`: no frame goes over it. One may begin there, as the
     /// next one does when the last edge of a frame was missed.
     pub(super) fn spoil(&mut self, at_ticks: u32) {
-        // The edge before tells for how long the line may have rested.
+        // The edge before shows how long the line may have rested.
         self.held = self.held.min(1);
         self.run = self.held;
         self.push(at_ticks);

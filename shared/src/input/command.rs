@@ -12,14 +12,14 @@
 //! | 22, 26 | the light on, off | 1 |
 //! | 31 | silent mode on, off: no tunes but beacons | 6 |
 //!
-//! The others are heard and ignored, and count as zero throttle like these: 11 asks for settings in
+//! The others are received and ignored, and count as zero throttle like these: 11 asks for settings in
 //! a form that nobody has published, 23 to 25 and 27 to 29 are for lights that no board here has, 30
 //! is an audio stream, 32 to 35 switch a telemetry that bidirectional DShot has replaced, and the
 //! rest has no meaning.
 //!
 //! A command counts at zero throttle. While the motor still turns then, extended telemetry is switched at
 //! once, since Betaflight asks for it at each arming and a pilot may arm again before the propeller has run
-//! down. A direction and the save behind it wait until the motor stands, as long as the wire stays at zero:
+//! down. A direction and the save after it wait until the motor stands, as long as the wire stays at zero:
 //! Betaflight's configurator sends them 400 ms after a stop, and a motor that coasts takes longer. Within
 //! 100 ms of throttle they count as little as under it. The others are obeyed only while the motor stands.
 //!
@@ -27,10 +27,10 @@
 //! single bad frame between two of them, or before the first, does not end the row: the line's rise, when
 //! a flight controller starts, spoils one. Two do.
 //!
-//! One that counts at once may be another frame whose errors the check sum has not shown. So it needs six
+//! One that counts at once may be another frame whose errors the checksum has not shown. So it needs six
 //! like the rest just after a bad frame, and longer after two within half a second. Flight controllers send
 //! a beacon once, and a bad frame now and then must not silence all of them. What this cannot prevent: on any
-//! other wire one frame whose errors pass the check sum can sound a beacon, send the information or switch
+//! other wire one frame whose errors pass the checksum can sound a beacon, send the information or switch
 //! the light; of random words it is one in 4096. What changes something always takes six.
 
 use super::dshot::Frame;
@@ -193,7 +193,7 @@ impl Commands {
         }
     }
 
-    /// The signal was lost, or what came is no command now: nothing has been heard.
+    /// The signal was lost, or what came is no command now: nothing has been received.
     pub fn interrupt(&mut self) {
         self.value = 0;
         self.count = 0;

@@ -48,7 +48,7 @@ impl Detector {
         }
     }
 
-    /// Begins anew.
+    /// Starts over.
     pub(super) fn clear(&mut self) {
         self.frames = None;
         self.pulses = None;
@@ -61,7 +61,7 @@ impl Detector {
                 && candidate.misses <= candidate.hits / 2
                 && candidate.last_at.wrapping_sub(candidate.first_at) >= self.held_ticks
         };
-        // A right check sum says more than a width.
+        // A right checksum says more than a width.
         let leading = self.frames.or(self.pulses);
         leading.filter(known).map(|candidate| candidate.signal)
     }
@@ -96,7 +96,7 @@ impl Detector {
         let before = self.pulses.take();
         if let Event::Pulse { kind, width_ns } = event {
             let signal = Signal::Pulse(kind);
-            // Nothing may speak against pulses, which have no check sum.
+            // Nothing may speak against pulses, which have no checksum.
             let same = before.filter(|pulses| {
                 pulses.signal == signal
                     && pulses.lasts(at_ticks, self.gap_ticks)

@@ -1,6 +1,6 @@
 //! DShot frames: 16 bits, most significant first, each a pulse whose width is its value.
 //!
-//! 11 bits are the value, one asks for telemetry, four are a check sum.
+//! 11 bits are the value, one asks for telemetry, four are a checksum.
 
 use super::{Share, reverse};
 
@@ -12,7 +12,7 @@ const LAST_THROTTLE: u16 = 2047;
 const FIRST_FORWARD: u16 = 1048;
 
 /// The bits to flip in a frame on this kind of wire: a bidirectional one inverts all four bits of the
-/// check sum.
+/// checksum.
 pub const fn check_mask(bidirectional: bool) -> u16 {
     if bidirectional { 0xF } else { 0 }
 }
@@ -39,7 +39,7 @@ pub enum Kind {
 }
 
 impl Frame {
-    /// The frame of 16 bits from the wire, or nothing when the check sum does not fit.
+    /// The frame of 16 bits from the wire, or nothing when the checksum does not fit.
     pub fn from_bits(bits: u16) -> Option<Self> {
         let data = bits >> 4;
         (bits & 0xF == check_sum(data)).then_some(Self {
@@ -137,7 +137,7 @@ impl Rate {
     }
 }
 
-/// The 32 edges of a frame of these bits, check sum included: time since the first edge in ns, and
+/// The 32 edges of a frame of these bits, checksum included: time since the first edge in ns, and
 /// the level from then on. A one is high for 75 % of its bit, a zero for 37.5 %.
 pub fn edges(bits: u16, rate: Rate) -> impl Iterator<Item = (u32, bool)> {
     (0..16_u32).flat_map(move |bit| {

@@ -17,7 +17,7 @@ pub(super) struct Edge {
 pub(super) struct Told {
     /// The edge before, if this one confirms it.
     pub(super) believed: Option<Edge>,
-    /// An edge was missed before this one: it tells a level that the line already had.
+    /// An edge was missed before this one: its level is the one that the line already had.
     pub(super) missed: bool,
 }
 

@@ -17,11 +17,11 @@ const SILENCE_MS: u32 = 100;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Event {
-    /// A DShot frame with a right check sum.
+    /// A DShot frame with a right checksum.
     Frame {
         /// Its rate.
         rate: Rate,
-        /// True if the line rests high and the check sum is inverted.
+        /// True if the line rests high and the checksum is inverted.
         bidirectional: bool,
         /// Its contents.
         frame: Frame,
@@ -70,7 +70,7 @@ impl Line {
         }
     }
 
-    /// Takes one signal only, and counts others as bad; `None` detects it, anew from now on.
+    /// Takes one signal only, and counts others as bad; `None` detects it again from now on.
     pub fn force(&mut self, signal: Option<Signal>) {
         self.forced = signal.is_some();
         self.begin(signal);
@@ -92,7 +92,7 @@ impl Line {
     /// Takes one edge: when it came, in ticks that wrap, and the level from then on.
     ///
     /// An edge is believed when its level has lasted for the filter's time, or when a frame ends with
-    /// it: a check sum says more. So what this returns may come from the edge before.
+    /// it: a checksum says more. So what this returns may come from the edge before.
     pub fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
         self.edge_at = at_ticks;
         self.silent = false;

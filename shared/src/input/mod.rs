@@ -111,12 +111,12 @@ impl Input {
         }
     }
 
-    /// Puts other settings in force. The wire must be armed anew, unless only times have changed.
+    /// Puts other settings in force. The wire must be armed again, unless only times have changed.
     pub fn set(&mut self, settings: Settings) {
         self.authority.set_timing(settings.timing);
         self.authority.set_reading(settings.reading);
         if settings.protocol != self.settings.protocol {
-            // The decoder begins anew with it: not for every change, while frames come in.
+            // The decoder starts over with it: not for every change, while frames come in.
             self.line.force(settings.protocol);
             self.authority.restart();
         }
@@ -242,7 +242,7 @@ impl Input {
         core::mem::take(&mut self.lost)
     }
 
-    /// The next thing to tell a person; to be asked after each poll until there is none.
+    /// The next news for a person; to be called after each poll until there is none.
     pub fn news(&mut self, now_us: u64) -> Option<News> {
         let standing = Standing {
             signal: self.signal(now_us),

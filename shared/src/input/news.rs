@@ -12,7 +12,7 @@ const OPEN_US: u64 = 500_000;
 /// Time between two complaints, µs.
 const OPEN_AGAIN_US: u64 = 3_000_000;
 
-/// Something to tell, in words or by a tune.
+/// News, in words or by a tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum News {
     /// The wire carries this signal.
@@ -45,7 +45,7 @@ pub(super) struct Standing {
 pub(super) struct Announcer {
     signal: Option<Signal>,
     identified_us: Option<u64>,
-    /// A loss that is still to be told, and whether the wire was armed.
+    /// A loss that is still to be reported; true if the wire was armed.
     loss: Option<bool>,
     lost_us: Option<u64>,
     armed: bool,
@@ -57,7 +57,7 @@ pub(super) struct Announcer {
 impl Announcer {
     /// A signal was lost.
     pub(super) fn lost(&mut self, armed: bool) {
-        // Signals that nobody has heard of come and go in noise.
+        // Noise looks like signals that come and go; they have not been reported.
         if armed || self.signal.is_some() {
             self.loss = Some(armed || self.loss == Some(true));
         }
@@ -68,7 +68,7 @@ impl Announcer {
         self.step = step.or(self.step);
     }
 
-    /// The next thing to tell; to be asked until there is none.
+    /// The next news; to be called until there is none.
     pub(super) fn next(&mut self, now_us: u64, standing: Standing) -> Option<News> {
         if let Some(armed) = self.loss
             && is_apart(now_us, self.lost_us, APART_US)

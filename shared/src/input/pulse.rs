@@ -1,7 +1,7 @@
 //! From believed edges to pulses whose width is the throttle.
 //!
-//! A pulse has no check sum. What tells it from other edges is its width, the time since the one
-//! before, and that the one before was such a pulse too.
+//! A pulse has no checksum. It is told from other edges by its width, by the time since the one
+//! before, and by following another such pulse.
 
 use super::line::Event;
 use super::signal::Pulse;

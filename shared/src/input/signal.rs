@@ -44,7 +44,7 @@ pub enum Signal {
     Dshot {
         /// Their bit rate.
         rate: Rate,
-        /// True if the line rests high, the check sum is inverted and each frame is answered on the
+        /// True if the line rests high, the checksum is inverted and each frame is answered on the
         /// same wire.
         bidirectional: bool,
     },

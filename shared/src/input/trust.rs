@@ -10,7 +10,7 @@
 //! 143 000, so that at 1 kHz the wire is silent to all that count for 0.1 s: within 0.2 s of the first in
 //! all but one case of 26 000. It rises where more than a quarter of the frames are good. Of a link in which
 //! half are, one good frame in 2760 is missed, and a tenth of a second of silence at 1 kHz comes once in
-//! three years. Twelve bad frames in a row cost none of the good ones behind them, any number at most four.
+//! three years. Twelve bad frames in a row cost none of the good ones after them, any number at most four.
 
 /// Evidence of a good frame; a bad one takes 1.
 const GOOD: u8 = 3;
@@ -24,14 +24,14 @@ const MOST: u8 = 24;
 pub(super) struct Trust(u8);
 
 impl Default for Trust {
-    /// Of a wire that nothing bad has been heard of.
+    /// Full trust, until there are bad frames.
     fn default() -> Self {
         Self(MOST)
     }
 }
 
 impl Trust {
-    /// Takes in a frame with a right check sum; whether it is to be believed.
+    /// Takes in a frame with a right checksum; whether it is to be believed.
     pub(super) fn good(&mut self) -> bool {
         self.0 = MOST.min(self.0 + GOOD);
         self.0 >= BELIEVED

@@ -1,4 +1,4 @@
-//! A constant factor whose range stands in its type.
+//! A constant factor whose range is part of its type.
 
 use core::marker::PhantomData;
 

@@ -3,7 +3,7 @@
 use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
-/// A signed number of 32 bits whose fraction bits stand in its type: a [`FixedI32`], or a
+/// A signed number of 32 bits whose fraction bits are part of its type: a [`FixedI32`], or a
 /// [`Quantity`](super::Quantity), which has a dimension besides.
 pub trait Number: Copy {
     /// The fraction bits.

@@ -132,7 +132,7 @@ impl Command {
     }
 }
 
-/// Whose commands these are, and what they leave behind.
+/// The ESC's commands and their state.
 #[derive(Clone, Debug)]
 pub(super) struct Commands {
     role: Role,

@@ -57,7 +57,7 @@ impl Context<'_> {
 /// A request that only the caller can carry out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Put the parameters in force: build the drive's configuration anew.
+    /// Put the parameters in force: rebuild the drive's configuration.
     ParamsChanged,
     /// Write what is kept to flash, then call [`Component::storage_done`].
     Save,
@@ -78,11 +78,11 @@ pub enum Request {
 pub enum Act {
     /// Sound a beacon.
     Beep,
-    /// Begin a calibration by stick; [`Component::tell`] tells its steps.
+    /// Begin a calibration by stick; [`Component::tell`] reports its steps.
     Calibrate,
     /// End it.
     EndCalibration,
-    /// Begin a self-test; [`Component::tell_progress`] and [`Component::check_done`] tell of it.
+    /// Begin a self-test; [`Component::tell_progress`] and [`Component::check_done`] report it.
     Check,
 }
 
@@ -312,7 +312,7 @@ impl Component {
         self.params_changed = true;
     }
 
-    /// Tells what the throttle wire has to tell.
+    /// Reports the throttle wire's news.
     pub fn tell(&mut self, news: WireNews) {
         if let WireNews::Calibration(step) = news {
             self.commands.follow_stick(step, &mut self.replies);
@@ -333,7 +333,7 @@ impl Component {
         self.commands.end_check(result, &mut self.replies);
     }
 
-    /// Warns a person at the next poll. Two wait; of more, the first are told.
+    /// Warns a person at the next poll. Two wait; of more, the first are kept.
     pub fn warn(&mut self, warning: Warning) {
         self.warnings.push(warning);
     }

@@ -1,4 +1,4 @@
-//! Which faults have been told in words, and when.
+//! The faults that have been reported in words, and the times.
 
 use crate::drive::{Fault, Faults};
 
@@ -6,7 +6,7 @@ use crate::drive::{Fault, Faults};
 /// comes and goes each millisecond must not fill the link.
 const APART_US: u64 = 1_000_000;
 
-/// Something to tell.
+/// News.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum News {
     Began(Fault),
@@ -30,8 +30,8 @@ impl Announcer {
         }
     }
 
-    /// The next fault whose state differs from what was told and may be told now. What has to wait
-    /// is told later if it still differs then.
+    /// The next fault whose state differs from the one reported and may be reported now. What has to wait
+    /// is reported later if it still differs then.
     pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<News> {
         for (i, fault) in Fault::ALL.into_iter().enumerate() {
             let present = faults.contains(fault);

@@ -64,7 +64,7 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refusal {
-    /// For the one who asked.
+    /// For the sender of the request.
     pub(super) error: MavParamError,
     /// The parameter that stands against it, where that is another.
     pub(super) because: Option<ParamId>,

@@ -11,7 +11,7 @@ const FRAME_MAX: usize = 10 + 255 + 2 + SIGNATURE_LEN;
 /// Incompatibility flag of a signed frame; any other flag is unknown here.
 pub(super) const SIGNED: u8 = 0x01;
 /// Silence after which an incomplete frame is given up. A false start byte can claim 267 bytes and
-/// would hold back the frames behind it for as long as nobody sends more. Links that stall within
+/// would hold back the frames after it for as long as nobody sends more. Links that stall within
 /// a frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
 const IDLE_US: u64 = 100_000;
 
@@ -114,7 +114,7 @@ enum Front {
 /// Finds the frames in the bytes of one link; MAVLink 1 and 2.
 ///
 /// A candidate that fails is searched again from its second byte, so that a start byte in noise
-/// costs no frame behind it.
+/// costs no frame after it.
 #[derive(Clone, Debug)]
 pub struct Receiver {
     buffer: [u8; FRAME_MAX],

@@ -22,7 +22,7 @@ use super::identity::Address;
 use super::receiver::{Frame, is_signed};
 use crate::math::divide;
 
-/// Link, timestamp and hash, behind the check of a frame.
+/// Link, timestamp and hash, after the checksum of a frame.
 pub(super) const SIGNATURE_LEN: usize = 13;
 const TIMESTAMP_LEN: usize = 6;
 const HASH_LEN: usize = 6;
@@ -38,7 +38,7 @@ const YEAR_TICKS: u64 = 36_525 * 864 * 1_000_000 / TICK_US as u64;
 /// By how much a frame may be ahead of the newest timestamp that is known, where the time is not: an ESC
 /// may have lain without power for so long.
 const FIRST_TICKS: u64 = 5 * YEAR_TICKS;
-/// No clock that is right tells less: 2026, in which this was written.
+/// The least time of a clock that is right: 2026, in which this was written.
 const PAST: u64 = 11 * YEAR_TICKS;
 /// The greatest timestamp of a SETUP_SIGNING, in 2099: others must be able to follow in 48 bits.
 const SET_UP_MOST: u64 = (1 << 48) - 1 - FIRST_TICKS;
@@ -91,14 +91,14 @@ struct Stream {
 #[derive(Clone, Debug)]
 pub(super) struct Signing {
     key: Option<Key>,
-    /// The newest timestamp that was heard, and when that was.
+    /// The newest timestamp received, and when that was.
     newest: u64,
     newest_us: u64,
     /// The last timestamp that was sent.
     sent: u64,
     /// When the last frame that was signed was taken, or a SETUP_SIGNING that tells the time.
     told_us: Option<u64>,
-    /// Up to here, everything may have been heard before the start or before the key.
+    /// Up to here, everything may have been received before the start or before the key.
     floor: u64,
     /// Kept from key to key: one that comes back finds what it has signed before.
     streams: [Option<Stream>; STREAMS],
@@ -129,7 +129,7 @@ impl Signing {
 
     /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False where its time cannot be.
     ///
-    /// From key to key time does not run backwards, and what was heard is not heard again.
+    /// From key to key time does not run backwards, and a frame that was received is not taken again.
     #[inline(never)]
     pub(super) fn set_up(&mut self, key: [u8; 32], timestamp: u64) -> bool {
         let most = self.key.map_or(SET_UP_MOST, |_| self.latest());
@@ -237,7 +237,7 @@ impl Signing {
     }
 
     /// Signs a frame: from its start to its check, with the flag set and the check over it. The
-    /// signature stands behind it; nothing without a key.
+    /// signature follows it; nothing without a key.
     pub(super) fn sign(&mut self, frame: &[u8]) -> Option<[u8; SIGNATURE_LEN]> {
         let key = self.key?;
         let timestamp = self.clock().max(self.sent + 1);

@@ -5,7 +5,7 @@ use heapless::String;
 /// A text that is made up at run time; STATUSTEXT has room for 50 letters.
 pub type Warning = String<50>;
 
-/// The warnings that wait to be sent, two at the most, and the last one for who reads it later.
+/// The warnings that wait to be sent, two at most, and the last one for later readers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Warnings {
     texts: [Warning; 2],
@@ -17,7 +17,7 @@ pub(super) struct Warnings {
 }
 
 impl Warnings {
-    /// Of more than two at once, the first are told.
+    /// Of more than two at once, the first are kept.
     pub(super) fn push(&mut self, warning: Warning) {
         if let Some(place) = self.texts.get_mut(self.come) {
             *place = warning;

@@ -57,7 +57,7 @@ traced! {
 }
 
 impl State {
-    /// At power-up: full bounds, and a supply in the middle of its range until samples tell.
+    /// At power-up: full bounds, and a supply in the middle of its range until there are samples.
     pub fn new(config: &Config) -> Self {
         Self {
             trip: config.trip,

@@ -1,4 +1,4 @@
-//! Sets of words, appended to two halves of the flash, so that the settings always stand in two sets.
+//! Sets of words, appended to two halves of the flash, so that two sets always have the settings.
 
 use core::ops::Range;
 
@@ -196,7 +196,7 @@ impl Log {
         }
     }
 
-    /// Writes a set with this content behind the newest, unless that has it and the set before has its
+    /// Writes a set with this content after the newest, unless that has it and the set before has its
     /// settings; whether it did.
     pub(super) fn append<F: NorFlash>(
         &self,
@@ -254,7 +254,7 @@ impl Log {
         self.write(flash, content, half.start)
     }
 
-    /// Writes a set, and looks whether it stands.
+    /// Writes a set, and reads it back.
     fn write<F: NorFlash>(
         &self,
         flash: &mut F,

@@ -30,7 +30,7 @@ use schema::{CHANGES, Change, SCHEMA};
 
 /// Keys of words that are no value's; those of values are in [`kept`].
 mod key {
-    /// The seal behind a set.
+    /// The seal after a set.
     pub(super) const SEAL: u16 = 0;
     /// The schema of a set, its first word.
     pub(super) const SCHEMA: u16 = 0x1000;
@@ -144,8 +144,8 @@ fn load_changed<F: NorFlash>(flash: &mut F, range: Range<u32>, changes: &[Change
     loaded
 }
 
-/// Writes what is not stored yet, and looks whether it stands. When it is done the values survive the
-/// loss of power, and the settings of it stand twice.
+/// Writes what is not stored yet, and reads it back. When it is done the values survive the
+/// loss of power, and the settings are stored twice.
 ///
 /// Defaults are not written; what this firmware does not know is kept.
 ///

@@ -56,7 +56,7 @@ const STM32F405: u16 = 0x413;
 /// Revision A as RM0090 has it.
 const REVISION_A: u16 = 0x1000;
 
-/// 168 MHz from the internal 16 MHz, as no source tells this board's crystal for sure.
+/// 168 MHz from the internal 16 MHz, as no source is sure about this board's crystal.
 fn clock() -> Config {
     let mut config = Config::default();
     config.rcc.hsi = true;

@@ -26,7 +26,7 @@ pub(crate) fn erasing(sector: usize) -> Cr {
     control
 }
 
-/// Words of this flash have no bits that tell of others.
+/// This flash has no error correction that could report a torn word.
 pub(crate) fn take_torn_word() -> bool {
     false
 }

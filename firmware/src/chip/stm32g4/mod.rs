@@ -121,7 +121,7 @@ impl Reading {
     /// The reading, of 4096. For the tasks: it waits for it, some 8 µs, or as often as it is disturbed.
     /// `periods` counts the control periods, each of which follows injected conversions.
     ///
-    /// A regular conversion behind injected ones may be one of channel 0 (ES0431, 2.5.8): it counts where
+    /// A regular conversion after injected ones may be one of channel 0 (ES0431, 2.5.8): it counts where
     /// another stands before it and no period has gone by since. Both take half of the fastest PWM's
     /// period; where something else holds them up each time, the reading before stands.
     pub(crate) fn counts(&mut self, periods: impl Fn() -> u32) -> u16 {

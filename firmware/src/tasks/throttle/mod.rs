@@ -145,7 +145,7 @@ struct Looks {
     frame: bool,
     /// Until when the last edges of an expected frame are waited for.
     until_ticks: u32,
-    /// A frame whose answer cannot wait until it has been heard.
+    /// A frame whose answer cannot wait until it has been decoded.
     unheard: Option<Event>,
 }
 
@@ -156,7 +156,7 @@ impl Looks {
 }
 
 impl Listener {
-    /// The drive as the next answer shall tell of it; nothing before the control has told anything.
+    /// The drive as the next answer reports it; `None` before the first snapshot.
     #[inline(never)]
     fn ready(&mut self) -> Option<Ready> {
         let snapshot = self.snapshot.read()?;

@@ -298,7 +298,7 @@ fn an_armed_wire_may_be_silent_behind_a_command() {
     assert!(bench.authority.armed());
     bench.wait(1);
     assert!(!bench.authority.armed());
-    // One that is not armed begins anew.
+    // One that is not armed starts over.
     let mut bench = Bench::new();
     bench.play(300, event(1));
     bench.after(100_001, event(1));

@@ -183,7 +183,7 @@ fn clocks_far_off_are_refused() {
 fn wrong_numbers_of_pulses_are_bad_once_for_sixteen() {
     for rate in Rate::ALL {
         for pulses in 1..40 {
-            // A zero and then ones: the check sum of the first 16 is wrong.
+            // A zero and then ones: the checksum of the first 16 is wrong.
             let bit_ns = f64::from(rate.bit_ns());
             let mut burst = [0.75 * bit_ns, 0.25 * bit_ns].repeat(pulses);
             burst[0] = 0.375 * bit_ns;

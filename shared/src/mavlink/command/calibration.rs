@@ -44,7 +44,7 @@ impl Commands {
         IN_PROGRESS
     }
 
-    /// The stick has come a step further. What it has taught is stored before the end is told.
+    /// The stick has come a step further. The end points are stored before the end is reported.
     pub(in super::super) fn follow_stick(&mut self, step: Step, replies: &mut Replies) {
         match (step, self.calibrates()) {
             (Step::Full, Some(command)) => replies.ack(command.from, command.number, IN_PROGRESS),

@@ -83,7 +83,7 @@ impl Component {
             };
             self.text(severity, &[word, fault.text()], send);
         }
-        // Until the last one, which is a fault, nothing else tells why the motor does not turn.
+        // Until the last attempt, which is a fault, nothing else says why the motor does not turn.
         let failed = context.telemetry.failed_starts;
         if failed > core::mem::replace(&mut self.failed_starts, failed) && faults.is_empty() {
             let text = "Start failed: the motor is tried again";

@@ -1,4 +1,4 @@
-//! The messages that tell where a component's metadata are.
+//! The messages that say where a component's metadata are.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::COMPONENT_METADATA_DATA;

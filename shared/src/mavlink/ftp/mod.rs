@@ -1,15 +1,15 @@
 //! Files that can be read over MAVLink: <https://mavlink.io/en/services/ftp.html>.
 //!
-//! | file | what it tells |
+//! | file | what it shows |
 //! |---|---|
 //! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: 3 frames where the list takes 50; with `?withdefaults=1` or `?start=N&count=N` |
 //! | `@SYS/faults.txt` | faults and the last warning, in words |
 //! | `@SYS/statistics.txt` | what has happened in the life of the ESC, in words |
-//! | `general.json.xz` | where the next one is ([`metadata()`] tells where this one is) |
+//! | `general.json.xz` | the place of the next one ([`metadata()`] has that of this one) |
 //! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
 //!
 //! The last two are made of the table of parameters when the crate is built (`build.rs`).
-//! The others are written anew for each answer, and of what is written only what was asked for is
+//! The others are written again for each answer, and of what is written only what was asked for is
 //! kept: no file is ever in memory. One reader at a time has a session, which nobody else can end; what
 //! it reads is of one moment, since a file that has changed can no longer be read. Bursts leave with the
 //! lists of parameters, in their half of the link, and of a flood of requests few are answered.

@@ -86,7 +86,7 @@ impl Session {
 /// Serves files to one reader at a time.
 ///
 /// Every request can be obeyed twice, so that one that is sent again gets the same answer and none has
-/// to be kept: opening a file anew begins the same session, and to end one where there is none is no
+/// to be kept: opening a file again begins the same session, and to end one where there is none is no
 /// error.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mavlink) struct Server {

@@ -76,7 +76,7 @@ impl FluxSettings {
         let tau_int_s = TAU_INT / rad_s(params, SLOW_SHARE * get(ParamId::StaRunRpm));
         let (n, a_e) = (get(ParamId::CtlPosN), get(ParamId::CtlAe));
         let alpha = get(ParamId::CtlSlewRpmS) * get(ParamId::MotPolePairs) / 60.0;
-        // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures anew, and
+        // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures again, and
         // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
         let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
         Self {

@@ -102,7 +102,7 @@ const BUS_UNITS_MIN: f32 = 0.125;
 /// Speed at which (22) is linearised, of `CTL_RPM_MAX`: 4500 rpm on the bench.
 const LINEARISED_SHARE: f32 = 0.75;
 
-/// For how long ξ̂ may stand at the end of its range, s: far longer than any transient that the
+/// Time for which ξ̂ may be at the end of its range, s: far longer than any transient that the
 /// observer recovers from.
 const LOST_S: f32 = 0.1;
 
@@ -110,7 +110,7 @@ const LOST_S: f32 = 0.1;
 /// for: the hysteresis of the second paper's 3.2.4.
 const SLOW_SHARE: f32 = 0.5;
 
-/// For how long zero throttle must stand before a fault ends, s.
+/// Time for which zero throttle must hold before a fault ends, s.
 const CLEAR_S: f32 = 0.3;
 
 /// For how long a motor whose sensors know its position may be slow before it counts as stuck, s.
@@ -138,7 +138,7 @@ const TORQUE_DROP_SHARE: f32 = 0.5;
 const COAST_S: f32 = 2.0;
 
 /// Greatest current bandwidth of the PWM frequency: the observer's poles at (−1 ± i) times it are
-/// stepped by Euler's rule, and a period of delay stands in the loop.
+/// stepped by Euler's rule, and there is a period of delay in the loop.
 const BANDWIDTH_SHARE: f32 = 0.05;
 
 /// Greatest speed bandwidth of the current bandwidth: nested loops need that distance.
@@ -423,7 +423,7 @@ fn low_speed(p: &Si) -> low_speed::Config {
     let phase = p.scale.current_from_a(limit_a);
     let published = p.get(ParamId::CtlObserver) == 0.0 && p.get(ParamId::CtlObsCure) == 0.0;
     if published || p.get(ParamId::CtlObserver) == 2.0 {
-        // As published, and not needed where sensors tell the position.
+        // As published, and not needed where sensors give the position.
         return low_speed::Config::none(phase);
     }
     let ramp_a = p.get(ParamId::StaRampA).min(limit_a);
@@ -527,7 +527,7 @@ mod tests {
         params.set(ParamId::PwmDeadtimeNs, 0.0).expect("in range");
         build(&params, &Board::BENCH).expect("an ideal inverter");
 
-        // What was chosen is told; the table's default, which nobody chose, is not.
+        // A value that was chosen is named; the table's default, which nobody chose, is not.
         assert!(params.fit(&board));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
         let mut params = Params::default();

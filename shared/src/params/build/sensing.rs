@@ -57,7 +57,7 @@ const MEMORY_S: f32 = 0.05;
 /// For how long all must fit before a coasting rotor is known, s.
 const SURE_S: f32 = 0.001;
 
-/// For how long it may not fit before the observation begins anew, s.
+/// For how long it may not fit before the observation starts over, s.
 const UNFIT_S: f32 = 0.004;
 
 /// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high

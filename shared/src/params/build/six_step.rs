@@ -11,7 +11,7 @@ use crate::drive::six_step::Config;
 use crate::math::Real;
 use crate::params::ParamId;
 
-/// Back-EMF on the floating terminal that is told from none, V, and the same in counts: noise and
+/// Back-EMF on the floating terminal that is taken for one, V, and the same in counts: noise and
 /// the difference between the switches that are on.
 const LEAST_V: f32 = 0.02;
 const LEAST_COUNTS: f32 = 1.5;
