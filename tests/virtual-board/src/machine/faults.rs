@@ -5,13 +5,11 @@ use siskin_emulator::machine::Stopped;
 
 use super::VirtualBoard;
 use crate::chip::Cause;
-use crate::processor::Processor;
-use crate::world::World;
 
 /// How often what changes steadily is looked at, and a supply that may be too low for the chip, ns.
 const STEP_NS: u64 = 50_000;
 
-impl<P: Processor<World>> VirtualBoard<P> {
+impl VirtualBoard {
     /// Runs until a time, with the faults of each moment.
     pub(super) fn play(&mut self, until_ns: u64) -> Result<(), Stopped> {
         while self.now_ns < until_ns {

@@ -21,7 +21,6 @@ use crate::chip::{CODE, Cause, STORE};
 use crate::image::Image;
 use crate::load::Figures;
 use crate::memory::Memory;
-use crate::processor::unicorn::Translator;
 use crate::processor::{Mapped, Processor, Stop, Surroundings};
 use crate::serial::{Mavlink, Telemetry};
 use crate::time::{ns, of_ns};
@@ -37,9 +36,9 @@ const SRAM: (u32, usize) = (0x2000_0000, 24 * 1024);
 /// MAVLink's line; the other one is the telemetry's.
 const MAVLINK: u8 = 2;
 
-/// A board with an image in its flash, by the engine that translates or another one.
-pub struct VirtualBoard<P = Translator<World>> {
-    processor: P,
+/// A board with an image in its flash.
+pub struct VirtualBoard {
+    processor: Processor<World>,
     /// Those at the start.
     params: Params,
     now_ns: u64,
@@ -54,7 +53,7 @@ pub struct VirtualBoard<P = Translator<World>> {
     telemetry: Telemetry,
 }
 
-impl<P: Processor<World>> VirtualBoard<P> {
+impl VirtualBoard {
     /// A board with this image at power-up, on what `start` has; with a warning where what was stored is
     /// not whole.
     ///
@@ -114,7 +113,7 @@ impl<P: Processor<World>> VirtualBoard<P> {
             Bench::new(bench),
             setpoint.map(|(address, _)| address),
         );
-        let mut processor = P::new(world, &mapped);
+        let mut processor = Processor::new(world, &mapped);
         processor.reset(CODE.start);
         let board = Self {
             processor,
@@ -138,7 +137,7 @@ impl<P: Processor<World>> VirtualBoard<P> {
     }
 
     /// The processor.
-    pub fn processor(&mut self) -> &mut P {
+    pub fn processor(&mut self) -> &mut Processor<World> {
         &mut self.processor
     }
 
@@ -259,7 +258,7 @@ impl<P: Processor<World>> VirtualBoard<P> {
     }
 }
 
-impl<P: Processor<World>> Machine for VirtualBoard<P> {
+impl Machine for VirtualBoard {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }

@@ -1,8 +1,7 @@
 //! The Cortex-M4F: what executes the image, and what it stands in.
 //!
-//! [`unicorn`] translates the code and is fast; exceptions, the interrupt controller, SysTick and the
-//! cycle counter are this crate's (`exceptions`, `private`). The [`interpreter`], rsemu's, has all of
-//! these of its own, and is the cross-check. Both stand in the same [`Surroundings`].
+//! [`Processor`] translates the code by QEMU's engine; exceptions, the interrupt controller, SysTick and
+//! the cycle counter are this crate's (`exceptions`, `private`). It stands in its [`Surroundings`].
 //!
 //! # What code costs
 //! Instructions by the table of the processor's manual (DDI 0439, 3.3.1), where it gives a range by the
@@ -29,17 +28,16 @@ mod cost;
 mod counters;
 mod exceptions;
 mod flash_cache;
-pub mod interpreter;
 mod priority;
 mod private;
 #[cfg(test)]
 mod selftest;
-pub mod unicorn;
+mod unicorn;
 
 pub use cost::ENTRY;
+pub use unicorn::Processor;
 
 use std::cell::Cell;
-use std::ops::Range;
 
 use crate::memory::Memory;
 use crate::time::Cycles;
@@ -64,6 +62,15 @@ impl Width {
             Self::Word => 4,
         }
     }
+}
+
+/// What an instruction does with a memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// It reads.
+    Read,
+    /// It writes.
+    Write,
 }
 
 /// Why an access outside plain memory fails.
@@ -169,7 +176,7 @@ pub struct HandlerEvent {
     /// Instructions since power-up.
     pub instructions: u64,
     /// Since when the processor could have taken an exception of this priority between two instructions,
-    /// and did so only now: an engine that looks less often is late.
+    ///@@
     pub since: Cycles,
 }
 
@@ -205,25 +212,4 @@ pub enum Register {
     Basepri,
     /// CONTROL.
     Control,
-}
-
-/// An engine that executes Cortex-M4F code in its surroundings.
-pub trait Processor<S: Surroundings>: Sized {
-    /// One at power-up, with this plain memory.
-    fn new(surroundings: S, memories: &[Mapped]) -> Self;
-    /// Starts by the vector table at this address.
-    fn reset(&mut self, vector_table: u32);
-    /// Runs until something stops it; goes on where it was when it is called again.
-    fn run(&mut self) -> Stop;
-    /// What it stands in.
-    fn surroundings(&mut self) -> &mut S;
-    /// A register, while it does not run.
-    fn register(&self, register: Register) -> u32;
-    /// Writes a register, while it does not run, as a debugger does. A program counter wakes a processor
-    /// that waits.
-    fn set_register(&mut self, register: Register, value: u32);
-    /// Instructions since power-up.
-    fn instructions(&self) -> u64;
-    /// Memory that may hold code has been changed by other means than the program's writes.
-    fn forget_code(&mut self, addresses: Range<u32>);
 }

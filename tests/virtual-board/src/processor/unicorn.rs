@@ -23,7 +23,7 @@ use super::cost::Costs;
 use super::exceptions::State;
 use super::priority::{Exceptions, Masks, PRIORITY_MASK, bit, number};
 use super::private::Private;
-use super::{HandlerEvent, Mapped, Processor, Register, Stop, Surroundings};
+use super::{Access, HandlerEvent, Mapped, Register, Stop, Surroundings};
 use crate::time::Cycles;
 
 /// Where the chip's registers are, and the store that is handed out like them.
@@ -34,8 +34,8 @@ const REGISTERS: [Range<u64>; 4] = [
     0xe000_0000..0xe010_0000,
 ];
 
-/// The processor by that engine.
-pub struct Translator<S: Surroundings + 'static> {
+/// A Cortex-M4F in its surroundings, by that engine.
+pub struct Processor<S: Surroundings + 'static> {
     engine: Unicorn<'static, Inside<S>>,
 }
 
@@ -50,6 +50,8 @@ struct Inside<S> {
     /// The block that is being executed.
     running: Option<Running>,
     instructions: u64,
+    /// What an instruction has done first with each memory that is watched.
+    watched: Vec<Option<Access>>,
     /// The event register.
     event: bool,
     asleep: Option<Sleep>,
@@ -208,7 +210,135 @@ impl<S: Surroundings + 'static> State for Unicorn<'_, Inside<S>> {
     }
 }
 
-impl<S: Surroundings + 'static> Translator<S> {
+impl<S: Surroundings + 'static> Processor<S> {
+    /// One at power-up, with this plain memory.
+    ///
+    /// # Panics
+    /// When the engine cannot be had, for want of memory.
+    pub fn new(surroundings: S, memories: &[Mapped]) -> Self {
+        let inside = Inside {
+            surroundings,
+            private: Private::new(),
+            memories: memories.to_vec(),
+            costs: Costs::new(),
+            began: 0,
+            running: None,
+            instructions: 0,
+            watched: Vec::new(),
+            event: false,
+            asleep: None,
+            stop: None,
+        };
+        // In Thumb mode only: with that for the M class any model would become a Cortex-M33.
+        let engine = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
+        let engine = engine.expect("the engine is linked");
+        let mut processor = Self { engine };
+        processor.open().expect("regions that do not overlap");
+        let model = processor.engine.ctl_get_cpu_model();
+        assert_eq!(model, Ok(ArmCpuModel::CORTEX_M4 as i32));
+        processor
+    }
+
+    /// Starts by the vector table at this address.
+    pub fn reset(&mut self, vector_table: u32) {
+        let engine = &mut self.engine;
+        let inside = engine.get_data_mut();
+        inside.settle();
+        inside.private = Private::new();
+        inside.private.vtor = vector_table;
+        inside.event = false;
+        inside.asleep = None;
+        inside.stop = None;
+        for register in [
+            RegisterARM::PRIMASK,
+            RegisterARM::BASEPRI,
+            RegisterARM::FAULTMASK,
+        ] {
+            write(engine, register, 0);
+        }
+        engine.set(Register::Xpsr, 1 << 24);
+        engine.set(Register::Control, 0);
+        engine.set(Register::Lr, u32::MAX);
+        let stack = engine.load(vector_table).unwrap_or(0);
+        let start = engine.load(vector_table + 4).unwrap_or(0);
+        engine.set(Register::Sp, stack & !3);
+        engine.set(Register::Pc, start | 1);
+    }
+
+    /// Runs until something stops it; goes on where it was when it is called again.
+    pub fn run(&mut self) -> Stop {
+        loop {
+            if self.engine.get_data().asleep.is_some() {
+                doze(&mut self.engine);
+            }
+            if let Some(stop) = self.engine.get_data_mut().stop.take() {
+                return stop;
+            }
+            self.execute();
+        }
+    }
+
+    /// What it stands in.
+    pub fn surroundings(&mut self) -> &mut S {
+        &mut self.engine.get_data_mut().surroundings
+    }
+
+    /// A register, while it does not run.
+    pub fn register(&self, register: Register) -> u32 {
+        self.engine.get(register)
+    }
+
+    /// Writes a register, while it does not run, as a debugger does. A program counter wakes a processor
+    /// that waits.
+    pub fn set_register(&mut self, register: Register, value: u32) {
+        let value = if register == Register::Pc {
+            self.engine.get_data_mut().asleep = None;
+            value | 1
+        } else {
+            value
+        };
+        self.engine.set(register, value);
+    }
+
+    /// Instructions since power-up.
+    pub fn instructions(&self) -> u64 {
+        self.engine.get_data().instructions
+    }
+
+    /// Notes what instructions do first with each of these memories, from now on. The engine is slower then.
+    pub fn watch(&mut self, memories: &[Range<u32>]) {
+        self.engine.get_data_mut().watched = vec![None; memories.len()];
+        for (number, memory) in memories.iter().enumerate() {
+            let accesses = HookType::MEM_READ | HookType::MEM_WRITE;
+            let note = move |engine: &mut Unicorn<'_, Inside<S>>, kind, _, _, _| {
+                let access = match kind {
+                    MemType::WRITE => Access::Write,
+                    _ => Access::Read,
+                };
+                engine.get_data_mut().watched[number].get_or_insert(access);
+                true
+            };
+            let (start, end) = (u64::from(memory.start), u64::from(memory.end));
+            let hook = self.engine.add_mem_hook(accesses, start, end - 1, note);
+            hook.expect("the engine takes hooks at any time");
+        }
+    }
+
+    /// What has been done first with each of the memories that are watched.
+    pub fn first_accesses(&self) -> &[Option<Access>] {
+        &self.engine.get_data().watched
+    }
+
+    /// Memory that may hold code has been changed by other means than the program's writes.
+    pub fn forget_code(&mut self, addresses: Range<u32>) {
+        self.engine.get_data_mut().costs.forget();
+        let Range { start, end } = addresses;
+        // Where nothing was translated there is nothing to forget.
+        let _ = self.engine.ctl_remove_cache(start.into(), end.into());
+    }
+}
+
+impl<S: Surroundings + 'static> Processor<S> {
     /// Lets the engine execute until it leaves off.
     fn execute(&mut self) {
         let engine = &mut self.engine;
@@ -280,98 +410,5 @@ impl<S: Surroundings + 'static> Translator<S> {
         engine.add_intr_hook(|engine, kind| interrupt(engine, kind))?;
         engine.add_insn_invalid_hook(|engine| invalid(engine))?;
         Ok(())
-    }
-}
-
-impl<S: Surroundings + 'static> Processor<S> for Translator<S> {
-    /// # Panics
-    /// When the engine cannot be had, for want of memory.
-    fn new(surroundings: S, memories: &[Mapped]) -> Self {
-        let inside = Inside {
-            surroundings,
-            private: Private::new(),
-            memories: memories.to_vec(),
-            costs: Costs::new(),
-            began: 0,
-            running: None,
-            instructions: 0,
-            event: false,
-            asleep: None,
-            stop: None,
-        };
-        // In Thumb mode only: with that for the M class any model would become a Cortex-M33.
-        let engine = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
-        let engine = engine.expect("the engine is linked");
-        let mut translator = Self { engine };
-        translator.open().expect("regions that do not overlap");
-        let model = translator.engine.ctl_get_cpu_model();
-        assert_eq!(model, Ok(ArmCpuModel::CORTEX_M4 as i32));
-        translator
-    }
-
-    fn reset(&mut self, vector_table: u32) {
-        let engine = &mut self.engine;
-        let inside = engine.get_data_mut();
-        inside.settle();
-        inside.private = Private::new();
-        inside.private.vtor = vector_table;
-        inside.event = false;
-        inside.asleep = None;
-        inside.stop = None;
-        for register in [
-            RegisterARM::PRIMASK,
-            RegisterARM::BASEPRI,
-            RegisterARM::FAULTMASK,
-        ] {
-            write(engine, register, 0);
-        }
-        engine.set(Register::Xpsr, 1 << 24);
-        engine.set(Register::Control, 0);
-        engine.set(Register::Lr, u32::MAX);
-        let stack = engine.load(vector_table).unwrap_or(0);
-        let start = engine.load(vector_table + 4).unwrap_or(0);
-        engine.set(Register::Sp, stack & !3);
-        engine.set(Register::Pc, start | 1);
-    }
-
-    fn run(&mut self) -> Stop {
-        loop {
-            if self.engine.get_data().asleep.is_some() {
-                doze(&mut self.engine);
-            }
-            if let Some(stop) = self.engine.get_data_mut().stop.take() {
-                return stop;
-            }
-            self.execute();
-        }
-    }
-
-    fn surroundings(&mut self) -> &mut S {
-        &mut self.engine.get_data_mut().surroundings
-    }
-
-    fn register(&self, register: Register) -> u32 {
-        self.engine.get(register)
-    }
-
-    fn set_register(&mut self, register: Register, value: u32) {
-        let value = if register == Register::Pc {
-            self.engine.get_data_mut().asleep = None;
-            value | 1
-        } else {
-            value
-        };
-        self.engine.set(register, value);
-    }
-
-    fn instructions(&self) -> u64 {
-        self.engine.get_data().instructions
-    }
-
-    fn forget_code(&mut self, addresses: Range<u32>) {
-        self.engine.get_data_mut().costs.forget();
-        let Range { start, end } = addresses;
-        // Where nothing was translated there is nothing to forget.
-        let _ = self.engine.ctl_remove_cache(start.into(), end.into());
     }
 }

@@ -1,12 +1,12 @@
 //! The image starts, speaks on its serial port, and runs alike each time. Run with `--release`.
 
 use std::hash::Hasher;
+use std::ops::Range;
 
 use crate::common::{Board, MS, Throttle, image};
 use mavlink::dialects::ardupilotmega::MavCmd;
 use siskin_control::params::ParamId;
-use siskin_vboard::processor::Processor;
-use siskin_vboard::world::World;
+use siskin_vboard::processor::Access;
 
 /// 115200 baud as the 170 MHz divide to: bits of eight data bits, start and stop.
 const BYTE_NS: u64 = 10 * 1_000_000_000 / 115_200;
@@ -77,7 +77,7 @@ fn run() -> (u64, u64, u64) {
     board.param("MOT_KV", 100 * MS).expect("an answer");
     board.throttle = Throttle::Dshot(700);
     board.run(100 * MS);
-    let instructions = Processor::<World>::instructions(board.board.processor());
+    let instructions = board.board.processor().instructions();
     (
         instructions,
         board.world().bridge().edges(),
@@ -91,4 +91,21 @@ fn equal_inputs_give_equal_bits() {
     println!("instructions, edges, hash: {first:?}");
     assert!(first.0 > 10_000_000 && first.1 > 10_000, "{first:?}");
     assert_eq!(first, run());
+}
+
+/// The chip's memories, each a part of its own: SRAM1, SRAM2 and the CCM SRAM (RM0440, 2.2.2).
+const RAMS: [Range<u32>; 3] = [
+    0x2000_0000..0x2000_4000,
+    0x2000_4000..0x2000_5800,
+    0x1000_0000..0x1000_2800,
+];
+
+/// ES0431: the first write to a memory after a reset may be lost, unless it has been read.
+#[test]
+fn no_memory_is_written_before_it_is_read() {
+    let mut board = Board::new(&image(), &[]);
+    board.board.processor().watch(&RAMS);
+    board.run(2 * MS);
+    let first = board.board.processor().first_accesses();
+    assert_eq!(first, [Some(Access::Read); 3]);
 }

@@ -3,9 +3,8 @@
 
 use crate::common::{Board, ERASED, MS, PWM_PERIOD, Throttle, US, endless_loop, image, us};
 use siskin_vboard::image::Image;
-use siskin_vboard::processor::{Processor, Register, Surroundings};
+use siskin_vboard::processor::{Register, Surroundings};
 use siskin_vboard::time::{CLOCK_HZ, Cycles};
-use siskin_vboard::world::World;
 
 /// The exceptions in whose handlers a failure is put: the tasks' thread, and the PWM interrupt.
 const THREAD: u32 = 0;
@@ -124,7 +123,7 @@ fn tasks_that_stand_still() {
 fn too_much_current_while_the_processor_stands() {
     let mut board = Board::turning(&image());
     board.stop_in(THREAD);
-    let before = Processor::<World>::instructions(board.board.processor());
+    let before = board.board.processor().instructions();
     let from = board.now();
     let world = board.world();
     while !world.bridge().is_off() && Surroundings::now(world) < from + CLOCK_HZ / 10 {
@@ -145,10 +144,7 @@ fn too_much_current_while_the_processor_stands() {
     let until = Surroundings::now(world) + 5 * PWM_PERIOD;
     world.idle(until);
     assert_eq!(world.bridge().off_since(), Some(off));
-    assert_eq!(
-        Processor::<World>::instructions(board.board.processor()),
-        before
-    );
+    assert_eq!(board.board.processor().instructions(), before);
     board.hear("Fault: over-current", 200 * MS);
     assert_eq!(board.world().bridge().violations(), 0);
 }

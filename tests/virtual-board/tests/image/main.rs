@@ -9,7 +9,6 @@
 //! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
 //! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
 //! | [`damaged`] | a damaged image never turns the bridge on |
-//! | [`engines`] | the interpreting engine does what the translating one does |
 //! | [`agreement`] | the control's state and the motor are those of the emulator |
 //!
 //! The image is `SISKIN_IMAGE`, else what this makes:
@@ -23,7 +22,6 @@ mod agreement;
 mod boot;
 mod common;
 mod damaged;
-mod engines;
 mod failures;
 mod flight_controller;
 mod readings;

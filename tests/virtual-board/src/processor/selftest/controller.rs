@@ -1,22 +1,9 @@
 //! The registers of the interrupt controller and the system (B3.2, B3.4).
 
-use super::{Bed, Processor, marks, on_every_engine};
+use super::marks;
 
-on_every_engine!(
-    enables_are_set_and_cleared_by_bits,
-    pending_is_set_and_cleared_by_bits,
-    a_priority_is_a_byte_of_four_bits,
-    a_system_priority_is_a_byte,
-    it_tells_what_is_pending,
-    it_tells_what_is_active,
-    pendsv_is_set_and_cleared,
-    the_trigger_register_pends,
-    the_vector_table_moves_to_memory,
-    it_is_a_cortex_m4;
-    not interpreted: it_tells_which_exception_is_active
-);
-
-fn enables_are_set_and_cleared_by_bits<P: Processor<Bed>>() {
+#[test]
+fn enables_are_set_and_cleared_by_bits() {
     let program = "
         main: mov32 r0, 0xe000e100
         mov r1, #0xf0
@@ -39,10 +26,11 @@ fn enables_are_set_and_cleared_by_bits<P: Processor<Bed>>() {
         str r1, [r10]
         b stop
     ";
-    assert_eq!(marks::<P>(program), [0xff, 0xc3, 0xc3, 8, 0]);
+    assert_eq!(marks(program), [0xff, 0xc3, 0xc3, 8, 0]);
 }
 
-fn pending_is_set_and_cleared_by_bits<P: Processor<Bed>>() {
+#[test]
+fn pending_is_set_and_cleared_by_bits() {
     let program = "
         main: mov32 r0, 0xe000e200
         mov r1, #6
@@ -66,10 +54,11 @@ fn pending_is_set_and_cleared_by_bits<P: Processor<Bed>>() {
         exception_18: mark #2
         bx lr
     ";
-    assert_eq!(marks::<P>(program), [6, 4, 4, 2, 9]);
+    assert_eq!(marks(program), [6, 4, 4, 2, 9]);
 }
 
-fn a_priority_is_a_byte_of_four_bits<P: Processor<Bed>>() {
+#[test]
+fn a_priority_is_a_byte_of_four_bits() {
     let program = "
         main: mov32 r0, 0xe000e400
         mov r1, #0xff
@@ -86,10 +75,11 @@ fn a_priority_is_a_byte_of_four_bits<P: Processor<Bed>>() {
         str r1, [r10]
         b stop
     ";
-    assert_eq!(marks::<P>(program), [0x0050_f000, 0x50, 0x1020]);
+    assert_eq!(marks(program), [0x0050_f000, 0x50, 0x1020]);
 }
 
-fn a_system_priority_is_a_byte<P: Processor<Bed>>() {
+#[test]
+fn a_system_priority_is_a_byte() {
     let program = "
         main: mov32 r0, 0xe000ed18
         mov r1, #0xff
@@ -104,10 +94,11 @@ fn a_system_priority_is_a_byte<P: Processor<Bed>>() {
         str r1, [r10]
         b stop
     ";
-    assert_eq!(marks::<P>(program), [0x20f0_0000, 0x8000_0000]);
+    assert_eq!(marks(program), [0x20f0_0000, 0x8000_0000]);
 }
 
-fn it_tells_what_is_pending<P: Processor<Bed>>() {
+#[test]
+fn it_tells_what_is_pending() {
     let program = "
         main: mov32 r6, 0xe000ed00
         cpsid i
@@ -123,7 +114,7 @@ fn it_tells_what_is_pending<P: Processor<Bed>>() {
         b stop
     ";
     // RETTOBASE has no meaning in a thread.
-    let told: Vec<u32> = marks::<P>(program)
+    let told: Vec<u32> = marks(program)
         .iter()
         .map(|mark| mark & !(1 << 11))
         .collect();
@@ -160,19 +151,22 @@ const NESTED: &str = "
     bx lr
 ";
 
-fn it_tells_what_is_active<P: Processor<Bed>>() {
-    let marks = marks::<P>(NESTED);
+#[test]
+fn it_tells_what_is_active() {
+    let marks = marks(NESTED);
     assert_eq!([marks[1], marks[3]], [2, 6]);
     // RETTOBASE.
     assert_eq!([marks[0] >> 11 & 1, marks[2] >> 11 & 1], [1, 0]);
 }
 
-fn it_tells_which_exception_is_active<P: Processor<Bed>>() {
-    let marks = marks::<P>(NESTED);
+#[test]
+fn it_tells_which_exception_is_active() {
+    let marks = marks(NESTED);
     assert_eq!([marks[0] & 0x1ff, marks[2] & 0x1ff], [17, 18]);
 }
 
-fn pendsv_is_set_and_cleared<P: Processor<Bed>>() {
+#[test]
+fn pendsv_is_set_and_cleared() {
     let program = "
         main: mov32 r6, 0xe000ed00
         cpsid i
@@ -194,14 +188,15 @@ fn pendsv_is_set_and_cleared<P: Processor<Bed>>() {
         exception_14: mark #14
         bx lr
     ";
-    let marks = marks::<P>(program);
+    let marks = marks(program);
     let pending = 1 << 28 | 1 << 26;
     assert_eq!([marks[0] & pending, marks[1] & pending], [pending, 0]);
     assert_eq!(marks[0] >> 12 & 0x1ff, 14, "VECTPENDING");
     assert_eq!(marks[2..], [14, 9]);
 }
 
-fn the_trigger_register_pends<P: Processor<Bed>>() {
+#[test]
+fn the_trigger_register_pends() {
     let program = "
         main: mov32 r0, 0xe000e100
         mov r1, #4
@@ -215,10 +210,11 @@ fn the_trigger_register_pends<P: Processor<Bed>>() {
         exception_18: mark #2
         bx lr
     ";
-    assert_eq!(marks::<P>(program), [2, 9]);
+    assert_eq!(marks(program), [2, 9]);
 }
 
-fn the_vector_table_moves_to_memory<P: Processor<Bed>>() {
+#[test]
+fn the_vector_table_moves_to_memory() {
     let program = "
         main: mov32 r0, 0x20000200
         mov32 r1, =moved
@@ -241,15 +237,16 @@ fn the_vector_table_moves_to_memory<P: Processor<Bed>>() {
         mark #2
         bx lr
     ";
-    assert_eq!(marks::<P>(program), [0x2000_0200, 2, 9]);
+    assert_eq!(marks(program), [0x2000_0200, 2, 9]);
 }
 
-fn it_is_a_cortex_m4<P: Processor<Bed>>() {
+#[test]
+fn it_is_a_cortex_m4() {
     let program = "
         main: mov32 r6, 0xe000ed00
         ldr r0, [r6]
         str r0, [r10]
         b stop
     ";
-    assert_eq!(marks::<P>(program)[0], 0x410f_c241);
+    assert_eq!(marks(program)[0], 0x410f_c241);
 }

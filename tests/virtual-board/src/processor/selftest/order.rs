@@ -1,21 +1,6 @@
 //! Which exception comes when (B1.5.4, B1.5.9).
 
-use super::{Bed, Processor, marks, on_every_engine, run};
-
-on_every_engine!(
-    three_levels_nest,
-    the_most_urgent_goes_first,
-    equals_go_by_their_number,
-    an_equal_does_not_preempt,
-    a_handler_follows_without_unstacking,
-    a_line_that_stays_up_comes_again,
-    a_line_that_rises_in_its_handler_comes_again,
-    a_line_that_was_up_for_a_moment_is_taken_once,
-    the_lowest_comes_last,
-    a_level_between_does_not_wait_for_the_lowest,
-    the_non_maskable_one_is_above_all,
-    the_non_maskable_line_comes_once_a_time,
-);
+use super::{marks, run};
 
 /// Enables interrupts 0 to 15 and sets the priority of 1 to 3: the greater the number, the more urgent.
 const LEVELS: &str = "
@@ -44,11 +29,12 @@ const HANDLERS: &str = "
     bx lr
 ";
 
-fn leveled<P: Processor<Bed>>(parts: &[&str]) -> Vec<u32> {
-    marks::<P>(&format!("{LEVELS}\n{}", parts.join("\n")))
+fn leveled(parts: &[&str]) -> Vec<u32> {
+    marks(&format!("{LEVELS}\n{}", parts.join("\n")))
 }
 
-fn three_levels_nest<P: Processor<Bed>>() {
+#[test]
+fn three_levels_nest() {
     let program = "
         raise #2
         sync
@@ -76,10 +62,11 @@ fn three_levels_nest<P: Processor<Bed>>() {
     ";
     // Three frames of 32 bytes and what two handlers have pushed.
     let sp = super::STACK - 3 * 32 - 2 * 8;
-    assert_eq!(leveled::<P>(&[program]), [1, 2, 3, sp, 0x22, 0x11, 0x99]);
+    assert_eq!(leveled(&[program]), [1, 2, 3, sp, 0x22, 0x11, 0x99]);
 }
 
-fn the_most_urgent_goes_first<P: Processor<Bed>>() {
+#[test]
+fn the_most_urgent_goes_first() {
     let program = "
         cpsid i
         raise #0xe
@@ -88,10 +75,11 @@ fn the_most_urgent_goes_first<P: Processor<Bed>>() {
         mark #9
         b stop
     ";
-    assert_eq!(leveled::<P>(&[program, HANDLERS]), [3, 2, 1, 9]);
+    assert_eq!(leveled(&[program, HANDLERS]), [3, 2, 1, 9]);
 }
 
-fn equals_go_by_their_number<P: Processor<Bed>>() {
+#[test]
+fn equals_go_by_their_number() {
     let program = "
         mov r1, #0x20
         strb r1, [r0, #1]
@@ -103,10 +91,11 @@ fn equals_go_by_their_number<P: Processor<Bed>>() {
         mark #9
         b stop
     ";
-    assert_eq!(leveled::<P>(&[program, HANDLERS]), [1, 2, 3, 9]);
+    assert_eq!(leveled(&[program, HANDLERS]), [1, 2, 3, 9]);
 }
 
-fn an_equal_does_not_preempt<P: Processor<Bed>>() {
+#[test]
+fn an_equal_does_not_preempt() {
     let program = "
         raise #0x20
         sync
@@ -121,10 +110,11 @@ fn an_equal_does_not_preempt<P: Processor<Bed>>() {
         mark #4
         bx lr
     ";
-    assert_eq!(leveled::<P>(&[program]), [5, 4, 9]);
+    assert_eq!(leveled(&[program]), [5, 4, 9]);
 }
 
-fn a_handler_follows_without_unstacking<P: Processor<Bed>>() {
+#[test]
+fn a_handler_follows_without_unstacking() {
     let program = "
         mov r1, #0x100
         cpsid i
@@ -145,7 +135,7 @@ fn a_handler_follows_without_unstacking<P: Processor<Bed>>() {
         str lr, [r10]
         bx lr
     ";
-    let mut ran = run::<P>(&format!("{LEVELS}\n{program}"));
+    let mut ran = run(&format!("{LEVELS}\n{program}"));
     let bed = ran.processor.surroundings();
     let frame = super::STACK - 32;
     assert_eq!(bed.marks, [frame, 0x222, frame, 0xffff_fff9, 0x100]);
@@ -153,7 +143,8 @@ fn a_handler_follows_without_unstacking<P: Processor<Bed>>() {
     assert_eq!(bed.exceptions, told);
 }
 
-fn a_line_that_stays_up_comes_again<P: Processor<Bed>>() {
+#[test]
+fn a_line_that_stays_up_comes_again() {
     let program = "
         mov r4, #0
         raise #2
@@ -167,13 +158,14 @@ fn a_line_that_stays_up_comes_again<P: Processor<Bed>>() {
         lower #2
         again: bx lr
     ";
-    let mut ran = run::<P>(&format!("{LEVELS}\n{program}"));
+    let mut ran = run(&format!("{LEVELS}\n{program}"));
     let bed = ran.processor.surroundings();
     assert_eq!(bed.marks, [1, 2, 3, 9]);
     assert_eq!(bed.exceptions, [(17, true), (17, false)].repeat(3));
 }
 
-fn a_line_that_rises_in_its_handler_comes_again<P: Processor<Bed>>() {
+#[test]
+fn a_line_that_rises_in_its_handler_comes_again() {
     let program = "
         mov r4, #0
         raise #2
@@ -191,10 +183,11 @@ fn a_line_that_rises_in_its_handler_comes_again<P: Processor<Bed>>() {
         sync
         done: bx lr
     ";
-    assert_eq!(leveled::<P>(&[program]), [1, 2, 9]);
+    assert_eq!(leveled(&[program]), [1, 2, 9]);
 }
 
-fn a_line_that_was_up_for_a_moment_is_taken_once<P: Processor<Bed>>() {
+#[test]
+fn a_line_that_was_up_for_a_moment_is_taken_once() {
     let program = "
         cpsid i
         raise #2
@@ -205,10 +198,11 @@ fn a_line_that_was_up_for_a_moment_is_taken_once<P: Processor<Bed>>() {
         mark #9
         b stop
     ";
-    assert_eq!(leveled::<P>(&[program, HANDLERS]), [1, 9]);
+    assert_eq!(leveled(&[program, HANDLERS]), [1, 9]);
 }
 
-fn the_lowest_comes_last<P: Processor<Bed>>() {
+#[test]
+fn the_lowest_comes_last() {
     let program = "
         mov32 r6, 0xe000ed00
         mov r1, #0xf0
@@ -226,10 +220,11 @@ fn the_lowest_comes_last<P: Processor<Bed>>() {
         exception_14: mark #14
         bx lr
     ";
-    assert_eq!(leveled::<P>(&[program]), [1, 14, 9]);
+    assert_eq!(leveled(&[program]), [1, 14, 9]);
 }
 
-fn a_level_between_does_not_wait_for_the_lowest<P: Processor<Bed>>() {
+#[test]
+fn a_level_between_does_not_wait_for_the_lowest() {
     let program = "
         mov32 r6, 0xe000ed00
         mov r1, #0xf0
@@ -245,10 +240,11 @@ fn a_level_between_does_not_wait_for_the_lowest<P: Processor<Bed>>() {
         mark #0x14
         bx lr
     ";
-    assert_eq!(leveled::<P>(&[program, HANDLERS]), [14, 1, 0x14, 9]);
+    assert_eq!(leveled(&[program, HANDLERS]), [14, 1, 0x14, 9]);
 }
 
-fn the_non_maskable_one_is_above_all<P: Processor<Bed>>() {
+#[test]
+fn the_non_maskable_one_is_above_all() {
     let program = "
         main: mov r1, #1
         mov r2, #0
@@ -262,7 +258,7 @@ fn the_non_maskable_one_is_above_all<P: Processor<Bed>>() {
         mark #2
         bx lr
     ";
-    let mut ran = run::<P>(program);
+    let mut ran = run(program);
     assert_eq!(ran.processor.surroundings().marks, [2, 1]);
     assert_eq!(ran.stop, super::Stop::LockedUp);
     let program = "
@@ -278,10 +274,11 @@ fn the_non_maskable_one_is_above_all<P: Processor<Bed>>() {
         mark #2
         bx lr
     ";
-    assert_eq!(marks::<P>(program), [3, 2, 0x33]);
+    assert_eq!(marks(program), [3, 2, 0x33]);
 }
 
-fn the_non_maskable_line_comes_once_a_time<P: Processor<Bed>>() {
+#[test]
+fn the_non_maskable_line_comes_once_a_time() {
     let program = "
         main: mov r1, #1
         mov r2, #0
@@ -294,5 +291,5 @@ fn the_non_maskable_line_comes_once_a_time<P: Processor<Bed>>() {
         str r2, [r10, #20]
         bx lr
     ";
-    assert_eq!(marks::<P>(program), [2, 9]);
+    assert_eq!(marks(program), [2, 9]);
 }

@@ -1,19 +1,6 @@
 //! What sleeps and what wakes it (B1.5.18, B1.5.19).
 
-use super::{Bed, END, LATER, Processor, marks, on_every_engine, run};
-
-on_every_engine!(
-    an_interrupt_wakes_and_is_taken,
-    a_masked_interrupt_wakes_and_waits,
-    one_below_basepri_does_not_wake,
-    one_that_is_not_enabled_does_not_wake,
-    an_event_that_was_is_not_slept_over,
-    the_return_from_an_exception_is_an_event,
-    a_masked_interrupt_is_no_event,
-    a_masked_interrupt_can_be_made_an_event,
-    sleep_lasts_until_the_line_rises,
-    systick_wakes,
-);
+use super::{END, LATER, marks, run};
 
 /// Enables the interrupts 1 and 2, the second more urgent, with their handlers.
 const LINES: &str = "
@@ -37,28 +24,30 @@ const LINES: &str = "
     bx lr
 ";
 
-fn told<P: Processor<Bed>>(body: &str) -> Vec<u32> {
-    marks::<P>(&format!("{LINES}\nbody: {body}"))
+fn told(body: &str) -> Vec<u32> {
+    marks(&format!("{LINES}\nbody: {body}"))
 }
 
 /// For a program that sleeps for ever: what it leaves.
-fn slept<P: Processor<Bed>>(body: &str) -> Vec<u32> {
-    let mut ran = run::<P>(&format!("{LINES}\nbody: {body}"));
+fn slept(body: &str) -> Vec<u32> {
+    let mut ran = run(&format!("{LINES}\nbody: {body}"));
     let bed = ran.processor.surroundings();
     assert!(bed.now >= END, "woke: {:x?}", bed.marks);
     bed.marks.clone()
 }
 
-fn an_interrupt_wakes_and_is_taken<P: Processor<Bed>>() {
+#[test]
+fn an_interrupt_wakes_and_is_taken() {
     let body = "str r1, [r10, #16]
         wfi
         mark #9
         b stop
     ";
-    assert_eq!(told::<P>(body), [1, 9]);
+    assert_eq!(told(body), [1, 9]);
 }
 
-fn a_masked_interrupt_wakes_and_waits<P: Processor<Bed>>() {
+#[test]
+fn a_masked_interrupt_wakes_and_waits() {
     let body = "cpsid i
         str r1, [r10, #16]
         wfi
@@ -67,10 +56,11 @@ fn a_masked_interrupt_wakes_and_waits<P: Processor<Bed>>() {
         sync
         b stop
     ";
-    assert_eq!(told::<P>(body), [9, 1]);
+    assert_eq!(told(body), [9, 1]);
 }
 
-fn one_below_basepri_does_not_wake<P: Processor<Bed>>() {
+#[test]
+fn one_below_basepri_does_not_wake() {
     let body = "mov r4, #0x30
         msr basepri, r4
         raise #2
@@ -79,19 +69,21 @@ fn one_below_basepri_does_not_wake<P: Processor<Bed>>() {
         mark #9
         b stop
     ";
-    assert_eq!(told::<P>(body), [2, 9]);
+    assert_eq!(told(body), [2, 9]);
 }
 
-fn one_that_is_not_enabled_does_not_wake<P: Processor<Bed>>() {
+#[test]
+fn one_that_is_not_enabled_does_not_wake() {
     let body = "raise #8
         wfi
         mark #9
         b stop
     ";
-    assert!(slept::<P>(body).is_empty());
+    assert!(slept(body).is_empty());
 }
 
-fn an_event_that_was_is_not_slept_over<P: Processor<Bed>>() {
+#[test]
+fn an_event_that_was_is_not_slept_over() {
     let body = "sev
         wfe
         mark #9
@@ -100,10 +92,11 @@ fn an_event_that_was_is_not_slept_over<P: Processor<Bed>>() {
         mark #0x99
         b stop
     ";
-    assert_eq!(told::<P>(body), [9, 1, 0x99]);
+    assert_eq!(told(body), [9, 1, 0x99]);
 }
 
-fn the_return_from_an_exception_is_an_event<P: Processor<Bed>>() {
+#[test]
+fn the_return_from_an_exception_is_an_event() {
     let body = "svc 0
         wfe
         mark #9
@@ -112,20 +105,22 @@ fn the_return_from_an_exception_is_an_event<P: Processor<Bed>>() {
         b stop
         exception_11: bx lr
     ";
-    assert_eq!(slept::<P>(body), [9]);
+    assert_eq!(slept(body), [9]);
 }
 
-fn a_masked_interrupt_is_no_event<P: Processor<Bed>>() {
+#[test]
+fn a_masked_interrupt_is_no_event() {
     let body = "cpsid i
         str r1, [r10, #16]
         wfe
         mark #9
         b stop
     ";
-    assert!(slept::<P>(body).is_empty());
+    assert!(slept(body).is_empty());
 }
 
-fn a_masked_interrupt_can_be_made_an_event<P: Processor<Bed>>() {
+#[test]
+fn a_masked_interrupt_can_be_made_an_event() {
     let body = "mov32 r0, 0xe000ed10
         mov r4, #0x10
         str r4, [r0]            ; SEVONPEND
@@ -135,15 +130,16 @@ fn a_masked_interrupt_can_be_made_an_event<P: Processor<Bed>>() {
         mark #9
         b stop
     ";
-    assert_eq!(told::<P>(body), [9]);
+    assert_eq!(told(body), [9]);
 }
 
-fn sleep_lasts_until_the_line_rises<P: Processor<Bed>>() {
+#[test]
+fn sleep_lasts_until_the_line_rises() {
     let body = "str r1, [r10, #16]
         wfi
         b stop
     ";
-    let mut ran = run::<P>(&format!("{LINES}\nbody: {body}"));
+    let mut ran = run(&format!("{LINES}\nbody: {body}"));
     let instructions = ran.processor.instructions();
     let bed = ran.processor.surroundings();
     assert_eq!(bed.marks, [1]);
@@ -151,7 +147,8 @@ fn sleep_lasts_until_the_line_rises<P: Processor<Bed>>() {
     assert!(instructions < 60, "{instructions}");
 }
 
-fn systick_wakes<P: Processor<Bed>>() {
+#[test]
+fn systick_wakes() {
     let body = "mov32 r0, 0xe000e010
         mov r4, #2000
         str r4, [r0, #4]
@@ -164,5 +161,5 @@ fn systick_wakes<P: Processor<Bed>>() {
         exception_15: mark #15
         bx lr
     ";
-    assert_eq!(told::<P>(body), [15, 9]);
+    assert_eq!(told(body), [15, 9]);
 }

@@ -1,19 +1,12 @@
-//! What an engine tells of itself, and that it goes on where it was.
+//! What the processor tells of itself, and that it goes on where it was.
 
 use std::iter::repeat_n;
 
-use super::super::Register;
-use super::{Bed, Processor, RAM, STACK, Stop, assemble, marks, on_every_engine, run};
+use super::super::{Access, Register};
+use super::{RAM, STACK, Stop, assemble, load, marks, run};
 
-on_every_engine!(
-    its_registers_can_be_read,
-    instructions_are_counted,
-    it_goes_on_where_it_was,
-    code_that_the_program_writes_is_executed,
-    code_that_is_changed_from_outside_is_executed,
-);
-
-fn its_registers_can_be_read<P: Processor<Bed>>() {
+#[test]
+fn its_registers_can_be_read() {
     let program = "
         main: mov32 r0, 0x20000800
         msr psp, r0
@@ -29,7 +22,7 @@ fn its_registers_can_be_read<P: Processor<Bed>>() {
         msr apsr, r1
         b stop
     ";
-    let ran = run::<P>(program);
+    let ran = run(program);
     let wanted = [
         (Register::R(0), 0x100),
         (Register::R(8), 0x108),
@@ -51,8 +44,9 @@ fn its_registers_can_be_read<P: Processor<Bed>>() {
     }
 }
 
-fn instructions_are_counted<P: Processor<Bed>>() {
-    let count = |program: &str| run::<P>(program).processor.instructions();
+#[test]
+fn instructions_are_counted() {
+    let count = |program: &str| run(program).processor.instructions();
     let straight: String = repeat_n("nop\n", 300).collect();
     let base = count("main: mov r0, #0\nb stop");
     assert_eq!(
@@ -73,7 +67,8 @@ fn instructions_are_counted<P: Processor<Bed>>() {
     assert_eq!(count(turns), base + 600);
 }
 
-fn it_goes_on_where_it_was<P: Processor<Bed>>() {
+#[test]
+fn it_goes_on_where_it_was() {
     let program = "
         main: mark #1
         str r0, [r10, #4]
@@ -81,7 +76,7 @@ fn it_goes_on_where_it_was<P: Processor<Bed>>() {
         mark #2
         b stop
     ";
-    let mut ran = run::<P>(program);
+    let mut ran = run(program);
     assert_eq!(ran.stop, Stop::Asked);
     assert_eq!(ran.processor.surroundings().marks, [1]);
     ran.processor.surroundings().stopped = false;
@@ -89,7 +84,8 @@ fn it_goes_on_where_it_was<P: Processor<Bed>>() {
     assert_eq!(ran.processor.surroundings().marks, [1, 2]);
 }
 
-fn code_that_the_program_writes_is_executed<P: Processor<Bed>>() {
+#[test]
+fn code_that_the_program_writes_is_executed() {
     let program = "
         main: mov32 r4, 0x20000101
         mov32 r5, 0x20000100
@@ -109,10 +105,11 @@ fn code_that_the_program_writes_is_executed<P: Processor<Bed>>() {
         str r0, [r10]
         b stop
     ";
-    assert_eq!(marks::<P>(program), [0x11, 0xf]);
+    assert_eq!(marks(program), [0x11, 0xf]);
 }
 
-fn code_that_is_changed_from_outside_is_executed<P: Processor<Bed>>() {
+#[test]
+fn code_that_is_changed_from_outside_is_executed() {
     let program = "
         main: mov32 r4, 0x20000101
         mov32 r5, 0x20000100
@@ -126,7 +123,7 @@ fn code_that_is_changed_from_outside_is_executed<P: Processor<Bed>>() {
         str r0, [r10, #4]
         b turn
     ";
-    let mut ran = run::<P>(program);
+    let mut ran = run(program);
     assert_eq!(ran.processor.surroundings().marks, [0x11]);
     let code = assemble("subs r0, #2\nbx lr", 0).bytes;
     ran.ram.load(RAM + 0x100, &code);
@@ -134,4 +131,20 @@ fn code_that_is_changed_from_outside_is_executed<P: Processor<Bed>>() {
     ran.processor.surroundings().stopped = false;
     assert_eq!(ran.processor.run(), Stop::Asked);
     assert_eq!(ran.processor.surroundings().marks, [0x11, 0xe]);
+}
+
+#[test]
+fn what_is_done_first_with_a_memory_is_told() {
+    let ran = watched("str r0, [r4]\nldr r0, [r4]\nldrb r0, [r5]\nstr r0, [r5]");
+    assert_eq!(ran, [Some(Access::Write), Some(Access::Read), None]);
+}
+
+/// What is done first with the words at r4, r5 and r6.
+fn watched(body: &str) -> Vec<Option<Access>> {
+    let program = format!("main: mov32 r4, 0x20000010\nmov32 r5, 0x20000020\n{body}\nb stop");
+    let mut ran = load(&program);
+    ran.processor
+        .watch(&[0x10, 0x20, 0x30].map(|at| RAM + at..RAM + at + 4));
+    assert_eq!(ran.processor.run(), Stop::Asked);
+    ran.processor.first_accesses().to_vec()
 }

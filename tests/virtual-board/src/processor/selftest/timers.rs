@@ -1,18 +1,10 @@
 //! SysTick and the cycle counter (B3.3, C1.8), and the time that flash takes.
 
-use super::{Bed, LATER, Processor, marks, on_every_engine};
+use super::{LATER, marks};
 use crate::time::Cycles;
 
-on_every_engine!(
-    systick_tells_once_that_it_counted_down,
-    systick_interrupts_at_its_period,
-    systick_counts_down_from_its_reload,
-    the_cycle_counter_counts_while_enabled,
-    code_in_flash_waits_while_that_is_busy,
-    systick_stops
-);
-
-fn systick_tells_once_that_it_counted_down<P: Processor<Bed>>() {
+#[test]
+fn systick_tells_once_that_it_counted_down() {
     let program = "
         main: mov32 r6, 0xe000e010
         mov r1, #300
@@ -29,10 +21,11 @@ fn systick_tells_once_that_it_counted_down<P: Processor<Bed>>() {
         str r0, [r10]
         b stop
     ";
-    assert_eq!(marks::<P>(program), [0x1_0005, 5]);
+    assert_eq!(marks(program), [0x1_0005, 5]);
 }
 
-fn systick_interrupts_at_its_period<P: Processor<Bed>>() {
+#[test]
+fn systick_interrupts_at_its_period() {
     let program = "
         main: mov32 r0, 0xe000edfc
         mov32 r1, 0x01000000
@@ -57,7 +50,7 @@ fn systick_interrupts_at_its_period<P: Processor<Bed>>() {
         beq stop
         bx lr
     ";
-    let marks = marks::<P>(program);
+    let marks = marks(program);
     let (first, last) = (marks[0], marks[8]);
     assert_eq!(marks.len(), 9);
     // The entry may be an instruction or two early or late.
@@ -65,7 +58,8 @@ fn systick_interrupts_at_its_period<P: Processor<Bed>>() {
     assert!(eight.abs_diff(8_000) < 40, "{eight}");
 }
 
-fn systick_counts_down_from_its_reload<P: Processor<Bed>>() {
+#[test]
+fn systick_counts_down_from_its_reload() {
     let program = "
         main: mov32 r6, 0xe000e010
         mov32 r1, 0x12345678
@@ -84,13 +78,14 @@ fn systick_counts_down_from_its_reload<P: Processor<Bed>>() {
         str r0, [r10]
         b stop
     ";
-    let marks = marks::<P>(program);
+    let marks = marks(program);
     assert_eq!(marks[..2], [0, 0x34_5678]);
     assert!((0x34_5600..=0x34_5678).contains(&marks[2]), "{marks:x?}");
     assert!(marks[3] < marks[2], "{marks:x?}");
 }
 
-fn systick_stops<P: Processor<Bed>>() {
+#[test]
+fn systick_stops() {
     let program = "
         main: mov32 r6, 0xe000e010
         mov r1, #5000
@@ -108,12 +103,13 @@ fn systick_stops<P: Processor<Bed>>() {
         str r0, [r10]
         b stop
     ";
-    let marks = marks::<P>(program);
+    let marks = marks(program);
     assert_eq!(marks[0], marks[1]);
     assert!(marks[0] > 0);
 }
 
-fn the_cycle_counter_counts_while_enabled<P: Processor<Bed>>() {
+#[test]
+fn the_cycle_counter_counts_while_enabled() {
     let program = "
         main: mov32 r7, 0xe0001000
         mov32 r0, 0xe000edfc
@@ -139,14 +135,15 @@ fn the_cycle_counter_counts_while_enabled<P: Processor<Bed>>() {
         str r0, [r10]
         b stop
     ";
-    let marks = marks::<P>(program);
+    let marks = marks(program);
     assert_eq!(marks[0], 100);
     // 200 turns of two instructions, at two to five cycles.
     assert!((500..=1_200).contains(&marks[1]), "{marks:?}");
     assert!(marks[2] < 20, "{marks:?}");
 }
 
-fn code_in_flash_waits_while_that_is_busy<P: Processor<Bed>>() {
+#[test]
+fn code_in_flash_waits_while_that_is_busy() {
     let program = "
         main: mov32 r7, 0xe0001000
         mov32 r0, 0xe000edfc
@@ -178,7 +175,7 @@ fn code_in_flash_waits_while_that_is_busy<P: Processor<Bed>>() {
         str r0, [r10]
         bx lr
     ";
-    let marks = marks::<P>(program);
+    let marks = marks(program);
     let (in_memory, in_flash) = (marks[1] - marks[0], marks[2] - marks[0]);
     assert!(in_memory < 100, "{in_memory}");
     assert!(Cycles::from(in_flash).abs_diff(LATER) < 100, "{in_flash}");

@@ -27,8 +27,7 @@ use siskin_emulator::wire::Wire;
 use siskin_vboard::chip::Cause;
 use siskin_vboard::image::Image;
 use siskin_vboard::machine::VirtualBoard;
-use siskin_vboard::processor::unicorn::Translator;
-use siskin_vboard::processor::{Processor, Register, Surroundings, Width};
+use siskin_vboard::processor::{Register, Surroundings, Width};
 use siskin_vboard::time::{CLOCK_HZ, Cycles, ns};
 use siskin_vboard::world::World;
 
@@ -219,7 +218,7 @@ impl Onlooker for Heard {
 
 /// The board.
 pub(crate) struct Board {
-    pub(crate) board: VirtualBoard<Translator<World>>,
+    pub(crate) board: VirtualBoard,
     pub(crate) heard: Heard,
     pub(crate) throttle: Throttle,
     /// By which DShot is sent.
