@@ -5,7 +5,6 @@ use core::ops::Range;
 use embedded_storage::nor_flash::NorFlash;
 
 use super::kept::is_setting;
-use super::schema::{self, Change};
 use super::word::{Check, Word, Writer};
 use super::{Content, Integrity, StoreError, key};
 
@@ -68,25 +67,21 @@ impl Set {
         }
     }
 
-    /// Every value in it, as this firmware has it.
-    pub(super) fn values<'a>(&self, changes: &'a [Change]) -> Values<'a> {
+    /// Every value in it.
+    pub(super) fn values(&self) -> Values {
         Values {
             words: self.values.clone(),
-            schema: 0,
-            changes,
         }
     }
 }
 
 /// The values of a set, one after another.
 #[derive(Clone)]
-pub(super) struct Values<'a> {
+pub(super) struct Values {
     words: Range<u32>,
-    schema: u32,
-    changes: &'a [Change],
 }
 
-impl Values<'_> {
+impl Values {
     /// Key and bits of the next one.
     pub(super) fn next<F: NorFlash>(
         &mut self,
@@ -95,16 +90,9 @@ impl Values<'_> {
         while !self.words.is_empty() {
             let word = Word::read(flash, self.words.start)?;
             self.words.start += Word::BYTES;
-            if word.key == key::SCHEMA {
-                self.schema = word.bits;
-                continue;
+            if word.key != key::SCHEMA {
+                return Ok(Some((word.key, word.bits)));
             }
-            return Ok(Some(schema::change(
-                self.changes,
-                self.schema,
-                word.key,
-                word.bits,
-            )));
         }
         Ok(None)
     }

@@ -17,7 +17,6 @@
 
 mod kept;
 mod log;
-mod schema;
 mod word;
 
 use core::ops::Range;
@@ -26,7 +25,6 @@ use embedded_storage::nor_flash::NorFlash;
 
 pub use kept::Kept;
 use log::{Log, Set, Values};
-use schema::{CHANGES, Change, SCHEMA};
 
 /// Keys of words that are no value's; those of values are in [`kept`].
 mod key {
@@ -35,6 +33,9 @@ mod key {
     /// The schema of a set, its first word.
     pub(super) const SCHEMA: u16 = 0x1000;
 }
+
+/// Number of what keys and values mean: another one would tell that they have to be translated.
+const SCHEMA: u32 = 1;
 
 /// Sets that have the settings which were saved last.
 const COPIES: usize = 2;
@@ -117,10 +118,6 @@ impl StoreError {
 
 /// Reads what is kept from `range` of the flash, whatever is in it.
 pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Loaded {
-    load_changed(flash, range, CHANGES)
-}
-
-fn load_changed<F: NorFlash>(flash: &mut F, range: Range<u32>, changes: &[Change]) -> Loaded {
     let mut loaded = Loaded {
         kept: Kept::default(),
         integrity: Integrity::Unreadable,
@@ -128,7 +125,7 @@ fn load_changed<F: NorFlash>(flash: &mut F, range: Range<u32>, changes: &[Change
         unknown: false,
     };
     let read = Log::open(flash, range).and_then(|log| {
-        let mut values = log.newest.values(changes);
+        let mut values = log.newest.values();
         while let Some((key, bits)) = values.next(flash)? {
             match Kept::find(key) {
                 Some(word) => loaded.out_of_range |= !loaded.kept.set(word, bits),
@@ -154,7 +151,7 @@ fn load_changed<F: NorFlash>(flash: &mut F, range: Range<u32>, changes: &[Change
 pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, kept: &Kept) -> Result<(), StoreError> {
     for _ in 0..COPIES {
         let log = Log::open(flash, range.clone())?;
-        if !log.append(flash, &Content::new(kept, log.newest.values(CHANGES)))? {
+        if !log.append(flash, &Content::new(kept, log.newest.values()))? {
             break;
         }
     }
@@ -172,7 +169,7 @@ pub fn replace<F: NorFlash>(
     kept: &Kept,
 ) -> Result<(), StoreError> {
     let log = Log::open(flash, range.clone())?;
-    log.replace(flash, &Content::new(kept, Set::NONE.values(CHANGES)))?;
+    log.replace(flash, &Content::new(kept, Set::NONE.values()))?;
     save(flash, range, kept)
 }
 
@@ -181,13 +178,13 @@ pub fn replace<F: NorFlash>(
 #[derive(Clone)]
 struct Content<'a> {
     schema: Option<u32>,
-    old: Values<'a>,
+    old: Values,
     kept: &'a Kept,
     words: Range<usize>,
 }
 
 impl<'a> Content<'a> {
-    fn new(kept: &'a Kept, old: Values<'a>) -> Self {
+    fn new(kept: &'a Kept, old: Values) -> Self {
         Self {
             schema: Some(SCHEMA),
             old,

@@ -16,7 +16,6 @@ mod flash;
 mod power;
 mod random;
 mod rot;
-mod schema;
 
 fn changed() -> Kept {
     let mut params = Params::default();
