@@ -66,7 +66,7 @@ impl Mapping {
             (Command::Zero, _) => Setpoint::Zero,
             (Command::Throttle(throttle), Mode::Speed { least, span }) => {
                 let (share, reversed) = split(throttle);
-                let above = Speed::from_bits(share.top(span).to_bits() << 1);
+                let above = share.top(span).scaled();
                 let speed = least.saturating_add(above);
                 Setpoint::Speed(if reversed { -speed } else { speed })
             }
@@ -93,7 +93,7 @@ fn split(throttle: Share) -> (Share, bool) {
 
 fn share_of(throttle: Share, full: Current) -> Current {
     let (share, reversed) = split(throttle);
-    let current = Current::from_bits(share.top(full).to_bits() << 1);
+    let current: Current = share.top(full).scaled();
     if reversed { -current } else { current }
 }
 

@@ -4,8 +4,24 @@
 //! top half. Conversion from and to SI happens when the configuration is built and in telemetry,
 //! never in a control period.
 //!
-//! Each is a [`Quantity`], which adds to its like alone. An angle takes on what a speed turns it by in
-//! a period:
+//! Each is a [`Quantity`], which adds to its like alone; [`dimension`] has every product of two that
+//! there is. A voltage adds to a voltage:
+//!
+//! ```
+//! # use siskin_control::units::{Current, Voltage};
+//! let (u, i) = (Voltage::lit("0.5"), Current::lit("0.25"));
+//! assert_eq!(u + u, Voltage::ONE);
+//! ```
+//!
+//! but not with a current:
+//!
+//! ```compile_fail,E0308
+//! # use siskin_control::units::{Current, Voltage};
+//! let (u, i) = (Voltage::lit("0.5"), Current::lit("0.25"));
+//! u + i;
+//! ```
+//!
+//! An angle takes on what a speed turns it by in a period:
 //!
 //! ```
 //! # use siskin_control::units::{Angle, Speed};
@@ -13,7 +29,7 @@
 //! assert!(theta.wrapping_add(omega.over_period()) > theta);
 //! ```
 //!
-//! but not a speed:
+//! but not the speed:
 //!
 //! ```compile_fail,E0308
 //! # use siskin_control::units::{Angle, Speed};
@@ -23,30 +39,39 @@
 
 pub mod dimension;
 
-use fixed::types::extra::{U24, U28, U32};
-use fixed::types::{I4F28, I8F24, I16F16};
+use fixed::types::extra::{U16, U24, U26, U28, U32};
+use fixed::types::{I16F16, I36F28};
 
 use crate::math::{Quantity, Real};
 
 pub use crate::math::Angle;
-use dimension::{NewtonMetre, PerWeber, TurnPerPeriod, TurnPerPeriodSquare, Weber};
+use dimension::{
+    Ampere, AmperePerPeriod, NewtonMetre, PerVolt, PerWeber, TurnPerPeriod, TurnPerPeriodSquare,
+    Volt, VoltSquare, Weber,
+};
 
 /// An electrical speed in turns a control period: the angle's step.
 pub type Speed = Quantity<TurnPerPeriod, U32>;
 
 /// A current in units of [`Scale::current_a`].
-pub type Current = I4F28;
+pub type Current = Quantity<Ampere, U28>;
 
 /// A voltage in units of [`Scale::voltage_v`].
-pub type Voltage = I4F28;
+pub type Voltage = Quantity<Volt, U28>;
 
 /// A voltage with room for sums of what may be far beyond the supply.
-pub type WideVoltage = I8F24;
+pub type WideVoltage = Quantity<Volt, U24>;
+
+/// A voltage of a vector that has been turned twice: each sine takes a fraction bit.
+pub type TurnedVoltage = Quantity<Volt, U26>;
+
+/// One over a voltage.
+pub type InverseVoltage = Quantity<PerVolt, U28>;
 
 /// The voltage, with room for sums.
 #[inline(always)]
 pub fn wide(u: Voltage) -> WideVoltage {
-    WideVoltage::from_bits(u.to_bits() >> 4)
+    u.scaled()
 }
 
 /// The voltage, held at the ends of its type but for the bits that the wide one has not.
@@ -56,19 +81,19 @@ pub fn narrow(u: WideVoltage) -> Voltage {
 }
 
 /// A square of a voltage.
-pub type VoltageSquare = I8F24;
+pub type VoltageSquare = Quantity<VoltSquare, U24>;
+
+/// The same with room for sums of what is far beyond the supply.
+pub type WideVoltageSquare = Quantity<VoltSquare, U16>;
 
 /// ω·i: how fast a current changes in a frame that turns, in units of current a period, over 2π.
-pub type CurrentRate = Quantity<TurnPerPeriod, U28>;
+pub type CurrentRate = Quantity<AmperePerPeriod, U28>;
 
 /// A square of a speed.
 pub type SpeedSquare = Quantity<TurnPerPeriodSquare, U32>;
 
-/// What a voltage adds to a flux linkage in a period.
-#[inline(always)]
-pub fn over_period(u: Voltage) -> Flux {
-    Flux::from_bits(u.to_bits())
-}
+/// A current over a time, in units of current times periods.
+pub type Charge = I36F28;
 
 /// A torque in units of [`Scale::torque_nm`].
 pub type Torque = Quantity<NewtonMetre, U28>;
@@ -87,6 +112,13 @@ pub type InverseFlux = Quantity<PerWeber, U32>;
 
 /// The control's units in SI.
 pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
+
+/// The back-EMF of the motor's stated flux at a speed, |h| = ω/ξ.
+#[inline(always)]
+pub fn stated_emf(omega: Speed) -> Voltage {
+    // 1/ξ = 4, and a speed has 32 fraction bits.
+    Voltage::from_bits(omega.to_bits() >> 2)
+}
 
 /// A reading of the converter in counts, signed and without its offset. The chip's are whole; a
 /// simulation of ideal sensing has fractions.

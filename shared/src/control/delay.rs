@@ -31,7 +31,7 @@ impl Delay {
     pub fn applied(self, now: Voltage, before: Voltage) -> Voltage {
         match self {
             Self::None => now,
-            Self::Half => Voltage::from_bits((now.to_bits() + before.to_bits()) >> 1),
+            Self::Half => (now + before) >> 1,
             Self::One => before,
         }
     }

@@ -1,15 +1,19 @@
 //! From a voltage vector to three duties: space-vector or sine modulation with a minimum low-side
 //! on-time, and the compensation of the dead time.
 
+use crate::units::dimension::Volt;
 use fixed::FixedI32;
-use fixed::types::extra::U22;
-use fixed::types::{I0F32, I1F31, I4F28, I6F26, I8F24, I12F20, I16F16};
+use fixed::types::extra::{U20, U22};
+use fixed::types::{I0F32, I1F31, I8F24};
 
 use super::dead_time;
 use super::transform::{AlphaBeta, Dq, Order, phases_in};
-use crate::math::{Held, Multiplier, Real, SQRT_3, TopProduct, TopSum, other_leg};
+use crate::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use crate::trace::traced;
-use crate::units::{Duty, Voltage, VoltageSquare, WideVoltage, wide};
+use crate::units::{
+    Duty, InverseVoltage, TurnedVoltage, Voltage, VoltageSquare, WideVoltage, WideVoltageSquare,
+    wide,
+};
 
 /// How the phases' common voltage is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,11 +70,11 @@ traced! {
         /// Voltage.
         pub bus: Voltage,
         /// 1/V with 28 fraction bits, held at 8.
-        pub reciprocal: I4F28,
+        pub reciprocal: InverseVoltage,
         /// Longest voltage vector that can be had.
         pub longest: Longest,
         /// Square of the length up to which every phase can be read.
-        pub readable: I16F16,
+        pub readable: WideVoltageSquare,
     }
 }
 
@@ -79,13 +83,13 @@ traced! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Longest {
         length: Voltage,
-        square: I16F16,
+        square: WideVoltageSquare,
         /// Square of that part along d.
-        d_square: I8F24,
+        d_square: VoltageSquare,
         /// What is left along q.
         q: WideVoltage,
         /// What of the square's change q loses, 1/(2·q).
-        slope: Multiplier<VoltageSquare, I12F20>,
+        slope: Multiplier<VoltageSquare, Quantity<Volt, U20>>,
     }
 }
 
@@ -93,8 +97,8 @@ impl Longest {
     /// None at all.
     const NONE: Self = Self {
         length: Voltage::ZERO,
-        square: I16F16::ZERO,
-        d_square: I8F24::ZERO,
+        square: WideVoltageSquare::ZERO,
+        d_square: VoltageSquare::ZERO,
         q: WideVoltage::ZERO,
         slope: Multiplier::from_bits(0),
     };
@@ -123,8 +127,8 @@ impl Longest {
     #[inline(always)]
     fn beside(&self, d: Voltage) -> WideVoltage {
         // Both squares are below 12, and the slope is below 8.
-        let less = self.slope.of(d.top(d) - self.d_square).to_bits() << 4;
-        (self.q - WideVoltage::from_bits(less)).max(WideVoltage::ZERO)
+        let less = self.slope.of(d.top(d) - self.d_square).scaled();
+        (self.q - less).max(WideVoltage::ZERO)
     }
 }
 
@@ -133,9 +137,9 @@ impl Supply {
     pub fn new(config: &Config, bus: Voltage, d: Voltage) -> Self {
         let mut supply = Self {
             bus,
-            reciprocal: I4F28::ZERO,
+            reciprocal: InverseVoltage::ZERO,
             longest: Longest::NONE,
-            readable: I16F16::ZERO,
+            readable: WideVoltageSquare::ZERO,
         };
         supply.follow(bus);
         supply.reach(config, d);
@@ -149,7 +153,7 @@ impl Supply {
         // floor of 1/8 bounds the reciprocal.
         let bits = bus.to_bits().max(1 << 25);
         let rough = ((u32::MAX / (bits >> 10) as u32) << 14).min(i32::MAX as u32);
-        let rough = I4F28::from_bits(rough as i32);
+        let rough = InverseVoltage::from_bits(rough as i32);
         let product = i64::from(bits) * i64::from(rough.to_bits());
         let error = I0F32::from_bits((((1 << 56) - product) >> 24) as i32);
         self.bus = bus;
@@ -159,13 +163,12 @@ impl Supply {
     /// Takes the lengths that a vector can have, while its part along d is near this one.
     #[inline(never)]
     pub fn reach(&mut self, config: &Config, d: Voltage) {
-        let length = Voltage::from_bits(config.vector_max.top(self.bus).to_bits() << 1);
+        let length = config.vector_max.top(self.bus).scaled();
         self.longest = Longest::new(length, d);
         self.readable = if config.readable.is_negative() {
-            -I16F16::DELTA
+            -WideVoltageSquare::DELTA
         } else {
-            let length = config.readable.top(wide(self.bus)).to_bits() << 1;
-            square(WideVoltage::from_bits(length))
+            square(config.readable.top(wide(self.bus)).scaled())
         };
     }
 }
@@ -184,7 +187,7 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
     }
     let most = wide(longest.length);
     let d = u.d.min(most).max(-most);
-    let short_d = Voltage::from_bits(d.to_bits() << 4);
+    let short_d = d.scaled();
     let mut q_max = longest.beside(short_d);
     // The slope is too generous far from where it was taken, and never too strict.
     if square_of(Dq { d, q: q_max }) > longest.square + (longest.square >> TOO_LONG) {
@@ -200,12 +203,12 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
 
 /// The square of a vector's length. No component is above 128: the sum is below 2^15.
 #[inline(always)]
-pub fn square_of(u: Dq<WideVoltage>) -> I16F16 {
+pub fn square_of(u: Dq<WideVoltage>) -> WideVoltageSquare {
     square(u.d).plus_top(u.q, u.q)
 }
 
 #[inline(always)]
-fn square(u: WideVoltage) -> I16F16 {
+fn square(u: WideVoltage) -> WideVoltageSquare {
     u.top(u)
 }
 
@@ -213,8 +216,8 @@ fn square(u: WideVoltage) -> I16F16 {
 #[inline(always)]
 pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
     Dq {
-        d: Voltage::from_bits(u.d.to_bits() << 4),
-        q: Voltage::from_bits(u.q.to_bits() << 4),
+        d: u.d.scaled(),
+        q: u.q.scaled(),
     }
 }
 
@@ -226,7 +229,7 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
 pub fn duties(
     config: &Config,
     supply: &Supply,
-    (v, order): (AlphaBeta<I6F26>, Order),
+    (v, order): (AlphaBeta<TurnedVoltage>, Order),
     (dead_time, certainty): (&dead_time::Config, AlphaBeta<I8F24>),
 ) -> [Duty; 3] {
     let share: AlphaBeta<Share> = AlphaBeta {
@@ -299,8 +302,8 @@ mod tests {
             let (sin, cos) = (turns * TAU).sin_cos();
             let (alpha, beta) = (u_d * cos - u_q * sin, u_d * sin + u_q * cos);
             let v = AlphaBeta {
-                alpha: I6F26::from_num(alpha),
-                beta: I6F26::from_num(beta),
+                alpha: TurnedVoltage::from_num(alpha),
+                beta: TurnedVoltage::from_num(beta),
             };
             let none = (&dead_time::Config::NONE, AlphaBeta::default());
             let made = vector(duties(&config, &supply, (v, Order::NORMAL), none), bus);
@@ -320,8 +323,8 @@ mod tests {
                     let (sin, cos) = (f64::from(degrees) / 360.0 * TAU).sin_cos();
                     for length in [0.0, 0.3 * most, 0.999 * most] {
                         let v = AlphaBeta {
-                            alpha: I6F26::from_num(length * cos),
-                            beta: I6F26::from_num(length * sin),
+                            alpha: TurnedVoltage::from_num(length * cos),
+                            beta: TurnedVoltage::from_num(length * sin),
                         };
                         let made = duties(
                             &config,
@@ -344,8 +347,8 @@ mod tests {
         let config = config(Modulation::SpaceVector, 0.9);
         let supply = Supply::new(&config, Voltage::ONE, Voltage::ZERO);
         let v = AlphaBeta {
-            alpha: I6F26::from_num(0.4),
-            beta: I6F26::ZERO,
+            alpha: TurnedVoltage::from_num(0.4),
+            beta: TurnedVoltage::ZERO,
         };
         let [a, b, c] = duties(
             &config,
@@ -421,6 +424,6 @@ mod tests {
         let config = config(Modulation::SpaceVector, 0.95);
         let supply = Supply::new(&config, Voltage::ZERO, Voltage::ZERO);
         assert_eq!(supply.longest.length(), Voltage::ZERO);
-        assert!(supply.reciprocal > I4F28::from_num(7.9));
+        assert!(supply.reciprocal > InverseVoltage::from_num(7.9));
     }
 }

@@ -4,10 +4,12 @@
 //! knowledge of the rotor, which follows like a stepper motor's. The observer runs all the while, so
 //! at the hand-over it tells where the rotor really is.
 
+use crate::units::dimension::TurnPerPeriod;
 use fixed::types::I36F28;
+use fixed::types::extra::U28;
 
 use super::transform::Dq;
-use crate::math::{Gain, Held, TopProduct};
+use crate::math::{Gain, Held, Quantity, TopProduct};
 use crate::trace::traced;
 use crate::units::{Angle, Current, CurrentRate, InverseFlux, Speed, Voltage};
 
@@ -85,7 +87,7 @@ pub fn aligned(config: &Config, state: &State) -> bool {
 /// time before.
 pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) -> bool {
     let over = aligned(config, state);
-    state.charge += I36F28::from(current) * i64::from(periods);
+    state.charge += current.over_periods(periods);
     let sweeping = state.charge < config.park_charge >> 1;
     state.omega_s = if sweeping {
         config.sweep.apply(current)
@@ -127,8 +129,11 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
         .minus(config.reactance.saturating_apply(omega_s.top(i.q)))
         .minus(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
-    let rotor = config.xi_nominal.top(h_d).to_bits();
-    let rotor = Speed::from_bits(rotor.clamp(-SPEED_END, SPEED_END - 1) << 4);
+    let rotor = config.xi_nominal.top(h_d);
+    let rotor = rotor
+        .max(-SPEED_END)
+        .min(SPEED_END - Quantity::DELTA)
+        .scaled();
     // A rotor that follows turns as fast as the frame in the mean. Below a quarter of the speed at
     // which Run begins its swing is as fast.
     if omega_s > config.run_speed / 4 {
@@ -155,7 +160,7 @@ pub fn lost(config: &Config, state: &State) -> bool {
 impl State {}
 
 /// Where the speeds end, half a turn, with 28 fraction bits.
-const SPEED_END: i32 = 1 << 27;
+const SPEED_END: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(1 << 27);
 
 /// Most by which the frame yields: a sixteenth of a turn.
 const YIELDED_MAX: Angle = Angle::from_bits(1 << 28);

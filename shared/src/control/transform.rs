@@ -1,10 +1,10 @@
 //! Clarke's and Park's transforms, preserving the amplitude (11), (12).
 
-use fixed::types::{I0F32, I1F31, I6F26};
+use fixed::types::{I0F32, I1F31};
 
 use crate::math::{Held, Number, SinCos, TopProduct, TopSum};
 use crate::trace::traced;
-use crate::units::{AdcCounts, Angle, Current, Voltage};
+use crate::units::{AdcCounts, Angle, Current, TurnedVoltage, Voltage};
 
 traced! {
     /// A vector in the stator's frame.
@@ -82,10 +82,10 @@ pub fn clarke_in(order: Order, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> 
 
 /// The voltages of a vector that is turned twice, as the control's voltages: it is within ±8.
 #[inline(always)]
-pub fn voltages(v: AlphaBeta<I6F26>) -> AlphaBeta<Voltage> {
+pub fn voltages(v: AlphaBeta<TurnedVoltage>) -> AlphaBeta<Voltage> {
     AlphaBeta {
-        alpha: Voltage::from_bits(v.alpha.to_bits() << 2),
-        beta: Voltage::from_bits(v.beta.to_bits() << 2),
+        alpha: v.alpha.scaled(),
+        beta: v.beta.scaled(),
     }
 }
 
@@ -168,7 +168,6 @@ mod tests {
     use crate::math::sin_cos;
     use crate::units::Angle;
     use core::f64::consts::TAU;
-    use fixed::types::I4F28;
 
     /// A balanced vector of the given counts and angle as three readings.
     fn readings(counts: f64, turns: f64) -> [AdcCounts; 3] {
@@ -204,8 +203,8 @@ mod tests {
         let stator = inverse_park(v, sc);
         let back = park(
             AlphaBeta {
-                alpha: I4F28::from_num(stator.alpha),
-                beta: I4F28::from_num(stator.beta),
+                alpha: stator.alpha.scaled(),
+                beta: stator.beta.scaled(),
             },
             sc,
         );

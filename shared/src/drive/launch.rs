@@ -10,7 +10,7 @@ use crate::control::start;
 use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, rotate_frame, turn, voltages};
 use crate::control::{PERIODS, observer};
 use crate::math::SinCos;
-use crate::units::{Angle, Current, Speed, Voltage};
+use crate::units::{Angle, Current, Speed, Voltage, stated_emf};
 
 /// Which way a set-point wants the motor to turn, against the configured direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,11 +187,11 @@ fn go(
     };
 }
 
-/// The back-EMF at this speed. ω has 32 fraction bits, ξ = 1/4, a voltage 28.
+/// The back-EMF at this speed.
 fn emf(omega: Speed) -> Dq<Voltage> {
     Dq {
         d: Voltage::ZERO,
-        q: Voltage::from_bits(omega.to_bits() >> 2),
+        q: stated_emf(omega),
     }
 }
 

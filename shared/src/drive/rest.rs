@@ -94,7 +94,7 @@ fn clear(config: &Config, state: &mut State, setpoint: Setpoint) {
 /// The supply's voltage at a sample.
 #[inline(always)]
 pub(super) fn bus(config: &Config, sample: &Sample) -> Voltage {
-    Voltage::from_bits(config.bus.of(sample.bus).to_bits() << 4)
+    config.bus.of(sample.bus).scaled()
 }
 
 /// A period of Idle, Sense, Charge or Tone. `None` when Charge is done and the motor is to turn, and

@@ -15,7 +15,7 @@
 //! the true one, but learnt: it begins at the lesser of what each alone would take, and is doubled
 //! where twice as much has not brought the current. What both as stated would take is the most.
 
-use fixed::types::{I1F31, I6F26};
+use fixed::types::I1F31;
 
 use super::launch::{self, Wish};
 use super::slow::{self, CYCLE};
@@ -28,7 +28,7 @@ use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
 use crate::control::transform::{AlphaBeta, Dq, Order};
 use crate::math::{Gain, Held, SinCos, TopProduct, magnitude};
-use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
 
 /// Highest pitch, turns a period: with eight samples a cycle the greatest of them is at most 8 %
 /// below the current's peak.
@@ -188,8 +188,8 @@ pub(super) fn period(
         return Some(Bridge::Brake);
     }
     let v = AlphaBeta {
-        alpha: I6F26::from_bits(u.to_bits() >> 2),
-        beta: I6F26::ZERO,
+        alpha: u.scaled(),
+        beta: TurnedVoltage::ZERO,
     };
     let v = (v, Order::NORMAL);
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
@@ -221,20 +221,20 @@ fn play(
         regulate(tone, playing, supply);
     }
     let sine = SinCos::of(playing.angle).sin;
-    Voltage::from_bits(playing.amplitude.top(sine).to_bits() << 1)
+    playing.amplitude.top(sine).scaled()
 }
 
 /// The amplitude of the coming half cycle.
 fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
     let reactive = tone.reactive.held(playing.pitch);
     let stated = magnitude(tone.resistive, reactive);
-    let dead = Voltage::from_bits(tone.dead.top(supply.bus).to_bits() << 1);
+    let dead: Voltage = tone.dead.top(supply.bus).scaled();
     let least = tone.resistive.min(reactive).max(dead >> DEAD_SHIFT);
     let needed = playing.needed.max(least).min(stated);
     let missing = tone.share.held(tone.peak.minus(playing.peak));
     // 28 + 31 − 32 fraction bits are half of it with 28.
     let half = needed.top(missing);
-    let step = Voltage::from_bits(if half < 0 {
+    let step = Voltage::from_bits(if half.is_negative() {
         half.to_bits()
     } else {
         half.top(missing).to_bits()

@@ -182,9 +182,8 @@ pub(super) fn reading(counts: AdcCounts) -> Current {
 #[inline(always)]
 pub(super) fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
     // 24 + 28 − 32 fraction bits; 28 wanted.
-    let two_thirds = (u.d.top(i.d) + u.q.top(i.q))
+    let two_thirds: Current = (u.d.top(i.d) + u.q.top(i.q))
         .top(supply.reciprocal)
-        .to_bits()
-        << 8;
-    Current::from_bits(two_thirds + (two_thirds >> 1))
+        .scaled();
+    two_thirds + (two_thirds >> 1)
 }

@@ -107,6 +107,19 @@ impl<D, F> Quantity<D, F> {
         Self::from_bits(self.to_bits().wrapping_mul(rhs))
     }
 
+    /// self·rhs, held at the ends of the type.
+    #[inline(always)]
+    #[must_use]
+    pub const fn saturating_mul_int(self, rhs: i32) -> Self {
+        Self::from_bits(self.to_bits().saturating_mul(rhs))
+    }
+
+    /// self/rhs, if that exists.
+    #[inline(always)]
+    pub fn checked_div_int(self, rhs: i32) -> Option<Self> {
+        self.to_bits().checked_div(rhs).map(Self::from_bits)
+    }
+
     /// −self, wrapped.
     #[inline(always)]
     #[must_use]
@@ -143,6 +156,9 @@ impl<D, F> Quantity<D, F> {
 }
 
 impl<D, F: Unsigned> Quantity<D, F> {
+    /// One of its base, where the type holds that.
+    pub const ONE: Self = Self::from_bits(1 << F::U32);
+
     /// Its fraction bits.
     pub const FRAC_NBITS: u32 = F::U32;
 

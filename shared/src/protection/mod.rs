@@ -165,7 +165,7 @@ pub fn bound(
     let raised = if i_q.is_negative() {
         let too_much_returned = bus_current.saturating_neg().minus(may_return);
         // While the current is on its way to the bound there is nothing to say that more may be had.
-        let arrived = i_q < Current::from_bits(min.to_bits() - (min.to_bits() >> 3));
+        let arrived = i_q < min - (min >> 3);
         if arrived || too_much_returned.is_positive() {
             min.plus(rate(too_much_returned))
         } else {
@@ -173,10 +173,8 @@ pub fn bound(
         }
     } else {
         // The bus current is at most 1.5/√3 of i_q, at full modulation: 1 + 1/8 + 1/32 is 2/√3.
-        let bits = may_return.max(Current::ZERO).to_bits();
-        Current::from_bits(bits)
-            .plus(Current::from_bits((bits >> 3) + (bits >> 5)))
-            .saturating_neg()
+        let most = may_return.max(Current::ZERO);
+        most.plus((most >> 3) + (most >> 5)).saturating_neg()
     };
     bounds.min = raised.max(-config.phase).min(Current::ZERO);
 }

@@ -2,8 +2,9 @@
 //! has a meaning.
 
 use fixed::FixedI32;
-use fixed::types::extra::Unsigned;
+use fixed::types::extra::{U28, Unsigned};
 
+use super::Charge;
 use crate::math::{Quantity, Times, Turn};
 
 /// Declares dimensions.
@@ -16,6 +17,18 @@ macro_rules! dimensions {
 }
 
 dimensions! {
+    /// Of a current.
+    Ampere,
+    /// Of a current that turns: what ω·i is.
+    AmperePerPeriod,
+    /// Of a voltage.
+    Volt,
+    /// Of one over a voltage.
+    PerVolt,
+    /// Of a power.
+    Watt,
+    /// Of the square of a voltage.
+    VoltSquare,
     /// Of a flux linkage.
     Weber,
     /// Of an inverse flux.
@@ -33,24 +46,57 @@ macro_rules! products {
     ($($(#[$attribute:meta])* $one:ty, $other:ty => $product:ident;)*) => {$(
         $(#[$attribute])*
         impl Times<$other> for $one {
-            type Product<F: Unsigned> = $product<F>;
+            type Product<F: Unsigned> = Quantity<$product, F>;
         }
 
         impl Times<$one> for $other {
-            type Product<F: Unsigned> = $product<F>;
+            type Product<F: Unsigned> = Quantity<$product, F>;
         }
     )*};
 }
 
 products! {
     /// (9): i_q = ξ·T.
-    NewtonMetre, PerWeber => FixedI32;
+    NewtonMetre, PerWeber => Ampere;
     /// The voltage that a flux induces, ω·φ.
-    TurnPerPeriod, Weber => FixedI32;
+    TurnPerPeriod, Weber => Volt;
+    /// A power.
+    Volt, Ampere => Watt;
+    /// The current that a power takes from a supply.
+    Watt, PerVolt => Ampere;
+    /// The speed that a back-EMF tells, ω = ξ·|h|.
+    PerWeber, Volt => TurnPerPeriod;
+    /// How fast a current changes in a frame that turns, ω·i.
+    TurnPerPeriod, Ampere => AmperePerPeriod;
+}
+
+/// The share of a voltage in another.
+impl Times<PerVolt> for Volt {
+    type Product<F: Unsigned> = FixedI32<F>;
+}
+
+impl Times<Self> for Volt {
+    type Product<F: Unsigned> = Quantity<VoltSquare, F>;
+}
+
+impl<F> Quantity<Volt, F> {
+    /// What the voltage adds to a flux linkage in a period.
+    #[inline(always)]
+    pub const fn over_period(self) -> Quantity<Weber, F> {
+        Quantity::from_bits(self.to_bits())
+    }
 }
 
 impl Times<Self> for TurnPerPeriod {
     type Product<F: Unsigned> = Quantity<TurnPerPeriodSquare, F>;
+}
+
+impl Quantity<Ampere, U28> {
+    /// The charge of so many periods.
+    #[inline(always)]
+    pub fn over_periods(self, periods: u32) -> Charge {
+        Charge::from_bits(i64::from(self.to_bits())) * i64::from(periods)
+    }
 }
 
 impl<F> Quantity<TurnPerPeriod, F> {

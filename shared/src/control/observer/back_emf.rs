@@ -2,15 +2,20 @@
 //!
 //! Forward Euler, and the matrix exponential for the estimated currents, as its section V says.
 
+use crate::units::dimension::TurnPerPeriod;
 use fixed::types::I4F28;
+use fixed::types::extra::U28;
 
 use super::{Estimate, Told};
 use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
-use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, divide, magnitude};
+use crate::math::{Gain, Held, Quantity, SinCos, TopProduct, atan2_turns, divide, magnitude};
 use crate::trace::traced;
-use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage};
+use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
+
+/// Half a turn a period, where a speed ends.
+const FASTEST: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(i32::MAX >> 4);
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,8 +84,7 @@ traced! {
 
 /// The observer in a moment in which the frame's angle and speed are known, or imposed.
 pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
-    // ĥ_q = −ω/ξ; ω has 32 fraction bits, ξ = 1/4, a voltage 28.
-    let length = Voltage::from_bits(omega.to_bits() >> 2);
+    let length = stated_emf(omega);
     State {
         theta,
         h: Dq {
@@ -118,7 +122,7 @@ pub fn estimate(
     }
     // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4 turns
     // a period; above half a turn, where a speed ends, the rotor is lost anyway.
-    let omega_bar = Speed::from_bits(state.xi.top(length).to_bits().min(i32::MAX >> 4) << 4);
+    let omega_bar = state.xi.top(length).min(FASTEST).scaled();
     let omega = omega_bar.plus(config.k_eta.held(state.h.d));
     let omega_bar_step = config.k_f.apply(omega_bar.minus(state.omega_f));
     state.omega_f = state.omega_f.plus(omega_bar_step);
@@ -151,7 +155,7 @@ fn cured(
 ) -> (Estimate, Told) {
     // Twelve bits of the quotient are enough for a direction: 0.01°.
     let quotient = (state.h.d.to_bits() >> 2) / (length.to_bits() >> 14).max(1);
-    let epsilon = Voltage::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
+    let epsilon = I4F28::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
     let before = state.omega_i;
     state.omega_i = before
         .plus(cure.integral.apply(epsilon))

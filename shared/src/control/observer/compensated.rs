@@ -20,7 +20,7 @@ use crate::math::{
 use crate::trace::traced;
 use crate::units::{
     Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
-    WideVoltage, over_period,
+    WideVoltage,
 };
 
 /// A flux along an axis of the estimated frame: the sine takes a fraction bit.
@@ -208,7 +208,7 @@ pub fn estimate(
     let step = |v: Voltage, now: Current, before: Current| {
         config
             .half_resistance
-            .taken(over_period(v), now.plus(before))
+            .taken(v.over_period(), now.plus(before))
     };
     let psi = AlphaBeta {
         alpha: state

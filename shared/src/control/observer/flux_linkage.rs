@@ -7,7 +7,7 @@ use fixed::types::extra::U32;
 
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
 use crate::trace::traced;
-use crate::units::{Angle, Current, Flux, Speed, Voltage, over_period};
+use crate::units::{Angle, Current, Flux, Speed, Voltage};
 
 use super::sector::Sector;
 
@@ -90,7 +90,7 @@ pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current;
         let mean_i = (i[phase] >> 1) + (state.i_before[phase] >> 1);
         let drive = v[phase].minus(config.resistance.held(mean_i));
         let psi = state.psi[phase];
-        let psi = (psi - config.forget.apply(psi)).plus(over_period(drive));
+        let psi = (psi - config.forget.apply(psi)).plus(drive.over_period());
         let psi = psi.min(psi_max).max(-psi_max);
         state.psi[phase] = psi;
         let integral = match &config.high_pass {

@@ -11,6 +11,7 @@ use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
 use crate::trace::traced;
 use crate::units::{Angle, Current, Voltage, WideVoltage};
+use fixed::types::extra::U28;
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +51,8 @@ impl Config {
         let SinCos { cos, sin } = SinCos::of(phase);
         // 28 + 31 − 32 fraction bits; the length bounds both.
         Dq {
-            d: Voltage::from_bits(-(length.top(sin).to_bits() << 1)),
-            q: Voltage::from_bits(length.top(cos).to_bits() << 1),
+            d: -length.top(sin).scaled::<U28>(),
+            q: length.top(cos).scaled(),
         }
     }
 

@@ -118,7 +118,7 @@ pub fn look(
     }
     // Line to line, a motor that is driven has less back-EMF than the supply has volts: 1.5 times
     // a phase's at 30° from its crossing is 0.43 of that, at 60° 0.75.
-    let clamped = Voltage::from_bits((bus.to_bits() >> 2).saturating_mul(3)).min(config.greatest);
+    let clamped = (bus >> 2).saturating_mul_int(3).min(config.greatest);
     if terminal >= clamped {
         return None;
     }

@@ -78,10 +78,8 @@ impl State {
 #[inline]
 pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> Range {
     let change = i.minus(state.smoothed);
-    state.smoothed = state
-        .smoothed
-        .plus(Current::from_bits(change.to_bits() >> 3));
-    let forgotten = Current::from_bits(state.peak.to_bits() >> PEAK_SHIFT);
+    state.smoothed = state.smoothed.plus(change >> 3);
+    let forgotten = state.peak >> PEAK_SHIFT;
     state.peak = state.peak.minus(forgotten).max(i.saturating_abs());
     let ahead = i.plus(change.saturating_mul_int(3));
     let until = |bound: Current| {

@@ -9,7 +9,7 @@ use crate::control::observer;
 use crate::control::six_step::commutation::Sector;
 use crate::drive::{self, Fault, Phase};
 use crate::math::TopProduct;
-use crate::units::{Speed, Voltage};
+use crate::units::{Speed, Voltage, stated_emf};
 
 /// Mean back-EMF between two phases within a sextant over a phase's peak: √3·3/π.
 const BETWEEN_PHASES: I2F30 = I2F30::lit("1.6539867");
@@ -25,7 +25,7 @@ pub(super) fn begin(config: &drive::Config, six_step: &Config, state: &mut drive
     follow(config, six_step, state);
     let s = &mut state.six_step;
     // ω has 32 fraction bits, ξ = 1/4, a voltage 28.
-    let emf = Voltage::from_bits(s.tracking.omega.max(Speed::ZERO).to_bits() >> 2);
+    let emf = stated_emf(s.tracking.omega.max(Speed::ZERO));
     let supply = Supply::new(&config.modulator, state.protection.bus, Voltage::ZERO);
     // 28 + 28 − 32 and 24 + 30 − 32 fraction bits; 31 wanted.
     let share = emf.top(supply.reciprocal).top(BETWEEN_PHASES).to_bits();

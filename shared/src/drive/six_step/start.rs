@@ -59,7 +59,7 @@ pub(super) fn park(
     hold(six_step, s, greatest, wanted);
     // By the first attempt's current: a greater one does not damp the swing any sooner. After a
     // start that has failed, twice as long.
-    s.charge += I36F28::from(wanted.min(six_step.start_current));
+    s.charge += wanted.min(six_step.start_current).over_periods(1);
     let long = six_step.park_charge * (1 + i64::from(s.failed > 0));
     if s.sector == FIRST_PARK {
         if s.charge >= long {
@@ -69,7 +69,7 @@ pub(super) fn park(
     } else {
         // Forwards along phase a, b has a positive back-EMF and c a negative one.
         let forwards = low.saturating_sub(floating).saturating_sub(s.swing);
-        s.swing += Current::from_bits(forwards.to_bits() >> 6);
+        s.swing += forwards >> 6;
         let certain = wanted / 16;
         let was_forwards = s.swings_forwards;
         s.swings_forwards = s.swing

@@ -22,9 +22,7 @@ pub(super) fn tell(
 ) {
     let s = &state.six_step;
     let duty = s.duty.duty;
-    // 31 + 28 − 32 fraction bits; 28 wanted.
-    let of_duty = |x: Voltage| Voltage::from_bits(duty.top(x).to_bits() << 1);
-    let bus_current = of_duty(i);
+    let bus_current = duty.top(i).scaled();
     protection::bound(
         &config.protection,
         &mut state.protection,
@@ -37,14 +35,11 @@ pub(super) fn tell(
     let delta = if parked { SEXTANT } else { s.tracking.delta };
     let angle = s.sector.middle().wrapping_add(delta);
     let from_middle = SinCos::of(delta);
-    let along = of_duty(state.protection.bus)
-        .top(RECIPROCAL_ROOT_3)
-        .to_bits()
-        << 1;
-    let along = Voltage::from_bits(along);
+    let switched: Voltage = duty.top(state.protection.bus).scaled();
+    let along: Voltage = switched.top(RECIPROCAL_ROOT_3).scaled();
     let u = Dq {
-        d: Voltage::from_bits(along.top(from_middle.sin).to_bits() << 1),
-        q: Voltage::from_bits(along.top(from_middle.cos).to_bits() << 1),
+        d: along.top(from_middle.sin).scaled(),
+        q: along.top(from_middle.cos).scaled(),
     };
     let measured = park(clarke(currents), SinCos::of(angle));
     let peak = Dq {

@@ -158,8 +158,8 @@ mod tests {
     use crate::control::transform::{AlphaBeta, Order};
     use crate::drive::Config;
     use crate::params::{Board, Params, build};
-    use crate::units::Voltage;
-    use fixed::types::{I6F26, I8F24};
+    use crate::units::{TurnedVoltage, Voltage};
+    use fixed::types::I8F24;
 
     #[test]
     fn the_drivers_are_charged_for_their_time_and_a_turning_rotor_is_not_lost() {
@@ -207,8 +207,8 @@ mod tests {
         for degrees in 0..360 {
             let (sin, cos) = libm::sincosf(degrees as f32 * TAU / 360.0);
             let v = AlphaBeta {
-                alpha: I6F26::from_num(length * cos),
-                beta: I6F26::from_num(length * sin),
+                alpha: TurnedVoltage::from_num(length * cos),
+                beta: TurnedVoltage::from_num(length * sin),
             };
             for sixth in 0..6 {
                 // A current with the six signs that three phases can have.

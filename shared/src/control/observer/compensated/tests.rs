@@ -205,14 +205,15 @@ proptest! {
         let (config, _) = config(Delay::One, &[]);
         let mut state = State::default();
         for [a, b, c, d, e, f, what] in words {
-            let of = |alpha, beta| AlphaBeta { alpha: Current::from_bits(alpha), beta: Current::from_bits(beta) };
+            let i = AlphaBeta { alpha: Current::from_bits(a), beta: Current::from_bits(b) };
+            let v = AlphaBeta { alpha: Voltage::from_bits(c), beta: Voltage::from_bits(d) };
             if what & 63 == 0 {
                 let rotor = (Angle::from_bits(e), Speed::from_bits(f));
- begin(&config, &mut state, rotor, of(a, b));
+                begin(&config, &mut state, rotor, i);
             }
             let input = Input {
-                i: of(a, b),
-                v: of(c, d),
+                i,
+                v,
                 inductance: Factor::ONE,
                 planned: Speed::from_bits(e),
                 hall: 0,
