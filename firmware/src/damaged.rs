@@ -1,6 +1,6 @@
-//! The start of an image that is not whole. It goes no further: the control's interrupt, which alone turns
-//! the bridge on, is never started. The light blinks evenly, five times a second, and the serial line
-//! says why, at the rate from the factory: nothing that is stored is looked at.
+//! The start of a damaged image. It goes no further: the control's interrupt, which alone turns the
+//! bridge on, is never started. The light blinks evenly, five times a second, and the serial line says
+//! why, at the factory rate: nothing stored is read.
 
 /// MAVLink 2 frames: a heartbeat in the state *critical*, and a STATUSTEXT of the severity *critical*.
 #[cfg(any(board, test))]

@@ -1,10 +1,10 @@
-//! Which image this is: text right behind the vector table, where a tool finds it. And whether it is whole.
+//! The image's identity, as text right after the vector table where a tool finds it; and its checksum.
 //!
-//! After the tag the linker script puts the addresses that a checksum is of, and room for the sum and its
-//! inverse. The linker leaves both erased: such an image is not stamped, and its start takes it as it is,
-//! so that what cargo builds runs. `siskin image` stamps, `siskin flash` stamps what is not and refuses what
-//! is damaged, and the start of a stamped image that is damaged goes no further than [`damaged`](crate::damaged).
-//! The sum takes 1.4 ms of the start of a G431, on the virtual board.
+//! After the tag the linker script puts the address range that the checksum covers, and room for the
+//! sum and its inverse. The linker leaves both erased: such an image is not stamped and starts
+//! unchecked, so that what cargo builds runs. `siskin image` stamps; `siskin flash` stamps an image
+//! that is not, and refuses a damaged one; the start of a stamped image that is damaged ends in
+//! [`damaged`](crate::damaged). The check takes 1.4 ms of the start of a G431, on the virtual board.
 
 #[cfg(board)]
 use siskin_control::image::{NO_WORDS, check_sum};

@@ -1,8 +1,9 @@
-//! The throttle wire's side of an ESC: what must keep up with the wire's edges, whatever the other
-//! tasks do.
+//! The throttle wire's side of an ESC: everything that must keep up with the wire's edges, whatever the
+//! other tasks do.
 //!
-//! On the chip it belongs to a task that interrupts the one with [`Esc`](crate::esc::Esc), which
-//! gets at it by [`Reach`], for a moment at a time. What either needs of the other is copied then.
+//! On the chip it belongs to a task of higher priority than the one with [`Esc`](crate::esc::Esc),
+//! which reaches it through [`Reach`], for a moment at a time. Data that one side needs of the other
+//! are copied then.
 
 use core::mem::discriminant;
 

@@ -1,7 +1,7 @@
-//! The edges of the throttle wire that the capturing timer has seen, in two rings, with times of 32 bits
-//! whatever the timer has.
+//! The edges of the throttle wire from the capturing timer, in two rings. Times have 32 bits whatever
+//! the timer has.
 //!
-//! Nothing here touches the chip: what it shows is asked for by closures.
+//! Nothing here touches the chip: closures read it.
 
 mod ring;
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! A ring in memory into which the DMA puts the times of one direction's edges.
 //!
-//! Where the DMA is tells how many there are: no interrupt counts its rounds, which would have to come
-//! before the throttle's task looks, and hold it up. That it has come round is seen by the time before the
-//! next one, which is the first to be overwritten.
+//! The DMA's position gives the number of edges. No interrupt counts its rounds: that would have to run
+//! before the throttle's task looks, and would hold it up. A whole round is noticed by the time before
+//! the next one, which is the first to be overwritten.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 

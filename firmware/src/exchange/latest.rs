@@ -1,8 +1,8 @@
-//! The latest of what one writes and another reads, neither ever waiting: three places, one with the
+//! The latest value from one writer for one reader, neither ever waiting: three places, one with the
 //! writer, one with the reader, one between them.
 //!
-//! Who is done with a place swaps it for the one between. A reader that comes to it finds whole what
-//! was written last; one who comes late has missed what was before, and nothing of it is mixed in.
+//! Each swaps its place for the one between when it is done. The reader finds the last value whole; a
+//! reader that comes late misses earlier values, and gets no mixture.
 
 use super::sync::{AtomicU8, Ordering, UnsafeCell, read, write};
 

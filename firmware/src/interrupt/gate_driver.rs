@@ -1,4 +1,4 @@
-//! The gate driver: what it says of itself, and when the bridge may be turned on.
+//! The gate driver: its alarm, and when the bridge may be turned on.
 //!
 //! A DRV8302 turns its gates off by itself and pulls nFAULT low. The pin's interrupt ([`alarm`])
 //! then turns the bridge off and the driver with it; the PWM interrupt reads the pin too, each

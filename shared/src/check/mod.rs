@@ -1,14 +1,14 @@
-//! The self-test: what a person should know of a board before its motor turns.
+//! The self-test of a board before its motor turns.
 //!
-//! Each [`Item`] has a value, a unit and bounds; what a board cannot measure is left out. At
-//! power-up those are measured that need neither time nor the bridge. MAV_CMD_RUN_PREARM_CHECKS asks for
-//! all of them, and is obeyed under the rule of what may turn a motor: at rest, without a fault, the wire
-//! silent or at valid zero. It is acknowledged by IN_PROGRESS with a percentage, and at last by ACCEPTED
-//! or, where an item is out of its bounds, FAILED, with a STATUSTEXT that names such items. All lines are
-//! in `@SYS/check.txt` on MAVLink FTP, as `siskin check` shows them. Any throttle or fault ends it, as
-//! failed.
+//! Each [`Item`] has a value, a unit and bounds; items that a board cannot measure are left out. At
+//! power-up only those are measured that need neither time nor the bridge. MAV_CMD_RUN_PREARM_CHECKS
+//! asks for all of them. It is obeyed under the rule of what may turn a motor: at rest, without a
+//! fault, the wire silent or at valid zero. It is acknowledged by IN_PROGRESS with a percentage, and at
+//! the end by ACCEPTED, or by FAILED if an item is out of its bounds, with a STATUSTEXT that names such
+//! items. MAVLink FTP has all lines in `@SYS/check.txt`, as `siskin check` shows them. Any throttle or
+//! fault ends the test as failed.
 //!
-//! The motor does not turn, and no switch closes before what its neighbours do is known:
+//! The motor does not turn, and no switch closes before its neighbours have been checked:
 //!
 //! | step | the bridge | what is seen |
 //! |---|---|---|
@@ -16,7 +16,7 @@
 //! | pull a, b, c up | one leg from duty 0 to the whole, the others off ([`Pull`]) | `high_*`: its terminal comes to the supply, so its high side and the supply of its driver work. `motor_*`: the others follow it through the windings. `off_*`: no current, so no low side is shorted |
 //! | a to b, b to c, c to a | one leg up to a quarter, the low side of the next on, until a test's current flows | `low_*`: it comes back through that low side and its shunt, with the right sign |
 //!
-//! A terminal with all switches off lies at ground by its divider, so the low sides show by their current
+//! With all switches off a terminal is at ground by its divider, so the low sides show by their current
 //! alone.
 
 mod items;

@@ -1,12 +1,13 @@
 //! Decides whether the motor may turn: by an armed wire, or by a test of limited time. Nothing else
 //! turns it.
 //!
-//! The wire is armed by zero throttle held for a time, in a signal that has been identified; it
-//! loses that with its signal, and never turns a motor before. Only a frame whose checksum is right,
-//! or a pulse, can change what the motor is asked to do; and such a frame only where not nearly all the
-//! others fail theirs, as random words do: one of those in sixteen is right by chance. That judgement takes
-//! some twelve frames, so a wire at zero opens only by several throttles in a row: of armed wires that become
-//! noise at zero, one in 2170 turns the motor, where the first throttle alone would turn it in 57 of 100.
+//! The wire is armed by zero throttle held for a time, in a signal that has been identified. It is
+//! disarmed when that signal is lost, and never turns a motor before it is armed. Only a frame whose
+//! checksum is right, or a pulse, can change the command to the motor. If nearly all other frames fail,
+//! as random words do, the right ones do not count either: of random words one in sixteen is right by
+//! chance. That judgement takes some twelve frames, so a wire at zero opens only after several
+//! throttles in a row: of armed wires that become noise at zero, one in 2170 turns the motor, where the
+//! first throttle alone would turn it in 57 of 100.
 
 use super::Share;
 use super::command::within;

@@ -1,8 +1,8 @@
-//! The end points of pulses, taught by the stick.
+//! Calibration of the pulses' end points by the stick.
 //!
-//! As with other ESCs: the ESC is powered up with the stick at full throttle and says after two
-//! seconds that it has measured it; the stick is then pulled to no throttle, and after one and a half
-//! seconds both ends are known. Anything else leaves them as they were, until the next power-up.
+//! It works as with other ESCs: the ESC is powered up with the stick at full throttle and reports after
+//! two seconds that it has measured it; the stick is then pulled to no throttle, and after one and a
+//! half seconds both ends are known. Anything else leaves them as they were, until the next power-up.
 //!
 //! A ground station may ask for the same at any time: the stick then has a minute to come up.
 

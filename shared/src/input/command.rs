@@ -17,21 +17,23 @@
 //! is an audio stream, 32 to 35 switch a telemetry that bidirectional DShot has replaced, and the
 //! rest has no meaning.
 //!
-//! A command counts at zero throttle. While the motor still turns then, extended telemetry is switched at
-//! once, since Betaflight asks for it at each arming and a pilot may arm again before the propeller has run
-//! down. A direction and the save after it wait until the motor stands, as long as the wire stays at zero:
-//! Betaflight's configurator sends them 400 ms after a stop, and a motor that coasts takes longer. Within
-//! 100 ms of throttle they count as little as under it. The others are obeyed only while the motor stands.
+//! A command counts at zero throttle. If the motor still turns then, extended telemetry is switched at
+//! once: Betaflight asks for it at each arming, and a pilot may arm again before the propeller has
+//! stopped. A direction and the save after it wait until the motor stands, as long as the wire stays at
+//! zero: Betaflight's configurator sends them 400 ms after a stop, and a motor that coasts takes
+//! longer. Within 100 ms of throttle they are ignored, as they are under throttle. The others are
+//! obeyed only while the motor stands.
 //!
 //! A command is obeyed once for all its repeats: flight controllers send most of them ten times. A
-//! single bad frame between two of them, or before the first, does not end the row: the line's rise, when
-//! a flight controller starts, spoils one. Two do.
+//! single bad frame among them, or before the first, does not end the row: when a flight controller
+//! starts, the rise of the line spoils one. Two bad frames do.
 //!
-//! One that counts at once may be another frame whose errors the checksum has not shown. So it needs six
-//! like the rest just after a bad frame, and longer after two within half a second. Flight controllers send
-//! a beacon once, and a bad frame now and then must not silence all of them. What this cannot prevent: on any
-//! other wire one frame whose errors pass the checksum can sound a beacon, send the information or switch
-//! the light; of random words it is one in 4096. What changes something always takes six.
+//! A command that counts at once may be another frame with errors that its checksum has not shown. So
+//! it needs six in a row, like the rest, just after a bad frame, and for longer after two within half a
+//! second. Flight controllers send a beacon once, and an occasional bad frame must not silence all of
+//! them. This cannot prevent that on any other wire one frame with undetected errors sounds a beacon,
+//! sends the information or switches the light; of random words it is one in 4096. Commands that change
+//! something always take six.
 
 use super::dshot::Frame;
 use crate::tune::Beacon;

@@ -1,7 +1,7 @@
-//! Which signal a line carries, from what the decoders find in its edges.
+//! Detects the signal that a line carries, from what the decoders find in its edges.
 //!
-//! DShot and pulses have a candidate each, with what spoke for it and what against it. A candidate
-//! that lasts is the signal.
+//! DShot and pulses have a candidate each, with the evidence for and against it. A candidate that lasts
+//! is the signal.
 
 use super::line::Event;
 use super::signal::{Pulse, Signal};

@@ -1,7 +1,7 @@
-//! Drops levels that are too short to be meant.
+//! Drops levels that are too short to be part of a signal.
 //!
-//! An edge is believed when its level has lasted for the filter's time. A shorter level vanishes
-//! as if it had never been, and the level around it goes on.
+//! An edge is believed when its level has lasted for the filter's time. A shorter level is dropped, and
+//! the level around it goes on.
 
 /// An edge that is believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,9 +6,9 @@
 //!                                  → calibration::Calibration → the pulses' end points
 //! ```
 //!
-//! [`dshot`] knows what a frame means and [`endpoints`] what a pulse does, [`line`](mod@line) how they look on
-//! a timer, and [`authority`] alone what may turn a motor. None of them has a clock: the caller says
-//! when something happened. [`Input`] is all of it.
+//! [`dshot`] has the meaning of a frame and [`endpoints`] that of a pulse, [`line`](mod@line) decodes
+//! both from a timer's edges, and [`authority`] alone decides whether the motor may turn. None of them
+//! has a clock: the caller says when something happened. [`Input`] is all of it.
 
 pub mod access;
 pub mod authority;

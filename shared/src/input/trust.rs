@@ -1,16 +1,16 @@
 //! Tells a sender's frames from noise that passes the check now and then.
 //!
-//! Four check bits let one random word in sixteen pass, and nearly all of those are throttle. So a good
-//! frame is evidence of its wire, and a bad one against it: of a link in which half of the frames are good,
-//! a good one is 8 times as likely as of noise (1/2 to 1/16), and a bad one half as likely (1/2 to 15/16).
-//! The logarithms of the two are as 3 to −1 (2.08 and −0.63), and a count of them, held between two ends, is
-//! weighed against a bound.
+//! Of random words one in sixteen passes the four check bits, and nearly all of those are throttle. So
+//! each frame is evidence: on a link where half of the frames are good, a good one is 8 times as likely
+//! as in noise (1/2 to 1/16), and a bad one half as likely (1/2 to 15/16). The logarithms of the two
+//! are as 3 to −1 (2.08 and −0.63): their sum, kept between two ends, is compared with a threshold.
 //!
-//! In random words the count falls by 3/4 each and then stays near 0: it reaches the bound with one in
-//! 143 000, so that at 1 kHz the wire is silent to all that count for 0.1 s: within 0.2 s of the first in
-//! all but one case of 26 000. It rises where more than a quarter of the frames are good. Of a link in which
-//! half are, one good frame in 2760 is missed, and a tenth of a second of silence at 1 kHz comes once in
-//! three years. Twelve bad frames in a row cost none of the good ones after them, any number at most four.
+//! In random words the sum falls by 3/4 a word and then stays near 0. It reaches the threshold with one
+//! word in 143 000; at 1 kHz the wire therefore counts as silent within 0.2 s of the first word in all
+//! but one case of 26 000. The sum rises if more than a quarter of the frames are good. On a link where
+//! half are, one good frame in 2760 is missed, and at 1 kHz a silence of a tenth of a second comes once
+//! in three years. Twelve bad frames in a row cost none of the good ones after them, any number at most
+//! four.
 
 /// Evidence of a good frame; a bad one takes 1.
 const GOOD: u8 = 3;

@@ -1,9 +1,9 @@
 //! The seeds of the messages' checksums.
 //!
-//! Each message's check has a seed of its own. A receiver must know it of the whole dialect, not only
-//! of what an ESC obeys: a frame that something else carries (a file, a tunnel) is not found then. The
-//! dialect's own look-up takes 2.7 KB of the chip's flash, these tables a quarter of it; a test holds
-//! them against it.
+//! The checksum of each message has a seed of its own. A receiver must know those of the whole dialect,
+//! and not only of the messages that an ESC obeys: otherwise frames inside the payload of another
+//! message (a file, a tunnel) would be found. The dialect's own look-up takes 2.7 KB of the chip's
+//! flash, these tables a quarter of it; a test compares the two.
 
 /// The first message of each span, and the `CRC_EXTRA` of it and of those that follow; 0 where there
 /// is no message.

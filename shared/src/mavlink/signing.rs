@@ -1,18 +1,17 @@
-//! Signatures of frames (MAVLink 2, "Message Signing"): once there is a key, only who has it may
-//! change anything.
+//! Message signing of MAVLink 2: once there is a key, only its owners may change anything.
 //!
 //! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a
-//! component and a link), whatever key signs it, and may be at most a minute behind the newest
-//! timestamp that was heard or sent, and not before its key. What was newest is kept over a loss of
-//! power with the key, so that what was recorded before cannot be played again after it. It is stored
-//! with all else: what came in the last two seconds, or since the motor began to turn, may be played
-//! again where the power fails then, and what was refused since the last save.
+//! component and a link), whatever key signs it. It may be at most a minute older than the newest
+//! timestamp received or sent, and not older than its key. The newest timestamp is stored with the key,
+//! so that a recording cannot be replayed after a loss of power. It is stored together with the
+//! settings, so three things can be replayed if power fails: frames of the last two seconds, frames
+//! since the motor began to turn, and frames refused since the last save.
 //!
-//! The ESC has no clock, so those who sign tell it the time: SETUP_SIGNING does, and each frame that is
-//! newer. A frame may be dated at most a minute ahead. The first one after a start, and the next one
-//! after a minute without any, may be further ahead, since the time that has passed is not known or may
-//! be wrong; it tells the time then, but no more than five years at once. A wrong clock that is further
-//! off locks nobody out.
+//! The ESC has no clock: it takes the time from SETUP_SIGNING and from each newer frame. A frame may be
+//! dated at most a minute ahead. The first frame after a start, and the next one after a minute without
+//! any, may be further ahead, since the time that has passed is unknown or may be wrong; it sets the
+//! time then, but by no more than five years at once. A wrong clock that is further off locks nobody
+//! out.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SETUP_SIGNING_DATA;

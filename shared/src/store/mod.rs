@@ -1,12 +1,12 @@
 //! Storage that survives a loss of power, in flash.
 //!
 //! A save appends all values as one set, of 8 bytes a value, and ends it with a seal over them. The
-//! newest set with its seal counts, so a loss of power leaves the values of this save or of the one
-//! before, all of them. Where a setting has changed the set is written twice, so that a bit that rots
-//! in one leaves the other; where only the statistics or the time of signatures have, the set before
-//! has the same settings. The flash is used in two halves: where one has no more room, or anything
-//! written is not whole, the other is erased for the set. What it replaces stays until the new one
-//! stands.
+//! newest set with its seal counts, so a loss of power leaves all values of this save, or all of the
+//! one before. If a setting has changed the set is written twice, so that a rotten bit in one leaves
+//! the other; if only the statistics or the time of signatures have changed, the set before has the
+//! same settings. The flash is used in two halves. If one is full, or anything in it is not whole, the
+//! other is erased and takes the set; the sets that it replaces stay until the new one is written and
+//! checked.
 //!
 //! # Wear
 //! A set with twenty changed parameters, the statistics and a key has 42 words, 336 bytes. On the

@@ -3,8 +3,8 @@
 //! A second timer paces the DMA, which writes a word to the register that sets the pin's level at each
 //! bit: the capturing timer goes on counting.
 //!
-//! What can be done before the frame has ended is done then: at its end a reply of 30 µs later is begun by a
-//! few accesses.
+//! As much as possible is prepared before the frame has ended: at its end a few accesses start a reply
+//! that is due 30 µs later.
 
 use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
