@@ -8,7 +8,7 @@ use cortex_m_rt::exception;
 use siskin_firmware::last_words::{DETAILS, Failure, fail, turn_off};
 use siskin_firmware::storage::take_torn_word;
 
-/// Names no file: nothing of what a panic says is in the image, only where it was.
+/// Only the address is kept: the texts of panics are not in the image.
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
     turn_off();
@@ -59,7 +59,7 @@ unsafe extern "C" fn hard_fault_vector() {
 
 /// The fault with its stack pointer, which is of no use where the stack has left its memory.
 extern "C" fn hard_fault(stack: u32) -> ! {
-    // First of all: what follows reads what may be wrong.
+    // First of all: the rest reads memory that may be wrong.
     turn_off();
     let [lowest, highest] = [&raw const _stack_end as u32, &raw const _stack_start as u32];
     // SAFETY: a register of the processor without side effects.

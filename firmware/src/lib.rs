@@ -38,7 +38,7 @@
 //! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them behind it or before the frame; up to 5 µs of waiting for a frame's last edge | the other tasks, and drivers' interrupts, not their DMA; the PWM for the 0.4 µs in which a reply is begun |
 //! | the other tasks | thread mode | | nothing |
 //!
-//! What runs at 0 and 1 uses no critical section, no lock, no log and no type of the executor. A
+//! Code at priorities 0 and 1 uses no critical section, no lock, no log and no type of the executor. A
 //! fault's handlers are above all and do not return. An interrupt that the chip has and nobody
 //! handles ends in [`last_words`].
 //!

@@ -29,7 +29,7 @@ struct Basepri;
 set_impl!(Basepri);
 
 // SAFETY: everything that uses a critical section runs in thread mode or at `TASKS`, which the
-// raised BASEPRI holds up; to restore what was before lets sections nest. There is one core.
+// raised BASEPRI holds up; restoring the old value lets sections nest. There is one core.
 unsafe impl Impl for Basepri {
     // Never inlined: some sixty sections begin with it.
     #[inline(never)]

@@ -20,7 +20,7 @@ use crate::chip::pages;
 /// True while the store is being read.
 static READING: AtomicBool = AtomicBool::new(false);
 
-/// Within so many cycles of a read the flash reports that the word is torn: some times what its bus takes.
+/// Cycles from a read within which the flash reports a torn word: several times the delay of its bus.
 const READ_TOLD_CYCLES: u32 = 32;
 
 /// The place of the store, as the linker script has it: from the beginning of the flash.
@@ -50,7 +50,7 @@ pub struct Storage {
     place: Range<usize>,
 }
 
-/// Why the flash did not do what it was asked to do.
+/// The reason why the flash failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StorageError {
     /// Outside the store, or not at whole words or pages.

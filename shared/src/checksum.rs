@@ -1,4 +1,4 @@
-//! One checksum for what is stored and for files, as MAVLink's file transfer has it.
+//! The checksum of stored sets and of files, as MAVLink's file transfer has it.
 
 /// CRC-32 of IEEE 802.3, reflected, which begins at 0 and is not inverted at its end, so that a
 /// file's checksum goes on from that of what is before it (NuttX's `crc32part`, which PX4, ArduPilot

@@ -42,7 +42,7 @@ const fn version() -> [u8; 3] {
     let text = env!("CARGO_PKG_VERSION").as_bytes();
     let mut parts = [0; 3];
     let (mut part, mut at) = (0, 0);
-    // What follows the third number, as "-rc1", is left out.
+    // A suffix such as "-rc1" is left out.
     while at < text.len() && part < parts.len() {
         match text[at] {
             digit @ b'0'..=b'9' => parts[part] = parts[part] * 10 + (digit - b'0'),

@@ -1,4 +1,4 @@
-//! From what the motor may do to what the drive is asked for.
+//! From the command to the motor to the drive's set-point.
 
 use crate::drive::{Config, Setpoint, tone};
 use crate::input::authority::Command;

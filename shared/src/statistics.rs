@@ -82,7 +82,7 @@ pub(crate) struct Sight {
 }
 
 impl Recorder {
-    /// Takes note of what it sees; whether the motor has come to rest.
+    /// Takes in one look. Returns true if the motor has come to rest.
     pub(crate) fn look(&mut self, statistics: &mut Statistics, sight: &Sight) -> bool {
         for (fault, count) in Fault::ALL.into_iter().zip(&mut statistics.faults) {
             if sight.faults.contains(fault) && !self.faults.contains(fault) {

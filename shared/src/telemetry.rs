@@ -42,7 +42,7 @@ pub struct Telemetry {
     pub statistics: Statistics,
 }
 
-/// Names of what of the control's inside can be streamed, in the order of the bits of `TEL_SIGNALS`:
+/// Names of the control's signals that can be streamed, in the order of the bits of `TEL_SIGNALS`:
 /// mechanical speed and its reference, rpm; current and voltage in the rotor's frame, A and V;
 /// voltage as a share of what the supply gives without over-modulation; the supply's voltage and
 /// current as they are now, V and A.
@@ -109,7 +109,7 @@ impl Telemetry {
         }
     }
 
-    /// Takes in what the drive says after a further `time_us`.
+    /// Takes in the drive's snapshot after a further `time_us`.
     pub fn observe(&mut self, snapshot: &Snapshot, scale: &Scale, time_us: u64) {
         self.rpm = scale.rpm(snapshot.speed);
         self.bus_v = scale.volts(snapshot.bus);
@@ -189,7 +189,7 @@ mod tests {
         for ((name, found), wanted) in SIGNALS.iter().zip(telemetry.signals).zip(wanted) {
             assert!((found - wanted).abs() < 1e-3, "{name}: {found}");
         }
-        // What the messages for a person have is smoothed.
+        // Values for a person are smoothed.
         assert!(telemetry.bus_a > -0.1);
         snapshot.bus = Voltage::ZERO;
         telemetry.observe(&snapshot, &scale, 1000);

@@ -23,7 +23,7 @@ use crate::setpoint::Mapping;
 use crate::telemetry::Telemetry;
 use crate::tune::Note;
 
-/// A throttle wire, what is sent back on it, and what it asks of the drive.
+/// A throttle wire, the answers on it, and its demands on the drive.
 pub struct Throttle {
     input: Input,
     answers: Answers,
@@ -111,14 +111,14 @@ impl Throttle {
         self.input.whole(bit)
     }
 
-    /// Takes what [`Throttle::whole`] has found. Returns what [`Throttle::edge`] does.
+    /// Takes the event of [`Throttle::whole`]. Returns the same as [`Throttle::edge`].
     pub fn hear(&mut self, now_us: u64, event: &Event) -> Option<Ask> {
         let heard = self.input.heard(now_us, event)?;
         self.heard(heard)
     }
 
     /// Tells the time of the timer that captures the wire's edges, once a control period or more
-    /// often. Returns what [`Throttle::edge`] does.
+    /// often. Returns the same as [`Throttle::edge`].
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Ask> {
         let heard = self.input.settle(now_us, now_ticks)?;
         self.heard(heard)
@@ -201,7 +201,7 @@ impl Throttle {
         self.input.known()
     }
 
-    /// Lets time pass, and takes in what the drive is doing.
+    /// Lets time pass, and takes in the drive's state.
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
         self.input.poll(now_us, telemetry.drive(self.command()));
@@ -241,13 +241,13 @@ impl Throttle {
         None
     }
 
-    /// Takes what the tasks say.
+    /// Takes in the tasks' part.
     pub(crate) fn tell(&mut self, told: Told) {
         self.told = told;
         self.input.authority_mut().bar(told.barred);
     }
 
-    /// Takes what is sent when the wire asks for the ESC's information.
+    /// Takes the answer for a wire that asks for the ESC's information.
     pub(crate) fn tell_info(&mut self, info: [u8; info::BYTES]) {
         self.info = info;
     }

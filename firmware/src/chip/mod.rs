@@ -1,4 +1,4 @@
-//! The chips: what the boards with one have in common, and what the HAL does not have.
+//! The chips: code that boards with one share, and that the HAL does not have.
 
 pub(crate) mod flash;
 #[cfg(feature = "stm32f405")]

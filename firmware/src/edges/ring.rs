@@ -54,7 +54,7 @@ impl Ring {
         self.torn || self.word(LEN - 1) != self.before
     }
 
-    /// Forgets what it has.
+    /// Forgets its edges.
     pub(super) fn clear(&mut self) {
         self.skip(self.count());
         self.torn = false;

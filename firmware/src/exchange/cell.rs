@@ -4,7 +4,7 @@ use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Holds what one interrupt works on. It is filled once, before that interrupt is enabled.
+/// Holds the state of one interrupt. It is filled once, before that interrupt is enabled.
 pub(crate) struct InterruptCell<T> {
     filled: AtomicBool,
     value: UnsafeCell<MaybeUninit<T>>,

@@ -20,7 +20,7 @@ static CONFIG: Swap<Config> = Swap::new();
 pub struct Ends {
     /// For the interrupt.
     pub interrupt: InterruptEnd,
-    /// For the task that decides what the motor does.
+    /// For the task that commands the motor.
     pub setpoint: SetpointWriter,
     /// For the tasks that report its state.
     pub snapshot: SnapshotReader,
@@ -133,7 +133,7 @@ impl RunningEnd {
     }
 }
 
-/// The end of the task that decides what the motor does.
+/// The end of the task that commands the motor.
 pub struct SetpointWriter {
     sequence: u32,
 }

@@ -56,7 +56,7 @@ impl<T: Copy> Latest<T> {
         (Writer { place: 1 }, Reader { place: 2 })
     }
 
-    /// Writes what is now the latest.
+    /// Writes the latest value.
     #[inline(always)]
     pub(crate) fn publish(&self, hand: &mut Writer, value: T) {
         // SAFETY: the place is in the writer's hand. The mask says no more than that to the
@@ -68,7 +68,7 @@ impl<T: Copy> Latest<T> {
 
     /// The latest, or `None` while there has been none.
     pub(crate) fn read(&self, hand: &mut Reader) -> Option<T> {
-        // What is not new is in the reader's hand already.
+        // A value that is not new is in the reader's hand already.
         if self.between.load(Ordering::Relaxed) & NEW != 0 {
             hand.place = self.between.swap(hand.place, Ordering::AcqRel) & !NEW;
         }

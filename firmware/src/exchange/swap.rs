@@ -10,7 +10,7 @@ const QUIET: u8 = 0;
 /// The slot that is not in use waits for the interrupt.
 const OFFERED: u8 = 1;
 
-/// The two slots. What is in them needs no drop.
+/// The two slots. Their contents need no drop.
 pub(crate) struct Swap<T> {
     slots: [UnsafeCell<MaybeUninit<T>>; 2],
     state: AtomicU8,

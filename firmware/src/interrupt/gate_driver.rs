@@ -76,7 +76,7 @@ impl GateDriver {
 /// Lets a falling edge of the alarm's line ask for its interrupt from now on, or no more. This line is
 /// the only one of EXTI that is used.
 pub(crate) fn hear(pins: Pins, hears: bool) {
-    // What came unheard is not told later: the level is read each period.
+    // An alarm that was masked is not reported later: the level is read each period.
     EXTI.pr(0).write(|w| w.set_line(pins.fault, true));
     EXTI.imr(0).modify(|w| w.set_line(pins.fault, hears));
 }

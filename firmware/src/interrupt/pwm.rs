@@ -98,7 +98,7 @@ impl Pwm {
         );
     }
 
-    /// Lets the phases do what the last [`apply`](Self::apply) wanted.
+    /// Puts the legs of the last [`apply`](Self::apply) in force.
     #[inline(always)]
     pub(crate) fn commutate(&mut self) {
         self.timer.egr().write(|w| w.set_comg(true));
@@ -126,13 +126,13 @@ impl Pwm {
     #[cold]
     #[inline(never)]
     pub(crate) fn clear_break(&mut self) {
-        // What is written as 1 stays as it is.
+        // Bits written as 1 stay as they are.
         let mut others = SrAdv(!0);
         others.set_bif(0, false);
         self.timer.sr().write_value(others);
     }
 
-    /// Does with the bridge what the control wants, from the counter's next top on; to turn it off
+    /// Applies the control's bridge command from the counter's next top on; to turn it off
     /// takes effect at once, and after that all switches stay off until the top.
     #[inline(always)]
     pub(crate) fn apply(&mut self, bridge: Bridge) {
@@ -207,7 +207,7 @@ impl Pwm {
         timer.ccr(2).write_value(Ccr1ch(values[PHASES[2]]));
     }
 
-    /// Writes what the next commutation brings.
+    /// Writes the modes for the next commutation.
     fn set_modes(&mut self, legs: [Leg; 3]) {
         let [first, second, third] = [legs[PHASES[0]], legs[PHASES[1]], legs[PHASES[2]]];
         self.timer.ccmr_output(0).write(|w| {

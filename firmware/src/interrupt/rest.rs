@@ -45,7 +45,7 @@ impl Rest {
         self.periods -= 1;
         match self.periods {
             WAKE_PERIODS => Order::Wake,
-            // What has come up with an alarm is tried again and again: its cause may end.
+            // A driver that comes up with an alarm is tried again and again: the cause may end.
             0 if alarm => {
                 self.periods = REST_PERIODS;
                 Order::Sleep

@@ -60,7 +60,7 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
     }
 }
 
-/// The reverse of [`sample`]: where each reading of a sample is, and what is read there.
+/// The reverse of [`sample`]: the place of each reading, and its value.
 pub(crate) fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
     let reading = |counts: AdcCounts| counts.to_num::<i32>();
     let current = move |counts: AdcCounts| {

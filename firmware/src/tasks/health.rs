@@ -30,7 +30,7 @@ impl Health {
         }
     }
 
-    /// Reads what is due.
+    /// Takes the reading that is due.
     pub(crate) fn look(&mut self, now: Instant) {
         if now >= self.due {
             self.due = now + EVERY;

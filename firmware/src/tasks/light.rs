@@ -1,4 +1,4 @@
-//! The light, by which a person without a ground station sees what is wrong.
+//! The light, by which a person without a ground station sees trouble.
 
 use embassy_stm32::gpio::Output;
 use embassy_time::{Duration, Instant};
@@ -23,7 +23,7 @@ impl Light {
         }
     }
 
-    /// Shows what is due. Where all is well, a flight controller may have ordered it to be on.
+    /// Shows the pattern that is due. If all is well, a flight controller may have ordered it to be on.
     pub(crate) fn look(&mut self, now: Instant, snapshot: Option<&Snapshot>, ordered: bool) {
         if now < self.due {
             return;

@@ -21,7 +21,7 @@ use crate::exchange::{ConfigWriter, SnapshotReader};
 use crate::storage::{Storage, range};
 use crate::{interrupt, last_words};
 
-/// Time between two looks for what is due.
+/// Time between two polls.
 const POLL: Duration = Duration::from_millis(1);
 
 /// Bytes that wait to be sent: replies to a burst of requests, 90 ms of the slowest link.
@@ -168,7 +168,7 @@ impl Desk {
         }
     }
 
-    /// Gives the interrupt what the parameters make, once it has a place for it.
+    /// Gives the interrupt the configuration from the parameters, once it has a place for it.
     #[inline(never)]
     fn configure(&mut self) {
         if !self.changed {

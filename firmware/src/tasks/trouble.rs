@@ -10,7 +10,7 @@ use crate::text::{push, push_decimal};
 /// Time between two texts, so that they do not fill the link.
 const APART: Duration = Duration::from_secs(5);
 
-/// Counts of what has gone wrong since the start.
+/// Counts of trouble since the start.
 pub(crate) struct Trouble {
     lost_edges: AtomicU32,
     late_replies: AtomicU32,

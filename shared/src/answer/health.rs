@@ -31,7 +31,7 @@ pub(super) struct Health {
 }
 
 impl Health {
-    /// Takes in what the drive says, at each reply.
+    /// Takes in the drive's snapshot, at each reply.
     pub(super) fn observe(&mut self, snapshot: &Snapshot, basis: &Basis) {
         let doubt = basis.doubt(snapshot);
         self.stress = self.stress.max(doubt);
@@ -43,7 +43,7 @@ impl Health {
         self.fault_count = snapshot.fault_count;
     }
 
-    /// Forgets what has happened so far.
+    /// Forgets all events so far.
     pub(super) fn begin(&mut self) {
         *self = Self {
             fault_count: self.fault_count,

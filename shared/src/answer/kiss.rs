@@ -15,7 +15,7 @@ pub const SPACING_US: u32 = 1000;
 /// byte without one, and took −10 °C for 246.
 pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
     let mut frame = [0; BYTES];
-    // A float's conversion saturates, and makes 0 of what is no number.
+    // A float's conversion saturates, and turns NaN into 0.
     frame[0] = (round(telemetry.temperature_c) as i8).max(0) as u8;
     let words = [
         telemetry.bus_v * 100.0,

@@ -157,8 +157,8 @@ impl Answers {
         self.info = Some(info);
     }
 
-    /// The reply to a frame on its wire, if it asks for one: what has little time. `speed_bits` are those of a
-    /// reply with the drive's speed ([`speed_bits`]). [`Answers::serial`] is to follow.
+    /// The reply to a frame on its wire, if it asks for one. It must be quick: `speed_bits` are those of a
+    /// reply with the drive's speed ([`speed_bits`]), and [`Answers::serial`] is to follow.
     pub fn reply(&mut self, ask: Ask, speed_bits: u32, telemetry: &Telemetry) -> Option<Reply> {
         self.pass(ask.first_edge_ticks);
         ask.bidirectional.then(|| {

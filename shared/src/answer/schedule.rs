@@ -74,7 +74,7 @@ impl Schedule {
         if self.since_ticks < self.slot_ticks {
             return None;
         }
-        // What a frame came late by is made good; what several frames would have to, is given up.
+        // A late frame is made up for; lateness of several frames is given up.
         self.since_ticks = (self.since_ticks - self.slot_ticks).min(self.slot_ticks);
         let kind = TURN[self.next];
         self.next = (self.next + 1) % TURN.len();

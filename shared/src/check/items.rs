@@ -211,7 +211,7 @@ impl Report {
         self.values[Item::of(kind, phase).place()] = value;
     }
 
-    /// Tells the lines of what was measured, with the bounds that these parameters make.
+    /// The lines of the items measured, with the bounds from these parameters.
     pub fn tell(&self, params: &Params, mut tell: impl FnMut(&Line)) {
         for place in 0..self.values.len() {
             if let Some(line) = self.line(place, params) {

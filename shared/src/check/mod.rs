@@ -40,10 +40,10 @@ pub trait Probe {
     fn own(&mut self, item: Item) -> Option<f32>;
 }
 
-/// Looks in which nothing is read: the set-point is on its way, and so is what comes of it.
+/// Looks in which nothing is read: the set-point and its effect are still on their way.
 const LATENCY: u8 = 8;
 
-/// Looks at power-up until the supply's filter has come to what it shows.
+/// Looks at power-up until the supply's filter has settled.
 const POWER_UP_LOOKS: u8 = 3;
 
 /// Looks whose readings make a zero and its noise.

@@ -11,10 +11,10 @@ use crate::params::{BuildError, ParamId};
 use crate::store::{self, Kept, Loaded, StoreError};
 use crate::throttle::Reach;
 
-/// For how long nothing must have changed before what has is stored, µs: a client that writes a whole
+/// Time without a change after which changes are stored, µs: a client that writes a whole
 /// list of parameters wears the flash once.
 const QUIET_US: u64 = 1_000_000;
-/// For how long what has changed may wait at most because more changes, µs: so much of what was signed may
+/// Longest wait of a change because more follow, µs: so much of what was signed may
 /// be played again after a loss of power.
 const LATEST_US: u64 = 2_000_000;
 
@@ -98,7 +98,7 @@ impl Storage {
         due
     }
 
-    /// MAVLink asks for a restart, which waits for what waits to be stored.
+    /// MAVLink asks for a restart, which waits until pending changes are stored.
     pub(super) fn reboot(&mut self) {
         self.reboot = true;
     }
@@ -187,11 +187,11 @@ impl Unstored {
     }
 }
 
-/// Does what a request for storage asks for, with what [`Esc::kept`] gives for it. Returns what shall
+/// Carries out a request for storage, with the values of [`Esc::kept`]. Returns what shall
 /// be in force from now on, if that is something else.
 ///
 /// # Errors
-/// A few words on why what it promises would not survive the loss of power.
+/// A few words on why the values would not survive a loss of power.
 pub fn obey<F: NorFlash>(
     request: Request,
     flash: &mut F,

@@ -96,7 +96,7 @@ impl Esc {
         }
         let known = self.unstored.iter_mut().find(|known| known.id == id);
         match known {
-            // What has been set otherwise since is stored.
+            // Later settings by other ways are stored too.
             Some(known) if before == known.value => known.value = value,
             Some(known) => (known.value, known.stored) = (value, before),
             None => {

@@ -182,11 +182,11 @@ impl Authority {
         }
     }
 
-    /// Takes what the decoder found, and the signal that it has identified so far.
+    /// Takes the decoder's event, and the signal identified so far.
     ///
     /// Before one is identified, zero throttle counts and does not arm. Later, any other is bad.
     pub fn wire(&mut self, now_us: u64, event: Event, identified: Option<Signal>) {
-        // What ended before this event has ended, however late `poll` is.
+        // Time-outs before this event apply, however late `poll` is.
         self.poll(now_us);
         self.event_us = Some(now_us);
         let (Some(signal), Some(demand)) = (event.signal(), self.reading.demand(&event)) else {
@@ -281,7 +281,7 @@ impl Authority {
         self.arming = None;
     }
 
-    /// The stick teaches its end points: what it shows now is no throttle, not even zero.
+    /// The stick teaches its end points: for now it is no throttle, not even zero.
     pub fn learn(&mut self) {
         self.restart();
         self.test = None;
@@ -290,7 +290,7 @@ impl Authority {
         }
     }
 
-    /// Ends what the time has ended: a lost signal's arming, and a test.
+    /// Applies time-outs: of a lost signal's arming, and of a test.
     ///
     /// Between two calls a lost signal or a test lasts longer than it should; otherwise it does not
     /// matter how rarely it is called. Returns true once for each signal that was lost.

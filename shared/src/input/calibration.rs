@@ -9,7 +9,7 @@
 use super::endpoints::EndPoints;
 use crate::math::quotient;
 
-/// Servo pulses that may be full throttle, ns: the upper part of what is accepted. The middle of a
+/// Servo pulses that may be full throttle, ns: the upper part of the accepted range. The middle of a
 /// stick for two directions must not begin a calibration.
 const FULL_NS: core::ops::RangeInclusive<u32> = 1_700_000..=2_200_000;
 /// Servo pulses that may be no throttle, ns.
@@ -37,7 +37,7 @@ pub enum Step {
     Full,
     /// Both ends have been measured.
     Done(EndPoints),
-    /// After full throttle came something else than no throttle, or nothing of what was asked for.
+    /// Something else than no throttle followed full throttle, or the stick was not moved as asked.
     Cancelled,
 }
 

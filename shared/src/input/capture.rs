@@ -161,7 +161,7 @@ impl Decoder {
             return None;
         }
         let event = self.sound(first, span, bidirectional, bit)?;
-        // What the next frame must know of this one is when it ended.
+        // The next frame must know when this one ended.
         self.push_of_run(end, EDGES);
         self.held = 1;
         Some(event)
@@ -236,7 +236,7 @@ impl Decoder {
         let first_edge_ticks = self.back(EDGES_BEFORE);
         let span = self.back(1).wrapping_sub(first_edge_ticks);
         let before_ticks = first_edge_ticks.wrapping_sub(self.back(EDGES_BEFORE + 1));
-        // What was before the first of all edges is taken for a rest.
+        // The time before the first edge of all counts as a rest.
         let rested = self.held == EDGES || before_ticks >= rest(span);
         if !rested {
             return None;

@@ -195,7 +195,7 @@ impl Commands {
         }
     }
 
-    /// The signal was lost, or what came is no command now: nothing has been received.
+    /// The signal was lost, or the value is no command now: forgets the row.
     pub fn interrupt(&mut self) {
         self.value = 0;
         self.count = 0;

@@ -1,4 +1,4 @@
-//! Detects the signal that a line carries, from what the decoders find in its edges.
+//! Detects the signal that a line carries, from the decoders' events.
 //!
 //! DShot and pulses have a candidate each, with the evidence for and against it. A candidate that lasts
 //! is the signal.
@@ -66,7 +66,7 @@ impl Detector {
         leading.filter(known).map(|candidate| candidate.signal)
     }
 
-    /// Weighs what the DShot decoder has found, and returns it if it is to be handed on.
+    /// Weighs the DShot decoder's event, and returns it if it is to be passed on.
     pub(super) fn frame(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
         let Some(signal) = event.signal() else {
             self.frames = self.frames.and_then(Candidate::missed);
@@ -91,7 +91,7 @@ impl Detector {
         Some(event)
     }
 
-    /// Weighs what the pulse decoder has found, and returns it if it is to be handed on.
+    /// Weighs the pulse decoder's event, and returns it if it is to be passed on.
     pub(super) fn pulse(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
         let before = self.pulses.take();
         if let Event::Pulse { kind, width_ns } = event {

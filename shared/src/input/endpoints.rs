@@ -11,7 +11,7 @@ const NS_PER_US: u32 = 1000;
 pub const ZERO_DIVISOR: u32 = 50;
 
 /// One over this is the share of the range, to either side of its middle, that is zero where there
-/// are two directions: 4 %. It is twice what an end has, because a stick's spring returns it less
+/// are two directions: 4 %. It is twice that of an end, because a stick's spring returns it less
 /// exactly than an end stop does, and within the ±5 % that flight controllers leave free there.
 const CENTRE_DIVISOR: u32 = 25;
 

@@ -94,7 +94,7 @@ impl Filter {
         self.level = Some(level);
     }
 
-    /// The line has been silent: what its level was does not matter to the next edge.
+    /// The line has been silent: its former level does not matter to the next edge.
     pub(super) fn rest(&mut self) {
         self.level = None;
     }

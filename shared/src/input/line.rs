@@ -82,7 +82,7 @@ impl Line {
         self.signal
     }
 
-    /// The signal is lost: what was detected is forgotten, what was forced stays.
+    /// The signal is lost: a detected one is forgotten, a forced one stays.
     pub fn lost(&mut self) {
         if self.signal.is_some() && !self.forced {
             self.begin(None);
@@ -183,7 +183,7 @@ impl Line {
         }
     }
 
-    /// Weighs an edge, and what the DShot decoder has found with it, while the signal is not known.
+    /// Weighs an edge, and the DShot decoder's event at it, while the signal is not known.
     fn detect(&mut self, edge: Edge, frame: Option<Event>) -> Option<Event> {
         let Edge { at_ticks, level } = edge;
         let pulse = self.pulses.edge(at_ticks, level);

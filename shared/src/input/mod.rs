@@ -137,7 +137,7 @@ impl Input {
         self.line.whole(bit)
     }
 
-    /// Takes what [`Input::whole`] has found.
+    /// Takes the event of [`Input::whole`].
     pub fn heard(&mut self, now_us: u64, event: &Event) -> Option<Heard> {
         self.take(now_us, event)
     }
@@ -154,7 +154,7 @@ impl Input {
         self.hear(now_us, event, identified)
     }
 
-    /// Takes what the decoder found, and the signal that it has identified so far.
+    /// Takes the decoder's event, and the signal identified so far.
     fn hear(&mut self, now_us: u64, event: &Event, identified: Option<Signal>) -> Option<Heard> {
         self.authority.wire(now_us, *event, identified);
         let known = identified.is_some() && event.signal() == identified;
@@ -176,7 +176,7 @@ impl Input {
                 let in_time = in_time.is_some_and(|(since_us, order)| {
                     order.is_in_time(self.stopped, now_us.saturating_sub(since_us))
                 });
-                // What comes at another time is no command, however long it is repeated.
+                // At another time it is no command, however often it is repeated.
                 if in_time {
                     self.commands.frame(now_us, frame)
                 } else {
@@ -200,7 +200,7 @@ impl Input {
         })
     }
 
-    /// Lets time pass, each millisecond or so, and takes in what the drive is doing.
+    /// Lets time pass, each millisecond or so, and takes in the drive's state.
     pub fn poll(&mut self, now_us: u64, drive: DriveStatus) {
         self.stopped = drive.stopped;
         self.expire(now_us);
@@ -210,7 +210,7 @@ impl Input {
         self.tally.poll(now_us);
     }
 
-    /// Begins a calibration by stick: from now on what it shows is no throttle, not even zero.
+    /// Begins a calibration by stick: from now on the stick is no throttle, not even zero.
     pub fn calibrate(&mut self, now_us: u64) {
         self.calibration.ask(now_us);
         self.authority.learn();
@@ -222,7 +222,7 @@ impl Input {
         self.announcer.calibration(cancelled);
     }
 
-    /// Ends what the time has ended.
+    /// Applies time-outs.
     fn expire(&mut self, now_us: u64) {
         let armed = self.authority.armed();
         if self.authority.poll(now_us) {

@@ -73,8 +73,8 @@ impl Decoder {
         self.only = only;
     }
 
-    /// Takes an edge. A pulse, or what is none, is reported at its end; not reported is a pulse
-    /// that follows what was none.
+    /// Takes an edge. A pulse, good or bad, is reported at its end, except for a good one
+    /// after a bad one.
     pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
         if level {
             self.spacing = self.rise_at.map(|rise_at| Spacing {
@@ -97,7 +97,7 @@ impl Decoder {
         })
     }
 
-    /// An edge was missed: the next pulse follows what was none.
+    /// An edge was missed: the next pulse follows a bad one.
     pub(super) fn spoil(&mut self) {
         self.clear();
         self.sound = false;

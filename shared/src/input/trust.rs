@@ -16,10 +16,10 @@
 const GOOD: u8 = 3;
 /// From here on frames are believed.
 const BELIEVED: u8 = 15;
-/// The end of the count: what has been good for long is doubted after twelve bad frames in a row.
+/// The end of the count: after a long good time twelve bad frames in a row raise doubt.
 const MOST: u8 = 24;
 
-/// The count of what a wire's frames were.
+/// The evidence of a wire's frames.
 #[derive(Clone, Debug)]
 pub(super) struct Trust(u8);
 

@@ -69,7 +69,7 @@ pub(super) struct Command {
 }
 
 impl Command {
-    /// The two messages differ only in parameters 5 and 6 and in what comes after the target.
+    /// The two messages differ only in parameters 5 and 6 and after the target.
     pub(super) fn read(now_us: u64, frame: &Frame, trust: Trust, exact: bool) -> Self {
         let mut params = [0.0; 7];
         for (i, param) in params.iter_mut().enumerate() {
@@ -302,7 +302,7 @@ impl Commands {
         match command.choice(0) {
             Some(0) => return ACCEPTED,
             Some(1) => {}
-            // Shutting down and staying in a boot loader are not what an ESC can do.
+            // An ESC cannot shut down or stay in a boot loader.
             _ => return DENIED,
         }
         if self.is_busy() || !drive.stopped {

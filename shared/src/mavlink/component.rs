@@ -86,7 +86,7 @@ pub enum Act {
     Check,
 }
 
-/// One ESC on MAVLink. Frames may come from several links; what it sends goes to all of them.
+/// One ESC on MAVLink. Frames may come from several links; its own go to all of them.
 #[derive(Clone, Debug)]
 pub struct Component {
     identity: Identity,
@@ -115,7 +115,7 @@ pub struct Component {
 impl Component {
     /// A component whose identity is in `params`; a change of it applies at the next start.
     ///
-    /// `link_bytes_per_s` is what the slowest link carries (11520 at 115200 baud). Lists of
+    /// `link_bytes_per_s` is the rate of the slowest link (11520 at 115200 baud). Lists of
     /// parameters take at most half of it, and streams the other half; replies are never held up.
     ///
     /// Never inlined: a copy of it takes 1.7 KB of stack.
@@ -150,14 +150,14 @@ impl Component {
     /// Obeys a frame. Replies leave at the next [`Component::poll`]; up to 40 wait, and a text
     /// tells of any that found no room.
     ///
-    /// Never inlined, as [`Component::poll`]: an image shows what the component takes.
+    /// Never inlined, as [`Component::poll`]: an image report shows its size.
     #[inline(never)]
     pub fn handle(&mut self, frame: &Frame, context: &mut Context) {
         if frame.from == self.identity.address {
             return;
         }
         let target = target(frame).filter(|target| self.identity.is_for(*target));
-        // Of what others say to others no stream is followed.
+        // Frames between others are not tracked.
         if target.is_none() && !self.identity.awaits(frame) {
             return;
         }
@@ -173,7 +173,7 @@ impl Component {
         if trust == Trust::None {
             return;
         }
-        // Whether nobody else has been asked, so that what does not exist is an error.
+        // If nobody else has been asked, an unknown name is an error.
         let alone = target.component != 0 || self.identity.role == Role::Standalone;
         let drive = context.drive();
         match frame.id {
@@ -295,7 +295,7 @@ impl Component {
         self.commands.take_act()
     }
 
-    /// A request for storage is done: whether what it promises would survive the loss of power now, or
+    /// A request for storage is done: `Ok` if the values would survive a loss of power now, or
     /// a few words on why not. The command is acknowledged with this.
     pub fn storage_done(&mut self, result: Result<(), &'static str>) {
         if self.commands.storage_done(result, &mut self.replies) {

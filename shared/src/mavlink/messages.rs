@@ -166,7 +166,7 @@ fn padded<const N: usize>(name: &str) -> [u8; N] {
     bytes
 }
 
-/// `ESC_FAILURE_FLAGS`; what has no flag of its own is GENERIC.
+/// `ESC_FAILURE_FLAGS`; faults without a flag of their own are GENERIC.
 fn failure_flags(faults: Faults) -> u16 {
     faults
         .iter()
@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn each_fault_has_a_flag() {
-        // The numbers of the protocol; what it does not name is GENERIC.
+        // The numbers of the protocol; faults that it does not name are GENERIC.
         let flags = [1, 2, 64, 4, 64, 32, 64];
         let mut all = Faults::NONE;
         for (fault, flag) in Fault::ALL.into_iter().zip(flags) {

@@ -1,6 +1,6 @@
 //! Shares of a link.
 
-/// A share of a link's bytes, so that what can wait does not hold up what cannot.
+/// A share of a link's bytes, so that messages that can wait do not hold up the others.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     bytes_per_s: u32,

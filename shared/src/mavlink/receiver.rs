@@ -180,7 +180,7 @@ impl Receiver {
         }
     }
 
-    /// Moves what waits to the front of the buffer.
+    /// Moves the waiting bytes to the front of the buffer.
     fn compact(&mut self) {
         // Byte by byte: a general move of memory takes 1.5 KB of the chip's flash.
         for (to, from) in (self.start..self.end).enumerate() {
@@ -230,7 +230,7 @@ impl Receiver {
         }
         let (_, _, id) = sender_and_message(bytes);
         let extra_crc = check::extra_crc(id);
-        // The dialect answers 0 for what it does not have; HEARTBEAT's is 50, and no message that
+        // The dialect answers 0 for an unknown message; HEARTBEAT's is 50, and no message that
         // an ESC obeys has 0.
         if extra_crc == 0 {
             count(&mut self.counters.unknown);

@@ -147,7 +147,7 @@ impl Replies {
     }
 }
 
-/// Encodes what does not depend on the state of the ESC.
+/// Encodes replies that do not depend on the state of the ESC.
 #[derive(Clone, Debug)]
 pub(super) struct Writer {
     pub(super) sender: Sender,
@@ -197,7 +197,7 @@ impl Writer {
         pieces: &[&str],
         out: &mut dyn FnMut(&[u8]),
     ) {
-        // Whole chunks: what is behind the text is zero.
+        // Whole chunks, padded with zeros.
         let mut text = [0; TEXT_MAX + CHUNK_LEN];
         let mut len = 0;
         let bytes = pieces.iter().flat_map(|piece| piece.bytes());

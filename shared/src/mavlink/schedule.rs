@@ -19,7 +19,7 @@ pub(super) enum Stream {
     EscInfo,
     EscStatus,
     EscTelemetry,
-    /// NAMED_VALUE_FLOAT of the throttle wire: what this message's interval and requests mean.
+    /// NAMED_VALUE_FLOAT of the throttle wire: the one that intervals and requests of this message mean.
     BadFrames,
     /// NAMED_VALUE_FLOAT of the control's signals, all of one moment.
     Signals,
@@ -188,7 +188,7 @@ impl Schedule {
         Intervals(self.timers.map(|timer| timer.interval.bits()))
     }
 
-    /// Goes on with what was kept.
+    /// Restores the stored intervals.
     pub(super) fn keep(&mut self, intervals: &Intervals) {
         for (stream, bits) in Stream::ALL.into_iter().zip(intervals.0) {
             let interval = Interval::from_bits(bits).unwrap_or(Interval::Default);

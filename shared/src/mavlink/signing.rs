@@ -99,13 +99,13 @@ pub(super) struct Signing {
     told_us: Option<u64>,
     /// Up to here, everything may have been received before the start or before the key.
     floor: u64,
-    /// Kept from key to key: one that comes back finds what it has signed before.
+    /// Kept from key to key, so that a key that comes back finds its earlier streams.
     streams: [Option<Stream>; STREAMS],
     now_us: u64,
 }
 
 impl Signing {
-    /// With what was kept from before the start; no key means that nothing is signed.
+    /// With the values stored before the start; without a key nothing is signed.
     pub(super) fn new(kept: Option<Kept>) -> Self {
         let floor = kept.map_or(0, |kept| ((u64::from(kept.newest) + 1) << KEPT_SHIFT) - 1);
         Self {
@@ -140,7 +140,7 @@ impl Signing {
             self.floor = self.floor.max(timestamp.saturating_sub(1));
         }
         self.key = key;
-        // What has not begun does not pass.
+        // A time that has not begun does not pass.
         let known = self.newest > 0;
         self.newest = timestamp.max(if known { self.clock() } else { 0 });
         self.newest_us = self.now_us;

@@ -208,7 +208,7 @@ impl Log {
             return Ok(true);
         }
         self.move_to(flash, content, there, len)?;
-        // What is not whole would be found again.
+        // An incomplete set would be found again.
         if !self.whole {
             wipe(flash, here)?;
         }

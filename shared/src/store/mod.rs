@@ -34,7 +34,7 @@ mod key {
     pub(super) const SCHEMA: u16 = 0x1000;
 }
 
-/// Number of what keys and values mean: another one would tell that they have to be translated.
+/// The schema's number: another one means that keys and values must be converted.
 const SCHEMA: u32 = 1;
 
 /// Sets that have the settings which were saved last.
@@ -94,14 +94,14 @@ impl Loaded {
     }
 }
 
-/// Why nothing is promised of what was stored.
+/// The reason why stored values cannot be relied on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError {
     /// The range is not two halves of whole pages of the flash.
     BadRange,
     /// The flash refused a read, a write or an erase.
     Flash,
-    /// The values do not fit, or the flash does not hold what was written to it.
+    /// The values do not fit, or the flash does not hold what was written.
     NotStored,
 }
 
@@ -116,7 +116,7 @@ impl StoreError {
     }
 }
 
-/// Reads what is kept from `range` of the flash, whatever is in it.
+/// Reads the stored values from `range` of the flash, whatever is in it.
 pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Loaded {
     let mut loaded = Loaded {
         kept: Kept::default(),
@@ -144,7 +144,7 @@ pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Loaded {
 /// Writes what is not stored yet, and reads it back. When it is done the values survive the
 /// loss of power, and the settings are stored twice.
 ///
-/// Defaults are not written; what this firmware does not know is kept.
+/// Defaults are not written; values unknown to this firmware are kept.
 ///
 /// # Errors
 /// Any [`StoreError`]; what was stored before is still there then, or these values are.
@@ -158,7 +158,7 @@ pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, kept: &Kept) -> Resul
     Ok(())
 }
 
-/// Leaves nothing in the flash but these values: not what this firmware does not know, and no earlier
+/// Leaves nothing in the flash but these values: no values unknown to this firmware, and no earlier
 /// save either.
 ///
 /// # Errors

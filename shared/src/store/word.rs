@@ -1,4 +1,4 @@
-//! Words, of which sets are made, and what seals a set.
+//! The words of sets, and the seal of a set.
 
 use embedded_storage::nor_flash::NorFlash;
 

@@ -29,7 +29,7 @@ pub(crate) const READINGS_AT_WORD: usize = 0x3c / 4;
 /// Takes the interrupt's request back. Both sequences have the same length.
 #[inline(always)]
 pub(crate) fn acknowledge(converters: &[Adc; 2]) {
-    // What is written as 1 stays as it is.
+    // Bits written as 1 stay as they are.
     let mut others = Sr(!0);
     others.set_jeoc(false);
     converters[0].sr().write_value(others);

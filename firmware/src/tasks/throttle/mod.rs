@@ -70,7 +70,7 @@ impl Reach for Port {
     }
 }
 
-/// Looks at the wire, at least this often: what is lost is noticed, and set-points are renewed.
+/// Longest time between two looks at the wire, which notice a lost signal and renew set-points.
 const RENEWAL_US: u32 = 1000;
 
 /// When the edges that follow a first one are looked at where no frame is known to come, twice.
@@ -285,7 +285,7 @@ impl Listener {
         asked
     }
 
-    /// Gives the interrupt what it is to do.
+    /// Gives the interrupt its set-point.
     fn renew(&mut self, setpoint: Setpoint) {
         self.setpoint.write(setpoint);
         throttle_lives();
@@ -308,7 +308,7 @@ impl Listener {
         }
         if let Some(event) = &looks.unheard {
             let setpoint = self.port.reach(|throttle| {
-                // What it asks for is being sent.
+                // The answer to its request is being sent.
                 let _ = throttle.hear(now_us(), event);
                 throttle.setpoint()
             });

@@ -50,7 +50,7 @@ impl Commands {
         }
     }
 
-    /// CONFIGURE_ACTUATOR: what DShot's commands do by the wire, and storing it. The ACK follows when
+    /// CONFIGURE_ACTUATOR: does and stores the same as DShot's commands. The ACK follows when
     /// it has been stored.
     pub(super) fn configure(
         &mut self,

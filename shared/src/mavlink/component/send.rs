@@ -23,7 +23,7 @@ const FILE: (u32, u8) = (
 );
 
 impl Component {
-    /// Sends what waits and what is due, each frame by one call of `send`. To be called every
+    /// Sends all that waits or is due, each frame by one call of `send`. To be called every
     /// millisecond or so.
     ///
     /// Never inlined: its stack is free for what the caller does next.

@@ -1,4 +1,4 @@
-//! An answer: what it says, and the message's payload.
+//! An answer: its contents, and the message's payload.
 
 use super::files::{Entry, View};
 use super::server::Server;
@@ -50,7 +50,7 @@ pub(in crate::mavlink) struct Answer {
     pub(super) sequence: u16,
     pub(super) session: u8,
     pub(super) request: u8,
-    /// As asked for: clients know by it what a refusal is of.
+    /// The opcode of the request: clients need it to match a refusal.
     pub(super) offset: u32,
     pub(super) content: Content,
 }

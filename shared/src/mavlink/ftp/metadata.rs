@@ -12,7 +12,7 @@ const COMPONENT_INFORMATION_ID: u32 = 395;
 
 /// Without a component: it is the one that tells it.
 const GENERAL_URI: &str = "mftp:///general.json.xz";
-/// The URI and what is before it in the longer message; only zeros follow.
+/// The URI and the fields before it in the longer message; only zeros follow.
 const PAYLOAD_LEN: usize = 12 + GENERAL_URI.len();
 
 /// Returns true if [`metadata`] makes the message of this id.

@@ -1,4 +1,4 @@
-//! Who reads what: one session.
+//! The reader's session: there is one.
 
 use super::answer::{Answer, Content, DATA_MAX, Error};
 use super::files::{Entry, File, View};
@@ -253,7 +253,7 @@ impl Server {
     }
 
     /// The bytes of a file that an answer asks for. Those of a file that has changed since it was
-    /// opened are refused and its session is over, so that what someone has read is of one moment.
+    /// opened are refused and its session is over, so that a file that was read is of one moment.
     pub(super) fn read(
         &mut self,
         (reader, number): (Address, u8),

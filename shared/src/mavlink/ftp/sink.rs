@@ -2,7 +2,7 @@
 
 use crate::checksum::checksum;
 
-/// Keeps of what is put into it what there is room for, from an offset on, and measures the whole.
+/// Keeps the bytes that fit, from an offset on, and measures the whole.
 #[derive(Debug, Default)]
 pub(super) struct Sink<'a> {
     skip: usize,
@@ -14,7 +14,7 @@ pub(super) struct Sink<'a> {
 }
 
 impl<'a> Sink<'a> {
-    /// `room` for what is put in from `skip` bytes on.
+    /// `room` for the bytes from `skip` on.
     pub(super) fn new(skip: usize, room: &'a mut [u8]) -> Self {
         Self {
             skip,

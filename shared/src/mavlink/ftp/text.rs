@@ -4,7 +4,7 @@ use super::files::View;
 use super::sink::Sink;
 use crate::drive::Fault;
 
-/// `@SYS/faults.txt`: what has gone wrong, and what holds the bridge off.
+/// `@SYS/faults.txt`: past faults, and those that hold the bridge off.
 pub(super) fn faults(view: &View, sink: &mut Sink) {
     sink.put(b"Faults since the start: ");
     decimal(view.telemetry.fault_count, sink);

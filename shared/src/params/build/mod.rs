@@ -230,7 +230,7 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
     Ok(config)
 }
 
-/// Refuses what is wrong whatever the coefficients are.
+/// Refuses values that are wrong whatever the coefficients are.
 fn refuse_contradictions(p: &Si) {
     let get = |id| p.get(id);
     let unit_v = p.scale.voltage_v;

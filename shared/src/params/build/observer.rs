@@ -26,7 +26,7 @@ const OMEGA_MIN_RAD_S: f32 = 60.0;
 /// Least and greatest ω_n of the loop, 1/s.
 const OMEGA_N_RAD_S: [f32; 2] = [150.0, 1000.0];
 
-/// Corner of what is added to the loop's integrator for the speed, 1/s.
+/// Corner of the speed's part above the loop's integrator, 1/s.
 const SMOOTHING_RAD_S: f32 = 300.0;
 
 /// Flux of a unit of current, in units of flux: with up to a unit and a half of current the stator's
