@@ -4,24 +4,21 @@
 
 use core::mem;
 
-use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, Exten, SampleTime};
-use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
-use embassy_stm32::opamp::{OpAmp, OpAmpGain, OpAmpSpeed};
-use embassy_stm32::pac::opamp::vals::PgaGain;
+use embassy_stm32::pac::adc::vals::SampleTime;
 use embassy_stm32::peripherals::{
     DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, IWDG, PA15, PB3, PB4, PB6, TIM1,
     TIM2, TIM3, USART1, USART2,
 };
-use embassy_stm32::timer::complementary_pwm::ComplementaryPwmPin;
 use embassy_stm32::timer::input_capture::CapturePin;
-use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
 use embassy_stm32::usart::{self, Uart, UartTx};
-use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
+use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc};
 use siskin_control::units::AdcCounts;
 
-use crate::chip::{self, comparators};
+use crate::chip::pins::{self, Pin, Use};
+use crate::chip::{self, comparators, converters, op_amps};
 use crate::circuit::b_g431b_esc1::{
     BIAS_V, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT, ZERO_COUNTS,
 };
@@ -49,7 +46,7 @@ pub(crate) const GATE_DRIVER: Option<Pins> = None;
 /// The phases, from 0, on the timer's channels 1, 2, 3.
 pub(crate) const PHASES: [usize; 3] = [0, 1, 2];
 
-/// The order of the sequences in [`Hardware::claim`].
+/// The order of [`FIRST`] and [`SECOND`].
 pub(crate) const WIRING: Wiring = Wiring {
     currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), Some(Slot(0, 1))],
     zero: ZERO_COUNTS,
@@ -59,6 +56,43 @@ pub(crate) const WIRING: Wiring = Wiring {
     bus: Slot(0, 3),
     hall: Some(6),
 };
+
+/// The pins that stay as they are. The analogue ones need nothing, the op-amps' inverting inputs PA3, PA5
+/// and PB2 among them: the board brings them the shunts' grounds.
+const PINS: [Pin; 10] = [
+    (pac::GPIOA, 8, Use::Gate(6)),
+    (pac::GPIOC, 13, Use::Gate(4)),
+    (pac::GPIOA, 9, Use::Gate(6)),
+    (pac::GPIOA, 12, Use::Gate(6)),
+    (pac::GPIOA, 10, Use::Gate(6)),
+    (pac::GPIOB, 15, Use::Gate(4)),
+    // Low, it is the ground of the terminals' dividers.
+    (pac::GPIOB, 5, Use::Low),
+    // Hall sensors have open collectors; without sensors the pulls read 7. The telemetry may take the
+    // first one's.
+    (pac::GPIOB, 6, Use::PulledUp),
+    (pac::GPIOB, 7, Use::PulledUp),
+    (pac::GPIOB, 8, Use::PulledUp),
+];
+
+/// The first converter's channels: op-amp 1 inside the chip, op-amp 3 at PB1, PB11, PA0. The supply's
+/// divider at PA0 has 16 kΩ and is sampled longer than the terminals' with 1.8 kΩ.
+const FIRST: [(u8, SampleTime); 4] = [
+    (13, SampleTime::CYCLES12_5),
+    (12, SampleTime::CYCLES12_5),
+    (14, SampleTime::CYCLES24_5),
+    (1, SampleTime::CYCLES47_5),
+];
+
+/// The second converter's: op-amp 2 inside the chip, PA4, PC4.
+const SECOND: [(u8, SampleTime); 3] = [
+    (16, SampleTime::CYCLES12_5),
+    (17, SampleTime::CYCLES24_5),
+    (5, SampleTime::CYCLES24_5),
+];
+
+/// The first converter's channel of the thermistor, PB14.
+const THERMISTOR: u8 = 5;
 
 /// The comparators' view: they are at the op-amps' inputs.
 const TRIP: TripCircuit = TripCircuit {
@@ -198,12 +232,15 @@ impl Mavlink {
     /// Opens it at a rate that the table of parameters allows.
     pub fn open(self, baud: u32) -> Uart<'static, Async> {
         let mut config = usart::Config::default();
-        config.baudrate = baud;
+        config.baudrate = chip::told_hz(baud);
         let ((rx, tx), (out, into)) = (self.pins, self.dma);
         Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
             .expect("the table's range can be had of 170 MHz")
     }
 }
+
+/// The KISS telemetry's rate.
+const KISS_HZ: u32 = 115_200;
 
 /// The KISS telemetry, on the pin of Hall sensor a.
 pub struct Kiss {
@@ -215,7 +252,8 @@ pub struct Kiss {
 impl Kiss {
     /// Takes the pin from the Hall sensor: for a motor without sensors.
     pub fn open(self) -> UartTx<'static, Async> {
-        let config = usart::Config::default();
+        let mut config = usart::Config::default();
+        config.baudrate = chip::told_hz(KISS_HZ);
         UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
             .expect("115200 baud can be had of 170 MHz")
     }
@@ -223,7 +261,7 @@ impl Kiss {
 
 /// The board's temperature.
 pub struct Temperature {
-    reading: chip::Reading,
+    reading: converters::Reading,
 }
 
 impl Temperature {
@@ -269,84 +307,17 @@ impl Hardware {
         comparators::set_up(TRIP.level(RATING_A));
         chip::break_on_lock_up();
 
-        // The pull keeps the gates off while nothing drives the pin.
-        let gate = PwmPinConfig {
-            output_type: OutputType::PushPull,
-            speed: Speed::VeryHigh,
-            pull: Pull::Down,
-        };
-        // A dropped pin would be given back: these stay the timer's for ever.
-        mem::forget((
-            PwmPin::<TIM1, _>::new_with_config(p.PA8, gate),
-            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PC13, gate),
-            PwmPin::<TIM1, _>::new_with_config(p.PA9, gate),
-            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PA12, gate),
-            PwmPin::<TIM1, _>::new_with_config(p.PA10, gate),
-            ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB15, gate),
-        ));
-
-        let fast = OpAmpSpeed::HighSpeed;
-        let mut a = OpAmp::new(p.OPAMP1, fast);
-        let mut b = OpAmp::new(p.OPAMP2, fast);
-        let mut c = OpAmp::new(p.OPAMP3, fast);
-        let a = a.pga_int(p.PA1, OpAmpGain::Mul16).degrade_adc();
-        let b = b.pga_int(p.PA7, OpAmpGain::Mul16).degrade_adc();
-        // This one's internal way leads to the second converter, which has b at that time.
-        let mut c_out = p.PB1;
-        c.pga_ext(p.PB0, c_out.reborrow(), OpAmpGain::Mul16);
-        let c = c_out.degrade_adc();
-        // They amplify from the shunts' grounds, which the board brings to PA3, PA5 and PB2 (inverting
-        // input 0, analogue since the reset), and not from the chip's: the HAL has no name for it. And a
-        // dropped output turns its op-amp off, and `degrade_adc` drops what it is given (embassy-stm32
-        // 0.6).
-        for amplifier in [pac::OPAMP1, pac::OPAMP2, pac::OPAMP3] {
-            amplifier.csr().modify(|w| {
-                w.set_pga_gain(PgaGain::GAIN16_INPUT_VINM0);
-                w.set_opampen(true);
-            });
-        }
-
-        // Low, it is the ground of the terminals' dividers. A dropped pin would be given back.
-        mem::forget(Output::new(p.PB5, Level::Low, Speed::Low));
-
-        // The supply's divider has 16 kΩ and is sampled longer than the terminals' with 1.8 kΩ.
-        let first = [
-            (a, SampleTime::CYCLES12_5),
-            (c, SampleTime::CYCLES12_5),
-            (p.PB11.degrade_adc(), SampleTime::CYCLES24_5),
-            (p.PA0.degrade_adc(), SampleTime::CYCLES47_5),
-        ];
-        let second = [
-            (b, SampleTime::CYCLES12_5),
-            (p.PA4.degrade_adc(), SampleTime::CYCLES24_5),
-            (p.PC4.degrade_adc(), SampleTime::CYCLES24_5),
-        ];
-        let mut hall_a = p.PB6;
-        // Open collectors; without sensors the pulls read 7. The telemetry may take this one.
-        mem::forget(Input::new(hall_a.reborrow(), Pull::Up));
-        let thermistor = p.PB14.degrade_adc();
-        let converter = Adc::new(p.ADC1, AdcConfig::default());
+        pins::set_up(&PINS);
+        // The third one's internal way leads to the second converter, which has b at that time.
+        op_amps::amplify_by_16(pac::OPAMP1, true);
+        op_amps::amplify_by_16(pac::OPAMP2, true);
+        op_amps::amplify_by_16(pac::OPAMP3, false);
+        converters::switch_on();
         let temperature = Temperature {
-            reading: chip::Reading::new(&converter, thermistor.get_hw_channel()),
+            reading: converters::Reading::new(THERMISTOR),
         };
-        // Dropped converters would stop, and dropped pins be given back. Hall sensor a's is also the
-        // KISS telemetry's.
-        mem::forget((
-            Adc::new(p.ADC2, AdcConfig::default()).setup_injected_conversions(
-                second,
-                triggers::TIM1_TRGO,
-                Exten::RISING_EDGE,
-                false,
-            ),
-            converter.setup_injected_conversions(
-                first,
-                triggers::TIM1_TRGO,
-                Exten::RISING_EDGE,
-                true,
-            ),
-            Input::new(p.PB7, Pull::Up),
-            Input::new(p.PB8, Pull::Up),
-        ));
+        converters::convert(pac::ADC2, &SECOND, false);
+        converters::convert(pac::ADC1, &FIRST, true);
         Self {
             bridge: Bridge { _timer: p.TIM1 },
             converters: Converters { _private: () },
@@ -365,7 +336,7 @@ impl Hardware {
             },
             kiss: Kiss {
                 uart: p.USART1,
-                pin: hall_a,
+                pin: p.PB6,
                 dma: p.DMA1_CH3,
             },
             flash: Storage::new(p.FLASH),

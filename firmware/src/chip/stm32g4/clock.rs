@@ -1,0 +1,79 @@
+//! The clock: 170 MHz from the internal 16 MHz, since sources disagree on the crystal's frequency.
+//!
+//! The HAL starts the chip by that oscillator and is not told of the rest: its own way to 170 MHz takes
+//! 1.5 KB and leaves the core's supply behind (see [`R1MODE`]). What reckons with the HAL's clock are the
+//! time's timer, which is seen to here, and the serial lines, whose rates are told as [`told_hz`] has them.
+
+use embassy_stm32::pac::flash::vals::Latency;
+use embassy_stm32::pac::pwr::regs::Cr5;
+use embassy_stm32::pac::rcc::vals::Pllsrc;
+use embassy_stm32::pac::timer::vals::Urs;
+use embassy_stm32::pac::{FLASH, PWR, RCC, TIM4};
+use embassy_stm32::rcc::mux::{Adcsel, Uartsel, Usart1sel};
+use embassy_stm32::rcc::{AHBPrescaler, PllMul, PllPreDiv, PllRDiv, Sysclk};
+use embassy_stm32::{Config, Peripherals};
+use embassy_time::TICK_HZ;
+
+use super::TIMER_HZ;
+
+/// The HAL's clock.
+const TOLD_HZ: u32 = 16_000_000;
+
+/// Bit of PWR_CR5 that takes the core out of the boost which more than 150 MHz need (RM0440, 6.4.5).
+/// The HAL's register has it at bit 0, which is none.
+const R1MODE: u32 = 1 << 8;
+
+/// Starts the chip: processor, buses, serial lines and converters have [`TIMER_HZ`].
+pub(crate) fn start() -> Peripherals {
+    let mut config = Config::default();
+    config.rcc.hsi48 = None;
+    config.rcc.mux.adc12sel = Adcsel::SYS;
+    config.rcc.mux.usart1sel = Usart1sel::SYS;
+    config.rcc.mux.usart2sel = Uartsel::SYS;
+    let peripherals = embassy_stm32::init(config);
+    speed_up();
+    // The time's timer counts on at its rate.
+    TIM4.psc()
+        .write_value((TIMER_HZ / TICK_HZ as u32 - 1) as u16);
+    TIM4.cr1().modify(|w| w.set_urs(Urs::COUNTER_ONLY));
+    TIM4.egr().write(|w| w.set_ug(true));
+    TIM4.cr1().modify(|w| w.set_urs(Urs::ANY_EVENT));
+    peripherals
+}
+
+/// Above 150 MHz the core's supply wants to be boosted, and to see half of the clock for 1 µs (RM0440,
+/// 6.1.5).
+fn speed_up() {
+    let supply = PWR.cr5();
+    supply.write_value(Cr5(supply.read().0 & !R1MODE));
+    RCC.pllcfgr().write(|w| {
+        w.set_pllsrc(Pllsrc::HSI);
+        w.set_pllm(PllPreDiv::DIV4);
+        w.set_plln(PllMul::MUL85);
+        w.set_pllr(PllRDiv::DIV2);
+        w.set_pllren(true);
+    });
+    RCC.cr().modify(|w| w.set_pllon(true));
+    while !RCC.cr().read().pllrdy() {}
+    // Most of the program stands in the flash, which has four wait states and a small cache.
+    FLASH.acr().modify(|w| {
+        w.set_latency(Latency::WS4);
+        w.set_prften(true);
+    });
+    while FLASH.acr().read().latency() != Latency::WS4 {}
+    RCC.cfgr().modify(|w| {
+        w.set_hpre(AHBPrescaler::DIV2);
+        w.set_sw(Sysclk::PLL1_R);
+    });
+    while RCC.cfgr().read().sws() != Sysclk::PLL1_R {}
+    // 1 µs of 85 MHz.
+    cortex_m::asm::delay(85);
+    RCC.cfgr().modify(|w| w.set_hpre(AHBPrescaler::DIV1));
+}
+
+/// What the HAL is to be told of a serial line's rate: it divides its own clock by it.
+pub(crate) const fn told_hz(rate_hz: u32) -> u32 {
+    // The rates end below 1 MHz.
+    let mega = TIMER_HZ / 1_000_000;
+    (rate_hz * (TOLD_HZ / 1_000_000) + mega / 2) / mega
+}
