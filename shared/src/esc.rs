@@ -9,7 +9,7 @@ use crate::drive::{Config, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
 use crate::mavlink::{Component, Context, Frame, Request, Warning};
-use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build};
+use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale};
 use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Reach, Reached, Throttle, Told};
@@ -100,10 +100,12 @@ impl Given {
 }
 
 /// Checks that parameters make a drive. Never inlined: a configuration takes 0.9 KB of stack.
+///
+/// # Errors
+/// The parameter that does not fit the board.
 #[inline(never)]
-fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
-    build(params, board)?;
-    Ok(())
+pub fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
+    build_in(params, board, &mut Config::default())
 }
 
 impl Esc {
@@ -120,19 +122,17 @@ impl Esc {
         tick_hz: u32,
         link_bytes_per_s: u32,
     ) -> Result<(Self, Throttle), BuildError> {
-        let config = build(&params, &board)?;
-        let throttle = Throttle::new(tick_hz, &params, &board, &config);
-        let esc = Self::with_scale(params, board, config.scale, link_bytes_per_s);
-        Ok((esc, throttle))
+        check(&params, &board)?;
+        let throttle = Throttle::new(tick_hz, &params, &board);
+        Ok((Self::unchecked(params, board, link_bytes_per_s), throttle))
     }
 
-    /// An ESC at power-up, without its throttle, whose parameters have made a configuration of this
-    /// scale.
+    /// An ESC at power-up, without its throttle, whose parameters fit the board ([`check`]).
     ///
     /// Never inlined: on the chip it is made where it stays, by this and by [`Throttle::new`], since
     /// the two on their way through [`Esc::new`] take 10 KB of stack.
     #[inline(never)]
-    pub fn with_scale(params: Params, board: Board, scale: Scale, link_bytes_per_s: u32) -> Self {
+    pub fn unchecked(params: Params, board: Board, link_bytes_per_s: u32) -> Self {
         Self {
             board,
             given: Given {
@@ -140,7 +140,7 @@ impl Esc {
                 pwm_deadtime_ns: params.get(ParamId::PwmDeadtimeNs),
                 opposite: false,
             },
-            scale,
+            scale: scale(&params, &board),
             component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),
@@ -165,6 +165,14 @@ impl Esc {
     /// Never with the parameters in force, which have been tried before.
     pub fn config(&self) -> Result<Config, BuildError> {
         build(&self.given.running(&self.params), &self.board)
+    }
+
+    /// As [`Esc::config`], in a place that the caller has for it.
+    ///
+    /// # Errors
+    /// As [`Esc::config`].
+    pub fn config_in(&self, place: &mut Config) -> Result<(), BuildError> {
+        build_in(&self.given.running(&self.params), &self.board, place)
     }
 
     /// The parameters in force.
@@ -357,11 +365,9 @@ impl Esc {
     }
 
     fn apply(&mut self, throttle: &mut impl Reach) {
-        // Each change has been validated: the old configuration stays where it cannot be built.
-        if let Ok(config) = self.config() {
-            self.scale = config.scale;
-            throttle.reach(|throttle| throttle.adopt(&self.params, &config));
-        }
+        // Each change has been validated: a drive can be made of it.
+        self.scale = scale(&self.given.running(&self.params), &self.board);
+        throttle.reach(|throttle| throttle.adopt(&self.params, self.scale));
         self.tell_info(throttle);
     }
 

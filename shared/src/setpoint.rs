@@ -1,12 +1,12 @@
 //! From the command to the motor to the drive's set-point.
 
-use crate::drive::{Config, Setpoint, tone};
+use crate::drive::{Setpoint, tone};
 use crate::input::authority::Command;
 use crate::input::{Share, reverse};
 use crate::math::{Real, TopProduct};
-use crate::params::{ParamId, Params};
+use crate::params::{self, ParamId, Params};
 use crate::tune::Note;
-use crate::units::{Current, Speed};
+use crate::units::{Current, Scale, Speed};
 
 /// The mapping of throttle, by `CTL_MODE`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +28,7 @@ enum Mode {
 
 impl Mapping {
     /// The mapping that the parameters ask for.
-    pub fn new(params: &Params, config: &Config) -> Self {
-        let scale = &config.scale;
+    pub fn new(params: &Params, scale: &Scale) -> Self {
         let full = scale.current_from_a(params.get(ParamId::LimPhaseA));
         let speed = |id| scale.speed_from_rpm(params.get(id));
         let least = speed(ParamId::CtlRpmMin);
@@ -43,7 +42,7 @@ impl Mapping {
                 _ => Mode::Voltage,
             },
             period_s: scale.period_s,
-            test_full: config.test_current,
+            test_full: params::test_current(params, scale),
         }
     }
 
@@ -100,14 +99,13 @@ fn share_of(throttle: Share, full: Current) -> Current {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::{Board, build};
-    use crate::units::Scale;
+    use crate::params::{Board, scale};
 
     fn mapping(mode: f32) -> (Mapping, Scale) {
         let mut params = Params::default();
         params.set(ParamId::CtlMode, mode).expect("in range");
-        let config = build(&params, &Board::BENCH).expect("the defaults fit");
-        (Mapping::new(&params, &config), config.scale)
+        let scale = scale(&params, &Board::BENCH);
+        (Mapping::new(&params, &scale), scale)
     }
 
     fn rpm(throttle: f64) -> f32 {
@@ -178,8 +176,7 @@ mod tests {
             let mut params = Params::default();
             params.set(ParamId::PwmFreqHz, pwm_hz).expect("in range");
             params.set(ParamId::CtlRpmMax, 4000.0).expect("in range");
-            let config = build(&params, &Board::BENCH).expect("they fit the bench");
-            let mapping = Mapping::new(&params, &config);
+            let mapping = Mapping::new(&params, &scale(&params, &Board::BENCH));
             let Setpoint::Tone(pitch) = mapping.tone(Note::Pitch { hz }) else {
                 panic!("a note");
             };
@@ -193,8 +190,7 @@ mod tests {
                 .set(ParamId::PwmFreqHz, f32::from(pwm_hz))
                 .expect("in range");
             params.set(ParamId::CtlRpmMax, 4000.0).expect("in range");
-            let config = build(&params, &Board::BENCH).expect("they fit the bench");
-            let mapping = Mapping::new(&params, &config);
+            let mapping = Mapping::new(&params, &scale(&params, &Board::BENCH));
             for (hz, octaves) in [(pwm_hz / 8, 1.0), (pwm_hz / 8 + 1, 0.5)] {
                 let Setpoint::Tone(pitch) = mapping.tone(Note::Pitch { hz }) else {
                     panic!("a note");

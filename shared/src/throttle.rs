@@ -11,17 +11,18 @@ use heapless::Deque;
 
 use crate::answer::info;
 use crate::answer::{self, Answer, Answers, Ask, Basis, Reply, Serial};
-use crate::drive::{Config, Fault, Pull, Setpoint, Snapshot};
+use crate::drive::{Fault, Pull, Setpoint, Snapshot};
 use crate::input::access::Access;
 use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
 use crate::input::command::Order;
 use crate::input::line::Event;
 use crate::input::signal::Signal;
 use crate::input::{Heard, Input, News};
-use crate::params::{self, Board, Params};
+use crate::params::{self, Board, Params, scale};
 use crate::setpoint::Mapping;
 use crate::telemetry::Telemetry;
 use crate::tune::Note;
+use crate::units::Scale;
 
 /// A throttle wire, the answers on it, and its demands on the drive.
 pub struct Throttle {
@@ -78,15 +79,15 @@ impl Reach for Throttle {
 }
 
 impl Throttle {
-    /// A quiet wire at power-up, captured by a timer of `tick_hz`, with the configuration that these
-    /// parameters make of this board.
+    /// A quiet wire at power-up, captured by a timer of `tick_hz`, with these parameters of this board.
     #[inline(never)]
-    pub fn new(tick_hz: u32, params: &Params, board: &Board, config: &Config) -> Self {
+    pub fn new(tick_hz: u32, params: &Params, board: &Board) -> Self {
+        let scale = scale(params, board);
         Self {
             input: Input::new(tick_hz, params::input(params)),
             answers: Answers::new(tick_hz),
-            mapping: Mapping::new(params, config),
-            basis: Basis::new(config),
+            mapping: Mapping::new(params, &scale),
+            basis: Basis::new(params, scale),
             telemetry: Telemetry::new(),
             info: info::info(params, false, &board.image),
             told: Told::default(),
@@ -253,9 +254,9 @@ impl Throttle {
     }
 
     /// Goes on with other parameters.
-    pub(crate) fn adopt(&mut self, params: &Params, config: &Config) {
-        self.mapping = Mapping::new(params, config);
-        self.basis = Basis::new(config);
+    pub(crate) fn adopt(&mut self, params: &Params, scale: Scale) {
+        self.mapping = Mapping::new(params, &scale);
+        self.basis = Basis::new(params, scale);
         self.input.set(params::input(params));
     }
 

@@ -132,7 +132,7 @@ pub type Duty = fixed::types::U1F31;
 /// The bases are chosen so that Clarke's transform is two integer products (one unit of current is
 /// 4096/3 counts), and so that the motor's flux is the same number for every motor: the voltage
 /// base is π·φ/(2·T_s), which makes ξ = 1/4 and ψ = 2/π.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scale {
     /// The control period T_s, s.
     pub period_s: f32,

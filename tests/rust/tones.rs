@@ -71,7 +71,7 @@ impl Stage {
         let board = bench.sensing.board(bench.delay);
         let config = build(&believed, &board).expect("the parameters fit the bench");
         Self {
-            mapping: Mapping::new(&believed, &config),
+            mapping: Mapping::new(&believed, &config.scale),
             pole_pairs: f64::from(bench.motor.pole_pairs),
             angle_turns: bench.initial_angle_turns,
             rig: Rig::new(bench, config),

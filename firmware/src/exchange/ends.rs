@@ -61,21 +61,21 @@ pub struct InterruptEnd {
 }
 
 impl InterruptEnd {
-    /// Puts the first configuration into use.
-    pub(crate) fn begin(self, config: Config) -> RunningEnd {
+    /// Puts the first configuration into use: what `make` makes of its place.
+    pub fn begin(self, make: impl FnOnce(&mut Config)) -> RunningEnd {
         RunningEnd {
             word: 0,
             setpoint: Setpoint::Stop,
             age_periods: 0,
             stale_periods: self.stale_periods,
             snapshot: self.snapshot,
-            config: CONFIG.begin(self.config, config),
+            config: CONFIG.begin(self.config, make),
         }
     }
 }
 
 /// The interrupt's end.
-pub(crate) struct RunningEnd {
+pub struct RunningEnd {
     /// The last word, and the set-point that it holds.
     word: u32,
     setpoint: Setpoint,
@@ -166,21 +166,12 @@ pub struct ConfigWriter {
 }
 
 impl ConfigWriter {
-    /// Offers a configuration, which the interrupt adopts as a whole at its next period.
-    ///
-    /// # Errors
-    /// The one before has not been adopted yet: this one comes back.
-    #[expect(
-        clippy::result_large_err,
-        reason = "what comes back is what was given, to be offered again"
-    )]
-    pub fn offer(&mut self, config: Config) -> Result<(), Config> {
-        match CONFIG.free(&mut self.hand) {
-            None => Err(config),
-            Some(free) => {
-                free.offer(config);
-                Ok(())
-            }
-        }
+    /// Offers the configuration that `make` puts where it stays, if it says that it has; the interrupt
+    /// adopts it as a whole at its next period. False where nothing is offered, as while the one before
+    /// has not been adopted yet.
+    pub fn offer(&mut self, make: impl FnOnce(&mut Config) -> bool) -> bool {
+        CONFIG
+            .free(&mut self.hand)
+            .is_some_and(|free| free.offer(make))
     }
 }

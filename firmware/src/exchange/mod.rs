@@ -31,6 +31,6 @@ mod ends;
 #[cfg(board)]
 pub(crate) use cell::InterruptCell;
 #[cfg(board)]
-pub(crate) use ends::RunningEnd;
-#[cfg(board)]
-pub use ends::{ConfigWriter, Ends, InterruptEnd, SetpointWriter, SnapshotReader, open};
+pub use ends::{
+    ConfigWriter, Ends, InterruptEnd, RunningEnd, SetpointWriter, SnapshotReader, open,
+};

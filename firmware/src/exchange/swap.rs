@@ -3,7 +3,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::sync::{AtomicU8, Ordering, UnsafeCell, write};
+use super::sync::{AtomicU8, Ordering, UnsafeCell, with_mut};
 
 /// No offer: the slot that is not in use is the task's.
 const QUIET: u8 = 0;
@@ -34,6 +34,28 @@ pub(crate) struct User {
     used: usize,
 }
 
+impl<T: Default> Swap<T> {
+    /// Puts the first value into use: what `make` makes of the slot.
+    pub(crate) fn begin(&self, _hand: Beginner, make: impl FnOnce(&mut T)) -> User {
+        let user = User { used: 0 };
+        // SAFETY: the slot in use is the user's.
+        unsafe { fill(&self.slots[user.used], make) };
+        user
+    }
+}
+
+/// Puts a default into a slot, and has `make` change it there: a copy would take much of a stack.
+///
+/// # Safety
+/// Nobody else may reach the slot meanwhile.
+unsafe fn fill<T: Default, R>(
+    slot: &UnsafeCell<MaybeUninit<T>>,
+    make: impl FnOnce(&mut T) -> R,
+) -> R {
+    // SAFETY: the caller sees to it.
+    unsafe { with_mut(slot, |place| make(place.write(T::default()))) }
+}
+
 impl<T> Swap<T> {
     /// Two empty slots.
     #[cfg(not(test))]
@@ -59,14 +81,6 @@ impl<T> Swap<T> {
     /// To be called once for these slots.
     pub(crate) unsafe fn hands() -> (Offerer, Beginner) {
         (Offerer { free: 1 }, Beginner(()))
-    }
-
-    /// Puts the first value into use.
-    pub(crate) fn begin(&self, _hand: Beginner, value: T) -> User {
-        let user = User { used: 0 };
-        // SAFETY: the slot in use is the user's.
-        unsafe { write(&self.slots[user.used], MaybeUninit::new(value)) };
-        user
     }
 
     /// The way to offer a value, or `None` while one before it waits.
@@ -117,15 +131,17 @@ pub(crate) struct Free<'a, T> {
     hand: &'a mut Offerer,
 }
 
-impl<T> Free<'_, T> {
-    /// Offers a value.
-    #[inline(always)]
-    pub(crate) fn offer(self, value: T) {
+impl<T: Default> Free<'_, T> {
+    /// Offers what `make` puts into the slot, if it says that it has; whether it did.
+    pub(crate) fn offer(self, make: impl FnOnce(&mut T) -> bool) -> bool {
         let slot = &self.swap.slots[self.hand.free & 1];
         // SAFETY: without an offer the slot that is not in use is the offerer's.
-        unsafe { write(slot, MaybeUninit::new(value)) };
-        self.hand.free ^= 1;
-        self.swap.state.store(OFFERED, Ordering::Release);
+        let made = unsafe { fill(slot, make) };
+        if made {
+            self.hand.free ^= 1;
+            self.swap.state.store(OFFERED, Ordering::Release);
+        }
+        made
     }
 }
 
@@ -159,20 +175,21 @@ mod tests {
     }
 
     /// Offers the value; false if it could not be offered.
-    fn offer<T>(swap: &Swap<T>, hand: &mut Offerer, value: T) -> bool {
-        let free = swap.free(hand);
-        let is_free = free.is_some();
-        if let Some(free) = free {
-            free.offer(value);
+    fn offer<T: Default>(swap: &Swap<T>, hand: &mut Offerer, value: T) -> bool {
+        if let Some(free) = swap.free(hand) {
+            return free.offer(|slot| {
+                *slot = value;
+                true
+            });
         }
-        is_free
+        false
     }
 
     fn offer_twice(pauses: bool) -> (bool, [u32; 3]) {
         let swap = Arc::new(Swap::new());
         // SAFETY: once for these slots.
         let (mut offerer, beginner) = unsafe { Swap::<[u32; 2]>::hands() };
-        let mut user = swap.begin(beginner, [0, !0]);
+        let mut user = swap.begin(beginner, |slot| *slot = [0, !0]);
         let theirs = Arc::clone(&swap);
         let interrupt = thread::spawn(move || {
             [(); 3].map(|()| {
@@ -201,7 +218,7 @@ mod tests {
             let swap = Swap::new();
             // SAFETY: once for these slots.
             let (mut offerer, beginner) = unsafe { Swap::<u32>::hands() };
-            let mut user = swap.begin(beginner, 0);
+            let mut user = swap.begin(beginner, |slot| *slot = 0);
             assert!(offer(&swap, &mut offerer, 1));
             assert!(!offer(&swap, &mut offerer, 2));
             swap.adopt(&mut user, |_, _| {});

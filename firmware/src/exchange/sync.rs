@@ -28,6 +28,21 @@ pub(super) unsafe fn write<T>(cell: &UnsafeCell<T>, value: T) {
     cell.with_mut(|place| unsafe { *place = value });
 }
 
+/// Works on a cell's content.
+///
+/// # Safety
+/// Nobody else is at it.
+#[inline(always)]
+pub(super) unsafe fn with_mut<T, R>(cell: &UnsafeCell<T>, work: impl FnOnce(&mut T) -> R) -> R {
+    #[cfg(not(test))]
+    // SAFETY: as the caller promises.
+    let result = work(unsafe { &mut *cell.get() });
+    #[cfg(test)]
+    // SAFETY: as the caller promises; loom checks it.
+    let result = cell.with_mut(|place| work(unsafe { &mut *place }));
+    result
+}
+
 /// A copy of a cell's content.
 ///
 /// # Safety

@@ -14,7 +14,7 @@ use super::sample::sample;
 use super::timing::Timing;
 use crate::board::TIMER_HZ;
 use crate::chip;
-use crate::exchange::{InterruptEnd, RunningEnd};
+use crate::exchange::RunningEnd;
 use crate::last_words::{Failure, fail};
 
 /// True while the flash is being written.
@@ -60,13 +60,13 @@ pub struct Interrupt {
 
 impl Interrupt {
     /// The interrupt at power-up, with the timer set up and all switches off.
-    pub fn new(registers: Registers, config: Config, end: InterruptEnd) -> Self {
+    pub fn new(registers: Registers, end: RunningEnd) -> Self {
         Self {
             registers,
-            pwm: Pwm::new(registers.timer, Timing::new(&config, TIMER_HZ)),
+            pwm: end.with_config(|config| Pwm::new(registers.timer, Timing::new(config, TIMER_HZ))),
             gate_driver: GateDriver::new(registers.gate_driver),
-            state: State::new(&config),
-            end: end.begin(config),
+            state: end.with_config(State::new),
+            end,
             trip: Setpoint::Fault(Fault::OverCurrent),
             overruns: Overruns::default(),
             alarmed: false,

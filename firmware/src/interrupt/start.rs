@@ -4,12 +4,11 @@ use core::cell::UnsafeCell;
 
 use cortex_m::peripheral::{NVIC, SCB};
 use embassy_stm32::interrupt;
-use siskin_control::drive::Config;
 
 use super::period::Interrupt;
 use crate::board;
 use crate::chip;
-use crate::exchange::{InterruptCell, InterruptEnd};
+use crate::exchange::{InterruptCell, RunningEnd};
 use crate::priority;
 
 #[unsafe(link_section = ".control_state")]
@@ -24,19 +23,14 @@ static INTERRUPT: InterruptCell<Interrupt> = InterruptCell::new();
 /// When it is called again.
 // Out of line, here and in the board's `claim`: their stack is given back before the tasks begin.
 #[inline(never)]
-pub fn start(
-    bridge: board::Bridge,
-    converters: board::Converters,
-    config: Config,
-    end: InterruptEnd,
-) {
+pub fn start(bridge: board::Bridge, converters: board::Converters, end: RunningEnd) {
     // SAFETY: the processor's own, of which nothing but what follows uses the vector table's
     // address; embassy has not been given it.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     vectors_in_ram(&mut core.SCB);
     let registers = board::prepare(bridge, converters);
     // SAFETY: the interrupt is not enabled, and this runs in thread mode.
-    let put = unsafe { INTERRUPT.put(|| Interrupt::new(registers, config, end)) };
+    let put = unsafe { INTERRUPT.put(|| Interrupt::new(registers, end)) };
     assert!(put, "the interrupt is started once");
     // SAFETY: as above; the cell is filled.
     critical_section::with(|_| unsafe { INTERRUPT.with(Interrupt::begin) });

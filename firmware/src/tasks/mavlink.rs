@@ -174,10 +174,9 @@ impl Desk {
         if !self.changed {
             return;
         }
+        let esc = &self.esc;
         // It can be built, since it has been before.
-        if let Ok(config) = self.esc.config() {
-            self.changed = self.config.offer(config).is_err();
-        }
+        self.changed = !self.config.offer(|place| esc.config_in(place).is_ok());
     }
 
     /// Has the hardware's trip follow `LIM_PHASE_A`: up before the control does, and down after it.

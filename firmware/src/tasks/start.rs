@@ -2,14 +2,12 @@
 
 use embassy_executor::Spawner;
 use embassy_stm32::uid::uid;
-use siskin_control::drive::Config;
-use siskin_control::esc::Esc;
+use siskin_control::esc::{Esc, check};
 use siskin_control::image::Image;
 use siskin_control::mavlink::{Receiver, Warning};
-use siskin_control::params::{Board, ParamId, Params, build};
+use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::store;
 use siskin_control::throttle::Throttle;
-use siskin_control::units::Scale;
 use static_cell::StaticCell;
 
 use super::health::Health;
@@ -132,8 +130,9 @@ fn power_up(params: &mut Params) -> (&'static mut Esc, Port) {
         ..BOARD
     };
     let raised = params.fit(&board);
-    if let Some((port, scale)) = make_port(params, &board) {
-        let esc = make_esc(params.clone(), board, scale);
+    if check(params, &board).is_ok() {
+        let port = open_port(params, &board);
+        let esc = make_esc(params.clone(), board);
         if raised {
             let mut warning = Warning::new();
             push(&mut warning, "PWM_DEADTIME_NS ");
@@ -145,38 +144,32 @@ fn power_up(params: &mut Params) -> (&'static mut Esc, Port) {
     }
     let mut defaults = Params::default();
     defaults.fit(&board);
-    let (port, scale) = make_port(&defaults, &board).expect("the defaults fit every board");
-    let esc = make_esc(defaults, board, scale);
+    check(&defaults, &board).expect("the defaults fit every board");
+    let port = open_port(&defaults, &board);
+    let esc = make_esc(defaults, board);
     esc.lose_stored();
     warn(esc, "Parameters do not fit the board: defaults in force");
     (esc, port)
 }
 
-/// The throttle, and the scale of the configuration, which takes 0.9 KB and is gone before the ESC is
-/// made.
 #[inline(never)]
-fn make_port(params: &Params, board: &Board) -> Option<(Port, Scale)> {
-    let config = build(params, board);
-    let config = config.as_ref().ok()?;
-    Some((open_port(params, board, config), config.scale))
+fn open_port(params: &Params, board: &Board) -> Port {
+    Port::open(|| Throttle::new(TICK_HZ, params, board))
 }
 
 #[inline(never)]
-fn open_port(params: &Params, board: &Board, config: &Config) -> Port {
-    Port::open(|| Throttle::new(TICK_HZ, params, board, config))
-}
-
-#[inline(never)]
-fn make_esc(params: Params, board: Board, scale: Scale) -> &'static mut Esc {
+fn make_esc(params: Params, board: Board) -> &'static mut Esc {
     static ESC: StaticCell<Esc> = StaticCell::new();
     let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
-    ESC.init_with(|| Esc::with_scale(params, board, scale, bytes_per_s))
+    ESC.init_with(|| Esc::unchecked(params, board, bytes_per_s))
 }
 
 /// The control's interrupt with what the parameters make.
 #[inline(never)]
 fn start_interrupt(esc: &Esc, bridge: Bridge, converters: Converters, end: InterruptEnd) {
-    let config = esc.config().expect("it has been built before");
     interrupt::set_trip(esc.params().get(ParamId::LimPhaseA));
-    interrupt::start(bridge, converters, config, end);
+    let end = end.begin(|place| {
+        esc.config_in(place).expect("it has been built before");
+    });
+    interrupt::start(bridge, converters, end);
 }

@@ -1,6 +1,7 @@
 //! The part of the drive's configuration that answers need.
 
-use crate::drive::{ATTEMPTS, Config, Fault, Snapshot, six_step};
+use crate::drive::{ATTEMPTS, Fault, Snapshot, six_step};
+use crate::params::{self, ParamId, Params};
 use crate::units::{Current, Scale};
 
 /// The little of a [`Config`] that is needed to read a snapshot.
@@ -10,17 +11,17 @@ pub struct Basis {
     pub scale: Scale,
     /// Bound of the current's vector, `LIM_PHASE_A`.
     pub(super) phase: Current,
-    /// As [`Config::lost_periods`].
+    /// As [`Config::lost_periods`](crate::drive::Config::lost_periods).
     pub(super) lost_periods: u32,
 }
 
 impl Basis {
-    /// Of this configuration.
-    pub fn new(config: &Config) -> Self {
+    /// Of the drive that these parameters make, whose units have this scale.
+    pub fn new(params: &Params, scale: Scale) -> Self {
         Self {
-            scale: config.scale,
-            phase: config.protection.phase,
-            lost_periods: config.lost_periods,
+            scale,
+            phase: scale.current_from_a(params.get(ParamId::LimPhaseA)),
+            lost_periods: params::lost_periods(&scale),
         }
     }
 

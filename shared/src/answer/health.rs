@@ -76,7 +76,7 @@ mod tests {
     fn rig() -> (Basis, Snapshot) {
         let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
         let snapshot = State::new(&config).snapshot();
-        (Basis::new(&config), snapshot)
+        (Basis::new(&Params::default(), config.scale), snapshot)
     }
 
     fn status(health: &mut Health) -> Status {

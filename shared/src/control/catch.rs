@@ -44,7 +44,7 @@ const LOOK_SHIFT: u32 = 2;
 const BEGIN: I17F15 = I17F15::lit("6");
 
 /// What the observer must know.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Back-EMF's amplitude that the stated flux gives, in counts of the terminals with 8 fraction
     /// bits, over the speed in turns a period.

@@ -15,7 +15,7 @@ use crate::math::{Gain, SinCos, TopSum};
 use crate::units::Current;
 
 /// What the compensation must know.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Phase current over the least whose sign is certain.
     pub certainty: Gain<Current, I12F20>,

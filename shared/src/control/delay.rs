@@ -3,9 +3,10 @@
 use crate::units::{Angle, Speed, Voltage};
 
 /// Periods between the sample and the voltage that it leads to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Delay {
     /// At once.
+    #[default]
     None,
     /// Half a period later.
     Half,

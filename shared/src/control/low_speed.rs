@@ -8,7 +8,7 @@ use crate::math::{Gain, Held, other_leg};
 use crate::units::{Current, Speed};
 
 /// The current along d, and the bound of the one along q.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
     i_d: Current,

@@ -25,7 +25,7 @@ pub enum Modulation {
 }
 
 /// What the modulator must know.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// All ones where the common voltage follows the phases, else zero.
     centred: I1F31,

@@ -10,7 +10,7 @@ use crate::trace::traced;
 use crate::units::Speed;
 
 /// Limits of the trajectory.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Greatest change of ω* in a period.
     pub slew: Speed,

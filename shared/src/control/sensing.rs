@@ -14,9 +14,10 @@ use crate::trace::traced;
 use crate::units::{AdcCounts, Duty};
 
 /// Which phases have a shunt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shunts {
     /// All three: the phase with the highest duty may be left out.
+    #[default]
     Three,
     /// Phases a and b: both must be read in every period, so no duty may exceed
     /// [`Config::window`].
@@ -34,7 +35,7 @@ impl Shunts {
 }
 
 /// What the reconstruction must know.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Which phases have a shunt.
     pub shunts: Shunts,

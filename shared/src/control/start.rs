@@ -14,7 +14,7 @@ use crate::trace::traced;
 use crate::units::{Angle, Current, CurrentRate, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// I_qr, the current of Park and Ramp.
     pub current: Current,

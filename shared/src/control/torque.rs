@@ -11,7 +11,7 @@ use crate::trace::traced;
 use crate::units::Current;
 
 /// Limit of the change.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Greatest change of i_q* in a period of the outer loops.
     pub slew: Current,

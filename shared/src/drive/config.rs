@@ -11,25 +11,27 @@ use crate::protection;
 use crate::units::{AdcCounts, Current, Duty, Scale, Speed, WideVoltage};
 
 /// Direction of rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
     /// Phases in the order a, b, c.
+    #[default]
     Normal,
     /// Phases in the order a, c, b.
     Reversed,
 }
 
 /// How the motor is stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
     /// Without torque, then the bridge off.
+    #[default]
     Coast,
     /// By regenerative braking, then all low sides on.
     Brake,
 }
 
 /// How the supplies of the high sides' drivers are charged before the phases switch.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Charge {
     /// The low sides' share of each period.
     pub duty: Duty,
@@ -43,7 +45,7 @@ pub struct Charge {
 pub const ATTEMPTS: usize = 4;
 
 /// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// What the control's units are worth.
     pub scale: Scale,

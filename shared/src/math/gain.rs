@@ -33,6 +33,12 @@ impl<A, B> PartialEq for Gain<A, B> {
     }
 }
 
+impl<A: Number, B: Number> Default for Gain<A, B> {
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
 impl<A: Number, B: Number> Gain<A, B> {
     /// The factor zero.
     pub const ZERO: Self = Self::from_parts(0, 0);

@@ -6,8 +6,8 @@ mod table;
 
 use crate::math::SQRT_3;
 
-pub(crate) use build::TRIP_SHARE;
-pub use build::{Board, BuildError, FluxSettings, LeastDeadTime, build, input};
+pub use build::{Board, BuildError, FluxSettings, LeastDeadTime, build, build_in, input, scale};
+pub(crate) use build::{TRIP_SHARE, lost_periods, test_current};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Kind, ParamId, Parameter, TABLE, Text};
 

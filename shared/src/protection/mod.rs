@@ -17,7 +17,7 @@ use crate::units::{AdcCounts, Current, Voltage};
 const OVER_CURRENT_SAMPLES: u8 = 2;
 
 /// Thresholds.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`. Where that was lowered, the
     /// trip in force is [`State::trip`].

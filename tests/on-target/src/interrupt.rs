@@ -43,7 +43,10 @@ fn replay(counter: &Counter) -> io::Result<()> {
     let (params, board) = request::read_set_up(&set_up);
     let config = build(&params, &board).expect("the PC has built it");
     let mut ends = exchange::open(STALE_PERIODS).expect("opened here and nowhere else");
-    let mut interrupt = Interrupt::new(STAND.registers(), config, ends.interrupt);
+    let mut interrupt = Interrupt::new(
+        STAND.registers(),
+        ends.interrupt.begin(|place| *place = config),
+    );
     let mut before = None;
     for n in 0.. {
         let Some(words) = reader.next()? else { break };

@@ -24,7 +24,7 @@ use crate::units::{
 };
 
 /// The observer in use (`CTL_OBSERVER`) and its coefficients.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Config {
     /// Adaptive back-EMF.
     BackEmf(back_emf::Config),
@@ -33,6 +33,7 @@ pub enum Config {
     /// Compensated flux with a phase-locked loop.
     Compensated(compensated::Config),
     /// None: the drive is told where the rotor is, see [`drive::State::place`](crate::drive::State::place).
+    #[default]
     Given,
 }
 

@@ -90,6 +90,12 @@ pub enum Config {
     Modified(modified::Config),
 }
 
+impl Default for Config {
+    fn default() -> Self {
+        Self::Synchronous(synchronous::Config::default())
+    }
+}
+
 traced! {
     /// The integrators of all regulators; those of the others rest.
     #[derive(Clone, Debug, Default, PartialEq)]

@@ -12,7 +12,7 @@ use crate::trace::traced;
 use crate::units::{Current, Speed, Voltage, WideVoltage, wide};
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// k_p, bandwidth·L.
     pub k_p: Multiplier<Current, WideVoltage>,

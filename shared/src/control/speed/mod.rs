@@ -10,7 +10,7 @@ use crate::trace::traced;
 use crate::units::{Current, Speed, Torque};
 
 /// The planner and one of the laws.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// From the command to ω*.
     pub planner: planner::Config,
@@ -25,6 +25,12 @@ pub enum Law {
     Nested(nested::Config),
     /// Second paper, figure 47.
     FeedForward(feed_forward::Config),
+}
+
+impl Default for Law {
+    fn default() -> Self {
+        Self::Nested(nested::Config::default())
+    }
 }
 
 traced! {

@@ -18,7 +18,7 @@ use crate::units::{Current, Speed, Torque, Voltage};
 const ALMOST_HALF: I0F32 = I0F32::from_bits(i32::MAX - (1 << 26));
 
 /// Coefficients for one period of the outer loops, here T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// k_pω.
     pub k_p: Gain<Speed, Torque>,
