@@ -370,8 +370,7 @@ impl Device {
                 let _ = kept.params.set(given.id, given.stored);
             }
         }
-        let other = obey(request, &mut self.flash, STORE, &kept)?;
-        if let Some(mut kept) = other {
+        if obey(request, &mut self.flash, STORE, &mut kept)? {
             for given in &mut self.overrides {
                 given.stored = kept.params.get(given.id);
             }

@@ -146,9 +146,10 @@ impl Desk {
 
     #[inline(never)]
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
-        let Some(kept) = obey(request, &mut self.flash, range(), &self.esc.kept())? else {
+        let mut kept = self.esc.kept();
+        if !obey(request, &mut self.flash, range(), &mut kept)? {
             return Ok(());
-        };
+        }
         self.changed = true;
         self.esc
             .replace(&mut self.throttle, &kept)

@@ -96,6 +96,8 @@ pub struct Component {
     list_pace: Pace,
     schedule: Schedule,
     commands: Commands,
+    /// Whether it has told that it is there.
+    started: bool,
     params_changed: bool,
     /// True if something that is kept has changed.
     keep: bool,
@@ -121,18 +123,17 @@ impl Component {
     /// Never inlined: a copy of it takes 1.7 KB of stack.
     #[inline(never)]
     pub fn new(params: &Params, image: &Image, link_bytes_per_s: u32) -> Self {
-        let mut replies = Replies::new();
-        let text = [START_TEXT, image.board];
-        replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
         let identity = Identity::new(params);
         Self {
             writer: Writer::new(Signing::new(None)),
-            replies,
+            // A constant is made in its place, where a copy would take 1 KB of stack.
+            replies: const { Replies::new() },
             list: List::default(),
             list_pace: Pace::new(link_bytes_per_s / 2),
             schedule: Schedule::new(identity.place, link_bytes_per_s / 2),
             commands: Commands::new(&identity),
             identity,
+            started: false,
             params_changed: false,
             keep: false,
             unsign: false,
@@ -180,8 +181,7 @@ impl Component {
             PING_ID if target.system == 0 && target.component == 0 => {
                 self.replies.push(Reply::Pong {
                     to: frame.from,
-                    time_us: frame.u64(0),
-                    sequence: frame.u32(8),
+                    asked: frame.bytes(0),
                 });
             }
             PARAM_REQUEST_LIST_DATA::ID => self.list.start(),

@@ -27,6 +27,8 @@ const PROGRESS_UNKNOWN: u8 = u8::MAX;
 /// Message id and CRC seed of PING. The dialect marks the message as superseded, which would be a
 /// warning at each use, but clients still send it.
 pub(super) const PING: (u32, u8) = (4, 237);
+/// Bytes of a PING that come back: time and sequence.
+pub(super) const PING_LEN: usize = 12;
 
 /// Something to send once.
 #[derive(Clone, Copy, Debug)]
@@ -42,10 +44,10 @@ pub(super) enum Reply {
     Message(u32),
     /// MESSAGE_INTERVAL of this message.
     Interval(u16),
+    /// Time and sequence as they came: bytes, which take no more room here than another reply.
     Pong {
         to: Address,
-        time_us: u64,
-        sequence: u32,
+        asked: [u8; PING_LEN],
     },
     /// No missions of this type.
     MissionCount {
@@ -231,14 +233,12 @@ impl Writer {
         &mut self,
         identity: &Identity,
         to: Address,
-        (time_us, sequence): (u64, u32),
+        asked: &[u8; PING_LEN],
         out: &mut dyn FnMut(&[u8]),
     ) {
-        let mut payload = [0; 14];
-        payload[..8].copy_from_slice(&time_us.to_le_bytes());
-        payload[8..12].copy_from_slice(&sequence.to_le_bytes());
-        payload[12] = to.system;
-        payload[13] = to.component;
+        let mut payload = [0; PING_LEN + 2];
+        payload[..PING_LEN].copy_from_slice(asked);
+        payload[PING_LEN..].copy_from_slice(&[to.system, to.component]);
         self.sender
             .send_payload(identity.address, PING, &payload, out);
     }

@@ -50,7 +50,7 @@ pub(crate) fn start(listener: Listener, replier: Replier) {
 }
 
 /// The throttle's side of the ESC, which tasks reach one at a time.
-type Shared = Mutex<CriticalSectionRawMutex, RefCell<Throttle>>;
+type Shared = Mutex<CriticalSectionRawMutex, RefCell<&'static mut Throttle>>;
 
 /// A way to the throttle's side.
 #[derive(Clone, Copy)]
@@ -59,8 +59,11 @@ pub(crate) struct Port(&'static Shared);
 impl Port {
     /// Makes the throttle's side where all tasks reach it; to be called once.
     pub(crate) fn open(make: impl FnOnce() -> Throttle) -> Self {
-        static THROTTLE: StaticCell<Shared> = StaticCell::new();
-        Self(THROTTLE.init_with(|| Mutex::new(RefCell::new(make()))))
+        // Made apart from its lock, with which it would be copied once more.
+        static THROTTLE: StaticCell<Throttle> = StaticCell::new();
+        static SHARED: StaticCell<Shared> = StaticCell::new();
+        let throttle = THROTTLE.init_with(make);
+        Self(SHARED.init_with(|| Mutex::new(RefCell::new(throttle))))
     }
 }
 

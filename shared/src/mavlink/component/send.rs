@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use mavlink::{MavlinkVersion, MessageData};
 
-use super::{Component, Context};
+use super::{Component, Context, START_TEXT};
 use crate::mavlink::faults::News;
 use crate::mavlink::identity::Address;
 use crate::mavlink::reply::Reply;
@@ -32,6 +32,10 @@ impl Component {
         self.writer.sender.signing.advance(context.now_us);
         self.files.rest();
         self.tell_faults(context, send);
+        if !core::mem::replace(&mut self.started, true) {
+            let text = [START_TEXT, self.image.board];
+            self.text(MavSeverity::MAV_SEVERITY_INFO, &text, send);
+        }
         while let Some(reply) = self.replies.next() {
             self.send_reply(reply, context, send);
         }
@@ -114,11 +118,7 @@ impl Component {
                 }
             }
             Reply::Interval(message) => self.send_interval(message, context.params, send),
-            Reply::Pong {
-                to,
-                time_us,
-                sequence,
-            } => writer.pong(identity, to, (time_us, sequence), send),
+            Reply::Pong { to, asked } => writer.pong(identity, to, &asked, send),
             Reply::MissionCount { to, mission_type } => {
                 writer.mission_count(identity, to, mission_type, send);
             }

@@ -82,7 +82,7 @@ impl VirtualBoard {
                 let _ = kept.params.set(id, value);
             }
             let mut other = FileFlash::in_memory();
-            obey(Request::Save, &mut other, ALL, &kept)
+            obey(Request::Save, &mut other, ALL, &mut kept)
                 .map_err(|reason| Stopped(format!("the parameters cannot be stored: {reason}")))?;
             stored = bytes(&mut other);
         }
