@@ -41,10 +41,10 @@ const LENGTH: f64 = 1.0 - 7.6e-5;
 /// A quarter of a turn.
 const QUARTER: usize = TABLE_SIZE / 4;
 
-/// Sines at the table's angles of a turn and a quarter: a cosine is the sine a quarter further. What
+/// Sines at the table's angles of a turn: a cosine is the sine a quarter further. What
 /// remains to be rotated is at most ±π/256. That rotation lengthens by up to 7.6e-5; the entries are
 /// shorter by as much, so that no sum leaves ±1.
-static TABLE: [I1F31; TABLE_SIZE + QUARTER] = table();
+static TABLE: [I1F31; TABLE_SIZE] = table();
 
 /// 2π/8: the remainder's factor from turns to radians, an eighth of it so that it stays below 1.
 const EIGHTH_TURN: I1F31 = I1F31::from_bits(1_686_629_713);
@@ -57,7 +57,7 @@ pub fn sin_cos(angle: Angle) -> SinCos {
     let bits = angle.to_bits() as u32;
     let half_section = 1 << (31 - TABLE_BITS);
     let near = (bits.wrapping_add(half_section) >> (32 - TABLE_BITS)) as usize;
-    let (cos, sin) = (TABLE[near + QUARTER], TABLE[near]);
+    let (cos, sin) = (TABLE[(near + QUARTER) % TABLE_SIZE], TABLE[near]);
     // From the nearest angle of the table, with 8 bits more than an angle. Times 2π/8 that is the
     // angle in radians with 36 fraction bits, and its product with a cosine has 35, four more than
     // it needs.
@@ -110,8 +110,8 @@ fn direction(y: i32, x: i32) -> i32 {
     turns as i32
 }
 
-const fn table() -> [I1F31; TABLE_SIZE + QUARTER] {
-    let mut table = [I1F31::ZERO; TABLE_SIZE + QUARTER];
+const fn table() -> [I1F31; TABLE_SIZE] {
+    let mut table = [I1F31::ZERO; TABLE_SIZE];
     let mut i = 0;
     while i < table.len() {
         let radians = i as f64 * core::f64::consts::TAU / TABLE_SIZE as f64;
