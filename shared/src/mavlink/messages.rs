@@ -1,14 +1,12 @@
 //! Messages about the ESC.
 
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
-    EscConnectionType, EscFailureFlags, HEARTBEAT_DATA, MavModeFlag, MavParamType,
-    MavProtocolCapability, MavState, NAMED_VALUE_FLOAT_DATA, PARAM_VALUE_DATA,
+    EscConnectionType, EscFailureFlags, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
 };
-use mavlink::types::CharArray;
 
 use super::identity::Identity;
-use super::place::{Place, SLOTS};
+use super::payload::Payload;
+use super::place::Place;
 use crate::drive::{Fault, Faults};
 use crate::image::{Image, VERSION};
 use crate::input::signal::{Pulse, Signal};
@@ -20,56 +18,66 @@ use crate::telemetry::Telemetry;
 const NO_TEMPERATURE: i16 = i16::MAX;
 
 pub(super) fn heartbeat(
+    payload: &mut Payload,
     identity: &Identity,
     telemetry: &Telemetry,
     armed: bool,
     stopped: bool,
-) -> HEARTBEAT_DATA {
+) {
     let (mavtype, autopilot) = identity.kind();
-    HEARTBEAT_DATA {
-        custom_mode: 0,
-        mavtype,
-        autopilot,
-        base_mode: if armed {
-            MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED
-        } else {
-            MavModeFlag::empty()
-        },
-        system_status: if !telemetry.faults.is_empty() {
-            MavState::MAV_STATE_CRITICAL
-        } else if armed || !stopped {
-            MavState::MAV_STATE_ACTIVE
-        } else {
-            MavState::MAV_STATE_STANDBY
-        },
-        mavlink_version: 3,
-    }
+    let base_mode = if armed {
+        MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED
+    } else {
+        MavModeFlag::empty()
+    };
+    let system_status = if !telemetry.faults.is_empty() {
+        MavState::MAV_STATE_CRITICAL
+    } else if armed || !stopped {
+        MavState::MAV_STATE_ACTIVE
+    } else {
+        MavState::MAV_STATE_STANDBY
+    };
+    // The custom mode comes first; MAVLink's version is 3 in all of its second one.
+    payload.u32(0);
+    payload.put(&[
+        mavtype as u8,
+        autopilot as u8,
+        base_mode.bits(),
+        system_status as u8,
+        3,
+    ]);
 }
 
 /// `counter` is the number of this message.
 pub(super) fn esc_info(
+    payload: &mut Payload,
     now_us: u64,
     telemetry: &Telemetry,
     place: Place,
     counter: u16,
-) -> ESC_INFO_DATA {
+) {
     let errors = telemetry.fault_count.saturating_add(telemetry.bad_frames);
     let temperature_cdegc = if telemetry.temperature_c.is_nan() {
         NO_TEMPERATURE
     } else {
         (round(telemetry.temperature_c * 100.0) as i16).min(NO_TEMPERATURE - 1)
     };
-    ESC_INFO_DATA {
-        time_usec: now_us,
-        error_count: place.slots(errors, 0),
-        counter,
-        failure_flags: place.slots(failure_flags(telemetry.faults), 0),
-        temperature: place.slots(temperature_cdegc, NO_TEMPERATURE),
-        index: place.index(),
-        count: place.count(),
-        connection_type: connection_type(telemetry.signal),
-        info: place.online(),
-    }
+    payload.u64(now_us);
+    payload.slots(place, &errors.to_le_bytes(), &[0; 4]);
+    payload.u16(counter);
+    let flags = failure_flags(telemetry.faults);
+    payload.slots(place, &flags.to_le_bytes(), &[0; 2]);
+    payload.slots(
+        place,
+        &temperature_cdegc.to_le_bytes(),
+        &NO_TEMPERATURE.to_le_bytes(),
+    );
+    payload.put(&[
+        place.index(),
+        place.count(),
+        connection_type(telemetry.signal) as u8,
+        place.online(),
+    ]);
 }
 
 /// DShot, as long as nothing else is known.
@@ -82,85 +90,75 @@ fn connection_type(signal: Option<Signal>) -> EscConnectionType {
 }
 
 /// A value by a name of at most 10 characters.
-pub(super) fn named_value(now_us: u64, name: &str, value: f32) -> NAMED_VALUE_FLOAT_DATA {
-    NAMED_VALUE_FLOAT_DATA {
-        // The field wraps after 49 days.
-        time_boot_ms: quotient(now_us, 1000),
-        value,
-        name: CharArray::new(padded(name)),
-    }
+pub(super) fn named_value(payload: &mut Payload, now_us: u64, name: &str, value: f32) {
+    // The field wraps after 49 days.
+    payload.u32(quotient(now_us, 1000));
+    payload.f32(value);
+    payload.put(name.as_bytes());
 }
 
-pub(super) fn esc_status(now_us: u64, telemetry: &Telemetry, place: Place) -> ESC_STATUS_DATA {
-    ESC_STATUS_DATA {
-        time_usec: now_us,
-        rpm: place.slots(round(telemetry.rpm) as i32, 0),
-        voltage: place.slots(telemetry.bus_v, 0.0),
-        current: place.slots(telemetry.bus_a, 0.0),
-        index: place.index(),
+pub(super) fn esc_status(payload: &mut Payload, now_us: u64, telemetry: &Telemetry, place: Place) {
+    payload.u64(now_us);
+    let words = [
+        round(telemetry.rpm) as i32 as u32,
+        telemetry.bus_v.to_bits(),
+        telemetry.bus_a.to_bits(),
+    ];
+    for word in words {
+        payload.slots(place, &word.to_le_bytes(), &[0; 4]);
     }
+    payload.put(&[place.index()]);
 }
 
 /// The message has no signs: speed is its magnitude, and a current into the supply is 0. Those for
 /// later ESCs are laid out alike ([`Place::telemetry`]).
 pub(super) fn esc_telemetry(
+    payload: &mut Payload,
     telemetry: &Telemetry,
     place: Place,
     count: u16,
-) -> ESC_TELEMETRY_1_TO_4_DATA {
-    // Never inlined: four fields are made by it.
-    #[inline(never)]
-    fn whole(place: Place, value: f32) -> [u16; SLOTS] {
-        place.slots(round(value) as u16, 0)
+) {
+    let values = [
+        telemetry.bus_v * 100.0,
+        telemetry.bus_a * 100.0,
+        telemetry.consumed_mah,
+        telemetry.rpm.abs(),
+        f32::from(count),
+    ];
+    for value in values {
+        payload.slots(place, &(round(value) as u16).to_le_bytes(), &[0; 2]);
     }
-    ESC_TELEMETRY_1_TO_4_DATA {
-        voltage: whole(place, telemetry.bus_v * 100.0),
-        current: whole(place, telemetry.bus_a * 100.0),
-        totalcurrent: whole(place, telemetry.consumed_mah),
-        rpm: whole(place, telemetry.rpm.abs()),
-        count: place.slots(count, 0),
-        temperature: place.slots(round(telemetry.temperature_c) as u8, 0),
-    }
+    payload.slots(place, &[round(telemetry.temperature_c) as u8], &[0]);
 }
 
-pub(super) fn autopilot_version(image: &Image) -> AUTOPILOT_VERSION_DATA {
-    AUTOPILOT_VERSION_DATA {
-        // C_CAST: a float is the value itself, never an integer's bytes.
-        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP,
-        uid: uid(&image.serial),
-        flight_sw_version: version(),
-        middleware_sw_version: 0,
-        os_sw_version: 0,
-        board_version: image.board_number.into(),
-        vendor_id: 0,
-        product_id: 0,
-        flight_custom_version: image.build,
-        middleware_custom_version: [0; 8],
-        os_custom_version: [0; 8],
+pub(super) fn autopilot_version(payload: &mut Payload, image: &Image) {
+    // C_CAST: a float is the value itself, never an integer's bytes.
+    let capabilities = MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP;
+    payload.u64(capabilities.bits());
+    payload.u64(uid(&image.serial));
+    // The versions of the middleware and of the operating system are 0, and there are no numbers of a
+    // vendor and a product.
+    for word in [version(), 0, 0, image.board_number.into(), 0] {
+        payload.u32(word);
     }
+    payload.put(&image.build);
 }
 
-pub(super) fn param_value(params: &Params, id: ParamId) -> PARAM_VALUE_DATA {
-    PARAM_VALUE_DATA {
-        param_value: params.get(id),
-        param_count: TABLE.len() as u16,
-        param_index: id as u16,
-        param_id: CharArray::new(name_bytes(id)),
-        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
-    }
+pub(super) fn param_value(payload: &mut Payload, params: &Params, id: ParamId) {
+    payload.f32(params.get(id));
+    payload.u16(TABLE.len() as u16);
+    payload.u16(id as u16);
+    payload.put(&name_bytes(id));
+    payload.put(&[MavParamType::MAV_PARAM_TYPE_REAL32 as u8]);
 }
 
 /// Its name, without a zero behind it where it has 16 characters.
 pub(super) fn name_bytes(id: ParamId) -> [u8; 16] {
-    padded(id.entry().name)
-}
-
-fn padded<const N: usize>(name: &str) -> [u8; N] {
-    let mut bytes = [0; N];
-    for (to, byte) in bytes.iter_mut().zip(name.bytes()) {
+    let mut bytes = [0; 16];
+    for (to, byte) in bytes.iter_mut().zip(id.entry().name.bytes()) {
         *to = byte;
     }
     bytes
@@ -197,8 +195,24 @@ fn uid(serial: &[u8; 12]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use mavlink::dialects::ardupilotmega::{
+        ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
+    };
+    use mavlink::{MavlinkVersion, MessageData};
+
     use super::*;
     use crate::mavlink::tests::TELEMETRY;
+
+    /// What the dialect reads in a payload.
+    fn read<D: MessageData>(write: impl FnOnce(&mut Payload)) -> D {
+        let mut payload = Payload::new();
+        write(&mut payload);
+        D::deser(MavlinkVersion::V2, payload.bytes()).expect("it is whole")
+    }
+
+    fn info(telemetry: &Telemetry) -> ESC_INFO_DATA {
+        read(|payload| esc_info(payload, 5, telemetry, Place::FIRST, 1))
+    }
 
     #[test]
     fn values_are_held_at_the_ends_of_their_fields() {
@@ -210,14 +224,17 @@ mod tests {
             consumed_mah: 1e9,
             ..TELEMETRY
         };
-        let message = esc_telemetry(&telemetry, Place::FIRST, 7);
+        let message: ESC_TELEMETRY_1_TO_4_DATA =
+            read(|payload| esc_telemetry(payload, &telemetry, Place::FIRST, 7));
         assert_eq!(message.rpm, [65_535, 0, 0, 0]);
         assert_eq!(message.current[0], 0);
         assert_eq!(message.temperature[0], 255);
         assert_eq!(message.voltage[0], 0);
         assert_eq!(message.totalcurrent[0], 65_535);
-        assert_eq!(esc_status(5, &telemetry, Place::FIRST).rpm[0], -70_000);
-        let info = esc_info(5, &telemetry, Place::FIRST, 1);
+        let status: ESC_STATUS_DATA =
+            read(|payload| esc_status(payload, 5, &telemetry, Place::FIRST));
+        assert_eq!(status.rpm[0], -70_000);
+        let info = info(&telemetry);
         assert_eq!(info.temperature[0], i16::MAX - 1);
     }
 
@@ -233,7 +250,7 @@ mod tests {
                 temperature_c,
                 ..TELEMETRY
             };
-            let info = esc_info(5, &telemetry, Place::FIRST, 1);
+            let info = info(&telemetry);
             assert_eq!(info.temperature[0], told, "{temperature_c}");
         }
     }
@@ -245,7 +262,7 @@ mod tests {
             bad_frames: u32::MAX - 1,
             ..TELEMETRY
         };
-        let info = esc_info(5, &telemetry, Place::FIRST, 1);
+        let info = info(&telemetry);
         assert_eq!(info.error_count[0], u32::MAX);
     }
 

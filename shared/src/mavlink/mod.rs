@@ -15,6 +15,7 @@ mod messages;
 mod news;
 mod pace;
 mod parameter;
+mod payload;
 mod place;
 mod receiver;
 mod reply;

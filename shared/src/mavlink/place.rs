@@ -1,10 +1,11 @@
 //! Which ESC of a vehicle this is, and where the messages for four ESCs hold it.
 
-use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     ESC_TELEMETRY_1_TO_4_DATA, ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA,
     ESC_TELEMETRY_13_TO_16_DATA,
 };
+
+use super::payload::id_of;
 
 /// Component ids of servos and motor controllers, `MAV_COMP_ID_SERVO1` to `_SERVO14`.
 const FIRST_COMPONENT: u8 = 140;
@@ -49,23 +50,18 @@ impl Place {
         f32::from(self.0 + 1)
     }
 
-    /// A value in its slot, and another in those of the other ESCs.
-    pub(super) fn slots<T: Copy>(self, own: T, other: T) -> [T; SLOTS] {
-        let mut slots = [other; SLOTS];
-        slots[usize::from(self.0) % SLOTS] = own;
-        slots
+    /// Its slot in an array of [`SLOTS`].
+    pub(super) fn slot(self) -> usize {
+        usize::from(self.0) % SLOTS
     }
 
     /// Id and CRC seed of the message `ESC_TELEMETRY_*` with its slot; they are laid out alike.
     pub(super) const fn telemetry(self) -> (u32, u8) {
-        const fn of<D: MessageData>() -> (u32, u8) {
-            (D::ID, D::EXTRA_CRC)
-        }
         match self.index() {
-            0 => of::<ESC_TELEMETRY_1_TO_4_DATA>(),
-            4 => of::<ESC_TELEMETRY_5_TO_8_DATA>(),
-            8 => of::<ESC_TELEMETRY_9_TO_12_DATA>(),
-            _ => of::<ESC_TELEMETRY_13_TO_16_DATA>(),
+            0 => id_of::<ESC_TELEMETRY_1_TO_4_DATA>(),
+            4 => id_of::<ESC_TELEMETRY_5_TO_8_DATA>(),
+            8 => id_of::<ESC_TELEMETRY_9_TO_12_DATA>(),
+            _ => id_of::<ESC_TELEMETRY_13_TO_16_DATA>(),
         }
     }
 }

@@ -1,16 +1,15 @@
 //! Replies that wait for the next poll.
 
 use heapless::Deque;
-use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, MISSION_COUNT_DATA, MavParamError, MavResult, MavSeverity, PARAM_ERROR_DATA,
     STATUSTEXT_DATA,
 };
-use mavlink::types::CharArray;
 
 use super::ftp;
 use super::identity::{Address, Identity};
 use super::parameter::Refusal;
+use super::payload::id_of;
 use super::sender::Sender;
 use super::signing::Signing;
 use crate::params::{ParamId, TABLE};
@@ -186,7 +185,7 @@ impl Writer {
             to.system,
             to.component,
         ];
-        let message = (COMMAND_ACK_DATA::ID, COMMAND_ACK_DATA::EXTRA_CRC);
+        let message = id_of::<COMMAND_ACK_DATA>();
         self.sender
             .send_payload(identity.address, message, &payload, out);
     }
@@ -219,13 +218,13 @@ impl Writer {
         let [id_low, id_high] = id.to_le_bytes();
         let parts = text.as_chunks::<CHUNK_LEN>().0.iter();
         for (chunk, part) in parts.take(chunks).enumerate() {
-            let message = STATUSTEXT_DATA {
-                severity,
-                text: CharArray::new(*part),
-            };
-            let extension = [id_low, id_high, chunk as u8];
+            let mut payload = [0; 1 + CHUNK_LEN + 3];
+            payload[0] = severity as u8;
+            payload[1..=CHUNK_LEN].copy_from_slice(part);
+            payload[1 + CHUNK_LEN..].copy_from_slice(&[id_low, id_high, chunk as u8]);
+            let message = id_of::<STATUSTEXT_DATA>();
             self.sender
-                .send(identity.address, &message, &extension, out);
+                .send_payload(identity.address, message, &payload, out);
         }
     }
 
@@ -251,7 +250,7 @@ impl Writer {
         out: &mut dyn FnMut(&[u8]),
     ) {
         let payload = [0, 0, to.system, to.component, mission_type];
-        let message = (MISSION_COUNT_DATA::ID, MISSION_COUNT_DATA::EXTRA_CRC);
+        let message = id_of::<MISSION_COUNT_DATA>();
         self.sender
             .send_payload(identity.address, message, &payload, out);
     }
@@ -269,7 +268,7 @@ impl Writer {
         payload[..4].copy_from_slice(&[index_low, index_high, to.system, to.component]);
         payload[4..20].copy_from_slice(&name);
         payload[20] = error as u8;
-        let message = (PARAM_ERROR_DATA::ID, PARAM_ERROR_DATA::EXTRA_CRC);
+        let message = id_of::<PARAM_ERROR_DATA>();
         self.sender
             .send_payload(identity.address, message, &payload, out);
     }

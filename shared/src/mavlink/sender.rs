@@ -1,16 +1,16 @@
 //! Payloads to frames.
 
-use mavlink::{MAV_STX_V2, MavlinkVersion, MessageData};
+use mavlink::MAV_STX_V2;
 
 use super::check;
 use super::identity::Address;
+use super::payload::PAYLOAD_MAX;
 use super::receiver::SIGNED;
 use super::signing::{SIGNATURE_LEN, Signing};
 
 /// Header and check.
 const OVERHEAD_LEN: usize = 12;
 const HEADER_LEN: usize = 10;
-const PAYLOAD_MAX: usize = 255;
 
 /// Numbers the frames that leave. Always MAVLink 2: an ESC's messages have ids above 255.
 #[derive(Clone, Debug)]
@@ -35,23 +35,6 @@ impl Sender {
             } else {
                 0
             }
-    }
-
-    /// Sends a message; `extension` are the bytes of its extension fields, which the generated
-    /// payloads do not have.
-    pub(super) fn send<D: MessageData>(
-        &mut self,
-        from: Address,
-        data: &D,
-        extension: &[u8],
-        out: &mut dyn FnMut(&[u8]),
-    ) {
-        let mut payload = [0; PAYLOAD_MAX];
-        data.ser(MavlinkVersion::V2, &mut payload);
-        for (to, byte) in payload.iter_mut().skip(D::ENCODED_LEN).zip(extension) {
-            *to = *byte;
-        }
-        self.send_payload(from, (D::ID, D::EXTRA_CRC), &payload, out);
     }
 
     /// Sends a payload of at most 255 bytes as the message with this id and CRC seed.

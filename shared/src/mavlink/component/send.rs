@@ -1,15 +1,17 @@
 //! Sends what leaves the component, in this order: faults, answers, warnings, streams, and at last the
 //! rest.
 
+use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, ESC_TELEMETRY_1_TO_4_DATA, FILE_TRANSFER_PROTOCOL_DATA,
-    MESSAGE_INTERVAL_DATA, MavParamError, MavSeverity, PARAM_VALUE_DATA,
+    AUTOPILOT_VERSION_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, FILE_TRANSFER_PROTOCOL_DATA,
+    HEARTBEAT_DATA, MESSAGE_INTERVAL_DATA, MavParamError, MavSeverity, NAMED_VALUE_FLOAT_DATA,
+    PARAM_VALUE_DATA,
 };
-use mavlink::{MavlinkVersion, MessageData};
 
 use super::{Component, Context, START_TEXT};
 use crate::mavlink::faults::News;
 use crate::mavlink::identity::Address;
+use crate::mavlink::payload::{Payload, id_of};
 use crate::mavlink::reply::Reply;
 use crate::mavlink::schedule::{self, Stream};
 use crate::mavlink::{check, ftp, messages, parameter};
@@ -17,10 +19,7 @@ use crate::params::{ParamId, Params};
 use crate::telemetry::SIGNALS;
 
 /// FILE_TRANSFER_PROTOCOL.
-const FILE: (u32, u8) = (
-    FILE_TRANSFER_PROTOCOL_DATA::ID,
-    FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC,
-);
+const FILE: (u32, u8) = id_of::<FILE_TRANSFER_PROTOCOL_DATA>();
 
 impl Component {
     /// Sends all that waits or is due, each frame by one call of `send`. To be called every
@@ -107,8 +106,12 @@ impl Component {
                 progress,
             } => writer.ack(identity, to, command, (result, progress), send),
             Reply::Message(AUTOPILOT_VERSION_DATA::ID) => {
-                let message = messages::autopilot_version(&self.image);
-                writer.sender.send(identity.address, &message, &[], send);
+                let mut payload = Payload::new();
+                messages::autopilot_version(&mut payload, &self.image);
+                let message = id_of::<AUTOPILOT_VERSION_DATA>();
+                writer
+                    .sender
+                    .send_payload(identity.address, message, payload.bytes(), send);
             }
             Reply::Message(id) => {
                 if let Some(stream) = self.schedule.find(id) {
@@ -139,48 +142,57 @@ impl Component {
     }
 
     fn send_stream(&mut self, stream: Stream, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
-        let (from, place) = (self.identity.address, self.identity.place);
-        let sender = &mut self.writer.sender;
+        let place = self.identity.place;
         let telemetry = context.telemetry;
-        match stream {
+        let mut payload = Payload::new();
+        let message = match stream {
             Stream::Heartbeat => {
                 let armed = context.authority.armed();
                 let stopped = context.drive().stopped;
-                let message = messages::heartbeat(&self.identity, telemetry, armed, stopped);
-                sender.send(from, &message, &[], send);
+                messages::heartbeat(&mut payload, &self.identity, telemetry, armed, stopped);
+                id_of::<HEARTBEAT_DATA>()
             }
             Stream::EscInfo => {
                 self.infos = self.infos.wrapping_add(1);
-                let message = messages::esc_info(context.now_us, telemetry, place, self.infos);
-                sender.send(from, &message, &[], send);
+                messages::esc_info(&mut payload, context.now_us, telemetry, place, self.infos);
+                id_of::<ESC_INFO_DATA>()
             }
             Stream::BadFrames => {
                 let share = telemetry.bad_share * 100.0;
-                let message = messages::named_value(context.now_us, "bad_frames", share);
-                sender.send(from, &message, &[], send);
+                return self.send_named(context.now_us, "bad_frames", share, send);
             }
             Stream::Signals => {
                 let chosen = schedule::signals(context.params);
                 for (bit, name) in SIGNALS.into_iter().enumerate() {
                     if chosen >> bit & 1 != 0 {
-                        let value = telemetry.signals[bit];
-                        let message = messages::named_value(context.now_us, name, value);
-                        sender.send(from, &message, &[], send);
+                        self.send_named(context.now_us, name, telemetry.signals[bit], send);
                     }
                 }
+                return;
             }
             Stream::EscStatus => {
-                let message = messages::esc_status(context.now_us, telemetry, place);
-                sender.send(from, &message, &[], send);
+                messages::esc_status(&mut payload, context.now_us, telemetry, place);
+                id_of::<ESC_STATUS_DATA>()
             }
             Stream::EscTelemetry => {
                 self.telemetries = self.telemetries.wrapping_add(1);
-                let message = messages::esc_telemetry(telemetry, place, self.telemetries);
-                let mut payload = [0; ESC_TELEMETRY_1_TO_4_DATA::ENCODED_LEN];
-                message.ser(MavlinkVersion::V2, &mut payload);
-                sender.send_payload(from, place.telemetry(), &payload, send);
+                messages::esc_telemetry(&mut payload, telemetry, place, self.telemetries);
+                place.telemetry()
             }
-        }
+        };
+        self.send_payload(message, &payload, send);
+    }
+
+    #[inline(never)]
+    fn send_named(&mut self, now_us: u64, name: &str, value: f32, send: &mut dyn FnMut(&[u8])) {
+        let mut payload = Payload::new();
+        messages::named_value(&mut payload, now_us, name, value);
+        self.send_payload(id_of::<NAMED_VALUE_FLOAT_DATA>(), &payload, send);
+    }
+
+    fn send_payload(&mut self, message: (u32, u8), payload: &Payload, send: &mut dyn FnMut(&[u8])) {
+        let sender = &mut self.writer.sender;
+        sender.send_payload(self.identity.address, message, payload.bytes(), send);
     }
 
     /// MESSAGE_INTERVAL: -1 when it is off, 0 when there is no such stream.
@@ -192,13 +204,10 @@ impl Component {
                 .map_or(-1, |us| i32::try_from(us).unwrap_or(i32::MAX)),
             None => 0,
         };
-        let data = MESSAGE_INTERVAL_DATA {
-            interval_us,
-            message_id: message,
-        };
-        self.writer
-            .sender
-            .send(self.identity.address, &data, &[], send);
+        let mut payload = Payload::new();
+        payload.u32(interval_us as u32);
+        payload.u16(message);
+        self.send_payload(id_of::<MESSAGE_INTERVAL_DATA>(), &payload, send);
     }
 
     /// Sends as much of the file that someone reads as the link has room for. Never inlined, nor are
@@ -244,10 +253,9 @@ impl Component {
     }
 
     fn send_value(&mut self, context: &Context, id: ParamId, send: &mut dyn FnMut(&[u8])) {
-        let message = messages::param_value(context.params, id);
-        self.writer
-            .sender
-            .send(self.identity.address, &message, &[], send);
+        let mut payload = Payload::new();
+        messages::param_value(&mut payload, context.params, id);
+        self.send_payload(id_of::<PARAM_VALUE_DATA>(), &payload, send);
     }
 
     fn text(&mut self, severity: MavSeverity, pieces: &[&str], send: &mut dyn FnMut(&[u8])) {

@@ -1,0 +1,74 @@
+//! Payloads field by field, in the order of the wire, where larger fields stand before smaller ones.
+//!
+//! The dialect's own serialisers are a copy of code for each message, which is 1 KB of the chip's flash.
+//! Tests read with the dialect's types what is written here.
+
+use mavlink::MessageData;
+
+use super::place::{Place, SLOTS};
+
+/// The longest payload.
+pub(super) const PAYLOAD_MAX: usize = 255;
+
+/// Id and CRC seed of a message.
+pub(super) const fn id_of<D: MessageData>() -> (u32, u8) {
+    (D::ID, D::EXTRA_CRC)
+}
+
+/// A payload that is being written; what is not written is zero.
+pub(super) struct Payload {
+    bytes: [u8; PAYLOAD_MAX],
+    len: usize,
+}
+
+impl Payload {
+    pub(super) fn new() -> Self {
+        Self {
+            bytes: [0; PAYLOAD_MAX],
+            len: 0,
+        }
+    }
+
+    /// All of it: a frame leaves zeros at the end out.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The next field, the least byte first.
+    ///
+    /// Never inlined: each message calls it for each field.
+    #[inline(never)]
+    pub(super) fn put(&mut self, field: &[u8]) {
+        let room = self.bytes.iter_mut().skip(self.len);
+        for (to, byte) in room.zip(field) {
+            *to = *byte;
+        }
+        self.len += field.len();
+    }
+
+    pub(super) fn u16(&mut self, field: u16) {
+        self.put(&field.to_le_bytes());
+    }
+
+    #[inline(never)]
+    pub(super) fn u32(&mut self, field: u32) {
+        self.put(&field.to_le_bytes());
+    }
+
+    pub(super) fn f32(&mut self, field: f32) {
+        self.u32(field.to_bits());
+    }
+
+    #[inline(never)]
+    pub(super) fn u64(&mut self, field: u64) {
+        self.put(&field.to_le_bytes());
+    }
+
+    /// An array with a value for each of four ESCs: this one's in its slot, and another for the rest.
+    #[inline(never)]
+    pub(super) fn slots(&mut self, place: Place, own: &[u8], other: &[u8]) {
+        for slot in 0..SLOTS {
+            self.put(if slot == place.slot() { own } else { other });
+        }
+    }
+}
