@@ -199,3 +199,15 @@ def test_the_files_that_contributors_are_led_to_are_there():
     # NAME is that of a board or a bench to come.
     absent = [name for name in named if "NAME" not in name and not (ROOT / name).exists()]
     assert absent == []
+
+
+def test_every_parameter_that_is_named_exists():
+    table = (ROOT / "shared" / "src" / "params" / "table.rs").read_text()
+    known = set(re.findall(r'"([A-Z]{3}_[A-Z0-9_]+)"', table))
+    assert len(known) > 50
+    groups = "|".join({name[:4] for name in known})
+    for file in [*READMES, CONTRIBUTING]:
+        named = set(re.findall(rf"\b(?:{groups})[A-Z0-9_]+\b", file.read_text()))
+        # MAVLink's own commands begin as its parameters do.
+        unknown = {name for name in named - known if not name.startswith("MAV_CMD_")}
+        assert unknown == set(), file

@@ -278,3 +278,24 @@ impl Report {
         Some(line)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::format;
+
+    use super::*;
+
+    #[test]
+    fn the_builders_guide_has_every_line() {
+        let guide = include_str!("../../../firmware/README.md");
+        let (_, section) = guide
+            .split_once("\n## Self-test\n")
+            .expect("it has a part on this");
+        let section = section.split("\n## ").next().unwrap_or_default();
+        for (kind, row) in ROWS.iter().enumerate() {
+            let of_phases = if kind < SINGLE { "" } else { "_*" };
+            let name = format!("`{}{of_phases}`", row.name);
+            assert!(section.contains(&name), "{name}");
+        }
+    }
+}

@@ -79,3 +79,19 @@ impl Faults {
         self.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::format;
+
+    use super::*;
+
+    #[test]
+    fn the_builders_guide_has_every_fault() {
+        let guide = include_str!("../../../firmware/README.md");
+        for fault in Fault::ALL {
+            let row = format!("\n| `{}` |", fault.text());
+            assert!(guide.contains(&row), "{row}");
+        }
+    }
+}
