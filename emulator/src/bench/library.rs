@@ -227,4 +227,12 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn the_readme_has_every_bench() {
+        let readme = include_str!("../../README.md");
+        for name in names() {
+            assert!(readme.contains(&format!("`{name}`")), "{name}");
+        }
+    }
 }
