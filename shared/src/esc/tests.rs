@@ -202,7 +202,7 @@ fn a_wire_whose_3d_has_changed_is_armed_anew_and_turns_both_ways() {
     bench.frames(10, 10);
     assert!(!bench.esc.telemetry().armed);
     bench.frames(310, 0);
-    bench.frames(1, 1047);
+    bench.frames(4, 1047);
     assert!(matches!(bench.throttle.setpoint(), Setpoint::Speed(speed) if speed.is_negative()));
     bench.frames(1, 2047);
     assert!(matches!(bench.throttle.setpoint(), Setpoint::Speed(speed) if speed.is_positive()));
@@ -298,7 +298,7 @@ fn what_waits_is_forgotten_at_throttle_at_a_test_and_with_the_signal() {
         bench.wait_ms(1);
         bench.frames(10, 8);
         match end {
-            0 => bench.frames(1, 1000),
+            0 => bench.frames(4, 1000),
             1 => {
                 let drive = DriveStatus {
                     stopped: true,

@@ -59,7 +59,7 @@ fn a_direction_is_in_force_at_once_and_acknowledged_when_it_is_stored() {
 
     // While the wire turns it, nothing.
     bench.requests.clear();
-    bench.frames(1, 1000);
+    bench.frames(4, 1000);
     for action in [1.0, 2.0, 4.0] {
         bench.configure(action);
         bench.frames(1, 1000);

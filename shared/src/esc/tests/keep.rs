@@ -173,7 +173,7 @@ fn a_restart_without_anything_to_store_is_made_at_once() {
 #[test]
 fn a_restart_that_waits_is_given_up_when_the_motor_turns() {
     let mut bench = Bench::armed();
-    bench.frames(1, 1000);
+    bench.frames(4, 1000);
     bench.frames(10, 0);
     bench.set("LIM_PHASE_A", 12.5);
     bench.command(REBOOT, 1.0);

@@ -75,7 +75,7 @@ fn a_save_that_waited_for_a_tune_is_not_made_in_flight() {
 #[test]
 fn a_silent_wire_is_not_waited_for() {
     let mut bench = Bench::armed();
-    bench.frames(1, 1000);
+    bench.frames(4, 1000);
     bench.frames(10, 0);
     bench.command(STORAGE, 1.0);
     bench.wait_ms(95);
@@ -100,7 +100,7 @@ fn nothing_turns_the_motor_while_the_flash_is_written() {
 fn a_start_is_no_rest_in_any_of_its_phases() {
     for phase in [Phase::Idle, Phase::Sense, Phase::Charge, Phase::Park] {
         let mut bench = Bench::armed();
-        bench.frames(1, 1000);
+        bench.frames(4, 1000);
         bench.set_phase(phase);
         for action in [0.0, 1.0, 2.0] {
             bench.command(STORAGE, action);
