@@ -386,6 +386,7 @@ impl Esc {
         let mut context = Context {
             now_us,
             params: &mut self.params,
+            board: &board,
             telemetry: &self.telemetry,
             check: &self.check.report,
             authority: &mut Reached(throttle),

@@ -8,7 +8,7 @@ import time
 import pytest
 from dshot import BIDIRECTIONAL_DSHOT600, HALF, erpm, is_extended
 from emulator import PATIENT
-from paths import IMAGES, ROOT, VIRTUAL_BOARD
+from paths import IMAGES, ROOT, TOOL, VIRTUAL_BOARD
 from readme import commands
 
 import siskin_dialect as dialect
@@ -35,6 +35,26 @@ def test_the_image_answers_and_lists_its_parameters(board):
         version = esc.wait("AUTOPILOT_VERSION")
         assert version.uid != 0, "the chip has a number"
         assert esc.params()["PWM_FREQ_HZ"] == 24_000
+
+
+def test_the_dead_time_from_the_factory_is_the_boards(board):
+    emulator = board()
+    with emulator.connect() as esc:
+        esc.next("HEARTBEAT")
+        esc.set_param("PWM_DEADTIME_NS", 900)
+
+    def params(*words: str) -> str:
+        command = [TOOL, "params", "--connect", f"tcp:127.0.0.1:{emulator.port}", *words]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        assert ended.returncode == 0, ended.stderr
+        return ended.stdout
+
+    described = params("describe", "PWM_DEADTIME_NS")
+    assert "from the factory 750 ns" in described
+    assert "900 ns, from the factory 750 ns" in params("diff")
+    params("reset", "PWM_DEADTIME_NS")
+    assert params("diff") == "0 different\n"
+    assert "750 ns" in params("get", "PWM_DEADTIME_NS")
 
 
 def test_what_is_stored_survives_kills_at_any_moment(board):

@@ -7,6 +7,7 @@ mod cli;
 pub mod decode;
 mod endpoint;
 mod error;
+mod factory;
 mod flash;
 mod ftp;
 mod image;

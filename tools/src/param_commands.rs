@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 
 use crate::cli::ParamsCommand;
 use crate::error::Error;
+use crate::factory::Factory;
 use crate::json::number;
 use crate::param_file::{self, Line};
 use crate::param_load::{load, same};
@@ -32,8 +33,8 @@ pub(crate) enum Task<'a> {
         against: Option<(&'a Path, Vec<Line>)>,
     },
     Reset {
-        /// With their values from the factory; without, all.
-        params: Option<Vec<Param>>,
+        /// Nothing for all.
+        names: Option<Vec<String>>,
         store: bool,
     },
     Set {
@@ -82,11 +83,11 @@ impl<'a> Task<'a> {
                 },
             },
             ParamsCommand::Reset { store, all, names } => Self::Reset {
-                params: if *all {
+                names: if *all {
                     None
                 } else {
-                    let params = names.iter().map(|name| factory_param(name));
-                    Some(params.collect::<Result<_, _>>()?)
+                    let names = names.iter().map(|name| checked_factory_name(name));
+                    Some(names.collect::<Result<_, _>>()?)
                 },
                 store: *store,
             },
@@ -126,12 +127,16 @@ impl<'a> Task<'a> {
                 } else {
                     get(session, &names, complaints)?
                 };
+                let factory = Factory::ask(session)?;
                 for param in &found {
-                    param_text::describe(param, out)?;
+                    param_text::describe(param, factory.value(&param.name), out)?;
                 }
                 ended
             }
-            Self::Diff { against: None } => diff_to_factory(&params::list(session)?, out),
+            Self::Diff { against: None } => {
+                let factory = Factory::ask(session)?;
+                diff_to_factory(&params::list(session)?, &factory, out)
+            }
             Self::Diff {
                 against: Some((file, lines)),
             } => {
@@ -139,18 +144,27 @@ impl<'a> Task<'a> {
                 diff_to_file(&params::list(session)?, file, &lines, out)
             }
             Self::Reset {
-                params: None,
+                names: None,
                 store: _,
             } => {
                 params::storage(session, Storage::Reset)?;
                 writeln!(out, "all parameters are the factory's, and stored")?;
                 Ok(())
             }
-            Self::Set { params, store }
-            | Self::Reset {
-                params: Some(params),
+            Self::Reset {
+                names: Some(names),
                 store,
             } => {
+                let factory = Factory::ask(session)?;
+                // One that the ESC does not have: it will say so.
+                let params = names.into_iter().map(|name| Param {
+                    value: factory.value(&name).unwrap_or_default(),
+                    name,
+                });
+                let params = params.collect();
+                Self::Set { params, store }.run(session, out, complaints)
+            }
+            Self::Set { params, store } => {
                 let refused = set(session, &params, out, complaints)?;
                 finish(session, store, refused, params.len(), out)
             }
@@ -182,16 +196,16 @@ fn checked_name(name: &str) -> Result<String, Error> {
     )))
 }
 
-/// A parameter with its value from the factory.
-fn factory_param(name: &str) -> Result<Param, Error> {
+/// The name of a parameter that has a value from the factory.
+fn checked_factory_name(name: &str) -> Result<String, Error> {
     let name = checked_name(name)?;
-    match param_text::factory(&name) {
-        Some(value) => Ok(Param { name, value }),
-        None => Err(Error::Usage(format!(
-            "{name} has no value from the factory that this program knows; 'siskin params describe' \
-             shows those that have"
-        ))),
+    if param_text::has_factory(&name) {
+        return Ok(name);
     }
+    Err(Error::Usage(format!(
+        "{name} has no value from the factory that this program knows; 'siskin params describe' \
+         shows those that have"
+    )))
 }
 
 /// The settings of a file, if all its lines make sense.
@@ -274,11 +288,10 @@ pub(crate) fn print(params: &[Param], json: bool, out: &mut dyn Write) -> Result
 }
 
 /// Prints what differs from the factory's values.
-fn diff_to_factory(params: &[Param], out: &mut dyn Write) -> Result<(), Error> {
-    let pairs = params.iter().filter_map(|param| {
-        let factory = param_text::factory(&param.name)?;
-        Some((param, factory))
-    });
+fn diff_to_factory(params: &[Param], factory: &Factory, out: &mut dyn Write) -> Result<(), Error> {
+    let pairs = params
+        .iter()
+        .filter_map(|param| Some((param, factory.value(&param.name)?)));
     diff(pairs, "from the factory", out)
 }
 

@@ -38,14 +38,17 @@ pub(crate) fn remedy(name: &str, value: f32) -> String {
     }
 }
 
-/// The value from the factory, of a parameter that has one of its own.
-pub(crate) fn factory(name: &str) -> Option<f32> {
-    let entry = ParamId::find(name)?.entry();
-    (entry.kind != Kind::Derived).then_some(entry.default)
+/// True for a parameter that this program knows and that has a value of its own from the factory.
+pub(crate) fn has_factory(name: &str) -> bool {
+    ParamId::find(name).is_some_and(|id| id.entry().kind != Kind::Derived)
 }
 
 /// Prints a parameter with all that is known of it.
-pub(crate) fn describe(param: &Param, out: &mut dyn Write) -> Result<(), Error> {
+pub(crate) fn describe(
+    param: &Param,
+    factory: Option<f32>,
+    out: &mut dyn Write,
+) -> Result<(), Error> {
     let Param { name, value: now } = param;
     writeln!(out, "{name:<NAME_LENGTH$} {}", value(name, *now))?;
     let Some(id) = ParamId::find(name) else {
@@ -53,7 +56,7 @@ pub(crate) fn describe(param: &Param, out: &mut dyn Write) -> Result<(), Error> 
         return Ok(());
     };
     let mut facts = String::new();
-    if let Some(factory) = factory(name) {
+    if let Some(factory) = factory {
         // A String takes all that is written to it.
         let _ = write!(
             facts,
@@ -129,7 +132,7 @@ mod tests {
                 name: entry.name.to_owned(),
                 value: entry.default,
             };
-            describe(&param, &mut text).unwrap();
+            describe(&param, Some(entry.default), &mut text).unwrap();
             let text = String::from_utf8(text).unwrap();
             assert!(text.contains(id.text().description), "{text}");
             assert!(text.lines().count() >= 2, "{text}");

@@ -24,6 +24,7 @@ use crate::image::Image;
 use crate::input::News as WireNews;
 use crate::input::access::Access;
 use crate::input::authority::DriveStatus;
+use crate::params::Board;
 use crate::params::{BuildError, ParamId, Params};
 use crate::telemetry::Telemetry;
 
@@ -38,6 +39,8 @@ pub struct Context<'a> {
     pub now_us: u64,
     /// The values in force; PARAM_SET changes them and asks for [`Request::ParamsChanged`].
     pub params: &'a mut Params,
+    /// The board, which has other values from the factory than the table's.
+    pub board: &'a Board,
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
     /// The result of the last self-test.
@@ -220,6 +223,7 @@ impl Component {
             FILE_TRANSFER_PROTOCOL_DATA::ID => {
                 let view = ftp::View {
                     params: context.params,
+                    board: context.board,
                     telemetry: context.telemetry,
                     check: context.check,
                     warning: self.warnings.last(),

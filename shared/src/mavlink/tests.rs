@@ -20,6 +20,7 @@ use crate::check::Report;
 use crate::drive::{Faults, Phase};
 use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
+use crate::params::Board;
 use crate::params::{BuildError, ParamId, Params};
 use crate::telemetry::{SIGNALS, Telemetry};
 
@@ -112,6 +113,7 @@ impl Bench {
         let mut context = Context {
             now_us: *now_us,
             params,
+            board: &Board::BENCH,
             telemetry,
             check: &check,
             authority,
@@ -135,6 +137,7 @@ impl Bench {
         let mut context = Context {
             now_us: self.now_us,
             params: &mut self.params,
+            board: &Board::BENCH,
             telemetry: &self.telemetry,
             check: &check,
             authority: &mut self.authority,

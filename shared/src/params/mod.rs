@@ -56,6 +56,15 @@ impl ParamId {
     pub const fn entry(self) -> &'static Parameter {
         &TABLE[self as usize]
     }
+
+    /// The value from the factory on this board.
+    pub fn factory(self, board: &Board) -> f32 {
+        let default = self.entry().default;
+        match self {
+            Self::PwmDeadtimeNs => default.max(board.least_dead_time.ns),
+            _ => default,
+        }
+    }
 }
 
 impl Params {
@@ -90,12 +99,12 @@ impl Params {
     /// Raises what is below the board's least, as the table's default may be; whether it was another value,
     /// which somebody has chosen.
     pub fn fit(&mut self, board: &Board) -> bool {
-        let (id, least_ns) = (ParamId::PwmDeadtimeNs, board.least_dead_time.ns);
+        let id = ParamId::PwmDeadtimeNs;
         let given_ns = self.get(id);
-        if given_ns >= least_ns {
+        if given_ns >= board.least_dead_time.ns {
             return false;
         }
-        self.values[id as usize] = least_ns;
+        self.values[id as usize] = board.least_dead_time.ns;
         given_ns != id.entry().default
     }
 

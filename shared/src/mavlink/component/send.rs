@@ -234,6 +234,7 @@ impl Component {
     ) {
         let view = ftp::View {
             params: context.params,
+            board: context.board,
             telemetry: context.telemetry,
             check: context.check,
             warning: self.warnings.last(),

@@ -7,6 +7,7 @@ use super::text;
 use crate::SELF_TEST;
 use crate::check::Report;
 use crate::checksum::checksum;
+use crate::params::Board;
 use crate::params::Params;
 use crate::telemetry::Telemetry;
 
@@ -23,6 +24,7 @@ pub(super) const GENERAL_CHECKSUM: u32 = checksum(
 #[derive(Clone, Copy)]
 pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) params: &'a Params,
+    pub(in crate::mavlink) board: &'a Board,
     pub(in crate::mavlink) telemetry: &'a Telemetry,
     /// The result of the last self-test.
     pub(in crate::mavlink) check: &'a Report,
@@ -135,7 +137,7 @@ impl File {
         match self.entry.content {
             Content::Folder => {}
             Content::Fixed(bytes) => sink.put(bytes),
-            Content::Parameters => self.selection.write(view.params, sink),
+            Content::Parameters => self.selection.write(view.params, view.board, sink),
             Content::Faults => text::faults(view, sink),
             Content::Statistics => text::statistics(view, sink),
             Content::Check if SELF_TEST => text::check(view, sink),

@@ -8,6 +8,7 @@
 //! read; that is not needed here, since a file that changes can no longer be read.
 
 use super::sink::Sink;
+use crate::params::Board;
 use crate::params::{ParamId, Params};
 
 const MAGIC: u16 = 0x671B;
@@ -56,7 +57,7 @@ impl Selection {
         Some(selection)
     }
 
-    pub(super) fn write(self, params: &Params, sink: &mut Sink) {
+    pub(super) fn write(self, params: &Params, board: &Board, sink: &mut Sink) {
         let magic = if self.defaults {
             MAGIC_WITH_DEFAULTS
         } else {
@@ -68,8 +69,7 @@ impl Selection {
         let mut before: &[u8] = &[];
         let chosen = ParamId::ALL.iter().skip(self.first.into());
         for id in chosen.take(self.count.into()) {
-            let entry = id.entry();
-            let name = entry.name.as_bytes();
+            let name = id.entry().name.as_bytes();
             // At least one letter is written; a name has 16 at the most.
             let mut alike = 0;
             while alike + 1 < name.len() && name.get(alike) == before.get(alike) {
@@ -77,7 +77,8 @@ impl Selection {
             }
             let letters = name.get(alike..).unwrap_or_default();
             let value = params.get(*id);
-            let default = self.defaults && value != entry.default;
+            let factory = id.factory(board);
+            let default = self.defaults && value != factory;
             sink.put(&[
                 FLOAT | if default { WITH_DEFAULT } else { 0 },
                 alike as u8 | (letters.len() as u8 - 1) << 4,
@@ -85,7 +86,7 @@ impl Selection {
             sink.put(letters);
             sink.put(&value.to_le_bytes());
             if default {
-                sink.put(&entry.default.to_le_bytes());
+                sink.put(&factory.to_le_bytes());
             }
             before = name;
         }

@@ -10,6 +10,7 @@ use super::*;
 use crate::check::Report;
 use crate::checksum::checksum;
 use crate::mavlink::tests::TELEMETRY;
+use crate::params::{Board, LeastDeadTime};
 use crate::params::{ParamId, Params, TABLE};
 
 static CHECK: Report = Report::new(40.0, 0.02);
@@ -17,6 +18,7 @@ static CHECK: Report = Report::new(40.0, 0.02);
 fn view(params: &Params) -> View<'_> {
     View {
         params,
+        board: &Board::BENCH,
         telemetry: &TELEMETRY,
         check: &CHECK,
         warning: "",
@@ -87,6 +89,38 @@ fn parameters_are_packed_as_they_should_be() {
         let file = whole(path, &params).expect(path);
         assert_eq!(file, packed(&params, chosen, defaults), "{path}");
     }
+}
+
+#[test]
+fn the_default_of_a_dead_time_is_the_boards() {
+    let board = Board {
+        least_dead_time: LeastDeadTime {
+            ns: 750.0,
+            refusal: "",
+        },
+        ..Board::BENCH
+    };
+    let mut params = Params::default();
+    params.fit(&board);
+    let id = ParamId::PwmDeadtimeNs;
+    let place = id as usize;
+    let path = format!("@PARAM/param.pck?withdefaults=1&start={place}&count=1");
+    let file = File::find(path.as_bytes()).expect("a file");
+    let read = |params: &Params| {
+        let view = View {
+            board: &board,
+            ..view(params)
+        };
+        let mut whole = std::vec![0; file.measure(&view).0 as usize];
+        file.write(&view, &mut Sink::new(0, &mut whole));
+        whole
+    };
+    // No default of its own follows the value.
+    assert!(read(&params).ends_with(&750.0_f32.to_le_bytes()));
+    assert_eq!(read(&params)[6], 0x04);
+    params.set(id, 900.0).expect("in range");
+    assert!(read(&params).ends_with(&750.0_f32.to_le_bytes()));
+    assert_eq!(read(&params)[6], 0x14);
 }
 
 #[test]
