@@ -88,6 +88,19 @@ def judge(folder, text) -> subprocess.CompletedProcess:
             "what between reads at {table} (ADC1_2 -> between)",
         ),
         ("ldr r3, [r0]; blx r3", "", "perhaps what between calls by a pointer (ADC1_2 -> between)"),
+        # The address of one function tells nothing of the next call.
+        (
+            "ldr r3, =between; blx r3; ldr r3, [r0]; blx r3",
+            "",
+            "perhaps what between calls by a pointer (ADC1_2 -> between)",
+        ),
+        # Of two addresses in one datum, that of each register is its own.
+        (
+            "movw r2, #:lower16:table; movw r3, #:lower16:(table + 4); "
+            "movt r2, #:upper16:table; movt r3, #:upper16:(table + 4)",
+            "",
+            "what between reads at {table} (ADC1_2 -> between), and 1 more;",
+        ),
         ("nop", ".word table, between", "{table}, to which the word at"),
     ],
 )

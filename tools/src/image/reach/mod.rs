@@ -6,6 +6,7 @@
 //! all whose addresses it holds, called or not.
 
 mod program;
+mod registers;
 mod thumb;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -90,12 +90,16 @@ impl<'a> Program<'a> {
                     program.called.insert(place, symbol_at.address() as u32);
                 }
                 R_ARM_THM_MOVW_ABS_NC => {
-                    low.insert(symbol.0, immediate(program.word(place)?));
+                    let code = program.word(place)?;
+                    low.insert((symbol.0, register(code)), immediate(code));
                 }
                 R_ARM_THM_MOVT_ABS => {
-                    let high = immediate(program.word(place)?);
-                    let low = low.get(&symbol.0).copied().unwrap_or(0);
-                    program.held.insert(place, high << 16 | low);
+                    let code = program.word(place)?;
+                    let low = low.get(&(symbol.0, register(code)));
+                    let low = low.copied().ok_or_else(|| {
+                        format!("the upper half of an address at {place:#010x} has no lower one")
+                    })?;
+                    program.held.insert(place, immediate(code) << 16 | low);
                 }
                 R_ARM_NONE | R_ARM_PREL31 => {}
                 other => return Err(format!("a relocation of kind {other} is not understood")),
@@ -165,7 +169,6 @@ impl<'a> Program<'a> {
             table.range(place.clone()).map(|(_, to)| *to).collect()
         };
         let held = of(&self.held);
-        let holds_function = held.iter().any(|to| self.function(*to).is_some());
         let mut computed = false;
         let mut addresses = [held, of(&self.called)].concat();
         for (begin, code) in self.code(&place) {
@@ -177,8 +180,11 @@ impl<'a> Program<'a> {
                         let function = self.function_around(to);
                         addresses.push(function.map_or(to, |function| function.place.start));
                     }
-                    // Code for size has a call's target in a register.
-                    Branch::Computed => computed |= !holds_function,
+                    // Code for size has a call's target in a register; its address is among those held.
+                    Branch::Computed(by) => {
+                        let to = by.and_then(|by| self.held.get(&by));
+                        computed |= to.is_none_or(|to| self.function(*to).is_none());
+                    }
                 }
             }
         }
@@ -239,6 +245,11 @@ fn function(symbol: &str, place: Range<u32>) -> Function {
         place,
         is_jump: target.is_some(),
     }
+}
+
+/// The register of a movw or a movt.
+fn register(code: u32) -> u32 {
+    code >> 24 & 0xF
 }
 
 /// The 16 bits of a movw or a movt.

@@ -1,12 +1,15 @@
 //! Where instructions lead: the branches and calls of Thumb-2 (Armv7-M manual, chapter A7.7).
 
+use super::registers::Registers;
+
 /// Where an instruction goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Branch {
     /// At this address.
     To(u32),
-    /// Wherever a register or the memory says; a return is none of these.
-    Computed,
+    /// Wherever a register or the memory says; a return is none of these. With the place of the word or of the
+    /// `movt` whose address the register has been given, if it has.
+    Computed(Option<u32>),
 }
 
 const LINK: u16 = 14;
@@ -18,31 +21,48 @@ pub(super) fn branches(begin: u32, code: &[u8]) -> Vec<Branch> {
         .chunks_exact(2)
         .map(|half| u16::from_le_bytes([half[0], half[1]]))
         .collect();
-    let (mut found, mut at) = (Vec::new(), 0);
+    let (mut found, mut at, mut registers) = (Vec::new(), 0, Registers::default());
     while let Some(&first) = halves.get(at) {
         // What it counts from.
         let here = begin + 2 * at as u32 + 4;
         let second = halves.get(at + 1).copied().unwrap_or(0);
         let is_wide = first >> 11 > 0b11100;
         found.extend(if is_wide {
+            registers.wide(here, first, second);
             wide(here, first, second)
         } else {
-            narrow(here, first)
+            registers.narrow(here, first);
+            narrow(here, first, &registers)
         });
+        if is_call(is_wide, first, second) {
+            registers.called();
+        }
         at += 1 + usize::from(is_wide);
     }
     found
 }
 
-fn narrow(here: u32, code: u16) -> Option<Branch> {
+/// bl, or blx of a register.
+fn is_call(is_wide: bool, first: u16, second: u16) -> bool {
+    if is_wide {
+        first & 0xF800 == 0xF000 && second & 0xD000 == 0xD000
+    } else {
+        first & 0xFF80 == 0x4780
+    }
+}
+
+fn narrow(here: u32, code: u16, registers: &Registers) -> Option<Branch> {
     match code {
         // b, under a condition; of the 16 the last two are other instructions.
         0xD000..=0xDDFF => Some(Branch::To(moved(here, code, 8))),
         0xE000..=0xE7FF => Some(Branch::To(moved(here, code, 11))),
         // bx, blx.
-        0x4700..=0x47FF => (code >> 3 & 15 != LINK).then_some(Branch::Computed),
+        0x4700..=0x47FF => {
+            let register = code >> 3 & 15;
+            (register != LINK).then(|| Branch::Computed(registers.get(register)))
+        }
         // mov pc.
-        _ if code & 0xFF87 == 0x4687 => Some(Branch::Computed),
+        _ if code & 0xFF87 == 0x4687 => Some(Branch::Computed(registers.get(code >> 3))),
         _ => None,
     }
 }
@@ -50,7 +70,7 @@ fn narrow(here: u32, code: u16) -> Option<Branch> {
 fn wide(here: u32, first: u16, second: u16) -> Option<Branch> {
     // ldr pc; from the stack it is a return.
     if first & 0xFF70 == 0xF850 && second >> 12 == 15 {
-        return (first & 15 != STACK).then_some(Branch::Computed);
+        return (first & 15 != STACK).then_some(Branch::Computed(None));
     }
     if first & 0xF800 != 0xF000 || second & 0x8000 == 0 {
         return None;
@@ -93,23 +113,23 @@ mod tests {
     fn branches_are_found_among_other_instructions() {
         // As GNU as writes them, at 0x1000.
         let code: [(&[u16], Option<Branch>); 17] = [
-            (&[0xB510], None),                             // push {r4, lr}
-            (&[0xF000, 0xF87D], Some(Branch::To(0x1100))), // bl 0x1100
-            (&[0xF7FF, 0xFF7B], Some(Branch::To(0x0F00))), // bl 0x0f00
-            (&[0xF000, 0xB879], Some(Branch::To(0x1100))), // b.w 0x1100
-            (&[0xF000, 0x8077], Some(Branch::To(0x1100))), // beq.w 0x1100
-            (&[0xF3EF, 0x8009], None),                     // mrs r0, psp
-            (&[0xD0FE], Some(Branch::To(0x1016))),         // beq .
-            (&[0xE7FE], Some(Branch::To(0x1018))),         // b .
-            (&[0xDE00], None),                             // udf #0
-            (&[0xDF00], None),                             // svc 0
-            (&[0x4798], Some(Branch::Computed)),           // blx r3
-            (&[0x4718], Some(Branch::Computed)),           // bx r3
-            (&[0x4770], None),                             // bx lr
-            (&[0x469F], Some(Branch::Computed)),           // mov pc, r3
-            (&[0xF8D3, 0xF004], Some(Branch::Computed)),   // ldr.w pc, [r3, #4]
-            (&[0xF85D, 0xFB04], None),                     // ldr pc, [sp], #4
-            (&[0xBD10], None),                             // pop {r4, pc}
+            (&[0xB510], None),                                 // push {r4, lr}
+            (&[0xF000, 0xF87D], Some(Branch::To(0x1100))),     // bl 0x1100
+            (&[0xF7FF, 0xFF7B], Some(Branch::To(0x0F00))),     // bl 0x0f00
+            (&[0xF000, 0xB879], Some(Branch::To(0x1100))),     // b.w 0x1100
+            (&[0xF000, 0x8077], Some(Branch::To(0x1100))),     // beq.w 0x1100
+            (&[0xF3EF, 0x8009], None),                         // mrs r0, psp
+            (&[0xD0FE], Some(Branch::To(0x1016))),             // beq .
+            (&[0xE7FE], Some(Branch::To(0x1018))),             // b .
+            (&[0xDE00], None),                                 // udf #0
+            (&[0xDF00], None),                                 // svc 0
+            (&[0x4798], Some(Branch::Computed(None))),         // blx r3
+            (&[0x4718], Some(Branch::Computed(None))),         // bx r3
+            (&[0x4770], None),                                 // bx lr
+            (&[0x469F], Some(Branch::Computed(None))),         // mov pc, r3
+            (&[0xF8D3, 0xF004], Some(Branch::Computed(None))), // ldr.w pc, [r3, #4]
+            (&[0xF85D, 0xFB04], None),                         // ldr pc, [sp], #4
+            (&[0xBD10], None),                                 // pop {r4, pc}
         ];
         let halves = code.iter().flat_map(|(halves, _)| halves.iter());
         let bytes: Vec<u8> = halves.flat_map(|half| half.to_le_bytes()).collect();
