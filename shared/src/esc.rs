@@ -240,7 +240,7 @@ impl Esc {
         self.command = standing.command;
         self.follow_wire(throttle, now_us);
         if self.storage.reminds(now_us) {
-            self.warn_of("Settings lost: set and store them, or reset them");
+            self.warn_of(storage::LOST);
         }
         self.with_component(throttle, now_us, |component, context| {
             component.poll(context, send);
@@ -313,6 +313,10 @@ impl Esc {
                     Ok(()) => self.storage.ask(request),
                     Err(error) => self.component.storage_done(Err(error.reason)),
                 }
+            }
+            // A direction is to be stored: all others with it, which nobody has set.
+            Some(Request::Save) if self.storage.is_lost() && !self.component.stores_all() => {
+                self.component.storage_done(Err(storage::LOST));
             }
             _ => self.storage.ask(request),
         }

@@ -28,6 +28,9 @@ const SAVE_EVERY_US: u64 = 180_000_000;
 /// Time between two reminders that settings were lost, µs: a station may have come since.
 const REMIND_US: u64 = 10_000_000;
 
+/// What a person is told, and one who would store them beside something else.
+pub(super) const LOST: &str = "Settings lost: set and store them, or reset them";
+
 /// Who has asked for storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asker {

@@ -273,6 +273,12 @@ impl Commands {
         None
     }
 
+    /// Returns true if the storage command that waits asks for nothing else.
+    pub(super) fn stores_all(&self) -> bool {
+        let command = self.storage.as_ref();
+        command.is_some_and(|command| command.number == PREFLIGHT_STORAGE)
+    }
+
     /// The storage command that waits is done.
     pub(super) fn storage_done(
         &mut self,

@@ -299,6 +299,11 @@ impl Component {
         self.commands.take_act()
     }
 
+    /// Returns true if the command that waits for storage asks for nothing else.
+    pub fn stores_all(&self) -> bool {
+        self.commands.stores_all()
+    }
+
     /// A request for storage is done: `Ok` if the values would survive a loss of power now, or
     /// a few words on why not. The command is acknowledged with this.
     pub fn storage_done(&mut self, result: Result<(), &'static str>) {

@@ -46,6 +46,29 @@ impl Bench {
     }
 }
 
+/// The others would be stored with it, which are the defaults.
+#[test]
+fn a_direction_does_not_store_settings_that_were_lost() {
+    let mut bench = Bench::new();
+    bench.esc.lose_stored();
+    bench.frames(2_000, 0);
+    bench.configure(5.0);
+    bench.frames(1_000, 0);
+    assert_eq!(bench.requests, [Request::ParamsChanged]);
+    assert_eq!(bench.take_results(), [FAILED]);
+    let lost = "Settings lost: set and store them, or reset them";
+    assert_eq!(bench.texts.last().map(String::as_str), Some(lost));
+    assert!(!bench.esc.telemetry().armed);
+    // Once they are stored on their own, it is stored too.
+    bench.command(MavCmd::MAV_CMD_PREFLIGHT_STORAGE, 1.0);
+    bench.frames(2, 0);
+    bench.storage_done(Ok(()));
+    bench.configure(4.0);
+    bench.frames(2, 0);
+    let save = [Request::ParamsChanged, Request::Save];
+    assert_eq!(bench.requests[1..], [&[Request::Save], &save[..]].concat());
+}
+
 #[test]
 fn a_direction_is_in_force_at_once_and_acknowledged_when_it_is_stored() {
     let mut bench = Bench::armed();
