@@ -11,7 +11,8 @@ use crate::mavlink::receiver::{Frame, is_signed};
 const SESSION_US: u64 = 10_000_000;
 
 /// Most that requests may cost between two polls. A client that waits for each answer asks once, since
-/// answers leave at a poll; of more, those that find nothing left are as if they had been lost.
+/// answers leave at a poll; of more, those that find nothing left are as if they had been lost. Who leaves
+/// nothing and asks for more has nothing until the poll after the next: meanwhile others have theirs.
 const COST_MOST: u8 = 5;
 
 /// Offsets in the message; before these stand the network and the target.
@@ -93,12 +94,19 @@ pub(in crate::mavlink) struct Server {
     session: Option<Session>,
     /// Cost of the requests since the last poll.
     cost: u8,
+    /// Whose the last of these was.
+    spender: Option<Address>,
+    /// Who has spent all and asked for more, since the last poll and before it.
+    greedy: Option<Address>,
+    waits: Option<Address>,
 }
 
 impl Server {
     /// A poll: requests may cost something again.
     pub(in crate::mavlink) fn rest(&mut self) {
         self.cost = 0;
+        self.spender = None;
+        self.waits = self.greedy.take();
     }
 
     /// Obeys a request. None when the frame is an answer itself, or the answer comes in a burst.
@@ -115,11 +123,9 @@ impl Server {
         if request >= request::ACK {
             return None;
         }
-        let cost = self.cost + cost(request);
-        if cost > COST_MOST {
+        if !self.affords(frame.from, cost(request)) {
             return None;
         }
-        self.cost = cost;
         let over = |session: &mut Session| now_us.saturating_sub(session.used_us) >= SESSION_US;
         self.session.take_if(over);
         let content = match self.obey(now_us, frame, request, view) {
@@ -133,6 +139,24 @@ impl Server {
             offset: frame.u32(OFFSET),
             content,
         })
+    }
+
+    /// Takes the cost of a request; whether there is so much left for this one.
+    fn affords(&mut self, from: Address, cost: u8) -> bool {
+        if cost == 0 {
+            return true;
+        }
+        if self.waits == Some(from) {
+            return false;
+        }
+        let affords = self.cost + cost <= COST_MOST;
+        if affords {
+            self.cost += cost;
+            self.spender = Some(from);
+        } else if self.spender == Some(from) {
+            self.greedy = self.spender;
+        }
+        affords
     }
 
     fn obey(
