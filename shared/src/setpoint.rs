@@ -4,6 +4,7 @@ use crate::drive::{Setpoint, tone};
 use crate::input::authority::Command;
 use crate::input::{Share, reverse};
 use crate::math::{Real, TopProduct};
+use crate::params::choice::CtlMode;
 use crate::params::{self, ParamId, Params};
 use crate::tune::Note;
 use crate::units::{Current, Scale, Speed};
@@ -33,13 +34,13 @@ impl Mapping {
         let speed = |id| scale.speed_from_rpm(params.get(id));
         let least = speed(ParamId::CtlRpmMin);
         Self {
-            mode: match params.get(ParamId::CtlMode) {
-                0.0 => Mode::Speed {
+            mode: match params.choice() {
+                CtlMode::Speed => Mode::Speed {
                     least,
                     span: speed(ParamId::CtlRpmMax).saturating_sub(least),
                 },
-                1.0 => Mode::Torque { full },
-                _ => Mode::Voltage,
+                CtlMode::Torque => Mode::Torque { full },
+                CtlMode::Voltage => Mode::Voltage,
             },
             period_s: scale.period_s,
             test_full: params::test_current(params, scale),

@@ -4,6 +4,7 @@ use serde::Deserialize;
 use siskin_control::input::dshot::{self, Rate};
 use siskin_control::input::endpoints::ZERO_DIVISOR;
 use siskin_control::input::signal::{Pulse, Signal};
+use siskin_control::params::choice::Inp3d;
 use siskin_control::params::{ParamId, Params};
 
 /// Share of a pulse's range that is zero throttle.
@@ -88,7 +89,7 @@ fn bits(throttle: f64, bidirectional: bool) -> u16 {
 fn servo_us(throttle: f64, params: &Params) -> f64 {
     let get = |id| f64::from(params.get(id));
     let (min_us, max_us) = (get(ParamId::InpPulseMinUs), get(ParamId::InpPulseMaxUs));
-    let share = match (get(ParamId::Inp3d) != 0.0, throttle > 0.0) {
+    let share = match (params.chosen(Inp3d::On), throttle > 0.0) {
         (false, false) => 0.0,
         (false, true) => ZERO_SHARE + (1.0 - ZERO_SHARE) * throttle,
         (true, false) => 0.5,

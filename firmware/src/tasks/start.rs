@@ -5,6 +5,7 @@ use embassy_stm32::uid::uid;
 use siskin_control::esc::{Esc, check};
 use siskin_control::image::Image;
 use siskin_control::mavlink::{Receiver, Warning};
+use siskin_control::params::choice::CtlObserver;
 use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::store;
 use siskin_control::throttle::Throttle;
@@ -27,9 +28,6 @@ use crate::{exchange, interrupt, last_words};
 /// Age at which the interrupt stops obeying a set-point: ten missed renewals.
 const STALE_S: f32 = 0.01;
 
-/// `CTL_OBSERVER` of Hall sensors, one of which has the pin of the serial line on some boards.
-const HALL: f32 = 2.0;
-
 /// Bytes that come in between two looks of the task: 5 ms of the fastest link.
 const LINE_BYTES: usize = 512;
 
@@ -45,7 +43,8 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
     }
     let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
     let baud = esc.params().get(ParamId::TelBaud) as u32;
-    let has_hall_sensors = esc.params().get(ParamId::CtlObserver) == HALL;
+    // One of them has the pin of the serial line on some boards.
+    let has_hall_sensors = esc.params().chosen(CtlObserver::Hall);
 
     let stale_periods = (pwm_hz * STALE_S) as u32;
     let ends = exchange::open(stale_periods).expect("opened here and nowhere else");

@@ -5,6 +5,7 @@ use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 
 use super::place::Place;
 use super::receiver::Frame;
+use crate::params::choice::MavRole;
 use crate::params::{ParamId, Params};
 
 /// A component of a system; 0 stands for all where something is addressed.
@@ -36,7 +37,7 @@ pub(super) struct Identity {
 
 impl Identity {
     pub(super) fn new(params: &Params) -> Self {
-        let role = if params.get(ParamId::MavRole) == 0.0 {
+        let role = if params.chosen(MavRole::Standalone) {
             Role::Standalone
         } else {
             Role::Peripheral

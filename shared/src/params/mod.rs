@@ -9,7 +9,7 @@ use crate::math::SQRT_3;
 pub use build::{Board, BuildError, FluxSettings, LeastDeadTime, build, build_in, input, scale};
 pub(crate) use build::{TRIP_SHARE, lost_periods, test_current};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
-pub use table::{Kind, ParamId, Parameter, TABLE, Text};
+pub use table::{Choice, Kind, ParamId, Parameter, TABLE, Text, choice};
 
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,6 +71,24 @@ impl Params {
     /// The value of one parameter, in the unit of its entry.
     pub fn get(&self, id: ParamId) -> f32 {
         self.values[id as usize]
+    }
+
+    /// The value of a parameter that is a choice of few, which its type names.
+    #[inline]
+    pub fn choice<C: Choice>(&self) -> C {
+        C::of(self.number(C::PARAM))
+    }
+
+    /// Whether a parameter that is a choice of few has this value.
+    #[inline]
+    pub fn chosen<C: Choice>(&self, choice: C) -> bool {
+        self.number(C::PARAM) == choice.number()
+    }
+
+    /// Never inlined: the conversion would be at every choice.
+    #[inline(never)]
+    fn number(&self, id: ParamId) -> u8 {
+        self.get(id) as u8
     }
 
     /// Takes a value, or says why not and changes nothing.
@@ -146,6 +164,25 @@ mod tests {
         assert!((params.get(ParamId::MotKv) - 353.0).abs() < 0.5);
         params.set(ParamId::MotPolePairs, 6.0).expect("in range");
         assert!((params.get(ParamId::MotKv) - 706.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_choice_is_the_one_that_was_set() {
+        use choice::{CtlAdaptL, CtlObserver};
+
+        let mut params = Params::default();
+        for choice in [
+            CtlObserver::BackEmf,
+            CtlObserver::FluxCrossings,
+            CtlObserver::Hall,
+            CtlObserver::Compensated,
+        ] {
+            let (id, value) = choice.setting();
+            params.set(id, value).expect("in range");
+            assert_eq!(params.choice::<CtlObserver>(), choice);
+            assert!(params.chosen(choice) && params.chosen(CtlAdaptL::Off));
+        }
+        assert!(!params.chosen(CtlObserver::Hall));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Named sets of parameters.
 
 use super::ParamId;
+use super::choice::{CtlObsCure, CtlObserver, CtlRegulator, CtlSpeed};
 
 /// Parameters that belong together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,10 +27,10 @@ pub const BOSSO_TABLE_III: Preset = Preset {
         (ParamId::MotJGcm2, 1430.0),
         (ParamId::CtlRpmMax, 6000.0),
         (ParamId::PwmFreqHz, 15_000.0),
-        (ParamId::CtlObserver, 0.0),
-        (ParamId::CtlObsCure, 0.0),
-        (ParamId::CtlRegulator, 0.0),
-        (ParamId::CtlSpeed, 2.0),
+        CtlObserver::BackEmf.setting(),
+        CtlObsCure::Published.setting(),
+        CtlRegulator::ObserverBased.setting(),
+        CtlSpeed::Pi.setting(),
         (ParamId::CtlBwCurHz, 375.0),
         (ParamId::CtlBwSpdHz, 7.9),
     ],

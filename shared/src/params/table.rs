@@ -46,6 +46,18 @@ pub struct Text {
     pub restart: bool,
 }
 
+/// A parameter that is a choice of few.
+pub trait Choice: Copy {
+    /// The parameter.
+    const PARAM: ParamId;
+
+    /// The choice of this number; the table's range holds no other.
+    fn of(number: u8) -> Self;
+
+    /// Its number.
+    fn number(self) -> u8;
+}
+
 /// A row's optional words; any other does not compile.
 macro_rules! is_live {
     () => {
@@ -73,13 +85,18 @@ macro_rules! is_at_restart {
 macro_rules! parameters {
     ($($key:literal $id:ident $name:literal $unit:literal $kind:ident
        $min:literal .. $max:literal = $default:literal $($word:ident)* $description:literal
-       $($value:literal $choice:literal)*;)*) => {
+       $($value:literal $choice:literal)*
+       $(one of $($number:literal $variant:ident $meaning:literal)+)?;)*) => {
         /// Names a row of [`TABLE`]; its order is the order on MAVLink.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u8)]
         pub enum ParamId {
             $(
-                #[doc = concat!($description $(, "; ", $value, " ", $choice)*)]
+                #[doc = concat!(
+                    $description
+                    $(, "; ", $value, " ", $choice)*
+                    $($(, "; ", $number, " ", $meaning)+)?
+                )]
                 $id,
             )*
         }
@@ -102,10 +119,51 @@ macro_rules! parameters {
             Text {
                 unit: $unit,
                 description: $description,
-                choices: &[$(($value, $choice)),*],
+                choices: &[$(($value, $choice),)* $($(($number, $meaning)),+)?],
                 restart: is_at_restart!($($word)*),
             },
         )*];
+
+        /// The parameters that are a choice of few, each by its own name.
+        pub mod choice {
+            use super::{Choice, ParamId};
+
+            $($(
+                #[doc = $description]
+                #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+                #[repr(u8)]
+                pub enum $id {
+                    $(
+                        #[doc = $meaning]
+                        $variant = $number,
+                    )+
+                }
+
+                impl $id {
+                    /// The parameter and the value that choose this.
+                    pub const fn setting(self) -> (ParamId, f32) {
+                        (ParamId::$id, self as u8 as f32)
+                    }
+                }
+
+                impl Choice for $id {
+                    const PARAM: ParamId = ParamId::$id;
+
+                    #[inline]
+                    fn of(number: u8) -> Self {
+                        match number {
+                            $($number => Self::$variant,)+
+                            _ => [$(Self::$variant),+][0],
+                        }
+                    }
+
+                    #[inline]
+                    fn number(self) -> u8 {
+                        self as u8
+                    }
+                }
+            )?)*
+        }
 
         impl ParamId {
             /// All parameters in the order of the table.
@@ -125,9 +183,9 @@ parameters! {
     2 MavCompId "MAV_COMP_ID" "" Whole 1.0..250.0 = 140.0 live restart
         "MAVLink component id as a peripheral; standalone it is 1";
     3 MavRole "MAV_ROLE" "" Whole 0.0..1.0 = 0.0 live restart
-        "What it is to a ground station"
-            0 "standalone, a vehicle of its own"
-            1 "peripheral beside an autopilot";
+        "What it is to a ground station" one of
+            0 Standalone "standalone, a vehicle of its own"
+            1 Peripheral "peripheral beside an autopilot";
     10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 1.0..64.0 = 12.0
         "Pole pairs of the motor: half the number of its magnets";
     11 MotRMohm "MOT_R_MOHM" "mOhm" Real 1.0..10000.0 = 108.0
@@ -139,49 +197,49 @@ parameters! {
     14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" Real 0.1..10000000.0 = 1430.0
         "Moment of inertia of motor and load";
     15 MotDir "MOT_DIR" "" Whole 0.0..1.0 = 0.0
-        "Direction of rotation"
-            0 "normal"
-            1 "reversed";
+        "Direction of rotation" one of
+            0 Normal "normal"
+            1 Reversed "reversed";
     16 MotKv "MOT_KV" "rpm/V" Derived 0.0..1000000.0 = 353.416
         "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only";
     17 MotStop "MOT_STOP" "" Whole 0.0..1.0 = 1.0
-        "At zero throttle and at loss of signal"
-            0 "coast"
-            1 "brake";
+        "At zero throttle and at loss of signal" one of
+            0 Coast "coast"
+            1 Brake "brake";
     18 MotToneA "MOT_TONE_A" "A" Real 0.0..10.0 = 1.5 live
         "Bound of tones' phase current, peak; up to a quarter more with R or L stated wrongly; 0 is silent";
     20 CtlMode "CTL_MODE" "" Whole 0.0..2.0 = 0.0
-        "What throttle commands"
-            0 "speed"
-            1 "torque"
-            2 "voltage";
+        "What throttle commands" one of
+            0 Speed "speed"
+            1 Torque "torque"
+            2 Voltage "voltage";
     21 CtlDrive "CTL_DRIVE" "" Whole 0.0..1.0 = 0.0
-        "Drive"
-            0 "field-oriented"
-            1 "six-step";
+        "Drive" one of
+            0 FieldOriented "field-oriented"
+            1 SixStep "six-step";
     22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..3.0 = 3.0
-        "Position observer"
-            0 "adaptive back-EMF"
-            1 "flux crossings"
-            2 "Hall"
-            3 "compensated flux with PLL";
+        "Position observer" one of
+            0 BackEmf "adaptive back-EMF"
+            1 FluxCrossings "flux crossings"
+            2 Hall "Hall"
+            3 Compensated "compensated flux with PLL";
     23 CtlRegulator "CTL_REGULATOR" "" Whole 0.0..2.0 = 1.0
-        "Current regulator"
-            0 "observer-based"
-            1 "synchronous"
-            2 "modified synchronous";
+        "Current regulator" one of
+            0 ObserverBased "observer-based"
+            1 Synchronous "synchronous"
+            2 Modified "modified synchronous";
     24 CtlModulation "CTL_MODULATION" "" Whole 0.0..1.0 = 0.0
-        "Modulation"
-            0 "space vector"
-            1 "sine";
+        "Modulation" one of
+            0 SpaceVector "space vector"
+            1 Sine "sine";
     25 CtlObsCure "CTL_OBS_CURE" "" Whole 0.0..1.0 = 0.0
-        "Form of the adaptive back-EMF observer"
-            0 "as published"
-            1 "cured of its sensitivity to R, L";
+        "Form of the adaptive back-EMF observer" one of
+            0 Published "as published"
+            1 Cured "cured of its sensitivity to R, L";
     26 CtlAdaptL "CTL_ADAPT_L" "" Whole 0.0..1.0 = 0.0
-        "Adaptation of the inductance by a square wave of i_d"
-            0 "off"
-            1 "on";
+        "Adaptation of the inductance by a square wave of i_d" one of
+            0 Off "off"
+            1 On "on";
     27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
         "Mechanical speed at full throttle in speed mode";
     28 CtlRpmMin "CTL_RPM_MIN" "rpm" Real 100.0..200000.0 = 300.0
@@ -197,20 +255,20 @@ parameters! {
     33 CtlPosN "CTL_POS_N" "" Whole 1.0..4.0 = 1.0
         "Observers 1 and 2: electrical turns over which the speed is measured";
     34 CtlFluxForm "CTL_FLUX_FORM" "" Whole 0.0..3.0 = 1.0
-        "Flux integrators"
-            0 "first order, limits as measured"
-            1 "second order, limits as measured"
-            2 "first order, limits as stated"
-            3 "second order, limits as stated";
+        "Flux integrators" one of
+            0 FirstOrder "first order, limits as measured"
+            1 SecondOrder "second order, limits as measured"
+            2 FirstOrderStated "first order, limits as stated"
+            3 SecondOrderStated "second order, limits as stated";
     35 CtlHall "CTL_HALL" "" Whole 0.0..1.0 = 1.0
-        "Hall observer"
-            0 "sensors alone"
-            1 "merged with the flux crossings";
+        "Hall observer" one of
+            0 Alone "sensors alone"
+            1 Merged "merged with the flux crossings";
     36 CtlSpeed "CTL_SPEED" "" Whole 0.0..2.0 = 0.0
-        "Speed loop"
-            0 "with feed-forward of the inertia"
-            1 "PI with feed-forward of CTL_FF_A"
-            2 "PI";
+        "Speed loop" one of
+            0 Inertia "with feed-forward of the inertia"
+            1 Propeller "PI with feed-forward of CTL_FF_A"
+            2 Pi "PI";
     37 CtlFfA "CTL_FF_A" "A" Real 0.0..200.0 = 8.4 live
         "Steady current at CTL_RPM_MAX, fed forward with the square of the speed if CTL_SPEED is 1";
     40 PwmFreqHz "PWM_FREQ_HZ" "Hz" Real 8000.0..60000.0 = 24000.0 restart
@@ -233,9 +291,9 @@ parameters! {
             22 "bidirectional DShot600"
             23 "bidirectional DShot1200";
     51 Inp3d "INP_3D" "" Whole 0.0..1.0 = 0.0
-        "Both directions by one throttle"
-            0 "off"
-            1 "on";
+        "Both directions by one throttle" one of
+            0 Off "off"
+            1 On "on";
     52 InpArmMs "INP_ARM_MS" "ms" Real 10.0..5000.0 = 300.0
         "Time for which zero throttle must be received before the motor may turn";
     53 InpLossMs "INP_LOSS_MS" "ms" Real 5.0..2000.0 = 100.0

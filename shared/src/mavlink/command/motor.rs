@@ -8,6 +8,7 @@ use super::{
 };
 use crate::input::authority::TestError;
 use crate::mavlink::parameter;
+use crate::params::choice::Inp3d;
 use crate::params::{ParamId, Params};
 
 const PERCENT: i32 = MotorTestThrottleType::MOTOR_TEST_THROTTLE_PERCENT as i32;
@@ -99,7 +100,7 @@ fn motor_test(command: &Command, params: &Params) -> Option<(f32, f32)> {
         Some(PWM) => {
             let min_us = params.get(ParamId::InpPulseMinUs);
             let share = (throttle - min_us) / (params.get(ParamId::InpPulseMaxUs) - min_us);
-            if params.get(ParamId::Inp3d) == 0.0 {
+            if params.chosen(Inp3d::Off) {
                 share
             } else {
                 2.0 * share - 1.0

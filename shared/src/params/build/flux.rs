@@ -9,6 +9,7 @@ use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{crossing, flux_linkage, hall, position};
 use crate::math::{Real, settled, square_root};
+use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
 use crate::params::{ParamId, Params};
 use crate::units::{Angle, Flux, Speed};
 
@@ -81,9 +82,11 @@ impl FluxSettings {
         let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
         Self {
             tau_int_s,
-            tau_hpfs_s: match get(ParamId::CtlFluxForm) {
-                0.0 | 2.0 => None,
-                _ => Some(HIGH_PASS_SHARE * tau_int_s),
+            tau_hpfs_s: match params.choice() {
+                CtlFluxForm::FirstOrder | CtlFluxForm::FirstOrderStated => None,
+                CtlFluxForm::SecondOrder | CtlFluxForm::SecondOrderStated => {
+                    Some(HIGH_PASS_SHARE * tau_int_s)
+                }
             },
             hold_off_turns: HOLD_OFF * A_TURNS,
             turns: n,
@@ -120,9 +123,9 @@ pub(super) fn edges(p: &Si) -> Config {
         corner: corner(tau_s),
     });
     Config {
-        sensors: match (get(ParamId::CtlObserver), get(ParamId::CtlHall)) {
-            (2.0, 0.0) => Sensors::Hall,
-            (2.0, _) => Sensors::Merged,
+        sensors: match (p.choice(), p.choice()) {
+            (CtlObserver::Hall, CtlHall::Alone) => Sensors::Hall,
+            (CtlObserver::Hall, CtlHall::Merged) => Sensors::Merged,
             _ => Sensors::None,
         },
         flux: flux_linkage::Config {
@@ -137,7 +140,10 @@ pub(super) fn edges(p: &Si) -> Config {
             stator_max: Flux::from_f32(
                 get(ParamId::LimPhaseA) / p.scale.current_a * flux_per_current,
             ),
-            adaptive: get(ParamId::CtlFluxForm) < 2.0,
+            adaptive: matches!(
+                p.choice(),
+                CtlFluxForm::FirstOrder | CtlFluxForm::SecondOrder
+            ),
         },
         crossing: crossing::Config {
             deadband: I0F32::from_f32(DEADBAND),

@@ -3,6 +3,7 @@
 use super::Si;
 use crate::control::inductance::{Config, MEAN_PERIODS_MAX};
 use crate::params::ParamId;
+use crate::params::choice::CtlAdaptL;
 
 /// Half the square wave's height over `LIM_PHASE_A`: 1 A on the bench.
 const AMPLITUDE_SHARE: f32 = 0.05;
@@ -15,7 +16,7 @@ const STEP: f32 = 0.1;
 
 /// The adaptation, where `CTL_ADAPT_L` asks for it.
 pub(super) fn inductance(p: &Si) -> Option<Config> {
-    if p.get(ParamId::CtlAdaptL) == 0.0 {
+    if p.chosen(CtlAdaptL::Off) {
         return None;
     }
     let half_periods = (HALF_S / p.period_s) as u32;

@@ -5,6 +5,7 @@ use crate::input::authority::Timing;
 use crate::input::demand::Reading;
 use crate::input::endpoints::EndPoints;
 use crate::input::signal::Signal;
+use crate::params::choice::Inp3d;
 use crate::params::{ParamId, Params};
 
 /// The way the throttle wire is read.
@@ -18,7 +19,7 @@ pub fn input(params: &Params) -> Settings {
             loss_us: time_us(ParamId::InpLossMs),
         },
         reading: Reading {
-            two_directions: params.get(ParamId::Inp3d) != 0.0,
+            two_directions: params.chosen(Inp3d::On),
             ends: EndPoints {
                 min_us: width_us(ParamId::InpPulseMinUs),
                 max_us: width_us(ParamId::InpPulseMaxUs),

@@ -19,7 +19,8 @@ use core::f32::consts::{FRAC_PI_2, TAU};
 
 use fixed::types::extra::Unsigned;
 
-use super::{ParamId, Params};
+use super::choice::{CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, MotDir, MotStop};
+use super::{Choice, ParamId, Params};
 use crate::control::delay::Delay;
 use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
@@ -176,9 +177,9 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     let refused = Cell::new(None);
     let p = Si::new(params, board, &refused);
     refuse_contradictions(&p);
-    let modulation = match p.get(ParamId::CtlModulation) {
-        0.0 => Modulation::SpaceVector,
-        _ => Modulation::Sine,
+    let modulation = match p.choice() {
+        CtlModulation::SpaceVector => Modulation::SpaceVector,
+        CtlModulation::Sine => Modulation::Sine,
     };
     let (duty_max, window) = sensing::duty_max(&p, modulation);
     p.verdict()?;
@@ -187,13 +188,13 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
         ParamId::LimBusVMax,
         board.bus_v_per_count / p.scale.voltage_v,
     );
-    place.direction = match p.get(ParamId::MotDir) {
-        0.0 => Direction::Normal,
-        _ => Direction::Reversed,
+    place.direction = match p.choice() {
+        MotDir::Normal => Direction::Normal,
+        MotDir::Reversed => Direction::Reversed,
     };
-    place.stop = match p.get(ParamId::MotStop) {
-        0.0 => Stop::Coast,
-        _ => Stop::Brake,
+    place.stop = match p.choice() {
+        MotStop::Coast => Stop::Coast,
+        MotStop::Brake => Stop::Brake,
     };
     place.delay = board.delay;
     place.observer = observer::observer(&p);
@@ -204,7 +205,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.low_speed = low_speed(&p);
     place.start = start::attempts(&p);
     place.test_current = test_current(params, &p.scale);
-    place.both_ways = p.get(ParamId::Inp3d) == 1.0;
+    place.both_ways = p.chosen(Inp3d::On);
     place.slow = p.slow();
     place.coast = p.gain(ParamId::PwmFreqHz, p.period_s / COAST_S);
     place.modulator = modulator::Config::new(
@@ -222,14 +223,15 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.dead_time = sensing::dead_time(&p);
     place.protection = limits(&p);
     place.tone = tone::tone(&p);
-    place.six_step = match p.get(ParamId::CtlDrive) {
-        0.0 => None,
-        _ => Some(six_step::six_step(&p, duty_max)),
+    place.six_step = match p.choice() {
+        CtlDrive::FieldOriented => None,
+        CtlDrive::SixStep => Some(six_step::six_step(&p, duty_max)),
     };
     place.clear_periods = p.periods(CLEAR_S);
-    place.slow_periods = match p.get(ParamId::CtlObserver) {
-        2.0 => p.periods(SENSED_S),
-        _ => 0,
+    place.slow_periods = if p.chosen(CtlObserver::Hall) {
+        p.periods(SENSED_S)
+    } else {
+        0
     };
     place.proven_periods = p.periods(PROVEN_S);
     place.lost_periods = lost_periods(&p.scale);
@@ -313,7 +315,7 @@ fn refuse_contradictions(p: &Si) {
         ParamId::PwmFreqHz,
         "less than four periods a turn at CTL_RPM_MAX",
     );
-    let by_edges = [1.0, 2.0].contains(&get(ParamId::CtlObserver));
+    let by_edges = p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall);
     p.refuse_if(
         by_edges && turns > EDGES_TURNS,
         ParamId::PwmFreqHz,
@@ -385,6 +387,14 @@ impl<'a> Si<'a> {
         self.params.get(id)
     }
 
+    fn choice<C: Choice>(&self) -> C {
+        self.params.choice()
+    }
+
+    fn chosen<C: Choice>(&self, choice: C) -> bool {
+        self.params.chosen(choice)
+    }
+
     /// A time in whole periods.
     fn periods(&self, time_s: f32) -> u32 {
         (time_s / self.period_s) as u32
@@ -447,8 +457,8 @@ impl<'a> Si<'a> {
 fn low_speed(p: &Si) -> low_speed::Config {
     let limit_a = p.get(ParamId::LimPhaseA);
     let phase = p.scale.current_from_a(limit_a);
-    let published = p.get(ParamId::CtlObserver) == 0.0 && p.get(ParamId::CtlObsCure) == 0.0;
-    if published || p.get(ParamId::CtlObserver) == 2.0 {
+    let published = p.chosen(CtlObserver::BackEmf) && p.chosen(CtlObsCure::Published);
+    if published || p.chosen(CtlObserver::Hall) {
         // As published, and not needed where sensors give the position.
         return low_speed::Config::none(phase);
     }

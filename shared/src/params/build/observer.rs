@@ -8,6 +8,7 @@ use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated};
 use crate::math::{EIGHTH_PI, Multiplier, Real, settled};
 use crate::params::ParamId;
+use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
@@ -36,16 +37,16 @@ const INDUCTANCE_MAX: f32 = 4.0;
 
 /// The observer that `CTL_OBSERVER` names.
 pub(super) fn observer(p: &Si) -> observer::Config {
-    match p.get(ParamId::CtlObserver) {
-        0.0 => {
+    match p.choice() {
+        CtlObserver::BackEmf => {
             let mut config = back_emf(p);
-            if p.get(ParamId::CtlObsCure) == 1.0 {
+            if p.chosen(CtlObsCure::Cured) {
                 config.cure = Some(cure(p));
             }
             observer::Config::BackEmf(config)
         }
-        1.0 | 2.0 => observer::Config::Edges(flux::edges(p)),
-        _ => observer::Config::Compensated(compensated(p)),
+        CtlObserver::FluxCrossings | CtlObserver::Hall => observer::Config::Edges(flux::edges(p)),
+        CtlObserver::Compensated => observer::Config::Compensated(compensated(p)),
     }
 }
 

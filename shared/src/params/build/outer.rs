@@ -7,6 +7,7 @@ use crate::control::speed::{Config, Law, feed_forward, nested};
 use crate::control::{PERIODS, planner, torque};
 use crate::math::{Gain, Real};
 use crate::params::ParamId;
+use crate::params::choice::{CtlObserver, CtlRegulator, CtlSpeed};
 use crate::units::Speed;
 
 /// k_iω/k_pω over k_pω/J: Table III has 5.87 against 49.65 1/s.
@@ -34,9 +35,10 @@ const TORQUE_S: f32 = 0.003;
 const MODIFIED_SLOWER: f32 = 4.0;
 
 fn slower(p: &Si) -> f32 {
-    match p.get(ParamId::CtlRegulator) {
-        2.0 => MODIFIED_SLOWER,
-        _ => 1.0,
+    if p.chosen(CtlRegulator::Modified) {
+        MODIFIED_SLOWER
+    } else {
+        1.0
     }
 }
 
@@ -57,10 +59,10 @@ pub(super) fn torque(p: &Si) -> torque::Config {
 pub(super) fn speed(p: &Si) -> Config {
     Config {
         planner: planner(p, period_s(p)),
-        law: match p.get(ParamId::CtlSpeed) {
-            0.0 => Law::Nested(with_inertia(p)),
-            1.0 => Law::FeedForward(feed_forward(p)),
-            _ => Law::Nested(published(p)),
+        law: match p.choice() {
+            CtlSpeed::Inertia => Law::Nested(with_inertia(p)),
+            CtlSpeed::Propeller => Law::FeedForward(feed_forward(p)),
+            CtlSpeed::Pi => Law::Nested(published(p)),
         },
     }
 }
@@ -71,13 +73,13 @@ pub(super) fn planner(p: &Si, period_s: f32) -> planner::Config {
         .scale
         .speed_from_rpm(p.get(ParamId::CtlSlewRpmS) * period_s);
     // How ω* begins and ends to move: softly, or by the slew alone as in the papers.
-    let (approach, jerk) = match p.get(ParamId::CtlSpeed) {
-        0.0 => {
+    let (approach, jerk) = match p.choice() {
+        CtlSpeed::Inertia => {
             let jerk = slew.to_f32() * period_s / (JERK_S * slower(p));
             let approach = LANDING_SHARE * p.speed_rad_s * period_s;
             (approach, Speed::from_f32(jerk))
         }
-        _ => (1.0, Speed::MAX),
+        CtlSpeed::Propeller | CtlSpeed::Pi => (1.0, Speed::MAX),
     };
     planner::Config {
         slew,
@@ -116,10 +118,11 @@ fn with_inertia(p: &Si) -> nested::Config {
         k_i: p.gain(ParamId::CtlBwSpdHz, k_i * period_s(p) * torque),
         inertia: p.gain(ParamId::MotJGcm2, inertia),
         inertia_inverse: p.gain(ParamId::MotJGcm2, 1.0 / inertia),
-        trust: match p.get(ParamId::CtlObserver) {
+        trust: if p.chosen(CtlObserver::Hall) {
             // Sensors know R as little as they need to.
-            2.0 => p.gain(ParamId::CtlBwSpdHz, 5_000.0),
-            _ => p.gain(ParamId::StaRampA, 0.5 / trusted),
+            p.gain(ParamId::CtlBwSpdHz, 5_000.0)
+        } else {
+            p.gain(ParamId::StaRampA, 0.5 / trusted)
         },
         with_step: reads_step(p),
     }
@@ -127,7 +130,7 @@ fn with_inertia(p: &Si) -> nested::Config {
 
 /// Only the observer-based regulator reads p_q*.
 fn reads_step(p: &Si) -> bool {
-    p.get(ParamId::CtlRegulator) == 0.0
+    p.chosen(CtlRegulator::ObserverBased)
 }
 
 /// Second paper, figure 47.
@@ -147,9 +150,10 @@ fn feed_forward(p: &Si) -> feed_forward::Config {
         k_i: p.gain(ParamId::CtlBwSpdHz, k_i * period_s(p) * current_per_speed),
         k_ffi: p.gain(ParamId::CtlFfA, steady / (fastest * fastest)),
         k_ffv: flux,
-        own: match p.get(ParamId::CtlRegulator) {
-            2.0 => Gain::ZERO,
-            _ => flux,
+        own: if p.chosen(CtlRegulator::Modified) {
+            Gain::ZERO
+        } else {
+            flux
         },
     }
 }

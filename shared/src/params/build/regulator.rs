@@ -5,16 +5,17 @@ use core::f32::consts::TAU;
 use super::Si;
 use crate::control::regulator::{Config, modified, observer_based, synchronous};
 use crate::params::ParamId;
+use crate::params::choice::CtlRegulator;
 
 /// Poles of the current regulator (21): Table III has −2357 and −2142, the second at 0.909.
 const SECOND_POLE_SHARE: f32 = 0.909;
 
 /// The regulator that `CTL_REGULATOR` names.
 pub(super) fn regulator(p: &Si) -> Config {
-    match p.get(ParamId::CtlRegulator) {
-        0.0 => Config::ObserverBased(observer_based(p)),
-        1.0 => Config::Synchronous(synchronous(p)),
-        _ => Config::Modified(modified(p)),
+    match p.choice() {
+        CtlRegulator::ObserverBased => Config::ObserverBased(observer_based(p)),
+        CtlRegulator::Synchronous => Config::Synchronous(synchronous(p)),
+        CtlRegulator::Modified => Config::Modified(modified(p)),
     }
 }
 
