@@ -57,7 +57,7 @@ unsafe extern "C" fn hard_fault_vector() {
     )
 }
 
-/// The fault with its stack pointer, which is of no use where the stack has left its memory.
+/// The fault with its stack pointer, which is of no use if the stack has left its memory.
 extern "C" fn hard_fault(stack: u32) -> ! {
     // First of all: the rest reads memory that may be wrong.
     turn_off();
@@ -79,7 +79,7 @@ extern "C" fn hard_fault(stack: u32) -> ! {
 /// Of the exceptions of the processor.
 const NON_MASKABLE: i32 = -14;
 
-// SAFETY: it returns only where a word of the store was read, whose content is not trusted.
+// SAFETY: it returns only if a word of the store was read, whose content is not trusted.
 #[exception]
 unsafe fn NonMaskableInt() {
     if !take_torn_word() {

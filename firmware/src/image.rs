@@ -83,7 +83,7 @@ pub const fn identity(board: &'static str, board_number: u16) -> siskin_control:
     }
 }
 
-/// The first eight bytes of the commit's number; zeros where it is not known.
+/// The first eight bytes of the commit's number; zeros if it is not known.
 const fn build(commit: &[u8]) -> [u8; 8] {
     let mut build = [0; 8];
     let mut at = 0;

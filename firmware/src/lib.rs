@@ -32,7 +32,7 @@
 //!
 //! | interrupt | priority | takes | may hold up |
 //! |---|---|---|---|
-//! | PWM: `ADC1_2` on the G431, `ADC` on the F405 | 0, alone | 107 instructions besides `step`, 102 more in every eighth period, and some 120 where the bridge is turned on or off | everything |
+//! | PWM: `ADC1_2` on the G431, `ADC` on the F405 | 0, alone | 107 instructions besides `step`, 102 more in every eighth period, and some 120 when the bridge is turned on or off | everything |
 //! | nFAULT of the gate driver: `EXTI15_10`, F405 | 1, alone | 20 instructions | all but the PWM |
 //! | clock (`TIM4`), serial lines, DMA, throttle's timer | 2 | a waker each, below 5 µs by their length | tasks; not each other |
 //! | the throttle's task, by an interrupt whose unit is not used: `FMAC`, `CAN2_SCE` | 2 | some 4200 instructions for a DShot600 frame and its answer, half of them behind it or before the frame; up to 5 µs of waiting for a frame's last edge | the other tasks, and drivers' interrupts, not their DMA; the PWM for the 0.4 µs in which a reply is begun |
@@ -88,7 +88,7 @@
 //! # A debugger's halt
 //! With DBG_TIM1_STOP the counter stops with the processor, and "the outputs are disabled (as if the MOE bit
 //! was reset)" (RM0440, debug mode of TIM1; RM0090, 38.16.2); OSSI then drives them to their idle level,
-//! low. So both switches of each phase are off. MOE itself stays: where the processor goes on, so does the
+//! low. So both switches of each phase are off. MOE itself stays: if the processor goes on, so does the
 //! PWM with its last duties, and the motor has meanwhile done as it likes; what the current does then is the
 //! trips'. The watchdog does not stop, and resets a chip that is halted for longer than 1.6 s. The bit is
 //! set when the program starts and outlives all resets but a power-up; before, the gates have their

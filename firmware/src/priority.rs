@@ -12,7 +12,7 @@ use critical_section::{Impl, RawRestoreState, set_impl};
 /// Of the PWM interrupt, alone there.
 pub(crate) const PWM: u8 = 0;
 
-/// Of the gate driver's alarm, where the board has one.
+/// Of the gate driver's alarm, if the board has one.
 #[cfg(feature = "vesc4-f405")]
 pub(crate) const ALARM: u8 = 1;
 

@@ -47,7 +47,7 @@ impl Mapping {
         }
     }
 
-    /// The set-point of a note: octaves lower where the control period is too long for it.
+    /// The set-point of a note: octaves lower if the control period is too long for it.
     pub fn tone(&self, note: Note) -> Setpoint {
         let Note::Pitch { hz } = note else {
             return Setpoint::Tone(Speed::ZERO);

@@ -232,7 +232,7 @@ impl Throttle {
         }
     }
 
-    /// The next order of the wire for the tasks, where the motor stands; else some wait, and the others are
+    /// The next order of the wire for the tasks, if the motor stands; else some wait, and the others are
     /// dropped.
     pub(crate) fn next_order(&mut self, stopped: bool) -> Option<Order> {
         if stopped {

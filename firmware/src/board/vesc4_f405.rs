@@ -7,7 +7,7 @@
 //! turns itself off, and the amplifiers' gain are straps (SLES267, pins M_PWM, OC_ADJ, M_OC, GAIN), which
 //! makers of this class of boards set differently. So nothing here counts on its limiter: the control's
 //! own trip is what bounds the current. nFAULT tells of whatever has turned the driver off: a supply of
-//! the gates that is too low, over-temperature, and over-current where it is strapped so.
+//! the gates that is too low, over-temperature, and over-current if it is strapped so.
 
 use core::mem;
 

@@ -16,7 +16,7 @@ const ORIGIN: usize = 0x0800_0000;
 /// The flash has reported an error.
 pub(crate) struct Failed;
 
-/// Programs a word where nothing has been since the last erase.
+/// Programs a word that has been blank since the last erase.
 ///
 /// # Safety
 /// Nothing but data lies there.

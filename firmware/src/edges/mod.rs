@@ -156,7 +156,7 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
     }
 
     /// The next edge of both directions. One that is too young waits: an older one of the other
-    /// direction may still be on its way into memory. None as well where it was overwritten meanwhile.
+    /// direction may still be on its way into memory. None as well if it was overwritten meanwhile.
     fn next(&mut self) -> Option<(u32, bool)> {
         let age = |ticks: u32| self.settled_ticks.wrapping_sub(ticks) as i32;
         let fronts = [self.front(0), self.front(1)];

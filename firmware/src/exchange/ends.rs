@@ -126,7 +126,7 @@ impl RunningEnd {
         CONFIG.with(&self.config, work)
     }
 
-    /// Puts the snapshot where the tasks find it.
+    /// Offers the snapshot to the tasks.
     #[inline(always)]
     pub(crate) fn publish(&mut self, snapshot: Snapshot) {
         SNAPSHOT.publish(&mut self.snapshot, snapshot);
@@ -167,7 +167,7 @@ pub struct ConfigWriter {
 
 impl ConfigWriter {
     /// Offers the configuration that `make` puts where it stays, if it says that it has; the interrupt
-    /// adopts it as a whole at its next period. False where nothing is offered, as while the one before
+    /// adopts it as a whole at its next period. False if nothing is offered, as while the one before
     /// has not been adopted yet.
     pub fn offer(&mut self, make: impl FnOnce(&mut Config) -> bool) -> bool {
         CONFIG

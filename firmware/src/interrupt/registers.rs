@@ -41,7 +41,7 @@ const WORDS: usize = 256;
 /// A block of registers in plain memory.
 type Block = [AtomicU32; WORDS];
 
-/// Memory in place of the blocks, where the interrupt can be run without its chip: to count its
+/// Memory in place of the blocks, so that the interrupt can be run without its chip: to count its
 /// instructions on an emulated processor.
 pub struct Stand {
     timer: Block,

@@ -25,7 +25,7 @@ pub(crate) struct Wiring {
     pub(crate) terminals: [Slot; 3],
     /// The supply.
     pub(crate) bus: Slot,
-    /// The Hall sensors' first pin of port B, with the others behind it, where there are any.
+    /// The Hall sensors' first pin of port B, with the others after it, if there are any.
     pub(crate) hall: Option<u8>,
 }
 

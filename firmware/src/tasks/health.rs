@@ -38,7 +38,7 @@ impl Health {
         }
     }
 
-    /// Temperature of the transistors, °C; not a number where the sensor is torn off, or
+    /// Temperature of the transistors, °C; not a number if the sensor is torn off, or
     /// has not been read.
     pub(crate) fn temperature_c(&self) -> f32 {
         self.temperature_c

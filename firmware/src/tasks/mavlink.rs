@@ -38,7 +38,7 @@ pub(crate) async fn transmit(mut line: UartTx<'static, Async>) -> ! {
     }
 }
 
-/// A whole frame, or, where the line is behind, nothing: half a frame would spoil the next as well.
+/// A whole frame, or, if the line is behind, nothing: half a frame would spoil the next as well.
 fn send(mut frame: &[u8]) {
     if OUT.free_capacity() < frame.len() {
         return;

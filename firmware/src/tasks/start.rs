@@ -116,7 +116,7 @@ fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
     esc.recall(&store::load(flash, range()));
 }
 
-/// The ESC and its throttle with these parameters or, where they do not fit the board, with the
+/// The ESC and its throttle with these parameters or, if they do not fit the board, with the
 /// defaults; each is made where it stays.
 // Out of line, as what follows: the stack that one takes is free for the next.
 #[inline(never)]

@@ -1,7 +1,7 @@
 //! Speed in a reply: the time of an electrical turn.
 //!
 //! `eeemmmmmmmmm` is m·2^e µs. Betaflight and ArduPilot shift by e, and some descriptions that say
-//! e − 1 are wrong. The mantissa is normalised: where e is not 0 its highest bit is set, since words
+//! e − 1 are wrong. The mantissa is normalised: if e is not 0 its highest bit is set, since words
 //! without it are extended telemetry.
 
 use crate::units::{Scale, Speed};

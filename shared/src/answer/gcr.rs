@@ -44,7 +44,7 @@ pub fn encode(data: u16) -> u32 {
     levels
 }
 
-/// The 12 bits of data of 21 levels; nothing where they are no reply.
+/// The 12 bits of data of 21 levels; `None` if they are no reply.
 pub fn decode(levels: u32) -> Option<u16> {
     if levels >> (BITS - 1) != 0 {
         return None;

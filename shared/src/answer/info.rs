@@ -68,7 +68,7 @@ fn version() -> [u8; 2] {
     [major, minor.saturating_mul(10).saturating_add(patch)]
 }
 
-/// The name, and the board's behind it where there is room.
+/// The name, followed by the board's if there is room.
 fn name(board: &str) -> [u8; NAME_BYTES] {
     let mut name = [0; NAME_BYTES];
     let bytes = NAME.iter().copied().chain(board.bytes());

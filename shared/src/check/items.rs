@@ -6,7 +6,7 @@
 //! | `reference` | V | 3.2 to 3.4 | the converter's full scale, by the chip's own reference |
 //! | `temperature` | degC | −20 to `LIM_TEMP_C` | the thermistor |
 //! | `clock` | kHz | 29.5 to 34 | the chip's slow oscillator of 32 kHz, counted by the clock that times the PWM and the wire. The bounds are the slow one's (data sheet of the STM32G431, LSI) |
-//! | `option_bytes` | 1 | 1 | 1 where the chip starts from its flash whatever its BOOT0 pin says |
+//! | `option_bytes` | 1 | 1 | 1 if the chip starts from its flash whatever its BOOT0 pin says |
 //! | `comparator_a`.. | A | ± 0.4 of the range | where the comparator trips without current: its level is searched between 0, which must trip, and full scale, which must not |
 //! | `zero_a`.. | A | ± 0.1 of the range | mean of the current's readings without current: the drive takes no greater one for sound |
 //! | `noise_a`.. | A | 0.1 counts to 0.01 of the range | standard deviation of the same; readings that never change are no readings |
@@ -108,7 +108,7 @@ static ROWS: [Row; ROWS_LEN] = [
     row("off", "A", (-0.1, 0.1), Basis::Limit),
 ];
 
-/// None where there is no self-test, so that nothing is kept for it.
+/// None without the self-test, so that nothing is kept for it.
 const ITEMS: usize = if SELF_TEST {
     SINGLE + 3 * (ROWS_LEN - SINGLE)
 } else {
@@ -120,7 +120,7 @@ const ITEMS: usize = if SELF_TEST {
 pub struct Item {
     /// The kind of measurement.
     pub kind: Kind,
-    /// Of which phase, 0, 1, 2 for a, b, c; 0 where there is but one.
+    /// Of which phase, 0, 1, 2 for a, b, c; 0 if there is only one.
     pub phase: u8,
 }
 
@@ -152,7 +152,7 @@ impl Item {
 /// The results of a self-test.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// Not a number where nothing was measured.
+    /// Not a number if nothing was measured.
     values: [f32; ITEMS],
     /// The greatest current that the board can show, and a count of it, A.
     scale_a: [(f32, f32); SELF_TEST as usize],

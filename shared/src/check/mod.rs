@@ -34,7 +34,7 @@ pub trait Probe {
     /// The latest sample that the control has, or could have, had.
     fn sample(&mut self) -> Sample;
 
-    /// The value of an item that only the board knows, in its unit; nothing where it has no means:
+    /// The value of an item that only the board knows, in its unit; `None` if it has no means:
     /// [`Kind::Reference`], [`Kind::Clock`], [`Kind::OptionBytes`] and [`Kind::Comparator`]. It may take
     /// a millisecond.
     fn own(&mut self, item: Item) -> Option<f32>;
@@ -64,7 +64,7 @@ const UP_PERCENT: f32 = 90.0;
 /// The greatest reading of a terminal, counts.
 const FULL_SCALE: f32 = 4095.0;
 
-/// Phases whose currents are summed; none where there is no self-test.
+/// Phases whose currents are summed; none without the self-test.
 const SUMMED: usize = if SELF_TEST { 3 } else { 0 };
 
 /// The step of a self-test.

@@ -133,7 +133,7 @@ impl Storage {
         } else if self.save {
             Some((Asker::Wire, Request::Save))
         } else {
-            // Where settings were lost, what a companion sets at each start restores none of them.
+            // If settings were lost, the few that a companion sets at each start restore none of them.
             let due = !self.lost && self.changed_us.is_some_and(is_due);
             due.then_some((Asker::Nobody, Request::Keep))
         }

@@ -110,8 +110,8 @@ impl Esc {
         }
     }
 
-    /// Takes the stick's end points, and has them stored; whether they fit. Where settings were lost they
-    /// do not: storing them would store other settings than those that were lost.
+    /// Takes the stick's end points and has them stored. Returns true if they fit. If settings were lost they
+    /// do not: the defaults would be stored with them.
     fn calibrate(&mut self, ends: EndPoints) -> bool {
         let fit = !self.storage.is_lost()
             && self.change(&[
@@ -124,7 +124,7 @@ impl Esc {
         fit
     }
 
-    /// Sets parameters as MAVLink does: all of them, or none where they do not fit; which of the two.
+    /// Sets parameters as MAVLink does: all of them and true, or none and false if they do not fit.
     fn change(&mut self, values: &[(ParamId, f32)]) -> bool {
         let mut params = self.params.clone();
         for (id, value) in values {

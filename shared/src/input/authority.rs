@@ -231,7 +231,7 @@ impl Authority {
         }
     }
 
-    /// What is asked, where an armed wire at zero stays there for the first throttles.
+    /// The demand; an armed wire at zero stays there for the first throttles.
     fn opened(&mut self, signal: Signal, demand: Demand) -> Demand {
         let closed = self.armed && self.closing >= CLOSING_FRAMES;
         let waits = closed && self.opening < OPENING_FRAMES;

@@ -22,7 +22,7 @@ const SPAN_NS: u32 = 500_000;
 const FULL_US: u64 = 2_200_000;
 /// Time for which no throttle must be held, µs.
 const NONE_US: u64 = 1_500_000;
-/// The most that a held stick strays from where it was when it came to rest, ns: receivers jitter by
+/// The most that a held stick strays from its first width at rest, ns: receivers jitter by
 /// some µs.
 const STEADY_NS: u32 = 16_000;
 /// The longest way of the stick from one end to the other, µs.

@@ -124,7 +124,7 @@ impl Order {
         stopped || matches!(self, Self::Extended(_)) || self.waits() && zero_us >= SETTLED_US
     }
 
-    /// Frames in a row that it takes. One is enough where what it does ends by itself or is only to
+    /// Frames in a row that it takes. One is enough if its effect ends by itself or is only to
     /// be seen.
     fn repeats(self) -> u8 {
         match self {
@@ -134,7 +134,7 @@ impl Order {
     }
 }
 
-/// Frames in a row that the command of this value takes where none has been bad of late; nothing
+/// Frames in a row that the command of this value takes if none has been bad of late; nothing
 /// for one that is ignored.
 pub fn repeats(value: u16) -> Option<u8> {
     Order::of(value).map(Order::repeats)

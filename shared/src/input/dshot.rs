@@ -8,7 +8,7 @@ use super::{Share, reverse};
 const FIRST_THROTTLE: u16 = 48;
 /// The highest value of a frame.
 const LAST_THROTTLE: u16 = 2047;
-/// The first value of the second direction, where throttle has two.
+/// The first value of the second direction, if throttle has two.
 const FIRST_FORWARD: u16 = 1048;
 
 /// The bits to flip in a frame on this kind of wire: a bidirectional one inverts all four bits of the

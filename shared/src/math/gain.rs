@@ -43,7 +43,7 @@ impl<A: Number, B: Number> Gain<A, B> {
     /// The factor zero.
     pub const ZERO: Self = Self::from_parts(0, 0);
 
-    /// The gain of value `k`, or `None` where its magnitude does not fit or is not finite.
+    /// The gain of value `k`, or `None` if its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
@@ -62,7 +62,7 @@ impl<A: Number, B: Number> Gain<A, B> {
 
     /// The product with `x`.
     ///
-    /// The result wraps where it leaves its type: the caller bounds `x`, or uses
+    /// The result wraps if it leaves its type: the caller bounds `x`, or uses
     /// [`Gain::saturating_apply`].
     #[inline(always)]
     pub fn apply(self, x: A) -> B {
@@ -92,7 +92,7 @@ fn held(factor: Factor, x: i32) -> i32 {
 /// Bits of a float's mantissa, with the one that it does not store.
 const MANTISSA_BITS: i32 = 24;
 
-/// The [`Gain::from_parts`] of `k·2^exponent`, or `None` where they do not exist.
+/// The [`Gain::from_parts`] of `k·2^exponent`, or `None` if they do not exist.
 ///
 /// Once for all types, and never inlined: on the chip it is called for every coefficient.
 #[inline(never)]

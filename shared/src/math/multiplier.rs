@@ -61,7 +61,7 @@ impl<A, B> Trace for Multiplier<A, B> {
 }
 
 impl<A: Number, B: Number> Multiplier<A, B> {
-    /// The factor of value `k`, or `None` where its magnitude does not fit or is not finite.
+    /// The factor of value `k`, or `None` if its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {

@@ -13,7 +13,7 @@ pub fn magnitude<T: Number>(x: T, y: T) -> T {
     T::from_bits(hypotenuse(x.to_bits(), y.to_bits()))
 }
 
-/// The other leg of a right triangle, √(c² − a²), or 0 where the leg `a` is the longer.
+/// The other leg of a right triangle, √(c² − a²), or 0 if the leg `a` is the longer.
 ///
 /// The error is as that of [`magnitude`].
 #[inline(always)]

@@ -66,7 +66,7 @@ pub(super) fn of(bytes: &[u8], extra_crc: u8) -> u16 {
     })
 }
 
-/// The seed of a message; 0 where the dialect does not have it.
+/// The seed of a message; 0 if the dialect does not have it.
 pub(super) fn extra_crc(message: u32) -> u8 {
     let seed = |(first, seeds): &(u32, &'static [u8])| {
         let index = usize::try_from(message.checked_sub(*first)?).ok()?;

@@ -8,7 +8,7 @@ use super::receiver::Frame;
 use crate::params::choice::MavRole;
 use crate::params::{ParamId, Params};
 
-/// A component of a system; 0 stands for all where something is addressed.
+/// A component of a system; as a target 0 means all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Address {
     /// System, 1 to 255.

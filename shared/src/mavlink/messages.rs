@@ -155,7 +155,7 @@ pub(super) fn param_value(payload: &mut Payload, params: &Params, id: ParamId) {
     payload.put(&[MavParamType::MAV_PARAM_TYPE_REAL32 as u8]);
 }
 
-/// Its name, without a zero behind it where it has 16 characters.
+/// Its name, without a final zero if it has 16 characters.
 pub(super) fn name_bytes(id: ParamId) -> [u8; 16] {
     let mut bytes = [0; 16];
     for (to, byte) in bytes.iter_mut().zip(id.entry().name.bytes()) {

@@ -66,7 +66,7 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
 pub(super) struct Refusal {
     /// For the sender of the request.
     pub(super) error: MavParamError,
-    /// The parameter that stands against it, where that is another.
+    /// The parameter that conflicts with it, if that is another.
     pub(super) because: Option<ParamId>,
     /// For a person.
     pub(super) reason: &'static str,

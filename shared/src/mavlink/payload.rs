@@ -1,4 +1,4 @@
-//! Payloads field by field, in the order of the wire, where larger fields stand before smaller ones.
+//! Payloads field by field, in the order of the wire, with larger fields before smaller ones.
 //!
 //! The dialect's own serialisers are a copy of code for each message, which is 1 KB of the chip's flash.
 //! Tests read with the dialect's types what is written here.

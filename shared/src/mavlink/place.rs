@@ -1,4 +1,4 @@
-//! Which ESC of a vehicle this is, and where the messages for four ESCs hold it.
+//! The ESC's number in its vehicle, and its place in messages for four ESCs.
 
 use mavlink::dialects::ardupilotmega::{
     ESC_TELEMETRY_1_TO_4_DATA, ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA,

@@ -103,7 +103,7 @@ enum Front {
     Reject,
     /// A sound frame of this length that is not obeyed.
     Skip(usize),
-    /// A sound frame: its whole length, and where its payload is.
+    /// A sound frame: its whole length, and the place of its payload.
     Frame {
         len: usize,
         header_len: usize,

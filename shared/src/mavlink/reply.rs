@@ -190,7 +190,7 @@ impl Writer {
             .send_payload(identity.address, message, &payload, out);
     }
 
-    /// STATUSTEXT, in chunks of 50 bytes where it is longer.
+    /// STATUSTEXT, in chunks of 50 bytes if it is longer.
     pub(super) fn text(
         &mut self,
         identity: &Identity,

@@ -161,7 +161,7 @@ impl Schedule {
         }
     }
 
-    /// The stream of this message, the first where several have it.
+    /// The stream of this message, the first if several have it.
     pub(super) fn find(&self, message: u32) -> Option<Stream> {
         Stream::ALL
             .into_iter()

@@ -126,7 +126,7 @@ impl Signing {
         self.key.map(|key| Kept { key, newest })
     }
 
-    /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False where its time cannot be.
+    /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False if its time is impossible.
     ///
     /// From key to key time does not run backwards, and a frame that was received is not taken again.
     #[inline(never)]

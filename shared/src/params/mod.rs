@@ -18,7 +18,7 @@ pub enum SetError {
     NotFinite,
     /// Outside `min..=max` of the table.
     OutOfRange,
-    /// A fraction where a whole number is wanted.
+    /// A fraction for a whole number.
     NotWhole,
     /// The parameter is derived.
     ReadOnly,

@@ -40,7 +40,7 @@ pub struct Text {
     pub unit: &'static str,
     /// One sentence for a ground station.
     pub description: &'static str,
-    /// The values that it can take and what they mean, where it is a choice.
+    /// The values that it can take and their meanings, for a choice.
     pub choices: &'static [(u8, &'static str)],
     /// True if a change applies at the next start.
     pub restart: bool,

@@ -19,7 +19,7 @@ const OVER_CURRENT_SAMPLES: u8 = 2;
 /// Thresholds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`. Where that was lowered, the
+    /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`. If that was lowered, the
     /// trip in force is [`State::trip`].
     pub trip: AdcCounts,
     /// Least supply voltage.
@@ -79,7 +79,7 @@ impl Config {
 
 /// Takes a sample's supply voltage into the filter and looks for a reason to turn the bridge off.
 ///
-/// `currents` is `None` where the readings are those of no current.
+/// `currents` is `None` if the readings are those of no current.
 #[inline(always)]
 pub fn check(
     config: &Config,
@@ -120,7 +120,7 @@ fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     far(a) || far(b) || far(c)
 }
 
-/// Lets the trip follow `LIM_PHASE_A`: at once where that was raised, and where it was lowered when
+/// Lets the trip follow `LIM_PHASE_A`: at once if that was raised, and if it was lowered when
 /// the current vector `i` has come down to within a quarter above it. Else to lower a limit would be a
 /// reason to trip.
 pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {

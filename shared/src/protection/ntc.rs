@@ -27,7 +27,7 @@ impl Ntc {
         beta_k: 3434.0,
     };
 
-    /// Temperature of a reading, °C; not a number where the thermistor is torn off or shorted.
+    /// Temperature of a reading, °C; not a number if the thermistor is torn off or shorted.
     ///
     /// For the tasks, about once a millisecond: it takes a logarithm.
     pub fn celsius(&self, reading: AdcCounts) -> f32 {

@@ -193,7 +193,7 @@ impl Log {
     ) -> Result<bool, StoreError> {
         let newest = &self.newest;
         let len = length(flash, content)?;
-        // Where nothing is stored, a schema without values says no more.
+        // If nothing is stored, a schema without values says no more.
         let nothing = newest.values.is_empty() && len == 2 * Word::BYTES;
         if self.whole
             && (nothing
@@ -227,7 +227,7 @@ impl Log {
         wipe(flash, here)
     }
 
-    /// Writes a set of this length where nothing else stays.
+    /// Writes a set of this length, if nothing else stays there.
     fn move_to<F: NorFlash>(
         &self,
         flash: &mut F,

@@ -93,7 +93,7 @@ impl Reading {
     ///
     /// A regular conversion after injected ones may be one of channel 0 (ES0431, 2.5.8): it counts where
     /// another stands before it and no period has gone by since. Both take half of the fastest PWM's
-    /// period; where something else holds them up each time, the reading before stands.
+    /// period; if something else holds them up each time, the reading before stays.
     pub(crate) fn counts(&mut self, periods: impl Fn() -> u32) -> u16 {
         for _ in 0..TRIES {
             let before = periods();

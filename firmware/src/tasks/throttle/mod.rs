@@ -76,7 +76,7 @@ impl Reach for Port {
 /// Longest time between two looks at the wire, which notice a lost signal and renew set-points.
 const RENEWAL_US: u32 = 1000;
 
-/// When the edges that follow a first one are looked at where no frame is known to come, twice.
+/// When the edges that follow a first one are looked at if no frame is known to come, twice.
 const UNKNOWN_LOOK_US: u32 = 30;
 
 /// When a frame is looked at, in eighths of a bit after its first edge: when its last edge is there (15

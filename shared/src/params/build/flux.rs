@@ -22,7 +22,7 @@ use crate::units::{Angle, Flux, Speed};
 /// swings about 640 rpm whatever is asked for. The greater lead at such speeds is known, and taken off.
 const TAU_INT: f32 = 5.671;
 
-/// τ_HPFS over τ_int, much above 1 (figure 21): where the lead is 10° it adds 1°.
+/// τ_HPFS over τ_int, much above 1 (figure 21): to a lead of 10° it adds 1°.
 const HIGH_PASS_SHARE: f32 = 10.0;
 
 /// Half the deadband of the flux, as a share of its amplitude: 3° of the rotor (2.3.2).

@@ -14,7 +14,7 @@ const HALF_S: f32 = 0.01;
 /// Share of the error shown that one half wave corrects.
 const STEP: f32 = 0.1;
 
-/// The adaptation, where `CTL_ADAPT_L` asks for it.
+/// The adaptation, if `CTL_ADAPT_L` asks for it.
 pub(super) fn inductance(p: &Si) -> Option<Config> {
     if p.chosen(CtlAdaptL::Off) {
         return None;

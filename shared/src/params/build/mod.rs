@@ -58,7 +58,7 @@ pub struct Board {
     /// For how long the low sides must be on in all before the high sides' drivers are supplied
     /// after a time off, s.
     pub charge_s: f32,
-    /// `PWM_DEADTIME_NS` at least, which is its default where the table's is shorter.
+    /// `PWM_DEADTIME_NS` at least, which is also its default if the table's is shorter.
     pub least_dead_time: LeastDeadTime,
 }
 
@@ -414,13 +414,13 @@ impl<'a> Si<'a> {
         Voltage::from_f32(volts / self.scale.voltage_v)
     }
 
-    /// The gain of value `k`; where there is none, the parameter is refused.
+    /// The gain of value `k`; if there is none, the parameter is refused.
     fn gain<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Gain<A, B> {
         let (mantissa, shift) = self.gain_parts(param, k, B::Frac::I32 - A::Frac::I32);
         Gain::from_parts(mantissa, shift)
     }
 
-    /// The factor of value `k`; where it leaves its type's range, the parameter is refused.
+    /// The factor of value `k`; if it leaves its type's range, the parameter is refused.
     fn factor<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Multiplier<A, B> {
         Multiplier::from_bits(self.factor_bits(param, k, B::Frac::I32 - A::Frac::I32))
     }

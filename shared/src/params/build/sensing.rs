@@ -175,7 +175,7 @@ mod tests {
         assert!((1e-3..1.02e-3).contains(&charged(all)), "{}", charged(all));
         let turning_s = (all - config.charge.spared_periods) as f32 * period_s;
         assert!((1.9e-3..=2.0e-3).contains(&turning_s), "{turning_s}");
-        // Where little is to be charged, all of it is.
+        // If little is to be charged, all of it is.
         let config = build(&params, &Board::BENCH).expect("it makes a drive");
         assert_eq!(
             (config.charge.periods, config.charge.spared_periods),

@@ -22,7 +22,7 @@ const LIMIT_SHARE: f32 = 0.5;
 /// and out by two, 1 + 1/3.
 const DEAD_TIME_VECTOR: f32 = 4.0 / 3.0;
 
-/// The tones of `MOT_TONE_A`; none where it is 0.
+/// The tones of `MOT_TONE_A`; `None` if it is 0.
 pub(super) fn tone(p: &Si) -> Option<Config> {
     let limit_a = LIMIT_SHARE * p.get(ParamId::LimPhaseA);
     let bound_a = p.get(ParamId::MotToneA).min(limit_a);
