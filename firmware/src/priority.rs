@@ -9,14 +9,14 @@ use core::arch::asm;
 
 use critical_section::{Impl, RawRestoreState, set_impl};
 
-/// Of the PWM interrupt, alone there.
+/// Priority of the PWM interrupt, alone there.
 pub(crate) const PWM: u8 = 0;
 
-/// Of the gate driver's alarm, if the board has one.
+/// Priority of the gate driver's alarm, if the board has one.
 #[cfg(feature = "vesc4-f405")]
 pub(crate) const ALARM: u8 = 1;
 
-/// Of every other interrupt, of the 16 levels of these chips.
+/// Priority of every other interrupt, of the 16 levels of these chips.
 pub(crate) const TASKS: u8 = 2;
 
 /// A level's value in the priority registers, which count from their upper bits.

@@ -28,7 +28,7 @@ pub use storage::obey;
 /// Degrees below `LIM_TEMP_C` at which an over-temperature has ended.
 const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 
-/// For how long a wire with signals must have asked for rest before the flash is written, µs: what
+/// Time for which a wire with signals must have asked for rest before the flash is written, µs: what
 /// is written stalls the processor, and so a flight controller's frames are missed.
 const REST_US: u64 = 1_000_000;
 

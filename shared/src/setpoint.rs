@@ -82,7 +82,7 @@ impl Mapping {
     }
 }
 
-/// A throttle's share, and whether it is for the other direction.
+/// A throttle's share, and true if it is for the other direction.
 fn split(throttle: Share) -> (Share, bool) {
     if throttle.is_negative() {
         (reverse(throttle), true)

@@ -43,7 +43,7 @@ impl Statistics {
         }
     }
 
-    /// Takes a stored word; whether it can be one.
+    /// Takes a stored word. Returns true if it can be one.
     pub(crate) fn set_word(&mut self, word: usize, bits: u32) -> bool {
         let value = f32::from_bits(bits);
         let fits = value.is_finite() && value >= 0.0;

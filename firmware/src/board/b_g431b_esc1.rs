@@ -33,7 +33,7 @@ use crate::tasks::throttle::{self, Capture, CaptureInterrupt, Replier};
 pub use crate::chip::TIMER_HZ;
 pub use crate::circuit::b_g431b_esc1::{BOARD, NAME, NTC};
 
-/// For how long the phase currents are sampled: 12.5 cycles of the converters' 42.5 MHz, in
+/// Sampling time of the phase currents: 12.5 cycles of the converters' 42.5 MHz, in
 /// clocks of the timer's 170 MHz. 0.29 µs, above the 0.2 µs that an op-amp's output needs.
 pub(crate) const SAMPLING_CLOCKS: u16 = 50;
 

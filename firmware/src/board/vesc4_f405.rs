@@ -38,7 +38,7 @@ use crate::tasks::throttle::{self, Capture, CaptureInterrupt, Replier};
 pub use crate::chip::TIMER_HZ;
 pub use crate::circuit::vesc4_f405::{BOARD, NAME, NTC};
 
-/// For how long the phase currents are sampled: 15 cycles of the converters' 21 MHz, in clocks of
+/// Sampling time of the phase currents: 15 cycles of the converters' 21 MHz, in clocks of
 /// the timer's 168 MHz.
 pub(crate) const SAMPLING_CLOCKS: u16 = 120;
 

@@ -20,16 +20,16 @@ pub(crate) struct Swap<T> {
 // the state is `QUIET`; the user changes them over while it is `OFFERED`. There is one of each.
 unsafe impl<T: Send> Sync for Swap<T> {}
 
-/// Who offers.
+/// The task's end, which offers.
 pub(crate) struct Offerer {
     /// The slot that is, or becomes, free.
     free: usize,
 }
 
-/// Who will use, and has nothing to use yet.
+/// The interrupt's end before there is anything to use.
 pub(crate) struct Beginner(());
 
-/// Who uses.
+/// The interrupt's end, which uses.
 pub(crate) struct User {
     used: usize,
 }
@@ -132,7 +132,7 @@ pub(crate) struct Free<'a, T> {
 }
 
 impl<T: Default> Free<'_, T> {
-    /// Offers what `make` puts into the slot, if it says that it has; whether it did.
+    /// Offers what `make` puts into the slot, if it says that it has. Returns true if it did.
     pub(crate) fn offer(self, make: impl FnOnce(&mut T) -> bool) -> bool {
         let slot = &self.swap.slots[self.hand.free & 1];
         // SAFETY: without an offer the slot that is not in use is the offerer's.

@@ -86,7 +86,7 @@ mod tests {
             }
         }
 
-        /// A period; whether its alarm's interrupt has come.
+        /// A period. Returns true if its alarm's interrupt has come.
         fn period(&mut self) -> bool {
             self.awake_periods = if self.enabled {
                 self.awake_periods + 1

@@ -20,7 +20,7 @@ static INTERRUPT: InterruptCell<Interrupt> = InterruptCell::new();
 /// It waits 20 ms for the gate driver and the amplifiers.
 ///
 /// # Panics
-/// When it is called again.
+/// If called again.
 // Out of line, here and in the board's `claim`: their stack is given back before the tasks begin.
 #[inline(never)]
 pub fn start(bridge: board::Bridge, converters: board::Converters, end: RunningEnd) {

@@ -43,8 +43,8 @@ pub fn restart() -> ! {
     SCB::sys_reset()
 }
 
-/// Why the run before ended, if not by a power-down or by a wish; the record is cleared. To be called
-/// once, early.
+/// The reason why the run before ended, if not by a power-down or on request; the record is cleared. To be
+/// called once, early.
 pub fn take() -> Option<String<TEXT_BYTES>> {
     // SAFETY: a failure in between writes it whole, and then there is nothing after.
     let record = unsafe { PLACE.0.get().read_volatile() };

@@ -10,7 +10,7 @@ pub const TEXT_BYTES: usize = 50;
 /// Words that a failure leaves besides its kind: all fit the text.
 pub const DETAILS: usize = 4;
 
-/// Why the processor stopped.
+/// The reason why the processor stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Failure {

@@ -34,7 +34,7 @@ const LINE_BYTES: usize = 512;
 /// Starts the control's interrupt and the tasks.
 ///
 /// # Panics
-/// When it is called again, or the defaults do not fit the board.
+/// If called again, or if the defaults do not fit the board.
 pub fn start(spawner: Spawner, hardware: Hardware) {
     let mut flash = hardware.flash;
     let (esc, port) = recall(&mut flash);

@@ -30,7 +30,7 @@ pub const REPLY_DELAY_NS: u32 = 30_000;
 /// The answers that a frame may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ask {
-    /// When the frame's first edge came, in ticks of the capturing timer.
+    /// Time of the frame's first edge, in ticks of the capturing timer.
     pub first_edge_ticks: u32,
     /// The frame's rate.
     pub rate: Rate,
@@ -67,7 +67,7 @@ pub struct Reply {
     pub bits: u32,
     /// Bits a second: 5/4 of the frame's.
     pub bit_hz: u32,
-    /// When its first bit begins, in ticks of the capturing timer.
+    /// Time of its first bit, in ticks of the capturing timer.
     pub at_ticks: u32,
 }
 
@@ -98,10 +98,10 @@ impl Ask {
 pub struct Answers {
     /// From a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
     reply_ticks: [u32; Rate::ALL.len()],
-    /// For how long a KISS frame, and the ESC's information, take the serial line.
+    /// Times for which a KISS frame, and the ESC's information, take the serial line.
     kiss_ticks: u32,
     info_ticks: u32,
-    /// When the frame before began.
+    /// Time at which the frame before began.
     asked_at_ticks: Option<u32>,
     /// Time for which the serial line is still taken.
     busy_ticks: u32,

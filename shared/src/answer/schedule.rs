@@ -1,4 +1,4 @@
-//! Which replies are extended telemetry, and of which kind.
+//! The schedule of extended telemetry among the replies.
 
 /// A kind of extended word that is sent in turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -49,7 +49,7 @@ const POWER_UP_LOOKS: u8 = 3;
 /// Looks whose readings make a zero and its noise.
 const LISTENED: u8 = 64;
 
-/// Looks for which the drive may look whether the shaft stands.
+/// Looks that the drive may take to see that the shaft stands.
 const SHAFT_LOOKS: u8 = 200;
 
 /// Looks for which a leg is pulled up, at most: at 8 kHz it takes 32 ms.

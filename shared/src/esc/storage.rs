@@ -28,10 +28,10 @@ const SAVE_EVERY_US: u64 = 180_000_000;
 /// Time between two reminders that settings were lost, µs: a station may have come since.
 const REMIND_US: u64 = 10_000_000;
 
-/// What a person is told, and one who would store them beside something else.
+/// The warning to a person, and the refusal to store something else beside lost settings.
 pub(super) const LOST: &str = "Settings lost: set and store them, or reset them";
 
-/// Who has asked for storage.
+/// The sender of the request for storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asker {
     /// A command or a calibration on the throttle wire.
@@ -48,7 +48,7 @@ pub(super) struct Storage {
     /// MAVLink has one at a time, and refuses others.
     mavlink: Option<Request>,
     save: bool,
-    /// When something changed that is to be stored, for the first and the last time.
+    /// Times of the first and the last change that is to be stored.
     changed_us: Option<(u64, u64)>,
     /// Time at which all saves without a request are available again.
     spent_us: u64,
@@ -111,7 +111,7 @@ impl Storage {
         self.reboot && self.under_way.is_none() && self.next(0).is_none()
     }
 
-    /// The restart begins, or is given up; whether there was to be one.
+    /// The restart begins, or is given up. Returns true if there was to be one.
     pub(super) fn cancel_reboot(&mut self) -> bool {
         core::mem::take(&mut self.reboot)
     }

@@ -80,7 +80,7 @@ pub struct DriveStatus {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Denied;
 
-/// Why a test was refused.
+/// The reason why a test was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TestError {
     /// A value outside 0 to 1, or −1 to 1 with two directions, or a time outside 0 to 3 s.
@@ -417,8 +417,8 @@ impl Authority {
         drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us))
     }
 
-    /// Told, at each look, whether a fault holds the bridge off: it ends a test, and what a
-    /// disarming has forgiven is used up when it has ended.
+    /// To be called at each look with true if a fault holds the bridge off: that ends a test. When the fault
+    /// has ended, a disarming no longer forgives anything.
     pub fn fault(&mut self, holds: bool) {
         if holds {
             self.test = None;

@@ -45,7 +45,7 @@ pub enum Step {
 #[derive(Clone, Debug, Default)]
 pub struct Calibration {
     stage: Stage,
-    /// When it was asked for, until it ends.
+    /// Time at which it was asked for, until it ends.
     asked_us: Option<u64>,
 }
 
@@ -59,7 +59,7 @@ enum Stage {
     /// Full throttle has been measured.
     None {
         full_ns: u32,
-        /// When the stick was last at full throttle.
+        /// Time at which the stick was last at full throttle.
         full_us: u64,
         held: Option<Held>,
     },

@@ -26,7 +26,7 @@ const SHARES: u32 = 16;
 const SHORTEST: u32 = 3;
 const ONE: u32 = 9;
 const LONGEST: u32 = 15;
-/// By how much a single bit may stray from the mean one.
+/// The most that a single bit may stray from the mean one.
 const STRAY: u32 = 3;
 
 /// Ticks that a bit must have for its pulses to be told apart: 7.2 MHz for DShot600.
@@ -39,7 +39,7 @@ const KEPT: usize = 64;
 #[derive(Clone, Debug)]
 pub(super) struct Decoder {
     rates: [Option<Limits>; 4],
-    /// The rate that is taken, and whether bidirectional; nothing for all of them.
+    /// The rate that is taken, and true if bidirectional; `None` takes all of them.
     only: Option<(Rate, bool)>,
     /// A level at least this long is no part of a frame.
     rest_ticks: u32,

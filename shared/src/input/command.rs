@@ -41,7 +41,7 @@ use crate::tune::Beacon;
 /// Frames in a row that a command takes which changes something.
 const REPEATS: u8 = 6;
 
-/// For how long a bad frame makes the wire one whose single frames prove nothing, µs.
+/// Time after a bad frame for which single frames prove nothing, µs.
 const DOUBT_US: u64 = 50_000;
 /// The time for two of them.
 const DOUBT_OF_TWO_US: u64 = 1_000_000;

@@ -6,7 +6,7 @@
 /// An edge that is believed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
-    /// When it came.
+    /// Its time.
     pub(super) at_ticks: u32,
     /// The level from then on.
     pub(super) level: bool,

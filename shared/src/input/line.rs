@@ -25,12 +25,12 @@ pub enum Event {
         bidirectional: bool,
         /// Its contents.
         frame: Frame,
-        /// When its first edge came, in ticks of the capturing timer.
+        /// Time of its first edge, in ticks of the capturing timer.
         first_edge_ticks: u32,
     },
     /// A pulse.
     Pulse {
-        /// Which kind.
+        /// Its kind.
         kind: Pulse,
         /// Its width, ns.
         width_ns: u32,

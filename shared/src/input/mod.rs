@@ -43,7 +43,7 @@ use tally::Tally;
 
 /// A share of the throttle's range, 0 to 1; its highest value, 1 − 2⁻³¹, stands for 1.
 ///
-/// 0 is the least throttle that turns, and not a stop: whether to turn is said beside it. A throttle
+/// 0 is the least throttle that turns, and not a stop: whether to turn is separate. A throttle
 /// for the other direction is the complement of its share, −2⁻³¹ to −1: see [`reverse`].
 pub type Share = fixed::types::I1F31;
 

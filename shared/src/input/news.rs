@@ -7,7 +7,7 @@ use super::signal::Signal;
 /// the MAVLink link.
 const APART_US: u64 = 1_000_000;
 
-/// For how long throttle is open before the ESC complains, µs.
+/// Time for which throttle is open before the ESC complains, µs.
 const OPEN_US: u64 = 500_000;
 /// Time between two complaints, µs.
 const OPEN_AGAIN_US: u64 = 3_000_000;

@@ -31,7 +31,7 @@ impl Default for Trust {
 }
 
 impl Trust {
-    /// Takes in a frame with a right checksum; whether it is to be believed.
+    /// Takes in a frame with a right checksum. Returns true if it is to be believed.
     pub(super) fn good(&mut self) -> bool {
         self.0 = MOST.min(self.0 + GOOD);
         self.0 >= BELIEVED

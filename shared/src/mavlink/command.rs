@@ -46,7 +46,7 @@ const MESSAGE_MAX: f32 = 16_777_215.0;
 /// greatest f32 below its end.
 const INTERVAL_MAX_US: f32 = 2_147_483_520.0;
 
-/// For how long a command that is sent again is the same one; clients give up after 3 s or less.
+/// Time within which a repeated command is the same one; clients give up after 3 s or less.
 const REPEAT_US: u64 = 5_000_000;
 /// That time for COMMAND_INT, which has no number of its transmission: as long as a client waits for an
 /// ACK, and hardly as long as a person takes to ask for the same again.
@@ -338,7 +338,7 @@ impl Commands {
         core::mem::take(&mut self.left)
     }
 
-    /// `replies_sent`: whether nothing waits to be sent. A reboot waits for its ACK.
+    /// `replies_sent`: true if nothing waits to be sent. A reboot waits for its ACK.
     pub(super) fn take_request(&mut self, replies_sent: bool) -> Option<Request> {
         if core::mem::take(&mut self.params_changed) {
             return Some(Request::ParamsChanged);

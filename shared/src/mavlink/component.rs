@@ -99,7 +99,7 @@ pub struct Component {
     list_pace: Pace,
     schedule: Schedule,
     commands: Commands,
-    /// Whether it has told that it is there.
+    /// True if it has announced itself.
     started: bool,
     params_changed: bool,
     /// True if something that is kept has changed.

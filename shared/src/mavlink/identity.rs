@@ -1,4 +1,4 @@
-//! Who the ESC is on MAVLink.
+//! The ESC's identity on MAVLink.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};

@@ -4,7 +4,7 @@
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     bytes_per_s: u32,
-    /// When all that has been taken will have left.
+    /// Time at which all bytes taken so far will have left.
     free_us: u64,
 }
 

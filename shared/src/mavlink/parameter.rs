@@ -61,7 +61,7 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
     }
 }
 
-/// Why a value was not taken.
+/// The reason why a value was not taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refusal {
     /// For the sender of the request.
@@ -94,7 +94,7 @@ impl From<SetError> for Refusal {
     }
 }
 
-/// PARAM_SET; whether the value was taken. The value is broadcast either way.
+/// PARAM_SET. Returns true if the value was taken; it is broadcast either way.
 ///
 /// The type that the sender names is not looked at: those that keep integers in floats mean the
 /// same number. Those that put an integer's bytes into the float give a subnormal, which no

@@ -36,7 +36,7 @@ pub struct Counters {
 /// A frame that passed its check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Who sent it.
+    /// Its sender.
     pub from: Address,
     /// Number of the message.
     pub id: u32,

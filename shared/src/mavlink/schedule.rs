@@ -1,4 +1,4 @@
-//! When which message is sent by itself.
+//! The schedule of messages that are sent without a request.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -122,7 +122,7 @@ impl Intervals {
         self.0[word]
     }
 
-    /// Takes a stored word; whether it can be one.
+    /// Takes a stored word. Returns true if it can be one.
     pub(crate) fn set_word(&mut self, word: usize, bits: u32) -> bool {
         let fits = Interval::from_bits(bits).is_some();
         if fits {
@@ -144,7 +144,7 @@ pub(super) struct Schedule {
     timers: [Timer; Stream::ALL.len()],
     pace: Pace,
     place: Place,
-    /// Which stream is looked at first, so that on a link too slow for all each gets its turn.
+    /// The stream that is looked at first, so that on a link too slow for all each gets its turn.
     first: usize,
 }
 

@@ -29,12 +29,12 @@ const HASH_LEN: usize = 6;
 /// The link that this ESC signs for: it sends the same frames on all of them.
 const LINK: u8 = 0;
 
-/// By how much a stream may begin behind the newest timestamp, and be ahead of it: a minute.
+/// The most that a stream may begin behind the newest timestamp, and be ahead of it: a minute.
 const MINUTE_TICKS: u64 = 6_000_000;
 const TICK_US: u32 = 10;
 const MINUTE_US: u64 = MINUTE_TICKS * TICK_US as u64;
 const YEAR_TICKS: u64 = 36_525 * 864 * 1_000_000 / TICK_US as u64;
-/// By how much a frame may be ahead of the newest timestamp that is known, where the time is not: an ESC
+/// The most that a frame may be ahead of the newest known timestamp while the time is unknown: an ESC
 /// may have lain without power for so long.
 const FIRST_TICKS: u64 = 5 * YEAR_TICKS;
 /// The least time of a clock that is right: 2026, in which this was written.
@@ -95,7 +95,7 @@ pub(super) struct Signing {
     newest_us: u64,
     /// The last timestamp that was sent.
     sent: u64,
-    /// When the last frame that was signed was taken, or a SETUP_SIGNING that tells the time.
+    /// Time of the last signed frame taken, or of a SETUP_SIGNING that sets the time.
     told_us: Option<u64>,
     /// Up to here, everything may have been received before the start or before the key.
     floor: u64,

@@ -11,7 +11,7 @@ pub(crate) use build::{TRIP_SHARE, lost_periods, test_current};
 pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Choice, Kind, ParamId, Parameter, TABLE, Text, choice};
 
-/// Why a value was not taken.
+/// The reason why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetError {
     /// NaN or infinite.
@@ -114,8 +114,8 @@ impl Params {
         Ok(())
     }
 
-    /// Raises what is below the board's least, as the table's default may be; whether it was another value,
-    /// which somebody has chosen.
+    /// Raises values that are below the board's least, as the table's default may be. Returns true if one was
+    /// not the default, but chosen by somebody.
     pub fn fit(&mut self, board: &Board) -> bool {
         let id = ParamId::PwmDeadtimeNs;
         let given_ns = self.get(id);

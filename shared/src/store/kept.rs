@@ -33,7 +33,7 @@ pub struct Kept {
     pub signing: Option<KeptSigning>,
 }
 
-/// Which value a word is of.
+/// The value that a word belongs to.
 #[derive(Clone, Copy)]
 enum Place {
     Param(ParamId),
@@ -102,7 +102,7 @@ impl Kept {
         (bits != 0).then_some(bits)
     }
 
-    /// Takes a stored word; whether this firmware accepts it.
+    /// Takes a stored word. Returns true if this firmware accepts it.
     pub(super) fn set(&mut self, word: usize, bits: u32) -> bool {
         match Place::of(word) {
             Place::Param(id) => self.params.set(id, f32::from_bits(bits)).is_ok(),

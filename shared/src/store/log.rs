@@ -185,7 +185,7 @@ impl Log {
     }
 
     /// Writes a set with this content after the newest, unless that has it and the set before has its
-    /// settings; whether it did.
+    /// settings. Returns true if it did.
     pub(super) fn append<F: NorFlash>(
         &self,
         flash: &mut F,

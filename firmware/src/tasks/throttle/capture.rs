@@ -152,7 +152,7 @@ impl Capture {
         self.edges.now(CAPTURE.cnt().read())
     }
 
-    /// Waits for an edge, until a time at most; whether one came.
+    /// Waits for an edge, until a time at most. Returns true if one came.
     pub(super) async fn wait_for_edge(&mut self, due_ticks: u32) -> bool {
         EDGE.store(false, Ordering::Relaxed);
         // An edge that came before is in the rings: the flags tell of new ones.

@@ -76,10 +76,10 @@ impl Reach for Port {
 /// Longest time between two looks at the wire, which notice a lost signal and renew set-points.
 const RENEWAL_US: u32 = 1000;
 
-/// When the edges that follow a first one are looked at if no frame is known to come, twice.
+/// Times of two looks at the edges after a first one, if no frame is known to come.
 const UNKNOWN_LOOK_US: u32 = 30;
 
-/// When a frame is looked at, in eighths of a bit after its first edge: when its last edge is there (15
+/// Time of the look at a frame, in eighths of a bit after its first edge: its last edge is there (15
 /// bits and the 3/4 of a one), and half a bit for the DMA; and, if it was late, soon after.
 const FRAME_LOOK_EIGHTHS: u32 = 129;
 const LATE_LOOK_EIGHTHS: u32 = 144;
@@ -139,7 +139,7 @@ struct Asked {
     reply: Option<Reply>,
 }
 
-/// When the wire is looked at, from the first edge that has come.
+/// Time of the look at the wire, from the first edge that has come.
 struct Looks {
     begin_ticks: u32,
     /// Times of those to come, ticks.

@@ -14,7 +14,7 @@ const DATA_AT: usize = 15;
 const ACK: u8 = 128;
 const NAK: u8 = 129;
 
-/// Why a request is refused, by the protocol's numbers.
+/// The reason why a request is refused, by the protocol's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Error {

@@ -18,7 +18,7 @@ const WITH_DEFAULT: u8 = 1 << 4;
 /// `ParamId` is a byte: no more parameters can be asked for.
 const ALL: u8 = ParamId::ALL.len() as u8;
 
-/// Which parameters, and whether with their defaults.
+/// The parameters asked for; with their defaults if that is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Selection {
     first: u8,

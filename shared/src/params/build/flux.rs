@@ -31,10 +31,10 @@ const DEADBAND: f32 = 0.05;
 /// Hold-off, as a share of the sixth of a turn between crossings (2.3.2).
 const HOLD_OFF: f32 = 0.05;
 
-/// For how long the next edge may be missing, in sixths of a turn at the least speed.
+/// Time for which the next edge may be missing, in sixths of a turn at the least speed.
 const PATIENCE: f32 = 2.0;
 
-/// For how long all Hall sensors may be alike, s: far longer than their edges differ.
+/// Time for which all Hall sensors may be alike, s: far longer than their edges differ.
 const HALL_PATIENCE_S: f32 = 1e-3;
 
 /// The position error that an acceleration of `CTL_SLEW_RPM_S` may make, turns: 10°.

@@ -45,7 +45,7 @@ pub struct Board {
     pub current_range_a: f32,
     /// Volts of one count of the terminals' converter, of 4096.
     pub terminal_v_per_count: f32,
-    /// Which phases have a current shunt.
+    /// The phases that have a current shunt.
     pub shunts: Shunts,
     /// Control periods from the sample to the voltage.
     pub delay: Delay,
@@ -55,7 +55,7 @@ pub struct Board {
     /// Least time for which a low side must be on in each period so that its high side's driver
     /// stays supplied, s.
     pub refresh_s: f32,
-    /// For how long the low sides must be on in all before the high sides' drivers are supplied
+    /// Time for which the low sides must be on in all before the high sides' drivers are supplied
     /// after a time off, s.
     pub charge_s: f32,
     /// `PWM_DEADTIME_NS` at least, which is also its default if the table's is shorter.
@@ -67,7 +67,7 @@ pub struct Board {
 pub struct LeastDeadTime {
     /// In ns.
     pub ns: f32,
-    /// Why a shorter one is refused: its number is in it.
+    /// The reason why a shorter one is refused, with its number.
     pub refusal: &'static str,
 }
 
@@ -79,7 +79,7 @@ impl LeastDeadTime {
     };
 }
 
-/// Why the parameters do not make a drive.
+/// The reason why parameters do not make a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuildError {
     /// The parameter to change.
@@ -114,10 +114,10 @@ const SLOW_SHARE: f32 = 0.5;
 /// Time for which zero throttle must hold before a fault ends, s.
 const CLEAR_S: f32 = 0.3;
 
-/// For how long a motor whose sensors know its position may be slow before it counts as stuck, s.
+/// Time for which a motor whose sensors know its position may be slow before it counts as stuck, s.
 const SENSED_S: f32 = 0.8;
 
-/// For how long the observer must have led before a start counts as done, s.
+/// Time for which the observer must have led before a start counts as done, s.
 const PROVEN_S: f32 = 0.3;
 
 /// i_d at standstill over `STA_RAMP_A`.
@@ -329,7 +329,7 @@ fn refuse_contradictions(p: &Si) {
     );
 }
 
-/// Why most coefficients are refused.
+/// The reason for most refusals.
 const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
 
 /// The source of the coefficients: the parameters that several blocks need in SI, and all else that

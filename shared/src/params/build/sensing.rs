@@ -13,7 +13,7 @@ use crate::math::{Real, SQRT_3};
 use crate::params::ParamId;
 use crate::units::{AdcCounts, Duty, Speed};
 
-/// For how long the offsets are measured, s; rounded to a power of two of periods. 5 ms leave a
+/// Time for which the offsets are measured, s; rounded to a power of two of periods. 5 ms leave a
 /// tenth of one reading's noise.
 const ZERO_S: f32 = 0.005;
 
@@ -25,7 +25,7 @@ const OFFSET_SHARE: f32 = 0.1;
 /// proportion.
 const SIGN_CERTAIN_A: f32 = 0.3;
 
-/// For how long a rotor that turns may do so unseen, s: a propeller at full speed is 2° behind by then, where
+/// Time for which a turning rotor may be unseen, s: a propeller at full speed is 2° behind by then, where
 /// it would be tens of degrees behind after a long charge. The bridge supplies the drivers as it switches.
 const UNSEEN_S: f32 = 0.002;
 
@@ -54,10 +54,10 @@ const LEVEL_S: f32 = 0.004;
 /// Longest memory of the observation of a coasting rotor, s.
 const MEMORY_S: f32 = 0.05;
 
-/// For how long all must fit before a coasting rotor is known, s.
+/// Time for which all must fit before a coasting rotor is known, s.
 const SURE_S: f32 = 0.001;
 
-/// For how long it may not fit before the observation starts over, s.
+/// Time for which it may not fit before the observation starts over, s.
 const UNFIT_S: f32 = 0.004;
 
 /// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high

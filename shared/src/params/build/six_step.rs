@@ -36,11 +36,11 @@ const BOUND_RATE: f32 = 320.0;
 /// slower. On the bench, at 5 A the loop would ring by half of it.
 const BOUND_LEAST_A: f32 = 20.0;
 
-/// For how long a start waits for a crossing, s: under its ramp's current a rotor with ten times the
+/// Time for which a start waits for a crossing, s: under its ramp's current a rotor with ten times the
 /// bench's inertia takes 0.08 s.
 const PATIENCE_S: f32 = 0.2;
 
-/// For how long a start may go on without a turn of crossings in a row, s.
+/// Time for which a start may go on without a turn of crossings in a row, s.
 const ASTRAY_S: f32 = 0.9;
 
 /// Greatest current against the rotation, of `LIM_PHASE_A`.

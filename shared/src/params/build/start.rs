@@ -34,7 +34,7 @@ const INERTIA: [f32; ATTEMPTS] = [1.0, 10.0, 20.0, 40.0];
 /// swing that is damped by ζ = 0.5 dies down to 3 %.
 const PARK_SWINGS: f32 = 3.0;
 
-/// For how long a rotor may turn too slowly in Ramp, in periods of its swing.
+/// Time for which a rotor may turn too slowly in Ramp, in periods of its swing.
 const ASTRAY_SWINGS: f32 = 1.0;
 
 /// The attempts of a start (section 3.2 of the second paper): each with more current, up to
