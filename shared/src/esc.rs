@@ -19,6 +19,7 @@ use sound::Sound;
 use storage::{Asker, Storage, Unstored};
 
 mod check;
+mod kept;
 mod sound;
 mod storage;
 mod wire;

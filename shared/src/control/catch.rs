@@ -27,45 +27,18 @@
 
 mod compare;
 mod learn;
+mod state;
 
 use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
+pub use state::{Config, LOOK_PERIODS, State};
+use state::{LOOK_SHIFT, SUM_FRACTION, Turn};
 
 use crate::math::{SinCos, TopProduct, atan2_turns};
-use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Speed};
 use compare::Difference;
 
-/// Periods from look to look.
-pub const LOOK_PERIODS: u32 = 1 << LOOK_SHIFT;
-
-const LOOK_SHIFT: u32 = 2;
-
 /// Highest reading from which an observation may begin, three times the noise.
 const BEGIN: I17F15 = I17F15::lit("6");
-
-/// What the observer must know.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Config {
-    /// Back-EMF's amplitude that the stated flux gives, in counts of the terminals with 8 fraction
-    /// bits, over the speed in turns a period.
-    pub emf: u32,
-    /// A diode's drop.
-    pub diode: AdcCounts,
-    /// Noise times the amplitude a radian per look, counts²: (E/|ω|)·σ, which makes the first
-    /// guess of the speed's uncertainty.
-    pub prior: u32,
-    /// Slowest forgetting, a share a look.
-    pub forget_min: I0F32,
-    /// Mean of the highest reading below which the rotor stands, or turns so slowly that it can be
-    /// aligned.
-    pub standing: AdcCounts,
-    /// Share of a new look in that mean.
-    pub level_share: I0F32,
-    /// Looks in a row for which all must fit before the rotor is known.
-    pub sure_looks: u32,
-    /// Looks for which something may not fit before the observation begins anew.
-    pub lost_looks: u32,
-}
 
 /// What is known of the rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,98 +55,6 @@ pub enum Rotor {
         /// Signed speed.
         omega: Speed,
     },
-}
-
-traced! {
-    /// What a period does for a look.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    enum Turn {
-        /// It compares the readings with the prediction.
-        Look,
-        /// It finds by how much angle and speed are to be corrected for what differs.
-        Weigh,
-        /// It corrects them, and the amplitude.
-        Correct,
-        /// It sees whether all fits.
-        Judge,
-    }
-}
-
-traced! {
-    /// What is remembered from sample to sample.
-    #[derive(Clone, Debug, PartialEq)]
-    pub struct State {
-        /// Mean of the highest reading.
-        level: AdcCounts,
-        /// What this period is to do.
-        turn: Turn,
-        /// Sum of the readings after the last look.
-        readings: [I17F15; 3],
-        /// Looks of this observation; 0 while there is none.
-        looks: u32,
-        /// θ_e, the angle of the back-EMF's vector at this sample.
-        theta: Angle,
-        /// ω.
-        omega: Speed,
-        /// E, in counts.
-        amplitude: AdcCounts,
-        /// S_0.
-        weight: I20F12,
-        /// S_1 and S_2, 12 fraction bits.
-        ages: [i64; 2],
-        /// Sum of the weights of E.
-        amplitude_weight: I20F12,
-        /// Sum of the squared ages about their mean, looks².
-        spread: u32,
-        /// Mean of the errors' magnitudes, summed over the phases.
-        residual: I17F15,
-        /// What the last look has told.
-        told: Difference,
-        /// k_ω, 30 fraction bits.
-        speed_gain: i32,
-        /// S_1/S_0, looks with 12 fraction bits.
-        mean_age: i32,
-        /// Looks in a row for which all fitted.
-        fitting: u32,
-        /// Looks for which something did not.
-        unfitting: u32,
-    }
-}
-
-impl State {
-    /// Nothing known.
-    pub fn new(config: &Config) -> Self {
-        Self {
-            // Twice the threshold: a resting rotor is told from one that has not been seen.
-            level: config.standing.saturating_mul_int(2),
-            turn: Turn::Look,
-            readings: [I17F15::ZERO; 3],
-            looks: 0,
-            theta: Angle::ZERO,
-            omega: Speed::ZERO,
-            amplitude: AdcCounts::ZERO,
-            weight: I20F12::ZERO,
-            ages: [0; 2],
-            amplitude_weight: I20F12::ZERO,
-            spread: 0,
-            residual: I17F15::ZERO,
-            told: Difference::default(),
-            speed_gain: 0,
-            mean_age: 0,
-            fitting: 0,
-            unfitting: 0,
-        }
-    }
-
-    /// Begins anew, but for the mean that tells a resting rotor.
-    pub fn restart(&mut self) {
-        self.turn = Turn::Look;
-        self.looks = 0;
-        self.omega = Speed::ZERO;
-        self.residual = I17F15::ZERO;
-        self.fitting = 0;
-        self.unfitting = 0;
-    }
 }
 
 /// Takes one sample of the terminals a, b, c with the bridge off and says what is known by now.
@@ -221,20 +102,6 @@ fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
         seek(config, state, readings);
     } else {
         follow(config, state, readings);
-    }
-}
-
-impl State {
-    /// Whether looks are at the mean of four readings.
-    fn is_slow(&self) -> bool {
-        self.omega.saturating_abs() < SLOW
-    }
-
-    /// Whether there is no vector yet, or a large one and no speed: of a large back-EMF the
-    /// difference of two vectors is the speed, since the prediction of a rotor at rest may be too far
-    /// off. A small one is of a slow rotor, and too noisy for that.
-    fn seeks(&self, config: &Config) -> bool {
-        self.looks == 0 || self.looks == 1 && self.amplitude >> 1 > config.diode
     }
 }
 
@@ -338,12 +205,6 @@ fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     state.readings = [I17F15::ZERO; 3];
     state.turn = Turn::Weigh;
 }
-
-/// Speed below which the mean of four readings is as good as one: 3° a period.
-const SLOW: Speed = Speed::lit("0.0078125");
-
-/// Fraction bits of the sums.
-const SUM_FRACTION: u32 = 12;
 
 /// √3/4, which with a sum of its product makes √3/2.
 const HALF_ROOT_3: I0F32 = I0F32::lit("0.4330127018922");

@@ -6,13 +6,15 @@
 //! period, with the current's sign.
 
 use fixed::FixedI32;
-use fixed::types::extra::U25;
+use fixed::types::extra::{U22, U25};
 use fixed::types::{I2F30, I6F26, I8F24, I12F20};
 
-use super::modulator::Share;
 use super::transform::{Dq, turn};
 use crate::math::{Gain, SinCos, TopSum};
 use crate::units::Current;
+
+/// A share of the supply.
+pub type Share = FixedI32<U22>;
 
 /// What the compensation must know.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,9 +1,9 @@
 //! From a voltage vector to three duties: space-vector or sine modulation with a minimum low-side
 //! on-time, and the compensation of the dead time.
 
+use crate::control::dead_time::Share;
 use crate::units::dimension::Volt;
-use fixed::FixedI32;
-use fixed::types::extra::{U20, U22};
+use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
 
 use super::dead_time;
@@ -251,9 +251,6 @@ pub fn duties(
         config.duty(common, dead_time.compensated(c, cc)),
     ]
 }
-
-/// A share of the supply.
-pub type Share = FixedI32<U22>;
 
 /// The share as a duty: a vector is at most 1/√3 long.
 #[inline(always)]

@@ -5,11 +5,9 @@ use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::Esc;
 use crate::mavlink::Request;
-use crate::params::{BuildError, ParamId};
-use crate::store::{self, Kept, Loaded, StoreError};
-use crate::throttle::Reach;
+use crate::params::ParamId;
+use crate::store::{self, Kept, StoreError};
 
 /// Time without a change after which changes are stored, µs: a client that writes a whole
 /// list of parameters wears the flash once.
@@ -182,7 +180,7 @@ pub(super) struct Unstored {
 
 impl Unstored {
     /// Puts the value that is stored in the place of the one in force, if that is still this one.
-    fn hide(self, kept: &mut Kept) {
+    pub(super) fn hide(self, kept: &mut Kept) {
         if kept.params.get(self.id) == self.value {
             // It was in force once.
             let _ = kept.params.set(self.id, self.stored);
@@ -190,7 +188,7 @@ impl Unstored {
     }
 }
 
-/// Carries out a request for storage, with the values of [`Esc::kept`]. Returns true if `kept` now has other
+/// Carries out a request for storage, with the values of [`Esc::kept`](super::Esc::kept). Returns true if `kept` now has other
 /// values, which shall be in force from now on: on the chip each copy takes 0.5 KB of stack.
 ///
 /// # Errors
@@ -226,61 +224,5 @@ pub fn obey<F: NorFlash>(
             Ok(true)
         }
         Request::ParamsChanged | Request::Reboot => Ok(false),
-    }
-}
-
-impl Esc {
-    /// Goes on from what was stored, at power-up. It has been made with the parameters of it already.
-    pub fn recall(&mut self, loaded: &Loaded) {
-        let kept = &loaded.kept;
-        self.component.keep_intervals(&kept.intervals);
-        self.component.keep_signing(kept.signing);
-        self.telemetry.statistics = kept.statistics;
-        if loaded.integrity.is_lost() {
-            self.lose_stored();
-        }
-        if let Some(trouble) = loaded.trouble() {
-            self.warn_of(trouble);
-        }
-    }
-
-    /// Leaves the stored settings alone because they are not those in force, and keeps the motor off,
-    /// until somebody asks for settings to be stored or reset.
-    pub fn lose_stored(&mut self) {
-        self.storage.lose();
-    }
-
-    /// The values to be stored now.
-    pub fn kept(&self) -> Kept {
-        let mut kept = Kept {
-            params: self.params.clone(),
-            intervals: self.component.kept_intervals(),
-            statistics: self.telemetry.statistics,
-            signing: self.component.kept_signing(),
-        };
-        if !self.storage.takes_all() {
-            for unstored in &self.unstored {
-                unstored.hide(&mut kept);
-            }
-        }
-        kept
-    }
-
-    /// Puts other values in force, as [`obey`] gives them. The interrupt shall run with
-    /// [`Esc::config`] afterwards.
-    ///
-    /// # Errors
-    /// The parameter that does not fit the board; nothing has changed then.
-    pub fn replace(&mut self, throttle: &mut impl Reach, kept: &Kept) -> Result<(), BuildError> {
-        let mut params = kept.params.clone();
-        params.fit(&self.board);
-        self.given.check(&params, &self.board)?;
-        self.params = params;
-        self.component.keep_intervals(&kept.intervals);
-        if kept.signing.is_none() {
-            self.component.forget_signing();
-        }
-        self.apply(throttle);
-        Ok(())
     }
 }

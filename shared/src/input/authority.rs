@@ -11,8 +11,9 @@
 
 use super::Share;
 use super::command::within;
-use super::demand::{Demand, Reading};
-use super::line::Event;
+use super::demand::Reading;
+use super::endpoints::Demand;
+use super::event::Event;
 use super::signal::Signal;
 use super::trust::Trust;
 use crate::math::Real;

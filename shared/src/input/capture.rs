@@ -5,8 +5,8 @@
 //! reported once for every 32 of them, or when the line comes to rest.
 
 use super::dshot::{Frame, Rate, check_mask};
+use super::event::Event;
 use super::filter::{Edge, since};
-use super::line::Event;
 use crate::math::quotient;
 
 /// Edges of a frame: two a bit.

@@ -1,18 +1,9 @@
 //! The demand on the motor that a frame or a pulse makes.
 
-use super::Share;
 use super::dshot::Kind;
+pub use super::endpoints::Demand;
 use super::endpoints::EndPoints;
-use super::line::Event;
-
-/// The demand on the motor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Demand {
-    /// Not to turn. So do DShot's stop and its commands.
-    Zero,
-    /// To turn.
-    Throttle(Share),
-}
+use super::event::Event;
 
 /// The way frames and pulses are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

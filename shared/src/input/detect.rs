@@ -3,7 +3,7 @@
 //! DShot and pulses have a candidate each, with the evidence for and against it. A candidate that lasts
 //! is the signal.
 
-use super::line::Event;
+use super::event::Event;
 use super::signal::{Pulse, Signal};
 
 /// Hits after which a signal is believed, with the time below. At 50 Hz four pulses take 60 ms, and the

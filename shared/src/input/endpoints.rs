@@ -1,11 +1,19 @@
 //! The width of a pulse as a throttle.
 
-use super::demand::Demand;
 use super::signal::Pulse;
 use super::{Share, reverse};
 use crate::math::quotient;
 
 const NS_PER_US: u32 = 1000;
+
+/// The demand on the motor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Demand {
+    /// Not to turn. So do DShot's stop and its commands.
+    Zero,
+    /// To turn.
+    Throttle(Share),
+}
 
 /// One over this is the share of the range, from its lower end, that is zero: 2 %.
 pub const ZERO_DIVISOR: u32 = 50;

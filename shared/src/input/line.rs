@@ -2,7 +2,8 @@
 
 use super::capture;
 use super::detect::Detector;
-use super::dshot::{Frame, Rate};
+use super::dshot::Rate;
+pub use super::event::Event;
 use super::filter::{Edge, Filter, since};
 use super::pulse;
 use super::signal::{Pulse, Signal};
@@ -10,34 +11,6 @@ use crate::math::quotient;
 
 /// A line without an edge for so long is at rest, whatever was on it. At 50 Hz pulses leave 19 ms.
 const SILENCE_MS: u32 = 100;
-
-/// A finding on the wire.
-///
-/// In whole words, tag and all: a chip copies it in a few instructions at every edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Event {
-    /// A DShot frame with a right checksum.
-    Frame {
-        /// Its rate.
-        rate: Rate,
-        /// True if the line rests high and the checksum is inverted.
-        bidirectional: bool,
-        /// Its contents.
-        frame: Frame,
-        /// Time of its first edge, in ticks of the capturing timer.
-        first_edge_ticks: u32,
-    },
-    /// A pulse.
-    Pulse {
-        /// Its kind.
-        kind: Pulse,
-        /// Its width, ns.
-        width_ns: u32,
-    },
-    /// Edges that were neither.
-    Bad,
-}
 
 /// The wire's decoder.
 #[derive(Clone, Debug)]
@@ -236,24 +209,6 @@ fn filter_ticks(tick_hz: u32, signal: Option<Signal>) -> u32 {
         Some(Signal::Pulse(Pulse::Servo)) => 2_000,
     };
     quotient(u64::from(tick_hz) * u64::from(time_ns), 1_000_000_000)
-}
-
-impl Event {
-    /// The signal that it belongs to; nothing for a bad one.
-    pub fn signal(&self) -> Option<Signal> {
-        match *self {
-            Self::Frame {
-                rate,
-                bidirectional,
-                ..
-            } => Some(Signal::Dshot {
-                rate,
-                bidirectional,
-            }),
-            Self::Pulse { kind, .. } => Some(Signal::Pulse(kind)),
-            Self::Bad => None,
-        }
-    }
 }
 
 #[cfg(test)]

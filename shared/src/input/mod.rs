@@ -19,10 +19,12 @@ pub mod demand;
 mod detect;
 pub mod dshot;
 pub mod endpoints;
+pub mod event;
 mod filter;
 pub mod line;
 mod news;
 mod pulse;
+mod share;
 pub mod signal;
 mod tally;
 mod trust;
@@ -31,26 +33,17 @@ mod trust;
 mod tests;
 
 pub use news::News;
+pub use share::{Share, reverse};
 
 use authority::{Authority, DriveStatus, Timing};
 use calibration::Calibration;
 use command::{Commands, Order};
 use demand::Reading;
-use line::{Event, Line};
+use event::Event;
+use line::Line;
 use news::{Announcer, Standing};
 use signal::Signal;
 use tally::Tally;
-
-/// A share of the throttle's range, 0 to 1; its highest value, 1 − 2⁻³¹, stands for 1.
-///
-/// 0 is the least throttle that turns, and not a stop: whether to turn is separate. A throttle
-/// for the other direction is the complement of its share, −2⁻³¹ to −1: see [`reverse`].
-pub type Share = fixed::types::I1F31;
-
-/// The throttle of the same share in the other direction, `!share`: the least one has one too.
-pub const fn reverse(throttle: Share) -> Share {
-    Share::from_bits(!throttle.to_bits())
-}
 
 /// The settings of the wire, from the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 //! A pulse has no checksum. It is told from other edges by its width, by the time since the one
 //! before, and by following another such pulse.
 
-use super::line::Event;
+use super::event::Event;
 use super::signal::Pulse;
 use crate::math::quotient;
 

@@ -5,10 +5,11 @@ use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult, MavSeverity,
 };
 
-use super::component::{Act, Context, Request};
+use super::context::{Act, Context, Request};
+use super::frame::Address;
+use super::frame::{Frame, is_signed};
 use super::ftp;
-use super::identity::{Address, Identity, Role};
-use super::receiver::{Frame, is_signed};
+use super::identity::{Identity, Role};
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;

@@ -1,5 +1,6 @@
 //! The ESC as others on MAVLink see it.
 
+use crate::mavlink::context::{Act, Context, Request};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_INT_DATA, COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA, MISSION_REQUEST_LIST_DATA,
@@ -9,85 +10,25 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::command::{ACCEPTED, Command, Commands, FAILED};
 use super::faults::Announcer;
-use super::identity::{Address, Identity, Role};
+use super::frame::Address;
+use super::frame::Frame;
+use super::identity::{Identity, Role};
 use super::pace::Pace;
 use super::parameter::{self, List};
-use super::receiver::Frame;
 use super::reply::{PING, Replies, Reply, Writer};
 use super::schedule::{Intervals, Schedule};
 use super::signing::{Kept, Signing, Trust};
 use super::warnings::{Warning, Warnings};
 use super::{ftp, news};
-use crate::check::Report;
 use crate::drive::Faults;
 use crate::image::Image;
 use crate::input::News as WireNews;
-use crate::input::access::Access;
-use crate::input::authority::DriveStatus;
-use crate::params::Board;
-use crate::params::{BuildError, ParamId, Params};
-use crate::telemetry::Telemetry;
+use crate::params::{ParamId, Params};
 
 mod send;
 
 const PING_ID: u32 = PING.0;
 const START_TEXT: &str = concat!("Siskin ESC ", env!("CARGO_PKG_VERSION"), ", ");
-
-/// The component's surroundings: what it reads and may change.
-pub struct Context<'a> {
-    /// Time since the start, µs; it does not run backwards.
-    pub now_us: u64,
-    /// The values in force; PARAM_SET changes them and asks for [`Request::ParamsChanged`].
-    pub params: &'a mut Params,
-    /// The board, which has other values from the factory than the table's.
-    pub board: &'a Board,
-    /// The state of the ESC.
-    pub telemetry: &'a Telemetry,
-    /// The result of the last self-test.
-    pub check: &'a Report,
-    /// Decides whether the motor may turn.
-    pub authority: &'a mut dyn Access,
-    /// Checks that values make a drive; a value that breaks it is refused with the reason.
-    pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
-}
-
-impl Context<'_> {
-    fn drive(&mut self) -> DriveStatus {
-        self.telemetry.drive(self.authority.command())
-    }
-}
-
-/// A request that only the caller can carry out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// Put the parameters in force: rebuild the drive's configuration.
-    ParamsChanged,
-    /// Write what is kept to flash, then call [`Component::storage_done`].
-    Save,
-    /// Save without being asked.
-    Keep,
-    /// Read the parameters and intervals from flash and put them in force, then call
-    /// [`Component::storage_done`].
-    Load,
-    /// Erase all but the statistics and put the defaults in force, then call
-    /// [`Component::storage_done`].
-    FactoryReset,
-    /// Start again; the ACK has been sent.
-    Reboot,
-}
-
-/// An act that the ESC does at once. It reports progress if the act takes longer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Act {
-    /// Sound a beacon.
-    Beep,
-    /// Begin a calibration by stick; [`Component::tell`] reports its steps.
-    Calibrate,
-    /// End it.
-    EndCalibration,
-    /// Begin a self-test; [`Component::tell_progress`] and [`Component::check_done`] report it.
-    Check,
-}
 
 /// One ESC on MAVLink. Frames may come from several links; its own go to all of them.
 #[derive(Clone, Debug)]

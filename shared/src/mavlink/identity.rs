@@ -3,19 +3,10 @@
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 
+use super::frame::{Address, Frame};
 use super::place::Place;
-use super::receiver::Frame;
 use crate::params::choice::MavRole;
 use crate::params::{ParamId, Params};
-
-/// A component of a system; as a target 0 means all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Address {
-    /// System, 1 to 255.
-    pub system: u8,
-    /// Component within it, 1 to 255.
-    pub component: u8,
-}
 
 /// The ESC's role to a ground station (`MAV_ROLE`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,21 +1,15 @@
 //! The parameter protocol. Every value is REAL32: no encoding of integers works in every client.
 
-use mavlink::dialects::ardupilotmega::MavParamError;
-
-use super::component::Context;
-use super::identity::Address;
-use super::receiver::Frame;
+use super::context::Context;
+use super::frame::Address;
+use super::frame::Frame;
+use super::refusal::{NOT_PERMITTED, OUT_OF_RANGE, Refusal, WRONG_TYPE};
 use super::reply::{Replies, Reply};
 use super::signing::Trust;
-use crate::params::{ParamId, SetError, TABLE};
+use crate::params::{ParamId, TABLE};
 
 /// `PARAM_REQUEST_READ.param_index` when the name counts.
 pub(super) const BY_NAME: i16 = -1;
-
-const OUT_OF_RANGE: MavParamError = MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE;
-const NOT_PERMITTED: MavParamError = MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED;
-const READ_ONLY: MavParamError = MavParamError::MAV_PARAM_ERROR_READ_ONLY;
-const WRONG_TYPE: MavParamError = MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH;
 
 /// The parameters that are still to be broadcast for PARAM_REQUEST_LIST.
 #[derive(Clone, Debug, Default)]
@@ -58,39 +52,6 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
         Some(id) => replies.value(id),
         None if alone => unknown(frame.from, name, index, replies),
         None => {}
-    }
-}
-
-/// The reason why a value was not taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Refusal {
-    /// For the sender of the request.
-    pub(super) error: MavParamError,
-    /// The parameter that conflicts with it, if that is another.
-    pub(super) because: Option<ParamId>,
-    /// For a person.
-    pub(super) reason: &'static str,
-}
-
-impl Refusal {
-    const fn new(error: MavParamError, reason: &'static str) -> Self {
-        Self {
-            error,
-            because: None,
-            reason,
-        }
-    }
-}
-
-impl From<SetError> for Refusal {
-    fn from(error: SetError) -> Self {
-        let (error, reason) = match error {
-            SetError::NotFinite => (OUT_OF_RANGE, "not a finite number"),
-            SetError::OutOfRange => (OUT_OF_RANGE, "out of range"),
-            SetError::NotWhole => (OUT_OF_RANGE, "must be a whole number"),
-            SetError::ReadOnly => (READ_ONLY, "read-only"),
-        };
-        Self::new(error, reason)
     }
 }
 

@@ -3,13 +3,10 @@
 use mavlink::{MAV_STX, MAV_STX_V2};
 
 use super::check;
-use super::identity::Address;
-use super::signing::SIGNATURE_LEN;
+use super::frame::{Address, Frame, SIGNATURE_LEN, SIGNED, is_signed};
 
 /// The greatest frame: MAVLink 2, 255 bytes of payload, signed.
 const FRAME_MAX: usize = 10 + 255 + 2 + SIGNATURE_LEN;
-/// Incompatibility flag of a signed frame; any other flag is unknown here.
-pub(super) const SIGNED: u8 = 0x01;
 /// Silence after which an incomplete frame is given up. A false start byte can claim 267 bytes and
 /// would hold back the frames after it for as long as nobody sends more. Links that stall within
 /// a frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
@@ -31,68 +28,6 @@ pub struct Counters {
     pub signed: u32,
     /// Incomplete frames given up after silence.
     pub incomplete: u32,
-}
-
-/// A frame that passed its check.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Frame<'a> {
-    /// Its sender.
-    pub from: Address,
-    /// Number of the message.
-    pub id: u32,
-    /// As received: MAVLink 2 leaves trailing zeros out.
-    pub payload: &'a [u8],
-    /// The whole frame, for its signature or a log.
-    pub raw: &'a [u8],
-}
-
-impl Frame<'_> {
-    /// `N` bytes of the payload; those that were left out are zero.
-    pub(super) fn bytes<const N: usize>(&self, offset: usize) -> [u8; N] {
-        let mut bytes = [0; N];
-        for (byte, sent) in bytes.iter_mut().zip(self.payload.iter().skip(offset)) {
-            *byte = *sent;
-        }
-        bytes
-    }
-
-    /// Never inlined: every field that is read goes through it.
-    #[inline(never)]
-    pub(super) fn u32(&self, offset: usize) -> u32 {
-        u32::from_le_bytes(self.bytes(offset))
-    }
-
-    pub(super) fn u8(&self, offset: usize) -> u8 {
-        self.u32(offset) as u8
-    }
-
-    pub(super) fn u16(&self, offset: usize) -> u16 {
-        self.u32(offset) as u16
-    }
-
-    pub(super) fn i16(&self, offset: usize) -> i16 {
-        self.u32(offset) as i16
-    }
-
-    pub(super) fn i32(&self, offset: usize) -> i32 {
-        self.u32(offset) as i32
-    }
-
-    pub(super) fn u64(&self, offset: usize) -> u64 {
-        u64::from(self.u32(offset)) | u64::from(self.u32(offset + 4)) << 32
-    }
-
-    pub(super) fn f32(&self, offset: usize) -> f32 {
-        f32::from_bits(self.u32(offset))
-    }
-
-    /// The address of two bytes, system first, that a message is for.
-    pub(super) fn address(&self, offset: usize) -> Address {
-        Address {
-            system: self.u8(offset),
-            component: self.u8(offset + 1),
-        }
-    }
 }
 
 /// The front of the bytes that wait.
@@ -264,11 +199,6 @@ impl Receiver {
             payload_len,
         }
     }
-}
-
-/// Returns true if a frame whose header is complete has a signature.
-pub(super) fn is_signed(bytes: &[u8]) -> bool {
-    matches!(*bytes, [MAV_STX_V2, _, flags, ..] if flags & SIGNED != 0)
 }
 
 /// System, component and message of a frame whose header is complete.

@@ -6,10 +6,11 @@ use mavlink::dialects::ardupilotmega::{
     STATUSTEXT_DATA,
 };
 
+use super::frame::Address;
 use super::ftp;
-use super::identity::{Address, Identity};
-use super::parameter::Refusal;
+use super::identity::Identity;
 use super::payload::id_of;
+use super::refusal::Refusal;
 use super::sender::Sender;
 use super::signing::Signing;
 use crate::params::{ParamId, TABLE};

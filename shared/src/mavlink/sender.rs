@@ -3,10 +3,11 @@
 use mavlink::MAV_STX_V2;
 
 use super::check;
-use super::identity::Address;
+use super::frame::Address;
+use super::frame::SIGNATURE_LEN;
+use super::frame::SIGNED;
 use super::payload::PAYLOAD_MAX;
-use super::receiver::SIGNED;
-use super::signing::{SIGNATURE_LEN, Signing};
+use super::signing::Signing;
 
 /// Header and check.
 const OVERHEAD_LEN: usize = 12;

@@ -17,12 +17,9 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SETUP_SIGNING_DATA;
 use sha2::{Digest, Sha256};
 
-use super::identity::Address;
-use super::receiver::{Frame, is_signed};
+use super::frame::{Address, Frame, SIGNATURE_LEN, is_signed};
 use crate::math::divide;
 
-/// Link, timestamp and hash, after the checksum of a frame.
-pub(super) const SIGNATURE_LEN: usize = 13;
 const TIMESTAMP_LEN: usize = 6;
 const HASH_LEN: usize = 6;
 

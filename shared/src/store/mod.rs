@@ -15,56 +15,23 @@
 //! parameters it is at least 80 000 changes, and with every value changed 40 000. The two sectors of the
 //! STM32F405 (10 000 erases, DS8626) last four times as long.
 
+mod error;
 mod kept;
 mod log;
+mod set;
 mod word;
 
 use core::ops::Range;
 
 use embedded_storage::nor_flash::NorFlash;
 
+pub use error::{Integrity, StoreError};
 pub use kept::Kept;
-use log::{Log, Set, Values};
-
-/// Keys of words that are no value's; those of values are in [`kept`].
-mod key {
-    /// The seal after a set.
-    pub(super) const SEAL: u16 = 0;
-    /// The schema of a set, its first word.
-    pub(super) const SCHEMA: u16 = 0x1000;
-}
-
-/// The schema's number: another one means that keys and values must be converted.
-const SCHEMA: u32 = 1;
+use log::Log;
+use set::{Content, Set};
 
 /// Sets that have the settings which were saved last.
 const COPIES: usize = 2;
-
-/// The integrity of the stored values.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Integrity {
-    /// Every value is the one that was saved.
-    Sound,
-    /// Nothing was stored: the values are the defaults.
-    Empty,
-    /// A save was interrupted, or a value has rotted: the values are those of an earlier save, or of the
-    /// other copy of this one.
-    Incomplete,
-    /// The first save of all was interrupted: the values are the defaults.
-    Unfinished,
-    /// No order was found in the flash: the values are the defaults.
-    Corrupt,
-    /// The flash could not be read: the values are the defaults.
-    Unreadable,
-}
-
-impl Integrity {
-    /// Returns true if there was something and nothing of it can be used: the defaults may be those of
-    /// another motor than the one that was set up.
-    pub const fn is_lost(self) -> bool {
-        matches!(self, Self::Unfinished | Self::Corrupt | Self::Unreadable)
-    }
-}
 
 /// The stored values.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,28 +57,6 @@ impl Loaded {
             _ if self.out_of_range => Some("storage: out of range, some values are defaults"),
             _ if self.unknown => Some("storage: values of another firmware are kept"),
             Integrity::Sound | Integrity::Empty => None,
-        }
-    }
-}
-
-/// The reason why stored values cannot be relied on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StoreError {
-    /// The range is not two halves of whole pages of the flash.
-    BadRange,
-    /// The flash refused a read, a write or an erase.
-    Flash,
-    /// The values do not fit, or the flash does not hold what was written.
-    NotStored,
-}
-
-impl StoreError {
-    /// A few words for a person.
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::BadRange => "storage: too few or uneven pages of flash",
-            Self::Flash => "storage: the flash failed",
-            Self::NotStored => "storage: the flash does not hold the values",
         }
     }
 }
@@ -171,41 +116,6 @@ pub fn replace<F: NorFlash>(
     let log = Log::open(flash, range.clone())?;
     log.replace(flash, &Content::new(kept, Set::NONE.values()))?;
     save(flash, range, kept)
-}
-
-/// The words of a set that is to be written, but for its seal: the schema, what this firmware does not
-/// know of the set before, and each value that is no default.
-#[derive(Clone)]
-struct Content<'a> {
-    schema: Option<u32>,
-    old: Values,
-    kept: &'a Kept,
-    words: Range<usize>,
-}
-
-impl<'a> Content<'a> {
-    fn new(kept: &'a Kept, old: Values) -> Self {
-        Self {
-            schema: Some(SCHEMA),
-            old,
-            kept,
-            words: 0..Kept::WORDS,
-        }
-    }
-
-    /// Key and bits of the next word.
-    fn next<F: NorFlash>(&mut self, flash: &mut F) -> Result<Option<(u16, u32)>, StoreError> {
-        if let Some(schema) = self.schema.take() {
-            return Ok(Some((key::SCHEMA, schema)));
-        }
-        while let Some((key, bits)) = self.old.next(flash)? {
-            if Kept::find(key).is_none() {
-                return Ok(Some((key, bits)));
-            }
-        }
-        let next = |word| Some((Kept::key(word), self.kept.bits(word)?));
-        Ok(self.words.find_map(next))
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
+use super::word::key;
 use super::word::{Word, Writer};
 use super::*;
 use crate::mavlink::{Intervals, KeptSigning, Key};

@@ -2,8 +2,16 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use super::{StoreError, key};
+use super::error::StoreError;
 use crate::checksum::checksum;
+
+/// Keys of words that are no value's; those of values are in [`kept`](super::kept).
+pub(super) mod key {
+    /// The seal after a set.
+    pub(in crate::store) const SEAL: u16 = 0;
+    /// The schema of a set, its first word.
+    pub(in crate::store) const SCHEMA: u16 = 0x1000;
+}
 
 /// The unit by which the flash is read and written.
 pub(super) struct Word {

@@ -6,6 +6,7 @@ pub mod back_emf;
 pub mod compensated;
 pub mod crossing;
 pub mod edges;
+mod estimate;
 pub mod flux_linkage;
 pub mod given;
 pub mod hall;
@@ -17,11 +18,9 @@ use super::inductance::Factor;
 use super::regulator::Feedback;
 use super::transform::{AlphaBeta, Dq, phases};
 use crate::math::{EIGHTH_PI, SinCos, TopProduct};
-use crate::trace::{Trace, traced};
-use crate::units::{
-    Angle, Current, FLUX_NOMINAL, Flux, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage,
-    WideVoltage, wide,
-};
+use crate::trace::Trace;
+use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
+pub use estimate::{Estimate, Input, Told};
 
 /// The observer in use (`CTL_OBSERVER`) and its coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,62 +49,6 @@ pub struct State {
     pub given: given::State,
     /// What the observer in use says besides; the compensated flux observer says it by [`pace`].
     pub told: Told,
-}
-
-/// What an observer reads at a sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input {
-    /// Currents in the stator's frame at this sample.
-    pub i: AlphaBeta<Current>,
-    /// Mean voltage in the stator's frame from the last sample to this one.
-    pub v: AlphaBeta<Voltage>,
-    /// L over the inductance that the parameters state.
-    pub inductance: Factor,
-    /// Change of the speed's reference in the last period, ω̇*·T_s.
-    pub planned: Speed,
-    /// Hall sensors, see [`Sample`](crate::drive::Sample).
-    pub hall: u8,
-    /// Whether the phases b and c have changed places in all this.
-    pub swapped: bool,
-}
-
-/// What an observer says at a sample.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
-    /// θ̂ at this sample.
-    pub theta: Angle,
-    /// Its cosine and sine.
-    pub frame: SinCos,
-    /// ω̂: the step of θ̂ until the next sample.
-    pub omega: Speed,
-    /// ω̄̂: the speed without the term that passes the noise.
-    pub omega_bar: Speed,
-}
-
-traced! {
-    /// What an observer says besides, for what is not done in every period.
-    #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Told {
-        /// The change of ω̄̂ in a period.
-        pub omega_bar_step: Speed,
-        /// ξ̂, the inverse of the flux.
-        pub xi: InverseFlux,
-        /// Change of ξ̂ in a period.
-        pub xi_step: InverseFlux,
-        /// Whether the observer's state is out of its range: the rotor may be elsewhere.
-        pub lost: bool,
-    }
-}
-
-impl Default for Told {
-    fn default() -> Self {
-        Self {
-            omega_bar_step: Speed::ZERO,
-            xi: INVERSE_FLUX_NOMINAL,
-            xi_step: InverseFlux::ZERO,
-            lost: false,
-        }
-    }
 }
 
 /// An observer in a control period: the one in use of all, or one that is known beforehand.

@@ -6,7 +6,7 @@
 //! the d axis has the bandwidth that is asked for at the greatest speed, where V is greatest, and
 //! less of it below, where there is less to decouple.
 
-use super::{Feedback, Reference, beyond};
+use super::reference::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
 use crate::trace::traced;

@@ -1,6 +1,6 @@
 //! The observer-based current regulator of the first paper (10).
 
-use super::{Feedback, Reference, beyond};
+use super::reference::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;

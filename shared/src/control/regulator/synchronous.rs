@@ -4,7 +4,7 @@
 //! With the zero of each PI on the winding's pole (k_i/k_p = R/L) the loop is of first order, at
 //! the bandwidth that k_p = bandwidth·L sets.
 
-use super::{Feedback, Reference};
+use super::reference::{Feedback, Reference};
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, Multiplier};

@@ -1,13 +1,15 @@
 //! Speed regulators: from a speed command to the current that is wanted (`CTL_SPEED`).
 
 pub mod feed_forward;
+mod input;
 pub mod nested;
 
-use super::observer::Told;
 use super::planner;
 use super::regulator::Reference;
 use crate::trace::traced;
-use crate::units::{Current, Speed, Torque};
+use crate::units::{Current, Speed};
+use input::torque;
+pub use input::{Bounds, Input};
 
 /// The planner and one of the laws.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,41 +42,6 @@ traced! {
         planner: planner::State,
         nested: nested::State,
         feed_forward: feed_forward::State,
-    }
-}
-
-/// What one period of speed control, [`PERIODS`](super::PERIODS) of the drive, reads.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input {
-    /// Ω*.
-    pub command: Speed,
-    /// ω̄̂.
-    pub speed: Speed,
-    /// What the observer says besides.
-    pub told: Told,
-    /// Bounds of i_q*.
-    pub bounds: Bounds,
-    /// i_q* less i_q of the last period where its voltage was limited, else zero: the torque that
-    /// the supply cannot give.
-    pub missing: Current,
-}
-
-traced! {
-    /// Bounds of i_q*; by default no current.
-    #[derive(Clone, Copy, Debug, Default, PartialEq)]
-    pub struct Bounds {
-        /// Least i_q*, at most zero: what braking may return.
-        pub min: Current,
-        /// Greatest i_q*.
-        pub max: Current,
-    }
-}
-
-impl Bounds {
-    /// The current, held within.
-    #[inline(always)]
-    pub fn hold(self, i_q: Current) -> Current {
-        i_q.min(self.max).max(self.min)
     }
 }
 
@@ -113,10 +80,4 @@ impl State {
     pub fn reference(&self) -> Speed {
         self.planner.reference
     }
-}
-
-/// The torque of a current with the stated flux, ξ = 1/4.
-#[inline(always)]
-fn torque(i_q: Current) -> Torque {
-    Torque::from_bits(i_q.to_bits().saturating_mul(4))
 }

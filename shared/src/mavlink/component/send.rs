@@ -10,7 +10,7 @@ use mavlink::dialects::ardupilotmega::{
 
 use super::{Component, Context, START_TEXT};
 use crate::mavlink::faults::News;
-use crate::mavlink::identity::Address;
+use crate::mavlink::frame::Address;
 use crate::mavlink::payload::{Payload, id_of};
 use crate::mavlink::reply::Reply;
 use crate::mavlink::schedule::{self, Stream};

@@ -1,15 +1,12 @@
 //! The files, and the folders that they are in.
 
-use super::answer::Error;
+use super::error::Error;
 use super::packed::Selection;
 use super::sink::Sink;
 use super::text;
+use super::view::View;
 use crate::SELF_TEST;
-use crate::check::Report;
 use crate::checksum::checksum;
-use crate::params::Board;
-use crate::params::Params;
-use crate::telemetry::Telemetry;
 
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
 static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
@@ -19,18 +16,6 @@ pub(super) const GENERAL_CHECKSUM: u32 = checksum(
     0,
     include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz")),
 );
-
-/// The sources of those files that are made when they are read.
-#[derive(Clone, Copy)]
-pub(in crate::mavlink) struct View<'a> {
-    pub(in crate::mavlink) params: &'a Params,
-    pub(in crate::mavlink) board: &'a Board,
-    pub(in crate::mavlink) telemetry: &'a Telemetry,
-    /// The result of the last self-test.
-    pub(in crate::mavlink) check: &'a Report,
-    /// The last that a person was warned of; empty if there was none.
-    pub(in crate::mavlink) warning: &'a str,
-}
 
 /// The kind of an entry.
 #[derive(Debug)]

@@ -15,17 +15,20 @@
 //! their half of the link, and only a few requests of a flood are answered.
 
 mod answer;
+mod error;
 mod files;
 mod metadata;
 mod packed;
+mod payload;
 mod server;
 mod sink;
 mod text;
+mod view;
 
 pub(super) use answer::{Answer, PAYLOAD_MAX};
-pub(super) use files::View;
 pub(super) use metadata::{is_metadata, metadata};
 pub(super) use server::Server;
+pub(super) use view::View;
 
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,12 @@
 //! The reader's session: there is one.
 
-use super::answer::{Answer, Content, DATA_MAX, Error};
-use super::files::{Entry, File, View};
+use super::answer::{Answer, Content, DATA_MAX};
+use super::error::Error;
+use super::files::{Entry, File};
 use super::sink::Sink;
-use crate::mavlink::identity::Address;
-use crate::mavlink::receiver::{Frame, is_signed};
+use super::view::View;
+use crate::mavlink::frame::Address;
+use crate::mavlink::frame::{Frame, is_signed};
 
 /// A session without a request for so long is over, µs: a client that is gone must not keep the next
 /// one out, and one that lives asks again within seconds.

@@ -1,7 +1,7 @@
 //! Texts in words, and numbers in decimal.
 
-use super::files::View;
 use super::sink::Sink;
+use super::view::View;
 use crate::drive::Fault;
 
 /// `@SYS/faults.txt`: past faults, and those that hold the bridge off.

@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
 
-use super::{SLOW_SHARE, Si};
+use super::si::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{crossing, flux_linkage, hall, position};

@@ -1,6 +1,6 @@
 //! The coefficients of the inductance's adaptation.
 
-use super::Si;
+use super::si::Si;
 use crate::control::inductance::{Config, MEAN_PERIODS_MAX};
 use crate::params::ParamId;
 use crate::params::choice::CtlAdaptL;

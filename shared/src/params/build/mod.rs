@@ -7,92 +7,34 @@ mod observer;
 mod outer;
 mod regulator;
 mod sensing;
+mod si;
 mod six_step;
 mod start;
 mod tone;
 
 pub use flux::FluxSettings;
 pub use input::input;
+pub use si::{BuildError, scale};
+use si::{Si, TEST_SHARE};
 
 use core::cell::Cell;
-use core::f32::consts::{FRAC_PI_2, TAU};
+use core::f32::consts::TAU;
 
-use fixed::types::extra::Unsigned;
-
+use super::board::Board;
 use super::choice::{CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, MotDir, MotStop};
-use super::{Choice, ParamId, Params};
-use crate::control::delay::Delay;
+use super::table::ParamId;
+use super::values::Params;
 use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Stop};
-use crate::image::Image;
 use crate::input::signal::Signal;
-use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
+use crate::math::Real;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Scale, Speed, Voltage};
-
-/// The properties of the board that the control must know.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Board {
-    /// The program's name and version.
-    pub image: Image,
-    /// Amperes of one count of the current converter.
-    pub current_a_per_count: f32,
-    /// Volts of one count of the supply's converter.
-    pub bus_v_per_count: f32,
-    /// Greatest phase current that the converter can show, peak amperes.
-    pub current_range_a: f32,
-    /// Volts of one count of the terminals' converter, of 4096.
-    pub terminal_v_per_count: f32,
-    /// The phases that have a current shunt.
-    pub shunts: Shunts,
-    /// Control periods from the sample to the voltage.
-    pub delay: Delay,
-    /// Least time for which a low side must be on, half of it before the sample, for its current to
-    /// be read, s. Dead times are not part of it.
-    pub low_side_on_s: f32,
-    /// Least time for which a low side must be on in each period so that its high side's driver
-    /// stays supplied, s.
-    pub refresh_s: f32,
-    /// Time for which the low sides must be on in all before the high sides' drivers are supplied
-    /// after a time off, s.
-    pub charge_s: f32,
-    /// `PWM_DEADTIME_NS` at least, which is also its default if the table's is shorter.
-    pub least_dead_time: LeastDeadTime,
-}
-
-/// The shortest dead time that the drivers and transistors of a board take.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeastDeadTime {
-    /// In ns.
-    pub ns: f32,
-    /// The reason why a shorter one is refused, with its number.
-    pub refusal: &'static str,
-}
-
-impl LeastDeadTime {
-    /// Any will do, and none.
-    pub const NONE: Self = Self {
-        ns: 0.0,
-        refusal: "",
-    };
-}
-
-/// The reason why parameters do not make a drive.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BuildError {
-    /// The parameter to change.
-    pub param: ParamId,
-    /// The reason.
-    pub reason: &'static str,
-}
+use crate::units::{AdcCounts, Current, Scale};
 
 /// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
-
-/// Share of `LIM_PHASE_A` that a test of the motor may use.
-const TEST_SHARE: f32 = 0.2;
 
 /// The supply may be at most this many units of voltage, of the eight that the type holds.
 const BUS_UNITS_MAX: f32 = 6.0;
@@ -100,16 +42,9 @@ const BUS_UNITS_MAX: f32 = 6.0;
 /// The supply must be at least so many units, where the modulator's reciprocal of it ends.
 const BUS_UNITS_MIN: f32 = 0.125;
 
-/// Speed at which (22) is linearised, of `CTL_RPM_MAX`: 4500 rpm on the bench.
-const LINEARISED_SHARE: f32 = 0.75;
-
 /// Time for which ξ̂ may be at the end of its range, s: far longer than any transient that the
 /// observer recovers from.
 const LOST_S: f32 = 0.1;
-
-/// Share below which Run ends, of the speed at which it begins or of the least that can be asked
-/// for: the hysteresis of the second paper's 3.2.4.
-const SLOW_SHARE: f32 = 0.5;
 
 /// Time for which zero throttle must hold before a fault ends, s.
 const CLEAR_S: f32 = 0.3;
@@ -238,18 +173,6 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     p.verdict()
 }
 
-/// What the control's units are worth with these parameters.
-pub fn scale(params: &Params, board: &Board) -> Scale {
-    let flux_wb = params.get(ParamId::MotFluxMwb) * 1e-3;
-    let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
-    Scale {
-        period_s,
-        current_a: board.current_a_per_count * 4096.0 / 3.0,
-        voltage_v: FRAC_PI_2 * flux_wb / period_s,
-        pole_pairs: params.get(ParamId::MotPolePairs),
-    }
-}
-
 /// Greatest current of a test of the motor.
 pub(crate) fn test_current(params: &Params, scale: &Scale) -> Current {
     scale.current_from_a(TEST_SHARE * params.get(ParamId::LimPhaseA))
@@ -329,130 +252,6 @@ fn refuse_contradictions(p: &Si) {
     );
 }
 
-/// The reason for most refusals.
-const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
-
-/// The source of the coefficients: the parameters that several blocks need in SI, and all else that
-/// there is.
-struct Si<'a> {
-    params: &'a Params,
-    board: &'a Board,
-    scale: Scale,
-    period_s: f32,
-    dead_time_s: f32,
-    pole_pairs: f32,
-    resistance_ohm: f32,
-    inductance_h: f32,
-    flux_wb: f32,
-    inertia_kgm2: f32,
-    /// Bandwidth of the current loop, 1/s: 1/ε of (20), (21).
-    current_rad_s: f32,
-    /// Bandwidth of the speed loop, 1/s: k_pω/J.
-    speed_rad_s: f32,
-    /// Electrical speed at which (22) is linearised, 1/s.
-    linearised_rad_s: f32,
-    /// The first that was refused. Noted here and not returned: on the chip, a hundred early returns
-    /// take more flash than the coefficients that they guard.
-    refused: &'a Cell<Option<BuildError>>,
-}
-
-impl<'a> Si<'a> {
-    fn new(params: &'a Params, board: &'a Board, refused: &'a Cell<Option<BuildError>>) -> Self {
-        let scale = scale(params, board);
-        let Scale {
-            period_s,
-            pole_pairs,
-            ..
-        } = scale;
-        let rpm = LINEARISED_SHARE * params.get(ParamId::CtlRpmMax);
-        Self {
-            params,
-            board,
-            scale,
-            period_s,
-            dead_time_s: params.get(ParamId::PwmDeadtimeNs) * 1e-9,
-            pole_pairs,
-            resistance_ohm: params.get(ParamId::MotRMohm) * 1e-3,
-            inductance_h: params.get(ParamId::MotLUh) * 1e-6,
-            flux_wb: params.get(ParamId::MotFluxMwb) * 1e-3,
-            inertia_kgm2: params.get(ParamId::MotJGcm2) * 1e-7,
-            current_rad_s: TAU * params.get(ParamId::CtlBwCurHz),
-            speed_rad_s: TAU * params.get(ParamId::CtlBwSpdHz),
-            linearised_rad_s: rpm * pole_pairs * TAU / 60.0,
-            refused,
-        }
-    }
-
-    fn get(&self, id: ParamId) -> f32 {
-        self.params.get(id)
-    }
-
-    fn choice<C: Choice>(&self) -> C {
-        self.params.choice()
-    }
-
-    fn chosen<C: Choice>(&self, choice: C) -> bool {
-        self.params.chosen(choice)
-    }
-
-    /// A time in whole periods.
-    fn periods(&self, time_s: f32) -> u32 {
-        (time_s / self.period_s) as u32
-    }
-
-    /// Below this speed Run ends.
-    fn slow(&self) -> Speed {
-        let least_rpm = self
-            .get(ParamId::StaRunRpm)
-            .min(self.get(ParamId::CtlRpmMin));
-        self.scale.speed_from_rpm(SLOW_SHARE * least_rpm)
-    }
-
-    /// A volt number in the control's unit.
-    #[inline(never)]
-    fn voltage(&self, volts: f32) -> Voltage {
-        Voltage::from_f32(volts / self.scale.voltage_v)
-    }
-
-    /// The gain of value `k`; if there is none, the parameter is refused.
-    fn gain<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Gain<A, B> {
-        let (mantissa, shift) = self.gain_parts(param, k, B::Frac::I32 - A::Frac::I32);
-        Gain::from_parts(mantissa, shift)
-    }
-
-    /// The factor of value `k`; if it leaves its type's range, the parameter is refused.
-    fn factor<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Multiplier<A, B> {
-        Multiplier::from_bits(self.factor_bits(param, k, B::Frac::I32 - A::Frac::I32))
-    }
-
-    #[inline(never)]
-    fn factor_bits(&self, param: ParamId, k: f32, exponent: i32) -> i32 {
-        let (bits, shift) = self.gain_parts(param, k, exponent);
-        self.refuse_if(shift != 0, param, OUT_OF_RANGE);
-        bits
-    }
-
-    #[inline(never)]
-    fn gain_parts(&self, param: ParamId, k: f32, exponent: i32) -> (i32, u32) {
-        let parts = gain_parts(k, exponent);
-        self.refuse_if(parts.is_none(), param, OUT_OF_RANGE);
-        parts.unwrap_or((0, 0))
-    }
-
-    /// Refuses a parameter in some case, unless another has been refused before.
-    #[inline(never)]
-    fn refuse_if(&self, refused: bool, param: ParamId, reason: &'static str) {
-        if refused && self.refused.get().is_none() {
-            self.refused.set(Some(BuildError { param, reason }));
-        }
-    }
-
-    /// The first refusal, if any.
-    fn verdict(&self) -> Result<(), BuildError> {
-        self.refused.get().map_or(Ok(()), Err)
-    }
-}
-
 /// Keeps an observer that lives by the back-EMF in lock where there is little of it.
 fn low_speed(p: &Si) -> low_speed::Config {
     let limit_a = p.get(ParamId::LimPhaseA);
@@ -501,26 +300,10 @@ fn limits(p: &Si) -> protection::Config {
 }
 
 #[cfg(test)]
-impl Board {
-    /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
-    pub(crate) const BENCH: Self = Self {
-        image: Image::EMULATOR,
-        current_a_per_count: 40.0 / 2048.0,
-        bus_v_per_count: 70.0 / 4096.0,
-        current_range_a: 40.0,
-        terminal_v_per_count: 70.0 / 4096.0,
-        shunts: Shunts::Three,
-        delay: Delay::One,
-        low_side_on_s: 1e-6,
-        refresh_s: 1e-6,
-        charge_s: 63e-6,
-        least_dead_time: LeastDeadTime::NONE,
-    };
-}
-
-#[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::delay::Delay;
+    use crate::params::board::LeastDeadTime;
 
     #[test]
     fn the_defaults_make_a_drive() {

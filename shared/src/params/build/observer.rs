@@ -2,7 +2,8 @@
 
 use core::f32::consts::TAU;
 
-use super::{Si, flux};
+use super::flux;
+use super::si::Si;
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated};

@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use super::Si;
+use super::si::Si;
 use crate::control::speed::{Config, Law, feed_forward, nested};
 use crate::control::{PERIODS, planner, torque};
 use crate::math::{Gain, Real};

@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use super::Si;
+use super::si::Si;
 use crate::control::regulator::{Config, modified, observer_based, synchronous};
 use crate::params::ParamId;
 use crate::params::choice::CtlRegulator;

@@ -4,7 +4,7 @@ use core::f32::consts::{SQRT_2, TAU};
 
 use fixed::types::{I0F32, I2F30};
 
-use super::Si;
+use super::si::Si;
 use crate::control::modulator::Modulation;
 use crate::control::sensing::{self, Shunts};
 use crate::control::{catch, dead_time};

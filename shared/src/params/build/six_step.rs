@@ -4,7 +4,8 @@ use core::f32::consts::TAU;
 
 use fixed::types::{I1F31, I36F28};
 
-use super::{Si, TEST_SHARE, outer};
+use super::outer;
+use super::si::{Si, TEST_SHARE};
 use crate::control::delay::Delay;
 use crate::control::six_step::{crossing, duty};
 use crate::drive::six_step::Config;

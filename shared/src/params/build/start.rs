@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 
 use fixed::types::I36F28;
 
-use super::Si;
+use super::si::Si;
 use crate::control::start;
 use crate::drive::ATTEMPTS;
 use crate::math::{Real, square_root};

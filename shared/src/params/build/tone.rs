@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 
 use fixed::types::I1F31;
 
-use super::Si;
+use super::si::Si;
 use crate::drive::tone::Config;
 use crate::math::Real;
 use crate::params::ParamId;

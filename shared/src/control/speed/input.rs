@@ -1,0 +1,46 @@
+//! What both laws read.
+
+use crate::control::observer::Told;
+use crate::trace::traced;
+use crate::units::{Current, Speed, Torque};
+
+/// What one period of speed control, [`PERIODS`](crate::control::PERIODS) of the drive, reads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input {
+    /// Ω*.
+    pub command: Speed,
+    /// ω̄̂.
+    pub speed: Speed,
+    /// What the observer says besides.
+    pub told: Told,
+    /// Bounds of i_q*.
+    pub bounds: Bounds,
+    /// i_q* less i_q of the last period where its voltage was limited, else zero: the torque that
+    /// the supply cannot give.
+    pub missing: Current,
+}
+
+traced! {
+    /// Bounds of i_q*; by default no current.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    pub struct Bounds {
+        /// Least i_q*, at most zero: what braking may return.
+        pub min: Current,
+        /// Greatest i_q*.
+        pub max: Current,
+    }
+}
+
+impl Bounds {
+    /// The current, held within.
+    #[inline(always)]
+    pub fn hold(self, i_q: Current) -> Current {
+        i_q.min(self.max).max(self.min)
+    }
+}
+
+/// The torque of a current with the stated flux, ξ = 1/4.
+#[inline(always)]
+pub(super) fn torque(i_q: Current) -> Torque {
+    Torque::from_bits(i_q.to_bits().saturating_mul(4))
+}

@@ -1,0 +1,62 @@
+//! What the ESC keeps over a loss of power.
+
+use super::Esc;
+use crate::params::BuildError;
+use crate::store::{Kept, Loaded};
+use crate::throttle::Reach;
+
+impl Esc {
+    /// Goes on from what was stored, at power-up. It has been made with the parameters of it already.
+    pub fn recall(&mut self, loaded: &Loaded) {
+        let kept = &loaded.kept;
+        self.component.keep_intervals(&kept.intervals);
+        self.component.keep_signing(kept.signing);
+        self.telemetry.statistics = kept.statistics;
+        if loaded.integrity.is_lost() {
+            self.lose_stored();
+        }
+        if let Some(trouble) = loaded.trouble() {
+            self.warn_of(trouble);
+        }
+    }
+
+    /// Leaves the stored settings alone because they are not those in force, and keeps the motor off,
+    /// until somebody asks for settings to be stored or reset.
+    pub fn lose_stored(&mut self) {
+        self.storage.lose();
+    }
+
+    /// The values to be stored now.
+    pub fn kept(&self) -> Kept {
+        let mut kept = Kept {
+            params: self.params.clone(),
+            intervals: self.component.kept_intervals(),
+            statistics: self.telemetry.statistics,
+            signing: self.component.kept_signing(),
+        };
+        if !self.storage.takes_all() {
+            for unstored in &self.unstored {
+                unstored.hide(&mut kept);
+            }
+        }
+        kept
+    }
+
+    /// Puts other values in force, as [`obey`](super::obey) gives them. The interrupt shall run with
+    /// [`Esc::config`] afterwards.
+    ///
+    /// # Errors
+    /// The parameter that does not fit the board; nothing has changed then.
+    pub fn replace(&mut self, throttle: &mut impl Reach, kept: &Kept) -> Result<(), BuildError> {
+        let mut params = kept.params.clone();
+        params.fit(&self.board);
+        self.given.check(&params, &self.board)?;
+        self.params = params;
+        self.component.keep_intervals(&kept.intervals);
+        if kept.signing.is_none() {
+            self.component.forget_signing();
+        }
+        self.apply(throttle);
+        Ok(())
+    }
+}

@@ -1,0 +1,17 @@
+//! What the files are made of.
+
+use crate::check::Report;
+use crate::params::{Board, Params};
+use crate::telemetry::Telemetry;
+
+/// The sources of those files that are made when they are read.
+#[derive(Clone, Copy)]
+pub(in crate::mavlink) struct View<'a> {
+    pub(in crate::mavlink) params: &'a Params,
+    pub(in crate::mavlink) board: &'a Board,
+    pub(in crate::mavlink) telemetry: &'a Telemetry,
+    /// The result of the last self-test.
+    pub(in crate::mavlink) check: &'a Report,
+    /// The last that a person was warned of; empty if there was none.
+    pub(in crate::mavlink) warning: &'a str,
+}

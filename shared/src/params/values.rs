@@ -1,0 +1,188 @@
+//! The values, and why one is not taken.
+
+use super::board::Board;
+use super::table::{Choice, Kind, ParamId, Parameter, TABLE};
+use crate::math::SQRT_3;
+
+/// The reason why a value was not taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SetError {
+    /// NaN or infinite.
+    NotFinite,
+    /// Outside `min..=max` of the table.
+    OutOfRange,
+    /// A fraction for a whole number.
+    NotWhole,
+    /// The parameter is derived.
+    ReadOnly,
+}
+
+/// The value of every parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    values: [f32; TABLE.len()],
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        let mut params = Self {
+            values: TABLE.map(|p| p.default),
+        };
+        params.derive();
+        params
+    }
+}
+
+impl ParamId {
+    /// The parameter of this MAVLink name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::find_bytes(name.as_bytes())
+    }
+
+    /// The parameter of this MAVLink name, which need not be text.
+    pub(crate) fn find_bytes(name: &[u8]) -> Option<Self> {
+        let row = TABLE.iter().position(|row| row.name.as_bytes() == name)?;
+        Some(Self::ALL[row])
+    }
+
+    /// This parameter's row of the table.
+    pub const fn entry(self) -> &'static Parameter {
+        &TABLE[self as usize]
+    }
+
+    /// The value from the factory on this board.
+    pub fn factory(self, board: &Board) -> f32 {
+        let default = self.entry().default;
+        match self {
+            Self::PwmDeadtimeNs => default.max(board.least_dead_time.ns),
+            _ => default,
+        }
+    }
+}
+
+impl Params {
+    /// The value of one parameter, in the unit of its entry.
+    pub fn get(&self, id: ParamId) -> f32 {
+        self.values[id as usize]
+    }
+
+    /// The value of a parameter that is a choice of few, which its type names.
+    #[inline]
+    pub fn choice<C: Choice>(&self) -> C {
+        C::of(self.number(C::PARAM))
+    }
+
+    /// Whether a parameter that is a choice of few has this value.
+    #[inline]
+    pub fn chosen<C: Choice>(&self, choice: C) -> bool {
+        self.number(C::PARAM) == choice.number()
+    }
+
+    /// Never inlined: the conversion would be at every choice.
+    #[inline(never)]
+    fn number(&self, id: ParamId) -> u8 {
+        self.get(id) as u8
+    }
+
+    /// Takes a value, or says why not and changes nothing.
+    ///
+    /// # Errors
+    /// Any [`SetError`].
+    pub fn set(&mut self, id: ParamId, value: f32) -> Result<(), SetError> {
+        let entry = id.entry();
+        if entry.kind == Kind::Derived {
+            return Err(SetError::ReadOnly);
+        }
+        if !value.is_finite() {
+            return Err(SetError::NotFinite);
+        }
+        if value < entry.min || value > entry.max {
+            return Err(SetError::OutOfRange);
+        }
+        if entry.kind == Kind::Whole && libm::truncf(value) != value {
+            return Err(SetError::NotWhole);
+        }
+        self.values[id as usize] = value;
+        self.derive();
+        Ok(())
+    }
+
+    /// Raises values that are below the board's least, as the table's default may be. Returns true if one was
+    /// not the default, but chosen by somebody.
+    pub fn fit(&mut self, board: &Board) -> bool {
+        let id = ParamId::PwmDeadtimeNs;
+        let given_ns = self.get(id);
+        if given_ns >= board.least_dead_time.ns {
+            return false;
+        }
+        self.values[id as usize] = board.least_dead_time.ns;
+        given_ns != id.entry().default
+    }
+
+    fn derive(&mut self) {
+        let pole_pairs = self.get(ParamId::MotPolePairs);
+        let flux_wb = self.get(ParamId::MotFluxMwb) * 1e-3;
+        self.values[ParamId::MotKv as usize] =
+            60.0 / (core::f32::consts::TAU * SQRT_3 * pole_pairs * flux_wb);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_value_changes_nothing() {
+        let mut params = Params::default();
+        let before = params.clone();
+        assert_eq!(params.set(ParamId::MotKv, 100.0), Err(SetError::ReadOnly));
+        assert_eq!(
+            params.set(ParamId::LimPhaseA, f32::NAN),
+            Err(SetError::NotFinite)
+        );
+        assert_eq!(
+            params.set(ParamId::LimPhaseA, 1e9),
+            Err(SetError::OutOfRange)
+        );
+        assert_eq!(
+            params.set(ParamId::MotPolePairs, 6.5),
+            Err(SetError::NotWhole)
+        );
+        assert_eq!(params, before);
+    }
+
+    #[test]
+    fn kv_follows_pole_pairs_and_flux() {
+        let mut params = Params::default();
+        assert!((params.get(ParamId::MotKv) - 353.0).abs() < 0.5);
+        params.set(ParamId::MotPolePairs, 6.0).expect("in range");
+        assert!((params.get(ParamId::MotKv) - 706.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn a_choice_is_the_one_that_was_set() {
+        use crate::params::choice::{CtlAdaptL, CtlObserver};
+
+        let mut params = Params::default();
+        for choice in [
+            CtlObserver::BackEmf,
+            CtlObserver::FluxCrossings,
+            CtlObserver::Hall,
+            CtlObserver::Compensated,
+        ] {
+            let (id, value) = choice.setting();
+            params.set(id, value).expect("in range");
+            assert_eq!(params.choice::<CtlObserver>(), choice);
+            assert!(params.chosen(choice) && params.chosen(CtlAdaptL::Off));
+        }
+        assert!(!params.chosen(CtlObserver::Hall));
+    }
+
+    #[test]
+    fn every_name_is_found() {
+        for id in ParamId::ALL {
+            assert_eq!(ParamId::find(id.entry().name), Some(id));
+        }
+        assert_eq!(ParamId::find("NO_SUCH"), None);
+    }
+}
