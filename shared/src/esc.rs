@@ -128,7 +128,7 @@ impl Esc {
         Ok((Self::unchecked(params, board, link_bytes_per_s), throttle))
     }
 
-    /// An ESC at power-up, without its throttle, whose parameters fit the board ([`check`]).
+    /// An ESC at power-up, without its throttle, whose parameters fit the board ([`check()`]).
     ///
     /// Never inlined: on the chip it is made where it stays, by this and by [`Throttle::new`], since
     /// the two on their way through [`Esc::new`] take 10 KB of stack.

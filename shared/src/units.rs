@@ -39,12 +39,13 @@
 
 pub mod dimension;
 
+use fixed::types::I16F16;
 use fixed::types::extra::{U16, U24, U26, U28, U32};
-use fixed::types::{I16F16, I36F28};
 
 use crate::math::{Quantity, Real};
 
 pub use crate::math::Angle;
+pub use dimension::Charge;
 use dimension::{
     Ampere, AmperePerPeriod, NewtonMetre, PerVolt, PerWeber, TurnPerPeriod, TurnPerPeriodSquare,
     Volt, VoltSquare, Weber,
@@ -92,9 +93,6 @@ pub type CurrentRate = Quantity<AmperePerPeriod, U28>;
 /// A square of a speed.
 pub type SpeedSquare = Quantity<TurnPerPeriodSquare, U32>;
 
-/// A current over a time, in units of current times periods.
-pub type Charge = I36F28;
-
 /// A torque in units of [`Scale::torque_nm`].
 pub type Torque = Quantity<NewtonMetre, U28>;
 
@@ -116,8 +114,14 @@ pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
 /// The back-EMF of the motor's stated flux at a speed, |h| = ω/ξ.
 #[inline(always)]
 pub fn stated_emf(omega: Speed) -> Voltage {
-    // 1/ξ = 4, and a speed has 32 fraction bits.
+    // ξ = 1/4, and a speed has 32 fraction bits.
     Voltage::from_bits(omega.to_bits() >> 2)
+}
+
+/// The torque of a current along q with the motor's stated flux, T = i_q/ξ, held at the type's ends.
+#[inline(always)]
+pub fn stated_torque(i_q: Current) -> Torque {
+    Torque::from_bits(i_q.to_bits().saturating_mul(4))
 }
 
 /// A reading of the converter in counts, signed and without its offset. The chip's are whole; a

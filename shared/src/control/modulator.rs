@@ -293,7 +293,7 @@ mod tests {
                 q: WideVoltage::from_num(q * length),
             };
             let (u, _) = limit(asked, &supply.longest);
-            let [u_d, u_q] = [u.d, u.q].map(|x| x.to_num::<f64>());
+            let [u_d, u_q] = [u.d, u.q].map(Voltage::to_num::<f64>);
             prop_assert!(u_d.hypot(u_q) < length * 1.001, "{u_d} {u_q} for {length}");
             // And no duty wraps: what they make is the vector.
             let (sin, cos) = (turns * TAU).sin_cos();

@@ -5,7 +5,7 @@
 
 use core::fmt;
 use core::marker::PhantomData;
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Shr, Sub, SubAssign};
+use core::ops::{Add, AddAssign, Div, Mul, Neg, Shl, Shr, Sub, SubAssign};
 
 use fixed::FixedI32;
 use fixed::traits::{FromFixed, ToFixed};
@@ -361,6 +361,15 @@ impl<D, F> Div<i32> for Quantity<D, F> {
     #[inline(always)]
     fn div(self, rhs: i32) -> Self {
         Self::from_bits(self.to_bits() / rhs)
+    }
+}
+
+impl<D, F> Shl<u32> for Quantity<D, F> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn shl(self, rhs: u32) -> Self {
+        Self::from_bits(self.to_bits() << rhs)
     }
 }
 

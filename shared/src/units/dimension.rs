@@ -1,10 +1,12 @@
 //! The dimensions of the control's quantities, by their units in SI, and every product of two that
 //! has a meaning.
+//!
+//! Each conversion is inlined: it is no instruction at all, but for one with a factor.
 
 use fixed::FixedI32;
+use fixed::types::I36F28;
 use fixed::types::extra::{U28, Unsigned};
 
-use super::Charge;
 use crate::math::{Quantity, Times, Turn};
 
 /// Declares dimensions.
@@ -91,6 +93,9 @@ impl Times<Self> for TurnPerPeriod {
     type Product<F: Unsigned> = Quantity<TurnPerPeriodSquare, F>;
 }
 
+/// A current over a time, in units of current times periods.
+pub type Charge = I36F28;
+
 impl Quantity<Ampere, U28> {
     /// The charge of so many periods.
     #[inline(always)]
@@ -100,6 +105,12 @@ impl Quantity<Ampere, U28> {
 }
 
 impl<F> Quantity<TurnPerPeriod, F> {
+    /// ω·T_s in turns, a plain number.
+    #[inline(always)]
+    pub const fn turns(self) -> FixedI32<F> {
+        FixedI32::from_bits(self.to_bits())
+    }
+
     /// The angle that the rotor turns by in a period.
     #[inline(always)]
     pub const fn over_period(self) -> Quantity<Turn, F> {

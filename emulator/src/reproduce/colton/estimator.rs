@@ -11,7 +11,7 @@ use siskin_control::control::observer::flux_linkage::{self, HighPass};
 use siskin_control::control::observer::{crossing, position};
 use siskin_control::math::Gain;
 use siskin_control::params::{ParamId, Params, build};
-use siskin_control::units::{Angle, Current, Speed, Voltage};
+use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
 
 use crate::rig::Bench;
 
@@ -34,7 +34,7 @@ pub(super) fn hz(rpm: f64) -> f64 {
 
 /// The fluxes of the phases at an angle in turns, in the control's units.
 pub(super) fn fluxes(turns: f64) -> [f64; 3] {
-    let flux = flux_linkage::NOMINAL.to_num::<f64>();
+    let flux = FLUX_NOMINAL.to_num::<f64>();
     [0.0, -1.0, 1.0].map(|third| flux * libm::cos(TAU * (turns + third / 3.0)))
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use siskin_control::control::observer::flux_linkage;
 use siskin_control::control::observer::limits;
-use siskin_control::units::{Angle, Current, Speed};
+use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed};
 
 use super::estimator::{SAMPLE_HZ, fluxes, integrator, rad_s, voltages};
 use super::sheet::{between, figure, over, ratios, spread};
@@ -58,7 +58,7 @@ fn respond(tau_int_s: f64, tau_hpfs_s: Option<f64>, omega_rad_s: f64) -> Respons
             }
         }
     }
-    let ideal = 1.5 * flux_linkage::NOMINAL.to_num::<f64>() * f64::from(2 * a_turn);
+    let ideal = 1.5 * FLUX_NOMINAL.to_num::<f64>() * f64::from(2 * a_turn);
     Response {
         gain: libm::hypot(along, across) / ideal,
         lead_deg: libm::atan2(across, along) * 360.0 / TAU,

@@ -2,7 +2,7 @@
 //! its formula.
 
 use siskin_control::control::observer::{crossing, edges, flux_linkage, limits};
-use siskin_control::units::{Angle, Flux, Speed};
+use siskin_control::units::{Angle, FLUX_NOMINAL, Flux, Speed};
 
 use super::acceleration::{A_E, RPM_S, Runs, Seen, envelope, greatest};
 use super::estimator::{N, SAMPLE_HZ, begun, config, fluxes, follow, hz, integrator, rad_s};
@@ -93,7 +93,7 @@ fn hold_off(rpm: f64) -> Option<f64> {
         let [a, b, c] = fluxes(turns);
         let b = if turns < falls { -b.abs() } else { b };
         let now = [a, b, c].map(Flux::from_num);
-        let amplitude = flux_linkage::NOMINAL;
+        let amplitude = FLUX_NOMINAL;
         let found = crossing::detect(&config, &mut state, &before, &now, amplitude, speed);
         before = now;
         let of_a = found.filter(|crossing| crossing.sector.edge().phase == 0);

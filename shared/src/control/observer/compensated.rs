@@ -168,19 +168,19 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor) {
         .max(config.omega_min)
         .min(EIGHTH_TURN);
     // Half of ω⁺·T_s is π times its turns.
-    let leak = I0F32::from_bits(omega_plus.top(EIGHTH_PI).to_bits() << 3);
+    let leak = omega_plus.turns().top(EIGHTH_PI) << 3;
     let omega_n = omega
         .top(OMEGA_N_SHARE)
         .max(config.omega_n_min)
         .min(config.omega_n_max);
-    let four_pi_omega_n = Speed::from_bits(omega_n.top(EIGHTH_PI).to_bits() << 5);
+    let four_pi_omega_n = omega_n.top(EIGHTH_PI) << 5;
     state.pace = Pace {
         inductance: inductance.multiplied(config.inductance),
         leak,
         held: leak.minus(config.bias.apply(omega_plus.top(omega_plus))),
-        phi: I0F32::from_bits(omega_plus.top(PHI_RATE_HALF).to_bits() << 1),
+        phi: omega_plus.turns().top(PHI_RATE_HALF) << 1,
         integral: four_pi_omega_n.top(omega_n).over_period(),
-        proportional: Speed::from_bits(omega_n.top(DAMPING).to_bits() << 3),
+        proportional: omega_n.top(DAMPING) << 3,
         // A speed in turns takes 2π: 16·π/8, and a voltage with 24 fraction bits has a sixteenth.
         emf: Multiplier::from_bits(state.phi.top(EIGHTH_PI).to_bits()),
         omega_bar: state.omega_bar(),

@@ -166,7 +166,7 @@ mod tests {
     use std::f64::consts::{FRAC_2_PI, TAU};
     use std::vec::Vec;
 
-    use super::super::flux_linkage::NOMINAL;
+    use crate::units::FLUX_NOMINAL;
 
     fn config() -> Config {
         Config {
@@ -207,7 +207,7 @@ mod tests {
                 &mut self.state,
                 &self.before,
                 &now,
-                NOMINAL,
+                FLUX_NOMINAL,
                 self.omega,
             );
             self.before = now;

@@ -7,12 +7,9 @@ use fixed::types::extra::U32;
 
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns};
 use crate::trace::traced;
-use crate::units::{Angle, Current, Flux, Speed, Voltage};
+use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage};
 
 use super::sector::Sector;
-
-/// The flux that the parameters state, 2/π: the base of the voltage makes it so for every motor.
-pub const NOMINAL: Flux = Flux::from_bits(170_891_319);
 
 /// Least amplitude that is believed: 0.3 times the stated flux.
 pub const AMPLITUDE_MIN: Flux = Flux::from_bits(51_267_396);
@@ -74,7 +71,7 @@ impl Default for State {
             lambda: [Flux::ZERO; 3],
             lambda_before: [Flux::ZERO; 3],
             i_before: [Current::ZERO; 3],
-            amplitude: NOMINAL,
+            amplitude: FLUX_NOMINAL,
         }
     }
 }
@@ -153,7 +150,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
     // A filter of first order that leads by δ has the gain cos δ.
     let first = lead_of(config.corner, omega);
     let both = lead(config, omega);
-    let length = shortened(NOMINAL, first);
+    let length = shortened(FLUX_NOMINAL, first);
     let integral = phases(length, theta.wrapping_add(first));
     let length = shortened(length, both.wrapping_sub(first));
     let lambda = phases(length, theta.wrapping_add(both));
@@ -164,7 +161,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
         lambda,
         lambda_before: lambda,
         i_before: i,
-        amplitude: NOMINAL,
+        amplitude: FLUX_NOMINAL,
     };
 }
 

@@ -84,13 +84,13 @@ impl State {
                 // may be seen some degrees early or late: half of what that tells is taken.
                 let gained = times(self.acceleration, interval) >> 1;
                 let middle = self.omega.minus(bounded(gained).per_period());
-                self.omega += half(mean.minus(middle));
+                self.omega += mean.minus(middle) >> 1;
             }
             self.omega_bar = self.omega;
         } else {
             self.acceleration = Speed::ZERO;
-            self.omega += half(mean.minus(self.omega));
-            self.omega_bar += half(half(mean.minus(self.omega_bar)));
+            self.omega += mean.minus(self.omega) >> 1;
+            self.omega_bar += mean.minus(self.omega_bar) >> 2;
         }
         self.omega = self.omega.max(Speed::ZERO).min(FASTEST);
         self.delta = if overdue {
@@ -137,16 +137,12 @@ impl State {
     pub fn forced(&mut self) {
         self.commutated();
         if self.crossings > 0 {
-            self.omega -= half(half(self.omega));
+            self.omega -= self.omega >> 2;
             self.acceleration = Speed::ZERO;
         }
         self.delta = -HALF_SEXTANT;
         self.crossings = 0;
     }
-}
-
-fn half(speed: Speed) -> Speed {
-    Speed::from_bits(speed.to_bits() >> 1)
 }
 
 /// A quantity with 32 fraction bits over a time, at most [`FASTEST`].

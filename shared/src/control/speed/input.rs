@@ -2,7 +2,7 @@
 
 use crate::control::observer::Told;
 use crate::trace::traced;
-use crate::units::{Current, Speed, Torque};
+use crate::units::{Current, Speed};
 
 /// What one period of speed control, [`PERIODS`](crate::control::PERIODS) of the drive, reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,10 +37,4 @@ impl Bounds {
     pub fn hold(self, i_q: Current) -> Current {
         i_q.min(self.max).max(self.min)
     }
-}
-
-/// The torque of a current with the stated flux, ξ = 1/4.
-#[inline(always)]
-pub(super) fn torque(i_q: Current) -> Torque {
-    Torque::from_bits(i_q.to_bits().saturating_mul(4))
 }

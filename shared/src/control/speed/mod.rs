@@ -7,8 +7,7 @@ pub mod nested;
 use super::planner;
 use super::regulator::Reference;
 use crate::trace::traced;
-use crate::units::{Current, Speed};
-use input::torque;
+use crate::units::{Current, Speed, stated_torque};
 pub use input::{Bounds, Input};
 
 /// The planner and one of the laws.
@@ -69,7 +68,7 @@ impl Config {
     pub fn begin(&self, state: &mut State, speed: Speed, i_q: Current) {
         state.planner = planner::State::begin(speed);
         match &self.law {
-            Law::Nested(_) => state.nested.sigma = torque(i_q),
+            Law::Nested(_) => state.nested.sigma = stated_torque(i_q),
             Law::FeedForward(c) => state.feed_forward.sigma = c.remainder(speed, i_q),
         }
     }

@@ -6,13 +6,13 @@
 
 use fixed::types::I0F32;
 
-use super::{Input, torque};
+use super::input::Input;
 use crate::control::regulator::Reference;
 use crate::control::transform::Dq;
 use crate::control::{PERIODS, planner};
 use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
-use crate::units::{Current, Speed, Torque, Voltage};
+use crate::units::{Current, Speed, Torque, Voltage, stated_torque};
 
 /// From here on the error is acted on in full.
 const ALMOST_HALF: I0F32 = I0F32::from_bits(i32::MAX - (1 << 26));
@@ -62,7 +62,7 @@ impl Config {
         let half_trust = self.trust.held(input.speed).max(I0F32::ZERO);
         let error = input.speed.minus(wanted);
         let error = if half_trust < ALMOST_HALF {
-            Speed::from_bits(error.top(half_trust).to_bits() << 1)
+            error.top(half_trust) << 1
         } else {
             error
         };
@@ -111,7 +111,7 @@ impl Config {
         over: Current,
         integral_step: Torque,
     ) -> Speed {
-        let less = self.inertia_inverse.held(torque(over));
+        let less = self.inertia_inverse.held(stated_torque(over));
         let free = step.minus(less);
         let taken = free.min(slew).max(-slew);
         let conditioned = taken == free && self.inertia_inverse != Gain::ZERO;
