@@ -3,6 +3,7 @@
 pub mod library;
 mod load;
 mod motor;
+mod set_up;
 mod supply;
 
 use std::fmt;
@@ -15,6 +16,7 @@ use thiserror::Error;
 
 pub use load::LoadTable;
 pub use motor::MotorTable;
+pub use set_up::{Bench, Position};
 pub use supply::SupplyTable;
 
 /// The motor of the default bench.

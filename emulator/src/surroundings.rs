@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 
 use siskin_control::drive::{Bridge, Sample};
 
+use crate::bench::Bench;
 use crate::fault::InForce;
 use crate::plant::{Bus, Flow, Gate, Noise, Plant, Sensing, Thermal, Truth};
-use crate::rig::Bench;
 
 /// The first period's length to expect, s, before there was one.
 const USUAL_S: f64 = 1.0 / 24_000.0;

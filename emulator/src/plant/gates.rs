@@ -5,7 +5,7 @@
 
 use siskin_control::drive::Bridge;
 
-use super::stage::Rail;
+use super::rail::Rail;
 use super::timing::{Half, Timer, first_half, second_half};
 
 /// The timer's outputs behind the dead time.

@@ -12,7 +12,8 @@ mod edges;
 use siskin_control::drive::Bridge;
 
 use super::machine::{Flow, Machine};
-use super::stage::{Breaks, DIODE_V, Rail, Stage};
+use super::rail::Rail;
+use super::stage::{Breaks, DIODE_V, Stage};
 use super::timing::{Half, Timer, delayed, duties, first_half, second_half, share};
 use super::{Extras, Load, Motor};
 

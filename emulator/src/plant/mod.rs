@@ -14,6 +14,7 @@ mod machine;
 mod magnetics;
 mod motor;
 mod noise;
+mod rail;
 mod sensing;
 mod series;
 mod shaft;
@@ -31,8 +32,9 @@ pub use load::Load;
 pub use machine::Flow;
 pub use motor::Motor;
 pub use noise::{Noise, share_of};
+pub use rail::Rail;
 pub use sensing::{Sensing, Truth};
-pub use stage::{Breaks, DIODE_V, LegBreaks, Rail};
+pub use stage::{Breaks, DIODE_V, LegBreaks};
 pub use supply::{CAPACITANCE_F, CAPACITY_C, CELL_OHM, Source, Supply};
 pub use thermal::Thermal;
 

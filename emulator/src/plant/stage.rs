@@ -11,6 +11,7 @@ pub use breaks::{Breaks, LegBreaks};
 
 use super::circuit::{Drive, Way};
 use super::machine::Machine;
+use super::rail::Rail;
 use super::vector::{AXES, along_axes, dot};
 
 /// Forward voltage of the switches' body diodes, V: silicon at some amperes. The switches' own
@@ -19,24 +20,6 @@ pub const DIODE_V: f64 = 0.7;
 
 /// Phase current that is none, A.
 const ZERO_A: f64 = 1e-10;
-
-/// A pole of the supply.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rail {
-    /// The negative one.
-    Low,
-    /// The positive one.
-    High,
-}
-
-impl Rail {
-    pub(super) const fn other(self) -> Self {
-        match self {
-            Self::Low => Self::High,
-            Self::High => Self::Low,
-        }
-    }
-}
 
 /// What connects a leg's terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use siskin_control::drive::Bridge;
 use siskin_control::units::Duty;
 
-use super::stage::Rail;
+use super::rail::Rail;
 
 /// One bit of a duty.
 const DUTY_BIT: f64 = 1.0 / 2_147_483_648.0;

@@ -1,16 +1,11 @@
 //! The registers that the interrupt reads and writes: their blocks may also be plain memory.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::AtomicU32;
 
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::pac::{ADC1, ADC2, GPIOB, GPIOC, TIM1};
-use siskin_control::drive::Sample;
-
-use super::sample::{self, Slot};
-use crate::board::WIRING;
-use crate::chip::READINGS_AT_WORD;
 
 /// The blocks that the interrupt is at.
 #[derive(Clone, Copy)]
@@ -45,8 +40,8 @@ type Block = [AtomicU32; WORDS];
 /// instructions on an emulated processor.
 pub struct Stand {
     timer: Block,
-    converters: [Block; 2],
-    hall: Block,
+    pub(super) converters: [Block; 2],
+    pub(super) hall: Block,
     gate_driver: Block,
 }
 
@@ -64,16 +59,6 @@ impl Stand {
             hall: [const { AtomicU32::new(0) }; WORDS],
             gate_driver: [const { AtomicU32::new(!0) }; WORDS],
         }
-    }
-
-    /// Puts a sample where the converters and the pins of the board would show it.
-    pub fn set_sample(&self, sample: &Sample) {
-        for (Slot(converter, rank), counts) in sample::readings(sample) {
-            self.converters[converter][READINGS_AT_WORD + rank].store(counts, Ordering::Relaxed);
-        }
-        let hall = u32::from(sample.hall) << WIRING.hall.unwrap_or(0);
-        // GPIO's IDR is at 0x10.
-        self.hall[0x10 / 4].store(hall, Ordering::Relaxed);
     }
 
     /// The blocks in this memory.

@@ -1,10 +1,13 @@
 //! From the converters' counts to a [`Sample`].
 
+use core::sync::atomic::Ordering;
+
 use siskin_control::drive::Sample;
 use siskin_control::units::AdcCounts;
 
-use super::registers::Registers;
+use super::registers::{Registers, Stand};
 use crate::board::WIRING;
+use crate::chip::READINGS_AT_WORD;
 
 /// Fraction bits of [`AdcCounts`].
 const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
@@ -61,7 +64,7 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
 }
 
 /// The reverse of [`sample`]: the place of each reading, and its value.
-pub(crate) fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
+fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
     let reading = |counts: AdcCounts| counts.to_num::<i32>();
     let current = move |counts: AdcCounts| {
         let counts = reading(counts);
@@ -75,4 +78,16 @@ pub(crate) fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
         .chain(terminals)
         .chain([(WIRING.bus, reading(sample.bus))])
         .map(|(slot, counts)| (slot, counts as u32))
+}
+
+impl Stand {
+    /// Puts a sample where the converters and the pins of the board would show it.
+    pub fn set_sample(&self, sample: &Sample) {
+        for (Slot(converter, rank), counts) in readings(sample) {
+            self.converters[converter][READINGS_AT_WORD + rank].store(counts, Ordering::Relaxed);
+        }
+        let hall = u32::from(sample.hall) << WIRING.hall.unwrap_or(0);
+        // GPIO's IDR is at 0x10.
+        self.hall[0x10 / 4].store(hall, Ordering::Relaxed);
+    }
 }

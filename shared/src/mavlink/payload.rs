@@ -5,8 +5,6 @@
 
 use mavlink::MessageData;
 
-use super::place::{Place, SLOTS};
-
 /// The longest payload.
 pub(super) const PAYLOAD_MAX: usize = 255;
 
@@ -62,13 +60,5 @@ impl Payload {
     #[inline(never)]
     pub(super) fn u64(&mut self, field: u64) {
         self.put(&field.to_le_bytes());
-    }
-
-    /// An array with a value for each of four ESCs: this one's in its slot, and another for the rest.
-    #[inline(never)]
-    pub(super) fn slots(&mut self, place: Place, own: &[u8], other: &[u8]) {
-        for slot in 0..SLOTS {
-            self.put(if slot == place.slot() { own } else { other });
-        }
     }
 }

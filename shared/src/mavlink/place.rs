@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::{
     ESC_TELEMETRY_13_TO_16_DATA,
 };
 
-use super::payload::id_of;
+use super::payload::{Payload, id_of};
 
 /// Component ids of servos and motor controllers, `MAV_COMP_ID_SERVO1` to `_SERVO14`.
 const FIRST_COMPONENT: u8 = 140;
@@ -62,6 +62,16 @@ impl Place {
             4 => id_of::<ESC_TELEMETRY_5_TO_8_DATA>(),
             8 => id_of::<ESC_TELEMETRY_9_TO_12_DATA>(),
             _ => id_of::<ESC_TELEMETRY_13_TO_16_DATA>(),
+        }
+    }
+}
+
+impl Payload {
+    /// An array with a value for each of four ESCs: this one's in its slot, and another for the rest.
+    #[inline(never)]
+    pub(super) fn slots(&mut self, place: Place, own: &[u8], other: &[u8]) {
+        for slot in 0..SLOTS {
+            self.put(if slot == place.slot() { own } else { other });
         }
     }
 }

@@ -1,0 +1,86 @@
+//! What stands on a bench.
+
+use siskin_control::control::delay::Delay;
+use siskin_control::drive::Config;
+
+use super::{Choice, DEFAULT_LOAD, DEFAULT_MOTOR, LoadTable, MotorTable};
+use crate::plant::{Extras, Fidelity, Load, Motor, Sensing, Supply};
+
+/// Where the control has the rotor's position from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Position {
+    /// Its own observer.
+    #[default]
+    Observer,
+    /// The truth: angle and speed at each sample.
+    Ideal,
+}
+
+/// What stands on the bench.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bench {
+    /// The motor.
+    pub motor: Motor,
+    /// What it has beyond the ideal motor.
+    pub extras: Extras,
+    /// What it turns.
+    pub load: Load,
+    /// What feeds it.
+    pub supply: Supply,
+    /// How the inverter is simulated.
+    pub plant: Fidelity,
+    /// Where the control has the rotor's position from.
+    pub position: Position,
+    /// Sensors and converter.
+    pub sensing: Sensing,
+    /// Control periods from the sample to the voltage.
+    pub delay: Delay,
+    /// Dead time of the inverter, s; `None` is what the parameters set the timer to.
+    pub dead_time_s: Option<f64>,
+    /// Speed that the shaft is held at, rad/s.
+    pub imposed_rad_s: Option<f64>,
+    /// Speed at the start, rad/s.
+    pub initial_rad_s: f64,
+    /// Electrical angle at the start, turns.
+    pub initial_angle_turns: f64,
+    /// Seed of all randomness.
+    pub seed: u64,
+}
+
+impl Default for Bench {
+    /// The bench of the first paper's section V with the sensors of a board: an Antigravity 4006
+    /// KV380 with a 13×4.4 propeller at 24 V; 12 bits over ±40 A, 0.05 A of noise, one period of
+    /// delay and the dead time of the parameters.
+    fn default() -> Self {
+        let built_in = "the built-in benches are tested";
+        let motor = Choice::<MotorTable>::Named(DEFAULT_MOTOR.to_owned());
+        let load = Choice::<LoadTable>::Named(DEFAULT_LOAD.to_owned());
+        let (motor, extras) = motor.motor().expect(built_in);
+        Self {
+            motor,
+            extras,
+            load: load.load().expect(built_in),
+            supply: Supply::stiff(24.0),
+            plant: Fidelity::Averaged,
+            position: Position::Observer,
+            sensing: Sensing::default(),
+            delay: Delay::One,
+            dead_time_s: None,
+            imposed_rad_s: None,
+            initial_rad_s: 0.0,
+            initial_angle_turns: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl Bench {
+    /// The control's configuration with this bench's source of the rotor's position.
+    pub(crate) fn observed(&self, config: Config) -> Config {
+        match self.position {
+            Position::Observer => config,
+            Position::Ideal => config.with_position_given(),
+        }
+    }
+}
