@@ -17,9 +17,10 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # The order of the modules
-//! Dependencies run one way: `trace` ← `math` ← `units` ← {`input`, `control`, `protection`} ← `drive` ←
-//! {`telemetry`, `statistics`} ← `check` ← {`throttle`, `mavlink`} ← `store` ← `esc`. `params` builds the
-//! configurations of the others.
+//! Dependencies run one way: {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control`
+//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `setpoint`, `telemetry`} ← {`answer`,
+//! `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
+//! and that each folder has one.
 #![no_std]
 #![forbid(unsafe_code)]
 
