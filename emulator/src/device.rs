@@ -376,7 +376,7 @@ impl Device {
             }
             apply(&self.overrides, &mut kept.params);
             self.esc
-                .replace(&mut self.throttle, &kept)
+                .replace(&mut self.throttle, &mut kept)
                 .map_err(|error| error.reason)?;
             self.configure();
         }

@@ -72,8 +72,9 @@ impl Charge {
 
     /// The charge in mAh.
     pub fn mah(self) -> f32 {
-        // 3600 s of 1 mA.
-        self.0 as f32 / 3.6e12
+        // 3600 s of 1 mA. The upper word counts 0.0012 mAh, and a word is a float in one instruction.
+        let upper = (self.0 >> 32) as i32;
+        upper as f32 * (4_294_967_296.0 / 3.6e12)
     }
 }
 

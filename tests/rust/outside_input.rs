@@ -128,9 +128,9 @@ impl Desk {
         self.esc.storage_done(&mut self.throttle, result);
     }
 
-    fn replace(&mut self, kept: Kept) -> Result<(), &'static str> {
+    fn replace(&mut self, mut kept: Kept) -> Result<(), &'static str> {
         self.esc
-            .replace(&mut self.throttle, &kept)
+            .replace(&mut self.throttle, &mut kept)
             .map_err(|error| error.reason)
     }
 

@@ -8,7 +8,6 @@ use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 use embassy_time::{Duration, Instant, Ticker};
-use siskin_control::drive::Snapshot;
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 
@@ -101,16 +100,30 @@ impl Desk {
             .push(now_us, bytes, |frame| esc.receive(throttle, now_us, frame));
     }
 
-    #[inline(never)]
     fn poll(&mut self) {
         // No bytes tell a receiver that time has passed: what a false start held back is searched.
         self.receive(&[]);
+        if !self.look() {
+            return;
+        }
+        while let Some(request) = self.request() {
+            self.obey(request);
+        }
+        self.limit();
+        self.configure();
+        self.restart();
+    }
+
+    /// Takes in what the interrupt and the board report, and lets the ESC act. Returns false while the
+    /// interrupt has not reported anything.
+    #[inline(never)]
+    fn look(&mut self) -> bool {
         let now = Instant::now();
         self.supervisor.look(now);
         let snapshot = self.snapshot.read();
         self.light.look(now, snapshot.as_ref(), self.esc.light());
         let Some(snapshot) = snapshot else {
-            return;
+            return false;
         };
         if let Some(warning) = self.teller.next(now) {
             self.esc.warn(warning);
@@ -124,12 +137,12 @@ impl Desk {
             &mut |frame| send(frame),
         );
         self.esc.test_itself(&snapshot, &mut self.health);
-        while let Some(request) = self.esc.take_request(&mut self.throttle) {
-            self.obey(request);
-        }
-        self.limit(&snapshot);
-        self.configure();
-        self.restart();
+        true
+    }
+
+    #[inline(never)]
+    fn request(&mut self) -> Option<Request> {
+        self.esc.take_request(&mut self.throttle)
     }
 
     #[inline(never)]
@@ -152,7 +165,7 @@ impl Desk {
         }
         self.changed = true;
         self.esc
-            .replace(&mut self.throttle, &kept)
+            .replace(&mut self.throttle, &mut kept)
             .map_err(|error| error.reason)
     }
 
@@ -181,8 +194,12 @@ impl Desk {
     }
 
     /// Has the hardware's trip follow `LIM_PHASE_A`: up before the control does, and down after it.
-    fn limit(&mut self, snapshot: &Snapshot) {
-        let limit_a = self.esc.phase_limit_a(snapshot);
+    #[inline(never)]
+    fn limit(&mut self) {
+        let Some(snapshot) = self.snapshot.read() else {
+            return;
+        };
+        let limit_a = self.esc.phase_limit_a(&snapshot);
         if limit_a != self.limit_a {
             self.limit_a = limit_a;
             interrupt::set_trip(limit_a);

@@ -193,6 +193,8 @@ impl Unstored {
 ///
 /// # Errors
 /// A few words on why the values would not survive a loss of power.
+// Never inlined: its stack is free for what puts the values in force.
+#[inline(never)]
 pub fn obey<F: NorFlash>(
     request: Request,
     flash: &mut F,

@@ -12,7 +12,6 @@ use super::identity::Identity;
 use super::payload::id_of;
 use super::refusal::Refusal;
 use super::sender::Sender;
-use super::signing::Signing;
 use crate::params::{ParamId, TABLE};
 
 /// Replies that can wait. A poll empties them, so it is the most that may arrive between two:
@@ -101,6 +100,7 @@ impl Replies {
         }
     }
 
+    #[inline(never)]
     pub(super) fn ack(&mut self, to: Address, command: u16, result: MavResult) {
         let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS {
             PROGRESS_UNKNOWN
@@ -157,9 +157,9 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    pub(super) fn new(signing: Signing) -> Self {
+    pub(super) const fn new() -> Self {
         Self {
-            sender: Sender::new(signing),
+            sender: Sender::new(),
             text_id: 0,
         }
     }

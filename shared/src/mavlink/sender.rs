@@ -21,10 +21,10 @@ pub(super) struct Sender {
 }
 
 impl Sender {
-    pub(super) fn new(signing: Signing) -> Self {
+    pub(super) const fn new() -> Self {
         Self {
             sequence: 0,
-            signing,
+            signing: Signing::NONE,
         }
     }
 

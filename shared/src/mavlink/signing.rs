@@ -102,6 +102,18 @@ pub(super) struct Signing {
 }
 
 impl Signing {
+    /// Without a key, before anything is known: nothing is signed.
+    pub(super) const NONE: Self = Self {
+        key: None,
+        newest: 0,
+        newest_us: 0,
+        sent: 0,
+        told_us: None,
+        floor: 0,
+        streams: [None; STREAMS],
+        now_us: 0,
+    };
+
     /// With the values stored before the start; without a key nothing is signed.
     pub(super) fn new(kept: Option<Kept>) -> Self {
         let floor = kept.map_or(0, |kept| ((u64::from(kept.newest) + 1) << KEPT_SHIFT) - 1);

@@ -6,7 +6,7 @@ use heapless::String;
 pub type Warning = String<50>;
 
 /// The warnings that wait to be sent, two at most, and the last one for later readers.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Warnings {
     texts: [Warning; 2],
     /// Number of warnings that have come since all had been sent, and number of those sent.
@@ -17,6 +17,15 @@ pub(super) struct Warnings {
 }
 
 impl Warnings {
+    pub(super) const fn new() -> Self {
+        Self {
+            texts: [const { Warning::new() }; 2],
+            come: 0,
+            sent: 0,
+            last: 0,
+        }
+    }
+
     /// Of more than two at once, the first are kept.
     pub(super) fn push(&mut self, warning: Warning) {
         if let Some(place) = self.texts.get_mut(self.come) {

@@ -298,12 +298,12 @@ fn a_reset_to_the_factorys_settings_leaves_the_statistics_alone() {
     bench.command(STORAGE, 2.0);
     bench.wait_ms(1);
     assert_eq!(bench.requests, [], "it is not signed");
-    let reset = Kept {
+    let mut reset = Kept {
         statistics,
         ..Kept::default()
     };
     let Bench { esc, throttle, .. } = &mut bench;
-    esc.replace(throttle, &reset).expect("the defaults fit");
+    esc.replace(throttle, &mut reset).expect("the defaults fit");
     assert_eq!(esc.kept(), reset);
     bench.wait_ms(1);
     assert_eq!(bench.esc.kept(), reset, "the key is gone with the replies");
