@@ -2,7 +2,6 @@
 //! on-time, and the compensation of the dead time.
 
 use crate::control::dead_time::Share;
-use crate::units::dimension::Volt;
 use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
 
@@ -10,6 +9,7 @@ use super::dead_time;
 use super::transform::{AlphaBeta, Dq, Order, phases_in};
 use crate::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use crate::trace::traced;
+use crate::units::dimension::Volt;
 use crate::units::{
     Duty, InverseVoltage, TurnedVoltage, Voltage, VoltageSquare, WideVoltage, WideVoltageSquare,
     wide,

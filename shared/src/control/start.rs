@@ -4,14 +4,13 @@
 //! knowledge of the rotor, which follows like a stepper motor's. The observer runs all the while, so
 //! at the hand-over it tells where the rotor really is.
 
-use crate::units::dimension::TurnPerPeriod;
-use fixed::types::I36F28;
 use fixed::types::extra::U28;
 
 use super::transform::Dq;
 use crate::math::{Gain, Held, Quantity, TopProduct};
 use crate::trace::traced;
-use crate::units::{Angle, Current, CurrentRate, InverseFlux, Speed, Voltage};
+use crate::units::dimension::TurnPerPeriod;
+use crate::units::{Angle, Charge, Current, CurrentRate, InverseFlux, Speed, Voltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,7 +18,7 @@ pub struct Config {
     /// I_qr, the current of Park and Ramp.
     pub current: Current,
     /// Current times periods after which Park ends (A·s of section 3.2.2).
-    pub park_charge: I36F28,
+    pub park_charge: Charge,
     /// Current to the frame's speed in the first half of Park. It turns the current's vector by a
     /// quarter of a turn, so that a rotor that stood opposite to it does not stay there.
     pub sweep: Gain<Current, Speed>,
@@ -50,7 +49,7 @@ traced! {
         /// Current along q of the first frame, a quarter of a turn back, is along phase a.
         pub frame: Angle,
         /// ∫I_qr in Park, in periods.
-        pub charge: I36F28,
+        pub charge: Charge,
         /// ω_s, the speed of the frame but for its yielding.
         pub omega_s: Speed,
         /// Its change in a period.
@@ -68,7 +67,7 @@ impl Default for State {
     fn default() -> Self {
         Self {
             frame: Angle::from_bits(-1 << 30),
-            charge: I36F28::ZERO,
+            charge: Charge::ZERO,
             omega_s: Speed::ZERO,
             acceleration: Speed::ZERO,
             yielded: Angle::ZERO,
@@ -174,7 +173,7 @@ mod tests {
     fn config() -> Config {
         Config {
             current: Current::from_num(0.5),
-            park_charge: I36F28::from_num(100),
+            park_charge: Charge::from_num(100),
             // A quarter of a turn in half of the charge.
             sweep: Gain::new(0.25 / 50.0).expect("in range"),
             k_s: Gain::new(1e-4).expect("in range"),

@@ -2,7 +2,6 @@
 //!
 //! Forward Euler, and the matrix exponential for the estimated currents, as its section V says.
 
-use crate::units::dimension::TurnPerPeriod;
 use fixed::types::I4F28;
 use fixed::types::extra::U28;
 
@@ -12,6 +11,7 @@ use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
 use crate::math::{Gain, Held, Quantity, SinCos, TopProduct, atan2_turns, divide, magnitude};
 use crate::trace::traced;
+use crate::units::dimension::TurnPerPeriod;
 use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
 
 /// Half a turn a period, where a speed ends.

@@ -6,8 +6,8 @@
 //! they do in ω̂ = ξ̂·|ĥ| of the first paper (7), which loses its lock where they are wrong.
 //!
 //! In the control's units a voltage for one period is a flux, and the stated flux φ is 2/π.
+#![doc = include_str!("compensated/derivation.md")]
 
-use crate::units::dimension::Weber;
 use fixed::types::extra::{U27, U29};
 use fixed::types::{I0F32, I5F27};
 
@@ -18,6 +18,7 @@ use crate::math::{
     EIGHTH_PI, Gain, Held, Multiplier, Quantity, SinCos, TopProduct, TopSum, sin_cos,
 };
 use crate::trace::traced;
+use crate::units::dimension::Weber;
 use crate::units::{
     Angle, Current, FLUX_NOMINAL, Flux, InverseFlux, Speed, SpeedSquare, Voltage, WideFlux,
     WideVoltage,

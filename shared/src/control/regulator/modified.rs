@@ -6,12 +6,13 @@
 //! the d axis has the bandwidth that is asked for at the greatest speed, where V is greatest, and
 //! less of it below, where there is less to decouple.
 
+use fixed::types::extra::U28;
+
 use super::reference::{Feedback, Reference, beyond};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
 use crate::trace::traced;
 use crate::units::{Angle, Current, Voltage, WideVoltage};
-use fixed::types::extra::U28;
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, PartialEq)]
