@@ -40,7 +40,7 @@ use compare::Difference;
 /// Highest reading from which an observation may begin, three times the noise.
 const BEGIN: I17F15 = I17F15::lit("6");
 
-/// What is known of the rotor.
+/// The result of observing the rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rotor {
     /// Not enough, yet.

@@ -16,7 +16,7 @@ use crate::units::Current;
 /// A share of the supply.
 pub type Share = FixedI32<U22>;
 
-/// What the compensation must know.
+/// The compensation's coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Phase current over the least whose sign is certain.

@@ -15,8 +15,8 @@ pub enum Delay {
 }
 
 impl Delay {
-    /// How far the rotor's frame turns from the sample to the middle of the voltage, at this
-    /// speed: (0.5 + delay) periods.
+    /// Delay compensation: the angle by which the rotor's frame turns from the sample to the middle
+    /// of the voltage, (0.5 + delay) periods at this speed.
     #[inline(always)]
     pub fn advance(self, speed: Speed) -> Angle {
         let half = speed.over_half_period();

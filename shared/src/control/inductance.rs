@@ -66,9 +66,9 @@ traced! {
         pub factor: Factor,
         /// Periods since the wave's last edge.
         count: u32,
-        /// Whether the wave is at its upper level.
+        /// True while the wave is at its upper level.
         high: bool,
-        /// Whether a half wave has ended since the begin.
+        /// True once a half wave has ended.
         compares: bool,
         /// Over the last periods of this half wave.
         now: Sums,

@@ -1,4 +1,4 @@
-//! What is done for the observer at low speed.
+//! Support of the observer at low speed: a current along d, and a bound of the one along q.
 //!
 //! There the back-EMF is small against what is not known: the dead time's loss around zero current,
 //! and the drop across a resistance that may be stated wrongly.
@@ -12,7 +12,7 @@ use crate::units::{Current, Speed};
 pub struct Config {
     /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
     i_d: Current,
-    /// What the speed takes of it.
+    /// Its fall over the speed.
     i_d_slope: Gain<Speed, Current>,
     /// Bound of i_q at standstill.
     i_q: Current,

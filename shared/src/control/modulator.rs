@@ -15,7 +15,7 @@ use crate::units::{
     wide,
 };
 
-/// How the phases' common voltage is chosen.
+/// The choice of the phases' common voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Modulation {
     /// In the middle between the highest and the lowest phase: full line-to-line voltage.
@@ -24,7 +24,7 @@ pub enum Modulation {
     Sine,
 }
 
-/// What the modulator must know.
+/// The modulator's limits.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// All ones where the common voltage follows the phases, else zero.
@@ -86,9 +86,9 @@ traced! {
         square: WideVoltageSquare,
         /// Square of that part along d.
         d_square: VoltageSquare,
-        /// What is left along q.
+        /// The greatest part along q beside it.
         q: WideVoltage,
-        /// What of the square's change q loses, 1/(2·q).
+        /// The share of the square's change that q loses, 1/(2·q).
         slope: Multiplier<VoltageSquare, Quantity<Volt, U20>>,
     }
 }

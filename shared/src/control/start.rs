@@ -42,7 +42,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What Park and Ramp remember.
+    /// The state of Park and Ramp.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// The frame's angle at the coming sample.
@@ -77,7 +77,7 @@ impl Default for State {
     }
 }
 
-/// Whether the rotor has had its time in Park.
+/// True once the rotor has had its time in Park.
 pub fn aligned(config: &Config, state: &State) -> bool {
     state.charge >= config.park_charge
 }
@@ -150,7 +150,7 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     state.yielding = config.yield_rate.apply(target.minus(state.yielded));
 }
 
-/// Whether the rotor has lost the frame of Ramp.
+/// True if the rotor has lost the frame of Ramp.
 #[inline]
 pub fn lost(config: &Config, state: &State) -> bool {
     state.astray > config.astray_periods
@@ -158,7 +158,7 @@ pub fn lost(config: &Config, state: &State) -> bool {
 
 impl State {}
 
-/// Where the speeds end, half a turn, with 28 fraction bits.
+/// The end of the range of speeds, half a turn a period, with 28 fraction bits.
 const SPEED_END: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(1 << 27);
 
 /// Most by which the frame yields: a sixteenth of a turn.

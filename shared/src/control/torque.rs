@@ -18,7 +18,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What is remembered: i_q* of the last period.
+    /// The state: i_q* of the last period.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// i_q*.

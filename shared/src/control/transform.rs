@@ -66,7 +66,7 @@ pub fn clarke(readings: [AdcCounts; 3]) -> AlphaBeta<Current> {
     clarke_in(Order::NORMAL, readings)
 }
 
-/// The same of phases in this order.
+/// Clarke's transform of phases in this order.
 #[inline(always)]
 pub fn clarke_in(order: Order, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> {
     let (a, b, c) = (a.to_bits(), b.to_bits(), c.to_bits());
@@ -132,7 +132,7 @@ pub fn phases<T: Number>(v: AlphaBeta<T>) -> [T; 3] {
     phases_in(Order::NORMAL, v)
 }
 
-/// The same of phases in this order.
+/// The three phases' values of a vector (11), in this order.
 #[inline(always)]
 pub fn phases_in<T: Number>(order: Order, v: AlphaBeta<T>) -> [T; 3] {
     let alpha = v.alpha.to_bits();

@@ -1,4 +1,4 @@
-//! What a look says against the prediction.
+//! Comparison of a look with its prediction.
 
 use fixed::types::{I2F30, I4F28, I17F15, I19F13};
 

@@ -1,4 +1,4 @@
-//! What the looks so far say of the rotor, by recursive least squares, and how well they fit.
+//! The estimate of the rotor from the looks so far, by recursive least squares, and the quality of its fit.
 
 use fixed::types::{I0F32, I16F16, I17F15, I20F12};
 

@@ -1,4 +1,4 @@
-//! What the observation knows and remembers.
+//! The configuration and the state of the observation.
 
 use fixed::types::{I0F32, I17F15, I20F12};
 
@@ -11,7 +11,7 @@ pub const LOOK_PERIODS: u32 = 1 << LOOK_SHIFT;
 
 pub(super) const LOOK_SHIFT: u32 = 2;
 
-/// What the observer must know.
+/// The observer's coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Back-EMF's amplitude that the stated flux gives, in counts of the terminals with 8 fraction
@@ -36,7 +36,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What a period does for a look.
+    /// A period's part in a look.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub(super) enum Turn {
         /// It compares the readings with the prediction.
@@ -51,12 +51,12 @@ traced! {
 }
 
 traced! {
-    /// What is remembered from sample to sample.
+    /// The state from sample to sample.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// Mean of the highest reading.
         pub(super) level: AdcCounts,
-        /// What this period is to do.
+        /// This period's part.
         pub(super) turn: Turn,
         /// Sum of the readings after the last look.
         pub(super) readings: [I17F15; 3],
@@ -78,7 +78,7 @@ traced! {
         pub(super) spread: u32,
         /// Mean of the errors' magnitudes, summed over the phases.
         pub(super) residual: I17F15,
-        /// What the last look has told.
+        /// The result of the last look.
         pub(super) told: Difference,
         /// k_ω, 30 fraction bits.
         pub(super) speed_gain: i32,
@@ -128,7 +128,7 @@ impl State {
 }
 
 impl State {
-    /// Whether looks are at the mean of four readings.
+    /// True if looks are at the mean of four readings.
     pub(super) fn is_slow(&self) -> bool {
         self.omega.saturating_abs() < SLOW
     }

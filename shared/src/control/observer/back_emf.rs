@@ -62,7 +62,7 @@ pub struct Cure {
 }
 
 traced! {
-    /// What the observer remembers from period to period.
+    /// The observer's state from period to period.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// θ̂ at this sample; the type wraps it (25).
@@ -251,7 +251,7 @@ pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<A
 
 impl State {}
 
-/// Where the rotor is, as seen from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
+/// The rotor's angle from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
 ///
 /// `None` where the back-EMF is not between half and twice of what the stated flux gives at the
 /// frame's speed: the rotor has not followed, or there is none and the voltage met no current.

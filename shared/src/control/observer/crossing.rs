@@ -10,7 +10,7 @@ use crate::math::{Held, TopProduct, divide};
 use crate::trace::traced;
 use crate::units::{Angle, Flux, Speed};
 
-/// What keeps noise from being taken for a crossing (2.3.2).
+/// Limits that keep noise from being taken for a crossing (2.3.2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// How far beyond zero a flux must be, as a share of the amplitude: half the deadband, below
@@ -25,16 +25,16 @@ pub struct Config {
 }
 
 traced! {
-    /// What the comparator remembers.
+    /// The comparator's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// The sector that the last crossing has begun.
         pub sector: Sector,
         /// Periods since the sample of that crossing.
         pub since: u32,
-        /// How much the crossings are to be trusted, 0 to 12: a sound one adds one, another takes three.
+        /// Trust in the crossings, 0 to 12: a sound one adds one, another takes three.
         pub sound: u8,
-        /// Whether they tell where the rotor is.
+        /// True while they tell where the rotor is.
         pub tracks: bool,
     }
 }
@@ -54,7 +54,7 @@ pub struct Crossing {
 const SOUND_MAX: u8 = 12;
 /// From here on the crossings are trusted: those of a turn.
 const SOUND: u8 = 6;
-/// What a crossing that cannot be one takes away.
+/// The trust that an impossible crossing takes away.
 const UNSOUND: u8 = 3;
 
 /// A crossing is no crossing if the rotor has turned less than this since the last one: a third of
@@ -153,7 +153,7 @@ fn ratio(part: Flux, whole: Flux) -> Periods {
 }
 
 impl State {
-    /// Whether a whole turn of crossings has been sound.
+    /// True if a whole turn of crossings has been sound.
     pub fn trusted(&self) -> bool {
         self.tracks && self.sound >= SOUND
     }

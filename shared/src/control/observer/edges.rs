@@ -10,7 +10,7 @@ use super::position::{self, Periods};
 use crate::trace::traced;
 use crate::units::{Angle, Current, Speed, Voltage};
 
-/// Where edges come from.
+/// The source of the edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensors {
     /// Flux crossings; there are no Hall sensors.
@@ -22,10 +22,10 @@ pub enum Sensors {
     Merged,
 }
 
-/// What the estimation must know.
+/// The estimation's coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// Where edges come from.
+    /// The source of the edges.
     pub sensors: Sensors,
     /// Flux observers.
     pub flux: flux_linkage::Config,
@@ -42,7 +42,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What triggers the position estimator at present.
+    /// The present trigger of the position estimator.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     #[repr(u8)]
     pub enum Source {
@@ -55,10 +55,10 @@ traced! {
 }
 
 traced! {
-    /// What the estimation remembers.
+    /// The estimation's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// What triggers the position estimator.
+        /// The trigger of the position estimator.
         pub source: Source,
         /// Flux observers.
         pub flux: flux_linkage::State,
@@ -71,7 +71,7 @@ traced! {
     }
 }
 
-/// What is known of the rotor at a sample.
+/// The estimate of the rotor at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
     /// θ̂ at this sample.
@@ -80,9 +80,9 @@ pub struct Position {
     pub omega: Speed,
     /// Its change in a period, by the last measurement.
     pub omega_step: Speed,
-    /// Whether the position is known; if not, the rest is the last that was.
+    /// True if the position is known; if not, the rest is the last that was.
     pub known: bool,
-    /// Whether a Hall sensor is at fault.
+    /// True if a Hall sensor is at fault.
     pub sensor_fault: bool,
 }
 

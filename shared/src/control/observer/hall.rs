@@ -4,7 +4,7 @@
 use super::sector::Sector;
 use crate::trace::traced;
 
-/// What the sensors must show.
+/// The check of the sensors' codes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Periods for which all three may be alike; no rotor makes them so.
@@ -12,7 +12,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What is remembered of the sensors.
+    /// The state of the sensors.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Code of the last sample.
@@ -23,9 +23,9 @@ traced! {
         pub sector: Option<Sector>,
         /// Periods for which it has been invalid.
         pub invalid: u32,
-        /// What speaks against the sensors.
+        /// The evidence against the sensors.
         pub evidence: u8,
-        /// Whether a sensor is at fault. It stays so.
+        /// True once a sensor is at fault; it stays so.
         pub fault: bool,
     }
 }
@@ -46,7 +46,7 @@ pub enum Step {
 /// Samples that a code must last. One alone may be a spike on the wires.
 pub const SAMPLES: u32 = 2;
 
-/// What one contradiction adds to the evidence; an edge as it should be takes one away.
+/// The evidence that one contradiction adds; an edge as it should be takes one away.
 const CONTRADICTION: u8 = 8;
 /// Evidence that is a fault: three contradictions within a turn or two. A sensor that is stuck makes
 /// two or three a turn, a spike on the wires one.

@@ -36,7 +36,7 @@ pub enum Config {
     Given,
 }
 
-/// What the observers remember; only the one in use changes.
+/// The observers' states; only that of the one in use changes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Adaptive back-EMF.

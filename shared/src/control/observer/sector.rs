@@ -16,7 +16,7 @@ traced! {
 pub struct Edge {
     /// Phase whose flux crosses zero: 0, 1, 2.
     pub phase: usize,
-    /// Whether it becomes positive.
+    /// True if it becomes positive.
     pub rising: bool,
 }
 
@@ -56,7 +56,7 @@ impl Sector {
         Self(if self.0 >= 5 { 0 } else { self.0 + 1 })
     }
 
-    /// How many sectors forwards it is from here to there, 0 to 5.
+    /// The number of sectors forwards from here to there, 0 to 5.
     pub fn steps_to(self, there: Self) -> u8 {
         (there.0 + 6 - self.0) % 6
     }

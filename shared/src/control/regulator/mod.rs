@@ -110,7 +110,7 @@ impl Config {
         }
     }
 
-    /// What is done every few periods: coefficients follow the speed.
+    /// Update of the coefficients that follow the speed, every few periods.
     pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
         if let Self::Synchronous(c) = self {
             c.pace(&mut state.synchronous, omega, inductance);

@@ -1,4 +1,4 @@
-//! What every current regulator reads, and what its limit cuts off.
+//! The inputs of every current regulator, and the voltage that its limit cuts off.
 
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
@@ -31,7 +31,7 @@ impl Reference {
         }
     }
 
-    /// The same with another current along d.
+    /// This reference with another current along d.
     #[must_use]
     pub fn with_i_d(self, i_d: Current) -> Self {
         Self {
@@ -43,7 +43,7 @@ impl Reference {
         }
     }
 
-    /// The same with another current along q.
+    /// This reference with another current along q.
     #[must_use]
     pub fn with_i_q(self, i_q: Current) -> Self {
         Self {
@@ -56,7 +56,7 @@ impl Reference {
     }
 }
 
-/// What the regulator reads of the observer and of the sample.
+/// The regulator's feedback, from the observer and the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feedback {
     /// ω̂, the speed of the frame.

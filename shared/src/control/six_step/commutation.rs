@@ -54,7 +54,7 @@ impl Sector {
         }
     }
 
-    /// Whether the floating phase's back-EMF rises through zero; it falls in every other sextant.
+    /// True if the floating phase's back-EMF rises through zero; it falls in every other sextant.
     ///
     /// At the start of a rising sextant the low leg has changed and the switching one goes on, at
     /// the start of a falling one it is the other way round.
@@ -101,7 +101,7 @@ impl Sector {
         }
     }
 
-    /// What each leg does, as phases a, b, c.
+    /// The state of each leg, as phases a, b, c.
     pub fn phases<T>(self, legs: Legs<T>) -> [T; 3] {
         let Legs {
             switching: s,

@@ -30,7 +30,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What the sextant has shown.
+    /// The readings of the present sextant.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Samples of this sextant.
@@ -84,7 +84,7 @@ impl State {
         self.above = Some(Span { first, last: now });
     }
 
-    /// Where the reading has changed by far more than the converter's steps and noise.
+    /// The measured slope, where the reading has changed by far more than the converter's steps and noise.
     fn measured_slope(&self, config: &Config) -> Option<Voltage> {
         let Span { first, last } = self.above?;
         let samples = i32::from(last.0 - first.0);
@@ -180,7 +180,7 @@ fn whole(samples: u16) -> I16F16 {
     I16F16::from_num(samples.min(1 << 14))
 }
 
-/// How long a reading takes to grow by this slope; none where the slope is not known.
+/// The time in which a reading grows by this slope; zero if the slope is not known.
 fn periods(reading: Voltage, slope: Voltage) -> I16F16 {
     if reading <= Voltage::ZERO || slope <= Voltage::ZERO {
         return I16F16::ZERO;

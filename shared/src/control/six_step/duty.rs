@@ -24,14 +24,14 @@ pub struct Config {
     pub k_p: Gain<Speed, I1F31>,
     /// Speed to duty in a period.
     pub k_i: Gain<Speed, I1F31>,
-    /// What the current has left to its bound, to what the duty may change in a period.
+    /// The current's distance from its bound to the greatest change of the duty in a period.
     pub k_b: Gain<Current, I1F31>,
     /// Greatest duty: what is left is the low sides' on-time in which the sample falls.
     pub duty_max: I1F31,
 }
 
 traced! {
-    /// What the loop remembers.
+    /// The loop's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// The duty of the period before, 0 to `duty_max`.

@@ -12,7 +12,7 @@ use crate::units::{Angle, Speed};
 pub const KNOWN: u8 = 6;
 
 traced! {
-    /// What is known of the rotor.
+    /// The estimate of the rotor.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Angle past the middle of the present sextant.
