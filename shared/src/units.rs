@@ -84,7 +84,7 @@ pub fn narrow(u: WideVoltage) -> Voltage {
 /// A square of a voltage.
 pub type VoltageSquare = Quantity<VoltSquare, U24>;
 
-/// The same with room for sums of what is far beyond the supply.
+/// That with room for sums far beyond the supply.
 pub type WideVoltageSquare = Quantity<VoltSquare, U16>;
 
 /// ω·i: how fast a current changes in a frame that turns, in units of current a period, over 2π.
@@ -131,7 +131,7 @@ pub type AdcCounts = I16F16;
 /// A share of the PWM period for which the high side is on, 0 to 1.
 pub type Duty = fixed::types::U1F31;
 
-/// What the control's units are worth in SI.
+/// The control's units in SI.
 ///
 /// The bases are chosen so that Clarke's transform is two integer products (one unit of current is
 /// 4096/3 counts), and so that the motor's flux is the same number for every motor: the voltage

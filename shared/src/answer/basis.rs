@@ -4,7 +4,7 @@ use crate::drive::{ATTEMPTS, Fault, Snapshot, six_step};
 use crate::params::{self, ParamId, Params};
 use crate::units::{Current, Scale};
 
-/// The little of a [`Config`] that is needed to read a snapshot.
+/// The little of a [`Config`](crate::drive::Config) that is needed to read a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Basis {
     /// The control's units in SI.

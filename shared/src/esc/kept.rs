@@ -1,4 +1,4 @@
-//! What the ESC keeps over a loss of power.
+//! The values that the ESC keeps over a loss of power.
 
 use super::Esc;
 use crate::params::BuildError;

@@ -1,4 +1,4 @@
-//! What a line has brought.
+//! Events on a line.
 
 use super::dshot::{Frame, Rate};
 use super::signal::{Pulse, Signal};

@@ -60,13 +60,13 @@ impl<D, F> Quantity<D, F> {
         self.number.to_bits()
     }
 
-    /// Whether it is below zero.
+    /// Returns true if it is below zero.
     #[inline(always)]
     pub const fn is_negative(self) -> bool {
         self.to_bits() < 0
     }
 
-    /// Whether it is above zero.
+    /// Returns true if it is above zero.
     #[inline(always)]
     pub const fn is_positive(self) -> bool {
         self.to_bits() > 0
@@ -187,12 +187,12 @@ impl<D, F: LeEqU32> Quantity<D, F> {
         Self::of(FixedI32::from_num(number))
     }
 
-    /// The same of any number, wrapped.
+    /// The quantity of any number, wrapped.
     pub fn wrapping_from_num<N: ToFixed>(number: N) -> Self {
         Self::of(FixedI32::wrapping_from_num(number))
     }
 
-    /// The same of any number, held at the ends of the type.
+    /// The quantity of any number, held at the ends of the type.
     pub fn saturating_from_num<N: ToFixed>(number: N) -> Self {
         Self::of(FixedI32::saturating_from_num(number))
     }

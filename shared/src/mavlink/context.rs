@@ -1,4 +1,4 @@
-//! What the component is told, and what it asks of its caller.
+//! The interface of the component to its caller.
 
 use crate::check::Report;
 use crate::input::access::Access;

@@ -203,7 +203,7 @@ mod tests {
     use super::*;
     use crate::mavlink::tests::TELEMETRY;
 
-    /// What the dialect reads in a payload.
+    /// The message that the dialect reads in a payload.
     fn read<D: MessageData>(write: impl FnOnce(&mut Payload)) -> D {
         let mut payload = Payload::new();
         write(&mut payload);

@@ -1,4 +1,4 @@
-//! What the configuration needs to know of the board.
+//! The properties of the board that the configuration needs.
 
 use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;

@@ -72,7 +72,7 @@ impl Params {
         C::of(self.number(C::PARAM))
     }
 
-    /// Whether a parameter that is a choice of few has this value.
+    /// Returns true if a parameter that is a choice has this value.
     #[inline]
     pub fn chosen<C: Choice>(&self, choice: C) -> bool {
         self.number(C::PARAM) == choice.number()

@@ -1,4 +1,4 @@
-//! How sound what is stored is, and what may go wrong with it.
+//! The integrity of stored values, and the errors of storage.
 
 /// The integrity of the stored values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -68,7 +68,7 @@ products! {
     Watt, PerVolt => Ampere;
     /// The speed that a back-EMF tells, ω = ξ·|h|.
     PerWeber, Volt => TurnPerPeriod;
-    /// How fast a current changes in a frame that turns, ω·i.
+    /// The rate of a current in a frame that turns, ω·i.
     TurnPerPeriod, Ampere => AmperePerPeriod;
 }
 
@@ -82,7 +82,7 @@ impl Times<Self> for Volt {
 }
 
 impl<F> Quantity<Volt, F> {
-    /// What the voltage adds to a flux linkage in a period.
+    /// The flux linkage that the voltage adds in a period.
     #[inline(always)]
     pub const fn over_period(self) -> Quantity<Weber, F> {
         Quantity::from_bits(self.to_bits())

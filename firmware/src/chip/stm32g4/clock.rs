@@ -71,7 +71,7 @@ fn speed_up() {
     RCC.cfgr().modify(|w| w.set_hpre(AHBPrescaler::DIV1));
 }
 
-/// What the HAL is to be told of a serial line's rate: it divides its own clock by it.
+/// The rate of a serial line as the HAL must be given it: it divides its own clock by it.
 pub(crate) const fn told_hz(rate_hz: u32) -> u32 {
     // The rates end below 1 MHz.
     let mega = TIMER_HZ / 1_000_000;

@@ -3,7 +3,7 @@
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::{Moder, Ospeedr, Pupdr};
 
-/// What a pin is for. One that is not set up is analogue, as the reset has left it.
+/// The use of a pin. One that is not set up is analogue, as the reset has left it.
 #[derive(Clone, Copy)]
 pub(crate) enum Use {
     /// A gate signal, by this alternate function: as fast as a pin is, and pulled down, so that the gate

@@ -1,4 +1,4 @@
-//! What the files are made of.
+//! The sources of the files.
 
 use crate::check::Report;
 use crate::params::{Board, Params};

@@ -158,7 +158,7 @@ impl<'a> Si<'a> {
     }
 }
 
-/// What the control's units are worth with these parameters.
+/// The control's units in SI with these parameters.
 pub fn scale(params: &Params, board: &Board) -> Scale {
     let flux_wb = params.get(ParamId::MotFluxMwb) * 1e-3;
     let period_s = 1.0 / params.get(ParamId::PwmFreqHz);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 
-/// How likely it is that random words, one a millisecond, turn the motor of an armed wire at zero before they
+/// The probability that random words, one a millisecond, turn the motor of an armed wire at zero before they
 /// are a lost signal. Of 2048 values that pass the check, 48 are no throttle. Ways less likely than this are left
 /// out, which together are less than a thousandth of the result.
 fn likely_turned_by_noise() -> f64 {
