@@ -17,6 +17,7 @@ use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc};
 use siskin_control::units::AdcCounts;
 
+use super::parts::parts;
 use crate::chip::pins::{self, Pin, Use};
 use crate::chip::{self, comparators, converters, op_amps};
 use crate::circuit::b_g431b_esc1::{
@@ -163,12 +164,11 @@ pub(crate) mod wire {
     }
 }
 
-/// The interrupt in which the throttle's task runs: one whose unit is not used.
-pub(crate) const EXECUTOR: interrupt::Interrupt = interrupt::FMAC;
-
-#[interrupt]
-fn FMAC() {
-    throttle::run_executor();
+parts! {
+    throttle: PA15 at TIM2 Ch1,
+    executor: FMAC,
+    edges: DMA1_CH4 DMA1_CH5,
+    replies: TIM3 DMA1_CH6,
 }
 
 /// The gate signals, set up; [`crate::interrupt::start`] takes them.
@@ -188,37 +188,6 @@ pub struct Bridge {
 /// | second | current b −0.15 to 0.15 | terminal a 0.44 to 1.02 | terminal b 1.31 to 1.89 | |
 pub struct Converters {
     _private: (),
-}
-
-/// The throttle wire.
-pub struct Throttle {
-    pin: Peri<'static, PA15>,
-    _timers: (Peri<'static, TIM2>, Peri<'static, TIM3>),
-    rising: Peri<'static, DMA1_CH4>,
-    falling: Peri<'static, DMA1_CH5>,
-    reply: Peri<'static, DMA1_CH6>,
-}
-
-impl Throttle {
-    /// Begins to capture.
-    pub(crate) fn open(self) -> (Capture, Replier) {
-        // A wire that is not connected is at rest. A dropped pin would be given back.
-        mem::forget(CapturePin::<TIM2, Ch1>::new(self.pin, Pull::Up));
-        let requests = [
-            Dma::<TIM2, Ch1>::request(&*self.rising),
-            Dma::<TIM2, Ch2>::request(&*self.falling),
-        ];
-        let channels = [
-            dma::Channel::new(self.rising, Interrupts),
-            dma::Channel::new(self.falling, Interrupts),
-        ];
-        let update = UpDma::<TIM3>::request(&*self.reply);
-        let reply = dma::Channel::new(self.reply, Interrupts);
-        (
-            Capture::new(channels, requests),
-            Replier::new(reply, update),
-        )
-    }
 }
 
 /// MAVLink's serial line.
@@ -269,28 +238,6 @@ impl Temperature {
     pub fn read(&mut self) -> AdcCounts {
         AdcCounts::from_num(self.reading.counts(crate::interrupt::periods))
     }
-}
-
-/// The parts of the board, set up.
-pub struct Hardware {
-    /// Gate signals.
-    pub bridge: Bridge,
-    /// Currents, voltages and Hall sensors.
-    pub converters: Converters,
-    /// The LED.
-    pub light: Output<'static>,
-    /// The throttle wire.
-    pub throttle: Throttle,
-    /// MAVLink's serial line.
-    pub mavlink: Mavlink,
-    /// The KISS telemetry.
-    pub kiss: Kiss,
-    /// The flash that keeps the parameters.
-    pub flash: Storage,
-    /// The watchdog, which does not run yet.
-    pub watchdog: Peri<'static, IWDG>,
-    /// The thermistor.
-    pub temperature: Temperature,
 }
 
 impl Hardware {

@@ -1,6 +1,8 @@
 //! The board, chosen by a feature: one file each.
 #![doc = include_str!("third.md")]
 
+mod parts;
+
 #[cfg(feature = "b-g431b-esc1")]
 mod b_g431b_esc1;
 #[cfg(feature = "vesc4-f405")]

@@ -26,6 +26,7 @@ use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
 use siskin_control::units::AdcCounts;
 
+use super::parts::parts;
 use crate::chip;
 use crate::circuit::vesc4_f405::ZERO_COUNTS;
 use crate::interrupt::gate_driver::{Pins, hear};
@@ -147,12 +148,11 @@ pub(crate) mod wire {
     }
 }
 
-/// The interrupt in which the throttle's task runs: one whose unit is not used.
-pub(crate) const EXECUTOR: interrupt::Interrupt = interrupt::CAN2_SCE;
-
-#[interrupt]
-fn CAN2_SCE() {
-    throttle::run_executor();
+parts! {
+    throttle: PB5 at TIM3 Ch2,
+    executor: CAN2_SCE,
+    edges: DMA1_CH4 DMA1_CH5,
+    replies: TIM6 DMA1_CH1,
 }
 
 /// The gate signals, set up; [`crate::interrupt::start`] takes them.
@@ -174,37 +174,6 @@ pub struct Bridge {
 pub struct Converters {
     _first: InjectedAdc<'static, ADC1, 3>,
     _second: InjectedAdc<'static, ADC2, 3>,
-}
-
-/// The throttle wire.
-pub struct Throttle {
-    pin: Peri<'static, PB5>,
-    _timers: (Peri<'static, TIM3>, Peri<'static, TIM6>),
-    rising: Peri<'static, DMA1_CH4>,
-    falling: Peri<'static, DMA1_CH5>,
-    reply: Peri<'static, DMA1_CH1>,
-}
-
-impl Throttle {
-    /// Begins to capture.
-    pub(crate) fn open(self) -> (Capture, Replier) {
-        // A wire that is not connected is at rest. A dropped pin would be given back.
-        mem::forget(CapturePin::<TIM3, Ch2>::new(self.pin, Pull::Up));
-        let requests = [
-            Dma::<TIM3, Ch1>::request(&*self.rising),
-            Dma::<TIM3, Ch2>::request(&*self.falling),
-        ];
-        let channels = [
-            dma::Channel::new(self.rising, Interrupts),
-            dma::Channel::new(self.falling, Interrupts),
-        ];
-        let update = UpDma::<TIM6>::request(&*self.reply);
-        let reply = dma::Channel::new(self.reply, Interrupts);
-        (
-            Capture::new(channels, requests),
-            Replier::new(reply, update),
-        )
-    }
 }
 
 /// MAVLink's serial line.
@@ -255,28 +224,6 @@ impl Temperature {
             .blocking_read(&mut self.pin, SampleTime::CYCLES144);
         AdcCounts::from_num(counts)
     }
-}
-
-/// The parts of the board, set up.
-pub struct Hardware {
-    /// Gate signals.
-    pub bridge: Bridge,
-    /// Currents and voltages.
-    pub converters: Converters,
-    /// The green LED.
-    pub light: Output<'static>,
-    /// The throttle wire.
-    pub throttle: Throttle,
-    /// MAVLink's serial line.
-    pub mavlink: Mavlink,
-    /// The KISS telemetry.
-    pub kiss: Kiss,
-    /// The flash that keeps the parameters.
-    pub flash: Storage,
-    /// The watchdog, which does not run yet.
-    pub watchdog: Peri<'static, IWDG>,
-    /// The thermistor.
-    pub temperature: Temperature,
 }
 
 impl Hardware {
