@@ -1,4 +1,4 @@
-//! One control period: [`step`] takes a sample and a set-point, and says what the bridge does.
+//! One control period: [`step()`] takes a sample and a set-point, and says what the bridge does.
 
 mod config;
 mod launch;
