@@ -47,7 +47,3 @@ pub mod throttle;
 pub mod trace;
 pub mod tune;
 pub mod units;
-
-/// True with the self-test ([`check`]), by the feature `self-test`. Without it the command for one is
-/// UNSUPPORTED, and nothing is kept for it.
-pub const SELF_TEST: bool = cfg!(any(test, feature = "self-test"));

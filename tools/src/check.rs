@@ -125,7 +125,7 @@ fn why(result: MavResult) -> &'static str {
             "not now; it needs a shaft at rest, no fault, and the throttle at zero or unplugged"
         }
         MavResult::MAV_RESULT_UNSUPPORTED => {
-            "this component has none: its image is older than this program, or its chip has no room for it"
+            "this component has none: is its image older than this program?"
         }
         MavResult::MAV_RESULT_DENIED => "denied; is the link signed with a key?",
         _ => "ended by the ESC",

@@ -21,7 +21,6 @@
 
 use core::ops::Range;
 
-use crate::SELF_TEST;
 use crate::params::{ParamId, Params};
 
 /// A kind of measurement.
@@ -108,12 +107,7 @@ static ROWS: [Row; ROWS_LEN] = [
     row("off", "A", (-0.1, 0.1), Basis::Limit),
 ];
 
-/// None without the self-test, so that nothing is kept for it.
-const ITEMS: usize = if SELF_TEST {
-    SINGLE + 3 * (ROWS_LEN - SINGLE)
-} else {
-    0
-};
+const ITEMS: usize = SINGLE + 3 * (ROWS_LEN - SINGLE);
 
 /// One line's subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,7 +149,7 @@ pub struct Report {
     /// Not a number if nothing was measured.
     values: [f32; ITEMS],
     /// The greatest current that the board can show, and a count of it, A.
-    scale_a: [(f32, f32); SELF_TEST as usize],
+    scale_a: (f32, f32),
 }
 
 /// A line of a self-test.
@@ -186,7 +180,7 @@ impl Report {
     pub const fn new(range_a: f32, count_a: f32) -> Self {
         Self {
             values: [f32::NAN; ITEMS],
-            scale_a: [(range_a, count_a); SELF_TEST as usize],
+            scale_a: (range_a, count_a),
         }
     }
 
@@ -235,7 +229,7 @@ impl Report {
     /// Returns true if the values of a kind that each phase has are within their bounds.
     pub(super) fn holds(&self, kind: Kind, params: &Params) -> bool {
         let first = Item::of(kind, 0).place();
-        !SELF_TEST || self.fit(first..first + 3, params)
+        self.fit(first..first + 3, params)
     }
 
     #[inline(never)]
@@ -253,7 +247,7 @@ impl Report {
             let phase = (place - SINGLE) % 3;
             (SINGLE + (place - SINGLE) / 3, ["_a", "_b", "_c"][phase])
         };
-        let (range_a, count_a) = self.scale_a.first().copied().unwrap_or_default();
+        let (range_a, count_a) = self.scale_a;
         let row = &ROWS[kind];
         let base = match row.of {
             Basis::One => 1.0,

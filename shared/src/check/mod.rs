@@ -23,7 +23,6 @@ mod items;
 
 pub use items::{Item, Kind, Line, Report};
 
-use crate::SELF_TEST;
 use crate::drive::{Phase, Pull, Sample, Snapshot};
 use crate::math::{Real, square_root};
 use crate::params::{Board, Params};
@@ -63,9 +62,6 @@ const UP_PERCENT: f32 = 90.0;
 
 /// The greatest reading of a terminal, counts.
 const FULL_SCALE: f32 = 4095.0;
-
-/// Phases whose currents are summed; none without the self-test.
-const SUMMED: usize = if SELF_TEST { 3 } else { 0 };
 
 /// The step of a self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,8 +110,8 @@ pub struct Check {
     /// Looks in this step.
     looks: u8,
     /// Sums of the readings of the currents, and of their squares, A.
-    sums: [f32; SUMMED],
-    squares: [f32; SUMMED],
+    sums: [f32; 3],
+    squares: [f32; 3],
     /// The results so far.
     pub report: Report,
 }
@@ -126,8 +122,8 @@ impl Check {
         Self {
             step: Step::PowerUp,
             looks: 0,
-            sums: [0.0; SUMMED],
-            squares: [0.0; SUMMED],
+            sums: [0.0; 3],
+            squares: [0.0; 3],
             report: Report::new(board.current_range_a, board.current_a_per_count),
         }
     }
@@ -141,7 +137,6 @@ impl Check {
     /// The pull that is asked of the drive, while nothing turns the motor.
     pub fn pull(&self) -> Option<Pull> {
         match self.step {
-            _ if !SELF_TEST => None,
             Step::Over | Step::PowerUp => None,
             Step::Listen | Step::Shaft => Some(Pull::Open),
             Step::Pull(pull) => Some(pull),
@@ -244,8 +239,8 @@ impl Check {
     fn go(&mut self, step: Step) -> Outcome {
         self.step = step;
         self.looks = 0;
-        self.sums = [0.0; SUMMED];
-        self.squares = [0.0; SUMMED];
+        self.sums = [0.0; 3];
+        self.squares = [0.0; 3];
         Outcome::Progress(match step {
             Step::Over | Step::PowerUp | Step::Listen => 0,
             Step::Shaft => 30,

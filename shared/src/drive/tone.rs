@@ -22,7 +22,6 @@ use super::slow::{self, CYCLE};
 use super::state::Seen;
 use super::turn::{bus_current, reading};
 use super::{Bridge, Phase, Setpoint, State, pull};
-use crate::SELF_TEST;
 use crate::control::catch::Rotor;
 use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
@@ -104,7 +103,7 @@ impl Playing {
 /// was to begin is asked for any more. False where the set-point and the phase have nothing to do with that.
 #[cold]
 pub(super) fn follow(config: &super::Config, state: &mut State, setpoint: Setpoint) -> bool {
-    let pulls = SELF_TEST && matches!(setpoint, Setpoint::Pull(_));
+    let pulls = matches!(setpoint, Setpoint::Pull(_));
     let plays = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
     let rests = launch::wish(config, setpoint) == Wish::Rest;
     let braked = state.tone.braked;
@@ -141,7 +140,7 @@ pub(super) fn period(
     currents: [AdcCounts; 3],
     setpoint: Setpoint,
 ) -> Option<Bridge> {
-    if SELF_TEST && let Setpoint::Pull(pull) = setpoint {
+    if let Setpoint::Pull(pull) = setpoint {
         return Some(pull::period(config, state, currents, pull));
     }
     let (Some(tone), Setpoint::Tone(pitch)) = (&config.tone, setpoint) else {

@@ -1,7 +1,6 @@
 //! The self-test as the ESC runs and reports it.
 
 use super::Esc;
-use crate::SELF_TEST;
 use crate::check::{Outcome, Probe, Sight};
 use crate::drive::Snapshot;
 use crate::mavlink::Warning;
@@ -10,9 +9,6 @@ impl Esc {
     /// Goes on with a self-test, if there is one, by what the board measures; to be called after each
     /// [`Esc::poll`].
     pub fn test_itself(&mut self, snapshot: &Snapshot, probe: &mut impl Probe) {
-        if !SELF_TEST {
-            return;
-        }
         let sight = Sight {
             snapshot,
             scale: &self.scale,

@@ -3,7 +3,6 @@
 
 use super::Esc;
 use super::storage::Unstored;
-use crate::SELF_TEST;
 use crate::input::News;
 use crate::input::calibration::Step;
 use crate::input::command::Order;
@@ -36,8 +35,7 @@ impl Esc {
         match act {
             Act::Beep => self.sound.play(now_us, Tune::Beacon(Beacon::One)),
             Act::Calibrate => throttle.reach(|throttle| throttle.calibrate(now_us, true)),
-            Act::Check if SELF_TEST => self.check.begin(),
-            Act::Check => {}
+            Act::Check => self.check.begin(),
             Act::EndCalibration => throttle.reach(|throttle| throttle.calibrate(now_us, false)),
         }
     }

@@ -13,7 +13,6 @@ use super::identity::{Identity, Role};
 use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;
-use crate::SELF_TEST;
 use crate::input::authority::{self, DriveStatus};
 
 mod calibration;
@@ -226,7 +225,7 @@ impl Commands {
             }
             CONFIGURE_ACTUATOR => return self.configure(command, drive, context, replies),
             PREFLIGHT_CALIBRATION => self.calibrate(command, drive, context, replies),
-            RUN_PREARM_CHECKS if SELF_TEST && (command.exact || self.role == Role::Standalone) => {
+            RUN_PREARM_CHECKS if command.exact || self.role == Role::Standalone => {
                 self.check(command, drive, context)
             }
             COMPONENT_ARM_DISARM => arm_disarm(command.choice(0), context),

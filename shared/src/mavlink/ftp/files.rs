@@ -5,7 +5,6 @@ use super::packed::Selection;
 use super::sink::Sink;
 use super::text;
 use super::view::View;
-use crate::SELF_TEST;
 use crate::checksum::checksum;
 
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
@@ -85,12 +84,6 @@ static ENTRIES: [Entry; 8] = [
     },
 ];
 
-/// Those that there are: the last one with the self-test.
-fn entries() -> &'static [Entry] {
-    let [others @ .., _] = &ENTRIES;
-    if SELF_TEST { &ENTRIES } else { others }
-}
-
 /// One file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct File {
@@ -107,7 +100,7 @@ impl File {
             Some(at) => (path.get(..at)?, path.get(at + 1..)),
             None => (path, None),
         };
-        let entry = entries().iter().find(|entry| {
+        let entry = ENTRIES.iter().find(|entry| {
             path.strip_prefix(entry.folder.as_bytes()) == Some(entry.name.as_bytes())
         })?;
         let selection = match (&entry.content, query) {
@@ -125,8 +118,7 @@ impl File {
             Content::Parameters => self.selection.write(view.params, view.board, sink),
             Content::Faults => text::faults(view, sink),
             Content::Statistics => text::statistics(view, sink),
-            Content::Check if SELF_TEST => text::check(view, sink),
-            Content::Check => {}
+            Content::Check => text::check(view, sink),
         }
     }
 
@@ -144,7 +136,7 @@ impl Entry {
         let path = trim(path);
         let mut before = 0;
         let mut error = Error::FileNotFound;
-        for entry in entries() {
+        for entry in &ENTRIES {
             if trim(entry.folder.as_bytes()) == path {
                 if before == number {
                     return Ok(entry);
@@ -160,7 +152,7 @@ impl Entry {
     /// and a zero.
     pub(super) fn write_rest(&'static self, view: &View, sink: &mut Sink) {
         let mut begun = false;
-        for entry in entries() {
+        for entry in &ENTRIES {
             begun |= core::ptr::eq(entry, self);
             if !begun || entry.folder != self.folder {
                 continue;
