@@ -6,6 +6,7 @@ use core::mem;
 
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
+use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::adc::vals::SampleTime;
 use embassy_stm32::peripherals::{
     DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4, DMA1_CH5, DMA1_CH6, IWDG, PA15, PB3, PB4, PB6, TIM1,
@@ -15,6 +16,7 @@ use embassy_stm32::timer::input_capture::CapturePin;
 use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc};
+use siskin_control::check::{Item, Kind};
 use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
@@ -303,4 +305,25 @@ pub(crate) fn prepare(_bridge: Bridge, _converters: Converters) -> Registers {
 /// Sets the comparators' level for a bound on the phase currents, peak amperes.
 pub(crate) fn set_trip(phase_a: f32) {
     comparators::set_level(TRIP.level(phase_a));
+}
+
+/// nBOOT0 and nSWBOOT0 among the option bytes (RM0440, FLASH_OPTR): with the first set and the second clear the
+/// chip starts from its flash whatever the level of PB8, BOOT0, which is a Hall sensor's here.
+const BOOT_OPTIONS: (u32, u32) = (1 << 27, 1 << 26);
+
+/// Measures an item of the self-test that is this board's own. The full scale and the slow oscillator are not
+/// measured.
+pub(crate) fn own(item: Item) -> Option<f32> {
+    match item.kind {
+        Kind::OptionBytes => {
+            let (set, clear) = BOOT_OPTIONS;
+            let sound = FLASH.optr().read().0 & (set | clear) == set;
+            Some(f32::from(u8::from(sound)))
+        }
+        Kind::Comparator => {
+            let level = comparators::search(item.phase.into());
+            Some(level.map_or(f32::NAN, |level| TRIP.amperes(level)))
+        }
+        _ => None,
+    }
 }

@@ -24,6 +24,7 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
+use siskin_control::check::Item;
 use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
@@ -335,6 +336,11 @@ pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
 
 /// No hardware trips at a level that could be set.
 pub(crate) fn set_trip(_phase_a: f32) {}
+
+/// No item of the self-test is this board's own: it has neither comparators nor such option bytes.
+pub(crate) fn own(_item: Item) -> Option<f32> {
+    None
+}
 
 /// nFAULT, at priority 1: not even the tasks' critical sections hold it up.
 #[interrupt]

@@ -39,6 +39,11 @@ impl TripCircuit {
         let level = (self.bias_v + trip_a * self.v_per_a) / self.v_per_step;
         level as u16
     }
+
+    /// The current at which a level trips, A.
+    pub(crate) fn amperes(&self, level: u16) -> f32 {
+        (f32::from(level) * self.v_per_step - self.bias_v) / self.v_per_a
+    }
 }
 
 #[cfg(test)]
@@ -52,15 +57,11 @@ mod tests {
         v_per_step: 3.3 / 4096.0,
     };
 
-    fn amperes(level: u16) -> f32 {
-        (f32::from(level) * CIRCUIT.v_per_step - CIRCUIT.bias_v) / CIRCUIT.v_per_a
-    }
-
     #[test]
     fn the_level_is_within_a_step_below_1_6_times_the_bound() {
         for tenths in 10..250 {
             let bound = tenths as f32 / 10.0;
-            let trip = amperes(CIRCUIT.level(bound));
+            let trip = CIRCUIT.amperes(CIRCUIT.level(bound));
             let wanted = 1.6 * bound;
             assert!(
                 (wanted - 0.48..wanted + 0.01).contains(&trip),
@@ -72,7 +73,7 @@ mod tests {
     #[test]
     fn no_bound_takes_it_above_the_rating() {
         for bound in [25.0, 60.0, 1e9, f32::INFINITY, f32::NAN] {
-            let trip = amperes(CIRCUIT.level(bound));
+            let trip = CIRCUIT.amperes(CIRCUIT.level(bound));
             assert!((39.5..40.01).contains(&trip), "{bound}: {trip}");
         }
     }

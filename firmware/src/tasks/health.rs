@@ -6,7 +6,7 @@ use embassy_time::{Duration, Instant};
 use siskin_control::check::{Item, Probe};
 use siskin_control::drive::Sample;
 
-use crate::board::{NTC, Temperature};
+use crate::board::{self, NTC, Temperature};
 use crate::interrupt::Registers;
 use crate::interrupt::sample::sample;
 
@@ -52,8 +52,7 @@ impl Probe for Health {
         sample(&Registers::CHIP)
     }
 
-    fn own(&mut self, _item: Item) -> Option<f32> {
-        // The board that has the self-test has neither comparators nor such options.
-        None
+    fn own(&mut self, item: Item) -> Option<f32> {
+        board::own(item)
     }
 }

@@ -7,11 +7,19 @@
 use embassy_stm32::pac::comp::Comp;
 use embassy_stm32::pac::comp::vals::{Hysteresis, Inm};
 use embassy_stm32::pac::dac::vals::Mode;
+use embassy_stm32::pac::timer::regs::SrAdv;
 use embassy_stm32::pac::{COMP1, COMP2, COMP4, DAC3, RCC, TIM1};
 
 /// The comparators with the level that each compares with. All get the first of INPSEL: PA1, PA7
 /// and PB0.
 const COMPARATORS: [Comp; 3] = [COMP1, COMP2, COMP4];
+
+/// The highest level.
+const FULL_SCALE: u16 = 4095;
+
+/// From a level to an output that follows it, cycles of the core: 10 µs, where the DAC takes up to 3 µs without
+/// its buffer (data sheet of the STM32G431) and the comparator 0.1 µs.
+const SETTLE: u32 = 1_700;
 
 /// Sets the comparators up with a level of 4096, and lets them break the PWM. The timer's clock must
 /// be on.
@@ -53,4 +61,40 @@ pub(crate) fn set_level(level: u16) {
     for channel in 0..2 {
         DAC3.dhr12r(channel).write(|w| w.set_dhr(level));
     }
+}
+
+/// The highest level, of 4096, at which a comparator would trip now; nothing where it does not trip at 0, or
+/// does at full scale. To be called while the bridge is off: none of them breaks the PWM meanwhile, for
+/// 0.2 ms.
+pub(crate) fn search(comparator: usize) -> Option<u16> {
+    let breaking = TIM1.af1().read();
+    TIM1.af1().modify(|w| {
+        for number in [0, 1, 3] {
+            w.set_bkcmpe(number, false);
+        }
+    });
+    let given = DAC3.dhr12r(0).read().dhr();
+    let trips_at = |level| {
+        set_level(level);
+        cortex_m::asm::delay(SETTLE);
+        COMPARATORS[comparator].csr().read().value()
+    };
+    let (mut low, mut high) = (0, FULL_SCALE);
+    let found = trips_at(low) && !trips_at(high);
+    while high - low > 1 {
+        let middle = (low + high) / 2;
+        if trips_at(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    set_level(given);
+    cortex_m::asm::delay(SETTLE);
+    // Bits written as 1 stay as they are.
+    let mut others = SrAdv(!0);
+    others.set_bif(0, false);
+    TIM1.sr().write_value(others);
+    TIM1.af1().write_value(breaking);
+    found.then_some(low)
 }

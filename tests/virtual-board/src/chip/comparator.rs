@@ -20,6 +20,8 @@ const CHANNELS: [usize; 3] = [0, 1, 1];
 struct Comparator {
     control: Csr,
     output: bool,
+    /// It never trips.
+    dead: bool,
 }
 
 /// The comparators. Their registers are a word each, COMP1's at 0.
@@ -32,6 +34,23 @@ impl Comparators {
     /// As they are after a reset.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// As after a reset of the chip; one that is dead stays so.
+    pub(crate) fn reset(&mut self) {
+        for comparator in &mut self.comparators {
+            *comparator = Comparator {
+                dead: comparator.dead,
+                ..Comparator::default()
+            };
+        }
+    }
+
+    /// From now on a comparator never trips, by its number.
+    pub(crate) fn kill(&mut self, number: u8) {
+        if let Some(which) = index(number) {
+            self.comparators[which].dead = true;
+        }
     }
 
     /// The pin (port, number; 0 is port A) at a comparator's plus input, by its number, while it is
@@ -56,7 +75,7 @@ impl Comparators {
             .volts(CHANNELS[which])
             .is_some_and(|level| volts > level);
         let inverted = control.polarity() == Polarity::INVERTED;
-        comparator.output = control.en() && above != inverted;
+        comparator.output = control.en() && !comparator.dead && above != inverted;
         comparator.output
     }
 }

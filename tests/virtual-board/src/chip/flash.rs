@@ -53,6 +53,8 @@ pub struct Flash {
     control: Cr,
     status: Sr,
     torn: Eccr,
+    /// The option bytes.
+    pub(crate) options: u32,
     /// Whether ADDR_ECC counts double words and not bytes.
     torn_by_words: bool,
     /// How often the program has removed ECCD.
@@ -84,6 +86,7 @@ impl Flash {
             control,
             status: Sr(0),
             torn: Eccr(0),
+            options: OPTIONS,
             torn_by_words: false,
             torn_removed: 0,
             lock: Lock::Closed,
@@ -104,6 +107,7 @@ impl Flash {
         let [line, torn] = [self.line, self.torn.eccd()];
         *self = Self {
             fails: self.fails,
+            options: self.options,
             torn_by_words: self.torn_by_words,
             torn_removed: self.torn_removed,
             line,
@@ -364,7 +368,7 @@ impl Part for Flash {
                 Ok(control.0)
             }
             0x18 => Ok(self.torn.0),
-            0x20 => Ok(OPTIONS),
+            0x20 => Ok(self.options),
             _ => Err(Unmodelled),
         }
     }

@@ -90,8 +90,11 @@ impl Parts {
         let empty = Flash::new(Memory::new(0, 0, 0), 0..0);
         let flash = mem::replace(&mut self.flash, empty);
         let rcc = mem::take(&mut self.rcc);
+        let mut comparators = mem::take(&mut self.comparators);
+        comparators.reset();
         *self = Self {
             rcc,
+            comparators,
             ..Self::new(flash)
         };
     }

@@ -84,18 +84,8 @@ impl World {
         if may == [false; 3] && !self.coupling.breaks {
             return;
         }
-        let outside = self.outside();
-        let parts = &mut self.parts;
-        let mut breaks = false;
-        for (number, may) in COMPARATORS.into_iter().zip(may) {
-            let volts = parts
-                .comparators
-                .pin(number)
-                .and_then(|pin| outside.volts(pin));
-            let trips =
-                volts.is_some_and(|volts| parts.comparators.level(number, volts, &parts.dac));
-            breaks |= may && trips;
-        }
+        let trips = self.compare();
+        let breaks = may.into_iter().zip(trips).any(|(may, trips)| may && trips);
         if breaks != self.coupling.breaks {
             self.coupling.breaks = breaks;
             if breaks {
@@ -107,6 +97,23 @@ impl World {
             };
             self.parts.tim1.set_break(breaks, &mut context);
         }
+    }
+
+    /// The comparators look at what the bench was taken to, and say whether they trip.
+    fn compare(&mut self) -> [bool; 3] {
+        let outside = self.outside();
+        let parts = &mut self.parts;
+        COMPARATORS.map(|number| {
+            let pin = parts.comparators.pin(number);
+            let volts = pin.and_then(|pin| outside.volts(pin));
+            volts.is_some_and(|volts| parts.comparators.level(number, volts, &parts.dac))
+        })
+    }
+
+    /// The comparators look at the present, for who reads their outputs.
+    pub(super) fn look(&mut self) {
+        self.coupling.reach(self.now);
+        self.compare();
     }
 
     /// What the sensors are at now, before any noise.

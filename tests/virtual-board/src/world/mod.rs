@@ -32,6 +32,9 @@ const INTERRUPTS: u16 = 16;
 /// Reserved up to the SRAM (RM0440, table 3): a stack that leaves its memory comes there.
 const RESERVED: std::ops::Range<u32> = 0x1fff_8000..0x2000_0000;
 
+/// The comparators' registers.
+const COMPARATORS: std::ops::Range<u32> = 0x4001_0200..0x4001_0300;
+
 /// The processor's clock after a reset: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
 
@@ -224,6 +227,16 @@ impl World {
         &mut self.parts
     }
 
+    /// A comparator of the board's, by its number, never trips from now on.
+    pub fn kill_comparator(&mut self, number: u8) {
+        self.parts.comparators.kill(number);
+    }
+
+    /// Sets the option bytes.
+    pub fn set_options(&mut self, options: u32) {
+        self.parts.flash.options = options;
+    }
+
     /// Moves the grounds of the three shunts above the chip's, V: currents beside them do so on a board.
     pub fn shift_grounds(&mut self, grounds_v: [f64; 3]) {
         self.coupling.grounds_v = grounds_v;
@@ -372,6 +385,9 @@ impl Surroundings for World {
         } else if UNIQUE_ID.contains(&address) {
             ID[((address - UNIQUE_ID.start) / 4) as usize]
         } else {
+            if COMPARATORS.contains(&address) {
+                self.look();
+            }
             let value = self.access(address, |part, offset, context| part.read(offset, context))?;
             self.settle();
             value

@@ -175,7 +175,7 @@ impl World {
             (0x38, 28) => parts.pwr = crate::chip::pwr::Pwr::new(),
             (0x40, 0) => {
                 parts.syscfg = crate::chip::syscfg::Syscfg::new();
-                parts.comparators = crate::chip::comparator::Comparators::new();
+                parts.comparators.reset();
                 parts.op_amps = crate::chip::opamp::OpAmps::new();
             }
             (0x40, 11) => parts.tim1.reset(&mut context),

@@ -7,6 +7,7 @@
 //! | [`replies`] | a flight controller's decoder reads each reply at DShot300, 600 and 1200 |
 //! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
 //! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
+//! | [`self_test`] | a sound board passes its self-test, and each defect is named |
 //! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
 //! | [`damaged`] | a damaged image never turns the bridge on |
 //! | [`agreement`] | the control's state and the motor are those of the emulator |
@@ -26,5 +27,6 @@ mod failures;
 mod flight_controller;
 mod readings;
 mod replies;
+mod self_test;
 mod storage;
 mod throttle;

@@ -1,0 +1,78 @@
+//! The image tests its board: one that is sound passes, and each defect is named. Run with `--release`.
+
+use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
+
+use crate::common::{Board, MS, Throttle, image};
+
+/// nBOOT0 and nSWBOOT0 of the option bytes.
+const N_BOOT0: u32 = 1 << 27;
+const N_SW_BOOT0: u32 = 1 << 26;
+
+const PASSED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
+const FAILED: MavResult = MavResult::MAV_RESULT_FAILED;
+
+/// The result of a self-test by command, at zero throttle.
+fn check(board: &mut Board) -> MavResult {
+    board.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
+    board.run(2_000 * MS);
+    let acks = board.heard.messages::<COMMAND_ACK_DATA>();
+    let (_, ack) = acks.last().expect("an answer");
+    assert_eq!(ack.command, MavCmd::MAV_CMD_RUN_PREARM_CHECKS);
+    ack.result
+}
+
+/// What was told of items out of their bounds.
+fn named(board: &mut Board) -> Vec<String> {
+    let mut texts = board.heard.texts();
+    texts.retain(|text| text.starts_with("Self-test: "));
+    texts
+}
+
+#[test]
+fn a_sound_board_passes() {
+    let mut board = Board::new(&image(), &[]);
+    board.throttle = Throttle::Dshot(0);
+    board.run(1_000 * MS);
+    let result = check(&mut board);
+    assert_eq!(named(&mut board), [""; 0]);
+    assert_eq!(result, PASSED);
+    // The comparators protect it still: their levels are as they were.
+    board.throttle = Throttle::Dshot(1_048);
+    board.run(1_500 * MS);
+    assert!(board.rpm() > 3_000.0, "{} rpm", board.rpm());
+}
+
+#[test]
+fn a_comparator_that_never_trips_is_named_and_keeps_the_motor_off() {
+    for (number, item) in [
+        (1, "comparator_a"),
+        (2, "comparator_b"),
+        (4, "comparator_c"),
+    ] {
+        let mut board = Board::new(&image(), &[]);
+        board.world().kill_comparator(number);
+        board.throttle = Throttle::Dshot(0);
+        board.run(1_000 * MS);
+        assert_eq!(named(&mut board), [format!("Self-test: {item}")]);
+        board.throttle = Throttle::Dshot(1_048);
+        board.run(300 * MS);
+        assert!(board.rpm().abs() < 1.0, "{} rpm", board.rpm());
+        board.throttle = Throttle::Dshot(0);
+        assert_eq!(check(&mut board), FAILED);
+    }
+}
+
+#[test]
+fn option_bytes_by_which_a_pin_decides_are_named() {
+    for (options, sound) in [(N_BOOT0, true), (N_BOOT0 | N_SW_BOOT0, false), (0, false)] {
+        let mut board = Board::new(&image(), &[]);
+        board.world().set_options(0xF3EF_F8AA | options);
+        board.run(300 * MS);
+        let wanted: &[&str] = if sound {
+            &[]
+        } else {
+            &["Self-test: option_bytes"]
+        };
+        assert_eq!(named(&mut board), wanted, "{options:#x}");
+    }
+}
