@@ -1,6 +1,7 @@
 //! From the command to the motor to the drive's set-point.
 
-use crate::drive::{Setpoint, tone};
+use crate::drive::Setpoint;
+use crate::drive::config::tone;
 use crate::input::authority::Command;
 use crate::input::{Share, reverse};
 use crate::math::{Real, TopProduct};

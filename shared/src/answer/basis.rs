@@ -1,6 +1,7 @@
 //! The part of the drive's configuration that answers need.
 
-use crate::drive::{ATTEMPTS, Fault, Snapshot, six_step};
+use crate::drive::config::six_step;
+use crate::drive::{ATTEMPTS, Fault, Snapshot};
 use crate::params::{self, ParamId, Params};
 use crate::units::{Current, Scale};
 

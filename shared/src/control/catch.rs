@@ -34,6 +34,7 @@ pub use state::{Config, LOOK_PERIODS, State};
 use state::{LOOK_SHIFT, SUM_FRACTION, Turn};
 
 use crate::math::{SinCos, TopProduct, atan2_turns};
+use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Speed};
 use compare::Difference;
 
@@ -55,6 +56,21 @@ pub enum Rotor {
         /// Signed speed.
         omega: Speed,
     },
+}
+
+impl Trace for Rotor {
+    /// As many words whatever is known, so that a word's place tells what it is.
+    #[inline]
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        let (kind, theta, omega) = match *self {
+            Self::Unknown => (0, Angle::ZERO, Speed::ZERO),
+            Self::Standing => (1, Angle::ZERO, Speed::ZERO),
+            Self::Turning { theta, omega } => (2, theta, omega),
+        };
+        out(kind);
+        theta.trace(out);
+        omega.trace(out);
+    }
 }
 
 /// Takes one sample of the terminals a, b, c with the bridge off and says what is known by now.

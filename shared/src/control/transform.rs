@@ -3,7 +3,7 @@
 use fixed::types::{I0F32, I1F31};
 
 use crate::math::{Held, Number, SinCos, TopProduct, TopSum};
-use crate::trace::traced;
+use crate::trace::{Trace, traced};
 use crate::units::{AdcCounts, Angle, Current, TurnedVoltage, Voltage};
 
 traced! {
@@ -35,6 +35,14 @@ pub struct Order {
     root_3_quarter: I0F32,
     /// ±1.
     sign: i32,
+}
+
+impl Trace for Order {
+    /// Whether the phases b and c have changed places.
+    #[inline]
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        (*self == Self::SWAPPED).trace(out);
+    }
 }
 
 impl Order {

@@ -1,6 +1,8 @@
 //! Everything that a control period reads and does not change.
 
-use super::{six_step, tone};
+pub mod six_step;
+pub mod tone;
+
 use crate::control::delay::Delay;
 use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
@@ -106,7 +108,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// The same drive, told where its rotor is by [`State::place`](super::State::place) in place of
+    /// The same drive, told where its rotor is by [`State::place`](crate::drive::State::place) in place of
     /// an observer. It starts from standstill without aligning the rotor.
     pub fn with_position_given(self) -> Self {
         Self {

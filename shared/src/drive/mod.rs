@@ -1,82 +1,75 @@
 //! One control period: [`step()`] takes a sample and a set-point, and says what the bridge does.
+//!
+//! # A period, from top to bottom
+//! `step.rs`: the mode is decided (`asked.rs`, and of what the rotor does each mode's own file), the sample is
+//! read and judged (`shared.rs`, [`protection`](crate::protection)), the mode does its own work, and says what
+//! the bridge does and perhaps why it ends. The outer loop's work is sliced over 32 periods (`schedule.rs`).
+//! Observer and regulator are chosen in one place (`foc/period.rs`).
+//!
+//! # The modes
+//! | mode | file | what it does and remembers |
+//! |---|---|---|
+//! | Idle, Sense | `off.rs` | the bridge is off: the rotor is watched, the currents' zeros are measured |
+//! | Charge | `charge.rs` | the drivers' supplies are charged, then the drive is made ready (`foc/begin.rs`) |
+//! | Park, Ramp | `foc/open_loop.rs` | the frame is imposed, the rotor follows |
+//! | Run, Stopping | `foc/` | field-oriented control |
+//! | Brake | `foc/short.rs` | the low sides are on, the observer goes on |
+//! | Park to Brake | `six_step/` | the same by zero crossings, where the six-step drive is configured |
+//! | Tone | `tone.rs`, `self_test.rs` | the phases switch to be heard, or to be tested |
+//!
+//! All changes of mode, each with its reason, are the table in `transitions.rs`; they are made by one
+//! function, `State::change`:
+//!
+//! ```text
+//!        Drive, Sound           Sensed            Stands            Aligned
+//!  Idle --------------> Sense ----------> Charge ----------> Park ----------> Ramp
+//!   ^ ^                   |                | | |               |   Released     |
+//!   | |     Released,     |                | | |               +----------------+--> Idle or
+//!   | +-------------------+----------------+ | |                                |    Brake
+//!   |       TooFast                          | | Caught                         |
+//!   |                                 Sounds | +---------------> Run <----------+ HandedOver
+//!   | Released    Shorted                    v                  |   ^
+//!   +---------- Tone ------> Brake          Tone       Released |   | Resumed
+//!   ^             | Drive     |  |                              v   |
+//!   |             v           |  +--- Resumed ---> Run       Stopping <--- CaughtBackwards (Charge)
+//!   |           Sense <-------+ Drive, Sound                    |
+//!   |                                                           | Stopped
+//!   |                                                           +--> Idle or Brake
+//!   +--- Coasts (Run, Stopping), Failed (Ramp, Run, Stopping), Tripped (any)
+//! ```
+//!
+//! # The files' order
+//! Each file uses those before it, and none behind it: `phase`, `pull`, `io`, `config`, `transitions`,
+//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `foc`, `six_step`, `snapshot`, `state`,
+//! `asked`, `step`.
 
-mod config;
-mod launch;
+mod asked;
+mod charge;
+pub mod config;
+mod foc;
+mod io;
+mod off;
 mod phase;
 mod pull;
-mod rest;
-pub mod six_step;
-mod slow;
+mod schedule;
+mod seen;
+mod self_test;
+mod shared;
+mod six_step;
+mod snapshot;
 mod state;
 mod step;
-pub mod tone;
-mod turn;
+mod tone;
+mod transitions;
 
 pub use crate::protection::{Fault, Faults};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop};
+pub use io::{Bridge, Sample, Setpoint};
 pub use phase::Phase;
 pub use pull::Pull;
-pub use state::{Snapshot, State};
+pub use snapshot::Snapshot;
+pub use state::State;
 pub use step::step;
-
-use fixed::types::I1F31;
-
-use crate::units::{AdcCounts, Current, Duty, Speed};
-
-/// What the converter read for one control period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    /// Phase currents a, b, c into the motor, as the converter reads them: with the sensors' offsets
-    /// about a nominal zero, at the middle of the low sides' on-time.
-    pub currents: [AdcCounts; 3],
-    /// The supply's voltage.
-    pub bus: AdcCounts,
-    /// Voltages of the motor's terminals a, b, c against the supply's negative pole.
-    pub terminals: [AdcCounts; 3],
-    /// Hall sensors a, b, c in bits 0, 1, 2: high while the rotor's flux through the phase is
-    /// positive. Without sensors their pull-ups read 7.
-    pub hall: u8,
-}
-
-/// What the motor is asked to do; it comes from something that may turn it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setpoint {
-    /// No drive: coast or brake, as configured.
-    Stop,
-    /// The same, because the throttle is at zero: that also ends a latched fault.
-    Zero,
-    /// No drive, the bridge off, for a reason that something outside the interrupt has found.
-    Fault(Fault),
-    /// Turn at this electrical speed; negative ones, here and below, are the other way.
-    Speed(Speed),
-    /// Hold this current i_q.
-    Torque(Current),
-    /// Apply this share of the voltage that the supply can give.
-    Voltage(I1F31),
-    /// Play a tone of this pitch, in cycles a period, without turning the motor: of at most
-    /// [`tone::PITCH_MAX`]; zero is a pause between two notes.
-    Tone(Speed),
-    /// Hold this current i_q for a test; the start uses no more than a test may either.
-    Test(Current),
-    /// Pull half-bridges to the supply's poles without turning the motor, once it is seen to stand.
-    Pull(Pull),
-}
-
-/// What the inverter does until the next period.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bridge {
-    /// All switches off.
-    Off,
-    /// The low sides on for this share of the period around the sample and all else off: it charges
-    /// the supplies of the high sides' drivers.
-    Charge(Duty),
-    /// All low sides on.
-    Brake,
-    /// Each phase switches; the share of the period for which its high side is on.
-    Duty([Duty; 3]),
-    /// As `Duty`, but a phase with `None` has both switches off.
-    Legs([Option<Duty>; 3]),
-}
 
 #[cfg(test)]
 mod tests;

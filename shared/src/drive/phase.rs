@@ -1,5 +1,7 @@
 //! What the drive is doing.
 
+use crate::trace::Trace;
+
 /// What the drive is doing (start-up of the second paper, section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -44,8 +46,22 @@ impl Phase {
         matches!(self, Self::Park | Self::Ramp)
     }
 
+    /// Whether all switches are off.
+    #[inline(always)]
+    pub(super) fn is_off(self) -> bool {
+        matches!(self, Self::Idle | Self::Sense)
+    }
+
     /// Whether the motor is turned, or slowed down.
+    #[inline(always)]
     pub fn drives(self) -> bool {
         matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)
+    }
+}
+
+impl Trace for Phase {
+    #[inline]
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        out(*self as u32);
     }
 }

@@ -1,303 +1,267 @@
-//! The control period.
+//! The control period, from top to bottom.
 
-use super::state::NOT_PLAIN;
-use super::{Bridge, Config, Direction, Phase, Sample, Setpoint, State};
-use super::{launch, rest, six_step, slow, tone, turn};
-use crate::control::delay::Delay;
-use crate::control::observer::{self, compensated};
-use crate::control::regulator::{self, synchronous};
-use crate::control::{inductance, sensing};
+use super::asked::asked;
+use super::config::Config;
+use super::foc::period::period;
+use super::foc::{begin, open_loop, outer_loop, short};
+use super::io::{Asked, Bridge, Sample, Setpoint};
+use super::phase::Phase;
+use super::schedule::{self, Work};
+use super::state::State;
+use super::transitions::Why;
+use super::{charge, off, self_test, six_step, tone};
 use crate::protection;
-use crate::units::{AdcCounts, Duty};
+use crate::units::AdcCounts;
 
 /// One control period: from the sample to what the bridge does in the period that follows.
 ///
 /// Pure: no clock, no allocation, no logging, and no result but the state and the returned value.
 /// Called once a PWM period, in the interrupt of the chip and in the emulator's loop.
-///
-/// Almost every period is a plain one: the phases switch under the default observer and regulator,
-/// and nothing new is asked for. It is the same work as in any other, without the choices.
 #[inline(never)]
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
-    let same = setpoint.kind() == state.plain;
-    match (&config.observer, &config.regulator) {
-        (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
-            if same || state.plain != NOT_PLAIN && stays_plain(config, state, &setpoint) =>
-        {
-            if same {
-                slow::turn(config, state, &setpoint);
+    // Decide the mode, of what the last period has seen: while field-oriented control drives, twice a cycle
+    // of its outer loop. Before the sample is looked at, so that nothing of it must be kept meanwhile.
+    let field_oriented = if state.is_decided_for(&setpoint) {
+        match schedule::next(&mut state.foc.loops.slot) {
+            Work::Nothing => true,
+            Work::Reference => {
+                // The first period of a drive comes by here.
+                state.shared.seen.phase = state.phase;
+                outer_loop::reference(config, &mut state.foc, &state.shared, &setpoint);
+                true
             }
-            plain((observer, regulator), (config, state), &sample, &setpoint)
+            work => outer(config, state, &setpoint, work),
         }
-        _ => any(config, state, &sample, setpoint),
+    } else {
+        !asks_nothing_new(config, state, &setpoint) && decide(config, state, &setpoint)
+    };
+
+    // Sense. With the bridge off a reading is its offset, which may not have been measured yet.
+    let [a, b, c] = state.shared.currents(config, &sample);
+    let flowing = (field_oriented || !state.phase.is_off()).then_some([a, b, c]);
+    let bus = config.bus.of(sample.bus).scaled();
+    let protection = &mut state.shared.protection;
+    let fault = protection::check(&config.protection, protection, flowing, bus);
+    if let Some(fault) = fault {
+        state.change(config, Why::Tripped(fault));
     }
+
+    // The mode's own work: voltage, duties, and what is seen.
+    if field_oriented && fault.is_none() {
+        let drive = (&mut state.foc, &mut state.shared);
+        return period(config, drive, &sample, [a, b, c]);
+    }
+    if let Some(bridge) = state.enters_rest() {
+        return bridge;
+    }
+    if state.phase.is_off() {
+        return off(config, state, (&sample, &setpoint));
+    }
+    if state.phase == Phase::Brake && config.six_step.is_none() {
+        let drive = (&mut state.foc, &mut state.shared);
+        short::watch(config, drive, &sample, [a, b, c]);
+        return Bridge::Brake;
+    }
+    other(config, state, (&sample, &setpoint), [a, b, c])
 }
 
-/// Whether a period under another kind of set-point than the one before is as plain as that. Its slow
-/// work is left out: it has another turn.
-#[cold]
-#[inline(never)]
-fn stays_plain(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
-    if matches!(setpoint, Setpoint::Fault(_)) {
-        return false;
-    }
-    state.turn = (state.turn + 1) % slow::CYCLE as u8;
-    launch::follow(config, state, *setpoint);
-    let drives = state.phase.drives();
-    if drives {
-        state.plain = setpoint.kind();
-        state.seen.phase = state.phase;
-    }
-    drives
-}
-
-/// A plain period.
+/// Whether a drive that rests is asked for nothing, which ends a row of failed starts, or one that begins
+/// for what it begins for.
 #[inline(always)]
-fn plain(
-    parts: (&compensated::Config, &synchronous::Config),
-    (config, state): (&Config, &mut State),
-    sample: &Sample,
-    setpoint: &Setpoint,
-) -> Bridge {
-    if matches!(state.phase, Phase::Run | Phase::Stopping) {
-        switching(false, parts, (config, state), sample)
-    } else if state.phase.is_open_loop() {
-        open_loop(parts, (config, state), sample, setpoint)
-    } else {
-        ended(config, state, sample)
-    }
-}
-
-/// A plain period in which the phases switch.
-#[inline(always)]
-fn switching(
-    open_loop: bool,
-    parts: (&compensated::Config, &synchronous::Config),
-    (config, state): (&Config, &mut State),
-    sample: &Sample,
-) -> Bridge {
-    match sense(config, state, sample, true) {
-        Some(currents) => {
-            let drive = (config, state);
-            turn::period((open_loop, Delay::One), parts, drive, (sample, currents))
+fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
+    match (state.phase, setpoint) {
+        (Phase::Idle | Phase::Brake, Setpoint::Stop | Setpoint::Zero) => {
+            let nothing = !state.tone.shorted_before && state.shared.latch.faults.is_empty();
+            if nothing {
+                state.shared.failed_starts = 0;
+            }
+            nothing
         }
-        None => Bridge::Off,
+        (Phase::Sense, Setpoint::Speed(_)) => {
+            config.six_step.is_none() && setpoint.asks(config.both_ways) != Asked::Nothing
+        }
+        _ => false,
     }
 }
 
-/// A plain period of a start.
+/// The mode that the set-point asks for. Whether field-oriented control drives.
 #[inline(never)]
-fn open_loop(
-    parts: (&compensated::Config, &synchronous::Config),
-    (config, state): (&Config, &mut State),
-    sample: &Sample,
-    setpoint: &Setpoint,
-) -> Bridge {
-    launch::impose(config, state, setpoint);
-    switching(true, parts, (config, state), sample)
-}
-
-/// A period in which the phases cease to switch. The observer goes on in the next one.
-#[cold]
-fn ended(config: &Config, state: &mut State, sample: &Sample) -> Bridge {
-    let brakes = state.phase == Phase::Brake;
-    let sound = sense(config, state, sample, brakes).is_some();
-    state.applied[0] = [Duty::ZERO; 3];
-    if sound && brakes {
-        Bridge::Brake
-    } else {
-        Bridge::Off
-    }
-}
-
-/// What the bridge does where the phases do not switch.
-fn still(config: &Config, state: &mut State, sample: &Sample, currents: [AdcCounts; 3]) -> Bridge {
-    if state.phase == Phase::Brake {
-        let drive = (config, state);
-        match &config.observer {
-            observer::Config::Compensated(known) => turn::watch(known, drive, sample, currents),
-            any => turn::watch(any, drive, sample, currents),
-        }
-        Bridge::Brake
-    } else {
-        Bridge::Off
-    }
-}
-
-/// Any period.
-#[inline(never)]
-fn any(config: &Config, state: &mut State, sample: &Sample, setpoint: Setpoint) -> Bridge {
-    if rest::is_off(config, state) {
-        return rest::off(config, state, sample, setpoint);
-    }
-    let trips = matches!(setpoint, Setpoint::Fault(_));
-    if state.phase.drives() && config.six_step.is_none() && !trips {
-        // As in a plain period: of the supply that the sample before has shown.
-        slow::turn(config, state, &setpoint);
-        if !state.phase.drives() {
-            return ended(config, state, sample);
-        }
-    }
-    let off = matches!(state.phase, Phase::Idle | Phase::Sense);
-    if state.unread == 0 && state.switched() {
-        state.unread = 1;
-    }
-    let currents = sense(config, state, sample, !off);
-    // None, until the phases are told to switch.
-    state.applied[0] = [Duty::ZERO; 3];
+fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
+    // This period's slice of the outer loop is left out: it has another turn.
+    schedule::next(&mut state.foc.loops.slot);
     if let Setpoint::Fault(fault) = setpoint {
-        state.trip(fault);
+        state.change(config, Why::Tripped(*fault));
     }
-    let bridge = match currents {
-        Some(currents) if state.faults.is_empty() => {
-            healthy(config, state, sample, currents, setpoint)
+    if state.shared.latch.faults.is_empty()
+        && let Some(why) = asked(config, state, setpoint)
+    {
+        state.change(config, why);
+    }
+    state.decided_for(config, setpoint);
+    state.shared.seen.phase = state.phase;
+    state.is_decided()
+}
+
+/// This period's slice of field-oriented control's outer loop, and what it makes of the mode. Whether
+/// that drives on.
+// Cold, so that what it needs is not in the way of the periods without.
+#[cold]
+#[inline(never)]
+fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, work: Work) -> bool {
+    let phase = state.phase;
+    let State { foc, shared, .. } = state;
+    let mut why = None;
+    match work {
+        Work::Nothing | Work::Reference => {}
+        Work::Damp => open_loop::damp(config, foc, shared, phase),
+        Work::StartCurrent => why = open_loop::current(config, foc, shared, (phase, setpoint)),
+        Work::DeadTimeSign => outer_loop::dead_time_sign(config, foc),
+        Work::Supply => {
+            outer_loop::supply(shared);
+            if !phase.is_open_loop() {
+                outer_loop::longest_vector(config, shared);
+            }
+        }
+        Work::Bounds => {
+            outer_loop::trip_level(config, shared);
+            outer_loop::supply_bounds(config, foc, shared);
+            if !phase.is_open_loop() {
+                outer_loop::speed_bounds(config, foc, shared);
+            }
+        }
+        Work::ObserverGains => {
+            outer_loop::dead_time_sign(config, foc);
+            outer_loop::observer_gains(config, foc);
+        }
+        Work::Setpoint => {
+            outer_loop::delay_compensation(config, foc, shared);
+            outer_loop::dead_time_sign(config, foc);
+            why = asked(config, state, setpoint);
+        }
+        Work::Rotor => {
+            why = open_loop::rotor(config, foc, shared, phase);
+            if why.is_none() {
+                // One that is handed over has begun with the decoupling, and has no reference of its
+                // own yet.
+                outer_loop::dead_time_sign(config, foc);
+                outer_loop::decoupling(config, foc, shared);
+            }
+        }
+    }
+    if let Some(why) = why {
+        state.change(config, why);
+    }
+    state.shared.seen.phase = state.phase;
+    state.is_decided()
+}
+
+/// A period with the bridge off.
+#[inline(never)]
+fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoint)) -> Bridge {
+    let shared = &mut state.shared;
+    if state.phase == Phase::Idle {
+        off::watch(config, &mut state.off, shared, sample);
+        if !shared.latch.faults.is_empty()
+            && shared.latch.clear(config, *setpoint == Setpoint::Zero)
+        {
+            shared.failed_starts = 0;
+        }
+    } else if let Some(why) = off::sense(config, &mut state.off, shared, sample) {
+        state.change(config, why);
+    }
+    Bridge::Off
+}
+
+/// A period of any mode but those and field-oriented control's.
+#[inline(never)]
+fn other(
+    config: &Config,
+    state: &mut State,
+    (sample, setpoint): (&Sample, &Setpoint),
+    currents: [AdcCounts; 3],
+) -> Bridge {
+    let phase = state.phase;
+    let shared = &mut state.shared;
+    let (bridge, why) = match (phase, &config.six_step) {
+        (Phase::Charge, _) => {
+            let rotor = &mut state.off.rotor;
+            let charged = charge::period(config, &mut state.charge, rotor, &mut shared.seen);
+            let why = charged.and_then(|n| ready(config, state, (sample, setpoint), n));
+            (Bridge::Charge(config.charge.duty), why)
+        }
+        (Phase::Brake, _) => {
+            six_step::period::watch(config, (&mut state.six_step, shared), currents);
+            return Bridge::Brake;
+        }
+        (Phase::Tone, _) => return sound(config, state, currents, setpoint),
+        (Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping, Some(six_step)) => {
+            let position = six_step::given::position(config, &state.foc.observer, shared);
+            let drive = (&mut state.six_step, shared);
+            let asked = (sample, setpoint);
+            six_step::period::period(config, six_step, drive, (phase, position), asked, currents)
+        }
+        // Off has its own period, and so has what field-oriented control drives.
+        _ => return Bridge::Off,
+    };
+    if let Some(why) = why {
+        state.change(config, why);
+        state.decided_for(config, setpoint);
+    }
+    state.enters_rest().unwrap_or(bridge)
+}
+
+/// Behind Charge, `n` periods after it: what makes ready for the mode that follows.
+#[cold]
+#[inline(never)]
+fn ready(
+    config: &Config,
+    state: &mut State,
+    (sample, setpoint): (&Sample, &Setpoint),
+    n: u32,
+) -> Option<Why> {
+    let (foc, shared) = (&mut state.foc, &mut state.shared);
+    if matches!(setpoint, Setpoint::Tone(_)) {
+        // What the supply gives is all that a tone must know.
+        if n > 0 {
+            outer_loop::ready(config, foc, shared, n);
+        }
+        return (n + 1 >= tone::READY_PERIODS).then_some(Why::Sounds);
+    }
+    match &config.six_step {
+        Some(six_step) => {
+            let position = six_step::given::position(config, &foc.observer, shared);
+            let drive = (&mut state.six_step, shared);
+            Some(six_step::period::begin(
+                config,
+                six_step,
+                drive,
+                (position, setpoint),
+            ))
+        }
+        None if n > 0 => {
+            let rotor = state.off.rotor;
+            begin::begin(config, foc, shared, rotor, (sample, setpoint), n)
+        }
+        None => None,
+    }
+}
+
+/// A period of a tone or of a self-test.
+#[inline(never)]
+fn sound(
+    config: &Config,
+    state: &mut State,
+    currents: [AdcCounts; 3],
+    setpoint: &Setpoint,
+) -> Bridge {
+    let shared = &mut state.shared;
+    match (setpoint, &config.tone) {
+        (Setpoint::Pull(pull), _) => {
+            self_test::period(config, (&mut state.self_test, shared), currents, *pull)
+        }
+        (Setpoint::Tone(pitch), Some(tone)) => {
+            tone::period(config, tone, (&mut state.tone, shared), currents, *pitch)
         }
         _ => Bridge::Off,
-    };
-    let plain = state.phase.drives()
-        && state.faults.is_empty()
-        && config.delay == Delay::One
-        && config.six_step.is_none()
-        && config.adapt_l.is_none();
-    state.plain = if plain { setpoint.kind() } else { NOT_PLAIN };
-    bridge
-}
-
-/// The currents of a sample; `None` where it is a fault.
-#[inline(always)]
-fn sense(
-    config: &Config,
-    state: &mut State,
-    sample: &Sample,
-    flowing: bool,
-) -> Option<[AdcCounts; 3]> {
-    let mut currents = sensing::read(&state.sensing, sample.currents);
-    if state.unread != 0 {
-        // Not by a reference to `currents`, which would then be in memory in every period.
-        currents = doubtful(config, state, sample);
-    }
-    let bus = rest::bus(config, sample);
-    let flowing = flowing.then_some(currents);
-    if let Some(fault) = protection::check(&config.protection, &mut state.protection, flowing, bus)
-    {
-        state.trip(fault);
-        state.applied[0] = [Duty::ZERO; 3];
-        return None;
-    }
-    Some(currents)
-}
-
-/// The currents of a sample at which a phase may be unreadable.
-#[cold]
-fn doubtful(config: &Config, state: &mut State, sample: &Sample) -> [AdcCounts; 3] {
-    state.unread -= 1;
-    let duties = state.duties(config.delay);
-    state.applied[1] = state.applied[0];
-    sensing::currents(&config.sensing, &state.sensing, sample.currents, duties)
-}
-
-/// A period without a fault.
-fn healthy(
-    config: &Config,
-    state: &mut State,
-    sample: &Sample,
-    currents: [AdcCounts; 3],
-    setpoint: Setpoint,
-) -> Bridge {
-    if let Some(six_step) = &config.six_step {
-        return six_step::period(config, six_step, state, sample, currents, setpoint);
-    }
-    if state.phase == Phase::Brake && rest::stays(state, setpoint) {
-        return still(config, state, sample, currents);
-    }
-    if state.phase == Phase::Tone
-        && let Some(bridge) = tone::period(config, state, currents, setpoint)
-    {
-        return bridge;
-    }
-    launch::follow(config, state, setpoint);
-    state.seen.phase = state.phase;
-    if matches!(state.phase, Phase::Idle | Phase::Sense) {
-        // The rotor is watched from the next period on.
-        return Bridge::Off;
-    }
-    if let Some(bridge) = rest::period(config, state, sample, (currents, setpoint)) {
-        return bridge;
-    }
-    if state.phase == Phase::Charge {
-        let n = state.charge_periods - config.charge.periods;
-        launch::begin(config, state, (sample, setpoint), n);
-        return Bridge::Charge(config.charge.duty);
-    }
-    if state.phase.drives() {
-        if state.phase.is_open_loop() {
-            launch::impose(config, state, &setpoint);
-        } else if let Some(adapt) = &config.adapt_l {
-            let flux = observer::flux(&config.observer, &state.observer);
-            let wave = inductance::step(adapt, &mut state.inductance, state.seen.i.d, flux);
-            state.wanted.i.d = state.i_d + wave;
-        }
-    }
-    let parts = (&config.observer, &config.regulator);
-    if state.phase.drives() {
-        let open_loop = state.phase.is_open_loop();
-        state.seen.phase = state.phase;
-        turn::period(
-            (open_loop, config.delay),
-            parts,
-            (config, state),
-            (sample, currents),
-        )
-    } else {
-        still(config, state, sample, currents)
-    }
-}
-
-impl Setpoint {
-    /// A number for each kind.
-    #[inline(always)]
-    pub(super) fn kind(self) -> u8 {
-        match self {
-            Self::Stop => 0,
-            Self::Zero => 1,
-            Self::Fault(_) => 2,
-            Self::Speed(_) => 3,
-            Self::Torque(_) => 4,
-            Self::Voltage(_) => 5,
-            Self::Tone(_) => 6,
-            Self::Test(_) => 7,
-            Self::Pull(_) => 8,
-        }
-    }
-
-    /// The same as seen by a motor that turns the other way.
-    pub(super) fn turned(self) -> Self {
-        match self {
-            Self::Speed(speed) => Self::Speed(speed.saturating_neg()),
-            Self::Torque(current) => Self::Torque(current.saturating_neg()),
-            Self::Voltage(share) => Self::Voltage(share.saturating_neg()),
-            Self::Test(current) => Self::Test(current.saturating_neg()),
-            Self::Stop | Self::Zero | Self::Fault(_) | Self::Tone(_) | Self::Pull(_) => self,
-        }
-    }
-}
-
-impl State {
-    /// Whether phases b and c change places for the control, which always turns one way.
-    #[inline(always)]
-    pub(super) fn swapped(&self, config: &Config) -> bool {
-        (config.direction == Direction::Reversed) != self.reversed
-    }
-
-    /// Whether a phase has switched in the last two periods.
-    fn switched(&self) -> bool {
-        let [[a, b, c], [d, e, f]] = self.applied;
-        a | b | c | d | e | f != Duty::ZERO
-    }
-
-    /// The duties of the period that has elapsed at this sample.
-    #[inline(always)]
-    fn duties(&self, delay: Delay) -> [Duty; 3] {
-        self.applied[usize::from(delay == Delay::One)]
     }
 }

@@ -6,6 +6,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::params::{Board, ParamId, Params, build};
+use crate::units::{AdcCounts, Current, Speed};
 
 mod any;
 mod at_rest;
@@ -102,6 +103,12 @@ impl Bench {
 
     fn faults(&self) -> Faults {
         self.state.snapshot().faults
+    }
+
+    /// Back to work at once.
+    fn clear_faults(&mut self) {
+        self.state.shared.latch.faults = Faults::NONE;
+        self.state.shared.failed_starts = 0;
     }
 
     fn phase(&self) -> Phase {

@@ -15,176 +15,100 @@
 //! the true one, but learnt: it begins at the lesser of what each alone would take, and is doubled
 //! where twice as much has not brought the current. What both as stated would take is the most.
 
-use fixed::types::I1F31;
-
-use super::launch::{self, Wish};
-use super::slow::{self, CYCLE};
-use super::state::Seen;
-use super::turn::{bus_current, reading};
-use super::{Bridge, Phase, Setpoint, State, pull};
-use crate::control::catch::Rotor;
+use super::config::Config;
+use super::config::tone::{self, PITCH_MAX};
+use super::io::Bridge;
+use super::phase::Phase;
+use super::schedule::CYCLE;
+use super::seen::{Seen, bus_current, greatest, reading};
+use super::shared::Shared;
 use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
 use crate::control::transform::{AlphaBeta, Dq, Order};
-use crate::math::{Gain, Held, SinCos, TopProduct, magnitude};
+use crate::math::{Held, SinCos, TopProduct, magnitude};
+use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
-
-/// Highest pitch, turns a period: with eight samples a cycle the greatest of them is at most 8 %
-/// below the current's peak.
-pub const PITCH_MAX: Speed = Speed::lit("0.125");
 
 /// The least that a current is taken to need, of what the dead time takes: crossing that in steps of a
 /// quarter of so much takes some 30 half cycles.
 const DEAD_SHIFT: u32 = 3;
 
 /// The period behind Charge in which a tone begins; those before it look at the supply.
-const READY_PERIODS: u32 = 3;
+pub(super) const READY_PERIODS: u32 = 3;
 
-/// Config of the tones.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Config {
-    /// Peak that the greatest phase current is led to.
-    pub peak: Current,
-    /// Current to its share of that.
-    pub share: Gain<Current, I1F31>,
-    /// R times the peak.
-    pub resistive: Voltage,
-    /// Pitch to ωL times the peak.
-    pub reactive: Gain<Speed, Voltage>,
-    /// What the dead time takes of a vector along a phase, of the supply.
-    pub dead: I1F31,
+/// Slot of a cycle in which the supply's voltage is taken.
+const SUPPLY_SLOT: u8 = 0;
+
+/// Slot in which the longest vector is taken.
+const LONGEST_SLOT: u8 = 16;
+
+traced! {
+    /// The tone that is being played.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub(super) struct State {
+        /// Where in a cycle of the supply's looks it is.
+        slot: u8,
+        /// Turns a period; zero is a pause.
+        pitch: Speed,
+        /// The sine's angle.
+        angle: Angle,
+        /// The sine's amplitude.
+        amplitude: Voltage,
+        /// Greatest phase current since the last half cycle began.
+        peak: Current,
+        /// Voltage that the peak current needs beside the dead time's, as far as has been learnt.
+        needed: Voltage,
+        /// The low sides were on before, and will be again: at once where a tone has been played, else
+        /// when the rotor is seen to stand.
+        pub(super) shorted_before: bool,
+    }
 }
 
-/// The tone that is being played.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Playing {
-    /// Turns a period; zero is a pause.
-    pitch: Speed,
-    /// The sine's angle.
-    angle: Angle,
-    /// The sine's amplitude.
-    amplitude: Voltage,
-    /// Greatest phase current since the last half cycle began.
-    peak: Current,
-    /// Voltage that the peak current needs beside the dead time's, as far as has been learnt.
-    needed: Voltage,
-    /// The low sides were on before, and will be again: at once where a tone has been played, else
-    /// when the rotor is seen to stand.
-    pub(super) braked: bool,
-}
-
-impl Playing {
-    /// No tone, and no low sides to go back to; all else is begun by the next one.
-    pub(super) fn end(&mut self) {
+impl State {
+    /// No tone, and whether there are low sides to go back to; all else is begun by the next tone.
+    pub(super) fn end(&mut self, shorted_before: bool) {
         self.pitch = Speed::ZERO;
-        self.braked = false;
-    }
-
-    /// Every word.
-    pub(super) fn trace(&self, out: &mut impl FnMut(u32)) {
-        let Self {
-            pitch,
-            angle,
-            amplitude,
-            peak,
-            needed,
-            braked,
-        } = self;
-        out(pitch.to_bits() as u32);
-        out(angle.to_bits() as u32);
-        out(amplitude.to_bits() as u32);
-        out(peak.to_bits() as u32);
-        out(needed.to_bits() as u32);
-        out(u32::from(*braked));
+        self.shorted_before = shorted_before;
     }
 }
 
-/// Changes the phase for a tone or a test that is asked for, or that has ended, and where nothing that
-/// was to begin is asked for any more. False where the set-point and the phase have nothing to do with that.
-#[cold]
-pub(super) fn follow(config: &super::Config, state: &mut State, setpoint: Setpoint) -> bool {
-    let pulls = matches!(setpoint, Setpoint::Pull(_));
-    let plays = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
-    let rests = launch::wish(config, setpoint) == Wish::Rest;
-    let braked = state.tone.braked;
-    let stands = state.rotor == Rotor::Standing;
-    match state.phase {
-        Phase::Tone | Phase::Sense if plays => {}
-        // A test charges what it needs, and is to find a short circuit before all low sides are on.
-        Phase::Charge if pulls && stands => state.phase = Phase::Tone,
-        Phase::Charge if plays && stands => {}
-        Phase::Idle if plays && stands => to(state, Phase::Sense, braked),
-        Phase::Brake if plays && state.seen.speed == Speed::ZERO => to(state, Phase::Sense, true),
-        Phase::Tone if !rests => state.rest(Phase::Sense),
-        Phase::Tone if braked => state.rest(Phase::Brake),
-        Phase::Idle if braked && rests && stands => state.rest(Phase::Brake),
-        Phase::Tone => state.rest(Phase::Idle),
-        // Not the low sides: the rotor may turn, and is looked at until it stands.
-        Phase::Sense | Phase::Charge if rests => to(state, Phase::Idle, braked),
-        _ => return false,
-    }
-    true
-}
-
-/// On the way to a tone, or back from one that has not come to be played.
-fn to(state: &mut State, phase: Phase, braked: bool) {
-    state.rest(phase);
-    state.tone.braked = braked;
-}
-
-/// A period in which a tone or a test may be played: `None` where none is asked for.
+/// A period of a tone.
 #[cold]
 pub(super) fn period(
-    config: &super::Config,
-    state: &mut State,
+    config: &Config,
+    tone: &tone::Config,
+    (state, shared): (&mut State, &mut Shared),
     currents: [AdcCounts; 3],
-    setpoint: Setpoint,
-) -> Option<Bridge> {
-    if let Setpoint::Pull(pull) = setpoint {
-        return Some(pull::period(config, state, currents, pull));
-    }
-    let (Some(tone), Setpoint::Tone(pitch)) = (&config.tone, setpoint) else {
-        return None;
-    };
-    if state.phase == Phase::Charge {
-        let n = state.charge_periods - config.charge.periods;
-        if n < READY_PERIODS {
-            slow::begin(config, state, n);
-            return Some(Bridge::Charge(config.charge.duty));
-        }
-        state.phase = Phase::Tone;
-    }
-    state.turn = (state.turn + 1) % CYCLE as u8;
-    match state.turn {
-        0 => state.supply.follow(state.protection.bus),
-        16 => state.supply.reach(&config.modulator, Voltage::ZERO),
+    pitch: Speed,
+) -> Bridge {
+    state.slot = (state.slot + 1) % CYCLE as u8;
+    match state.slot {
+        SUPPLY_SLOT => shared.supply.follow(shared.protection.bus),
+        LONGEST_SLOT => shared.supply.reach(&config.modulator, Voltage::ZERO),
         _ => {}
     }
-    let [a, b, c] = currents.map(reading);
-    let greatest = a
-        .saturating_abs()
-        .max(b.saturating_abs())
-        .max(c.saturating_abs());
-    let u = play(tone, &mut state.tone, pitch, greatest, &state.supply);
+    let currents = currents.map(reading);
+    let u = play(tone, state, pitch, greatest(currents), &shared.supply);
     let i = Dq {
-        d: a,
+        d: currents[0],
         q: Current::ZERO,
     };
     let along = Dq {
         d: u,
         q: Voltage::ZERO,
     };
-    state.seen = Seen {
+    shared.seen = Seen {
         phase: Phase::Tone,
         angle: Angle::ZERO,
         speed: Speed::ZERO,
         i,
         u: along,
-        bus_current: bus_current(along, i, &state.supply),
+        bus_current: bus_current(along, i, &shared.supply),
     };
-    if state.tone.pitch == Speed::ZERO {
+    if state.pitch == Speed::ZERO {
         // A pause brakes what a tone has left of a movement, and keeps the drivers charged.
-        return Some(Bridge::Brake);
+        shared.applied.rest();
+        return Bridge::Brake;
     }
     let v = AlphaBeta {
         alpha: u.scaled(),
@@ -192,25 +116,26 @@ pub(super) fn period(
     };
     let v = (v, Order::NORMAL);
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
-    let duties = modulator::duties(&config.modulator, &state.supply, v, none);
-    state.applied[0] = duties;
-    Some(Bridge::Duty(duties))
+    let duties = modulator::duties(&config.modulator, &shared.supply, v, none);
+    shared.applied.command(duties);
+    Bridge::Duty(duties)
 }
 
 /// The voltage along the axis of phase a.
 fn play(
-    tone: &Config,
-    playing: &mut Playing,
+    tone: &tone::Config,
+    playing: &mut State,
     pitch: Speed,
     greatest: Current,
     supply: &Supply,
 ) -> Voltage {
     let pitch = pitch.max(Speed::ZERO).min(PITCH_MAX);
     if pitch != playing.pitch {
-        *playing = Playing {
+        *playing = State {
+            slot: playing.slot,
             pitch,
-            braked: playing.braked,
-            ..Playing::default()
+            shorted_before: playing.shorted_before,
+            ..State::default()
         };
     }
     playing.peak = playing.peak.max(greatest);
@@ -224,7 +149,7 @@ fn play(
 }
 
 /// The amplitude of the coming half cycle.
-fn regulate(tone: &Config, playing: &mut Playing, supply: &Supply) {
+fn regulate(tone: &tone::Config, playing: &mut State, supply: &Supply) {
     let reactive = tone.reactive.held(playing.pitch);
     let stated = magnitude(tone.resistive, reactive);
     let dead: Voltage = tone.dead.top(supply.bus).scaled();

@@ -1,5 +1,7 @@
 //! Faults: each has one number, in telemetry, in logs and in the documentation.
 
+use crate::trace::Trace;
+
 /// A reason for which the bridge was turned off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -49,6 +51,13 @@ impl Fault {
 /// A set of faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Faults(u8);
+
+impl Trace for Faults {
+    #[inline]
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        self.0.trace(out);
+    }
+}
 
 impl Faults {
     /// No fault.

@@ -69,8 +69,8 @@ pub trait Observer {
     fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>);
 }
 
-// Not inlined: what is chosen among all is not in the default's way.
 impl Observer for Config {
+    // One copy for whoever calls it.
     #[inline(never)]
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
         estimate(self, state, input, imposed)
@@ -80,12 +80,10 @@ impl Observer for Config {
         !matches!(self, Self::Compensated(_))
     }
 
-    #[inline(never)]
     fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback {
         feedback(self, state, frame, inductance)
     }
 
-    #[inline(never)]
     fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
         advance(self, state, fb, u);
     }
@@ -119,6 +117,13 @@ impl Observer for compensated::Config {
 
     #[inline(always)]
     fn advance(&self, _: &mut State, _: &Feedback, _: Dq<Voltage>) {}
+}
+
+impl Config {
+    /// Whether [`advance`] is of any use: only the adaptive back-EMF observer works in the control's frame.
+    pub fn works_in_frame(&self) -> bool {
+        matches!(self, Self::BackEmf(_))
+    }
 }
 
 /// Takes the observer in use from the last sample to this one.

@@ -131,12 +131,10 @@ pub trait Regulator {
 }
 
 impl Regulator for Config {
-    #[inline(never)]
     fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         Self::voltage(self, state, wanted, fb)
     }
 
-    #[inline(never)]
     fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         Self::integrate(self, state, wanted, fb);
     }

@@ -2,19 +2,23 @@
 
 use fixed::types::I36F28;
 
+use super::duty::{bridge, hold};
+use super::state::{FIRST_PARK, State};
 use super::tell::tell;
-use super::{Config, State, hold, in_order, turn_on};
 use crate::control::six_step::commutation::{Legs, Sector};
 use crate::control::six_step::{crossing, tracking};
-use crate::drive::turn::reading;
-use crate::drive::{self, Bridge, Fault, Phase, Setpoint};
+use crate::drive::config;
+use crate::drive::config::six_step::Config;
+use crate::drive::io::{Bridge, Setpoint, in_order};
+use crate::drive::phase::Phase;
+use crate::drive::seen::{greatest, reading};
+use crate::drive::shared::Shared;
+use crate::drive::transitions::Why;
+use crate::protection::Fault;
 use crate::units::{AdcCounts, Current, Duty};
 
 /// Starts in a row that may fail.
 const ATTEMPTS: u8 = 3;
-
-/// The rotor is first held along phase c, at 240°.
-pub(super) const FIRST_PARK: Sector = Sector::Cb;
 
 /// Then along phase a, at 0°: one that stood opposite to c has not stayed there.
 const SECOND_PARK: Sector = Sector::Ac;
@@ -24,10 +28,14 @@ const SECOND_PARK: Sector = Sector::Ac;
 const FIRST_RAMP: Sector = Sector::Ba;
 
 /// The current of Park and Ramp: half more after each start that has failed, up to the bound.
-pub(super) fn current(six_step: &Config, state: &drive::State, setpoint: Setpoint) -> Current {
+pub(super) fn current(
+    six_step: &Config,
+    (s, shared): (&State, &Shared),
+    setpoint: &Setpoint,
+) -> Current {
     let more = |current: Current, _| current.saturating_add(current / 2);
-    let current = (0..state.six_step.failed).fold(six_step.start_current, more);
-    let current = current.min(state.protection.bounds.max);
+    let current = (0..s.failed).fold(six_step.start_current, more);
+    let current = current.min(shared.protection.bounds.max);
     match setpoint {
         Setpoint::Test(_) => current.min(six_step.test_current),
         _ => current,
@@ -38,25 +46,22 @@ pub(super) fn current(six_step: &Config, state: &drive::State, setpoint: Setpoin
 /// them open: what the rotor's swing induces flows between them without any dead time in its way,
 /// damps the swing and shows its direction.
 pub(super) fn park(
-    config: &drive::Config,
+    config: &config::Config,
     six_step: &Config,
-    state: &mut drive::State,
+    (s, shared): (&mut State, &mut Shared),
     currents: [AdcCounts; 3],
-    setpoint: Setpoint,
-) -> Bridge {
-    let wanted = current(six_step, state, setpoint);
-    let currents = in_order(config, state, currents);
-    let s = &mut state.six_step;
+    setpoint: &Setpoint,
+) -> (Bridge, Option<Why>) {
+    let wanted = current(six_step, (s, shared), setpoint);
+    let swapped = shared.swapped(config);
+    let currents = in_order(swapped, currents);
     let Legs {
         switching,
         low,
         floating,
     } = s.sector.legs(currents.map(reading));
     // A rotor that swings drives a current through the other two, which may be the greatest.
-    let greatest = switching
-        .max(low.saturating_abs())
-        .max(floating.saturating_abs());
-    hold(six_step, s, greatest, wanted);
+    hold(six_step, s, greatest([switching, low, floating]), wanted);
     // By the first attempt's current: a greater one does not damp the swing any sooner. After a
     // start that has failed, twice as long.
     s.charge += wanted.min(six_step.start_current).over_periods(1);
@@ -83,36 +88,28 @@ pub(super) fn park(
             s.sector = FIRST_RAMP;
             s.tracking = tracking::State::at_rest(six_step.ramp.apply(wanted));
             s.crossing = crossing::State::default();
-            state.phase = Phase::Ramp;
-            return turn_on(config, state, currents, switching);
+            tell(config, (s, shared), Phase::Ramp, (currents, switching));
+            return (bridge(s, swapped, None), Some(Why::Aligned));
         }
     }
-    let phases = s.sector.phases(Legs {
-        switching: Some(s.duty.for_bridge()),
-        low: Some(Duty::ZERO),
-        floating: Some(Duty::ZERO),
-    });
-    tell(config, state, currents, switching);
-    Bridge::Legs(in_order(config, state, phases))
+    tell(config, (s, shared), Phase::Park, (currents, switching));
+    (bridge(s, swapped, Some(Duty::ZERO)), None)
 }
 
-/// The rotor has not been followed: another start, or none.
+/// Loss of synchronism: another start, or none.
 #[cold]
-pub(super) fn lost(six_step: &Config, state: &mut drive::State) -> Bridge {
-    let slow = state.six_step.tracking.omega_bar <= six_step.run_speed;
-    if state.phase == Phase::Ramp || slow {
-        let failed = state.six_step.failed + 1;
-        if failed <= ATTEMPTS {
-            state.six_step = State {
-                failed,
-                ..State::default()
-            };
-            state.rest(Phase::Park);
-            return Bridge::Off;
-        }
-        state.trip(Fault::Stuck);
+pub(super) fn lost(six_step: &Config, s: &mut State, phase: Phase) -> Why {
+    let starting = phase == Phase::Ramp || s.tracking.omega_bar <= six_step.run_speed;
+    let failed = s.failed + 1;
+    if !starting {
+        Why::Tripped(Fault::ObserverLost)
+    } else if failed > ATTEMPTS {
+        Why::Tripped(Fault::Stuck)
     } else {
-        state.trip(Fault::ObserverLost);
+        *s = State {
+            failed,
+            ..State::default()
+        };
+        Why::Retried
     }
-    Bridge::Off
 }

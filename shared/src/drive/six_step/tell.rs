@@ -2,10 +2,13 @@
 
 use fixed::types::I1F31;
 
+use super::state::State;
 use crate::control::six_step::commutation::SEXTANT;
 use crate::control::transform::{Dq, clarke, park};
-use crate::drive::state::Seen;
-use crate::drive::{self, Phase};
+use crate::drive::config::Config;
+use crate::drive::phase::Phase;
+use crate::drive::seen::Seen;
+use crate::drive::shared::Shared;
 use crate::math::{SinCos, TopProduct};
 use crate::protection;
 use crate::units::{AdcCounts, Current, Speed, Voltage};
@@ -15,27 +18,26 @@ const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);
 
 /// What telemetry hears, and what the supply's current does to the bounds.
 pub(super) fn tell(
-    config: &drive::Config,
-    state: &mut drive::State,
-    currents: [AdcCounts; 3],
-    i: Current,
+    config: &Config,
+    (s, shared): (&State, &mut Shared),
+    phase: Phase,
+    (currents, i): ([AdcCounts; 3], Current),
 ) {
-    let s = &state.six_step;
     let duty = s.duty.duty;
     let bus_current = duty.top(i).scaled();
     protection::bound(
         &config.protection,
-        &mut state.protection,
+        &mut shared.protection,
         (bus_current, i),
         1,
     );
 
-    let parked = state.phase == Phase::Park;
+    let parked = phase == Phase::Park;
     // In Park the rotor is taken to stand along the switching phase.
     let delta = if parked { SEXTANT } else { s.tracking.delta };
     let angle = s.sector.middle().wrapping_add(delta);
     let from_middle = SinCos::of(delta);
-    let switched: Voltage = duty.top(state.protection.bus).scaled();
+    let switched: Voltage = duty.top(shared.protection.bus).scaled();
     let along: Voltage = switched.top(RECIPROCAL_ROOT_3).scaled();
     let u = Dq {
         d: along.top(from_middle.sin).scaled(),
@@ -46,15 +48,15 @@ pub(super) fn tell(
         d: Current::ZERO,
         q: s.duty.peak,
     };
-    protection::follow_limit(&config.protection, &mut state.protection, peak);
+    protection::follow_limit(&config.protection, &mut shared.protection, peak);
     let speed = match (parked, s.tracking.crossings) {
         (true, _) => Speed::ZERO,
         (false, 0) => s.tracking.omega,
         (false, _) => s.tracking.omega_bar,
     };
-    state.seen = Seen {
-        phase: state.phase,
-        angle: if state.swapped(config) {
+    shared.seen = Seen {
+        phase,
+        angle: if shared.swapped(config) {
             angle.wrapping_neg()
         } else {
             angle

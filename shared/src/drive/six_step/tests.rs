@@ -1,10 +1,13 @@
 //! The six-step drive with samples that a test makes up. How it turns a motor is tested where there
 //! is one.
 
-use super::*;
+use fixed::types::I1F31;
+
 use crate::control::six_step::commutation::Sector;
-use crate::drive::{Config, Fault, State, step};
+use crate::drive::io::in_order;
+use crate::drive::{Bridge, Config, Fault, Phase, Sample, Setpoint, State, step};
 use crate::params::{Board, ParamId, Params, build};
+use crate::units::{AdcCounts, Current, Duty, Speed};
 
 fn drive(changes: &[(ParamId, f32)]) -> (Config, State) {
     let mut params = Params::default();
@@ -107,7 +110,7 @@ fn a_rotor_whose_position_is_told_is_driven_from_where_it_stands() {
         let Bridge::Legs(legs) = bridge else {
             panic!("{bridge:?}");
         };
-        let legs = turn::in_order(backwards, legs);
+        let legs = in_order(backwards, legs);
         assert_eq!(sector.legs(legs).floating, None, "{sector:?}");
         assert_eq!(sector.legs(legs).low, Some(Duty::ZERO), "{sector:?}");
     }

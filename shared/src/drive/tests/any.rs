@@ -4,7 +4,7 @@ use super::*;
 use fixed::types::I1F31;
 
 /// Numbers that look random.
-struct Noise(u32);
+pub(super) struct Noise(pub(super) u32);
 
 impl Noise {
     fn bits(&mut self) -> i32 {
@@ -16,7 +16,7 @@ impl Noise {
         AdcCounts::from_num(self.bits() % most)
     }
 
-    fn sample(&mut self, period: u32) -> Sample {
+    pub(super) fn sample(&mut self, period: u32) -> Sample {
         // Now and then all of the range, else what does not trip; for a while still, too.
         let wild = period % 8192 > 8000;
         let (range, bus) = if wild { (4096, 4096) } else { (1000, 300) };
@@ -33,7 +33,7 @@ impl Noise {
         }
     }
 
-    fn setpoint(&mut self, period: u32, turn: Setpoint) -> Setpoint {
+    pub(super) fn setpoint(&mut self, period: u32, turn: Setpoint) -> Setpoint {
         let value = self.bits() << 12;
         match period / 1024 % 16 {
             0 => Setpoint::Speed(Speed::from_bits(value)),
@@ -80,9 +80,7 @@ fn anything(changes: &[(ParamId, f32)], periods: u32, seed: u32) -> Vec<Phase> {
             "{changes:?}, {period}: {phase:?}"
         );
         if !bench.faults().is_empty() {
-            // Back to work at once.
-            bench.state.faults = Faults::NONE;
-            bench.state.failed_starts = 0;
+            bench.clear_faults();
         }
     }
     seen

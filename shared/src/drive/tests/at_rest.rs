@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::control::catch::Rotor;
-use crate::drive::launch;
+use crate::drive::foc::begin::READY_PERIODS;
 
 /// A rotor that turns at a constant speed while no current flows.
 struct Coasting {
@@ -71,7 +71,7 @@ fn a_rotor_that_turns_is_caught_into_run() {
                 let turn = motor.bench.turn();
                 let periods = motor.until(Phase::Run, turn);
                 // 128 readings of the currents' zeros, 63 µs of charge, and what makes ready.
-                assert!(periods < 145 + launch::READY_PERIODS, "{case}: {periods}");
+                assert!(periods < 145 + READY_PERIODS, "{case}: {periods}");
                 let error = motor.angle_error_deg();
                 assert!(error.abs() < 5.0, "{case}: {error}");
                 let seen = motor.seen_rpm();
@@ -93,7 +93,7 @@ fn a_rotor_that_turns_backwards_is_stopped_first() {
         let mut motor = Coasting::new(&[(ParamId::MotDir, direction)], sign * 2000.0);
         let turn = motor.bench.turn();
         motor.until(Phase::Stopping, turn);
-        assert!(motor.bench.state.reversed);
+        assert!(motor.bench.state.shared.reversed);
         assert!(
             (motor.seen_rpm() + 2000.0).abs() < 60.0,
             "{}",
@@ -207,7 +207,7 @@ fn terminals_that_tell_nothing_delay_a_start_by_40_ms() {
         assert_eq!(bench.run(1, stuck, turn), Bridge::Off);
         periods += 1;
     }
-    assert_eq!(bench.state.rotor, Rotor::Unknown);
+    assert_eq!(bench.state.off.rotor, Rotor::Unknown);
     // Two periods in which a current may still die, and eight measurements that end in one that judges.
     assert_eq!(periods, 2 + 8 * (128 + 1));
 }
@@ -218,7 +218,7 @@ fn the_speed_at_a_fault_is_reported_until_the_terminals_tell_another() {
         let mut bench = Bench::new(&[]);
         let hot = Setpoint::Fault(Fault::OverTemperature);
         bench.state.phase = Phase::Run;
-        bench.state.seen.speed = bench.config.scale.speed_from_rpm(3000.0);
+        bench.state.shared.seen.speed = bench.config.scale.speed_from_rpm(3000.0);
         let sample = Sample {
             terminals,
             ..sample([0.0; 3], 24.0)

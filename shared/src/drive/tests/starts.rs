@@ -2,9 +2,12 @@
 
 use super::*;
 use crate::control::observer::sector::Sector;
-use crate::drive::launch;
-use crate::drive::slow::CYCLE;
-use crate::drive::state::NOT_PLAIN;
+use crate::control::transform::clarke_in;
+use crate::drive::foc::any::any;
+use crate::drive::foc::begin::READY_PERIODS;
+use crate::drive::foc::current_loop::Drive;
+use crate::drive::foc::period::period;
+use crate::drive::schedule::CYCLE;
 use crate::units::Angle;
 use fixed::types::I1F31;
 
@@ -27,7 +30,7 @@ fn a_start_senses_charges_parks_and_ramps() {
     // 5 ms are 128 periods, rounded to a power of two; before them a current may still die for two,
     // and one after them judges what was read.
     assert_eq!(sense, 2 + 128 + 1);
-    assert_eq!(charge, pulses + launch::READY_PERIODS);
+    assert_eq!(charge, pulses + READY_PERIODS);
     // Three periods of the rotor's swing, which are more than 0.4 As at 4 A, in steps of eight, and
     // eight for the observer.
     let expected = 3.0 * TAU / swing_rad_s * 24_000.0;
@@ -75,7 +78,7 @@ fn a_start_that_fails_is_tried_again_with_more_current_and_ends_as_stuck() {
             assert_ne!(phase, Phase::Run, "{observer}: nothing has turned");
             if phase == Phase::Ramp && before != phase {
                 ramps += 1;
-                let attempt = &bench.config.start[usize::from(bench.state.failed_starts)];
+                let attempt = &bench.config.start[usize::from(bench.state.shared.failed_starts)];
                 currents.push(scale.amperes(attempt.current));
             }
             before = phase;
@@ -92,7 +95,7 @@ fn a_start_that_fails_is_tried_again_with_more_current_and_ends_as_stuck() {
         // Zero throttle gives all the attempts anew.
         bench.quiet(bench.periods(0.32), Setpoint::Zero);
         assert!(bench.faults().is_empty());
-        assert_eq!(bench.state.failed_starts, 0);
+        assert_eq!(bench.state.shared.failed_starts, 0);
     }
 }
 
@@ -100,11 +103,11 @@ fn a_start_that_fails_is_tried_again_with_more_current_and_ends_as_stuck() {
 fn zero_throttle_between_two_attempts_begins_with_the_first_one() {
     let mut bench = Bench::new(&[]);
     let turn = bench.turn();
-    while bench.state.failed_starts == 0 {
+    while bench.state.shared.failed_starts == 0 {
         bench.quiet(1, turn);
     }
     bench.quiet(2, Setpoint::Stop);
-    assert_eq!(bench.state.failed_starts, 0);
+    assert_eq!(bench.state.shared.failed_starts, 0);
 }
 
 #[test]
@@ -177,7 +180,7 @@ fn a_start_backwards_takes_both_directions_or_a_test() {
                 bench.quiet(200, setpoint);
                 let case = std::format!("{both}: {setpoint:?}");
                 assert_eq!(bench.phase() == Phase::Park, starts, "{case}");
-                assert_eq!(bench.state.reversed, starts && sign < 0.0, "{case}");
+                assert_eq!(bench.state.shared.reversed, starts && sign < 0.0, "{case}");
             }
         }
         for (amperes, starts) in [(0.5, true), (0.0, false), (-0.5, true)] {
@@ -185,7 +188,7 @@ fn a_start_backwards_takes_both_directions_or_a_test() {
             let test = Setpoint::Test(bench.config.scale.current_from_a(amperes));
             bench.quiet(200, test);
             assert_eq!(bench.phase() == Phase::Park, starts, "{amperes}");
-            assert_eq!(bench.state.reversed, amperes < 0.0);
+            assert_eq!(bench.state.shared.reversed, amperes < 0.0);
         }
     }
 }
@@ -200,7 +203,7 @@ fn the_other_direction_ends_a_start() {
     let ended = bridges.find(|bridge| !matches!(bridge, Bridge::Duty(_)));
     assert_eq!(ended, Some(Bridge::Brake));
     bench.until(Phase::Ramp, backwards);
-    assert!(bench.state.reversed);
+    assert!(bench.state.shared.reversed);
     let snapshot = bench.state.snapshot();
     assert!(snapshot.speed <= Speed::ZERO);
 }
@@ -286,7 +289,8 @@ fn a_torque_against_the_rotation_does_not_turn_the_motor_round_within_run() {
         let (forwards, backwards) = (setpoint(current(1.0)), setpoint(current(-1.0)));
         bench.run(200, sample, forwards);
         assert_eq!(bench.phase(), Phase::Run);
-        let bridge = bench.run(CYCLE + 1, sample, backwards);
+        // A cycle until the set-point is looked at, and one until the rotor is.
+        let bridge = bench.run(2 * CYCLE, sample, backwards);
         assert!(
             !matches!(bridge, Bridge::Duty(_)),
             "{backwards:?}: {bridge:?}"
@@ -305,9 +309,9 @@ fn what_the_last_run_held_is_forgotten_by_the_next_start() {
     let turn = bench.turn();
     bench.until(Phase::Park, turn);
     // The bounds of the speed regulator's current grow from it.
-    bench.state.torque.i_q = Current::ONE;
+    bench.state.foc.loops.torque.i_q = Current::ONE;
     bench.quiet(CYCLE, Setpoint::Stop);
-    assert_eq!(bench.state.torque.i_q, Current::ZERO);
+    assert_eq!(bench.state.foc.loops.torque.i_q, Current::ZERO);
 }
 
 #[test]
@@ -316,32 +320,43 @@ fn what_flows_as_the_bridge_is_turned_off_is_no_offset() {
     let turn = bench.turn();
     bench.run(2, sample([13.5, 0.0, -13.5], 24.0), turn);
     bench.until(Phase::Charge, turn);
-    assert_eq!(bench.state.sensing.offsets, [AdcCounts::ZERO; 3]);
+    assert_eq!(bench.state.shared.zeros.offsets, [AdcCounts::ZERO; 3]);
 }
 
-/// With the supply in motion, so that a look at another sample of it shows.
+/// With the supply in motion, and currents that are no rotor's, so that each start fails.
 #[test]
-fn a_period_is_the_same_whether_it_is_a_plain_one_or_not() {
-    let (mut plain, mut general) = (Bench::new(&[]), Bench::new(&[]));
-    let turn = plain.turn();
+fn the_default_loop_does_what_the_one_of_any_observer_and_regulator_does() {
+    let mut bench = Bench::new(&[]);
+    let turn = bench.turn();
     let mut driven = 0;
     for k in 0..20_000 {
         let bus_v = 24.0 + 0.5 * (f64::from(k) * 0.01).sin();
         let angle = f64::from(k) * 0.02;
         let current = |shift: f64| 2.0 * (angle - shift * TAU / 3.0).sin();
-        let sample = sample([current(0.0), current(1.0), current(2.0)], bus_v);
-        let sample = match plain.phase() {
-            // These currents are no rotor's, so that each start fails.
-            Phase::Idle | Phase::Sense => self::sample([0.0; 3], bus_v),
-            _ => sample,
+        let flowing = sample([current(0.0), current(1.0), current(2.0)], bus_v);
+        let phase = bench.phase();
+        if phase.drives() {
+            let with = |period: fn(&Config, Drive<'_>, &Sample, [AdcCounts; 3]) -> Bridge| {
+                let mut state = bench.state.clone();
+                let drive = (&mut state.foc, &mut state.shared);
+                let bridge = period(&bench.config, drive, &flowing, flowing.currents);
+                (bridge, state)
+            };
+            assert_eq!(
+                with(period),
+                with(|config, (foc, shared), sample, currents| {
+                    let stator = clarke_in(foc.loops.order, currents);
+                    any(config, (foc, shared), sample, stator)
+                }),
+                "{k}: {phase:?}"
+            );
+            driven += 1;
+        }
+        let sample = match phase {
+            Phase::Idle | Phase::Sense => sample([0.0; 3], bus_v),
+            _ => flowing,
         };
-        general.state.plain = NOT_PLAIN;
-        let bridges = (plain.run(1, sample, turn), general.run(1, sample, turn));
-        assert_eq!(bridges.0, bridges.1, "{k}: {:?}", plain.phase());
-        assert_eq!(plain.state.seen, general.state.seen, "{k}");
-        assert_eq!(plain.state.supply, general.state.supply, "{k}");
-        assert_eq!(plain.state.bounds, general.state.bounds, "{k}");
-        driven += u32::from(plain.state.plain != NOT_PLAIN);
+        bench.run(1, sample, turn);
     }
     assert!(driven > 5_000, "{driven}");
 }

@@ -1,6 +1,8 @@
 //! Tones: when one is played, and what ends it.
 
 use super::*;
+use crate::drive::config::tone::PITCH_MAX;
+use crate::drive::transitions::Why;
 use crate::units::Speed;
 
 /// A pitch of 1 kHz.
@@ -126,7 +128,7 @@ fn what_a_tone_found_is_what_it_leaves() {
         assert_eq!(bench.quiet(1, Setpoint::Zero), Bridge::Off);
         assert_eq!(bench.phase(), Phase::Idle);
 
-        bench.state.rest(Phase::Brake);
+        bench.state.change(&bench.config, Why::Shorted);
         bench.quiet(2000, Setpoint::Stop);
         let tone = tone(&bench);
         bench.until(Phase::Tone, tone);
@@ -139,7 +141,7 @@ fn what_a_tone_found_is_what_it_leaves() {
 /// In the brake, and with a tone asked for, until it has come to a phase.
 fn braked_until(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     let mut bench = Bench::new(drive);
-    bench.state.rest(Phase::Brake);
+    bench.state.change(&bench.config, Why::Shorted);
     bench.quiet(2000, Setpoint::Stop);
     let tone = tone(&bench);
     bench.until(phase, tone);
@@ -267,7 +269,7 @@ fn a_tone_above_the_highest_is_the_highest() {
         let voltages = (0..800).map(|_| vector(bench.quiet(1, Setpoint::Tone(pitch))).0);
         voltages.skip(400).collect::<Vec<_>>()
     };
-    let wanted = cycle(&mut bench, tone::PITCH_MAX);
+    let wanted = cycle(&mut bench, PITCH_MAX);
     let seen = cycle(&mut bench, Speed::from_num(0.4));
     let changes = |volts: &[f64]| volts.windows(2).filter(|w| w[0] * w[1] < 0.0).count();
     assert_eq!(changes(&seen), changes(&wanted));

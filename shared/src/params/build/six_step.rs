@@ -8,7 +8,7 @@ use super::outer;
 use super::si::{Si, TEST_SHARE};
 use crate::control::delay::Delay;
 use crate::control::six_step::{crossing, duty};
-use crate::drive::six_step::Config;
+use crate::drive::config::six_step::Config;
 use crate::math::Real;
 use crate::params::ParamId;
 

@@ -5,7 +5,7 @@ use core::f32::consts::TAU;
 use fixed::types::I1F31;
 
 use super::si::Si;
-use crate::drive::tone::Config;
+use crate::drive::config::tone::Config;
 use crate::math::Real;
 use crate::params::ParamId;
 use crate::units::Voltage;

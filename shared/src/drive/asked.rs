@@ -1,0 +1,109 @@
+//! The mode that a set-point asks for.
+
+use super::config::{Config, Stop};
+use super::io::{Asked, Setpoint};
+use super::phase::Phase;
+use super::shared::Shared;
+use super::six_step;
+use super::state::State;
+use super::transitions::Why;
+use crate::control::catch::Rotor;
+use crate::units::Speed;
+
+/// Where a set-point asks for another mode: why the present one ends.
+pub(super) fn asked(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
+    match (state.phase, &config.six_step) {
+        (Phase::Idle | Phase::Sense | Phase::Charge | Phase::Brake | Phase::Tone, _) => {
+            at_rest(config, state, setpoint)
+        }
+        (phase, None) => driving(config, &mut state.shared, phase, setpoint),
+        (phase, Some(_)) => six_step::period::asked(config, &state.shared, phase, setpoint),
+    }
+}
+
+/// Whether a set-point wants the motor to turn the way it does, or is being started.
+fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
+    let present = if shared.reversed {
+        Asked::Backward
+    } else {
+        Asked::Forward
+    };
+    setpoint.asks(config.both_ways) == present
+}
+
+/// While field-oriented control drives.
+#[inline(always)]
+fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
+    let along = is_along(config, shared, setpoint);
+    match phase {
+        Phase::Stopping if along => return Some(Why::Resumed),
+        _ if along => return None,
+        Phase::Park | Phase::Ramp => {
+            shared.failed_starts = 0;
+            return Some(Why::Released);
+        }
+        _ => {}
+    }
+    // A torque against the rotation slows the motor down within Run, but does not turn it round.
+    let holds = matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
+        && shared.seen.speed >= config.slow;
+    let nothing = setpoint.asks(config.both_ways) == Asked::Nothing;
+    if config.stop == Stop::Coast && nothing && !holds {
+        // The bridge is off at once: without current, and the terminals tell how the shaft turns.
+        Some(Why::Coasts)
+    } else if phase == Phase::Run && !holds {
+        Some(Why::Released)
+    } else {
+        None
+    }
+}
+
+/// While nothing drives.
+fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
+    let pulls = matches!(setpoint, Setpoint::Pull(_));
+    let sounds = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
+    let drives = setpoint.asks(config.both_ways) != Asked::Nothing;
+    let stands = state.off.rotor == Rotor::Standing;
+    let why = match state.phase {
+        Phase::Tone | Phase::Sense if sounds => None,
+        // A test charges what it needs, and is to find a short circuit before all low sides are on.
+        Phase::Charge if pulls && stands => Some(Why::Sounds),
+        Phase::Charge if sounds && stands => None,
+        Phase::Idle if sounds && stands => Some(Why::Sound),
+        Phase::Brake if sounds && state.shared.seen.speed == Speed::ZERO => Some(Why::Sound),
+        Phase::Tone if drives => Some(Why::Drive),
+        Phase::Tone if state.tone.shorted_before => Some(Why::Shorted),
+        Phase::Idle if state.tone.shorted_before && !drives && stands => Some(Why::Shorted),
+        // Not the low sides: the rotor may turn, and is looked at until it stands.
+        Phase::Tone | Phase::Sense | Phase::Charge if !drives => Some(Why::Released),
+        Phase::Idle | Phase::Brake if !drives => {
+            state.shared.failed_starts = 0;
+            None
+        }
+        phase => start(config, state, phase, setpoint),
+    };
+    why
+}
+
+/// While nothing drives and something asks for it.
+fn start(config: &Config, state: &State, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
+    let shared = &state.shared;
+    let begins = matches!(phase, Phase::Idle | Phase::Brake).then_some(Why::Drive);
+    if let Some(six_step) = &config.six_step {
+        let position = six_step::given::position(config, &state.foc.observer, shared);
+        if !six_step::period::is_too_fast(config, six_step, shared, (position, setpoint)) {
+            begins
+        } else if begins.is_none() {
+            Some(Why::TooFast)
+        } else {
+            None
+        }
+    } else if phase == Phase::Brake
+        && is_along(config, shared, setpoint)
+        && shared.seen.speed > config.slow
+    {
+        Some(Why::Resumed)
+    } else {
+        begins
+    }
+}

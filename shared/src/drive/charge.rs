@@ -1,0 +1,41 @@
+//! Charge: the low sides charge the supplies of the high sides' drivers before the phases switch.
+
+use super::config::Config;
+use super::seen::Seen;
+use crate::control::catch::Rotor;
+use crate::trace::traced;
+
+traced! {
+    /// What Charge remembers.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub(super) struct State {
+        /// Periods so far.
+        periods: u32,
+    }
+}
+
+impl State {
+    /// Charge begins, for a shorter time where the rotor turns, which it does unseen meanwhile.
+    pub(super) fn begin(&mut self, config: &Config, rotor: Rotor) {
+        self.periods = match rotor {
+            Rotor::Turning { .. } => config.charge.spared_periods,
+            Rotor::Unknown | Rotor::Standing => 0,
+        };
+    }
+}
+
+/// A period of Charge, in which the rotor turns on. The periods since the drivers are charged, from 1 on.
+pub(super) fn period(
+    config: &Config,
+    state: &mut State,
+    rotor: &mut Rotor,
+    seen: &mut Seen,
+) -> Option<u32> {
+    if let Rotor::Turning { theta, omega } = rotor {
+        *theta = theta.wrapping_add(omega.over_period());
+        seen.angle = *theta;
+    }
+    state.periods += 1;
+    let charged = state.periods.checked_sub(config.charge.periods);
+    charged.filter(|periods| *periods > 0)
+}

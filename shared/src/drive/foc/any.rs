@@ -1,0 +1,49 @@
+//! The current loop with any observer and regulator, and in an open-loop start.
+
+use super::current_loop::{Drive, Frame, current_loop, imposed, observed};
+use crate::control::transform::AlphaBeta;
+use crate::control::{inductance, observer};
+use crate::drive::config::Config;
+use crate::drive::io::{Bridge, Sample};
+use crate::drive::schedule;
+use crate::units::Current;
+
+/// A period on any board, with the adaptation of the inductance where it is asked for.
+#[inline(never)]
+pub(in crate::drive) fn any(
+    config: &Config,
+    (foc, shared): Drive<'_>,
+    sample: &Sample,
+    stator: AlphaBeta<Current>,
+) -> Bridge {
+    let frame = frame(config, (foc, shared), sample, stator);
+    let parts = (&config.observer, &config.regulator);
+    current_loop(parts, config, (foc, shared), frame, stator)
+}
+
+/// The frame, imposed by a start or where the observer sees the rotor.
+// A call: where the two ways meet, the compiler would multiply what it no longer knows to be of 32 bits.
+#[inline(never)]
+fn frame(
+    config: &Config,
+    (foc, shared): Drive<'_>,
+    sample: &Sample,
+    stator: AlphaBeta<Current>,
+) -> Frame {
+    let parts = (&config.observer, config.delay);
+    if schedule::is_start(foc.loops.slot) {
+        return imposed(parts, (foc, shared), sample, stator);
+    }
+    adapt(config, (foc, shared));
+    observed(parts, (foc, shared), sample, stator)
+}
+
+/// The adaptation of the inductance, where it is asked for: i_d* carries its wave.
+fn adapt(config: &Config, (foc, shared): Drive<'_>) {
+    if let Some(adapt) = &config.adapt_l {
+        let flux = observer::flux(&config.observer, &foc.observer);
+        let i_d = shared.seen.i.d;
+        let wave = inductance::step(adapt, &mut foc.loops.inductance, i_d, flux);
+        foc.loops.reference.i.d = foc.loops.i_d + wave;
+    }
+}

@@ -1,0 +1,153 @@
+//! The begin of a drive, in pieces, behind Charge: a flying start where the rotor turns.
+
+use super::outer_loop::{self, READY_PIECES};
+use super::state::State;
+use crate::control::catch::Rotor;
+use crate::control::observer;
+use crate::control::regulator::Reference;
+use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, turn, voltages};
+use crate::drive::config::{Config, Direction};
+use crate::drive::io::{Asked, Sample, Setpoint, hall};
+use crate::drive::schedule;
+use crate::drive::shared::Shared;
+use crate::drive::transitions::Why;
+use crate::math::SinCos;
+use crate::units::{Angle, Current, Speed, Voltage, stated_emf};
+
+/// Periods behind Charge in which a drive is made ready, a piece in each.
+pub(in crate::drive) const READY_PERIODS: u32 = 10;
+
+/// Piece `n`, from 1, of what makes a drive ready: the rotor is caught where it turns, started where
+/// its sensors show it, or parked, from the period after the last piece on.
+#[cold]
+pub(in crate::drive) fn begin(
+    config: &Config,
+    foc: &mut State,
+    shared: &mut Shared,
+    rotor: Rotor,
+    (sample, setpoint): (&Sample, &Setpoint),
+    n: u32,
+) -> Option<Why> {
+    let turning = turning(config, shared, rotor);
+    // Until the first period that drives.
+    let periods = READY_PERIODS as i32 + 1 - n as i32;
+    match (n, turning) {
+        (1..=READY_PIECES, _) => outer_loop::ready(config, foc, shared, n),
+        (6, Some((theta, omega))) => {
+            let theta = theta.wrapping_add(omega.over_periods(periods));
+            let rest = AlphaBeta::default();
+            observer::begin(&config.observer, &mut foc.observer, (theta, omega), rest);
+        }
+        (7, Some(_)) => outer_loop::observer_gains(config, foc),
+        (8, Some((_, omega))) => regulate(config, foc, omega),
+        (9, Some((theta, omega))) => {
+            let theta = theta.wrapping_add(omega.over_periods(periods));
+            foc.loops.commanded = commanded(config, theta, omega);
+        }
+        (READY_PERIODS, _) => {
+            let omega = turning.map(|(_, omega)| omega);
+            return Some(go(config, foc, shared, (sample, setpoint), omega));
+        }
+        _ => {}
+    }
+    None
+}
+
+/// The rotor's angle and speed as the control sees them, where it turns fast enough to be caught.
+fn turning(config: &Config, shared: &mut Shared, rotor: Rotor) -> Option<(Angle, Speed)> {
+    match rotor {
+        Rotor::Turning { theta, omega } if omega.saturating_abs() > config.slow => {
+            shared.reversed = omega.is_negative() != (config.direction == Direction::Reversed);
+            let theta = if shared.swapped(config) {
+                theta.wrapping_neg()
+            } else {
+                theta
+            };
+            Some((theta, omega.saturating_abs()))
+        }
+        _ => None,
+    }
+}
+
+/// How a drive begins, for a rotor that turns at `omega`, or stands.
+fn go(
+    config: &Config,
+    foc: &mut State,
+    shared: &mut Shared,
+    (sample, setpoint): (&Sample, &Setpoint),
+    omega: Option<Speed>,
+) -> Why {
+    let backward = setpoint.asks(config.both_ways) == Asked::Backward;
+    // The first period takes its reference.
+    foc.loops.slot = schedule::LAST;
+    if omega.is_none() {
+        shared.reversed = backward;
+    }
+    let swapped = shared.swapped(config);
+    foc.loops.order = if swapped {
+        Order::SWAPPED
+    } else {
+        Order::NORMAL
+    };
+    let speed = &mut foc.loops.speed;
+    if let Some(omega) = omega {
+        config.speed.begin(speed, omega, Current::ZERO);
+        // One that turns the other way is stopped first.
+        if shared.reversed == backward {
+            Why::Caught
+        } else {
+            Why::CaughtBackwards
+        }
+    } else {
+        let (frame, hall) = (foc.loops.start.frame, hall(sample, swapped));
+        if observer::stand(&config.observer, &mut foc.observer, frame, hall) {
+            config.speed.begin(speed, Speed::ZERO, Current::ZERO);
+            Why::Caught
+        } else {
+            Why::Stands
+        }
+    }
+}
+
+/// Drives on from the speed and the current that there are.
+#[cold]
+pub(in crate::drive) fn resume(config: &Config, foc: &mut State, shared: &Shared) {
+    let (speed, i_q) = (shared.seen.speed, shared.seen.i.q);
+    config.speed.begin(&mut foc.loops.speed, speed, i_q);
+}
+
+/// The back-EMF at this speed.
+fn emf(omega: Speed) -> Dq<Voltage> {
+    Dq {
+        d: Voltage::ZERO,
+        q: stated_emf(omega),
+    }
+}
+
+/// The current regulator at this speed, without current.
+fn regulate(config: &Config, foc: &mut State, omega: Speed) {
+    let still = Dq::default();
+    let loops = &mut foc.loops;
+    let factor = loops.inductance.factor;
+    let fb = observer::feedback(&config.observer, &foc.observer, (omega, still), factor);
+    let reference = Reference::default();
+    config
+        .regulator
+        .begin(&mut loops.regulator, emf(omega), &reference, &fb);
+}
+
+/// The back-EMF has been at the terminals, as if it had been commanded: the last two commands, for a
+/// rotor that is at `theta` at the first period's sample.
+fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
+    let to_middle = config
+        .delay
+        .advance(omega)
+        .wrapping_sub(omega.over_period());
+    let frame = SinCos::of(theta);
+    let emf = emf(omega);
+    let at = |middle: Angle| voltages(inverse_park(turn(emf, SinCos::of(middle)), frame));
+    [
+        at(to_middle),
+        at(to_middle.wrapping_sub(omega.over_period())),
+    ]
+}

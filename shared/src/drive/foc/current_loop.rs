@@ -1,0 +1,144 @@
+//! The current loop: from the sample's currents to the phases' duties.
+
+use super::state::{Loops, State};
+use crate::control::delay::Delay;
+use crate::control::observer::{Input, Observer};
+use crate::control::regulator::Regulator;
+use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, park, turn, voltages};
+use crate::control::{modulator, start};
+use crate::drive::config::Config;
+use crate::drive::io::{Bridge, Sample, hall};
+use crate::drive::phase::Phase;
+use crate::drive::shared::Shared;
+use crate::math::{Held, SinCos, sin_cos};
+use crate::units::{Current, Speed, Voltage, WideVoltage};
+
+/// What field-oriented control remembers, and what all modes share.
+pub(in crate::drive) type Drive<'a> = (&'a mut State, &'a mut Shared);
+
+/// The control's frame in a period: its cosine and sine, and its speed.
+pub(super) type Frame = (SinCos, Speed);
+
+/// The frame where the observer sees the rotor.
+#[inline(always)]
+pub(super) fn observed(
+    (observer, delay): (&impl Observer, Delay),
+    (foc, shared): Drive<'_>,
+    sample: &Sample,
+    stator: AlphaBeta<Current>,
+) -> Frame {
+    let State {
+        loops,
+        observer: of,
+    } = foc;
+    let input = input(loops, delay, sample, stator);
+    let estimate = observer.estimate(of, &input, None);
+    shared.seen.angle = loops.order.angle(estimate.theta);
+    shared.seen.speed = estimate.omega_bar;
+    (estimate.frame, estimate.omega)
+}
+
+/// The frame that an open-loop start imposes, while the observer runs along.
+#[inline(always)]
+pub(super) fn imposed(
+    (observer, delay): (&impl Observer, Delay),
+    (foc, shared): Drive<'_>,
+    sample: &Sample,
+    stator: AlphaBeta<Current>,
+) -> Frame {
+    let State {
+        loops,
+        observer: of,
+    } = foc;
+    if shared.seen.phase == Phase::Ramp || observer.follows_park() {
+        let input = input(loops, delay, sample, stator);
+        observer.estimate(of, &input, Some(loops.start.omega_s));
+    }
+    let theta = loops.start.frame;
+    shared.seen.angle = loops.order.angle(theta);
+    shared.seen.speed = loops.start.omega_s;
+    (sin_cos(theta), start::advance(&mut loops.start))
+}
+
+/// From the current in a frame to the duties, with this observer and this regulator.
+#[inline(always)]
+pub(super) fn current_loop(
+    (observer, regulator): (&impl Observer, &impl Regulator),
+    config: &Config,
+    (foc, shared): Drive<'_>,
+    (frame, omega): Frame,
+    stator: AlphaBeta<Current>,
+) -> Bridge {
+    let State {
+        loops,
+        observer: of,
+    } = foc;
+    let i = park(stator, frame);
+    shared.seen.i = i;
+
+    // The voltage that brings the current to its reference, as far as the supply gives it.
+    let fb = observer.feedback(of, (omega, i), loops.inductance.factor);
+    let asked = regulator.voltage(&loops.regulator, &loops.reference, &fb);
+    regulator.integrate(&mut loops.regulator, &loops.reference, &fb);
+    let u = if modulator::square_of(asked) <= shared.supply.readable {
+        modulator::short(asked)
+    } else {
+        limited(regulator, loops, shared, asked)
+    };
+    observer.advance(of, &fb, u);
+    shared.seen.u = u;
+
+    // The phases' duties, for where the frame will be when they act.
+    let v = inverse_park(turn(u, loops.advance), frame);
+    loops.commanded = [voltages(v), loops.commanded[0]];
+    let dead_time = (&config.dead_time, inverse_park(loops.dead_time_sign, frame));
+    let duties = modulator::duties(
+        &config.modulator,
+        &shared.supply,
+        (v, loops.order),
+        dead_time,
+    );
+    shared.applied.command(duties);
+    Bridge::Duty(duties)
+}
+
+/// A voltage vector so long that a phase cannot be read, or than the supply can give. Anti-windup: the
+/// regulator's integrators take back what the limit cuts off, and the speed regulator is told.
+#[cold]
+fn limited(
+    regulator: &impl Regulator,
+    loops: &mut Loops,
+    shared: &mut Shared,
+    asked: Dq<WideVoltage>,
+) -> Dq<Voltage> {
+    shared.applied.expect_unreadable();
+    let (u, cut) = modulator::limit(asked, &shared.supply.longest);
+    if let Some(cut) = cut {
+        regulator.give_way(&mut loops.regulator, cut);
+        loops.deficit = loops.reference.i.q.minus(shared.seen.i.q);
+    }
+    u
+}
+
+/// What the observer reads at this sample.
+#[inline(always)]
+pub(super) fn input(
+    loops: &Loops,
+    delay: Delay,
+    sample: &Sample,
+    stator: AlphaBeta<Current>,
+) -> Input {
+    let swapped = loops.order == Order::SWAPPED;
+    let [now, before] = loops.commanded;
+    Input {
+        i: stator,
+        v: AlphaBeta {
+            alpha: delay.applied(now.alpha, before.alpha),
+            beta: delay.applied(now.beta, before.beta),
+        },
+        inductance: loops.inductance.factor,
+        planned: loops.planned,
+        hall: hall(sample, swapped),
+        swapped,
+    }
+}

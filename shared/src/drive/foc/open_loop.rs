@@ -1,0 +1,167 @@
+//! The open-loop start: Park and Ramp, and what the rotor makes of Run.
+
+use super::state::State;
+use crate::control::regulator::Reference;
+use crate::control::transform::{AlphaBeta, Dq, rotate_frame};
+use crate::control::{PERIODS, observer, start};
+use crate::drive::config::{ATTEMPTS, Config};
+use crate::drive::io::Setpoint;
+use crate::drive::phase::Phase;
+use crate::drive::schedule::{CYCLE, DAMP_PERIODS};
+use crate::drive::shared::Shared;
+use crate::drive::transitions::Why;
+use crate::math::SinCos;
+use crate::protection::Fault;
+use crate::units::{Angle, Current};
+
+/// The coefficients of the attempt that is being made.
+fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
+    &config.start[usize::from(shared.failed_starts).min(ATTEMPTS - 1)]
+}
+
+/// The rotor's swing; once, at the end of Park, where the rotor is.
+#[inline(never)]
+pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, phase: Phase) {
+    let attempt = attempt(config, shared);
+    let start = &mut foc.loops.start;
+    let first = foc.loops.slot % PERIODS as u8 == 1;
+    if first && phase == Phase::Park && start::aligned(attempt, start) {
+        expect(config, foc, shared);
+    } else {
+        let felt = (shared.seen.i, shared.seen.u);
+        start::damp(attempt, start, felt, DAMP_PERIODS);
+    }
+}
+
+/// The current, and what it makes of the frame's speed.
+#[inline(never)]
+pub(in crate::drive) fn current(
+    config: &Config,
+    foc: &mut State,
+    shared: &Shared,
+    (phase, setpoint): (Phase, &Setpoint),
+) -> Option<Why> {
+    let attempt = attempt(config, shared);
+    let mut i_q = attempt.current.min(shared.protection.bounds.max);
+    if matches!(setpoint, Setpoint::Test(_)) {
+        i_q = i_q.min(config.test_current);
+    }
+    foc.loops.reference = Reference::steady(i_q);
+    let start = &mut foc.loops.start;
+    if phase == Phase::Ramp {
+        start::ramp(attempt, start, i_q);
+        None
+    } else {
+        start::park(attempt, start, i_q, PERIODS).then_some(Why::Aligned)
+    }
+}
+
+/// The rotor's flux stands along the current, on the frame's q axis.
+fn expect(config: &Config, foc: &mut State, shared: &Shared) {
+    let frame = foc.loops.start.frame;
+    let rotor = frame.wrapping_add(Angle::from_bits(1 << 30));
+    let Dq { d: alpha, q: beta } = rotate_frame(shared.seen.i, SinCos::of(frame.wrapping_neg()));
+    let i = AlphaBeta { alpha, beta };
+    observer::expect(&config.observer, &mut foc.observer, rotor, i);
+}
+
+/// Every [`CYCLE`], what the rotor makes of the phase: hand-over at the ramp's end, another attempt where
+/// it has not followed or has become too slow, the end of a stop, a fault where it is lost.
+#[inline(never)]
+pub(in crate::drive) fn rotor(
+    config: &Config,
+    foc: &mut State,
+    shared: &mut Shared,
+    phase: Phase,
+) -> Option<Why> {
+    let lost = foc.observer.told.lost && !phase.is_open_loop();
+    let progress = &mut shared.progress;
+    progress.lost_periods = if lost {
+        progress.lost_periods + CYCLE
+    } else {
+        0
+    };
+    let slow = shared.seen.speed < config.slow;
+    if phase == Phase::Run && !slow {
+        progress.slow_periods = 0;
+    }
+    match phase {
+        Phase::Ramp => ramp(config, foc, shared),
+        // Before the speed is looked at: sensors that fail at standstill are lost there.
+        Phase::Run | Phase::Stopping if progress.lost_periods >= config.lost_periods => {
+            Some(if progress.run_periods < config.proven_periods {
+                failed(shared)
+            } else {
+                Why::Tripped(Fault::ObserverLost)
+            })
+        }
+        Phase::Run if slow => {
+            progress.slow_periods += CYCLE;
+            (progress.slow_periods > config.slow_periods).then(|| failed(shared))
+        }
+        Phase::Stopping if slow => Some(Why::Stopped),
+        Phase::Run if progress.run_periods < config.proven_periods => {
+            progress.run_periods += CYCLE;
+            if progress.run_periods >= config.proven_periods {
+                shared.failed_starts = 0;
+            }
+            None
+        }
+        _ => None,
+    }
+}
+
+/// Loss of synchronism, or the ramp's end.
+fn ramp(config: &Config, foc: &mut State, shared: &mut Shared) -> Option<Why> {
+    let attempt = attempt(config, shared);
+    let start = &foc.loops.start;
+    if start::lost(attempt, start) {
+        Some(failed(shared))
+    } else if start.omega_s >= attempt.run_speed {
+        Some(hand_over(config, foc, shared))
+    } else {
+        None
+    }
+}
+
+/// A start has failed, or the motor has become too slow: the next attempt, if there is one.
+#[cold]
+fn failed(shared: &mut Shared) -> Why {
+    shared.failed_starts += 1;
+    if usize::from(shared.failed_starts) >= ATTEMPTS {
+        Why::Tripped(Fault::Stuck)
+    } else {
+        Why::Failed
+    }
+}
+
+/// Turns the control's frame from where the ramp held it to where the rotor is, and begins Run
+/// with the torque that there is.
+#[cold]
+fn hand_over(config: &Config, foc: &mut State, shared: &mut Shared) -> Why {
+    let loops = &mut foc.loops;
+    let omega_s = loops.start.omega_s;
+    let lead = observer::take_over(
+        &config.observer,
+        &mut foc.observer,
+        loops.start.frame,
+        omega_s,
+    );
+    let Some(lead) = lead else {
+        return failed(shared);
+    };
+    let lead = SinCos::of(lead);
+    // The voltage goes on as it was, in the new frame.
+    let u = rotate_frame(shared.seen.u, lead);
+    let i = rotate_frame(shared.seen.i, lead);
+    let factor = loops.inductance.factor;
+    let fb = observer::feedback(&config.observer, &foc.observer, (omega_s, i), factor);
+    let reference = Reference::steady(i.q).with_i_d(i.d);
+    config
+        .regulator
+        .begin(&mut loops.regulator, u, &reference, &fb);
+    // What the ramp's current accelerates with is not what the load takes.
+    config.speed.begin(&mut loops.speed, omega_s, Current::ZERO);
+    loops.reference = reference;
+    Why::HandedOver
+}

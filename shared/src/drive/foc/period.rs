@@ -1,0 +1,51 @@
+//! The choice of the current loop's parts.
+
+use super::any::any;
+use super::current_loop::{Drive, current_loop, imposed, observed};
+use crate::control::delay::Delay;
+use crate::control::observer::{self, compensated};
+use crate::control::regulator::{self, synchronous};
+use crate::control::transform::{AlphaBeta, clarke_in};
+use crate::drive::config::Config;
+use crate::drive::io::{Bridge, Sample};
+use crate::drive::schedule;
+use crate::units::{AdcCounts, Current};
+
+/// A period of Park, Ramp, Run or Stopping. Observer and regulator are chosen here and nowhere else: the
+/// default ones, for which the compiler makes one piece of the loop, or any others.
+#[inline(always)]
+pub(in crate::drive) fn period(
+    config: &Config,
+    (foc, shared): Drive<'_>,
+    sample: &Sample,
+    currents: [AdcCounts; 3],
+) -> Bridge {
+    let stator = clarke_in(foc.loops.order, currents);
+    match (&config.observer, &config.regulator) {
+        (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
+            if config.delay == Delay::One && config.adapt_l.is_none() =>
+        {
+            let parts = (observer, regulator);
+            if schedule::is_start(foc.loops.slot) {
+                return start(parts, config, (foc, shared), sample, stator);
+            }
+            let frame = observed((observer, Delay::One), (foc, shared), sample, stator);
+            current_loop(parts, config, (foc, shared), frame, stator)
+        }
+        _ => any(config, (foc, shared), sample, stator),
+    }
+}
+
+/// A period of an open-loop start with the default parts.
+#[inline(never)]
+fn start(
+    (observer, regulator): (&compensated::Config, &synchronous::Config),
+    config: &Config,
+    (foc, shared): Drive<'_>,
+    sample: &Sample,
+    stator: AlphaBeta<Current>,
+) -> Bridge {
+    let parts = (observer, Delay::One);
+    let frame = imposed(parts, (foc, shared), sample, stator);
+    current_loop((observer, regulator), config, (foc, shared), frame, stator)
+}

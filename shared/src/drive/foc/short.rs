@@ -1,0 +1,64 @@
+//! Brake: all low sides are on, and the observer goes on.
+
+use super::current_loop::input;
+use super::outer_loop::{self, READY_PIECES};
+use super::state::State;
+use crate::control::observer::Observer;
+use crate::control::transform::{AlphaBeta, Dq, clarke_in, park};
+use crate::drive::config::Config;
+use crate::drive::io::Sample;
+use crate::drive::phase::Phase;
+use crate::drive::schedule;
+use crate::drive::seen::Seen;
+use crate::drive::shared::Shared;
+use crate::units::{AdcCounts, Current, Speed};
+
+/// Slots from one piece that makes ready to the next.
+const READY_SLOTS: u32 = 4;
+
+/// With the low sides on the voltage is known to be zero: the observer goes on, so that the speed
+/// is reported down to where its back-EMF drowns in noise.
+#[inline(never)]
+pub(in crate::drive) fn watch(
+    config: &Config,
+    (foc, shared): (&mut State, &mut Shared),
+    sample: &Sample,
+    currents: [AdcCounts; 3],
+) {
+    let loops = &mut foc.loops;
+    schedule::next(&mut loops.slot);
+    let stator = clarke_in(loops.order, currents);
+    loops.commanded = [AlphaBeta::default(), loops.commanded[0]];
+    let input = input(loops, config.delay, sample, stator);
+    let observer = &config.observer;
+    let estimate = observer.estimate(&mut foc.observer, &input, None);
+    let i = park(stator, estimate.frame);
+    let u = Dq::default();
+    let slot = u32::from(foc.loops.slot);
+    if slot == 0 {
+        outer_loop::observer_gains(config, foc);
+    } else if slot.is_multiple_of(READY_SLOTS) && slot <= READY_SLOTS * READY_PIECES {
+        // A drive may resume at any time.
+        outer_loop::ready(config, foc, shared, slot / READY_SLOTS);
+    }
+    let loops = &foc.loops;
+    if observer.works_in_frame() {
+        let factor = loops.inductance.factor;
+        let fb = observer.feedback(&foc.observer, (estimate.omega, i), factor);
+        observer.advance(&mut foc.observer, &fb, u);
+    }
+    // An eighth of the speed at which Run ends: 19 rpm with the defaults.
+    let turns = estimate.omega_bar.to_bits() > config.slow.to_bits() >> 3;
+    shared.seen = Seen {
+        phase: Phase::Brake,
+        angle: loops.order.angle(estimate.theta),
+        speed: if turns {
+            estimate.omega_bar
+        } else {
+            Speed::ZERO
+        },
+        i,
+        u,
+        bus_current: Current::ZERO,
+    };
+}

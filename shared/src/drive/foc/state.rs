@@ -1,0 +1,105 @@
+//! What field-oriented control remembers.
+
+use crate::control::inductance;
+use crate::control::regulator::{self, Reference};
+use crate::control::speed::Bounds;
+use crate::control::transform::{AlphaBeta, Dq, Order};
+use crate::control::{dead_time, observer, speed, start, torque};
+use crate::drive::config::Config;
+use crate::drive::schedule::Slot;
+use crate::math::SinCos;
+use crate::trace::{Trace, traced};
+use crate::units::{Angle, Current, Speed, Voltage};
+
+/// What field-oriented control remembers.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::drive) struct State {
+    pub(in crate::drive) loops: Loops,
+    pub(in crate::drive) observer: observer::State,
+}
+
+traced! {
+    /// All but the observer.
+    #[derive(Clone, Debug, PartialEq)]
+    pub(in crate::drive) struct Loops {
+        /// Where in the schedule the last period was.
+        pub(in crate::drive) slot: Slot,
+        /// The phases' order as the control sees it.
+        pub(in crate::drive) order: Order,
+        /// What is wanted of the current regulator.
+        pub(in crate::drive) reference: Reference,
+        pub(in crate::drive) regulator: regulator::State,
+        /// Delay compensation: how far the frame turns until the voltage acts.
+        pub(in crate::drive) advance: SinCos,
+        /// Dead-time signs: the current's reference as the compensation takes it.
+        pub(in crate::drive) dead_time_sign: dead_time::Certainty,
+        /// The voltages of the last two commands in the stator's frame, the latest first.
+        pub(in crate::drive) commanded: [AlphaBeta<Voltage>; 2],
+        pub(in crate::drive) inductance: inductance::State,
+        pub(in crate::drive) speed: speed::State,
+        pub(in crate::drive) torque: torque::State,
+        /// Change of ω* in the last period.
+        pub(in crate::drive) planned: Speed,
+        /// i_d* at this speed.
+        pub(in crate::drive) i_d: Current,
+        /// Bounds of i_q* at this speed.
+        pub(in crate::drive) bounds: Bounds,
+        /// Anti-windup: i_q* less i_q where the voltage was limited.
+        pub(in crate::drive) deficit: Current,
+        /// The open-loop start.
+        pub(in crate::drive) start: start::State,
+    }
+}
+
+impl State {
+    /// At power-up.
+    pub(in crate::drive) fn new() -> Self {
+        Self {
+            loops: Loops {
+                slot: 0,
+                order: Order::NORMAL,
+                reference: Reference::default(),
+                regulator: regulator::State::default(),
+                advance: SinCos::of(Angle::ZERO),
+                dead_time_sign: Dq::default(),
+                commanded: [AlphaBeta::default(); 2],
+                inductance: inductance::State::default(),
+                speed: speed::State::default(),
+                torque: torque::State::default(),
+                planned: Speed::ZERO,
+                i_d: Current::ZERO,
+                bounds: Bounds::default(),
+                deficit: Current::ZERO,
+                start: start::State::default(),
+            },
+            observer: observer::State::default(),
+        }
+    }
+
+    /// As at power-up.
+    #[inline(never)]
+    pub(in crate::drive) fn restart(&mut self) {
+        *self = Self::new();
+    }
+
+    /// A drive has ended: nothing is held for the next one but the factor of the inductance.
+    pub(in crate::drive) fn rest(&mut self) {
+        let loops = &mut self.loops;
+        loops.commanded = [AlphaBeta::default(); 2];
+        loops.planned = Speed::ZERO;
+        loops.deficit = Current::ZERO;
+        loops.torque = torque::State::default();
+        loops.reference = Reference::default();
+        loops.inductance.begin();
+        loops.start = start::State::default();
+        loops.speed = speed::State::default();
+        loops.regulator = regulator::State::default();
+    }
+
+    /// Every word; of the observers those of the one in use.
+    #[inline(always)]
+    pub(in crate::drive) fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
+        self.loops.trace(out);
+        self.observer.trace(&config.observer, out);
+    }
+}

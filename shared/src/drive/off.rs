@@ -1,0 +1,100 @@
+//! Idle and Sense: the bridge is off, and the rotor is watched at the open terminals.
+//!
+//! A start begins with a few milliseconds in which the currents' zeros are measured and the rotor is
+//! looked for. One that turns is caught where it is; one that turns the other way is stopped first; one
+//! that stands is parked.
+
+use super::config::{Config, Direction};
+use super::io::Sample;
+use super::shared::Shared;
+use super::transitions::Why;
+use crate::control::catch::{self, Rotor};
+use crate::control::sensing::{self, Zeroing};
+use crate::protection::Fault;
+use crate::trace::traced;
+use crate::units::Speed;
+
+/// How often the currents' zeros are measured anew while it is not known whether the rotor turns:
+/// after eight times 5 ms it turns too slowly to matter, or its terminals cannot be read.
+const LOOKS: u8 = 8;
+
+/// The sample at which the bridge is turned off, and one for a period of delay.
+const SETTLING_PERIODS: u8 = 2;
+
+traced! {
+    /// What is remembered while the bridge is off.
+    #[derive(Clone, Debug, PartialEq)]
+    pub(super) struct State {
+        /// Samples that may still show a current from before the bridge was off.
+        settling_periods: u8,
+        /// Measurements of the currents' zeros since Sense began.
+        looks: u8,
+        /// What the open terminals have told of the rotor, with the phases in the order a, b, c.
+        pub(super) rotor: Rotor,
+        catch: catch::State,
+    }
+}
+
+impl State {
+    /// Nothing known.
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            settling_periods: 0,
+            looks: 0,
+            rotor: Rotor::Unknown,
+            catch: catch::State::new(&config.catch),
+        }
+    }
+
+    /// Nothing has been measured yet.
+    #[inline(always)]
+    pub(super) fn begin(&mut self) {
+        self.settling_periods = SETTLING_PERIODS;
+        self.looks = 0;
+    }
+
+    /// What the terminals told before they were driven is over.
+    pub(super) fn forget(&mut self) {
+        self.rotor = Rotor::Unknown;
+        self.catch.restart();
+    }
+}
+
+/// The rotor is watched at the open terminals. The currents are not looked at: a reading is its offset,
+/// which may not have been measured yet.
+#[inline(never)]
+pub(super) fn watch(config: &Config, state: &mut State, shared: &mut Shared, sample: &Sample) {
+    state.rotor = catch::observe(&config.catch, &mut state.catch, sample.terminals);
+    match state.rotor {
+        Rotor::Unknown => shared.coast(config),
+        Rotor::Standing => shared.seen.speed = Speed::ZERO,
+        Rotor::Turning { theta, omega } => {
+            shared.reversed = omega.is_negative() != (config.direction == Direction::Reversed);
+            shared.seen.speed = omega.saturating_abs();
+            shared.seen.angle = theta;
+        }
+    }
+}
+
+/// Sense: until the currents' zeros and the rotor are known.
+pub(super) fn sense(
+    config: &Config,
+    state: &mut State,
+    shared: &mut Shared,
+    sample: &Sample,
+) -> Option<Why> {
+    watch(config, state, shared, sample);
+    if state.settling_periods > 0 {
+        state.settling_periods -= 1;
+        return None;
+    }
+    match sensing::zero(&config.sensing, &mut shared.zeros, sample.currents) {
+        Zeroing::Measuring => None,
+        Zeroing::Defect => Some(Why::Tripped(Fault::CurrentSensor)),
+        Zeroing::Done => {
+            state.looks += 1;
+            let known = state.rotor != Rotor::Unknown || state.looks >= LOOKS;
+            known.then_some(Why::Sensed)
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! What a period has seen and done, for telemetry.
+
+use super::phase::Phase;
+use crate::control::modulator::Supply;
+use crate::control::transform::Dq;
+use crate::math::TopProduct;
+use crate::trace::traced;
+use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
+
+traced! {
+    /// The last period's quantities.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    pub(super) struct Seen {
+        /// What the drive did.
+        pub(super) phase: Phase,
+        /// Electrical angle of the control's frame at the sample, with the phases in the order a, b, c.
+        pub(super) angle: Angle,
+        /// Electrical speed the way the motor turns.
+        pub(super) speed: Speed,
+        /// Measured current in the frame.
+        pub(super) i: Dq<Current>,
+        /// Voltage that was commanded, in the frame.
+        pub(super) u: Dq<Voltage>,
+        /// Current from the supply.
+        pub(super) bus_current: Current,
+    }
+}
+
+impl Seen {
+    /// A shaft that stands, without current and voltage.
+    pub(super) const NOTHING: Self = Self {
+        phase: Phase::Idle,
+        angle: Angle::ZERO,
+        speed: Speed::ZERO,
+        i: Dq {
+            d: Current::ZERO,
+            q: Current::ZERO,
+        },
+        u: Dq {
+            d: Voltage::ZERO,
+            q: Voltage::ZERO,
+        },
+        bus_current: Current::ZERO,
+    };
+
+    /// The bridge is off, or the low sides are on: nothing flows any more.
+    pub(super) fn rest(&mut self) {
+        self.i = Dq::default();
+        self.u = Dq::default();
+        self.bus_current = Current::ZERO;
+    }
+}
+
+/// A phase's reading as a current: one unit is 4096/3 counts.
+pub(super) fn reading(counts: AdcCounts) -> Current {
+    Current::from_bits(counts.to_bits().saturating_mul(3))
+}
+
+/// The greatest of three currents' magnitudes.
+pub(super) fn greatest([a, b, c]: [Current; 3]) -> Current {
+    a.saturating_abs()
+        .max(b.saturating_abs())
+        .max(c.saturating_abs())
+}
+
+/// What the supply gives: 1.5·(v·i)/V_bus.
+#[inline(always)]
+pub(super) fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
+    // 24 + 28 − 32 fraction bits; 28 wanted.
+    let two_thirds: Current = (u.d.top(i.d) + u.q.top(i.q))
+        .top(supply.reciprocal)
+        .scaled();
+    two_thirds + (two_thirds >> 1)
+}

@@ -1,0 +1,189 @@
+//! What every mode is handed, and none owns: protection, the currents' zeros, faults, what was applied.
+
+use super::config::{Config, Direction};
+use super::io::Sample;
+use super::phase::Phase;
+use super::seen::Seen;
+use crate::control::delay::Delay;
+use crate::control::modulator::Supply;
+use crate::control::sensing::{self, Shunts};
+use crate::protection::{self, Fault, Faults};
+use crate::trace::traced;
+use crate::units::{AdcCounts, Duty, Speed, Voltage};
+
+traced! {
+    /// What every mode is handed.
+    #[derive(Clone, Debug, PartialEq)]
+    pub(super) struct Shared {
+        pub(super) seen: Seen,
+        pub(super) latch: Latch,
+        /// Whether the motor turns, or is to turn, against the configured direction.
+        pub(super) reversed: bool,
+        /// Attempts of a start that have failed.
+        pub(super) failed_starts: u8,
+        pub(super) progress: Progress,
+        pub(super) protection: protection::State,
+        /// The currents' zeros.
+        pub(super) zeros: sensing::State,
+        pub(super) applied: Applied,
+        /// What the supply gives.
+        pub(super) supply: Supply,
+    }
+}
+
+traced! {
+    /// Faults that hold the bridge off.
+    #[derive(Clone, Debug, PartialEq)]
+    pub(super) struct Latch {
+        pub(super) faults: Faults,
+        /// How often a fault has turned the bridge off.
+        pub(super) count: u32,
+        /// Periods at zero throttle since the last sample that was a fault.
+        clear_periods: u32,
+    }
+}
+
+traced! {
+    /// How far a start has come, and how a drive fares.
+    #[derive(Clone, Debug, Default, PartialEq)]
+    pub(super) struct Progress {
+        /// Periods for which Run has been slow.
+        pub(super) slow_periods: u32,
+        /// Periods since Run began, as far as they matter.
+        pub(super) run_periods: u32,
+        /// Periods in a row for which the observer's state has been out of its range.
+        pub(super) lost_periods: u32,
+    }
+}
+
+traced! {
+    /// What the phases were told to do, and whether all of them can be read.
+    #[derive(Clone, Debug, PartialEq)]
+    pub(super) struct Applied {
+        /// The last two commands' duties of the phases a, b, c, the latest first. The second is kept up
+        /// only while a phase may be unreadable.
+        duties: [[Duty; 3]; 2],
+        /// Samples for which a phase may be unreadable.
+        unreadable: u8,
+    }
+}
+
+/// Samples after a long voltage vector in which its duties may still count.
+const UNREADABLE: u8 = 3;
+
+impl Shared {
+    /// At power-up.
+    pub(super) fn new(config: &Config) -> Self {
+        Self {
+            seen: Seen::NOTHING,
+            latch: Latch {
+                faults: Faults::NONE,
+                count: 0,
+                clear_periods: 0,
+            },
+            reversed: false,
+            failed_starts: 0,
+            progress: Progress::default(),
+            protection: protection::State::new(&config.protection),
+            zeros: sensing::State::default(),
+            applied: Applied {
+                duties: [[Duty::ZERO; 3]; 2],
+                unreadable: UNREADABLE,
+            },
+            supply: Supply::new(&config.modulator, Voltage::ZERO, Voltage::ZERO),
+        }
+    }
+
+    /// The currents of a sample.
+    #[inline(always)]
+    pub(super) fn currents(&mut self, config: &Config, sample: &Sample) -> [AdcCounts; 3] {
+        let mut currents = sensing::read(&self.zeros, sample.currents);
+        if self.applied.unreadable != 0 {
+            // Not by a reference to `currents`, which would then be in memory in every period.
+            currents = self.reconstructed(config, sample);
+        }
+        currents
+    }
+
+    /// The currents of a sample at which a phase may be unreadable.
+    #[cold]
+    fn reconstructed(&mut self, config: &Config, sample: &Sample) -> [AdcCounts; 3] {
+        let Applied { duties, unreadable } = &mut self.applied;
+        // With two shunts the third phase never is.
+        if config.sensing.shunts == Shunts::Three {
+            *unreadable -= 1;
+        }
+        let elapsed = duties[usize::from(config.delay == Delay::One)];
+        duties[1] = duties[0];
+        sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed)
+    }
+
+    /// Whether phases b and c change places for the control, which always turns one way.
+    #[inline(always)]
+    pub(super) fn swapped(&self, config: &Config) -> bool {
+        (config.direction == Direction::Reversed) != self.reversed
+    }
+
+    /// Until something tells the shaft's speed, what is reported falls as slowly as a large propeller
+    /// coasts.
+    pub(super) fn coast(&mut self, config: &Config) {
+        let speed = &mut self.seen.speed;
+        let lost = config.coast.apply(*speed) + Speed::DELTA;
+        *speed = speed.saturating_sub(lost).max(Speed::ZERO);
+    }
+}
+
+impl Latch {
+    /// Notes a fault in this phase; false where it has been noted, and the bridge is off for it.
+    pub(super) fn note(&mut self, fault: Fault, phase: Phase) -> bool {
+        self.clear_periods = 0;
+        let known = self.faults.contains(fault);
+        if !known {
+            self.count = self.count.saturating_add(1);
+            self.faults.insert(fault);
+        }
+        !known || phase != Phase::Idle
+    }
+
+    /// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
+    /// by then, and a limit that is grazed does not come and go. True where it ends.
+    #[inline(always)]
+    pub(super) fn clear(&mut self, config: &Config, at_zero: bool) -> bool {
+        if !at_zero {
+            self.clear_periods = 0;
+        } else if self.clear_periods < config.clear_periods {
+            self.clear_periods += 1;
+        } else {
+            self.faults = Faults::NONE;
+            return true;
+        }
+        false
+    }
+}
+
+impl Applied {
+    /// What the bridge is told.
+    #[inline(always)]
+    pub(super) fn command(&mut self, duties: [Duty; 3]) {
+        self.duties[0] = duties;
+    }
+
+    /// No phase is told to switch.
+    pub(super) fn rest(&mut self) {
+        self.command([Duty::ZERO; 3]);
+    }
+
+    /// The bridge has been off for long enough that no duty counts any more.
+    pub(super) fn forget(&mut self) {
+        self.duties = [[Duty::ZERO; 3]; 2];
+    }
+
+    /// What the bridge is about to be told may leave a phase unreadable.
+    pub(super) fn expect_unreadable(&mut self) {
+        if self.unreadable == 0 {
+            // Since then nobody has asked for them.
+            self.duties[1] = self.duties[0];
+        }
+        self.unreadable = UNREADABLE;
+    }
+}

@@ -1,0 +1,264 @@
+//! A period of the six-step drive.
+
+use super::duty::{self, NO_CURRENT, bridge, hold, take_over};
+use super::state::State;
+use super::tell::tell;
+use super::{given, start};
+use crate::control::six_step::commutation::{HALF_SEXTANT, SEXTANT};
+use crate::control::six_step::crossing;
+use crate::control::six_step::tracking::KNOWN;
+use crate::drive::config;
+use crate::drive::config::six_step::{Config, LOST_SEXTANTS};
+use crate::drive::io::{Asked, Bridge, Sample, Setpoint, in_order};
+use crate::drive::phase::Phase;
+use crate::drive::seen::reading;
+use crate::drive::shared::Shared;
+use crate::drive::transitions::Why;
+use crate::protection::Fault;
+use crate::units::{AdcCounts, Angle, Speed};
+
+/// Sextants without a crossing for which one counts that Ramp has waited for in vain: three of them
+/// end the start.
+const IMPATIENCE: u8 = 4;
+
+/// Periods in a row without a current after which the shaft stands.
+const STILL_PERIODS: u16 = 1000;
+
+/// Where the rotor is told to be, if it is.
+type Position = Option<(Angle, Speed)>;
+
+/// The mode that a set-point asks for while this drive drives.
+pub(in crate::drive) fn asked(
+    config: &config::Config,
+    shared: &Shared,
+    phase: Phase,
+    setpoint: &Setpoint,
+) -> Option<Why> {
+    let is_to_stop = duty::is_to_stop(setpoint, shared.reversed);
+    match phase {
+        Phase::Stopping if !is_to_stop => Some(Why::Resumed),
+        Phase::Run if is_to_stop => Some(Why::Released),
+        Phase::Park | Phase::Ramp if !is_along(config, shared, setpoint) => Some(Why::Released),
+        _ => None,
+    }
+}
+
+/// Whether the set-point wants the motor to turn the way in which it is being started.
+fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bool {
+    let present = if shared.reversed {
+        Asked::Backward
+    } else {
+        Asked::Forward
+    };
+    setpoint.asks(config.both_ways) == present
+}
+
+/// Whether a shaft turns too fast to be parked: it is left to slow down first.
+pub(in crate::drive) fn is_too_fast(
+    config: &config::Config,
+    six_step: &Config,
+    shared: &Shared,
+    (position, setpoint): (Position, &Setpoint),
+) -> bool {
+    let may_be_caught = position.is_some() && is_along(config, shared, setpoint);
+    shared.seen.speed > six_step.run_speed && !may_be_caught
+}
+
+/// Run goes on from the speed and the duty that there are.
+pub(in crate::drive) fn resume(s: &mut State) {
+    take_over(s);
+}
+
+/// Begins a start.
+pub(in crate::drive) fn begin(
+    config: &config::Config,
+    six_step: &Config,
+    (s, shared): (&mut State, &mut Shared),
+    (position, setpoint): (Position, &Setpoint),
+) -> Why {
+    *s = State::default();
+    shared.reversed = setpoint.asks(config.both_ways) == Asked::Backward;
+    match position {
+        Some(position) => {
+            given::begin(config, six_step, (s, shared), position);
+            Why::Caught
+        }
+        None => Why::Stands,
+    }
+}
+
+/// With the low sides on, a shaft that turns drives a current. It has stopped when there has been
+/// none for a while; until then what is reported falls slowly.
+pub(in crate::drive) fn watch(
+    config: &config::Config,
+    (s, shared): (&mut State, &mut Shared),
+    currents: [AdcCounts; 3],
+) {
+    let [a, b, c] = currents.map(AdcCounts::saturating_abs);
+    s.still = if a.max(b).max(c) > NO_CURRENT {
+        0
+    } else {
+        s.still.saturating_add(1)
+    };
+    if s.still >= STILL_PERIODS {
+        shared.seen.speed = Speed::ZERO;
+    } else {
+        shared.coast(config);
+    }
+}
+
+/// A period of Park, Ramp, Run or Stopping.
+// Apart from the modes that are chosen with it: it takes many more registers.
+#[inline(never)]
+pub(in crate::drive) fn period(
+    config: &config::Config,
+    six_step: &Config,
+    (s, shared): (&mut State, &mut Shared),
+    (phase, position): (Phase, Position),
+    (sample, setpoint): (&Sample, &Setpoint),
+    currents: [AdcCounts; 3],
+) -> (Bridge, Option<Why>) {
+    if phase == Phase::Park {
+        return start::park(config, six_step, (s, shared), currents, setpoint);
+    }
+    let swapped = shared.swapped(config);
+    let currents = in_order(swapped, currents);
+    let terminals = in_order(swapped, sample.terminals);
+    let ramping = phase == Phase::Ramp;
+    let legs = s.sector.legs(currents);
+    // The leg that was on before the last commutation carries all of the current, the other one
+    // only what the released phase has left.
+    let i = if s.sector.rising() {
+        reading(legs.switching)
+    } else {
+        reading(legs.low).saturating_neg()
+    };
+
+    if let Some(position) = position {
+        given::follow(six_step, (s, shared), position);
+    } else if !crossings(six_step, (s, shared), terminals, ramping) {
+        return (Bridge::Off, Some(start::lost(six_step, s, phase)));
+    }
+
+    let (mut told, mut why) = (phase, None);
+    if ramping {
+        let ramp_current = start::current(six_step, (s, shared), setpoint);
+        hold(six_step, s, i, ramp_current);
+        if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
+            s.tracking.acceleration = Speed::ZERO;
+            take_over(s);
+            (told, why) = (Phase::Run, Some(Why::HandedOver));
+        }
+    } else {
+        duty::run(config, six_step, (s, shared), i, setpoint);
+    }
+    tell(config, (s, shared), told, (currents, i));
+    let bridge = bridge(s, swapped, None);
+    if ramping {
+        return (bridge, why);
+    }
+    let slow = s.tracking.omega_bar < six_step.slow;
+    (
+        bridge,
+        rotor(
+            config,
+            six_step,
+            (s, shared),
+            phase,
+            (slow, position.is_some()),
+        ),
+    )
+}
+
+/// What the rotor makes of Run and Stopping.
+fn rotor(
+    config: &config::Config,
+    six_step: &Config,
+    (s, shared): (&mut State, &mut Shared),
+    phase: Phase,
+    (slow, given): (bool, bool),
+) -> Option<Why> {
+    let run_periods = &mut shared.progress.run_periods;
+    match phase {
+        Phase::Stopping if slow => {
+            s.still = 0;
+            Some(Why::Stopped)
+        }
+        Phase::Run if slow && given => {
+            given::is_stuck(config, shared).then_some(Why::Tripped(Fault::Stuck))
+        }
+        Phase::Run if slow => Some(start::lost(six_step, s, phase)),
+        Phase::Run if *run_periods < config.proven_periods => {
+            *run_periods += 1;
+            if *run_periods == config.proven_periods {
+                s.failed = 0;
+            }
+            None
+        }
+        _ => None,
+    }
+}
+
+/// Looks for the crossing and commutates by it. False where the rotor is no longer followed.
+#[inline]
+fn crossings(
+    six_step: &Config,
+    (s, shared): (&mut State, &Shared),
+    terminals: [AdcCounts; 3],
+    ramping: bool,
+) -> bool {
+    s.tracking.advance();
+    let terminal = s.sector.legs(terminals).floating;
+    let terminal = six_step.terminal.held(terminal);
+    let rising = s.sector.rising();
+    let found = crossing::look(
+        &six_step.crossing,
+        &mut s.crossing,
+        rising,
+        ramping,
+        s.tracking.certain(),
+        terminal,
+        shared.protection.bus,
+    );
+    if let Some(age) = found {
+        s.tracking.crossed(age);
+        s.missed = 0;
+    }
+    commutate(six_step, s, ramping);
+    s.astray = if ramping && s.tracking.crossings < KNOWN {
+        s.astray.saturating_add(1)
+    } else {
+        0
+    };
+    s.missed < LOST_SEXTANTS && s.astray < six_step.astray
+}
+
+/// The next sextant, where it is time.
+fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
+    let blind = s.crossing.blind();
+    let mut sextants = 1;
+    let due = if s.crossing.found || blind {
+        // Where nothing has been seen, the released phase's current has hidden the crossing, or the
+        // rotor had been past it: what is known of it tells when the sextant ends.
+        s.tracking.reaches(HALF_SEXTANT, six_step.delay)
+    } else if ramping {
+        // It is certain to be on its way, pulled forwards, unless something holds it.
+        sextants = IMPATIENCE;
+        s.crossing.samples >= six_step.patience
+    } else {
+        s.tracking.reaches(SEXTANT, six_step.delay)
+    };
+    if !due {
+        return;
+    }
+    if s.crossing.found || (blind && s.tracking.crossings > 0) {
+        s.tracking.commutated();
+    } else {
+        s.tracking.forced();
+    }
+    if !s.crossing.found {
+        s.missed += sextants;
+    }
+    s.sector = s.sector.next();
+    s.crossing.begin(&six_step.crossing);
+}

@@ -1,0 +1,141 @@
+//! Every change of the drive's phase, with its reason: the one table of them.
+
+use super::config::Stop;
+use super::phase::Phase;
+use crate::protection::Fault;
+
+/// Why the phase changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Why {
+    /// Something may turn the motor and asks for it.
+    Drive,
+    /// A tone or a self-test is asked for, of a rotor that stands.
+    Sound,
+    /// Nothing is asked for any more, or the other direction is.
+    Released,
+    /// The same, where the shaft is to coast: without current at once.
+    Coasts,
+    /// The low sides were on before a tone, and are to be again.
+    Shorted,
+    /// The currents' zeros are measured, and what there is to know of the rotor is known.
+    Sensed,
+    /// The shaft turns too fast to be parked by the six-step drive, which knows no flying start.
+    TooFast,
+    /// The drivers are charged, and the rotor stands somewhere: it is to be aligned.
+    Stands,
+    /// The drivers are charged, and the rotor is known: a flying start, or sensors that show where it is.
+    Caught,
+    /// The drivers are charged, and the rotor turns the other way.
+    CaughtBackwards,
+    /// The drivers are charged as far as a tone or a self-test needs.
+    Sounds,
+    /// The rotor has had its time to align.
+    Aligned,
+    /// The observer has the rotor.
+    HandedOver,
+    /// The motor is to turn again, and the observer still follows it.
+    Resumed,
+    /// There is nothing left to slow down.
+    Stopped,
+    /// Loss of synchronism in a start, or Run has been too slow for too long: another attempt.
+    Failed,
+    /// The six-step drive's loss of synchronism in a start: it aligns the rotor anew.
+    Retried,
+    /// The bridge is off until zero throttle.
+    Tripped(Fault),
+}
+
+/// Where a change leads: the table. From any phase that is not in it, for that reason, nowhere.
+pub(super) const fn next(from: Phase, why: Why, stop: Stop) -> Phase {
+    use Phase::{Brake, Charge, Idle, Park, Ramp, Run, Sense, Stopping, Tone};
+    match (from, why) {
+        (Idle | Brake | Tone, Why::Drive) | (Idle | Brake, Why::Sound) => Sense,
+        (Sense, Why::Sensed) => Charge,
+        (Sense | Charge, Why::Released | Why::TooFast) | (Tone, Why::Released) => Idle,
+        (Idle | Tone, Why::Shorted) => Brake,
+        (Charge, Why::Sounds) => Tone,
+        (Charge, Why::Stands) => Park,
+        (Charge, Why::Caught) => Run,
+        (Charge, Why::CaughtBackwards) => Stopping,
+        (Park, Why::Aligned) => Ramp,
+        (Ramp, Why::HandedOver) => Run,
+        (Run, Why::Released) => Stopping,
+        (Stopping | Brake, Why::Resumed) => Run,
+        (Park | Ramp, Why::Released) | (Stopping, Why::Stopped) => match stop {
+            Stop::Coast => Idle,
+            Stop::Brake => Brake,
+        },
+        (Run | Stopping, Why::Coasts) => Idle,
+        (Ramp | Run | Stopping, Why::Failed) => Idle,
+        (Ramp | Run | Stopping, Why::Retried) => Park,
+        (_, Why::Tripped(_)) => Idle,
+        _ => from,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    const ALL: [Why; 18] = [
+        Why::Drive,
+        Why::Sound,
+        Why::Released,
+        Why::Coasts,
+        Why::Shorted,
+        Why::Sensed,
+        Why::TooFast,
+        Why::Stands,
+        Why::Caught,
+        Why::CaughtBackwards,
+        Why::Sounds,
+        Why::Aligned,
+        Why::HandedOver,
+        Why::Resumed,
+        Why::Stopped,
+        Why::Failed,
+        Why::Retried,
+        Why::Tripped(Fault::OverCurrent),
+    ];
+
+    /// Phases that a table leads to from here, for either way to stop.
+    fn led_to(from: Phase) -> Vec<Phase> {
+        let stops = [Stop::Coast, Stop::Brake];
+        let to = |why| stops.map(|stop| next(from, why, stop));
+        ALL.into_iter()
+            .flat_map(to)
+            .filter(|to| *to != from)
+            .collect()
+    }
+
+    #[test]
+    fn nothing_drives_and_nothing_sounds_but_behind_sense_and_charge() {
+        for from in [Phase::Idle, Phase::Sense, Phase::Tone] {
+            let led_to = led_to(from);
+            assert!(!led_to.is_empty());
+            assert!(led_to.iter().all(|to| !to.drives()), "{from:?}: {led_to:?}");
+            assert!(!led_to.contains(&Phase::Tone), "{from:?}: {led_to:?}");
+        }
+        // The low sides have kept the drivers charged.
+        let driving: Vec<_> = led_to(Phase::Brake);
+        assert!(driving.iter().all(|to| !to.drives() || *to == Phase::Run));
+    }
+
+    #[test]
+    fn a_fault_turns_the_bridge_off_in_each_phase() {
+        for from in Phase::ALL {
+            let to = next(from, Why::Tripped(Fault::Stuck), Stop::Brake);
+            assert_eq!(to, Phase::Idle, "{from:?}");
+        }
+    }
+
+    #[test]
+    fn each_phase_is_left_and_each_is_come_to() {
+        let all: Vec<_> = Phase::ALL.into_iter().flat_map(led_to).collect();
+        for phase in Phase::ALL {
+            assert!(all.contains(&phase), "{phase:?} is never come to");
+            assert!(!led_to(phase).is_empty(), "{phase:?} is never left");
+        }
+    }
+}
