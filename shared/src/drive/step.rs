@@ -36,33 +36,63 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
         !asks_nothing_new(config, state, &setpoint) && decide(config, state, &setpoint)
     };
 
-    // Sense. With the bridge off a reading is its offset, which may not have been measured yet.
-    let [a, b, c] = state.shared.currents(config, &sample);
-    let flowing = (field_oriented || !state.phase.is_off()).then_some([a, b, c]);
+    // Sense. The mode's own work: voltage, duties, and what is seen.
+    if !field_oriented {
+        return rest(config, state, &sample, &setpoint);
+    }
+    match sense(config, state, &sample, true) {
+        Some(currents) => period(
+            config,
+            (&mut state.foc, &mut state.shared),
+            &sample,
+            currents,
+        ),
+        None => state.enters_rest().unwrap_or(Bridge::Off),
+    }
+}
+
+/// The currents of a sample; `None` where the sample is a fault, which ends the drive.
+// In the period's own code: a call would carry the three currents through memory.
+#[inline(always)]
+fn sense(
+    config: &Config,
+    state: &mut State,
+    sample: &Sample,
+    flowing: bool,
+) -> Option<[AdcCounts; 3]> {
+    let currents = state.shared.currents(config, sample);
     let bus = config.bus.of(sample.bus).scaled();
     let protection = &mut state.shared.protection;
-    let fault = protection::check(&config.protection, protection, flowing, bus);
-    if let Some(fault) = fault {
+    let judged = flowing.then_some(currents);
+    if let Some(fault) = protection::check(&config.protection, protection, judged, bus) {
         state.change(config, Why::Tripped(fault));
+        return None;
     }
+    Some(currents)
+}
 
-    // The mode's own work: voltage, duties, and what is seen.
-    if field_oriented && fault.is_none() {
-        let drive = (&mut state.foc, &mut state.shared);
-        return period(config, drive, &sample, [a, b, c]);
-    }
+/// A period of any mode but field-oriented control's.
+// In the period's own code, which has saved the registers already.
+#[inline(always)]
+fn rest(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
+    // With the bridge off a reading is its offset, which may not have been measured yet.
+    let flowing = !state.phase.is_off();
+    let currents = sense(config, state, sample, flowing);
     if let Some(bridge) = state.enters_rest() {
         return bridge;
     }
     if state.phase.is_off() {
-        return off(config, state, (&sample, &setpoint));
+        return off(config, state, (sample, setpoint));
     }
+    let Some(currents) = currents else {
+        return Bridge::Off;
+    };
     if state.phase == Phase::Brake && config.six_step.is_none() {
         let drive = (&mut state.foc, &mut state.shared);
-        short::watch(config, drive, &sample, [a, b, c]);
+        short::watch(config, drive, sample, currents);
         return Bridge::Brake;
     }
-    other(config, state, (&sample, &setpoint), [a, b, c])
+    other(config, state, (sample, setpoint), currents)
 }
 
 /// Whether a drive that rests is asked for nothing, which ends a row of failed starts, or one that begins

@@ -18,18 +18,18 @@ use record::{Act, Run};
 use siskin_control::drive::Phase;
 use siskin_control::params::{ParamId, Params};
 
-/// Instructions of a control period of the default drive, start-up and faults included. Wanted are 300
-/// and 380; at 24 kHz a chip of 170 MHz has 7083 clocks a period, one of 84 MHz 3500.
+/// Instructions of a control period of the default drive, start-up and faults included. Wanted are 330
+/// and 500; at 24 kHz a chip of 170 MHz has 7083 clocks a period, one of 84 MHz 3500.
 const STEP_MAX: Bounds = Bounds {
-    median: 325,
-    most: 605,
+    median: 330,
+    most: 645,
 };
 
 /// Instructions of the whole interrupt around it: from the converters' registers to the timer's, the
-/// set-point taken and the snapshot published. Wanted are 400 and 500.
+/// set-point taken and the snapshot published. Wanted are 470 and 750.
 const INTERRUPT_MAX: Bounds = Bounds {
-    median: 475,
-    most: 890,
+    median: 440,
+    most: 820,
 };
 
 /// The most that counts may be.
