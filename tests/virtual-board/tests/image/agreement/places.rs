@@ -198,7 +198,7 @@ fn a_word_is_found_where_it_stands_and_lost_where_it_does_not() {
         let wide = period * 0x0101_0101;
         let mut memory = [0; 12];
         memory[4..8].copy_from_slice(&wide.to_le_bytes());
-        memory[9] = 7 * period as u8;
+        memory[9] = (7 * period) as u8;
         memory[10] = if period < 20 { 5 } else { 3 };
         let coded = u32::from(period >= 20);
         places.look(&[wide, (7 * period) & 0xff, 0, coded], &memory);
