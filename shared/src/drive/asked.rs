@@ -64,7 +64,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
     let sounds = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
     let drives = setpoint.asks(config.both_ways) != Asked::Nothing;
     let stands = state.off.rotor == Rotor::Standing;
-    let why = match state.phase {
+    match state.phase {
         Phase::Tone | Phase::Sense if sounds => None,
         // A test charges what it needs, and is to find a short circuit before all low sides are on.
         Phase::Charge if pulls && stands => Some(Why::Sounds),
@@ -81,8 +81,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
             None
         }
         phase => start(config, state, phase, setpoint),
-    };
-    why
+    }
 }
 
 /// While nothing drives and something asks for it.

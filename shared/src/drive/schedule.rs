@@ -108,7 +108,7 @@ const SLOTS: [[Work; CYCLE as usize]; 2] = [RUN, START];
 /// Takes the slot on by a period, and says what is done in it.
 #[inline(always)]
 pub(super) fn next(slot: &mut Slot) -> Work {
-    *slot = *slot & !(CYCLE as u8 - 1) | (*slot + 1) % CYCLE as u8;
+    *slot = (*slot & !(CYCLE as u8 - 1)) | ((*slot + 1) % CYCLE as u8);
     SLOTS.as_flattened()[usize::from(*slot) % (2 * CYCLE as usize)]
 }
 
