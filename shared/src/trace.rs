@@ -10,8 +10,8 @@ pub trait Trace {
     fn trace(&self, out: &mut impl FnMut(u32));
 }
 
-/// Declares a struct (generic in one type at most), or an enum without payload, that hands out the words of its fields in the order of
-/// their declaration.
+/// Declares a struct (generic in one type at most), or an enum without payload, that hands out the
+/// words of its fields in the order of their declaration.
 macro_rules! traced {
     (
         $(#[$attribute:meta])*

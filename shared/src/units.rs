@@ -108,7 +108,7 @@ pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);
 /// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
 pub type InverseFlux = Quantity<PerWeber, U32>;
 
-/// The control's units in SI.
+/// The inverse of the motor's stated flux, ξ = 1/4: the voltage base makes it so for every motor.
 pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
 
 /// The back-EMF of the motor's stated flux at a speed, |h| = ω/ξ.

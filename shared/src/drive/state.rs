@@ -113,7 +113,8 @@ impl State {
         };
     }
 
-    /// Changes the phase, by the table of [`transitions`](super::transitions): here and nowhere else.
+    /// Changes the phase, by the table of [`transitions`](super::transitions): here, and where all begins
+    /// anew under other units, and nowhere else.
     #[cold]
     pub(super) fn change(&mut self, config: &Config, why: Why) {
         if let Why::Tripped(fault) = why
@@ -122,7 +123,10 @@ impl State {
             return;
         }
         let from = self.phase;
-        let to = next(from, why, config.stop);
+        let Some(to) = next(from, why, config.stop) else {
+            debug_assert!(false, "{from:?} does not end by {why:?}");
+            return;
+        };
         self.phase = to;
         schedule::choose(&mut self.foc.loops.slot, to.is_open_loop());
         if to.is_off() || to == Phase::Brake || why == Why::Retried {

@@ -117,8 +117,12 @@ fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> 
 /// The mode that the set-point asks for. Whether field-oriented control drives.
 #[inline(never)]
 fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
-    // This period's slice of the outer loop is left out: it has another turn.
-    schedule::next(&mut state.foc.loops.slot);
+    // This period's slice of the outer loop is left out, since it has another turn; but not the damping of a
+    // start, in which the observer is told once where the aligned rotor is.
+    let work = schedule::next(&mut state.foc.loops.slot);
+    if work == Work::Damp && state.phase.is_open_loop() {
+        open_loop::damp(config, &mut state.foc, &state.shared, state.phase);
+    }
     if let Setpoint::Fault(fault) = setpoint {
         state.change(config, Why::Tripped(*fault));
     }
@@ -240,7 +244,7 @@ fn other(
     state.enters_rest().unwrap_or(bridge)
 }
 
-/// Behind Charge, `n` periods after it: what makes ready for the mode that follows.
+/// After Charge, in its period `n`, from 1 on: what makes ready for the mode that follows.
 #[cold]
 #[inline(never)]
 fn ready(
@@ -252,9 +256,7 @@ fn ready(
     let (foc, shared) = (&mut state.foc, &mut state.shared);
     if matches!(setpoint, Setpoint::Tone(_)) {
         // What the supply gives is all that a tone must know.
-        if n > 0 {
-            outer_loop::ready(config, foc, shared, n);
-        }
+        outer_loop::ready(config, foc, shared, n);
         return (n + 1 >= tone::READY_PERIODS).then_some(Why::Sounds);
     }
     match &config.six_step {
@@ -268,11 +270,10 @@ fn ready(
                 (position, setpoint),
             ))
         }
-        None if n > 0 => {
+        None => {
             let rotor = state.off.rotor;
             begin::begin(config, foc, shared, rotor, (sample, setpoint), n)
         }
-        None => None,
     }
 }
 

@@ -117,6 +117,8 @@ pub(super) fn period(
     let v = (v, Order::NORMAL);
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
     let duties = modulator::duties(&config.modulator, &shared.supply, v, none);
+    // A tone's voltage may be as long as the supply gives.
+    shared.applied.expect_unreadable();
     shared.applied.command(duties);
     Bridge::Duty(duties)
 }

@@ -133,8 +133,8 @@ pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {
     }
 }
 
-/// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw` and takes no more than
-/// `bus_return`, and less of that as its voltage nears the limit.
+/// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw`
+/// and takes no more than `bus_return`, and less of that as its voltage nears the limit.
 ///
 /// Braking begins at a bound that returns no more than that at any speed; only then is it moved by
 /// what is returned. From the full bound it would return too much for some milliseconds.

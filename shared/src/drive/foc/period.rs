@@ -1,4 +1,5 @@
-//! The choice of the current loop's parts.
+//! The choice of the current loop's parts: the default observer and regulator are compiled as one piece,
+//! any others are chosen by the configuration at each call.
 
 use super::any::any;
 use super::current_loop::{Drive, current_loop, imposed, observed};
@@ -11,8 +12,8 @@ use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
 use crate::units::{AdcCounts, Current};
 
-/// A period of Park, Ramp, Run or Stopping. Observer and regulator are chosen here and nowhere else: the
-/// default ones, for which the compiler makes one piece of the loop, or any others.
+/// A period of Park, Ramp, Run or Stopping. The default observer and regulator have a piece of
+/// code of their own; any others share one.
 #[inline(always)]
 pub(in crate::drive) fn period(
     config: &Config,
