@@ -61,10 +61,10 @@ fn speed_up() {
         w.set_prften(true);
     });
     while FLASH.acr().read().latency() != Latency::WS4 {}
-    RCC.cfgr().modify(|w| {
-        w.set_hpre(AHBPrescaler::DIV2);
-        w.set_sw(Sysclk::PLL1_R);
-    });
+    // In force before the PLL is (RM0440, 6.1.5).
+    RCC.cfgr().modify(|w| w.set_hpre(AHBPrescaler::DIV2));
+    while RCC.cfgr().read().hpre() != AHBPrescaler::DIV2 {}
+    RCC.cfgr().modify(|w| w.set_sw(Sysclk::PLL1_R));
     while RCC.cfgr().read().sws() != Sysclk::PLL1_R {}
     // 1 µs of 85 MHz.
     cortex_m::asm::delay(85);
@@ -73,7 +73,7 @@ fn speed_up() {
 
 /// The rate of a serial line as the HAL must be given it: it divides its own clock by it.
 pub(crate) const fn told_hz(rate_hz: u32) -> u32 {
-    // The rates end below 1 MHz.
+    // `TEL_BAUD` ends at 921 600, where the HAL divides by 184 and the rate is 0.25 % off.
     let mega = TIMER_HZ / 1_000_000;
     (rate_hz * (TOLD_HZ / 1_000_000) + mega / 2) / mega
 }
