@@ -25,7 +25,7 @@ pub enum Direction {
 /// How the motor is stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
-    /// Without torque, then the bridge off.
+    /// The bridge off: at once by field-oriented control, by the six-step drive when the shaft is slow.
     #[default]
     Coast,
     /// By regenerative braking, then all low sides on.

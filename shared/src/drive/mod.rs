@@ -1,12 +1,18 @@
 //! One control period: [`step()`] takes a sample and a set-point, and says what the bridge does.
 //!
 //! # A period, from top to bottom
-//! `step.rs`: the mode is decided (`asked.rs`, and of what the rotor does each mode's own file), the sample is
-//! read and judged (`shared.rs`, [`protection`](crate::protection)), the mode does its own work, and says what
-//! the bridge does and perhaps why it ends. The outer loop's work is sliced over 32 periods (`schedule.rs`).
-//! Observer and regulator are chosen in one place (`foc/period.rs`).
+//! `step.rs`: the mode is decided (`asked.rs`, and by what the rotor does in each mode's own file) and this
+//! period's slice of the outer loop's work is done (`schedule.rs`, 32 periods), both from what the last period
+//! saw. Then the sample is read and judged (`shared.rs`, [`protection`](crate::protection)), and the mode does
+//! its own work: it says what the bridge does, and perhaps why it ends. The default observer and regulator have
+//! a piece of code of their own, any others share one (`foc/period.rs`).
+//!
+//! A set-point of another kind is obeyed in its own period, and so is a fault. One of the same kind that only
+//! changes its sign is obeyed within a cycle of the schedule, at most 32 periods later.
 //!
 //! # The modes
+//! They are the values of [`Phase`].
+//!
 //! | mode | file | what it does and remembers |
 //! |---|---|---|
 //! | Idle, Sense | `off.rs` | the bridge is off: the rotor is watched, the currents' zeros are measured |
@@ -18,7 +24,7 @@
 //! | Tone | `tone.rs`, `self_test.rs` | the phases switch to be heard, or to be tested |
 //!
 //! All changes of mode, each with its reason, are the table in `transitions.rs`; they are made by one
-//! function, `State::change`:
+//! function, `State::change`, but for a restart under other units ([`State::adopt`]):
 //!
 //! ```text
 //!        Drive, Sound           Sensed            Stands            Aligned
@@ -36,6 +42,8 @@
 //!   |                                                           | Stopped
 //!   |                                                           +--> Idle or Brake
 //!   +--- Coasts (Run, Stopping), Failed (Ramp, Run, Stopping), Tripped (any)
+//!
+//!  Ramp, Run, Stopping -- Retried, by the six-step drive --> Park        Idle -- Shorted --> Brake
 //! ```
 //!
 //! # The files' order

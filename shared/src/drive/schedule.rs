@@ -35,9 +35,9 @@ pub(super) enum Work {
     Bounds,
     /// Dead-time signs, and the update of the observer's gains.
     ObserverGains,
-    /// Delay compensation, dead-time signs, and the mode that the set-point asks for.
+    /// Delay compensation, dead-time signs, and the mode that the set-point asks for: it may end the drive.
     Setpoint,
-    /// The mode that the rotor allows; dead-time signs, and the decoupling of the regulator's axes.
+    /// The mode that the rotor allows, which may end the drive; dead-time signs, and the decoupling of the regulator's axes.
     Rotor,
 }
 

@@ -38,7 +38,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
 
     // Sense. The mode's own work: voltage, duties, and what is seen.
     if !field_oriented {
-        return rest(config, state, &sample, &setpoint);
+        return other(config, state, &sample, &setpoint);
     }
     match sense(config, state, &sample, true) {
         Some(currents) => period(
@@ -71,10 +71,10 @@ fn sense(
     Some(currents)
 }
 
-/// A period of any mode but field-oriented control's.
+/// A period of any mode but field-oriented control's, among them all of the six-step drive's.
 // In the period's own code, which has saved the registers already.
 #[inline(always)]
-fn rest(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
+fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
     // With the bridge off a reading is its offset, which may not have been measured yet.
     let flowing = !state.phase.is_off();
     let currents = sense(config, state, sample, flowing);
@@ -92,7 +92,7 @@ fn rest(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint
         short::watch(config, drive, sample, currents);
         return Bridge::Brake;
     }
-    other(config, state, (sample, setpoint), currents)
+    energised(config, state, (sample, setpoint), currents)
 }
 
 /// Whether a drive that rests is asked for nothing, which ends a row of failed starts, or one that begins
@@ -206,9 +206,9 @@ fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoi
     Bridge::Off
 }
 
-/// A period of any mode but those and field-oriented control's.
+/// A period of Charge, of a tone, or of the six-step drive.
 #[inline(never)]
-fn other(
+fn energised(
     config: &Config,
     state: &mut State,
     (sample, setpoint): (&Sample, &Setpoint),

@@ -37,7 +37,8 @@ pub(super) enum Why {
     Resumed,
     /// There is nothing left to slow down.
     Stopped,
-    /// Loss of synchronism in a start, or Run has been too slow for too long: another attempt.
+    /// Loss of synchronism in a start, or Run has been too slow for too long: to Idle, from which a set-point
+    /// that still asks for it begins another attempt.
     Failed,
     /// The six-step drive's loss of synchronism in a start: it aligns the rotor anew.
     Retried,

@@ -16,7 +16,7 @@ pub enum Fault {
     OverTemperature = 3,
     /// The observer's state left its range: the rotor's position is not known.
     ObserverLost = 4,
-    /// No attempt of a start has made the motor turn.
+    /// All attempts of a start have failed, or the motor was too slow for too long.
     Stuck = 5,
     /// A current sensor's zero is too far off.
     CurrentSensor = 6,

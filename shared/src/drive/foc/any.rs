@@ -8,7 +8,7 @@ use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
 use crate::units::Current;
 
-/// A period on any board, with the adaptation of the inductance where it is asked for.
+/// A period with any observer, regulator and delay, and with the adaptation of the inductance if it is asked for.
 #[inline(never)]
 pub(in crate::drive) fn any(
     config: &Config,
