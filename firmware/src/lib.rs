@@ -77,7 +77,7 @@
 //! | current above the hardware's trip, G431 | comparators over the timer's break, without the processor | over-current |
 //! | over-current, F405 | the control's own trip, within two periods; the gate driver's limiter is a strap and not counted on | over-current |
 //! | low supply of the gates, over-temperature of the driver, F405 | the gate driver; its nFAULT also the timer and the driver's enable | over-current |
-//! | set-point not renewed | the control, by `Stop` | loss of signal, by the tasks |
+//! | set-point not renewed | `exchange`, which gives the control `Stop` | loss of signal, by the tasks |
 //! | overrun, three in a row or more than one in 100 periods for long | [`last_words`] | after the reset |
 //! | damage to a stamped image | its start, which never turns it on | at 115200 baud, and by the light |
 //! | panic, hard fault, stack overflow, interrupt without a handler | [`last_words`], first of all | after the reset |
@@ -96,7 +96,7 @@
 //!
 //! # What no board has shown yet
 //! None of this has run on a board. Pins and alternate functions agree with the metadata of
-//! `stm32-metapac` (the HAL's types would not take others); that the comparators' inputs, DAC3's
+//! `stm32-metapac`: on the F405 the HAL's types would not take others, on the G431 they are numbers; that the comparators' inputs, DAC3's
 //! channels and the break's bits are as `chip` has them is from the reference manual alone. Of the
 //! boards, these could not be checked: the order and the sign of the VESC's two shunts, the amplifiers'
 //! settling times, how the straps of a DRV8302 are set, the thermistor of the B-G431B-ESC1, and what its
