@@ -321,7 +321,7 @@ pub(crate) fn own(item: Item) -> Option<f32> {
             Some(f32::from(u8::from(sound)))
         }
         Kind::Comparator => {
-            let level = comparators::search(item.phase.into())?;
+            let level = comparators::search(item.phase.into());
             Some(level.map_or(f32::NAN, |level| TRIP.amperes(level)))
         }
         _ => None,

@@ -14,14 +14,11 @@ use embassy_stm32::pac::{COMP1, COMP2, COMP4, DAC3, RCC, TIM1};
 /// and PB0.
 const COMPARATORS: [Comp; 3] = [COMP1, COMP2, COMP4];
 
-/// Their enables in TIM1_AF1, BKCMP1E, 2E and 4E, counted from 0.
-const BREAKS: [usize; 3] = [0, 1, 3];
-
 /// The highest level.
 const FULL_SCALE: u16 = 4095;
 
-/// From a level to an output that follows it, cycles of the core: 10 µs, where the DAC takes at most 3 µs and
-/// the comparator 0.1 µs (data sheet of the STM32G431).
+/// From a level to an output that follows it, cycles of the core: 10 µs, where the DAC takes up to 3 µs without
+/// its buffer (data sheet of the STM32G431) and the comparator 0.1 µs.
 const SETTLE: u32 = 1_700;
 
 /// Sets the comparators up with a level of 4096, and lets them break the PWM. The timer's clock must
@@ -53,7 +50,7 @@ pub(crate) fn set_up(level: u16) {
     TIM1.af1().write(|w| {
         // No pin breaks.
         w.set_bkine(false);
-        for number in BREAKS {
+        for number in [0, 1, 3] {
             w.set_bkcmpe(number, true);
         }
     });
@@ -66,31 +63,25 @@ pub(crate) fn set_level(level: u16) {
     }
 }
 
-/// The highest level, of 4096, at which a comparator would trip now; the inner `None` if it does not trip
-/// at 0, or does at full scale.
-///
-/// None of the comparators breaks the PWM meanwhile, for 0.2 ms. So it is for a bridge that is off: where
-/// the bridge is on, or comes on, all is put back within a probe of 10 µs, and the outer `None` is the answer.
-pub(crate) fn search(comparator: usize) -> Option<Option<u16>> {
-    let is_off = || !TIM1.bdtr().read().moe();
-    if !is_off() {
-        return None;
-    }
-    let given = DAC3.dhr12r(0).read().dhr();
+/// The highest level, of 4096, at which a comparator would trip now; nothing where it does not trip at 0, or
+/// does at full scale. To be called while the bridge is off: none of them breaks the PWM meanwhile, for
+/// 0.2 ms.
+pub(crate) fn search(comparator: usize) -> Option<u16> {
     let breaking = TIM1.af1().read();
     TIM1.af1().modify(|w| {
-        for number in BREAKS {
+        for number in [0, 1, 3] {
             w.set_bkcmpe(number, false);
         }
     });
+    let given = DAC3.dhr12r(0).read().dhr();
     let trips_at = |level| {
         set_level(level);
         cortex_m::asm::delay(SETTLE);
         COMPARATORS[comparator].csr().read().value()
     };
     let (mut low, mut high) = (0, FULL_SCALE);
-    let found = is_off() && trips_at(low) && is_off() && !trips_at(high);
-    while found && high - low > 1 && is_off() {
+    let found = trips_at(low) && !trips_at(high);
+    while high - low > 1 {
         let middle = (low + high) / 2;
         if trips_at(middle) {
             low = middle;
@@ -98,16 +89,12 @@ pub(crate) fn search(comparator: usize) -> Option<Option<u16>> {
             high = middle;
         }
     }
-    let undisturbed = is_off();
     set_level(given);
     cortex_m::asm::delay(SETTLE);
-    // The break of a comparator that had not fallen yet would be taken for one of the bridge. Bits written
-    // as 1 stay as they are.
-    if undisturbed {
-        let mut others = SrAdv(!0);
-        others.set_bif(0, false);
-        TIM1.sr().write_value(others);
-    }
+    // Bits written as 1 stay as they are.
+    let mut others = SrAdv(!0);
+    others.set_bif(0, false);
+    TIM1.sr().write_value(others);
     TIM1.af1().write_value(breaking);
-    undisturbed.then_some(found.then_some(low))
+    found.then_some(low)
 }

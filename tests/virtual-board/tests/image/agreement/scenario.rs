@@ -66,14 +66,15 @@ impl Step {
     }
 }
 
-/// Zero until it is armed, a start, up in steps and back, and to rest.
+/// Zero until it is armed, a start, up in steps and back, and to rest. The first step is long enough that the
+/// speed has settled where it is measured, though a start may be 15 ms later: a start takes 0.8 s of it.
 pub(crate) const STEPS: [Step; 6] = [
     Step::command(500, 0),
-    Step::throttle(1600, 0.25),
-    Step::throttle(2200, 0.5),
-    Step::throttle(2800, 0.75),
-    Step::throttle(3600, 0.25),
-    Step::command(4400, 0),
+    Step::throttle(1900, 0.25),
+    Step::throttle(2500, 0.5),
+    Step::throttle(3100, 0.75),
+    Step::throttle(3900, 0.25),
+    Step::command(4700, 0),
 ];
 
 /// The default bench with the sensors of the board, switch by switch.
