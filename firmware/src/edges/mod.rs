@@ -101,6 +101,11 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
         self.rings.iter().all(|ring| ring.count() >= BITS)
     }
 
+    /// Returns true if half as many edges have come as a frame has.
+    pub(crate) fn has_half_a_frame(&self) -> bool {
+        self.rings.iter().all(|ring| ring.count() >= BITS / 2)
+    }
+
     /// Returns true if this time was still to come at the last look.
     pub(crate) fn is_before(&self, until_ticks: u32) -> bool {
         until_ticks.wrapping_sub(self.last_ticks) as i32 > 0

@@ -146,6 +146,8 @@ struct Looks {
     after_ticks: Vec<u32, 2>,
     /// True if a whole frame is expected, and nothing else taken.
     frame: bool,
+    /// True if what comes is left out, since it had begun long before.
+    late: bool,
     /// Until when the last edges of an expected frame are waited for.
     until_ticks: u32,
     /// A frame whose answer cannot wait until it has been decoded.
@@ -188,6 +190,9 @@ impl Listener {
     fn begin(&mut self, edge: bool) -> Looks {
         let signal = self.port.reach(|throttle| throttle.signal());
         self.fill();
+        // Edge by edge a frame of an unknown signal takes 140 µs and more: who is behind leaves out whole frames,
+        // and is in time for others.
+        let late = signal.is_none() && self.capture.edges.has_half_a_frame();
         if let Some(Signal::Dshot {
             rate,
             bidirectional,
@@ -213,12 +218,14 @@ impl Listener {
                 let waking_ticks = last.saturating_sub(capture::ticks_of_us(WAKING_US));
                 (last, Vec::from([late, waking_ticks]))
             }
+            _ if late => (0, Vec::from([2 * unknown_ticks, 2 * unknown_ticks])),
             _ => (0, Vec::from([2 * unknown_ticks, unknown_ticks])),
         };
         Looks {
             begin_ticks,
             after_ticks,
             frame: last_ticks > 0,
+            late,
             until_ticks: begin_ticks.wrapping_add(last_ticks),
             unheard: None,
         }
@@ -244,7 +251,7 @@ impl Listener {
         }
         let edges = &mut self.capture.edges;
         let (asked, setpoint) = self.port.reach(|throttle| {
-            if throttle.is_storing() {
+            if throttle.is_storing() || looks.late {
                 edges.forget();
                 return Some((None, Some(throttle.setpoint())));
             }
