@@ -59,14 +59,12 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
     }
 
     /// An edge's time, by what the timer showed then.
-    #[inline(always)]
     fn time(&self, shown: u32) -> u32 {
         let before_ticks = self.last_ticks.wrapping_sub(shown) & Self::MASK;
         self.last_ticks.wrapping_sub(before_ticks)
     }
 
     /// The next edge of a direction.
-    #[inline(always)]
     fn front(&self, direction: usize) -> Option<u32> {
         let ring = &self.rings[direction];
         (ring.count() > 0).then(|| self.time(ring.word(0)))
@@ -80,7 +78,6 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
     }
 
     /// The first and the second edge of each of 16 bits, if as many edges have come as a frame has.
-    #[inline(always)]
     pub(crate) fn frame(&self) -> Option<impl Fn(usize) -> (u32, u32) + '_> {
         if !self.has_frame() {
             return None;

@@ -88,7 +88,6 @@ pub(super) struct Armed<'a> {
 
 impl<'a> Armed<'a> {
     /// Begins to send a reply at its time; nothing, if that has passed.
-    #[inline(never)]
     pub(super) fn begin(self, capture: &mut Capture, reply: &Reply) -> Option<Sending<'a>> {
         if reply.bits != self.bits {
             write_words(self.words, reply.bits);
