@@ -208,10 +208,13 @@ impl Authority {
             }
         }
         if matches!(signal, Signal::Dshot { .. }) && !self.trust.good() {
-            // It keeps no signal and opens no throttle. To stop is right in either case.
-            if let (Some(valid), Demand::Zero) = (&mut self.valid, demand) {
-                valid.demand = demand;
+            // It keeps no signal and opens no throttle. To stop is right in either case, and the sender is not
+            // silent any more.
+            if let Some(valid) = &mut self.valid {
                 valid.command = false;
+                if demand == Demand::Zero {
+                    valid.demand = demand;
+                }
             }
             return;
         }

@@ -310,15 +310,21 @@ fn an_armed_wire_may_be_silent_behind_a_command() {
 }
 
 #[test]
-fn a_stop_that_is_not_believed_ends_the_silence_behind_a_command() {
-    let mut bench = Bench::armed();
-    bench.after(1_000, event(1));
-    bench.play(20, Event::Bad);
-    bench.after(1_000, event(0));
-    bench.wait(79_000);
-    assert!(bench.authority.armed());
-    bench.wait(1);
-    assert!(!bench.authority.armed(), "100 ms behind the command");
+fn a_frame_that_is_not_believed_ends_the_silence_behind_a_command() {
+    for value in [0, 48, 1805] {
+        let mut bench = Bench::armed();
+        bench.after(1_000, event(1));
+        bench.play(20, Event::Bad);
+        bench.after(1_000, event(value));
+        bench.wait(79_000);
+        assert!(bench.authority.armed(), "{value}");
+        bench.wait(1);
+        assert!(
+            !bench.authority.armed(),
+            "{value}: 100 ms behind the command"
+        );
+        assert!(!bench.turns(), "{value}");
+    }
 }
 
 #[test]
