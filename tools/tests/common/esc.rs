@@ -9,29 +9,13 @@ use std::time::{Duration, Instant};
 
 use siskin_control::check::Report;
 use siskin_control::control::delay::Delay;
-use siskin_control::control::sensing::Shunts;
-use siskin_control::image::Image;
 use siskin_control::input::authority::{Authority, Timing};
 use siskin_control::mavlink::{Component, Context, Frame, Receiver, Request};
-use siskin_control::params::{Board, BuildError, LeastDeadTime, ParamId, Params};
+use siskin_control::params::{BuildError, ParamId, Params};
 use siskin_control::telemetry::Telemetry;
+use siskin_emulator::plant::Sensing;
 
 use crate::run::{Run, siskin};
-
-/// A board that has no values of its own from the factory.
-const BOARD: Board = Board {
-    image: Image::EMULATOR,
-    current_a_per_count: 40.0 / 2048.0,
-    bus_v_per_count: 70.0 / 4096.0,
-    current_range_a: 40.0,
-    terminal_v_per_count: 70.0 / 4096.0,
-    shunts: Shunts::Three,
-    delay: Delay::One,
-    low_side_on_s: 1e-6,
-    refresh_s: 1e-6,
-    charge_s: 63e-6,
-    least_dead_time: LeastDeadTime::NONE,
-};
 
 const HEARTBEAT: u32 = 0;
 const PARAM_VALUE: u32 = 22;
@@ -178,12 +162,14 @@ fn validate(params: &Params) -> Result<(), BuildError> {
 
 fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Outcome {
     let started = Instant::now();
+    // It has no values of its own from the factory.
+    let board = Sensing::default().board(Delay::One);
     let mut params = Params::default();
     let mut authority = Authority::new(Timing {
         arm_us: 300_000,
         loss_us: 100_000,
     });
-    let mut component = Component::new(&params, &Image::EMULATOR, 1_000_000);
+    let mut component = Component::new(&params, &board.image, 1_000_000);
     let mut client: Option<(TcpStream, Receiver)> = None;
     let mut lost_in = Loss {
         every: behaviour.lose_every,
@@ -209,7 +195,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
         let mut context = Context {
             now_us,
             params: &mut params,
-            board: &BOARD,
+            board: &board,
             telemetry: &telemetry,
             check: &Report::new(40.0, 0.02),
             authority: &mut authority,

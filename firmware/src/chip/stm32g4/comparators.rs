@@ -14,6 +14,9 @@ use embassy_stm32::pac::{COMP1, COMP2, COMP4, DAC3, RCC, TIM1};
 /// and PB0.
 const COMPARATORS: [Comp; 3] = [COMP1, COMP2, COMP4];
 
+/// Their enables in TIM1_AF1, BKCMP1E, 2E and 4E, counted from 0.
+const BREAKS: [usize; 3] = [0, 1, 3];
+
 /// The highest level.
 const FULL_SCALE: u16 = 4095;
 
@@ -50,7 +53,7 @@ pub(crate) fn set_up(level: u16) {
     TIM1.af1().write(|w| {
         // No pin breaks.
         w.set_bkine(false);
-        for number in [0, 1, 3] {
+        for number in BREAKS {
             w.set_bkcmpe(number, true);
         }
     });
@@ -69,7 +72,7 @@ pub(crate) fn set_level(level: u16) {
 pub(crate) fn search(comparator: usize) -> Option<u16> {
     let breaking = TIM1.af1().read();
     TIM1.af1().modify(|w| {
-        for number in [0, 1, 3] {
+        for number in BREAKS {
             w.set_bkcmpe(number, false);
         }
     });
