@@ -70,7 +70,7 @@ enum Step {
     Over,
     /// Measurements that need neither time nor the bridge, and then the end.
     PowerUp,
-    /// The same measurements, and the sensors without current.
+    /// Those measurements, and the sensors without current.
     Listen,
     /// The shaft must stand.
     Shaft,

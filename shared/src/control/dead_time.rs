@@ -89,7 +89,7 @@ mod tests {
         }
     }
 
-    /// What is added to each phase.
+    /// The voltage to add to each phase.
     fn made(config: &Config, certainty: AlphaBeta<I8F24>) -> [f64; 3] {
         phases(certainty).map(|x| config.compensated(Share::ZERO, x).to_num())
     }

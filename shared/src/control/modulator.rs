@@ -269,7 +269,7 @@ mod tests {
         Config::new(modulation, duty_max as f32, duty_max as f32)
     }
 
-    /// What the duties make of the supply: the vector without its common part.
+    /// The vector that duties make of the supply: without its common part.
     fn vector(duties: [Duty; 3], bus: f64) -> (f64, f64) {
         let [a, b, c] = duties.map(|d| d.to_num::<f64>() * bus);
         ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt())

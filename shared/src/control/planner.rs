@@ -21,7 +21,7 @@ pub struct Config {
 }
 
 traced! {
-    /// Where the trajectory is.
+    /// State of the trajectory.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// ω*.

@@ -25,7 +25,7 @@ pub enum Shunts {
 }
 
 impl Shunts {
-    /// How many phases have one, from the first.
+    /// Phases that have one, from the first.
     pub const fn count(self) -> usize {
         match self {
             Self::Three => 3,
@@ -34,7 +34,7 @@ impl Shunts {
     }
 }
 
-/// What the reconstruction must know.
+/// Coefficients of the reconstruction.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Which phases have a shunt.
@@ -60,7 +60,7 @@ traced! {
     }
 }
 
-/// How far the measurement of the offsets is.
+/// Progress of the measurement of the offsets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Zeroing {
     /// More readings are needed.
@@ -95,7 +95,7 @@ pub fn zero(config: &Config, state: &mut State, raw: [AdcCounts; 3]) -> Zeroing 
     }
 }
 
-/// What has been measured, if the sensors are sound.
+/// The offsets, if the sensors are sound.
 #[cold]
 fn judge(config: &Config, state: &mut State) -> Zeroing {
     let mut measured = state.partial;

@@ -150,7 +150,7 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     state.yielding = config.yield_rate.apply(target.minus(state.yielded));
 }
 
-/// True if the rotor has lost the frame of Ramp.
+/// Returns true if the rotor has lost the frame of Ramp.
 #[inline]
 pub fn lost(config: &Config, state: &State) -> bool {
     state.astray > config.astray_periods

@@ -38,7 +38,7 @@ const K_F: f64 = 500.0;
 const K_P_OMEGA: f64 = 7.1e-3;
 const K_I_OMEGA: f64 = 41.7e-3;
 
-/// How far the computed gains may lie from Table III: its eigenvalues have three digits.
+/// Distance that the computed gains may have from Table III: its eigenvalues have three digits.
 const TABLE_III: f64 = 0.02;
 
 fn config_with(changes: &[(ParamId, f32)]) -> Config {
@@ -62,7 +62,7 @@ fn published(config: &Config) -> back_emf::Config {
     }
 }
 
-/// What that observer reads of a period's feedback.
+/// That observer's input from a period's feedback.
 fn feedback(omega: Speed, i: Dq<Current>) -> Feedback {
     Feedback {
         omega,

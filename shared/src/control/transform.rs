@@ -38,7 +38,7 @@ pub struct Order {
 }
 
 impl Trace for Order {
-    /// Whether the phases b and c have changed places.
+    /// Returns true if the phases b and c have changed places.
     #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         (*self == Self::SWAPPED).trace(out);

@@ -10,7 +10,7 @@ use super::transitions::Why;
 use crate::control::catch::Rotor;
 use crate::units::Speed;
 
-/// Where a set-point asks for another mode: why the present one ends.
+/// The reason why the present mode ends, if the set-point asks for another.
 pub(super) fn asked(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     match (state.phase, &config.six_step) {
         (Phase::Idle | Phase::Sense | Phase::Charge | Phase::Brake | Phase::Tone, _) => {
@@ -21,7 +21,7 @@ pub(super) fn asked(config: &Config, state: &mut State, setpoint: &Setpoint) -> 
     }
 }
 
-/// Whether a set-point wants the motor to turn the way it does, or is being started.
+/// Returns true if a set-point wants the motor to turn the way it does, or is being started.
 fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
         Asked::Backward

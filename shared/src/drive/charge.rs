@@ -6,7 +6,7 @@ use crate::control::catch::Rotor;
 use crate::trace::traced;
 
 traced! {
-    /// What Charge remembers.
+    /// State of Charge.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub(super) struct State {
         /// Periods so far.

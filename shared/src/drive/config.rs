@@ -22,7 +22,7 @@ pub enum Direction {
     Reversed,
 }
 
-/// How the motor is stopped.
+/// Way to stop the motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
     /// The bridge off: at once by field-oriented control, by the six-step drive when the shaft is slow.
@@ -32,7 +32,7 @@ pub enum Stop {
     Brake,
 }
 
-/// How the supplies of the high sides' drivers are charged before the phases switch.
+/// Charging of the supplies of the high sides' drivers before the phases switch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Charge {
     /// The low sides' share of each period.
@@ -43,21 +43,21 @@ pub struct Charge {
     pub spared_periods: u32,
 }
 
-/// How often a start is tried.
+/// Attempts of a start.
 pub const ATTEMPTS: usize = 4;
 
 /// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// What the control's units are worth.
+    /// The control's units in SI.
     pub scale: Scale,
     /// Counts of the supply's converter to voltage.
     pub bus: Multiplier<AdcCounts, WideVoltage>,
     /// Direction of rotation.
     pub direction: Direction,
-    /// How the motor is stopped.
+    /// Way to stop the motor.
     pub stop: Stop,
-    /// Whether a set-point may turn the motor the other way.
+    /// True if a set-point may turn the motor the other way.
     pub both_ways: bool,
     /// Voltage commanded to voltage applied.
     pub delay: Delay,
@@ -71,7 +71,7 @@ pub struct Config {
     pub torque: torque::Config,
     /// Adaptation of the inductance, if it is asked for.
     pub adapt_l: Option<inductance::Config>,
-    /// What is done for the observer at low speed.
+    /// Currents and bounds for the observer at low speed.
     pub low_speed: low_speed::Config,
     /// The attempts of a start, in order.
     pub start: [start::Config; ATTEMPTS],
@@ -108,7 +108,7 @@ pub struct Config {
 }
 
 impl Config {
-    /// The same drive, told where its rotor is by [`State::place`](crate::drive::State::place) in place of
+    /// This drive, told where its rotor is by [`State::place`](crate::drive::State::place) in place of
     /// an observer. It starts from standstill without aligning the rotor.
     pub fn with_position_given(self) -> Self {
         Self {

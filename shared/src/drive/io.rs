@@ -1,4 +1,4 @@
-//! What goes into a control period and what comes out: sample, set-point, bridge.
+//! Inputs and output of a control period: sample, set-point, bridge.
 
 use fixed::types::I1F31;
 
@@ -6,7 +6,7 @@ use super::pull::Pull;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
-/// What the converter read for one control period.
+/// The converter's readings for one control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Phase currents a, b, c into the motor, as the converter reads them: with the sensors' offsets
@@ -21,12 +21,12 @@ pub struct Sample {
     pub hall: u8,
 }
 
-/// What the motor is asked to do; it comes from something that may turn it.
+/// The demand on the motor; it comes from something that may turn it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Setpoint {
     /// No drive: coast or brake, as configured.
     Stop,
-    /// The same, because the throttle is at zero: that also ends a latched fault.
+    /// No drive, because the throttle is at zero: that also ends a latched fault.
     Zero,
     /// No drive, the bridge off, for a reason that something outside the interrupt has found.
     Fault(Fault),
@@ -45,7 +45,7 @@ pub enum Setpoint {
     Pull(Pull),
 }
 
-/// What the inverter does until the next period.
+/// State of the inverter's switches until the next period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bridge {
     /// All switches off.
@@ -96,7 +96,7 @@ impl Setpoint {
         }
     }
 
-    /// The same as seen by a motor that turns the other way.
+    /// This set-point as seen by a motor that turns the other way.
     pub(super) fn mirrored(self) -> Self {
         match self {
             Self::Speed(speed) => Self::Speed(speed.saturating_neg()),

@@ -14,7 +14,7 @@ use crate::protection::Fault;
 use crate::trace::traced;
 use crate::units::Speed;
 
-/// How often the currents' zeros are measured anew while it is not known whether the rotor turns:
+/// Measurements of the currents' zeros while it is not known whether the rotor turns:
 /// after eight times 5 ms it turns too slowly to matter, or its terminals cannot be read.
 const LOOKS: u8 = 8;
 
@@ -22,14 +22,14 @@ const LOOKS: u8 = 8;
 const SETTLING_PERIODS: u8 = 2;
 
 traced! {
-    /// What is remembered while the bridge is off.
+    /// State while the bridge is off.
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct State {
         /// Samples that may still show a current from before the bridge was off.
         settling_periods: u8,
         /// Measurements of the currents' zeros since Sense began.
         looks: u8,
-        /// What the open terminals have told of the rotor, with the phases in the order a, b, c.
+        /// The rotor by the open terminals, with the phases in the order a, b, c.
         pub(super) rotor: Rotor,
         catch: catch::State,
     }
@@ -53,7 +53,7 @@ impl State {
         self.looks = 0;
     }
 
-    /// What the terminals told before they were driven is over.
+    /// Forgets the rotor: the terminals have been driven since.
     pub(super) fn forget(&mut self) {
         self.rotor = Rotor::Unknown;
         self.catch.restart();

@@ -1,8 +1,8 @@
-//! What the drive is doing.
+//! Phases of the drive.
 
 use crate::trace::Trace;
 
-/// What the drive is doing (start-up of the second paper, section 3).
+/// Phase of the drive (start-up: second paper, section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {
@@ -40,19 +40,19 @@ impl Phase {
         Self::Tone,
     ];
 
-    /// Whether the control's frame is imposed on the rotor.
+    /// Returns true if the control's frame is imposed on the rotor.
     #[inline(always)]
     pub(super) fn is_open_loop(self) -> bool {
         matches!(self, Self::Park | Self::Ramp)
     }
 
-    /// Whether all switches are off.
+    /// Returns true if all switches are off.
     #[inline(always)]
     pub(super) fn is_off(self) -> bool {
         matches!(self, Self::Idle | Self::Sense)
     }
 
-    /// Whether the motor is turned, or slowed down.
+    /// Returns true if the motor is turned, or slowed down.
     #[inline(always)]
     pub fn drives(self) -> bool {
         matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)

@@ -51,7 +51,7 @@ impl Pull {
         }
     }
 
-    /// Whether the low side of the next leg is on.
+    /// Returns true if the low side of the next leg is on.
     pub const fn is_through(self) -> bool {
         self as u8 >= Self::ThroughA as u8
     }

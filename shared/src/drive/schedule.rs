@@ -37,7 +37,8 @@ pub(super) enum Work {
     ObserverGains,
     /// Delay compensation, dead-time signs, and the mode that the set-point asks for: it may end the drive.
     Setpoint,
-    /// The mode that the rotor allows, which may end the drive; dead-time signs, and the decoupling of the regulator's axes.
+    /// The mode that the rotor allows, which may end the drive; dead-time signs, and the decoupling of the
+    /// regulator's axes.
     Rotor,
 }
 
@@ -46,7 +47,7 @@ use Work::{
     Supply,
 };
 
-/// What field-oriented control does in each period of a cycle. Behind each reference, two periods later,
+/// Field-oriented control's work in each period of a cycle. Two periods after each reference
 /// come the dead-time signs; no period has much more than a reference, and most have nothing.
 #[rustfmt::skip]
 const RUN: [Work; CYCLE as usize] = [
@@ -56,7 +57,7 @@ const RUN: [Work; CYCLE as usize] = [
     /* 24 */ Reference, Nothing, Rotor,         Nothing, Nothing, Nothing, Nothing, Nothing,
 ];
 
-/// What an open-loop start does.
+/// An open-loop start's work in each period of a cycle.
 #[rustfmt::skip]
 const START: [Work; CYCLE as usize] = [
     /*  0 */ StartCurrent, Damp, ObserverGains, Damp, Supply,  Damp, Bounds,  Damp,
@@ -65,7 +66,7 @@ const START: [Work; CYCLE as usize] = [
     /* 24 */ StartCurrent, Damp, Rotor,         Damp, Nothing, Damp, Nothing, Damp,
 ];
 
-/// Whether a piece is done every so many periods from its first on, and in no other.
+/// Returns true if a piece is done every so many periods from its first on, and in no other.
 const fn is_every(schedule: &[Work; CYCLE as usize], work: Work, periods: u32) -> bool {
     let mut first = 0;
     while schedule[first] as u8 != work as u8 {
@@ -99,7 +100,7 @@ const _: () = {
     }
 };
 
-/// Where in a cycle the drive is: of Run's below [`CYCLE`], of the open-loop start's from there.
+/// Period of a cycle: of Run's below [`CYCLE`], of the open-loop start's from there.
 pub(super) type Slot = u8;
 
 /// Both schedules, one behind the other.
@@ -117,7 +118,7 @@ pub(super) fn choose(slot: &mut Slot, open_loop: bool) {
     *slot = *slot % CYCLE as u8 + if open_loop { CYCLE as u8 } else { 0 };
 }
 
-/// Whether a slot is of the open-loop start's schedule.
+/// Returns true if a slot is of the open-loop start's schedule.
 #[inline(always)]
 pub(super) fn is_start(slot: Slot) -> bool {
     slot >= CYCLE as u8

@@ -1,4 +1,4 @@
-//! What a period has seen and done, for telemetry.
+//! Figures of the last period, for telemetry.
 
 use super::phase::Phase;
 use crate::control::modulator::Supply;
@@ -11,7 +11,7 @@ traced! {
     /// The last period's quantities.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub(super) struct Seen {
-        /// What the drive did.
+        /// Phase of the drive.
         pub(super) phase: Phase,
         /// Electrical angle of the control's frame at the sample, with the phases in the order a, b, c.
         pub(super) angle: Angle,
@@ -63,7 +63,7 @@ pub(super) fn greatest([a, b, c]: [Current; 3]) -> Current {
         .max(c.saturating_abs())
 }
 
-/// What the supply gives: 1.5·(v·i)/V_bus.
+/// Current from the supply: 1.5·(v·i)/V_bus.
 #[inline(always)]
 pub(super) fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
     // 24 + 28 − 32 fraction bits; 28 wanted.

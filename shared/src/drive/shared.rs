@@ -1,4 +1,4 @@
-//! What every mode is handed, and none owns: protection, the currents' zeros, faults, what was applied.
+//! State that every mode is handed and none owns: protection, the currents' zeros, faults, what was applied.
 
 use super::config::{Config, Direction};
 use super::io::Sample;
@@ -12,12 +12,12 @@ use crate::trace::traced;
 use crate::units::{AdcCounts, Duty, Speed, Voltage};
 
 traced! {
-    /// What every mode is handed.
+    /// State that every mode is handed.
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct Shared {
         pub(super) seen: Seen,
         pub(super) latch: Latch,
-        /// Whether the motor turns, or is to turn, against the configured direction.
+        /// True if the motor turns, or is to turn, against the configured direction.
         pub(super) reversed: bool,
         /// Attempts of a start that have failed.
         pub(super) failed_starts: u8,
@@ -26,7 +26,7 @@ traced! {
         /// The currents' zeros.
         pub(super) zeros: sensing::State,
         pub(super) applied: Applied,
-        /// What the supply gives.
+        /// The supply's voltage and the vectors that it gives.
         pub(super) supply: Supply,
     }
 }
@@ -36,7 +36,7 @@ traced! {
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct Latch {
         pub(super) faults: Faults,
-        /// How often a fault has turned the bridge off.
+        /// Faults that have turned the bridge off.
         pub(super) count: u32,
         /// Periods at zero throttle since the last sample that was a fault.
         clear_periods: u32,
@@ -44,7 +44,7 @@ traced! {
 }
 
 traced! {
-    /// How far a start has come, and how a drive fares.
+    /// Progress of a start and of a drive, in periods.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub(super) struct Progress {
         /// Periods for which Run has been slow.
@@ -57,7 +57,7 @@ traced! {
 }
 
 traced! {
-    /// What the phases were told to do, and whether all of them can be read.
+    /// Duties of the last commands, and whether all phases can be read.
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct Applied {
         /// The last two commands' duties of the phases a, b, c, the latest first. The second is kept up
@@ -118,7 +118,7 @@ impl Shared {
         sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed)
     }
 
-    /// Whether phases b and c change places for the control, which always turns one way.
+    /// Returns true if phases b and c change places for the control, which always turns one way.
     #[inline(always)]
     pub(super) fn swapped(&self, config: &Config) -> bool {
         (config.direction == Direction::Reversed) != self.reversed
@@ -162,7 +162,7 @@ impl Latch {
 }
 
 impl Applied {
-    /// What the bridge is told.
+    /// Notes the duties of a command.
     #[inline(always)]
     pub(super) fn command(&mut self, duties: [Duty; 3]) {
         self.duties[0] = duties;
@@ -178,7 +178,7 @@ impl Applied {
         self.duties = [[Duty::ZERO; 3]; 2];
     }
 
-    /// What the bridge is about to be told may leave a phase unreadable.
+    /// Notes that the command to come may leave a phase unreadable.
     pub(super) fn expect_unreadable(&mut self) {
         if self.unreadable == 0 {
             // Since then nobody has asked for them.

@@ -1,4 +1,4 @@
-//! What the tasks may know of the control.
+//! A copy of the control's figures for the tasks.
 
 use super::phase::Phase;
 use crate::control::inductance::Factor;
@@ -6,14 +6,14 @@ use crate::control::transform::Dq;
 use crate::protection::Faults;
 use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
-/// What the tasks may know of the control, copied out of the interrupt.
+/// The control's figures for the tasks, copied out of the interrupt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Snapshot {
-    /// What the drive did in the last period.
+    /// Phase of the drive in the last period.
     pub phase: Phase,
     /// Faults that hold the bridge off.
     pub faults: Faults,
-    /// How often a fault has turned the bridge off since the start.
+    /// Faults that have turned the bridge off since the start.
     pub fault_count: u32,
     /// Electrical angle of the control's frame at the sample, with the phases in the order a, b, c:
     /// the rotor's as estimated in Run and Stopping, an imposed one in Park and Ramp.
@@ -34,7 +34,7 @@ pub struct Snapshot {
     pub trip: AdcCounts,
     /// The adapted inductance over the one that the parameters state.
     pub inductance: Factor,
-    /// Whether a position sensor is at fault.
+    /// True if a position sensor is at fault.
     pub sensor_fault: bool,
     /// Attempts of the present start that have failed.
     pub failed_starts: u8,

@@ -1,4 +1,4 @@
-//! What a control period remembers: each mode's own, and what all share.
+//! State of the drive from period to period: that of each mode, and that which all share.
 
 use super::config::Config;
 use super::io::{Bridge, Setpoint};
@@ -20,7 +20,7 @@ pub struct State {
     pub(super) phase: Phase,
     /// The kind of set-point for which field-oriented control drives, or [`UNDECIDED`].
     decided: u8,
-    /// Whether the present phase, one of rest, has just begun.
+    /// True if the present phase, one of rest, has just begun.
     enters_rest: bool,
     pub(super) shared: Shared,
     pub(super) off: off::State,
@@ -78,20 +78,20 @@ impl State {
         self.self_test = self_test::State::default();
     }
 
-    /// Whether field-oriented control drives for this kind of set-point: only its schedule says when
+    /// Returns true if field-oriented control drives for this kind of set-point: only its schedule says when
     /// the mode is looked at again.
     #[inline(always)]
     pub(super) fn is_decided_for(&self, setpoint: &Setpoint) -> bool {
         self.decided == setpoint.kind()
     }
 
-    /// Whether field-oriented control drives.
+    /// Returns true if field-oriented control drives.
     #[inline(always)]
     pub(super) fn is_decided(&self) -> bool {
         self.decided != UNDECIDED
     }
 
-    /// What the bridge does where a phase of rest has just begun. Its own work begins in the next period:
+    /// The bridge in the period in which a phase of rest has just begun. Its own work begins in the next period:
     /// what is at the terminals now has been driven.
     pub(super) fn enters_rest(&mut self) -> Option<Bridge> {
         core::mem::take(&mut self.enters_rest).then(|| {
@@ -193,7 +193,7 @@ impl State {
         self.shared.protection.trip
     }
 
-    /// What the tasks may know.
+    /// A copy for the tasks.
     // Made where it is put, not copied there.
     #[inline(always)]
     pub fn snapshot(&self) -> Snapshot {

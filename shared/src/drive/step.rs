@@ -95,7 +95,7 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
     energised(config, state, (sample, setpoint), currents)
 }
 
-/// Whether a drive that rests is asked for nothing, which ends a row of failed starts, or one that begins
+/// Returns true if a drive that rests is asked for nothing, which ends a row of failed starts, or one that begins
 /// for what it begins for.
 #[inline(always)]
 fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {

@@ -33,7 +33,7 @@ fn sample(currents_a: [f64; 3], bus_v: f64) -> Sample {
     }
 }
 
-/// What a rotor that turns shows at the open terminals: its back-EMF, standing on the drop of the
+/// Readings of the open terminals of a rotor that turns: its back-EMF, standing on the drop of the
 /// lowest phase's diode where that conducts.
 fn terminals(turns: f64, rpm: f64) -> [AdcCounts; 3] {
     let peak_v = 1.3e-3 * rpm * 12.0 * TAU / 60.0;

@@ -11,7 +11,7 @@
 //! and the greatest of the half cycles stays near what is wanted. For a sensor that shows nothing,
 //! the amplitude itself is bounded: by what twice the current and the dead time need.
 //!
-//! What the current needs is not taken from R and L as stated, one of which may be a hundred times
+//! The voltage for that current is not taken from R and L as stated, one of which may be a hundred times
 //! the true one, but learnt: it begins at the lesser of what each alone would take, and is doubled
 //! where twice as much has not brought the current. What both as stated would take is the most.
 
@@ -46,7 +46,7 @@ traced! {
     /// The tone that is being played.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub(super) struct State {
-        /// Where in a cycle of the supply's looks it is.
+        /// Period in the cycle in which the supply is looked at.
         slot: u8,
         /// Turns a period; zero is a pause.
         pitch: Speed,

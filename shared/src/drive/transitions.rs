@@ -13,7 +13,7 @@ pub(super) enum Why {
     Sound,
     /// Nothing is asked for any more, or the other direction is.
     Released,
-    /// The same, where the shaft is to coast: without current at once.
+    /// Nothing is asked for any more and the shaft is to coast: without current at once.
     Coasts,
     /// The low sides were on before a tone, and are to be again.
     Shorted,

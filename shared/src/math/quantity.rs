@@ -162,7 +162,7 @@ impl<D, F: Unsigned> Quantity<D, F> {
     /// Its fraction bits.
     pub const FRAC_NBITS: u32 = F::U32;
 
-    /// The same quantity with `G` fraction bits: of fewer the last are left out, and what more leave
+    /// This quantity with `G` fraction bits: of fewer the last are left out, and what more leave
     /// no room for wraps.
     #[inline(always)]
     #[must_use]

@@ -18,9 +18,9 @@ traced! {
         pub(super) by_angle: I19F13,
         /// Sum of the squares of these derivatives.
         pub(super) angle_weight: I4F28,
-        /// The same of the derivatives by E.
+        /// Sum of the errors, in counts, each times its derivative by E.
         pub(super) by_amplitude: I19F13,
-        /// Likewise.
+        /// Sum of the squares of these derivatives.
         pub(super) amplitude_weight: I4F28,
         /// Sum of the errors' magnitudes.
         pub(super) misfit: I17F15,

@@ -128,12 +128,12 @@ impl State {
 }
 
 impl State {
-    /// True if looks are at the mean of four readings.
+    /// Returns true if looks are at the mean of four readings.
     pub(super) fn is_slow(&self) -> bool {
         self.omega.saturating_abs() < SLOW
     }
 
-    /// Whether there is no vector yet, or a large one and no speed: of a large back-EMF the
+    /// Returns true if there is no vector yet, or a large one and no speed: of a large back-EMF the
     /// difference of two vectors is the speed, since the prediction of a rotor at rest may be too far
     /// off. A small one is of a slow rotor, and too noisy for that.
     pub(super) fn seeks(&self, config: &Config) -> bool {

@@ -7,7 +7,7 @@ use crate::params::{Board, ParamId, Params, build};
 const POLE_PAIRS: f64 = 12.0;
 const FLUX_WB: f64 = 1.3e-3;
 
-/// What the terminals are read with.
+/// The converter of the terminals.
 #[derive(Clone, Copy)]
 struct Dividers {
     v_per_count: f64,
@@ -111,7 +111,7 @@ fn config(dividers: Dividers, pwm_hz: f64, flux_share: f64) -> Config {
     build(&params, &board).expect("it fits the bench").catch
 }
 
-/// What observing showed.
+/// Results of observing.
 #[derive(Default)]
 struct Seen {
     /// When the rotor was known first, s.

@@ -52,7 +52,7 @@ pub struct Config {
 }
 
 traced! {
-    /// What the observer remembers from period to period.
+    /// State of the observer.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// θ̂ at the coming sample.
@@ -65,11 +65,11 @@ traced! {
         z_d: Flux,
         /// ψ, the stator's flux.
         psi: AlphaBeta<Flux>,
-        /// What ω̂ has above ω̂_i, smoothed.
+        /// ω̂ − ω̂_i, smoothed.
         smooth: Speed,
         /// Current at the last sample.
         i_before: AlphaBeta<Current>,
-        /// What the speed makes of the coefficients.
+        /// Coefficients at the present speed.
         pace: Pace,
     }
 }
@@ -82,7 +82,7 @@ traced! {
         inductance: Multiplier<Current, WideFlux>,
         /// 0.5·ω⁺·T_s.
         leak: I0F32,
-        /// The same less β·ω⁺²·T_s.
+        /// 0.5·ω⁺·T_s − β·ω⁺²·T_s.
         held: I0F32,
         /// Rate of φ̂, 0.15·ω⁺·T_s.
         phi: I0F32,
@@ -134,7 +134,7 @@ pub fn begin(config: &Config, state: &mut State, rotor: (Angle, Speed), i: Alpha
     pace(config, state, Factor::ONE);
 }
 
-/// The same but for what the speed makes of the coefficients, [`pace`].
+/// As [`begin`], but the coefficients stay as [`pace`] has left them.
 pub fn place(
     config: &Config,
     state: &mut State,
@@ -273,7 +273,7 @@ pub fn estimate(
     }
 }
 
-/// What the speed regulator reads besides, `periods` after [`pace`].
+/// The slower part of the estimate, `periods` after [`pace`].
 pub fn told(config: &Config, state: &State, periods: u32) -> Told {
     let change = state.omega_bar().minus(state.pace.omega_bar);
     Told {

@@ -13,7 +13,7 @@ use crate::units::{Angle, Flux, Speed};
 /// Limits that keep noise from being taken for a crossing (2.3.2).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
-    /// How far beyond zero a flux must be, as a share of the amplitude: half the deadband, below
+    /// Distance beyond zero that a flux must have, as a share of the amplitude: half the deadband, below
     /// 0.5.
     pub deadband: I0F32,
     /// The rotor's angle at which a flux is that far: arcsin of it.
@@ -153,7 +153,7 @@ fn ratio(part: Flux, whole: Flux) -> Periods {
 }
 
 impl State {
-    /// True if a whole turn of crossings has been sound.
+    /// Returns true if a whole turn of crossings has been sound.
     pub fn trusted(&self) -> bool {
         self.tracks && self.sound >= SOUND
     }

@@ -202,7 +202,7 @@ fn sensed(config: &Config, state: &mut State, step: Step) {
     }
 }
 
-/// How late a Hall edge is seen: half a period in the mean, and what its code must last beyond the
+/// Delay until a Hall edge is seen: half a period in the mean, and what its code must last beyond the
 /// first sample.
 const HALL_LATE: Periods = Periods::from_bits((2 * hall::SAMPLES - 1) << (Periods::FRAC_NBITS - 1));
 

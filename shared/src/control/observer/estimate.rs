@@ -1,4 +1,4 @@
-//! What every observer reads, and what it says.
+//! Input and estimate of every observer.
 
 use crate::control::inductance::Factor;
 use crate::control::transform::AlphaBeta;
@@ -6,7 +6,7 @@ use crate::math::SinCos;
 use crate::trace::traced;
 use crate::units::{Angle, Current, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage};
 
-/// What an observer reads at a sample.
+/// Input of an observer at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     /// Currents in the stator's frame at this sample.
@@ -19,11 +19,11 @@ pub struct Input {
     pub planned: Speed,
     /// Hall sensors, see [`Sample`](crate::drive::Sample).
     pub hall: u8,
-    /// Whether the phases b and c have changed places in all this.
+    /// True if the phases b and c have changed places in all this.
     pub swapped: bool,
 }
 
-/// What an observer says at a sample.
+/// Estimate of an observer at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// θ̂ at this sample.
@@ -37,7 +37,7 @@ pub struct Estimate {
 }
 
 traced! {
-    /// What an observer says besides, for what is not done in every period.
+    /// The slower part of the estimate, for work that is not done in every period.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Told {
         /// The change of ω̄̂ in a period.
@@ -46,7 +46,7 @@ traced! {
         pub xi: InverseFlux,
         /// Change of ξ̂ in a period.
         pub xi_step: InverseFlux,
-        /// Whether the observer's state is out of its range: the rotor may be elsewhere.
+        /// True if the observer's state is out of its range: the rotor may be elsewhere.
         pub lost: bool,
     }
 }

@@ -31,7 +31,7 @@ pub struct Config {
     pub high_pass: Option<HighPass>,
     /// i_max·L_s, by which the integrator's limit is above that of the rotor's flux.
     pub stator_max: Flux,
-    /// Whether the limits follow the measured amplitude; else they are those of the stated flux.
+    /// True if the limits follow the measured amplitude; else they are those of the stated flux.
     pub adaptive: bool,
 }
 
@@ -45,7 +45,7 @@ pub struct HighPass {
 }
 
 traced! {
-    /// What the observers of the three phases remember.
+    /// State of the three phases' observers.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// Integral of v − i·R.

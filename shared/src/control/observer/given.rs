@@ -6,7 +6,7 @@ use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
 traced! {
-    /// What was told of the rotor at the coming sample, with the phases in the order a, b, c.
+    /// Angle and speed given for the coming sample, with the phases in the order a, b, c.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Electrical angle.

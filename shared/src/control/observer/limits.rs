@@ -1,4 +1,4 @@
-//! What the angle of the flux crossings can be trusted to (second paper, Table 1): by how far each
+//! Error of the angle of the flux crossings (second paper, Table 1): by how far each
 //! source of error can put it off, over the speed.
 //!
 //! Every function gives the magnitude of its error in electrical degrees. ω is the electrical speed

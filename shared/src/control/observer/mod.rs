@@ -45,9 +45,9 @@ pub struct State {
     pub edges: edges::State,
     /// Compensated flux with a phase-locked loop.
     pub compensated: compensated::State,
-    /// What the drive has been told.
+    /// Report to the drive of this period.
     pub given: given::State,
-    /// What the observer in use says besides; the compensated flux observer says it by [`pace`].
+    /// The slower part of the estimate; the compensated flux observer says it by [`pace`].
     pub told: Told,
 }
 
@@ -57,10 +57,10 @@ pub trait Observer {
     /// start gives the rotor.
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate;
 
-    /// Whether what it sees while the rotor is being aligned counts; else [`expect`] begins it anew.
+    /// Returns true if what it sees while the rotor is being aligned counts; else [`expect`] begins it anew.
     fn follows_park(&self) -> bool;
 
-    /// What the current regulator reads: the speed of the control's frame, the measured current in it
+    /// The current regulator's feedback: the speed of the control's frame, the measured current in it
     /// and what the observer makes of it.
     fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback;
 
@@ -120,7 +120,7 @@ impl Observer for compensated::Config {
 }
 
 impl Config {
-    /// Whether [`advance`] is of any use: only the adaptive back-EMF observer works in the control's frame.
+    /// Returns true if [`advance`] is of any use: only the adaptive back-EMF observer works in the control's frame.
     pub fn works_in_frame(&self) -> bool {
         matches!(self, Self::BackEmf(_))
     }
@@ -169,7 +169,7 @@ pub fn estimate(
     }
 }
 
-/// What is done every so many `periods`: coefficients follow the speed, and [`State::told`] is
+/// Update of gains, every so many `periods`: coefficients follow the speed, and [`State::told`] is
 /// brought up to date.
 pub fn pace(config: &Config, state: &mut State, inductance: Factor, periods: u32) {
     if let Config::Compensated(config) = config {
@@ -193,12 +193,12 @@ pub fn stand(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool
     }
 }
 
-/// Whether a position sensor is at fault.
+/// Returns true if a position sensor is at fault.
 pub fn sensor_fault(state: &State) -> bool {
     state.edges.hall.fault
 }
 
-/// What the current regulator reads: the speed of the control's frame, the measured current in it
+/// The current regulator's feedback: the speed of the control's frame, the measured current in it
 /// and what the observer makes of it.
 #[inline(always)]
 pub fn feedback(
@@ -292,7 +292,7 @@ pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Cur
     }
 }
 
-/// How far the rotor leads the control's frame, which has turned at the imposed speed `omega_s` and
+/// The angle by which the rotor leads the control's frame, which has turned at the imposed speed `omega_s` and
 /// stands at `frame`. The observer goes on from there. `None` where the rotor has not followed.
 pub fn take_over(
     config: &Config,

@@ -15,7 +15,7 @@ use crate::units::{Angle, Speed};
 /// A time in control periods.
 pub type Periods = U20F12;
 
-/// What the estimator must know.
+/// Coefficients of the estimator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// N, the electrical turns over which the speed is taken, 1 to 4.
@@ -27,13 +27,13 @@ pub struct Config {
     pub a_e: Gain<Angle, Angle>,
     /// The speed above which A_e counts.
     pub filter_above: Speed,
-    /// Whether what is known of an edge's angle and of its time before the sample is taken into
+    /// True if what is known of an edge's angle and of its time before the sample is taken into
     /// account. The paper's figures 28 and 30 are without.
     pub compensates: bool,
 }
 
 traced! {
-    /// What the estimator remembers.
+    /// State of the estimator.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// θ̂ at this sample.
@@ -46,17 +46,17 @@ traced! {
         pub omega_step: Speed,
         /// Periods since the sample that saw the last edge.
         pub since: u32,
-        /// How long before that sample the edge was.
+        /// Time from the edge to that sample.
         pub late: Periods,
         /// The last intervals between edges, a ring.
         pub intervals: [Periods; EDGES_MAX],
-        /// Where the next one goes.
+        /// Place of the next interval.
         pub next: u8,
-        /// How many there are, at most those of N turns.
+        /// Number of intervals, at most those of N turns.
         pub edges: u8,
         /// Their sum.
         pub window: Periods,
-        /// Whether the last edge was seen, so that the next interval is one.
+        /// True if the last edge was seen, so that the next interval is one.
         pub timed: bool,
     }
 }

@@ -54,7 +54,7 @@ impl Sector {
         }
     }
 
-    /// True if the floating phase's back-EMF rises through zero; it falls in every other sextant.
+    /// Returns true if the floating phase's back-EMF rises through zero; it falls in every other sextant.
     ///
     /// At the start of a rising sextant the low leg has changed and the switching one goes on, at
     /// the start of a falling one it is the other way round.

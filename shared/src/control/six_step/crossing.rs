@@ -45,7 +45,7 @@ traced! {
         pub above: Option<Span>,
         /// The crossing has been found.
         pub found: bool,
-        /// What the reading changes in a period near the crossing, of the sextants before; 0 where it
+        /// Change of the reading in a period near the crossing, of the sextants before; 0 where it
         /// is not known.
         pub slope: Voltage,
     }
@@ -57,13 +57,13 @@ traced! {
     pub struct Span {
         /// Samples of the sextant until the first, and its value.
         pub first: (u16, Voltage),
-        /// Likewise for the last.
+        /// Sample and reading of the last.
         pub last: (u16, Voltage),
     }
 }
 
 impl State {
-    /// Whether no reading of this sextant has said anything: the released phase's current has not
+    /// Returns true if no reading of this sextant has said anything: the released phase's current has not
     /// died.
     pub fn blind(&self) -> bool {
         !self.below && self.above.is_none()

@@ -105,7 +105,7 @@ impl State {
         self.crossings = (self.crossings + 1).min(KNOWN);
     }
 
-    /// How many readings in a row are to tell on which side of zero the floating phase is: one a 40th
+    /// Readings in a row that are to tell on which side of zero the floating phase is: one a 40th
     /// of a sextant, up to four, since the slower a rotor is, the smaller its back-EMF.
     #[inline]
     pub fn certain(&self) -> u16 {
@@ -118,7 +118,7 @@ impl State {
         }
     }
 
-    /// Whether a commutation that is commanded now takes effect nearest to `angle` past the middle
+    /// Returns true if a commutation that is commanded now takes effect nearest to `angle` past the middle
     /// of the sextant.
     #[inline]
     pub fn reaches(&self, angle: Angle, delay: Delay) -> bool {

@@ -20,7 +20,7 @@ pub struct Config {
     pub k_ffi: Gain<SpeedSquare, Current>,
     /// K_FFv, speed to voltage: the flux.
     pub k_ffv: Gain<Speed, Voltage>,
-    /// What of K_FFv times the measured speed the current regulator's own feed-forward brings
+    /// The part of K_FFv times the measured speed that the current regulator's own feed-forward brings
     /// already; zero for the modified one, which has none.
     pub own: Gain<Speed, Voltage>,
 }
@@ -64,7 +64,7 @@ impl Config {
         }
     }
 
-    /// What the integrator holds of a current at this speed.
+    /// The integrator's part of a current at this speed.
     pub(super) fn remainder(&self, omega: Speed, i_q: Current) -> Current {
         i_q.minus(self.propeller(omega))
     }

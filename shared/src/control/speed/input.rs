@@ -1,17 +1,17 @@
-//! What both laws read.
+//! Input of both laws.
 
 use crate::control::observer::Told;
 use crate::trace::traced;
 use crate::units::{Current, Speed};
 
-/// What one period of speed control, [`PERIODS`](crate::control::PERIODS) of the drive, reads.
+/// Input of one period of speed control, [`PERIODS`](crate::control::PERIODS) of the drive, reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     /// Ω*.
     pub command: Speed,
     /// ω̄̂.
     pub speed: Speed,
-    /// What the observer says besides.
+    /// The slower part of the observer's estimate.
     pub told: Told,
     /// Bounds of i_q*.
     pub bounds: Bounds,

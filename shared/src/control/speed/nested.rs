@@ -32,7 +32,7 @@ pub struct Config {
     /// speed an R stated too high closes a loop through the estimate, and its gain is that of the
     /// regulator.
     pub trust: Gain<Speed, I0F32>,
-    /// Whether the current regulator reads p_q*, the change of i_q*.
+    /// True if the current regulator reads p_q*, the change of i_q*.
     pub with_step: bool,
 }
 

@@ -19,14 +19,14 @@ pub(super) struct Motor {
     /// Load of section V: c1·ω + c2·ω².
     pub(super) c1: f64,
     pub(super) c2: f64,
-    /// Whether the shaft is held at its speed.
+    /// True if the shaft is held at its speed.
     pub(super) held: bool,
     /// Mechanical speed, rad/s.
     pub(super) omega_m: f64,
     /// Electrical angle.
     theta: f64,
     i: (f64, f64),
-    /// What the last period has commanded: it acts in this one.
+    /// Command of the last period: it acts in this one.
     pending: (f64, f64),
 }
 
@@ -45,7 +45,7 @@ impl Motor {
         }
     }
 
-    /// The same with its shaft held at that speed.
+    /// This motor with its shaft held at that speed.
     pub(super) fn held(rpm: f64) -> Self {
         Self {
             held: true,
@@ -123,7 +123,7 @@ impl Loop {
         }
     }
 
-    /// What an observer without errors says.
+    /// Estimate of an observer without errors.
     pub(super) fn feedback(&self) -> Feedback {
         let (i_d, i_q) = self.motor.i_dq();
         let i = Dq {

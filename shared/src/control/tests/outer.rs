@@ -44,7 +44,7 @@ impl Bench {
         }
     }
 
-    /// Whether the outer loops act in this period.
+    /// Returns true if the outer loops act in this period.
     fn outer(&mut self) -> bool {
         self.periods += 1;
         self.periods % PERIODS == 1

@@ -37,7 +37,7 @@ fn sigma(units: &Units, state: &State) -> [f64; 2] {
     ]
 }
 
-/// What a period does for speeds in mechanical rad/s and currents in A.
+/// A period for speeds in mechanical rad/s and currents in A.
 struct Case {
     omega_m: f64,
     omega_star: f64,

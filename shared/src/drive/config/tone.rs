@@ -20,6 +20,6 @@ pub struct Config {
     pub resistive: Voltage,
     /// Pitch to ωL times the peak.
     pub reactive: Gain<Speed, Voltage>,
-    /// What the dead time takes of a vector along a phase, of the supply.
+    /// Voltage that the dead time takes of a vector along a phase, as a share of the supply.
     pub dead: I1F31,
 }

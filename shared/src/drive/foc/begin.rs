@@ -69,7 +69,7 @@ fn turning(config: &Config, shared: &mut Shared, rotor: Rotor) -> Option<(Angle,
     }
 }
 
-/// How a drive begins, for a rotor that turns at `omega`, or stands.
+/// The mode in which a drive begins, for a rotor that turns at `omega`, or stands.
 fn go(
     config: &Config,
     foc: &mut State,

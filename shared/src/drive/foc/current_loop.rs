@@ -13,7 +13,7 @@ use crate::drive::shared::Shared;
 use crate::math::{Held, SinCos, sin_cos};
 use crate::units::{Current, Speed, Voltage, WideVoltage};
 
-/// What field-oriented control remembers, and what all modes share.
+/// State of field-oriented control, and the state that all modes share.
 pub(in crate::drive) type Drive<'a> = (&'a mut State, &'a mut Shared);
 
 /// The control's frame in a period: its cosine and sine, and its speed.
@@ -120,7 +120,7 @@ fn limited(
     u
 }
 
-/// What the observer reads at this sample.
+/// The observer's input at this sample.
 #[inline(always)]
 pub(super) fn input(
     loops: &Loops,

@@ -17,7 +17,7 @@ use crate::units::{Current, Speed};
 /// Pieces in which a drive is made ready, one a period.
 pub(in crate::drive) const READY_PIECES: u32 = 5;
 
-/// What a drive that begins must know before its first period, in [`READY_PIECES`].
+/// Outer-loop work before the first period of a drive, in [`READY_PIECES`].
 pub(in crate::drive) fn ready(config: &Config, foc: &mut State, shared: &mut Shared, piece: u32) {
     match piece {
         1 => {
@@ -54,7 +54,7 @@ pub(in crate::drive) fn longest_vector(config: &Config, shared: &mut Shared) {
     shared.supply.reach(&config.modulator, shared.seen.u.d);
 }
 
-/// What the supply's current does to the bounds of i_q.
+/// Bounds of i_q by the supply's current.
 #[inline(never)]
 pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: &mut Shared) {
     let seen = &shared.seen;
@@ -70,7 +70,7 @@ pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: 
     *i_q = (*i_q).max(shared.protection.bounds.min);
 }
 
-/// What the speed leaves of them, and i_d.
+/// Bounds of i_q by the speed, and i_d.
 #[inline(never)]
 pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &Shared) {
     let bounds = shared.protection.bounds;

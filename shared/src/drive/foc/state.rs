@@ -1,4 +1,4 @@
-//! What field-oriented control remembers.
+//! State of field-oriented control.
 
 use crate::control::inductance;
 use crate::control::regulator::{self, Reference};
@@ -11,7 +11,7 @@ use crate::math::SinCos;
 use crate::trace::{Trace, traced};
 use crate::units::{Angle, Current, Speed, Voltage};
 
-/// What field-oriented control remembers.
+/// State of field-oriented control.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::drive) struct State {
     pub(in crate::drive) loops: Loops,
@@ -22,11 +22,11 @@ traced! {
     /// All but the observer.
     #[derive(Clone, Debug, PartialEq)]
     pub(in crate::drive) struct Loops {
-        /// Where in the schedule the last period was.
+        /// Slot of the last period in the schedule.
         pub(in crate::drive) slot: Slot,
         /// The phases' order as the control sees it.
         pub(in crate::drive) order: Order,
-        /// What is wanted of the current regulator.
+        /// Reference of the current regulator.
         pub(in crate::drive) reference: Reference,
         pub(in crate::drive) regulator: regulator::State,
         /// Delay compensation: how far the frame turns until the voltage acts.

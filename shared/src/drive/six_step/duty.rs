@@ -19,10 +19,10 @@ use crate::units::{AdcCounts, Current, Duty, Speed};
 /// are 20 rpm.
 pub(super) const NO_CURRENT: AdcCounts = AdcCounts::lit("16");
 
-/// What a shaft may gain in speed while it is to stop, as a part of the least that it has had.
+/// Speed that a shaft may gain while it is to stop, as a part of the least that it has had.
 const GAINED_PART: i32 = 64;
 
-/// What is asked of a motor that turns the way it does.
+/// The demand on a motor that turns the way it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Demand {
     /// Nothing, or the other way: it is to be stopped.
@@ -50,7 +50,7 @@ fn demand(setpoint: &Setpoint, reversed: bool) -> Demand {
     }
 }
 
-/// Whether a motor that turns the way it does is to be stopped.
+/// Returns true if a motor that turns the way it does is to be stopped.
 pub(super) fn is_to_stop(setpoint: &Setpoint, reversed: bool) -> bool {
     demand(setpoint, reversed) == Demand::Rest
 }

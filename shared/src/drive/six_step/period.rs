@@ -24,7 +24,7 @@ const IMPATIENCE: u8 = 4;
 /// Periods in a row without a current after which the shaft stands.
 const STILL_PERIODS: u16 = 1000;
 
-/// Where the rotor is told to be, if it is.
+/// Position of the rotor, if it is given.
 type Position = Option<(Angle, Speed)>;
 
 /// The mode that a set-point asks for while this drive drives.
@@ -43,7 +43,7 @@ pub(in crate::drive) fn asked(
     }
 }
 
-/// Whether the set-point wants the motor to turn the way in which it is being started.
+/// Returns true if the set-point wants the motor to turn the way in which it is being started.
 fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
         Asked::Backward
@@ -53,7 +53,7 @@ fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bo
     setpoint.asks(config.both_ways) == present
 }
 
-/// Whether a shaft turns too fast to be parked: it is left to slow down first.
+/// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
 pub(in crate::drive) fn is_too_fast(
     config: &config::Config,
     six_step: &Config,
@@ -170,7 +170,7 @@ pub(in crate::drive) fn period(
     )
 }
 
-/// What the rotor makes of Run and Stopping.
+/// The end of Run and of Stopping by what the rotor does.
 fn rotor(
     config: &config::Config,
     six_step: &Config,

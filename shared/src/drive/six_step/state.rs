@@ -1,4 +1,4 @@
-//! What the six-step drive remembers.
+//! State of the six-step drive.
 
 use fixed::types::I36F28;
 
@@ -12,7 +12,7 @@ use crate::units::Current;
 pub(super) const FIRST_PARK: Sector = Sector::Cb;
 
 traced! {
-    /// What the six-step drive remembers.
+    /// State of the six-step drive.
     #[derive(Clone, Debug, PartialEq)]
     pub(in crate::drive) struct State {
         pub(super) sector: Sector,
@@ -21,7 +21,7 @@ traced! {
         pub(super) duty: duty::State,
         /// ∫i dt since the present angle of Park.
         pub(super) charge: I36F28,
-        /// What the rotor's swing in Park induces, smoothed; positive forwards.
+        /// Current that the rotor's swing in Park induces, smoothed; positive forwards.
         pub(super) swing: Current,
         /// It is certain that it swings forwards.
         pub(super) swings_forwards: bool,

@@ -1,4 +1,4 @@
-//! What telemetry hears of the six-step drive.
+//! Telemetry of the six-step drive.
 
 use fixed::types::I1F31;
 
@@ -16,7 +16,7 @@ use crate::units::{AdcCounts, Current, Speed, Voltage};
 /// 1/√3 with 31 fraction bits.
 const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);
 
-/// What telemetry hears, and what the supply's current does to the bounds.
+/// Telemetry of this period, and the bounds by the supply's current.
 pub(super) fn tell(
     config: &Config,
     (s, shared): (&State, &mut Shared),

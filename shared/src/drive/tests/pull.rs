@@ -4,7 +4,7 @@ use super::*;
 use crate::drive::Pull;
 use crate::units::Duty;
 
-/// What the bridge does in so many periods of a pull, at a sample with this current into phase b.
+/// The bridge in so many periods of a pull, at a sample with this current into phase b.
 fn pulled(bench: &mut Bench, pull: Pull, periods: usize, b: i32) -> Vec<Bridge> {
     let mut sample = sample([0.0; 3], 24.0);
     sample.currents[1] = AdcCounts::from_num(b);

@@ -243,7 +243,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// What the observer believes may differ by `changes`; the motor is the default one.
+    /// The observer's parameters differ by `changes`; the motor is the default one.
     fn new(changes: &[(ParamId, f32)], rpm: f64) -> Self {
         let (config, scale) = config(Delay::One, changes);
         Self {

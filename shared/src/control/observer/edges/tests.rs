@@ -32,7 +32,7 @@ struct Bench {
     random: u64,
     /// By how much the sensors are ahead of the phases, degrees.
     hall_deg: f64,
-    /// What a fault makes of their code.
+    /// Their code under a fault.
     spoil: fn(u8) -> u8,
 }
 
@@ -138,7 +138,7 @@ impl Bench {
         self.ramp(0.0, seconds)
     }
 
-    /// The same while the speed changes by so many rpm a second.
+    /// A run while the speed changes by so many rpm a second.
     fn ramp(&mut self, rpm_s: f64, seconds: f64) -> f64 {
         let mut worst = 0.0_f64;
         for _ in 0..(seconds / TS).round() as u32 {
