@@ -103,13 +103,13 @@ impl Throttle {
         self.heard(heard)
     }
 
-    /// Takes all edges of a DShot frame at once, by the first and the second of each bit, much sooner than
-    /// [`Throttle::edge`] does one by one; nothing, and none of them is taken, if they are none of the
-    /// signal that is known. What is found is to be given to [`Throttle::hear`], before its answer or, where
-    /// that cannot wait, behind it.
+    /// Takes all edges of a DShot frame at once, by the line's level before them and the first and the second
+    /// of each bit, much sooner than [`Throttle::edge`] does one by one; nothing, and none of them is taken,
+    /// if they are no frame, or one of another signal than that which is known. What is found is to be given
+    /// to [`Throttle::hear`], before its answer or, where that cannot wait, behind it.
     #[inline(always)]
-    pub fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
-        self.input.whole(bit)
+    pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
+        self.input.whole(rests_high, bit)
     }
 
     /// Takes the event of [`Throttle::whole`]. Returns the same as [`Throttle::edge`].

@@ -77,30 +77,29 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
         fronts.into_iter().flatten().max_by_key(age)
     }
 
-    /// The first and the second edge of each of 16 bits, if as many edges have come as a frame has.
-    pub(crate) fn frame(&self) -> Option<impl Fn(usize) -> (u32, u32) + '_> {
+    /// True if the line was high before them, and the first and the second edge of each of 16 bits, if as many
+    /// edges have come as a frame has.
+    pub(crate) fn frame(&self) -> Option<(bool, impl Fn(usize) -> (u32, u32) + '_)> {
         if !self.has_frame() {
             return None;
         }
         let [rising, falling] = &self.rings;
         let since = falling.word(0).wrapping_sub(rising.word(0)) & Self::MASK;
-        let (first, second) = if since <= Self::MASK / 2 {
-            (rising, falling)
-        } else {
+        let rests_high = since > Self::MASK / 2;
+        let (first, second) = if rests_high {
             (falling, rising)
+        } else {
+            (rising, falling)
         };
         let (first, second) = (first.words(), second.words());
-        Some(move |bit| (self.time(first(bit)), self.time(second(bit))))
+        Some((rests_high, move |bit| {
+            (self.time(first(bit)), self.time(second(bit)))
+        }))
     }
 
     /// Returns true if as many edges have come as a frame has.
     pub(crate) fn has_frame(&self) -> bool {
         self.rings.iter().all(|ring| ring.count() >= BITS)
-    }
-
-    /// Returns true if half as many edges have come as a frame has.
-    pub(crate) fn has_half_a_frame(&self) -> bool {
-        self.rings.iter().all(|ring| ring.count() >= BITS / 2)
     }
 
     /// Returns true if this time was still to come at the last look.

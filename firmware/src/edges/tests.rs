@@ -141,7 +141,8 @@ fn a_frame_is_read_though_the_next_one_has_begun() {
     assert!(chip.fill(&mut edges) && !edges.has_frame());
     chip.pass(next + 600 - chip.now.get());
     assert!(chip.fill(&mut edges));
-    let read = edges.frame().unwrap();
+    let (rests_high, read) = edges.frame().unwrap();
+    assert!(rests_high);
     let sent: Vec<_> = frame(1000).map(|(at, _)| at as u32).collect();
     for bit in 0..16 {
         assert_eq!(read(bit), (sent[2 * bit], sent[2 * bit + 1]));

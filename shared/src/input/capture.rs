@@ -146,12 +146,18 @@ impl Decoder {
         event
     }
 
-    /// Takes all edges of a frame of the one that is taken at once, the first and the second of each of its
-    /// 16 bits, after a rest; nothing, and none of them is taken, if they are no such frame. It comes to
-    /// what the edges one by one come to, in a tenth of the time.
+    /// Takes all edges of a frame at once, the first and the second of each of its 16 bits, after a rest at
+    /// the level that this kind of wire has; nothing, and none of them is taken, if they are no such frame. It
+    /// comes to what the edges one by one come to, in a tenth of the time.
     #[inline(always)]
-    pub(super) fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
-        let (_, bidirectional) = self.only?;
+    pub(super) fn whole(
+        &mut self,
+        bidirectional: bool,
+        bit: impl Fn(usize) -> (u32, u32),
+    ) -> Option<Event> {
+        if self.only.is_some_and(|(_, only)| only != bidirectional) {
+            return None;
+        }
         let (first, _) = bit(0);
         let (start, end) = bit(15);
         let span = start.wrapping_sub(first);

@@ -93,23 +93,29 @@ impl Line {
         }
     }
 
-    /// Takes all edges of a DShot frame at once, the first and the second of each of its 16 bits, as
-    /// [`Line::edge`] would one by one; nothing, and none of
-    /// them is taken, if they are none of the signal that is known.
+    /// Takes all edges of a DShot frame at once, the first and the second of each of its 16 bits and whether
+    /// the line was high before them, as [`Line::edge`] would one by one; nothing, and none of them is taken,
+    /// if they are no frame, or one of another signal than that which is known.
     #[inline(always)]
-    pub fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
-        let Some(Signal::Dshot { bidirectional, .. }) = self.signal else {
-            return None;
-        };
-        // The line rests high if it is bidirectional.
-        if !self.filter.rests_at(bidirectional) {
+    pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
+        let pulses = matches!(self.signal, Some(Signal::Pulse(_)));
+        if pulses || !self.filter.rests_at(rests_high) {
             return None;
         }
         let (_, end) = bit(15);
-        let event = self.frames.whole(bit)?;
+        // The line rests high if it is bidirectional.
+        let event = self.frames.whole(rests_high, bit)?;
         self.edge_at = end;
         self.silent = false;
-        self.filter.settled(bidirectional);
+        self.filter.settled(rests_high);
+        if self.signal.is_none() {
+            // No pulse goes over it.
+            self.pulses.spoil();
+            let _ = self.detector.pulse(end, Event::Bad);
+            let event = self.detector.frame(end, event);
+            self.know();
+            return event;
+        }
         Some(event)
     }
 
@@ -162,11 +168,16 @@ impl Line {
         let pulse = self.pulses.edge(at_ticks, level);
         let pulse = pulse.and_then(|event| self.detector.pulse(at_ticks, event));
         let frame = frame.and_then(|event| self.detector.frame(at_ticks, event));
+        self.know();
+        frame.or(pulse)
+    }
+
+    /// Takes the detected signal and no other, once there is one.
+    fn know(&mut self) {
         let signal = self.detector.signal();
         if signal.is_some() {
             self.take_only(signal);
         }
-        frame.or(pulse)
     }
 
     /// Begins to listen to one signal, or to find out which there is.

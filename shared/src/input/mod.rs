@@ -122,12 +122,11 @@ impl Input {
         self.take(now_us, event.as_ref()?)
     }
 
-    /// Takes all edges of a DShot frame at once, by the first and the second of each bit; nothing, and none
-    /// of them is taken, if they are none of the signal that is known. What is found is to be given to
+    /// Takes all edges of a DShot frame at once, as [`Line::whole`] does. What is found is to be given to
     /// [`Input::heard`]; with that it is what [`Input::edge`] does edge by edge.
     #[inline(always)]
-    pub fn whole(&mut self, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
-        self.line.whole(bit)
+    pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
+        self.line.whole(rests_high, bit)
     }
 
     /// Takes the event of [`Input::whole`].

@@ -76,8 +76,13 @@ impl Reach for Port {
 /// Longest time between two looks at the wire, which notice a lost signal and renew set-points.
 const RENEWAL_US: u32 = 1000;
 
-/// Times of two looks at the edges after a first one, if no frame is known to come.
-const UNKNOWN_LOOK_US: u32 = 30;
+/// Times of the looks at the edges after a first one, the last one first. If nothing is known of what comes,
+/// DShot1200 and 600 are whole at the first and DShot300 at the second; at the last one DShot150 is, and all
+/// else is taken edge by edge.
+const UNKNOWN_LOOKS_US: [u32; 3] = [120, 60, 30];
+
+/// Time of the look at a pulse after its first edge; a longer one's second edge is another first one.
+const PULSE_LOOK_US: u32 = 30;
 
 /// Time of the look at a frame, in eighths of a bit after its first edge: its last edge is there (15
 /// bits and the 3/4 of a one), and half a bit for the DMA; and, if it was late, soon after.
@@ -142,12 +147,8 @@ struct Asked {
 /// Time of the look at the wire, from the first edge that has come.
 struct Looks {
     begin_ticks: u32,
-    /// Times of those to come, ticks.
-    after_ticks: Vec<u32, 2>,
-    /// True if a whole frame is expected, and nothing else taken.
-    frame: bool,
-    /// True if what comes is left out, since it had begun long before.
-    late: bool,
+    /// Times of those to come, ticks. All but the last one take a whole frame and nothing else.
+    after_ticks: Vec<u32, 3>,
     /// Until when the last edges of an expected frame are waited for.
     until_ticks: u32,
     /// A frame whose answer cannot wait until it has been decoded.
@@ -188,9 +189,6 @@ impl Listener {
     fn begin(&mut self, edge: bool) -> Looks {
         let signal = self.port.reach(|throttle| throttle.signal());
         self.fill();
-        // Edge by edge a frame of an unknown signal takes 140 µs and more: who is behind leaves out whole frames,
-        // and is in time for others.
-        let late = signal.is_none() && self.capture.edges.has_half_a_frame();
         if let Some(Signal::Dshot {
             rate,
             bidirectional,
@@ -207,23 +205,20 @@ impl Listener {
             Some(first_ticks) => first_ticks,
             None => self.capture.now(),
         };
-        let unknown_ticks = capture::ticks_of_us(UNKNOWN_LOOK_US);
         let (last_ticks, after_ticks) = match signal {
-            _ if !edge => (0, Vec::from([0])),
+            _ if !edge => (0, Vec::from_iter([0])),
             Some(Signal::Dshot { rate, .. }) => {
                 let [late, last] = [LATE_LOOK_EIGHTHS, FRAME_LOOK_EIGHTHS]
                     .map(|eighths| eighths_ticks(rate, eighths));
                 let waking_ticks = last.saturating_sub(capture::ticks_of_us(WAKING_US));
-                (last, Vec::from([late, waking_ticks]))
+                (last, Vec::from_iter([late, waking_ticks]))
             }
-            _ if late => (0, Vec::from([2 * unknown_ticks, 2 * unknown_ticks])),
-            _ => (0, Vec::from([2 * unknown_ticks, unknown_ticks])),
+            Some(Signal::Pulse(_)) => (0, Vec::from_iter([capture::ticks_of_us(PULSE_LOOK_US)])),
+            None => (0, Vec::from(UNKNOWN_LOOKS_US.map(capture::ticks_of_us))),
         };
         Looks {
             begin_ticks,
             after_ticks,
-            frame: last_ticks > 0,
-            late,
             until_ticks: begin_ticks.wrapping_add(last_ticks),
             unheard: None,
         }
@@ -241,8 +236,8 @@ impl Listener {
     #[inline(never)]
     fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Asked> {
         self.fill();
-        let waits = core::mem::take(&mut looks.frame);
-        while waits
+        let is_last = looks.after_ticks.is_empty();
+        while !is_last
             && !self.capture.edges.has_frame()
             && self.capture.edges.is_before(looks.until_ticks)
         {
@@ -250,12 +245,12 @@ impl Listener {
         }
         let edges = &mut self.capture.edges;
         let (asked, setpoint) = self.port.reach(|throttle| {
-            if throttle.is_storing() || looks.late {
+            if throttle.is_storing() {
                 edges.forget();
                 return Some((None, Some(throttle.setpoint())));
             }
             let whole = edges.frame();
-            let event = whole.and_then(|bit| throttle.whole(bit));
+            let event = whole.and_then(|(rests_high, bit)| throttle.whole(rests_high, bit));
             let ask = if let Some(event) = event {
                 looks.after_ticks.clear();
                 if !edges.skip_frame() {
@@ -269,7 +264,11 @@ impl Listener {
                 } else {
                     throttle.hear(now_us(), &event)
                 }
-            } else if waits {
+            } else if !is_last {
+                if throttle.signal().is_none() {
+                    // The line had rested before: what was left of the edges then is none of this frame's.
+                    let _ = throttle.settle(now_us(), looks.begin_ticks);
+                }
                 return None;
             } else {
                 let (mut ask, now_us) = (None, now_us());
