@@ -6,7 +6,7 @@ mod machine;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use siskin_control::check::{Item, Probe};
+use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::{Sample, Setpoint};
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
@@ -112,8 +112,8 @@ impl Probe for Latest {
         self.0
     }
 
-    fn own(&mut self, _item: Item) -> Option<f32> {
-        None
+    fn own(&mut self, _item: Item) -> Own {
+        Own::Absent
     }
 }
 

@@ -254,7 +254,7 @@ impl Esc {
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
         self.sound.look(now_us, snapshot, rests);
         let told = Told {
-            note: self.sound.note(),
+            note: self.sound.note().filter(|_| !self.check.powers_up()),
             pull: self.check.pull(),
             too_hot: self.too_hot,
             barred: self.storage.is_lost() || !self.check.report.may_turn(&self.params),

@@ -16,12 +16,13 @@ use embassy_stm32::timer::input_capture::CapturePin;
 use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc};
-use siskin_control::check::{Item, Kind};
+use siskin_control::check::{Item, Kind, Own};
 use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
+use crate::chip::comparators::{self, Unfound};
 use crate::chip::pins::{self, Pin, Use};
-use crate::chip::{self, comparators, converters, op_amps};
+use crate::chip::{self, converters, op_amps};
 use crate::circuit::b_g431b_esc1::{
     BIAS_V, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT, ZERO_COUNTS,
 };
@@ -313,17 +314,18 @@ const BOOT_OPTIONS: (u32, u32) = (1 << 27, 1 << 26);
 
 /// Measures an item of the self-test that is this board's own. The full scale and the slow oscillator are not
 /// measured.
-pub(crate) fn own(item: Item) -> Option<f32> {
+pub(crate) fn own(item: Item) -> Own {
     match item.kind {
         Kind::OptionBytes => {
             let (set, clear) = BOOT_OPTIONS;
             let sound = FLASH.optr().read().0 & (set | clear) == set;
-            Some(f32::from(u8::from(sound)))
+            Own::Value(f32::from(u8::from(sound)))
         }
-        Kind::Comparator => {
-            let level = comparators::search(item.phase.into());
-            Some(level.map_or(f32::NAN, |level| TRIP.amperes(level)))
-        }
-        _ => None,
+        Kind::Comparator => match comparators::search(item.phase.into()) {
+            Ok(level) => Own::Value(TRIP.amperes(level)),
+            Err(Unfound::Stuck) => Own::Value(f32::NAN),
+            Err(Unfound::Conducts) => Own::Busy,
+        },
+        _ => Own::Absent,
     }
 }

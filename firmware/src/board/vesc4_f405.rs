@@ -24,7 +24,7 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::timer::{Ch1, Ch2, Dma, UpDma};
 use embassy_stm32::usart::{self, Uart, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, interrupt, pac, rcc, triggers};
-use siskin_control::check::Item;
+use siskin_control::check::{Item, Own};
 use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
@@ -338,8 +338,8 @@ pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
 pub(crate) fn set_trip(_phase_a: f32) {}
 
 /// No item of the self-test is this board's own: it has neither comparators nor such option bytes.
-pub(crate) fn own(_item: Item) -> Option<f32> {
-    None
+pub(crate) fn own(_item: Item) -> Own {
+    Own::Absent
 }
 
 /// nFAULT, at priority 1: not even the tasks' critical sections hold it up.

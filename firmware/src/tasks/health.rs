@@ -3,7 +3,7 @@
 
 use embassy_time::{Duration, Instant};
 
-use siskin_control::check::{Item, Probe};
+use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::Sample;
 
 use crate::board::{self, NTC, Temperature};
@@ -52,7 +52,7 @@ impl Probe for Health {
         sample(&Registers::CHIP)
     }
 
-    fn own(&mut self, item: Item) -> Option<f32> {
+    fn own(&mut self, item: Item) -> Own {
         board::own(item)
     }
 }

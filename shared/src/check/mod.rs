@@ -33,10 +33,20 @@ pub trait Probe {
     /// The latest sample that the control has, or could have, had.
     fn sample(&mut self) -> Sample;
 
-    /// The value of an item that only the board knows, in its unit; `None` if it has no means:
-    /// [`Kind::Reference`], [`Kind::Clock`], [`Kind::OptionBytes`] and [`Kind::Comparator`]. It may take
-    /// a millisecond.
-    fn own(&mut self, item: Item) -> Option<f32>;
+    /// An item that only the board knows: [`Kind::Reference`], [`Kind::Clock`], [`Kind::OptionBytes`] and
+    /// [`Kind::Comparator`]. It may take a millisecond.
+    fn own(&mut self, item: Item) -> Own;
+}
+
+/// A board's measurement of an item of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Own {
+    /// It has no means for it.
+    Absent,
+    /// The bridge conducts, and must not do so meanwhile: it is to be asked again.
+    Busy,
+    /// The value, in the item's unit.
+    Value(f32),
 }
 
 /// Looks in which nothing is read: the set-point and its effect are still on their way.
@@ -134,6 +144,11 @@ impl Check {
         self.go(Step::Listen);
     }
 
+    /// Returns true until the measurements of power-up are made: no tune begins before.
+    pub fn powers_up(&self) -> bool {
+        self.step == Step::PowerUp
+    }
+
     /// The pull that is asked of the drive, while nothing turns the motor.
     pub fn pull(&self) -> Option<Pull> {
         match self.step {
@@ -156,12 +171,11 @@ impl Check {
             return None;
         }
         if self.step == Step::PowerUp {
-            // Before the tune, and after some readings of the supply.
-            self.looks += 1;
-            if self.looks < POWER_UP_LOOKS {
+            // After some readings of the supply.
+            self.looks = self.looks.saturating_add(1);
+            if self.looks < POWER_UP_LOOKS || !self.own(sight, probe) {
                 return None;
             }
-            self.own(sight, probe);
             return Some(self.end(params, true));
         }
         if !sight.rests {
@@ -179,10 +193,9 @@ impl Check {
                         self.listen(phase, counts.to_f32() * board.current_a_per_count);
                     }
                 }
-                if looks < LATENCY + LISTENED {
+                if looks < LATENCY + LISTENED || !self.own(sight, probe) {
                     return None;
                 }
-                self.own(sight, probe);
                 for phase in 0..board.shunts.count() {
                     self.judge(phase);
                 }
@@ -255,16 +268,19 @@ impl Check {
         }
     }
 
-    /// Makes the measurements that need neither time nor the bridge.
-    fn own(&mut self, sight: &Sight, probe: &mut impl Probe) {
+    /// Makes the measurements that need neither time nor the bridge. False if some are to be made later.
+    fn own(&mut self, sight: &Sight, probe: &mut impl Probe) -> bool {
         let bus_v = sight.scale.volts(sight.snapshot.bus);
         self.report.set(Kind::Supply, 0, bus_v);
         self.report.set(Kind::Temperature, 0, sight.temperature_c);
         for item in Item::OWN {
-            if let Some(value) = probe.own(item) {
-                self.report.set(item.kind, item.phase, value);
+            match probe.own(item) {
+                Own::Absent => {}
+                Own::Busy => return false,
+                Own::Value(value) => self.report.set(item.kind, item.phase, value),
             }
         }
+        true
     }
 
     /// Takes a reading of a current. Out of line, as what follows for each phase: a loop would be unrolled,

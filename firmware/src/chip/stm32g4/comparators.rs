@@ -66,10 +66,17 @@ pub(crate) fn set_level(level: u16) {
     }
 }
 
-/// The highest level, of 4096, at which a comparator would trip now; nothing where it does not trip at 0, or
-/// does at full scale. To be called while the bridge is off: none of them breaks the PWM meanwhile, for
-/// 0.2 ms.
-pub(crate) fn search(comparator: usize) -> Option<u16> {
+/// Why a comparator's level was not found.
+pub(crate) enum Unfound {
+    /// It does not trip at 0, or does at full scale.
+    Stuck,
+    /// The bridge conducts, or began to: it needs the comparators.
+    Conducts,
+}
+
+/// The highest level, of 4096, at which a comparator would trip now. None of them breaks the PWM meanwhile, for
+/// 0.2 ms, or for 30 µs after the bridge has begun to conduct.
+pub(crate) fn search(comparator: usize) -> Result<u16, Unfound> {
     let breaking = TIM1.af1().read();
     TIM1.af1().modify(|w| {
         for number in BREAKS {
@@ -77,21 +84,7 @@ pub(crate) fn search(comparator: usize) -> Option<u16> {
         }
     });
     let given = DAC3.dhr12r(0).read().dhr();
-    let trips_at = |level| {
-        set_level(level);
-        cortex_m::asm::delay(SETTLE);
-        COMPARATORS[comparator].csr().read().value()
-    };
-    let (mut low, mut high) = (0, FULL_SCALE);
-    let found = trips_at(low) && !trips_at(high);
-    while high - low > 1 {
-        let middle = (low + high) / 2;
-        if trips_at(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
+    let found = bisect(COMPARATORS[comparator]);
     set_level(given);
     cortex_m::asm::delay(SETTLE);
     // Bits written as 1 stay as they are.
@@ -99,5 +92,39 @@ pub(crate) fn search(comparator: usize) -> Option<u16> {
     others.set_bif(0, false);
     TIM1.sr().write_value(others);
     TIM1.af1().write_value(breaking);
-    found.then_some(low)
+    found
+}
+
+fn bisect(comparator: Comp) -> Result<u16, Unfound> {
+    let trips_at = |level| {
+        set_level(level);
+        cortex_m::asm::delay(SETTLE);
+        if conducts() {
+            return Err(Unfound::Conducts);
+        }
+        Ok(comparator.csr().read().value())
+    };
+    let (mut low, mut high) = (0, FULL_SCALE);
+    if conducts() {
+        return Err(Unfound::Conducts);
+    }
+    if !trips_at(low)? || trips_at(high)? {
+        return Err(Unfound::Stuck);
+    }
+    while high - low > 1 {
+        let middle = (low + high) / 2;
+        if trips_at(middle)? {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Ok(low)
+}
+
+/// Returns true if a switch is on, or may be from the next commutation on: a leg that is off keeps its low side's
+/// output disabled.
+fn conducts() -> bool {
+    let enables = TIM1.ccer().read();
+    TIM1.bdtr().read().moe() && (0..3).any(|channel| enables.ccne(channel))
 }

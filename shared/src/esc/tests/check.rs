@@ -2,23 +2,39 @@
 
 use super::storage::ACCEPTED;
 use super::*;
-use crate::check::{Item, Kind, Probe};
+use crate::check::{Item, Kind, Own, Probe};
 use crate::drive::Sample;
 use crate::units::AdcCounts;
 use mavlink::dialects::ardupilotmega::MavCmd;
 
-/// A board whose first comparator trips nowhere.
+/// Readings of a board at rest.
+const AT_REST: Sample = Sample {
+    currents: [AdcCounts::ZERO; 3],
+    bus: AdcCounts::ZERO,
+    terminals: [AdcCounts::ZERO; 3],
+    hall: 7,
+};
+
+/// A board whose first comparator trips nowhere, and whose bridge conducts for some looks.
 struct Bad {
-    sample: Sample,
+    busy: u32,
 }
 
 impl Probe for Bad {
     fn sample(&mut self) -> Sample {
-        self.sample
+        AT_REST
     }
 
-    fn own(&mut self, item: Item) -> Option<f32> {
-        (item.kind == Kind::Comparator).then_some(if item.phase == 0 { f32::NAN } else { 0.0 })
+    fn own(&mut self, item: Item) -> Own {
+        if item.kind == Kind::Comparator && self.busy > 0 {
+            self.busy -= 1;
+            return Own::Busy;
+        }
+        match (item.kind, item.phase) {
+            (Kind::Comparator, 0) => Own::Value(f32::NAN),
+            (Kind::Comparator, _) => Own::Value(0.0),
+            _ => Own::Absent,
+        }
     }
 }
 
@@ -35,14 +51,7 @@ impl Bench {
 #[test]
 fn a_self_test_lifts_no_bar_before_it_has_measured() {
     let mut bench = Bench::new();
-    let mut probe = Bad {
-        sample: Sample {
-            currents: [AdcCounts::ZERO; 3],
-            bus: AdcCounts::ZERO,
-            terminals: [AdcCounts::ZERO; 3],
-            hall: 7,
-        },
-    };
+    let mut probe = Bad { busy: 0 };
     bench.test_itself_ms(&mut probe, 1_500);
     assert!(!bench.esc.telemetry().armed, "barred since power-up");
     bench.results.clear();
@@ -56,4 +65,24 @@ fn a_self_test_lifts_no_bar_before_it_has_measured() {
     bench.test_itself_ms(&mut probe, 1_500);
     assert_ne!(bench.results.last(), Some(&ACCEPTED));
     assert!(!bench.esc.telemetry().armed, "still barred");
+}
+
+/// The comparators are searched while no switch is on: until then no tune begins, and a test waits.
+#[test]
+fn what_the_board_measures_waits_for_a_bridge_that_is_off() {
+    let mut bench = Bench::new();
+    let mut probe = Bad { busy: 50 };
+    let misfit = |bench: &Bench| bench.texts.iter().any(|text| text.contains("comparator_a"));
+    let sounds = |bench: &Bench| matches!(bench.throttle.setpoint(), Setpoint::Tone { .. });
+    bench.test_itself_ms(&mut probe, 50);
+    assert!(probe.busy > 0 && !misfit(&bench) && !sounds(&bench));
+    bench.test_itself_ms(&mut probe, 20);
+    assert!(probe.busy == 0 && misfit(&bench) && sounds(&bench));
+    bench.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
+    probe.busy = 50;
+    bench.test_itself_ms(&mut probe, 100);
+    assert!(probe.busy > 0);
+    assert_eq!(bench.results.len(), 1, "it is listening");
+    bench.test_itself_ms(&mut probe, 100);
+    assert_eq!((probe.busy, bench.results.len()), (0, 2), "it goes on");
 }

@@ -15,13 +15,24 @@ const PINS: [[(u8, u8); 2]; 3] = [[(0, 1), (1, 1)], [(0, 7), (0, 3)], [(1, 0), (
 /// DAC3's channels, from 0, at INMSEL 4 (RM0440, comparators' minus inputs).
 const CHANNELS: [usize; 3] = [0, 1, 1];
 
+/// What is wrong with a comparator.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum Defect {
+    /// Nothing.
+    #[default]
+    None,
+    /// Its output is always at this level.
+    Stuck(bool),
+    /// It sees its pin so many volts higher.
+    Offset(f64),
+}
+
 /// A comparator.
 #[derive(Clone, Debug, Default)]
 struct Comparator {
     control: Csr,
     output: bool,
-    /// It never trips.
-    dead: bool,
+    defect: Defect,
 }
 
 /// The comparators. Their registers are a word each, COMP1's at 0.
@@ -36,20 +47,20 @@ impl Comparators {
         Self::default()
     }
 
-    /// As after a reset of the chip; one that is dead stays so.
+    /// As after a reset of the chip; a defect stays.
     pub(crate) fn reset(&mut self) {
         for comparator in &mut self.comparators {
             *comparator = Comparator {
-                dead: comparator.dead,
+                defect: comparator.defect,
                 ..Comparator::default()
             };
         }
     }
 
-    /// From now on a comparator never trips, by its number.
-    pub(crate) fn kill(&mut self, number: u8) {
+    /// Gives a comparator a defect, by its number.
+    pub(crate) fn set_defect(&mut self, number: u8, defect: Defect) {
         if let Some(which) = index(number) {
-            self.comparators[which].dead = true;
+            self.comparators[which].defect = defect;
         }
     }
 
@@ -71,11 +82,15 @@ impl Comparators {
         let comparator = &mut self.comparators[which];
         let control = comparator.control;
         // One without a level floats: it does not trip.
-        let above = dac
-            .volts(CHANNELS[which])
-            .is_some_and(|level| volts > level);
+        let level = dac.volts(CHANNELS[which]);
+        let above = |volts| level.is_some_and(|level| volts > level);
         let inverted = control.polarity() == Polarity::INVERTED;
-        comparator.output = control.en() && !comparator.dead && above != inverted;
+        let output = match comparator.defect {
+            Defect::None => above(volts) != inverted,
+            Defect::Offset(offset_v) => above(volts + offset_v) != inverted,
+            Defect::Stuck(output) => output,
+        };
+        comparator.output = control.en() && output;
         comparator.output
     }
 }

@@ -12,6 +12,7 @@ use siskin_emulator::plant::Gate;
 use siskin_emulator::surroundings::{Passage, Surroundings as Bench};
 
 use crate::bridge::Bridge;
+use crate::chip::comparator::Defect;
 use crate::chip::flash::Flash;
 use crate::chip::parts::Parts;
 use crate::chip::rcc::Supply;
@@ -227,9 +228,9 @@ impl World {
         &mut self.parts
     }
 
-    /// A comparator of the board's, by its number, never trips from now on.
-    pub fn kill_comparator(&mut self, number: u8) {
-        self.parts.comparators.kill(number);
+    /// Gives a comparator of the board's a defect, by its number.
+    pub fn set_comparator_defect(&mut self, number: u8, defect: Defect) {
+        self.parts.comparators.set_defect(number, defect);
     }
 
     /// Sets the option bytes.

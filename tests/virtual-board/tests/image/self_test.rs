@@ -1,6 +1,7 @@
 //! The image tests its board: one that is sound passes, and each defect is named. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
+use siskin_vboard::chip::comparator::Defect;
 
 use crate::common::{Board, MS, Throttle, image};
 
@@ -50,7 +51,8 @@ fn a_comparator_that_never_trips_is_named_and_keeps_the_motor_off() {
         (4, "comparator_c"),
     ] {
         let mut board = Board::new(&image(), &[]);
-        board.world().kill_comparator(number);
+        let defect = Defect::Stuck(false);
+        board.world().set_comparator_defect(number, defect);
         board.throttle = Throttle::Dshot(0);
         board.run(1_000 * MS);
         assert_eq!(named(&mut board), [format!("Self-test: {item}")]);
@@ -60,6 +62,39 @@ fn a_comparator_that_never_trips_is_named_and_keeps_the_motor_off() {
         board.throttle = Throttle::Dshot(0);
         assert_eq!(check(&mut board), FAILED);
     }
+}
+
+/// A comparator that trips too early or too late by 30 mV, 17.5 A, is named, and one by 15 mV is not: the bound
+/// is 0.4 of the board's range.
+#[test]
+fn a_comparator_whose_level_is_off_is_named_and_one_within_the_bounds_is_not() {
+    for (offset_v, sound) in [(0.03, false), (-0.03, false), (0.015, true), (-0.015, true)] {
+        let mut board = Board::new(&image(), &[]);
+        let defect = Defect::Offset(offset_v);
+        board.world().set_comparator_defect(2, defect);
+        board.throttle = Throttle::Dshot(0);
+        board.run(300 * MS);
+        let wanted: &[&str] = if sound {
+            &[]
+        } else {
+            &["Self-test: comparator_b"]
+        };
+        assert_eq!(named(&mut board), wanted, "{offset_v} V");
+    }
+}
+
+/// One that always trips keeps the bridge off by itself, and is named.
+#[test]
+fn a_comparator_that_always_trips_is_named() {
+    let mut board = Board::new(&image(), &[]);
+    let defect = Defect::Stuck(true);
+    board.world().set_comparator_defect(4, defect);
+    board.throttle = Throttle::Dshot(0);
+    board.run(1_000 * MS);
+    assert!(named(&mut board).contains(&"Self-test: comparator_c".into()));
+    board.throttle = Throttle::Dshot(1_048);
+    board.run(300 * MS);
+    assert!(board.rpm().abs() < 1.0, "{} rpm", board.rpm());
 }
 
 #[test]
