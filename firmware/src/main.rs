@@ -12,6 +12,7 @@ mod start_up;
 use embassy_executor::Spawner;
 use siskin_firmware::board::{Hardware, NAME};
 use siskin_firmware::image::{Image, is_whole};
+use siskin_firmware::tasks::Fit;
 use siskin_firmware::{damaged, tasks};
 
 #[unsafe(no_mangle)]
@@ -21,9 +22,14 @@ static IMAGE: Image = Image::of(NAME);
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     // Its pins keep the gates off until the control drives them.
-    let hardware = Hardware::claim();
+    let mut hardware = Hardware::claim();
     if !is_whole() {
         damaged::tell(hardware);
     }
-    tasks::start(spawner, hardware);
+    // A variable of this task is made where it stays. In a static memory the ESC would be a copy of one on
+    // the stack, which would need 2.9 KB more for that alone.
+    let mut fit = Fit::default();
+    let mut esc = tasks::power_up(&mut hardware.flash, &mut fit);
+    let mut desk = tasks::start(spawner, hardware, &mut esc, fit);
+    desk.attend().await
 }

@@ -13,8 +13,9 @@ FIRST_VECTORS = 2
 """The stack's begin, and the reset."""
 HARD_FAULT = 3
 """Its handler begins the stack anew."""
-BEFORE = "siskin_firmware::tasks::start::power_up"
-"""Makes the ESC, returns before the control's interrupt is started, and is not called again."""
+BEFORE = tuple(f"siskin_firmware::tasks::start::{name}" for name in ("power_up", "open_port"))
+"""Make the ESC and its throttle, return before the control's interrupt is started, and are not called
+again."""
 TASK = "embassy_executor::raw::TaskStorage::poll"
 THROTTLE = "siskin_firmware::tasks::throttle::Listener::"
 """The throttle's task has an executor of its own, in an interrupt, which runs no other."""
@@ -56,7 +57,7 @@ def levels(calls: Calls, board: Board) -> list[tuple[str, Bound]]:
     image = calls.image
     named = {name: image.symbols[name] & ~1 for name in (board.pwm, board.alarm) if name}
     handlers = vectors(calls)
-    before = frozenset(f for f in image.functions.values() if f.name == BEFORE)
+    before = frozenset(f for f in image.functions.values() if f.name in BEFORE)
     reset = image.functions[image.symbols["Reset"] & ~1]
 
     def at(name):

@@ -44,6 +44,13 @@ impl<T: Default> Swap<T> {
     }
 }
 
+/// Never inlined: where the slot is an argument, the default is made in it, and not copied into it from a
+/// stack.
+#[inline(never)]
+fn put_default<T: Default>(place: &mut MaybeUninit<T>) -> &mut T {
+    place.write(T::default())
+}
+
 /// Puts a default into a slot, and has `make` change it there: a copy would take much of a stack.
 ///
 /// # Safety
@@ -53,7 +60,7 @@ unsafe fn fill<T: Default, R>(
     make: impl FnOnce(&mut T) -> R,
 ) -> R {
     // SAFETY: the caller sees to it.
-    unsafe { with_mut(slot, |place| make(place.write(T::default()))) }
+    unsafe { with_mut(slot, |place| make(put_default(place))) }
 }
 
 impl<T> Swap<T> {

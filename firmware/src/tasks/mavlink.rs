@@ -54,9 +54,9 @@ fn send(mut frame: &[u8]) {
 /// 6 ms at the lowest speed.
 const RESTART_POLLS: u8 = 10;
 
-/// The task's own state.
-pub(crate) struct Desk {
-    pub(crate) esc: &'static mut Esc,
+/// The state of the ESC's task.
+pub struct Desk<'a> {
+    pub(crate) esc: &'a mut Esc,
     pub(crate) throttle: Port,
     pub(crate) line: RingBufferedUartRx<'static>,
     pub(crate) config: ConfigWriter,
@@ -75,23 +75,22 @@ pub(crate) struct Desk {
     pub(crate) restart_polls: Option<u8>,
 }
 
-/// Attends to the ESC for ever.
-#[embassy_executor::task]
-pub(crate) async fn attend(desk: &'static mut Desk) -> ! {
-    let mut ticker = Ticker::every(POLL);
-    let mut bytes = [0; 64];
-    loop {
-        match select(ticker.next(), desk.line.read(&mut bytes)).await {
-            Either::First(()) => desk.poll(),
-            Either::Second(Ok(count)) => desk.receive(&bytes[..count]),
-            // Bytes were lost or garbled: the frame's checksum shows it.
-            Either::Second(Err(_)) => {}
+// Each out of line: the stack that one takes is free for the next.
+impl Desk<'_> {
+    /// Attends to the ESC for ever.
+    pub async fn attend(&mut self) -> ! {
+        let mut ticker = Ticker::every(POLL);
+        let mut bytes = [0; 64];
+        loop {
+            match select(ticker.next(), self.line.read(&mut bytes)).await {
+                Either::First(()) => self.poll(),
+                Either::Second(Ok(count)) => self.receive(&bytes[..count]),
+                // Bytes were lost or garbled: the frame's checksum shows it.
+                Either::Second(Err(_)) => {}
+            }
         }
     }
-}
 
-// Each out of line: the stack that one takes is free for the next.
-impl Desk {
     #[inline(never)]
     fn receive(&mut self, bytes: &[u8]) {
         let now_us = Instant::now().as_micros();

@@ -31,13 +31,15 @@ const STALE_S: f32 = 0.01;
 /// Bytes that come in between two looks of the task: 5 ms of the fastest link.
 const LINE_BYTES: usize = 512;
 
-/// Starts the control's interrupt and the tasks.
+/// Starts the control's interrupt and all tasks but the ESC's own, which has what is returned.
 ///
 /// # Panics
-/// If called again, or if the defaults do not fit the board.
-pub fn start(spawner: Spawner, hardware: Hardware) {
-    let mut flash = hardware.flash;
-    let (esc, port) = recall(&mut flash);
+/// If called again.
+#[inline(never)]
+pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) -> Desk<'_> {
+    tell(esc, fit);
+    recall_rest(esc, &mut hardware.flash);
+    let port = open_port(esc.params());
     if let Some(text) = last_words::take() {
         esc.warn(text);
     }
@@ -64,14 +66,19 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
     let (out, line) = hardware.mavlink.open(baud).split();
     static BYTES: StaticCell<[u8; LINE_BYTES]> = StaticCell::new();
     let line = line.into_ring_buffered(BYTES.init_with(|| [0; LINE_BYTES]));
-    static DESK: StaticCell<Desk> = StaticCell::new();
-    let desk = DESK.init_with(|| Desk {
+
+    let once = "spawned here and nowhere else";
+    spawner.spawn(mavlink::transmit(out).expect(once));
+    if !has_hall_sensors {
+        spawner.spawn(kiss::transmit(hardware.kiss.open()).expect(once));
+    }
+    Desk {
         esc,
         throttle: port,
         line,
         config: ends.config,
         snapshot,
-        flash,
+        flash: hardware.flash,
         health: Health::new(hardware.temperature),
         receiver: Receiver::new(),
         teller: Teller::new(),
@@ -80,30 +87,74 @@ pub fn start(spawner: Spawner, hardware: Hardware) {
         changed: false,
         limit_a,
         restart_polls: None,
-    });
-
-    let once = "spawned here and nowhere else";
-    spawner.spawn(mavlink::attend(desk).expect(once));
-    spawner.spawn(mavlink::transmit(out).expect(once));
-    if !has_hall_sensors {
-        spawner.spawn(kiss::transmit(hardware.kiss.open()).expect(once));
     }
 }
 
+/// How the stored parameters fit the board.
+#[derive(Default)]
+pub enum Fit {
+    /// They do.
+    #[default]
+    Whole,
+    /// They do with the board's dead time.
+    Raised,
+    /// They do not.
+    Refused,
+}
+
+/// The ESC with the parameters as they were left or, if they do not fit the board, with the defaults. All
+/// that is stored is read twice: beside the ESC that is being made, the stack has room for the
+/// parameters alone.
+///
+/// # Panics
+/// If the defaults do not fit the board.
+// Out of line, as what follows: the stack that one takes is free for the next.
 #[inline(never)]
-fn warn(esc: &mut Esc, text: &str) {
+pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
+    let board = board();
+    let mut params = stored_params(flash);
+    if params.fit(&board) {
+        *fit = Fit::Raised;
+    }
+    if check(&params, &board).is_err() {
+        *fit = Fit::Refused;
+        params = Params::default();
+        params.fit(&board);
+        check(&params, &board).expect("the defaults fit every board");
+    }
+    let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
+    Esc::unchecked(params, board, bytes_per_s)
+}
+
+/// Has the ESC tell what became of the stored parameters.
+#[inline(never)]
+fn tell(esc: &mut Esc, fit: Fit) {
     let mut warning = Warning::new();
-    push(&mut warning, text);
+    match fit {
+        Fit::Whole => return,
+        Fit::Raised => {
+            push(&mut warning, "PWM_DEADTIME_NS ");
+            push(&mut warning, BOARD.least_dead_time.refusal);
+            push(&mut warning, ", raised");
+        }
+        Fit::Refused => {
+            esc.lose_stored();
+            let text = "Parameters do not fit the board: defaults in force";
+            push(&mut warning, text);
+        }
+    }
     esc.warn(warning);
 }
 
-/// The ESC and its throttle as they were left. All that is stored is read twice: beside the ESC that is
-/// being made, the stack has room for the parameters alone.
-#[inline(never)]
-fn recall(flash: &mut Storage) -> (&'static mut Esc, Port) {
-    let (esc, port) = power_up(&mut stored_params(flash));
-    recall_rest(esc, flash);
-    (esc, port)
+/// This board, with its number.
+fn board() -> Board {
+    Board {
+        image: Image {
+            serial: uid(),
+            ..BOARD.image
+        },
+        ..BOARD
+    }
 }
 
 #[inline(never)]
@@ -116,51 +167,9 @@ fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
     esc.recall(&store::load(flash, range()));
 }
 
-/// The ESC and its throttle with these parameters or, if they do not fit the board, with the
-/// defaults; each is made where it stays.
-// Out of line, as what follows: the stack that one takes is free for the next.
 #[inline(never)]
-fn power_up(params: &mut Params) -> (&'static mut Esc, Port) {
-    let board = Board {
-        image: Image {
-            serial: uid(),
-            ..BOARD.image
-        },
-        ..BOARD
-    };
-    let raised = params.fit(&board);
-    if check(params, &board).is_ok() {
-        let port = open_port(params, &board);
-        let esc = make_esc(params.clone(), board);
-        if raised {
-            let mut warning = Warning::new();
-            push(&mut warning, "PWM_DEADTIME_NS ");
-            push(&mut warning, board.least_dead_time.refusal);
-            push(&mut warning, ", raised");
-            esc.warn(warning);
-        }
-        return (esc, port);
-    }
-    let mut defaults = Params::default();
-    defaults.fit(&board);
-    check(&defaults, &board).expect("the defaults fit every board");
-    let port = open_port(&defaults, &board);
-    let esc = make_esc(defaults, board);
-    esc.lose_stored();
-    warn(esc, "Parameters do not fit the board: defaults in force");
-    (esc, port)
-}
-
-#[inline(never)]
-fn open_port(params: &Params, board: &Board) -> Port {
-    Port::open(|| Throttle::new(TICK_HZ, params, board))
-}
-
-#[inline(never)]
-fn make_esc(params: Params, board: Board) -> &'static mut Esc {
-    static ESC: StaticCell<Esc> = StaticCell::new();
-    let bytes_per_s = params.get(ParamId::TelBaud) as u32 / 10;
-    ESC.init_with(|| Esc::unchecked(params, board, bytes_per_s))
+fn open_port(params: &Params) -> Port {
+    Port::open(|| Throttle::new(TICK_HZ, params, &board()))
 }
 
 /// The control's interrupt with what the parameters make.

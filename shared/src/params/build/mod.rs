@@ -138,7 +138,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.torque = outer::torque(&p);
     place.adapt_l = inductance::inductance(&p);
     place.low_speed = low_speed(&p);
-    place.start = start::attempts(&p);
+    start::attempts(&p, &mut place.start);
     place.test_current = test_current(params, &p.scale);
     place.both_ways = p.chosen(Inp3d::On);
     place.slow = p.slow();

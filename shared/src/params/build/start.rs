@@ -37,17 +37,15 @@ const PARK_SWINGS: f32 = 3.0;
 /// Time for which a rotor may turn too slowly in Ramp, in periods of its swing.
 const ASTRAY_SWINGS: f32 = 1.0;
 
-/// The attempts of a start (section 3.2 of the second paper): each with more current, up to
-/// `LIM_PHASE_A`, and slower than the one before.
-pub(super) fn attempts(p: &Si) -> [start::Config; ATTEMPTS] {
+/// Puts the attempts of a start (section 3.2 of the second paper) into their places: each with more
+/// current, up to `LIM_PHASE_A`, and slower than the one before.
+pub(super) fn attempts(p: &Si, places: &mut [start::Config; ATTEMPTS]) {
     let mut current_a = p.get(ParamId::StaRampA);
-    let mut next = |inertia: f32| {
+    for (place, inertia) in places.iter_mut().zip(INERTIA) {
         let bounded_a = current_a.min(p.get(ParamId::LimPhaseA));
+        *place = attempt(p, bounded_a, inertia * p.inertia_kgm2);
         current_a *= CURRENT_GROWTH;
-        attempt(p, bounded_a, inertia * p.inertia_kgm2)
-    };
-    let [first, second, third, fourth] = INERTIA;
-    [next(first), next(second), next(third), next(fourth)]
+    }
 }
 
 fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
