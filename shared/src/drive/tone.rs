@@ -27,7 +27,7 @@ use crate::control::modulator::{self, Supply};
 use crate::control::transform::{AlphaBeta, Dq, Order};
 use crate::math::{Held, SinCos, TopProduct, magnitude};
 use crate::trace::traced;
-use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
 
 /// The least that a current is taken to need, of what the dead time takes: crossing that in steps of a
 /// quarter of so much takes some 30 half cycles.
@@ -118,7 +118,13 @@ pub(super) fn period(
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
     let duties = modulator::duties(&config.modulator, &shared.supply, v, none);
     // A tone's voltage may be as long as the supply gives.
-    shared.applied.expect_unreadable();
+    let asked = Dq {
+        d: wide(u),
+        q: WideVoltage::ZERO,
+    };
+    if modulator::square_of(asked) > shared.supply.readable {
+        shared.applied.expect_unreadable();
+    }
     shared.applied.command(duties);
     Bridge::Duty(duties)
 }
@@ -141,22 +147,41 @@ fn play(
         };
     }
     playing.peak = playing.peak.max(greatest);
-    let before = playing.angle;
-    playing.angle = before.wrapping_add(pitch.over_period());
-    if playing.angle.is_negative() != before.is_negative() {
+    // A half cycle ends, and its work is shared with the period behind; the first one of all has only that.
+    let step = pitch.over_period();
+    let ends = |angle: Angle| angle.is_negative() != angle.wrapping_sub(step).is_negative();
+    if ends(playing.angle) {
+        playing.needed = needed(tone, playing, supply);
+    }
+    playing.angle = playing.angle.wrapping_add(step);
+    if ends(playing.angle) {
         regulate(tone, playing, supply);
     }
     let sine = SinCos::of(playing.angle).sin;
     playing.amplitude.top(sine).scaled()
 }
 
-/// The amplitude of the coming half cycle.
-fn regulate(tone: &tone::Config, playing: &mut State, supply: &Supply) {
+/// The voltage that the dead time takes.
+#[inline(always)]
+fn dead(tone: &tone::Config, supply: &Supply) -> Voltage {
+    tone.dead.top(supply.bus).scaled()
+}
+
+/// What has been learnt of the voltage that the current needs, as far as it can be true.
+fn needed(tone: &tone::Config, playing: &State, supply: &Supply) -> Voltage {
     let reactive = tone.reactive.held(playing.pitch);
     let stated = magnitude(tone.resistive, reactive);
-    let dead: Voltage = tone.dead.top(supply.bus).scaled();
-    let least = tone.resistive.min(reactive).max(dead >> DEAD_SHIFT);
-    let needed = playing.needed.max(least).min(stated);
+    let least = tone
+        .resistive
+        .min(reactive)
+        .max(dead(tone, supply) >> DEAD_SHIFT);
+    playing.needed.max(least).min(stated)
+}
+
+/// The amplitude of the coming half cycle.
+fn regulate(tone: &tone::Config, playing: &mut State, supply: &Supply) {
+    let needed = playing.needed;
+    let dead = dead(tone, supply);
     let missing = tone.share.held(tone.peak.minus(playing.peak));
     // 28 + 31 − 32 fraction bits are half of it with 28.
     let half = needed.top(missing);
