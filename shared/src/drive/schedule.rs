@@ -29,10 +29,15 @@ pub(super) enum Work {
     Damp,
     /// Dead-time signs.
     DeadTimeSign,
-    /// The supply's voltage, and the longest vector that it gives.
+    /// The supply's voltage and current, in a start.
     Supply,
-    /// The trip, and the bounds of i_q that the supply's current leaves.
+    /// The longest vector that the supply gives.
+    Longest,
+    /// The trip, and the bounds of i_q that the supply's current leaves; in Run the supply's voltage and
+    /// current before.
     Bounds,
+    /// The bounds of i_q that the speed leaves, and i_d.
+    SpeedBounds,
     /// Dead-time signs, and the update of the observer's gains.
     ObserverGains,
     /// Delay compensation, dead-time signs, and the mode that the set-point asks for: it may end the drive.
@@ -40,30 +45,34 @@ pub(super) enum Work {
     /// The mode that the rotor allows, which may end the drive; dead-time signs, and the decoupling of the
     /// regulator's axes.
     Rotor,
+    /// The speed regulator is made ready for the end of an open-loop start.
+    Standby,
+    /// The end of an open-loop start that has come to its speed.
+    HandOver,
 }
 
 use Work::{
-    Bounds, Damp, DeadTimeSign, Nothing, ObserverGains, Reference, Rotor, Setpoint, StartCurrent,
-    Supply,
+    Bounds, Damp, DeadTimeSign, HandOver, Longest, Nothing, ObserverGains, Reference, Rotor,
+    Setpoint, SpeedBounds, Standby, StartCurrent, Supply,
 };
 
 /// Field-oriented control's work in each period of a cycle. Two periods after each reference
-/// come the dead-time signs; no period has much more than a reference, and most have nothing.
+/// come the dead-time signs; most periods have nothing.
 #[rustfmt::skip]
 const RUN: [Work; CYCLE as usize] = [
-    /*  0 */ Reference, Nothing, ObserverGains, Nothing, Supply,  Nothing, Bounds,  Nothing,
+    /*  0 */ Reference, Nothing, ObserverGains, Nothing, Bounds, Nothing, Longest, SpeedBounds,
     /*  8 */ Reference, Nothing, Setpoint,      Nothing, Nothing, Nothing, Nothing, Nothing,
-    /* 16 */ Reference, Nothing, DeadTimeSign,  Nothing, Supply,  Nothing, Bounds,  Nothing,
+    /* 16 */ Reference, Nothing, DeadTimeSign,  Nothing, Bounds, Nothing, Longest, SpeedBounds,
     /* 24 */ Reference, Nothing, Rotor,         Nothing, Nothing, Nothing, Nothing, Nothing,
 ];
 
 /// An open-loop start's work in each period of a cycle.
 #[rustfmt::skip]
 const START: [Work; CYCLE as usize] = [
-    /*  0 */ StartCurrent, Damp, ObserverGains, Damp, Supply,  Damp, Bounds,  Damp,
-    /*  8 */ StartCurrent, Damp, Setpoint,      Damp, Nothing, Damp, Nothing, Damp,
-    /* 16 */ StartCurrent, Damp, DeadTimeSign,  Damp, Supply,  Damp, Bounds,  Damp,
-    /* 24 */ StartCurrent, Damp, Rotor,         Damp, Nothing, Damp, Nothing, Damp,
+    /*  0 */ StartCurrent, Damp, ObserverGains, Damp, Supply,  Damp, Bounds,   Damp,
+    /*  8 */ StartCurrent, Damp, Setpoint,      Damp, Nothing, Damp, Nothing,  Damp,
+    /* 16 */ StartCurrent, Damp, DeadTimeSign,  Damp, Supply,  Damp, Bounds,   Damp,
+    /* 24 */ StartCurrent, Damp, Rotor,         Damp, Standby, Damp, HandOver, Damp,
 ];
 
 /// Returns true if a piece is done every so many periods from its first on, and in no other.
@@ -87,13 +96,17 @@ const _: () = {
     assert!(is_every(&RUN, Reference, PERIODS));
     assert!(is_every(&START, StartCurrent, PERIODS));
     assert!(is_every(&START, Damp, DAMP_PERIODS));
+    assert!(is_every(&START, Standby, CYCLE));
+    assert!(is_every(&START, HandOver, CYCLE));
+    assert!(is_every(&START, Supply, SUPPLY_PERIODS));
+    assert!(is_every(&RUN, Longest, SUPPLY_PERIODS));
+    assert!(is_every(&RUN, SpeedBounds, SUPPLY_PERIODS));
     let mut n = 0;
     while n < 2 {
         let schedule = [&RUN, &START][n];
-        assert!(is_every(schedule, Supply, SUPPLY_PERIODS));
+        assert!(is_every(schedule, DeadTimeSign, CYCLE));
         assert!(is_every(schedule, Bounds, SUPPLY_PERIODS));
         assert!(is_every(schedule, ObserverGains, CYCLE));
-        assert!(is_every(schedule, DeadTimeSign, CYCLE));
         assert!(is_every(schedule, Setpoint, CYCLE));
         assert!(is_every(schedule, Rotor, CYCLE));
         n += 1;

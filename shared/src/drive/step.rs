@@ -150,23 +150,17 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, work: Work) ->
         Work::Damp => open_loop::damp(config, foc, shared, phase),
         Work::StartCurrent => why = open_loop::current(config, foc, shared, (phase, setpoint)),
         Work::DeadTimeSign => outer_loop::dead_time_sign(config, foc),
-        Work::Supply => {
-            outer_loop::supply(shared);
-            if !phase.is_open_loop() {
-                outer_loop::longest_vector(config, shared);
-            }
-        }
+        Work::Supply => outer_loop::supply(shared),
+        Work::Longest => outer_loop::longest_vector(config, shared),
         Work::Bounds => {
+            if !phase.is_open_loop() {
+                outer_loop::supply(shared);
+            }
             outer_loop::trip_level(config, shared);
             outer_loop::supply_bounds(config, foc, shared);
-            if !phase.is_open_loop() {
-                outer_loop::speed_bounds(config, foc, shared);
-            }
         }
-        Work::ObserverGains => {
-            outer_loop::dead_time_sign(config, foc);
-            outer_loop::observer_gains(config, foc);
-        }
+        Work::SpeedBounds => outer_loop::speed_bounds(config, foc, shared),
+        Work::ObserverGains => outer_loop::observer_gains(config, foc),
         Work::Setpoint => {
             outer_loop::delay_compensation(config, foc, shared);
             outer_loop::dead_time_sign(config, foc);
@@ -175,12 +169,12 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, work: Work) ->
         Work::Rotor => {
             why = open_loop::rotor(config, foc, shared, phase);
             if why.is_none() {
-                // One that is handed over has begun with the decoupling, and has no reference of its
-                // own yet.
                 outer_loop::dead_time_sign(config, foc);
                 outer_loop::decoupling(config, foc, shared);
             }
         }
+        Work::Standby => open_loop::stand_by(config, foc),
+        Work::HandOver => why = open_loop::hand_over(config, foc, shared, phase),
     }
     if let Some(why) = why {
         state.change(config, why);

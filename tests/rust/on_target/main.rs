@@ -22,7 +22,7 @@ use siskin_control::params::{ParamId, Params};
 /// and 500; at 24 kHz a chip of 170 MHz has 7083 clocks a period, one of 84 MHz 3500.
 const STEP_MAX: Bounds = Bounds {
     median: 330,
-    most: 645,
+    most: 635,
 };
 
 /// Instructions of the whole interrupt around it: from the converters' registers to the timer's, the

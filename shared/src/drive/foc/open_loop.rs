@@ -65,8 +65,8 @@ fn expect(config: &Config, foc: &mut State, shared: &Shared) {
     observer::expect(&config.observer, &mut foc.observer, rotor, i);
 }
 
-/// Every [`CYCLE`], what the rotor makes of the phase: hand-over at the ramp's end, another attempt where
-/// it has not followed or has become too slow, the end of a stop, a fault where it is lost.
+/// Every [`CYCLE`], what the rotor makes of the phase: another attempt where it has not followed or has
+/// become too slow, the end of a stop, a fault where it is lost.
 #[inline(never)]
 pub(in crate::drive) fn rotor(
     config: &Config,
@@ -86,7 +86,10 @@ pub(in crate::drive) fn rotor(
         progress.slow_periods = 0;
     }
     match phase {
-        Phase::Ramp => ramp(config, foc, shared),
+        Phase::Ramp => {
+            let astray = start::lost(attempt(config, shared), &foc.loops.start);
+            astray.then(|| failed(shared))
+        }
         // Before the speed is looked at: sensors that fail at standstill are lost there.
         Phase::Run | Phase::Stopping if progress.lost_periods >= config.lost_periods => {
             Some(if progress.run_periods < config.proven_periods {
@@ -111,19 +114,6 @@ pub(in crate::drive) fn rotor(
     }
 }
 
-/// Loss of synchronism, or the ramp's end.
-fn ramp(config: &Config, foc: &mut State, shared: &mut Shared) -> Option<Why> {
-    let attempt = attempt(config, shared);
-    let start = &foc.loops.start;
-    if start::lost(attempt, start) {
-        Some(failed(shared))
-    } else if start.omega_s >= attempt.run_speed {
-        Some(hand_over(config, foc, shared))
-    } else {
-        None
-    }
-}
-
 /// A start has failed, or the motor has become too slow: the next attempt, if there is one.
 #[cold]
 fn failed(shared: &mut Shared) -> Why {
@@ -135,12 +125,31 @@ fn failed(shared: &mut Shared) -> Why {
     }
 }
 
-/// Turns the control's frame from where the ramp held it to where the rotor is, and begins Run
-/// with the torque that there is.
+/// The speed regulator is made ready for [`hand_over`], shortly before it.
 #[cold]
-fn hand_over(config: &Config, foc: &mut State, shared: &mut Shared) -> Why {
+pub(in crate::drive) fn stand_by(config: &Config, foc: &mut State) {
+    let loops = &mut foc.loops;
+    // What the ramp's current accelerates with is not what the load takes.
+    config
+        .speed
+        .begin(&mut loops.speed, loops.start.omega_s, Current::ZERO);
+}
+
+/// The ramp's end: turns the control's frame from where the ramp held it to where the rotor is, and begins
+/// Run with the torque that there is.
+#[cold]
+#[inline(never)]
+pub(in crate::drive) fn hand_over(
+    config: &Config,
+    foc: &mut State,
+    shared: &mut Shared,
+    phase: Phase,
+) -> Option<Why> {
     let loops = &mut foc.loops;
     let omega_s = loops.start.omega_s;
+    if phase != Phase::Ramp || omega_s < attempt(config, shared).run_speed {
+        return None;
+    }
     let lead = observer::take_over(
         &config.observer,
         &mut foc.observer,
@@ -148,7 +157,7 @@ fn hand_over(config: &Config, foc: &mut State, shared: &mut Shared) -> Why {
         omega_s,
     );
     let Some(lead) = lead else {
-        return failed(shared);
+        return Some(failed(shared));
     };
     let lead = SinCos::of(lead);
     // The voltage goes on as it was, in the new frame.
@@ -160,8 +169,6 @@ fn hand_over(config: &Config, foc: &mut State, shared: &mut Shared) -> Why {
     config
         .regulator
         .begin(&mut loops.regulator, u, &reference, &fb);
-    // What the ramp's current accelerates with is not what the load takes.
-    config.speed.begin(&mut loops.speed, omega_s, Current::ZERO);
     loops.reference = reference;
-    Why::HandedOver
+    Some(Why::HandedOver)
 }

@@ -8,7 +8,7 @@ use crate::control::transform::{AlphaBeta, Dq, clarke_in, park};
 use crate::drive::config::Config;
 use crate::drive::io::Sample;
 use crate::drive::phase::Phase;
-use crate::drive::schedule;
+use crate::drive::schedule::{CYCLE, Slot};
 use crate::drive::seen::Seen;
 use crate::drive::shared::Shared;
 use crate::units::{AdcCounts, Current, Speed};
@@ -26,7 +26,7 @@ pub(in crate::drive) fn watch(
     currents: [AdcCounts; 3],
 ) {
     let loops = &mut foc.loops;
-    schedule::next(&mut loops.slot);
+    loops.slot = (loops.slot + 1) % CYCLE as Slot;
     let stator = clarke_in(loops.order, currents);
     loops.commanded = [AlphaBeta::default(), loops.commanded[0]];
     let input = input(loops, config.delay, sample, stator);
