@@ -40,8 +40,8 @@ BOARDS = {
         # update in the field wants it, there are 52 KB.
         flash=Region("flash", 0x0800_0000, 128 * KB, 120 * KB),
         memories=(
-            Region("CCM", 0x1000_0000, 10 * KB, 9 * KB + KB // 2),
-            Region("SRAM", 0x2000_0000, 22 * KB, 19 * KB),
+            Region("CCM", 0x1000_0000, 10 * KB, 9 * KB),
+            Region("SRAM", 0x2000_0000, 22 * KB, 18 * KB),
         ),
         pwm="ADC1_2",
         alarm=None,
