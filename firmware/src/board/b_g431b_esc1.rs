@@ -21,7 +21,7 @@ use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
 use crate::chip::comparators::{self, Unfound};
-use crate::chip::pins::{self, Pin, Use};
+use crate::chip::pins::{self, Pin, Port, Use};
 use crate::chip::{self, converters, op_amps};
 use crate::circuit::b_g431b_esc1::{
     BIAS_V, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT, ZERO_COUNTS,
@@ -64,20 +64,24 @@ pub(crate) const WIRING: Wiring = Wiring {
 /// The pins that stay as they are. The analogue ones need nothing, the op-amps' inverting inputs PA3, PA5
 /// and PB2 among them: the board brings them the shunts' grounds.
 const PINS: [Pin; 10] = [
-    (pac::GPIOA, 8, Use::Gate(6)),
-    (pac::GPIOC, 13, Use::Gate(4)),
-    (pac::GPIOA, 9, Use::Gate(6)),
-    (pac::GPIOA, 12, Use::Gate(6)),
-    (pac::GPIOA, 10, Use::Gate(6)),
-    (pac::GPIOB, 15, Use::Gate(4)),
+    (Port::A, 8, Use::Gate(6)),
+    (Port::C, 13, Use::Gate(4)),
+    (Port::A, 9, Use::Gate(6)),
+    (Port::A, 12, Use::Gate(6)),
+    (Port::A, 10, Use::Gate(6)),
+    (Port::B, 15, Use::Gate(4)),
     // Low, it is the ground of the terminals' dividers.
-    (pac::GPIOB, 5, Use::Low),
+    (Port::B, 5, Use::Low),
     // Hall sensors have open collectors; without sensors the pulls read 7. The telemetry may take the
     // first one's.
-    (pac::GPIOB, 6, Use::PulledUp),
-    (pac::GPIOB, 7, Use::PulledUp),
-    (pac::GPIOB, 8, Use::PulledUp),
+    (Port::B, 6, Use::PulledUp),
+    (Port::B, 7, Use::PulledUp),
+    (Port::B, 8, Use::PulledUp),
 ];
+const _: () = assert!(
+    pins::exist_once(&PINS),
+    "a pin is named twice or does not exist"
+);
 
 /// The first converter's channels: op-amp 1 inside the chip, op-amp 3 at PB1, PB11, PA0. The supply's
 /// divider at PA0 has 16 kΩ and is sampled longer than the terminals' with 1.8 kΩ.
@@ -204,10 +208,10 @@ impl Mavlink {
     /// Opens it at a rate that the table of parameters allows.
     pub fn open(self, baud: u32) -> Uart<'static, Async> {
         let mut config = usart::Config::default();
-        config.baudrate = chip::told_hz(baud);
+        config.baudrate = chip::hal_baud(baud);
         let ((rx, tx), (out, into)) = (self.pins, self.dma);
         Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
-            .expect("the table's range can be had of 170 MHz")
+            .expect("170 MHz divides to every rate of the parameter")
     }
 }
 
@@ -225,9 +229,9 @@ impl Kiss {
     /// Takes the pin from the Hall sensor: for a motor without sensors.
     pub fn open(self) -> UartTx<'static, Async> {
         let mut config = usart::Config::default();
-        config.baudrate = chip::told_hz(KISS_HZ);
+        config.baudrate = chip::hal_baud(KISS_HZ);
         UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
-            .expect("115200 baud can be had of 170 MHz")
+            .expect("170 MHz divides to 115200 baud")
     }
 }
 

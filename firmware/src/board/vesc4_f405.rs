@@ -191,7 +191,7 @@ impl Mavlink {
         config.baudrate = baud;
         let ((rx, tx), (out, into)) = (self.pins, self.dma);
         Uart::new(self.uart, rx, tx, out, into, Interrupts, config)
-            .expect("the table's range can be had of 84 MHz")
+            .expect("84 MHz divides to every rate of the parameter")
     }
 }
 
@@ -207,7 +207,7 @@ impl Kiss {
     pub fn open(self) -> UartTx<'static, Async> {
         let config = usart::Config::default();
         UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
-            .expect("115200 baud can be had of 42 MHz")
+            .expect("42 MHz divides to 115200 baud")
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! The HAL starts the chip by that oscillator and is not told of the rest: its own way to 170 MHz takes
 //! 1.5 KB and leaves the core's supply behind (see [`R1MODE`]). What reckons with the HAL's clock are the
-//! time's timer, which is seen to here, and the serial lines, whose rates are told as [`told_hz`] has them.
+//! time's timer, which is seen to here, and the serial lines, whose rates [`hal_baud`] converts for the HAL.
 
 use embassy_stm32::pac::flash::vals::Latency;
 use embassy_stm32::pac::pwr::regs::Cr5;
@@ -72,7 +72,7 @@ fn speed_up() {
 }
 
 /// The rate of a serial line as the HAL must be given it: it divides its own clock by it.
-pub(crate) const fn told_hz(rate_hz: u32) -> u32 {
+pub(crate) const fn hal_baud(rate_hz: u32) -> u32 {
     // `TEL_BAUD` ends at 921 600, where the HAL divides by 184 and the rate is 0.25 % off.
     let mega = TIMER_HZ / 1_000_000;
     (rate_hz * (TOLD_HZ / 1_000_000) + mega / 2) / mega

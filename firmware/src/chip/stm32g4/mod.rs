@@ -11,7 +11,7 @@ use embassy_stm32::interrupt;
 use embassy_stm32::pac;
 use embassy_stm32::pac::adc::Adc;
 
-pub(crate) use clock::{start, told_hz};
+pub(crate) use clock::{hal_baud, start};
 
 /// Clock of the timers.
 pub const TIMER_HZ: u32 = 170_000_000;

@@ -1,5 +1,6 @@
 //! Pins that are set up once and stay as they are.
 
+use embassy_stm32::pac;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::{Moder, Ospeedr, Pupdr};
 
@@ -15,12 +16,50 @@ pub(crate) enum Use {
     PulledUp,
 }
 
+/// A port of the chip. The PAC's own ports are addresses, which a constant cannot compare.
+#[derive(Clone, Copy)]
+pub(crate) enum Port {
+    A,
+    B,
+    C,
+}
+
+impl Port {
+    fn registers(self) -> Gpio {
+        match self {
+            Self::A => pac::GPIOA,
+            Self::B => pac::GPIOB,
+            Self::C => pac::GPIOC,
+        }
+    }
+}
+
 /// A port, the number of a pin there, and what the pin is for.
-pub(crate) type Pin = (Gpio, u8, Use);
+pub(crate) type Pin = (Port, u8, Use);
+
+/// Whether each pin and its alternate function exist and no pin is named twice.
+pub(crate) const fn exist_once(pins: &[Pin]) -> bool {
+    let mut named = [0_u16; 3];
+    let mut at = 0;
+    while at < pins.len() {
+        let (port, number, for_what) = pins[at];
+        if number > 15 || matches!(for_what, Use::Gate(16..)) {
+            return false;
+        }
+        let port = port as usize;
+        if named[port] & 1 << number != 0 {
+            return false;
+        }
+        named[port] |= 1 << number;
+        at += 1;
+    }
+    true
+}
 
 /// Sets pins up. What they do comes last, so that none does anything else before.
 pub(crate) fn set_up(pins: &[Pin]) {
     for &(port, number, for_what) in pins {
+        let port = port.registers();
         let pin = usize::from(number % 16);
         let (mode, pull) = match for_what {
             Use::Gate(function) => {
@@ -29,7 +68,10 @@ pub(crate) fn set_up(pins: &[Pin]) {
                     .modify(|w| w.set_ospeedr(pin, Ospeedr::VERY_HIGH_SPEED));
                 (Moder::ALTERNATE, Pupdr::PULL_DOWN)
             }
-            Use::Low => (Moder::OUTPUT, Pupdr::FLOATING),
+            Use::Low => {
+                port.bsrr().write(|w| w.set_br(pin, true));
+                (Moder::OUTPUT, Pupdr::FLOATING)
+            }
             Use::PulledUp => (Moder::INPUT, Pupdr::PULL_UP),
         };
         port.pupdr().modify(|w| w.set_pupdr(pin, pull));
