@@ -19,7 +19,7 @@ from paths import ROOT
 NOT_YET = {
     "shared": [],
     "firmware": [""],
-    "emulator": """bench device link live plant::stage plot record reproduce reproduce::bosso scenario
+    "emulator": """bench device link live plant::stage plot reproduce reproduce::bosso scenario
         summary wire yardstick""".split(),
 }
 OWN = "(itself)"

@@ -3,7 +3,8 @@
 use std::fs::File;
 use std::io;
 
-use super::{Row, Sink};
+use super::row::Row;
+use super::sink::Sink;
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
 

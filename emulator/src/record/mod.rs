@@ -8,6 +8,7 @@ mod csv;
 #[cfg(feature = "parquet")]
 pub(crate) mod parquet;
 mod row;
+mod sink;
 #[cfg(test)]
 mod tests;
 mod tlog;
@@ -23,6 +24,8 @@ use thiserror::Error;
 use crate::plant::Gate;
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
+
+use sink::Sink;
 
 pub use row::Row;
 
@@ -53,31 +56,6 @@ pub enum RecordError {
 
 /// What to do where a build cannot write or read Parquet.
 pub(crate) const NO_PARQUET: &str = "this build has no Parquet; build it with --features parquet";
-
-/// A format: it takes what it has a place for.
-trait Sink {
-    fn period(&mut self, _t_s: f64, _period: &Period, _rig: &Rig) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn passage(&mut self, _t_s: f64, _passage: &Passage) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn gates(&mut self, _time_ns: u64, _leg: usize, _gate: Gate) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn edge(&mut self, _time_ns: u64, _level: bool) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn frame(&mut self, _time_ns: u64, _frame: &[u8]) -> io::Result<()> {
-        Ok(())
-    }
-
-    fn finish(self: Box<Self>) -> io::Result<()>;
-}
 
 /// Writes a recording.
 pub struct Recorder {

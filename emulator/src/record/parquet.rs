@@ -20,7 +20,8 @@ use parquet::schema::parser::parse_message_type;
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as NameError;
 
-use super::{Row, Sink};
+use super::row::Row;
+use super::sink::Sink;
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
 

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::time::Duration;
 
-use super::Sink;
+use super::sink::Sink;
 
 /// The lowest bits of a time are the link's number to the readers; all frames here are of link 0.
 const LINK_BITS: u64 = 3;

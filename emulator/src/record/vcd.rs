@@ -9,7 +9,7 @@ use std::io::{self, BufWriter};
 use siskin_control::drive::{Fault, Phase};
 use vcd::{IdCode, TimescaleUnit, Writer};
 
-use super::Sink;
+use super::sink::Sink;
 use crate::plant::{Gate, Gates};
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
