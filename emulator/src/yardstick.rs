@@ -11,22 +11,13 @@
 
 mod control;
 mod plant;
+mod setting;
 
 use control::Control;
 use plant::Plant;
+use setting::BUS_V;
 
-/// Control and PWM period, s.
-pub const PERIOD_S: f64 = 1.0 / 15_000.0;
-
-/// Speed that the drive holds, rpm.
-pub const RPM: f64 = 4500.0;
-
-const BUS_V: f64 = 24.0;
-const RESISTANCE_OHM: f64 = 0.108;
-const INDUCTANCE_H: f64 = 30.6e-6;
-const FLUX_WB: f64 = 1.3e-3;
-const POLE_PAIRS: f64 = 12.0;
-const INERTIA_KGM2: f64 = 1.43e-4;
+pub use setting::{PERIOD_S, RPM};
 
 /// The drive and its motor.
 #[derive(Clone, Debug)]

@@ -20,7 +20,7 @@ NOT_YET = {
     "shared": [],
     "firmware": [""],
     "emulator": """bench device link live plant::stage plot reproduce reproduce::bosso scenario
-        summary wire yardstick""".split(),
+        summary wire""".split(),
 }
 OWN = "(itself)"
 

@@ -2,7 +2,9 @@
 
 use std::f32::consts::{PI, TAU};
 
-use super::{FLUX_WB, INDUCTANCE_H, INERTIA_KGM2, PERIOD_S, POLE_PAIRS, RESISTANCE_OHM, RPM};
+use super::setting::{
+    FLUX_WB, INDUCTANCE_H, INERTIA_KGM2, PERIOD_S, POLE_PAIRS, RESISTANCE_OHM, RPM,
+};
 
 const PERIOD: f32 = PERIOD_S as f32;
 const R: f32 = RESISTANCE_OHM as f32;

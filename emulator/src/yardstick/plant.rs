@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{
+use super::setting::{
     BUS_V, FLUX_WB, INDUCTANCE_H, INERTIA_KGM2, PERIOD_S, POLE_PAIRS, RESISTANCE_OHM, RPM,
 };
 
