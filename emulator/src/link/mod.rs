@@ -10,6 +10,8 @@ mod pacer;
 #[cfg(unix)]
 mod pty;
 mod serial;
+mod socket;
+mod stream;
 mod tcp;
 mod tty;
 mod udp;
@@ -17,9 +19,13 @@ mod udp;
 pub use address::{AddressError, HostPort};
 pub use endpoint::{DEFAULT_BAUD, Endpoint, EndpointError, EndpointReason};
 pub use error::LinkError;
+pub use stream::{Event, LinkId};
 
+#[cfg(not(unix))]
 use std::io;
 use std::time::Duration;
+
+use stream::{Ids, Inbox, Link};
 
 /// Most bytes that one read takes: the longest datagram.
 const READ_BYTES: usize = 65_535;
@@ -27,57 +33,12 @@ const READ_BYTES: usize = 65_535;
 /// What a loopback socket takes without loss, by far.
 const SOCKET_BYTES_PER_S: u32 = 1_000_000;
 
-/// One byte stream: a TCP client, a UDP peer, a serial line while someone is there. A number is
-/// never used again, so a peer that comes back gets another.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct LinkId(u64);
-
-/// What happened on a stream.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Event<'a> {
-    /// Bytes came in. From UDP it is one whole datagram.
-    Bytes(&'a [u8]),
-    /// The stream is gone, and with it what its receiver remembers.
-    Ended,
-}
-
 /// Every open MAVLink link.
 #[derive(Default)]
 pub struct Links {
     links: Vec<Box<dyn Link>>,
     buffer: Vec<u8>,
     ids: Ids,
-}
-
-/// Gives each stream its number.
-#[derive(Default)]
-struct Ids(u64);
-
-impl Ids {
-    fn next(&mut self) -> LinkId {
-        self.0 += 1;
-        LinkId(self.0)
-    }
-}
-
-/// What the parts of [`Links::receive`] share.
-struct Inbox<'a> {
-    now: Duration,
-    ids: &'a mut Ids,
-    buffer: &'a mut [u8],
-    handle: &'a mut dyn FnMut(LinkId, Event<'_>),
-}
-
-/// One endpoint that is open.
-trait Link {
-    /// Takes in what is pending, a bounded amount, and goes on with what is being sent.
-    fn receive(&mut self, inbox: &mut Inbox<'_>);
-    /// Sends a frame to each peer, whole or not at all. Returns to how many it was lost.
-    fn send(&mut self, frame: &[u8]) -> u64;
-    /// The endpoint as it came to be: with the port that the system chose.
-    fn endpoint(&self) -> Endpoint;
-    /// A line for a person.
-    fn describe(&self) -> String;
 }
 
 impl Links {
@@ -164,28 +125,6 @@ fn open(endpoint: &Endpoint) -> Result<Option<Box<dyn Link>>, LinkError> {
             });
         }
     }))
-}
-
-/// Whether an operation has only to be tried again later.
-fn is_pending(error: &io::Error) -> bool {
-    use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
-    matches!(error.kind(), WouldBlock | TimedOut | Interrupted)
-}
-
-/// What refuses a socket: a port that is taken has another remedy than an address that is wrong.
-fn socket_error(endpoint: &Endpoint, source: io::Error) -> LinkError {
-    let endpoint = endpoint.clone();
-    match source.kind() {
-        io::ErrorKind::AddrInUse => LinkError::Taken { endpoint },
-        _ => LinkError::Socket { endpoint, source },
-    }
-}
-
-fn resolve(endpoint: &Endpoint, address: &HostPort) -> Result<std::net::SocketAddr, LinkError> {
-    address.resolve().map_err(|source| LinkError::Host {
-        endpoint: endpoint.clone(),
-        source,
-    })
 }
 
 #[cfg(test)]

@@ -5,7 +5,9 @@ use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::Duration;
 
-use super::{Endpoint, Event, HostPort, Inbox, Link, LinkError, LinkId, is_pending};
+use super::socket::{resolve, socket_error};
+use super::stream::{Event, Inbox, Link, LinkId, is_pending};
+use super::{Endpoint, HostPort, LinkError};
 
 /// Clients at once. One more takes the place of the one that has been silent for longest, if any is, and
 /// is turned away otherwise.
@@ -38,14 +40,14 @@ struct Client {
 
 impl TcpServer {
     pub(super) fn open(endpoint: &Endpoint, address: &HostPort) -> Result<Self, LinkError> {
-        let address = super::resolve(endpoint, address)?;
+        let address = resolve(endpoint, address)?;
         let open = || {
             let listener = TcpListener::bind(address)?;
             listener.set_nonblocking(true)?;
             let given = listener.local_addr()?;
             Ok((listener, given))
         };
-        let (listener, given) = open().map_err(|error| super::socket_error(endpoint, error))?;
+        let (listener, given) = open().map_err(|error| socket_error(endpoint, error))?;
         Ok(Self {
             listener,
             clients: Vec::new(),

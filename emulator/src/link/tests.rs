@@ -9,6 +9,7 @@ use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::thread::sleep;
 use std::time::Duration;
 
+use super::stream::is_pending;
 use super::*;
 
 const MS: Duration = Duration::from_millis(1);

@@ -4,8 +4,9 @@ use std::collections::VecDeque;
 use std::io;
 use std::time::Duration;
 
+use super::Endpoint;
 use super::pacer::Pacer;
-use super::{Endpoint, Event, Inbox, Link, LinkId, is_pending};
+use super::stream::{Event, Inbox, Link, LinkId, is_pending};
 
 /// Bytes taken in one call, whatever the rate: a kernel terminal holds as many.
 const READ_BYTES: usize = 4096;

@@ -4,7 +4,9 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::Duration;
 
-use super::{Endpoint, Event, HostPort, Inbox, Link, LinkError, LinkId, is_pending};
+use super::socket::{resolve, socket_error};
+use super::stream::{Event, Inbox, Link, LinkId, is_pending};
+use super::{Endpoint, HostPort, LinkError};
 
 /// Datagrams taken in one call: more than a ground station sends in the millisecond between two.
 const DATAGRAMS_PER_CALL: usize = 64;
@@ -33,7 +35,7 @@ struct Peer {
 impl Udp {
     /// Sends to `address` whether anyone listens there or not.
     pub(super) fn outward(endpoint: &Endpoint, address: &HostPort) -> Result<Self, LinkError> {
-        let target = super::resolve(endpoint, address)?;
+        let target = resolve(endpoint, address)?;
         // What goes to this machine only is not to be reached from another either.
         let local: IpAddr = match (target.ip(), target.ip().is_loopback()) {
             (ip, true) => ip,
@@ -47,10 +49,10 @@ impl Udp {
 
     /// Sends to those that have sent to `address`.
     pub(super) fn inward(endpoint: &Endpoint, address: &HostPort) -> Result<Self, LinkError> {
-        let local = super::resolve(endpoint, address)?;
+        let local = resolve(endpoint, address)?;
         let mut link = Self::bind(endpoint, local)?;
         let given = link.socket.local_addr();
-        let given = given.map_err(|error| super::socket_error(endpoint, error))?;
+        let given = given.map_err(|error| socket_error(endpoint, error))?;
         link.endpoint = Endpoint::UdpIn(given.into());
         Ok(link)
     }
@@ -64,7 +66,7 @@ impl Udp {
             Ok(socket)
         };
         Ok(Self {
-            socket: open().map_err(|error| super::socket_error(endpoint, error))?,
+            socket: open().map_err(|error| socket_error(endpoint, error))?,
             target: None,
             peers: Vec::new(),
             endpoint: endpoint.clone(),
