@@ -3,9 +3,7 @@
 //! | name | unit | bounds | what it shows |
 //! |---|---|---|---|
 //! | `supply` | V | `LIM_BUS_V_MIN` to `LIM_BUS_V_MAX` | the supply, as its divider shows it |
-//! | `reference` | V | 3.2 to 3.4 | the converter's full scale, by the chip's own reference |
 //! | `temperature` | degC | −20 to `LIM_TEMP_C` | the thermistor |
-//! | `clock` | kHz | 29.5 to 34 | the chip's slow oscillator of 32 kHz, counted by the clock that times the PWM and the wire. The bounds are the slow one's (data sheet of the STM32G431, LSI) |
 //! | `option_bytes` | 1 | 1 | 1 if the chip starts from its flash whatever its BOOT0 pin says |
 //! | `comparator_a`.. | A | ± 0.4 of the range | where the comparator trips without current: its level is searched between 0, which must trip, and full scale, which must not |
 //! | `zero_a`.. | A | ± 0.1 of the range | mean of the current's readings without current: the drive takes no greater one for sound |
@@ -29,12 +27,8 @@ use crate::params::{ParamId, Params};
 pub enum Kind {
     /// The supply's voltage, V.
     Supply,
-    /// The converters' full scale, V.
-    Reference,
     /// Temperature of the board, °C.
     Temperature,
-    /// The slow oscillator's rate by the fast one, kHz.
-    Clock,
     /// 1 if the chip is set to start from its flash, else 0.
     OptionBytes,
     /// Current at which a phase's comparator would trip with its level moved to where it does, A.
@@ -93,9 +87,7 @@ const fn row(name: &'static str, unit: &'static str, (low, high): (f32, f32), of
 /// In the order of [`Kind`].
 static ROWS: [Row; ROWS_LEN] = [
     row("supply", "V", (0.0, 0.0), Basis::One),
-    row("reference", "V", (3.2, 3.4), Basis::One),
     row("temperature", "degC", (-20.0, 0.0), Basis::One),
-    row("clock", "kHz", (29.5, 34.0), Basis::One),
     row("option_bytes", "1", (1.0, 1.0), Basis::One),
     row("comparator", "A", (-0.4, 0.4), Basis::Range),
     row("zero", "A", (-0.1, 0.1), Basis::Range),
@@ -120,9 +112,7 @@ pub struct Item {
 
 impl Item {
     /// Those that only the board can measure.
-    pub const OWN: [Self; 6] = [
-        Self::of(Kind::Reference, 0),
-        Self::of(Kind::Clock, 0),
+    pub const OWN: [Self; 4] = [
         Self::of(Kind::OptionBytes, 0),
         Self::of(Kind::Comparator, 0),
         Self::of(Kind::Comparator, 1),

@@ -12,7 +12,7 @@
 //!
 //! | step | the bridge | what is seen |
 //! |---|---|---|
-//! | listen, 64 ms | off | `supply`, `reference`, `temperature`, `clock`, `option_bytes`, `comparator_*`, which are all that is measured at power-up; `zero_*`, `noise_*`, `rest_*`: a terminal that is not at ground has a shorted high side, and nothing is pulled |
+//! | listen, 64 ms | off | `supply`, `temperature`, `option_bytes`, `comparator_*`, which are all that is measured at power-up; `zero_*`, `noise_*`, `rest_*`: a terminal that is not at ground has a shorted high side, and nothing is pulled |
 //! | pull a, b, c up | one leg from duty 0 to the whole, the others off ([`Pull`]) | `high_*`: its terminal comes to the supply, so its high side and the supply of its driver work. `motor_*`: the others follow it through the windings. `off_*`: no current, so no low side is shorted |
 //! | a to b, b to c, c to a | one leg up to a quarter, the low side of the next on, until a test's current flows | `low_*`: it comes back through that low side and its shunt, with the right sign |
 //!
@@ -33,8 +33,8 @@ pub trait Probe {
     /// The latest sample that the control has, or could have, had.
     fn sample(&mut self) -> Sample;
 
-    /// An item that only the board knows: [`Kind::Reference`], [`Kind::Clock`], [`Kind::OptionBytes`] and
-    /// [`Kind::Comparator`]. It may take a millisecond.
+    /// An item that only the board knows: [`Kind::OptionBytes`] and [`Kind::Comparator`]. It may take a
+    /// millisecond.
     fn own(&mut self, item: Item) -> Own;
 }
 
