@@ -12,6 +12,7 @@ impl Esc {
         self.component.keep_intervals(&kept.intervals);
         self.component.keep_signing(kept.signing);
         self.telemetry.statistics = kept.statistics;
+        self.storage.recall(kept.owed_s);
         if loaded.integrity.is_lost() {
             self.lose_stored();
         }
@@ -35,6 +36,7 @@ impl Esc {
             intervals: self.component.kept_intervals(),
             statistics: self.telemetry.statistics,
             signing: self.component.kept_signing(),
+            owed_s: self.storage.owed_s(),
         };
         if !self.storage.takes_all() {
             for unstored in &self.unstored {

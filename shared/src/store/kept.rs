@@ -13,11 +13,13 @@ const SIGNING: u16 = 0x1300;
 const SIGNING_WORDS: usize = 9;
 /// Key of the newest timestamp.
 const TIME: u16 = SIGNING + SIGNING_WORDS as u16 - 1;
+/// Key of the time that saves owe.
+const OWED: u16 = 0x1400;
 
 /// Returns true if the value with this key is set by somebody, so that an older value in its place is a
-/// wrong one. The statistics and the time of signatures change by themselves.
+/// wrong one. The statistics, the time of signatures and that owed change by themselves.
 pub(super) fn is_setting(key: u16) -> bool {
-    !(STATISTICS..SIGNING).contains(&key) && key != TIME
+    !(STATISTICS..SIGNING).contains(&key) && key != TIME && key != OWED
 }
 
 /// The values that survive a loss of power.
@@ -31,6 +33,8 @@ pub struct Kept {
     pub statistics: Statistics,
     /// The key of signatures, if there is one.
     pub signing: Option<KeptSigning>,
+    /// Time that saves without a request owe, s: a restart must not give them all back.
+    pub owed_s: u32,
 }
 
 /// The value that a word belongs to.
@@ -40,6 +44,7 @@ enum Place {
     Interval(usize),
     Statistic(usize),
     Signing(usize),
+    Owed,
 }
 
 impl Place {
@@ -56,14 +61,18 @@ impl Place {
         if word < Statistics::WORDS {
             return Self::Statistic(word);
         }
-        Self::Signing(word - Statistics::WORDS)
+        word -= Statistics::WORDS;
+        if word < SIGNING_WORDS {
+            return Self::Signing(word);
+        }
+        Self::Owed
     }
 }
 
 impl Kept {
     /// Words in all.
     pub(super) const WORDS: usize =
-        TABLE.len() + Intervals::WORDS + Statistics::WORDS + SIGNING_WORDS;
+        TABLE.len() + Intervals::WORDS + Statistics::WORDS + SIGNING_WORDS + 1;
 
     /// The key of a word.
     pub(super) fn key(word: usize) -> u16 {
@@ -72,6 +81,7 @@ impl Kept {
             Place::Interval(word) => INTERVALS + word as u16,
             Place::Statistic(word) => STATISTICS + word as u16,
             Place::Signing(word) => SIGNING + word as u16,
+            Place::Owed => OWED,
         }
     }
 
@@ -98,6 +108,7 @@ impl Kept {
                 let part = signing.key.0.as_chunks().0.get(word);
                 part.map_or(signing.newest, |part| u32::from_le_bytes(*part))
             }
+            Place::Owed => self.owed_s,
         };
         (bits != 0).then_some(bits)
     }
@@ -117,6 +128,10 @@ impl Kept {
                     Some(part) => *part = bits.to_le_bytes(),
                     None => signing.newest = bits,
                 }
+                true
+            }
+            Place::Owed => {
+                self.owed_s = bits;
                 true
             }
         }

@@ -9,7 +9,7 @@
 //! checked.
 //!
 //! # Wear
-//! A set with twenty changed parameters, the statistics and a key has 42 words, 336 bytes. On the
+//! A set with twenty changed parameters, the statistics and a key has 43 words, 344 bytes. On the
 //! STM32G431, whose pages last for 10 000 erases (DS12589) and of which a half has two of 2 KB, 12 sets
 //! fit a half: it lasts for 240 000 saves of statistics, or 120 000 changes of settings. Up to 40 changed
 //! parameters it is at least 80 000 changes, and with every value changed 40 000. The two sectors of the

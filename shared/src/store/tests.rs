@@ -50,6 +50,7 @@ fn everything(shift: f32) -> Kept {
         key: Key([(200.0 * shift) as u8; 32]),
         newest: 99,
     });
+    kept.owed_s = (1_000.0 * shift) as u32;
     kept
 }
 
