@@ -10,6 +10,7 @@ use crate::units::{AdcCounts, Current, Speed};
 
 mod any;
 mod at_rest;
+mod faults;
 mod pull;
 mod starts;
 mod tones;
