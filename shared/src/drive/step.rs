@@ -149,18 +149,24 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, work: Work) ->
         Work::Nothing | Work::Reference => {}
         Work::Damp => open_loop::damp(config, foc, shared, phase),
         Work::StartCurrent => why = open_loop::current(config, foc, shared, (phase, setpoint)),
-        Work::DeadTimeSign => outer_loop::dead_time_sign(config, foc),
-        Work::Supply => outer_loop::supply(shared),
-        Work::Longest => outer_loop::longest_vector(config, shared),
-        Work::Bounds => {
+        Work::DeadTimeSign | Work::ObserverGains => {
+            outer_loop::dead_time_sign(config, foc);
+            if work == Work::ObserverGains {
+                outer_loop::observer_gains(config, foc);
+            }
             if !phase.is_open_loop() {
                 outer_loop::supply(shared);
             }
+        }
+        Work::Supply => outer_loop::supply(shared),
+        Work::Bounds => {
             outer_loop::trip_level(config, shared);
             outer_loop::supply_bounds(config, foc, shared);
+            if !phase.is_open_loop() {
+                outer_loop::longest_vector(config, shared);
+            }
         }
         Work::SpeedBounds => outer_loop::speed_bounds(config, foc, shared),
-        Work::ObserverGains => outer_loop::observer_gains(config, foc),
         Work::Setpoint => {
             outer_loop::delay_compensation(config, foc, shared);
             outer_loop::dead_time_sign(config, foc);
