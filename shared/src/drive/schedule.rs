@@ -1,4 +1,4 @@
-//! Outer-loop work, time-sliced over 32 periods: at most one piece of it a period, and none in most.
+//! Outer-loop work, time-sliced over 32 periods: at most one slot's work a period, and none in most.
 //!
 //! The speed regulator so acts three thousand times a second at 24 kHz, for a bandwidth of tens of
 //! hertz, and the dead time's compensation follows it; what follows the supply does so half as often, and
