@@ -47,6 +47,13 @@ impl Mavlink {
         });
     }
 
+    /// The links that have sent anything. Each must be told now and then that time has passed, by
+    /// [`receive`](Self::receive) without bytes: after silence, what a start without its frame held
+    /// back is searched.
+    pub fn links(&self) -> Vec<LinkId> {
+        self.links.keys().copied().collect()
+    }
+
     /// A link that has ended.
     pub fn forget(&mut self, stream: LinkId) {
         if let Some(receiver) = self.links.remove(&stream) {
@@ -54,10 +61,10 @@ impl Mavlink {
         }
     }
 
-    /// A byte from the chip; a frame that is whole with it goes to `send`.
-    pub fn sent(&mut self, now: Cycles, byte: u8, mut send: impl FnMut(&[u8])) {
+    /// Bytes from the chip, or none: time has passed. A frame that is whole with them goes to `send`.
+    pub fn sent(&mut self, now: Cycles, bytes: &[u8], mut send: impl FnMut(&[u8])) {
         self.chip
-            .push(ns(now) / 1000, &[byte], |frame| send(frame.raw));
+            .push(ns(now) / 1000, bytes, |frame| send(frame.raw));
     }
 
     /// Frames of the links that were refused.
@@ -107,5 +114,35 @@ impl Telemetry {
             _ => return None,
         };
         Some([&[code], bytes.as_slice()].concat())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mavlink::dialects::ardupilotmega::HEARTBEAT_DATA;
+    use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+
+    use super::*;
+    use crate::time::of_ns;
+
+    #[test]
+    fn a_frame_behind_a_start_without_one_comes_after_silence_from_either_side() {
+        let mut sound = MAVLinkV2MessageRaw::new();
+        sound.serialize_message_data(MavHeader::default(), &HEARTBEAT_DATA::default());
+        let sound = sound.raw_bytes();
+        // The start of a long frame of a known message holds back what follows.
+        let bytes = [&[0xfd, 255, 0, 0, 0, 1, 1, 0, 0, 0], sound].concat();
+        let (mut line, link) = (Mavlink::default(), LinkId::default());
+        let (mut from_link, mut from_chip) = (Vec::new(), Vec::new());
+        line.receive(link, 0, &bytes, 0, |frame| from_link.extend(frame));
+        line.sent(0, &bytes, |frame| from_chip.extend(frame));
+        assert_eq!(line.links(), [link]);
+        for (at_ns, heard) in [(99_000_000, &[][..]), (101_000_000, sound)] {
+            let now = of_ns(at_ns);
+            line.receive(link, now, &[], 0, |frame| from_link.extend(frame));
+            line.sent(now, &[], |frame| from_chip.extend(frame));
+            assert_eq!((&from_link[..], &from_chip[..]), (heard, heard));
+        }
+        assert!(line.refused() > 0);
     }
 }

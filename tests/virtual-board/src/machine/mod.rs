@@ -225,13 +225,17 @@ impl VirtualBoard {
                     onlooker.answer(&datagram);
                     self.wire.send(reply.asked_ns, &datagram);
                 }
-                Event::Byte(at, MAVLINK, byte) => self.mavlink.sent(at, byte, |frame| {
+                Event::Byte(at, MAVLINK, byte) => self.mavlink.sent(at, &[byte], |frame| {
                     onlooker.frame(ns(at), frame);
                     send(frame);
                 }),
                 Event::Byte(at, _, byte) => self.telemetry.sent(at, byte),
             }
         }
+        self.mavlink.sent(now, &[], |frame| {
+            onlooker.frame(ns(now), frame);
+            send(frame);
+        });
         if let Some(datagram) = self.telemetry.take(now) {
             onlooker.answer(&datagram);
             let asked_ns = self.processor.surroundings().throttle.frame_ns();
@@ -293,6 +297,9 @@ impl Machine for VirtualBoard {
         onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) -> Result<(), Stopped> {
+        for stream in self.mavlink.links() {
+            self.receive(stream, &[], onlooker);
+        }
         let world = self.processor.surroundings();
         world.throttle.take(&mut self.wire, until_ns);
         world.edges_come();

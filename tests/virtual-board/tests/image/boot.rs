@@ -4,8 +4,11 @@ use std::hash::Hasher;
 use std::ops::Range;
 
 use crate::common::{Board, MS, Throttle, image};
-use mavlink::dialects::ardupilotmega::MavCmd;
+use mavlink::dialects::ardupilotmega::{MavCmd, PARAM_REQUEST_READ_DATA, PARAM_VALUE_DATA};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use siskin_control::params::ParamId;
+use siskin_emulator::link::LinkId;
+use siskin_emulator::machine::Machine as _;
 use siskin_vboard::processor::Access;
 
 /// 115200 baud as the 170 MHz divide to: bits of eight data bits, start and stop.
@@ -41,6 +44,29 @@ fn it_starts_and_answers() {
 
 /// The board's least dead time is its default, also after a reset to the defaults, and nothing shorter is
 /// taken.
+/// The board's link hands on whole frames. One that waits behind the start of another, which never comes, is
+/// handed on after 0.1 s of silence.
+#[test]
+fn a_question_behind_a_start_without_its_frame_is_answered_though_nothing_more_is_sent() {
+    let mut board = Board::new(&image(), &[]);
+    board.run(1_100 * MS);
+    let mut question = MAVLinkV2MessageRaw::new();
+    let data = PARAM_REQUEST_READ_DATA {
+        param_index: -1,
+        target_system: board.heard.from.system,
+        target_component: board.heard.from.component,
+        param_id: "PWM_FREQ_HZ".into(),
+    };
+    question.serialize_message_data(MavHeader::default(), &data);
+    let bytes = [&[0xfd, 255, 0, 0, 0, 1, 1, 0, 0, 0], question.raw_bytes()].concat();
+    let link = LinkId::default();
+    board.board.receive(link, &bytes, &mut board.heard);
+    board.run(90 * MS);
+    assert!(board.heard.messages::<PARAM_VALUE_DATA>().is_empty());
+    board.run(60 * MS);
+    assert_eq!(board.heard.messages::<PARAM_VALUE_DATA>().len(), 1);
+}
+
 #[test]
 fn a_dead_time_below_the_boards_is_refused() {
     let id = "PWM_DEADTIME_NS";
