@@ -7,6 +7,7 @@ use std::io::{self, Write as _};
 use siskin_control::params::{ParamId, Params};
 
 use crate::bench::DEFAULT_MOTOR;
+use crate::interrupt;
 use crate::link::Endpoint;
 use crate::live::Opened;
 use crate::options::RunArgs;
@@ -19,7 +20,8 @@ use crate::summary::Report;
 /// Standard output cannot be written.
 pub fn print(text: &str) -> Result<(), String> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    let written = interrupt::writing(|| out.write_all(text.as_bytes()).and_then(|()| out.flush()));
+    match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(format!("standard output cannot be written: {error}"))
         }

@@ -1,6 +1,8 @@
 """Recordings: other programs can read them."""
 
+import contextlib
 import json
+import os
 import signal
 import subprocess
 import time
@@ -124,6 +126,39 @@ def test_an_interrupted_scenario_keeps_what_was_played_however_often_it_is_asked
     lines = path.read_text().splitlines()
     assert len(lines) == summary["steps"] + 1
     assert {line.count(",") for line in lines} == {lines[0].count(",")}
+
+
+@pytest.mark.parametrize("interrupted", [True, False])
+def test_output_that_nobody_takes_is_kept_until_an_interrupt_comes(interrupted):
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    command = [str(PROGRAM), "scenario", str(SCENARIOS / "opening.toml"), "--json"]
+    with (
+        subprocess.Popen(command, stdout=writer, stderr=subprocess.PIPE) as played,
+        open(reader, "rb") as output,
+    ):
+        os.close(writer)
+        try:
+            with pytest.raises(subprocess.TimeoutExpired):
+                played.wait(timeout=3.0)
+            if interrupted:
+                # One that comes too soon ends what is played, not the writing.
+                deadline = time.monotonic() + 20.0
+                while played.poll() is None:
+                    assert time.monotonic() < deadline
+                    played.send_signal(signal.SIGINT)
+                    time.sleep(0.5)
+                assert played.returncode == 130
+            else:
+                told = output.read().lstrip(b"\0")
+                assert json.loads(told)["sim_s"] == pytest.approx(0.4)
+                assert played.wait(timeout=5.0) == 0
+        finally:
+            played.kill()
 
 
 def test_a_dump_of_a_scenario_has_its_wires(tmp_path):
