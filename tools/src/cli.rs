@@ -38,7 +38,7 @@ pub(crate) struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Have the ESC test itself at rest: supply, sensors, switches and clock, each with its bounds.
+    /// Have the ESC test itself at rest: supply, sensors and switches, each with its bounds.
     ///
     /// The motor does not turn; a current of a fifth of LIM_PHASE_A flows through it for some
     /// milliseconds. The exit status is 1 where something is out of its bounds.
@@ -195,15 +195,22 @@ pub(crate) struct FlashArgs {
     pub(crate) dfu: bool,
 }
 
-/// What a budget is made of.
+/// Parameters, without an ESC.
 #[derive(Debug, Args)]
-pub(crate) struct BudgetArgs {
+pub(crate) struct GivenArgs {
     /// Parameters as 'siskin params save' writes them; without, those from the factory. Of a file of
     /// several components --component chooses one.
     pub(crate) file: Option<PathBuf>,
-    /// A parameter in place of the file's, for example CTL_FLUX_FORM=0.
+    /// A parameter in place of the file's, for example PWM_FREQ_HZ=48000.
     #[arg(long = "param", value_name = "NAME=VALUE")]
     pub(crate) params: Vec<String>,
+}
+
+/// What a budget is made of.
+#[derive(Debug, Args)]
+pub(crate) struct BudgetArgs {
+    #[command(flatten)]
+    pub(crate) given: GivenArgs,
     /// Greatest error of the angle, electrical degrees.
     #[arg(long, value_name = "DEG", default_value_t = 20.0, value_parser = positive)]
     pub(crate) error: f64,

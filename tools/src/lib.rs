@@ -10,6 +10,7 @@ mod error;
 mod factory;
 mod flash;
 mod ftp;
+mod given;
 mod image;
 mod json;
 mod link;

@@ -1,19 +1,13 @@
 //! The motor and the settings that a budget is made for: from parameters and from the command line.
 
 use std::f64::consts::TAU;
-use std::fs;
-use std::path::Path;
 
-use siskin_control::params::{FluxSettings, Kind, ParamId, Params, SetError};
+use siskin_control::params::{FluxSettings, ParamId};
 
 use super::limits::{HoldOff, Settings};
 use crate::cli::BudgetArgs;
 use crate::error::Error;
-use crate::param_file;
-
-/// The component of an ESC beside an autopilot: whose lines a file of several components is read
-/// for by default.
-const PERIPHERAL: u8 = 140;
+use crate::given;
 
 /// A motor and what its angle is found with.
 pub(crate) struct Motor {
@@ -27,13 +21,7 @@ impl Motor {
     /// # Errors
     /// [`Error::Usage`] or [`Error::File`].
     pub(crate) fn of(args: &BudgetArgs, component: Option<u8>) -> Result<Self, Error> {
-        let mut params = Params::default();
-        if let Some(file) = &args.file {
-            read(&mut params, file, component.unwrap_or(PERIPHERAL))?;
-        }
-        for text in &args.params {
-            assign(&mut params, text)?;
-        }
+        let mut params = given::params(&args.given, component)?;
         let pole_pairs = args.pole_pairs.or(args.poles.map(|poles| poles / 2));
         for (id, value) in [
             (ParamId::MotPolePairs, pole_pairs.map(f64::from)),
@@ -41,7 +29,7 @@ impl Motor {
             (ParamId::PwmFreqHz, args.pwm),
         ] {
             if let Some(value) = value {
-                set(&mut params, id, value as f32).map_err(Error::Usage)?;
+                given::set(&mut params, id, value as f32).map_err(Error::Usage)?;
             }
         }
         let get = |id| f64::from(params.get(id));
@@ -83,62 +71,4 @@ impl Motor {
     pub(crate) fn rpm(&self, omega: f64) -> f64 {
         omega * 60.0 / (TAU * self.pole_pairs)
     }
-}
-
-/// Takes the parameters of a file over those that there are.
-fn read(params: &mut Params, file: &Path, component: u8) -> Result<(), Error> {
-    let failed = |reason: String| Error::File {
-        path: file.display().to_string(),
-        reason,
-    };
-    let content = fs::read_to_string(file).map_err(|error| failed(error.to_string()))?;
-    let lines = param_file::read(&content).map_err(|bad| failed(bad.join("; ")))?;
-    let lines = param_file::for_component(lines, component);
-    if lines.is_empty() {
-        return Err(failed(format!(
-            "it has no setting for component {component}"
-        )));
-    }
-    for line in &lines {
-        let (name, value) = (&line.param.name, line.param.value);
-        let id = find(name).map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
-        // A file that was saved has the derived ones too.
-        if id.entry().kind != Kind::Derived {
-            set(params, id, value)
-                .map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
-        }
-    }
-    Ok(())
-}
-
-/// Takes one `NAME=VALUE`.
-fn assign(params: &mut Params, text: &str) -> Result<(), Error> {
-    let usage = |reason: String| Error::Usage(format!("--param {text}: {reason}"));
-    let (name, value) = text
-        .split_once('=')
-        .ok_or_else(|| usage("write NAME=VALUE".to_owned()))?;
-    let id = find(&name.to_ascii_uppercase()).map_err(usage)?;
-    let value = value
-        .parse()
-        .map_err(|_| usage(format!("'{value}' is not a number")))?;
-    set(params, id, value).map_err(usage)
-}
-
-fn find(name: &str) -> Result<ParamId, String> {
-    ParamId::find(name).ok_or_else(|| format!("no parameter is called {name}"))
-}
-
-fn set(params: &mut Params, id: ParamId, value: f32) -> Result<(), String> {
-    let entry = id.entry();
-    params.set(id, value).map_err(|error| match error {
-        SetError::ReadOnly => format!("{} is computed from others", entry.name),
-        SetError::NotWhole => format!("{} takes whole numbers", entry.name),
-        SetError::NotFinite | SetError::OutOfRange => format!(
-            "{} is {} to {} {}, and {value} is not",
-            entry.name,
-            entry.min,
-            entry.max,
-            id.text().unit
-        ),
-    })
 }

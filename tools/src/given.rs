@@ -1,0 +1,89 @@
+//! Parameters that a command is given, without an ESC: from a file and from the command line.
+
+use std::fs;
+use std::path::Path;
+
+use siskin_control::params::{Kind, ParamId, Params, SetError};
+
+use crate::cli::GivenArgs;
+use crate::error::Error;
+use crate::param_file;
+
+/// The component of an ESC beside an autopilot: whose lines a file of several components is read
+/// for by default.
+const PERIPHERAL: u8 = 140;
+
+/// What the arguments say over the factory's parameters. `component` is whose lines of a file of several
+/// components count.
+///
+/// # Errors
+/// [`Error::Usage`] or [`Error::File`].
+pub(crate) fn params(args: &GivenArgs, component: Option<u8>) -> Result<Params, Error> {
+    let mut params = Params::default();
+    if let Some(file) = &args.file {
+        read(&mut params, file, component.unwrap_or(PERIPHERAL))?;
+    }
+    for text in &args.params {
+        assign(&mut params, text)?;
+    }
+    Ok(params)
+}
+
+/// Takes the parameters of a file over those that there are.
+fn read(params: &mut Params, file: &Path, component: u8) -> Result<(), Error> {
+    let failed = |reason: String| Error::File {
+        path: file.display().to_string(),
+        reason,
+    };
+    let content = fs::read_to_string(file).map_err(|error| failed(error.to_string()))?;
+    let lines = param_file::read(&content).map_err(|bad| failed(bad.join("; ")))?;
+    let lines = param_file::for_component(lines, component);
+    if lines.is_empty() {
+        return Err(failed(format!(
+            "it has no setting for component {component}"
+        )));
+    }
+    for line in &lines {
+        let (name, value) = (&line.param.name, line.param.value);
+        let id = find(name).map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
+        // A file that was saved has the derived ones too.
+        if id.entry().kind != Kind::Derived {
+            set(params, id, value)
+                .map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
+        }
+    }
+    Ok(())
+}
+
+/// Takes one `NAME=VALUE`.
+fn assign(params: &mut Params, text: &str) -> Result<(), Error> {
+    let usage = |reason: String| Error::Usage(format!("--param {text}: {reason}"));
+    let (name, value) = text
+        .split_once('=')
+        .ok_or_else(|| usage("write NAME=VALUE".to_owned()))?;
+    let id = find(&name.to_ascii_uppercase()).map_err(usage)?;
+    let value = value
+        .parse()
+        .map_err(|_| usage(format!("'{value}' is not a number")))?;
+    set(params, id, value).map_err(usage)
+}
+
+fn find(name: &str) -> Result<ParamId, String> {
+    ParamId::find(name).ok_or_else(|| format!("no parameter is called {name}"))
+}
+
+/// Sets a parameter, or says why it does not take the value.
+pub(crate) fn set(params: &mut Params, id: ParamId, value: f32) -> Result<(), String> {
+    let entry = id.entry();
+    params.set(id, value).map_err(|error| match error {
+        SetError::ReadOnly => format!("{} is computed from others", entry.name),
+        SetError::NotWhole => format!("{} takes whole numbers", entry.name),
+        SetError::NotFinite | SetError::OutOfRange => format!(
+            "{} is {} to {} {}, and {value} is not",
+            entry.name,
+            entry.min,
+            entry.max,
+            id.text().unit
+        ),
+    })
+}
