@@ -3,9 +3,9 @@
 //! The duty of one leg rises from zero by the same step each period, and all ends as soon as a phase
 //! carries the current of a test: a low side that is shorted shows as a current of a few amperes through
 //! the windings, not as the trip of an over-current. Not so that of the first leg to be pulled: its own
-//! high side works against it, in pulses that end before a sample sees them. There only the supply's
-//! limit and the gate driver's hold the current. What flowed last stays to be read, at a period's pace
-//! or slower.
+//! high side works against it, in pulses that end before a sample sees them. The first is no longer than
+//! a step of the duty, and there the hardware's trip ends it: the comparator on that leg's shunt, or the
+//! gate driver. What flowed last stays to be read, at a period's pace or slower.
 
 use super::config::Config;
 use super::io::Bridge;

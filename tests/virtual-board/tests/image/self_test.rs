@@ -1,9 +1,13 @@
 //! The image tests its board: one that is sound passes, and each defect is named. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
+use siskin_control::params::ParamId;
+use siskin_emulator::fault::InForce;
+use siskin_emulator::plant::Gate;
 use siskin_vboard::chip::comparator::Defect;
+use siskin_vboard::time::ns;
 
-use crate::common::{Board, MS, Throttle, image};
+use crate::common::{Board, MS, PWM_PERIOD, Scope, Throttle, image};
 
 /// nBOOT0 and nSWBOOT0 of the option bytes.
 const N_BOOT0: u32 = 1 << 27;
@@ -95,6 +99,37 @@ fn a_comparator_that_always_trips_is_named() {
     board.throttle = Throttle::Dshot(1_048);
     board.run(300 * MS);
     assert!(board.rpm().abs() < 1.0, "{} rpm", board.rpm());
+}
+
+/// Leg a is pulled before a current through the motor could tell that its low side is shorted. The comparator on
+/// its shunt ends that with the first pulse of its high side, which the rising duty leaves no longer than one of
+/// its 256 steps: in so long 24 V bring 200 A through the 20 nH or so of a leg and its capacitors.
+#[test]
+fn a_shorted_low_side_of_the_first_leg_ends_the_test_in_one_short_pulse() {
+    let mut board = Board::new(&image(), &[(ParamId::MotToneA, 0.0)]);
+    board.run(1_000 * MS);
+    let mut broken = InForce::default();
+    broken.breaks.0[0].shorted[0] = true;
+    board.world().bench().disturb(&InForce::default(), &broken);
+    board.heard.scope = Some(Scope::default());
+    assert_eq!(check(&mut board), FAILED);
+    let gates = board.heard.scope.take().expect("it was there").gates;
+    let first = gates.iter().position(|(.., gate)| gate.high);
+    let first = first.expect("the high side is tried");
+    let [(on_ns, 0, _), (off_ns, 0, off)] = gates[first..] else {
+        panic!("more than one pulse: {:?}", &gates[first..]);
+    };
+    assert_eq!(off, Gate::default());
+    let step_ns = ns(PWM_PERIOD / 256);
+    assert!(off_ns - on_ns <= step_ns, "{} ns", off_ns - on_ns);
+    let tripped_ns = board.world().tripped().map(ns);
+    assert!(tripped_ns.is_some_and(|at| (on_ns..=off_ns).contains(&at)));
+    let texts = board.heard.texts();
+    assert!(texts.contains(&"Fault: over-current".into()), "{texts:?}");
+    let [named] = &named(&mut board)[..] else {
+        panic!("{texts:?}");
+    };
+    assert!(named.starts_with("Self-test: high_a"), "{named}");
 }
 
 #[test]

@@ -119,7 +119,7 @@ pub(crate) struct Heard {
     pub(crate) replies: Vec<Reply>,
     /// All gates' and the wire's edges, frames and replies so far.
     pub(crate) hash: DefaultHasher,
-    /// The throttle wire's levels and the motor, where a test looks at them.
+    /// The throttle wire's levels, the gates and the motor, where a test looks at them.
     pub(crate) scope: Option<Scope>,
 }
 
@@ -128,6 +128,8 @@ pub(crate) struct Heard {
 pub(crate) struct Scope {
     /// The throttle wire's edges: when, ns, and the level after each.
     pub(crate) line: Vec<(u64, bool)>,
+    /// Changes of gates: when, ns, the leg, and its gates from then on.
+    pub(crate) gates: Vec<(u64, usize, Gate)>,
     /// The motor and the supply at the beginning of each period of the PWM: when, ns.
     pub(crate) motor: Vec<(u64, Motion)>,
 }
@@ -184,6 +186,9 @@ impl Onlooker for Heard {
 
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
         (time_ns, leg, gate.high, gate.low).hash(&mut self.hash);
+        if let Some(scope) = &mut self.scope {
+            scope.gates.push((time_ns, leg, gate));
+        }
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {
