@@ -140,7 +140,7 @@ def test_every_command_of_a_readme_ends_well(start, tmp_path, readme):
         if path == TOOL and "--connect" in words:
             # A board's serial line.
             del words[words.index("--connect") : words.index("--connect") + 2]
-        if path == TOOL and not {"image", "flash", "decode", "budget"} & set(words):
+        if path == TOOL and not {"image", "flash", "decode", "budget", "tune"} & set(words):
             words[1:1] = ["--connect", f"tcp:127.0.0.1:{emulator.port}"]
         if "monitor" in words and "--count" not in words:
             # Until Ctrl-C.

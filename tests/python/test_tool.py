@@ -108,14 +108,14 @@ def test_all_parameters_can_be_reset(siskin_stored):
     assert siskin_stored("params", "diff").stdout == "0 different\n"
 
 
-@pytest.mark.parametrize("command", ["image", "flash", "decode", "budget"])
+@pytest.mark.parametrize("command", ["image", "flash", "decode", "budget", "tune"])
 def test_what_needs_no_esc_offers_no_way_to_one(command):
     def run(*arguments):
         return subprocess.run([str(TOOL), *arguments], capture_output=True, text=True, timeout=60)
 
     shown = run(command, "--help").stdout
     assert "Usage:" in shown and "--connect" not in shown and "--system" not in shown
-    assert ("--component" in shown) == (command == "budget")
+    assert ("--component" in shown) == (command in ("budget", "tune"))
     connect = ("--connect", "tcp:127.0.0.1:1")
     for arguments in ((command, *connect), (*connect, command, "word", "--output", "nowhere")):
         if command != "image":

@@ -9,7 +9,7 @@ use crate::endpoint::Endpoint;
 use crate::image::Board;
 
 /// Self-test, parameters and live telemetry of a Siskin ESC over MAVLink, images for its boards, captures of a
-/// throttle wire, and the limits of a motor.
+/// throttle wire, and the settings and limits of a motor.
 #[derive(Debug, Parser)]
 #[command(version, arg_required_else_help = true)]
 pub(crate) struct Cli {
@@ -66,6 +66,11 @@ pub(crate) enum Command {
     /// at; given here they count at every speed, as in the paper. The drive takes off what it knows
     /// of lead and delay, so that it stays below.
     Budget(BudgetArgs),
+    /// Compute the settings of start and control loops that follow from the motor, and say from what.
+    ///
+    /// From resistance, inductance, flux, pole pairs and inertia (MOT_...), LIM_PHASE_A, LIM_BUS_V_MAX, CTL_RPM_MAX,
+    /// PWM_FREQ_HZ and PWM_DEADTIME_NS, by what has been found to start motors from 2-inch to 30-inch propellers.
+    Tune(TuneArgs),
     /// Make the files that go onto a board: BOARD.elf, BOARD.bin and BOARD.hex.
     ///
     /// Prints for which board they are, which version, from which commit (+ behind it where files
@@ -204,6 +209,25 @@ pub(crate) struct GivenArgs {
     /// A parameter in place of the file's, for example PWM_FREQ_HZ=48000.
     #[arg(long = "param", value_name = "NAME=VALUE")]
     pub(crate) params: Vec<String>,
+}
+
+/// What settings are made of.
+#[derive(Debug, Args)]
+pub(crate) struct TuneArgs {
+    #[command(flatten)]
+    pub(crate) given: GivenArgs,
+    /// KV as on the motor's label, rpm/V, for MOT_FLUX_MWB.
+    #[arg(long, value_name = "RPM_V", value_parser = positive)]
+    pub(crate) kv: Option<f64>,
+    /// Poles of the motor, twice MOT_POLE_PAIRS.
+    #[arg(long, value_name = "N", value_parser = even)]
+    pub(crate) poles: Option<u32>,
+    /// Write the motor's parameters and the settings to a file for 'siskin params load'.
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// One JSON object, name to value.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// What a budget is made of.

@@ -24,6 +24,7 @@ mod params;
 mod program;
 mod sample;
 mod session;
+mod tune;
 
 use std::io;
 use std::process::ExitCode;
@@ -62,10 +63,11 @@ pub fn main() -> ExitCode {
 }
 
 /// Commands that work without an ESC, and what of the options that choose one means nothing to them.
-const WITHOUT_ESC: [(&str, &[&str]); 4] = [
+const WITHOUT_ESC: [(&str, &[&str]); 5] = [
     ("decode", &["connect", "system", "component"]),
     // Of a file of several ESCs --component chooses one.
     ("budget", &["connect", "system"]),
+    ("tune", &["connect", "system"]),
     ("image", &["connect", "system", "component"]),
     ("flash", &["connect", "system", "component"]),
 ];
@@ -106,6 +108,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Check { json } => check::run(&mut find()?, *json, &mut out),
         Command::Decode(args) => decode::run(&args.capture, &args.options, &mut out),
         Command::Budget(args) => budget::run(args, cli.component, &mut out),
+        Command::Tune(args) => tune::run(args, cli.component, &mut out),
         Command::Image(args) => image::run(args, &mut out),
         Command::Flash(args) => flash::run(args, &mut out),
         Command::Monitor(args) => monitor::run(&mut find()?, args, &mut out, &mut complaints),

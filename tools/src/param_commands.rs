@@ -10,6 +10,7 @@ use crate::cli::ParamsCommand;
 use crate::error::Error;
 use crate::factory::Factory;
 use crate::json::number;
+use crate::message::name_of;
 use crate::param_file::{self, Line};
 use crate::param_load::{load, same};
 use crate::param_text;
@@ -170,7 +171,7 @@ impl<'a> Task<'a> {
             }
             Self::Save { file } => {
                 let params = params::list(session)?;
-                fs::write(file, param_file::write(session.target(), &params))
+                fs::write(file, param_file::write(&name_of(session.target()), &params))
                     .map_err(|e| file_error(file, &e))?;
                 writeln!(out, "{}: {} parameters", file.display(), params.len())?;
                 Ok(())

@@ -7,9 +7,6 @@
 use std::collections::HashMap;
 use std::fmt::Write;
 
-use siskin_control::mavlink::Address;
-
-use crate::message::name_of;
 use crate::params::{NAME_LENGTH, Param, is_name};
 
 /// One setting of a file.
@@ -22,11 +19,11 @@ pub(crate) struct Line {
     pub(crate) param: Param,
 }
 
-/// The text of a file with these parameters. Values have as many digits as it takes to read the
+/// The text of a file with these parameters of somebody or something. Values have as many digits as it takes to read the
 /// same number back.
-pub(crate) fn write(from: Address, params: &[Param]) -> String {
-    let (count, from) = (params.len(), name_of(from));
-    let mut file = format!("# Siskin: {count} parameters of {from}\n# NAME VALUE\n");
+pub(crate) fn write(of: &str, params: &[Param]) -> String {
+    let count = params.len();
+    let mut file = format!("# Siskin: {count} parameters of {of}\n# NAME VALUE\n");
     for Param { name, value } in params {
         // The standard library formats into a string without fail.
         let _ = writeln!(file, "{name:<NAME_LENGTH$} {value}");
@@ -127,13 +124,10 @@ mod tests {
 
     use super::*;
 
-    const OWN: Address = Address {
-        system: 1,
-        component: 140,
-    };
+    const OWN: &str = "the ESC 1.140";
 
     fn names_and_values(file: &str) -> Vec<(usize, String, f32)> {
-        for_component(read(file).expect("a sound file"), OWN.component)
+        for_component(read(file).expect("a sound file"), 140)
             .into_iter()
             .map(|line| (line.number, line.param.name, line.param.value))
             .collect()
