@@ -13,17 +13,30 @@ use super::supply::word;
 use super::{BenchError, toml_reason};
 
 /// The files in the binary; the first is the default.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 10] = [
     ("bosso", include_str!("../../library/bosso.toml")),
     ("bosso-real", include_str!("../../library/bosso-real.toml")),
     ("bare", include_str!("../../library/bare.toml")),
+    (
+        "quad-3-inch",
+        include_str!("../../library/quad-3-inch.toml"),
+    ),
     (
         "quad-5-inch",
         include_str!("../../library/quad-5-inch.toml"),
     ),
     (
+        "quad-7-inch",
+        include_str!("../../library/quad-7-inch.toml"),
+    ),
+    (
         "quad-10-inch",
         include_str!("../../library/quad-10-inch.toml"),
+    ),
+    ("cinelifter", include_str!("../../library/cinelifter.toml")),
+    (
+        "lift-28-inch",
+        include_str!("../../library/lift-28-inch.toml"),
     ),
     ("scooter", include_str!("../../library/scooter.toml")),
 ];
