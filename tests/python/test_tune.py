@@ -9,9 +9,6 @@ import pytest
 
 from paths import PROGRAM, TOOL
 
-MOTORS = 60
-SWITCHING = 6
-
 
 def tune(*words) -> dict:
     ended = subprocess.run([str(TOOL), "tune", "--json", *words], capture_output=True, text=True, timeout=60)
@@ -42,6 +39,7 @@ def motor_of(draw: random.Random) -> dict:
     return {
         "supply_v": supply_v,
         "rpm": rpm,
+        "angle_deg": draw.uniform(-180.0, 180.0),
         "drag": 0.8 * power_w / rad_s**3,
         "params": {
             "MOT_POLE_PAIRS": pole_pairs,
@@ -64,7 +62,16 @@ def scenario(motor: dict, params: dict, plant: str) -> str:
     # Half of the inertia is the bell's.
     j = of["MOT_J_GCM2"] * 1e-7 / 2
     tables = [
-        ("[bench]", {"bus": motor["supply_v"], "adc_range_a": 2 * of["LIM_PHASE_A"], "duration_s": 3.5, "plant": plant}),
+        (
+            "[bench]",
+            {
+                "bus": motor["supply_v"],
+                "adc_range_a": 2 * of["LIM_PHASE_A"],
+                "duration_s": 3.5,
+                "plant": plant,
+                "initial_angle_deg": motor["angle_deg"],
+            },
+        ),
         (
             "[bench.motor]",
             {
@@ -83,25 +90,34 @@ def scenario(motor: dict, params: dict, plant: str) -> str:
         ("[[signal]]", {"at_s": 2.5, "throttle": 0.9}),
         ("[[window]]", {"name": "all", "t0_s": 0.0, "t1_s": 3.5}),
         ("[[window]]", {"name": "slow", "t0_s": 2.2, "t1_s": 2.5}),
+        ("[[window]]", {"name": "end", "t0_s": 3.4, "t1_s": 3.5}),
     ]
     return "\n".join(f"{head}\n{toml(table)}" for head, table in tables)
 
 
-@pytest.mark.parametrize("number", range(MOTORS + SWITCHING))
-def test_a_motor_that_nobody_tuned_starts_and_follows_the_throttle(tmp_path, number):
+def flown(folder, number: int, plant: str) -> tuple[bool, bool]:
+    """Whether a drawn motor turns in the end, without a fault, and whether it does so at the first attempt."""
     motor = motor_of(random.Random(number))
     words = [f"--param={name}={value:.6g}" for name, value in motor["params"].items()]
     params = {**motor["params"], **tune(*words)}
-    file = tmp_path / "drawn.toml"
-    file.write_text(scenario(motor, params, "switching" if number >= MOTORS else "averaged"))
-    played = subprocess.run(
-        [str(PROGRAM), "scenario", str(file), "--json"], capture_output=True, text=True, timeout=120
-    )
-    assert played.returncode == 0, played.stderr
+    file = folder / "drawn.toml"
+    file.write_text(scenario(motor, params, plant))
+    command = [str(PROGRAM), "scenario", str(file), "--json"]
+    played = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert played.returncode == 0, (number, played.stderr)
     found = json.loads(played.stdout)
     windows = {window["name"]: window for window in found["windows"]}
-    assert found["faults"] == [] and not windows["all"]["lock_lost"], found["faults"]
-    assert windows["all"]["starts"] == 1, "at the first attempt"
+    turns = found["faults"] == [] and windows["end"]["rpm_mean"] > params["CTL_RPM_MIN"]
     # Speed mode: from CTL_RPM_MIN to CTL_RPM_MAX.
     wanted = params["CTL_RPM_MIN"] + 0.3 * (motor["rpm"] - params["CTL_RPM_MIN"])
-    assert windows["slow"]["rpm_mean"] == pytest.approx(wanted, rel=0.03)
+    follows = windows["slow"]["rpm_mean"] == pytest.approx(wanted, rel=0.03)
+    at_once = windows["all"]["starts"] == 1 and not windows["all"]["lock_lost"]
+    return turns, turns and follows and at_once
+
+
+@pytest.mark.parametrize(("plant", "motors"), [("averaged", 120), ("switching", 20)])
+def test_motors_that_nobody_tuned_start_and_follow_the_throttle(tmp_path, plant, motors):
+    flights = {number: flown(tmp_path, number, plant) for number in range(motors)}
+    assert [number for number, (turns, _) in flights.items() if not turns] == []
+    again = [number for number, (_, at_once) in flights.items() if not at_once]
+    assert len(again) <= 0.05 * motors, again

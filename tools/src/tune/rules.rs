@@ -1,6 +1,6 @@
 //! The settings that follow from a motor, and from what.
 //!
-//! Each share below is one that both hand-set benches have, of a 5-inch racing motor and of the first paper's
+//! Each share below, but the alignment's, is one that both hand-set benches have, of a 5-inch racing motor and of the first paper's
 //! motor with its propeller, a tenfold apart in speed and two hundredfold in inertia.
 
 use std::f64::consts::{PI, TAU};
@@ -10,9 +10,10 @@ use siskin_control::params::{ParamId, Params};
 /// Ramp current of an open-loop start over `LIM_PHASE_A`.
 const RAMP_SHARE: f64 = 0.2;
 
-/// Time for which the whole ramp current aligns the rotor, s. The drive makes it longer for one that swings
-/// slowly.
-const PARK_S: f64 = 0.1;
+/// Time for which the whole ramp current aligns the rotor, s. With a quarter of it one motor in fourteen swings
+/// still when the ramp begins, at some angles that it may start from. The drive makes it longer for one that
+/// swings slowly.
+const PARK_S: f64 = 0.4;
 
 /// Back-EMF over the ramp current's drop across R, where the observer takes over.
 const EMF_SHARE: f64 = 1.5;
@@ -135,10 +136,7 @@ pub(crate) fn settings(params: &Params) -> Vec<Setting> {
         (ParamId::CtlBwCurHz, (current_hz, "a 48th of PWM_FREQ_HZ")),
         (ParamId::CtlBwSpdHz, speed_hz),
         (ParamId::PwmFreqHz, pwm),
-        (
-            ParamId::StaParkAs,
-            (PARK_S * ramp_a, "a tenth of a second of STA_RAMP_A"),
-        ),
+        (ParamId::StaParkAs, (PARK_S * ramp_a, "0.4 s of STA_RAMP_A")),
         (ParamId::StaRampA, (ramp_a, "a fifth of LIM_PHASE_A")),
         (ParamId::StaRampRpmS, ramp_rpm_s),
         (ParamId::StaRunRpm, run),
@@ -196,7 +194,7 @@ mod tests {
         let settings = settings(&params);
         for (id, wanted) in [
             (ParamId::StaRampA, 8.0),
-            (ParamId::StaParkAs, 0.8),
+            (ParamId::StaParkAs, 3.2),
             (ParamId::StaRunRpm, 2720.0),
             (ParamId::CtlRpmMin, 2720.0),
             (ParamId::CtlBwCurHz, 1000.0),
