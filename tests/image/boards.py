@@ -36,8 +36,7 @@ class Board:
 
 BOARDS = {
     "b-g431b-esc1": Board(
-        # All but the store. Beside a boot loader of 12 KB, a second image and a store of 8 KB, as an
-        # update in the field wants it, there are 52 KB.
+        # All but the store. The aim is 96 KB, beside a resident loader.
         flash=Region("flash", 0x0800_0000, 128 * KB, 120 * KB),
         memories=(
             Region("CCM", 0x1000_0000, 10 * KB, 9 * KB),
