@@ -12,7 +12,7 @@
 //!
 //! | step | the bridge | what is seen |
 //! |---|---|---|
-//! | listen, 64 ms | off | `supply`, `temperature`, `option_bytes`, `comparator_*`, which are all that is measured at power-up; `zero_*`, `noise_*`, `rest_*`: a terminal that is not at ground has a shorted high side, and nothing is pulled |
+//! | listen, 72 ms | off | `supply`, `temperature`, `option_bytes`, `comparator_*`, which are all that is measured at power-up; `zero_*`, `noise_*`, `rest_*`: a terminal that is not at ground has a shorted high side, and nothing is pulled |
 //! | pull a, b, c up | one leg from duty 0 to the whole, the others off ([`Pull`]) | `high_*`: its terminal comes to the supply, so its high side and the supply of its driver work. `motor_*`: the others follow it through the windings. `off_*`: no current, so no low side is shorted |
 //! | a to b, b to c, c to a | one leg up to a quarter, the low side of the next on, until a test's current flows | `low_*`: it comes back through that low side and its shunt, with the right sign |
 //!
@@ -76,7 +76,7 @@ const FULL_SCALE: f32 = 4095.0;
 /// The step of a self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// Nowhere: there is none.
+    /// No test is under way.
     Over,
     /// Measurements that need neither time nor the bridge, and then the end.
     PowerUp,
@@ -127,7 +127,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// That of power-up, of this board.
+    /// The test at power-up.
     pub fn new(board: &Board) -> Self {
         Self {
             step: Step::PowerUp,

@@ -20,8 +20,8 @@
 //! | Park, Ramp | `foc/open_loop.rs` | the frame is imposed, the rotor follows |
 //! | Run, Stopping | `foc/` | field-oriented control |
 //! | Brake | `foc/short.rs` | the low sides are on, the observer goes on |
-//! | Park to Brake | `six_step/` | the same by zero crossings, where the six-step drive is configured |
-//! | Tone | `tone.rs`, `self_test.rs` | the phases switch to be heard, or to be tested |
+//! | Park, Ramp, Run, Stopping, Brake with `CTL_DRIVE` 1 | `six_step/` | the same by zero crossings |
+//! | Tone | `tone.rs`, `self_test.rs` | the phases switch to be heard, or, with [`Setpoint::Pull`], to be tested |
 //!
 //! All changes of mode, each with its reason, are the table in `transitions.rs`; they are made by one
 //! function, `State::change`, but for a restart under other units ([`State::adopt`]):

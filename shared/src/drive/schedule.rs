@@ -1,8 +1,10 @@
-//! Outer-loop work, time-sliced over 32 periods: at most one slot's work a period, and none in most.
+//! Outer-loop work, time-sliced over 32 periods. In Run 20 of the 32 have none.
 //!
-//! The speed regulator so acts three thousand times a second at 24 kHz, for a bandwidth of tens of
-//! hertz, and the dead time's compensation follows it; what follows the supply does so half as often, and
-//! what follows the speed half as often as that.
+//! The reference is computed every 8 periods (3 kHz with a PWM of 24 kHz, for a bandwidth of tens of hertz), and the
+//! dead-time signs two periods after it. The supply and the bounds of i_q follow every 16; the observer's gains,
+//! the delay's compensation, the decoupling and the changes of mode every 32.
+//!
+//! A tone and Brake have cycles of their own, in `tone.rs` and `foc/short.rs`.
 
 use crate::control::PERIODS;
 
@@ -55,8 +57,8 @@ use Work::{
 };
 
 /// Field-oriented control's work in each period of a cycle. Two periods after each reference
-/// come the dead-time signs. Five of eight periods have nothing: with those that publish besides, half of
-/// all interrupts are still short.
+/// come the dead-time signs. 20 of 32 periods are empty; every eighth also publishes a snapshot, so that about half
+/// of all interrupts stay short.
 #[rustfmt::skip]
 const RUN: [Work; CYCLE as usize] = [
     /*  0 */ Reference, Nothing, ObserverGains, Nothing, Bounds,  Nothing, SpeedBounds, Nothing,
@@ -74,7 +76,7 @@ const START: [Work; CYCLE as usize] = [
     /* 24 */ StartCurrent, Damp, Rotor,         Damp, Standby, Damp, HandOver, Damp,
 ];
 
-/// Returns true if a piece is done every so many periods from its first on, and in no other.
+/// Returns true if a piece is in every so many slots from its first on, and in no other.
 const fn is_every(schedule: &[Work; CYCLE as usize], work: Work, periods: u32) -> bool {
     let mut first = 0;
     while schedule[first] as u8 != work as u8 {

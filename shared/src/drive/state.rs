@@ -104,7 +104,7 @@ impl State {
         })
     }
 
-    /// The phase is the one that this set-point asks for.
+    /// Notes that the phase suits this set-point.
     pub(super) fn decided_for(&mut self, config: &Config, setpoint: &Setpoint) {
         self.decided = if self.phase.drives() && config.six_step.is_none() {
             setpoint.kind()

@@ -19,13 +19,13 @@ use crate::units::AdcCounts;
 /// Called once a PWM period, in the interrupt of the chip and in the emulator's loop.
 #[inline(never)]
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
-    // Decide the mode, of what the last period has seen: while field-oriented control drives, twice a cycle
-    // of its outer loop. Before the sample is looked at, so that nothing of it must be kept meanwhile.
+    // Decide the mode from what the last period saw. While field-oriented control drives, only its schedule does
+    // so, in two slots of a cycle. This comes before the sample is read, so that no sample is kept across it.
     let field_oriented = if state.is_decided_for(&setpoint) {
         match schedule::next(&mut state.foc.loops.slot) {
             Work::Nothing => true,
             Work::Reference => {
-                // The first period of a drive comes by here.
+                // A drive's first period is in this slot.
                 state.shared.seen.phase = state.phase;
                 outer_loop::reference(config, &mut state.foc, &state.shared, &setpoint);
                 true
@@ -95,8 +95,8 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
     energised(config, state, (sample, setpoint), currents)
 }
 
-/// Returns true if a drive that rests is asked for nothing, which ends a row of failed starts, or one that begins
-/// for what it begins for.
+/// Returns true if nothing changes: a drive at rest is asked for nothing, which also ends a row of failed starts, or
+/// one in Sense is still asked to turn.
 #[inline(always)]
 fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
@@ -117,7 +117,7 @@ fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> 
 /// The mode that the set-point asks for. Whether field-oriented control drives.
 #[inline(never)]
 fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
-    // This period's slice of the outer loop is left out, since it has another turn; but not the damping of a
+    // This period's slice of the outer loop is left out, since it comes round again; but not the damping of a
     // start, in which the observer is told once where the aligned rotor is.
     let work = schedule::next(&mut state.foc.loops.slot);
     if work == Work::Damp && state.phase.is_open_loop() {

@@ -33,7 +33,7 @@ use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, Wid
 /// quarter of so much takes some 30 half cycles.
 const DEAD_SHIFT: u32 = 3;
 
-/// The period behind Charge in which a tone begins; those before it look at the supply.
+/// The period after Charge in which a tone begins; those before it look at the supply.
 pub(super) const READY_PERIODS: u32 = 3;
 
 /// Slot of a cycle in which the supply's voltage is taken.
@@ -46,7 +46,7 @@ traced! {
     /// The tone that is being played.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub(super) struct State {
-        /// Period in the cycle in which the supply is looked at.
+        /// The present slot of the cycle, in one of which the supply is looked at.
         slot: u8,
         /// Turns a period; zero is a pause.
         pitch: Speed,
@@ -147,7 +147,7 @@ fn play(
         };
     }
     playing.peak = playing.peak.max(greatest);
-    // A half cycle ends, and its work is shared with the period behind; the first one of all has only that.
+    // The work at the end of a half cycle is shared by two periods; a tone's first period has the second half alone.
     let step = pitch.over_period();
     let ends = |angle: Angle| angle.is_negative() != angle.wrapping_sub(step).is_negative();
     if ends(playing.angle) {

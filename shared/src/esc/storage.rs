@@ -12,18 +12,18 @@ use crate::store::{self, Kept, StoreError};
 /// Time without a change after which changes are stored, µs: a client that writes a whole
 /// list of parameters wears the flash once.
 const QUIET_US: u64 = 1_000_000;
-/// Longest wait of a change because more follow, µs: so much of what was signed may
-/// be played again after a loss of power.
+/// Longest wait while changes keep coming, µs. Signed frames heard in this time can be played again after a
+/// loss of power.
 const LATEST_US: u64 = 2_000_000;
 
 /// Saves without a request that may follow one another at once. An evening of trying one value
 /// after another takes as many.
 const SAVES_AT_ONCE: u64 = 100;
-/// The time that gives one of them back, µs. A client that changes a value again and again, for a day,
-/// costs 100 + 480 of the flash's 80 000 saves, 0.7 %.
+/// Time that earns one more of them, µs. A client that keeps changing a value costs 100 + 480 of the flash's
+/// 80 000 saves on its first day, 0.7 %.
 const SAVE_EVERY_US: u64 = 180_000_000;
 /// Longest wait for the first of them after a start, µs, where all were taken before it: a person who
-/// has the ESC on for a minute shall have the changes. A client that changes a value and restarts the ESC,
+/// has the ESC on for a minute keeps the changes. A client that changes a value and restarts the ESC,
 /// for a day, costs 100 + 1440 saves, 1.9 %.
 const FIRST_SAVE_US: u64 = 60_000_000;
 /// What may be owed while one more save is made, µs.
