@@ -88,7 +88,10 @@ pub(crate) fn settings(params: &Params) -> Vec<Setting> {
     let max_hz = max_rpm * pole_pairs / 60.0;
     let pwm = most([
         (get(ParamId::PwmFreqHz), "as it was"),
-        (TURN_PERIODS * max_hz, "20 periods a turn at CTL_RPM_MAX"),
+        (
+            (TURN_PERIODS * max_hz).min(f64::from(ParamId::PwmFreqHz.entry().max)),
+            "20 periods a turn at CTL_RPM_MAX",
+        ),
     ]);
     let dead_v = 4.0 / PI * get(ParamId::PwmDeadtimeNs) * 1e-9 * pwm.0 * get(ParamId::LimBusVMax);
 

@@ -115,7 +115,8 @@ pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
         let mut armed = replies.map(|ready| replier.arm(ready.speed_bits));
         let due_ticks = listener.capture.now().wrapping_add(renewal_ticks);
         let edge = listener.capture.wait_for_edge(due_ticks).await;
-        let mut looks = listener.begin(edge);
+        let signal = ready.as_ref().and_then(|ready| ready.signal);
+        let mut looks = listener.begin(edge, signal);
         while let Some(after_ticks) = looks.next() {
             let at_ticks = looks.begin_ticks.wrapping_add(after_ticks);
             if after_ticks > 0 {
@@ -134,7 +135,9 @@ struct Ready {
     snapshot: Snapshot,
     /// A reply's bits for its speed.
     speed_bits: u32,
-    /// True if the signal is one that is answered on its wire, as far as is known.
+    /// The signal, if it is known.
+    signal: Option<Signal>,
+    /// True if it is one that is answered on its wire, as far as is known.
     may_reply: bool,
 }
 
@@ -171,6 +174,7 @@ impl Listener {
         Some(Ready {
             snapshot,
             speed_bits,
+            signal,
             may_reply: !matches!(
                 signal,
                 Some(
@@ -186,8 +190,7 @@ impl Listener {
 
     /// A first edge has come: what follows is looked at until the line is quiet. Without one it is once, at
     /// once.
-    fn begin(&mut self, edge: bool) -> Looks {
-        let signal = self.port.reach(|throttle| throttle.signal());
+    fn begin(&mut self, edge: bool, signal: Option<Signal>) -> Looks {
         self.fill();
         if let Some(Signal::Dshot {
             rate,
@@ -314,16 +317,17 @@ impl Listener {
         if reply.is_some() && sending.is_none() {
             TROUBLE.late_reply();
         }
-        if let Some(event) = &looks.unheard {
-            let setpoint = self.port.reach(|throttle| {
+        let (setpoint, Serial { kiss, info }) = self.port.reach(|throttle| {
+            let setpoint = looks.unheard.as_ref().map(|event| {
                 // The answer to its request is being sent.
                 let _ = throttle.hear(now_us(), event);
                 throttle.setpoint()
             });
+            (setpoint, throttle.serial(ask, &ready.snapshot))
+        });
+        if let Some(setpoint) = setpoint {
             self.renew(setpoint);
         }
-        let Serial { kiss, info } =
-            (self.port).reach(|throttle| throttle.serial(ask, &ready.snapshot));
         if let Some(frame) = kiss {
             kiss::send(&frame);
         }
