@@ -261,7 +261,9 @@ impl Listener {
                     return None;
                 }
                 let ask = Ask::of(&event);
-                if ask.is_some_and(|ask| ask.bidirectional) && ready.is_some() {
+                // The wire is the sender's until it is known that an answer is wanted.
+                let answers = throttle.signal().is_some() && ready.is_some();
+                if ask.is_some_and(|ask| ask.bidirectional) && answers {
                     looks.unheard = Some(event);
                     ask
                 } else {

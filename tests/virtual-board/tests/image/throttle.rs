@@ -127,6 +127,8 @@ fn a_signal_of_4_khz_is_found_out_and_answered() {
                     .filter(|exchange| exchange.word().is_some())
                     .count()
             };
+            // A signal is known after 50 ms of frames at the earliest, and the wire is the sender's until then.
+            assert_eq!(answered(&exchanges[..190]), 0, "{name}: not known yet");
             let late = answered(&exchanges[2400..]);
             let texts = board.heard.texts();
             println!("{name} from {begin_us} us: {late} of the last 800 are answered; {texts:?}");
