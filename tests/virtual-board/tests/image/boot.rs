@@ -42,8 +42,6 @@ fn it_starts_and_answers() {
     assert!((50_000..=55_200).contains(&figures.interrupts), "{figures}");
 }
 
-/// The board's least dead time is its default, also after a reset to the defaults, and nothing shorter is
-/// taken.
 /// The board's link hands on whole frames. One that waits behind the start of another, which never comes, is
 /// handed on after 0.1 s of silence.
 #[test]
@@ -67,6 +65,8 @@ fn a_question_behind_a_start_without_its_frame_is_answered_though_nothing_more_i
     assert_eq!(board.heard.messages::<PARAM_VALUE_DATA>().len(), 1);
 }
 
+/// The board's least dead time is its default, also after a reset to the defaults, and nothing shorter is
+/// taken.
 #[test]
 fn a_dead_time_below_the_boards_is_refused() {
     let id = "PWM_DEADTIME_NS";
