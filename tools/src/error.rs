@@ -1,6 +1,8 @@
 //! What can go wrong: one line for a person, and an exit status for a script.
 
+use std::fmt::Display;
 use std::io;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Why the work was not done. Each text names the input and what to do.
@@ -62,6 +64,14 @@ pub(crate) enum Error {
 }
 
 impl Error {
+    /// A file could not be read, written or understood, for this reason.
+    pub(crate) fn file(path: &Path, reason: impl Display) -> Self {
+        Self::File {
+            path: path.display().to_string(),
+            reason: reason.to_string(),
+        }
+    }
+
     /// 2 for bad input or no connection, 1 for what the ESC or another program refused or did not
     /// answer, 0 where only the reader of the output went away, as in `siskin monitor | head -1`.
     pub(crate) fn exit_code(&self) -> ExitCode {

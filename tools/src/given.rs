@@ -31,19 +31,10 @@ pub(crate) fn params(args: &GivenArgs, component: Option<u8>) -> Result<Params, 
 
 /// Takes the parameters of a file over those that there are.
 fn read(params: &mut Params, file: &Path, component: u8) -> Result<(), Error> {
-    let failed = |reason: String| Error::File {
-        path: file.display().to_string(),
-        reason,
-    };
-    let content = fs::read_to_string(file).map_err(|error| failed(error.to_string()))?;
+    let failed = |reason: String| Error::file(file, reason);
+    let content = fs::read_to_string(file).map_err(|error| Error::file(file, error))?;
     let lines = param_file::read(&content).map_err(|bad| failed(bad.join("; ")))?;
-    let lines = param_file::for_component(lines, component);
-    if lines.is_empty() {
-        return Err(failed(format!(
-            "it has no setting for component {component}"
-        )));
-    }
-    for line in &lines {
+    for line in param_file::for_component(file, lines, component)? {
         let (name, value) = (&line.param.name, line.param.value);
         let id = find(name).map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
         // A file that was saved has the derived ones too.

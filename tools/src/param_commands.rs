@@ -141,7 +141,7 @@ impl<'a> Task<'a> {
             Self::Diff {
                 against: Some((file, lines)),
             } => {
-                let lines = lines_for(session, file, lines)?;
+                let lines = param_file::for_component(file, lines, session.target().component)?;
                 diff_to_file(&params::list(session)?, file, &lines, out)
             }
             Self::Reset {
@@ -172,12 +172,12 @@ impl<'a> Task<'a> {
             Self::Save { file } => {
                 let params = params::list(session)?;
                 fs::write(file, param_file::write(&name_of(session.target()), &params))
-                    .map_err(|e| file_error(file, &e))?;
+                    .map_err(|e| Error::file(file, e))?;
                 writeln!(out, "{}: {} parameters", file.display(), params.len())?;
                 Ok(())
             }
             Self::Load { file, lines, store } => {
-                let lines = lines_for(session, file, lines)?;
+                let lines = param_file::for_component(file, lines, session.target().component)?;
                 let refused = load(session, &lines, out, complaints)?;
                 finish(session, store, refused, lines.len(), out)
             }
@@ -211,29 +211,14 @@ fn checked_factory_name(name: &str) -> Result<String, Error> {
 
 /// The settings of a file, if all its lines make sense.
 fn read(file: &Path, complaints: &mut dyn Write) -> Result<Vec<Line>, Error> {
-    let content = fs::read_to_string(file).map_err(|e| file_error(file, &e))?;
+    let content = fs::read_to_string(file).map_err(|e| Error::file(file, e))?;
     param_file::read(&content).or_else(|bad| {
         for text in &bad {
             writeln!(complaints, "{}: {text}", file.display())?;
         }
-        Err(Error::File {
-            path: file.display().to_string(),
-            reason: format!("{} bad; nothing was sent", counted(bad.len(), "line")),
-        })
+        let bad = counted(bad.len(), "line");
+        Err(Error::file(file, format!("{bad} bad; nothing was sent")))
     })
-}
-
-/// Those for the ESC that is being talked to.
-fn lines_for(session: &Session, file: &Path, lines: Vec<Line>) -> Result<Vec<Line>, Error> {
-    let component = session.target().component;
-    let lines = param_file::for_component(lines, component);
-    if lines.is_empty() {
-        return Err(Error::File {
-            path: file.display().to_string(),
-            reason: format!("it has no setting for component {component}"),
-        });
-    }
-    Ok(lines)
 }
 
 /// `1 line`, `2 lines`.
@@ -263,13 +248,6 @@ fn names_and_values(pairs: &[String]) -> Result<Vec<Param>, Error> {
             }
         })
         .collect()
-}
-
-fn file_error(file: &Path, error: &std::io::Error) -> Error {
-    Error::File {
-        path: file.display().to_string(),
-        reason: error.to_string(),
-    }
 }
 
 pub(crate) fn print(params: &[Param], json: bool, out: &mut dyn Write) -> Result<(), Error> {

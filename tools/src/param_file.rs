@@ -6,7 +6,9 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
+use std::path::Path;
 
+use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param, is_name};
 
 /// One setting of a file.
@@ -19,8 +21,8 @@ pub(crate) struct Line {
     pub(crate) param: Param,
 }
 
-/// The text of a file with these parameters of somebody or something. Values have as many digits as it takes to read the
-/// same number back.
+/// The text of a file with these parameters, and whose they are. Values have as many digits as it takes to
+/// read the same number back.
 pub(crate) fn write(of: &str, params: &[Param]) -> String {
     let count = params.len();
     let mut file = format!("# Siskin: {count} parameters of {of}\n# NAME VALUE\n");
@@ -66,7 +68,23 @@ pub(crate) fn read(file: &str) -> Result<Vec<Line>, Vec<String>> {
 
 /// What a file says for a component. Of a file of several components it is the lines of this one;
 /// a file of a single component is for any, so that an ESC's settings can be copied to the next.
-pub(crate) fn for_component(lines: Vec<Line>, component: u8) -> Vec<Line> {
+///
+/// # Errors
+/// [`Error::File`] if that is nothing.
+pub(crate) fn for_component(
+    file: &Path,
+    lines: Vec<Line>,
+    component: u8,
+) -> Result<Vec<Line>, Error> {
+    let lines = chosen(lines, component);
+    if lines.is_empty() {
+        let reason = format!("it has no setting for component {component}");
+        return Err(Error::file(file, reason));
+    }
+    Ok(lines)
+}
+
+fn chosen(lines: Vec<Line>, component: u8) -> Vec<Line> {
     let several = lines
         .windows(2)
         .any(|pair| pair[0].component != pair[1].component);
@@ -127,7 +145,7 @@ mod tests {
     const OWN: &str = "the ESC 1.140";
 
     fn names_and_values(file: &str) -> Vec<(usize, String, f32)> {
-        for_component(read(file).expect("a sound file"), 140)
+        chosen(read(file).expect("a sound file"), 140)
             .into_iter()
             .map(|line| (line.number, line.param.name, line.param.value))
             .collect()

@@ -95,10 +95,7 @@ pub(crate) fn run(path: &Path, options: &Options, out: &mut dyn Write) -> Result
         .map_err(|error| DecodeError::Capture(error.to_string()))
         .and_then(|file| decode(file, options, out));
     done.map_err(|error| match error {
-        DecodeError::Capture(reason) => Error::File {
-            path: path.display().to_string(),
-            reason,
-        },
+        DecodeError::Capture(reason) => Error::file(path, reason),
         DecodeError::Output(error) => Error::Output(error),
     })
 }

@@ -70,10 +70,7 @@ impl Image {
             )),
             _ => Ok(image),
         });
-        image.map_err(|reason| Error::File {
-            path: path.display().to_string(),
-            reason,
-        })
+        image.map_err(|reason| Error::file(path, reason))
     }
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {

@@ -21,18 +21,14 @@ const PAGE_BYTES: u32 = 1 << 16;
 /// # Errors
 /// [`Error::File`] for what cannot be written.
 pub(super) fn write(image: &Image, folder: &Path) -> Result<[PathBuf; 3], Error> {
-    let failed = |path: &Path, reason: String| Error::File {
-        path: path.display().to_string(),
-        reason,
-    };
-    fs::create_dir_all(folder).map_err(|e| failed(folder, e.to_string()))?;
+    fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
     let name = |extension| folder.join(image.board.name()).with_extension(extension);
     let [elf, bin, hex] = [name("elf"), name("bin"), name("hex")];
 
-    fs::write(&elf, &image.file).map_err(|e| failed(&elf, e.to_string()))?;
-    fs::write(&bin, image.contents()).map_err(|e| failed(&bin, e.to_string()))?;
-    let text = intel_hex(image).map_err(|e| failed(&hex, e))?;
-    fs::write(&hex, text).map_err(|e| failed(&hex, e.to_string()))?;
+    fs::write(&elf, &image.file).map_err(|e| Error::file(&elf, e))?;
+    fs::write(&bin, image.contents()).map_err(|e| Error::file(&bin, e))?;
+    let text = intel_hex(image).map_err(|e| Error::file(&hex, e))?;
+    fs::write(&hex, text).map_err(|e| Error::file(&hex, e))?;
     Ok([elf, bin, hex])
 }
 

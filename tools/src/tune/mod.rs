@@ -63,10 +63,7 @@ pub(crate) fn run(
         ids.dedup();
         let lines: Vec<_> = ids.into_iter().map(|id| param(&params, id)).collect();
         let text = param_file::write("a motor and its settings", &lines);
-        fs::write(path, text).map_err(|error| Error::File {
-            path: path.display().to_string(),
-            reason: error.to_string(),
-        })?;
+        fs::write(path, text).map_err(|error| Error::file(path, error))?;
     }
     if args.json {
         let values = settings.iter().map(|setting| {
