@@ -7,7 +7,8 @@ import subprocess
 
 import pytest
 
-from paths import PROGRAM, TOOL
+from emulator import scenario
+from paths import TOOL
 
 
 def tune(*words) -> dict:
@@ -56,7 +57,7 @@ def motor_of(draw: random.Random) -> dict:
     }
 
 
-def scenario(motor: dict, params: dict, plant: str) -> str:
+def flight(motor: dict, params: dict, plant: str) -> str:
     """At 0.5 s the throttle goes to 30 %, and at 2.5 s to 90 %."""
     of = motor["params"]
     # Half of the inertia is the bell's.
@@ -101,11 +102,9 @@ def flown(folder, number: int, plant: str) -> tuple[bool, bool]:
     words = [f"--param={name}={value:.6g}" for name, value in motor["params"].items()]
     params = {**motor["params"], **tune(*words)}
     file = folder / "drawn.toml"
-    file.write_text(scenario(motor, params, plant))
-    command = [str(PROGRAM), "scenario", str(file), "--json"]
-    played = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert played.returncode == 0, (number, played.stderr)
-    found = json.loads(played.stdout)
+    file.write_text(flight(motor, params, plant))
+    status, found = scenario(file)
+    assert status == 0, number
     windows = {window["name"]: window for window in found["windows"]}
     turns = found["faults"] == [] and windows["end"]["rpm_mean"] > params["CTL_RPM_MIN"]
     # Speed mode: from CTL_RPM_MIN to CTL_RPM_MAX.

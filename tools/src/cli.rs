@@ -68,8 +68,9 @@ pub(crate) enum Command {
     Budget(BudgetArgs),
     /// Compute the settings of start and control loops that follow from the motor, and say from what.
     ///
-    /// From resistance, inductance, flux, pole pairs and inertia (MOT_...), LIM_PHASE_A, LIM_BUS_V_MAX, CTL_RPM_MAX,
-    /// PWM_FREQ_HZ and PWM_DEADTIME_NS, by what has been found to start motors from 2-inch to 30-inch propellers.
+    /// From resistance, flux, pole pairs and inertia (MOT_...), LIM_PHASE_A, LIM_BUS_V_MAX, CTL_RPM_MAX,
+    /// PWM_FREQ_HZ and PWM_DEADTIME_NS, by what starts motors from 3-inch propellers to lifts of 3 kW in the
+    /// simulation.
     Tune(TuneArgs),
     /// Make the files that go onto a board: BOARD.elf, BOARD.bin and BOARD.hex.
     ///

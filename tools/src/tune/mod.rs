@@ -16,7 +16,7 @@ use crate::params::{NAME_LENGTH, Param};
 use crate::{given, json, param_file, param_text};
 use rules::Setting;
 
-/// What the settings are made of.
+/// The motor, and what else its settings are made of.
 const MADE_OF: [ParamId; 10] = [
     ParamId::MotPolePairs,
     ParamId::MotRMohm,

@@ -1,7 +1,7 @@
 //! The settings that follow from a motor, and from what.
 //!
-//! Each share below, but the alignment's, is one that both hand-set benches have, of a 5-inch racing motor and of the first paper's
-//! motor with its propeller, a tenfold apart in speed and two hundredfold in inertia.
+//! Each share below, but the alignment's, is one that two benches set by hand have in common: a 5-inch racing
+//! motor's, and that of the first paper's motor with its propeller.
 
 use std::f64::consts::{PI, TAU};
 
@@ -68,8 +68,8 @@ fn most<const N: usize>(bounds: [Bound; N]) -> Bound {
 }
 
 fn least<const N: usize>(bounds: [Bound; N]) -> Bound {
-    let (value, from) = most(bounds.map(|(value, from)| (-value, from)));
-    (-value, from)
+    let least = bounds.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    least.expect("a list of bounds has some")
 }
 
 /// The settings for the motor, the limits and the speed of these parameters, in the order of their numbers.
