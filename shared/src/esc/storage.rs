@@ -125,9 +125,8 @@ impl Storage {
 
     /// Returns true if a restart is due now.
     pub(super) fn reboots(&self) -> bool {
-        let changed = !self.lost && self.changed_us.is_some();
-        let waits = self.mavlink.is_some() || self.save || changed;
-        self.reboot && self.under_way.is_none() && !waits
+        // At the end of time all that waits is due.
+        self.reboot && self.under_way.is_none() && self.next(u64::MAX).is_none()
     }
 
     /// The restart begins, or is given up. Returns true if there was to be one.
