@@ -111,7 +111,7 @@ pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
         // What can be done before a frame comes is not to be done while it does, nor behind it: it is told as
         // it was at the frame before, or `RENEWAL_US` ago.
         let ready = listener.ready();
-        let replies = ready.as_ref().filter(|ready| ready.may_reply);
+        let replies = ready.as_ref().filter(|ready| ready.may_reply());
         let mut armed = replies.map(|ready| replier.arm(ready.speed_bits));
         let due_ticks = listener.capture.now().wrapping_add(renewal_ticks);
         let edge = listener.capture.wait_for_edge(due_ticks).await;
@@ -137,8 +137,22 @@ struct Ready {
     speed_bits: u32,
     /// The signal, if it is known.
     signal: Option<Signal>,
-    /// True if it is one that is answered on its wire, as far as is known.
-    may_reply: bool,
+}
+
+impl Ready {
+    /// Returns true if the signal is one that is answered on its wire, as far as is known.
+    fn may_reply(&self) -> bool {
+        !matches!(
+            self.signal,
+            Some(
+                Signal::Pulse(_)
+                    | Signal::Dshot {
+                        bidirectional: false,
+                        ..
+                    }
+            )
+        )
+    }
 }
 
 /// The requests of a frame, and the reply to it on the wire.
@@ -175,16 +189,6 @@ impl Listener {
             snapshot,
             speed_bits,
             signal,
-            may_reply: !matches!(
-                signal,
-                Some(
-                    Signal::Pulse(_)
-                        | Signal::Dshot {
-                            bidirectional: false,
-                            ..
-                        }
-                )
-            ),
         })
     }
 
