@@ -2,7 +2,8 @@
 //!
 //! The reference is computed every 8 periods (3 kHz with a PWM of 24 kHz, for a bandwidth of tens of hertz), and the
 //! dead-time signs two periods after it. The supply and the bounds of i_q follow every 16; the observer's gains,
-//! the delay's compensation, the decoupling and the changes of mode every 32.
+//! the delay's compensation, the decoupling and the changes of mode every 32. Every eighth period also publishes a
+//! snapshot, so that about half of all interrupts stay short.
 //!
 //! A tone and Brake have cycles of their own, in `tone.rs` and `foc/short.rs`.
 
@@ -18,74 +19,136 @@ pub(super) const SUPPLY_PERIODS: u32 = 2 * PERIODS;
 /// Periods from one look at the rotor's swing to the next, in an open-loop start. A swing takes hundreds.
 pub(super) const DAMP_PERIODS: u32 = 2;
 
-/// A piece of outer-loop work.
+/// Pieces of outer-loop work, none or several: what is due in one period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Work {
+pub(super) struct Work(u16);
+
+impl Work {
     /// None.
-    Nothing,
+    pub(super) const NOTHING: Self = Self(0);
     /// The current's reference, by the speed regulator or as it is commanded.
-    Reference,
-    /// The open-loop start's current, and what it makes of the frame's speed.
-    StartCurrent,
-    /// The rotor's swing in the open-loop start's frame is damped.
-    Damp,
-    /// Dead-time signs; in Run the supply's voltage and current too.
-    DeadTimeSign,
-    /// The supply's voltage and current, in a start.
-    Supply,
-    /// The trip, and the bounds of i_q that the supply's current leaves; in Run the longest vector that the
-    /// supply gives too.
-    Bounds,
+    pub(super) const REFERENCE: Self = Self(1);
+    /// Dead-time signs.
+    pub(super) const DEAD_TIME_SIGN: Self = Self(1 << 1);
+    /// The supply's voltage and current.
+    pub(super) const SUPPLY: Self = Self(1 << 2);
+    /// The update of the observer's gains.
+    pub(super) const OBSERVER_GAINS: Self = Self(1 << 3);
+    /// The trip.
+    pub(super) const TRIP_LEVEL: Self = Self(1 << 4);
+    /// The bounds of i_q that the supply's current leaves.
+    pub(super) const SUPPLY_BOUNDS: Self = Self(1 << 5);
+    /// The longest vector that the supply gives.
+    pub(super) const LONGEST_VECTOR: Self = Self(1 << 6);
     /// The bounds of i_q that the speed leaves, and i_d.
-    SpeedBounds,
-    /// As [`DeadTimeSign`], and the update of the observer's gains.
-    ObserverGains,
-    /// Delay compensation, dead-time signs, and the mode that the set-point asks for: it may end the drive.
-    Setpoint,
-    /// The mode that the rotor allows, which may end the drive; dead-time signs, and the decoupling of the
-    /// regulator's axes.
-    Rotor,
+    pub(super) const SPEED_BOUNDS: Self = Self(1 << 7);
+    /// Delay compensation.
+    pub(super) const DELAY_COMPENSATION: Self = Self(1 << 8);
+    /// The decoupling of the regulator's axes.
+    pub(super) const DECOUPLING: Self = Self(1 << 9);
+    /// The mode that the set-point asks for: it may end the drive.
+    pub(super) const SETPOINT: Self = Self(1 << 10);
+    /// The mode that the rotor allows, which may end the drive: then nothing else is done.
+    pub(super) const ROTOR: Self = Self(1 << 11);
+    /// The open-loop start's current, and what it makes of the frame's speed.
+    pub(super) const START_CURRENT: Self = Self(1 << 12);
+    /// The rotor's swing in the open-loop start's frame is damped.
+    pub(super) const DAMP: Self = Self(1 << 13);
     /// The speed regulator is made ready for the end of an open-loop start.
-    Standby,
+    pub(super) const STAND_BY: Self = Self(1 << 14);
     /// The end of an open-loop start that has come to its speed.
-    HandOver,
+    pub(super) const HAND_OVER: Self = Self(1 << 15);
+
+    /// Those of which each has its periods for itself.
+    const ALONE: Self = Self::REFERENCE
+        .with(Self::START_CURRENT)
+        .with(Self::DAMP)
+        .with(Self::STAND_BY)
+        .with(Self::HAND_OVER);
+
+    /// Returns true if any of these pieces is among them.
+    #[inline(always)]
+    pub(super) const fn includes(self, pieces: Self) -> bool {
+        self.0 & pieces.0 != 0
+    }
+
+    const fn with(self, piece: Self) -> Self {
+        Self(self.0 | piece.0)
+    }
 }
 
-use Work::{
-    Bounds, Damp, DeadTimeSign, HandOver, Nothing, ObserverGains, Reference, Rotor, Setpoint,
-    SpeedBounds, Standby, StartCurrent, Supply,
-};
+/// A piece of work, the first period of a cycle in which it is due, and the periods from there to the next.
+type Row = (Work, u32, u32);
 
-/// Field-oriented control's work in each period of a cycle. Two periods after each reference
-/// come the dead-time signs. 20 of 32 periods are empty; every eighth also publishes a snapshot, so that about half
-/// of all interrupts stay short.
-#[rustfmt::skip]
-const RUN: [Work; CYCLE as usize] = [
-    /*  0 */ Reference, Nothing, ObserverGains, Nothing, Bounds,  Nothing, SpeedBounds, Nothing,
-    /*  8 */ Reference, Nothing, Setpoint,      Nothing, Nothing, Nothing, Nothing,     Nothing,
-    /* 16 */ Reference, Nothing, DeadTimeSign,  Nothing, Bounds,  Nothing, SpeedBounds, Nothing,
-    /* 24 */ Reference, Nothing, Rotor,         Nothing, Nothing, Nothing, Nothing,     Nothing,
+/// The work of each period of a cycle.
+type Cycle = [Work; CYCLE as usize];
+
+/// Lays the rows out over a cycle.
+const fn cycle(rows: &[Row]) -> Cycle {
+    let mut cycle = [Work::NOTHING; CYCLE as usize];
+    let mut row = 0;
+    while row < rows.len() {
+        let (piece, first, periods) = rows[row];
+        assert!(first < periods && CYCLE.is_multiple_of(periods));
+        let mut period = first;
+        while period < CYCLE {
+            let due = &mut cycle[period as usize];
+            *due = due.with(piece);
+            assert!(!Work::ALONE.includes(*due) || due.0.is_power_of_two());
+            period += periods;
+        }
+        row += 1;
+    }
+    cycle
+}
+
+/// Field-oriented control's.
+const RUN: &[Row] = &[
+    (Work::REFERENCE, 0, PERIODS),
+    (Work::DEAD_TIME_SIGN, 2, PERIODS),
+    (Work::SUPPLY, 2, SUPPLY_PERIODS),
+    (Work::TRIP_LEVEL, 4, SUPPLY_PERIODS),
+    (Work::SUPPLY_BOUNDS, 4, SUPPLY_PERIODS),
+    (Work::LONGEST_VECTOR, 4, SUPPLY_PERIODS),
+    (Work::SPEED_BOUNDS, 6, SUPPLY_PERIODS),
+    (Work::OBSERVER_GAINS, 2, CYCLE),
+    (Work::DELAY_COMPENSATION, 10, CYCLE),
+    (Work::SETPOINT, 10, CYCLE),
+    (Work::DECOUPLING, 26, CYCLE),
+    (Work::ROTOR, 26, CYCLE),
 ];
 
-/// An open-loop start's work in each period of a cycle.
-#[rustfmt::skip]
-const START: [Work; CYCLE as usize] = [
-    /*  0 */ StartCurrent, Damp, ObserverGains, Damp, Supply,  Damp, Bounds,   Damp,
-    /*  8 */ StartCurrent, Damp, Setpoint,      Damp, Nothing, Damp, Nothing,  Damp,
-    /* 16 */ StartCurrent, Damp, DeadTimeSign,  Damp, Supply,  Damp, Bounds,   Damp,
-    /* 24 */ StartCurrent, Damp, Rotor,         Damp, Standby, Damp, HandOver, Damp,
+/// An open-loop start's. Its current takes little of the supply's voltage and is bounded by the supply alone: it
+/// needs neither the longest vector nor the bounds by the speed.
+const START: &[Row] = &[
+    (Work::DAMP, 1, DAMP_PERIODS),
+    (Work::START_CURRENT, 0, PERIODS),
+    (Work::DEAD_TIME_SIGN, 2, PERIODS),
+    (Work::SUPPLY, 4, SUPPLY_PERIODS),
+    (Work::TRIP_LEVEL, 6, SUPPLY_PERIODS),
+    (Work::SUPPLY_BOUNDS, 6, SUPPLY_PERIODS),
+    (Work::OBSERVER_GAINS, 2, CYCLE),
+    (Work::DELAY_COMPENSATION, 10, CYCLE),
+    (Work::SETPOINT, 10, CYCLE),
+    (Work::DECOUPLING, 26, CYCLE),
+    (Work::ROTOR, 26, CYCLE),
+    (Work::STAND_BY, 28, CYCLE),
+    (Work::HAND_OVER, 30, CYCLE),
 ];
 
-/// Returns true if a piece is in every so many slots from its first on, and in no other.
-const fn is_every(schedule: &[Work; CYCLE as usize], work: Work, periods: u32) -> bool {
+/// Both schedules, one behind the other.
+const SLOTS: [Cycle; 2] = [cycle(RUN), cycle(START)];
+
+/// Returns true if a piece is due every so many periods of a cycle, and in no other.
+const fn is_every(cycle: &Cycle, piece: Work, periods: u32) -> bool {
     let mut first = 0;
-    while schedule[first] as u8 != work as u8 {
+    while !cycle[first].includes(piece) {
         first += 1;
     }
     let mut period = 0;
-    while period < schedule.len() {
+    while period < cycle.len() {
         let due = period % periods as usize == first % periods as usize;
-        if (schedule[period] as u8 == work as u8) != due {
+        if cycle[period].includes(piece) != due {
             return false;
         }
         period += 1;
@@ -93,31 +156,29 @@ const fn is_every(schedule: &[Work; CYCLE as usize], work: Work, periods: u32) -
     first < periods as usize
 }
 
+// The paces that are counted on where the work is done, or that its limits are made for.
 const _: () = {
-    assert!(is_every(&RUN, Reference, PERIODS));
-    assert!(is_every(&START, StartCurrent, PERIODS));
-    assert!(is_every(&START, Damp, DAMP_PERIODS));
-    assert!(is_every(&START, Standby, CYCLE));
-    assert!(is_every(&START, HandOver, CYCLE));
-    assert!(is_every(&START, Supply, SUPPLY_PERIODS));
-    assert!(is_every(&RUN, SpeedBounds, SUPPLY_PERIODS));
+    let [run, start] = &SLOTS;
+    assert!(is_every(run, Work::REFERENCE, PERIODS));
+    assert!(is_every(run, Work::SUPPLY, SUPPLY_PERIODS));
+    assert!(is_every(run, Work::LONGEST_VECTOR, SUPPLY_PERIODS));
+    assert!(is_every(run, Work::SPEED_BOUNDS, SUPPLY_PERIODS));
+    assert!(is_every(start, Work::START_CURRENT, PERIODS));
+    assert!(is_every(start, Work::DAMP, DAMP_PERIODS));
+    assert!(is_every(start, Work::SUPPLY, SUPPLY_PERIODS));
     let mut n = 0;
-    while n < 2 {
-        let schedule = [&RUN, &START][n];
-        assert!(is_every(schedule, Bounds, SUPPLY_PERIODS));
-        assert!(is_every(schedule, DeadTimeSign, CYCLE));
-        assert!(is_every(schedule, ObserverGains, CYCLE));
-        assert!(is_every(schedule, Setpoint, CYCLE));
-        assert!(is_every(schedule, Rotor, CYCLE));
+    while n < SLOTS.len() {
+        assert!(is_every(&SLOTS[n], Work::DEAD_TIME_SIGN, PERIODS));
+        assert!(is_every(&SLOTS[n], Work::SUPPLY_BOUNDS, SUPPLY_PERIODS));
+        assert!(is_every(&SLOTS[n], Work::OBSERVER_GAINS, CYCLE));
+        assert!(is_every(&SLOTS[n], Work::SETPOINT, CYCLE));
+        assert!(is_every(&SLOTS[n], Work::ROTOR, CYCLE));
         n += 1;
     }
 };
 
 /// Period of a cycle: of Run's below [`CYCLE`], of the open-loop start's from there.
 pub(super) type Slot = u8;
-
-/// Both schedules, one behind the other.
-const SLOTS: [[Work; CYCLE as usize]; 2] = [RUN, START];
 
 /// Takes the slot on by a period, and says what is done in it.
 #[inline(always)]

@@ -23,14 +23,14 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
     // so, in two slots of a cycle. This comes before the sample is read, so that no sample is kept across it.
     let field_oriented = if state.is_decided_for(&setpoint) {
         match schedule::next(&mut state.foc.loops.slot) {
-            Work::Nothing => true,
-            Work::Reference => {
+            Work::NOTHING => true,
+            Work::REFERENCE => {
                 // A drive's first period is in this slot.
                 state.shared.seen.phase = state.phase;
                 outer_loop::reference(config, &mut state.foc, &state.shared, &setpoint);
                 true
             }
-            work => outer(config, state, &setpoint, work),
+            due => outer(config, state, &setpoint, due),
         }
     } else {
         !asks_nothing_new(config, state, &setpoint) && decide(config, state, &setpoint)
@@ -119,8 +119,8 @@ fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> 
 fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     // This period's slice of the outer loop is left out, since it comes round again; but not the damping of a
     // start, in which the observer is told once where the aligned rotor is.
-    let work = schedule::next(&mut state.foc.loops.slot);
-    if work == Work::Damp && state.phase.is_open_loop() {
+    let due = schedule::next(&mut state.foc.loops.slot);
+    if due.includes(Work::DAMP) && state.phase.is_open_loop() {
         open_loop::damp(config, &mut state.foc, &state.shared, state.phase);
     }
     if let Setpoint::Fault(fault) = setpoint {
@@ -141,52 +141,44 @@ fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
 // Cold, so that what it needs is not in the way of the periods without.
 #[cold]
 #[inline(never)]
-fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, work: Work) -> bool {
+fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> bool {
     let phase = state.phase;
     let State { foc, shared, .. } = state;
-    let mut why = None;
-    match work {
-        Work::Nothing | Work::Reference => {}
-        Work::Damp => open_loop::damp(config, foc, shared, phase),
-        Work::StartCurrent => why = open_loop::current(config, foc, shared, (phase, setpoint)),
-        Work::DeadTimeSign | Work::ObserverGains => {
-            outer_loop::dead_time_sign(config, foc);
-            if work == Work::ObserverGains {
-                outer_loop::observer_gains(config, foc);
-            }
-            if !phase.is_open_loop() {
-                outer_loop::supply(shared);
-            }
+    let why = match due {
+        Work::DAMP => {
+            open_loop::damp(config, foc, shared, phase);
+            None
         }
-        Work::Supply => outer_loop::supply(shared),
-        Work::Bounds => {
-            outer_loop::trip_level(config, shared);
-            outer_loop::supply_bounds(config, foc, shared);
-            if !phase.is_open_loop() {
-                outer_loop::longest_vector(config, shared);
-            }
+        Work::START_CURRENT => open_loop::current(config, foc, shared, (phase, setpoint)),
+        Work::STAND_BY => {
+            open_loop::stand_by(config, foc);
+            None
         }
-        Work::SpeedBounds => outer_loop::speed_bounds(config, foc, shared),
-        Work::Setpoint => {
-            outer_loop::delay_compensation(config, foc, shared);
-            outer_loop::dead_time_sign(config, foc);
-            why = asked(config, state, setpoint);
-        }
-        Work::Rotor => {
-            why = open_loop::rotor(config, foc, shared, phase);
-            if why.is_none() {
-                outer_loop::dead_time_sign(config, foc);
-                outer_loop::decoupling(config, foc, shared);
-            }
-        }
-        Work::Standby => open_loop::stand_by(config, foc),
-        Work::HandOver => why = open_loop::hand_over(config, foc, shared, phase),
-    }
+        Work::HAND_OVER => open_loop::hand_over(config, foc, shared, phase),
+        _ => together(config, state, setpoint, due),
+    };
     if let Some(why) = why {
         state.change(config, why);
     }
     state.shared.seen.phase = state.phase;
     state.is_decided()
+}
+
+/// The pieces that may be due in one period, and what they make of the mode.
+#[inline(always)]
+fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> Option<Why> {
+    let State { foc, shared, .. } = state;
+    if due.includes(Work::ROTOR)
+        && let Some(why) = open_loop::rotor(config, foc, shared, state.phase)
+    {
+        return Some(why);
+    }
+    outer_loop::work(config, foc, shared, due);
+    if due.includes(Work::SETPOINT) {
+        asked(config, state, setpoint)
+    } else {
+        None
+    }
 }
 
 /// A period with the bridge off.

@@ -7,7 +7,7 @@ use crate::control::{PERIODS, dead_time, observer, torque, voltage};
 use crate::drive::config::Config;
 use crate::drive::io::Setpoint;
 use crate::drive::phase::Phase;
-use crate::drive::schedule::{CYCLE, SUPPLY_PERIODS};
+use crate::drive::schedule::{CYCLE, SUPPLY_PERIODS, Work};
 use crate::drive::seen::bus_current;
 use crate::drive::shared::Shared;
 use crate::math::{Held, sin_cos};
@@ -34,6 +34,39 @@ pub(in crate::drive) fn ready(config: &Config, foc: &mut State, shared: &mut Sha
     }
 }
 
+/// The pieces that follow what is measured, in any mode, and change none.
+// In the code of its only caller, of whose longest period a call would be 20 instructions.
+#[inline(always)]
+pub(in crate::drive) fn work(config: &Config, foc: &mut State, shared: &mut Shared, due: Work) {
+    if due.includes(Work::DELAY_COMPENSATION) {
+        delay_compensation(config, foc, shared);
+    }
+    if due.includes(Work::DEAD_TIME_SIGN) {
+        dead_time_sign(config, foc);
+    }
+    if due.includes(Work::OBSERVER_GAINS) {
+        observer_gains(config, foc);
+    }
+    if due.includes(Work::SUPPLY) {
+        supply(shared);
+    }
+    if due.includes(Work::TRIP_LEVEL) {
+        trip_level(config, shared);
+    }
+    if due.includes(Work::SUPPLY_BOUNDS) {
+        supply_bounds(config, foc, shared);
+    }
+    if due.includes(Work::LONGEST_VECTOR) {
+        longest_vector(config, shared);
+    }
+    if due.includes(Work::SPEED_BOUNDS) {
+        speed_bounds(config, foc, shared);
+    }
+    if due.includes(Work::DECOUPLING) {
+        decoupling(config, foc, shared);
+    }
+}
+
 /// The trip follows its limit.
 #[inline(always)]
 pub(in crate::drive) fn trip_level(config: &Config, shared: &mut Shared) {
@@ -47,8 +80,7 @@ pub(in crate::drive) fn supply(shared: &mut Shared) {
     shared.seen.bus_current = bus_current(shared.seen.u, shared.seen.i, &shared.supply);
 }
 
-/// The longest vector that the supply gives. The current that a start imposes takes little of it, and is
-/// bounded by the supply alone: it needs neither this nor [`speed_bounds`].
+/// The longest vector that the supply gives.
 #[inline(never)]
 pub(in crate::drive) fn longest_vector(config: &Config, shared: &mut Shared) {
     shared.supply.reach(&config.modulator, shared.seen.u.d);
