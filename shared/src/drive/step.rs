@@ -118,9 +118,8 @@ fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> 
 #[inline(never)]
 fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     // This period's slice of the outer loop is left out, since it comes round again; but not the damping of a
-    // start, in which the observer is told once where the aligned rotor is.
-    let due = schedule::next(&mut state.foc.loops.slot);
-    if due.includes(Work::DAMP) && state.phase.is_open_loop() {
+    // start, in which the observer is told once where the aligned rotor is. No other mode has this schedule.
+    if state.is_decided() && schedule::next(&mut state.foc.loops.slot) == Work::DAMP {
         open_loop::damp(config, &mut state.foc, &state.shared, state.phase);
     }
     if let Setpoint::Fault(fault) = setpoint {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::drive::config::tone::PITCH_MAX;
+use crate::drive::schedule::CYCLE;
 use crate::drive::transitions::Why;
 use crate::units::Speed;
 
@@ -188,6 +189,21 @@ fn a_rotor_that_is_seen_to_turn_is_not_braked_until_it_stands() {
             assert!(matches!(bridge, Bridge::Off | Bridge::Charge(_)), "{k}");
         }
         bench.until(Phase::Brake, Setpoint::Stop);
+    }
+}
+
+#[test]
+fn a_tone_refused_to_a_rotor_that_is_braked_does_not_hurry_what_follows_it() {
+    let mut bench = Bench::new(&[]);
+    bench.state.change(&bench.config, Why::Shorted);
+    bench.quiet(10, Setpoint::Stop);
+    let tone = tone(&bench);
+    for period in 0..100 {
+        bench.state.shared.seen.speed = bench.config.slow;
+        let before = u32::from(bench.state.foc.loops.slot);
+        assert_eq!(bench.quiet(1, tone), Bridge::Brake);
+        let slot = u32::from(bench.state.foc.loops.slot);
+        assert_eq!(slot, (before + 1) % CYCLE, "{period}");
     }
 }
 
