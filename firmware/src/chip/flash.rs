@@ -1,6 +1,6 @@
 //! Programming and erasing the flash, alike on these chips but for their words and pages.
 
-use core::sync::atomic::{Ordering, compiler_fence};
+use core::sync::atomic::{AtomicBool, Ordering, compiler_fence};
 
 use embassy_stm32::pac::flash::regs::{Cr, Sr};
 use embassy_stm32::pac::iwdg::vals::Key;
@@ -8,10 +8,20 @@ use embassy_stm32::pac::{FLASH, IWDG};
 
 pub(crate) use super::pages::{PAGE_BYTES, WORD_BYTES};
 use super::pages::{erasing, programming};
-use crate::interrupt::set_writing;
 
 /// The beginning of the flash.
 const ORIGIN: usize = 0x0800_0000;
+
+/// True while the flash is being written.
+static WRITING: AtomicBool = AtomicBool::new(false);
+
+/// Returns true while the flash is being written: the control's interrupt, which goes on, then calls
+/// nothing that lies there, and the bridge is off.
+// Always inlined: as a function it would lie in the flash itself.
+#[inline(always)]
+pub(crate) fn is_writing() -> bool {
+    WRITING.load(Ordering::Relaxed)
+}
 
 /// The flash has reported an error.
 pub(crate) struct Failed;
@@ -53,12 +63,12 @@ fn with_unlocked(act: impl FnOnce()) -> Result<(), Failed> {
         FLASH.keyr().write_value(0xcdef_89ab);
         // Flags of errors are removed by ones.
         FLASH.sr().write_value(FLASH.sr().read());
-        set_writing(true);
+        WRITING.store(true, Ordering::Relaxed);
         // The interrupt must know before the flash begins, and until it has ended.
         compiler_fence(Ordering::SeqCst);
         act();
         compiler_fence(Ordering::SeqCst);
-        set_writing(false);
+        WRITING.store(false, Ordering::Relaxed);
         let errors = Sr(FLASH.sr().read().0 & !ended().0);
         FLASH.cr().write(|w| w.set_lock(true));
         if errors.0 == 0 { Ok(()) } else { Err(Failed) }

@@ -42,8 +42,6 @@ mod start;
 #[cfg(all(board, feature = "vesc4-f405"))]
 pub(crate) use gate_driver::alarm;
 #[cfg(board)]
-pub(crate) use period::set_writing;
-#[cfg(board)]
 pub use period::{Interrupt, overruns, periods};
 #[cfg(board)]
 pub(crate) use pwm::turn_off;

@@ -1,7 +1,7 @@
 //! One control period.
 
 use core::mem;
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use siskin_control::drive::{Bridge, Config, Fault, Setpoint, State, step};
@@ -16,9 +16,6 @@ use crate::board::TIMER_HZ;
 use crate::chip;
 use crate::exchange::RunningEnd;
 use crate::last_words::{Failure, fail};
-
-/// True while the flash is being written.
-static WRITING: AtomicBool = AtomicBool::new(false);
 
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 static OVERRUNS: AtomicU32 = AtomicU32::new(0);
@@ -35,12 +32,6 @@ pub fn periods() -> u32 {
 /// Control periods since the start that were not done with when the next was due.
 pub fn overruns() -> u32 {
     OVERRUNS.load(Ordering::Relaxed)
-}
-
-/// Tells the interrupt that the flash is being written, or is not any more: meanwhile it calls nothing
-/// that lies there, and the bridge is off. For a motor at rest.
-pub(crate) fn set_writing(writing: bool) {
-    WRITING.store(writing, Ordering::Relaxed);
 }
 
 /// Everything that the interrupt owns.
@@ -82,7 +73,7 @@ impl Interrupt {
     #[inline(always)]
     pub fn run(&mut self) {
         chip::acknowledge(&self.registers.converters);
-        if WRITING.load(Ordering::Relaxed) {
+        if chip::flash::is_writing() {
             self.hold();
         } else {
             self.control();

@@ -44,7 +44,7 @@ impl Check {
         Self {
             mirror: Mirror::new(),
             setpoint_at: address(&["exchange", "ends", "SETPOINT"]).0,
-            writing_at: address(&["interrupt", "period", "WRITING"]).0,
+            writing_at: address(&["chip", "flash", "WRITING"]).0,
             owned: address(&["interrupt", "start", "INTERRUPT"]),
             inputs: None,
             places: Places::default(),
