@@ -13,6 +13,8 @@ use embassy_stm32::pac::gpio::vals::Idr;
 
 use super::rest::{Order, Rest};
 use crate::board::GATE_DRIVER;
+#[cfg(feature = "vesc4-f405")]
+use crate::chip::bridge::turn_off;
 
 /// The pins of a gate driver on its port.
 #[derive(Clone, Copy)]
@@ -88,7 +90,7 @@ fn disable(port: Gpio, pins: Pins) {
 /// The gate driver's alarm: the bridge off, the driver off.
 #[cfg(feature = "vesc4-f405")]
 pub(crate) fn alarm(registers: super::Registers) {
-    super::pwm::turn_off(registers.timer);
+    turn_off(registers.timer);
     if let Some(pins) = GATE_DRIVER {
         disable(registers.gate_driver, pins);
     }

@@ -44,8 +44,6 @@ pub(crate) use gate_driver::alarm;
 #[cfg(board)]
 pub use period::{Interrupt, overruns, periods};
 #[cfg(board)]
-pub(crate) use pwm::turn_off;
-#[cfg(board)]
 pub use registers::{Registers, Stand};
 #[cfg(board)]
 pub use start::{set_trip, start};

@@ -27,6 +27,7 @@ use siskin_control::units::Duty;
 
 use super::timing::{Timing, compare};
 use crate::board::{PHASES, SAMPLING_CLOCKS};
+use crate::chip::bridge::turn_off;
 
 /// The running PWM.
 pub(crate) struct Pwm {
@@ -286,10 +287,4 @@ impl Leg {
             Self::Switching(duty) => compare(duty, top),
         }
     }
-}
-
-/// Turns all switches off, at once. It may be called at any time, also before the timer is set up.
-#[inline(always)]
-pub(crate) fn turn_off(timer: TimAdv) {
-    timer.bdtr().modify(|w| w.set_moe(false));
 }

@@ -5,7 +5,9 @@ use core::sync::atomic::AtomicU32;
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::timer::TimAdv;
-use embassy_stm32::pac::{ADC1, ADC2, GPIOB, GPIOC, TIM1};
+use embassy_stm32::pac::{ADC1, ADC2, GPIOB, GPIOC};
+
+use crate::chip::bridge;
 
 /// The blocks that the interrupt is at.
 #[derive(Clone, Copy)]
@@ -23,7 +25,7 @@ pub struct Registers {
 impl Registers {
     /// The chip's.
     pub const CHIP: Self = Self {
-        timer: TIM1,
+        timer: bridge::TIMER,
         converters: [ADC1, ADC2],
         hall: GPIOB,
         gate_driver: GPIOC,

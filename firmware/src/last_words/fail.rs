@@ -6,8 +6,7 @@ use cortex_m::peripheral::SCB;
 use heapless::String;
 
 use super::record::{DETAILS, Failure, Record, TEXT_BYTES};
-use crate::chip;
-use crate::interrupt::{self, Registers};
+use crate::chip::{self, bridge};
 
 struct Place(UnsafeCell<Record>);
 
@@ -23,7 +22,7 @@ static PLACE: Place = Place(UnsafeCell::new(Record::empty()));
 pub fn turn_off() {
     // One instruction, and the control interrupt cannot turn the bridge on again.
     cortex_m::interrupt::disable();
-    interrupt::turn_off(Registers::CHIP.timer);
+    bridge::turn_off(bridge::TIMER);
 }
 
 /// Turns the bridge off, writes the cause down, and resets the chip.
