@@ -13,7 +13,7 @@
 //! |---|---|
 //! | [`board`] | one file a board: pins, converters; [how to add one](board#a-third-board-in-an-hour) |
 //! | [`circuit`] | one file a board: what a count is worth, for the control and for a PC that replays it |
-//! | `chip` | clock, converters' flags and comparators: what the HAL does not have, by its PAC |
+//! | `chip` | clock, flash, converters' flags, comparators, the timer that wakes at an edge: what the HAL does not have, by its PAC |
 //! | [`interrupt`] | the control period: readings, set-point, `step`, duties; and its start |
 //! | `edges` | the throttle wire's edges as the DMA leaves them in memory |
 //! | [`exchange`] | the memory that the interrupt and the tasks share, proven with loom |

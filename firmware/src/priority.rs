@@ -13,7 +13,7 @@ use critical_section::{Impl, RawRestoreState, set_impl};
 pub(crate) const PWM: u8 = 0;
 
 /// Priority of the gate driver's alarm, if the board has one.
-#[cfg(feature = "vesc4-f405")]
+#[cfg(feature = "stm32f405")]
 pub(crate) const ALARM: u8 = 1;
 
 /// Priority of every other interrupt, of the 16 levels of these chips.

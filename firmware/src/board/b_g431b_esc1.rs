@@ -4,6 +4,7 @@
 
 use core::mem;
 
+use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac::FLASH;
@@ -20,19 +21,16 @@ use siskin_control::check::{Item, Kind, Own};
 use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
+use super::wiring::{GateDriverPins, Slot, Wiring};
 use crate::chip::comparators::{self, Unfound};
 use crate::chip::pins::{self, Pin, Port, Use};
-use crate::chip::{self, converters, op_amps};
+use crate::chip::{self, capture, converters, op_amps};
 use crate::circuit::b_g431b_esc1::{
     BIAS_V, RATING_A, SHUNT_DIVIDER, SHUNT_OHM, V_PER_COUNT, ZERO_COUNTS,
 };
-use crate::interrupt::Registers;
-use crate::interrupt::gate_driver::Pins;
-use crate::interrupt::sample::{Slot, Wiring};
-use crate::interrupt::trip_level::TripCircuit;
+use crate::circuit::trip_level::TripCircuit;
 use crate::priority;
 use crate::storage::Storage;
-use crate::tasks::throttle::{self, Capture, CaptureInterrupt, Replier};
 
 pub use crate::chip::TIMER_HZ;
 pub use crate::circuit::b_g431b_esc1::{BOARD, NAME, NTC};
@@ -45,7 +43,7 @@ pub(crate) const SAMPLING_CLOCKS: u16 = 50;
 pub(crate) const BREAKS: bool = true;
 
 /// No gate driver that speaks.
-pub(crate) const GATE_DRIVER: Option<Pins> = None;
+pub(crate) const GATE_DRIVER: Option<GateDriverPins> = None;
 
 /// The phases, from 0, on the timer's channels 1, 2, 3.
 pub(crate) const PHASES: [usize; 3] = [0, 1, 2];
@@ -118,7 +116,6 @@ bind_interrupts!(struct Interrupts {
     DMA1_CHANNEL4 => dma::InterruptHandler<DMA1_CH4>;
     DMA1_CHANNEL5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_CHANNEL6 => dma::InterruptHandler<DMA1_CH6>;
-    TIM2 => CaptureInterrupt;
 });
 
 /// The throttle wire's timers and pin.
@@ -242,8 +239,9 @@ pub struct Temperature {
 
 impl Temperature {
     /// The thermistor's reading, for [`NTC`]; it waits some 8 µs for it.
-    pub fn read(&mut self) -> AdcCounts {
-        AdcCounts::from_num(self.reading.counts(crate::interrupt::periods))
+    /// `periods` counts the control periods.
+    pub fn read(&mut self, periods: fn() -> u32) -> AdcCounts {
+        AdcCounts::from_num(self.reading.counts(periods))
     }
 }
 
@@ -300,11 +298,9 @@ impl Hardware {
     }
 }
 
-/// Prepares the registers that belong to the interrupt from then on. It waits 1 ms for the amplifiers
-/// to settle.
-pub(crate) fn prepare(_bridge: Bridge, _converters: Converters) -> Registers {
+/// Prepares what belongs to the interrupt from then on. It waits 1 ms for the amplifiers to settle.
+pub(crate) fn prepare(_bridge: Bridge, _converters: Converters) {
     cortex_m::asm::delay(TIMER_HZ / 1000);
-    Registers::CHIP
 }
 
 /// Sets the comparators' level for a bound on the phase currents, peak amperes.

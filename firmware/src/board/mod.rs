@@ -2,6 +2,7 @@
 #![doc = include_str!("third.md")]
 
 mod parts;
+pub(crate) mod wiring;
 
 #[cfg(feature = "b-g431b-esc1")]
 mod b_g431b_esc1;

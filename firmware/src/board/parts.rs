@@ -8,13 +8,27 @@ macro_rules! parts {
         edges: $rising:ident $falling:ident,
         replies: $pace:ident $reply:ident $(,)?
     ) => {
-        /// The interrupt in which the throttle's task runs: one whose unit is not used.
-        pub(crate) const EXECUTOR: interrupt::Interrupt = interrupt::$executor;
+        static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+
+        /// Starts the executor of the throttle's task, in an interrupt whose unit is not used.
+        pub(crate) fn start_executor() -> SendSpawner {
+            EXECUTOR.start(interrupt::$executor)
+        }
 
         #[interrupt]
         fn $executor() {
-            throttle::run_executor();
+            // SAFETY: it is the interrupt in which the executor is started.
+            unsafe { EXECUTOR.on_interrupt() }
         }
+
+        /// The timer that captures the edges.
+        #[interrupt]
+        fn $capture() {
+            capture::attend(wire::CAPTURE);
+        }
+
+        type Edges = ([dma::Channel<'static>; 2], [dma::Request; 2]);
+        type Replies = (dma::Channel<'static>, dma::Request);
 
         /// The throttle wire.
         pub struct Throttle {
@@ -26,8 +40,9 @@ macro_rules! parts {
         }
 
         impl Throttle {
-            /// Begins to capture.
-            pub(crate) fn open(self) -> (Capture, Replier) {
+            /// Its edges' channels, those of the rising ones first, and that of its replies, each with what
+            /// asks for a transfer.
+            pub(crate) fn open(self) -> (Edges, Replies) {
                 // A wire that is not connected is at rest. A dropped pin would be given back.
                 mem::forget(CapturePin::<$capture, $channel>::new(self.pin, Pull::Up));
                 let requests = [
@@ -40,10 +55,7 @@ macro_rules! parts {
                 ];
                 let update = UpDma::<$pace>::request(&*self.reply);
                 let reply = dma::Channel::new(self.reply, Interrupts);
-                (
-                    Capture::new(channels, requests),
-                    Replier::new(reply, update),
-                )
+                ((channels, requests), (reply, update))
             }
         }
 

@@ -11,6 +11,7 @@
 
 use core::mem;
 
+use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_stm32::adc::{Adc, AdcChannel, AnyAdcChannel, Exten, InjectedAdc, SampleTime};
 use embassy_stm32::gpio::{Input, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::mode::Async;
@@ -28,14 +29,11 @@ use siskin_control::check::{Item, Own};
 use siskin_control::units::AdcCounts;
 
 use super::parts::parts;
-use crate::chip;
+use super::wiring::{GateDriverPins, Slot, Wiring};
+use crate::chip::{self, capture};
 use crate::circuit::vesc4_f405::ZERO_COUNTS;
-use crate::interrupt::gate_driver::{Pins, hear};
-use crate::interrupt::sample::{Slot, Wiring};
-use crate::interrupt::{Registers, alarm};
 use crate::priority;
 use crate::storage::Storage;
-use crate::tasks::throttle::{self, Capture, CaptureInterrupt, Replier};
 
 pub use crate::chip::TIMER_HZ;
 pub use crate::circuit::vesc4_f405::{BOARD, NAME, NTC};
@@ -49,12 +47,10 @@ pub(crate) const SAMPLING_CLOCKS: u16 = 120;
 pub(crate) const BREAKS: bool = false;
 
 /// On port C.
-pub(crate) const GATE_DRIVER: Option<Pins> = Some(DRIVER);
-
-const DRIVER: Pins = Pins {
+pub(crate) const GATE_DRIVER: Option<GateDriverPins> = Some(GateDriverPins {
     enable: 10,
     fault: 12,
-};
+});
 
 /// The phases, from 0, on the timer's channels 1, 2, 3.
 pub(crate) const PHASES: [usize; 3] = [0, 2, 1];
@@ -79,7 +75,6 @@ bind_interrupts!(struct Interrupts {
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA2_STREAM2 => dma::InterruptHandler<DMA2_CH2>;
     DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
-    TIM3 => CaptureInterrupt;
 });
 
 /// The throttle wire's timers and pin.
@@ -90,7 +85,7 @@ pub(crate) mod wire {
     use embassy_stm32::pac::timer::{TimGp16, TimGp32};
     use embassy_stm32::peripherals::{TIM3, TIM6};
 
-    use super::throttle;
+    use super::capture;
 
     /// Captures the edges.
     pub(crate) type CaptureTimer = TIM3;
@@ -143,7 +138,7 @@ pub(crate) mod wire {
                 w.set_ocm(SIGNAL_CHANNEL, Ocm::FORCE_ACTIVE);
             });
         } else {
-            throttle::capture_on(SIGNAL_CHANNEL);
+            capture::capture_on(CAPTURE, SIGNAL_CHANNEL, SIGNAL_CHANNEL);
         }
         CAPTURE.ccer().write_value(CcerGp16(level_word(on)));
     }
@@ -219,7 +214,7 @@ pub struct Temperature {
 
 impl Temperature {
     /// The thermistor's reading, for [`NTC`]; it waits 10 µs for it.
-    pub fn read(&mut self) -> AdcCounts {
+    pub fn read(&mut self, _periods: fn() -> u32) -> AdcCounts {
         let counts = self
             .converter
             .blocking_read(&mut self.pin, SampleTime::CYCLES144);
@@ -318,20 +313,13 @@ impl Hardware {
     }
 }
 
-/// Prepares the registers that belong to the interrupt from then on. It enables the gate driver and
+/// Prepares what belongs to the interrupt from then on. It enables the gate driver and
 /// waits 20 ms: the driver takes up to 10 ms, and its amplifiers must have settled before their zeros
 /// are measured.
-pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) -> Registers {
+pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) {
     bridge.enable.set_high();
     mem::forget((bridge, converters));
     cortex_m::asm::delay(TIMER_HZ / 50);
-    chip::detect(DRIVER.fault);
-    hear(DRIVER, true);
-    priority::set(chip::ALARM as usize, priority::ALARM);
-    // SAFETY: what the handler needs is in place, and no critical section relies on its being
-    // masked.
-    unsafe { cortex_m::peripheral::NVIC::unmask(chip::ALARM) };
-    Registers::CHIP
 }
 
 /// No hardware trips at a level that could be set.
@@ -340,12 +328,4 @@ pub(crate) fn set_trip(_phase_a: f32) {}
 /// No item of the self-test is this board's own: it has neither comparators nor such option bytes.
 pub(crate) fn own(_item: Item) -> Own {
     Own::Absent
-}
-
-/// nFAULT, at priority 1: not even the tasks' critical sections hold it up.
-#[interrupt]
-#[unsafe(link_section = ".control")]
-fn EXTI15_10() {
-    alarm(Registers::CHIP);
-    chip::heard(DRIVER.fault);
 }

@@ -1,6 +1,7 @@
 //! The chips: code that boards with one share, and that the HAL does not have.
 
 pub(crate) mod bridge;
+pub(crate) mod capture;
 pub(crate) mod flash;
 #[cfg(feature = "stm32f405")]
 mod stm32f4;

@@ -1,29 +1,28 @@
 //! The gate driver: its alarm, and when the bridge may be turned on.
 //!
-//! A DRV8302 turns its gates off by itself and pulls nFAULT low. The pin's interrupt ([`alarm`])
-//! then turns the bridge off and the driver with it; the PWM interrupt reads the pin too, each
+//! A DRV8302 turns its gates off by itself and pulls nFAULT low. The pin's interrupt then
+//! turns the bridge off and the driver with it; the PWM interrupt reads the pin too, each
 //! period, and lets the driver come up again when some time has passed. Until then the pin's interrupt
 //! is masked: a driver that comes up pulls nFAULT low as well.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
+#[cfg(feature = "stm32f405")]
+use embassy_stm32::interrupt;
 use embassy_stm32::pac::EXTI;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::Idr;
 
+#[cfg(feature = "stm32f405")]
+use super::registers::Registers;
 use super::rest::{Order, Rest};
 use crate::board::GATE_DRIVER;
-#[cfg(feature = "vesc4-f405")]
-use crate::chip::bridge::turn_off;
-
-/// The pins of a gate driver on its port.
-#[derive(Clone, Copy)]
-pub(crate) struct Pins {
-    /// Enables it, high.
-    pub(crate) enable: usize,
-    /// Its alarm, low.
-    pub(crate) fault: usize,
-}
+use crate::board::wiring::GateDriverPins;
+#[cfg(feature = "stm32f405")]
+use crate::{
+    chip::{self, bridge::turn_off},
+    priority,
+};
 
 /// True if the alarm's interrupt has turned the driver off since the last period.
 static ALARMED: AtomicBool = AtomicBool::new(false);
@@ -59,7 +58,7 @@ impl GateDriver {
 
     #[cold]
     #[inline(never)]
-    fn attend(&mut self, pins: Pins, alarm: bool) {
+    fn attend(&mut self, pins: GateDriverPins, alarm: bool) {
         match self.rest.step(alarm) {
             Order::Sleep => {
                 hear(pins, false);
@@ -77,22 +76,41 @@ impl GateDriver {
 
 /// Lets a falling edge of the alarm's line ask for its interrupt from now on, or no more. This line is
 /// the only one of EXTI that is used.
-pub(crate) fn hear(pins: Pins, hears: bool) {
+fn hear(pins: GateDriverPins, hears: bool) {
     // An alarm that was masked is not reported later: the level is read each period.
     EXTI.pr(0).write(|w| w.set_line(pins.fault, true));
     EXTI.imr(0).modify(|w| w.set_line(pins.fault, hears));
 }
 
-fn disable(port: Gpio, pins: Pins) {
+fn disable(port: Gpio, pins: GateDriverPins) {
     port.bsrr().write(|w| w.set_br(pins.enable, true));
 }
 
-/// The gate driver's alarm: the bridge off, the driver off.
-#[cfg(feature = "vesc4-f405")]
-pub(crate) fn alarm(registers: super::Registers) {
+/// Lets the driver's alarm ask for its interrupt, at priority 1: not even the tasks' critical sections hold
+/// it up.
+#[cfg(feature = "stm32f405")]
+pub(super) fn begin() {
+    let Some(pins) = GATE_DRIVER else {
+        return;
+    };
+    chip::detect(pins.fault);
+    hear(pins, true);
+    priority::set(chip::ALARM as usize, priority::ALARM);
+    // SAFETY: what the handler needs is in place, and no critical section relies on its being
+    // masked.
+    unsafe { cortex_m::peripheral::NVIC::unmask(chip::ALARM) };
+}
+
+/// nFAULT: the bridge off, the driver off.
+#[cfg(feature = "stm32f405")]
+#[interrupt]
+#[unsafe(link_section = ".control")]
+fn EXTI15_10() {
+    let registers = Registers::CHIP;
     turn_off(registers.timer);
     if let Some(pins) = GATE_DRIVER {
         disable(registers.gate_driver, pins);
+        ALARMED.store(true, Ordering::Relaxed);
+        chip::heard(pins.fault);
     }
-    ALARMED.store(true, Ordering::Relaxed);
 }

@@ -12,8 +12,7 @@ use super::pwm::Pwm;
 use super::registers::Registers;
 use super::sample::sample;
 use super::timing::Timing;
-use crate::board::TIMER_HZ;
-use crate::chip;
+use crate::chip::{self, TIMER_HZ};
 use crate::exchange::RunningEnd;
 use crate::last_words::{Failure, fail};
 

@@ -6,6 +6,7 @@ use cortex_m::peripheral::{NVIC, SCB};
 use embassy_stm32::interrupt;
 
 use super::period::Interrupt;
+use super::registers::Registers;
 use crate::board;
 use crate::chip;
 use crate::exchange::{InterruptCell, RunningEnd};
@@ -28,9 +29,11 @@ pub fn start(bridge: board::Bridge, converters: board::Converters, end: RunningE
     // address; embassy has not been given it.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     vectors_in_ram(&mut core.SCB);
-    let registers = board::prepare(bridge, converters);
+    board::prepare(bridge, converters);
+    #[cfg(feature = "stm32f405")]
+    super::gate_driver::begin();
     // SAFETY: the interrupt is not enabled, and this runs in thread mode.
-    let put = unsafe { INTERRUPT.put(|| Interrupt::new(registers, end)) };
+    let put = unsafe { INTERRUPT.put(|| Interrupt::new(Registers::CHIP, end)) };
     assert!(put, "the interrupt is started once");
     // SAFETY: as above; the cell is filled.
     critical_section::with(|_| unsafe { INTERRUPT.with(Interrupt::begin) });

@@ -7,8 +7,8 @@ use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::Sample;
 
 use crate::board::{self, NTC, Temperature};
-use crate::interrupt::Registers;
 use crate::interrupt::sample::sample;
+use crate::interrupt::{self, Registers};
 
 /// Time between two readings: the board's copper takes seconds to warm.
 const EVERY: Duration = Duration::from_millis(10);
@@ -34,7 +34,7 @@ impl Health {
     pub(crate) fn look(&mut self, now: Instant) {
         if now >= self.due {
             self.due = now + EVERY;
-            self.temperature_c = NTC.celsius(self.sensor.read());
+            self.temperature_c = NTC.celsius(self.sensor.read(interrupt::periods));
         }
     }
 

@@ -15,7 +15,7 @@ use super::health::Health;
 use super::light::Light;
 use super::mavlink::Desk;
 use super::supervisor::Supervisor;
-use super::throttle::{Listener, Port};
+use super::throttle::{Capture, Listener, Port, Replier};
 use super::trouble::Teller;
 use super::{kiss, mavlink, throttle};
 use crate::board::wire::TICK_HZ;
@@ -54,14 +54,14 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     let snapshot = &*SNAPSHOT.init(ends.snapshot);
     let limit_a = esc.params().get(ParamId::LimPhaseA);
     start_interrupt(esc, hardware.bridge, hardware.converters, ends.interrupt);
-    let (capture, replier) = hardware.throttle.open();
+    let ((edges, asked), (reply, update)) = hardware.throttle.open();
     let listener = Listener {
         port,
-        capture,
+        capture: Capture::new(edges, asked),
         setpoint: ends.setpoint,
         snapshot,
     };
-    throttle::start(listener, replier);
+    throttle::start(listener, Replier::new(reply, update));
 
     let (out, line) = hardware.mavlink.open(baud).split();
     static BYTES: StaticCell<[u8; LINE_BYTES]> = StaticCell::new();

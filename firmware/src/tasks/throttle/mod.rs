@@ -10,7 +10,6 @@ mod reply;
 
 use core::cell::RefCell;
 
-use embassy_executor::InterruptExecutor;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time::Instant;
@@ -29,23 +28,13 @@ use super::trouble::TROUBLE;
 use crate::board;
 use crate::board::wire::TICK_HZ;
 use crate::exchange::{SetpointWriter, SnapshotReader};
-#[cfg(feature = "vesc4-f405")]
-pub(crate) use capture::capture_on;
-pub(crate) use capture::{Capture, CaptureInterrupt};
+pub(crate) use capture::Capture;
 use reply::Armed;
 pub(crate) use reply::Replier;
 
-static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
-
-/// Runs the throttle's task; for the interrupt that its executor has.
-pub(crate) fn run_executor() {
-    // SAFETY: called by the interrupt of `start` alone.
-    unsafe { EXECUTOR.on_interrupt() }
-}
-
 /// Starts the task.
 pub(crate) fn start(listener: Listener, replier: Replier) {
-    let spawner = EXECUTOR.start(board::EXECUTOR);
+    let spawner = board::start_executor();
     spawner.spawn(listen(listener, replier).expect("spawned here and nowhere else"));
 }
 
