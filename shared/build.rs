@@ -65,7 +65,11 @@ fn parameter(id: ParamId) -> String {
     if !text.unit.is_empty() {
         fields.text("units", text.unit);
     }
-    fields.bare("min", entry.min);
+    let least = match entry.kind {
+        Kind::FromMotor => 0.0,
+        Kind::Real | Kind::Whole | Kind::Derived => entry.min,
+    };
+    fields.bare("min", least);
     fields.bare("max", entry.max);
     if entry.kind == Kind::Derived {
         fields.bare("readOnly", true);

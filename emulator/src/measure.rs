@@ -14,7 +14,7 @@ use std::time::Instant;
 use serde::Serialize;
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::{self, Bridge, Sample, Setpoint};
-use siskin_control::params::{BuildError, ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, BuildError, ParamId, Params, build};
 
 use crate::plant::Fidelity;
 use crate::rig::{Bench, Rig};
@@ -169,7 +169,7 @@ impl Run {
             delay: Delay::One,
             ..Bench::default()
         };
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         // The table's range has it.
         let _ = params.set(ParamId::PwmFreqHz, (1.0 / yardstick::PERIOD_S) as f32);
         let config = build(&params, &bench.sensing.board(bench.delay))?;

@@ -14,9 +14,8 @@ pub fn parameter(name: &str, value: f32) -> Result<(ParamId, f32), String> {
         Err(SetError::ReadOnly) => Err(format!("{name} is computed and cannot be set")),
         Err(SetError::NotWhole) => Err(format!("{name} = {value} is not a whole number")),
         Err(SetError::NotFinite | SetError::OutOfRange) => Err(format!(
-            "{name} = {value} is out of range; give {} to {} {}",
-            entry.min,
-            entry.max,
+            "{name} = {value} is out of range; give {} {}",
+            entry.range(),
             id.text().unit
         )
         .trim_end()

@@ -222,12 +222,12 @@ impl Period {
 
 #[cfg(test)]
 mod tests {
-    use siskin_control::params::{ParamId, Params, build};
+    use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 
     use super::*;
 
     fn limited_to(limit_a: f32) -> Config {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         params.set(ParamId::LimPhaseA, limit_a).expect("in range");
         let bench = Bench::default();
         build(&params, &bench.sensing.board(bench.delay)).expect("it fits the bench")

@@ -6,7 +6,7 @@ use crate::input::authority::Command;
 use crate::input::{Share, reverse};
 use crate::math::{Real, TopProduct};
 use crate::params::choice::CtlMode;
-use crate::params::{self, ParamId, Params};
+use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;
 use crate::units::{Current, Scale, Speed};
 
@@ -32,13 +32,13 @@ impl Mapping {
     /// The mapping that the parameters ask for.
     pub fn new(params: &Params, scale: &Scale) -> Self {
         let full = scale.current_from_a(params.get(ParamId::LimPhaseA));
-        let speed = |id| scale.speed_from_rpm(params.get(id));
-        let least = speed(ParamId::CtlRpmMin);
+        let least = scale.speed_from_rpm(FromMotor::new(params).least_rpm);
+        let fastest = scale.speed_from_rpm(params.get(ParamId::CtlRpmMax));
         Self {
             mode: match params.choice() {
                 CtlMode::Speed => Mode::Speed {
                     least,
-                    span: speed(ParamId::CtlRpmMax).saturating_sub(least),
+                    span: fastest.saturating_sub(least),
                 },
                 CtlMode::Torque => Mode::Torque { full },
                 CtlMode::Voltage => Mode::Voltage,
@@ -101,10 +101,10 @@ fn share_of(throttle: Share, full: Current) -> Current {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::{Board, scale};
+    use crate::params::{BOSSO_BENCH, Board, scale};
 
     fn mapping(mode: f32) -> (Mapping, Scale) {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         params.set(ParamId::CtlMode, mode).expect("in range");
         let scale = scale(&params, &Board::BENCH);
         (Mapping::new(&params, &scale), scale)
@@ -175,7 +175,7 @@ mod tests {
             (8_000.0, 1047, 523.5),
             (8_000.0, 2093, 523.25),
         ] {
-            let mut params = Params::default();
+            let mut params = Params::of(&BOSSO_BENCH);
             params.set(ParamId::PwmFreqHz, pwm_hz).expect("in range");
             params.set(ParamId::CtlRpmMax, 4000.0).expect("in range");
             let mapping = Mapping::new(&params, &scale(&params, &Board::BENCH));
@@ -187,7 +187,7 @@ mod tests {
         }
         // An eighth of the control's rate is the highest that is played as it is.
         for pwm_hz in (8_000..=24_000_u16).step_by(8) {
-            let mut params = Params::default();
+            let mut params = Params::of(&BOSSO_BENCH);
             params
                 .set(ParamId::PwmFreqHz, f32::from(pwm_hz))
                 .expect("in range");

@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use crate::drive::State;
     use crate::math::Real;
-    use crate::params::{Board, Params, build};
+    use crate::params::{BOSSO_BENCH, Board, Params, build};
     use crate::units::Voltage;
 
     #[test]
@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn signals_are_what_the_snapshot_says_in_si() {
-        let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
+        let config = build(&Params::of(&BOSSO_BENCH), &Board::BENCH).expect("the defaults fit");
         let scale = config.scale;
         let mut snapshot = State::new(&config).snapshot();
         let volts = |v: f32| Voltage::from_f32(v / scale.voltage_v);

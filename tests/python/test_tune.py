@@ -1,4 +1,4 @@
-"""`siskin tune`: motors that nobody has tuned by hand start and follow the throttle with its settings."""
+"""Motors that nobody has tuned by hand start and follow the throttle with the settings that follow from them."""
 
 import json
 import math
@@ -15,6 +15,11 @@ def tune(*words) -> dict:
     ended = subprocess.run([str(TOOL), "tune", "--json", *words], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 0, ended.stderr
     return json.loads(ended.stdout)
+
+
+# What follows from the motor where it is 0.
+FROM_MOTOR = """CTL_RPM_MIN CTL_SLEW_RPM_S CTL_BW_CUR_HZ CTL_BW_SPD_HZ STA_PARK_AS STA_RAMP_A STA_RAMP_RPM_S
+    STA_RUN_RPM""".split()
 
 
 def toml(table: dict) -> str:
@@ -100,15 +105,17 @@ def flown(folder, number: int, plant: str) -> tuple[bool, bool]:
     """Whether a drawn motor turns in the end, without a fault, and whether it does so at the first attempt."""
     motor = motor_of(random.Random(number))
     words = [f"--param={name}={value:.6g}" for name, value in motor["params"].items()]
-    params = {**motor["params"], **tune(*words)}
+    followed = tune(*words)
+    assert followed.keys() == {*FROM_MOTOR, "PWM_FREQ_HZ"}
+    params = {**motor["params"], "PWM_FREQ_HZ": followed["PWM_FREQ_HZ"], **dict.fromkeys(FROM_MOTOR, 0)}
     file = folder / "drawn.toml"
     file.write_text(flight(motor, params, plant))
     status, found = scenario(file)
     assert status == 0, number
     windows = {window["name"]: window for window in found["windows"]}
-    turns = found["faults"] == [] and windows["end"]["rpm_mean"] > params["CTL_RPM_MIN"]
+    turns = found["faults"] == [] and windows["end"]["rpm_mean"] > followed["CTL_RPM_MIN"]
     # Speed mode: from CTL_RPM_MIN to CTL_RPM_MAX.
-    wanted = params["CTL_RPM_MIN"] + 0.3 * (motor["rpm"] - params["CTL_RPM_MIN"])
+    wanted = followed["CTL_RPM_MIN"] + 0.3 * (motor["rpm"] - followed["CTL_RPM_MIN"])
     follows = windows["slow"]["rpm_mean"] == pytest.approx(wanted, rel=0.03)
     at_once = windows["all"]["starts"] == 1 and not windows["all"]["lock_lost"]
     return turns, turns and follows and at_once

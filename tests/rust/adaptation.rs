@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use siskin_control::drive::Setpoint;
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::rig::{Bench, Rig};
 
 const RPM: f32 = 4500.0;
@@ -12,7 +12,7 @@ const L_UH: f64 = 30.6;
 /// What the drive takes the inductance for, over the truth, after 0.3 s at 4500 rpm from a caught
 /// rotor.
 fn found_over_true(stated_uh: f32) -> f64 {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in [
         (ParamId::PwmFreqHz, 15_000.0),
         (ParamId::MotLUh, stated_uh),

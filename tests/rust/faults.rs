@@ -9,7 +9,7 @@ use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
 use siskin_control::drive::{Bridge, Fault, Phase, Setpoint};
 use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Frame, Receiver, Request};
-use siskin_control::params::{ParamId, Params};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params};
 use siskin_control::throttle::Throttle;
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Rig};
@@ -74,7 +74,7 @@ impl Station {
 
     /// One that has turned at half throttle for 3 s.
     fn turning() -> Self {
-        let mut station = Self::new(Params::default());
+        let mut station = Self::new(Params::of(&BOSSO_BENCH));
         station.run(400, STOP);
         let seen = station.run(3_000, HALF);
         assert!((seen.rpm - 3150.0).abs() < 31.5, "{seen:?}");
@@ -273,7 +273,7 @@ fn above_lim_temp_c_the_bridge_is_off_until_5_degrees_below_it_and_zero_throttle
 #[test]
 fn a_limit_that_is_lowered_in_flight_stops_no_motor() {
     for drive in [0.0, 1.0] {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in [(ParamId::CtlDrive, drive), (ParamId::PwmFreqHz, 40_000.0)] {
             params.set(id, value).expect("in range");
         }
@@ -344,7 +344,7 @@ const THIRD_AND_LESS_MOHM: [f32; 3] = [18.0, 27.0, 36.0];
 #[test]
 fn a_rotor_that_the_published_observer_has_lost_is_a_fault() {
     for resistance_mohm in THIRD_AND_LESS_MOHM {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in [
             (ParamId::CtlObserver, 0.0),
             (ParamId::MotRMohm, resistance_mohm),
@@ -368,7 +368,7 @@ fn a_rotor_that_the_published_observer_has_lost_is_a_fault() {
 #[test]
 fn the_default_observer_keeps_that_rotor() {
     for resistance_mohm in THIRD_AND_LESS_MOHM {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         params
             .set(ParamId::MotRMohm, resistance_mohm)
             .expect("in range");
@@ -393,7 +393,7 @@ fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {
             imposed_rad_s: Some(0.0),
             ..Bench::default()
         },
-        Params::default(),
+        Params::of(&BOSSO_BENCH),
     );
     station.run(400, STOP);
     let mut starts = 0;
@@ -427,7 +427,7 @@ fn a_current_sensor_whose_zero_is_far_off_is_a_fault_before_the_bridge_is_on() {
     let started = |offset_a: f64| {
         let mut bench = Bench::default();
         bench.sensing.offset_a[1] = offset_a;
-        let mut station = Station::on(bench, Params::default());
+        let mut station = Station::on(bench, Params::of(&BOSSO_BENCH));
         station.run(400, STOP);
         let seen = station.run(2_000, HALF);
         (station, seen)

@@ -1,7 +1,7 @@
 //! Hall sensors that break, on the bench: in merged mode the flux crossings take their place.
 
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
 
@@ -9,7 +9,7 @@ use siskin_emulator::rig::{Bench, Rig};
 const MERGED: [(ParamId, f32); 2] = [(ParamId::CtlObserver, 2.0), (ParamId::CtlHall, 1.0)];
 
 fn rig(bench: Bench) -> Rig {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in MERGED {
         params.set(id, value).expect("in range");
     }

@@ -2,7 +2,7 @@
 //! of the simulated motor, to the millisecond of simulated time and with default parameters.
 
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_control::params::ParamId;
+use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::flash::FileFlash;
 use siskin_emulator::rig::{Bench, Period, Rig};
@@ -43,7 +43,7 @@ impl Flight {
             bench: Bench::default(),
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
-            overrides: overrides.to_vec(),
+            overrides: [BOSSO_BENCH.settings, overrides].concat(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         })

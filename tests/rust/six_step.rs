@@ -1,7 +1,7 @@
 //! The six-step drive on its bench, with switches, diodes and a floating phase.
 
 use siskin_control::drive::{Fault, Phase, Setpoint};
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Rig};
 
@@ -15,7 +15,7 @@ fn bench() -> Bench {
 }
 
 fn rig(bench: Bench, changes: &[(ParamId, f32)]) -> Rig {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in SIX_STEP.iter().chain(changes) {
         params.set(*id, *value).expect("in range");
     }

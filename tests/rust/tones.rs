@@ -1,7 +1,7 @@
 //! Tunes on the benches: heard, with a bounded current, by a motor that does not turn.
 
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::setpoint::Mapping;
 use siskin_control::tune::{Beacon, Note, Player, Tune};
 use siskin_emulator::device::{Device, Start};
@@ -64,7 +64,7 @@ impl Stage {
             mut bench, params, ..
         } = stand(name, Default::default()).expect("a built-in bench");
         on(&mut bench);
-        let mut believed = Params::default();
+        let mut believed = Params::of(&BOSSO_BENCH);
         for (id, value) in params.iter().chain(changes) {
             believed.set(*id, *value).expect("in range");
         }
@@ -236,7 +236,7 @@ fn the_current_is_bounded_with_r_or_l_stated_far_too_high() {
     let l = vec![(ParamId::MotLUh, 4437.0), (ParamId::CtlObserver, 1.0)];
     let eightfold = |name| {
         let standing = stand(name, Default::default()).expect("a built-in bench");
-        let mut stated = Params::default();
+        let mut stated = Params::of(&BOSSO_BENCH);
         for (id, value) in &standing.params {
             stated.set(*id, *value).expect("in range");
         }

@@ -70,10 +70,9 @@ pub(crate) fn set(params: &mut Params, id: ParamId, value: f32) -> Result<(), St
         SetError::ReadOnly => format!("{} is computed from others", entry.name),
         SetError::NotWhole => format!("{} takes whole numbers", entry.name),
         SetError::NotFinite | SetError::OutOfRange => format!(
-            "{} is {} to {} {}, and {value} is not",
+            "{} is {} {}, and {value} is not",
             entry.name,
-            entry.min,
-            entry.max,
+            entry.range(),
             id.text().unit
         ),
     })

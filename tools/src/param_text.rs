@@ -14,6 +14,9 @@ pub(crate) fn value(name: &str, value: f32) -> String {
     let Some(text) = ParamId::find(name).map(ParamId::text) else {
         return value.to_string();
     };
+    if is_from_motor(name) && value == 0.0 {
+        return "0 (from the motor)".to_owned();
+    }
     let mut choices = text.choices.iter();
     match choices.find(|(number, _)| f32::from(*number) == value) {
         Some((_, meaning)) => format!("{value} ({meaning})"),
@@ -22,14 +25,18 @@ pub(crate) fn value(name: &str, value: f32) -> String {
     }
 }
 
+/// True for a parameter that follows from the motor where it is 0.
+fn is_from_motor(name: &str) -> bool {
+    ParamId::find(name).is_some_and(|id| id.entry().kind == Kind::FromMotor)
+}
+
 /// Why a value cannot be taken, where that is for its range: `; give 1 to 60 A`.
 pub(crate) fn remedy(name: &str, value: f32) -> String {
     let Some(id) = ParamId::find(name) else {
         return String::new();
     };
     let entry = id.entry();
-    let fits = (entry.min..=entry.max).contains(&value)
-        && (entry.kind != Kind::Whole || value.fract() == 0.0);
+    let fits = entry.allows(value) && (entry.kind != Kind::Whole || value.fract() == 0.0);
     match entry.kind {
         // The ESC has said that nobody sets it.
         Kind::Derived => String::new(),
@@ -88,9 +95,9 @@ fn range(id: ParamId) -> String {
     }
     let whole = match entry.kind {
         Kind::Whole => "a whole number from ",
-        Kind::Real | Kind::Derived => "",
+        Kind::Real | Kind::FromMotor | Kind::Derived => "",
     };
-    let range = format!("{whole}{} to {}", entry.min, entry.max);
+    let range = format!("{whole}{}", entry.range());
     match text.unit {
         "" => range,
         unit => format!("{range} {unit}"),

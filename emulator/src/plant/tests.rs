@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use proptest::prelude::*;
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_control::params::{Params, build};
+use siskin_control::params::{BOSSO_BENCH, Params, build};
 use siskin_control::units::Duty;
 
 use super::*;
@@ -340,7 +340,7 @@ fn rig_with(plant: Fidelity, extras: Extras) -> Rig {
         extras,
         ..Bench::default()
     };
-    let config = build(&Params::default(), &bench.sensing.board(bench.delay)).unwrap();
+    let config = build(&Params::of(&BOSSO_BENCH), &bench.sensing.board(bench.delay)).unwrap();
     Rig::new(bench, config)
 }
 

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::{Bridge, Setpoint};
-use siskin_control::params::{Params, build};
+use siskin_control::params::{BOSSO_BENCH, Params, build};
 use vcd::{Command, ScopeItem, Value};
 
 use super::{Recorder, Row};
@@ -16,7 +16,7 @@ use crate::watch::Watch;
 
 fn rig() -> Rig {
     let sensing = Sensing::default();
-    let config = build(&Params::default(), &sensing.board(Delay::One)).unwrap();
+    let config = build(&Params::of(&BOSSO_BENCH), &sensing.board(Delay::One)).unwrap();
     let bench = Bench {
         sensing,
         dead_time_s: Some(500e-9),

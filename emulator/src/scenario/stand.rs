@@ -59,12 +59,15 @@ mod tests {
 
     use super::*;
     use crate::bench::library;
+    use siskin_control::params::BOSSO_BENCH;
 
     #[test]
     fn the_default_bench_is_the_first_one_of_the_library() {
         let standing = stand(library::DEFAULT, Table::new()).unwrap();
         assert_eq!(standing.bench, Bench::default());
-        assert_eq!(standing.params, []);
+        let of_bench = |setting| standing.params.contains(setting);
+        assert!(BOSSO_BENCH.settings.iter().all(of_bench));
+        assert_eq!(standing.params.len(), BOSSO_BENCH.settings.len());
         assert_eq!(standing.names, ["antigravity-4006-kv380", "cfprop-13x4.4"]);
     }
 

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
     use siskin_control::control::delay::Delay;
     use siskin_control::control::sensing::Shunts;
-    use siskin_control::params::{Board, LeastDeadTime, ParamId, Params, build};
+    use siskin_control::params::{BOSSO_BENCH, Board, LeastDeadTime, ParamId, Params, build};
 
     /// Any board.
     const BOARD: Board = Board {
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn parameters_become_clocks() {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         params.set(ParamId::PwmFreqHz, 24_000.0).expect("in range");
         params.set(ParamId::PwmDeadtimeNs, 500.0).expect("in range");
         let config = build(&params, &BOARD).expect("it makes a drive");

@@ -12,7 +12,7 @@ use super::observer::{self, back_emf};
 use super::regulator::Feedback;
 use super::transform::Dq;
 use crate::drive::Config;
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::units::{Angle, Current, InverseFlux, Speed, Torque, Voltage, WideVoltage};
 
 mod inductance;
@@ -42,7 +42,7 @@ const K_I_OMEGA: f64 = 41.7e-3;
 const TABLE_III: f64 = 0.02;
 
 fn config_with(changes: &[(ParamId, f32)]) -> Config {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     params.set(ParamId::PwmFreqHz, 15_000.0).expect("in range");
     for (id, value) in changes {
         params.set(*id, *value).expect("in range");

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::vec::Vec;
 
 use super::*;
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::units::{AdcCounts, Current, Speed};
 
 mod any;
@@ -18,7 +18,7 @@ mod tones;
 const COUNTS_PER_A: f64 = 2048.0 / 40.0;
 
 fn config_with(changes: &[(ParamId, f32)]) -> Config {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in changes {
         params.set(*id, *value).expect("in range");
     }

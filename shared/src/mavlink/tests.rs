@@ -21,7 +21,7 @@ use crate::drive::{Faults, Phase};
 use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
 use crate::params::Board;
-use crate::params::{BuildError, ParamId, Params};
+use crate::params::{BOSSO_BENCH, BuildError, ParamId, Params};
 use crate::telemetry::{SIGNALS, Telemetry};
 
 pub(super) const TELEMETRY: Telemetry = Telemetry {
@@ -77,7 +77,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Self::with(Params::default(), 1_000_000)
+        Self::with(Params::of(&BOSSO_BENCH), 1_000_000)
     }
 
     /// The start text has been sent.

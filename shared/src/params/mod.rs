@@ -2,6 +2,7 @@
 
 mod board;
 mod build;
+mod from_motor;
 mod preset;
 mod table;
 mod values;
@@ -9,6 +10,7 @@ mod values;
 pub use board::{Board, LeastDeadTime};
 pub use build::{BuildError, FluxSettings, build, build_in, input, scale};
 pub(crate) use build::{TRIP_SHARE, lost_periods, test_current};
-pub use preset::{BOSSO_TABLE_III, PRESETS, Preset};
+pub use from_motor::FromMotor;
+pub use preset::{BOSSO_BENCH, BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Choice, Kind, ParamId, Parameter, TABLE, Text, choice};
 pub use values::{Params, SetError};

@@ -1,12 +1,16 @@
 //! The one table of parameters.
 
-/// The kind of a parameter: fractions, whole numbers, or computed from others.
+use core::fmt;
+
+/// The kind of a parameter: fractions, whole numbers, following from the motor, or computed from others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Any value in range.
     Real,
     /// Whole numbers in range.
     Whole,
+    /// Any value in range, or 0 for the one that [follows from the motor](super::FromMotor).
+    FromMotor,
     /// Computed from other parameters; it cannot be set and is not stored.
     Derived,
 }
@@ -20,16 +24,33 @@ pub struct Parameter {
     pub name: &'static str,
     /// Fractions, whole numbers or derived.
     pub kind: Kind,
-    /// Least value that is accepted.
+    /// Least value that is accepted, beside the 0 of [`Kind::FromMotor`].
     pub min: f32,
     /// Greatest value that is accepted.
     pub max: f32,
-    /// Value from the factory: the bench of the first paper, an Antigravity 4006 KV380 with a
-    /// 13×4.4 propeller at 24 V.
+    /// Value from the factory: the motor of the first paper, an Antigravity 4006 KV380 with a 13×4.4
+    /// propeller at 24 V, and settings that follow from it.
     pub default: f32,
     /// True if it may change while the motor turns. All others describe the motor, the bridge, the wire
     /// or the way it is driven, and wait until it stands.
     pub live: bool,
+}
+
+impl Parameter {
+    /// Returns true for a value in range.
+    pub fn allows(&self, value: f32) -> bool {
+        (self.min..=self.max).contains(&value) || (self.kind == Kind::FromMotor && value == 0.0)
+    }
+
+    /// The range in words, without its unit.
+    pub fn range(&self) -> impl fmt::Display + '_ {
+        fmt::from_fn(|f| {
+            if self.kind == Kind::FromMotor {
+                f.write_str("0 (from the motor), or ")?;
+            }
+            write!(f, "{} to {}", self.min, self.max)
+        })
+    }
 }
 
 /// A parameter's words for a person. They are apart from the table so that a chip, which serves them in
@@ -242,14 +263,14 @@ parameters! {
             1 On "on";
     27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
         "Mechanical speed at full throttle in speed mode";
-    28 CtlRpmMin "CTL_RPM_MIN" "rpm" Real 100.0..200000.0 = 300.0
-        "Mechanical speed at the least throttle above zero in speed mode";
-    29 CtlSlewRpmS "CTL_SLEW_RPM_S" "rpm/s" Real 10.0..10000000.0 = 20000.0 live
-        "Greatest change of the speed reference";
-    30 CtlBwCurHz "CTL_BW_CUR_HZ" "Hz" Real 10.0..5000.0 = 375.0
-        "Bandwidth of the current loop and of the back-EMF observer";
-    31 CtlBwSpdHz "CTL_BW_SPD_HZ" "Hz" Real 0.1..200.0 = 7.9 live
-        "Bandwidth of the speed loop";
+    28 CtlRpmMin "CTL_RPM_MIN" "rpm" FromMotor 100.0..200000.0 = 0.0
+        "Mechanical speed at the least throttle above zero in speed mode; 0 follows from the motor";
+    29 CtlSlewRpmS "CTL_SLEW_RPM_S" "rpm/s" FromMotor 10.0..10000000.0 = 0.0 live
+        "Greatest change of the speed reference; 0 follows from the motor";
+    30 CtlBwCurHz "CTL_BW_CUR_HZ" "Hz" FromMotor 10.0..5000.0 = 0.0
+        "Bandwidth of the current loop and of the back-EMF observer; 0 follows from the motor";
+    31 CtlBwSpdHz "CTL_BW_SPD_HZ" "Hz" FromMotor 0.1..200.0 = 0.0 live
+        "Bandwidth of the speed loop; 0 follows from the motor";
     32 CtlAe "CTL_AE" "" Real 0.0..0.95 = 0.5
         "Observers 1 and 2: share of the extrapolated angle that a crossing leaves, at high speed";
     33 CtlPosN "CTL_POS_N" "" Whole 1.0..4.0 = 1.0
@@ -314,14 +335,14 @@ parameters! {
         "Supply voltage above which the bridge is turned off";
     65 LimTempC "LIM_TEMP_C" "degC" Real 40.0..150.0 = 100.0
         "Temperature of the board above which the bridge is turned off";
-    70 StaParkAs "STA_PARK_AS" "A.s" Real 0.01..100.0 = 0.4
-        "Current times time for which the rotor is aligned before the ramp";
-    71 StaRampA "STA_RAMP_A" "A" Real 0.1..100.0 = 4.0
-        "Current of alignment and ramp, peak";
-    72 StaRampRpmS "STA_RAMP_RPM_S" "rpm/s" Real 10.0..1000000.0 = 800.0
-        "Acceleration of the ramp at full ramp current";
-    73 StaRunRpm "STA_RUN_RPM" "rpm" Real 50.0..50000.0 = 300.0
-        "Mechanical speed at which the observer takes over from the ramp";
+    70 StaParkAs "STA_PARK_AS" "A.s" FromMotor 0.01..100.0 = 0.0
+        "Current times time for which the rotor is aligned before the ramp; 0 follows from the motor";
+    71 StaRampA "STA_RAMP_A" "A" FromMotor 0.1..100.0 = 0.0
+        "Current of alignment and ramp, peak; 0 follows from the motor";
+    72 StaRampRpmS "STA_RAMP_RPM_S" "rpm/s" FromMotor 10.0..1000000.0 = 0.0
+        "Acceleration of the ramp at full ramp current; 0 follows from the motor";
+    73 StaRunRpm "STA_RUN_RPM" "rpm" FromMotor 50.0..50000.0 = 0.0
+        "Mechanical speed at which the observer takes over from the ramp; 0 follows from the motor";
     80 TelRateHz "TEL_RATE_HZ" "Hz" Real 1.0..100.0 = 10.0 live
         "Rate of ESC_STATUS and ESC_TELEMETRY_1_TO_4";
     81 TelBaud "TEL_BAUD" "bit/s" Whole 115200.0..921600.0 = 115200.0 restart
@@ -343,7 +364,7 @@ mod tests {
     fn the_table_is_sound() {
         for (i, p) in TABLE.iter().enumerate() {
             assert!(p.name.len() <= 16 && p.name.is_ascii(), "{}", p.name);
-            assert!(p.min <= p.default && p.default <= p.max, "{}", p.name);
+            assert!(p.allows(p.default), "{}", p.name);
             assert!(!TEXTS[i].description.is_empty(), "{}", p.name);
             let choices = TEXTS[i].choices;
             for (value, meaning) in choices {

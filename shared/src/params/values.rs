@@ -1,6 +1,7 @@
 //! The values, and why one is not taken.
 
 use super::board::Board;
+use super::preset::Preset;
 use super::table::{Choice, Kind, ParamId, Parameter, TABLE};
 use crate::math::SQRT_3;
 
@@ -61,6 +62,16 @@ impl ParamId {
 }
 
 impl Params {
+    /// A named set over the defaults.
+    pub fn of(preset: &Preset) -> Self {
+        let mut params = Self::default();
+        for (id, value) in preset.settings {
+            params.values[*id as usize] = *value;
+        }
+        params.derive();
+        params
+    }
+
     /// The value of one parameter, in the unit of its entry.
     pub fn get(&self, id: ParamId) -> f32 {
         self.values[id as usize]
@@ -96,7 +107,7 @@ impl Params {
         if !value.is_finite() {
             return Err(SetError::NotFinite);
         }
-        if value < entry.min || value > entry.max {
+        if !entry.allows(value) {
             return Err(SetError::OutOfRange);
         }
         if entry.kind == Kind::Whole && libm::truncf(value) != value {

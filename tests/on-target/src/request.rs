@@ -5,7 +5,7 @@ use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
 use siskin_control::drive::{Fault, Pull, Sample, Setpoint};
 use siskin_control::image::Image;
-use siskin_control::params::{Board, LeastDeadTime, ParamId, Params, TABLE};
+use siskin_control::params::{BOSSO_BENCH, Board, LeastDeadTime, ParamId, Params, TABLE};
 use siskin_control::units::{AdcCounts, Current, Speed};
 
 /// Words of the parameters and the board.
@@ -52,7 +52,7 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
 /// The reverse of [`set_up`]. Derived parameters are derived anew.
 pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
     let (table, rest) = words.split_at(TABLE.len());
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, &bits) in ParamId::ALL.into_iter().zip(table) {
         // Refused are the derived ones only: the others have been accepted once.
         let _ = params.set(id, f32::from_bits(bits));

@@ -1,7 +1,7 @@
 //! A flight controller that sends frames at a steady rate, and everything that comes back.
 
 use siskin_control::drive::Snapshot;
-use siskin_control::params::ParamId;
+use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::flash::FileFlash;
 use siskin_emulator::rig::{Bench, Period, Rig};
@@ -91,7 +91,7 @@ impl Flight {
             bench: Bench::default(),
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
-            overrides: overrides.to_vec(),
+            overrides: [BOSSO_BENCH.settings, overrides].concat(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         })

@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::{MavMessage, STATUSTEXT_DATA};
 use mavlink::{MavlinkVersion, Message, MessageData};
 use siskin_control::answer::gcr;
 use siskin_control::drive::Setpoint;
-use siskin_control::params::ParamId;
+use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_control::units::Speed;
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::flash::FileFlash;
@@ -72,7 +72,7 @@ impl FlightController {
             bench: Bench::default(),
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
-            overrides: overrides.to_vec(),
+            overrides: [BOSSO_BENCH.settings, overrides].concat(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         })

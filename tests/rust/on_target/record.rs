@@ -2,7 +2,7 @@
 
 use fixed::types::I1F31;
 use siskin_control::drive::{Config, Phase, Sample, Setpoint, State, step};
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::units::{Current, Speed};
 use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
@@ -73,7 +73,7 @@ pub(crate) struct Run {
 impl Run {
     /// Each of the acts for so many seconds, on the default bench with its realistic sensing.
     pub(crate) fn record(changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Self {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in changes {
             params.set(*id, *value).expect("in range");
         }

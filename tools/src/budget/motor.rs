@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use siskin_control::params::{FluxSettings, ParamId};
+use siskin_control::params::{FluxSettings, FromMotor, ParamId};
 
 use super::limits::{HoldOff, Settings};
 use crate::cli::BudgetArgs;
@@ -35,7 +35,9 @@ impl Motor {
         let get = |id| f64::from(params.get(id));
         let pole_pairs = get(ParamId::MotPolePairs);
         let rad_s_per_rpm = pole_pairs * TAU / 60.0;
-        let acceleration = args.acceleration.unwrap_or(get(ParamId::CtlSlewRpmS));
+        let acceleration = args
+            .acceleration
+            .unwrap_or_else(|| f64::from(FromMotor::new(&params).slew_rpm_s));
         let drive = FluxSettings::new(&params);
         // What is given as in the paper counts at every speed.
         let from = |given: Option<f64>, above_hz: f32| match given {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::{Bridge, Phase, Setpoint};
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 
 use super::course::{Course, Legs};
 use super::means::{Means, seek};
@@ -113,7 +113,7 @@ impl Foc {
             initial_angle_turns: angle_turns,
             ..Bench::default()
         };
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         let modulation = match self.modulation {
             Modulation::SpaceVector => 0.0,
             Modulation::Sine => 1.0,

@@ -8,7 +8,7 @@ use siskin_control::control::PERIODS;
 use siskin_control::control::delay::Delay;
 use siskin_control::control::{observer, regulator, speed};
 use siskin_control::math::{Gain, Number};
-use siskin_control::params::{BOSSO_TABLE_III, Params, build};
+use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, Params, build};
 use siskin_control::units::Scale;
 
 use super::{Item, MOTOR, item};
@@ -65,7 +65,7 @@ fn value<A: Number, B: Number>(gain: Gain<A, B>) -> f64 {
 impl Gains {
     /// What the drive computes for its control period, in the paper's units.
     fn computed() -> Self {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in BOSSO_TABLE_III.settings {
             params.set(*id, *value).expect("within the table");
         }

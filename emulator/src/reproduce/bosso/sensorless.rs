@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use siskin_control::drive::{Phase, Setpoint};
-use siskin_control::params::{BOSSO_TABLE_III, ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, ParamId, Params, build};
 
 use super::means::Means;
 use super::{BUS_V, exact_sensing, load_nm};
@@ -76,7 +76,7 @@ impl Drive {
             initial_rad_s: initial_rpm * TAU / 60.0,
             ..default
         };
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         let dead_time = (ParamId::PwmDeadtimeNs, dead_time_ns);
         for (id, value) in self.params().iter().chain(&[dead_time]) {
             // Each is within the table's range.

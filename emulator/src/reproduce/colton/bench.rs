@@ -1,7 +1,7 @@
 //! The second paper's machines on the bench, from the library, under its observer.
 
 use siskin_control::drive::Setpoint;
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::units::Scale;
 
 use crate::plant::{Load, Motor};
@@ -51,7 +51,7 @@ fn drive(base: &str, keys: &str, others: &[(ParamId, f64)]) -> Drive {
     let Standing {
         bench, params: own, ..
     } = stands;
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     let others = others.iter().map(|(id, value)| (*id, *value as f32));
     let observer = [(ParamId::CtlObserver, 1.0)];
     for (id, value) in own.into_iter().chain(observer).chain(others) {

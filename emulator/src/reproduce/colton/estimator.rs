@@ -10,7 +10,7 @@ use siskin_control::control::observer::edges::{self, Sensors};
 use siskin_control::control::observer::flux_linkage::{self, HighPass};
 use siskin_control::control::observer::{crossing, position};
 use siskin_control::math::Gain;
-use siskin_control::params::{ParamId, Params, build};
+use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed, Voltage};
 
 use crate::rig::Bench;
@@ -47,7 +47,7 @@ pub(super) fn voltages(before: [f64; 3], now: [f64; 3]) -> [Voltage; 3] {
 /// The estimator of the paper: what the drive does beyond it is turned off. Its integrators forget
 /// nothing. `compensates` is whether the time from a crossing to its sample is taken into account.
 pub(super) fn config(a_e: f64, compensates: bool) -> edges::Config {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in [
         (ParamId::MotPolePairs, POLE_PAIRS),
         (ParamId::PwmFreqHz, SAMPLE_HZ),

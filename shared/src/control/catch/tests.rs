@@ -2,7 +2,7 @@ use core::f64::consts::TAU;
 use proptest::prelude::*;
 
 use super::*;
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 
 const POLE_PAIRS: f64 = 12.0;
 const FLUX_WB: f64 = 1.3e-3;
@@ -98,7 +98,7 @@ impl Coasting {
 }
 
 fn config(dividers: Dividers, pwm_hz: f64, flux_share: f64) -> Config {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     let flux_mwb = (1e3 * FLUX_WB * flux_share) as f32;
     params
         .set(ParamId::PwmFreqHz, pwm_hz as f32)

@@ -6,11 +6,11 @@ use fixed::types::I1F31;
 use crate::control::six_step::commutation::Sector;
 use crate::drive::io::in_order;
 use crate::drive::{Bridge, Config, Fault, Phase, Sample, Setpoint, State, step};
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
 fn drive(changes: &[(ParamId, f32)]) -> (Config, State) {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     let six_step = [(ParamId::PwmFreqHz, 40_000.0), (ParamId::CtlDrive, 1.0)];
     for (id, value) in six_step.iter().chain(changes) {
         params.set(*id, *value).expect("in range");
@@ -170,7 +170,7 @@ fn a_start_without_a_rotor_that_follows_fails_within_a_second_and_ends_in_a_faul
 
 #[test]
 fn fewer_than_four_periods_a_sextant_are_refused() {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     params.set(ParamId::CtlDrive, 1.0).expect("in range");
     params.set(ParamId::PwmFreqHz, 28_000.0).expect("in range");
     let error = build(&params, &Board::BENCH).expect_err("3.9 periods");

@@ -10,7 +10,7 @@ use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{crossing, flux_linkage, hall, position};
 use crate::math::{Real, settled, square_root};
 use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
-use crate::params::{ParamId, Params};
+use crate::params::{FromMotor, ParamId, Params};
 use crate::units::{Angle, Flux, Speed};
 
 /// τ_int·ω where Run ends with the defaults, at half of `STA_RUN_RPM`: there the first-order integrator
@@ -73,10 +73,11 @@ impl FluxSettings {
     /// The speeds from which whole turns and the filter are used follow from the errors that the paper
     /// gives for the greatest acceleration that the drive asks for.
     pub fn new(params: &Params) -> Self {
+        let from_motor = FromMotor::new(params);
         let get = |id| params.get(id);
-        let tau_int_s = TAU_INT / rad_s(params, SLOW_SHARE * get(ParamId::StaRunRpm));
+        let tau_int_s = TAU_INT / rad_s(params, SLOW_SHARE * from_motor.run_rpm);
         let (n, a_e) = (get(ParamId::CtlPosN), get(ParamId::CtlAe));
-        let alpha = get(ParamId::CtlSlewRpmS) * get(ParamId::MotPolePairs) / 60.0;
+        let alpha = from_motor.slew_rpm_s * get(ParamId::MotPolePairs) / 60.0;
         // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures again, and
         // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
         let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
@@ -100,14 +101,6 @@ impl FluxSettings {
 /// The electrical speed of mechanical rpm, rad/s.
 fn rad_s(params: &Params, rpm: f32) -> f32 {
     rpm * params.get(ParamId::MotPolePairs) * TAU / 60.0
-}
-
-/// The least speed that the flux is followed to, rpm.
-fn slow_rpm(params: &Params) -> f32 {
-    SLOW_SHARE
-        * params
-            .get(ParamId::StaRunRpm)
-            .min(params.get(ParamId::CtlRpmMin))
 }
 
 /// Sections 2.2 to 2.4.
@@ -149,15 +142,15 @@ pub(super) fn edges(p: &Si) -> Config {
             deadband: I0F32::from_f32(DEADBAND),
             deadband_angle: Angle::from_f32(libm::asinf(DEADBAND) / TAU),
             hold_off: U0F32::from_f32(settings.hold_off_turns),
-            patience: (PATIENCE * A_TURNS * TAU
-                / (rad_s(p.params, slow_rpm(p.params)) * p.period_s)) as u32,
+            patience: (PATIENCE * A_TURNS * TAU / (rad_s(p.params, p.slow_rpm()) * p.period_s))
+                as u32,
         },
         position: estimator(p, &settings),
         hall: hall::Config {
             patience: (HALL_PATIENCE_S / p.period_s) as u32,
         },
-        flux_above: p.scale.speed_from_rpm(get(ParamId::StaRunRpm)),
-        hall_below: p.scale.speed_from_rpm(slow_rpm(p.params)),
+        flux_above: p.scale.speed_from_rpm(p.from_motor.run_rpm),
+        hall_below: p.slow(),
     }
 }
 

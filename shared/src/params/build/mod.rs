@@ -203,22 +203,22 @@ fn refuse_contradictions(p: &Si) {
         "not below LIM_BUS_V_MAX",
     );
     p.refuse_if(
-        get(ParamId::CtlRpmMin) > get(ParamId::CtlRpmMax),
+        p.from_motor.least_rpm > get(ParamId::CtlRpmMax),
         ParamId::CtlRpmMin,
         "above CTL_RPM_MAX",
     );
     p.refuse_if(
-        get(ParamId::StaRunRpm) > get(ParamId::CtlRpmMax),
+        p.from_motor.run_rpm > get(ParamId::CtlRpmMax),
         ParamId::StaRunRpm,
         "above CTL_RPM_MAX",
     );
     p.refuse_if(
-        get(ParamId::CtlBwCurHz) > BANDWIDTH_SHARE * get(ParamId::PwmFreqHz),
+        p.from_motor.current_hz > BANDWIDTH_SHARE * get(ParamId::PwmFreqHz),
         ParamId::CtlBwCurHz,
         "above a twentieth of PWM_FREQ_HZ",
     );
     p.refuse_if(
-        get(ParamId::CtlBwSpdHz) > SPEED_SHARE * get(ParamId::CtlBwCurHz),
+        p.from_motor.speed_hz > SPEED_SHARE * p.from_motor.current_hz,
         ParamId::CtlBwSpdHz,
         "above a fifth of CTL_BW_CUR_HZ",
     );
@@ -261,7 +261,7 @@ fn low_speed(p: &Si) -> low_speed::Config {
         // As published, and not needed where sensors give the position.
         return low_speed::Config::none(phase);
     }
-    let ramp_a = p.get(ParamId::StaRampA).min(limit_a);
+    let ramp_a = p.from_motor.ramp_a.min(limit_a);
     let bias_a = BIAS_SHARE * ramp_a;
     let rad_per_unit = TAU / p.period_s;
     let end_rad_s = BIAS_END * p.resistance_ohm * bias_a / p.flux_wb;

@@ -69,9 +69,7 @@ pub(super) fn speed(p: &Si) -> Config {
 
 /// The planner of a speed regulator that acts once in `period_s`.
 pub(super) fn planner(p: &Si, period_s: f32) -> planner::Config {
-    let slew = p
-        .scale
-        .speed_from_rpm(p.get(ParamId::CtlSlewRpmS) * period_s);
+    let slew = p.scale.speed_from_rpm(p.from_motor.slew_rpm_s * period_s);
     // How ω* begins and ends to move: softly, or by the slew alone as in the papers.
     let (approach, jerk) = match p.choice() {
         CtlSpeed::Inertia => {
@@ -111,7 +109,7 @@ fn with_inertia(p: &Si) -> nested::Config {
     let k_i = pole_rad_s * pole_rad_s * p.inertia_kgm2;
     let torque = torque_per_speed(p);
     let inertia = p.inertia_kgm2 / period_s(p) * torque;
-    let trusted_rad_s = TRUST_EMF * p.resistance_ohm * p.get(ParamId::StaRampA) / p.flux_wb;
+    let trusted_rad_s = TRUST_EMF * p.resistance_ohm * p.from_motor.ramp_a / p.flux_wb;
     let trusted = trusted_rad_s * p.period_s / TAU;
     nested::Config {
         k_p: p.gain(ParamId::CtlBwSpdHz, k_p * torque),

@@ -110,7 +110,7 @@ pub(super) fn catch(p: &Si) -> catch::Config {
     let counts_per_turn = p.flux_wb * TAU / (p.period_s * p.board.terminal_v_per_count);
     let standing: Speed = p
         .scale
-        .speed_from_rpm(STANDING_SHARE * p.get(ParamId::StaRunRpm));
+        .speed_from_rpm(STANDING_SHARE * p.from_motor.run_rpm);
     let standing_counts = HIGHEST_SHARE * counts_per_turn * standing.to_f32();
     let share = |time_s: f32| I0F32::from_f32(look_s / time_s);
     let looks = |time_s: f32| (time_s / look_s) as u32;
@@ -157,7 +157,7 @@ mod tests {
     use crate::control::modulator::{Supply, duties};
     use crate::control::transform::{AlphaBeta, Order};
     use crate::drive::Config;
-    use crate::params::{Board, Params, build};
+    use crate::params::{BOSSO_BENCH, Board, Params, build};
     use crate::units::{TurnedVoltage, Voltage};
     use fixed::types::I8F24;
 
@@ -167,7 +167,7 @@ mod tests {
             charge_s: 1e-3,
             ..Board::BENCH
         };
-        let params = Params::default();
+        let params = Params::of(&BOSSO_BENCH);
         let config = build(&params, &board).expect("it makes a drive");
         let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
         let charged = |periods: u32| periods as f32 * config.charge.duty.to_num::<f32>() * period_s;
@@ -191,7 +191,7 @@ mod tests {
     };
 
     fn config(board: &Board, modulation: f32) -> Config {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         params
             .set(ParamId::CtlModulation, modulation)
             .expect("in range");

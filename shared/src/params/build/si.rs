@@ -7,6 +7,7 @@ use fixed::types::extra::Unsigned;
 
 use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
 use crate::params::board::Board;
+use crate::params::from_motor::FromMotor;
 use crate::params::table::{Choice, ParamId};
 use crate::params::values::Params;
 use crate::units::{Scale, Speed, Voltage};
@@ -37,6 +38,8 @@ const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
 /// there is.
 pub(super) struct Si<'a> {
     pub(super) params: &'a Params,
+    /// Which of them follow from the motor.
+    pub(super) from_motor: FromMotor,
     pub(super) board: &'a Board,
     pub(super) scale: Scale,
     pub(super) period_s: f32,
@@ -69,9 +72,11 @@ impl<'a> Si<'a> {
             pole_pairs,
             ..
         } = scale;
+        let from_motor = FromMotor::new(params);
         let rpm = LINEARISED_SHARE * params.get(ParamId::CtlRpmMax);
         Self {
             params,
+            from_motor,
             board,
             scale,
             period_s,
@@ -81,8 +86,8 @@ impl<'a> Si<'a> {
             inductance_h: params.get(ParamId::MotLUh) * 1e-6,
             flux_wb: params.get(ParamId::MotFluxMwb) * 1e-3,
             inertia_kgm2: params.get(ParamId::MotJGcm2) * 1e-7,
-            current_rad_s: TAU * params.get(ParamId::CtlBwCurHz),
-            speed_rad_s: TAU * params.get(ParamId::CtlBwSpdHz),
+            current_rad_s: TAU * from_motor.current_hz,
+            speed_rad_s: TAU * from_motor.speed_hz,
             linearised_rad_s: rpm * pole_pairs * TAU / 60.0,
             refused,
         }
@@ -105,12 +110,14 @@ impl<'a> Si<'a> {
         (time_s / self.period_s) as u32
     }
 
-    /// Below this speed Run ends.
+    /// Below this speed Run ends, and the flux is not followed, rpm.
+    pub(super) fn slow_rpm(&self) -> f32 {
+        SLOW_SHARE * self.from_motor.run_rpm.min(self.from_motor.least_rpm)
+    }
+
+    /// As [`Self::slow_rpm`].
     pub(super) fn slow(&self) -> Speed {
-        let least_rpm = self
-            .get(ParamId::StaRunRpm)
-            .min(self.get(ParamId::CtlRpmMin));
-        self.scale.speed_from_rpm(SLOW_SHARE * least_rpm)
+        self.scale.speed_from_rpm(self.slow_rpm())
     }
 
     /// A volt number in the control's unit.

@@ -56,12 +56,12 @@ pub(super) fn six_step(p: &Si, duty_max: f32) -> Config {
         "less than four periods a sextant at CTL_RPM_MAX",
     );
     let limit_a = get(ParamId::LimPhaseA);
-    let start_a = get(ParamId::StaRampA).min(limit_a);
+    let start_a = p.from_motor.ramp_a.min(limit_a);
     let count_v = p.board.terminal_v_per_count;
     let k_p = PROPORTIONAL / fastest;
-    let corner = CORNER_SHARE * TAU * get(ParamId::CtlBwSpdHz);
+    let corner = CORNER_SHARE * TAU * p.from_motor.speed_hz;
     let bound = BOUND_RATE * p.period_s * p.scale.current_a / limit_a.max(BOUND_LEAST_A);
-    let step = get(ParamId::StaRampRpmS) * p.period_s * p.pole_pairs * p.period_s / 60.0;
+    let step = p.from_motor.ramp_rpm_s * p.period_s * p.pole_pairs * p.period_s / 60.0;
     Config {
         planner: outer::planner(p, p.period_s),
         terminal: p.gain(ParamId::LimBusVMax, count_v / p.scale.voltage_v),
@@ -83,14 +83,14 @@ pub(super) fn six_step(p: &Si, duty_max: f32) -> Config {
         braking: p.scale.current_from_a(BRAKING_SHARE * limit_a),
         start_current: p.scale.current_from_a(start_a),
         test_current: p.scale.current_from_a(TEST_SHARE * limit_a),
-        park_charge: I36F28::from_f32(get(ParamId::StaParkAs) / (p.scale.current_a * p.period_s)),
+        park_charge: I36F28::from_f32(p.from_motor.park_as / (p.scale.current_a * p.period_s)),
         ramp: p.gain(
             ParamId::StaRampRpmS,
-            step * p.scale.current_a / get(ParamId::StaRampA),
+            step * p.scale.current_a / p.from_motor.ramp_a,
         ),
         patience: (PATIENCE_S / p.period_s) as u16,
         astray: (ASTRAY_S / p.period_s) as u16,
-        run_speed: p.scale.speed_from_rpm(get(ParamId::StaRunRpm)),
+        run_speed: p.scale.speed_from_rpm(p.from_motor.run_rpm),
         slow: p.slow(),
     }
 }

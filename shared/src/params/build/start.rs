@@ -40,7 +40,7 @@ const ASTRAY_SWINGS: f32 = 1.0;
 /// Puts the attempts of a start (section 3.2 of the second paper) into their places: each with more
 /// current, up to `LIM_PHASE_A`, and slower than the one before.
 pub(super) fn attempts(p: &Si, places: &mut [start::Config; ATTEMPTS]) {
-    let mut current_a = p.get(ParamId::StaRampA);
+    let mut current_a = p.from_motor.ramp_a;
     for (place, inertia) in places.iter_mut().zip(INERTIA) {
         let bounded_a = current_a.min(p.get(ParamId::LimPhaseA));
         *place = attempt(p, bounded_a, inertia * p.inertia_kgm2);
@@ -52,7 +52,7 @@ fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
     // What the current can accelerate, in electrical rad/s²: p·1.5·p·φ·I/J.
     let torque_nm = 1.5 * p.pole_pairs * p.flux_wb * current_a;
     let possible = TORQUE_SHARE * p.pole_pairs * torque_nm / inertia_kgm2;
-    let asked = p.get(ParamId::StaRampRpmS) * p.pole_pairs * TAU / 60.0;
+    let asked = p.from_motor.ramp_rpm_s * p.pole_pairs * TAU / 60.0;
     let acceleration = asked.min(possible);
     let step = acceleration / TAU * p.period_s * p.period_s;
     // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
@@ -60,7 +60,7 @@ fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
     let swing_rad_s = square_root(p.pole_pairs * torque_nm / inertia_kgm2);
     let yielding_s = 2.0 * SWING_DAMPING / swing_rad_s;
     let swing_as = PARK_SWINGS * TAU / swing_rad_s * current_a;
-    let park_as = p.get(ParamId::StaParkAs).max(swing_as);
+    let park_as = p.from_motor.park_as.max(swing_as);
     let park_charge = park_as / (p.scale.current_a * p.period_s);
     let voltage_per_current = p.scale.current_a / p.scale.voltage_v;
     start::Config {
@@ -80,7 +80,7 @@ fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
             ParamId::MotLUh,
             p.inductance_h * voltage_per_current * TAU / p.period_s,
         ),
-        run_speed: p.scale.speed_from_rpm(p.get(ParamId::StaRunRpm)),
+        run_speed: p.scale.speed_from_rpm(p.from_motor.run_rpm),
         xi_nominal: INVERSE_FLUX_NOMINAL,
     }
 }
@@ -88,10 +88,10 @@ fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::{Board, Params, build};
+    use crate::params::{BOSSO_BENCH, Board, Params, build};
 
     fn config(changes: &[(ParamId, f32)]) -> crate::drive::Config {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in changes {
             params.set(*id, *value).expect("in range");
         }

@@ -8,7 +8,7 @@ use super::*;
 use crate::control::PERIODS;
 use crate::control::delay::Delay;
 use crate::control::observer;
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::units::{Scale, Voltage};
 
 const R: f64 = 0.108;
@@ -18,7 +18,7 @@ const P: f64 = 12.0;
 const TS: f64 = 1.0 / 24_000.0;
 
 fn config(delay: Delay, changes: &[(ParamId, f32)]) -> (Config, Scale) {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in changes {
         params.set(*id, *value).expect("in range");
     }

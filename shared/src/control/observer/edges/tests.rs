@@ -6,7 +6,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::control::observer::{self, sector::Sector};
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::units::Scale;
 
 const R: f64 = 0.108;
@@ -42,7 +42,7 @@ fn three(length: f64, turns: f64) -> [f64; 3] {
 
 impl Bench {
     fn new(sensors: Sensors, changes: &[(ParamId, f32)]) -> Self {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in changes {
             params.set(*id, *value).expect("in range");
         }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::*;
 use crate::control::observer;
-use crate::params::{Board, ParamId, Params, build};
+use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 use crate::units::Scale;
 
 const R: f64 = 0.108;
@@ -22,7 +22,7 @@ const SECOND: f32 = 1.0;
 const FIRST_FIXED: f32 = 2.0;
 
 fn config(form: f32) -> (Config, Scale) {
-    let mut params = Params::default();
+    let mut params = Params::of(&BOSSO_BENCH);
     params.set(ParamId::CtlObserver, 1.0).expect("in range");
     params.set(ParamId::CtlFluxForm, form).expect("in range");
     let config = build(&params, &Board::BENCH).expect("the defaults fit");

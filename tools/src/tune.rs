@@ -1,20 +1,17 @@
 //! `siskin tune`: the settings of start and control loops that follow from a motor.
 
-mod rules;
-
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write;
 
 use serde_json::{Map, Value};
-use siskin_control::params::{ParamId, Params};
+use siskin_control::params::{FromMotor, ParamId, Params};
 
 use crate::cli::TuneArgs;
 use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param};
 use crate::{given, json, param_file, param_text};
-use rules::Setting;
 
 /// The motor, and what else its settings are made of.
 const MADE_OF: [ParamId; 10] = [
@@ -29,6 +26,17 @@ const MADE_OF: [ParamId; 10] = [
     ParamId::LimPhaseA,
     ParamId::LimBusVMax,
 ];
+
+/// Periods of the PWM in an electrical turn at `CTL_RPM_MAX`, at least.
+const TURN_PERIODS: f32 = 20.0;
+
+/// A setting in force.
+struct Setting {
+    id: ParamId,
+    value: f32,
+    /// What it follows from.
+    from: &'static str,
+}
 
 /// Computes the settings, prints them and writes the file. `component` is whose parameters a file of several
 /// gives.
@@ -49,11 +57,12 @@ pub(crate) fn run(
         let flux_mwb = flux_mwb(kv, &params);
         set(&mut params, ParamId::MotFluxMwb, flux_mwb)?;
     }
-    let before = params.clone();
-    let settings = rules::settings(&params);
-    for Setting { id, value, .. } in &settings {
-        set(&mut params, *id, *value)?;
-    }
+    let pwm = pwm(&params);
+    set(&mut params, ParamId::PwmFreqHz, pwm.value)?;
+    let followed = FromMotor::new(&params).reasons(&params);
+    let mut settings = Vec::from(followed.map(|(id, value, from)| Setting { id, value, from }));
+    settings.push(pwm);
+    settings.sort_by_key(|setting| setting.id as usize);
     if let Some(path) = &args.output {
         let of_motor = MADE_OF
             .iter()
@@ -72,7 +81,7 @@ pub(crate) fn run(
         });
         writeln!(out, "{}", Value::Object(values.collect::<Map<_, _>>()))?;
     } else {
-        write!(out, "{}", table(&before, &settings))?;
+        write!(out, "{}", table(&params, &settings))?;
     }
     Ok(())
 }
@@ -90,31 +99,66 @@ fn param(params: &Params, id: ParamId) -> Param {
     }
 }
 
-/// The motor, and each setting with what it was and what it follows from.
-fn table(before: &Params, settings: &[Setting]) -> String {
+/// The PWM that the speed at full throttle needs.
+fn pwm(params: &Params) -> Setting {
+    let id = ParamId::PwmFreqHz;
+    let as_it_is = params.get(id);
+    let turns_hz = params.get(ParamId::CtlRpmMax) * params.get(ParamId::MotPolePairs) / 60.0;
+    let wanted = (TURN_PERIODS * turns_hz).min(id.entry().max);
+    let (value, from) = if wanted > as_it_is {
+        (wanted, "20 periods a turn at CTL_RPM_MAX")
+    } else {
+        (as_it_is, "as it was")
+    };
+    Setting { id, value, from }
+}
+
+/// The motor, and each setting in force with what it follows from.
+fn table(params: &Params, settings: &[Setting]) -> String {
     let mut out = String::new();
-    let mut line = |name: &str, value: &str, was: &str, from: &str| {
+    let mut line = |name: &str, value: &str, from: &str| {
         // A String takes all that is written to it.
         let _ = writeln!(
             out,
             "{}",
-            format!("{name:<NAME_LENGTH$} {value:<14} {was:<14} {from}").trim_end()
+            format!("{name:<NAME_LENGTH$} {value:<14} {from}").trim_end()
         );
     };
-    let text = |id: ParamId, value| param_text::value(id.entry().name, value);
-    line("made of", "", "", "");
+    line("made of", "", "");
     for id in MADE_OF {
-        line(id.entry().name, &text(id, before.get(id)), "", "");
+        let name = id.entry().name;
+        line(name, &param_text::value(name, params.get(id)), "");
     }
-    line("", "", "", "");
-    line("setting", "value", "before", "from");
+    line("", "", "");
+    line("setting", "value", "from");
     for Setting { id, value, from } in settings {
-        line(
-            id.entry().name,
-            &text(*id, *value),
-            &text(*id, before.get(*id)),
-            from,
-        );
+        let name = id.entry().name;
+        line(name, &param_text::value(name, three_digits(*value)), from);
     }
     out
+}
+
+/// As much of a value as a person reads.
+fn three_digits(value: f32) -> f32 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fast_motor_gets_twenty_periods_a_turn_as_far_as_there_are() {
+        for (max_rpm, wanted_hz) in [
+            (10_000.0, 24_000.0),
+            (18_000.0, 42_000.0),
+            (60_000.0, 60_000.0),
+        ] {
+            let mut params = Params::default();
+            for (id, value) in [(ParamId::MotPolePairs, 7.0), (ParamId::CtlRpmMax, max_rpm)] {
+                params.set(id, value).expect("in range");
+            }
+            assert_eq!(pwm(&params).value, wanted_hz);
+        }
+    }
 }
