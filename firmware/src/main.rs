@@ -30,6 +30,6 @@ async fn main(spawner: Spawner) {
     // the stack, which would need 2.9 KB more for that alone.
     let mut fit = Fit::default();
     let mut esc = tasks::power_up(&mut hardware.flash, &mut fit);
-    let mut desk = tasks::start(spawner, hardware, &mut esc, fit);
-    desk.attend().await
+    let mut main_task = tasks::start(spawner, hardware, &mut esc, fit);
+    main_task.attend().await
 }

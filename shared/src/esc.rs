@@ -15,13 +15,13 @@ use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Reach, Reached, Throttle, Told};
 use crate::tune::Tune;
 use crate::units::Scale;
-use sound::Sound;
 use storage::{Asker, Storage, Unstored};
+use tunes::Tunes;
 
 mod check;
 mod kept;
-mod sound;
 mod storage;
+mod tunes;
 mod wire;
 
 pub use storage::obey;
@@ -45,7 +45,7 @@ pub struct Esc {
     recorder: Recorder,
     too_hot: bool,
     polled_us: Option<u64>,
-    sound: Sound,
+    tunes: Tunes,
     check: Check,
     light: bool,
     /// The motor's command at the last poll.
@@ -149,7 +149,7 @@ impl Esc {
             params,
             too_hot: false,
             polled_us: None,
-            sound: Sound::default(),
+            tunes: Tunes::default(),
             check: Check::new(&board),
             light: false,
             command: Command::Stop,
@@ -223,7 +223,7 @@ impl Esc {
         send: &mut dyn FnMut(&[u8]),
     ) {
         if self.polled_us.is_none() {
-            self.sound.play(now_us, Tune::Start);
+            self.tunes.play(now_us, Tune::Start);
         }
         let before_us = self.polled_us.replace(now_us).unwrap_or(now_us);
         self.observe(
@@ -252,9 +252,9 @@ impl Esc {
         self.command = throttle.reach(|throttle| throttle.command());
         let rests = self.command.rests();
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
-        self.sound.look(now_us, snapshot, rests);
+        self.tunes.look(now_us, snapshot, rests);
         let told = Told {
-            note: self.sound.note().filter(|_| !self.check.powers_up()),
+            note: self.tunes.note().filter(|_| !self.check.powers_up()),
             pull: self.check.pull(),
             too_hot: self.too_hot,
             barred: self.storage.is_lost() || !self.check.report.may_turn(&self.params),
@@ -347,7 +347,7 @@ impl Esc {
             }
             _ => false,
         };
-        holds && rested && self.drive().stopped && self.sound.note().is_none()
+        holds && rested && self.drive().stopped && self.tunes.note().is_none()
     }
 
     fn drive(&self) -> DriveStatus {

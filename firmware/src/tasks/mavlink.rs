@@ -55,7 +55,7 @@ fn send(mut frame: &[u8]) {
 const RESTART_POLLS: u8 = 10;
 
 /// The state of the ESC's task.
-pub struct Desk<'a> {
+pub struct MainTask<'a> {
     pub(crate) esc: &'a mut Esc,
     pub(crate) throttle: Port,
     pub(crate) line: RingBufferedUartRx<'static>,
@@ -76,7 +76,7 @@ pub struct Desk<'a> {
 }
 
 // Each out of line: the stack that one takes is free for the next.
-impl Desk<'_> {
+impl MainTask<'_> {
     /// Attends to the ESC for ever.
     pub async fn attend(&mut self) -> ! {
         let mut ticker = Ticker::every(POLL);

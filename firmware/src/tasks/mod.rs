@@ -3,7 +3,7 @@
 //! | task | does | where |
 //! |---|---|---|
 //! | `throttle::listen` | edges into set-points and answers | an executor of its own, above the others |
-//! | `main`, by [`Desk::attend`] | the ESC: MAVLink in, telemetry, storage, health, light, watchdog | thread |
+//! | `main`, by [`MainTask::attend`] | the ESC: MAVLink in, telemetry, storage, health, light, watchdog | thread |
 //! | `mavlink::transmit` | MAVLink out | thread |
 //! | `kiss::transmit` | telemetry on the serial line | thread |
 
@@ -16,5 +16,5 @@ pub(crate) mod supervisor;
 pub(crate) mod throttle;
 pub(crate) mod trouble;
 
-pub use mavlink::Desk;
+pub use mavlink::MainTask;
 pub use start::{Fit, power_up, start};

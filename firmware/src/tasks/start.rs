@@ -13,7 +13,7 @@ use static_cell::StaticCell;
 
 use super::health::Health;
 use super::light::Light;
-use super::mavlink::Desk;
+use super::mavlink::MainTask;
 use super::supervisor::Supervisor;
 use super::throttle::{Capture, Listener, Port, Replier};
 use super::trouble::Teller;
@@ -36,7 +36,7 @@ const LINE_BYTES: usize = 512;
 /// # Panics
 /// If called again.
 #[inline(never)]
-pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) -> Desk<'_> {
+pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) -> MainTask<'_> {
     tell(esc, fit);
     recall_rest(esc, &mut hardware.flash);
     let port = open_port(esc.params());
@@ -72,7 +72,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     if !has_hall_sensors {
         spawner.spawn(kiss::transmit(hardware.kiss.open()).expect(once));
     }
-    Desk {
+    MainTask {
         esc,
         throttle: port,
         line,

@@ -21,7 +21,7 @@
 //!   followed: a propeller coasts with a time constant of a second.
 //!
 //! A period with the bridge off is to be no longer than one that drives, so the work is done in
-//! turns of four periods (`Turn`). A slow rotor, whose readings are small in their noise, is
+//! four periods, a stage in each (`Stage`). A slow rotor, whose readings are small in their noise, is
 //! compared with the mean of four readings. Ages are in such looks, and so are all times of the
 //! configuration.
 
@@ -31,7 +31,7 @@ mod state;
 
 use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
 pub use state::{Config, LOOK_PERIODS, State};
-use state::{LOOK_SHIFT, SUM_FRACTION, Turn};
+use state::{LOOK_SHIFT, SUM_FRACTION, Stage};
 
 use crate::math::{SinCos, TopProduct, atan2_turns};
 use crate::trace::Trace;
@@ -81,7 +81,7 @@ pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) ->
     let held = |v: AdcCounts| I17F15::from_bits(v.to_bits() >> 1 & ((1 << 27) - 1));
     let [a, b, c] = terminals;
     let readings @ [a, b, c] = [held(a), held(b), held(c)];
-    if state.turn == Turn::Look {
+    if state.stage == Stage::Look {
         look(config, state, readings);
     } else {
         let [before_a, before_b, before_c] = state.readings;
@@ -144,9 +144,9 @@ fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     }
     if !state.seeks(config) {
         // There is nothing to weigh; this reading is the first of the next mean.
-        state.told = Difference::default();
+        state.difference = Difference::default();
         state.readings = readings;
-        state.turn = Turn::Correct;
+        state.stage = Stage::Correct;
     }
 }
 
@@ -216,10 +216,10 @@ fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     } else {
         (state.theta, readings)
     };
-    state.told = compare::compare(config.diode, theta, state.amplitude, readings);
+    state.difference = compare::compare(config.diode, theta, state.amplitude, readings);
     state.looks = state.looks.saturating_add(1);
     state.readings = [I17F15::ZERO; 3];
-    state.turn = Turn::Weigh;
+    state.stage = Stage::Weigh;
 }
 
 /// √3/4, which with a sum of its product makes √3/2.

@@ -9,7 +9,7 @@ use fixed::FixedI32;
 use fixed::types::extra::{U22, U25};
 use fixed::types::{I2F30, I6F26, I8F24, I12F20};
 
-use super::transform::{Dq, turn};
+use super::transform::{Dq, rotate};
 use crate::math::{Gain, SinCos, TopSum};
 use crate::units::Current;
 
@@ -42,7 +42,7 @@ pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certain
         d: I6F26::from_bits(d << shift),
         q: I6F26::from_bits(q << shift),
     };
-    turn(scaled, ahead)
+    rotate(scaled, ahead)
 }
 
 /// The fraction bits by which a certainty's type is finer than its gain's.

@@ -146,16 +146,16 @@ proptest! {
             ..back_emf::State::default()
         };
 
-        let (estimate, told) = back_emf::estimate(observer, &mut state, None, Speed::ZERO);
+        let (estimate, slow) = back_emf::estimate(observer, &mut state, None, Speed::ZERO);
         let omega_bar = xi * h_d.hypot(h_q);
         let omega = omega_bar + K_ETA * h_d;
         near(units.rad_s(estimate.omega_bar), omega_bar, 1e-5, 0.01)?;
         near(units.rad_s(estimate.omega), omega, 1e-5, 0.01 + TABLE_III * (K_ETA * h_d).abs())?;
         let y_f = -K_F * (omega_f - omega_bar);
-        near(units.rad_s(told.omega_bar_step) / TS, y_f, TABLE_III, 10.0)?;
+        near(units.rad_s(slow.omega_bar_step) / TS, y_f, TABLE_III, 10.0)?;
         near(units.rad_s(state.omega_f), omega_f + y_f * TS, 0.0, TABLE_III * (y_f * TS).abs() + 0.01)?;
 
-        prop_assert!(!told.lost);
+        prop_assert!(!slow.lost);
         near(units.per_wb(state.xi), xi + TS * GAMMA * h_d, 0.0, 0.03 * TS * GAMMA * h_d.abs() + 0.01)?;
 
         let measured = Dq { d: units.current(i[0]), q: units.current(i[1]) };
@@ -199,7 +199,7 @@ proptest! {
             ..back_emf::State::default()
         };
         let step = units.speed(planned * TS);
-        let (got, told) = back_emf::estimate(&config, &mut state, None, step);
+        let (got, slow) = back_emf::estimate(&config, &mut state, None, step);
         let epsilon = h_d / h_d.hypot(h_q);
         let omega_n = 400.0;
         let next = omega_i + TS * (omega_n * omega_n * epsilon + planned);
@@ -208,12 +208,12 @@ proptest! {
         let part = 1e-3 + 1.0 / 4096.0 + 1.1 * 16_384.0 / f64::from(length);
         near(units.rad_s(got.omega_bar), next, 0.0, 0.01 + part * TS * omega_n * omega_n)?;
         near(units.rad_s(got.omega), next + 2.0 * omega_n * epsilon, 0.0, 0.01 + part * 2.1 * omega_n)?;
-        near(units.rad_s(told.omega_bar_step), next - omega_i, 0.0, 0.01 + part * TS * omega_n * omega_n)?;
+        near(units.rad_s(slow.omega_bar_step), next - omega_i, 0.0, 0.01 + part * TS * omega_n * omega_n)?;
         near(units.rad_s(state.omega_i), units.rad_s(got.omega_bar), 0.0, 1e-9)?;
-        prop_assert_eq!(told.xi, config.xi_nominal);
+        prop_assert_eq!(slow.xi, config.xi_nominal);
         prop_assert_eq!(state.xi, config.xi_nominal);
         // The rotor cannot be where ĥ is opposite to what the frame expects.
-        prop_assert_eq!(told.lost, !state.h.q.is_negative());
+        prop_assert_eq!(slow.lost, !state.h.q.is_negative());
     }
 }
 

@@ -126,7 +126,7 @@ where
 
 /// Turns a vector of the rotor's frame ahead by an angle; the sine takes a fraction bit.
 #[inline(always)]
-pub fn turn<T>(v: Dq<T>, ahead: SinCos) -> Dq<T::Output>
+pub fn rotate<T>(v: Dq<T>, ahead: SinCos) -> Dq<T::Output>
 where
     T: Number + TopProduct<I1F31, Output: Number>,
 {

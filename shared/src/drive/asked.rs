@@ -61,16 +61,16 @@ fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoi
 /// While nothing drives.
 fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     let pulls = matches!(setpoint, Setpoint::Pull(_));
-    let sounds = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
+    let wants_tone = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
     let drives = setpoint.asks(config.both_ways) != Asked::Nothing;
     let stands = state.off.rotor == Rotor::Standing;
     match state.phase {
-        Phase::Tone | Phase::Sense if sounds => None,
+        Phase::Tone | Phase::Sense if wants_tone => None,
         // A test charges what it needs, and is to find a short circuit before all low sides are on.
-        Phase::Charge if pulls && stands => Some(Why::Sounds),
-        Phase::Charge if sounds && stands => None,
-        Phase::Idle if sounds && stands => Some(Why::Sound),
-        Phase::Brake if sounds && state.shared.seen.speed == Speed::ZERO => Some(Why::Sound),
+        Phase::Charge if pulls && stands => Some(Why::ToneReady),
+        Phase::Charge if wants_tone && stands => None,
+        Phase::Idle if wants_tone && stands => Some(Why::Tone),
+        Phase::Brake if wants_tone && state.shared.seen.speed == Speed::ZERO => Some(Why::Tone),
         Phase::Tone if drives => Some(Why::Drive),
         Phase::Tone if state.tone.shorted_before => Some(Why::Shorted),
         Phase::Idle if state.tone.shorted_before && !drives && stands => Some(Why::Shorted),

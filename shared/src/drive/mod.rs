@@ -27,18 +27,18 @@
 //! function, `State::change`, but for a restart under other units ([`State::adopt`]):
 //!
 //! ```text
-//!        Drive, Sound           Sensed            Stands            Aligned
+//!        Drive, Tone            Sensed            Stands            Aligned
 //!  Idle --------------> Sense ----------> Charge ----------> Park ----------> Ramp
 //!   ^ ^                   |                | | |               |   Released     |
 //!   | |     Released,     |                | | |               +----------------+--> Idle or
 //!   | +-------------------+----------------+ | |                                |    Brake
 //!   |       TooFast                          | | Caught                         |
-//!   |                                 Sounds | +---------------> Run <----------+ HandedOver
+//!   |                              ToneReady | +---------------> Run <----------+ HandedOver
 //!   | Released    Shorted                    v                  |   ^
 //!   +---------- Tone ------> Brake          Tone       Released |   | Resumed
 //!   ^             | Drive     |  |                              v   |
 //!   |             v           |  +--- Resumed ---> Run       Stopping <--- CaughtBackwards (Charge)
-//!   |           Sense <-------+ Drive, Sound                    |
+//!   |           Sense <-------+ Drive, Tone                     |
 //!   |                                                           | Stopped
 //!   |                                                           +--> Idle or Brake
 //!   +--- Coasts (Run, Stopping), Failed (Ramp, Run, Stopping), Tripped (any)

@@ -105,7 +105,7 @@ impl State {
     }
 
     /// Notes that the phase suits this set-point.
-    pub(super) fn decided_for(&mut self, config: &Config, setpoint: &Setpoint) {
+    pub(super) fn set_decided_for(&mut self, config: &Config, setpoint: &Setpoint) {
         self.decided = if self.phase.drives() && config.six_step.is_none() {
             setpoint.kind()
         } else {
@@ -154,9 +154,9 @@ impl State {
         self.off.begin();
         self.self_test = self_test::State::default();
         self.tone.end(match (from, why) {
-            (Phase::Brake, Why::Sound) => true,
+            (Phase::Brake, Why::Tone) => true,
             // On the way to a tone, or back from one that has not come to be played.
-            (Phase::Idle, Why::Sound) | (Phase::Sense | Phase::Charge, Why::Released) => {
+            (Phase::Idle, Why::Tone) | (Phase::Sense | Phase::Charge, Why::Released) => {
                 self.tone.shorted_before
             }
             _ => false,

@@ -130,7 +130,7 @@ fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     {
         state.change(config, why);
     }
-    state.decided_for(config, setpoint);
+    state.set_decided_for(config, setpoint);
     state.shared.seen.phase = state.phase;
     state.is_decided()
 }
@@ -218,7 +218,7 @@ fn energised(
             six_step::period::watch(config, (&mut state.six_step, shared), currents);
             return Bridge::Brake;
         }
-        (Phase::Tone, _) => return sound(config, state, currents, setpoint),
+        (Phase::Tone, _) => return tone_or_test(config, state, currents, setpoint),
         (Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping, Some(six_step)) => {
             let position = six_step::given::position(config, &state.foc.observer, shared);
             let drive = (&mut state.six_step, shared);
@@ -230,7 +230,7 @@ fn energised(
     };
     if let Some(why) = why {
         state.change(config, why);
-        state.decided_for(config, setpoint);
+        state.set_decided_for(config, setpoint);
     }
     state.enters_rest().unwrap_or(bridge)
 }
@@ -248,7 +248,7 @@ fn ready(
     if matches!(setpoint, Setpoint::Tone(_)) {
         // What the supply gives is all that a tone must know.
         outer_loop::ready(config, foc, shared, n);
-        return (n + 1 >= tone::READY_PERIODS).then_some(Why::Sounds);
+        return (n + 1 >= tone::READY_PERIODS).then_some(Why::ToneReady);
     }
     match &config.six_step {
         Some(six_step) => {
@@ -270,7 +270,7 @@ fn ready(
 
 /// A period of a tone or of a self-test.
 #[inline(never)]
-fn sound(
+fn tone_or_test(
     config: &Config,
     state: &mut State,
     currents: [AdcCounts; 3],

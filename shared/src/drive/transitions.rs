@@ -10,7 +10,7 @@ pub(super) enum Why {
     /// Something may turn the motor and asks for it.
     Drive,
     /// A tone or a self-test is asked for, of a rotor that stands.
-    Sound,
+    Tone,
     /// Nothing is asked for any more, or the other direction is.
     Released,
     /// Nothing is asked for any more and the shaft is to coast: without current at once.
@@ -28,7 +28,7 @@ pub(super) enum Why {
     /// The drivers are charged, and the rotor turns the other way.
     CaughtBackwards,
     /// The drivers are charged as far as a tone or a self-test needs.
-    Sounds,
+    ToneReady,
     /// The rotor has had its time to align.
     Aligned,
     /// The observer has the rotor.
@@ -50,11 +50,11 @@ pub(super) enum Why {
 pub(super) const fn next(from: Phase, why: Why, stop: Stop) -> Option<Phase> {
     use Phase::{Brake, Charge, Idle, Park, Ramp, Run, Sense, Stopping, Tone};
     Some(match (from, why) {
-        (Idle | Brake | Tone, Why::Drive) | (Idle | Brake, Why::Sound) => Sense,
+        (Idle | Brake | Tone, Why::Drive) | (Idle | Brake, Why::Tone) => Sense,
         (Sense, Why::Sensed) => Charge,
         (Sense | Charge, Why::Released | Why::TooFast) | (Tone, Why::Released) => Idle,
         (Idle | Tone, Why::Shorted) => Brake,
-        (Charge, Why::Sounds) => Tone,
+        (Charge, Why::ToneReady) => Tone,
         (Charge, Why::Stands) => Park,
         (Charge, Why::Caught) => Run,
         (Charge, Why::CaughtBackwards) => Stopping,
@@ -81,7 +81,7 @@ mod tests {
 
     const ALL: [Why; 18] = [
         Why::Drive,
-        Why::Sound,
+        Why::Tone,
         Why::Released,
         Why::Coasts,
         Why::Shorted,
@@ -90,7 +90,7 @@ mod tests {
         Why::Stands,
         Why::Caught,
         Why::CaughtBackwards,
-        Why::Sounds,
+        Why::ToneReady,
         Why::Aligned,
         Why::HandedOver,
         Why::Resumed,

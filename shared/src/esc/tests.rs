@@ -104,7 +104,7 @@ impl Bench {
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.requests.push(request);
         }
-        if let Some(note) = self.esc.sound.note()
+        if let Some(note) = self.esc.tunes.note()
             && self.notes.last() != Some(&note)
         {
             self.notes.push(note);

@@ -33,7 +33,7 @@ impl Esc {
     /// Carries out a MAVLink command.
     pub(super) fn act(&mut self, throttle: &mut impl Reach, now_us: u64, act: Act) {
         match act {
-            Act::Beep => self.sound.play(now_us, Tune::Beacon(Beacon::One)),
+            Act::Beep => self.tunes.play(now_us, Tune::Beacon(Beacon::One)),
             Act::Calibrate => throttle.reach(|throttle| throttle.calibrate(now_us, true)),
             Act::Check => self.check.begin(),
             Act::EndCalibration => throttle.reach(|throttle| throttle.calibrate(now_us, false)),
@@ -58,13 +58,13 @@ impl Esc {
             | News::Lost { armed: false }
             | News::Calibration(Step::Cancelled) => return,
         };
-        self.sound.play(now_us, tune);
+        self.tunes.play(now_us, tune);
     }
 
     fn obey(&mut self, throttle: &mut impl Reach, now_us: u64, order: Order) {
         let number = |on| f32::from(u8::from(on));
         match order {
-            Order::Beacon(beacon) => self.sound.play(now_us, Tune::Beacon(beacon)),
+            Order::Beacon(beacon) => self.tunes.play(now_us, Tune::Beacon(beacon)),
             Order::Direction { reversed } => {
                 self.change_for_now(ParamId::MotDir, number(reversed));
             }
@@ -81,7 +81,7 @@ impl Esc {
                 self.light = on;
                 self.tell_info(throttle);
             }
-            Order::Silent => self.sound.toggle_silent(),
+            Order::Silent => self.tunes.toggle_silent(),
             Order::Info | Order::Extended(_) => {}
         }
     }

@@ -76,7 +76,7 @@ const ROWS: [Row; 8] = [
         // Four of the rotation by the angle ahead, whose sine is taken now and then; four of that into the
         // stator's frame, by the sine of clarke_park; and √3/2.
         counted: [6, 9, 0, 0, 0],
-        functions: "transform::turn, inverse_park, phases_in (11)",
+        functions: "transform::rotate, inverse_park, phases_in (11)",
     },
 ];
 

@@ -2,7 +2,7 @@
 
 use fixed::types::{I0F32, I16F16, I17F15, I20F12};
 
-use super::{Config, LOOK_SHIFT, SUM_FRACTION, State, Turn};
+use super::{Config, LOOK_SHIFT, SUM_FRACTION, Stage, State};
 use crate::math::TopProduct;
 use crate::units::{Angle, Speed};
 
@@ -38,18 +38,18 @@ const QUIET: I17F15 = I17F15::lit("7");
 /// A period after a look.
 #[inline(never)]
 pub(super) fn learn(config: &Config, state: &mut State) {
-    match state.turn {
-        Turn::Look => {}
-        Turn::Weigh => {
-            state.turn = Turn::Correct;
+    match state.stage {
+        Stage::Look => {}
+        Stage::Weigh => {
+            state.stage = Stage::Correct;
             weigh(config, state);
         }
-        Turn::Correct => {
-            state.turn = Turn::Judge;
+        Stage::Correct => {
+            state.stage = Stage::Judge;
             correct(state);
         }
-        Turn::Judge => {
-            state.turn = Turn::Look;
+        Stage::Judge => {
+            state.stage = Stage::Look;
             judge(config, state);
         }
     }
@@ -70,9 +70,9 @@ fn weigh(config: &Config, state: &mut State) {
     let s_0 = i64::from(state.weight.to_bits());
     let [s_1, s_2] = [keep(s_1 + s_0), keep(s_2 + 2 * s_1 + s_0)];
     state.ages = [s_1, s_2];
-    let told = &state.told;
-    let of_angle = I20F12::from_bits(told.angle_weight.to_bits() >> 16);
-    let of_amplitude = I20F12::from_bits(told.amplitude_weight.to_bits() >> 16);
+    let difference = &state.difference;
+    let of_angle = I20F12::from_bits(difference.angle_weight.to_bits() >> 16);
+    let of_amplitude = I20F12::from_bits(difference.amplitude_weight.to_bits() >> 16);
     state.weight += of_angle - state.weight.top(share);
     state.amplitude_weight += of_amplitude - state.amplitude_weight.top(share);
     if state.weight < WEIGHT_MIN {
@@ -94,14 +94,14 @@ fn weigh(config: &Config, state: &mut State) {
     state.mean_age = mean_age;
 }
 
-/// Corrects the vector by what the last look has told.
+/// Corrects the vector by what the last look has difference.
 #[inline(always)]
 fn correct(state: &mut State) {
     let amplitude = state.amplitude.to_bits();
     if state.weight >= WEIGHT_MIN {
         // The innovation, of 13 and 16 fraction bits: 24 bits, at most 4 radians; as turns 28.
         let most = amplitude >> 1;
-        let by_angle = state.told.by_angle.to_bits().max(-most).min(most);
+        let by_angle = state.difference.by_angle.to_bits().max(-most).min(most);
         let radians = quotient(by_angle, amplitude as u32, 27);
         let turns = ((i64::from(radians << 4) * i64::from(TURNS_PER_RADIAN)) >> 32) as i32;
         // 30 + 28 fraction bits: a look's 32, and a quarter of that a period.
@@ -119,7 +119,7 @@ fn correct(state: &mut State) {
     if state.amplitude_weight >= AMPLITUDE_WEIGHT_MIN {
         // 13 − 12 fraction bits; 16 wanted.
         let weight = state.amplitude_weight.to_bits() as u32;
-        let step = quotient(state.told.by_amplitude.to_bits(), weight, 15);
+        let step = quotient(state.difference.by_amplitude.to_bits(), weight, 15);
         let amplitude = state.amplitude.saturating_add(I16F16::from_bits(step));
         state.amplitude = amplitude.max(AMPLITUDE[0]).min(AMPLITUDE[1]);
     }
@@ -129,7 +129,7 @@ fn correct(state: &mut State) {
 /// amplitude, speed and residual fit each other.
 #[inline(always)]
 fn judge(config: &Config, state: &mut State) {
-    state.residual += (state.told.misfit - state.residual) >> RESIDUAL_SHIFT;
+    state.residual += (state.difference.misfit - state.residual) >> RESIDUAL_SHIFT;
     let omega = state.omega.magnitude_bits();
     let a_look = omega.min(u32::MAX >> LOOK_SHIFT) << LOOK_SHIFT;
     let amplitude = state.amplitude.to_bits() as u32;

@@ -38,7 +38,7 @@ pub struct Config {
 traced! {
     /// A period's part in a look.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    pub(super) enum Turn {
+    pub(super) enum Stage {
         /// It compares the readings with the prediction.
         Look,
         /// It finds by how much angle and speed are to be corrected for what differs.
@@ -57,7 +57,7 @@ traced! {
         /// Mean of the highest reading.
         pub(super) level: AdcCounts,
         /// This period's part.
-        pub(super) turn: Turn,
+        pub(super) stage: Stage,
         /// Sum of the readings after the last look.
         pub(super) readings: [I17F15; 3],
         /// Looks of this observation; 0 while there is none.
@@ -79,7 +79,7 @@ traced! {
         /// Mean of the errors' magnitudes, summed over the phases.
         pub(super) residual: I17F15,
         /// The result of the last look.
-        pub(super) told: Difference,
+        pub(super) difference: Difference,
         /// k_ω, 30 fraction bits.
         pub(super) speed_gain: i32,
         /// S_1/S_0, looks with 12 fraction bits.
@@ -97,7 +97,7 @@ impl State {
         Self {
             // Twice the threshold: a resting rotor is told from one that has not been seen.
             level: config.standing.saturating_mul_int(2),
-            turn: Turn::Look,
+            stage: Stage::Look,
             readings: [I17F15::ZERO; 3],
             looks: 0,
             theta: Angle::ZERO,
@@ -108,7 +108,7 @@ impl State {
             amplitude_weight: I20F12::ZERO,
             spread: 0,
             residual: I17F15::ZERO,
-            told: Difference::default(),
+            difference: Difference::default(),
             speed_gain: 0,
             mean_age: 0,
             fitting: 0,
@@ -118,7 +118,7 @@ impl State {
 
     /// Begins anew, but for the mean that tells a resting rotor.
     pub fn restart(&mut self) {
-        self.turn = Turn::Look;
+        self.stage = Stage::Look;
         self.looks = 0;
         self.omega = Speed::ZERO;
         self.residual = I17F15::ZERO;

@@ -5,7 +5,7 @@
 use fixed::types::I4F28;
 use fixed::types::extra::U28;
 
-use super::{Estimate, Told};
+use super::{Estimate, SlowEstimate};
 use crate::control::delay::Delay;
 use crate::control::regulator::Feedback;
 use crate::control::transform::{Dq, rotate_frame};
@@ -113,7 +113,7 @@ pub fn estimate(
     state: &mut State,
     imposed: Option<Speed>,
     planned: Speed,
-) -> (Estimate, Told) {
+) -> (Estimate, SlowEstimate) {
     let theta = state.theta;
     let frame = SinCos::of(theta);
     let length = magnitude(state.h.d, state.h.q);
@@ -135,13 +135,13 @@ pub fn estimate(
         omega,
         omega_bar,
     };
-    let told = Told {
+    let slow = SlowEstimate {
         omega_bar_step,
         xi,
         xi_step,
         lost,
     };
-    (estimate, told)
+    (estimate, slow)
 }
 
 /// ω̂ = ω̂_i + 2·ω_n·ε, ω̂_i += T_s·(ω_n²·ε + ω̇*) with ε = ĥ_d/|ĥ|.
@@ -152,7 +152,7 @@ fn cured(
     (theta, frame): (Angle, SinCos),
     length: Voltage,
     planned: Speed,
-) -> (Estimate, Told) {
+) -> (Estimate, SlowEstimate) {
     // Twelve bits of the quotient are enough for a direction: 0.01°.
     let quotient = (state.h.d.to_bits() >> 2) / (length.to_bits() >> 14).max(1);
     let epsilon = I4F28::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
@@ -167,14 +167,14 @@ fn cured(
         omega: state.omega_i.plus(cure.proportional.apply(epsilon)),
         omega_bar: state.omega_i,
     };
-    let told = Told {
+    let slow = SlowEstimate {
         omega_bar_step: state.omega_i.minus(before),
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,
         // ĥ opposite to what the frame expects, or nearly none.
         lost: !state.h.q.is_negative(),
     };
-    (estimate, told)
+    (estimate, slow)
 }
 
 /// Takes ξ̂ on by a period, within the range in which the stated flux can be wrong. True if it

@@ -11,7 +11,7 @@
 use fixed::types::extra::{U27, U29};
 use fixed::types::{I0F32, I5F27};
 
-use super::{Estimate, Input, Told};
+use super::{Estimate, Input, SlowEstimate};
 use crate::control::inductance::Factor;
 use crate::control::transform::{AlphaBeta, Dq};
 use crate::math::{
@@ -274,9 +274,9 @@ pub fn estimate(
 }
 
 /// The slower part of the estimate, `periods` after [`pace`].
-pub fn told(config: &Config, state: &State, periods: u32) -> Told {
+pub fn slow_estimate(config: &Config, state: &State, periods: u32) -> SlowEstimate {
     let change = state.omega_bar().minus(state.pace.omega_bar);
-    Told {
+    SlowEstimate {
         omega_bar_step: change / periods as i32,
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,

@@ -39,7 +39,7 @@ pub struct Estimate {
 traced! {
     /// The slower part of the estimate, for work that is not done in every period.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Told {
+    pub struct SlowEstimate {
         /// The change of ω̄̂ in a period.
         pub omega_bar_step: Speed,
         /// ξ̂, the inverse of the flux.
@@ -51,7 +51,7 @@ traced! {
     }
 }
 
-impl Default for Told {
+impl Default for SlowEstimate {
     fn default() -> Self {
         Self {
             omega_bar_step: Speed::ZERO,

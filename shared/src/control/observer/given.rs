@@ -1,6 +1,6 @@
 //! No observer at all: an encoder, or a simulation that knows the truth, tells where the rotor is.
 
-use super::{Estimate, Told};
+use super::{Estimate, SlowEstimate};
 use crate::math::SinCos;
 use crate::trace::traced;
 use crate::units::{Angle, Speed};
@@ -39,7 +39,7 @@ impl State {
 
 /// One period: what was told.
 #[inline]
-pub fn estimate(state: &State, swapped: bool) -> (Estimate, Told) {
+pub fn estimate(state: &State, swapped: bool) -> (Estimate, SlowEstimate) {
     let (theta, omega) = state.seen(swapped);
     let estimate = Estimate {
         theta,
@@ -47,15 +47,15 @@ pub fn estimate(state: &State, swapped: bool) -> (Estimate, Told) {
         omega,
         omega_bar: omega,
     };
-    let told = Told {
+    let slow = SlowEstimate {
         omega_bar_step: if swapped {
             state.omega_step.saturating_neg()
         } else {
             state.omega_step
         },
-        ..Told::default()
+        ..SlowEstimate::default()
     };
-    (estimate, told)
+    (estimate, slow)
 }
 
 #[cfg(test)]
@@ -67,17 +67,17 @@ mod tests {
         let mut state = State::default();
         state.place(Angle::lit("0.2"), Speed::lit("0.01"));
         state.place(Angle::lit("0.25"), Speed::lit("0.03"));
-        let (seen, told) = estimate(&state, false);
+        let (seen, slow) = estimate(&state, false);
         assert_eq!(
             (seen.theta, seen.omega),
             (Angle::lit("0.25"), Speed::lit("0.03"))
         );
-        assert_eq!(told.omega_bar_step, Speed::lit("0.03") - Speed::lit("0.01"));
-        let (turned, turned_told) = estimate(&state, true);
+        assert_eq!(slow.omega_bar_step, Speed::lit("0.03") - Speed::lit("0.01"));
+        let (turned, turned_slow) = estimate(&state, true);
         assert_eq!(
             (turned.theta, turned.omega_bar),
             (-Angle::lit("0.25"), -Speed::lit("0.03"))
         );
-        assert_eq!(turned_told.omega_bar_step, -told.omega_bar_step);
+        assert_eq!(turned_slow.omega_bar_step, -slow.omega_bar_step);
     }
 }

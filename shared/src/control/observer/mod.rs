@@ -20,7 +20,7 @@ use super::transform::{AlphaBeta, Dq, phases};
 use crate::math::{EIGHTH_PI, SinCos, TopProduct};
 use crate::trace::Trace;
 use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
-pub use estimate::{Estimate, Input, Told};
+pub use estimate::{Estimate, Input, SlowEstimate};
 
 /// The observer in use (`CTL_OBSERVER`) and its coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,7 +48,7 @@ pub struct State {
     /// Report to the drive of this period.
     pub given: given::State,
     /// The slower part of the estimate; the compensated flux observer says it by [`pace`].
-    pub told: Told,
+    pub slow_estimate: SlowEstimate,
 }
 
 /// An observer in a control period: the one in use of all, or one that is known beforehand.
@@ -138,18 +138,18 @@ pub fn estimate(
 ) -> Estimate {
     match config {
         Config::BackEmf(config) => {
-            let (estimate, told) =
+            let (estimate, slow) =
                 back_emf::estimate(config, &mut state.back_emf, imposed, input.planned);
-            state.told = told;
+            state.slow_estimate = slow;
             estimate
         }
         Config::Edges(config) => {
             let (v, i) = (phases(input.v), phases(input.i));
             let position = edges::estimate(config, &mut state.edges, v, i, input.hall);
-            state.told = Told {
+            state.slow_estimate = SlowEstimate {
                 omega_bar_step: position.omega_step,
                 lost: !position.known,
-                ..Told::default()
+                ..SlowEstimate::default()
             };
             Estimate {
                 theta: position.theta,
@@ -162,18 +162,18 @@ pub fn estimate(
             compensated::estimate(config, &mut state.compensated, input, imposed)
         }
         Config::Given => {
-            let (estimate, told) = given::estimate(&state.given, input.swapped);
-            state.told = told;
+            let (estimate, slow) = given::estimate(&state.given, input.swapped);
+            state.slow_estimate = slow;
             estimate
         }
     }
 }
 
-/// Update of gains, every so many `periods`: coefficients follow the speed, and [`State::told`] is
+/// Update of gains, every so many `periods`: coefficients follow the speed, and [`State::slow_estimate`] is
 /// brought up to date.
 pub fn pace(config: &Config, state: &mut State, inductance: Factor, periods: u32) {
     if let Config::Compensated(config) = config {
-        state.told = compensated::told(config, &state.compensated, periods);
+        state.slow_estimate = compensated::slow_estimate(config, &state.compensated, periods);
         compensated::pace(config, &mut state.compensated, inductance);
     }
 }
@@ -314,7 +314,7 @@ pub fn take_over(
 impl State {
     /// The observer in use forgets the rotor, but not what is known of its sensors.
     fn clear(&mut self, config: &Config) {
-        self.told = Told::default();
+        self.slow_estimate = SlowEstimate::default();
         match config {
             // A start or a catch gives it all of its state.
             Config::BackEmf(_) | Config::Given => {}
@@ -336,9 +336,9 @@ impl State {
             edges,
             compensated,
             given,
-            told,
+            slow_estimate,
         } = self;
-        told.trace(out);
+        slow_estimate.trace(out);
         match config {
             Config::BackEmf(_) => back_emf.trace(out),
             Config::Edges(_) => edges.trace(out),

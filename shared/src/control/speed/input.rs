@@ -1,6 +1,6 @@
 //! Input of both laws.
 
-use crate::control::observer::Told;
+use crate::control::observer::SlowEstimate;
 use crate::trace::traced;
 use crate::units::{Current, Speed};
 
@@ -12,7 +12,7 @@ pub struct Input {
     /// ω̄̂.
     pub speed: Speed,
     /// The slower part of the observer's estimate.
-    pub told: Told,
+    pub slow_estimate: SlowEstimate,
     /// Bounds of i_q*.
     pub bounds: Bounds,
     /// i_q* less i_q of the last period where its voltage was limited, else zero: the torque that

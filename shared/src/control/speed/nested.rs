@@ -57,7 +57,7 @@ impl Config {
         (step, slew): (Speed, Speed),
         input: &Input,
     ) -> Reference {
-        let told = &input.told;
+        let slow = &input.slow_estimate;
         let wanted = planner.reference.plus(step);
         let half_trust = self.trust.held(input.speed).max(I0F32::ZERO);
         let error = input.speed.minus(wanted);
@@ -71,7 +71,7 @@ impl Config {
             .minus(self.k_p.held(error))
             .plus(self.inertia.held(step));
         let integral_step = self.k_i.held(error);
-        let i_q = told.xi.top(torque);
+        let i_q = slow.xi.top(torque);
         let bounded = input.bounds.hold(i_q);
         if bounded != i_q || input.missing != Current::ZERO {
             let over = i_q.minus(bounded).plus(input.missing);
@@ -88,7 +88,7 @@ impl Config {
         let periods = PERIODS as i32;
         let torque_step = self
             .k_p
-            .held((step / periods).minus(told.omega_bar_step))
+            .held((step / periods).minus(slow.omega_bar_step))
             .minus(integral_step / periods);
         Reference {
             i: Dq {
@@ -96,7 +96,7 @@ impl Config {
                 q: i_q,
             },
             u_q: Voltage::ZERO,
-            i_q_step: told.xi_step.top(torque).plus(told.xi.top(torque_step)),
+            i_q_step: slow.xi_step.top(torque).plus(slow.xi.top(torque_step)),
         }
     }
 

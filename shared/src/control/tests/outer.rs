@@ -5,7 +5,7 @@ use std::vec::Vec;
 use super::motor::{Loop, Motor};
 use super::{P, PHI, R, TS, Units, config_with};
 use crate::control::PERIODS;
-use crate::control::observer::Told;
+use crate::control::observer::SlowEstimate;
 use crate::control::regulator::Reference;
 use crate::control::speed::{self, Bounds};
 use crate::control::{torque, voltage};
@@ -57,9 +57,9 @@ impl Bench {
             let input = speed::Input {
                 command: units.0.scale.speed_from_rpm(rpm as f32),
                 speed: units.speed(self.inner.motor.omega()),
-                told: Told {
+                slow_estimate: SlowEstimate {
                     xi: units.xi(1.0 / PHI),
-                    ..Told::default()
+                    ..SlowEstimate::default()
                 },
                 bounds: self.bounds,
                 missing: self.inner.missing,

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::{K_I_OMEGA, K_P_OMEGA, P, PHI, TABLE_III, TS, Units, config_with, near};
 use crate::control::PERIODS;
-use crate::control::observer::Told;
+use crate::control::observer::SlowEstimate;
 use crate::control::speed::{Bounds, Input, State};
 use crate::params::ParamId;
 use crate::trace::Trace;
@@ -74,7 +74,7 @@ impl Case {
             &Input {
                 command: begin + step,
                 speed: units.speed(P * self.omega_m),
-                told: Told {
+                slow_estimate: SlowEstimate {
                     omega_bar_step: units.speed(P * self.y_f * TS),
                     xi: units.xi(self.xi),
                     xi_step: units.xi(self.xi_dot * TS),

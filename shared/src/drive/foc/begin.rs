@@ -5,7 +5,7 @@ use super::state::State;
 use crate::control::catch::Rotor;
 use crate::control::observer;
 use crate::control::regulator::Reference;
-use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, turn, voltages};
+use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, rotate, voltages};
 use crate::drive::config::{Config, Direction};
 use crate::drive::io::{Asked, Sample, Setpoint, hall};
 use crate::drive::schedule;
@@ -145,7 +145,7 @@ fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>
         .wrapping_sub(omega.over_period());
     let frame = SinCos::of(theta);
     let emf = emf(omega);
-    let at = |middle: Angle| voltages(inverse_park(turn(emf, SinCos::of(middle)), frame));
+    let at = |middle: Angle| voltages(inverse_park(rotate(emf, SinCos::of(middle)), frame));
     [
         at(to_middle),
         at(to_middle.wrapping_sub(omega.over_period())),

@@ -4,7 +4,7 @@ use super::state::{Loops, State};
 use crate::control::delay::Delay;
 use crate::control::observer::{Input, Observer};
 use crate::control::regulator::Regulator;
-use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, park, turn, voltages};
+use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, park, rotate, voltages};
 use crate::control::{modulator, start};
 use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample, hall};
@@ -89,7 +89,7 @@ pub(super) fn current_loop(
     shared.seen.u = u;
 
     // The phases' duties, for where the frame will be when they act.
-    let v = inverse_park(turn(u, loops.advance), frame);
+    let v = inverse_park(rotate(u, loops.advance), frame);
     loops.commanded = [voltages(v), loops.commanded[0]];
     let dead_time = (&config.dead_time, inverse_park(loops.dead_time_sign, frame));
     let duties = modulator::duties(

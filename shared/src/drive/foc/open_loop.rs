@@ -74,7 +74,7 @@ pub(in crate::drive) fn rotor(
     shared: &mut Shared,
     phase: Phase,
 ) -> Option<Why> {
-    let lost = foc.observer.told.lost && !phase.is_open_loop();
+    let lost = foc.observer.slow_estimate.lost && !phase.is_open_loop();
     let progress = &mut shared.progress;
     progress.lost_periods = if lost {
         progress.lost_periods + CYCLE

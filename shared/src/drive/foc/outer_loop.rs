@@ -146,7 +146,7 @@ pub(in crate::drive) fn reference(
     let input = speed::Input {
         command,
         speed: shared.seen.speed,
-        told: foc.observer.told,
+        slow_estimate: foc.observer.slow_estimate,
         bounds,
         missing: deficit,
     };

@@ -140,19 +140,19 @@ pub(in crate::drive) fn period(
         return (Bridge::Off, Some(start::lost(six_step, s, phase)));
     }
 
-    let (mut told, mut why) = (phase, None);
+    let (mut shown, mut why) = (phase, None);
     if ramping {
         let ramp_current = start::current(six_step, (s, shared), setpoint);
         hold(six_step, s, i, ramp_current);
         if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
             s.tracking.acceleration = Speed::ZERO;
             take_over(s);
-            (told, why) = (Phase::Run, Some(Why::HandedOver));
+            (shown, why) = (Phase::Run, Some(Why::HandedOver));
         }
     } else {
         duty::run(config, six_step, (s, shared), i, setpoint);
     }
-    tell(config, (s, shared), told, (currents, i));
+    tell(config, (s, shared), shown, (currents, i));
     let bridge = bridge(s, swapped, None);
     if ramping {
         return (bridge, why);

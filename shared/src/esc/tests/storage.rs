@@ -149,7 +149,7 @@ fn storage_by_mavlink_waits_with_its_acknowledgement_until_the_bridge_rests() {
         assert_eq!(bench.requests, [], "a note is due");
         bench.snapshot.phase = Phase::Tone;
         bench.frames(300, 0);
-        assert_eq!(bench.esc.sound.note(), None);
+        assert_eq!(bench.esc.tunes.note(), None);
         for phase in [Phase::Tone, Phase::Sense, Phase::Charge] {
             bench.set_phase(phase);
             assert_eq!(bench.requests, [], "{phase:?}");

@@ -1,5 +1,5 @@
 //! The observer against its equations in double precision and SI units, and on a motor that turns as
-//! it is told.
+//! it is slow.
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -175,7 +175,7 @@ proptest! {
         prop_assume!(z.0.abs() > 1e-3 * PHI);
         // The table of sines is right to 2e-5; a bit of ψ is 5e-12 Wb.
         let flux = 5e-5 * PHI;
-        let told = told(&config, &state, 1);
+        let slow = slow_estimate(&config, &state, 1);
         // The bounds of φ̂.
         pace(&config, &mut state, Factor::ONE);
         near("ψ α", units.wb(state.psi.alpha), psi.0, flux)?;
@@ -186,15 +186,15 @@ proptest! {
         near("ω̂", rad_s(got.omega), omega, 0.1 + 1e-4 * over.abs())?;
         near("ω̄̂", rad_s(got.omega_bar), next_omega_i + next_smooth, 0.05)?;
         let step = next_omega_i - omega_i + next_smooth - smooth;
-        near("its step", rad_s(told.omega_bar_step), step, 0.05)?;
+        near("its step", rad_s(slow.omega_bar_step), step, 0.05)?;
         let at = wrapped(got.theta.to_num::<f64>() * TAU - theta);
         near("θ̂ at the sample", at, 0.0, 1e-8)?;
         let moved = wrapped(state.theta.to_num::<f64>() * TAU - theta - omega * TS);
         near("θ̂ after it", moved, 0.0, 1e-5)?;
         let out = z.0 < 0.299 * PHI || z.0 > 2.001 * PHI;
         let within = z.0 > 0.301 * PHI && z.0 < 1.999 * PHI;
-        prop_assert!(told.lost || !out);
-        prop_assert!(!told.lost || !within);
+        prop_assert!(slow.lost || !out);
+        prop_assert!(!slow.lost || !within);
     }
 
     #[test]
@@ -401,7 +401,7 @@ fn a_rotor_without_its_flux_is_lost() {
         if period.is_multiple_of(PERIODS) {
             pace(&bench.config, &mut bench.state, Factor::ONE);
         }
-        told(&bench.config, &bench.state, 1).lost
+        slow_estimate(&bench.config, &bench.state, 1).lost
     });
     assert!(lost.count() > 2000);
     assert_eq!(found(&bench.state), None);

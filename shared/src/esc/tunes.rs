@@ -4,9 +4,9 @@ use crate::drive::Snapshot;
 use crate::tune::{Note, Player, Tune};
 use crate::units::Speed;
 
-/// The sounds of the motor.
+/// The tune that is being played.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sound {
+pub(super) struct Tunes {
     player: Player,
     /// The note that is due, as of the last look.
     note: Option<Note>,
@@ -14,7 +14,7 @@ pub(super) struct Sound {
     silent: bool,
 }
 
-impl Sound {
+impl Tunes {
     /// Begins a tune. A beacon sounds in silent mode too: whoever asks for it is looking for the craft.
     pub(super) fn play(&mut self, now_us: u64, tune: Tune) {
         if !self.silent || matches!(tune, Tune::Beacon(_)) {
