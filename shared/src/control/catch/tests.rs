@@ -343,7 +343,12 @@ proptest! {
         let config = config(BENCH, 8_000.0, 1.0);
         let mut state = State::new(&config);
         for reading in readings {
-            observe(&config, &mut state, reading.map(|x| AdcCounts::from_bits(x >> shift)));
+            let rotor = observe(&config, &mut state, reading.map(|x| AdcCounts::from_bits(x >> shift)));
+            let seen = state.level >= config.standing;
+            prop_assert_eq!(rotor == Rotor::Standing, !seen);
+            if matches!(rotor, Rotor::Turning { .. }) {
+                prop_assert!(state.fitting >= config.sure_looks);
+            }
         }
     }
 }

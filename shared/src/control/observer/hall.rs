@@ -235,8 +235,13 @@ mod tests {
         #[test]
         fn any_input_is_survived(codes in prop::collection::vec(any::<u8>(), 0..500)) {
             let mut state = State::default();
+            let mut before = 0;
             for code in codes {
-                read(&CONFIG, &mut state, code);
+                let (code_before, was_faulty) = (before & 7, state.fault);
+                let step = read(&CONFIG, &mut state, code);
+                prop_assert!(step.is_none() || code & 7 == code_before, "a spike is no step");
+                prop_assert!(state.fault || !was_faulty, "a fault stays");
+                before = code;
             }
         }
     }

@@ -182,16 +182,27 @@ fn fewer_than_four_periods_a_sextant_are_refused() {
 #[test]
 fn no_sample_and_no_set_point_makes_it_overflow() {
     // Overflow panics in this build.
-    for changes in [
-        &[(ParamId::LimPhaseA, 27.0), (ParamId::LimBusVMax, 60.0)][..],
-        &[(ParamId::LimPhaseA, 0.5), (ParamId::StaRampA, 100.0)][..],
-        &[
-            (ParamId::StaRampRpmS, 1e6),
-            (ParamId::StaParkAs, 0.01),
-            (ParamId::MotPolePairs, 1.0),
-        ][..],
+    // Noise of so many counts, which trips now and then.
+    for (noise_counts, changes) in [
+        (
+            1000,
+            &[(ParamId::LimPhaseA, 27.0), (ParamId::LimBusVMax, 60.0)][..],
+        ),
+        (
+            60,
+            &[(ParamId::LimPhaseA, 0.5), (ParamId::StaRampA, 100.0)][..],
+        ),
+        (
+            1000,
+            &[
+                (ParamId::StaRampRpmS, 1e6),
+                (ParamId::StaParkAs, 0.01),
+                (ParamId::MotPolePairs, 1.0),
+            ][..],
+        ),
     ] {
         let (config, mut state) = drive(changes);
+        let mut parked = false;
         let mut noise = 1_u32;
         let mut random = || {
             noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -200,7 +211,8 @@ fn no_sample_and_no_set_point_makes_it_overflow() {
         for period in 0..300_000_u32 {
             let mut counts = |most: i32| AdcCounts::from_num(random() % most);
             let sample = Sample {
-                currents: [0, 1, 2].map(|_| counts(1000) - AdcCounts::from_num(500)),
+                currents: [0, 1, 2]
+                    .map(|_| counts(noise_counts) - AdcCounts::from_num(noise_counts / 2)),
                 bus: AdcCounts::from_num(1200) + counts(300),
                 terminals: [0, 1, 2].map(|_| counts(4096) >> (period / 64 % 9)),
                 hall: 7,
@@ -213,10 +225,18 @@ fn no_sample_and_no_set_point_makes_it_overflow() {
                 3 => Setpoint::Zero,
                 _ => turn(&config),
             };
-            step(&config, &mut state, sample, setpoint);
-            if !state.snapshot().faults.is_empty() {
+            let bridge = step(&config, &mut state, sample, setpoint);
+            let snapshot = state.snapshot();
+            let switches = matches!(bridge, Bridge::Legs(_));
+            assert!(
+                !switches || snapshot.phase.drives(),
+                "{changes:?}, {period}"
+            );
+            parked |= switches && snapshot.phase == Phase::Park;
+            if !snapshot.faults.is_empty() {
                 state = State::new(&config);
             }
         }
+        assert!(parked, "{changes:?}");
     }
 }

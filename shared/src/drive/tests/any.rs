@@ -134,7 +134,11 @@ fn at_the_ends_of_the_limits_nothing_overflows_either() {
         ] {
             let mut changes = extreme.to_vec();
             changes.push((ParamId::CtlObserver, observer));
-            anything(&changes, 20_000, 7);
+            let seen = anything(&changes, 20_000, 7);
+            assert!(
+                seen.iter().any(|phase| phase.drives()),
+                "{changes:?}: {seen:?}"
+            );
         }
     }
 }

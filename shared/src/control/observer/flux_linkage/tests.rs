@@ -153,7 +153,7 @@ proptest! {
         }
     }
 
-    /// No input overflows.
+    /// No input overflows, and λ̂ and its amplitude stay within their bounds.
     #[test]
     fn any_input_is_survived(words in prop::collection::vec(any::<[i32; 6]>(), 1..40)) {
         let (config, _) = config(SECOND);
@@ -161,8 +161,11 @@ proptest! {
         for [a, b, c, d, e, f] in words {
             let v = [a, b, c].map(Voltage::from_bits);
             advance(&config, &mut state, v, [d, e, f].map(Current::from_bits));
+            let bound = state.amplitude + (state.amplitude >> 2);
+            prop_assert!(state.lambda.iter().all(|lambda| lambda.saturating_abs() <= bound));
             let measured = measure(&state.lambda, Sector::of(Angle::from_bits(a)));
             adapt(&config, &mut state, measured);
+            prop_assert!((AMPLITUDE_MIN..=AMPLITUDE_MAX).contains(&state.amplitude));
         }
     }
 }

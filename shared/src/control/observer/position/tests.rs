@@ -131,6 +131,9 @@ proptest! {
                     place(&config, &mut state, sector(a % 6), Angle::from_bits(c as i32));
                 }
             }
+            prop_assert!((Angle::ZERO..=LIMIT).contains(&state.theta_inc), "{}", state.theta_inc);
+            let fastest = Speed::from_bits(OMEGA_MAX as i32);
+            prop_assert!((Speed::ZERO..=fastest).contains(&state.omega), "{}", state.omega);
         }
     }
 }
