@@ -245,6 +245,26 @@ fn vector(bridge: Bridge) -> (f64, f64) {
 }
 
 #[test]
+fn with_sine_modulation_a_tone_has_the_same_voltage() {
+    let tone_a = (ParamId::MotToneA, 6.0);
+    let benches =
+        [0.0, 1.0].map(|modulation| playing(&[tone_a, (ParamId::CtlModulation, modulation)]));
+    let [mut space_vector, mut sine] = benches;
+    let tone = tone(&sine);
+    let (mut most, mut differs) = (0.0_f64, false);
+    for period in 0..5000 {
+        let bridges = [space_vector.quiet(1, tone), sine.quiet(1, tone)];
+        let [wanted, seen] = bridges.map(vector);
+        // Duties are rounded to 2^-16 of 24 V.
+        let error = (seen.0 - wanted.0).abs().max(seen.1.abs());
+        assert!(error < 1e-3, "{period}: {seen:?}, {wanted:?}");
+        most = most.max(seen.0.abs());
+        differs |= bridges[0] != bridges[1];
+    }
+    assert!(most > 1.0 && differs, "{most}");
+}
+
+#[test]
 fn the_voltage_is_along_one_axis_as_often_one_way_as_the_other_and_bounded() {
     for (pitch_hz, tone_a) in [(600.0, 1.5), (3000.0, 1.5), (2000.0, 6.0)] {
         let mut bench = Bench::new(&[(ParamId::MotToneA, tone_a)]);
