@@ -69,6 +69,9 @@ pub struct Start {
     pub flash: FileFlash,
     /// Parameters that are set over the stored ones and not stored themselves.
     pub overrides: Vec<(ParamId, f32)>,
+    /// Parameters that are set in place of the factory's values and not stored: what else is stored goes
+    /// before them.
+    pub defaults: Vec<(ParamId, f32)>,
     /// What goes wrong.
     pub faults: Vec<Fault>,
     /// What the slowest MAVLink link carries.
@@ -96,12 +99,21 @@ pub struct Device {
     faults: Timeline,
 }
 
-/// A parameter from the command line, which is not stored.
+/// A parameter from the command line or the bench, which is not stored.
 struct Override {
     id: ParamId,
     value: f32,
+    /// True if it only takes the place of the factory's value.
+    is_default: bool,
     /// What is stored, and stays so.
     stored: f32,
+}
+
+impl Override {
+    /// True if it goes before what is stored.
+    fn prevails(&self) -> bool {
+        !self.is_default || self.stored == self.id.entry().default
+    }
 }
 
 /// The simulated chip for the self-test: it has converters, and neither comparators nor clocks.
@@ -140,6 +152,7 @@ impl Device {
             mut wire,
             mut flash,
             overrides,
+            defaults,
             faults,
             link_bytes_per_s,
         } = start;
@@ -148,15 +161,18 @@ impl Device {
             return Err(StartError::CorruptStorage);
         }
         let params = &mut loaded.kept.params;
-        let overrides: Vec<_> = overrides
-            .into_iter()
-            .map(|(id, value)| Override {
+        let defaults = defaults.into_iter().map(|given| (given, true));
+        let overrides = overrides.into_iter().map(|given| (given, false));
+        let mut overrides: Vec<_> = defaults
+            .chain(overrides)
+            .map(|((id, value), is_default)| Override {
                 id,
                 value,
+                is_default,
                 stored: params.get(id),
             })
             .collect();
-        apply(&overrides, params);
+        apply(&mut overrides, params);
         let board = bench.sensing.board(bench.delay);
         let (mut esc, throttle) = Esc::new(params.clone(), board, CAPTURE_HZ, link_bytes_per_s)?;
         esc.recall(&loaded);
@@ -371,10 +387,7 @@ impl Device {
             }
         }
         if obey(request, &mut self.flash, STORE, &mut kept)? {
-            for given in &mut self.overrides {
-                given.stored = kept.params.get(given.id);
-            }
-            apply(&self.overrides, &mut kept.params);
+            apply(&mut self.overrides, &mut kept.params);
             self.esc
                 .replace(&mut self.throttle, &mut kept)
                 .map_err(|error| error.reason)?;
@@ -406,7 +419,7 @@ impl Device {
     fn reboot(&mut self) {
         let mut loaded = store::load(&mut self.flash, STORE);
         let params = &mut loaded.kept.params;
-        apply(&self.overrides, params);
+        apply(&mut self.overrides, params);
         // What cannot be built now was never in force: the old values go on.
         let Ok((mut esc, throttle)) = Esc::new(
             params.clone(),
@@ -458,9 +471,12 @@ fn rejected(receiver: &Receiver) -> u64 {
     .sum()
 }
 
-/// Puts what the command line set over what was stored. Each value was accepted before.
-fn apply(overrides: &[Override], params: &mut Params) {
-    for given in overrides {
+/// Puts what the command line and the bench set over what was stored. Each value was accepted before.
+fn apply(overrides: &mut [Override], params: &mut Params) {
+    for given in &mut *overrides {
+        given.stored = params.get(given.id);
+    }
+    for given in overrides.iter().filter(|given| given.prevails()) {
         let _ = params.set(given.id, given.value);
     }
 }

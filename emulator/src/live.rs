@@ -59,6 +59,8 @@ pub struct Session {
     pub flash: FileFlash,
     /// Parameters over the stored ones.
     pub params: Vec<(ParamId, f32)>,
+    /// Parameters in place of the factory's values.
+    pub defaults: Vec<(ParamId, f32)>,
     /// What goes wrong.
     pub faults: Vec<Fault>,
     /// Where each period is written.
@@ -124,6 +126,7 @@ pub fn run<M: Machine>(
         wire,
         flash: session.flash,
         overrides: session.params,
+        defaults: session.defaults,
         faults: session.faults,
         link_bytes_per_s,
     })?;

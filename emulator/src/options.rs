@@ -169,7 +169,12 @@ impl RunArgs {
     /// The file behind `--storage` cannot serve.
     pub fn session(&self, standing: &Standing) -> Result<(Session, Option<String>), StorageError> {
         let (flash, warning) = storage(self.storage.as_deref())?;
-        let mut params = standing.params.clone();
+        let of_bench = standing.params.clone();
+        // The default bench is there unasked, and lasts from run to run: what was stored on it is found again.
+        let (defaults, mut params) = match self.bench {
+            None => (of_bench, Vec::new()),
+            Some(_) => (Vec::new(), of_bench),
+        };
         params.extend(self.common.params());
         let session = Session {
             bench: standing.bench.clone(),
@@ -183,6 +188,7 @@ impl RunArgs {
             duration: self.duration.map(Duration::from_secs_f64),
             flash,
             params,
+            defaults,
             faults: self.fault.clone(),
             record: self.common.record.clone(),
         };
@@ -257,7 +263,8 @@ fn bench_help() -> String {
     let names: Vec<_> = library::names().collect();
     format!(
         "A built-in bench ({}) or a TOML file: motor, load, supply and the parameters that the ESC \
-         needs for them, set before the start as --param does [default: {}, without setting any]",
+         needs for them, set before the start as --param does [default: {}, whose parameters \
+         give way to stored ones]",
         names.join(", "),
         library::DEFAULT
     )

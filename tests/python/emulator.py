@@ -16,6 +16,11 @@ PATIENT = ("--param", "INP_LOSS_MS=500")
 """For a flight controller that is a thread on a busy machine: its frames may have longer gaps than the
 default allows."""
 
+OF_BENCH = (
+    "CTL_SLEW_RPM_S CTL_BW_CUR_HZ CTL_BW_SPD_HZ STA_PARK_AS STA_RAMP_A STA_RAMP_RPM_S STA_RUN_RPM"
+).split()
+"""What the default bench sets, and the factory leaves at 0: from the motor."""
+
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:
     """A port that nobody has now."""

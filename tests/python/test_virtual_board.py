@@ -92,8 +92,7 @@ def test_the_motor_turns_and_frames_are_answered_in_time(board):
     with emulator.connect() as esc, emulator.throttle(**protocol) as throttle:
         esc.wait_armed()
         throttle.value = HALF
-        # Between the 817 rpm at which 750 ns of dead time let the observer begin, and 6000.
-        esc.wait_rpm(3300, 3520)
+        esc.wait_rpm(3000, 3300)
         since, sent = len(throttle.answers), throttle.sent
         time.sleep(1.0)
         told = [data for data in throttle.replies(since) if not is_extended(data)]
@@ -101,7 +100,7 @@ def test_the_motor_turns_and_frames_are_answered_in_time(board):
         # reply between them. On an exact wire each is answered, as tests/virtual-board/tests shows.
         assert len(told) >= 100, f"{len(told)} replies to {throttle.sent - sent} frames"
         speeds = [erpm(data) / POLE_PAIRS for data in told]
-        assert all(3300 < rpm < 3520 for rpm in speeds), (min(speeds), max(speeds))
+        assert all(3000 < rpm < 3300 for rpm in speeds), (min(speeds), max(speeds))
         for answer in throttle.answers[since:]:
             if answer[0] == BIDIRECTIONAL_DSHOT600:
                 after_ns = int.from_bytes(answer[5:9], "little")

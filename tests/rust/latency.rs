@@ -47,6 +47,7 @@ fn device() -> Device {
         wire: Wire::detached(),
         flash: FileFlash::in_memory(),
         overrides: vec![(ParamId::CtlMode, 2.0)],
+        defaults: Vec::new(),
         faults: Vec::new(),
         link_bytes_per_s: 11_520,
     })

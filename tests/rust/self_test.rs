@@ -44,6 +44,7 @@ impl Station {
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
             overrides: params.to_vec(),
+            defaults: Vec::new(),
             faults: kinds.iter().map(fault).collect(),
             link_bytes_per_s: 1_000_000,
         };

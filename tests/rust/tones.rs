@@ -331,6 +331,7 @@ fn power_up(tone_a: f32, throttle_at_s: f64) -> (f64, Option<f64>) {
         wire: Wire::detached(),
         flash: FileFlash::in_memory(),
         overrides: vec![(ParamId::MotToneA, tone_a)],
+        defaults: Vec::new(),
         faults: Vec::new(),
         link_bytes_per_s: 11_520,
     });

@@ -57,6 +57,10 @@ pub(crate) fn run(
         let flux_mwb = flux_mwb(kv, &params);
         set(&mut params, ParamId::MotFluxMwb, flux_mwb)?;
     }
+    if params.get(ParamId::CtlRpmMin) == ParamId::CtlRpmMin.entry().default {
+        // 300 rpm suit the motor of the first bench.
+        set(&mut params, ParamId::CtlRpmMin, 0.0)?;
+    }
     let pwm = pwm(&params);
     set(&mut params, ParamId::PwmFreqHz, pwm.value)?;
     let followed = FromMotor::new(&params).reasons(&params);

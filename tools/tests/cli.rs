@@ -107,7 +107,7 @@ fn set_tells_what_was_taken_and_why_not() {
         (
             "CTL_RPM_MIN",
             "7000",
-            "must be below CTL_RPM_MAX; it stays 0",
+            "must be below CTL_RPM_MAX; it stays 300",
         ),
         ("NO_SUCH", "1", "no such parameter"),
     ] {

@@ -58,21 +58,28 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 pub type Check<'a> = &'a dyn Fn(&str, &Table) -> Result<(), String>;
 
 /// Puts what stands on the bench that `bench.base` names under what `root`, a scenario's tables, says
-/// itself: tables are merged key by key, everything else of `root` stays. Paths begin at `folder`.
+/// itself: tables are merged key by key, everything else of `root` stays. Where it names none, the default
+/// bench's `[params]` alone: what stands there is the default already. Paths begin at `folder`.
 ///
 /// # Errors
 /// A base that is neither built in nor a file, or no bench.
 pub fn complete(root: &mut Table, folder: &Path, check: Check) -> Result<(), BenchError> {
     begin_at(folder, root);
-    let Some(Value::Table(bench)) = root.get_mut("bench") else {
-        return Ok(());
+    let mut bench = root.get_mut("bench").and_then(Value::as_table_mut);
+    let under = match bench.as_ref().and_then(|bench| bench.get("base")) {
+        Some(Value::String(name)) => find(name, check)?,
+        // What is no text is left to be refused with the rest.
+        Some(_) => return Ok(()),
+        None => {
+            let mut default = TABLES[0].clone();
+            default.retain(|key, _| key == "params");
+            default
+        }
     };
-    // What is no text is left to be refused with the rest.
-    let Some(name) = bench.get("base").and_then(Value::as_str).map(str::to_owned) else {
-        return Ok(());
-    };
-    bench.remove("base");
-    merge(root, &find(&name, check)?);
+    if let Some(bench) = &mut bench {
+        bench.remove("base");
+    }
+    merge(root, &under);
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! What faults do to the chip and its flash, and to whom it answers.
 
 use std::net::UdpSocket;
+use std::path::Path;
 use std::time::Duration;
 
 use super::*;
@@ -16,6 +17,7 @@ fn device(flash: FileFlash, faults: Vec<Fault>) -> Device {
         wire: Wire::detached(),
         flash,
         overrides: Vec::new(),
+        defaults: Vec::new(),
         faults,
         link_bytes_per_s: 11_520,
     });
@@ -73,22 +75,26 @@ fn a_flash_that_refuses_keeps_what_was_stored() {
     assert_eq!(limit(&device), 12.0);
 }
 
+/// A device on a stored file, with parameters over the stored ones and in place of the factory's.
+fn given(path: &Path, overrides: Vec<(ParamId, f32)>, defaults: Vec<(ParamId, f32)>) -> Device {
+    let started = Device::start(Start {
+        bench: Bench::default(),
+        wire: Wire::detached(),
+        flash: FileFlash::open(path).unwrap(),
+        overrides,
+        defaults,
+        faults: Vec::new(),
+        link_bytes_per_s: 11_520,
+    });
+    started.unwrap().0
+}
+
 /// Nor by a reset to the factory's settings, after which it is still in force.
 #[test]
 fn what_the_command_line_set_is_not_stored() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("flash");
-    let start = |overrides| {
-        let started = Device::start(Start {
-            bench: Bench::default(),
-            wire: Wire::detached(),
-            flash: FileFlash::open(&path).unwrap(),
-            overrides,
-            faults: Vec::new(),
-            link_bytes_per_s: 11_520,
-        });
-        started.unwrap().0
-    };
+    let start = |overrides| given(&path, overrides, Vec::new());
     let mut plain = start(Vec::new());
     set(&mut plain, 15.0);
     assert_eq!(plain.store(Request::Keep), Ok(()));
@@ -114,6 +120,40 @@ fn what_the_command_line_set_is_not_stored() {
         );
         assert_eq!(found, (stored, 6000.0), "{request:?}");
     }
+}
+
+/// Unlike what the command line sets, it gives way to what is stored: before a restart, after it, and after a
+/// load. What the command line sets goes before it.
+#[test]
+fn what_takes_the_place_of_the_factorys_value_gives_way_to_a_stored_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flash");
+    let start = |overrides| given(&path, overrides, vec![(ParamId::LimPhaseA, 12.0)]);
+    let stored = |device: &mut Device| {
+        let params = store::load(&mut device.flash, STORE).kept.params;
+        params.get(ParamId::LimPhaseA)
+    };
+    let mut device = start(Vec::new());
+    assert_eq!(limit(&device), 12.0);
+    assert_eq!(device.store(Request::Save), Ok(()));
+    assert_eq!(stored(&mut device), 20.0, "the factory's");
+
+    set(&mut device, 15.0);
+    assert_eq!(device.store(Request::Save), Ok(()));
+    assert_eq!(stored(&mut device), 15.0);
+    set(&mut device, 12.5);
+    assert_eq!(device.store(Request::Load), Ok(()));
+    assert_eq!(limit(&device), 15.0);
+    device.reboot();
+    assert_eq!(limit(&device), 15.0);
+    drop(device);
+    let mut device = start(Vec::new());
+    assert_eq!(limit(&device), 15.0);
+
+    assert_eq!(device.store(Request::FactoryReset), Ok(()));
+    assert_eq!((limit(&device), stored(&mut device)), (12.0, 20.0));
+    drop(device);
+    assert_eq!(limit(&start(vec![(ParamId::LimPhaseA, 18.0)])), 18.0);
 }
 
 #[test]
@@ -192,6 +232,7 @@ fn an_answer_goes_to_who_has_asked() {
             wire: Wire::open(&"udp:127.0.0.1:0".parse().unwrap(), 0).unwrap(),
             flash: FileFlash::in_memory(),
             overrides: vec![(ParamId::InpProto, 22.0)],
+            defaults: Vec::new(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         })

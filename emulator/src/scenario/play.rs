@@ -101,6 +101,7 @@ fn run<M: Machine>(
         wire: Wire::detached(),
         flash: FileFlash::in_memory(),
         overrides,
+        defaults: Vec::new(),
         faults: scenario.faults()?,
         link_bytes_per_s: 11_520,
     })?;

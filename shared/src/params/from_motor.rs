@@ -259,7 +259,8 @@ mod tests {
         FromMotor::new(&params(values))
     }
 
-    const RACING: [(ParamId, f32); 10] = [
+    const RACING: [(ParamId, f32); 11] = [
+        (ParamId::CtlRpmMin, 0.0),
         (ParamId::MotPolePairs, 7.0),
         (ParamId::MotRMohm, 33.0),
         (ParamId::MotLUh, 12.0),

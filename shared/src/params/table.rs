@@ -263,7 +263,7 @@ parameters! {
             1 On "on";
     27 CtlRpmMax "CTL_RPM_MAX" "rpm" Real 100.0..200000.0 = 6000.0
         "Mechanical speed at full throttle in speed mode";
-    28 CtlRpmMin "CTL_RPM_MIN" "rpm" FromMotor 100.0..200000.0 = 0.0
+    28 CtlRpmMin "CTL_RPM_MIN" "rpm" FromMotor 100.0..200000.0 = 300.0
         "Mechanical speed at the least throttle above zero in speed mode; 0 follows from the motor";
     29 CtlSlewRpmS "CTL_SLEW_RPM_S" "rpm/s" FromMotor 10.0..10000000.0 = 0.0 live
         "Greatest change of the speed reference; 0 follows from the motor";

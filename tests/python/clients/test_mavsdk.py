@@ -17,6 +17,7 @@ from mavsdk.plugins.param.param import Param, ParamError, ParamResult
 
 import siskin_dialect as dialect
 from desk import Desk
+from emulator import OF_BENCH
 from esc import TIMEOUT_S
 
 
@@ -116,4 +117,6 @@ def test_ftp_has_what_describes_the_parameters(desk):
     defaults = {name: param["default"] for name, param in described.items() if "default" in param}
     # What follows from others has none.
     assert set(values) - set(defaults) == {"MOT_KV"}
+    # Those of the factory.
+    values.update(dict.fromkeys(OF_BENCH, 0))
     assert defaults == pytest.approx({name: values[name] for name in defaults}, rel=1e-6)

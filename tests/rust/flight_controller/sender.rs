@@ -73,6 +73,7 @@ impl FlightController {
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
             overrides: [BOSSO_BENCH.settings, overrides].concat(),
+            defaults: Vec::new(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         })

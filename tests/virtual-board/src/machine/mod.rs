@@ -5,7 +5,7 @@ mod faults;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use siskin_control::esc::obey;
 use siskin_control::mavlink::Request;
-use siskin_control::params::Params;
+use siskin_control::params::{ParamId, Params};
 use siskin_control::store;
 use siskin_emulator::device::Start;
 use siskin_emulator::fault::Timeline;
@@ -68,6 +68,7 @@ impl VirtualBoard {
             mut wire,
             mut flash,
             overrides,
+            defaults,
             faults,
             ..
         } = start;
@@ -76,8 +77,12 @@ impl VirtualBoard {
         let warning = loaded.trouble();
         let mut stored = bytes(&mut flash);
         let mut kept = loaded.kept;
-        if !overrides.is_empty() {
-            for (id, value) in overrides {
+        let is_the_factorys = |id: ParamId| kept.params.get(id) == id.entry().default;
+        let mut given = defaults;
+        given.retain(|(id, _)| is_the_factorys(*id));
+        given.extend(overrides);
+        if !given.is_empty() {
+            for (id, value) in given {
                 // It was checked when it was given.
                 let _ = kept.params.set(id, value);
             }

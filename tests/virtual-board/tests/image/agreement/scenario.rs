@@ -93,6 +93,7 @@ pub(crate) fn start() -> Start {
         flash: FileFlash::in_memory(),
         // As short as the board takes it, for the emulator too.
         overrides: vec![(ParamId::PwmDeadtimeNs, BOARD.least_dead_time.ns)],
+        defaults: Vec::new(),
         faults: Vec::new(),
         link_bytes_per_s: LINK_BYTES_PER_S,
     }

@@ -243,6 +243,7 @@ impl Board {
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
             overrides: overrides.to_vec(),
+            defaults: Vec::new(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         };
