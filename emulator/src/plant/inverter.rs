@@ -11,9 +11,10 @@ mod edges;
 
 use siskin_control::drive::Bridge;
 
+use super::breaks::Breaks;
 use super::machine::{Flow, Machine};
 use super::rail::Rail;
-use super::stage::{Breaks, DIODE_V, Stage};
+use super::stage::{DIODE_V, Stage};
 use super::timing::{Half, Timer, delayed, duties, first_half, second_half, share};
 use super::{Extras, Load, Motor};
 

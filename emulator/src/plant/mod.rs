@@ -3,6 +3,7 @@
 //! Double precision, `libm`'s functions and a fixed order of operations: equal inputs give equal
 //! bits on every machine.
 
+mod breaks;
 mod bus;
 mod circuit;
 mod conduction;
@@ -24,6 +25,7 @@ mod thermal;
 mod timing;
 mod vector;
 
+pub use breaks::{Breaks, LegBreaks};
 pub use bus::Bus;
 pub use extras::{Cogging, Drag, Extras, Harmonic, Winding};
 pub use gates::{Gate, Gates};
@@ -34,7 +36,7 @@ pub use motor::Motor;
 pub use noise::{Noise, share_of};
 pub use rail::Rail;
 pub use sensing::{Sensing, Truth};
-pub use stage::{Breaks, DIODE_V, LegBreaks};
+pub use stage::DIODE_V;
 pub use supply::{CAPACITANCE_F, CAPACITY_C, CELL_OHM, Source, Supply};
 pub use thermal::Thermal;
 

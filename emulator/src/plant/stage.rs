@@ -3,12 +3,11 @@
 //! With all switches on or a dead time's diode certain, stretches of the closed solution follow
 //! each other; everything else is left to the [`diodes`].
 
-mod breaks;
+mod broken;
 mod diodes;
 mod sweep;
 
-pub use breaks::{Breaks, LegBreaks};
-
+use super::breaks::Breaks;
 use super::circuit::{Drive, Way};
 use super::machine::Machine;
 use super::rail::Rail;

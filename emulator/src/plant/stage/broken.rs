@@ -8,28 +8,15 @@
 //!   resistances: half the supply's voltage for the motor and, through both switches and the shunt,
 //!   V/(2·R_on) besides what the motor takes.
 
+use super::super::breaks::Breaks;
 use super::super::gates::Gate;
+use super::super::rail::Rail;
 use super::super::vector::{AXES, dot};
-use super::{Path, Rail, Stage};
+use super::{Path, Stage};
 
 /// Resistance of one switch with its half of the leg's copper and shunt, Ω: 2 mΩ of silicon, 3 mΩ
 /// of shunt and some copper share the leg.
 const ON_OHM: f64 = 3e-3;
-
-/// What is broken in a leg; switches are low and high.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LegBreaks {
-    /// The wire to the motor is open.
-    pub wire: bool,
-    /// Switches that never turn on.
-    pub open: [bool; 2],
-    /// Switches that are always on.
-    pub shorted: [bool; 2],
-}
-
-/// What is broken in each leg.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Breaks(pub [LegBreaks; 3]);
 
 impl Stage {
     /// Whether nothing is broken.
