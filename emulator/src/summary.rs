@@ -1,5 +1,6 @@
 //! What a run comes to: figures over measuring windows, and a hash of the control state.
 
+mod since;
 mod trace;
 mod turning;
 mod window;

@@ -3,7 +3,7 @@
 use siskin_control::drive::Setpoint;
 use siskin_control::units::{Current, Speed};
 
-use super::window::Since;
+use super::since::Since;
 use crate::shaft::Units;
 
 /// The shaft has reached a speed from this share of it on.

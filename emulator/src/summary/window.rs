@@ -3,6 +3,7 @@
 use serde::Serialize;
 use siskin_control::drive::{Phase, Setpoint, Snapshot};
 
+use super::since::Since;
 use super::turning::Turning;
 use crate::rig::Period;
 use crate::shaft::Units;
@@ -156,16 +157,6 @@ pub(super) struct Window {
     starts: u64,
     /// The drive has turned the motor.
     drove: bool,
-}
-
-/// Since when something has held without a break, s.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Since(pub(super) Option<f64>);
-
-impl Since {
-    pub(super) fn add(&mut self, t_s: f64, holds: bool) {
-        self.0 = if holds { self.0.or(Some(t_s)) } else { None };
-    }
 }
 
 /// Means of several quantities over the same samples.
