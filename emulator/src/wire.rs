@@ -4,6 +4,7 @@
 //! levels. Nothing here decodes: the edges go to the same capture decoder as on the chip.
 
 mod frame;
+mod rejected;
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -16,6 +17,7 @@ use thiserror::Error;
 use crate::link::{AddressError, HostPort};
 use crate::plant::Noise;
 use frame::Frame;
+pub use rejected::Rejected;
 
 /// What may wait to be played, ns; a datagram that would have to wait longer is dropped.
 pub const MAX_BACKLOG_NS: u64 = 100_000_000;
@@ -83,37 +85,6 @@ pub enum WireError {
     /// The system refuses the socket.
     #[error("--signal {0}: cannot open the socket ({1}); give an address of this machine")]
     Socket(SignalAddress, io::Error),
-}
-
-/// Why a datagram is not played.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum Rejected {
-    /// There is not even a protocol in it.
-    #[error("an empty datagram")]
-    Empty,
-    /// The first byte is no protocol.
-    #[error("protocol {0} is unknown")]
-    Protocol(u8),
-    /// The payload does not have the protocol's length.
-    #[error("{length} bytes are not a datagram of protocol {protocol}")]
-    Length {
-        /// The first byte.
-        protocol: u8,
-        /// Bytes of the datagram.
-        length: usize,
-    },
-    /// A pulse of no width.
-    #[error("a pulse of 0 ns")]
-    NoPulse,
-    /// The first raw level is neither 0 nor 1.
-    #[error("level {0} is neither 0 nor 1")]
-    Level(u8),
-    /// It would hold the wire for more than 10 s.
-    #[error("{0} ns are more than 10 s")]
-    TooLong(u64),
-    /// Too much waits already. This one counts as dropped, the others as rejected.
-    #[error("more than 100 ms wait to be played")]
-    Backlog,
 }
 
 /// What became of the datagrams so far.

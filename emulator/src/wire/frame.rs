@@ -4,7 +4,7 @@ use siskin_control::answer::{REPLY_DELAY_NS, gcr, reply_bit_hz};
 use siskin_control::input::dshot::{Rate, edges};
 use siskin_control::input::signal::Signal;
 
-use super::Rejected;
+use super::rejected::Rejected;
 
 /// The longest run of levels that is played, ns. It is far above any frame's, and bounds for how
 /// long one datagram can hold the wire.
