@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::means::Means;
-use super::{BUS_V, MOTOR};
+use super::setting::{BUS_V, MOTOR};
 use crate::plant::{Fidelity, Load, Plant, Rail};
 
 /// Longest piece of a waveform, s: 1/67 of a PWM period.

@@ -8,8 +8,8 @@ use std::f64::consts::{PI, TAU};
 use siskin_control::drive::Setpoint;
 
 use super::sensorless::{Drive, Realism};
-use super::{Item, item};
 use crate::plot::chart::{Axis, Curve, Figure, Panel};
+use crate::reproduce::{Item, item};
 
 /// From the catch to the begin of what is shown, s.
 const SETTLE_S: f64 = 1.0;

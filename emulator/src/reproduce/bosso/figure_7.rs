@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use super::foc::{Foc, Modulation};
 use super::means::Means;
 use super::sensorless::{Drive, Realism};
+use super::setting::load_nm;
 use super::six_step::SixStep;
-use super::{Item, item, load_nm};
 use crate::plot::chart::{Axis, Curve, Figure, Panel};
+use crate::reproduce::{Item, item};
 
 /// Speeds of the figure, rpm.
 const SPEEDS_RPM: [f64; 8] = [

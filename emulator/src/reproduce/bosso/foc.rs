@@ -9,7 +9,7 @@ use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 
 use super::course::{Course, Legs};
 use super::means::{Means, seek};
-use super::{BUS_V, CARRIER_HZ, MOTOR, PHASES, exact_sensing};
+use super::setting::{BUS_V, CARRIER_HZ, MOTOR, PHASES, exact_sensing};
 use crate::plant::{Fidelity, Load, Rail, Supply};
 use crate::rig::{Bench, Position, Rig};
 

@@ -11,8 +11,9 @@ use siskin_control::math::{Gain, Number};
 use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, Params, build};
 use siskin_control::units::Scale;
 
-use super::{Item, MOTOR, item};
+use super::setting::MOTOR;
 use crate::plant::Sensing;
+use crate::reproduce::{Item, item};
 
 /// Speed at which (22) and (23) are linearised, rad/s.
 const OMEGA_M: f64 = 4500.0 * TAU / 60.0;

@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 use super::foc::{Foc, Modulation};
 use super::means::Means;
+use super::setting::load_nm;
 use super::six_step::SixStep;
-use super::{Item, item, load_nm};
+use crate::reproduce::{Item, item};
 
 /// Speeds at which the paper prints figures, and its differences of the efficiencies, points.
 const PRINTED: [(f64, f64); 3] = [(3000.0, 3.65), (4500.0, 1.49), (6000.0, 0.54)];
@@ -212,7 +213,7 @@ fn ripples(exact: &Point, dead: &Point) -> Vec<Item> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reproduce::bosso::MOTOR;
+    use crate::reproduce::bosso::setting::MOTOR;
 
     #[test]
     fn stepwise_currents_lose_what_the_paper_derives() {

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 
 use super::foc::{Foc, Modulation};
-use super::load_nm;
 use super::means::Means;
+use super::setting::load_nm;
 use super::six_step::SixStep;
 use crate::plot::chart::{Axis, Curve, Figure, Map, Panel};
 

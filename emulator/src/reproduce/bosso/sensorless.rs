@@ -6,7 +6,7 @@ use siskin_control::drive::{Phase, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, BOSSO_TABLE_III, ParamId, Params, build};
 
 use super::means::Means;
-use super::{BUS_V, exact_sensing, load_nm};
+use super::setting::{BUS_V, exact_sensing, load_nm};
 use crate::bench::{Choice, MotorTable};
 use crate::plant::{Fidelity, Load, Sensing, Supply};
 use crate::rig::{Bench, Rig};

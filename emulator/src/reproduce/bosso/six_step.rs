@@ -6,7 +6,7 @@ use siskin_control::control::six_step::commutation::{Legs as Roles, Sector};
 
 use super::course::{Course, Legs};
 use super::means::{Means, seek};
-use super::{BUS_V, CARRIER_HZ, MOTOR, PHASES, electrical_hz};
+use super::setting::{BUS_V, CARRIER_HZ, MOTOR, PHASES, electrical_hz};
 use crate::plant::Rail;
 
 /// Electrical transients are over after this time, 70 times L/R, s.
