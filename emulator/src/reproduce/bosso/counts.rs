@@ -6,7 +6,7 @@
 //! Shifts, negations and the saturation of sums are not counted, nor what is inside a root, a sine or
 //! a cosine. The inductance's factor in ω·L·i, for its adaptation, is.
 
-use crate::reproduce::{Item, item};
+use crate::reproduce::item::{Item, item};
 
 /// Sums, products, comparisons, roots with sines and cosines, and states of a block.
 type Counts = [u32; 5];

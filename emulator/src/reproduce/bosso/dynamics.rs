@@ -9,7 +9,7 @@ use siskin_control::drive::Setpoint;
 
 use super::sensorless::{Drive, Realism};
 use crate::plot::chart::{Axis, Curve, Figure, Panel};
-use crate::reproduce::{Item, item};
+use crate::reproduce::item::{Item, item};
 
 /// From the catch to the begin of what is shown, s.
 const SETTLE_S: f64 = 1.0;

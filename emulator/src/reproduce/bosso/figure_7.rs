@@ -8,7 +8,7 @@ use super::sensorless::{Drive, Realism};
 use super::setting::load_nm;
 use super::six_step::SixStep;
 use crate::plot::chart::{Axis, Curve, Figure, Panel};
-use crate::reproduce::{Item, item};
+use crate::reproduce::item::{Item, item};
 
 /// Speeds of the figure, rpm.
 const SPEEDS_RPM: [f64; 8] = [

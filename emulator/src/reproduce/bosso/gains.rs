@@ -13,7 +13,7 @@ use siskin_control::units::Scale;
 
 use super::setting::MOTOR;
 use crate::plant::Sensing;
-use crate::reproduce::{Item, item};
+use crate::reproduce::item::{Item, item};
 
 /// Speed at which (22) and (23) are linearised, rad/s.
 const OMEGA_M: f64 = 4500.0 * TAU / 60.0;

@@ -9,7 +9,7 @@ use super::foc::{Foc, Modulation};
 use super::means::Means;
 use super::setting::load_nm;
 use super::six_step::SixStep;
-use crate::reproduce::{Item, item};
+use crate::reproduce::item::{Item, item};
 
 /// Speeds at which the paper prints figures, and its differences of the efficiencies, points.
 const PRINTED: [(f64, f64); 3] = [(3000.0, 3.65), (4500.0, 1.49), (6000.0, 0.54)];

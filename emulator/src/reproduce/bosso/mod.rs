@@ -18,7 +18,7 @@ mod sensorless;
 mod setting;
 mod six_step;
 
-use super::Reproduction;
+use super::item::Reproduction;
 
 /// The first paper's figures.
 pub fn bosso() -> Reproduction {

@@ -12,7 +12,7 @@ use siskin_control::control::observer::limits;
 use super::estimator::{N, SAMPLE_HZ, begun, config, follow, hz, rad_s};
 use super::sheet::{between, evenly, figure, over};
 use crate::plot::chart::{Axis, Curve, Figure, Panel};
-use crate::reproduce::{Item, Reproduction, item};
+use crate::reproduce::item::{Item, Reproduction, item};
 
 /// Acceleration, mechanical rpm/s.
 pub(super) const RPM_S: f64 = 10_000.0;

@@ -10,7 +10,7 @@ use siskin_control::params::{FluxSettings, ParamId};
 use super::bench::quadrotor;
 use super::sheet::{between, evenly, figure};
 use crate::plot::chart::{Axis, Curve, Map, Panel};
-use crate::reproduce::{Item, Reproduction, item};
+use crate::reproduce::item::{Item, Reproduction, item};
 use crate::shaft::Units;
 
 /// Hovering, and climbing, rpm.

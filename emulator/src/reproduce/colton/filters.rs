@@ -10,7 +10,7 @@ use siskin_control::units::{Angle, Current, FLUX_NOMINAL, Speed};
 use super::estimator::{SAMPLE_HZ, fluxes, integrator, rad_s, voltages};
 use super::sheet::{between, figure, over, ratios, spread};
 use crate::plot::chart::{Curve, Figure, Panel};
-use crate::reproduce::{Item, Reproduction, item};
+use crate::reproduce::item::{Item, Reproduction, item};
 
 /// The paper's allowed lead, degrees.
 const LEAD_DEG: f64 = 10.0;

@@ -11,7 +11,7 @@ mod waveforms;
 
 use rayon::prelude::*;
 
-use super::Reproduction;
+use super::item::Reproduction;
 
 /// The second paper's figures and Table 1, in its order.
 pub fn colton() -> Reproduction {

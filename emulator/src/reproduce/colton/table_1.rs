@@ -8,7 +8,7 @@ use super::acceleration::{A_E, RPM_S, Runs, Seen, envelope, greatest};
 use super::estimator::{N, SAMPLE_HZ, begun, config, fluxes, follow, hz, integrator, rad_s};
 use super::sheet::{between, figure, over, ratios, spread};
 use crate::plot::chart::{Curve, Panel};
-use crate::reproduce::{Reproduction, item};
+use crate::reproduce::item::{Reproduction, item};
 
 /// The integrator of the table: 10° of lead at this speed, rpm.
 const LEAST_RPM: f64 = 500.0;

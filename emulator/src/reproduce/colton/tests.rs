@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::*;
-use crate::reproduce::Item;
+use crate::reproduce::item::Item;
 
 static COLTON: LazyLock<Reproduction> = LazyLock::new(colton);
 

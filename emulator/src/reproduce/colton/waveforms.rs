@@ -10,7 +10,7 @@ use siskin_control::params::FluxSettings;
 use super::bench::{Drive, scooter};
 use super::sheet::{between, evenly, figure, over};
 use crate::plot::chart::{Axis, Curve, Figure, Panel};
-use crate::reproduce::{Item, Reproduction, item};
+use crate::reproduce::item::{Item, Reproduction, item};
 
 /// Torque current, A.
 const CURRENT_A: f32 = 20.0;
