@@ -4,10 +4,11 @@
 //! the present and sends. An answer leaves within two milliseconds.
 
 mod keeping;
+mod pace;
 
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use siskin_control::params::ParamId;
 use thiserror::Error;
@@ -24,24 +25,8 @@ use crate::summary::Report;
 use crate::watch::{Watch, WatchError};
 use crate::wire::{SignalAddress, Wire, WireError};
 use keeping::Keeping;
-
-/// Wall time between two looks at the sockets.
-const SLICE: Duration = Duration::from_millis(1);
-
-/// Lag behind the wall clock that is given up rather than caught up with: the machine slept.
-const GIVEN_UP: Duration = Duration::from_millis(500);
-
-/// A control period at the lowest PWM frequency, 8 kHz, and some more, ns.
-const LONGEST_PERIOD_NS: u64 = 130_000;
-
-/// How fast simulated time passes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pace {
-    /// So many simulated seconds a second.
-    Times(f64),
-    /// As fast as the machine can.
-    Max,
-}
+pub use pace::Pace;
+use pace::Pacer;
 
 /// What to run.
 pub struct Session {
@@ -173,51 +158,4 @@ pub fn run<M: Machine>(
         ..watch.finish(sim_s, pacer.began.elapsed().as_secs_f64())?
     };
     Ok((report, machine))
-}
-
-/// Keeps simulated time in step with the wall's.
-struct Pacer {
-    pace: Pace,
-    began: Instant,
-    /// Where the two clocks last met: wall time since the start, and simulated ns.
-    met: (Duration, u64),
-}
-
-impl Pacer {
-    fn new(pace: Pace) -> Self {
-        Self {
-            pace,
-            began: Instant::now(),
-            met: (Duration::ZERO, 0),
-        }
-    }
-
-    /// How far to simulate now, in slices that take a millisecond of the wall's time.
-    fn until_ns(&mut self, now_ns: u64) -> u64 {
-        let Pace::Times(times) = self.pace else {
-            // The sockets are looked at once in 20 ms of simulation, which take less than one.
-            return now_ns + 20_000_000;
-        };
-        let wall = self.began.elapsed();
-        let due_ns = self.met.1 + ((wall - self.met.0).as_secs_f64() * times * 1e9) as u64;
-        if due_ns.saturating_sub(now_ns) > (GIVEN_UP.as_secs_f64() * times * 1e9) as u64 {
-            self.met = (wall, now_ns);
-        }
-        due_ns.min(now_ns + slice_ns(times))
-    }
-
-    /// Sleeps until a slice is due.
-    fn wait(&self, now_ns: u64) {
-        let Pace::Times(times) = self.pace else {
-            return;
-        };
-        let simulated_s = (now_ns + slice_ns(times) - self.met.1) as f64 * 1e-9;
-        let due = self.met.0 + Duration::from_secs_f64(simulated_s / times);
-        std::thread::sleep(due.saturating_sub(self.began.elapsed()));
-    }
-}
-
-/// What is simulated in a millisecond of the wall's time; in slow motion at least a control period.
-fn slice_ns(times: f64) -> u64 {
-    ((SLICE.as_nanos() as f64 * times) as u64).max(LONGEST_PERIOD_NS)
 }

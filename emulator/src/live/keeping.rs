@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use super::Pace;
+use super::pace::Pace;
 
 /// What is looked at together.
 const LOOK: Duration = Duration::from_secs(1);
