@@ -1,7 +1,9 @@
 //! One emulated ESC: its tasks' side, its drive on a bench, its throttle wire and its flash.
 
 mod answer;
+mod capture;
 mod machine;
+mod reply;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -21,12 +23,10 @@ use crate::link::LinkId;
 use crate::rig::{Bench, Rig};
 use crate::summary::Rejected;
 use crate::wire::Wire;
-use answer::Driven;
+use capture::{CAPTURE_HZ, ticks};
+use reply::Driven;
 
 pub use crate::machine::Onlooker;
-
-/// Rate of the timer that captures the wire's edges: that of the STM32G431.
-const CAPTURE_HZ: u32 = 170_000_000;
 
 /// Where in the flash the parameters are: all of it.
 const STORE: Range<u32> = 0..FLASH_BYTES as u32;
@@ -450,11 +450,6 @@ fn reason(error: &FlashError) -> &'static str {
         FlashError::Gone => "storage: the file was removed or cut",
         _ => "storage: the file cannot be written",
     }
-}
-
-/// The capturing timer's count at a time.
-fn ticks(time_ns: u64) -> u32 {
-    (u128::from(time_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000) as u32
 }
 
 /// Frames that a receiver did not hand on.

@@ -19,7 +19,7 @@ from paths import ROOT
 NOT_YET = {
     "shared": [],
     "firmware": [],
-    "emulator": """bench device plot scenario""".split(),
+    "emulator": """bench plot scenario""".split(),
 }
 OWN = "(itself)"
 
