@@ -10,8 +10,8 @@ mod tests;
 
 use std::path::Path;
 
-use super::PlotError;
 use super::canvas::Format;
+use super::error::PlotError;
 
 /// A picture: panels side by side and below each other, under a title.
 #[derive(Clone, Debug, PartialEq)]

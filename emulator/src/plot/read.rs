@@ -5,7 +5,7 @@ use std::path::Path;
 
 use siskin_control::drive::Phase;
 
-use super::PlotError;
+use super::error::PlotError;
 use super::reduce::Trace;
 use crate::record::Row;
 
