@@ -19,7 +19,7 @@ from paths import ROOT
 NOT_YET = {
     "shared": [],
     "firmware": [],
-    "emulator": """bench plot scenario""".split(),
+    "emulator": """bench scenario""".split(),
 }
 OWN = "(itself)"
 

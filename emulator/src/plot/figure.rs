@@ -3,32 +3,22 @@
 use plotters::backend::DrawingBackend;
 use plotters::element::Rectangle;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, RGBAColor, RGBColor, WHITE};
-use siskin_control::drive::{Fault, Phase};
+use plotters::style::{Color, WHITE};
+use siskin_control::drive::Fault;
 
 use super::canvas::{Area, Drawn, Picture};
+use super::page::{LEFT, RIGHT, WIDTH, legend};
 use super::panel::{Curve, Look, Panel};
+use super::phases::{name, spans, tint};
 use super::read::Recording;
 use super::style::{BLUE, FAULT, GREEN, GREY, GRID, ORANGE, VERMILION, heading, number, text};
 
-const WIDTH: u32 = 2400;
 const HEIGHT: u32 = 2100;
 /// Columns that a recording is reduced to: one for about two and a half pixels, so that the SVG of
 /// a long recording stays below 300 kB.
 pub(super) const COLUMNS: usize = 900;
-/// Left of the axes.
-pub(super) const LEFT: u32 = 150;
-/// Right of the axes.
-pub(super) const RIGHT: u32 = 40;
 const TITLE: u32 = 90;
 const STRIP: u32 = 44;
-
-/// A stretch of time in one phase.
-pub(super) struct Span {
-    pub(super) phase: Phase,
-    pub(super) t0_s: f64,
-    pub(super) t1_s: f64,
-}
 
 impl Picture for Recording {
     fn size(&self) -> (u32, u32) {
@@ -178,82 +168,4 @@ fn strip<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
         }
     }
     Ok(())
-}
-
-/// A line of legend that ends at the right of the axes: names, colours, thickness of the samples.
-pub(super) fn legend<'a, B: DrawingBackend>(
-    area: &Area<B>,
-    middle: i32,
-    entries: impl IntoIterator<Item = (&'a str, RGBAColor, i32), IntoIter: DoubleEndedIterator>,
-) -> Drawn<B> {
-    let style = text(26.0);
-    let mut right = (WIDTH - RIGHT) as i32;
-    for (name, colour, thickness) in entries.into_iter().rev() {
-        let left = right - area.estimate_text_size(name, &style)?.0 as i32;
-        area.draw_text(name, &style, (left, middle))?;
-        let corners = [
-            (left - 64, middle - thickness / 2),
-            (left - 14, middle + (thickness + 1) / 2),
-        ];
-        area.draw(&Rectangle::new(corners, colour.filled()))?;
-        right = left - 100;
-    }
-    Ok(())
-}
-
-/// The stretches of the drive's phases.
-pub(super) fn spans(recording: &Recording) -> Vec<Span> {
-    let mut column = 0;
-    let chunks = recording.phases.chunk_by(|a, b| a == b);
-    let spans = chunks.filter_map(|chunk| {
-        let first = column;
-        column += chunk.len();
-        chunk[0].map(|phase| Span {
-            phase,
-            t0_s: recording.edge_s(first as f64),
-            t1_s: recording.edge_s(column as f64),
-        })
-    });
-    spans.collect()
-}
-
-/// Where a fault begins, s.
-pub(super) fn fault_times(recording: &Recording) -> Vec<f64> {
-    let mut before = 0;
-    let columns = recording.faults.iter().enumerate();
-    let begins = columns.filter_map(|(column, &bits)| {
-        let new = bits & !before != 0;
-        before = bits;
-        new.then(|| recording.edge_s(column as f64))
-    });
-    begins.collect()
-}
-
-/// The background of a phase; none where nothing happens.
-pub(super) fn tint(phase: Phase) -> Option<RGBColor> {
-    match phase {
-        Phase::Idle => None,
-        Phase::Sense => Some(RGBColor(0xf2, 0xf2, 0xfb)),
-        Phase::Charge => Some(RGBColor(0xf9, 0xe4, 0xd8)),
-        Phase::Park => Some(RGBColor(0xfd, 0xf1, 0xcf)),
-        Phase::Ramp => Some(RGBColor(0xdf, 0xef, 0xfa)),
-        Phase::Run => Some(RGBColor(0xe9, 0xf6, 0xf0)),
-        Phase::Stopping => Some(RGBColor(0xf8, 0xe8, 0xf1)),
-        Phase::Brake => Some(RGBColor(0xe6, 0xe6, 0xe6)),
-        Phase::Tone => Some(RGBColor(0xec, 0xe4, 0xf7)),
-    }
-}
-
-fn name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "Idle",
-        Phase::Sense => "Sense",
-        Phase::Charge => "Charge",
-        Phase::Park => "Park",
-        Phase::Ramp => "Ramp",
-        Phase::Run => "Run",
-        Phase::Stopping => "Stopping",
-        Phase::Brake => "Brake",
-        Phase::Tone => "Tone",
-    }
 }

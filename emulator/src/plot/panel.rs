@@ -8,7 +8,8 @@ use plotters::element::{PathElement, Polygon, Rectangle};
 use plotters::style::{Color, RGBAColor, RGBColor};
 
 use super::canvas::{Area, Drawn};
-use super::figure::{self, LEFT, RIGHT};
+use super::page::{LEFT, RIGHT, legend};
+use super::phases::{fault_times, spans, tint};
 use super::read::Recording;
 use super::reduce::{Cell, Trace};
 use super::style::{AXIS, FAULT, GRID, heading, number, text};
@@ -79,8 +80,8 @@ impl Panel<'_> {
             .x_label_area_size(if self.time { TIME } else { 0 })
             .build_cartesian_2d(recording.t0_s..recording.t1_s, low..high)?;
 
-        for span in figure::spans(recording) {
-            if let Some(tint) = figure::tint(span.phase) {
+        for span in spans(recording) {
+            if let Some(tint) = tint(span.phase) {
                 let corners = [(span.t0_s, low), (span.t1_s, high)];
                 chart.draw_series([Rectangle::new(corners, tint.filled())])?;
             }
@@ -103,7 +104,7 @@ impl Panel<'_> {
         for curve in self.curves {
             curve.draw(&mut chart, recording, low, high)?;
         }
-        for t_s in figure::fault_times(recording) {
+        for t_s in fault_times(recording) {
             let line = PathElement::new(vec![(t_s, low), (t_s, high)], FAULT.stroke_width(3));
             chart.draw_series([line])?;
         }
@@ -119,7 +120,7 @@ impl Panel<'_> {
             (curve.name, curve.fill(), thickness)
         });
         let middle = HEADER as i32 / 2;
-        figure::legend(area, middle, entries)?;
+        legend(area, middle, entries)?;
         let title = heading(30.0);
         area.draw_text(self.title, &title, (LEFT as i32, middle))
     }
