@@ -9,8 +9,9 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::supply::word;
-use super::{BenchError, toml_reason};
+use super::error::BenchError;
+use super::text::toml_reason;
+use super::word::word;
 
 /// The files in the binary; the first is the default.
 const FILES: [(&str, &str); 10] = [

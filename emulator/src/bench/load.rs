@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{BenchError, Choice, range};
+use super::choice::Choice;
+use super::error::{BenchError, range};
 use crate::plant::Load;
 
 /// A load in SI units.

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{BenchError, Choice, range};
+use super::choice::Choice;
+use super::error::{BenchError, range};
 use crate::plant::{Cogging, Drag, Extras, Harmonic, Motor, Winding};
 
 /// Resistance of one phase, Ω. Ranges are those of motors that an ESC of 1 to 200 A turns, so that a number

@@ -3,8 +3,16 @@
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::Config;
 
-use super::{Choice, DEFAULT_LOAD, DEFAULT_MOTOR, LoadTable, MotorTable};
+use super::choice::Choice;
+use super::load::LoadTable;
+use super::motor::MotorTable;
 use crate::plant::{Extras, Fidelity, Load, Motor, Sensing, Supply};
+
+/// The motor of the default bench.
+pub const DEFAULT_MOTOR: &str = "antigravity-4006-kv380";
+
+/// The load of the default bench.
+pub const DEFAULT_LOAD: &str = "cfprop-13x4.4";
 
 /// Where the control has the rotor's position from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]

@@ -2,11 +2,10 @@
 
 use serde::Deserialize;
 
-use super::{BenchError, Choice, range};
+use super::choice::Choice;
+use super::error::{BenchError, range};
+use super::word::{CELLS_MAX, word};
 use crate::plant::{CAPACITANCE_F, CAPACITY_C, CELL_OHM, Source, Supply};
-
-/// The most cells of a pack: the voltage dividers end at 70 V.
-const CELLS_MAX: u32 = 14;
 
 /// A supply: `volts` or `cells`, and what else it has.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -43,18 +42,6 @@ impl Choice<SupplyTable> {
         }
         self.find("bus")?.supply()
     }
-}
-
-/// `24`, `24.0` or `6s`.
-pub(super) fn word(text: &str) -> Option<Supply> {
-    if let Some(cells) = text.strip_suffix(['s', 'S']) {
-        let cells = cells.parse().ok()?;
-        return (1..=CELLS_MAX)
-            .contains(&cells)
-            .then(|| Supply::battery(cells));
-    }
-    let volts = text.parse().ok()?;
-    (volts > 0.0 && volts <= 70.0).then(|| Supply::stiff(volts))
 }
 
 impl SupplyTable {
