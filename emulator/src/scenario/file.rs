@@ -190,6 +190,9 @@ pub(super) struct WindowTable {
     pub(super) t1_s: f64,
 }
 
+/// The window that an expectation names for the whole run.
+pub(super) const RUN: &str = "run";
+
 /// What a figure must be.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -3,9 +3,8 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::RUN;
 use super::error::ScenarioError;
-use super::file::Expectation;
+use super::file::{Expectation, RUN};
 use crate::summary::{Figures, Report};
 
 /// Whether an expectation held.

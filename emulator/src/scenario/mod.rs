@@ -27,6 +27,7 @@ mod fault;
 mod file;
 mod judge;
 mod lines;
+mod outcome;
 mod place;
 mod play;
 mod signal;
@@ -43,15 +44,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::device::Start;
 use crate::machine::Machine;
-use crate::summary::Report;
 use course::Courses;
 pub use error::ScenarioError;
 pub use fault::from_text as fault;
 pub use judge::Verdict;
+pub use outcome::Outcome;
 pub use place::Place;
 use play::Played;
 pub use stand::{Standing, stand};
@@ -61,52 +61,6 @@ use vary::{Case, Variations};
 /// The longest file, bytes: one of a hundred times the usual length. An entry takes a few KB while it is
 /// understood.
 const TEXT_MAX: u64 = 1_000_000;
-
-/// The window that an expectation names for the whole run.
-const RUN: &str = "run";
-
-/// The summary of a scenario that is one run.
-#[derive(Clone, Debug, Serialize)]
-pub struct Outcome {
-    /// The figures.
-    #[serde(flatten)]
-    pub report: Report,
-    /// What was expected of them.
-    pub expectations: Vec<Verdict>,
-    /// Whether an interrupt has ended the run before its time.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub interrupted: bool,
-    /// What the seed drew, if anything.
-    #[serde(serialize_with = "place::map", skip_serializing_if = "Vec::is_empty")]
-    pub drawn: Vec<(String, toml::Value)>,
-}
-
-impl Outcome {
-    fn new(played: Played, place: Place) -> Self {
-        let Played {
-            report,
-            verdicts,
-            interrupted,
-        } = played;
-        Self {
-            report,
-            expectations: verdicts,
-            interrupted,
-            drawn: place.drawn,
-        }
-    }
-
-    /// Whether no expectation failed.
-    pub fn held(&self) -> bool {
-        !self.expectations.iter().any(Verdict::failed)
-    }
-
-    /// What a program that played it ends with: 0, 1 where an expectation failed, 130 where it was
-    /// interrupted.
-    pub fn exit_status(&self) -> u8 {
-        exit_status(self.interrupted, self.held())
-    }
-}
 
 /// What the command line changes in a scenario.
 #[derive(Clone, Debug, Default)]
@@ -229,15 +183,6 @@ impl Plan {
         let filled = self.courses.fill(&mut case.scenario);
         filled.map_err(|error| case.place.blame(error))?;
         Ok(case)
-    }
-}
-
-/// As shells have it.
-fn exit_status(interrupted: bool, held: bool) -> u8 {
-    match (interrupted, held) {
-        (true, _) => 130,
-        (false, true) => 0,
-        (false, false) => 1,
     }
 }
 

@@ -9,9 +9,8 @@ use siskin_control::drive::Setpoint;
 use siskin_control::params::Params;
 use siskin_control::units::Scale;
 
-use super::RUN;
 use super::error::ScenarioError;
-use super::file::{Scenario, WindowTable};
+use super::file::{RUN, Scenario, WindowTable};
 use super::judge::{Verdict, judge};
 use super::signal::{Demand, Signal, demand};
 use crate::device::{Device, Start};

@@ -6,6 +6,7 @@ use serde::Serialize;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::judge::Verdict;
+use super::outcome::exit_status;
 use super::place::Place;
 use super::play::Played;
 use crate::summary::Report;
@@ -114,7 +115,7 @@ impl Survey {
 
     /// As [`Outcome::exit_status`](super::Outcome::exit_status).
     pub fn exit_status(&self) -> u8 {
-        super::exit_status(self.left_out > 0, self.held())
+        exit_status(self.left_out > 0, self.held())
     }
 
     fn add(&mut self, place: &Place, report: &Report, verdicts: Vec<Verdict>) {
