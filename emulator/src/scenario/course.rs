@@ -1,64 +1,13 @@
 //! A course of values over time, from a CSV file.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-
-use super::error::ScenarioError;
-use super::file::Scenario;
-use super::signal::NUMBER_MAX;
+/// The greatest magnitude of a number: what is computed from two of them stays finite.
+pub(super) const NUMBER_MAX: f64 = 1e9;
 
 /// Values at rising times, joined by straight lines. The first holds before, the last after.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Course {
     /// Times, s, and the values at them.
     points: Vec<(f64, f64)>,
-}
-
-/// Courses that have been read, each once for all runs.
-#[derive(Debug)]
-pub(super) struct Courses {
-    /// The scenario's folder, where relative paths begin.
-    folder: PathBuf,
-    read: Mutex<BTreeMap<PathBuf, Arc<Course>>>,
-}
-
-impl Courses {
-    /// Courses of a scenario in this folder.
-    pub(super) fn in_folder(folder: &Path) -> Self {
-        Self {
-            folder: folder.to_owned(),
-            read: Mutex::new(BTreeMap::new()),
-        }
-    }
-
-    /// Gives each signal that names a file what is in it.
-    pub(super) fn fill(&self, scenario: &mut Scenario) -> Result<(), ScenarioError> {
-        for (index, signal) in scenario.signal.iter_mut().enumerate() {
-            if let Some(path) = &signal.path {
-                let wrong =
-                    |problem| ScenarioError::of_key(format!("signal.{index}.path"), problem);
-                signal.course = Some(self.get(path).map_err(wrong)?);
-            }
-        }
-        Ok(())
-    }
-
-    fn get(&self, path: &Path) -> Result<Arc<Course>, String> {
-        // A reader that has failed left the courses before whole.
-        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(course) = read.get(path) {
-            return Ok(Arc::clone(course));
-        }
-        let place = self.folder.join(path);
-        let bytes = std::fs::read(&place)
-            .map_err(|error| format!("cannot read {}: {error}", place.display()))?;
-        let course =
-            Course::parse(&bytes).map_err(|problem| format!("{}: {problem}", place.display()))?;
-        let course = Arc::new(course);
-        read.insert(path.to_owned(), Arc::clone(&course));
-        Ok(course)
-    }
 }
 
 impl Course {

@@ -22,6 +22,7 @@
 //! different faults.
 
 mod course;
+mod courses;
 mod error;
 mod fault;
 mod file;
@@ -47,7 +48,7 @@ use rayon::prelude::*;
 
 use crate::device::Start;
 use crate::machine::Machine;
-use course::Courses;
+use courses::Courses;
 pub use error::ScenarioError;
 pub use fault::from_text as fault;
 pub use judge::Verdict;

@@ -6,10 +6,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::course::Course;
-
-/// The greatest magnitude of a number: what is computed from two of them stays finite.
-pub(super) const NUMBER_MAX: f64 = 1e9;
+use super::course::{Course, NUMBER_MAX};
 
 /// The shortest duration of a shape, s: far below a control period.
 const FOR_LEAST_S: f64 = 1e-6;
