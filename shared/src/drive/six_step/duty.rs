@@ -10,7 +10,6 @@ use crate::control::speed::Bounds;
 use crate::drive::config::six_step::Config;
 use crate::drive::config::{self, Stop};
 use crate::drive::io::{Bridge, Setpoint, in_order};
-use crate::drive::seen::reading;
 use crate::drive::shared::Shared;
 use crate::math::{Held, TopProduct};
 use crate::units::{AdcCounts, Current, Duty, Speed};
@@ -19,8 +18,12 @@ use crate::units::{AdcCounts, Current, Duty, Speed};
 /// are 20 rpm.
 pub(super) const NO_CURRENT: AdcCounts = AdcCounts::lit("16");
 
-/// Speed that a shaft may gain while it is to stop, as a part of the least that it has had.
-const GAINED_PART: i32 = 64;
+/// Current, at most, of a shaft that is to lose speed: one that is certain to brake.
+const LEAST_BRAKING: Current = Current::from_bits(-3 * NO_CURRENT.to_bits());
+
+/// What a shaft may have too much of while the supply is near its greatest voltage, as a part of what is
+/// wanted.
+const EXCESS_PART: i32 = 64;
 
 /// The demand on a motor that turns the way it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +58,28 @@ pub(super) fn is_to_stop(setpoint: &Setpoint, reversed: bool) -> bool {
     demand(setpoint, reversed) == Demand::Rest
 }
 
+/// The bounds, opened for braking where a speed, or a share of the supply, is above what is wanted of it; both
+/// in bits.
+///
+/// A current that reads as none is one of some mA, and a shaft without a load gains speed by it. That is
+/// taken back where the supply may be given nothing, too: some tens of mA while the shaft is fast. A supply
+/// that takes nothing at all is spared as its voltage nears the limit.
+fn opened(
+    config: &config::Config,
+    shared: &Shared,
+    bounds: Bounds,
+    (present, wanted): (i32, i32),
+) -> Bounds {
+    let spared = shared.protection.bus >= config.protection.bus_return_v;
+    let may_exceed = if spared { wanted / EXCESS_PART } else { 0 };
+    let min = if present.saturating_sub(wanted) > may_exceed {
+        bounds.min.min(LEAST_BRAKING)
+    } else {
+        bounds.min
+    };
+    Bounds { min, ..bounds }
+}
+
 /// Run and Stopping: the duty.
 pub(super) fn run(
     config: &config::Config,
@@ -68,53 +93,62 @@ pub(super) fn run(
         min: bounds.min.max(-six_step.braking),
         max: bounds.max.minus(s.duty.ripple()).max(bounds.max / 2),
     };
-    match demand(setpoint, shared.reversed) {
+    let speed = s.tracking.omega_bar;
+    let demand = demand(setpoint, shared.reversed);
+    let mut slowest = speed;
+    let (bounds, present, wanted) = match demand {
         Demand::Speed(command) => {
             let step = s.planner.plan(&six_step.planner, command);
             s.planner.advance(step);
-            let reference = s.planner.reference;
-            let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);
-            let error = reference.saturating_sub(s.tracking.omega_bar);
+            (bounds, speed.to_bits(), s.planner.reference.to_bits())
+        }
+        Demand::Share(share) => {
+            let share = duty_of(six_step, share);
+            (bounds, s.duty.duty.to_bits(), share.to_bits())
+        }
+        Demand::Current(current) => (only(bounds.hold(current)), 0, 0),
+        Demand::Rest => {
+            // The estimate's noise makes it a little slower each time: it comes to rest.
+            slowest = s.planner.reference.min(speed);
+            let bounds = match config.stop {
+                Stop::Coast => only(Current::ZERO),
+                Stop::Brake => bounds,
+            };
+            (bounds, speed.to_bits(), slowest.to_bits())
+        }
+    };
+    let bounds = opened(config, shared, bounds, (present, wanted));
+    let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);
+    match demand {
+        Demand::Speed(_) => {
+            let error = s.planner.reference.saturating_sub(speed);
             duty::speed(&six_step.duty, &mut s.duty, error, range);
             return;
         }
-        Demand::Share(share) => {
-            let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);
-            let share = I1F31::from_bits(share.top(six_step.duty.duty_max).to_bits() << 1);
-            duty::share(&mut s.duty, share, range);
-        }
-        Demand::Current(current) => hold(six_step, s, i, bounds.hold(current)),
-        Demand::Rest => {
-            // A current of none is one of some mA: what a shaft without a load gains by it is taken
-            // back.
-            let slowest = s.planner.reference.min(s.tracking.omega_bar);
-            let gained = s.tracking.omega_bar.saturating_sub(slowest) > slowest / GAINED_PART;
-            let current = match config.stop {
-                Stop::Coast => Current::ZERO,
-                Stop::Brake => bounds.min,
-            };
-            let current = if gained {
-                current.min(reading(NO_CURRENT).saturating_neg())
-            } else {
-                current
-            };
-            hold(six_step, s, i, current);
-            s.planner = planner::State::begin(slowest);
-            duty::take_over(&mut s.duty);
-            return;
-        }
+        Demand::Share(share) => duty::share(&mut s.duty, duty_of(six_step, share), range),
+        Demand::Current(_) => duty::current(&mut s.duty, range),
+        Demand::Rest => duty::share(&mut s.duty, I1F31::ZERO, range),
     }
-    s.planner = planner::State::begin(s.tracking.omega_bar);
+    s.planner = planner::State::begin(slowest);
     duty::take_over(&mut s.duty);
+}
+
+/// A share of the supply as a duty.
+fn duty_of(six_step: &Config, share: I1F31) -> I1F31 {
+    I1F31::from_bits(share.top(six_step.duty.duty_max).to_bits() << 1)
+}
+
+/// Bounds that leave one current.
+fn only(current: Current) -> Bounds {
+    Bounds {
+        min: current,
+        max: current,
+    }
 }
 
 /// Regulates the current.
 pub(super) fn hold(six_step: &Config, s: &mut State, i: Current, wanted: Current) {
-    let bounds = Bounds {
-        min: wanted,
-        max: wanted,
-    };
-    let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);
+    let range = duty::range(&six_step.duty, &mut s.duty, i, only(wanted));
     duty::current(&mut s.duty, range);
 }
 
