@@ -207,22 +207,35 @@ fn a_peripheral_follows_the_first_autopilot_it_hears() {
         &[],
     ));
     assert_eq!(system_of(&mut bench), 5);
-    let autopilot = HEARTBEAT_DATA {
+    for (system, wanted) in [(3, 3), (4, 3)] {
+        bench.receive(&autopilot(system));
+        assert_eq!(system_of(&mut bench), wanted);
+    }
+}
+
+#[test]
+fn a_peripheral_does_not_join_system_0_which_stands_for_all() {
+    let mut bench = Bench::with(peripheral(), 100_000);
+    bench.receive(&autopilot(0));
+    assert_eq!(system_of(&mut bench), 5);
+    bench.receive(&autopilot(3));
+    assert_eq!(system_of(&mut bench), 3);
+    bench.receive(&autopilot(0));
+    assert_eq!(system_of(&mut bench), 3);
+}
+
+/// A heartbeat of this system's autopilot.
+fn autopilot(system: u8) -> Vec<u8> {
+    let from = Address {
+        system,
+        component: 1,
+    };
+    let data = HEARTBEAT_DATA {
         mavtype: MavType::MAV_TYPE_QUADROTOR,
         autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
         ..HEARTBEAT_DATA::default()
     };
-    for (system, wanted) in [(0, 5), (3, 3), (4, 3)] {
-        bench.receive(&encode(
-            Address {
-                system,
-                component: 1,
-            },
-            &autopilot,
-            &[],
-        ));
-        assert_eq!(system_of(&mut bench), wanted);
-    }
+    encode(from, &data, &[])
 }
 
 /// The system that a peripheral with component 142 says it belongs to.
