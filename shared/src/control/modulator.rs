@@ -173,11 +173,15 @@ impl Supply {
     }
 }
 
+/// The part along d leaves this shift's share of the length.
+const D_RESERVE: u32 = 3;
+
 /// The square of a limited vector may be longer by this shift's share: 0.05 % of its length.
 const TOO_LONG: u32 = 10;
 
 /// Shortens a voltage vector to what the supply can give, keeping the part along d, which cancels
-/// what the current and the speed induce.
+/// what the current and the speed induce, up to seven eighths of the length. With all of it i_q has no
+/// regulator left, and stays where it is beyond its bound: ω·L·i_q is then what the part along d cancels.
 ///
 /// Returns the vector and what was cut off, if it was shortened.
 #[inline(always)]
@@ -185,7 +189,7 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
     if square_of(u) <= longest.square {
         return (short(u), None);
     }
-    let most = wide(longest.length);
+    let most = wide(longest.length - (longest.length >> D_RESERVE));
     let d = u.d.min(most).max(-most);
     let short_d = d.scaled();
     let mut q_max = longest.beside(short_d);

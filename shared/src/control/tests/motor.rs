@@ -25,7 +25,7 @@ pub(super) struct Motor {
     pub(super) omega_m: f64,
     /// Electrical angle.
     theta: f64,
-    i: (f64, f64),
+    pub(super) i: (f64, f64),
     /// Command of the last period: it acts in this one.
     pending: (f64, f64),
 }

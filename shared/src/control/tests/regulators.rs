@@ -317,6 +317,19 @@ fn a_step_of_the_synchronous_one_is_of_first_order_and_decoupled() {
     }
 }
 
+/// Braking at high speed with a current beyond what is wanted: at 6000 rpm −56 A along q induce the 13 V along d
+/// that there are, and without a voltage along q they would stay.
+#[test]
+fn a_current_beyond_its_bound_comes_back_where_its_drop_takes_the_whole_voltage() {
+    for kind in ALL {
+        let mut bench = Loop::new(units(kind), Motor::held(6000.0));
+        bench.vector_max = bench.units.voltage(13.0);
+        bench.motor.i = (-16.0, -56.0);
+        let i = *bench.run(0.05, [0.0, -30.0]).last().expect("it has run");
+        assert!((i.1 + 30.0).abs() < 0.1, "{kind}: {i:?}");
+    }
+}
+
 #[test]
 fn a_limited_voltage_winds_nothing_up() {
     for kind in ALL {
