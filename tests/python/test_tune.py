@@ -1,104 +1,23 @@
 """Motors that nobody has tuned by hand start and follow the throttle with the settings that follow from them."""
 
-import json
-import math
 import random
-import subprocess
 
 import pytest
 
 from emulator import scenario
-from paths import TOOL
-
-
-def tune(*words) -> dict:
-    ended = subprocess.run([str(TOOL), "tune", "--json", *words], capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 0, ended.stderr
-    return json.loads(ended.stdout)
-
-
-# What follows from the motor where it is 0.
-FROM_MOTOR = """CTL_RPM_MIN CTL_SLEW_RPM_S CTL_BW_CUR_HZ CTL_BW_SPD_HZ STA_PARK_AS STA_RAMP_A STA_RAMP_RPM_S
-    STA_RUN_RPM""".split()
-
-
-def toml(table: dict) -> str:
-    return "\n".join(f"{key} = {json.dumps(value)}" for key, value in table.items())
-
-
-def motor_of(draw: random.Random) -> dict:
-    """A motor with its propeller, supply and limits, of any size from a 3-inch one to a lift of 3 kW.
-
-    Speed falls and supply rises with the power; at full throttle the propeller takes it all, at the limit R drops
-    5 to 15 % of the supply, and the limit's torque takes 24 to 150 ms to full speed without the load.
-    """
-    size = draw.uniform(0.25, 1.0)
-    power_w = 10 ** (1.2 + 2.3 * size) * draw.uniform(0.7, 1.4)
-    supply_v = min(45.0, 3.7 * 10 ** (1.1 * size) * draw.uniform(0.8, 1.3))
-    rpm = 50_000 * 10**-size * draw.uniform(0.6, 1.4)
-    pole_pairs = draw.choice([6, 7, 7, 11, 12, 14, 14, 20, 21] if size > 0.5 else [6, 7, 7])
-    flux_wb = 60 / (math.tau * math.sqrt(3) * pole_pairs * rpm / 0.75 / supply_v)
-    limit_a = 1.6 * power_w / supply_v + 2
-    resistance_ohm = draw.uniform(0.05, 0.15) * supply_v / (math.sqrt(3) * limit_a)
-    rad_s = rpm * math.tau / 60
-    inertia = 1.5 * pole_pairs * flux_wb * limit_a * draw.uniform(0.024, 0.15) / rad_s
-    return {
-        "supply_v": supply_v,
-        "rpm": rpm,
-        "angle_deg": draw.uniform(-180.0, 180.0),
-        "drag": 0.8 * power_w / rad_s**3,
-        "params": {
-            "MOT_POLE_PAIRS": pole_pairs,
-            "MOT_R_MOHM": 1e3 * resistance_ohm,
-            "MOT_L_UH": 1e6 * resistance_ohm * draw.uniform(1.5e-4, 8e-4),
-            "MOT_FLUX_MWB": 1e3 * flux_wb,
-            "MOT_J_GCM2": 1e7 * inertia,
-            "LIM_PHASE_A": limit_a,
-            "LIM_BUS_V_MAX": 1.25 * supply_v,
-            "LIM_BUS_V_MIN": 0.6 * supply_v,
-            "PWM_DEADTIME_NS": draw.choice([200, 300, 500]),
-            "CTL_RPM_MAX": rpm,
-        },
-    }
+from motors import FROM_MOTOR, drawn_bench, lines, motor_of, tune
 
 
 def flight(motor: dict, params: dict, plant: str) -> str:
     """At 0.5 s the throttle goes to 30 %, and at 2.5 s to 90 %."""
-    of = motor["params"]
-    # Half of the inertia is the bell's.
-    j = of["MOT_J_GCM2"] * 1e-7 / 2
-    tables = [
-        (
-            "[bench]",
-            {
-                "bus": motor["supply_v"],
-                "adc_range_a": 2 * of["LIM_PHASE_A"],
-                "duration_s": 3.5,
-                "plant": plant,
-                "initial_angle_deg": motor["angle_deg"],
-            },
-        ),
-        (
-            "[bench.motor]",
-            {
-                "name": "drawn",
-                "R": of["MOT_R_MOHM"] * 1e-3,
-                "L": of["MOT_L_UH"] * 1e-6,
-                "flux": of["MOT_FLUX_MWB"] * 1e-3,
-                "pole_pairs": of["MOT_POLE_PAIRS"],
-                "J": j,
-            },
-        ),
-        ("[bench.load]", {"name": "propeller", "c2": motor["drag"], "J": j}),
-        ("[params]", params),
-        ("[[signal]]", {"at_s": 0.0, "throttle": 0.0}),
-        ("[[signal]]", {"at_s": 0.5, "throttle": 0.3}),
-        ("[[signal]]", {"at_s": 2.5, "throttle": 0.9}),
-        ("[[window]]", {"name": "all", "t0_s": 0.0, "t1_s": 3.5}),
-        ("[[window]]", {"name": "slow", "t0_s": 2.2, "t1_s": 2.5}),
-        ("[[window]]", {"name": "end", "t0_s": 3.4, "t1_s": 3.5}),
-    ]
-    return "\n".join(f"{head}\n{toml(table)}" for head, table in tables)
+    tables = drawn_bench(motor)
+    tables["bench"] |= {"duration_s": 3.5, "plant": plant}
+    tables["params"] = params
+    throttle = [(0.0, 0.0), (0.5, 0.3), (2.5, 0.9)]
+    windows = {"all": (0.0, 3.5), "slow": (2.2, 2.5), "end": (3.4, 3.5)}
+    entries = [("signal", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]
+    entries += [("window", {"name": name, "t0_s": t0, "t1_s": t1}) for name, (t0, t1) in windows.items()]
+    return lines(tables, entries)
 
 
 def flown(folder, number: int, plant: str) -> tuple[bool, bool]:

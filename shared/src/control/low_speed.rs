@@ -5,7 +5,7 @@
 
 use super::speed::Bounds;
 use crate::math::{Gain, Held, other_leg};
-use crate::units::{Current, Speed};
+use crate::units::{Current, Speed, Voltage};
 
 /// The current along d, and the bound of the one along q.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Config {
     phase: Current,
     /// The last speed at which anything is done.
     end: Speed,
+    /// Least voltage along q in voltage mode: the back-EMF of the least speed that the observer can know.
+    pub u_q: Voltage,
 }
 
 impl Config {
@@ -39,6 +41,7 @@ impl Config {
             i_q_slope,
             phase,
             end: Speed::MAX,
+            u_q: Voltage::ZERO,
         };
         config.end = config.last();
         config

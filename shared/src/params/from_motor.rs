@@ -19,14 +19,17 @@ const RAMP_SHARE: f32 = 0.2;
 /// swings slowly.
 const PARK_S: f32 = 0.4;
 
-/// Back-EMF over the ramp current's drop across R, where the observer takes over.
+/// Back-EMF over the ramp current's drop across R, at the least speed. To take over from the ramp, the observer
+/// needs the dead time's voltage on top; at less it stays in lock, since the bias of i_d tells the sign of each
+/// current, and a part of that voltage does.
 const EMF_SHARE: f32 = 1.5;
+const LEAST_DEAD_SHARE: f32 = 0.25;
 
-/// Speed at which the observer takes over, over `CTL_RPM_MAX`.
-const RUN_SHARE: f32 = 0.05;
+/// Least speed over `CTL_RPM_MAX`.
+const LEAST_SHARE: f32 = 0.05;
 
-/// Electrical frequency at which the observer takes over, at least, Hz: the speed loop is a part of it.
-const RUN_HZ: f32 = 30.0;
+/// Least electrical frequency, Hz: the speed loop is a part of it.
+const LEAST_HZ: f32 = 30.0;
 
 /// Electrical turns of the ramp: the observer needs some of them to settle.
 const RAMP_TURNS: f32 = 12.0;
@@ -70,6 +73,8 @@ pub struct FromMotor {
     pub ramp_rpm_s: f32,
     /// `STA_RUN_RPM`.
     pub run_rpm: f32,
+    /// What the dead time takes of a phase's voltage at the highest supply: the fundamental of a square wave, V.
+    pub dead_v: f32,
 }
 
 impl FromMotor {
@@ -79,12 +84,16 @@ impl FromMotor {
         let motor = Motor::new(params);
         let in_force = |id, value| in_force(params, id, value);
         let ramp_a = in_force(ParamId::StaRampA, RAMP_SHARE * motor.limit_a);
-        let run_rpm = in_force(ParamId::StaRunRpm, most(motor.run_rpm(params, ramp_a)));
+        let dead_s = params.get(ParamId::PwmDeadtimeNs) * 1e-9;
+        let dead_v = 4.0 / PI * dead_s * motor.pwm_hz * params.get(ParamId::LimBusVMax);
+        let run_rpm = motor.rpm(ramp_a, dead_v);
+        let run_rpm = in_force(ParamId::StaRunRpm, most(run_rpm));
+        let least_rpm = most(motor.rpm(ramp_a, LEAST_DEAD_SHARE * dead_v));
         let current_hz = in_force(ParamId::CtlBwCurHz, motor.pwm_hz / CURRENT_PERIODS);
         let speed_hz = motor.speed_hz(current_hz, run_rpm);
         let slew_rpm_s = SLEW_SHARE * motor.rpm_s_per_a * motor.limit_a;
         Self {
-            least_rpm: in_force(ParamId::CtlRpmMin, run_rpm),
+            least_rpm: in_force(ParamId::CtlRpmMin, least_rpm),
             slew_rpm_s: in_force(ParamId::CtlSlewRpmS, slew_rpm_s),
             current_hz,
             speed_hz: in_force(ParamId::CtlBwSpdHz, least(speed_hz)),
@@ -95,19 +104,26 @@ impl FromMotor {
                 least(motor.ramp_rpm_s(ramp_a, run_rpm)),
             ),
             run_rpm,
+            dead_v,
         }
     }
 
     /// Each setting in the order of the table, with what it follows from where it was not chosen.
     pub fn reasons(&self, params: &Params) -> [(ParamId, f32, &'static str); 8] {
         let motor = Motor::new(params);
-        let run = motor.run_rpm(params, self.ramp_a);
+        let run = motor.rpm(self.ramp_a, self.dead_v);
+        let slowest = motor.rpm(self.ramp_a, LEAST_DEAD_SHARE * self.dead_v);
         let speed = motor.speed_hz(self.current_hz, self.run_rpm);
         let ramp = motor.ramp_rpm_s(self.ramp_a, self.run_rpm);
         let of_run = [
             "back-EMF over R, STA_RAMP_A and the dead time",
             "a twentieth of CTL_RPM_MAX",
             "30 electrical turns a second",
+        ];
+        let of_slowest = [
+            "back-EMF over R, STA_RAMP_A and a part of the dead time",
+            of_run[1],
+            of_run[2],
         ];
         let of_speed = [
             "LIM_PHASE_A for an error of a twentieth of CTL_RPM_MAX",
@@ -119,7 +135,11 @@ impl FromMotor {
             "12 electrical turns to STA_RUN_RPM",
         ];
         let settings = [
-            (ParamId::CtlRpmMin, self.least_rpm, "STA_RUN_RPM"),
+            (
+                ParamId::CtlRpmMin,
+                self.least_rpm,
+                text(slowest, most(slowest), of_slowest),
+            ),
             (
                 ParamId::CtlSlewRpmS,
                 self.slew_rpm_s,
@@ -184,16 +204,14 @@ impl Motor {
         }
     }
 
-    /// The speed at which the observer takes over: the greatest, but no more than full throttle.
-    fn run_rpm(&self, params: &Params, ramp_a: f32) -> [f32; 3] {
-        let dead_s = params.get(ParamId::PwmDeadtimeNs) * 1e-9;
-        let dead_v = 4.0 / PI * dead_s * self.pwm_hz * params.get(ParamId::LimBusVMax);
+    /// Bounds of a speed that the observer can know: the greatest, but no more than full throttle.
+    fn rpm(&self, ramp_a: f32, dead_v: f32) -> [f32; 3] {
         let emf_v = EMF_SHARE * self.resistance_ohm * ramp_a + dead_v;
         let by_emf = emf_v / (self.flux_wb * self.pole_pairs) * (60.0 / TAU);
-        let by_turns = RUN_HZ * 60.0 / self.pole_pairs;
+        let by_turns = LEAST_HZ * 60.0 / self.pole_pairs;
         [
             by_emf.min(self.max_rpm),
-            RUN_SHARE * self.max_rpm,
+            LEAST_SHARE * self.max_rpm,
             by_turns.min(self.max_rpm),
         ]
     }
@@ -282,7 +300,8 @@ mod tests {
             (made.ramp_a, 8.0),
             (made.park_as, 3.2),
             (made.run_rpm, 2718.0),
-            (made.least_rpm, 2718.0),
+            // 0.396 V and a quarter of 0.2445 V.
+            (made.least_rpm, 1939.7),
             (made.current_hz, 1000.0),
             // 0.2·3.376 mNm/A·8 A/6.3 µkgm² are 857.4 rad/s².
             (made.ramp_rpm_s, 8188.0),

@@ -62,6 +62,9 @@ const BIAS_SHARE: f32 = 0.3;
 /// on the bench.
 const BIAS_END: f32 = 16.0;
 
+/// The same over the dead time's voltage, at least: 1937 rad/s on the bench.
+const BIAS_DEAD_END: f32 = 5.5;
+
 /// Least bound of i_q over `STA_RAMP_A`.
 const TORQUE_LEAST_SHARE: f32 = 0.5;
 
@@ -264,17 +267,22 @@ fn low_speed(p: &Si) -> low_speed::Config {
     let ramp_a = p.from_motor.ramp_a.min(limit_a);
     let bias_a = BIAS_SHARE * ramp_a;
     let rad_per_unit = TAU / p.period_s;
-    let end_rad_s = BIAS_END * p.resistance_ohm * bias_a / p.flux_wb;
+    let end_v = BIAS_END * p.resistance_ohm * bias_a;
+    let end_v = end_v.max(BIAS_DEAD_END * p.from_motor.dead_v);
+    let end_rad_s = end_v / p.flux_wb;
     let drop_a_s = TORQUE_DROP_SHARE * p.flux_wb / p.resistance_ohm;
     let i_d = p.scale.current_from_a(bias_a);
     let i_d_slope = bias_a / p.scale.current_a / end_rad_s * rad_per_unit;
     let i_q = p.scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a);
     let i_q_slope = drop_a_s * rad_per_unit / p.scale.current_a;
-    low_speed::Config::new(
+    let least_rad_s = p.from_motor.least_rpm * TAU / 60.0 * p.get(ParamId::MotPolePairs);
+    let mut config = low_speed::Config::new(
         (i_d, p.gain(ParamId::StaRampA, i_d_slope)),
         (i_q, p.gain(ParamId::MotRMohm, i_q_slope)),
         phase,
-    )
+    );
+    config.u_q = p.voltage(p.flux_wb * least_rad_s);
+    config
 }
 
 fn limits(p: &Si) -> protection::Config {
