@@ -176,7 +176,7 @@ pub struct HandlerEvent {
     /// Instructions since power-up.
     pub instructions: u64,
     /// Since when the processor could have taken an exception of this priority between two instructions,
-    ///@@
+    /// and did so only now: the engine looks where a block of code begins.
     pub since: Cycles,
 }
 

@@ -379,7 +379,12 @@ impl<S: Surroundings + 'static> Processor<S> {
                 engine.mem_map_ptr(start, cells.len() as u64, prot, cells.as_ptr() as *mut _)?;
             }
         }
-        for registers in REGISTERS {
+        let is_memory = |address: u64| {
+            let mut memories = memories.iter();
+            memories.any(|mapped| mapped.memory.holds(address as u32, 1))
+        };
+        // The store's place is plain memory in another chip.
+        for registers in REGISTERS.into_iter().filter(|each| !is_memory(each.start)) {
             let Range { start, end } = registers;
             engine.mmio_map(
                 start,
