@@ -13,6 +13,7 @@ from pymavlink import mavftp, mavutil
 from pymavlink.mavftp import FtpError
 
 import siskin_dialect as dialect
+from emulator import OF_BENCH
 
 PACK = "@PARAM/param.pck"
 COMPONENT_METADATA = 397
@@ -133,8 +134,9 @@ def test_the_parameters_are_those_of_the_list(esc, files):
     assert {name.decode(): value for name, value, _ in data.params} == listed
     defaults = {name.decode(): value for name, value, _ in data.defaults}
     assert defaults["MOT_L_UH"] == single(30.6)
-    changed = [name for name in listed if defaults[name] != listed[name]]
-    assert changed in (["MOT_L_UH"], ["MOT_L_UH", "MOT_KV"])
+    changed = {name for name in listed if defaults[name] != listed[name]}
+    assert changed - {"MOT_KV"} == {"MOT_L_UH", *OF_BENCH}
+    assert {defaults[name] for name in OF_BENCH} == {0.0}
 
     # The header of a part still names all, so the decoder for whole files takes it.
     data = mavftp.MAVFTP.ftp_param_decode(files.file(f"{PACK}?start=10&count=3"))
@@ -171,8 +173,8 @@ def test_the_metadata_describes_every_parameter(esc, files):
         assert entry["shortDesc"] and entry["group"]
         assert entry["min"] <= listed[name] <= entry["max"]
         if not entry.get("readOnly", False):
-            # The emulator is fresh.
-            assert single(entry["default"]) == listed[name], name
+            # The emulator is fresh, on its default bench.
+            assert single(entry["default"]) == (0.0 if name in OF_BENCH else listed[name]), name
         for choice in entry.get("values", ()):
             check(choice, {"value": NUMBER, "description": str}, ("value", "description"))
             assert entry["min"] <= choice["value"] <= entry["max"]
