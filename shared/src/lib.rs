@@ -21,6 +21,12 @@
 //! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `setpoint`, `telemetry`} ← {`answer`,
 //! `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
 //! and that each folder has one.
+//!
+//! # What is inlined
+//! The chip's code is made as small as it can be, and little is inlined by itself. What a control period
+//! passes through is `#[inline(always)]`: a call, and the registers that it saves, would cost each period
+//! more time than its copies take flash. What only some periods do is `#[inline(never)]`: the others would
+//! save registers for it. Any other reason stands beside the attribute.
 #![no_std]
 #![forbid(unsafe_code)]
 

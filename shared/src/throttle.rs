@@ -80,6 +80,8 @@ impl Reach for Throttle {
 
 impl Throttle {
     /// A quiet wire at power-up, captured by a timer of `tick_hz`, with these parameters of this board.
+    ///
+    /// Never inlined: on the chip it is made where it stays.
     #[inline(never)]
     pub fn new(tick_hz: u32, params: &Params, board: &Board) -> Self {
         let scale = scale(params, board);

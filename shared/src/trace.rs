@@ -40,7 +40,6 @@ macro_rules! traced {
         $visible struct $name($field_visible $type);
 
         impl $crate::trace::Trace for $name {
-            #[inline]
             fn trace(&self, out: &mut impl FnMut(u32)) {
                 $crate::trace::Trace::trace(&self.0, out);
             }
@@ -58,7 +57,6 @@ macro_rules! traced {
         }
 
         impl $crate::trace::Trace for $name {
-            #[inline]
             fn trace(&self, out: &mut impl FnMut(u32)) {
                 out(*self as u32);
             }
@@ -72,7 +70,6 @@ pub(crate) use traced;
 macro_rules! one_word {
     ($($type:ty),*) => {$(
         impl Trace for $type {
-            #[inline]
             fn trace(&self, out: &mut impl FnMut(u32)) {
                 out(u32::from(*self));
             }
@@ -83,7 +80,6 @@ macro_rules! one_word {
 one_word!(bool, u8, u16, u32);
 
 impl Trace for i32 {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         out(*self as u32);
     }
@@ -91,7 +87,6 @@ impl Trace for i32 {
 
 impl Trace for i64 {
     /// The lower word first.
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         out(*self as u32);
         out((*self >> 32) as u32);
@@ -99,28 +94,24 @@ impl Trace for i64 {
 }
 
 impl<F> Trace for FixedI32<F> {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.to_bits().trace(out);
     }
 }
 
 impl<F> Trace for FixedU32<F> {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.to_bits().trace(out);
     }
 }
 
 impl<F> Trace for FixedI64<F> {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.to_bits().trace(out);
     }
 }
 
 impl<T: Trace, const N: usize> Trace for [T; N] {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         for item in self {
             item.trace(out);
@@ -129,7 +120,6 @@ impl<T: Trace, const N: usize> Trace for [T; N] {
 }
 
 impl<T: Trace, U: Trace> Trace for (T, U) {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.0.trace(out);
         self.1.trace(out);
@@ -138,7 +128,6 @@ impl<T: Trace, U: Trace> Trace for (T, U) {
 
 impl<T: Trace + Copy + Default> Trace for Option<T> {
     /// One word for its presence, then its own words, or those of the default.
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.is_some().trace(out);
         self.unwrap_or_default().trace(out);

@@ -222,13 +222,13 @@ impl Report {
         self.fit(first..first + 3, params)
     }
 
+    // Never inlined: it would be there for all places, and again for a kind.
     #[inline(never)]
     fn fit(&self, places: Range<usize>, params: &Params) -> bool {
         let mut lines = places.map(|place| self.line(place, params));
         lines.all(|line| line.is_none_or(|line| line.ok()))
     }
 
-    #[inline(never)]
     fn line(&self, place: usize, params: &Params) -> Option<Line> {
         let value = *self.values.get(place).filter(|value| !value.is_nan())?;
         let (kind, phase) = if place < SINGLE {

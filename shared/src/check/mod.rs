@@ -316,7 +316,6 @@ impl Check {
 }
 
 /// The terminals' voltages, percent of the supply or of the most that they show.
-#[inline(never)]
 fn terminals(board: &Board, sample: &Sample) -> [f32; 3] {
     let bus_v = sample.bus.to_f32() * board.bus_v_per_count;
     let whole = (bus_v / board.terminal_v_per_count).clamp(1.0, FULL_SCALE);

@@ -60,7 +60,6 @@ pub enum Rotor {
 
 impl Trace for Rotor {
     /// As many words whatever is known, so that a word's place tells what it is.
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         let (kind, theta, omega) = match *self {
             Self::Unknown => (0, Angle::ZERO, Speed::ZERO),

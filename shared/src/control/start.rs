@@ -151,7 +151,6 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
 }
 
 /// Returns true if the rotor has lost the frame of Ramp.
-#[inline]
 pub fn lost(config: &Config, state: &State) -> bool {
     state.astray > config.astray_periods
 }

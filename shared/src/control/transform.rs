@@ -39,7 +39,6 @@ pub struct Order {
 
 impl Trace for Order {
     /// Returns true if the phases b and c have changed places.
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         (*self == Self::SWAPPED).trace(out);
     }

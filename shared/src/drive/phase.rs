@@ -60,7 +60,6 @@ impl Phase {
 }
 
 impl Trace for Phase {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         out(*self as u32);
     }

@@ -67,7 +67,6 @@ impl Pull {
 }
 
 impl Trace for Pull {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         out(*self as u32);
     }

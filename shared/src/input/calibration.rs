@@ -83,7 +83,8 @@ impl Calibration {
         self.asked_us = Some(now_us);
     }
 
-    /// It ends: the signal carries something else than pulses, or it is no longer wanted.
+    /// It ends: the signal carries something else than pulses, or it is no longer wanted. Never inlined:
+    /// each way out is one.
     #[inline(never)]
     pub fn end(&mut self) -> Option<Step> {
         let cancelled = self.is_under_way().then_some(Step::Cancelled);

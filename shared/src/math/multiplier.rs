@@ -54,7 +54,6 @@ impl<A, B> Multiplier<A, B> {
 }
 
 impl<A, B> Trace for Multiplier<A, B> {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.bits.trace(out);
     }

@@ -218,7 +218,6 @@ impl<D, F: Unsigned> Number for Quantity<D, F> {
 }
 
 impl<D, F> Trace for Quantity<D, F> {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.number.trace(out);
     }

@@ -43,7 +43,6 @@ fn square(x: i32) -> u64 {
 /// √x, rounded down to within 2^-25 of its value and one bit.
 ///
 /// The reciprocal root comes from a table and two Newton steps, which take products only.
-#[inline]
 fn root(x: u64) -> u32 {
     if x == 0 {
         return 0;

@@ -118,7 +118,6 @@ impl Command {
 
     /// Returns true if this is the same command sent again because its ACK did not arrive. Values are
     /// compared by their bits: NaN is a value here.
-    #[inline(never)]
     fn repeats(&self, earlier: &Self) -> bool {
         let most_us = match (self.confirmation, earlier.confirmation) {
             (Some(now), Some(then)) if now > then => REPEAT_US,

@@ -34,7 +34,7 @@ impl Payload {
 
     /// The next field, the least byte first.
     ///
-    /// Never inlined: each message calls it for each field.
+    /// Never inlined, nor are longer numbers: each message calls it for each field.
     #[inline(never)]
     pub(super) fn put(&mut self, field: &[u8]) {
         let room = self.bytes.iter_mut().skip(self.len);

@@ -68,7 +68,6 @@ impl Place {
 
 impl Payload {
     /// An array with a value for each of four ESCs: this one's in its slot, and another for the rest.
-    #[inline(never)]
     pub(super) fn slots(&mut self, place: Place, own: &[u8], other: &[u8]) {
         for slot in 0..SLOTS {
             self.put(if slot == place.slot() { own } else { other });

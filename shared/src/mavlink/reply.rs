@@ -92,7 +92,7 @@ impl Replies {
 
     /// Queues a reply. One too many is dropped, and the next poll says so.
     ///
-    /// Never inlined: a dozen places call it.
+    /// Never inlined, nor is the ACK: a dozen places call it.
     #[inline(never)]
     pub(super) fn push(&mut self, reply: Reply) {
         if self.queue.push_back(reply).is_err() {

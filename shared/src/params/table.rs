@@ -170,7 +170,6 @@ macro_rules! parameters {
                 impl Choice for $id {
                     const PARAM: ParamId = ParamId::$id;
 
-                    #[inline]
                     fn of(number: u8) -> Self {
                         match number {
                             $($number => Self::$variant,)+
@@ -178,7 +177,6 @@ macro_rules! parameters {
                         }
                     }
 
-                    #[inline]
                     fn number(self) -> u8 {
                         self as u8
                     }

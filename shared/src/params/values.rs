@@ -78,13 +78,11 @@ impl Params {
     }
 
     /// The value of a parameter that is a choice of few, which its type names.
-    #[inline]
     pub fn choice<C: Choice>(&self) -> C {
         C::of(self.number(C::PARAM))
     }
 
     /// Returns true if a parameter that is a choice has this value.
-    #[inline]
     pub fn chosen<C: Choice>(&self, choice: C) -> bool {
         self.number(C::PARAM) == choice.number()
     }

@@ -53,7 +53,6 @@ impl Fault {
 pub struct Faults(u8);
 
 impl Trace for Faults {
-    #[inline]
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.0.trace(out);
     }

@@ -38,7 +38,6 @@ impl State {
 }
 
 /// One period: what was told.
-#[inline]
 pub fn estimate(state: &State, swapped: bool) -> (Estimate, SlowEstimate) {
     let (theta, omega) = state.seen(swapped);
     let estimate = Estimate {

@@ -102,6 +102,7 @@ impl State {
 /// `certain` readings in a row on. With `strict` a rising phase too must have been seen on the other
 /// side: before the start has found the rotor, one that swings backwards looks like one that is past
 /// its crossing.
+// Inlined, though it is long: the call would be longer than what it saves.
 #[inline]
 pub fn look(
     config: &Config,

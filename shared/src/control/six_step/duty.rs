@@ -75,7 +75,6 @@ impl State {
 /// With `min` = `max` it is one value, the regulator of the current. Three times the current's
 /// difference from its smoothed value looks some 25 periods ahead, which damps motors whose
 /// current answers slowly.
-#[inline]
 pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> Range {
     let change = i.minus(state.smoothed);
     state.smoothed = state.smoothed.plus(change >> 3);
@@ -94,20 +93,17 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
 }
 
 /// Regulates the current, with the range of equal bounds.
-#[inline]
 pub fn current(state: &mut State, range: Range) {
     state.duty = range.greatest;
 }
 
 /// Goes to this share of the supply as the range permits.
-#[inline]
 pub fn share(state: &mut State, share: I1F31, range: Range) {
     state.duty = share.min(range.greatest).max(range.least);
 }
 
 /// Regulates the speed: `error` is what is wanted less what there is. The integral stands still
 /// while the duty is held by the range and the error pushes it further.
-#[inline]
 pub fn speed(config: &Config, state: &mut State, error: Speed, range: Range) {
     let wanted = state.sigma.plus(config.k_p.held(error));
     state.duty = wanted.min(range.greatest).max(range.least);

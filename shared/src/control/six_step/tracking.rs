@@ -53,7 +53,6 @@ impl State {
     }
 
     /// A period passes.
-    #[inline]
     pub fn advance(&mut self) {
         self.omega = self.omega.plus(self.acceleration).min(FASTEST);
         self.delta = self.delta.plus(self.omega.over_period());
@@ -107,7 +106,6 @@ impl State {
 
     /// Readings in a row that are to tell on which side of zero the floating phase is: one a 40th
     /// of a sextant, up to four, since the slower a rotor is, the smaller its back-EMF.
-    #[inline]
     pub fn certain(&self) -> u16 {
         match self.omega.to_bits() >> 21 {
             // Below 2^-11 turns a period, 341 periods a sextant; then 171, and 85.
@@ -120,7 +118,6 @@ impl State {
 
     /// Returns true if a commutation that is commanded now takes effect nearest to `angle` past the middle
     /// of the sextant.
-    #[inline]
     pub fn reaches(&self, angle: Angle, delay: Delay) -> bool {
         // Half a period and the delay, which is also the way to the middle of a voltage.
         self.delta.plus(delay.advance(self.omega)) >= angle

@@ -64,7 +64,6 @@ impl Config {
     }
 
     /// Begins, or goes on, at this speed with this current, without a jump.
-    #[inline]
     pub fn begin(&self, state: &mut State, speed: Speed, i_q: Current) {
         state.planner = planner::State::begin(speed);
         match &self.law {

@@ -200,7 +200,6 @@ fn rotor(
 }
 
 /// Looks for the crossing and commutates by it. False where the rotor is no longer followed.
-#[inline]
 fn crossings(
     six_step: &Config,
     (s, shared): (&mut State, &Shared),

@@ -183,7 +183,6 @@ impl Component {
         self.send_payload(message, &payload, send);
     }
 
-    #[inline(never)]
     fn send_named(&mut self, now_us: u64, name: &str, value: f32, send: &mut dyn FnMut(&[u8])) {
         let mut payload = Payload::new();
         messages::named_value(&mut payload, now_us, name, value);

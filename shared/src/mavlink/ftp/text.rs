@@ -70,7 +70,6 @@ pub(super) fn check(view: &View, sink: &mut Sink) {
 }
 
 /// A number with three decimals, and a space.
-#[inline(never)]
 fn thousandths(number: f32, sink: &mut Sink) {
     let thousandths = (number.abs() * 1000.0 + 0.5) as u32;
     if !number.is_finite() {

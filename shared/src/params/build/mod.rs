@@ -110,7 +110,6 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
 ///
 /// # Errors
 /// As [`build`]; what is in its place then is no configuration.
-#[inline(never)]
 pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<(), BuildError> {
     let refused = Cell::new(None);
     let p = Si::new(params, board, &refused);

@@ -120,7 +120,7 @@ impl<'a> Si<'a> {
         self.scale.speed_from_rpm(self.slow_rpm())
     }
 
-    /// A volt number in the control's unit.
+    /// A volt number in the control's unit. Never inlined: each limit in volts is one.
     #[inline(never)]
     pub(super) fn voltage(&self, volts: f32) -> Voltage {
         Voltage::from_f32(volts / self.scale.voltage_v)
@@ -137,21 +137,20 @@ impl<'a> Si<'a> {
         Multiplier::from_bits(self.factor_bits(param, k, B::Frac::I32 - A::Frac::I32))
     }
 
-    #[inline(never)]
     pub(super) fn factor_bits(&self, param: ParamId, k: f32, exponent: i32) -> i32 {
         let (bits, shift) = self.gain_parts(param, k, exponent);
         self.refuse_if(shift != 0, param, OUT_OF_RANGE);
         bits
     }
 
-    #[inline(never)]
     pub(super) fn gain_parts(&self, param: ParamId, k: f32, exponent: i32) -> (i32, u32) {
         let parts = gain_parts(k, exponent);
         self.refuse_if(parts.is_none(), param, OUT_OF_RANGE);
         parts.unwrap_or((0, 0))
     }
 
-    /// Refuses a parameter in some case, unless another has been refused before.
+    /// Refuses a parameter in some case, unless another has been refused before. Never inlined: each
+    /// coefficient may be one.
     #[inline(never)]
     pub(super) fn refuse_if(&self, refused: bool, param: ParamId, reason: &'static str) {
         if refused && self.refused.get().is_none() {
