@@ -100,6 +100,25 @@ pub enum Outcome {
     },
 }
 
+/// What follows from a look.
+enum Next {
+    /// The step goes on.
+    Wait,
+    /// The next step.
+    Go(Step),
+    /// The end, with all measured.
+    Measured,
+    /// The end, with something left that could not be measured.
+    Abandoned,
+}
+
+impl Next {
+    /// The next step, if what it needs is so.
+    fn go_if(may: bool, step: Step) -> Self {
+        if may { Self::Go(step) } else { Self::Abandoned }
+    }
+}
+
 /// The drive's state at a look.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
@@ -111,6 +130,13 @@ pub struct Sight<'a> {
     pub temperature_c: f32,
     /// True if nothing else asks the motor to turn.
     pub rests: bool,
+}
+
+impl Sight<'_> {
+    /// Returns true if the drive has a fault.
+    fn faulted(&self) -> bool {
+        !self.snapshot.faults.is_empty()
+    }
 }
 
 /// A self-test and its results.
@@ -167,86 +193,98 @@ impl Check {
         (board, params): (&Board, &Params),
         probe: &mut impl Probe,
     ) -> Option<Outcome> {
-        if self.step == Step::Over {
-            return None;
-        }
-        if self.step == Step::PowerUp {
-            // After some readings of the supply.
-            self.looks = self.looks.saturating_add(1);
-            if self.looks < POWER_UP_LOOKS || !self.own(sight, probe) {
-                return None;
-            }
-            return Some(self.end(params, true));
-        }
-        if !sight.rests {
-            return Some(self.end(params, false));
-        }
-        let faulted = !sight.snapshot.faults.is_empty();
         self.looks = self.looks.saturating_add(1);
-        let looks = self.looks;
         let next = match self.step {
-            Step::Over | Step::PowerUp => return None,
-            Step::Listen => {
-                let sample = probe.sample();
-                if looks > LATENCY {
-                    for (phase, counts) in sample.currents.into_iter().enumerate() {
-                        self.listen(phase, counts.to_f32() * board.current_a_per_count);
-                    }
-                }
-                if looks < LATENCY + LISTENED || !self.own(sight, probe) {
-                    return None;
-                }
-                for phase in 0..board.shunts.count() {
-                    self.judge(phase);
-                }
-                let share = terminals(board, &sample);
-                for phase in 0..3 {
-                    self.report
-                        .set(Kind::Rest, phase, share[usize::from(phase)]);
-                }
-                let grounded = self.report.holds(Kind::Rest, params);
-                grounded.then_some(Step::Shaft)
-            }
-            Step::Shaft => {
-                let stands = sight.snapshot.phase == Phase::Tone;
-                if !stands && !faulted && looks <= SHAFT_LOOKS {
-                    return None;
-                }
-                stands.then_some(Step::Pull(Pull::UpA))
-            }
+            Step::Over => return None,
+            Step::PowerUp => self.power_up(sight, probe),
+            _ if !sight.rests => Next::Abandoned,
+            Step::Listen => self.sensors(sight, (board, params), probe),
+            Step::Shaft => self.shaft(sight),
             Step::Pull(pull) => {
                 let share = terminals(board, &probe.sample());
-                let (leg, i) = (pull.leg(), sight.snapshot.i);
-                let [next_a, last_a] = [i.d, i.q].map(|i| sight.scale.amperes(i));
-                let [next, last] = [(leg + 1) % 3, (leg + 2) % 3];
-                let up = looks > LATENCY && share[usize::from(leg)] >= UP_PERCENT;
-                let most = if pull.is_through() {
-                    THROUGH_LOOKS
-                } else {
-                    UP_LOOKS
-                };
-                if !up && !faulted && looks <= most {
-                    return None;
-                }
-                if pull.is_through() {
-                    self.report.set(Kind::Low, next, next_a);
-                } else {
-                    self.report.set(Kind::High, leg, share[usize::from(leg)]);
-                    self.followed(next, &share, next_a);
-                    self.followed(last, &share, last_a);
-                }
-                if pull == Pull::ThroughC && !faulted {
-                    return Some(self.end(params, true));
-                }
-                // A leg whose low side is shorted must not switch.
-                let may = !faulted && self.report.holds(Kind::Off, params);
-                may.then_some(Step::Pull(Pull::from_number(pull as u8 + 1)))
+                self.pulled(pull, sight, &share, params)
             }
         };
-        Some(match next {
-            Some(step) => self.go(step),
-            None => self.end(params, false),
-        })
+        match next {
+            Next::Wait => None,
+            Next::Go(step) => Some(self.go(step)),
+            Next::Measured => Some(self.end(params, true)),
+            Next::Abandoned => Some(self.end(params, false)),
+        }
+    }
+
+    /// A look at power-up, after some readings of the supply.
+    fn power_up(&mut self, sight: &Sight, probe: &mut impl Probe) -> Next {
+        if self.looks < POWER_UP_LOOKS || !self.own(sight, probe) {
+            return Next::Wait;
+        }
+        Next::Measured
+    }
+
+    /// A look at the sensors without current. Before any leg is pulled no terminal may be at the supply.
+    fn sensors(
+        &mut self,
+        sight: &Sight,
+        (board, params): (&Board, &Params),
+        probe: &mut impl Probe,
+    ) -> Next {
+        let sample = probe.sample();
+        if self.looks > LATENCY {
+            for (phase, counts) in sample.currents.into_iter().enumerate() {
+                self.listen(phase, counts.to_f32() * board.current_a_per_count);
+            }
+        }
+        if self.looks < LATENCY + LISTENED || !self.own(sight, probe) {
+            return Next::Wait;
+        }
+        for phase in 0..board.shunts.count() {
+            self.judge(phase);
+        }
+        let share = terminals(board, &sample);
+        for phase in 0..3 {
+            self.report
+                .set(Kind::Rest, phase, share[usize::from(phase)]);
+        }
+        Next::go_if(self.report.holds(Kind::Rest, params), Step::Shaft)
+    }
+
+    /// A look whether the drive has seen that the shaft stands.
+    fn shaft(&self, sight: &Sight) -> Next {
+        let stands = sight.snapshot.phase == Phase::Tone;
+        if !stands && !sight.faulted() && self.looks <= SHAFT_LOOKS {
+            return Next::Wait;
+        }
+        Next::go_if(stands, Step::Pull(Pull::UpA))
+    }
+
+    /// A look at the legs while one is pulled, the terminals being at this share of the supply.
+    fn pulled(&mut self, pull: Pull, sight: &Sight, share: &[f32; 3], params: &Params) -> Next {
+        let faulted = sight.faulted();
+        let (leg, i) = (pull.leg(), sight.snapshot.i);
+        let [next_a, last_a] = [i.d, i.q].map(|i| sight.scale.amperes(i));
+        let up = self.looks > LATENCY && share[usize::from(leg)] >= UP_PERCENT;
+        let most = if pull.is_through() {
+            THROUGH_LOOKS
+        } else {
+            UP_LOOKS
+        };
+        if !up && !faulted && self.looks <= most {
+            return Next::Wait;
+        }
+        let [next, last] = [(leg + 1) % 3, (leg + 2) % 3];
+        if pull.is_through() {
+            self.report.set(Kind::Low, next, next_a);
+        } else {
+            self.report.set(Kind::High, leg, share[usize::from(leg)]);
+            self.followed(next, share, next_a);
+            self.followed(last, share, last_a);
+        }
+        if pull == Pull::ThroughC && !faulted {
+            return Next::Measured;
+        }
+        // A leg whose low side is shorted must not switch.
+        let may = !faulted && self.report.holds(Kind::Off, params);
+        Next::go_if(may, Step::Pull(Pull::from_number(pull as u8 + 1)))
     }
 
     fn go(&mut self, step: Step) -> Outcome {
