@@ -26,7 +26,8 @@ use super::kiss;
 use super::supervisor::throttle_lives;
 use super::trouble::TROUBLE;
 use crate::board;
-use crate::board::wire::TICK_HZ;
+use crate::board::wire::{TICK_HZ, TIMER_BITS};
+use crate::edges::Edges;
 use crate::exchange::{SetpointWriter, SnapshotReader};
 pub(crate) use capture::Capture;
 use reply::Armed;
@@ -165,6 +166,11 @@ impl Looks {
     fn next(&mut self) -> Option<u32> {
         self.after_ticks.pop()
     }
+
+    /// Returns true in the last one, or if no other is wanted.
+    fn is_last(&self) -> bool {
+        self.after_ticks.is_empty()
+    }
 }
 
 impl Listener {
@@ -231,50 +237,14 @@ impl Listener {
     // Inlined, it is 0.2 KB more flash.
     #[inline(never)]
     fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Asked> {
-        self.fill();
-        let is_last = looks.after_ticks.is_empty();
-        while !is_last
-            && !self.capture.edges.has_frame()
-            && self.capture.edges.is_before(looks.until_ticks)
-        {
-            self.fill();
-        }
+        self.fill_with_frame(looks);
         let edges = &mut self.capture.edges;
         let (asked, setpoint) = self.port.reach(|throttle| {
             if throttle.is_storing() {
                 edges.forget();
                 return Some((None, Some(throttle.setpoint())));
             }
-            let whole = edges.frame();
-            let event = whole.and_then(|(rests_high, bit)| throttle.whole(rests_high, bit));
-            let ask = if let Some(event) = event {
-                looks.after_ticks.clear();
-                if !edges.skip_frame() {
-                    // It may be none; the next look tells of what is lost.
-                    return None;
-                }
-                let ask = Ask::of(&event);
-                // The wire is the sender's until it is known that an answer is wanted.
-                let answers = throttle.signal().is_some() && ready.is_some();
-                if ask.is_some_and(|ask| ask.bidirectional) && answers {
-                    looks.unheard = Some(event);
-                    ask
-                } else {
-                    throttle.hear(now_us(), &event)
-                }
-            } else if !is_last {
-                if throttle.signal().is_none() {
-                    // The line had rested before: what was left of the edges then is none of this frame's.
-                    let _ = throttle.settle(now_us(), looks.begin_ticks);
-                }
-                return None;
-            } else {
-                let (mut ask, now_us) = (None, now_us());
-                edges.take(|at_ticks, level| {
-                    ask = throttle.edge(now_us, at_ticks, level).or(ask);
-                });
-                throttle.settle(now_us, edges.settled()).or(ask)
-            };
+            let ask = take_in(throttle, edges, looks, ready)?;
             let asked = ask.zip(ready).map(|(ask, ready)| Asked {
                 ask,
                 reply: throttle.reply(ask, ready.speed_bits),
@@ -289,6 +259,17 @@ impl Listener {
             self.renew(setpoint);
         }
         asked
+    }
+
+    /// Takes the edges from the DMA; all of a frame's, if the look is at one.
+    fn fill_with_frame(&mut self, looks: &Looks) {
+        self.fill();
+        while !looks.is_last()
+            && !self.capture.edges.has_frame()
+            && self.capture.edges.is_before(looks.until_ticks)
+        {
+            self.fill();
+        }
     }
 
     /// Gives the interrupt its set-point.
@@ -336,6 +317,57 @@ impl Listener {
             self.capture.edges.skip_before(over_ticks);
         }
     }
+}
+
+/// What the edges that have come ask for; `None` if the next look is to tell.
+fn take_in(
+    throttle: &mut Throttle,
+    edges: &mut Edges<TIMER_BITS>,
+    looks: &mut Looks,
+    ready: Option<&Ready>,
+) -> Option<Option<Ask>> {
+    let whole = edges.frame();
+    if let Some(event) = whole.and_then(|(rests_high, bit)| throttle.whole(rests_high, bit)) {
+        looks.after_ticks.clear();
+        // It may be none; the next look tells of what is lost.
+        let skipped = edges.skip_frame();
+        skipped.then(|| hear(throttle, looks, event, ready))
+    } else if looks.is_last() {
+        Some(edge_by_edge(throttle, edges))
+    } else {
+        if throttle.signal().is_none() {
+            // The line had rested before: what was left of the edges then is none of this frame's.
+            let _ = throttle.settle(now_us(), looks.begin_ticks);
+        }
+        None
+    }
+}
+
+/// A whole frame is heard at once, or behind its answer.
+fn hear(
+    throttle: &mut Throttle,
+    looks: &mut Looks,
+    event: Event,
+    ready: Option<&Ready>,
+) -> Option<Ask> {
+    let ask = Ask::of(&event);
+    // The wire is the sender's until it is known that an answer is wanted.
+    let answers = throttle.signal().is_some() && ready.is_some();
+    if ask.is_some_and(|ask| ask.bidirectional) && answers {
+        looks.unheard = Some(event);
+        ask
+    } else {
+        throttle.hear(now_us(), &event)
+    }
+}
+
+/// All edges that have come, one after the other.
+fn edge_by_edge(throttle: &mut Throttle, edges: &mut Edges<TIMER_BITS>) -> Option<Ask> {
+    let (mut ask, now_us) = (None, now_us());
+    edges.take(|at_ticks, level| {
+        ask = throttle.edge(now_us, at_ticks, level).or(ask);
+    });
+    throttle.settle(now_us, edges.settled()).or(ask)
 }
 
 /// The time of the tasks.
