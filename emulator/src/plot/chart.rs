@@ -10,8 +10,16 @@ mod tests;
 
 use std::path::Path;
 
+use plotters::style::RGBColor;
+
 use super::canvas::Format;
 use super::error::PlotError;
+
+/// Size of a panel where nothing else is wanted.
+pub const PANEL: (u32, u32) = (1200, 900);
+
+/// Width of a line where nothing else is wanted.
+const LINE: u32 = 5;
 
 /// A picture: panels side by side and below each other, under a title.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +30,8 @@ pub struct Figure {
     pub title: String,
     /// Panels a row; the rows follow from the number of panels.
     pub columns: usize,
+    /// Size of a panel, pixels of the PNG.
+    pub panel: (u32, u32),
     /// The panels, row by row.
     pub panels: Vec<Panel>,
 }
@@ -39,12 +49,27 @@ pub struct Panel {
     pub map: Option<Map>,
     /// The curves, each with its entry in the legend.
     pub curves: Vec<Curve>,
+    /// Stretches of the x axis that are told apart behind the curves.
+    pub stretches: Vec<Stretch>,
+    /// Places on the x axis at which something goes wrong.
+    pub faults: Vec<f64>,
+}
+
+/// A stretch of the x axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// Its name, above the axes; none where it is empty.
+    pub name: &'static str,
+    /// Its ends.
+    pub ends: (f64, f64),
+    /// The colour behind the curves.
+    pub tint: RGBColor,
 }
 
 /// An axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// The quantity with its unit, as `speed (rpm)`.
+    /// The quantity with its unit, as `speed (rpm)`; an x axis without is that of the panel below.
     pub label: String,
     /// Ends; `None` is what the curves span.
     pub range: Option<(f64, f64)>,
@@ -59,8 +84,14 @@ pub struct Curve {
     pub name: String,
     /// The points; one that is not finite is a gap.
     pub points: Vec<(f64, f64)>,
+    /// What the samples about each point span; empty where they are the points.
+    pub spread: Vec<(f64, f64)>,
     /// How it is drawn.
     pub look: CurveLook,
+    /// Its colour, where it is not the next of the palette.
+    pub colour: Option<RGBColor>,
+    /// Width of a line.
+    pub width: u32,
 }
 
 /// How a curve is drawn.
@@ -73,6 +104,8 @@ pub enum CurveLook {
     Dashed,
     /// A dot at each point: samples, or the paper's printed values.
     Dots,
+    /// What the samples span, without a line.
+    Band,
 }
 
 /// A third quantity over a grid of the two axes.
@@ -112,6 +145,8 @@ impl Panel {
             y,
             map: None,
             curves,
+            stretches: Vec::new(),
+            faults: Vec::new(),
         }
     }
 }
@@ -140,7 +175,10 @@ impl Curve {
         Self {
             name: name.into(),
             points: points.into_iter().collect(),
+            spread: Vec::new(),
             look,
+            colour: None,
+            width: LINE,
         }
     }
 }

@@ -1,171 +1,180 @@
-//! The figure: a title, the drive's phases, and panels over a common time.
+//! The figure of a recording: four panels over a common time.
 
-use plotters::backend::DrawingBackend;
-use plotters::element::Rectangle;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color, WHITE};
+use plotters::style::{RGBColor, WHITE};
 use siskin_control::drive::Fault;
 
-use super::canvas::{Area, Drawn, Picture};
-use super::page::{LEFT, RIGHT, WIDTH, legend};
-use super::panel::{Curve, Look, Panel};
-use super::phases::{name, spans, tint};
+use super::chart::{Axis, Curve, CurveLook, Figure, Panel, Stretch};
+use super::phases::{fault_times, name, spans, tint};
 use super::read::Recording;
-use super::style::{BLUE, FAULT, GREEN, GREY, GRID, ORANGE, VERMILION, heading, number, text};
+use super::reduce::{Cell, Trace};
+use super::style::{BLUE, GREEN, GREY, ORANGE, VERMILION, number};
 
-const HEIGHT: u32 = 2100;
 /// Columns that a recording is reduced to: one for about two and a half pixels, so that the SVG of
 /// a long recording stays below 300 kB.
 pub(super) const COLUMNS: usize = 900;
-const TITLE: u32 = 90;
-const STRIP: u32 = 44;
 
-impl Picture for Recording {
-    fn size(&self) -> (u32, u32) {
-        (WIDTH, HEIGHT)
-    }
+/// Size of a panel.
+const PANEL: (u32, u32) = (2400, 530);
 
-    fn draw<B: DrawingBackend>(&self, root: &Area<B>) -> Drawn<B> {
-        draw(root, self)
-    }
+/// Quantities of a recording on a panel: the least height of its axes, in the unit, since less is noise that
+/// would fill the panel, and the share of the columns at either end that may reach beyond them.
+struct Shown<'a> {
+    title: &'a str,
+    axis: &'a str,
+    curves: Vec<(Curve, &'a Trace)>,
+    least_span: f64,
+    outliers: f64,
 }
 
-fn draw<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
-    root.fill(&WHITE)?;
-    title(root, recording)?;
-    strip(root, recording)?;
-
-    let line = |name, trace, colour, width| Curve {
-        name,
-        trace,
-        colour,
-        look: Look::Line(width),
-    };
-    let spread = |name, trace, colour| Curve {
-        name,
-        trace,
-        colour,
-        look: Look::Spread(3),
-    };
+/// Draws speeds, currents, voltages and the angle error.
+pub(super) fn figure(recording: &Recording) -> Figure {
     let r = recording;
-    let panels = [
-        (
-            30,
-            Panel {
-                title: "Speed",
-                axis: "speed (rpm)",
-                curves: &[
-                    line("reference", &r.rpm_ref, GREY, 7),
-                    line("true", &r.rpm, BLUE, 5),
-                    line("estimated", &r.rpm_est, ORANGE, 3),
-                ],
-                outliers: 0.0,
-                least_span: 10.0,
-                time: false,
-            },
-        ),
-        (
-            27,
-            Panel {
-                title: "Currents",
-                axis: "current (A)",
-                curves: &[
-                    Curve {
-                        name: "phase a",
-                        trace: &r.i_a_a,
-                        colour: GREY,
-                        look: Look::Band,
-                    },
-                    spread("i_d", &r.i_d_a, BLUE),
-                    spread("i_q", &r.i_q_a, VERMILION),
-                ],
-                outliers: 0.0,
-                least_span: 0.5,
-                time: false,
-            },
-        ),
-        (
-            22,
-            Panel {
-                title: "Voltages",
-                axis: "voltage (V)",
-                curves: &[
-                    line("bus/√3", &r.u_max_v, GREY, 4),
-                    spread("u_d", &r.u_d_v, BLUE),
-                    spread("u_q", &r.u_q_v, VERMILION),
-                ],
-                outliers: 0.0,
-                least_span: 0.5,
-                time: false,
-            },
-        ),
-        (
-            21,
-            Panel {
-                title: "Angle error: estimated less true, while the observer leads",
-                axis: "error (el. °)",
-                curves: &[spread("angle error", &r.angle_error_deg, GREEN)],
-                // The first periods of the observer may be far off, and would flatten the rest.
-                outliers: 0.005,
-                least_span: 1.0,
-                time: true,
-            },
-        ),
+    let line = |name, trace, colour, width| (means(r, name, trace, colour, width), trace);
+    let spread = |name, trace, colour| {
+        let line = means(r, name, trace, colour, 3);
+        let spread = spread(trace);
+        (Curve { spread, ..line }, trace)
+    };
+    let band = |name, trace, colour| {
+        let (curve, _) = spread(name, trace, colour);
+        let look = CurveLook::Band;
+        (Curve { look, ..curve }, trace)
+    };
+    let shown = [
+        Shown {
+            title: "Speed",
+            axis: "speed (rpm)",
+            curves: vec![
+                line("reference", &r.rpm_ref, GREY, 7),
+                line("true", &r.rpm, BLUE, 5),
+                line("estimated", &r.rpm_est, ORANGE, 3),
+            ],
+            least_span: 10.0,
+            outliers: 0.0,
+        },
+        Shown {
+            title: "Currents",
+            axis: "current (A)",
+            curves: vec![
+                band("phase a", &r.i_a_a, GREY),
+                spread("i_d", &r.i_d_a, BLUE),
+                spread("i_q", &r.i_q_a, VERMILION),
+            ],
+            least_span: 0.5,
+            outliers: 0.0,
+        },
+        Shown {
+            title: "Voltages",
+            axis: "voltage (V)",
+            curves: vec![
+                line("bus/√3", &r.u_max_v, GREY, 4),
+                spread("u_d", &r.u_d_v, BLUE),
+                spread("u_q", &r.u_q_v, VERMILION),
+            ],
+            least_span: 0.5,
+            outliers: 0.0,
+        },
+        Shown {
+            title: "Angle error: estimated less true, while the observer leads",
+            axis: "error (el. °)",
+            curves: vec![spread("angle error", &r.angle_error_deg, GREEN)],
+            least_span: 1.0,
+            // The first periods of the observer may be far off, and would flatten the rest.
+            outliers: 0.005,
+        },
     ];
-    let margins: u32 = panels
-        .iter()
-        .map(|(_, panel)| Panel::margins(panel.time))
-        .sum();
-    let shares: u32 = panels.iter().map(|(share, _)| share).sum();
-    let axes = HEIGHT - TITLE - STRIP - margins - 20;
-    let mut rest = root.margin(TITLE + STRIP, 0, 0, 0);
-    for (share, panel) in &panels {
-        let height = axes * share / shares + Panel::margins(panel.time);
-        let (area, below) = rest.split_vertically(height);
-        panel.draw(&area, recording)?;
-        rest = below;
+    let last = shown.len() - 1;
+    let panels = shown.into_iter().enumerate();
+    Figure {
+        name: String::new(),
+        title: title(recording),
+        columns: 1,
+        panel: PANEL,
+        panels: panels
+            .map(|(index, shown)| shown.panel(recording, index == 0, index == last))
+            .collect(),
     }
-    Ok(())
 }
 
-fn title<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
-    let length_s = recording.t1_s - recording.t0_s;
-    let rate_khz = recording.periods as f64 / length_s / 1e3;
-    let length = number(length_s);
-    let text = format!("{}: {length} s at {rate_khz:.1} kHz", recording.name);
-    let middle = TITLE as i32 / 2;
-    root.draw_text(&text, &heading(38.0), (LEFT as i32, middle))?;
-    let bits = recording.faults.iter().fold(0, |all, bits| all | bits);
-    let faults = Fault::ALL
-        .iter()
-        .filter(|fault| bits & 1 << **fault as u8 != 0);
-    let faults: Vec<_> = faults.map(|fault| fault.text()).collect();
-    if faults.is_empty() {
-        return Ok(());
-    }
-    let text = format!("fault: {}", faults.join(", "));
-    legend(root, middle, [(text.as_str(), FAULT.mix(1.0), 5)])
-}
-
-/// The names of the phases over their stretches.
-fn strip<B: DrawingBackend>(root: &Area<B>, recording: &Recording) -> Drawn<B> {
-    let (top, bottom) = (TITLE as i32, (TITLE + STRIP) as i32);
-    let width = f64::from(WIDTH - LEFT - RIGHT);
-    let length_s = recording.t1_s - recording.t0_s;
-    let x = |t_s: f64| LEFT as i32 + ((t_s - recording.t0_s) / length_s * width) as i32;
-    let style = text(26.0);
-    for span in spans(recording) {
-        let (left, right) = (x(span.t0_s), x(span.t1_s));
-        let tint = tint(span.phase).unwrap_or(WHITE);
-        let corners = [(left, top), (right, bottom)];
-        root.draw(&Rectangle::new(corners, tint.filled()))?;
-        root.draw(&Rectangle::new(corners, GRID.stroke_width(2)))?;
-        let name = name(span.phase);
-        let room = root.estimate_text_size(name, &style)?.0 as i32 + 12;
-        if right - left >= room {
-            let style = style.pos(Pos::new(HPos::Center, VPos::Center));
-            root.draw_text(name, &style, ((left + right) / 2, (top + bottom) / 2))?;
+impl Shown<'_> {
+    fn panel(self, recording: &Recording, first: bool, last: bool) -> Panel {
+        let time = Axis {
+            range: Some((recording.t0_s, recording.t1_s)),
+            ..Axis::new(if last { "time (s)" } else { "" })
+        };
+        let values = Axis {
+            range: Some(self.range()),
+            ..Axis::new(self.axis)
+        };
+        let curves = self.curves.into_iter().map(|(curve, _)| curve).collect();
+        let stretches = spans(recording).into_iter().map(|span| Stretch {
+            name: if first { name(span.phase) } else { "" },
+            ends: (span.t0_s, span.t1_s),
+            tint: tint(span.phase).unwrap_or(WHITE),
+        });
+        Panel {
+            stretches: stretches.collect(),
+            faults: fault_times(recording),
+            ..Panel::new(self.title, time, values, curves)
         }
     }
-    Ok(())
+
+    /// What the axis of values spans: all curves, with some room.
+    fn range(&self) -> (f64, f64) {
+        let ranges = self.curves.iter().filter_map(|(curve, trace)| {
+            if curve.spread.is_empty() {
+                trace.range(self.outliers, Cell::mean, Cell::mean)
+            } else {
+                trace.range(self.outliers, |cell| cell.min, |cell| cell.max)
+            }
+        });
+        let (low, high) = ranges
+            .reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
+            .unwrap_or((0.0, 0.0));
+        let span = (high - low).max(self.least_span);
+        let middle = (low + high) / 2.0;
+        (middle - 0.55 * span, middle + 0.55 * span)
+    }
+}
+
+/// A line through the means of a trace.
+fn means(recording: &Recording, name: &str, trace: &Trace, colour: RGBColor, width: u32) -> Curve {
+    let cells = trace.cells().iter().enumerate();
+    let points = cells.map(|(column, cell)| {
+        let mean = cell.as_ref().map_or(f64::NAN, Cell::mean);
+        (recording.time_s(column), mean)
+    });
+    Curve {
+        colour: Some(colour),
+        width,
+        ..Curve::line(name, points)
+    }
+}
+
+/// What the columns of a trace span.
+fn spread(trace: &Trace) -> Vec<(f64, f64)> {
+    let nothing = (f64::NAN, f64::NAN);
+    let cells = trace.cells().iter();
+    cells
+        .map(|cell| cell.map_or(nothing, |cell| (cell.min, cell.max)))
+        .collect()
+}
+
+/// What was recorded, and the faults in it.
+fn title(recording: &Recording) -> String {
+    let length_s = recording.t1_s - recording.t0_s;
+    let rate_khz = recording.periods as f64 / length_s / 1e3;
+    let title = format!(
+        "{}: {} s at {rate_khz:.1} kHz",
+        recording.name,
+        number(length_s)
+    );
+    let bits = recording.faults.iter().fold(0, |all, bits| all | bits);
+    let faults = Fault::ALL.iter();
+    let faults = faults.filter(|fault| bits & 1 << **fault as u8 != 0);
+    let faults: Vec<_> = faults.map(|fault| fault.text()).collect();
+    match faults.as_slice() {
+        [] => title,
+        faults => format!("{title}; fault: {}", faults.join(", ")),
+    }
 }

@@ -4,8 +4,6 @@ mod canvas;
 pub mod chart;
 mod error;
 mod figure;
-mod page;
-mod panel;
 mod phases;
 mod read;
 mod reduce;
@@ -17,7 +15,7 @@ use std::path::Path;
 
 use canvas::Format;
 pub use error::PlotError;
-use figure::COLUMNS;
+use figure::{COLUMNS, figure};
 use read::Recording;
 
 /// Draws the recording at `record` to `picture`, an `.svg` or a `.png`: speeds, currents, voltages
@@ -28,5 +26,5 @@ use read::Recording;
 /// written.
 pub fn plot(record: &Path, picture: &Path) -> Result<(), PlotError> {
     let format = Format::of(picture)?;
-    format.write(&Recording::read(record, COLUMNS)?, picture)
+    format.write(&figure(&Recording::read(record, COLUMNS)?), picture)
 }

@@ -63,17 +63,8 @@ impl Trace {
         Some((*lows.get(cut)?, *highs.iter().rev().nth(cut)?))
     }
 
-    /// The stretches of columns that have samples, each with its first column.
-    pub(super) fn stretches(&self) -> impl Iterator<Item = (usize, Vec<Cell>)> {
-        let mut column = 0;
-        self.cells
-            .chunk_by(|a, b| a.is_some() == b.is_some())
-            .filter_map(move |chunk| {
-                let first = column;
-                column += chunk.len();
-                chunk[0]
-                    .is_some()
-                    .then(|| (first, chunk.iter().copied().flatten().collect()))
-            })
+    /// The columns.
+    pub(super) fn cells(&self) -> &[Option<Cell>] {
+        &self.cells
     }
 }

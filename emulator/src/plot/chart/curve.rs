@@ -9,8 +9,6 @@ use super::{Curve, CurveLook};
 use crate::plot::canvas::{Area, Drawn};
 use crate::plot::style::{BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION};
 
-/// Width of a line.
-pub(super) const LINE: u32 = 5;
 /// Length of a dash, and of the space after it.
 pub(super) const DASH: (i32, i32) = (20, 14);
 /// Radius of a dot.
@@ -36,6 +34,9 @@ pub(super) fn colours(curves: &[Curve]) -> Vec<RGBColor> {
     let mut lines = Vec::new();
     let mut taken = [0; 2];
     let own = curves.iter().map(|curve| {
+        if curve.colour.is_some() {
+            return (curve.look, curve.colour);
+        }
         let pairs = count(curve.look) == count(CurveLook::Line);
         if curve.look == CurveLook::Line || !pairs {
             let colour = free.next().copied().unwrap_or(INK);
@@ -85,27 +86,49 @@ impl Curve {
             }
             return Ok(());
         }
-        for run in pixels.split(Option::is_none) {
-            let mut run: Vec<_> = run.iter().copied().flatten().collect();
-            if let Some(columns) = columns(&run) {
-                if self.look == CurveLook::Line {
-                    let at = |y: fn(&Column) -> f64| columns.iter().map(move |c| (c.mean.0, y(c)));
-                    let band = at(|column| column.low).chain(at(|column| column.high).rev());
-                    let band =
-                        band.map(|(x, y)| (x.round() as i32, y.clamp(0.0, size.1).round() as i32));
-                    area.draw(&Polygon::new(band.collect::<Vec<_>>(), colour.mix(0.3)))?;
+        let height = |value: f64| Some((1.0 - y.share(y.place(value)?)) * size.1);
+        let pieces = pixels.iter().enumerate().map(|(index, pixel)| {
+            let mean = (*pixel)?;
+            let (high, low) = match self.spread.get(index) {
+                Some(&(least, greatest)) => (height(least)?, height(greatest)?),
+                None => (mean.1, mean.1),
+            };
+            Some(Column { mean, low, high })
+        });
+        let pieces: Vec<_> = pieces.collect();
+        for run in pieces.split(Option::is_none) {
+            let run: Vec<_> = run.iter().copied().flatten().collect();
+            let dense = reduced(&run);
+            let has_band = dense.is_some() && self.look == CurveLook::Line;
+            let run = dense.unwrap_or(run);
+            if has_band || !self.spread.is_empty() {
+                let at = |y: fn(&Column) -> f64| run.iter().map(move |c| (c.mean.0, y(c)));
+                let band = at(|column| column.low).chain(at(|column| column.high).rev());
+                let band =
+                    band.map(|(x, y)| (x.round() as i32, y.clamp(0.0, size.1).round() as i32));
+                let band: Vec<_> = band.collect();
+                if self.look == CurveLook::Band {
+                    let edge = colour.mix(0.5).stroke_width(2);
+                    area.draw(&PathElement::new(band.clone(), edge))?;
                 }
-                run = columns.into_iter().map(|column| column.mean).collect();
+                area.draw(&Polygon::new(band, colour.mix(0.3)))?;
             }
+            if self.look == CurveLook::Band {
+                continue;
+            }
+            let run: Vec<_> = run.iter().map(|column| column.mean).collect();
             for line in clip(&run, size) {
                 if on_map {
-                    path(area, &line, WHITE.stroke_width(LINE + 2 * RIM))?;
+                    path(area, &line, WHITE.stroke_width(self.width + 2 * RIM))?;
                 }
-                let style = colour.stroke_width(LINE);
+                let style = colour.stroke_width(self.width);
                 if self.look == CurveLook::Dashed {
                     area.draw(&DashedPathElement::new(line, DASH.0, DASH.1, style))?;
-                } else {
+                } else if self.spread.is_empty() {
                     path(area, &line, style)?;
+                } else {
+                    // A noisy line in pieces would make a long recording's file half as large again.
+                    area.draw(&PathElement::new(line, style))?;
                 }
             }
         }
@@ -113,30 +136,31 @@ impl Curve {
     }
 }
 
-/// What a dense line is reduced to: the means, with the span of the heights about them.
+/// A piece of a line: its mean, with the span of the heights about it.
+#[derive(Clone, Copy)]
 struct Column {
     mean: Point,
     low: f64,
     high: f64,
 }
 
-/// The columns of a line that goes to the right and is dense.
-fn columns(points: &[Point]) -> Option<Vec<Column>> {
-    let column = |point: &Point| (point.0 / COLUMN).floor();
-    let span = column(points.last()?) - column(points.first()?) + 1.0;
-    let dense = points.len() as f64 > DENSE as f64 * span;
-    if !dense || !points.is_sorted_by(|a, b| a.0 <= b.0) {
+/// A line that goes to the right and is dense, reduced to columns of pixels.
+fn reduced(line: &[Column]) -> Option<Vec<Column>> {
+    let column = |piece: &Column| (piece.mean.0 / COLUMN).floor();
+    let span = column(line.last()?) - column(line.first()?) + 1.0;
+    let dense = line.len() as f64 > DENSE as f64 * span;
+    if !dense || !line.is_sorted_by(|a, b| a.mean.0 <= b.mean.0) {
         return None;
     }
-    let columns = points.chunk_by(|a, b| column(a) == column(b));
+    let columns = line.chunk_by(|a, b| column(a) == column(b));
     let columns = columns.map(|within| {
         let mean =
-            |value: fn(&Point) -> f64| within.iter().map(value).sum::<f64>() / within.len() as f64;
-        let heights = || within.iter().map(|point| point.1);
+            |value: fn(&Column) -> f64| within.iter().map(value).sum::<f64>() / within.len() as f64;
+        let heights = |value: fn(&Column) -> f64| within.iter().map(value);
         Column {
-            mean: (mean(|point| point.0), mean(|point| point.1)),
-            low: heights().fold(f64::INFINITY, f64::min),
-            high: heights().fold(f64::NEG_INFINITY, f64::max),
+            mean: (mean(|piece| piece.mean.0), mean(|piece| piece.mean.1)),
+            low: heights(|piece| piece.low).fold(f64::INFINITY, f64::min),
+            high: heights(|piece| piece.high).fold(f64::NEG_INFINITY, f64::max),
         }
     });
     Some(columns.collect())

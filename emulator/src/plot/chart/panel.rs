@@ -2,15 +2,16 @@
 
 use plotters::backend::DrawingBackend;
 use plotters::chart::ChartBuilder;
-use plotters::element::{Circle, Rectangle};
-use plotters::style::{Color, RGBColor, TextStyle};
+use plotters::element::{Circle, PathElement, Rectangle};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color, RGBAColor, RGBColor, TextStyle};
 
-use super::curve::{DASH, DOT, LINE, colours};
+use super::curve::{DASH, DOT, colours};
 use super::map::{self, apart};
 use super::scale::{Laid, Scale};
-use super::{Curve, CurveLook, Map, Panel};
+use super::{Curve, CurveLook, Map, Panel, Stretch};
 use crate::plot::canvas::{Area, Drawn};
-use crate::plot::style::{AXIS, GRID, heading, length, text};
+use crate::plot::style::{AXIS, FAULT, GRID, heading, length, text};
 
 /// Left of the axes' name.
 const EDGE: u32 = 16;
@@ -30,6 +31,8 @@ const FREE: (f64, f64) = (0.05, 0.02);
 /// A line of the panel's title, and one of its legend.
 const TITLE: u32 = 44;
 const ENTRIES: u32 = 40;
+/// The names of the stretches.
+const STRIP: u32 = 44;
 /// The sample of a curve in the legend, the space before its name, and the one after it.
 const SAMPLE: i32 = 54;
 const NAME: i32 = 14;
@@ -40,11 +43,13 @@ pub(super) struct Header<'a> {
     title: Vec<String>,
     /// Lines of curves with their colours and left ends.
     legend: Vec<Vec<(&'a Curve, RGBColor, i32)>>,
+    /// Height of the stretches' names.
+    strip: u32,
 }
 
 impl Header<'_> {
     pub(super) fn height(&self) -> u32 {
-        TITLE * self.title.len() as u32 + ENTRIES * self.legend.len() as u32 + 16
+        TITLE * self.title.len() as u32 + ENTRIES * self.legend.len() as u32 + 16 + self.strip
     }
 }
 
@@ -70,6 +75,11 @@ impl Panel {
         Header {
             title: wrap(&self.title, &heading(30.0), room),
             legend,
+            strip: if self.stretches.iter().any(|s| !s.name.is_empty()) {
+                STRIP
+            } else {
+                0
+            },
         }
     }
 
@@ -88,9 +98,10 @@ impl Panel {
             RIGHT
         };
         let (x, y) = (self.x_scale(), self.y_scale());
+        let bottom = if self.x.label.is_empty() { 0 } else { BELOW };
         let (axes_width, axes_height) = (
             f64::from(width.saturating_sub(EDGE + LEFT + right)),
-            f64::from(height.saturating_sub(top + BELOW + FOOT)),
+            f64::from(height.saturating_sub(top + bottom + FOOT)),
         );
         let beside = |numbers: &[(f64, String)]| {
             numbers.windows(2).all(|pair| {
@@ -116,9 +127,22 @@ impl Panel {
             .margin_right(right)
             .margin_bottom(FOOT)
             .y_label_area_size(LEFT)
-            .x_label_area_size(BELOW)
+            .x_label_area_size(bottom)
             .build_cartesian_2d(axes.0, axes.1)?;
         let within = chart.plotting_area().strip_coord_spec();
+        let (x_pixels, y_pixels) = within.get_pixel_range();
+        let (panel_x, panel_y) = area.get_pixel_range();
+        let left = x_pixels.start - panel_x.start;
+        // What the axis has no place for is where it begins.
+        let along = |at| (x.share(x.place(at).unwrap_or(x.low)) * axes_width) as i32;
+        for stretch in &self.stretches {
+            let ends = (along(stretch.ends.0), along(stretch.ends.1));
+            let corners = [(ends.0, 0), (ends.1, axes_height as i32)];
+            within.draw(&Rectangle::new(corners, stretch.tint.filled()))?;
+            if header.strip > 0 {
+                stretch.label(area, (left + ends.0, left + ends.1), top)?;
+            }
+        }
         chart
             .configure_mesh()
             .light_line_style(GRID.mix(0.5).stroke_width(1))
@@ -131,13 +155,16 @@ impl Panel {
             .draw()?;
         if let Some(map) = &self.map {
             map.draw(&within, (&x, &y))?;
-            let (x_pixels, y_pixels) = within.get_pixel_range();
-            let (panel_x, panel_y) = area.get_pixel_range();
             let ends = (y_pixels.start - panel_y.start, y_pixels.end - panel_y.start);
             map.key(area, x_pixels.end - panel_x.start, ends)?;
         }
         for (curve, colour) in self.curves.iter().zip(colours(&self.curves)) {
             curve.draw(&within, (&x, &y), colour, self.map.is_some())?;
+        }
+        for fault in &self.faults {
+            let at = along(*fault);
+            let line = vec![(at, 0), (at, axes_height as i32)];
+            within.draw(&PathElement::new(line, FAULT.stroke_width(3)))?;
         }
         Ok(())
     }
@@ -165,6 +192,26 @@ impl Panel {
     }
 }
 
+impl Stretch {
+    /// Its name above the axes, if there is room between its ends.
+    fn label<B: DrawingBackend>(&self, area: &Area<B>, ends: (i32, i32), top: u32) -> Drawn<B> {
+        let (top, bottom) = ((top - STRIP) as i32, top as i32);
+        let corners = [(ends.0, top), (ends.1, bottom)];
+        area.draw(&Rectangle::new(corners, self.tint.filled()))?;
+        area.draw(&Rectangle::new(corners, GRID.stroke_width(2)))?;
+        let style = text(26.0);
+        if ends.1 - ends.0 < length(self.name, &style) + 12 {
+            return Ok(());
+        }
+        let style = style.pos(Pos::new(HPos::Center, VPos::Center));
+        area.draw_text(
+            self.name,
+            &style,
+            ((ends.0 + ends.1) / 2, (top + bottom) / 2),
+        )
+    }
+}
+
 /// The axis of a map: all of its cells.
 fn map_scale(axis: &super::Axis, places: &[f64]) -> Scale {
     let mut scale = Scale::new(axis, places.iter().copied(), 0.0);
@@ -183,7 +230,7 @@ fn draw_header<B: DrawingBackend>(area: &Area<B>, header: &Header<'_>) -> Drawn<
     }
     for line in &header.legend {
         for &(curve, colour, left) in line {
-            sample(area, curve.look, colour, (left, middle))?;
+            sample(area, curve, colour, (left, middle))?;
             area.draw_text(&curve.name, &text(26.0), (left + SAMPLE + NAME, middle))?;
         }
         middle += ENTRIES as i32;
@@ -194,21 +241,23 @@ fn draw_header<B: DrawingBackend>(area: &Area<B>, header: &Header<'_>) -> Drawn<
 /// How a curve looks, beside its name.
 fn sample<B: DrawingBackend>(
     area: &Area<B>,
-    look: CurveLook,
+    curve: &Curve,
     colour: RGBColor,
     (left, middle): (i32, i32),
 ) -> Drawn<B> {
-    let dash = |from: i32, to: i32| {
-        let half = LINE as i32 / 2;
-        let corners = [(left + from, middle - half), (left + to, middle + half + 1)];
+    let dash = |from: i32, to: i32, thickness: i32, colour: RGBAColor| {
+        let (above, below) = (thickness / 2, (thickness + 1) / 2);
+        let corners = [(left + from, middle - above), (left + to, middle + below)];
         area.draw(&Rectangle::new(corners, colour.filled()))
     };
-    match look {
-        CurveLook::Line => dash(0, SAMPLE),
+    let (line, full) = (curve.width as i32, colour.mix(1.0));
+    match curve.look {
+        CurveLook::Line => dash(0, SAMPLE, line, full),
         CurveLook::Dashed => {
-            dash(0, DASH.0)?;
-            dash(DASH.0 + DASH.1, SAMPLE)
+            dash(0, DASH.0, line, full)?;
+            dash(DASH.0 + DASH.1, SAMPLE, line, full)
         }
+        CurveLook::Band => dash(0, SAMPLE, 18, colour.mix(0.35)),
         CurveLook::Dots => area.draw(&Circle::new(
             (left + SAMPLE / 2, middle),
             DOT,

@@ -8,8 +8,7 @@ use super::panel::{Header, wrap};
 use crate::plot::canvas::{Area, Drawn, Picture};
 use crate::plot::style::heading;
 
-/// Size of a panel, and the width of one alone.
-const PANEL: (u32, u32) = (1200, 900);
+/// The least width, of a panel alone.
 const ALONE: u32 = 1600;
 /// A line of the title and its left end.
 const TITLE: u32 = 56;
@@ -26,7 +25,7 @@ impl Figure {
     }
 
     fn width(&self) -> u32 {
-        (self.columns() * PANEL.0).max(ALONE)
+        (self.columns() * self.panel.0).max(ALONE)
     }
 
     fn title_lines(&self) -> Vec<String> {
@@ -44,7 +43,10 @@ impl Figure {
 
 impl Picture for Figure {
     fn size(&self) -> (u32, u32) {
-        (self.width(), self.title_height() + self.rows() * PANEL.1)
+        (
+            self.width(),
+            self.title_height() + self.rows() * self.panel.1,
+        )
     }
 
     fn draw<B: DrawingBackend>(&self, root: &Area<B>) -> Drawn<B> {

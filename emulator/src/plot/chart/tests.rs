@@ -1,5 +1,5 @@
 use super::scale::Scale;
-use super::{Axis, Curve, CurveLook, Figure, Map, Panel, draw, prepare};
+use super::{Axis, Curve, CurveLook, Figure, Map, PANEL, Panel, draw, prepare};
 
 fn logarithmic(label: &str) -> Axis {
     Axis {
@@ -127,6 +127,7 @@ fn figure(name: &str, columns: usize, panels: Vec<Panel>) -> Figure {
         name: name.to_owned(),
         title: "A sheet whose title says at length what its panels show, so that it has to be broken into lines that fit the width".to_owned(),
         columns,
+        panel: PANEL,
         panels,
     }
 }

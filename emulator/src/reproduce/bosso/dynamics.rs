@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 use siskin_control::drive::Setpoint;
 
 use super::sensorless::{Drive, Realism};
-use crate::plot::chart::{Axis, Curve, Figure, Panel};
+use crate::plot::chart::{Axis, Curve, Figure, PANEL, Panel};
 use crate::reproduce::item::{Item, item};
 
 /// From the catch to the begin of what is shown, s.
@@ -176,6 +176,7 @@ pub(super) fn figures_8_and_9() -> (Vec<Item>, [Figure; 2]) {
         title: "The published drive follows steps and a modulated sinusoid (first paper, figure 8)"
             .to_owned(),
         columns: 1,
+        panel: PANEL,
         panels: vec![
             speeds("(a) positive steps", &up),
             speeds("(c) negative steps", &down),
@@ -186,6 +187,7 @@ pub(super) fn figures_8_and_9() -> (Vec<Item>, [Figure; 2]) {
         name: "bosso-9".to_owned(),
         title: "Tracking of the sinusoid of figure 8(e) (first paper, figure 9)".to_owned(),
         columns: 1,
+        panel: PANEL,
         panels: vec![
             Panel::new(
                 "(a) estimated speed mismatch",

@@ -7,7 +7,7 @@ use super::means::Means;
 use super::sensorless::{Drive, Realism};
 use super::setting::load_nm;
 use super::six_step::SixStep;
-use crate::plot::chart::{Axis, Curve, Figure, Panel};
+use crate::plot::chart::{Axis, Curve, Figure, PANEL, Panel};
 use crate::reproduce::item::{Item, item};
 
 /// Speeds of the figure, rpm.
@@ -171,6 +171,7 @@ fn draw(points: &[Point]) -> Figure {
         title: "Drives without a position sensor with the propeller (first paper, figure 7)"
             .to_owned(),
         columns: 2,
+        panel: PANEL,
         panels: vec![
             Panel::new(
                 "(a) motor power",

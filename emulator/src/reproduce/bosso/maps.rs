@@ -6,7 +6,7 @@ use super::foc::{Foc, Modulation};
 use super::means::Means;
 use super::setting::load_nm;
 use super::six_step::SixStep;
-use crate::plot::chart::{Axis, Curve, Figure, Map, Panel};
+use crate::plot::chart::{Axis, Curve, Figure, Map, PANEL, Panel};
 
 /// Time over which each setting of the grids is measured, s.
 const MEASURE_S: f64 = 0.1;
@@ -204,6 +204,7 @@ fn efficiency(bldc: &Grid, foc: &Grid) -> Figure {
                 (first paper, figure 3)"
             .to_owned(),
         columns: 4,
+        panel: PANEL,
         panels: vec![
             over_speed("(a) six-step: power", bldc_power),
             over_speed("(b) six-step: losses", bldc_losses),
@@ -252,6 +253,7 @@ fn ripple(bldc: &Grid, foc: &Grid) -> Figure {
                 (first paper, figure 4)"
             .to_owned(),
         columns: 2,
+        panel: PANEL,
         panels: vec![
             over_speed("(a) six-step: ripple", bldc_ripple),
             waveform(

@@ -1,6 +1,6 @@
 //! Pictures, in short.
 
-use crate::plot::chart::{Axis, Figure, Panel};
+use crate::plot::chart::{Axis, Figure, PANEL, Panel};
 
 /// A sheet, its panels in so many columns.
 pub(super) fn figure(name: &str, title: &str, columns: usize, panels: Vec<Panel>) -> Figure {
@@ -8,6 +8,7 @@ pub(super) fn figure(name: &str, title: &str, columns: usize, panels: Vec<Panel>
         name: name.to_owned(),
         title: title.to_owned(),
         columns,
+        panel: PANEL,
         panels,
     }
 }
