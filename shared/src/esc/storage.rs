@@ -46,16 +46,25 @@ pub(super) enum Asker {
     Nobody,
 }
 
+/// When what is to be stored has changed.
+#[derive(Clone, Copy, Debug)]
+struct Changes {
+    /// Time of the first change.
+    first_us: u64,
+    /// Time of the last one.
+    last_us: u64,
+}
+
 /// Requests that wait, and the one under way.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Storage {
     /// MAVLink has one at a time, and refuses others.
     mavlink: Option<Request>,
     save: bool,
-    /// Times of the first and the last change that is to be stored.
-    changed_us: Option<(u64, u64)>,
+    /// What is to be stored without being asked for.
+    changes: Option<Changes>,
     /// Time at which all saves without a request are available again.
-    spent_us: u64,
+    refilled_us: u64,
     /// How far off that was at the last of them, s, to be stored with it.
     owed_s: u32,
     /// True if the ESC is to restart when nothing waits any more.
@@ -85,7 +94,7 @@ impl Storage {
     /// At the start, with the time owed at the last save before it. How long the ESC was off is not known.
     pub(super) fn recall(&mut self, owed_s: u32) {
         self.owed_s = owed_s;
-        self.spent_us = (u64::from(owed_s) * 1_000_000).min(OWED_MAX_US + FIRST_SAVE_US);
+        self.refilled_us = (u64::from(owed_s) * 1_000_000).min(OWED_MAX_US + FIRST_SAVE_US);
     }
 
     /// The time owed at the last save, s.
@@ -95,8 +104,11 @@ impl Storage {
 
     /// Something that is kept has changed.
     pub(super) fn changed(&mut self, now_us: u64) {
-        let first_us = self.changed_us.map_or(now_us, |(first_us, _)| first_us);
-        self.changed_us = Some((first_us, now_us));
+        let first_us = self.changes.map_or(now_us, |changes| changes.first_us);
+        self.changes = Some(Changes {
+            first_us,
+            last_us: now_us,
+        });
     }
 
     /// Settings were lost.
@@ -140,11 +152,11 @@ impl Storage {
     }
 
     fn next(&self, now_us: u64) -> Option<(Asker, Request)> {
-        let is_due = |(first_us, last_us)| {
+        let is_due = |changes: Changes| {
             let quiet = self.reboot
-                || now_us.saturating_sub(last_us) >= QUIET_US
-                || now_us.saturating_sub(first_us) >= LATEST_US;
-            quiet && self.spent_us.saturating_sub(now_us) <= OWED_MAX_US
+                || now_us.saturating_sub(changes.last_us) >= QUIET_US
+                || now_us.saturating_sub(changes.first_us) >= LATEST_US;
+            quiet && self.refilled_us.saturating_sub(now_us) <= OWED_MAX_US
         };
         if let Some(request) = self.mavlink {
             Some((Asker::Mavlink, request))
@@ -152,7 +164,7 @@ impl Storage {
             Some((Asker::Wire, Request::Save))
         } else {
             // If settings were lost, the few that a companion sets at each start restore none of them.
-            let due = !self.lost && self.changed_us.is_some_and(is_due);
+            let due = !self.lost && self.changes.is_some_and(is_due);
             due.then_some((Asker::Nobody, Request::Keep))
         }
     }
@@ -165,14 +177,14 @@ impl Storage {
             Asker::Mavlink => self.mavlink = None,
             Asker::Wire => self.save = false,
             Asker::Nobody => {
-                self.spent_us = self.spent_us.max(now_us) + SAVE_EVERY_US;
+                self.refilled_us = self.refilled_us.max(now_us) + SAVE_EVERY_US;
                 // By 64·15 625, in 32 bits: a day is 2^30.3 parts of 64 µs. A quotient of 64 bits is 900 bytes of code.
-                self.owed_s = ((self.spent_us - now_us) >> 6) as u32 / 15_625;
+                self.owed_s = ((self.refilled_us - now_us) >> 6) as u32 / 15_625;
             }
         }
         if request != Request::Load {
             // All else is stored with it.
-            self.changed_us = None;
+            self.changes = None;
         }
         Some(request)
     }
