@@ -249,14 +249,15 @@ impl Device {
     /// A MAVLink stream that has ended.
     pub fn forget(&mut self, stream: LinkId) {
         if let Some(receiver) = self.receivers.remove(&stream) {
-            self.rejected_frames += rejected(&receiver);
+            self.rejected_frames += receiver.counters().rejected();
         }
     }
 
     /// What came in since the start and was refused.
     pub fn rejected(&self) -> Rejected {
         let wire = self.wire.counts();
-        let open: u64 = self.receivers.values().map(rejected).sum();
+        let receivers = self.receivers.values();
+        let open: u64 = receivers.map(|open| open.counters().rejected()).sum();
         Rejected {
             wire_datagrams: wire.rejected + wire.dropped,
             wire_frames: self.esc.telemetry().bad_frames,
@@ -450,20 +451,6 @@ fn reason(error: &FlashError) -> &'static str {
         FlashError::Gone => "storage: the file was removed or cut",
         _ => "storage: the file cannot be written",
     }
-}
-
-/// Frames that a receiver did not hand on.
-fn rejected(receiver: &Receiver) -> u64 {
-    let counters = receiver.counters();
-    [
-        counters.bad_checks,
-        counters.incompatible,
-        counters.unknown,
-        counters.incomplete,
-    ]
-    .map(u64::from)
-    .iter()
-    .sum()
 }
 
 /// Puts what the command line and the bench set over what was stored. Each value was accepted before.

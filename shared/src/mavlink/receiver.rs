@@ -30,6 +30,21 @@ pub struct Counters {
     pub incomplete: u32,
 }
 
+impl Counters {
+    /// Frames that were not handed on.
+    pub fn rejected(&self) -> u64 {
+        [
+            self.bad_checks,
+            self.incompatible,
+            self.unknown,
+            self.incomplete,
+        ]
+        .map(u64::from)
+        .iter()
+        .sum()
+    }
+}
+
 /// The front of the bytes that wait.
 enum Front {
     /// Nothing that could be a frame yet, or not all of it.

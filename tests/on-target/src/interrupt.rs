@@ -6,14 +6,13 @@
 #![no_main]
 
 mod count;
+mod program;
 mod words;
 
 use core::hint::black_box;
 
-use cortex_m::Peripherals;
 use cortex_m_rt::entry;
-use semihosting::{io, process};
-use siskin_control::params::build;
+use semihosting::io;
 use siskin_firmware::exchange;
 use siskin_firmware::interrupt::{Interrupt, Stand};
 use siskin_on_target::{answer, request};
@@ -31,17 +30,13 @@ static STAND: Stand = Stand::new();
 
 #[entry]
 fn main() -> ! {
-    let peripherals = Peripherals::take().expect("taken here and nowhere else");
-    replay(&Counter::new(peripherals.SYST)).expect("the PC gives and takes the files");
-    process::exit(0)
+    program::run(replay)
 }
 
 fn replay(counter: &Counter) -> io::Result<()> {
     let mut reader = Reader::open()?;
     let mut writer = Writer::create()?;
-    let set_up = reader.next()?.expect("the set-up comes first");
-    let (params, board) = request::read_set_up(&set_up);
-    let config = build(&params, &board).expect("the PC has built it");
+    let config = program::configuration(&mut reader)?;
     let mut ends = exchange::open(STALE_PERIODS).expect("opened here and nowhere else");
     let mut interrupt = Interrupt::new(
         STAND.registers(),

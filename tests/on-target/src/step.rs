@@ -4,15 +4,14 @@
 #![no_main]
 
 mod count;
+mod program;
 mod words;
 
 use core::hint::black_box;
 
-use cortex_m::Peripherals;
 use cortex_m_rt::entry;
-use semihosting::{io, process};
+use semihosting::io;
 use siskin_control::drive::{Bridge, Config, Sample, Setpoint, State, step};
-use siskin_control::params::build;
 use siskin_on_target::{answer, request};
 
 use count::Counter;
@@ -20,17 +19,13 @@ use words::{Reader, Writer};
 
 #[entry]
 fn main() -> ! {
-    let peripherals = Peripherals::take().expect("taken here and nowhere else");
-    replay(&Counter::new(peripherals.SYST)).expect("the PC gives and takes the files");
-    process::exit(0)
+    program::run(replay)
 }
 
 fn replay(counter: &Counter) -> io::Result<()> {
     let mut reader = Reader::open()?;
     let mut writer = Writer::create()?;
-    let set_up = reader.next()?.expect("the set-up comes first");
-    let (params, board) = request::read_set_up(&set_up);
-    let config = build(&params, &board).expect("the PC has built it");
+    let config = program::configuration(&mut reader)?;
     let mut state = State::new(&config);
     while let Some(words) = reader.next()? {
         let input = request::read_period(&words);

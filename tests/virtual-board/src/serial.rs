@@ -57,7 +57,7 @@ impl Mavlink {
     /// A link that has ended.
     pub fn forget(&mut self, stream: LinkId) {
         if let Some(receiver) = self.links.remove(&stream) {
-            self.refused += refused(&receiver);
+            self.refused += receiver.counters().rejected();
         }
     }
 
@@ -69,21 +69,12 @@ impl Mavlink {
 
     /// Frames of the links that were refused.
     pub fn refused(&self) -> u64 {
-        self.refused + self.links.values().map(refused).sum::<u64>()
+        let rejected = self
+            .links
+            .values()
+            .map(|receiver| receiver.counters().rejected());
+        self.refused + rejected.sum::<u64>()
     }
-}
-
-fn refused(receiver: &Receiver) -> u64 {
-    let counters = receiver.counters();
-    [
-        counters.bad_checks,
-        counters.incompatible,
-        counters.unknown,
-        counters.incomplete,
-    ]
-    .map(u64::from)
-    .iter()
-    .sum()
 }
 
 /// The telemetry's line: frames end with a quiet time.
