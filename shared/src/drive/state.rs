@@ -200,11 +200,11 @@ impl State {
         let shared = &self.shared;
         let seen = &shared.seen;
         let signed = |speed: Speed| if shared.reversed { -speed } else { speed };
-        let (failed, missed) = if self.phase.drives() {
+        let trouble = if self.phase.drives() {
             self.six_step.trouble()
         } else {
             // What the six-step drive counts is left where it was when it ended.
-            (0, 0)
+            six_step::state::Trouble::default()
         };
         Snapshot {
             phase: seen.phase,
@@ -220,9 +220,9 @@ impl State {
             trip: self.trip_level(),
             inductance: self.foc.loops.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.foc.observer),
-            failed_starts: shared.failed_starts.max(failed),
+            failed_starts: shared.failed_starts.max(trouble.failed_starts),
             lost_periods: shared.progress.lost_periods,
-            missed_sextants: missed,
+            missed_sextants: trouble.missed_sextants,
         }
     }
 

@@ -148,6 +148,6 @@ impl Candidate {
 }
 
 fn is_steady(kind: Pulse, before_ns: u32, width_ns: u32) -> bool {
-    let (least_ns, most_ns) = kind.end_points_ns();
-    before_ns.abs_diff(width_ns) <= (most_ns - least_ns) / STEADY_PART
+    let end_points = kind.end_points_ns();
+    before_ns.abs_diff(width_ns) <= (end_points.most - end_points.least) / STEADY_PART
 }

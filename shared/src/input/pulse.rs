@@ -129,11 +129,11 @@ impl Decoder {
 
 impl Limits {
     fn new(tick_hz: u32, kind: Pulse) -> Self {
-        let (least_ns, most_ns) = kind.end_points_ns();
+        let end_points = kind.end_points_ns();
         Self {
             kind,
-            least: ticks(tick_hz, least_ns / 5 * 4),
-            most: ticks(tick_hz, most_ns / 10 * 11),
+            least: ticks(tick_hz, end_points.least / 5 * 4),
+            most: ticks(tick_hz, end_points.most / 10 * 11),
             period: match kind {
                 Pulse::Multishot => ticks(tick_hz, MULTISHOT_PERIOD_NS),
                 _ => 0,

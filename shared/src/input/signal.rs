@@ -25,14 +25,24 @@ impl Pulse {
     ];
 
     /// The widths of least and most throttle by the protocol, ns.
-    pub const fn end_points_ns(self) -> (u32, u32) {
-        match self {
+    pub const fn end_points_ns(self) -> EndPointsNs {
+        let (least, most) = match self {
             Self::Servo => (1_000_000, 2_000_000),
             Self::OneShot125 => (125_000, 250_000),
             Self::OneShot42 => (42_000, 84_000),
             Self::Multishot => (5_000, 25_000),
-        }
+        };
+        EndPointsNs { least, most }
     }
+}
+
+/// The widths of a pulse's least and most throttle, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EndPointsNs {
+    /// Of the least throttle.
+    pub least: u32,
+    /// Of the most.
+    pub most: u32,
 }
 
 /// A signal that a wire may carry.

@@ -134,9 +134,9 @@ fn send(wire: &mut Wire<Line>, signal: Signal, first: bool) {
             wire.frame_from(skipped as usize, rate, bidirectional, frame.to_bits());
         }
         Signal::Pulse(kind) => {
-            let (least_ns, most_ns) = kind.end_points_ns();
-            let moved_ns = u64::from(most_ns - least_ns) / 10;
-            let width_ns = u64::from(least_ns) + wire.chance.below(moved_ns);
+            let end_points = kind.end_points_ns();
+            let moved_ns = u64::from(end_points.most - end_points.least) / 10;
+            let width_ns = u64::from(end_points.least) + wire.chance.below(moved_ns);
             if first {
                 // The line was high when it was first looked at.
                 wire.rest_at(false);

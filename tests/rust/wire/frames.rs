@@ -29,7 +29,7 @@ fn known_wire(tick_hz: u32, signal: Signal, forced: bool) -> Wire<Line> {
                 rate,
                 bidirectional,
             } => wire.frame(rate, bidirectional, 0),
-            Signal::Pulse(kind) => wire.pulse(kind.end_points_ns().0.into()),
+            Signal::Pulse(kind) => wire.pulse(kind.end_points_ns().least.into()),
         }
         wire.wait_until(begun_ps + 10_000_000_000);
     }
@@ -88,7 +88,7 @@ fn dshot_frames(tick_hz: u32, rate: Rate, bidirectional: bool) {
 
 fn pulses(tick_hz: u32, kind: Pulse) {
     let signal = Signal::Pulse(kind);
-    let (least_ns, most_ns) = kind.end_points_ns();
+    let end_points = kind.end_points_ns();
     let period_ps = least_period_ns(signal) * 1000;
     // Both edges stray, and each is seen up to a tick late.
     let allowed_ns = 2 * JITTER_NS + u64::from(1_000_000_000 / tick_hz) + 1;
@@ -97,7 +97,9 @@ fn pulses(tick_hz: u32, kind: Pulse) {
         for run in 0..RUNS / 2 {
             wire.errors.fast_permille = wire.chance.below(101) as i64 - 50;
             for _ in 0..RUN_FRAMES {
-                let width_ns = wire.chance.between(least_ns.into(), u64::from(most_ns) + 1);
+                let width_ns = wire
+                    .chance
+                    .between(end_points.least.into(), u64::from(end_points.most) + 1);
                 let begun_ps = wire.now_ps;
                 wire.pulse(width_ns);
                 wire.settle();

@@ -188,7 +188,7 @@ fn arms(wire: &mut Wire<Ear>, signal: Signal) -> bool {
                 rate,
                 bidirectional,
             } => wire.frame(rate, bidirectional, 0),
-            Signal::Pulse(kind) => wire.pulse(kind.end_points_ns().0.into()),
+            Signal::Pulse(kind) => wire.pulse(kind.end_points_ns().least.into()),
         }
         wire.wait_until(next_ps);
     }

@@ -32,8 +32,8 @@ impl Share {
 pub(super) fn step_ns(signal: Signal) -> u32 {
     match signal {
         Signal::Pulse(kind) => {
-            let (least_ns, most_ns) = kind.end_points_ns();
-            (most_ns - least_ns) / 1000
+            let end_points = kind.end_points_ns();
+            (end_points.most - end_points.least) / 1000
         }
         Signal::Dshot { .. } => 0,
     }

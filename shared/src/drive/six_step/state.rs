@@ -38,6 +38,15 @@ traced! {
     }
 }
 
+/// What goes wrong, as telemetry has it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::drive) struct Trouble {
+    /// Starts in a row that have failed.
+    pub(in crate::drive) failed_starts: u8,
+    /// Sextants in a row without a crossing.
+    pub(in crate::drive) missed_sextants: u8,
+}
+
 impl Default for State {
     fn default() -> Self {
         Self {
@@ -64,8 +73,11 @@ impl State {
         self.planner = planner::State::default();
     }
 
-    /// Starts in a row that have failed, and sextants in a row without a crossing.
-    pub(in crate::drive) fn trouble(&self) -> (u8, u8) {
-        (self.failed, self.missed)
+    /// What goes wrong just now.
+    pub(in crate::drive) fn trouble(&self) -> Trouble {
+        Trouble {
+            failed_starts: self.failed,
+            missed_sextants: self.missed,
+        }
     }
 }

@@ -105,8 +105,8 @@ fn ticks(ns: u64) -> u32 {
 }
 
 fn width_ns(kind: Pulse) -> u32 {
-    let (least_ns, most_ns) = kind.end_points_ns();
-    least_ns + (most_ns - least_ns) / 8
+    let end_points = kind.end_points_ns();
+    end_points.least + (end_points.most - end_points.least) / 8
 }
 
 /// Returns true for exactly one event, a frame or pulse of this signal that was sent whole.

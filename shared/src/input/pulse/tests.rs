@@ -58,7 +58,7 @@ fn one_kind_alone_is_taken() {
         wire.decoder.take_only(Some(only));
         for kind in Pulse::ALL {
             wire.decoder.clear();
-            let width = kind.end_points_ns().0;
+            let width = kind.end_points_ns().least;
             let wanted = if kind == only {
                 pulse(kind, width)
             } else {

@@ -123,11 +123,21 @@ impl File {
     }
 
     /// Its length and its checksum.
-    pub(super) fn measure(&self, view: &View) -> (u32, u32) {
+    pub(super) fn measure(&self, view: &View) -> Measure {
         let mut sink = Sink::default();
         self.write(view, &mut sink);
-        (sink.len as u32, sink.checksum)
+        Measure {
+            len: sink.len as u32,
+            checksum: sink.checksum,
+        }
     }
+}
+
+/// What a file's whole content comes to.
+pub(super) struct Measure {
+    /// Its bytes.
+    pub(super) len: u32,
+    pub(super) checksum: u32,
 }
 
 impl Entry {
@@ -163,7 +173,7 @@ impl Entry {
             if !is_folder {
                 let selection = Selection::ALL;
                 sink.put(b"\t");
-                text::decimal(File { entry, selection }.measure(view).0, sink);
+                text::decimal(File { entry, selection }.measure(view).len, sink);
             }
             sink.put(b"\0");
         }

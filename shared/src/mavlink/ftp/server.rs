@@ -2,7 +2,7 @@
 
 use super::answer::{Answer, Content, DATA_MAX};
 use super::error::Error;
-use super::files::{Entry, File};
+use super::files::{Entry, File, Measure};
 use super::sink::Sink;
 use super::view::View;
 use crate::mavlink::frame::Address;
@@ -190,7 +190,7 @@ impl Server {
             request::LIST_DIRECTORY => Content::Entries(Entry::find(path, offset)?),
             request::OPEN_FILE_RO | request::CALC_FILE_CRC32 => {
                 let file = File::find(path).ok_or(Error::FileNotFound)?;
-                let (len, checksum) = file.measure(view);
+                let Measure { len, checksum } = file.measure(view);
                 if request == request::CALC_FILE_CRC32 {
                     return Ok(Some(Content::Number(checksum)));
                 }

@@ -27,10 +27,10 @@ fn view(params: &Params) -> View<'_> {
 
 fn whole(path: &str, params: &Params) -> Option<Vec<u8>> {
     let file = File::find(path.as_bytes())?;
-    let (len, sum) = file.measure(&view(params));
-    let mut whole = std::vec![0; len as usize];
+    let measure = file.measure(&view(params));
+    let mut whole = std::vec![0; measure.len as usize];
     file.write(&view(params), &mut Sink::new(0, &mut whole));
-    assert_eq!(sum, checksum(0, &whole));
+    assert_eq!(measure.checksum, checksum(0, &whole));
     Some(whole)
 }
 
@@ -111,7 +111,7 @@ fn the_default_of_a_dead_time_is_the_boards() {
             board: &board,
             ..view(params)
         };
-        let mut whole = std::vec![0; file.measure(&view).0 as usize];
+        let mut whole = std::vec![0; file.measure(&view).len as usize];
         file.write(&view, &mut Sink::new(0, &mut whole));
         whole
     };
