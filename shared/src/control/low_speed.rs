@@ -4,8 +4,8 @@
 //! and the drop across a resistance that may be stated wrongly.
 
 use super::speed::Bounds;
-use crate::math::{Gain, Held, other_leg};
-use crate::units::{Current, Speed, Voltage};
+use crate::math::{Gain, Held};
+use crate::units::{Current, Speed};
 
 /// The current along d, and the bound of the one along q.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -22,8 +22,6 @@ pub struct Config {
     phase: Current,
     /// The last speed at which anything is done.
     end: Speed,
-    /// Least voltage along q in voltage mode: the back-EMF of the least speed that the observer can know.
-    pub u_q: Voltage,
 }
 
 impl Config {
@@ -41,7 +39,6 @@ impl Config {
             i_q_slope,
             phase,
             end: Speed::MAX,
-            u_q: Voltage::ZERO,
         };
         config.end = config.last();
         config
@@ -85,12 +82,8 @@ impl Config {
     #[cold]
     fn slow(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         let i_d = self.i_d_at(speed);
-        let most = self.i_q_at(speed);
-        let most = if i_d > Current::ZERO {
-            most.min(other_leg(self.phase, i_d))
-        } else {
-            most
-        };
+        // Both together stay below `phase` while i_d is below 0.47 of it. A root would be the longest period's.
+        let most = self.i_q_at(speed).min(self.phase.minus(i_d / 4));
         let bounds = Bounds {
             min: full.min.max(-most),
             max: full.max.min(most),
@@ -151,6 +144,18 @@ mod tests {
         let nothing = (Current::ZERO, FULL);
         assert_ne!(config.slow(FULL, config.end), nothing);
         assert_eq!(config.slow(FULL, config.end + Speed::DELTA), nothing);
+    }
+
+    #[test]
+    fn both_currents_together_are_within_the_phase_s() {
+        for share in [0.01, 0.1, 0.3] {
+            let i_d = PHASE.to_num::<f64>() * share;
+            let wide = (Current::MAX, Gain::ZERO);
+            let config = Config::new((Current::from_num(i_d), Gain::ZERO), wide, PHASE);
+            let (_, bounds) = config.bounds(FULL, Speed::ZERO);
+            let together = bounds.max.to_num::<f64>().hypot(i_d) / PHASE.to_num::<f64>();
+            assert!((0.965..1.0).contains(&together), "{share}: {together}");
+        }
     }
 
     #[test]

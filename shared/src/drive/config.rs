@@ -10,7 +10,7 @@ use crate::control::{
 };
 use crate::math::{Gain, Multiplier};
 use crate::protection;
-use crate::units::{AdcCounts, Current, Duty, Scale, Speed, WideVoltage};
+use crate::units::{AdcCounts, Current, Duty, Scale, Speed, Voltage, WideVoltage};
 
 /// Direction of rotation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,6 +105,8 @@ pub struct Config {
     pub clear_periods: u32,
     /// Periods in a row for which the observer's state may be out of its range.
     pub lost_periods: u32,
+    /// Least voltage along q in voltage mode: the back-EMF of the least speed that the observer can know.
+    pub least_u_q: Voltage,
 }
 
 impl Config {

@@ -53,6 +53,11 @@ impl State {
         self.looks = 0;
     }
 
+    /// True if this period looks at a rotor that is followed; the next one does not.
+    pub(super) fn is_looking(&self) -> bool {
+        self.catch.is_looking()
+    }
+
     /// Forgets the rotor: the terminals have been driven since.
     pub(super) fn forget(&mut self) {
         self.rotor = Rotor::Unknown;

@@ -1,9 +1,9 @@
-//! Outer-loop work, time-sliced over 32 periods. In Run 20 of the 32 have none.
+//! Outer-loop work, time-sliced over 32 periods. In Run 21 of the 32 have none.
 //!
 //! The reference is computed every 8 periods (3 kHz with a PWM of 24 kHz, for a bandwidth of tens of hertz), and the
 //! dead-time signs two periods after it. The supply and the bounds of i_q follow every 16; the observer's gains,
 //! the delay's compensation, the decoupling and the changes of mode every 32. Every eighth period also publishes a
-//! snapshot, so that about half of all interrupts stay short.
+//! snapshot, wherever in the cycle that falls, so that more than half of all interrupts stay short.
 //!
 //! A tone and Brake have cycles of their own, in `tone.rs` and `foc/short.rs`.
 
@@ -107,11 +107,11 @@ const RUN: &[Row] = &[
     (Work::REFERENCE, 0, PERIODS),
     (Work::DEAD_TIME_SIGN, 2, PERIODS),
     (Work::SUPPLY, 2, SUPPLY_PERIODS),
+    (Work::SUPPLY_BOUNDS, 2, SUPPLY_PERIODS),
     (Work::TRIP_LEVEL, 4, SUPPLY_PERIODS),
-    (Work::SUPPLY_BOUNDS, 4, SUPPLY_PERIODS),
     (Work::LONGEST_VECTOR, 4, SUPPLY_PERIODS),
-    (Work::SPEED_BOUNDS, 6, SUPPLY_PERIODS),
-    (Work::OBSERVER_GAINS, 2, CYCLE),
+    (Work::SPEED_BOUNDS, 4, SUPPLY_PERIODS),
+    (Work::OBSERVER_GAINS, 6, CYCLE),
     (Work::DELAY_COMPENSATION, 10, CYCLE),
     (Work::SETPOINT, 10, CYCLE),
     (Work::DECOUPLING, 26, CYCLE),

@@ -95,8 +95,9 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
     energised(config, state, (sample, setpoint), currents)
 }
 
-/// Returns true if nothing changes: a drive at rest is asked for nothing, which also ends a row of failed starts, or
-/// one in Sense is still asked to turn.
+/// Returns true if nothing changes: a drive at rest is asked for nothing, which also ends a row of failed starts, one
+/// in Sense is still asked to turn, or a rotor that is followed is looked at in this period, the longest of four, and
+/// what is asked for begins in the next.
 #[inline(always)]
 fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
@@ -107,6 +108,7 @@ fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> 
             }
             nothing
         }
+        (Phase::Idle, _) => state.off.is_looking(),
         (Phase::Sense, Setpoint::Speed(_)) => {
             config.six_step.is_none() && setpoint.asks(config.both_ways) != Asked::Nothing
         }

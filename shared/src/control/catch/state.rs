@@ -128,6 +128,12 @@ impl State {
 }
 
 impl State {
+    /// Returns true if the next sample is compared with what is expected of a rotor that is followed. The one after
+    /// it is not.
+    pub fn is_looking(&self) -> bool {
+        self.stage == Stage::Look && self.looks >= 2
+    }
+
     /// Returns true if looks are at the mean of four readings.
     pub(super) fn is_slow(&self) -> bool {
         self.omega.saturating_abs() < SLOW

@@ -166,7 +166,7 @@ fn at_voltage(
     shared: &Shared,
     share: fixed::types::I1F31,
 ) -> Reference {
-    let u_q = voltage::of_share(share, shared.supply.longest.length()).max(config.low_speed.u_q);
+    let u_q = voltage::of_share(share, shared.supply.longest.length()).max(config.least_u_q);
     let frame = (shared.seen.speed, shared.seen.i);
     let factor = foc.loops.inductance.factor;
     let fb = observer::feedback(&config.observer, &foc.observer, frame, factor);

@@ -31,7 +31,7 @@ use crate::drive::{Config, Direction, Stop};
 use crate::input::signal::Signal;
 use crate::math::Real;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Scale};
+use crate::units::{AdcCounts, Current, Scale, Voltage};
 
 /// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
@@ -172,6 +172,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     };
     place.proven_periods = p.periods(PROVEN_S);
     place.lost_periods = lost_periods(&p.scale);
+    place.least_u_q = least_u_q(&p);
     p.verdict()
 }
 
@@ -254,13 +255,28 @@ fn refuse_contradictions(p: &Si) {
     );
 }
 
+/// True for an observer that is helped where there is little back-EMF. The first paper's is as published, and
+/// sensors give the position at any speed.
+fn is_helped(p: &Si) -> bool {
+    let published = p.chosen(CtlObserver::BackEmf) && p.chosen(CtlObsCure::Published);
+    !published && !p.chosen(CtlObserver::Hall)
+}
+
+/// Least voltage along q in voltage mode.
+fn least_u_q(p: &Si) -> Voltage {
+    if is_helped(p) {
+        let turns_hz = p.from_motor.least_rpm / 60.0 * p.get(ParamId::MotPolePairs);
+        p.voltage(p.flux_wb * TAU * turns_hz)
+    } else {
+        Voltage::ZERO
+    }
+}
+
 /// Keeps an observer that lives by the back-EMF in lock where there is little of it.
 fn low_speed(p: &Si) -> low_speed::Config {
     let limit_a = p.get(ParamId::LimPhaseA);
     let phase = p.scale.current_from_a(limit_a);
-    let published = p.chosen(CtlObserver::BackEmf) && p.chosen(CtlObsCure::Published);
-    if published || p.chosen(CtlObserver::Hall) {
-        // As published, and not needed where sensors give the position.
+    if !is_helped(p) {
         return low_speed::Config::none(phase);
     }
     let ramp_a = p.from_motor.ramp_a.min(limit_a);
@@ -274,14 +290,11 @@ fn low_speed(p: &Si) -> low_speed::Config {
     let i_d_slope = bias_a / p.scale.current_a / end_rad_s * rad_per_unit;
     let i_q = p.scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a);
     let i_q_slope = drop_a_s * rad_per_unit / p.scale.current_a;
-    let least_rad_s = p.from_motor.least_rpm * TAU / 60.0 * p.get(ParamId::MotPolePairs);
-    let mut config = low_speed::Config::new(
+    low_speed::Config::new(
         (i_d, p.gain(ParamId::StaRampA, i_d_slope)),
         (i_q, p.gain(ParamId::MotRMohm, i_q_slope)),
         phase,
-    );
-    config.u_q = p.voltage(p.flux_wb * least_rad_s);
-    config
+    )
 }
 
 fn limits(p: &Si) -> protection::Config {
