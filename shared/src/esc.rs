@@ -8,7 +8,7 @@ use crate::check::Check;
 use crate::drive::{Config, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
-use crate::mavlink::{Component, Context, Frame, Request, Warning};
+use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
 use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale};
 use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
@@ -294,7 +294,8 @@ impl Esc {
     ///
     /// After [`Request::ParamsChanged`] the interrupt shall run with [`Esc::config`]; this side has done its
     /// part. A request for storage waits until the bridge rests and the one before has ended; nothing turns
-    /// the motor from then on until [`Esc::storage_done`]. A restart waits for storage.
+    /// the motor from then on until [`Esc::storage_done`]. A restart waits for storage, and is given up if the
+    /// wire is armed meanwhile.
     pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
         let now_us = self.polled_us.unwrap_or(0);
         let request = self.component.take_request();
@@ -306,7 +307,12 @@ impl Esc {
                 self.apply(throttle);
                 return request;
             }
-            Some(Request::Reboot) => self.storage.reboot(),
+            Some(Request::Reboot) => {
+                self.storage.reboot();
+                if self.storage.reboots_later(now_us) {
+                    self.warn_of("Reboot waits up to 3 min: saves are spaced");
+                }
+            }
             Some(Request::FactoryReset) => {
                 let mut defaults = Params::default();
                 defaults.fit(&self.board);
@@ -321,9 +327,15 @@ impl Esc {
             }
             _ => self.storage.ask(request),
         }
-        if !self.drive().stopped && self.storage.cancel_reboot() {
-            self.component
-                .tell_stored(Err("No reboot: the motor turns"));
+        let prevents = if self.telemetry.armed {
+            Some(NO_REBOOT_ARMED)
+        } else {
+            (!self.drive().stopped).then_some("No reboot: the motor turns")
+        };
+        if let Some(reason) = prevents
+            && self.storage.cancel_reboot()
+        {
+            self.warn_of(reason);
         }
         // Nothing turns the motor from then on.
         if self.storage.reboots() && throttle.reach(Throttle::store) {

@@ -141,6 +141,11 @@ impl Storage {
         self.reboot && self.under_way.is_none() && self.next(u64::MAX).is_none()
     }
 
+    /// Returns true if the restart waits for a save that is put off to spare the flash.
+    pub(super) fn reboots_later(&self, now_us: u64) -> bool {
+        self.next(now_us).is_none() && self.next(u64::MAX).is_some()
+    }
+
     /// The restart begins, or is given up. Returns true if there was to be one.
     pub(super) fn cancel_reboot(&mut self) -> bool {
         core::mem::take(&mut self.reboot)

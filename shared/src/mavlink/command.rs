@@ -46,6 +46,9 @@ const MESSAGE_MAX: f32 = 16_777_215.0;
 /// greatest f32 below its end.
 const INTERVAL_MAX_US: f32 = 2_147_483_520.0;
 
+/// Why a restart is refused, or given up.
+pub(crate) const NO_REBOOT_ARMED: &str = "No reboot: armed";
+
 /// Time within which a repeated command is the same one; clients give up after 3 s or less.
 const REPEAT_US: u64 = 5_000_000;
 /// That time for COMMAND_INT, which has no number of its transmission: as long as a client waits for an
@@ -229,7 +232,7 @@ impl Commands {
             }
             COMPONENT_ARM_DISARM => arm_disarm(command.choice(0), context),
             PREFLIGHT_STORAGE => return self.storage(command, drive),
-            PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, replies),
+            PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, context, replies),
             REQUEST_MESSAGE => request_message(command, schedule),
             SET_MESSAGE_INTERVAL => set_interval(p1, p2, schedule),
             GET_MESSAGE_INTERVAL => match message_id(p1) {
@@ -302,6 +305,7 @@ impl Commands {
         &mut self,
         command: &Command,
         drive: DriveStatus,
+        context: &mut Context,
         replies: &mut Replies,
     ) -> MavResult {
         match command.choice(0) {
@@ -311,6 +315,12 @@ impl Commands {
             _ => return DENIED,
         }
         if self.is_busy() || !drive.stopped {
+            return TEMPORARILY_REJECTED;
+        }
+        // The pilot may open the throttle at any moment.
+        if context.authority.armed() {
+            let text = [NO_REBOOT_ARMED, ""];
+            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_WARNING, text));
             return TEMPORARILY_REJECTED;
         }
         self.reboot = true;

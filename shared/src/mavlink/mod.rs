@@ -27,6 +27,7 @@ mod sender;
 mod signing;
 mod warnings;
 
+pub(crate) use command::NO_REBOOT_ARMED;
 pub use component::Component;
 pub use context::{Act, Context, Request};
 pub use frame::{Address, Frame};

@@ -1,6 +1,6 @@
 //! Settings that are stored without being asked for, and the times at which they are.
 
-use super::storage::{ACCEPTED, REBOOT, STORAGE};
+use super::storage::{ACCEPTED, REBOOT, REJECTED, STORAGE};
 use super::*;
 use crate::input::News;
 use crate::input::calibration::Step;
@@ -172,29 +172,78 @@ fn a_restart_without_anything_to_store_is_made_at_once() {
 }
 
 #[test]
-fn a_restart_that_waits_is_given_up_when_the_motor_turns() {
+fn an_armed_wire_refuses_a_restart() {
     let mut bench = Bench::armed();
-    bench.frames(4, 1000);
-    bench.frames(10, 0);
+    bench.command(REBOOT, 1.0);
+    bench.frames(2_000, 0);
+    assert_eq!(bench.results, [REJECTED]);
+    assert_eq!(bench.texts, ["No reboot: armed"]);
+    assert_eq!(bench.requests, []);
+    // With its motor disarmed, and before the wire has held zero again, it may be.
+    bench.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0);
+    bench.command(REBOOT, 1.0);
+    bench.wait_ms(2);
+    assert_eq!(bench.results, [REJECTED, ACCEPTED, ACCEPTED]);
+    assert_eq!(bench.requests, [Request::Reboot]);
+}
+
+/// All saves that are made without a request are taken, and one is asked for by a change and a restart.
+fn restart_that_waits() -> Bench {
+    let mut bench = Bench::new();
+    let mut loaded = loaded(Integrity::Sound);
+    loaded.kept.owed_s = 100 * 180;
+    bench.esc.recall(&loaded);
+    bench.wait_ms(3_000);
+    bench.texts.clear();
     bench.set("LIM_PHASE_A", 12.5);
     bench.command(REBOOT, 1.0);
-    bench.frames(10, 0);
-    assert_eq!(
-        bench.requests,
-        [Request::ParamsChanged],
-        "not a second at rest"
-    );
-    bench.frames(50, 1000);
-    assert!(
-        bench
-            .texts
-            .contains(&"No reboot: the motor turns".to_string())
-    );
-    bench.frames(2_000, 0);
-    assert_eq!(bench.requests, [Request::ParamsChanged, Request::Keep]);
+    bench.wait_ms(50);
+    assert_eq!(bench.results, [ACCEPTED]);
+    assert_eq!(bench.requests, [Request::ParamsChanged]);
+    bench
+}
+
+/// It takes minutes where the flash is spared: nobody should think that the command was lost.
+#[test]
+fn a_restart_that_waits_says_so() {
+    let mut bench = restart_that_waits();
+    let waits = "Reboot waits up to 3 min: saves are spaced";
+    assert_eq!(bench.texts, ["Rebooting", waits]);
+    bench.wait_ms(60_000);
     bench.storage_done(Ok(()));
-    bench.frames(100, 0);
-    assert_eq!(bench.requests.len(), 2, "no restart");
+    assert_eq!(bench.requests[2..], [Request::Reboot]);
+    assert_eq!(bench.texts.len(), 2, "once");
+    // One whose save is made at once does not.
+    let mut bench = rested();
+    bench.set("LIM_PHASE_A", 12.5);
+    bench.command(REBOOT, 1.0);
+    bench.wait_ms(5);
+    assert_eq!(bench.texts, ["Rebooting"]);
+}
+
+#[test]
+fn a_restart_that_waits_is_given_up_when_the_wire_is_armed_or_the_motor_turns() {
+    for (acts, text) in [
+        (
+            (|bench| bench.frames(400, 0)) as fn(&mut Bench),
+            "No reboot: armed",
+        ),
+        (
+            |bench| bench.command(MavCmd::MAV_CMD_ACTUATOR_TEST, 0.1),
+            "No reboot: the motor turns",
+        ),
+    ] {
+        let mut bench = restart_that_waits();
+        acts(&mut bench);
+        bench.wait_ms(2);
+        let told = bench.texts.iter().filter(|told| *told == text).count();
+        assert_eq!(told, 1, "{:?}", bench.texts);
+        bench.wait_ms(60_000);
+        bench.storage_done(Ok(()));
+        bench.wait_ms(100);
+        let requests = [Request::ParamsChanged, Request::Keep];
+        assert_eq!(bench.requests, requests, "no restart");
+    }
 }
 
 #[test]

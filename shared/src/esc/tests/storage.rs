@@ -12,7 +12,7 @@ pub(super) const REBOOT: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN;
 const ACTUATOR_TEST: MavCmd = MavCmd::MAV_CMD_ACTUATOR_TEST;
 
 pub(super) const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
-const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
+pub(super) const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 
 impl Bench {
     /// A message from a ground station.
