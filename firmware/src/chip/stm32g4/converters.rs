@@ -66,9 +66,14 @@ fn sample_for(converter: Adc, channel: u8, time: SampleTime) {
     }
 }
 
-/// Gives a converter that is supplied an order: what it is at stays as it is.
+/// Gives a converter that is supplied an order: what it is at stays as it is. Its orders are bits that are set by
+/// ones and left by zeros (RM0440, ADC_CR), so one that has ended since it was read would be given again by being
+/// written back.
 fn command(converter: Adc, order: impl FnOnce(&mut Cr)) {
-    converter.cr().modify(order);
+    converter.cr().write(|w| {
+        w.set_advregen(true);
+        order(w);
+    });
 }
 
 /// Tries of a reading, so that a task is not held up for ever.

@@ -243,10 +243,18 @@ impl Converter {
     /// Writes CR, whose bits are set by the program and, but for the supply's, taken back by the
     /// converter.
     fn control(&mut self, new: Cr, clock: Cycles, now: Cycles) -> Result<(), Unmodelled> {
-        let unknown = new.addis() || new.adstp() == Adstp::STOP || new.jadstp() == Adstp::STOP;
+        let old = self.control;
+        // A bit that is written back as it was read is an order again if the converter has taken it back
+        // meanwhile: each order is to be written alone (RM0440, ADC_CR: zeros have no effect).
+        let again = (old.aden() && new.aden())
+            || (old.adcal() && new.adcal())
+            || (old.adstart() && new.adstart())
+            || (old.jadstart() && new.jadstart());
+        let unknown =
+            again || new.addis() || new.adstp() == Adstp::STOP || new.jadstp() == Adstp::STOP;
         // Without its supply a converter that is on would be none.
         let supplied = new.advregen() && !new.deeppwd();
-        if unknown || self.control.aden() && !supplied {
+        if unknown || old.aden() && !supplied {
             return Err(Unmodelled);
         }
         if !supplied {
@@ -254,7 +262,6 @@ impl Converter {
         } else if self.regulated_from == NEVER {
             self.regulated_from = now + time::of_ns(REGULATOR_NS);
         }
-        let old = self.control;
         self.control.set_deeppwd(new.deeppwd());
         self.control.set_advregen(new.advregen());
         self.control.set_adcaldif(new.adcaldif());

@@ -14,6 +14,8 @@ const DR: u32 = 0x40;
 const JSQR: u32 = 0x4c;
 const JDR1: u32 = 0x80;
 
+const ADVREGEN: u32 = 1 << 28;
+
 /// The converters with their time.
 struct Bench {
     converters: Converters,
@@ -62,9 +64,9 @@ impl Bench {
         self.try_write(offset, value).expect("modelled");
     }
 
-    fn set(&mut self, offset: u32, bits: u32) {
-        let value = self.read(offset) | bits;
-        self.write(offset, value);
+    /// Gives an order to a converter that is supplied.
+    fn order(&mut self, at: u32, bit: u32) {
+        self.write(at + CR, ADVREGEN | bit);
     }
 
     /// Runs to that time.
@@ -84,13 +86,13 @@ impl Bench {
     fn switch_on(&mut self, at: u32) {
         // 170 MHz by 4.
         self.write(CCR, 2 << 18);
-        self.write(at + CR, 1 << 28);
+        self.write(at + CR, ADVREGEN);
         self.run_to(self.now + 3400);
-        self.set(at + CR, 1 << 31);
+        self.order(at, 1 << 31);
         self.run_to(self.now + 464);
         assert!(!Cr(self.read(at + CR)).adcal());
         self.run_to(self.now + 16);
-        self.set(at + CR, 1);
+        self.order(at, 1);
         self.run_to(self.now + 60);
         assert!(Isr(self.read(at + ISR)).adrdy());
     }
@@ -134,7 +136,7 @@ impl Bench {
             bench.write(at + SMPR1, low.0);
             bench.write(at + SMPR2, high.0);
             bench.write(at + JSQR, ranks.0);
-            bench.set(at + CR, 1 << 3);
+            bench.order(at, 1 << 3);
         }
         bench.write(IER, 1 << 6);
         bench.write(ISR, 0x7ff);
@@ -224,7 +226,7 @@ fn a_regular_conversion_alone() {
     let mut bench = Bench::armed();
     let start = bench.now;
     bench.volts = 1.1;
-    bench.set(CR, 1 << 2);
+    bench.order(0, 1 << 2);
     // 2, 247.5 and 12.5 clocks.
     bench.run_to(start + 1047);
     assert!(!Isr(bench.read(ISR)).eoc());
@@ -241,7 +243,7 @@ fn a_regular_conversion_alone() {
 fn an_injected_sequence_breaks_into_a_regular_conversion_which_begins_again() {
     let mut bench = Bench::armed();
     let start = bench.now;
-    bench.set(CR, 1 << 2);
+    bench.order(0, 1 << 2);
     bench.run_to(start + 600);
     bench.trigger();
     // The latency is 3 clocks now: the sequence's 588 cycles end at 600 + 12 + 588, and the regular
@@ -298,6 +300,9 @@ fn what_is_not_to_be_done_is_refused() {
     for (offset, value) in [(SMPR1, 0), (JSQR, 0), (0x0c, 0), (CCR, 1 << 18), (0x20, 0)] {
         assert_eq!(bench.try_write(offset, value), Err(Unmodelled), "{offset}");
     }
+    // Orders that are written back with another one: ADEN and JADSTART with ADSTART.
+    let read = bench.read(CR);
+    assert_eq!(bench.try_write(CR, read | 1 << 2), Err(Unmodelled));
     // What it was may be written.
     let same = bench.read(SMPR1);
     bench.write(SMPR1, same);
@@ -310,7 +315,7 @@ fn a_regular_conversion_that_is_asked_for_during_a_sequence_follows_it() {
     let start = bench.now;
     bench.trigger();
     bench.run_to(start + 100);
-    bench.set(CR, 1 << 2);
+    bench.order(0, 1 << 2);
     // The sequence ends at 596.
     bench.run_to(start + 596 + 1039);
     assert!(!Isr(bench.read(ISR)).eoc());
@@ -323,7 +328,7 @@ fn a_reading_that_nobody_fetches_is_kept_and_overrun() {
     let mut bench = Bench::armed();
     for volts in [1.1, 2.2] {
         bench.volts = volts;
-        bench.set(CR, 1 << 2);
+        bench.order(0, 1 << 2);
         bench.run_to(bench.now + 2000);
     }
     assert!(Isr(bench.read(ISR)).ovr());
