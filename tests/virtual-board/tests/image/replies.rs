@@ -77,8 +77,8 @@ impl Seen {
 /// Frames of [`FRAMES`] that may stay without a reply, half a per cent. From a frame's first edge to its reply
 /// are 43 µs at DShot1200, of which the task takes 30 and the PWM interrupt up to 11: where other interrupts
 /// come together with these, it would begin too late, and is left out. How often that is depends on how the
-/// frames fall against the PWM: 0 to 5 at DShot600 and 4 to 30 at DShot1200 from one image to the next. The
-/// flight controller then goes on with the speed of the frame before.
+/// frames fall against the PWM, and changes from one image to the next: from none to 30 so far. The flight
+/// controller then goes on with the speed of the frame before.
 const LATE: usize = FRAMES / 200;
 
 /// `close_ns` is how far frames are apart that are as close as this is to hold for.
