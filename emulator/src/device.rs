@@ -78,6 +78,22 @@ pub struct Start {
     pub link_bytes_per_s: u32,
 }
 
+/// Nothing but the default bench: a wire that nobody drives, nothing stored, set or broken, and a serial link of
+/// 115 200 baud.
+impl Default for Start {
+    fn default() -> Self {
+        Self {
+            bench: Bench::default(),
+            wire: Wire::detached(),
+            flash: FileFlash::in_memory(),
+            overrides: Vec::new(),
+            defaults: Vec::new(),
+            faults: Vec::new(),
+            link_bytes_per_s: 11_520,
+        }
+    }
+}
+
 /// One emulated ESC.
 pub struct Device {
     esc: Esc,

@@ -4,9 +4,7 @@ use siskin_control::drive::Setpoint;
 use siskin_control::input::dshot::{Frame, check_mask};
 use siskin_control::params::ParamId;
 use siskin_emulator::device::{Device, Onlooker, Start};
-use siskin_emulator::flash::FileFlash;
-use siskin_emulator::rig::{Bench, Period, Rig};
-use siskin_emulator::wire::Wire;
+use siskin_emulator::rig::{Period, Rig};
 
 /// The last edge of a frame before each change of the set-point, and when `step` was first given the
 /// new one.
@@ -43,13 +41,8 @@ impl Onlooker for Latency {
 
 fn device() -> Device {
     let (device, _) = Device::start(Start {
-        bench: Bench::default(),
-        wire: Wire::detached(),
-        flash: FileFlash::in_memory(),
         overrides: vec![(ParamId::CtlMode, 2.0)],
-        defaults: Vec::new(),
-        faults: Vec::new(),
-        link_bytes_per_s: 11_520,
+        ..Start::default()
     })
     .expect("voltage mode fits the bench");
     device

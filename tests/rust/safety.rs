@@ -4,9 +4,7 @@
 use siskin_control::drive::{Bridge, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Start};
-use siskin_emulator::flash::FileFlash;
-use siskin_emulator::rig::{Bench, Period, Rig};
-use siskin_emulator::wire::Wire;
+use siskin_emulator::rig::{Period, Rig};
 
 const MS_NS: u64 = 1_000_000;
 
@@ -40,13 +38,8 @@ struct Seen {
 impl Flight {
     fn new(overrides: &[(ParamId, f32)]) -> Self {
         let (device, warning) = Device::start(Start {
-            bench: Bench::default(),
-            wire: Wire::detached(),
-            flash: FileFlash::in_memory(),
             overrides: [BOSSO_BENCH.settings, overrides].concat(),
-            defaults: Vec::new(),
-            faults: Vec::new(),
-            link_bytes_per_s: 11_520,
+            ..Start::default()
         })
         .expect("default parameters fit the bench");
         assert_eq!(warning, None);

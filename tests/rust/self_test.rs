@@ -8,10 +8,8 @@ use siskin_control::mavlink::Receiver;
 use siskin_control::params::{ParamId, Params};
 use siskin_emulator::device::{Device, Start};
 use siskin_emulator::fault::{Fault, Kind, Side};
-use siskin_emulator::flash::FileFlash;
 use siskin_emulator::link::LinkId;
-use siskin_emulator::rig::{Bench, Period, Rig};
-use siskin_emulator::wire::Wire;
+use siskin_emulator::rig::{Period, Rig};
 
 const MS_NS: u64 = 1_000_000;
 /// 16 bits of DShot600: zero throttle, and half.
@@ -40,13 +38,10 @@ impl Station {
             kind: *kind,
         };
         let start = Start {
-            bench: Bench::default(),
-            wire: Wire::detached(),
-            flash: FileFlash::in_memory(),
             overrides: params.to_vec(),
-            defaults: Vec::new(),
             faults: kinds.iter().map(fault).collect(),
             link_bytes_per_s: 1_000_000,
+            ..Start::default()
         };
         let (device, warning) = Device::start(start).expect("it starts");
         assert_eq!(warning, None);

@@ -5,11 +5,9 @@ use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::setpoint::Mapping;
 use siskin_control::tune::{Beacon, Note, Player, Tune};
 use siskin_emulator::device::{Device, Start};
-use siskin_emulator::flash::FileFlash;
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Period, Rig};
 use siskin_emulator::scenario::{Standing, stand};
-use siskin_emulator::wire::Wire;
 
 const BENCHES: [&str; 4] = ["bosso", "quad-5-inch", "quad-10-inch", "scooter"];
 
@@ -327,13 +325,8 @@ fn a_tune_is_heard_after_the_brake_and_leaves_it() {
 /// throttle. Gives how long tones were played, and when the rotor was parked, s.
 fn power_up(tone_a: f32, throttle_at_s: f64) -> (f64, Option<f64>) {
     let started = Device::start(Start {
-        bench: Bench::default(),
-        wire: Wire::detached(),
-        flash: FileFlash::in_memory(),
         overrides: vec![(ParamId::MotToneA, tone_a)],
-        defaults: Vec::new(),
-        faults: Vec::new(),
-        link_bytes_per_s: 11_520,
+        ..Start::default()
     });
     let mut device = started.expect("the defaults fit the bench").0;
     let (mut tone_s, mut parked_s) = (0.0, None);

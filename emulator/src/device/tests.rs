@@ -13,13 +13,9 @@ const MS_NS: u64 = 1_000_000;
 
 fn device(flash: FileFlash, faults: Vec<Fault>) -> Device {
     let started = Device::start(Start {
-        bench: Bench::default(),
-        wire: Wire::detached(),
         flash,
-        overrides: Vec::new(),
-        defaults: Vec::new(),
         faults,
-        link_bytes_per_s: 11_520,
+        ..Start::default()
     });
     started.unwrap().0
 }
@@ -78,13 +74,10 @@ fn a_flash_that_refuses_keeps_what_was_stored() {
 /// A device on a stored file, with parameters over the stored ones and in place of the factory's.
 fn given(path: &Path, overrides: Vec<(ParamId, f32)>, defaults: Vec<(ParamId, f32)>) -> Device {
     let started = Device::start(Start {
-        bench: Bench::default(),
-        wire: Wire::detached(),
         flash: FileFlash::open(path).unwrap(),
         overrides,
         defaults,
-        faults: Vec::new(),
-        link_bytes_per_s: 11_520,
+        ..Start::default()
     });
     started.unwrap().0
 }
@@ -228,13 +221,9 @@ fn a_brown_out_resets_the_chip() {
 fn an_answer_goes_to_who_has_asked() {
     for jitter_ns in [0.0, 60.0] {
         let mut device = Device::start(Start {
-            bench: Bench::default(),
             wire: Wire::open(&"udp:127.0.0.1:0".parse().unwrap(), 0).unwrap(),
-            flash: FileFlash::in_memory(),
             overrides: vec![(ParamId::InpProto, 22.0)],
-            defaults: Vec::new(),
-            faults: Vec::new(),
-            link_bytes_per_s: 11_520,
+            ..Start::default()
         })
         .unwrap()
         .0;

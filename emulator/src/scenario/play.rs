@@ -14,13 +14,11 @@ use super::file::{RUN, Scenario, WindowTable};
 use super::judge::{Verdict, judge};
 use super::signal::{Demand, Signal, demand};
 use crate::device::{Device, Start};
-use crate::flash::FileFlash;
 use crate::machine::Machine;
 use crate::record::Recorder;
 use crate::rig::Rig;
 use crate::summary::{Report, Summary};
 use crate::watch::{Watch, WatchError};
-use crate::wire::Wire;
 
 /// Most entries of one kind: signals, faults, windows or expectations. Some of what looks through them takes
 /// the square of their number.
@@ -97,12 +95,9 @@ fn run<M: Machine>(
     let mut watch = Watch::new(windows(scenario), recorder);
     let (mut machine, _) = start(Start {
         bench: scenario.bench.bench()?,
-        wire: Wire::detached(),
-        flash: FileFlash::in_memory(),
         overrides,
-        defaults: Vec::new(),
         faults: scenario.faults()?,
-        link_bytes_per_s: 11_520,
+        ..Start::default()
     })?;
 
     let began = Instant::now();

@@ -3,9 +3,7 @@
 use siskin_control::drive::Snapshot;
 use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Onlooker, Start};
-use siskin_emulator::flash::FileFlash;
-use siskin_emulator::rig::{Bench, Period, Rig};
-use siskin_emulator::wire::Wire;
+use siskin_emulator::rig::{Period, Rig};
 
 use super::reply::{Reply, levels};
 
@@ -88,13 +86,8 @@ pub(super) struct Flight {
 impl Flight {
     pub(super) fn new(kind: Kind, overrides: &[(ParamId, f32)]) -> Self {
         let (device, _) = Device::start(Start {
-            bench: Bench::default(),
-            wire: Wire::detached(),
-            flash: FileFlash::in_memory(),
             overrides: [BOSSO_BENCH.settings, overrides].concat(),
-            defaults: Vec::new(),
-            faults: Vec::new(),
-            link_bytes_per_s: 11_520,
+            ..Start::default()
         })
         .expect("the parameters fit the bench");
         let mut flight = Self {

@@ -8,9 +8,7 @@ use siskin_control::drive::Setpoint;
 use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_control::units::Speed;
 use siskin_emulator::device::{Device, Onlooker, Start};
-use siskin_emulator::flash::FileFlash;
-use siskin_emulator::rig::{Bench, Period, Rig};
-use siskin_emulator::wire::Wire;
+use siskin_emulator::rig::{Period, Rig};
 
 /// Of the wire's datagrams.
 const SERVO: u8 = 0;
@@ -69,13 +67,8 @@ impl FlightController {
     /// One whose ESC has just been powered up.
     pub(super) fn new(overrides: &[(ParamId, f32)]) -> Self {
         let (device, warning) = Device::start(Start {
-            bench: Bench::default(),
-            wire: Wire::detached(),
-            flash: FileFlash::in_memory(),
             overrides: [BOSSO_BENCH.settings, overrides].concat(),
-            defaults: Vec::new(),
-            faults: Vec::new(),
-            link_bytes_per_s: 11_520,
+            ..Start::default()
         })
         .expect("the parameters fit the bench");
         assert_eq!(warning, None);

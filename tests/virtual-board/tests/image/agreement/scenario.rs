@@ -4,11 +4,9 @@ use siskin_control::input::dshot::{Frame, Rate, check_mask};
 use siskin_control::input::signal::Signal;
 use siskin_control::params::ParamId;
 use siskin_emulator::device::Start;
-use siskin_emulator::flash::FileFlash;
 use siskin_emulator::machine::{Machine, Onlooker};
 use siskin_emulator::plant::{Fidelity, Sensing};
 use siskin_emulator::rig::Bench;
-use siskin_emulator::wire::Wire;
 use siskin_firmware::circuit::b_g431b_esc1::BOARD;
 use siskin_vboard::image::Image;
 use siskin_vboard::machine::VirtualBoard;
@@ -25,9 +23,6 @@ const SIGNAL: Signal = Signal::Dshot {
 /// The first value that is throttle, and how many steps there are behind it.
 const FIRST: f64 = 48.0;
 const SPAN: f64 = 1999.0;
-
-/// Bytes a second of the slowest MAVLink link: 115200 baud.
-const LINK_BYTES_PER_S: u32 = 11_520;
 
 /// What is on the throttle wire until a time.
 pub(crate) struct Step {
@@ -89,13 +84,9 @@ pub(crate) fn start() -> Start {
             },
             ..Bench::default()
         },
-        wire: Wire::detached(),
-        flash: FileFlash::in_memory(),
         // As short as the board takes it, for the emulator too.
         overrides: vec![(ParamId::PwmDeadtimeNs, BOARD.least_dead_time.ns)],
-        defaults: Vec::new(),
-        faults: Vec::new(),
-        link_bytes_per_s: LINK_BYTES_PER_S,
+        ..Start::default()
     }
 }
 

@@ -18,12 +18,10 @@ use siskin_control::input::dshot::{Frame as Dshot, check_mask};
 use siskin_control::mavlink::{Address, Receiver};
 use siskin_control::params::ParamId;
 use siskin_emulator::device::Start;
-use siskin_emulator::flash::FileFlash;
 use siskin_emulator::machine::{Machine, Onlooker};
 use siskin_emulator::plant::Gate;
-use siskin_emulator::rig::{Bench, Period, Rig};
+use siskin_emulator::rig::{Period, Rig};
 use siskin_emulator::surroundings::{Motion, Passage};
-use siskin_emulator::wire::Wire;
 use siskin_vboard::chip::Cause;
 use siskin_vboard::image::Image;
 use siskin_vboard::machine::VirtualBoard;
@@ -239,13 +237,8 @@ impl Board {
     /// At power-up, with these parameters stored and all else as it leaves the factory.
     pub(crate) fn new(image: &Image, overrides: &[(ParamId, f32)]) -> Self {
         let start = Start {
-            bench: Bench::default(),
-            wire: Wire::detached(),
-            flash: FileFlash::in_memory(),
             overrides: overrides.to_vec(),
-            defaults: Vec::new(),
-            faults: Vec::new(),
-            link_bytes_per_s: 11_520,
+            ..Start::default()
         };
         let (board, warning) = VirtualBoard::new(image, start).expect("a board");
         assert_eq!(warning, None);
