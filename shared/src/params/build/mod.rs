@@ -31,7 +31,7 @@ use crate::drive::{Config, Direction, Stop};
 use crate::input::signal::Signal;
 use crate::math::Real;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Scale, Voltage};
+use crate::units::{AdcCounts, Current, Scale, Voltage, stated_emf};
 
 /// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
@@ -265,8 +265,7 @@ fn is_helped(p: &Si) -> bool {
 /// Least voltage along q in voltage mode.
 fn least_u_q(p: &Si) -> Voltage {
     if is_helped(p) {
-        let turns_hz = p.from_motor.least_rpm / 60.0 * p.get(ParamId::MotPolePairs);
-        p.voltage(p.flux_wb * TAU * turns_hz)
+        stated_emf(p.scale.speed_from_rpm(p.from_motor.least_rpm))
     } else {
         Voltage::ZERO
     }
