@@ -125,13 +125,6 @@ struct Override {
     stored: f32,
 }
 
-impl Override {
-    /// True if it goes before what is stored.
-    fn prevails(&self) -> bool {
-        !self.is_default || self.stored == self.id.entry().default
-    }
-}
-
 /// The simulated chip for the self-test: it has converters, and neither comparators nor clocks.
 struct Latest(Sample);
 
@@ -474,8 +467,10 @@ fn apply(overrides: &mut [Override], params: &mut Params) {
     for given in &mut *overrides {
         given.stored = params.get(given.id);
     }
-    for given in overrides.iter().filter(|given| given.prevails()) {
-        let _ = params.set(given.id, given.value);
+    for given in overrides {
+        if !given.is_default || params.is_default(given.id) {
+            let _ = params.set(given.id, given.value);
+        }
     }
 }
 

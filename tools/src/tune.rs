@@ -57,7 +57,7 @@ pub(crate) fn run(
         let flux_mwb = flux_mwb(kv, &params);
         set(&mut params, ParamId::MotFluxMwb, flux_mwb)?;
     }
-    if params.get(ParamId::CtlRpmMin) == ParamId::CtlRpmMin.entry().default {
+    if params.is_default(ParamId::CtlRpmMin) {
         // 300 rpm suit the motor of the first bench.
         set(&mut params, ParamId::CtlRpmMin, 0.0)?;
     }

@@ -116,16 +116,21 @@ impl Params {
         Ok(())
     }
 
+    /// Returns true if a parameter has the table's default.
+    pub fn is_default(&self, id: ParamId) -> bool {
+        self.get(id) == id.entry().default
+    }
+
     /// Raises values that are below the board's least, as the table's default may be. Returns true if one was
     /// not the default, but chosen by somebody.
     pub fn fit(&mut self, board: &Board) -> bool {
         let id = ParamId::PwmDeadtimeNs;
-        let given_ns = self.get(id);
-        if given_ns >= board.least_dead_time.ns {
+        if self.get(id) >= board.least_dead_time.ns {
             return false;
         }
+        let chosen = !self.is_default(id);
         self.values[id as usize] = board.least_dead_time.ns;
-        given_ns != id.entry().default
+        chosen
     }
 
     fn derive(&mut self) {

@@ -5,7 +5,7 @@ mod faults;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use siskin_control::esc::obey;
 use siskin_control::mavlink::Request;
-use siskin_control::params::{ParamId, Params};
+use siskin_control::params::Params;
 use siskin_control::store;
 use siskin_emulator::device::Start;
 use siskin_emulator::fault::Timeline;
@@ -77,9 +77,8 @@ impl VirtualBoard {
         let warning = loaded.trouble();
         let mut stored = bytes(&mut flash);
         let mut kept = loaded.kept;
-        let is_the_factorys = |id: ParamId| kept.params.get(id) == id.entry().default;
         let mut given = defaults;
-        given.retain(|(id, _)| is_the_factorys(*id));
+        given.retain(|(id, _)| kept.params.is_default(*id));
         given.extend(overrides);
         if !given.is_empty() {
             for (id, value) in given {
