@@ -53,6 +53,11 @@ def scenario(path: Path, *arguments: object) -> tuple[int, dict]:
     return ended.returncode, json.loads(ended.stdout)
 
 
+def windows_of(summary: dict) -> dict:
+    """The windows of a summary by name."""
+    return {window["name"]: window for window in summary["windows"]}
+
+
 class Emulator:
     """One ESC in real time, on ports of its own: the emulator's, or another program's with its options."""
 

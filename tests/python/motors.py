@@ -5,18 +5,20 @@ import math
 import random
 import subprocess
 
+from emulator import OF_BENCH, scenario, windows_of
 from paths import TOOL
 
 
-def tune(*words) -> dict:
+# What follows from the motor where it is 0.
+FROM_MOTOR = ["CTL_RPM_MIN", *OF_BENCH]
+
+
+def tune(params: dict) -> dict:
+    """What `siskin tune` makes of these parameters."""
+    words = [f"--param={name}={value:.6g}" for name, value in params.items()]
     ended = subprocess.run([str(TOOL), "tune", "--json", *words], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 0, ended.stderr
     return json.loads(ended.stdout)
-
-
-# What follows from the motor where it is 0.
-FROM_MOTOR = """CTL_RPM_MIN CTL_SLEW_RPM_S CTL_BW_CUR_HZ CTL_BW_SPD_HZ STA_PARK_AS STA_RAMP_A STA_RAMP_RPM_S
-    STA_RUN_RPM""".split()
 
 
 def toml(table: dict) -> str:
@@ -81,8 +83,16 @@ def drawn_bench(motor: dict) -> dict[str, dict]:
     }
 
 
-def lines(tables: dict[str, dict], entries: list[tuple[str, dict]]) -> str:
-    """A scenario's file: its tables, and the entries of its lists."""
+def flown(folder, tables: dict, throttle: list, windows: dict) -> tuple[list, dict]:
+    """Plays a scenario with these tables, with times and throttles, and with windows by name.
+
+    Gives its faults, and its windows by name.
+    """
     heads = [(f"[{name}]", table) for name, table in tables.items()]
-    heads += [(f"[[{name}]]", table) for name, table in entries]
-    return "\n".join(f"{head}\n{toml(table)}" for head, table in heads)
+    heads += [("[[signal]]", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]
+    heads += [("[[window]]", {"name": name, "t0_s": t0, "t1_s": t1}) for name, (t0, t1) in windows.items()]
+    file = folder / "flight.toml"
+    file.write_text("\n".join(f"{head}\n{toml(table)}" for head, table in heads))
+    status, found = scenario(file)
+    assert status == 0
+    return found["faults"], windows_of(found)

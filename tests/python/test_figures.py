@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from emulator import scenario
+from emulator import scenario, windows_of
 from paths import ROOT, SCENARIOS
 
 # The scenario of each row, its seeds and the expectations whose worst values the row has. A row without a
@@ -57,7 +57,7 @@ def test_the_steps_settle_as_the_table_says():
     settled_s, overshoot_rpm = (float(number) for number in re.findall(r"[\d.]+", worst))
     status, summary = scenario(SCENARIOS / "steps.toml")
     assert status == 0
-    windows = {window["name"]: window for window in summary["windows"]}
+    windows = windows_of(summary)
     up, down = windows["up"], windows["down"]
     assert abs(max(up["settled_s"], down["settled_s"]) - settled_s) <= STALE * 0.35
     overshoot = max(up["rpm_max"] - 6000.0, 3000.0 - down["rpm_min"])

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from emulator import scenario, simulate
+from emulator import scenario, simulate, windows_of
 from paths import SCENARIOS
 
 KEYS = {"sim_s", "wall_s", "sim_per_wall", "steps", "trace_hash", "faults", "windows"}
@@ -54,7 +54,7 @@ def test_a_scenario_has_every_figure_and_no_nan():
     status, summary = scenario(SCENARIOS / "half-throttle.toml")
     assert status == 0
     assert KEYS | {"expectations"} <= set(summary)
-    windows = {window["name"]: window for window in summary["windows"]}
+    windows = windows_of(summary)
     for window in windows.values():
         assert WINDOW_KEYS <= set(window)
         assert all(not isinstance(v, float) or math.isfinite(v) for v in window.values())

@@ -4,35 +4,28 @@ import random
 
 import pytest
 
-from emulator import scenario
-from motors import FROM_MOTOR, drawn_bench, lines, motor_of, tune
+from motors import FROM_MOTOR, drawn_bench, flown, motor_of, tune
 
 
-def flight(motor: dict, params: dict, plant: str) -> str:
-    """At 0.5 s the throttle goes to 30 %, and at 2.5 s to 90 %."""
+def flight(folder, number: int, plant: str) -> tuple[bool, bool]:
+    """At 0.5 s the throttle goes to 30 %, and at 2.5 s to 90 %.
+
+    Whether a drawn motor turns in the end, without a fault, and whether it does so at the first attempt.
+    """
+    motor = motor_of(random.Random(number))
+    followed = tune(motor["params"])
+    assert followed.keys() == {*FROM_MOTOR, "PWM_FREQ_HZ"}
     tables = drawn_bench(motor)
     tables["bench"] |= {"duration_s": 3.5, "plant": plant}
-    tables["params"] = params
+    tables["params"] = {
+        **motor["params"],
+        "PWM_FREQ_HZ": followed["PWM_FREQ_HZ"],
+        **dict.fromkeys(FROM_MOTOR, 0),
+    }
     throttle = [(0.0, 0.0), (0.5, 0.3), (2.5, 0.9)]
     windows = {"all": (0.0, 3.5), "slow": (2.2, 2.5), "end": (3.4, 3.5)}
-    entries = [("signal", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]
-    entries += [("window", {"name": name, "t0_s": t0, "t1_s": t1}) for name, (t0, t1) in windows.items()]
-    return lines(tables, entries)
-
-
-def flown(folder, number: int, plant: str) -> tuple[bool, bool]:
-    """Whether a drawn motor turns in the end, without a fault, and whether it does so at the first attempt."""
-    motor = motor_of(random.Random(number))
-    words = [f"--param={name}={value:.6g}" for name, value in motor["params"].items()]
-    followed = tune(*words)
-    assert followed.keys() == {*FROM_MOTOR, "PWM_FREQ_HZ"}
-    params = {**motor["params"], "PWM_FREQ_HZ": followed["PWM_FREQ_HZ"], **dict.fromkeys(FROM_MOTOR, 0)}
-    file = folder / "drawn.toml"
-    file.write_text(flight(motor, params, plant))
-    status, found = scenario(file)
-    assert status == 0, number
-    windows = {window["name"]: window for window in found["windows"]}
-    turns = found["faults"] == [] and windows["end"]["rpm_mean"] > followed["CTL_RPM_MIN"]
+    faults, windows = flown(folder, tables, throttle, windows)
+    turns = faults == [] and windows["end"]["rpm_mean"] > followed["CTL_RPM_MIN"]
     # Speed mode: from CTL_RPM_MIN to CTL_RPM_MAX.
     wanted = followed["CTL_RPM_MIN"] + 0.3 * (motor["rpm"] - followed["CTL_RPM_MIN"])
     follows = windows["slow"]["rpm_mean"] == pytest.approx(wanted, rel=0.03)
@@ -43,7 +36,7 @@ def flown(folder, number: int, plant: str) -> tuple[bool, bool]:
 # The ripple of the switching plant is one more thing that the ramp's estimate has to live with.
 @pytest.mark.parametrize(("plant", "motors", "again_share"), [("averaged", 120, 0.05), ("switching", 20, 0.2)])
 def test_motors_that_nobody_tuned_start_and_follow_the_throttle(tmp_path, plant, motors, again_share):
-    flights = {number: flown(tmp_path, number, plant) for number in range(motors)}
+    flights = {number: flight(tmp_path, number, plant) for number in range(motors)}
     assert [number for number, (turns, _) in flights.items() if not turns] == []
     again = [number for number, (_, at_once) in flights.items() if not at_once]
     assert len(again) <= again_share * motors, again
