@@ -8,9 +8,11 @@
 //! ```
 #![forbid(unsafe_code)]
 
+#[path = "image/common/made.rs"]
+mod made;
+
 use std::collections::HashMap;
-use std::path::Path;
-use std::{env, fs};
+use std::fs;
 
 use siskin_vboard::memory::Memory;
 use siskin_vboard::processor::{BusError, Lines, Mapped, Processor, Stop, Surroundings, Width};
@@ -53,13 +55,10 @@ const SECOND_DMA: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 
 /// What the linker has made of the image, from the flash's beginning on.
 fn image() -> Vec<u8> {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
-    let path = workspace.join(target).join("images/vesc4-f405.bin");
-    fs::read(&path).unwrap_or_else(|error| {
-        let name = path.display();
-        panic!("{name}: {error}; make it by cargo run --release -p siskin -- image --board vesc4-f405 --output target/images")
-    })
+    const BOARD: &str = "vesc4-f405";
+    let path = made::made(BOARD, "bin");
+    made::is_made(BOARD, &path);
+    fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
 /// The chip's registers, until its program takes the PWM timer, after the clocks have been set up.

@@ -4,10 +4,11 @@
 //! `SISKIN_IMAGE` names the image; else it is where the test command puts it. To be run with `--release`:
 //! a simulated second takes about one then, and twenty without.
 
+mod made;
+
 use std::collections::hash_map::DefaultHasher;
 use std::env;
 use std::hash::Hash;
-use std::path::Path;
 
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavParamType, PARAM_REQUEST_READ_DATA,
@@ -29,6 +30,8 @@ use siskin_vboard::processor::{Register, Surroundings, Width};
 use siskin_vboard::time::{CLOCK_HZ, Cycles, ns};
 use siskin_vboard::world::World;
 
+use made::{is_made, made, of_workspace};
+
 pub(crate) const US: u64 = 1_000;
 pub(crate) const MS: u64 = 1_000_000;
 
@@ -44,20 +47,10 @@ pub(crate) const BIDIRECTIONAL_1200: u8 = 23;
 
 /// The image to test. Paths that are not absolute begin at the workspace.
 pub(crate) fn image() -> Image {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let path = env::var_os("SISKIN_IMAGE").map_or_else(
-        || {
-            let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
-            workspace.join(target).join("images/b-g431b-esc1.elf")
-        },
-        |given| workspace.join(given),
-    );
-    assert!(
-        path.is_file(),
-        "{}: there is no image; make it by cargo run --release -p siskin -- image --board \
-         b-g431b-esc1 --output target/images",
-        path.display()
-    );
+    const BOARD: &str = "b-g431b-esc1";
+    let given = env::var_os("SISKIN_IMAGE");
+    let path = given.map_or_else(|| made(BOARD, "elf"), of_workspace);
+    is_made(BOARD, &path);
     Image::read(&path).unwrap_or_else(|error| panic!("{error}"))
 }
 
