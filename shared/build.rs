@@ -66,7 +66,7 @@ fn parameter(id: ParamId) -> String {
         fields.text("units", text.unit);
     }
     let least = match entry.kind {
-        Kind::FromMotor => 0.0,
+        Kind::FromMotor | Kind::OfMotor => 0.0,
         Kind::Real | Kind::Whole | Kind::Derived => entry.min,
     };
     fields.bare("min", least);

@@ -31,6 +31,7 @@ enum Mode {
 impl Mapping {
     /// The mapping that the parameters ask for.
     pub fn new(params: &Params, scale: &Scale) -> Self {
+        let params = &params.in_force();
         let full = scale.current_from_a(params.get(ParamId::LimPhaseA));
         let least = scale.speed_from_rpm(FromMotor::new(params).least_rpm);
         let fastest = scale.speed_from_rpm(params.get(ParamId::CtlRpmMax));

@@ -77,7 +77,7 @@ def test_a_set_value_is_told_to_every_client(esc):
         ("MOT_POLE_PAIRS", 7.5),
         ("MOT_STOP", 2.0),
         ("CTL_MODE", 3.0),
-        ("CTL_DRIVE", 2.0),
+        ("CTL_DRIVE", 3.0),
         ("CTL_OBSERVER", 4.0),
         ("CTL_REGULATOR", 3.0),
         ("CTL_HALL", 0.5),

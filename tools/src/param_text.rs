@@ -14,8 +14,8 @@ pub(crate) fn value(name: &str, value: f32) -> String {
     let Some(text) = ParamId::find(name).map(ParamId::text) else {
         return value.to_string();
     };
-    if is_from_motor(name) && value == 0.0 {
-        return "0 (from the motor)".to_owned();
+    if let Some(meaning) = zero(name).filter(|_| value == 0.0) {
+        return format!("0 ({meaning})");
     }
     let mut choices = text.choices.iter();
     match choices.find(|(number, _)| f32::from(*number) == value) {
@@ -25,9 +25,16 @@ pub(crate) fn value(name: &str, value: f32) -> String {
     }
 }
 
-/// True for a parameter that follows from the motor where it is 0.
-fn is_from_motor(name: &str) -> bool {
-    ParamId::find(name).is_some_and(|id| id.entry().kind == Kind::FromMotor)
+/// What 0 means to a parameter that has no such value itself.
+fn zero(name: &str) -> Option<&'static str> {
+    let id = ParamId::find(name)?;
+    match id.entry().kind {
+        Kind::FromMotor => Some("from the motor"),
+        Kind::OfMotor => Some("not known"),
+        // Nor does a motor have none.
+        Kind::Whole if id == ParamId::MotPolePairs => Some("not known"),
+        Kind::Real | Kind::Whole | Kind::Derived => None,
+    }
 }
 
 /// Why a value cannot be taken, where that is for its range: `; give 1 to 60 A`.
@@ -95,7 +102,7 @@ fn range(id: ParamId) -> String {
     }
     let whole = match entry.kind {
         Kind::Whole => "a whole number from ",
-        Kind::Real | Kind::FromMotor | Kind::Derived => "",
+        Kind::Real | Kind::FromMotor | Kind::OfMotor | Kind::Derived => "",
     };
     let range = format!("{whole}{}", entry.range());
     match text.unit {
@@ -125,7 +132,7 @@ mod tests {
         assert_eq!(remedy("MOT_STOP", 2.0), "; give 0 (coast) or 1 (brake)");
         assert_eq!(
             remedy("MOT_POLE_PAIRS", 6.5),
-            "; give a whole number from 1 to 64"
+            "; give a whole number from 0 to 64"
         );
         assert_eq!(remedy("MOT_KV", 1.0), "");
     }

@@ -61,9 +61,10 @@ pub(crate) fn run(
         // 300 rpm suit the motor of the first bench.
         set(&mut params, ParamId::CtlRpmMin, 0.0)?;
     }
-    let pwm = pwm(&params);
+    let pwm = pwm(&params.in_force());
     set(&mut params, ParamId::PwmFreqHz, pwm.value)?;
-    let followed = FromMotor::new(&params).reasons(&params);
+    let made = params.in_force();
+    let followed = FromMotor::new(&made).reasons(&made);
     let mut settings = Vec::from(followed.map(|(id, value, from)| Setting { id, value, from }));
     settings.push(pwm);
     settings.sort_by_key(|setting| setting.id as usize);
@@ -85,14 +86,14 @@ pub(crate) fn run(
         });
         writeln!(out, "{}", Value::Object(values.collect::<Map<_, _>>()))?;
     } else {
-        write!(out, "{}", table(&params, &settings))?;
+        write!(out, "{}", table(&params, &made, &settings))?;
     }
     Ok(())
 }
 
-/// The flux linkage of a motor of these pole pairs, by its KV.
+/// The flux linkage of a motor of these pole pairs, or of those assumed, by its KV.
 fn flux_mwb(kv: f64, params: &Params) -> f32 {
-    let pole_pairs = f64::from(params.get(ParamId::MotPolePairs));
+    let pole_pairs = f64::from(params.in_force().get(ParamId::MotPolePairs));
     (1e3 * 60.0 / (TAU * 3_f64.sqrt() * pole_pairs * kv)) as f32
 }
 
@@ -117,8 +118,8 @@ fn pwm(params: &Params) -> Setting {
     Setting { id, value, from }
 }
 
-/// The motor, and each setting in force with what it follows from.
-fn table(params: &Params, settings: &[Setting]) -> String {
+/// The motor with what of it is assumed, and each setting in force with what it follows from.
+fn table(params: &Params, made: &Params, settings: &[Setting]) -> String {
     let mut out = String::new();
     let mut line = |name: &str, value: &str, from: &str| {
         // A String takes all that is written to it.
@@ -131,7 +132,13 @@ fn table(params: &Params, settings: &[Setting]) -> String {
     line("made of", "", "");
     for id in MADE_OF {
         let name = id.entry().name;
-        line(name, &param_text::value(name, params.get(id)), "");
+        let value = made.get(id);
+        let (value, from) = if value == params.get(id) {
+            (value, "")
+        } else {
+            (three_digits(value), "assumed: the motor is not known")
+        };
+        line(name, &param_text::value(name, value), from);
     }
     line("", "", "");
     line("setting", "value", "from");

@@ -1,7 +1,7 @@
 //! The values that the ESC keeps over a loss of power.
 
 use super::Esc;
-use crate::params::BuildError;
+use crate::params::{BuildError, ParamId};
 use crate::store::{Kept, Loaded};
 use crate::throttle::Reach;
 
@@ -18,6 +18,9 @@ impl Esc {
         }
         if let Some(trouble) = loaded.trouble() {
             self.warn_of(trouble);
+        }
+        if self.params.get(ParamId::MotPolePairs) == 0.0 {
+            self.warn_of("MOT_POLE_PAIRS not known: speeds are told as of 7");
         }
     }
 

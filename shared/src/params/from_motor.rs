@@ -78,7 +78,7 @@ pub struct FromMotor {
 }
 
 impl FromMotor {
-    /// The settings of these parameters.
+    /// The settings of these parameters, which are those [in force](Params::in_force).
     #[inline(never)] // the throttle's mapping and the coefficients ask for it
     pub fn new(params: &Params) -> Self {
         let motor = Motor::new(params);

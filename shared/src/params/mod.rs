@@ -1,5 +1,6 @@
 //! Parameters: the table, the values, and the configuration that they make.
 
+mod assumed;
 mod board;
 mod build;
 mod from_motor;

@@ -11,6 +11,8 @@ pub enum Kind {
     Whole,
     /// Any value in range, or 0 for the one that [follows from the motor](super::FromMotor).
     FromMotor,
+    /// Any value in range, or 0 where it is not known.
+    OfMotor,
     /// Computed from other parameters; it cannot be set and is not stored.
     Derived,
 }
@@ -24,7 +26,7 @@ pub struct Parameter {
     pub name: &'static str,
     /// Fractions, whole numbers or derived.
     pub kind: Kind,
-    /// Least value that is accepted, beside the 0 of [`Kind::FromMotor`].
+    /// Least value that is accepted, beside the 0 of [`Kind::FromMotor`] and [`Kind::OfMotor`].
     pub min: f32,
     /// Greatest value that is accepted.
     pub max: f32,
@@ -39,14 +41,17 @@ pub struct Parameter {
 impl Parameter {
     /// Returns true for a value in range.
     pub fn allows(&self, value: f32) -> bool {
-        (self.min..=self.max).contains(&value) || (self.kind == Kind::FromMotor && value == 0.0)
+        let takes_zero = matches!(self.kind, Kind::FromMotor | Kind::OfMotor);
+        (self.min..=self.max).contains(&value) || (takes_zero && value == 0.0)
     }
 
     /// The range in words, without its unit.
     pub fn range(&self) -> impl fmt::Display + '_ {
         fmt::from_fn(|f| {
-            if self.kind == Kind::FromMotor {
-                f.write_str("0 (from the motor), or ")?;
+            match self.kind {
+                Kind::FromMotor => f.write_str("0 (from the motor), or ")?,
+                Kind::OfMotor => f.write_str("0 (not known), or ")?,
+                Kind::Real | Kind::Whole | Kind::Derived => {}
             }
             write!(f, "{} to {}", self.min, self.max)
         })
@@ -205,16 +210,16 @@ parameters! {
         "What it is to a ground station" one of
             0 Standalone "standalone, a vehicle of its own"
             1 Peripheral "peripheral beside an autopilot";
-    10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 1.0..64.0 = 12.0
-        "Pole pairs of the motor: half the number of its magnets";
-    11 MotRMohm "MOT_R_MOHM" "mOhm" Real 1.0..10000.0 = 108.0
-        "Resistance of one phase (star)";
-    12 MotLUh "MOT_L_UH" "uH" Real 0.5..10000.0 = 30.6
-        "Inductance of one phase (star)";
-    13 MotFluxMwb "MOT_FLUX_MWB" "mWb" Real 0.01..1000.0 = 1.3
-        "Peak flux linkage of one phase";
-    14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" Real 0.1..10000000.0 = 1430.0
-        "Moment of inertia of motor and load";
+    10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 0.0..64.0 = 12.0
+        "Pole pairs of the motor: half the number of its magnets; 0 is not known, and 7 are assumed";
+    11 MotRMohm "MOT_R_MOHM" "mOhm" OfMotor 1.0..10000.0 = 108.0
+        "Resistance of one phase (star); 0 is not known";
+    12 MotLUh "MOT_L_UH" "uH" OfMotor 0.5..10000.0 = 30.6
+        "Inductance of one phase (star); 0 is not known";
+    13 MotFluxMwb "MOT_FLUX_MWB" "mWb" OfMotor 0.01..1000.0 = 1.3
+        "Peak flux linkage of one phase; 0 is not known";
+    14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" OfMotor 0.1..10000000.0 = 1430.0
+        "Moment of inertia of motor and load; 0 is not known, and one is assumed";
     15 MotDir "MOT_DIR" "" Whole 0.0..1.0 = 0.0
         "Direction of rotation" one of
             0 Normal "normal"
@@ -232,10 +237,11 @@ parameters! {
             0 Speed "speed"
             1 Torque "torque"
             2 Voltage "voltage";
-    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..1.0 = 0.0
+    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..2.0 = 0.0
         "Drive" one of
             0 FieldOriented "field-oriented"
-            1 SixStep "six-step";
+            1 SixStep "six-step"
+            2 Automatic "field-oriented, or six-step in voltage mode while R, L or flux is not known";
     22 CtlObserver "CTL_OBSERVER" "" Whole 0.0..3.0 = 3.0
         "Position observer" one of
             0 BackEmf "adaptive back-EMF"

@@ -133,11 +133,20 @@ impl Params {
         chosen
     }
 
+    /// Puts a value in place that need not be in the table's range; nothing is derived of it.
+    pub(super) fn assume(&mut self, id: ParamId, value: f32) {
+        self.values[id as usize] = value;
+    }
+
     fn derive(&mut self) {
         let pole_pairs = self.get(ParamId::MotPolePairs);
         let flux_wb = self.get(ParamId::MotFluxMwb) * 1e-3;
-        self.values[ParamId::MotKv as usize] =
-            60.0 / (core::f32::consts::TAU * SQRT_3 * pole_pairs * flux_wb);
+        let linkage_wb = pole_pairs * flux_wb;
+        self.values[ParamId::MotKv as usize] = if linkage_wb == 0.0 {
+            0.0
+        } else {
+            60.0 / (core::f32::consts::TAU * SQRT_3 * linkage_wb)
+        };
     }
 }
 

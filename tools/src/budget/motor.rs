@@ -32,6 +32,7 @@ impl Motor {
                 given::set(&mut params, id, value as f32).map_err(Error::Usage)?;
             }
         }
+        let params = params.in_force();
         let get = |id| f64::from(params.get(id));
         let pole_pairs = get(ParamId::MotPolePairs);
         let rad_s_per_rpm = pole_pairs * TAU / 60.0;

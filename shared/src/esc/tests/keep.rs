@@ -481,3 +481,15 @@ fn what_the_wire_has_set_is_not_stored_by_itself_after_its_own_save_has_failed()
     bench.storage_done(Err("storage: the flash failed"));
     assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 0.0);
 }
+
+#[test]
+fn pole_pairs_that_are_not_known_are_told_at_the_start() {
+    for (pole_pairs, told) in [(0.0, true), (7.0, false)] {
+        let mut bench = Bench::new();
+        bench.set("MOT_POLE_PAIRS", pole_pairs);
+        bench.esc.recall(&loaded(Integrity::Sound));
+        bench.wait_ms(5);
+        let tells = |text: &String| text.starts_with("MOT_POLE_PAIRS not known");
+        assert_eq!(bench.texts.iter().any(tells), told, "{:?}", bench.texts);
+    }
+}

@@ -112,7 +112,15 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
 /// As [`build`]; what is in its place then is no configuration.
 pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<(), BuildError> {
     let refused = Cell::new(None);
-    let p = Si::new(params, board, &refused);
+    let made = params.in_force();
+    let p = Si::new(&made, board, &refused);
+    if let Some(unknown) = params.unknown() {
+        p.refuse_if(
+            p.chosen(CtlDrive::FieldOriented),
+            unknown,
+            "not known; set it, or CTL_DRIVE to 2",
+        );
+    }
     refuse_contradictions(&p);
     let modulation = match p.choice() {
         CtlModulation::SpaceVector => Modulation::SpaceVector,
@@ -141,6 +149,10 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.adapt_l = inductance::inductance(&p);
     place.low_speed = low_speed(&p);
     start::attempts(&p, &mut place.start);
+    if !p.chosen(CtlDrive::FieldOriented) {
+        // What the six-step drive never runs with need not fit: its motor may be any.
+        refused.set(None);
+    }
     place.test_current = test_current(params, &p.scale);
     place.both_ways = p.chosen(Inp3d::On);
     place.slow = p.slow();
@@ -162,7 +174,8 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.tone = tone::tone(&p);
     place.six_step = match p.choice() {
         CtlDrive::FieldOriented => None,
-        CtlDrive::SixStep => Some(six_step::six_step(&p, duty_max)),
+        // None is automatic in what is in force.
+        CtlDrive::SixStep | CtlDrive::Automatic => Some(six_step::six_step(&p, duty_max)),
     };
     place.clear_periods = p.periods(CLEAR_S);
     place.slow_periods = if p.chosen(CtlObserver::Hall) {

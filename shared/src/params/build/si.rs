@@ -61,12 +61,13 @@ pub(super) struct Si<'a> {
 }
 
 impl<'a> Si<'a> {
+    /// Of parameters that are [in force](Params::in_force).
     pub(super) fn new(
         params: &'a Params,
         board: &'a Board,
         refused: &'a Cell<Option<BuildError>>,
     ) -> Self {
-        let scale = scale(params, board);
+        let scale = scale_of(params, board);
         let Scale {
             period_s,
             pole_pairs,
@@ -166,6 +167,11 @@ impl<'a> Si<'a> {
 
 /// The control's units in SI with these parameters.
 pub fn scale(params: &Params, board: &Board) -> Scale {
+    scale_of(&params.in_force(), board)
+}
+
+/// As [`scale`], of what is in force.
+fn scale_of(params: &Params, board: &Board) -> Scale {
     let flux_wb = params.get(ParamId::MotFluxMwb) * 1e-3;
     let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
     Scale {
