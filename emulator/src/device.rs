@@ -12,7 +12,7 @@ use siskin_control::check::{Item, Own, Probe};
 use siskin_control::drive::{Sample, Setpoint};
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
-use siskin_control::params::{Board, BuildError, ParamId, Params};
+use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
 use thiserror::Error;
@@ -78,8 +78,8 @@ pub struct Start {
     pub link_bytes_per_s: u32,
 }
 
-/// Nothing but the default bench: a wire that nobody drives, nothing stored, set or broken, and a serial link of
-/// 115 200 baud.
+/// Nothing but the default bench, whose motor is known: a wire that nobody drives, nothing stored, set or broken,
+/// and a serial link of 115 200 baud.
 impl Default for Start {
     fn default() -> Self {
         Self {
@@ -87,7 +87,7 @@ impl Default for Start {
             wire: Wire::detached(),
             flash: FileFlash::in_memory(),
             overrides: Vec::new(),
-            defaults: Vec::new(),
+            defaults: BOSSO_MOTOR.settings.to_vec(),
             faults: Vec::new(),
             link_bytes_per_s: 11_520,
         }

@@ -16,10 +16,15 @@ PATIENT = ("--param", "INP_LOSS_MS=500")
 """For a flight controller that is a thread on a busy machine: its frames may have longer gaps than the
 default allows."""
 
-OF_BENCH = (
+MOTOR = "MOT_POLE_PAIRS MOT_R_MOHM MOT_L_UH MOT_FLUX_MWB MOT_J_GCM2".split()
+"""What the default bench tells of its motor, and the factory leaves at 0: not known."""
+
+SETTINGS = (
     "CTL_SLEW_RPM_S CTL_BW_CUR_HZ CTL_BW_SPD_HZ STA_PARK_AS STA_RAMP_A STA_RAMP_RPM_S STA_RUN_RPM"
 ).split()
-"""What the default bench sets, and the factory leaves at 0: from the motor."""
+"""What the default bench sets besides, and the factory leaves at 0: from the motor."""
+
+OF_BENCH = (*MOTOR, *SETTINGS)
 
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:

@@ -5,12 +5,12 @@ import math
 import random
 import subprocess
 
-from emulator import OF_BENCH, scenario, windows_of
+from emulator import SETTINGS, scenario, windows_of
 from paths import TOOL
 
 
 # What follows from the motor where it is 0.
-FROM_MOTOR = ["CTL_RPM_MIN", *OF_BENCH]
+FROM_MOTOR = ["CTL_RPM_MIN", *SETTINGS]
 
 
 def tune(params: dict) -> dict:

@@ -133,9 +133,9 @@ def test_the_parameters_are_those_of_the_list(esc, files):
     data = mavftp.MAVFTP.ftp_param_decode(files.file(f"{PACK}?withdefaults=1"))
     assert {name.decode(): value for name, value, _ in data.params} == listed
     defaults = {name.decode(): value for name, value, _ in data.defaults}
-    assert defaults["MOT_L_UH"] == single(30.6)
+    assert defaults["MOT_L_UH"] == 0.0
     changed = {name for name in listed if defaults[name] != listed[name]}
-    assert changed - {"MOT_KV"} == {"MOT_L_UH", *OF_BENCH}
+    assert changed - {"MOT_KV"} == set(OF_BENCH)
     assert {defaults[name] for name in OF_BENCH} == {0.0}
 
     # The header of a part still names all, so the decoder for whole files takes it.

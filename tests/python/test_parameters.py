@@ -124,7 +124,7 @@ def test_six_step_needs_a_pwm_that_sees_its_crossings(start):
         assert esc.set_param("CTL_DRIVE", 1.0) == 1.0
     with start().connect() as esc:
         mark = esc.mark()
-        assert esc.set_param("CTL_DRIVE", 1.0) == 0.0
+        assert esc.set_param("CTL_DRIVE", 1.0) == 2.0
         reason = esc.wait("STATUSTEXT", lambda m: "PWM_FREQ_HZ" in m.text, mark)
         assert reason is not None, "no reason given"
 

@@ -63,9 +63,18 @@ fn the_papers_figures_give_the_papers_ranges() {
     }
 }
 
+/// The first paper's.
+const MOTOR: [&str; 5] = [
+    "--param=MOT_POLE_PAIRS=12",
+    "--param=MOT_R_MOHM=108",
+    "--param=MOT_L_UH=30.6",
+    "--param=MOT_FLUX_MWB=1.3",
+    "--param=MOT_J_GCM2=1430",
+];
+
 #[test]
 fn what_limits_adds_up_to_the_bound_and_the_delay_limits_the_top() {
-    let budget = json(&[]);
+    let budget = json(&MOTOR);
     assert_eq!(budget["pole_pairs"], 12.0);
     assert_eq!(budget["pwm_hz"], 24_000.0);
     assert_eq!(budget["acceleration_rpm_s"], budget["braking_rpm_s"]);

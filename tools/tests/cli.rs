@@ -57,14 +57,14 @@ fn get_prints_what_there_is_and_names_what_is_not() {
         "params",
         "get",
         "--json",
-        "MOT_L_UH",
+        "CTL_FF_A",
         "NO_SUCH",
         "inp_arm_ms",
     ]);
     let values: Value = serde_json::from_str(ended(&run, 1)).expect("JSON");
     assert_eq!(
         values,
-        serde_json::json!({ "MOT_L_UH": 30.6, "INP_ARM_MS": 300.0 })
+        serde_json::json!({ "CTL_FF_A": 8.4, "INP_ARM_MS": 300.0 })
     );
     assert!(
         run.err.contains("NO_SUCH: no such parameter"),
@@ -103,7 +103,7 @@ fn set_tells_what_was_taken_and_why_not() {
             "LIM_PHASE_A 1000000000: refused: out of range; it stays 15.5",
         ),
         ("MOT_KV", "100", "read-only"),
-        ("MOT_POLE_PAIRS", "6.5", "whole number; it stays 12"),
+        ("MOT_POLE_PAIRS", "6.5", "whole number; it stays 0"),
         (
             "CTL_RPM_MIN",
             "7000",

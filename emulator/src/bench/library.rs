@@ -42,7 +42,7 @@ const FILES: [(&str, &str); 10] = [
     ("scooter", include_str!("../../library/scooter.toml")),
 ];
 
-/// The bench that the parameters' defaults describe.
+/// The bench that stands where none is named.
 pub const DEFAULT: &str = FILES[0].0;
 
 static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| {

@@ -96,6 +96,8 @@ fn run<M: Machine>(
     let (mut machine, _) = start(Start {
         bench: scenario.bench.bench()?,
         overrides,
+        // What is known of the motor is the scenario's to say.
+        defaults: Vec::new(),
         faults: scenario.faults()?,
         ..Start::default()
     })?;

@@ -70,13 +70,16 @@ impl Health {
 mod tests {
     use super::*;
     use crate::drive::{Fault, State};
-    use crate::params::{Board, Params, build};
+    use crate::params::{BOSSO_MOTOR, Board, Params, build};
     use crate::units::Current;
 
     fn rig() -> (Basis, Snapshot) {
-        let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
+        let config = build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit");
         let snapshot = State::new(&config).snapshot();
-        (Basis::new(&Params::default(), config.scale), snapshot)
+        (
+            Basis::new(&Params::of(&BOSSO_MOTOR), config.scale),
+            snapshot,
+        )
     }
 
     fn status(health: &mut Health) -> Status {

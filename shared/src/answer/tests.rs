@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::drive::State;
-use crate::params::{Board, Params, build};
+use crate::params::{BOSSO_MOTOR, Board, Params, build};
 use std::vec::Vec;
 
 const TICK_HZ: u32 = 170_000_000;
@@ -17,11 +17,11 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        let config = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
+        let config = build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit");
         Self {
             answers: Answers::new(TICK_HZ),
             snapshot: State::new(&config).snapshot(),
-            basis: Basis::new(&Params::default(), config.scale),
+            basis: Basis::new(&Params::of(&BOSSO_MOTOR), config.scale),
             telemetry: Telemetry {
                 temperature_c: 40.6,
                 bus_v: 23.9,

@@ -10,6 +10,7 @@ use crate::image::Image;
 use crate::input::access::Access;
 use crate::input::dshot::{self, Rate, edges};
 use crate::input::signal::Signal;
+use crate::params::BOSSO_MOTOR;
 use crate::tune::{Beacon, Note, Player};
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, MavMessage, MavResult, PARAM_VALUE_DATA, STATUSTEXT_DATA,
@@ -42,7 +43,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let esc = Esc::new(Params::default(), Board::BENCH, TICK_HZ, 1_000_000);
+        let esc = Esc::new(Params::of(&BOSSO_MOTOR), Board::BENCH, TICK_HZ, 1_000_000);
         let (esc, throttle) = esc.expect("the defaults fit");
         let config = esc.config().expect("the defaults fit");
         let mut bench = Self {
@@ -253,7 +254,7 @@ fn a_turning_motor_obeys_no_command() {
     for command in 1..48 {
         bench.frames(10, command);
     }
-    assert_eq!(bench.esc.params(), &Params::default());
+    assert_eq!(bench.esc.params(), &Params::of(&BOSSO_MOTOR));
     assert_eq!(bench.requests, []);
     assert!(!bench.esc.light());
     assert!(bench.answers.iter().all(|answer| answer.info.is_none()));
@@ -401,7 +402,7 @@ fn the_stick_calibrates_and_the_ends_are_stored() {
     bench.pulses(180, 1912);
     let full = "Stick calibration: full taken, now lower it";
     assert_eq!(bench.texts.last().map(String::as_str), Some(full));
-    assert_eq!(bench.esc.params(), &Params::default());
+    assert_eq!(bench.esc.params(), &Params::of(&BOSSO_MOTOR));
     bench.notes.clear();
     bench.pulses(10, 1400);
     bench.pulses(78, 1105);

@@ -85,30 +85,21 @@ impl Params {
 mod tests {
     use super::*;
     use crate::params::choice::CtlDrive;
-    use crate::params::{Board, build};
-    use std::vec::Vec;
-
-    const OF_MOTOR: [ParamId; 5] = [
-        ParamId::MotPolePairs,
-        ParamId::MotRMohm,
-        ParamId::MotLUh,
-        ParamId::MotFluxMwb,
-        ParamId::MotJGcm2,
-    ];
+    use crate::params::{BOSSO_MOTOR, Board, build};
 
     fn with(values: &[(ParamId, f32)]) -> Params {
-        let mut params = Params::default();
+        over(Params::of(&BOSSO_MOTOR), values)
+    }
+
+    fn out_of_the_bag(values: &[(ParamId, f32)]) -> Params {
+        over(Params::default(), values)
+    }
+
+    fn over(mut params: Params, values: &[(ParamId, f32)]) -> Params {
         for (id, value) in values {
             params.set(*id, *value).expect("in range");
         }
         params
-    }
-
-    fn out_of_the_bag(values: &[(ParamId, f32)]) -> Params {
-        let mut all = Vec::from(OF_MOTOR.map(|id| (id, 0.0)));
-        all.push(CtlDrive::Automatic.setting());
-        all.extend(values);
-        with(&all)
     }
 
     #[test]

@@ -263,10 +263,10 @@ fn text<const N: usize>(bounds: [f32; N], in_force: f32, texts: [&'static str; N
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::Kind;
+    use crate::params::{BOSSO_MOTOR, Kind};
 
     fn params(values: &[(ParamId, f32)]) -> Params {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         for (id, value) in values {
             params.set(*id, *value).expect("in range");
         }

@@ -14,17 +14,32 @@ pub struct Preset {
     pub settings: &'static [(ParamId, f32)],
 }
 
+/// The motor of the first paper's Table I, with its propeller's inertia.
+pub const BOSSO_MOTOR: Preset = Preset {
+    name: "bosso-motor",
+    description: "the first paper's motor, an Antigravity 4006 KV380, and its 13x4.4 propeller",
+    settings: &MOTOR,
+};
+
+const MOTOR: [(ParamId, f32); 5] = [
+    (ParamId::MotPolePairs, 12.0),
+    (ParamId::MotRMohm, 108.0),
+    (ParamId::MotLUh, 30.6),
+    (ParamId::MotFluxMwb, 1.3),
+    (ParamId::MotJGcm2, 1430.0),
+];
+
 /// The first paper's drive: pole placement with 1/ε = R/(1.5·L) and a speed loop of k_pω/J then gives
 /// the gains of its Table III, on the motor of its Table I at 15 kHz.
 pub const BOSSO_TABLE_III: Preset = Preset {
     name: "bosso-table-iii",
     description: "the first paper's motor and drive as published, with the gains of its Table III",
     settings: &[
-        (ParamId::MotPolePairs, 12.0),
-        (ParamId::MotRMohm, 108.0),
-        (ParamId::MotLUh, 30.6),
-        (ParamId::MotFluxMwb, 1.3),
-        (ParamId::MotJGcm2, 1430.0),
+        MOTOR[0],
+        MOTOR[1],
+        MOTOR[2],
+        MOTOR[3],
+        MOTOR[4],
         (ParamId::CtlRpmMax, 6000.0),
         (ParamId::PwmFreqHz, 15_000.0),
         CtlObserver::BackEmf.setting(),
@@ -43,11 +58,16 @@ pub const BOSSO_TABLE_III: Preset = Preset {
 };
 
 /// What the first paper's bench is driven with here. Chosen by hand, and what every figure of that bench stands
-/// on; the parameters' defaults follow from the motor.
+/// on; with [`BOSSO_MOTOR`] alone they follow from the motor.
 pub const BOSSO_BENCH: Preset = Preset {
     name: "bosso-bench",
-    description: "settings of start and control loops for the first paper's bench, chosen by hand",
+    description: "the first paper's motor, and settings of start and control loops for its bench, chosen by hand",
     settings: &[
+        MOTOR[0],
+        MOTOR[1],
+        MOTOR[2],
+        MOTOR[3],
+        MOTOR[4],
         (ParamId::CtlRpmMin, 300.0),
         (ParamId::CtlSlewRpmS, 20_000.0),
         (ParamId::CtlBwCurHz, 375.0),
@@ -60,7 +80,7 @@ pub const BOSSO_BENCH: Preset = Preset {
 };
 
 /// All presets.
-pub const PRESETS: &[Preset] = &[BOSSO_TABLE_III, BOSSO_BENCH];
+pub const PRESETS: &[Preset] = &[BOSSO_TABLE_III, BOSSO_BENCH, BOSSO_MOTOR];
 
 #[cfg(test)]
 mod tests {

@@ -30,8 +30,7 @@ pub struct Parameter {
     pub min: f32,
     /// Greatest value that is accepted.
     pub max: f32,
-    /// Value from the factory: the motor of the first paper, an Antigravity 4006 KV380 with a 13×4.4
-    /// propeller at 24 V, and settings that follow from it.
+    /// Value from the factory: no motor is known, and limits are those of the first paper's bench at 24 V.
     pub default: f32,
     /// True if it may change while the motor turns. All others describe the motor, the bridge, the wire
     /// or the way it is driven, and wait until it stands.
@@ -210,22 +209,22 @@ parameters! {
         "What it is to a ground station" one of
             0 Standalone "standalone, a vehicle of its own"
             1 Peripheral "peripheral beside an autopilot";
-    10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 0.0..64.0 = 12.0
+    10 MotPolePairs "MOT_POLE_PAIRS" "" Whole 0.0..64.0 = 0.0
         "Pole pairs of the motor: half the number of its magnets; 0 is not known, and 7 are assumed";
-    11 MotRMohm "MOT_R_MOHM" "mOhm" OfMotor 1.0..10000.0 = 108.0
+    11 MotRMohm "MOT_R_MOHM" "mOhm" OfMotor 1.0..10000.0 = 0.0
         "Resistance of one phase (star); 0 is not known";
-    12 MotLUh "MOT_L_UH" "uH" OfMotor 0.5..10000.0 = 30.6
+    12 MotLUh "MOT_L_UH" "uH" OfMotor 0.5..10000.0 = 0.0
         "Inductance of one phase (star); 0 is not known";
-    13 MotFluxMwb "MOT_FLUX_MWB" "mWb" OfMotor 0.01..1000.0 = 1.3
+    13 MotFluxMwb "MOT_FLUX_MWB" "mWb" OfMotor 0.01..1000.0 = 0.0
         "Peak flux linkage of one phase; 0 is not known";
-    14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" OfMotor 0.1..10000000.0 = 1430.0
+    14 MotJGcm2 "MOT_J_GCM2" "g.cm^2" OfMotor 0.1..10000000.0 = 0.0
         "Moment of inertia of motor and load; 0 is not known, and one is assumed";
     15 MotDir "MOT_DIR" "" Whole 0.0..1.0 = 0.0
         "Direction of rotation" one of
             0 Normal "normal"
             1 Reversed "reversed";
-    16 MotKv "MOT_KV" "rpm/V" Derived 0.0..1000000.0 = 353.416
-        "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only";
+    16 MotKv "MOT_KV" "rpm/V" Derived 0.0..1000000.0 = 0.0
+        "Speed per peak line-to-line volt, 60/(2 pi sqrt(3) p flux); computed, read-only; 0 is not known";
     17 MotStop "MOT_STOP" "" Whole 0.0..1.0 = 1.0
         "At zero throttle and at loss of signal" one of
             0 Coast "coast"
@@ -237,7 +236,7 @@ parameters! {
             0 Speed "speed"
             1 Torque "torque"
             2 Voltage "voltage";
-    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..2.0 = 0.0
+    21 CtlDrive "CTL_DRIVE" "" Whole 0.0..2.0 = 2.0
         "Drive" one of
             0 FieldOriented "field-oriented"
             1 SixStep "six-step"

@@ -153,6 +153,7 @@ impl Params {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::params::BOSSO_MOTOR;
 
     #[test]
     fn a_refused_value_changes_nothing() {
@@ -176,7 +177,7 @@ mod tests {
 
     #[test]
     fn kv_follows_pole_pairs_and_flux() {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         assert!((params.get(ParamId::MotKv) - 353.0).abs() < 0.5);
         params.set(ParamId::MotPolePairs, 6.0).expect("in range");
         assert!((params.get(ParamId::MotKv) - 706.0).abs() < 1.0);

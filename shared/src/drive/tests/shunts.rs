@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::control::sensing::Shunts;
+use crate::params::BOSSO_MOTOR;
 
 /// Readings of phase c that nothing stands behind.
 const NONSENSE_A: [f64; 4] = [0.0, 39.0, -39.0, 7.3];
@@ -11,7 +12,7 @@ fn with_two_shunts() -> Bench {
         shunts: Shunts::Two,
         ..Board::BENCH
     };
-    let config = build(&Params::default(), &board).expect("it makes a drive");
+    let config = build(&Params::of(&BOSSO_MOTOR), &board).expect("it makes a drive");
     let state = State::new(&config);
     Bench { config, state }
 }

@@ -158,7 +158,7 @@ fn a_calibration_that_is_not_followed_changes_nothing_and_gives_the_wire_back() 
         assert_eq!(bench.take_results(), result, "{end}");
         bench.pulses(60, 1000);
         assert!(bench.esc.telemetry().armed, "{end}");
-        assert_eq!(bench.esc.params(), &Params::default());
+        assert_eq!(bench.esc.params(), &Params::of(&BOSSO_MOTOR));
         assert_eq!(bench.requests, []);
     }
 }

@@ -335,16 +335,17 @@ fn limits(p: &Si) -> protection::Config {
 mod tests {
     use super::*;
     use crate::control::delay::Delay;
+    use crate::params::BOSSO_MOTOR;
     use crate::params::board::LeastDeadTime;
 
     #[test]
     fn the_defaults_make_a_drive() {
-        build(&Params::default(), &Board::BENCH).expect("the defaults fit the bench");
+        build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit the bench");
     }
 
     #[test]
     fn nothing_stays_of_what_was_in_the_place_before() {
-        let mut others = Params::default();
+        let mut others = Params::of(&BOSSO_MOTOR);
         for (id, value) in [
             (ParamId::CtlObserver, 2.0),
             (ParamId::CtlRegulator, 2.0),
@@ -373,8 +374,8 @@ mod tests {
             ..Board::BENCH
         };
         let mut place = build(&others, &board).expect("it makes a drive");
-        let wanted = build(&Params::default(), &Board::BENCH).expect("the defaults fit");
-        build_in(&Params::default(), &Board::BENCH, &mut place).expect("the defaults fit");
+        let wanted = build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit");
+        build_in(&Params::of(&BOSSO_MOTOR), &Board::BENCH, &mut place).expect("the defaults fit");
         assert_eq!(place, wanted);
     }
 
@@ -382,7 +383,7 @@ mod tests {
     fn each_parameter_at_its_ends_makes_a_drive_or_a_reason() {
         for id in ParamId::ALL {
             for value in [id.entry().min, id.entry().max] {
-                let mut params = Params::default();
+                let mut params = Params::of(&BOSSO_MOTOR);
                 if params.set(id, value).is_ok()
                     && let Err(error) = build(&params, &Board::BENCH)
                 {
@@ -401,7 +402,7 @@ mod tests {
             },
             ..Board::BENCH
         };
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         for short_ns in [0.0, 500.0, 749.0] {
             params
                 .set(ParamId::PwmDeadtimeNs, short_ns)
@@ -417,7 +418,7 @@ mod tests {
         // A value that was chosen is named; the table's default, which nobody chose, is not.
         assert!(params.fit(&board));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         assert!(!params.fit(&board));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
         build(&params, &board).expect("the board's default");
@@ -429,7 +430,7 @@ mod tests {
 
     #[test]
     fn contradictions_are_refused_with_the_parameter() {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         params.set(ParamId::CtlRpmMin, 7000.0).expect("in range");
         let error = build(&params, &Board::BENCH).expect_err("above the maximum");
         assert_eq!(error.param, ParamId::CtlRpmMin);

@@ -5,7 +5,7 @@
 //! duty is in the timer's clocks.
 
 use siskin_control::drive::{Bridge, Config, Fault, Sample, Setpoint, State, step};
-use siskin_control::params::{Params, build};
+use siskin_control::params::{BOSSO_MOTOR, Params, build};
 use siskin_control::units::{AdcCounts, Duty};
 use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
 use siskin_firmware::exchange::word::unpack;
@@ -56,7 +56,7 @@ pub(crate) struct Mirror {
 impl Mirror {
     /// The chip's with the default parameters, before its first interrupt.
     pub(crate) fn new() -> Self {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         params.fit(&BOARD);
         let config = build(&params, &BOARD).expect("the defaults fit the board");
         let period_s = config.scale.period_s;
