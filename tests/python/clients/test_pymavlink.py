@@ -135,7 +135,7 @@ def test_ftp_has_the_same_list_and_its_defaults(desk):
         file = download(master)
     assert named(file.params) == {**defaults, "CTL_RPM_MAX": 5432.5}
     # Those of the factory.
-    assert named(file.defaults) == {**defaults, **dict.fromkeys(OF_BENCH, 0)}
+    assert named(file.defaults) == {**defaults, **dict.fromkeys([*OF_BENCH, "MOT_KV"], 0)}
 
 
 def test_ftp_brings_the_full_list_over_a_lossy_path(lossy_desk):
