@@ -102,7 +102,9 @@ class MavProxy:
         return {name: float(value) for name, value in shown}
 
     def close(self) -> None:
-        """As a person leaves it, by the end of the input."""
+        """As a person leaves it, by the end of the input, once it has said all that it was asked."""
+        # What it still does while it unloads its modules it does with half of them.
+        self.ask("param status", r"Have \d+/\d+ params")
         self._process.stdin.close()
         try:
             self._process.wait(TIMEOUT_S)
