@@ -6,7 +6,7 @@ use siskin_control::esc::Esc;
 use siskin_control::input::line::{Event, Line};
 use siskin_control::input::signal::Signal;
 use siskin_control::mavlink::Request;
-use siskin_control::params::{ParamId, Params};
+use siskin_control::params::{BOSSO_MOTOR, ParamId, Params};
 use siskin_control::throttle::Throttle;
 use siskin_emulator::rig::Bench;
 
@@ -47,7 +47,7 @@ pub struct Desk {
 impl Desk {
     /// One with a signal that `INP_PROTO` forces, or none.
     pub fn new(signal: Option<Signal>, origin_ticks: u32) -> Self {
-        let mut params = Params::default();
+        let mut params = Params::of(&BOSSO_MOTOR);
         if let Some(signal) = signal {
             params
                 .set(ParamId::InpProto, f32::from(signal.number()))
@@ -56,8 +56,8 @@ impl Desk {
         let bench = Bench::default();
         let board = bench.sensing.board(bench.delay);
         let (esc, throttle) =
-            Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("defaults fit the bench");
-        let config = esc.config().expect("defaults fit the bench");
+            Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("its motor fits the bench");
+        let config = esc.config().expect("its motor fits the bench");
         let snapshot = State::new(&config).snapshot();
         Self {
             esc,
