@@ -65,10 +65,7 @@ fn parameter(id: ParamId) -> String {
     if !text.unit.is_empty() {
         fields.text("units", text.unit);
     }
-    let least = match entry.kind {
-        Kind::FromMotor | Kind::OfMotor => 0.0,
-        Kind::Real | Kind::Whole | Kind::Derived => entry.min,
-    };
+    let least = entry.kind.zero().map_or(entry.min, |_| 0.0);
     fields.bare("min", least);
     fields.bare("max", entry.max);
     if entry.kind == Kind::Derived {

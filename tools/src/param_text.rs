@@ -28,12 +28,10 @@ pub(crate) fn value(name: &str, value: f32) -> String {
 /// What 0 means to a parameter that has no such value itself.
 fn zero(name: &str) -> Option<&'static str> {
     let id = ParamId::find(name)?;
-    match id.entry().kind {
-        Kind::FromMotor => Some("from the motor"),
-        Kind::OfMotor => Some("not known"),
-        // Nor does a motor have none.
-        Kind::Whole if id == ParamId::MotPolePairs => Some("not known"),
-        Kind::Real | Kind::Whole | Kind::Derived => None,
+    match id {
+        // A whole number of the motor: of that kind there is no other.
+        ParamId::MotPolePairs => Kind::OfMotor.zero(),
+        _ => id.entry().kind.zero(),
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Parameter {
     pub name: &'static str,
     /// Fractions, whole numbers or derived.
     pub kind: Kind,
-    /// Least value that is accepted, beside the 0 of [`Kind::FromMotor`] and [`Kind::OfMotor`].
+    /// Least value that is accepted, beside a 0 that has a [meaning](Kind::zero).
     pub min: f32,
     /// Greatest value that is accepted.
     pub max: f32,
@@ -37,20 +37,28 @@ pub struct Parameter {
     pub live: bool,
 }
 
+impl Kind {
+    /// What 0 means, where it is taken outside the range too.
+    pub fn zero(self) -> Option<&'static str> {
+        match self {
+            Self::FromMotor => Some("from the motor"),
+            Self::OfMotor => Some("not known"),
+            Self::Real | Self::Whole | Self::Derived => None,
+        }
+    }
+}
+
 impl Parameter {
     /// Returns true for a value in range.
     pub fn allows(&self, value: f32) -> bool {
-        let takes_zero = matches!(self.kind, Kind::FromMotor | Kind::OfMotor);
-        (self.min..=self.max).contains(&value) || (takes_zero && value == 0.0)
+        (self.min..=self.max).contains(&value) || (self.kind.zero().is_some() && value == 0.0)
     }
 
     /// The range in words, without its unit.
     pub fn range(&self) -> impl fmt::Display + '_ {
         fmt::from_fn(|f| {
-            match self.kind {
-                Kind::FromMotor => f.write_str("0 (from the motor), or ")?,
-                Kind::OfMotor => f.write_str("0 (not known), or ")?,
-                Kind::Real | Kind::Whole | Kind::Derived => {}
+            if let Some(meaning) = self.kind.zero() {
+                write!(f, "0 ({meaning}), or ")?;
             }
             write!(f, "{} to {}", self.min, self.max)
         })
