@@ -7,6 +7,7 @@ use std::fs;
 
 use run::{Run, siskin};
 use serde_json::Value;
+use siskin_control::params::{BOSSO_MOTOR, ParamId};
 
 /// Status, output and complaints.
 fn budget(arguments: &[&str]) -> (i32, String, String) {
@@ -63,18 +64,12 @@ fn the_papers_figures_give_the_papers_ranges() {
     }
 }
 
-/// The first paper's.
-const MOTOR: [&str; 5] = [
-    "--param=MOT_POLE_PAIRS=12",
-    "--param=MOT_R_MOHM=108",
-    "--param=MOT_L_UH=30.6",
-    "--param=MOT_FLUX_MWB=1.3",
-    "--param=MOT_J_GCM2=1430",
-];
-
 #[test]
 fn what_limits_adds_up_to_the_bound_and_the_delay_limits_the_top() {
-    let budget = json(&MOTOR);
+    let param = |(id, value): &(ParamId, f32)| format!("--param={}={value}", id.entry().name);
+    let motor: Vec<_> = BOSSO_MOTOR.settings.iter().map(param).collect();
+    let motor: Vec<_> = motor.iter().map(String::as_str).collect();
+    let budget = json(&motor);
     assert_eq!(budget["pole_pairs"], 12.0);
     assert_eq!(budget["pwm_hz"], 24_000.0);
     assert_eq!(budget["acceleration_rpm_s"], budget["braking_rpm_s"]);
