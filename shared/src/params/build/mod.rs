@@ -174,7 +174,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.tone = tone::tone(&p);
     place.six_step = match p.choice() {
         CtlDrive::FieldOriented => None,
-        // None is automatic in what is in force.
+        // What is in force is never automatic.
         CtlDrive::SixStep | CtlDrive::Automatic => Some(six_step::six_step(&p, duty_max)),
     };
     place.clear_periods = p.periods(CLEAR_S);

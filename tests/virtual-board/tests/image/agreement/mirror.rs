@@ -54,7 +54,7 @@ pub(crate) struct Mirror {
 }
 
 impl Mirror {
-    /// The chip's with the default parameters, before its first interrupt.
+    /// The chip's with the first paper's motor and the default parameters, before its first interrupt.
     pub(crate) fn new() -> Self {
         let mut params = Params::of(&BOSSO_MOTOR);
         params.fit(&BOARD);
