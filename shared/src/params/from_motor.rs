@@ -238,9 +238,9 @@ impl Motor {
 /// What was chosen, or what follows, within the range.
 #[inline(never)] // eight times
 fn in_force(params: &Params, id: ParamId, follows: f32) -> f32 {
-    let (entry, chosen) = (id.entry(), params.get(id));
+    let chosen = params.get(id);
     if chosen == 0.0 {
-        follows.max(entry.min).min(entry.max)
+        id.held(follows)
     } else {
         chosen
     }

@@ -4,6 +4,7 @@ mod assumed;
 mod board;
 mod build;
 mod from_motor;
+mod packed;
 mod preset;
 mod table;
 mod values;

@@ -18,7 +18,7 @@ pub enum Kind {
 }
 
 /// One parameter's entry.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
     /// Number under which the value is stored; never given to another parameter.
     pub key: u16,

@@ -2,7 +2,7 @@
 
 use super::board::Board;
 use super::preset::Preset;
-use super::table::{Choice, Kind, ParamId, Parameter, TABLE};
+use super::table::{Choice, Kind, ParamId, TABLE};
 use crate::math::SQRT_3;
 
 /// The reason why a value was not taken.
@@ -27,7 +27,7 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         let mut params = Self {
-            values: TABLE.map(|p| p.default),
+            values: ParamId::ALL.map(ParamId::default_value),
         };
         params.derive();
         params
@@ -42,18 +42,13 @@ impl ParamId {
 
     /// The parameter of this MAVLink name, which need not be text.
     pub(crate) fn find_bytes(name: &[u8]) -> Option<Self> {
-        let row = TABLE.iter().position(|row| row.name.as_bytes() == name)?;
-        Some(Self::ALL[row])
-    }
-
-    /// This parameter's row of the table.
-    pub const fn entry(self) -> &'static Parameter {
-        &TABLE[self as usize]
+        let mut all = Self::ALL.iter().copied();
+        all.find(|id| id.entry().name.as_bytes() == name)
     }
 
     /// The value from the factory on this board.
     pub fn factory(self, board: &Board) -> f32 {
-        let default = self.entry().default;
+        let default = self.default_value();
         match self {
             Self::PwmDeadtimeNs => default.max(board.least_dead_time.ns),
             _ => default,
@@ -118,7 +113,7 @@ impl Params {
 
     /// Returns true if a parameter has the table's default.
     pub fn is_default(&self, id: ParamId) -> bool {
-        self.get(id) == id.entry().default
+        self.get(id) == id.default_value()
     }
 
     /// Raises values that are below the board's least, as the table's default may be. Returns true if one was
