@@ -96,12 +96,14 @@ pub(super) fn park(
     (bridge(s, swapped, Some(Duty::ZERO)), None)
 }
 
-/// Loss of synchronism: another start, or none.
+/// Loss of synchronism: another start, or none. While it is stopped nothing is lost with the rotor: it coasts.
 #[cold]
 pub(super) fn lost(six_step: &Config, s: &mut State, phase: Phase) -> Why {
     let starting = phase == Phase::Ramp || s.tracking.omega_bar <= six_step.run_speed;
     let failed = s.failed + 1;
-    if !starting {
+    if phase == Phase::Stopping {
+        Why::Coasts
+    } else if !starting {
         Why::Tripped(Fault::ObserverLost)
     } else if failed > ATTEMPTS {
         Why::Tripped(Fault::Stuck)
