@@ -46,7 +46,7 @@ impl Factor {
 }
 
 /// Coefficients for one sample period.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Half the height of the square wave along d.
     pub amplitude: Current,

@@ -27,8 +27,7 @@ impl<T: Number> Real for T {
 
 impl<F: Unsigned> Real for FixedU32<F> {
     fn from_f32(value: f32) -> Self {
-        // What a float has beside 32 bits are zeros.
-        Self::from_bits(libm::rintf(value * power_of_two(F::I32)) as u32)
+        Self::from_bits(whole_unsigned(value, F::I32))
     }
 
     fn to_f32(self) -> f32 {
@@ -48,8 +47,15 @@ impl<F: Unsigned> Real for FixedI64<F> {
 
 /// The bits of a number with so many binary places. Never inlined: each coefficient has one.
 #[inline(never)]
-fn whole(value: f32, places: i32) -> i32 {
+pub(crate) fn whole(value: f32, places: i32) -> i32 {
     libm::rintf(value * power_of_two(places)) as i32
+}
+
+/// As [`whole`], without a sign.
+#[inline(never)]
+fn whole_unsigned(value: f32, places: i32) -> u32 {
+    // What a float has beside 32 bits are zeros.
+    libm::rintf(value * power_of_two(places)) as u32
 }
 
 /// The nearest whole number, of two the even one.

@@ -51,7 +51,6 @@ impl LeastDeadTime {
     };
 }
 
-#[cfg(test)]
 impl Board {
     /// The sensors of the emulator's bench: 12 bits over ±40 A and 70 V.
     pub(crate) const BENCH: Self = Self {

@@ -18,7 +18,7 @@ use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltag
 const FASTEST: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(i32::MAX >> 4);
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Voltage commanded to voltage applied.
     pub delay: Delay,
@@ -53,7 +53,7 @@ pub struct Config {
 /// In (7) the speed is ξ̂·|ĥ|, and what R and L that are stated too high put into ĥ comes back
 /// through the speed: lock is lost at 6000 rpm with L 5 % or R 15 % too high on the bench. With |ĥ|
 /// out of the speed and a constant ξ in (9) it holds with both 30 % off.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cure {
     /// 2·ω_n.
     pub proportional: Gain<I4F28, Speed>,

@@ -28,7 +28,7 @@ use crate::units::{
 type Component = Quantity<Weber, U27>;
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// R·T_s/2, current to flux.
     pub half_resistance: Multiplier<Current, Flux>,

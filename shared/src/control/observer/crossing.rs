@@ -11,7 +11,7 @@ use crate::trace::traced;
 use crate::units::{Angle, Flux, Speed};
 
 /// Limits that keep noise from being taken for a crossing (2.3.2).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Distance beyond zero that a flux must have, as a share of the amplitude: half the deadband, below
     /// 0.5.

@@ -11,9 +11,10 @@ use crate::trace::traced;
 use crate::units::{Angle, Current, Speed, Voltage};
 
 /// The source of the edges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sensors {
     /// Flux crossings; there are no Hall sensors.
+    #[default]
     None,
     /// Hall sensors alone; neither voltages nor currents are looked at.
     Hall,
@@ -23,7 +24,7 @@ pub enum Sensors {
 }
 
 /// The estimation's coefficients.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// The source of the edges.
     pub sensors: Sensors,

@@ -17,7 +17,7 @@ pub const AMPLITUDE_MIN: Flux = Flux::from_bits(51_267_396);
 pub const AMPLITUDE_MAX: Flux = Flux::from_bits(341_782_638);
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// R: current to voltage.
     pub resistance: Gain<Current, Voltage>,
@@ -36,7 +36,7 @@ pub struct Config {
 }
 
 /// A first-order high-pass.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct HighPass {
     /// 1 − e^(−T_s/τ_HPFS).
     pub share: Gain<Flux, Flux>,

@@ -5,7 +5,7 @@ use super::sector::Sector;
 use crate::trace::traced;
 
 /// The check of the sensors' codes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Periods for which all three may be alike; no rotor makes them so.
     pub patience: u32,

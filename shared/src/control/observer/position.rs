@@ -16,7 +16,7 @@ use crate::units::{Angle, Speed};
 pub type Periods = U20F12;
 
 /// Coefficients of the estimator.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// N, the electrical turns over which the speed is taken, 1 to 4.
     pub turns: u8,

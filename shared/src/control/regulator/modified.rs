@@ -15,7 +15,7 @@ use crate::trace::traced;
 use crate::units::{Angle, Current, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// k_p of the length, bandwidth·L.
     pub k_p: Gain<Current, Voltage>,

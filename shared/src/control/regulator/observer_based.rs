@@ -7,7 +7,7 @@ use crate::trace::traced;
 use crate::units::{Current, CurrentRate, Voltage, WideVoltage, narrow};
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// R.
     pub resistance: Gain<Current, Voltage>,

@@ -19,7 +19,7 @@ use crate::trace::traced;
 use crate::units::Voltage;
 
 /// Thresholds.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Reading above which the back-EMF is positive: beyond the converter's noise.
     pub least: Voltage,

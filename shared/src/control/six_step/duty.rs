@@ -18,7 +18,7 @@ use crate::units::{Current, Duty, Speed};
 const PEAK_SHIFT: u32 = 6;
 
 /// Coefficients for one sample period T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Speed to duty.
     pub k_p: Gain<Speed, I1F31>,

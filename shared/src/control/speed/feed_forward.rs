@@ -10,7 +10,7 @@ use crate::trace::traced;
 use crate::units::{Current, Speed, SpeedSquare, Voltage};
 
 /// Coefficients for one period of the outer loops, here T_s.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Proportional gain, speed to current.
     pub k_p: Gain<Speed, Current>,

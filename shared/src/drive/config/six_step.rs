@@ -12,7 +12,7 @@ use crate::units::{AdcCounts, Current, Speed, Voltage};
 pub(crate) const LOST_SEXTANTS: u8 = 12;
 
 /// Coefficients of the six-step drive.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Counts of a terminal's converter to voltage.
     pub terminal: Gain<AdcCounts, Voltage>,

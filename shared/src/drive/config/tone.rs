@@ -10,7 +10,7 @@ use crate::units::{Current, Speed, Voltage};
 pub const PITCH_MAX: Speed = Speed::lit("0.125");
 
 /// Coefficients of the tones.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Peak that the greatest phase current is led to.
     pub peak: Current,

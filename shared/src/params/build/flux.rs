@@ -1,17 +1,20 @@
 //! The coefficients of the second paper's position estimation.
 
+use core::cell::Cell;
 use core::f32::consts::TAU;
 
 use fixed::types::{I0F32, U0F32};
 
+use super::formula::{fill, formulas};
+use super::quantity::Quantity;
 use super::si::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
-use crate::control::observer::{crossing, flux_linkage, hall, position};
+use crate::control::observer::{flux_linkage, position};
 use crate::math::{Real, settled, square_root};
 use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
-use crate::params::{FromMotor, ParamId, Params};
-use crate::units::{Angle, Flux, Speed};
+use crate::params::{Board, ParamId, Params};
+use crate::units::Angle;
 
 /// τ_int·ω where Run ends with the defaults, at half of `STA_RUN_RPM`: there the first-order integrator
 /// leads by 10° (2.2.2).
@@ -73,95 +76,115 @@ impl FluxSettings {
     /// The speeds from which whole turns and the filter are used follow from the errors that the paper
     /// gives for the greatest acceleration that the drive asks for.
     pub fn new(params: &Params) -> Self {
-        let from_motor = FromMotor::new(params);
-        let get = |id| params.get(id);
-        let tau_int_s = TAU_INT / rad_s(params, SLOW_SHARE * from_motor.run_rpm);
-        let (n, a_e) = (get(ParamId::CtlPosN), get(ParamId::CtlAe));
-        let alpha = from_motor.slew_rpm_s * get(ParamId::MotPolePairs) / 60.0;
-        // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures again, and
-        // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
-        let lag = a_e / (1.0 - a_e) * 6.0 * n * A_TURNS;
+        let (quantities, refused) = (Si::quantities(), Cell::new(None));
+        // They are the same on any board.
+        let p = Si::new(params, &Board::BENCH, &quantities, &refused);
+        p.prepare();
+        Self::of(&p)
+    }
+
+    fn of(p: &Si) -> Self {
+        p.set(Quantity::Turns, p.get(ParamId::CtlPosN));
+        p.set(Quantity::Ae, p.get(ParamId::CtlAe));
+        let formulas = formulas!(p, {
+            define SlowRadS([SLOW_SHARE] * RunRpm * PolePairs * Tau / [60.0]),
+            define TauInt([TAU_INT] / SlowRadS),
+            define Acceleration(SlewRpmS * PolePairs / [60.0]),
+            // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures again, and
+            // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
+            define Edges([6.0] * Turns + [1.0]),
+            value whole_turns_above(Edges * Acceleration * [A_TURNS] / [K_MAX]),
+            define Known([1.0] - Ae),
+            define Lag(Ae / Known * [6.0] * Turns * [A_TURNS]),
+            value filter_above(Acceleration * [A_TURNS] * Lag / [ERROR_TURNS]),
+        });
+        let whole_turns_above_hz = square_root(formulas.value());
+        let filter_above_hz = square_root(formulas.value());
+        let tau_int_s = p.of(Quantity::TauInt);
         Self {
             tau_int_s,
-            tau_hpfs_s: match params.choice() {
+            tau_hpfs_s: match p.choice() {
                 CtlFluxForm::FirstOrder | CtlFluxForm::FirstOrderStated => None,
                 CtlFluxForm::SecondOrder | CtlFluxForm::SecondOrderStated => {
                     Some(HIGH_PASS_SHARE * tau_int_s)
                 }
             },
             hold_off_turns: HOLD_OFF * A_TURNS,
-            turns: n,
-            whole_turns_above_hz: square_root((6.0 * n + 1.0) * alpha * A_TURNS / K_MAX),
-            a_e,
-            filter_above_hz: square_root(alpha * A_TURNS * lag / ERROR_TURNS),
+            turns: p.of(Quantity::Turns),
+            whole_turns_above_hz,
+            a_e: p.of(Quantity::Ae),
+            filter_above_hz,
         }
     }
 }
 
-/// The electrical speed of mechanical rpm, rad/s.
-fn rad_s(params: &Params, rpm: f32) -> f32 {
-    rpm * params.get(ParamId::MotPolePairs) * TAU / 60.0
+/// Sections 2.2 to 2.4.
+pub(super) fn edges(p: &Si, place: &mut Config) {
+    let settings = FluxSettings::of(p);
+    place.sensors = match (p.choice(), p.choice()) {
+        (CtlObserver::Hall, CtlHall::Alone) => Sensors::Hall,
+        (CtlObserver::Hall, CtlHall::Merged) => Sensors::Merged,
+        _ => Sensors::None,
+    };
+    integrators(p, &settings, &mut place.flux);
+    let crossing = &mut place.crossing;
+    crossing.deadband = I0F32::from_f32(DEADBAND);
+    crossing.deadband_angle = Angle::from_f32(libm::asinf(DEADBAND) / TAU);
+    crossing.hold_off = U0F32::from_f32(settings.hold_off_turns);
+    fill!(p, crossing, {
+        define SlowRadS(SlowRpm * PolePairs * Tau / [60.0] * T),
+        count patience([PATIENCE * A_TURNS * TAU] / SlowRadS),
+    });
+    estimator(p, &settings, &mut place.position);
+    place.hall.patience = p.periods(HALL_PATIENCE_S);
+    fill!(p, place, {
+        number flux_above(RunRpm * TurnsPerRpm),
+        number hall_below(SlowRpm * TurnsPerRpm),
+    });
 }
 
-/// Sections 2.2 to 2.4.
-pub(super) fn edges(p: &Si) -> Config {
-    let get = |id| p.get(id);
-    let settings = FluxSettings::new(p.params);
-    let flux_per_current = p.inductance_h * p.scale.current_a / p.scale.flux_wb();
-    // In a period, a filter of this time constant goes this share of its way.
-    let share = |tau_s: f32| settled(p.period_s / tau_s);
-    let corner = |tau_s: f32| Speed::from_f32(p.period_s / (TAU * tau_s));
-    let high_pass = settings.tau_hpfs_s.map(|tau_s| HighPass {
-        share: p.gain(ParamId::StaRunRpm, share(tau_s)),
-        corner: corner(tau_s),
+/// Sections 2.2 and 2.3.
+fn integrators(p: &Si, settings: &FluxSettings, place: &mut flux_linkage::Config) {
+    define_filter(p, settings.tau_int_s);
+    fill!(p, place, {
+        gain resistance(MotRMohm, R * UnitA / UnitV),
+        gain inductance(MotLUh, L * UnitA / UnitWb),
+        gain forget(StaRunRpm, Share),
+        number corner(T / CornerS),
+        define StatorFlux(L * UnitA / UnitWb),
+        number stator_max(LimitA / UnitA * StatorFlux),
     });
-    Config {
-        sensors: match (p.choice(), p.choice()) {
-            (CtlObserver::Hall, CtlHall::Alone) => Sensors::Hall,
-            (CtlObserver::Hall, CtlHall::Merged) => Sensors::Merged,
-            _ => Sensors::None,
-        },
-        flux: flux_linkage::Config {
-            resistance: p.gain(
-                ParamId::MotRMohm,
-                p.resistance_ohm * p.scale.current_a / p.scale.voltage_v,
-            ),
-            inductance: p.gain(ParamId::MotLUh, flux_per_current),
-            forget: p.gain(ParamId::StaRunRpm, share(settings.tau_int_s)),
-            corner: corner(settings.tau_int_s),
-            high_pass,
-            stator_max: Flux::from_f32(
-                get(ParamId::LimPhaseA) / p.scale.current_a * flux_per_current,
-            ),
-            adaptive: matches!(
-                p.choice(),
-                CtlFluxForm::FirstOrder | CtlFluxForm::SecondOrder
-            ),
-        },
-        crossing: crossing::Config {
-            deadband: I0F32::from_f32(DEADBAND),
-            deadband_angle: Angle::from_f32(libm::asinf(DEADBAND) / TAU),
-            hold_off: U0F32::from_f32(settings.hold_off_turns),
-            patience: (PATIENCE * A_TURNS * TAU / (rad_s(p.params, p.slow_rpm()) * p.period_s))
-                as u32,
-        },
-        position: estimator(p, &settings),
-        hall: hall::Config {
-            patience: (HALL_PATIENCE_S / p.period_s) as u32,
-        },
-        flux_above: p.scale.speed_from_rpm(p.from_motor.run_rpm),
-        hall_below: p.slow(),
+    if let Some(tau_s) = settings.tau_hpfs_s {
+        define_filter(p, tau_s);
+        let high_pass = place.high_pass.insert(HighPass::default());
+        fill!(p, high_pass, {
+            gain share(StaRunRpm, Share),
+            number corner(T / CornerS),
+        });
     }
+    place.adaptive = matches!(
+        p.choice(),
+        CtlFluxForm::FirstOrder | CtlFluxForm::SecondOrder
+    );
+}
+
+/// A filter of some time constant: the share of its way that it goes in a period, and 2π times that time.
+fn define_filter(p: &Si, tau_s: f32) {
+    p.set(Quantity::Share, settled(p.scale.period_s / tau_s));
+    p.set(Quantity::CornerS, TAU * tau_s);
 }
 
 /// Section 2.4.
-fn estimator(p: &Si, settings: &FluxSettings) -> position::Config {
-    let speed = |turns_per_s: f32| p.scale.speed_from_rpm(turns_per_s * 60.0 / p.pole_pairs);
-    position::Config {
-        turns: settings.turns as u8,
-        whole_turns_above: speed(settings.whole_turns_above_hz),
-        a_e: p.gain(ParamId::CtlAe, settings.a_e),
-        filter_above: speed(settings.filter_above_hz),
-        compensates: true,
-    }
+fn estimator(p: &Si, settings: &FluxSettings, place: &mut position::Config) {
+    place.turns = settings.turns as u8;
+    p.set(Quantity::WholeTurnsHz, settings.whole_turns_above_hz);
+    p.set(Quantity::FilterHz, settings.filter_above_hz);
+    fill!(p, place, {
+        define WholeTurnsRpm(WholeTurnsHz * [60.0] / PolePairs),
+        number whole_turns_above(WholeTurnsRpm * TurnsPerRpm),
+        gain a_e(CtlAe, Ae),
+        define FilterRpm(FilterHz * [60.0] / PolePairs),
+        number filter_above(FilterRpm * TurnsPerRpm),
+    });
+    place.compensates = true;
 }

@@ -1,8 +1,8 @@
 //! The coefficients of the inductance's adaptation.
 
+use super::formula::fill;
 use super::si::Si;
 use crate::control::inductance::{Config, MEAN_PERIODS_MAX};
-use crate::params::ParamId;
 use crate::params::choice::CtlAdaptL;
 
 /// Half the square wave's height over `LIM_PHASE_A`: 1 A on the bench.
@@ -15,20 +15,16 @@ const HALF_S: f32 = 0.01;
 const STEP: f32 = 0.1;
 
 /// The adaptation, if `CTL_ADAPT_L` asks for it.
-pub(super) fn inductance(p: &Si) -> Option<Config> {
+pub(super) fn inductance(p: &Si, place: &mut Option<Config>) {
+    *place = None;
     if p.chosen(CtlAdaptL::Off) {
-        return None;
+        return;
     }
-    let half_periods = (HALF_S / p.period_s) as u32;
-    Some(Config {
-        amplitude: p
-            .scale
-            .current_from_a(AMPLITUDE_SHARE * p.get(ParamId::LimPhaseA)),
-        half_periods,
-        mean_periods: (half_periods / 4).min(MEAN_PERIODS_MAX),
-        gain: p.gain(
-            ParamId::MotLUh,
-            STEP * p.scale.flux_wb() / p.scale.current_a / p.inductance_h,
-        ),
-    })
+    let place = place.insert(Config::default());
+    fill!(p, place, {
+        number amplitude([AMPLITUDE_SHARE] * LimitA / UnitA),
+        count half_periods([HALF_S] / T),
+        gain gain(MotLUh, [STEP] * UnitWb / UnitA / L),
+    });
+    place.mean_periods = (place.half_periods / 4).min(MEAN_PERIODS_MAX);
 }

@@ -1,10 +1,12 @@
 //! The configuration that the parameters make: SI values become the control's coefficients, once.
 
 mod flux;
+mod formula;
 mod inductance;
 mod input;
 mod observer;
 mod outer;
+mod quantity;
 mod regulator;
 mod sensing;
 mod si;
@@ -13,12 +15,11 @@ mod start;
 mod tone;
 
 pub use flux::FluxSettings;
+use formula::{fill, formulas, value};
 pub use input::input;
+use quantity::Quantity;
 pub use si::{BuildError, scale};
 use si::{Si, TEST_SHARE};
-
-use core::cell::Cell;
-use core::f32::consts::TAU;
 
 use super::board::Board;
 use super::choice::{CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, MotDir, MotStop};
@@ -29,9 +30,9 @@ use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
 use crate::drive::{Config, Direction, Stop};
 use crate::input::signal::Signal;
-use crate::math::Real;
 use crate::protection;
-use crate::units::{AdcCounts, Current, Scale, Voltage, stated_emf};
+use crate::units::{Current, Scale, Voltage, stated_emf};
+use core::cell::Cell;
 
 /// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
@@ -96,6 +97,9 @@ const RETURN_BAND_V: f32 = 1.0;
 /// Rate at which the bounds of i_q follow the bus current, 1/s.
 const BOUND_RATE: f32 = 600.0;
 
+/// The reason to refuse a speed.
+const ABOVE_FASTEST: &str = "above CTL_RPM_MAX";
+
 /// Computes the drive's coefficients from SI values.
 ///
 /// # Errors
@@ -113,7 +117,9 @@ pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
 pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<(), BuildError> {
     let refused = Cell::new(None);
     let made = params.in_force();
-    let p = Si::new(&made, board, &refused);
+    let quantities = Si::quantities();
+    let p = Si::new(&made, board, &quantities, &refused);
+    p.prepare();
     if let Some(unknown) = params.unknown() {
         p.refuse_if(
             p.chosen(CtlDrive::FieldOriented),
@@ -129,10 +135,6 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     let (duty_max, window) = sensing::duty_max(&p, modulation);
     p.verdict()?;
     place.scale = p.scale;
-    place.bus = p.factor(
-        ParamId::LimBusVMax,
-        board.bus_v_per_count / p.scale.voltage_v,
-    );
     place.direction = match p.choice() {
         MotDir::Normal => Direction::Normal,
         MotDir::Reversed => Direction::Reversed,
@@ -142,11 +144,12 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
         MotStop::Brake => Stop::Brake,
     };
     place.delay = board.delay;
-    place.observer = observer::observer(&p);
-    place.regulator = regulator::regulator(&p);
-    place.speed = outer::speed(&p);
-    place.torque = outer::torque(&p);
-    place.adapt_l = inductance::inductance(&p);
+    fill!(p, place, { factor bus(LimBusVMax, BusVPerCount / UnitV) });
+    observer::observer(&p, &mut place.observer);
+    regulator::regulator(&p, &mut place.regulator);
+    outer::speed(&p, &mut place.speed);
+    outer::torque(&p, &mut place.torque);
+    inductance::inductance(&p, &mut place.adapt_l);
     place.low_speed = low_speed(&p);
     start::attempts(&p, &mut place.start);
     if !p.chosen(CtlDrive::FieldOriented) {
@@ -155,36 +158,40 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     }
     place.test_current = test_current(params, &p.scale);
     place.both_ways = p.chosen(Inp3d::On);
-    place.slow = p.slow();
-    place.coast = p.gain(ParamId::PwmFreqHz, p.period_s / COAST_S);
+    fill!(p, place, {
+        number slow(SlowRpm * TurnsPerRpm),
+        gain coast(PwmFreqHz, T / [COAST_S]),
+        count clear_periods([CLEAR_S] / T),
+        count proven_periods([PROVEN_S] / T),
+        count lost_periods([LOST_S] / T),
+    });
     place.modulator = modulator::Config::new(
         modulation,
         duty_max,
         match board.shunts {
             // The dead time's compensation comes on top of what the vector makes.
-            Shunts::Three => window - p.dead_time_s / p.period_s,
+            Shunts::Three => window - value!(p, DeadTime / T),
             Shunts::Two => 0.0,
         },
     );
-    place.sensing = sensing::sensing(&p, window);
-    place.catch = sensing::catch(&p);
+    sensing::sensing(&p, window, &mut place.sensing);
+    sensing::catch(&p, &mut place.catch);
     place.charge = sensing::charge(&p);
-    place.dead_time = sensing::dead_time(&p);
-    place.protection = limits(&p);
-    place.tone = tone::tone(&p);
-    place.six_step = match p.choice() {
-        CtlDrive::FieldOriented => None,
+    sensing::dead_time(&p, &mut place.dead_time);
+    limits(&p, &mut place.protection);
+    tone::tone(&p, &mut place.tone);
+    match p.choice() {
+        CtlDrive::FieldOriented => place.six_step = None,
         // What is in force is never automatic.
-        CtlDrive::SixStep | CtlDrive::Automatic => Some(six_step::six_step(&p, duty_max)),
-    };
-    place.clear_periods = p.periods(CLEAR_S);
+        CtlDrive::SixStep | CtlDrive::Automatic => {
+            six_step::six_step(&p, duty_max, place.six_step.insert(Default::default()));
+        }
+    }
     place.slow_periods = if p.chosen(CtlObserver::Hall) {
         p.periods(SENSED_S)
     } else {
         0
     };
-    place.proven_periods = p.periods(PROVEN_S);
-    place.lost_periods = lost_periods(&p.scale);
     place.least_u_q = least_u_q(&p);
     p.verdict()
 }
@@ -201,66 +208,77 @@ pub(crate) fn lost_periods(scale: &Scale) -> u32 {
 
 /// Refuses values that are wrong whatever the coefficients are.
 fn refuse_contradictions(p: &Si) {
-    let get = |id| p.get(id);
-    let unit_v = p.scale.voltage_v;
-    p.refuse_if(
-        get(ParamId::LimBusVMax) > BUS_UNITS_MAX * unit_v,
+    let (supply_v, unit_v) = (p.of(Quantity::SupplyMaxV), p.of(Quantity::UnitV));
+    let fastest_rpm = p.of(Quantity::FastestRpm);
+    p.refuse_above(
+        supply_v,
+        BUS_UNITS_MAX * unit_v,
         ParamId::PwmFreqHz,
         "too low for this flux and LIM_BUS_V_MAX",
     );
-    p.refuse_if(
-        get(ParamId::LimBusVMax) < BUS_UNITS_MIN * unit_v,
+    p.refuse_above(
+        BUS_UNITS_MIN * unit_v,
+        supply_v,
         ParamId::PwmFreqHz,
         "too high for this flux and LIM_BUS_V_MAX",
     );
     p.refuse_if(
-        get(ParamId::LimBusVMin) >= get(ParamId::LimBusVMax),
+        p.of(Quantity::SupplyMinV) >= supply_v,
         ParamId::LimBusVMin,
         "not below LIM_BUS_V_MAX",
     );
-    p.refuse_if(
-        p.from_motor.least_rpm > get(ParamId::CtlRpmMax),
+    p.refuse_above(
+        p.of(Quantity::LeastRpm),
+        fastest_rpm,
         ParamId::CtlRpmMin,
-        "above CTL_RPM_MAX",
+        ABOVE_FASTEST,
     );
-    p.refuse_if(
-        p.from_motor.run_rpm > get(ParamId::CtlRpmMax),
+    p.refuse_above(
+        p.of(Quantity::RunRpm),
+        fastest_rpm,
         ParamId::StaRunRpm,
-        "above CTL_RPM_MAX",
+        ABOVE_FASTEST,
     );
-    p.refuse_if(
-        p.from_motor.current_hz > BANDWIDTH_SHARE * get(ParamId::PwmFreqHz),
+    p.refuse_above(
+        p.of(Quantity::CurrentHz),
+        value!(p, [BANDWIDTH_SHARE] * PwmHz),
         ParamId::CtlBwCurHz,
         "above a twentieth of PWM_FREQ_HZ",
     );
-    p.refuse_if(
-        p.from_motor.speed_hz > SPEED_SHARE * p.from_motor.current_hz,
+    p.refuse_above(
+        p.of(Quantity::SpeedHz),
+        value!(p, [SPEED_SHARE] * CurrentHz),
         ParamId::CtlBwSpdHz,
         "above a fifth of CTL_BW_CUR_HZ",
     );
-    p.refuse_if(
-        get(ParamId::LimPhaseA) * TRIP_SHARE > SHOWN_SHARE * p.board.current_range_a,
+    p.refuse_above(
+        value!(p, LimitA * [TRIP_SHARE]),
+        value!(p, [SHOWN_SHARE] * RangeA),
         ParamId::LimPhaseA,
         "the trip at 1.4 times this is beyond the board",
     );
-    p.refuse_if(
-        get(ParamId::PwmDeadtimeNs) < p.board.least_dead_time.ns,
+    p.refuse_above(
+        p.board.least_dead_time.ns,
+        p.get(ParamId::PwmDeadtimeNs),
         ParamId::PwmDeadtimeNs,
         p.board.least_dead_time.refusal,
     );
-    let turns = get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0;
-    p.refuse_if(
-        turns > 0.25,
+    let turns = p.of(Quantity::FastestTurns);
+    p.refuse_above(
+        turns,
+        0.25,
         ParamId::PwmFreqHz,
         "less than four periods a turn at CTL_RPM_MAX",
     );
-    let by_edges = p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall);
-    p.refuse_if(
-        by_edges && turns > EDGES_TURNS,
-        ParamId::PwmFreqHz,
-        "less than twelve periods a turn at CTL_RPM_MAX",
-    );
-    let protocol = get(ParamId::InpProto);
+    if p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall) {
+        p.refuse_above(
+            turns,
+            EDGES_TURNS,
+            ParamId::PwmFreqHz,
+            "less than twelve periods a turn at CTL_RPM_MAX",
+        );
+    }
+    let protocol = p.get(ParamId::InpProto);
     p.refuse_if(
         protocol != 0.0 && Signal::from_number(protocol as u8).is_none(),
         ParamId::InpProto,
@@ -278,7 +296,7 @@ fn is_helped(p: &Si) -> bool {
 /// Least voltage along q in voltage mode.
 fn least_u_q(p: &Si) -> Voltage {
     if is_helped(p) {
-        stated_emf(p.scale.speed_from_rpm(p.from_motor.least_rpm))
+        stated_emf(p.scale.speed_from_rpm(p.of(Quantity::LeastRpm)))
     } else {
         Voltage::ZERO
     }
@@ -286,49 +304,39 @@ fn least_u_q(p: &Si) -> Voltage {
 
 /// Keeps an observer that lives by the back-EMF in lock where there is little of it.
 fn low_speed(p: &Si) -> low_speed::Config {
-    let limit_a = p.get(ParamId::LimPhaseA);
-    let phase = p.scale.current_from_a(limit_a);
+    let formulas = formulas!(p, {
+        number phase(LimitA / UnitA),
+        define BiasA([BIAS_SHARE] * StartA),
+        define DeadEndV([BIAS_DEAD_END] * DeadV),
+        define EndV([BIAS_END] * R * BiasA max DeadEndV),
+        define EndRadS(EndV / Flux),
+        number i_d(BiasA / UnitA),
+        gain i_d_slope(StaRampA, BiasA / UnitA / EndRadS * RadPerUnit),
+        number i_q([TORQUE_LEAST_SHARE] * StartA / UnitA),
+        gain i_q_slope(MotRMohm, [TORQUE_DROP_SHARE] * Flux / R * RadPerUnit / UnitA),
+    });
+    let phase = formulas.number();
     if !is_helped(p) {
         return low_speed::Config::none(phase);
     }
-    let ramp_a = p.from_motor.ramp_a.min(limit_a);
-    let bias_a = BIAS_SHARE * ramp_a;
-    let rad_per_unit = TAU / p.period_s;
-    let end_v = BIAS_END * p.resistance_ohm * bias_a;
-    let end_v = end_v.max(BIAS_DEAD_END * p.from_motor.dead_v);
-    let end_rad_s = end_v / p.flux_wb;
-    let drop_a_s = TORQUE_DROP_SHARE * p.flux_wb / p.resistance_ohm;
-    let i_d = p.scale.current_from_a(bias_a);
-    let i_d_slope = bias_a / p.scale.current_a / end_rad_s * rad_per_unit;
-    let i_q = p.scale.current_from_a(TORQUE_LEAST_SHARE * ramp_a);
-    let i_q_slope = drop_a_s * rad_per_unit / p.scale.current_a;
-    low_speed::Config::new(
-        (i_d, p.gain(ParamId::StaRampA, i_d_slope)),
-        (i_q, p.gain(ParamId::MotRMohm, i_q_slope)),
-        phase,
-    )
+    let i_d = (formulas.number(), formulas.gain());
+    let i_q = (formulas.number(), formulas.gain());
+    low_speed::Config::new(i_d, i_q, phase)
 }
 
-fn limits(p: &Si) -> protection::Config {
-    let current = |id| p.scale.current_from_a(p.get(id));
-    let bus_max_v = p.get(ParamId::LimBusVMax);
-    let return_a = p.get(ParamId::LimRegenA);
-    protection::Config {
-        trip: AdcCounts::from_f32(
-            TRIP_SHARE * p.get(ParamId::LimPhaseA) / p.board.current_a_per_count,
-        ),
-        bus_min: p.voltage(p.get(ParamId::LimBusVMin)),
-        bus_max: p.voltage(bus_max_v),
-        phase: current(ParamId::LimPhaseA),
-        bus_draw: current(ParamId::LimBusA),
-        bus_return: current(ParamId::LimRegenA),
-        bus_return_v: p.voltage(bus_max_v - RETURN_BAND_V),
-        bus_return_slope: p.gain(
-            ParamId::LimRegenA,
-            return_a / RETURN_BAND_V * p.scale.voltage_v / p.scale.current_a,
-        ),
-        bound_rate: p.factor(ParamId::PwmFreqHz, BOUND_RATE * p.period_s),
-    }
+fn limits(p: &Si, place: &mut protection::Config) {
+    fill!(p, place, {
+        number trip([TRIP_SHARE] * LimitA / APerCount),
+        number bus_min(SupplyMinV / UnitV),
+        number bus_max(SupplyMaxV / UnitV),
+        number phase(LimitA / UnitA),
+        number bus_draw(SupplyA / UnitA),
+        number bus_return(RegenA / UnitA),
+        define ReturnV(SupplyMaxV - [RETURN_BAND_V]),
+        number bus_return_v(ReturnV / UnitV),
+        gain bus_return_slope(LimRegenA, RegenA / [RETURN_BAND_V] * UnitV / UnitA),
+        factor bound_rate(PwmFreqHz, [BOUND_RATE] * T),
+    });
 }
 
 #[cfg(test)]

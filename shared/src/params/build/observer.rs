@@ -1,16 +1,16 @@
 //! The observers' coefficients.
 
-use core::f32::consts::TAU;
-
 use super::flux;
+use super::formula::{fill, value};
+use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
-use crate::control::observer::{self, back_emf, compensated};
-use crate::math::{EIGHTH_PI, Multiplier, Real, settled};
+use crate::control::observer::{self, back_emf, compensated, edges};
+use crate::math::{EIGHTH_PI, Multiplier, settled};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObsCure, CtlObserver};
-use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux, Speed};
+use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux};
 
 /// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
 /// 2357 1/s.
@@ -37,106 +37,88 @@ const SMOOTHING_RAD_S: f32 = 300.0;
 const INDUCTANCE_MAX: f32 = 4.0;
 
 /// The observer that `CTL_OBSERVER` names.
-pub(super) fn observer(p: &Si) -> observer::Config {
+pub(super) fn observer(p: &Si, place: &mut observer::Config) {
     match p.choice() {
-        CtlObserver::BackEmf => {
-            let mut config = back_emf(p);
-            if p.chosen(CtlObsCure::Cured) {
-                config.cure = Some(cure(p));
-            }
-            observer::Config::BackEmf(config)
+        CtlObserver::BackEmf => *place = observer::Config::BackEmf(back_emf::Config::default()),
+        CtlObserver::FluxCrossings | CtlObserver::Hall => {
+            *place = observer::Config::Edges(edges::Config::default());
         }
-        CtlObserver::FluxCrossings | CtlObserver::Hall => observer::Config::Edges(flux::edges(p)),
-        CtlObserver::Compensated => observer::Config::Compensated(compensated(p)),
+        CtlObserver::Compensated => {
+            *place = observer::Config::Compensated(compensated::Config::default());
+        }
+    }
+    match place {
+        observer::Config::BackEmf(place) => back_emf(p, place),
+        observer::Config::Edges(place) => flux::edges(p, place),
+        observer::Config::Compensated(place) => compensated(p, place),
+        observer::Config::Given => {}
     }
 }
 
 /// The compensated flux observer.
-fn compensated(p: &Si) -> compensated::Config {
-    let flux_per_current = p.scale.current_a / p.scale.flux_wb();
-    // β = R·T_s²/(12·L); under a voltage that changes in the middle of the period half of it, the
-    // other way. The square of the speed is in turns a period.
-    let bias = p.resistance_ohm * p.period_s / p.inductance_h * TAU * TAU / 12.0;
-    let bias = match p.board.delay {
-        Delay::None | Delay::One => bias,
-        Delay::Half => -0.5 * bias,
-    };
-    let speed = |rad_s: f32| Speed::from_f32(rad_s * p.period_s / TAU);
+fn compensated(p: &Si, place: &mut compensated::Config) {
     p.refuse_if(
-        p.inductance_h * flux_per_current >= INDUCTANCE_MAX,
+        value!(p, L * FluxPerCurrent) >= INDUCTANCE_MAX,
         ParamId::MotLUh,
         "too high for this flux and the board's range",
     );
-    compensated::Config {
-        half_resistance: p.factor(
-            ParamId::MotRMohm,
-            0.5 * p.resistance_ohm * p.period_s * flux_per_current,
-        ),
-        inductance: p.factor(ParamId::MotLUh, p.inductance_h * flux_per_current),
-        bias: p.gain(ParamId::MotLUh, bias),
-        omega_min: speed(OMEGA_MIN_RAD_S),
-        omega_n_min: speed(OMEGA_N_RAD_S[0]),
-        omega_n_max: speed(OMEGA_N_RAD_S[1]),
-        smoothing: p.factor(ParamId::PwmFreqHz, SMOOTHING_RAD_S * p.period_s),
-        xi_nominal: INVERSE_FLUX_NOMINAL,
-        // The stated flux is 2/π.
-        quarter_per_flux: Multiplier::from_bits(EIGHTH_PI.to_bits()),
-    }
+    // Under a voltage that changes in the middle of the period β is half, the other way.
+    let share = match p.board.delay {
+        Delay::None | Delay::One => 1.0,
+        Delay::Half => -0.5,
+    };
+    p.set(Quantity::Share, share);
+    fill!(p, place, {
+        factor half_resistance(MotRMohm, [0.5] * R * T * FluxPerCurrent),
+        factor inductance(MotLUh, L * FluxPerCurrent),
+        // β = R·T_s²/(12·L). The square of the speed is in turns a period.
+        gain bias(MotLUh, R * T / L * Tau * Tau / [12.0] * Share),
+        number omega_min([OMEGA_MIN_RAD_S] * T / Tau),
+        number omega_n_min([OMEGA_N_RAD_S[0]] * T / Tau),
+        number omega_n_max([OMEGA_N_RAD_S[1]] * T / Tau),
+        factor smoothing(PwmFreqHz, [SMOOTHING_RAD_S] * T),
+    });
+    place.xi_nominal = INVERSE_FLUX_NOMINAL;
+    // The stated flux is 2/π.
+    place.quarter_per_flux = Multiplier::from_bits(EIGHTH_PI.to_bits());
 }
 
 /// The adaptive back-EMF observer (6), (7), (20), (22), (28).
-fn back_emf(p: &Si) -> back_emf::Config {
-    let r_over_l = p.resistance_ohm / p.inductance_h;
-    let decay = settled(r_over_l * p.period_s);
-    // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
-    let acts_s = decay / r_over_l;
-    let current_per_voltage = p.scale.voltage_v / p.scale.current_a;
-    let rad_per_unit = TAU / p.period_s;
-
-    // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
-    let k_p = 2.0 * p.current_rad_s - r_over_l;
-    let k_i = 2.0 * p.inductance_h * p.current_rad_s * p.current_rad_s;
-    // λ² + χ·k_η·λ + χ²·γ with both poles at (−1 ± i)·s (22).
-    let chi = p.linearised_rad_s * p.flux_wb;
-    let pole_rad_s = ATTITUDE_SHARE * p.current_rad_s;
-    let k_eta = 2.0 * pole_rad_s / chi;
-    let gamma = 2.0 * pole_rad_s * pole_rad_s / (chi * chi);
-
-    back_emf::Config {
-        delay: p.board.delay,
-        decay: p.gain(ParamId::MotRMohm, decay),
-        admittance: p.gain(
-            ParamId::MotLUh,
-            acts_s / p.inductance_h * current_per_voltage,
+fn back_emf(p: &Si, place: &mut back_emf::Config) {
+    p.set(Quantity::Decay, settled(value!(p, ROverL * T)));
+    place.delay = p.board.delay;
+    fill!(p, place, {
+        // The time for which a constant derivative acts in a period: (1 − e^(−R·T_s/L))·L/R.
+        define ActsS(Decay / ROverL),
+        gain decay(MotRMohm, Decay),
+        gain admittance(MotLUh, ActsS / L * CurrentPerVoltage),
+        gain rotation(MotLUh, ActsS * RadPerUnit),
+        // λ² + (R/L + k_p)·λ + k_i/L with both poles at (−1 ± i)/ε (20).
+        define KP([2.0] * CurrentRadS - ROverL),
+        gain k_p(CtlBwCurHz, KP * ActsS),
+        gain k_i(CtlBwCurHz, [2.0] * L * CurrentRadS * CurrentRadS * T / CurrentPerVoltage),
+        // λ² + χ·k_η·λ + χ²·γ with both poles at (−1 ± i)·s (22).
+        define Chi(LinearisedRadS * Flux),
+        define ChiSquare(Chi * Chi),
+        define PoleRadS([ATTITUDE_SHARE] * CurrentRadS),
+        gain k_eta(CtlBwCurHz, [2.0] * PoleRadS / Chi * UnitV / RadPerUnit),
+        gain gamma(
+            CtlBwCurHz,
+            [2.0] * PoleRadS * PoleRadS / ChiSquare * T * UnitV / UnitPerWb
         ),
-        rotation: p.gain(ParamId::MotLUh, acts_s * rad_per_unit),
-        k_p: p.gain(ParamId::CtlBwCurHz, k_p * acts_s),
-        k_i: p.gain(ParamId::CtlBwCurHz, k_i * p.period_s / current_per_voltage),
-        k_eta: p.gain(
-            ParamId::CtlBwCurHz,
-            k_eta * p.scale.voltage_v / rad_per_unit,
-        ),
-        gamma: p.gain(
-            ParamId::CtlBwCurHz,
-            gamma * p.period_s * p.scale.voltage_v / p.scale.inverse_flux_per_wb(),
-        ),
-        k_f: p.gain(
-            ParamId::CtlBwCurHz,
-            FILTER_SHARE * p.current_rad_s * p.period_s,
-        ),
-        xi_nominal: INVERSE_FLUX_NOMINAL,
-        xi_min: INVERSE_FLUX_NOMINAL / 2,
-        // Twice the nominal is one bit more than the type holds.
-        xi_max: InverseFlux::MAX,
-        cure: None,
-    }
-}
-
-/// The loop that cures the published observer.
-fn cure(p: &Si) -> Cure {
-    let omega_n = CURE_RAD_S * p.period_s;
-    Cure {
-        proportional: p.gain(ParamId::CtlObsCure, 2.0 * omega_n / TAU),
-        integral: p.gain(ParamId::CtlObsCure, omega_n * omega_n / TAU),
+        gain k_f(CtlBwCurHz, [FILTER_SHARE] * CurrentRadS * T),
+    });
+    place.xi_nominal = INVERSE_FLUX_NOMINAL;
+    place.xi_min = INVERSE_FLUX_NOMINAL / 2;
+    // Twice the nominal is one bit more than the type holds.
+    place.xi_max = InverseFlux::MAX;
+    if p.chosen(CtlObsCure::Cured) {
+        let cure = place.cure.insert(Cure::default());
+        // The loop that cures the published observer.
+        fill!(p, cure, {
+            define OmegaN([CURE_RAD_S] * T),
+            gain proportional(CtlObsCure, [2.0] * OmegaN / Tau),
+            gain integral(CtlObsCure, OmegaN * OmegaN / Tau),
+        });
     }
 }

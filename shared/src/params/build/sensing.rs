@@ -1,9 +1,9 @@
 //! Coefficients of the sensing, of the dead time and of the bridge's preparation.
 
-use core::f32::consts::{SQRT_2, TAU};
+use core::f32::consts::SQRT_2;
 
-use fixed::types::{I0F32, I2F30};
-
+use super::formula::{define, fill, value};
+use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::modulator::Modulation;
 use crate::control::sensing::{self, Shunts};
@@ -11,7 +11,7 @@ use crate::control::{catch, dead_time};
 use crate::drive::Charge;
 use crate::math::{Real, SQRT_3};
 use crate::params::ParamId;
-use crate::units::{AdcCounts, Duty, Speed};
+use crate::units::Duty;
 
 /// Time for which the offsets are measured, s; rounded to a power of two of periods. 5 ms leave a
 /// tenth of one reading's noise.
@@ -63,7 +63,8 @@ const UNFIT_S: f32 = 0.004;
 /// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high
 /// sides supplied; and the greatest duty of a phase that is read.
 pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
-    let with_low_side_on = |s: f32| 1.0 - (s + 2.0 * p.dead_time_s) / p.period_s;
+    let (period_s, dead_time_s) = (p.scale.period_s, p.of(Quantity::DeadTime));
+    let with_low_side_on = |s: f32| 1.0 - (s + 2.0 * dead_time_s) / period_s;
     let window = with_low_side_on(p.board.low_side_on_s);
     let supplied = with_low_side_on(p.board.refresh_s);
     let read = match p.board.shunts {
@@ -77,12 +78,13 @@ pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
                 Modulation::SpaceVector => 0.5 + SQRT_3 / 4.0,
                 Modulation::Sine => 0.75,
             };
-            (window - p.dead_time_s / p.period_s) / second
+            (window - dead_time_s / period_s) / second
         }
     };
     let duty_max = read.min(supplied);
-    p.refuse_if(
-        window.min(duty_max) < 0.5,
+    p.refuse_above(
+        0.5,
+        window.min(duty_max),
         ParamId::PwmFreqHz,
         "too high: the low sides could not be read",
     );
@@ -90,62 +92,58 @@ pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
 }
 
 /// The currents' offsets and reconstruction.
-pub(super) fn sensing(p: &Si, window: f32) -> sensing::Config {
+pub(super) fn sensing(p: &Si, window: f32, place: &mut sensing::Config) {
     // To the nearest power on a scale of logarithms: down from √2 times as many.
-    let readings = SQRT_2 * ZERO_S / p.period_s;
-    sensing::Config {
-        shunts: p.board.shunts,
-        window: Duty::from_f32(window),
-        // 5 at 8 kHz to 8 at 60 kHz.
-        zero_readings_log2: (readings as u32).checked_ilog2().unwrap_or(0),
-        offset_max: AdcCounts::from_f32(
-            OFFSET_SHARE * p.board.current_range_a / p.board.current_a_per_count,
-        ),
-    }
+    let readings = p.periods(SQRT_2 * ZERO_S);
+    place.shunts = p.board.shunts;
+    place.window = Duty::from_f32(window);
+    // 5 at 8 kHz to 8 at 60 kHz.
+    place.zero_readings_log2 = readings.checked_ilog2().unwrap_or(0);
+    fill!(p, place, { number offset_max([OFFSET_SHARE] * RangeA / APerCount) });
 }
 
 /// The observation of the terminals while the bridge is off.
-pub(super) fn catch(p: &Si) -> catch::Config {
-    let look_s = catch::LOOK_PERIODS as f32 * p.period_s;
-    let counts_per_turn = p.flux_wb * TAU / (p.period_s * p.board.terminal_v_per_count);
-    let standing: Speed = p
+pub(super) fn catch(p: &Si, place: &mut catch::Config) {
+    let standing = p
         .scale
-        .speed_from_rpm(STANDING_SHARE * p.from_motor.run_rpm);
-    let standing_counts = HIGHEST_SHARE * counts_per_turn * standing.to_f32();
-    let share = |time_s: f32| I0F32::from_f32(look_s / time_s);
-    let looks = |time_s: f32| (time_s / look_s) as u32;
-    let per_look = p.period_s / look_s;
-    catch::Config {
-        emf: (256.0 * counts_per_turn) as u32,
-        diode: AdcCounts::from_f32(DIODE_V / p.board.terminal_v_per_count),
-        prior: (TERMINAL_NOISE_COUNTS * counts_per_turn * per_look / TAU) as u32,
-        forget_min: share(MEMORY_S),
-        standing: AdcCounts::from_f32(standing_counts.max(TERMINAL_FLOOR_COUNTS)),
-        level_share: share(LEVEL_S),
-        sure_looks: looks(SURE_S),
-        lost_looks: looks(UNFIT_S),
-    }
+        .speed_from_rpm(STANDING_SHARE * p.of(Quantity::RunRpm));
+    p.set(Quantity::Standing, standing.to_f32());
+    fill!(p, place, {
+        define LookS([catch::LOOK_PERIODS as f32] * T),
+        define PerLook(T / LookS),
+        define CountS(T * TerminalVPerCount),
+        define CountsPerTurn(Flux * Tau / CountS),
+        count emf([256.0] * CountsPerTurn),
+        number diode([DIODE_V] / TerminalVPerCount),
+        count prior([TERMINAL_NOISE_COUNTS] * CountsPerTurn * PerLook / Tau),
+        number forget_min(LookS / [MEMORY_S]),
+        number standing(
+            [HIGHEST_SHARE] * CountsPerTurn * Standing max [TERMINAL_FLOOR_COUNTS]
+        ),
+        number level_share(LookS / [LEVEL_S]),
+        count sure_looks([SURE_S] / LookS),
+        count lost_looks([UNFIT_S] / LookS),
+    });
 }
 
 /// The dead time's compensation.
-pub(super) fn dead_time(p: &Si) -> dead_time::Config {
-    let duty = p.dead_time_s / p.period_s;
-    dead_time::Config {
-        certainty: p.gain(ParamId::PwmDeadtimeNs, p.scale.current_a / SIGN_CERTAIN_A),
-        duty: I2F30::from_f32(duty),
-    }
+pub(super) fn dead_time(p: &Si, place: &mut dead_time::Config) {
+    fill!(p, place, {
+        gain certainty(PwmDeadtimeNs, UnitA / [SIGN_CERTAIN_A]),
+        number duty(DeadTime / T),
+    });
 }
 
 /// The low sides' pulses before a switch-on: as wide as the back-EMF of the fastest rotor allows,
 /// but wide enough to be read and at most half a period, and as many as the board's time takes.
 pub(super) fn charge(p: &Si) -> Charge {
-    let rad_s = p.get(ParamId::CtlRpmMax) * p.pole_pairs * TAU / 60.0;
-    let rise_a_s = rad_s * p.flux_wb / p.inductance_h;
-    let allowed_s = CHARGE_CURRENT_SHARE * p.get(ParamId::LimPhaseA) / rise_a_s;
-    let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * p.period_s);
+    let period_s = p.scale.period_s;
+    define!(p, { RiseAS(FastestRadS * Flux / L) });
+    let allowed_s = value!(p, [CHARGE_CURRENT_SHARE] * LimitA / RiseAS);
+    let pulse_s = allowed_s.max(p.board.low_side_on_s).min(0.5 * period_s);
     let periods = (p.board.charge_s / pulse_s) as u32 + 1;
     Charge {
-        duty: Duty::from_f32(pulse_s / p.period_s),
+        duty: Duty::from_f32(pulse_s / period_s),
         periods,
         spared_periods: periods.saturating_sub(p.periods(UNSEEN_S)),
     }
@@ -153,6 +151,8 @@ pub(super) fn charge(p: &Si) -> Charge {
 
 #[cfg(test)]
 mod tests {
+    use core::f32::consts::TAU;
+
     use super::*;
     use crate::control::modulator::{Supply, duties};
     use crate::control::transform::{AlphaBeta, Order};

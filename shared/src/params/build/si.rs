@@ -3,14 +3,14 @@
 use core::cell::Cell;
 use core::f32::consts::{FRAC_PI_2, TAU};
 
-use fixed::types::extra::Unsigned;
-
-use crate::math::{Gain, Multiplier, Number, Real, gain_parts};
+use super::formula::define;
+use super::quantity::Quantity;
+use crate::control::PERIODS;
 use crate::params::board::Board;
 use crate::params::from_motor::FromMotor;
 use crate::params::table::{Choice, ParamId};
 use crate::params::values::Params;
-use crate::units::{Scale, Speed, Voltage};
+use crate::units::Scale;
 
 /// The reason why parameters do not make a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,66 +32,123 @@ pub(super) const LINEARISED_SHARE: f32 = 0.75;
 pub(super) const SLOW_SHARE: f32 = 0.5;
 
 /// The reason for most refusals.
-const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
+pub(super) const OUT_OF_RANGE: &str = "makes a coefficient leave its range";
+
+/// The quantities that parameters give, in the unit of the parameter's times a factor.
+const GIVEN: &[(Quantity, ParamId, f32)] = &[
+    (Quantity::PwmHz, ParamId::PwmFreqHz, 1.0),
+    (Quantity::DeadTime, ParamId::PwmDeadtimeNs, 1e-9),
+    (Quantity::R, ParamId::MotRMohm, 1e-3),
+    (Quantity::L, ParamId::MotLUh, 1e-6),
+    (Quantity::Flux, ParamId::MotFluxMwb, 1e-3),
+    (Quantity::J, ParamId::MotJGcm2, 1e-7),
+    (Quantity::LimitA, ParamId::LimPhaseA, 1.0),
+    (Quantity::RegenA, ParamId::LimRegenA, 1.0),
+    (Quantity::SupplyA, ParamId::LimBusA, 1.0),
+    (Quantity::SupplyMinV, ParamId::LimBusVMin, 1.0),
+    (Quantity::SupplyMaxV, ParamId::LimBusVMax, 1.0),
+    (Quantity::FastestRpm, ParamId::CtlRpmMax, 1.0),
+    (Quantity::PropellerA, ParamId::CtlFfA, 1.0),
+    (Quantity::ToneA, ParamId::MotToneA, 1.0),
+];
 
 /// The source of the coefficients: the parameters that several blocks need in SI, and all else that
 /// there is.
 pub(super) struct Si<'a> {
     pub(super) params: &'a Params,
-    /// Which of them follow from the motor.
-    pub(super) from_motor: FromMotor,
     pub(super) board: &'a Board,
     pub(super) scale: Scale,
-    pub(super) period_s: f32,
-    pub(super) dead_time_s: f32,
-    pub(super) pole_pairs: f32,
-    pub(super) resistance_ohm: f32,
-    pub(super) inductance_h: f32,
-    pub(super) flux_wb: f32,
-    pub(super) inertia_kgm2: f32,
-    /// Bandwidth of the current loop, 1/s: 1/ε of (20), (21).
-    pub(super) current_rad_s: f32,
-    /// Bandwidth of the speed loop, 1/s: k_pω/J.
-    pub(super) speed_rad_s: f32,
-    /// Electrical speed at which (22) is linearised, 1/s.
-    pub(super) linearised_rad_s: f32,
+    /// What formulas are made of.
+    pub(super) quantities: &'a [Cell<f32>; Quantity::COUNT],
+    /// Those that are to be worked out next.
+    pub(super) formulas: Cell<&'static [u8]>,
     /// The first that was refused. Noted here and not returned: on the chip, a hundred early returns
     /// take more flash than the coefficients that they guard.
     pub(super) refused: &'a Cell<Option<BuildError>>,
 }
 
 impl<'a> Si<'a> {
+    /// Room for the quantities.
+    pub(super) fn quantities() -> [Cell<f32>; Quantity::COUNT] {
+        [const { Cell::new(0.0) }; Quantity::COUNT]
+    }
+
     /// Of parameters that are [in force](Params::in_force).
     pub(super) fn new(
         params: &'a Params,
         board: &'a Board,
+        quantities: &'a [Cell<f32>; Quantity::COUNT],
         refused: &'a Cell<Option<BuildError>>,
     ) -> Self {
-        let scale = scale_of(params, board);
-        let Scale {
-            period_s,
-            pole_pairs,
-            ..
-        } = scale;
-        let from_motor = FromMotor::new(params);
-        let rpm = LINEARISED_SHARE * params.get(ParamId::CtlRpmMax);
         Self {
             params,
-            from_motor,
             board,
-            scale,
-            period_s,
-            dead_time_s: params.get(ParamId::PwmDeadtimeNs) * 1e-9,
-            pole_pairs,
-            resistance_ohm: params.get(ParamId::MotRMohm) * 1e-3,
-            inductance_h: params.get(ParamId::MotLUh) * 1e-6,
-            flux_wb: params.get(ParamId::MotFluxMwb) * 1e-3,
-            inertia_kgm2: params.get(ParamId::MotJGcm2) * 1e-7,
-            current_rad_s: TAU * from_motor.current_hz,
-            speed_rad_s: TAU * from_motor.speed_hz,
-            linearised_rad_s: rpm * pole_pairs * TAU / 60.0,
+            scale: scale_of(params, board),
+            quantities,
+            formulas: Cell::new(&[]),
             refused,
         }
+    }
+
+    /// Gives the quantities that several blocks need their values. Apart from [`Si::new`], since the chip would
+    /// copy them all to where they are kept.
+    pub(super) fn prepare(&self) {
+        for (quantity, param, factor) in GIVEN {
+            self.set(*quantity, self.params.get(*param) * factor);
+        }
+        let from_motor = FromMotor::new(self.params);
+        self.set(Quantity::LeastRpm, from_motor.least_rpm);
+        self.set(Quantity::SlewRpmS, from_motor.slew_rpm_s);
+        self.set(Quantity::CurrentHz, from_motor.current_hz);
+        self.set(Quantity::SpeedHz, from_motor.speed_hz);
+        self.set(Quantity::ParkAs, from_motor.park_as);
+        self.set(Quantity::RampA, from_motor.ramp_a);
+        self.set(Quantity::RampRpmS, from_motor.ramp_rpm_s);
+        self.set(Quantity::RunRpm, from_motor.run_rpm);
+        self.set(Quantity::DeadV, from_motor.dead_v);
+        self.set(Quantity::APerCount, self.board.current_a_per_count);
+        self.set(Quantity::BusVPerCount, self.board.bus_v_per_count);
+        self.set(Quantity::TerminalVPerCount, self.board.terminal_v_per_count);
+        self.set(Quantity::RangeA, self.board.current_range_a);
+        self.set(Quantity::T, self.scale.period_s);
+        self.set(Quantity::UnitA, self.scale.current_a);
+        self.set(Quantity::UnitV, self.scale.voltage_v);
+        self.set(Quantity::PolePairs, self.scale.pole_pairs);
+        define!(self, {
+            Tau([TAU]),
+            UnitWb(UnitV * T),
+            UnitPerWb(Tau / UnitWb),
+            UnitNm([1.5] * PolePairs * UnitA / UnitPerWb),
+            UnitAs(UnitA * T),
+            TurnsPerRpm(PolePairs * T / [60.0]),
+            RadPerUnit(Tau / T),
+            VoltagePerCurrent(UnitA / UnitV),
+            CurrentPerVoltage(UnitV / UnitA),
+            FluxPerCurrent(UnitA / UnitWb),
+            MechanicalT(PolePairs * T),
+            UnitRadS(Tau / MechanicalT),
+            TorquePerSpeed(UnitRadS / UnitNm),
+            OuterT([PERIODS as f32] * T),
+            ROverL(R / L),
+            CurrentRadS(Tau * CurrentHz),
+            SpeedRadS(Tau * SpeedHz),
+            LinearisedRadS([LINEARISED_SHARE] * FastestRpm * PolePairs * Tau / [60.0]),
+            FastestRadS(FastestRpm * PolePairs * Tau / [60.0]),
+            FastestTurns(FastestRpm * PolePairs * T / [60.0]),
+            SlowestRpm(RunRpm min LeastRpm),
+            SlowRpm([SLOW_SHARE] * SlowestRpm),
+            StartA(RampA min LimitA),
+        });
+    }
+
+    /// The value of a quantity.
+    pub(super) fn of(&self, quantity: Quantity) -> f32 {
+        self.quantities[usize::from(quantity.0)].get()
+    }
+
+    /// Gives a quantity its value.
+    pub(super) fn set(&self, quantity: Quantity, value: f32) {
+        self.quantities[usize::from(quantity.0)].set(value);
     }
 
     pub(super) fn get(&self, id: ParamId) -> f32 {
@@ -108,46 +165,19 @@ impl<'a> Si<'a> {
 
     /// A time in whole periods.
     pub(super) fn periods(&self, time_s: f32) -> u32 {
-        (time_s / self.period_s) as u32
+        (time_s / self.of(Quantity::T)) as u32
     }
 
-    /// Below this speed Run ends, and the flux is not followed, rpm.
-    pub(super) fn slow_rpm(&self) -> f32 {
-        SLOW_SHARE * self.from_motor.run_rpm.min(self.from_motor.least_rpm)
-    }
-
-    /// As [`Self::slow_rpm`].
-    pub(super) fn slow(&self) -> Speed {
-        self.scale.speed_from_rpm(self.slow_rpm())
-    }
-
-    /// A volt number in the control's unit. Never inlined: each limit in volts is one.
-    #[inline(never)]
-    pub(super) fn voltage(&self, volts: f32) -> Voltage {
-        Voltage::from_f32(volts / self.scale.voltage_v)
-    }
-
-    /// The gain of value `k`; if there is none, the parameter is refused.
-    pub(super) fn gain<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Gain<A, B> {
-        let (mantissa, shift) = self.gain_parts(param, k, B::Frac::I32 - A::Frac::I32);
-        Gain::from_parts(mantissa, shift)
-    }
-
-    /// The factor of value `k`; if it leaves its type's range, the parameter is refused.
-    pub(super) fn factor<A: Number, B: Number>(&self, param: ParamId, k: f32) -> Multiplier<A, B> {
-        Multiplier::from_bits(self.factor_bits(param, k, B::Frac::I32 - A::Frac::I32))
-    }
-
-    pub(super) fn factor_bits(&self, param: ParamId, k: f32, exponent: i32) -> i32 {
-        let (bits, shift) = self.gain_parts(param, k, exponent);
-        self.refuse_if(shift != 0, param, OUT_OF_RANGE);
-        bits
-    }
-
-    pub(super) fn gain_parts(&self, param: ParamId, k: f32, exponent: i32) -> (i32, u32) {
-        let parts = gain_parts(k, exponent);
-        self.refuse_if(parts.is_none(), param, OUT_OF_RANGE);
-        parts.unwrap_or((0, 0))
+    /// Refuses a parameter where one value is above another.
+    #[inline(never)] // the comparison would be at each of many
+    pub(super) fn refuse_above(
+        &self,
+        value: f32,
+        limit: f32,
+        param: ParamId,
+        reason: &'static str,
+    ) {
+        self.refuse_if(value > limit, param, reason);
     }
 
     /// Refuses a parameter in some case, unless another has been refused before. Never inlined: each

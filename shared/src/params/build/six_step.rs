@@ -2,12 +2,13 @@
 
 use core::f32::consts::TAU;
 
-use fixed::types::{I1F31, I36F28};
+use fixed::types::I1F31;
 
+use super::formula::{fill, value};
 use super::outer;
+use super::quantity::Quantity;
 use super::si::{Si, TEST_SHARE};
 use crate::control::delay::Delay;
-use crate::control::six_step::{crossing, duty};
 use crate::drive::config::six_step::Config;
 use crate::math::Real;
 use crate::params::ParamId;
@@ -47,50 +48,46 @@ const ASTRAY_S: f32 = 0.9;
 /// Greatest current against the rotation, of `LIM_PHASE_A`.
 const BRAKING_SHARE: f32 = 0.25;
 
-pub(super) fn six_step(p: &Si, duty_max: f32) -> Config {
-    let get = |id| p.get(id);
-    let fastest = get(ParamId::CtlRpmMax) * p.pole_pairs * p.period_s / 60.0;
-    p.refuse_if(
-        6.0 * fastest * LEAST_PERIODS > 1.0,
+pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
+    p.refuse_above(
+        value!(p, [6.0] * FastestTurns * [LEAST_PERIODS]),
+        1.0,
         ParamId::PwmFreqHz,
         "less than four periods a sextant at CTL_RPM_MAX",
     );
-    let limit_a = get(ParamId::LimPhaseA);
-    let start_a = p.from_motor.ramp_a.min(limit_a);
-    let count_v = p.board.terminal_v_per_count;
-    let k_p = PROPORTIONAL / fastest;
-    let corner = CORNER_SHARE * TAU * p.from_motor.speed_hz;
-    let bound = BOUND_RATE * p.period_s * p.scale.current_a / limit_a.max(BOUND_LEAST_A);
-    let step = p.from_motor.ramp_rpm_s * p.period_s * p.pole_pairs * p.period_s / 60.0;
-    Config {
-        planner: outer::planner(p, p.period_s),
-        terminal: p.gain(ParamId::LimBusVMax, count_v / p.scale.voltage_v),
-        crossing: crossing::Config {
-            least: p.voltage(LEAST_V.max(LEAST_COUNTS * count_v)),
-            greatest: p.voltage(GREATEST_COUNTS * count_v),
-            delayed: match p.board.delay {
-                Delay::None | Delay::Half => 0,
-                Delay::One => 1,
-            },
-        },
-        duty: duty::Config {
-            k_p: p.gain(ParamId::CtlRpmMax, k_p),
-            k_i: p.gain(ParamId::CtlBwSpdHz, k_p * corner * p.period_s),
-            k_b: p.gain(ParamId::LimPhaseA, bound),
-            duty_max: I1F31::from_f32(duty_max),
-        },
-        delay: p.board.delay,
-        braking: p.scale.current_from_a(BRAKING_SHARE * limit_a),
-        start_current: p.scale.current_from_a(start_a),
-        test_current: p.scale.current_from_a(TEST_SHARE * limit_a),
-        park_charge: I36F28::from_f32(p.from_motor.park_as / (p.scale.current_a * p.period_s)),
-        ramp: p.gain(
-            ParamId::StaRampRpmS,
-            step * p.scale.current_a / p.from_motor.ramp_a,
-        ),
-        patience: (PATIENCE_S / p.period_s) as u16,
-        astray: (ASTRAY_S / p.period_s) as u16,
-        run_speed: p.scale.speed_from_rpm(p.from_motor.run_rpm),
-        slow: p.slow(),
-    }
+    outer::planner(p, Quantity::T, &mut place.planner);
+    let crossing = &mut place.crossing;
+    fill!(p, crossing, {
+        define LeastV([LEAST_COUNTS] * TerminalVPerCount max [LEAST_V]),
+        number least(LeastV / UnitV),
+        define GreatestV([GREATEST_COUNTS] * TerminalVPerCount),
+        number greatest(GreatestV / UnitV),
+    });
+    crossing.delayed = match p.board.delay {
+        Delay::None | Delay::Half => 0,
+        Delay::One => 1,
+    };
+    let duty = &mut place.duty;
+    fill!(p, duty, {
+        define KP([PROPORTIONAL] / FastestTurns),
+        define CornerRadS([CORNER_SHARE * TAU] * SpeedHz),
+        define BoundA(LimitA max [BOUND_LEAST_A]),
+        gain k_p(CtlRpmMax, KP),
+        gain k_i(CtlBwSpdHz, KP * CornerRadS * T),
+        gain k_b(LimPhaseA, [BOUND_RATE] * T * UnitA / BoundA),
+    });
+    duty.duty_max = I1F31::from_f32(duty_max);
+    place.delay = p.board.delay;
+    place.patience = p.periods(PATIENCE_S) as u16;
+    place.astray = p.periods(ASTRAY_S) as u16;
+    fill!(p, place, {
+        gain terminal(LimBusVMax, TerminalVPerCount / UnitV),
+        number braking([BRAKING_SHARE] * LimitA / UnitA),
+        number start_current(StartA / UnitA),
+        number test_current([TEST_SHARE] * LimitA / UnitA),
+        gain ramp(StaRampRpmS, RampRpmS * T * PolePairs * T / [60.0] * UnitA / RampA),
+        charge park_charge(ParkAs / UnitAs),
+        number run_speed(RunRpm * TurnsPerRpm),
+        number slow(SlowRpm * TurnsPerRpm),
+    });
 }

@@ -2,13 +2,12 @@
 
 use core::f32::consts::TAU;
 
-use fixed::types::I36F28;
-
+use super::formula::{define, fill, value};
+use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::start;
 use crate::drive::ATTEMPTS;
-use crate::math::{Real, square_root};
-use crate::params::ParamId;
+use crate::math::square_root;
 use crate::units::INVERSE_FLUX_NOMINAL;
 
 /// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
@@ -40,55 +39,52 @@ const ASTRAY_SWINGS: f32 = 1.0;
 /// Puts the attempts of a start (section 3.2 of the second paper) into their places: each with more
 /// current, up to `LIM_PHASE_A`, and slower than the one before.
 pub(super) fn attempts(p: &Si, places: &mut [start::Config; ATTEMPTS]) {
-    let mut current_a = p.from_motor.ramp_a;
+    let mut current_a = p.of(Quantity::RampA);
     for (place, inertia) in places.iter_mut().zip(INERTIA) {
-        let bounded_a = current_a.min(p.get(ParamId::LimPhaseA));
-        *place = attempt(p, bounded_a, inertia * p.inertia_kgm2);
+        p.set(Quantity::AttemptA, current_a);
+        p.set(Quantity::AttemptJ, inertia * p.of(Quantity::J));
+        attempt(p, place);
         current_a *= CURRENT_GROWTH;
     }
 }
 
-fn attempt(p: &Si, current_a: f32, inertia_kgm2: f32) -> start::Config {
-    // What the current can accelerate, in electrical rad/s²: p·1.5·p·φ·I/J.
-    let torque_nm = 1.5 * p.pole_pairs * p.flux_wb * current_a;
-    let possible = TORQUE_SHARE * p.pole_pairs * torque_nm / inertia_kgm2;
-    let asked = p.from_motor.ramp_rpm_s * p.pole_pairs * TAU / 60.0;
-    let acceleration = asked.min(possible);
-    let step = acceleration / TAU * p.period_s * p.period_s;
+fn attempt(p: &Si, place: &mut start::Config) {
+    define!(p, {
+        AttemptA(AttemptA min LimitA),
+        // What the current can accelerate, in electrical rad/s²: p·1.5·p·φ·I/J.
+        TorqueNm([1.5] * PolePairs * Flux * AttemptA),
+        PossibleRadS2([TORQUE_SHARE] * PolePairs * TorqueNm / AttemptJ),
+        RampRadS2(RampRpmS * PolePairs * Tau / [60.0] min PossibleRadS2),
+    });
     // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
     // 2ζ/ω_n a unit of speed damps it by ζ.
-    let swing_rad_s = square_root(p.pole_pairs * torque_nm / inertia_kgm2);
-    let yielding_s = 2.0 * SWING_DAMPING / swing_rad_s;
-    let swing_as = PARK_SWINGS * TAU / swing_rad_s * current_a;
-    let park_as = p.from_motor.park_as.max(swing_as);
-    let park_charge = park_as / (p.scale.current_a * p.period_s);
-    let voltage_per_current = p.scale.current_a / p.scale.voltage_v;
-    start::Config {
-        current: p.scale.current_from_a(current_a),
-        yielding: p.gain(ParamId::MotJGcm2, yielding_s / p.period_s),
-        yield_rate: p.gain(
-            ParamId::MotJGcm2,
-            (YIELD_RATE_SHARE * swing_rad_s * p.period_s).min(YIELD_RATE_MAX),
-        ),
-        park_charge: I36F28::from_f32(park_charge),
+    let swing_rad_s = square_root(value!(p, PolePairs * TorqueNm / AttemptJ));
+    p.set(Quantity::SwingRadS, swing_rad_s);
+    fill!(p, place, {
+        number current(AttemptA / UnitA),
+        gain yielding(MotJGcm2, [2.0 * SWING_DAMPING] / SwingRadS / T),
+        gain yield_rate(MotJGcm2, [YIELD_RATE_SHARE] * SwingRadS * T min [YIELD_RATE_MAX]),
+        define SwingAs([PARK_SWINGS * TAU] / SwingRadS * AttemptA),
+        define ParkCharge(ParkAs max SwingAs / UnitAs),
+        charge park_charge(ParkCharge),
+        define HalfCharge([0.5] * ParkCharge),
         // A third of a turn, from one phase's axis to the next one's, in the first half.
-        sweep: p.gain(ParamId::StaParkAs, 1.0 / 3.0 / (0.5 * park_charge)),
-        k_s: p.gain(ParamId::StaRampRpmS, step * p.scale.current_a / current_a),
-        astray_periods: (ASTRAY_SWINGS * TAU / (swing_rad_s * p.period_s)) as u32,
-        resistance: p.gain(ParamId::MotRMohm, p.resistance_ohm * voltage_per_current),
-        reactance: p.gain(
-            ParamId::MotLUh,
-            p.inductance_h * voltage_per_current * TAU / p.period_s,
-        ),
-        run_speed: p.scale.speed_from_rpm(p.from_motor.run_rpm),
-        xi_nominal: INVERSE_FLUX_NOMINAL,
-    }
+        gain sweep(StaParkAs, [1.0 / 3.0] / HalfCharge),
+        gain k_s(StaRampRpmS, RampRadS2 / Tau * T * T * UnitA / AttemptA),
+        define SwingTurns(SwingRadS * T),
+        count astray_periods([ASTRAY_SWINGS * TAU] / SwingTurns),
+        gain resistance(MotRMohm, R * VoltagePerCurrent),
+        gain reactance(MotLUh, L * VoltagePerCurrent * Tau / T),
+        number run_speed(RunRpm * TurnsPerRpm),
+    });
+    place.xi_nominal = INVERSE_FLUX_NOMINAL;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::params::{BOSSO_BENCH, Board, Params, build};
+    use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
+    use core::f32::consts::TAU;
 
     fn config(changes: &[(ParamId, f32)]) -> crate::drive::Config {
         let mut params = Params::of(&BOSSO_BENCH);

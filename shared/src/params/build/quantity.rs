@@ -1,0 +1,159 @@
+//! The quantities that formulas are made of.
+
+/// A quantity that formulas are made of, in SI units unless its name has another.
+#[derive(Clone, Copy)]
+pub(super) struct Quantity(pub(super) u8);
+
+/// Names the quantities: those that stay, and those of blocks, which take each other's places.
+macro_rules! quantities {
+    (
+        stay { $($(#[$attribute:meta])* $name:ident,)* }
+        $(own { $($own:ident),* $(,)? })*
+    ) => {
+        const STAY: usize = [$(stringify!($name)),*].len();
+
+        const _: () = {
+            #[repr(u8)]
+            enum Place {
+                $($name),*
+            }
+
+            #[allow(non_upper_case_globals, reason = "they are told apart as variants are")]
+            impl Quantity {
+                $($(#[$attribute])* pub(super) const $name: Self = Self(Place::$name as u8);)*
+            }
+        };
+
+        $(const _: () = {
+            #[repr(u8)]
+            enum Place {
+                $($own),*
+            }
+
+            #[allow(non_upper_case_globals, reason = "they are told apart as variants are")]
+            impl Quantity {
+                $(pub(super) const $own: Self = Self(STAY as u8 + Place::$own as u8);)*
+            }
+
+            assert!([$(stringify!($own)),*].len() <= OWN);
+        };)*
+    };
+}
+
+/// Most quantities that a block has for itself.
+const OWN: usize = 14;
+
+impl Quantity {
+    /// Places that they take.
+    pub(super) const COUNT: usize = STAY + OWN;
+}
+
+quantities! {
+    stay {
+        /// A whole turn, 2π.
+        Tau,
+        // Of the parameters.
+        PwmHz,
+        DeadTime,
+        PolePairs,
+        R,
+        L,
+        Flux,
+        J,
+        /// `LIM_PHASE_A`.
+        LimitA,
+        RegenA,
+        SupplyA,
+        SupplyMinV,
+        SupplyMaxV,
+        FastestRpm,
+        PropellerA,
+        ToneA,
+        // Of those that follow from the motor.
+        LeastRpm,
+        SlewRpmS,
+        CurrentHz,
+        SpeedHz,
+        ParkAs,
+        RampA,
+        RampRpmS,
+        RunRpm,
+        /// What the dead time takes of a phase's voltage.
+        DeadV,
+        // Of the board.
+        APerCount,
+        BusVPerCount,
+        TerminalVPerCount,
+        RangeA,
+        // The control's units.
+        /// The control period T_s.
+        T,
+        UnitA,
+        UnitV,
+        UnitWb,
+        UnitPerWb,
+        UnitNm,
+        UnitAs,
+        TurnsPerRpm,
+        RadPerUnit,
+        VoltagePerCurrent,
+        CurrentPerVoltage,
+        FluxPerCurrent,
+        TorquePerSpeed,
+        /// The period over which the shaft turns by what the field turns by in one.
+        MechanicalT,
+        /// Of the mechanical speed.
+        UnitRadS,
+        // Of the motor and its loops.
+        /// A period of the outer loops.
+        OuterT,
+        ROverL,
+        /// Bandwidth of the current loop, 1/s: 1/ε of (20), (21).
+        CurrentRadS,
+        /// Bandwidth of the speed loop, 1/s: k_pω/J.
+        SpeedRadS,
+        /// The electrical speed at which (22) is linearised.
+        LinearisedRadS,
+        /// The electrical speed at `CTL_RPM_MAX`.
+        FastestRadS,
+        /// The same in turns a period.
+        FastestTurns,
+        SlowestRpm,
+        /// Below this speed Run ends, and the flux is not followed.
+        SlowRpm,
+        /// The start's current, within `LIM_PHASE_A`.
+        StartA,
+        // On the way to the coefficients of more than one block.
+        KP,
+        PoleRadS,
+        Share,
+        BoundA,
+    }
+    // Of low speed and the limits.
+    own { BiasA, DeadEndV, ReturnV, EndV, EndRadS }
+    // Of the edges.
+    own {
+        StatorFlux, CornerS, Turns, Ae, SlowRadS, TauInt, Edges, Acceleration, Known, Lag,
+        WholeTurnsHz, FilterHz, WholeTurnsRpm, FilterRpm,
+    }
+    // Of the start.
+    own {
+        AttemptA, AttemptJ, TorqueNm, PossibleRadS2, RampRadS2, SwingRadS, SwingTurns, SwingAs,
+        ParkCharge, HalfCharge,
+    }
+    // Of the other observers.
+    own { Decay, ActsS, Chi, ChiSquare, OmegaN }
+    // Of the regulators.
+    own { KI, SlopeV, EmfTurns, TurnsPerVoltage }
+    // Of the outer loop.
+    own {
+        Slower, SlowerS, Slew, PlannerT, Inertia, Trusted, NmPerA, APerNm, Fastest, FastestSquare,
+        CurrentPerSpeed,
+    }
+    // Of the sensing.
+    own { LookS, CountS, CountsPerTurn, PerLook, Standing, RiseAS }
+    // Of the six-step drive.
+    own { CornerRadS, LeastV, GreatestV }
+    // Of the tones.
+    own { LedA }
+}
