@@ -37,7 +37,7 @@ impl<F: Unsigned> Real for FixedU32<F> {
 
 impl<F: Unsigned> Real for FixedI64<F> {
     fn from_f32(value: f32) -> Self {
-        Self::from_bits(libm::rintf(value * power_of_two(F::I32)) as i64)
+        Self::from_bits(whole_long(value, F::I32))
     }
 
     fn to_f32(self) -> f32 {
@@ -56,6 +56,25 @@ pub(crate) fn whole(value: f32, places: i32) -> i32 {
 fn whole_unsigned(value: f32, places: i32) -> u32 {
     // What a float has beside 32 bits are zeros.
     libm::rintf(value * power_of_two(places)) as u32
+}
+
+/// As [`whole`], of 64 bits: by halves, since the chip's unit converts 32 bits, and the compiler's function for
+/// 64 is as long again.
+#[inline(never)]
+fn whole_long(value: f32, places: i32) -> i64 {
+    let magnitude = value.abs();
+    let high = (magnitude * power_of_two(places - 32)) as u32;
+    // Exact: a float has fewer bits than a half.
+    let rest = magnitude - high as f32 * power_of_two(32 - places);
+    let low = libm::rintf(rest * power_of_two(places)) as u32;
+    match (high > i32::MAX as u32, value < 0.0) {
+        (true, false) => i64::MAX,
+        (true, true) => i64::MIN,
+        (false, negative) => {
+            let bits = i64::from(high) << 32 | i64::from(low);
+            if negative { -bits } else { bits }
+        }
+    }
 }
 
 /// The nearest whole number, of two the even one.

@@ -82,9 +82,9 @@ impl Params {
         self.number(C::PARAM) == choice.number()
     }
 
-    /// Never inlined: the conversion would be at every choice.
+    /// A small whole number. Never inlined: the conversion would be at every choice.
     #[inline(never)]
-    fn number(&self, id: ParamId) -> u8 {
+    pub(super) fn number(&self, id: ParamId) -> u8 {
         self.get(id) as u8
     }
 

@@ -176,7 +176,7 @@ fn define_filter(p: &Si, tau_s: f32) {
 
 /// Section 2.4.
 fn estimator(p: &Si, settings: &FluxSettings, place: &mut position::Config) {
-    place.turns = settings.turns as u8;
+    place.turns = p.params.number(ParamId::CtlPosN);
     p.set(Quantity::WholeTurnsHz, settings.whole_turns_above_hz);
     p.set(Quantity::FilterHz, settings.filter_above_hz);
     fill!(p, place, {

@@ -13,7 +13,7 @@ pub fn input(params: &Params) -> Settings {
     let time_us = |id| u64::from((params.get(id) * 1000.0) as u32);
     let width_us = |id| params.get(id) as u16;
     Settings {
-        protocol: Signal::from_number(params.get(ParamId::InpProto) as u8),
+        protocol: Signal::from_number(params.number(ParamId::InpProto)),
         timing: Timing {
             arm_us: time_us(ParamId::InpArmMs),
             loss_us: time_us(ParamId::InpLossMs),

@@ -278,9 +278,9 @@ fn refuse_contradictions(p: &Si) {
             "less than twelve periods a turn at CTL_RPM_MAX",
         );
     }
-    let protocol = p.get(ParamId::InpProto);
+    let protocol = p.params.number(ParamId::InpProto);
     p.refuse_if(
-        protocol != 0.0 && Signal::from_number(protocol as u8).is_none(),
+        protocol != 0 && Signal::from_number(protocol).is_none(),
         ParamId::InpProto,
         "neither 0, 1 to 4, 10 to 13 nor 20 to 23",
     );
