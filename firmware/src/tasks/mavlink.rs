@@ -7,15 +7,15 @@ use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
-use embassy_time::{Duration, Instant, Ticker};
+use embassy_time::{Duration, Ticker};
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 
-use super::health;
 use super::light::Light;
 use super::supervisor::Supervisor;
 use super::throttle::Port;
 use super::trouble::Teller;
+use super::{health, now};
 use crate::exchange::{ConfigWriter, SnapshotReader};
 use crate::storage::{Storage, range};
 use crate::{interrupt, last_words};
@@ -93,7 +93,7 @@ impl MainTask<'_> {
 
     #[inline(never)]
     fn receive(&mut self, bytes: &[u8]) {
-        let now_us = Instant::now().as_micros();
+        let now_us = now().as_micros();
         let (esc, throttle) = (&mut self.esc, &mut self.throttle);
         self.receiver
             .push(now_us, bytes, |frame| esc.receive(throttle, now_us, frame));
@@ -117,7 +117,7 @@ impl MainTask<'_> {
     /// interrupt has not reported anything.
     #[inline(never)]
     fn look(&mut self) -> bool {
-        let now = Instant::now();
+        let now = now();
         self.supervisor.look(now);
         let snapshot = self.snapshot.read();
         self.light.look(now, snapshot.as_ref(), self.esc.light());

@@ -8,11 +8,10 @@
 mod capture;
 mod reply;
 
-use core::cell::RefCell;
+use core::cell::{RefCell, RefMut};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_time::Instant;
 use heapless::Vec;
 use siskin_control::answer::{Ask, Reply, Serial};
 use siskin_control::drive::{Setpoint, Snapshot};
@@ -22,9 +21,9 @@ use siskin_control::input::signal::Signal;
 use siskin_control::throttle::{Reach, Throttle};
 use static_cell::StaticCell;
 
-use super::kiss;
 use super::supervisor::throttle_lives;
 use super::trouble::TROUBLE;
+use super::{kiss, now};
 use crate::board;
 use crate::board::wire::{TICK_HZ, TIMER_BITS};
 use crate::edges::Edges;
@@ -59,8 +58,14 @@ impl Port {
 
 impl Reach for Port {
     fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T {
-        self.0.lock(|throttle| act(&mut throttle.borrow_mut()))
+        self.0.lock(|throttle| act(&mut borrow(throttle)))
     }
+}
+
+/// Never inlined: some twenty reaches have the check and its panic in common.
+#[inline(never)]
+fn borrow<'a>(throttle: &'a RefCell<&'static mut Throttle>) -> RefMut<'a, &'static mut Throttle> {
+    throttle.borrow_mut()
 }
 
 /// Longest time between two looks at the wire, which notice a lost signal and renew set-points.
@@ -372,7 +377,7 @@ fn edge_by_edge(throttle: &mut Throttle, edges: &mut Edges<TIMER_BITS>) -> Optio
 
 /// The time of the tasks.
 fn now_us() -> u64 {
-    Instant::now().as_micros()
+    now().as_micros()
 }
 
 /// So many eighths of a bit of a frame; 144 are the most.
