@@ -34,7 +34,7 @@ unsafe impl Impl for Basepri {
     // Never inlined: some sixty sections begin with it.
     #[inline(never)]
     unsafe fn acquire() -> RawRestoreState {
-        let before: u8;
+        let before: u32;
         // SAFETY: the two registers hold no memory; the instruction synchronisation makes the new
         // level good for the next instruction, and without `nomem` the compiler moves no access out
         // of the section.
@@ -56,7 +56,7 @@ unsafe impl Impl for Basepri {
         unsafe {
             asm!(
                 "msr BASEPRI, {before}",
-                before = in(reg) u32::from(before),
+                before = in(reg) before,
                 options(nostack, preserves_flags),
             );
         }
