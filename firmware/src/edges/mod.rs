@@ -31,7 +31,7 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
     /// it at the latest.
     pub(crate) fn new(memories: [&'static Memory; 2], settling_ticks: u32) -> Self {
         Self {
-            rings: memories.map(Ring::new),
+            rings: [Ring::new(memories[0]), Ring::new(memories[1])],
             settling_ticks,
             last_ticks: 0,
             settled_ticks: 0,
@@ -70,11 +70,17 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
         (ring.count() > 0).then(|| self.time(ring.word(0)))
     }
 
+    /// The time since an edge; negative while it is too young.
+    fn age(&self, ticks: u32) -> i32 {
+        self.settled_ticks.wrapping_sub(ticks) as i32
+    }
+
     /// The first edge that has come.
     pub(crate) fn first(&self) -> Option<u32> {
-        let age = |ticks: &u32| self.settled_ticks.wrapping_sub(*ticks) as i32;
-        let fronts = [self.front(0), self.front(1)];
-        fronts.into_iter().flatten().max_by_key(age)
+        match [self.front(0), self.front(1)] {
+            [Some(rising), Some(falling)] if self.age(rising) > self.age(falling) => Some(rising),
+            [rising, falling] => falling.or(rising),
+        }
     }
 
     /// True if the line was high before them, and the first and the second edge of each of 16 bits, if as many
@@ -159,9 +165,8 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
     /// The next edge of both directions. One that is too young waits: an older one of the other
     /// direction may still be on its way into memory. None as well if it was overwritten meanwhile.
     fn next(&mut self) -> Option<(u32, bool)> {
-        let age = |ticks: u32| self.settled_ticks.wrapping_sub(ticks) as i32;
         let fronts = [self.front(0), self.front(1)];
-        let [rising, falling] = fronts.map(|front| front.map(age));
+        let [rising, falling] = fronts.map(|front| front.map(|ticks| self.age(ticks)));
         let level = rising > falling;
         let direction = usize::from(!level);
         if [rising, falling][direction]? < 0 || self.rings.iter().any(Ring::is_torn) {
