@@ -11,11 +11,12 @@ use embassy_time::{Duration, Ticker};
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 
+use super::clock::now;
+use super::health;
 use super::light::Light;
 use super::supervisor::Supervisor;
 use super::throttle::Port;
 use super::trouble::Teller;
-use super::{health, now};
 use crate::exchange::{ConfigWriter, SnapshotReader};
 use crate::storage::{Storage, range};
 use crate::{interrupt, last_words};

@@ -7,6 +7,7 @@
 //! | `mavlink::transmit` | MAVLink out | thread |
 //! | `kiss::transmit` | telemetry on the serial line | thread |
 
+mod clock;
 pub(crate) mod health;
 pub(crate) mod kiss;
 pub(crate) mod light;
@@ -18,11 +19,3 @@ pub(crate) mod trouble;
 
 pub use mavlink::MainTask;
 pub use start::{Fit, power_up, start};
-
-use embassy_time::Instant;
-
-/// The time. Never inlined: the driver's code would stand in each place that asks for it.
-#[inline(never)]
-fn now() -> Instant {
-    Instant::now()
-}

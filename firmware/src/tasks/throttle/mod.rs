@@ -21,9 +21,10 @@ use siskin_control::input::signal::Signal;
 use siskin_control::throttle::{Reach, Throttle};
 use static_cell::StaticCell;
 
+use super::clock::now;
+use super::kiss;
 use super::supervisor::throttle_lives;
 use super::trouble::TROUBLE;
-use super::{kiss, now};
 use crate::board;
 use crate::board::wire::{TICK_HZ, TIMER_BITS};
 use crate::edges::Edges;

@@ -1,5 +1,6 @@
 //! The configuration that the parameters make: SI values become the control's coefficients, once.
 
+mod base;
 mod flux;
 mod formula;
 mod inductance;

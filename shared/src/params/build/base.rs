@@ -1,0 +1,81 @@
+//! The quantities that several blocks need, of which their formulas are made.
+
+use core::f32::consts::TAU;
+
+use super::formula::define;
+use super::quantity::Quantity;
+use super::si::{LINEARISED_SHARE, SLOW_SHARE, Si};
+use crate::control::PERIODS;
+use crate::params::from_motor::FromMotor;
+use crate::params::table::ParamId;
+
+/// The quantities that parameters give, in the unit of the parameter's times a factor.
+const GIVEN: &[(Quantity, ParamId, f32)] = &[
+    (Quantity::PwmHz, ParamId::PwmFreqHz, 1.0),
+    (Quantity::DeadTime, ParamId::PwmDeadtimeNs, 1e-9),
+    (Quantity::R, ParamId::MotRMohm, 1e-3),
+    (Quantity::L, ParamId::MotLUh, 1e-6),
+    (Quantity::Flux, ParamId::MotFluxMwb, 1e-3),
+    (Quantity::J, ParamId::MotJGcm2, 1e-7),
+    (Quantity::LimitA, ParamId::LimPhaseA, 1.0),
+    (Quantity::RegenA, ParamId::LimRegenA, 1.0),
+    (Quantity::SupplyA, ParamId::LimBusA, 1.0),
+    (Quantity::SupplyMinV, ParamId::LimBusVMin, 1.0),
+    (Quantity::SupplyMaxV, ParamId::LimBusVMax, 1.0),
+    (Quantity::FastestRpm, ParamId::CtlRpmMax, 1.0),
+    (Quantity::PropellerA, ParamId::CtlFfA, 1.0),
+    (Quantity::ToneA, ParamId::MotToneA, 1.0),
+];
+
+impl Si<'_> {
+    /// Gives the quantities that several blocks need their values. Apart from [`Si::new`], since the chip would
+    /// copy them all to where they are kept.
+    pub(super) fn prepare(&self) {
+        for (quantity, param, factor) in GIVEN {
+            self.set(*quantity, self.params.get(*param) * factor);
+        }
+        let from_motor = FromMotor::new(self.params);
+        self.set(Quantity::LeastRpm, from_motor.least_rpm);
+        self.set(Quantity::SlewRpmS, from_motor.slew_rpm_s);
+        self.set(Quantity::CurrentHz, from_motor.current_hz);
+        self.set(Quantity::SpeedHz, from_motor.speed_hz);
+        self.set(Quantity::ParkAs, from_motor.park_as);
+        self.set(Quantity::RampA, from_motor.ramp_a);
+        self.set(Quantity::RampRpmS, from_motor.ramp_rpm_s);
+        self.set(Quantity::RunRpm, from_motor.run_rpm);
+        self.set(Quantity::DeadV, from_motor.dead_v);
+        self.set(Quantity::APerCount, self.board.current_a_per_count);
+        self.set(Quantity::BusVPerCount, self.board.bus_v_per_count);
+        self.set(Quantity::TerminalVPerCount, self.board.terminal_v_per_count);
+        self.set(Quantity::RangeA, self.board.current_range_a);
+        self.set(Quantity::T, self.scale.period_s);
+        self.set(Quantity::UnitA, self.scale.current_a);
+        self.set(Quantity::UnitV, self.scale.voltage_v);
+        self.set(Quantity::PolePairs, self.scale.pole_pairs);
+        define!(self, {
+            Tau([TAU]),
+            UnitWb(UnitV * T),
+            UnitPerWb(Tau / UnitWb),
+            UnitNm([1.5] * PolePairs * UnitA / UnitPerWb),
+            UnitAs(UnitA * T),
+            TurnsPerRpm(PolePairs * T / [60.0]),
+            RadPerUnit(Tau / T),
+            VoltagePerCurrent(UnitA / UnitV),
+            CurrentPerVoltage(UnitV / UnitA),
+            FluxPerCurrent(UnitA / UnitWb),
+            MechanicalT(PolePairs * T),
+            UnitRadS(Tau / MechanicalT),
+            TorquePerSpeed(UnitRadS / UnitNm),
+            OuterT([PERIODS as f32] * T),
+            ROverL(R / L),
+            CurrentRadS(Tau * CurrentHz),
+            SpeedRadS(Tau * SpeedHz),
+            LinearisedRadS([LINEARISED_SHARE] * FastestRpm * PolePairs * Tau / [60.0]),
+            FastestRadS(FastestRpm * PolePairs * Tau / [60.0]),
+            FastestTurns(FastestRpm * PolePairs * T / [60.0]),
+            SlowestRpm(RunRpm min LeastRpm),
+            SlowRpm([SLOW_SHARE] * SlowestRpm),
+            StartA(RampA min LimitA),
+        });
+    }
+}
