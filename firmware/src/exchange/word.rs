@@ -1,7 +1,7 @@
 //! The set-point in one word, which an atomic store hands over whole.
 
 use fixed::types::I1F31;
-use siskin_control::drive::{Fault, Pull, Setpoint};
+use siskin_control::drive::{Excitation, Fault, Pull, Setpoint};
 use siskin_control::units::{Current, Speed};
 
 /// Kind of set-point, in the word's bits 31 to 29.
@@ -13,6 +13,7 @@ const TEST: u32 = 3;
 const VOLTAGE: u32 = 4;
 const TONE: u32 = 5;
 const PULL: u32 = 6;
+const EXCITE: u32 = 7;
 
 /// The sequence number's place: bits 28 to 24.
 const SEQUENCE_SHIFT: u32 = 24;
@@ -35,6 +36,7 @@ pub fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
         Setpoint::Test(current) => (TEST, value(current.to_bits())),
         Setpoint::Tone(pitch) => (TONE, value(pitch.to_bits())),
         Setpoint::Pull(pull) => (PULL, pull as u32),
+        Setpoint::Excite(excitation) => (EXCITE, excitation.to_word()),
         Setpoint::Voltage(share) => (VOLTAGE, value(share.to_bits())),
     };
     kind << KIND_SHIFT | (sequence & SEQUENCE_MASK) << SEQUENCE_SHIFT | value
@@ -50,6 +52,7 @@ pub fn unpack(word: u32) -> Setpoint {
         TEST => Setpoint::Test(Current::from_bits(bits)),
         TONE => Setpoint::Tone(Speed::from_bits(bits)),
         PULL => Setpoint::Pull(Pull::from_number(word as u8)),
+        EXCITE => Setpoint::Excite(Excitation::from_word(word & VALUE_MASK)),
         VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
         _ => rest(word & VALUE_MASK),
     }
@@ -73,6 +76,8 @@ fn rest(number: u32) -> Setpoint {
 
 #[cfg(test)]
 mod tests {
+    use siskin_control::drive::Ripple;
+
     use super::*;
 
     #[test]
@@ -88,6 +93,13 @@ mod tests {
             Setpoint::Speed(Speed::from_bits(-0x1234_5600)),
         ];
         all.extend(Pull::ALL.map(Setpoint::Pull));
+        for (phase, ripple) in [(0, Ripple::None), (1, Ripple::Along), (2, Ripple::Across)] {
+            all.push(Setpoint::Excite(Excitation {
+                phase,
+                current: Current::from_num(0.375),
+                ripple,
+            }));
+        }
         all.extend(Fault::ALL.map(Setpoint::Fault));
         for setpoint in all {
             for number in [0, 1, 31] {
@@ -111,7 +123,6 @@ mod tests {
     #[test]
     fn a_word_that_nobody_writes_is_stop() {
         assert_eq!(unpack(9), Setpoint::Stop);
-        assert_eq!(unpack(7 << KIND_SHIFT | 77), Setpoint::Stop);
         assert_eq!(unpack(0), Setpoint::Stop);
     }
 }

@@ -61,7 +61,11 @@ fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoi
 /// While nothing drives.
 fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     let pulls = matches!(setpoint, Setpoint::Pull(_));
-    let wants_tone = pulls || config.tone.is_some() && matches!(setpoint, Setpoint::Tone(_));
+    let wants_tone = match setpoint {
+        Setpoint::Pull(_) | Setpoint::Excite(_) => true,
+        Setpoint::Tone(_) => config.tone.is_some(),
+        _ => false,
+    };
     let drives = setpoint.asks(config.both_ways) != Asked::Nothing;
     let stands = state.off.rotor == Rotor::Standing;
     match state.phase {

@@ -2,6 +2,7 @@
 
 use fixed::types::I1F31;
 
+use super::excitation::Excitation;
 use super::pull::Pull;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Current, Duty, Speed};
@@ -43,6 +44,8 @@ pub enum Setpoint {
     Test(Current),
     /// Pull half-bridges to the supply's poles without turning the motor, once it is seen to stand.
     Pull(Pull),
+    /// Excite the windings without turning the motor, once it is seen to stand.
+    Excite(Excitation),
 }
 
 /// State of the inverter's switches until the next period.
@@ -75,6 +78,7 @@ impl Setpoint {
             Self::Tone(_) => 6,
             Self::Test(_) => 7,
             Self::Pull(_) => 8,
+            Self::Excite(_) => 9,
         }
     }
 
@@ -85,7 +89,12 @@ impl Setpoint {
             Self::Speed(speed) => speed.to_bits(),
             Self::Torque(current) | Self::Test(current) => current.to_bits(),
             Self::Voltage(share) => share.to_bits(),
-            Self::Stop | Self::Zero | Self::Fault(_) | Self::Tone(_) | Self::Pull(_) => 0,
+            Self::Stop
+            | Self::Zero
+            | Self::Fault(_)
+            | Self::Tone(_)
+            | Self::Pull(_)
+            | Self::Excite(_) => 0,
         };
         if sign > 0 {
             Asked::Forward
@@ -103,7 +112,12 @@ impl Setpoint {
             Self::Torque(current) => Self::Torque(current.saturating_neg()),
             Self::Voltage(share) => Self::Voltage(share.saturating_neg()),
             Self::Test(current) => Self::Test(current.saturating_neg()),
-            Self::Stop | Self::Zero | Self::Fault(_) | Self::Tone(_) | Self::Pull(_) => self,
+            Self::Stop
+            | Self::Zero
+            | Self::Fault(_)
+            | Self::Tone(_)
+            | Self::Pull(_)
+            | Self::Excite(_) => self,
         }
     }
 }

@@ -21,7 +21,7 @@
 //! | Run, Stopping | `foc/` | field-oriented control |
 //! | Brake | `foc/short.rs` | the low sides are on, the observer goes on |
 //! | Park, Ramp, Run, Stopping, Brake with `CTL_DRIVE` 1 | `six_step/` | the same by zero crossings |
-//! | Tone | `tone.rs`, `self_test.rs` | the phases switch to be heard, or, with [`Setpoint::Pull`], to be tested |
+//! | Tone | `tone.rs`, `self_test.rs`, `excite.rs` | the phases switch to be heard, or to be tested or measured: [`Setpoint::Pull`], [`Setpoint::Excite`] |
 //!
 //! All changes of mode, each with its reason, are the table in `transitions.rs`; they are made by one
 //! function, `State::change`, but for a restart under other units ([`State::adopt`]):
@@ -47,13 +47,15 @@
 //! ```
 //!
 //! # The files' order
-//! Each file uses those before it, and none behind it: `phase`, `pull`, `io`, `config`, `transitions`,
-//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `foc`, `six_step`, `snapshot`, `state`,
+//! Each file uses those before it, and none behind it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
+//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `state`,
 //! `asked`, `step`.
 
 mod asked;
 mod charge;
 pub mod config;
+mod excitation;
+mod excite;
 mod foc;
 mod io;
 mod off;
@@ -72,6 +74,7 @@ mod transitions;
 
 pub use crate::protection::{Fault, Faults};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop};
+pub use excitation::{Excitation, Ripple};
 pub use io::{Bridge, Sample, Setpoint};
 pub use phase::Phase;
 pub use pull::Pull;

@@ -6,7 +6,7 @@ use super::phase::Phase;
 use super::shared::Shared;
 use super::snapshot::Snapshot;
 use super::transitions::{Why, next};
-use super::{charge, foc, off, schedule, self_test, six_step, tone};
+use super::{charge, excite, foc, off, schedule, self_test, six_step, tone};
 use crate::control::{inductance, observer};
 use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Flux, Speed};
@@ -29,6 +29,7 @@ pub struct State {
     pub(super) six_step: six_step::state::State,
     pub(super) tone: tone::State,
     pub(super) self_test: self_test::State,
+    pub(super) excite: excite::State,
 }
 
 impl State {
@@ -45,6 +46,7 @@ impl State {
             six_step: six_step::state::State::default(),
             tone: tone::State::default(),
             self_test: self_test::State::default(),
+            excite: excite::State::default(),
         }
     }
 
@@ -76,6 +78,7 @@ impl State {
         self.six_step = six_step::state::State::default();
         self.tone = tone::State::default();
         self.self_test = self_test::State::default();
+        self.excite = excite::State::default();
     }
 
     /// Returns true if field-oriented control drives for this kind of set-point: only its schedule says when
@@ -152,6 +155,7 @@ impl State {
         shared.seen.phase = self.phase;
         shared.zeros.restart();
         self.off.begin();
+        self.excite = excite::State::default();
         self.self_test = self_test::State::default();
         self.tone.end(match (from, why) {
             (Phase::Brake, Why::Tone) => true,
@@ -254,6 +258,7 @@ impl State {
             six_step,
             tone,
             self_test,
+            excite,
         } = self;
         phase.trace(out);
         decided.trace(out);
@@ -267,5 +272,6 @@ impl State {
         }
         tone.trace(out);
         self_test.trace(out);
+        excite.trace(out);
     }
 }

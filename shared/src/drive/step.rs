@@ -9,7 +9,7 @@ use super::phase::Phase;
 use super::schedule::{self, Work};
 use super::state::State;
 use super::transitions::Why;
-use super::{charge, off, self_test, six_step, tone};
+use super::{charge, excite, off, self_test, six_step, tone};
 use crate::protection;
 use crate::units::AdcCounts;
 
@@ -247,7 +247,7 @@ fn ready(
     n: u32,
 ) -> Option<Why> {
     let (foc, shared) = (&mut state.foc, &mut state.shared);
-    if matches!(setpoint, Setpoint::Tone(_)) {
+    if matches!(setpoint, Setpoint::Tone(_) | Setpoint::Excite(_)) {
         // What the supply gives is all that a tone must know.
         outer_loop::ready(config, foc, shared, n);
         return (n + 1 >= tone::READY_PERIODS).then_some(Why::ToneReady);
@@ -282,6 +282,9 @@ fn tone_or_test(
     match (setpoint, &config.tone) {
         (Setpoint::Pull(pull), _) => {
             self_test::period(config, (&mut state.self_test, shared), currents, *pull)
+        }
+        (Setpoint::Excite(excitation), _) => {
+            excite::period(config, (&mut state.excite, shared), currents, *excitation)
         }
         (Setpoint::Tone(pitch), Some(tone)) => {
             tone::period(config, tone, (&mut state.tone, shared), currents, *pitch)

@@ -3,7 +3,7 @@
 use fixed::types::I1F31;
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
-use siskin_control::drive::{Fault, Pull, Sample, Setpoint};
+use siskin_control::drive::{Excitation, Fault, Pull, Sample, Setpoint};
 use siskin_control::image::Image;
 use siskin_control::params::{BOSSO_BENCH, Board, LeastDeadTime, ParamId, Params, TABLE};
 use siskin_control::units::{AdcCounts, Current, Speed};
@@ -96,6 +96,7 @@ pub fn period(sample: &Sample, setpoint: Setpoint) -> [u32; PERIOD_WORDS] {
         Setpoint::Tone(pitch) => (6, pitch.to_bits()),
         Setpoint::Test(current) => (7, current.to_bits()),
         Setpoint::Pull(pull) => (8, pull as i32),
+        Setpoint::Excite(excitation) => (9, excitation.to_word() as i32),
     };
     let bus = sample.bus.to_bits() as u32;
     let hall_and_kind = u32::from(sample.hall) << 8 | kind;
@@ -120,6 +121,7 @@ pub fn read_period(words: &[u32; PERIOD_WORDS]) -> (Sample, Setpoint) {
         5 => Setpoint::Voltage(I1F31::from_bits(value)),
         6 => Setpoint::Tone(Speed::from_bits(value)),
         8 => Setpoint::Pull(Pull::from_number(value as u8)),
+        9 => Setpoint::Excite(Excitation::from_word(value as u32)),
         _ => Setpoint::Test(Current::from_bits(value)),
     };
     (sample, setpoint)
