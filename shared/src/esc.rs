@@ -5,7 +5,8 @@ use heapless::Vec;
 
 use crate::answer::info::info;
 use crate::check::Check;
-use crate::drive::{Config, Phase, Snapshot};
+use crate::drive::{Config, Phase, Setpoint, Snapshot};
+use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
@@ -19,6 +20,7 @@ use storage::{Asker, Storage, Unstored};
 use tunes::Tunes;
 
 mod check;
+mod identify;
 mod kept;
 mod storage;
 mod tunes;
@@ -32,6 +34,10 @@ const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 /// Time for which a wire with signals must have asked for rest before the flash is written, µs: what
 /// is written stalls the processor, and so a flight controller's frames are missed.
 const REST_US: u64 = 1_000_000;
+
+/// Whether the identification of the motor is in this build: it takes 4 KB of code, which not every board's flash
+/// has left.
+const IDENTIFIES: bool = cfg!(feature = "identify");
 
 /// One ESC without its interrupt and its throttle.
 pub struct Esc {
@@ -47,6 +53,7 @@ pub struct Esc {
     polled_us: Option<u64>,
     tunes: Tunes,
     check: Check,
+    identify: Identify,
     light: bool,
     /// The motor's command at the last poll.
     command: Command,
@@ -54,6 +61,8 @@ pub struct Esc {
     /// True if the wire carried signals then.
     traffic: bool,
     storage: Storage,
+    /// The motor that is assumed has changed.
+    reassumes: bool,
     /// There are two such commands.
     unstored: Vec<Unstored, 2>,
 }
@@ -151,11 +160,13 @@ impl Esc {
             polled_us: None,
             tunes: Tunes::default(),
             check: Check::new(&board),
+            identify: Identify::default(),
             light: false,
             command: Command::Stop,
             rests_since_us: None,
             traffic: false,
             storage: Storage::default(),
+            reassumes: false,
             unstored: Vec::new(),
         }
     }
@@ -165,7 +176,7 @@ impl Esc {
     /// # Errors
     /// Never with the parameters in force, which have been tried before.
     pub fn config(&self) -> Result<Config, BuildError> {
-        build(&self.given.running(&self.params), &self.board)
+        build(&self.running(), &self.board)
     }
 
     /// As [`Esc::config`], in a place that the caller has for it.
@@ -173,7 +184,16 @@ impl Esc {
     /// # Errors
     /// As [`Esc::config`].
     pub fn config_in(&self, place: &mut Config) -> Result<(), BuildError> {
-        build_in(&self.given.running(&self.params), &self.board, place)
+        build_in(&self.running(), &self.board, place)
+    }
+
+    /// The parameters as the drive runs with them: for the motor of an identification, while one is under way.
+    fn running(&self) -> Params {
+        let mut running = self.given.running(&self.params);
+        if IDENTIFIES && self.identify.is_under_way() {
+            self.identify.assume(&mut running);
+        }
+        running
     }
 
     /// The parameters in force.
@@ -253,9 +273,14 @@ impl Esc {
         let rests = self.command.rests();
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
         self.tunes.look(now_us, snapshot, rests);
+        self.look_at_motor(now_us, snapshot);
         let told = Told {
             note: self.tunes.note().filter(|_| !self.check.powers_up()),
-            pull: self.check.pull(),
+            asked: self
+                .check
+                .pull()
+                .map(Setpoint::Pull)
+                .or_else(|| self.identification()),
             too_hot: self.too_hot,
             barred: self.storage.is_lost() || !self.check.report.may_turn(&self.params),
         };
@@ -298,6 +323,10 @@ impl Esc {
     /// wire is armed meanwhile.
     pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
         let now_us = self.polled_us.unwrap_or(0);
+        if core::mem::take(&mut self.reassumes) {
+            self.apply(throttle);
+            return Some(Request::ParamsChanged);
+        }
         let request = self.component.take_request();
         if self.component.take_changed() {
             self.storage.changed(now_us);
@@ -359,7 +388,8 @@ impl Esc {
             }
             _ => false,
         };
-        holds && rested && self.drive().stopped && self.tunes.note().is_none()
+        let busy = self.tunes.note().is_some() || self.identify.is_under_way();
+        holds && rested && self.drive().stopped && !busy
     }
 
     fn drive(&self) -> DriveStatus {
@@ -383,7 +413,7 @@ impl Esc {
 
     fn apply(&mut self, throttle: &mut impl Reach) {
         // Each change has been validated: a drive can be made of it.
-        self.scale = scale(&self.given.running(&self.params), &self.board);
+        self.scale = scale(&self.running(), &self.board);
         throttle.reach(|throttle| throttle.adopt(&self.params, self.scale));
         self.tell_info(throttle);
     }
@@ -406,6 +436,7 @@ impl Esc {
             board: &board,
             telemetry: &self.telemetry,
             check: &self.check.report,
+            identification: &self.identify.report,
             authority: &mut Reached(throttle),
             validate: &|params| given.check(params, &board),
         };

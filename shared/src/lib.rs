@@ -8,6 +8,7 @@
 //! [`statistics`]: crate::statistics
 //! [`answer`]: crate::answer
 //! [`check`]: crate::check
+//! [`identify`]: crate::identify
 //! [`tune`]: crate::tune
 //! [`params`]: crate::params
 //! [`store`]: crate::store
@@ -18,7 +19,7 @@
 //!
 //! # The order of the modules
 //! Dependencies run one way: {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control`
-//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `setpoint`, `telemetry`} ← {`answer`,
+//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `setpoint`, `telemetry`} ← {`answer`,
 //! `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
 //! and that each folder has one.
 //!
@@ -39,6 +40,7 @@ mod checksum;
 pub mod control;
 pub mod drive;
 pub mod esc;
+pub mod identify;
 pub mod image;
 pub mod input;
 pub mod math;

@@ -11,7 +11,7 @@ use heapless::Vec;
 
 use crate::answer::info;
 use crate::answer::{self, Answer, Answers, Ask, Basis, Reply, Serial};
-use crate::drive::{Fault, Pull, Setpoint, Snapshot};
+use crate::drive::{Fault, Setpoint, Snapshot};
 use crate::input::access::Access;
 use crate::input::authority::{Authority, Command, Denied, DriveStatus, TestError};
 use crate::input::command::Order;
@@ -24,6 +24,10 @@ use crate::telemetry::Telemetry;
 use crate::tune::Note;
 use crate::units::Scale;
 
+/// Time for which the tasks' demands on the drive hold, µs: they poll each millisecond, and a task that has died
+/// turns no motor.
+const TOLD_US: u64 = 100_000;
+
 /// A throttle wire, the answers on it, and its demands on the drive.
 pub struct Throttle {
     input: Input,
@@ -34,6 +38,9 @@ pub struct Throttle {
     telemetry: Telemetry,
     info: [u8; info::BYTES],
     told: Told,
+    /// The time, and when the tasks' demands on the drive end if they do not renew them, µs.
+    now_us: u64,
+    told_until_us: u64,
     /// Orders of DShot commands since the last poll, and those that wait to be done: one of each kind,
     /// and there are seven for the tasks.
     orders: Vec<Order, 7>,
@@ -46,8 +53,8 @@ pub struct Throttle {
 pub(crate) struct Told {
     /// The note that is due, to be played while nothing turns the motor.
     pub(crate) note: Option<Note>,
-    /// The pull of the self-test, if any, in place of notes.
-    pub(crate) pull: Option<Pull>,
+    /// What a self-test or an identification asks of the drive, in place of notes.
+    pub(crate) asked: Option<Setpoint>,
     /// True if the temperature is past its limit.
     pub(crate) too_hot: bool,
     /// True if nothing may turn the motor.
@@ -93,6 +100,8 @@ impl Throttle {
             telemetry: Telemetry::new(),
             info: info::info(params, false, &board.image),
             told: Told::default(),
+            now_us: 0,
+            told_until_us: 0,
             orders: Vec::new(),
             storing: false,
         }
@@ -123,6 +132,7 @@ impl Throttle {
     /// Tells the time of the timer that captures the wire's edges, once a control period or more
     /// often. Returns the same as [`Throttle::edge`].
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Ask> {
+        self.now_us = now_us;
         let heard = self.input.settle(now_us, now_ticks)?;
         self.heard(heard)
     }
@@ -187,8 +197,8 @@ impl Throttle {
             return Setpoint::Stop;
         }
         let command = self.command();
-        match (self.told.pull, self.told.note) {
-            (Some(pull), _) if command.rests() => Setpoint::Pull(pull),
+        match (self.told.asked, self.told.note) {
+            (Some(asked), _) if command.rests() && self.now_us < self.told_until_us => asked,
             (None, Some(note)) if command.rests() => self.mapping.tone(note),
             _ => self.mapping.setpoint(command),
         }
@@ -207,6 +217,7 @@ impl Throttle {
     /// Lets time pass, and takes in the drive's state.
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
+        self.told_until_us = now_us + TOLD_US;
         self.input.poll(now_us, telemetry.drive(self.command()));
         self.follow_wire();
         let authority = self.input.authority();

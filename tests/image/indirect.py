@@ -22,7 +22,7 @@ LEADS_TO = [
         WAKER,
     ),
     # MAVLink asks the throttle's side and checks a changed parameter by what it is given.
-    (r"^siskin_control::mavlink::(component|context)::", r" as siskin_control::input::access::Access>::"),
+    (r"^siskin_control::mavlink::(component|context|command)::", r" as siskin_control::input::access::Access>::"),
     (r"^siskin_control::mavlink::parameter::change$", r"^siskin_control::esc::Esc::with_component::{closure}$"),
     # What it hands bytes to is known when it is linked: the serial line's pipe, which wakes its task.
     (r"^siskin_control::mavlink::sender::Sender::send_payload$", WAKER),

@@ -1,158 +1,46 @@
 //! The self-test by command, on the emulated ESC: a sound one passes, each defect is named, the motor does
 //! not turn, and it is done only under the rule of what may turn one.
 
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
-use siskin_control::drive::Setpoint;
-use siskin_control::mavlink::Receiver;
+mod station;
+
+use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use siskin_control::params::{ParamId, Params};
-use siskin_emulator::device::{Device, Start};
+use siskin_emulator::device::Start;
 use siskin_emulator::fault::{Fault, Kind, Side};
-use siskin_emulator::link::LinkId;
-use siskin_emulator::rig::{Period, Rig};
+use station::{HALF, Station, ZERO};
 
-const MS_NS: u64 = 1_000_000;
-/// 16 bits of DShot600: zero throttle, and half.
-const ZERO: u16 = 0;
-const HALF: u16 = 1048;
+const CHECK: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;
 
-/// An ESC, and a ground station that hears it.
-struct Station {
-    device: Device,
-    listener: Receiver,
-    /// The results of the command, with the percentages.
-    acks: Vec<(MavResult, u8)>,
-    texts: Vec<String>,
-    /// Greatest speed of the shaft, rpm, and greatest phase current, A.
-    rpm: f64,
-    current_a: f64,
-    pulls: usize,
+/// An ESC with these defects and parameters.
+fn bench(kinds: &[Kind], params: &[(ParamId, f32)]) -> Station {
+    let at_s = 0.2;
+    let fault = |kind: &Kind| Fault {
+        at_s,
+        for_s: None,
+        kind: *kind,
+    };
+    Station::new(Start {
+        overrides: params.to_vec(),
+        faults: kinds.iter().map(fault).collect(),
+        ..Start::default()
+    })
 }
 
-impl Station {
-    fn new(kinds: &[Kind], params: &[(ParamId, f32)]) -> Self {
-        let at_s = 0.2;
-        let fault = |kind: &Kind| Fault {
-            at_s,
-            for_s: None,
-            kind: *kind,
-        };
-        let start = Start {
-            overrides: params.to_vec(),
-            faults: kinds.iter().map(fault).collect(),
-            link_bytes_per_s: 1_000_000,
-            ..Start::default()
-        };
-        let (device, warning) = Device::start(start).expect("it starts");
-        assert_eq!(warning, None);
-        let mut station = Self {
-            device,
-            listener: Receiver::default(),
-            acks: Vec::new(),
-            texts: Vec::new(),
-            rpm: 0.0,
-            current_a: 0.0,
-            pulls: 0,
-        };
-        station.run(1000, None);
-        station.texts.clear();
-        station.rpm = 0.0;
-        station.current_a = 0.0;
-        station
-    }
+/// The whole of one: how it ends.
+fn check(station: &mut Station) -> MavResult {
+    station.ask(CHECK, 0.0);
+    station.run(1500, None);
+    let (result, _) = *station.acks.last().expect("it is acknowledged");
+    result
+}
 
-    /// So many milliseconds, each with a frame of this throttle, if there is one.
-    fn run(&mut self, count_ms: u64, throttle: Option<u16>) {
-        for _ in 0..count_ms {
-            let now_ns = self.device.now_ns();
-            if let Some(throttle) = throttle {
-                let data = throttle << 1;
-                let bits = data << 4 | (data ^ data >> 4 ^ data >> 8) & 0xF;
-                let [low, high] = bits.to_le_bytes();
-                let wire = self.device.wire();
-                wire.play(now_ns, &[12, low, high]).expect("there is room");
-            }
-            let Self {
-                device,
-                listener,
-                acks,
-                texts,
-                rpm,
-                current_a,
-                pulls,
-            } = self;
-            let mut onlooker = |_: f64, period: &Period, _: &Rig| {
-                *rpm = rpm.max(period.rpm().abs());
-                for current in period.motion.currents_a {
-                    *current_a = current_a.max(current.abs());
-                }
-                *pulls += usize::from(matches!(period.setpoint, Setpoint::Pull(_)));
-            };
-            let mut send = |frame: &[u8]| {
-                listener.push(now_ns / 1000, frame, |frame| {
-                    match MavMessage::parse(MavlinkVersion::V2, frame.id, frame.payload) {
-                        Ok(MavMessage::COMMAND_ACK(_)) => {
-                            let result = frame.payload[2];
-                            let result = [
-                                MavResult::MAV_RESULT_ACCEPTED,
-                                MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
-                                MavResult::MAV_RESULT_FAILED,
-                                MavResult::MAV_RESULT_IN_PROGRESS,
-                            ]
-                            .into_iter()
-                            .find(|of| *of as u8 == result)
-                            .expect("one of these");
-                            // Trailing zeros are not sent.
-                            acks.push((result, frame.payload.get(3).copied().unwrap_or(0)));
-                        }
-                        Ok(MavMessage::STATUSTEXT(text)) => {
-                            texts.push(text.text.to_str().expect("ASCII").to_owned());
-                        }
-                        _ => {}
-                    }
-                });
-            };
-            device.advance(now_ns + MS_NS, |_, _| None, &mut onlooker, &mut send);
-        }
-    }
-
-    fn ask(&mut self) {
-        let mut raw = MAVLinkV2MessageRaw::new();
-        let header = MavHeader {
-            system_id: 255,
-            component_id: 190,
-            sequence: 0,
-        };
-        raw.serialize_message_data(
-            header,
-            &COMMAND_LONG_DATA {
-                command: MavCmd::MAV_CMD_RUN_PREARM_CHECKS,
-                target_system: 1,
-                target_component: 1,
-                ..COMMAND_LONG_DATA::default()
-            },
-        );
-        let mut nobody = |_: f64, _: &Period, _: &Rig| {};
-        self.device
-            .receive(LinkId::default(), raw.raw_bytes(), &mut nobody);
-    }
-
-    /// The whole of one: how it ends.
-    fn check(&mut self) -> MavResult {
-        self.ask();
-        self.run(1500, None);
-        let (result, _) = *self.acks.last().expect("it is acknowledged");
-        result
-    }
-
-    /// What is out of bounds, by the text that tells of it.
-    fn named(&self) -> Vec<&str> {
-        let told = self
-            .texts
-            .iter()
-            .find_map(|text| text.strip_prefix("Self-test: "));
-        told.map_or(Vec::new(), |names| names.split(", ").collect())
-    }
+/// What is out of bounds, by the text that tells of it.
+fn named(station: &Station) -> Vec<&str> {
+    let told = station
+        .texts
+        .iter()
+        .find_map(|text| text.strip_prefix("Self-test: "));
+    told.map_or(Vec::new(), |names| names.split(", ").collect())
 }
 
 #[test]
@@ -166,9 +54,9 @@ fn a_sound_esc_passes_and_its_motor_does_not_turn() {
         &[(ParamId::MotDir, 1.0)],
         &[(ParamId::LimPhaseA, 5.0)],
     ] {
-        let mut station = Station::new(&[], changes);
+        let mut station = bench(&[], changes);
         assert_eq!(
-            station.check(),
+            check(&mut station),
             MavResult::MAV_RESULT_ACCEPTED,
             "{changes:?}"
         );
@@ -190,7 +78,7 @@ fn a_sound_esc_passes_and_its_motor_does_not_turn() {
         );
         assert!(station.rpm < 30.0, "{} rpm", station.rpm);
         // Again, once it is done.
-        assert_eq!(station.check(), MavResult::MAV_RESULT_ACCEPTED);
+        assert_eq!(check(&mut station), MavResult::MAV_RESULT_ACCEPTED);
     }
 }
 
@@ -209,16 +97,20 @@ fn each_defect_is_named() {
             (Kind::OffsetDrift(phase, -6.0), own("zero")),
         ] {
             // The tunes would find an offset before.
-            let mut station = Station::new(&[kind], &[(ParamId::MotToneA, 0.0)]);
-            assert_eq!(station.check(), MavResult::MAV_RESULT_FAILED, "{kind:?}");
-            let named = station.named();
+            let mut station = bench(&[kind], &[(ParamId::MotToneA, 0.0)]);
+            assert_eq!(
+                check(&mut station),
+                MavResult::MAV_RESULT_FAILED,
+                "{kind:?}"
+            );
+            let named = named(&station);
             assert!(named.contains(&item.as_str()), "{kind:?}: {named:?}");
             assert!(station.rpm < 60.0, "{kind:?}: {} rpm", station.rpm);
         }
     }
-    let mut station = Station::new(&[Kind::Noise(1.0)], &[]);
-    assert_eq!(station.check(), MavResult::MAV_RESULT_FAILED);
-    assert_eq!(station.named()[..3], ["noise_a", "noise_b", "noise_c"]);
+    let mut station = bench(&[Kind::Noise(1.0)], &[]);
+    assert_eq!(check(&mut station), MavResult::MAV_RESULT_FAILED);
+    assert_eq!(named(&station)[..3], ["noise_a", "noise_b", "noise_c"]);
 }
 
 /// The others are pulled up with rising duty: the current of a test shows it before one that trips. The
@@ -227,10 +119,10 @@ fn each_defect_is_named() {
 fn a_shorted_low_side_is_named_by_a_small_current() {
     for phase in 0..3 {
         let short = Kind::MosfetShort(phase, Side::Low);
-        let mut station = Station::new(&[short], &[(ParamId::MotToneA, 0.0)]);
-        assert_eq!(station.check(), MavResult::MAV_RESULT_FAILED);
+        let mut station = bench(&[short], &[(ParamId::MotToneA, 0.0)]);
+        assert_eq!(check(&mut station), MavResult::MAV_RESULT_FAILED);
         let item = ["high_a", "off_b", "off_c"][phase];
-        assert!(station.named().contains(&item), "{:?}", station.named());
+        assert!(named(&station).contains(&item), "{:?}", named(&station));
         let tripped = station
             .texts
             .iter()
@@ -245,9 +137,9 @@ fn a_shorted_low_side_is_named_by_a_small_current() {
 #[test]
 fn it_is_done_at_rest_alone_and_ends_with_any_throttle() {
     // At zero throttle, as without a wire.
-    let mut station = Station::new(&[], &[]);
+    let mut station = bench(&[], &[]);
     station.run(500, Some(ZERO));
-    station.ask();
+    station.ask(CHECK, 0.0);
     station.run(1500, Some(ZERO));
     assert_eq!(
         station.acks.last().expect("one").0,
@@ -256,7 +148,7 @@ fn it_is_done_at_rest_alone_and_ends_with_any_throttle() {
 
     // The throttle takes the motor over within the time of the frame that opens it.
     station.acks.clear();
-    station.ask();
+    station.ask(CHECK, 0.0);
     station.run(150, Some(ZERO));
     assert_eq!(
         station.acks.last().expect("one").0,
@@ -276,7 +168,7 @@ fn it_is_done_at_rest_alone_and_ends_with_any_throttle() {
     // And while it turns, or coasts, there is none.
     station.acks.clear();
     station.pulls = 0;
-    station.ask();
+    station.ask(CHECK, 0.0);
     station.run(50, Some(HALF));
     let rejected = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
     assert_eq!(station.acks, [(rejected, 0)]);

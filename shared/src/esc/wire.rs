@@ -8,7 +8,7 @@ use crate::input::calibration::Step;
 use crate::input::command::Order;
 use crate::input::endpoints::EndPoints;
 use crate::mavlink::Act;
-use crate::params::ParamId;
+use crate::params::{BuildError, ParamId};
 use crate::throttle::Reach;
 use crate::tune::{Beacon, Tune};
 
@@ -36,6 +36,12 @@ impl Esc {
             Act::Beep => self.tunes.play(now_us, Tune::Beacon(Beacon::One)),
             Act::Calibrate => throttle.reach(|throttle| throttle.calibrate(now_us, true)),
             Act::Check => self.check.begin(),
+            Act::Identify => self.identify(now_us),
+            Act::EndIdentification => self.end_identification("cancelled"),
+            Act::KeepIdentified => {
+                let kept = self.keep_identified();
+                self.component.check_done(kept);
+            }
             Act::EndCalibration => throttle.reach(|throttle| throttle.calibrate(now_us, false)),
         }
     }
@@ -89,7 +95,7 @@ impl Esc {
     /// Sets a parameter until the next start, or until the wire asks for it to be stored.
     fn change_for_now(&mut self, id: ParamId, value: f32) {
         let before = self.params.get(id);
-        if !self.change(&[(id, value)]) {
+        if self.change(&[(id, value)]).is_err() {
             return;
         }
         let known = self.unstored.iter_mut().find(|known| known.id == id);
@@ -112,31 +118,35 @@ impl Esc {
     /// do not: the defaults would be stored with them.
     fn calibrate(&mut self, ends: EndPoints) -> bool {
         let fit = !self.storage.is_lost()
-            && self.change(&[
-                (ParamId::InpPulseMinUs, f32::from(ends.min_us)),
-                (ParamId::InpPulseMaxUs, f32::from(ends.max_us)),
-            ]);
+            && self
+                .change(&[
+                    (ParamId::InpPulseMinUs, f32::from(ends.min_us)),
+                    (ParamId::InpPulseMaxUs, f32::from(ends.max_us)),
+                ])
+                .is_ok();
         if fit {
             self.storage.save();
         }
         fit
     }
 
-    /// Sets parameters as MAVLink does: all of them and true, or none and false if they do not fit.
-    fn change(&mut self, values: &[(ParamId, f32)]) -> bool {
+    /// Sets parameters as MAVLink does: all of them, or none if they do not fit.
+    ///
+    /// # Errors
+    /// The parameter that does not.
+    pub(super) fn change(&mut self, values: &[(ParamId, f32)]) -> Result<(), BuildError> {
         let mut params = self.params.clone();
         for (id, value) in values {
-            if params.set(*id, *value).is_err() {
-                return false;
-            }
+            params.set(*id, *value).map_err(|_| BuildError {
+                param: *id,
+                reason: "out of range",
+            })?;
         }
-        if self.given.check(&params, &self.board).is_err() {
-            return false;
-        }
+        self.given.check(&params, &self.board)?;
         self.params = params;
         for (id, _) in values {
             self.component.changed(&[*id]);
         }
-        true
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! Decides whether the motor may turn: by an armed wire, or by a test of limited time. Nothing else
-//! turns it.
+//! turns it but an identification, which is begun under the rule of a test, and only while nobody here asks for
+//! anything (`Throttle::setpoint`).
 //!
 //! The wire is armed by zero throttle held for a time, in a signal that has been identified. It is
 //! disarmed when that signal is lost, and never turns a motor before it is armed. Only a frame whose

@@ -26,6 +26,8 @@ const PREFLIGHT_CALIBRATION: u16 = MavCmd::MAV_CMD_PREFLIGHT_CALIBRATION as u16;
 const PREFLIGHT_STORAGE: u16 = MavCmd::MAV_CMD_PREFLIGHT_STORAGE as u16;
 const PREFLIGHT_REBOOT_SHUTDOWN: u16 = MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN as u16;
 const RUN_PREARM_CHECKS: u16 = MavCmd::MAV_CMD_RUN_PREARM_CHECKS as u16;
+/// The dialect has none for it.
+const IDENTIFY: u16 = MavCmd::MAV_CMD_USER_1 as u16;
 const COMPONENT_ARM_DISARM: u16 = MavCmd::MAV_CMD_COMPONENT_ARM_DISARM as u16;
 /// By number: the dialect marks it as superseded, but clients still send it.
 const GET_MESSAGE_INTERVAL: u16 = 510;
@@ -122,12 +124,22 @@ impl Command {
     /// Returns true if this is the same command sent again because its ACK did not arrive. Values are
     /// compared by their bits: NaN is a value here.
     fn repeats(&self, earlier: &Self) -> bool {
-        let most_us = match (self.confirmation, earlier.confirmation) {
-            (Some(now), Some(then)) if now > then => REPEAT_US,
-            (None, None) => REPEAT_INT_US,
-            _ => return false,
+        let most_us = if self.confirmation.is_some() {
+            REPEAT_US
+        } else {
+            REPEAT_INT_US
         };
-        self.at_us.saturating_sub(earlier.at_us) <= most_us
+        self.at_us.saturating_sub(earlier.at_us) <= most_us && self.is_again(earlier)
+    }
+
+    /// Returns true if this is the same command, sent again at any time: of one that is under way it asks how far
+    /// it is.
+    fn is_again(&self, earlier: &Self) -> bool {
+        let transmitted_later = match (self.confirmation, earlier.confirmation) {
+            (Some(now), Some(then)) => now > then,
+            (now, then) => now == then,
+        };
+        transmitted_later
             && self.from == earlier.from
             && self.number == earlier.number
             && self.params.map(f32::to_bits) == earlier.params.map(f32::to_bits)
@@ -191,7 +203,7 @@ impl Commands {
         // One of the two at a time.
         let pending = self.storage.as_ref().or(self.under_way.as_ref());
         let result = match (pending, earlier) {
-            (Some(pending), _) if command.repeats(pending) => Some(IN_PROGRESS),
+            (Some(pending), _) if command.is_again(pending) => Some(IN_PROGRESS),
             (_, Some((_, result))) => Some(result),
             _ => self.obey(command, drive, context, schedule, replies),
         };
@@ -228,9 +240,18 @@ impl Commands {
             CONFIGURE_ACTUATOR => return self.configure(command, drive, context, replies),
             PREFLIGHT_CALIBRATION => self.calibrate(command, drive, context, replies),
             RUN_PREARM_CHECKS if command.exact || self.role == Role::Standalone => {
-                self.check(command, drive, context)
+                self.measure(command, Act::Check, drive, context)
             }
-            COMPONENT_ARM_DISARM => arm_disarm(command.choice(0), context),
+            IDENTIFY if command.exact && cfg!(feature = "identify") => {
+                self.identify(command, drive, context)
+            }
+            COMPONENT_ARM_DISARM => {
+                let arm = command.choice(0);
+                if arm == Some(0) {
+                    self.act = Some(Act::EndIdentification);
+                }
+                arm_disarm(arm, context)
+            }
             PREFLIGHT_STORAGE => return self.storage(command, drive),
             PREFLIGHT_REBOOT_SHUTDOWN => self.reboot(command, drive, context, replies),
             REQUEST_MESSAGE => request_message(command, schedule),

@@ -167,6 +167,7 @@ impl Component {
                     board: context.board,
                     telemetry: context.telemetry,
                     check: context.check,
+                    identification: context.identification,
                     warning: self.warnings.last(),
                 };
                 if let Some(answer) = self.files.handle(context.now_us, frame, &view) {

@@ -1,6 +1,7 @@
 //! The interface of the component to its caller.
 
-use crate::check::Report;
+use crate::check;
+use crate::identify;
 use crate::input::access::Access;
 use crate::input::authority::DriveStatus;
 use crate::params::{Board, BuildError, Params};
@@ -17,7 +18,9 @@ pub struct Context<'a> {
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
     /// The result of the last self-test.
-    pub check: &'a Report,
+    pub check: &'a check::Report,
+    /// The result of the last identification.
+    pub identification: &'a identify::Report,
     /// Decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
     /// Checks that values make a drive; a value that breaks it is refused with the reason.
@@ -58,6 +61,12 @@ pub enum Act {
     Calibrate,
     /// End it.
     EndCalibration,
+    /// Begin an identification of the motor; its progress and end are told as those of a self-test are.
+    Identify,
+    /// End it, if there is one.
+    EndIdentification,
+    /// Keep what it has found; [`Component::check_done`](super::Component::check_done) reports it.
+    KeepIdentified,
     /// Begin a self-test; [`Component::tell_progress`](super::Component::tell_progress) and [`Component::check_done`](super::Component::check_done) report it.
     Check,
 }

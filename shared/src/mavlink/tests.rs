@@ -18,6 +18,7 @@ use std::vec::Vec;
 use super::*;
 use crate::check::Report;
 use crate::drive::{Faults, Phase};
+use crate::identify;
 use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
 use crate::params::Board;
@@ -116,6 +117,7 @@ impl Bench {
             board: &Board::BENCH,
             telemetry,
             check: &check,
+            identification: &identify::Report::default(),
             authority,
             validate: &refuse_slow_pwm,
         };
@@ -140,6 +142,7 @@ impl Bench {
             board: &Board::BENCH,
             telemetry: &self.telemetry,
             check: &check,
+            identification: &identify::Report::default(),
             authority: &mut self.authority,
             validate: &refuse_slow_pwm,
         };

@@ -198,6 +198,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             board: &board,
             telemetry: &telemetry,
             check: &Report::new(40.0, 0.02),
+            identification: &siskin_control::identify::Report::default(),
             authority: &mut authority,
             validate: &validate,
         };

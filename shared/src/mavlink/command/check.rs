@@ -1,17 +1,39 @@
-//! RUN_PREARM_CHECKS: the self-test. It takes most of a second, and is acknowledged step by step.
+//! RUN_PREARM_CHECKS: the self-test. It takes most of a second, and is acknowledged step by step. USER_1: the
+//! identification of the motor, which takes some ten seconds; parameter 1 is 1 to begin it, 0 to end it, and 2 to
+//! keep what it has found.
 
 use mavlink::dialects::ardupilotmega::MavResult;
 
 use super::{
-    Act, Command, Commands, Context, DriveStatus, IN_PROGRESS, RUN_PREARM_CHECKS, Replies,
-    TEMPORARILY_REJECTED,
+    ACCEPTED, Act, Command, Commands, Context, DENIED, DriveStatus, IDENTIFY, IN_PROGRESS,
+    RUN_PREARM_CHECKS, Replies, TEMPORARILY_REJECTED,
 };
 
 impl Commands {
-    /// The bridge is used for it: under the rule of what may turn a motor.
-    pub(super) fn check(
+    /// Of an identification, the one or the other.
+    pub(super) fn identify(
         &mut self,
         command: &Command,
+        drive: DriveStatus,
+        context: &mut Context,
+    ) -> MavResult {
+        let act = match command.choice(0) {
+            Some(0) => {
+                self.act = Some(Act::EndIdentification);
+                return ACCEPTED;
+            }
+            Some(1) => Act::Identify,
+            Some(2) => Act::KeepIdentified,
+            _ => return DENIED,
+        };
+        self.measure(command, act, drive, context)
+    }
+
+    /// The bridge is used for it: under the rule of what may turn a motor.
+    pub(super) fn measure(
+        &mut self,
+        command: &Command,
+        act: Act,
         drive: DriveStatus,
         context: &mut Context,
     ) -> MavResult {
@@ -19,26 +41,30 @@ impl Commands {
             return TEMPORARILY_REJECTED;
         }
         self.under_way = Some(*command);
-        self.act = Some(Act::Check);
+        self.act = Some(act);
         IN_PROGRESS
     }
 
     /// The self-test is so far, percent.
     pub(in super::super) fn check_progress(&self, percent: u8, replies: &mut Replies) {
-        let under_way = self.under_way.as_ref();
-        if let Some(command) = under_way.filter(|command| command.number == RUN_PREARM_CHECKS) {
+        if let Some(command) = self.under_way.as_ref().filter(|command| measures(command)) {
             replies.progress(command.from, command.number, percent);
         }
     }
 
     /// Returns true if a self-test was asked for, and goes on.
     pub(super) fn checks(&self) -> bool {
-        let under_way = self.under_way.as_ref();
-        under_way.is_some_and(|command| command.number == RUN_PREARM_CHECKS)
+        self.under_way.as_ref().is_some_and(measures)
     }
 
     /// The self-test has this result, if one was asked for.
     pub(in super::super) fn end_check(&mut self, result: MavResult, replies: &mut Replies) {
-        self.end(RUN_PREARM_CHECKS, result, replies);
+        for number in [RUN_PREARM_CHECKS, IDENTIFY] {
+            self.end(number, result, replies);
+        }
     }
+}
+
+fn measures(command: &Command) -> bool {
+    matches!(command.number, RUN_PREARM_CHECKS | IDENTIFY)
 }

@@ -236,6 +236,7 @@ impl Component {
             board: context.board,
             telemetry: context.telemetry,
             check: context.check,
+            identification: context.identification,
             warning: self.warnings.last(),
         };
         let mut payload = [0; ftp::PAYLOAD_MAX];

@@ -30,6 +30,8 @@ enum Content {
     Statistics,
     /// The result of the last self-test.
     Check,
+    /// The result of the last identification.
+    Identification,
 }
 
 /// An entry of a folder.
@@ -41,7 +43,7 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 8] = [
+static ENTRIES: [Entry; 9] = [
     Entry {
         folder: "",
         name: "general.json.xz",
@@ -82,6 +84,11 @@ static ENTRIES: [Entry; 8] = [
         name: "check.txt",
         content: Content::Check,
     },
+    Entry {
+        folder: "@SYS/",
+        name: "identify.txt",
+        content: Content::Identification,
+    },
 ];
 
 /// One file.
@@ -119,6 +126,7 @@ impl File {
             Content::Faults => text::faults(view, sink),
             Content::Statistics => text::statistics(view, sink),
             Content::Check => text::check(view, sink),
+            Content::Identification => text::identification(view, sink),
         }
     }
 

@@ -9,11 +9,24 @@ use super::sink::Sink;
 use super::*;
 use crate::check::Report;
 use crate::checksum::checksum;
+use crate::identify;
 use crate::mavlink::tests::TELEMETRY;
 use crate::params::{Board, LeastDeadTime};
 use crate::params::{ParamId, Params, TABLE};
 
 static CHECK: Report = Report::new(40.0, 0.02);
+static IDENTIFICATION: identify::Report = identify::Report {
+    r_mohm: figure(107.96, 0.001),
+    l_uh: figure(30.6, 0.002),
+    flux_mwb: figure(1.3, 0.0125),
+    j_gcm2: figure(1430.5, 0.0),
+    l_axes_uh: [figure(30.55, 0.0), figure(30.65, 0.0)],
+    dead_time_ns: figure(498.0, 0.01),
+};
+
+const fn figure(value: f32, spread: f32) -> identify::Figure {
+    identify::Figure { value, spread }
+}
 
 fn view(params: &Params) -> View<'_> {
     View {
@@ -21,6 +34,7 @@ fn view(params: &Params) -> View<'_> {
         board: &Board::BENCH,
         telemetry: &TELEMETRY,
         check: &CHECK,
+        identification: &IDENTIFICATION,
         warning: "",
     }
 }
@@ -60,6 +74,17 @@ fn packed(params: &Params, chosen: &[ParamId], defaults: bool) -> Vec<u8> {
         before = name.into();
     }
     file
+}
+
+#[test]
+fn a_motor_s_figures_are_lines_of_name_value_unit_and_spread() {
+    let whole = whole("@SYS/identify.txt", &Params::default()).expect("a file");
+    let text = String::from_utf8(whole).expect("ASCII");
+    let lines: Vec<_> = text.lines().collect();
+    assert_eq!(lines.len(), 7, "{text}");
+    assert_eq!(lines[0], "MOT_R_MOHM 107.960 mOhm 0.100 %");
+    assert_eq!(lines[2], "MOT_FLUX_MWB 1.300 mWb 1.250 %");
+    assert_eq!(lines[6], "dead_time 498.000 ns 1.000 %");
 }
 
 #[test]

@@ -69,6 +69,19 @@ pub(super) fn check(view: &View, sink: &mut Sink) {
     });
 }
 
+/// `@SYS/identify.txt`: a line for each figure, with its name, value, unit and spread in percent.
+pub(super) fn identification(view: &View, sink: &mut Sink) {
+    view.identification.tell(|line| {
+        sink.put(line.name.as_bytes());
+        sink.put(b" ");
+        thousandths(line.figure.value, sink);
+        sink.put(line.unit.as_bytes());
+        sink.put(b" ");
+        thousandths(100.0 * line.figure.spread, sink);
+        sink.put(b"%\n");
+    });
+}
+
 /// A number with three decimals, and a space.
 fn thousandths(number: f32, sink: &mut Sink) {
     let thousandths = (number.abs() * 1000.0 + 0.5) as u32;

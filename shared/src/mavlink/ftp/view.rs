@@ -1,6 +1,7 @@
 //! The sources of the files.
 
-use crate::check::Report;
+use crate::check;
+use crate::identify;
 use crate::params::{Board, Params};
 use crate::telemetry::Telemetry;
 
@@ -11,7 +12,9 @@ pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) board: &'a Board,
     pub(in crate::mavlink) telemetry: &'a Telemetry,
     /// The result of the last self-test.
-    pub(in crate::mavlink) check: &'a Report,
+    pub(in crate::mavlink) check: &'a check::Report,
+    /// The result of the last identification.
+    pub(in crate::mavlink) identification: &'a identify::Report,
     /// The last that a person was warned of; empty if there was none.
     pub(in crate::mavlink) warning: &'a str,
 }

@@ -1,0 +1,372 @@
+//! Identification: R, L, flux and inertia of a motor that nobody measured, in some ten seconds.
+//!
+//! Nothing is taken as known of the motor but its pole pairs, which only the inertia needs. The drive is made anew
+//! as the figures come in, and as it was at the end: they stand in a [`Report`], and change no parameter until
+//! somebody has them kept. It turns the motor, up to four tenths of the speed that the supply can give it, so it is
+//! begun under the rule of what may turn one, and any throttle, fault or failed start ends it.
+//!
+//! | step | the drive | what follows |
+//! |---|---|---|
+//! | each phase is excited by two currents | [`Setpoint::Excite`]: the rotor stands aligned | R from the difference of the voltages, and from the rest what the dead time takes |
+//! | and by a square wave along the current and across it | likewise | L on both axes |
+//! | spin | six-step, by a share of the supply | about the flux |
+//! | up and down | field-oriented, by a torque each way | the flux, from the voltage that the current does not take; the inertia, from the currents of both runs and what they gain in speed |
+//!
+//! A current of either sign, two levels of it and a run each way: an error of the dead time, of a sensor's gain or of
+//! a drag that grows with the speed's square stands in both measurements, and their difference is without it.
+
+mod means;
+mod report;
+mod shaft;
+mod winding;
+
+use fixed::types::I1F31;
+
+pub use report::{Figure, Line, Report};
+
+use crate::drive::{Excitation, Phase, Ripple, Setpoint, Snapshot};
+use crate::params::choice::CtlDrive;
+use crate::params::{Choice, Kind, ParamId, Params};
+use crate::units::{Scale, Speed};
+use means::{EXCITED_LOOKS, Means, SPUN_LOOKS, seconds, seen};
+use report::Motor;
+use shaft::Shaft;
+use winding::Winding;
+
+/// The excitations of a phase: the current, of the greatest one, and the square wave.
+const EXCITATIONS: [(f32, Ripple); 4] = [
+    (0.5, Ripple::None),
+    (1.0, Ripple::None),
+    (1.0, Ripple::Along),
+    (1.0, Ripple::Across),
+];
+
+/// The excitations of all phases.
+const EXCITED: u8 = 12;
+
+/// The greatest current of an excitation, and that of a run, of `LIM_PHASE_A`.
+const EXCITED_SHARE: f32 = 0.5;
+const RUN_SHARE: f32 = 0.4;
+
+/// Share of the supply with which the motor is spun.
+const SPIN_SHARE: I1F31 = I1F31::lit("0.25");
+
+/// Time in which the torque of a run rises to its greatest, s: a light rotor has its speed before that.
+const RISE_S: f32 = 1.0;
+/// How far it has risen when a run begins, s: with less a rotor that is caught would slow down and be lost.
+const BEGUN_S: f32 = 0.15;
+/// The torque against the rotation, of that with which the run up has ended.
+const AGAINST: f32 = 0.5;
+/// Time between two looks, s.
+const LOOK_S: f32 = 1e-3;
+
+/// Time until the drive has been made anew, s.
+const ADOPTED_S: f32 = 0.02;
+/// Time until a rotor has swung to another phase's axis, and until a current has come to another level, s.
+const ALIGNED_S: f32 = 0.4;
+const SETTLED_S: f32 = 0.1;
+/// The means of an excitation are those of 512 periods.
+const SETTLED_PERIODS: f32 = 4096.0;
+/// What the voltage takes at most to come to the end of its range.
+const RISEN_PERIODS: f32 = 20_000.0;
+/// The longest that a step may take, s.
+const LONGEST_S: f32 = 8.0;
+
+/// The step of an identification.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// None is under way.
+    Over,
+    /// The drive forgets the motor.
+    Forget,
+    /// An excitation, by its number: four of each phase.
+    Excite(u8),
+    /// Six-step.
+    Spin,
+    /// The bridge goes off.
+    Release,
+    /// The drive learns what has been found.
+    Learn,
+    /// A torque along the rotation.
+    Up,
+    /// One against it.
+    Down,
+    /// The same until the rotor is slow: a light one would coast for a minute.
+    Halt,
+}
+
+/// The outcome of a look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outcome {
+    /// It goes on, so many percent being done.
+    Progress(u8),
+    /// The drive shall be made for the motor that is [assumed](Identify::assume) now.
+    Assume,
+    /// It has ended: well, or for this reason. The drive shall be made for the motor of the parameters.
+    Done(Result<(), &'static str>),
+}
+
+/// The drive's state at a look.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<'a> {
+    /// The time, µs.
+    pub now_us: u64,
+    /// Of the drive.
+    pub snapshot: &'a Snapshot,
+    /// Its units.
+    pub scale: &'a Scale,
+    /// `LIM_PHASE_A`, A.
+    pub limit_a: f32,
+    /// True if nothing else asks the motor to turn.
+    pub rests: bool,
+}
+
+impl Sight<'_> {
+    fn bus_v(&self) -> f32 {
+        self.scale.volts(self.snapshot.bus)
+    }
+}
+
+/// An identification and its results.
+#[derive(Clone, Debug)]
+pub struct Identify {
+    step: Step,
+    since_us: u64,
+    setpoint: Setpoint,
+    means: Means,
+    winding: Winding,
+    shaft: Shaft,
+    /// The motor as far as it is known, and the greatest speed that the drive must know, rpm.
+    motor: Motor,
+    rpm_max: f32,
+    /// How long the torque has risen, s.
+    risen_s: f32,
+    /// The speed with which the means of the spin began.
+    speed: Speed,
+    /// The results.
+    pub report: Report,
+}
+
+impl Default for Identify {
+    fn default() -> Self {
+        Self {
+            step: Step::Over,
+            since_us: 0,
+            setpoint: Setpoint::Stop,
+            means: Means::default(),
+            winding: Winding::default(),
+            shaft: Shaft::default(),
+            motor: Motor::default(),
+            rpm_max: 0.0,
+            risen_s: BEGUN_S,
+            speed: Speed::ZERO,
+            report: Report::default(),
+        }
+    }
+}
+
+impl Identify {
+    /// Begins one.
+    pub fn begin(&mut self, now_us: u64) -> Outcome {
+        *self = Self::default();
+        self.go(now_us, Step::Forget, Setpoint::Stop);
+        Outcome::Assume
+    }
+
+    /// Ends it, for this reason, if one is under way.
+    pub fn end(&mut self, reason: &'static str) -> Option<Outcome> {
+        let ended = self.is_under_way();
+        self.step = Step::Over;
+        ended.then_some(Outcome::Done(Err(reason)))
+    }
+
+    /// Returns true while one is under way.
+    pub fn is_under_way(&self) -> bool {
+        self.step != Step::Over
+    }
+
+    /// What is asked of the drive, while one is under way.
+    pub fn setpoint(&self) -> Option<Setpoint> {
+        self.is_under_way().then_some(self.setpoint)
+    }
+
+    /// Goes on, about each millisecond.
+    // Out of line: its stack is free for what the caller does next.
+    #[inline(never)]
+    pub fn look(&mut self, sight: &Sight) -> Option<Outcome> {
+        let passed_s = seconds(sight.now_us, self.since_us);
+        let result = if !sight.rests {
+            Err("the throttle is open")
+        } else if !sight.snapshot.faults.is_empty() {
+            Err("a fault holds")
+        } else if passed_s > LONGEST_S {
+            Err("the motor does not turn as it should")
+        } else {
+            self.goes_on(sight, passed_s)
+        };
+        result.unwrap_or_else(|reason| self.end(reason))
+    }
+
+    fn goes_on(&mut self, sight: &Sight, passed_s: f32) -> Result<Option<Outcome>, &'static str> {
+        match self.step {
+            Step::Forget if passed_s > ADOPTED_S => Ok(Some(self.excite(sight, 0))),
+            Step::Learn if passed_s > ADOPTED_S => {
+                self.go(sight.now_us, Step::Up, self.torque(sight, 1.0));
+                Ok(Some(Outcome::Progress(80)))
+            }
+            Step::Over | Step::Forget | Step::Learn => Ok(None),
+            Step::Excite(number) => self.excited(sight, number, passed_s),
+            Step::Spin => Ok(self.spun(sight)),
+            Step::Release => Ok(self.released(sight, passed_s)),
+            Step::Up | Step::Down => self.runs(sight),
+            Step::Halt if sight.snapshot.phase == Phase::Run => Ok(None),
+            Step::Halt => {
+                self.step = Step::Over;
+                Ok(Some(Outcome::Done(Ok(()))))
+            }
+        }
+    }
+
+    // Out of line: each step ends with one.
+    #[inline(never)]
+    fn go(&mut self, now_us: u64, step: Step, setpoint: Setpoint) {
+        self.step = step;
+        self.since_us = now_us;
+        self.setpoint = setpoint;
+        self.means = Means::default();
+    }
+
+    fn excite(&mut self, sight: &Sight, number: u8) -> Outcome {
+        let (share, ripple) = EXCITATIONS[usize::from(number % 4)];
+        let current_a = share * EXCITED_SHARE * sight.limit_a;
+        let excitation = Excitation {
+            phase: number / 4,
+            current: sight.scale.current_from_a(current_a),
+            ripple,
+        };
+        let setpoint = Setpoint::Excite(excitation);
+        self.go(sight.now_us, Step::Excite(number), setpoint);
+        Outcome::Progress(5 * number)
+    }
+
+    /// A look at the windings.
+    fn excited(
+        &mut self,
+        sight: &Sight,
+        number: u8,
+        passed_s: f32,
+    ) -> Result<Option<Outcome>, &'static str> {
+        let (snapshot, period_s) = (sight.snapshot, sight.scale.period_s);
+        let (phase, step) = (usize::from(number / 4), number % 4);
+        if self.means.looks == 0 {
+            let Setpoint::Excite(asked) = self.setpoint else {
+                return Ok(None);
+            };
+            let settled_s = if step == 0 { ALIGNED_S } else { SETTLED_S };
+            let settled = passed_s > settled_s + SETTLED_PERIODS * period_s;
+            let reached = (snapshot.i.d - asked.current).abs() < asked.current >> 5;
+            // Where the supply is too weak for the current, what flows is as good.
+            let risen = reached || passed_s > RISEN_PERIODS * period_s;
+            if snapshot.phase != Phase::Tone || !settled || !risen {
+                return Ok(None);
+            }
+        }
+        self.means.add(snapshot, sight.scale);
+        if self.means.looks < EXCITED_LOOKS {
+            return Ok(None);
+        }
+        self.winding.take(phase, step, self.means.get(), period_s);
+        if number + 1 < EXCITED {
+            return Ok(Some(self.excite(sight, number + 1)));
+        }
+        let supply = (sight.scale, sight.bus_v());
+        self.winding
+            .judge(&mut self.report, &mut self.motor, supply)?;
+        self.go(sight.now_us, Step::Spin, Setpoint::Voltage(SPIN_SHARE));
+        Ok(Some(Outcome::Progress(60)))
+    }
+
+    /// A look at a rotor that turns by six-step.
+    fn spun(&mut self, sight: &Sight) -> Option<Outcome> {
+        let snapshot = sight.snapshot;
+        if snapshot.phase != Phase::Run {
+            return None;
+        }
+        // Anew until the speed stays.
+        if (snapshot.speed - self.speed).abs() > self.speed >> 5 {
+            self.speed = snapshot.speed;
+            self.means = Means::default();
+        }
+        self.means.add(snapshot, sight.scale);
+        if self.means.looks < SPUN_LOOKS {
+            return None;
+        }
+        let dead_v = self.winding.dead_v();
+        self.motor.flux_wb = Shaft::about(self.means.get(), &self.motor, dead_v);
+        self.go(sight.now_us, Step::Release, Setpoint::Stop);
+        Some(Outcome::Progress(70))
+    }
+
+    /// A look whether the bridge is off: only then can the drive be made anew.
+    fn released(&mut self, sight: &Sight, passed_s: f32) -> Option<Outcome> {
+        if sight.snapshot.phase != Phase::Idle || passed_s < ADOPTED_S {
+            return None;
+        }
+        self.rpm_max = self.shaft.choose(sight.bus_v(), &self.motor, sight.scale);
+        self.go(sight.now_us, Step::Learn, Setpoint::Stop);
+        Some(Outcome::Assume)
+    }
+
+    /// A look at a run.
+    fn runs(&mut self, sight: &Sight) -> Result<Option<Outcome>, &'static str> {
+        if sight.snapshot.phase != Phase::Run {
+            return Ok(None);
+        }
+        let down = self.step == Step::Down;
+        if !down {
+            self.risen_s = (self.risen_s + LOOK_S).min(RISE_S);
+            self.setpoint = self.torque(sight, 1.0);
+        }
+        let seen = seen(sight.snapshot, sight.scale);
+        if !self.shaft.look(sight.now_us, seen, down, &self.motor) {
+            return Ok(None);
+        }
+        if !down {
+            self.go(sight.now_us, Step::Down, self.torque(sight, -AGAINST));
+            return Ok(Some(Outcome::Progress(90)));
+        }
+        self.shaft.judge(&mut self.report, sight.scale.pole_pairs)?;
+        self.go(sight.now_us, Step::Halt, self.setpoint);
+        Ok(None)
+    }
+
+    /// The torque that there is by now, this way.
+    // As above, three times.
+    #[inline(never)]
+    fn torque(&self, sight: &Sight, way: f32) -> Setpoint {
+        let current_a = way * RUN_SHARE * self.risen_s / RISE_S * sight.limit_a;
+        Setpoint::Torque(sight.scale.current_from_a(current_a))
+    }
+
+    /// Puts the motor as far as it is known, and what follows from it, in the place of that of the parameters.
+    pub(crate) fn assume(&self, params: &mut Params) {
+        for id in ParamId::ALL {
+            if id.entry().kind == Kind::FromMotor {
+                let _ = params.set(id, 0.0);
+            }
+        }
+        for (id, value) in [
+            (ParamId::MotRMohm, 1e3 * self.motor.r_ohm),
+            (ParamId::MotLUh, 1e6 * self.motor.l_h),
+            (ParamId::MotFluxMwb, 1e3 * self.motor.flux_wb),
+            (ParamId::MotJGcm2, 0.0),
+            // Braked by the low sides alone a motor could drive more than the limit.
+            (ParamId::MotStop, 0.0),
+            (CtlDrive::PARAM, f32::from(CtlDrive::Automatic.number())),
+            (ParamId::CtlRpmMax, self.rpm_max),
+        ] {
+            // A figure out of range is left out, and the check of what this makes tells of it.
+            let _ = params.set(id, value);
+        }
+    }
+}

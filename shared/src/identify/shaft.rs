@@ -1,0 +1,120 @@
+//! Flux and inertia from a rotor that turns.
+
+use core::f32::consts::TAU;
+
+use super::means::{Seen, seconds};
+use super::report::{Figure, Motor, Report};
+use crate::math::{SQRT_3, square_root};
+use crate::units::Scale;
+
+/// The speed of the runs: of what the supply can turn the motor with, and of a turn a period.
+const RUN_SHARE: f32 = 0.4;
+const RUN_TURNS: f32 = 1.0 / 30.0;
+
+/// The share of that speed at which a run down ends.
+const SLOW_SHARE: f32 = 0.3;
+
+/// The greatest speed of the drive, of that of the runs.
+const RESERVE: f32 = 1.5;
+
+/// Mean of the back-EMF between two commutations over its peak: 3/π.
+const SIX_STEP_SHARE: f32 = 0.955;
+
+/// Most by which the flux of a run may differ from the mean of both.
+const FLUX_SPREAD: f32 = 0.1;
+
+/// What the runs have told.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shaft {
+    fast_rad_s: f32,
+    /// Of the run up, and of the run down.
+    runs: [Run; 2],
+}
+
+/// Sums over the looks of a run between the two speeds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Run {
+    looks: f32,
+    flux_wb: f32,
+    /// ∫i_q dt and ∫ω² dt.
+    charge_as: f32,
+    square: f32,
+    first_rad_s: f32,
+    gained_rad_s: f32,
+    last_us: u64,
+}
+
+impl Run {
+    fn add(&mut self, now_us: u64, seen: Seen, motor: &Motor) {
+        let [_, i_q, .., omega] = seen;
+        if self.looks == 0.0 {
+            self.first_rad_s = omega;
+        } else {
+            let passed_s = seconds(now_us, self.last_us);
+            self.charge_as += i_q * passed_s;
+            self.square += omega * omega * passed_s;
+        }
+        self.last_us = now_us;
+        self.gained_rad_s = omega - self.first_rad_s;
+        self.looks += 1.0;
+        self.flux_wb += emf(seen, motor) / omega;
+    }
+}
+
+/// The length of the voltage that the current does not take: whatever the angle of the frame.
+fn emf([i_d, i_q, u_d, u_q, omega]: Seen, motor: &Motor) -> f32 {
+    let reactance_ohm = omega * motor.l_h;
+    let e_d = u_d - motor.r_ohm * i_d + reactance_ohm * i_q;
+    let e_q = u_q - motor.r_ohm * i_q - reactance_ohm * i_d;
+    length(e_d, e_q)
+}
+
+fn length(x: f32, y: f32) -> f32 {
+    square_root(x * x + y * y)
+}
+
+impl Shaft {
+    /// About the flux, Wb, of what the six-step drive shows. Of its two legs one switches: the dead time takes √3/4
+    /// of what it takes along a phase.
+    pub(super) fn about([i_d, i_q, u_d, u_q, omega]: Seen, motor: &Motor, dead_v: f32) -> f32 {
+        let dropped_v = motor.r_ohm * length(i_d, i_q) + SQRT_3 / 4.0 * dead_v;
+        (length(u_d, u_q) - dropped_v) / (SIX_STEP_SHARE * omega)
+    }
+
+    /// Chooses the speed of the runs. Returns the greatest speed that the drive must know, rpm.
+    pub(super) fn choose(&mut self, bus_v: f32, motor: &Motor, scale: &Scale) -> f32 {
+        let by_supply = RUN_SHARE * bus_v / (SQRT_3 * motor.flux_wb);
+        self.fast_rad_s = by_supply.min(RUN_TURNS * TAU / scale.period_s);
+        RESERVE * self.fast_rad_s * 60.0 / (TAU * scale.pole_pairs)
+    }
+
+    /// A look at a run up or down. True when it has come to its end.
+    pub(super) fn look(&mut self, now_us: u64, seen: Seen, down: bool, motor: &Motor) -> bool {
+        let slow = SLOW_SHARE * self.fast_rad_s;
+        let [.., omega] = seen;
+        if slow < omega && omega < self.fast_rad_s {
+            self.runs[usize::from(down)].add(now_us, seen, motor);
+        }
+        if down {
+            omega <= slow
+        } else {
+            omega >= self.fast_rad_s
+        }
+    }
+
+    /// The figures of the runs, or why there are none.
+    pub(super) fn judge(&self, report: &mut Report, pole_pairs: f32) -> Result<(), &'static str> {
+        let [up, down] = &self.runs;
+        let flux_wb = self.runs.map(|run| run.flux_wb / run.looks);
+        report.flux_mwb = Figure::of(&flux_wb, 1e3);
+        // J·Δω = k·∫i_q dt − c·∫ω² dt in both runs: two equations for J and c.
+        let k = 1.5 * pole_pairs * pole_pairs * 1e-3 * report.flux_mwb.value;
+        let j_kgm2 = k * (up.charge_as * down.square - down.charge_as * up.square)
+            / (up.gained_rad_s * down.square - down.gained_rad_s * up.square);
+        if report.flux_mwb.spread < FLUX_SPREAD && j_kgm2 > 0.0 {
+            report.j_gcm2 = Figure::of(&[j_kgm2], 1e7);
+            return Ok(());
+        }
+        Err("Flux differs between the runs")
+    }
+}
