@@ -1,24 +1,18 @@
 //! `siskin check`: the ESC tests itself, and says what it has found.
 
 use std::io::Write;
-use std::time::{Duration, Instant};
 
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavResult};
+use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 use serde_json::{Value, json};
 
 use crate::error::Error;
-use crate::message::Message;
-use crate::session::{ATTEMPTS, Session};
-use crate::{ftp, json};
+use crate::session::Session;
+use crate::{ftp, json, step_by_step};
 
 const COMMAND: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;
 
 /// Where the ESC has what it has found.
 const REPORT: &str = "@SYS/check.txt";
-
-/// How long the next acknowledgement is waited for: each step of the test has one, and takes 0.3 s at
-/// the most.
-const STEP_TIMEOUT: Duration = Duration::from_millis(800);
 
 /// A line of the report.
 #[derive(Debug, PartialEq)]
@@ -38,14 +32,15 @@ struct Item {
 /// [`Error::Refused`] where the ESC does not test itself now, [`Error::Partly`] where something is wrong
 /// with it.
 pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> Result<(), Error> {
-    let (result, texts) = command(session)?;
+    let what = "self-test";
+    let (result, texts) = step_by_step::run(session, what, (COMMAND, 0.0), &["Fault: "])?;
     let passed = match result {
         MavResult::MAV_RESULT_ACCEPTED => true,
         MavResult::MAV_RESULT_FAILED => false,
         other => {
             return Err(Error::Refused {
-                what: "self-test".into(),
-                reason: why(other).into(),
+                what: what.into(),
+                reason: step_by_step::why(other).into(),
             });
         }
     };
@@ -77,59 +72,6 @@ pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> 
         summary += &format!(" ({text})");
     }
     Err(Error::Partly(summary))
-}
-
-/// Has the ESC test itself: how it ended, and of which faults it has told meanwhile.
-fn command(session: &mut Session) -> Result<(MavResult, Vec<String>), Error> {
-    let target = session.target();
-    let mut texts = Vec::new();
-    let mut silent = 0;
-    let mut confirmation = 0;
-    while silent < ATTEMPTS {
-        session.send(&COMMAND_LONG_DATA {
-            command: COMMAND,
-            target_system: target.system,
-            target_component: target.component,
-            // Those after the first ask how far it is.
-            confirmation,
-            ..COMMAND_LONG_DATA::DEFAULT
-        })?;
-        silent += 1;
-        confirmation = confirmation.saturating_add(1);
-        let mut deadline = Instant::now() + STEP_TIMEOUT;
-        while let Some(message) = session.next_of_target(deadline)? {
-            match message {
-                Message::CommandAck(ack) if ack.command == COMMAND => {
-                    if ack.result != MavResult::MAV_RESULT_IN_PROGRESS {
-                        return Ok((ack.result, texts));
-                    }
-                    silent = 0;
-                    deadline = Instant::now() + STEP_TIMEOUT;
-                }
-                Message::StatusText(status) if status.text.starts_with("Fault: ") => {
-                    texts.push(status.text);
-                }
-                _ => {}
-            }
-        }
-    }
-    Err(Error::NoAnswer {
-        what: "self-test".into(),
-        attempts: ATTEMPTS,
-    })
-}
-
-fn why(result: MavResult) -> &'static str {
-    match result {
-        MavResult::MAV_RESULT_TEMPORARILY_REJECTED => {
-            "not now; it needs a shaft at rest, no fault, and the throttle at zero or unplugged"
-        }
-        MavResult::MAV_RESULT_UNSUPPORTED => {
-            "this component has none: is its image older than this program?"
-        }
-        MavResult::MAV_RESULT_DENIED => "denied; is the link signed with a key?",
-        _ => "ended by the ESC",
-    }
 }
 
 impl Item {

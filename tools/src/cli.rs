@@ -47,6 +47,18 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Have the ESC find out what motor it has: resistance, inductance, flux and inertia.
+    ///
+    /// The motor turns for some seconds, up to four tenths of its full speed, with half of LIM_PHASE_A at most.
+    /// Throttle, disarming or a fault ends it. Nothing is set without --keep.
+    Identify {
+        /// Keep what is found: MOT_R_MOHM, MOT_L_UH, MOT_FLUX_MWB and MOT_J_GCM2, stored once the shaft stands.
+        #[arg(long)]
+        keep: bool,
+        /// One JSON object: figures, a list of name, value, unit and spread_percent.
+        #[arg(long)]
+        json: bool,
+    },
     /// Read, change, save and load parameters.
     #[command(subcommand)]
     Params(ParamsCommand),

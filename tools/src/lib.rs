@@ -11,6 +11,7 @@ mod factory;
 mod flash;
 mod ftp;
 mod given;
+mod identify;
 mod image;
 mod json;
 mod link;
@@ -24,6 +25,7 @@ mod params;
 mod program;
 mod sample;
 mod session;
+mod step_by_step;
 mod tune;
 
 use std::io;
@@ -106,6 +108,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
             task.run(&mut find()?, &mut out, &mut complaints)
         }
         Command::Check { json } => check::run(&mut find()?, *json, &mut out),
+        Command::Identify { keep, json } => identify::run(&mut find()?, (*keep, *json), &mut out),
         Command::Decode(args) => decode::run(&args.capture, &args.options, &mut out),
         Command::Budget(args) => budget::run(args, cli.component, &mut out),
         Command::Tune(args) => tune::run(args, cli.component, &mut out),

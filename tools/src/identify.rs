@@ -1,0 +1,150 @@
+//! `siskin identify`: the ESC finds out what motor it has, and says what it has found.
+
+use std::io::Write;
+use std::thread::sleep;
+use std::time::Duration;
+
+use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
+use serde_json::{Value, json};
+
+use crate::error::Error;
+use crate::session::Session;
+use crate::{ftp, json, step_by_step};
+
+/// The dialect has no command for it; parameter 1 is what to do.
+const COMMAND: MavCmd = MavCmd::MAV_CMD_USER_1;
+const BEGIN: f32 = 1.0;
+const KEEP: f32 = 2.0;
+
+/// Where the ESC has what it has found.
+const REPORT: &str = "@SYS/identify.txt";
+
+/// How often, and how far apart, it is asked to keep what it has found: once the shaft stands.
+const KEEP_ATTEMPTS: u32 = 40;
+const KEEP_PAUSE: Duration = Duration::from_millis(500);
+
+/// A line of the report.
+#[derive(Debug, PartialEq)]
+struct Figure {
+    name: String,
+    value: f32,
+    unit: String,
+    spread_percent: f32,
+}
+
+/// Has the motor identified, prints what was found, and has it kept if that is asked for.
+///
+/// # Errors
+/// [`Error::Refused`] with the ESC's reason.
+pub(crate) fn run(
+    session: &mut Session,
+    (keep, as_json): (bool, bool),
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let what = "identification";
+    let beginnings = ["Not identified: ", "Fault: "];
+    let (result, texts) = step_by_step::run(session, what, (COMMAND, BEGIN), &beginnings)?;
+    accepted(what, result, &texts)?;
+    let report = String::from_utf8_lossy(&ftp::read(session, REPORT)?).into_owned();
+    let figures = report.lines().map(Figure::parse);
+    let figures = figures.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
+        what: REPORT.into(),
+        reason: "it is not understood; is the image newer than this program?".into(),
+    })?;
+    if as_json {
+        let figures: Vec<_> = figures.iter().map(Figure::json).collect();
+        writeln!(out, "{}", json!({ "figures": figures }))?;
+    } else {
+        for figure in &figures {
+            writeln!(out, "{}", figure.line())?;
+        }
+    }
+    if keep {
+        self::keep(session)?;
+    }
+    Ok(())
+}
+
+/// Has it kept and stored, once the shaft stands.
+fn keep(session: &mut Session) -> Result<(), Error> {
+    let what = "what was found";
+    for attempt in 1.. {
+        let (result, texts) = step_by_step::run(session, what, (COMMAND, KEEP), &["Not kept: "])?;
+        if result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED && attempt < KEEP_ATTEMPTS {
+            sleep(KEEP_PAUSE);
+            continue;
+        }
+        return accepted(what, result, &texts);
+    }
+    Ok(())
+}
+
+fn accepted(what: &str, result: MavResult, texts: &[String]) -> Result<(), Error> {
+    let reason = match result {
+        MavResult::MAV_RESULT_ACCEPTED => return Ok(()),
+        MavResult::MAV_RESULT_FAILED if !texts.is_empty() => texts.join("; "),
+        other => step_by_step::why(other).into(),
+    };
+    Err(Error::Refused {
+        what: what.into(),
+        reason,
+    })
+}
+
+impl Figure {
+    /// Reads a line: name, value, unit, spread.
+    fn parse(line: &str) -> Option<Self> {
+        let words: Vec<_> = line.split(' ').collect();
+        let [name, value, unit, spread, "%"] = words[..] else {
+            return None;
+        };
+        Some(Self {
+            name: name.to_owned(),
+            value: value.parse().ok()?,
+            unit: unit.to_owned(),
+            spread_percent: spread.parse().ok()?,
+        })
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "name": self.name,
+            "value": json::number(self.value),
+            "unit": self.unit,
+            "spread_percent": json::number(self.spread_percent),
+        })
+    }
+
+    fn line(&self) -> String {
+        let Self {
+            name,
+            value,
+            unit,
+            spread_percent,
+        } = self;
+        format!("{name:<16} {value:>10.3} {unit:<7} within {spread_percent:.1} %")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_read_as_the_esc_writes_it() {
+        let figure = Figure::parse("MOT_R_MOHM 107.960 mOhm 0.100 %").expect("a line");
+        assert_eq!((figure.value, figure.spread_percent), (107.96, 0.1));
+        assert_eq!(
+            figure.line(),
+            "MOT_R_MOHM          107.960 mOhm    within 0.1 %"
+        );
+        for line in [
+            "",
+            "MOT_R_MOHM",
+            "MOT_R_MOHM x mOhm 0.1 %",
+            "MOT_R_MOHM 1 mOhm 0.1",
+        ] {
+            assert_eq!(Figure::parse(line), None, "{line}");
+        }
+    }
+}
