@@ -52,7 +52,7 @@ pub fn unpack(word: u32) -> Setpoint {
         TEST => Setpoint::Test(Current::from_bits(bits)),
         TONE => Setpoint::Tone(Speed::from_bits(bits)),
         PULL => Setpoint::Pull(Pull::from_number(word as u8)),
-        EXCITE => Setpoint::Excite(Excitation::from_word(word & VALUE_MASK)),
+        EXCITE => Setpoint::Excite(Excitation::from_word(word)),
         VOLTAGE => Setpoint::Voltage(I1F31::from_bits(bits)),
         _ => rest(word & VALUE_MASK),
     }
@@ -94,11 +94,8 @@ mod tests {
         ];
         all.extend(Pull::ALL.map(Setpoint::Pull));
         for (phase, ripple) in [(0, Ripple::None), (1, Ripple::Along), (2, Ripple::Across)] {
-            all.push(Setpoint::Excite(Excitation {
-                phase,
-                current: Current::from_num(0.375),
-                ripple,
-            }));
+            let current = Current::from_num(0.375);
+            all.push(Setpoint::Excite(Excitation::new(phase, current, ripple)));
         }
         all.extend(Fault::ALL.map(Setpoint::Fault));
         for setpoint in all {

@@ -63,24 +63,25 @@ pub(super) fn period(
     currents: [AdcCounts; 3],
     excitation: Excitation,
 ) -> Bridge {
-    if state.phase != excitation.phase {
+    let (phase, ripple) = (excitation.phase(), excitation.ripple());
+    if state.phase != phase {
         *state = State {
-            phase: excitation.phase,
+            phase,
             ..State::default()
         };
     }
-    if state.ripple != excitation.ripple {
-        state.ripple = excitation.ripple;
+    if state.ripple != ripple {
+        state.ripple = ripple;
         state.h = Voltage::ZERO;
         state.response = Current::ZERO;
         state.mean_h = Voltage::ZERO;
     }
-    let at = |behind: usize| (usize::from(excitation.phase) + behind) % 3;
+    let at = |behind: usize| (usize::from(phase) + behind) % 3;
     shared.supply.follow(shared.protection.bus);
     shared.supply.reach(&config.modulator, Voltage::ZERO);
     // In the order from the excited phase on, along whose axis Clarke's first component is.
     let now = clarke([0, 1, 2].map(|behind| currents[at(behind)]));
-    regulate(config, state, shared.supply.bus, now, excitation.current);
+    regulate(config, state, shared.supply.bus, now, excitation.current());
     shared.seen = Seen {
         phase: Phase::Tone,
         angle: Angle::ZERO,

@@ -100,7 +100,7 @@ enum Step {
 pub enum Outcome {
     /// It goes on, so many percent being done.
     Progress(u8),
-    /// The drive shall be made for the motor that is [assumed](Identify::assume) now.
+    /// The drive shall be made for the motor as far as it is known by now.
     Assume,
     /// It has ended: well, or for this reason. The drive shall be made for the motor of the parameters.
     Done(Result<(), &'static str>),
@@ -239,11 +239,8 @@ impl Identify {
     fn excite(&mut self, sight: &Sight, number: u8) -> Outcome {
         let (share, ripple) = EXCITATIONS[usize::from(number % 4)];
         let current_a = share * EXCITED_SHARE * sight.limit_a;
-        let excitation = Excitation {
-            phase: number / 4,
-            current: sight.scale.current_from_a(current_a),
-            ripple,
-        };
+        let current = sight.scale.current_from_a(current_a);
+        let excitation = Excitation::new(number / 4, current, ripple);
         let setpoint = Setpoint::Excite(excitation);
         self.go(sight.now_us, Step::Excite(number), setpoint);
         Outcome::Progress(5 * number)
@@ -259,12 +256,13 @@ impl Identify {
         let (snapshot, period_s) = (sight.snapshot, sight.scale.period_s);
         let (phase, step) = (usize::from(number / 4), number % 4);
         if self.means.looks == 0 {
-            let Setpoint::Excite(asked) = self.setpoint else {
+            let Setpoint::Excite(excitation) = self.setpoint else {
                 return Ok(None);
             };
+            let asked = excitation.current();
             let settled_s = if step == 0 { ALIGNED_S } else { SETTLED_S };
             let settled = passed_s > settled_s + SETTLED_PERIODS * period_s;
-            let reached = (snapshot.i.d - asked.current).abs() < asked.current >> 5;
+            let reached = (snapshot.i.d - asked).abs() < asked >> 5;
             // Where the supply is too weak for the current, what flows is as good.
             let risen = reached || passed_s > RISEN_PERIODS * period_s;
             if snapshot.phase != Phase::Tone || !settled || !risen {

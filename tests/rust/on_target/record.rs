@@ -1,7 +1,7 @@
 //! A run of the emulator's bench, and what the chip must answer to it.
 
 use fixed::types::I1F31;
-use siskin_control::drive::{Config, Excitation, Phase, Sample, Setpoint, State, step};
+use siskin_control::drive::{Config, Phase, Sample, Setpoint, State, step};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
 use siskin_control::units::{Current, Speed};
 use siskin_emulator::fault::InForce;
@@ -150,9 +150,10 @@ fn exchanged(setpoint: Setpoint) -> Setpoint {
         Setpoint::Voltage(share) => Setpoint::Voltage(I1F31::from_bits(upper(share.to_bits()))),
         Setpoint::Tone(pitch) => Setpoint::Tone(Speed::from_bits(upper(pitch.to_bits()))),
         Setpoint::Test(i_q) => Setpoint::Test(Current::from_bits(upper(i_q.to_bits()))),
-        Setpoint::Excite(excitation) => {
-            Setpoint::Excite(Excitation::from_word(excitation.to_word()))
-        }
-        Setpoint::Stop | Setpoint::Zero | Setpoint::Fault(_) | Setpoint::Pull(_) => setpoint,
+        Setpoint::Stop
+        | Setpoint::Zero
+        | Setpoint::Fault(_)
+        | Setpoint::Pull(_)
+        | Setpoint::Excite(_) => setpoint,
     }
 }
