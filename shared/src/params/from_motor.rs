@@ -26,7 +26,7 @@ const EMF_SHARE: f32 = 1.5;
 const LEAST_DEAD_SHARE: f32 = 0.25;
 
 /// Least speed over `CTL_RPM_MAX`.
-const LEAST_SHARE: f32 = 0.05;
+pub(super) const LEAST_SHARE: f32 = 0.05;
 
 /// Least electrical frequency, Hz: the speed loop is a part of it.
 const LEAST_HZ: f32 = 30.0;

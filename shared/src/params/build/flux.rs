@@ -13,16 +13,18 @@ use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{flux_linkage, position};
 use crate::math::{Real, settled, square_root};
 use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
+use crate::params::from_motor::LEAST_SHARE;
 use crate::params::{Board, ParamId, Params};
 use crate::units::Angle;
 
 /// τ_int·ω where Run ends with the defaults, at half of `STA_RUN_RPM`: there the first-order integrator
 /// leads by 10° (2.2.2).
 ///
-/// A `CTL_RPM_MIN` below `STA_RUN_RPM` does not lengthen it. What a start leaves in the integrals, and
-/// what one period of them winds up behind an angle that is wrong, must be forgotten within some turns
-/// of the speed at which Run begins, or neither ever goes: with three times the time constant the drive
-/// swings about 640 rpm whatever is asked for. The greater lead at such speeds is known, and taken off.
+/// Neither a `CTL_RPM_MIN` below `STA_RUN_RPM` lengthens it, nor a `STA_RUN_RPM` below the least that
+/// follows from the motor. What a start leaves in the integrals, and what one period of them winds up
+/// behind an angle that is wrong, must be forgotten before the drive has accelerated far beyond it, or
+/// neither goes for seconds: with one and a half times the time constant the bench swings about 640 rpm
+/// whatever is asked for. The greater lead at low speeds is known, and taken off.
 const TAU_INT: f32 = 5.671;
 
 /// τ_HPFS over τ_int, much above 1 (figure 21): to a lead of 10° it adds 1°.
@@ -87,7 +89,7 @@ impl FluxSettings {
         p.set(Quantity::Turns, p.get(ParamId::CtlPosN));
         p.set(Quantity::Ae, p.get(ParamId::CtlAe));
         let formulas = formulas!(p, {
-            define SlowRadS([SLOW_SHARE] * RunRpm * PolePairs * Tau / [60.0]),
+            define SlowRadS([LEAST_SHARE] * FastestRpm max RunRpm * [SLOW_SHARE] * PolePairs * Tau / [60.0]),
             define TauInt([TAU_INT] / SlowRadS),
             define Acceleration(SlewRpmS * PolePairs / [60.0]),
             // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures again, and
