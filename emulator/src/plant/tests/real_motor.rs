@@ -267,7 +267,8 @@ fn a_blocked_shaft_stands_until_it_is_let_go() {
 }
 
 proptest! {
-    /// As for the ideal motor.
+    /// As for the ideal motor, and with more of what flows than the period's means show: what a pulse
+    /// puts into the currents, and the diodes give back by the period's end.
     #[test]
     fn energy_is_conserved_through_any_commands_in_a_real_motor(
         commands in prop::collection::vec(any_bridge(), 1..20),
@@ -283,15 +284,20 @@ proptest! {
         let (mut balance, mut gross) = (0.0, 1e-9);
         for pair in commands.windows(2) {
             let before = plant.stored_j();
+            let mut pulse = plant.clone();
+            pulse.period([pair[0]; 2], bus_v, 50e-6, DEAD_TIME_S);
+            let pulse_j = (pulse.stored_j() - before).abs();
             let flow = plant.period([pair[0], pair[1]], bus_v, 50e-6, DEAD_TIME_S);
             let shaft_w = flow.torque_nm * plant.speed_rad_s();
             let grown = plant.stored_j() - before;
             balance += 50e-6 * (flow.motor_w - flow.copper_w - shaft_w) - grown;
-            gross += 50e-6 * (flow.motor_w.abs() + flow.copper_w + shaft_w.abs());
+            gross += 50e-6 * (flow.motor_w.abs() + flow.copper_w + shaft_w.abs()) + pulse_j;
             prop_assert!(bus_v * flow.bus_a >= flow.motor_w - 1e-6);
             let [a, b, c] = plant.currents_a();
             prop_assert!((a + b + c).abs() < 1e-9 && a.abs() < 1e4);
         }
-        prop_assert!(balance.abs() < 1e-5 * gross, "{balance} of {gross}");
+        // In one step of Runge and Kutta's from no current the balance is off by 0.04·(R/L·h)³ of what
+        // flows, and a step is at most a tenth of L/R.
+        prop_assert!(balance.abs() < 4e-5 * gross, "{balance} of {gross}");
     }
 }
