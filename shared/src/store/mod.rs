@@ -50,7 +50,7 @@ impl Loaded {
     /// The trouble that a person must know of, if any.
     pub const fn trouble(&self) -> Option<&'static str> {
         match self.integrity {
-            Integrity::Incomplete => Some("storage: not whole, a sound copy is in force"),
+            Integrity::Incomplete => Some("storage: not whole, an older save may be in force"),
             Integrity::Unfinished => Some("storage: the first save was cut off"),
             Integrity::Corrupt => Some("storage: corrupt, all values are the defaults"),
             Integrity::Unreadable => Some("storage: unreadable, all values are the defaults"),
