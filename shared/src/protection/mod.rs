@@ -36,6 +36,8 @@ pub struct Config {
     pub bus_return_v: Voltage,
     /// Volts above that to current.
     pub bus_return_slope: Gain<Voltage, Current>,
+    /// Volts above that to i_d, which turns into heat what would raise them.
+    pub burn_slope: Gain<Voltage, Current>,
     /// Bus current's excess to the bound's change in a period.
     pub bound_rate: Multiplier<Current, Current>,
 }
@@ -131,6 +133,24 @@ pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {
     if down || state.trip < config.trip {
         state.trip = config.trip;
     }
+}
+
+/// `i_d`, or what turns more of the supply's power into heat, as its voltage nears the limit: no bound of i_q,
+/// and no current that is measured, is exact enough for a supply that takes nothing at all.
+#[inline(always)] // a comparison, in the longest period of the control
+pub fn burn(config: &Config, state: &State, i_d: Current) -> Current {
+    if state.bus <= config.bus_return_v {
+        i_d
+    } else {
+        burnt(config, state).max(i_d)
+    }
+}
+
+#[cold]
+#[inline(never)] // what is rare is no part of the longest period
+fn burnt(config: &Config, state: &State) -> Current {
+    let above = state.bus.minus(config.bus_return_v);
+    config.burn_slope.saturating_apply(above)
 }
 
 /// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw`

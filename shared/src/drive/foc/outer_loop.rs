@@ -107,7 +107,9 @@ pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: 
 pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &Shared) {
     let bounds = shared.protection.bounds;
     let loops = &mut foc.loops;
-    (loops.i_d, loops.bounds) = config.low_speed.bounds(bounds, shared.seen.speed);
+    let (i_d, bounds) = config.low_speed.bounds(bounds, shared.seen.speed);
+    loops.i_d = protection::burn(&config.protection, &shared.protection, i_d);
+    loops.bounds = bounds;
 }
 
 /// Run and Stopping: the current's reference.

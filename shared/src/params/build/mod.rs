@@ -95,6 +95,9 @@ const SHOWN_SHARE: f32 = 0.97;
 /// Volts below `LIM_BUS_V_MAX` over which the returned current is brought to zero.
 const RETURN_BAND_V: f32 = 1.0;
 
+/// i_d at `LIM_BUS_V_MAX` over `LIM_PHASE_A`: 4 W on the bench, where an i_q of zero returns 1 W.
+const BURN_SHARE: f32 = 0.25;
+
 /// Rate at which the bounds of i_q follow the bus current, 1/s.
 const BOUND_RATE: f32 = 600.0;
 
@@ -336,6 +339,7 @@ fn limits(p: &Si, place: &mut protection::Config) {
         define ReturnV(SupplyMaxV - [RETURN_BAND_V]),
         number bus_return_v(ReturnV / UnitV),
         gain bus_return_slope(LimRegenA, RegenA / [RETURN_BAND_V] * UnitV / UnitA),
+        gain burn_slope(LimPhaseA, [BURN_SHARE / RETURN_BAND_V] * LimitA * UnitV / UnitA),
         factor bound_rate(PwmFreqHz, [BOUND_RATE] * T),
     });
 }
