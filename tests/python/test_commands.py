@@ -28,7 +28,7 @@ REBOOT = dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 ESC_STATUS = dialect.MAVLINK_MSG_ID_ESC_STATUS
 
 
-@pytest.mark.parametrize("number", [16, 22, 999, 31010, 65535])
+@pytest.mark.parametrize("number", [16, 22, 999, 31011, 65535])
 def test_what_it_cannot_do_is_unsupported(esc, number):
     assert esc.command(number, 1.0) == UNSUPPORTED
 
