@@ -65,11 +65,11 @@ impl Step {
 /// speed has settled where it is measured, though a start may be 15 ms later: a start takes 0.8 s of it.
 pub(crate) const STEPS: [Step; 6] = [
     Step::command(500, 0),
-    Step::throttle(1900, 0.25),
-    Step::throttle(2500, 0.5),
-    Step::throttle(3100, 0.75),
-    Step::throttle(3900, 0.25),
-    Step::command(4700, 0),
+    Step::throttle(2300, 0.25),
+    Step::throttle(2900, 0.5),
+    Step::throttle(3500, 0.75),
+    Step::throttle(4300, 0.25),
+    Step::command(5100, 0),
 ];
 
 /// The default bench with the sensors of the board, switch by switch.
