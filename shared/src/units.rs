@@ -164,8 +164,8 @@ impl Scale {
         1.5 * self.pole_pairs * self.current_a / self.inverse_flux_per_wb()
     }
 
-    /// The control's speed for mechanical rpm; held below half a turn a period. Never inlined, nor is the
-    /// one for amperes: each limit is one.
+    /// The control's speed for mechanical rpm; held below half a turn a period.
+    // Out of line, as the one for amperes: every limit needs one of them.
     #[inline(never)]
     pub fn speed_from_rpm(&self, rpm: f32) -> Speed {
         Speed::from_f32(rpm * self.turns_per_rpm())

@@ -101,7 +101,7 @@ impl Interrupt {
         if tripped {
             self.pwm.clear_break();
         }
-        // One of two in memory: made up here, it would go through registers in pieces.
+        // By reference: a set-point built here would be copied through registers, field by field.
         let setpoint = *if tripped {
             &self.trip
         } else {

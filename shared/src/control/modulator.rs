@@ -149,8 +149,8 @@ impl Supply {
     /// Takes another voltage; [`reach`](Self::reach) takes what it is enough for.
     #[inline(never)]
     pub fn follow(&mut self, bus: Voltage) {
-        // 2^56/bus of the voltage's upper bits, right to 2^-11 at the worst, and one Newton step. The
-        // floor of 1/8 bounds the reciprocal.
+        // 2^56/bus: a division of 32 bits by the voltage's upper bits, right to 2^-11 at the worst, and one step of
+        // Newton's method. A bus below 1/8 of a unit counts as 1/8, which bounds the reciprocal.
         let bits = bus.to_bits().max(1 << 25);
         let rough = ((u32::MAX / (bits >> 10) as u32) << 14).min(i32::MAX as u32);
         let rough = InverseVoltage::from_bits(rough as i32);

@@ -38,7 +38,7 @@ pub struct Order {
 }
 
 impl Trace for Order {
-    /// Returns true if the phases b and c have changed places.
+    /// One word: 1 if the phases b and c have changed places.
     fn trace(&self, out: &mut impl FnMut(u32)) {
         (*self == Self::SWAPPED).trace(out);
     }

@@ -25,7 +25,8 @@ pub enum Direction {
 /// Way to stop the motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
-    /// The bridge off: at once by field-oriented control, by the six-step drive when the shaft is slow.
+    /// The bridge off: at once by field-oriented control, by the six-step drive when the shaft is slow. On the way to
+    /// the other direction the shaft is braked all the same.
     #[default]
     Coast,
     /// By regenerative braking, then all low sides on.

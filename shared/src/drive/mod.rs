@@ -7,7 +7,8 @@
 //! its own work: it says what the bridge does, and perhaps why it ends. The default observer and regulator have
 //! a piece of code of their own, any others share one (`foc/period.rs`).
 //!
-//! A set-point of another kind is obeyed in its own period, and so is a fault. One of the same kind that only
+//! A set-point of another kind is obeyed in its own period, and so is a fault; in Idle, while a turning rotor is
+//! looked at, in the next. One of the same kind that only
 //! changes its sign is obeyed within a cycle of the schedule, at most 32 periods later.
 //!
 //! # The modes
@@ -19,7 +20,7 @@
 //! | Charge | `charge.rs` | the drivers' supplies are charged, then the drive is made ready (`foc/begin.rs`) |
 //! | Park, Ramp | `foc/open_loop.rs` | the frame is imposed, the rotor follows |
 //! | Run, Stopping | `foc/` | field-oriented control |
-//! | Brake | `foc/short.rs` | the low sides are on, the observer goes on |
+//! | Brake | `foc/brake.rs` | the low sides are on, the observer goes on |
 //! | Park, Ramp, Run, Stopping, Brake with `CTL_DRIVE` 1 | `six_step/` | the same by zero crossings |
 //! | Tone | `tone.rs`, `self_test.rs`, `excite.rs` | the phases switch to be heard, or to be tested or measured: [`Setpoint::Pull`], [`Setpoint::Excite`] |
 //!

@@ -5,7 +5,7 @@
 //! the delay's compensation, the decoupling and the changes of mode every 32. Every eighth period also publishes a
 //! snapshot, wherever in the cycle that falls, so that more than half of all interrupts stay short.
 //!
-//! A tone and Brake have cycles of their own, in `tone.rs` and `foc/short.rs`.
+//! A tone and Brake have cycles of their own, in `tone.rs` and `foc/brake.rs`.
 
 use crate::control::PERIODS;
 

@@ -1,4 +1,6 @@
-//! Figures of the last period, for telemetry.
+//! What the last period saw and commanded: telemetry shows it, and the next period's decisions read it.
+//!
+//! Its phase is the one that these figures belong to; the drive's own, `State::phase`, may already be the next.
 
 use super::phase::Phase;
 use crate::control::modulator::Supply;

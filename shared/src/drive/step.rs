@@ -3,7 +3,7 @@
 use super::asked::asked;
 use super::config::Config;
 use super::foc::period::period;
-use super::foc::{begin, open_loop, outer_loop, short};
+use super::foc::{begin, brake, open_loop, outer_loop};
 use super::io::{Asked, Bridge, Sample, Setpoint};
 use super::phase::Phase;
 use super::schedule::{self, Work};
@@ -20,7 +20,8 @@ use crate::units::AdcCounts;
 #[inline(never)]
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
     // Decide the mode from what the last period saw. While field-oriented control drives, only its schedule does
-    // so, in two slots of a cycle. This comes before the sample is read, so that no sample is kept across it.
+    // so: once in a cycle, and in a start where its own pieces are due. This comes before the sample is read, so
+    // that no sample is kept across it.
     let field_oriented = if state.is_decided_for(&setpoint) {
         match schedule::next(&mut state.foc.loops.slot) {
             Work::NOTHING => true,
@@ -33,7 +34,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
             due => outer(config, state, &setpoint, due),
         }
     } else {
-        !asks_nothing_new(config, state, &setpoint) && decide(config, state, &setpoint)
+        !stays(config, state, &setpoint) && decide(config, state, &setpoint)
     };
 
     // Sense. The mode's own work: voltage, duties, and what is seen.
@@ -89,17 +90,19 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
     };
     if state.phase == Phase::Brake && config.six_step.is_none() {
         let drive = (&mut state.foc, &mut state.shared);
-        short::watch(config, drive, sample, currents);
+        brake::watch(config, drive, sample, currents);
         return Bridge::Brake;
     }
     energised(config, state, (sample, setpoint), currents)
 }
 
-/// Returns true if nothing changes: a drive at rest is asked for nothing, which also ends a row of failed starts, one
-/// in Sense is still asked to turn, or a rotor that is followed is looked at in this period, the longest of four, and
-/// what is asked for begins in the next.
+/// Returns true if the mode need not be decided in this period:
+///
+/// - a drive at rest is asked for nothing, which also ends a row of failed starts;
+/// - one in Sense is still asked to turn;
+/// - in Idle a turning rotor is looked at in this period, the longest of four: what is asked for begins in the next.
 #[inline(always)]
-fn asks_nothing_new(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
+fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
         (Phase::Idle | Phase::Brake, Setpoint::Stop | Setpoint::Zero) => {
             let nothing = !state.tone.shorted_before && state.shared.latch.faults.is_empty();

@@ -109,7 +109,8 @@ pub struct Authority {
     opening: u8,
     event_us: Option<u64>,
     test: Option<Test>,
-    /// Disarmed by command while a fault held.
+    /// Somebody has disarmed since the last drive: until the fault that may hold has ended, that is as good as zero
+    /// throttle on the wire.
     forgiven: bool,
     /// True if nothing may turn the motor, whoever asks.
     barred: bool,

@@ -159,5 +159,3 @@ impl Regulator for synchronous::Config {
         Self::give_way(self, &mut state.synchronous, cut);
     }
 }
-
-impl State {}

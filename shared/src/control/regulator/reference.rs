@@ -1,4 +1,4 @@
-//! The inputs of every current regulator, and the voltage that its limit cuts off.
+//! What every current regulator is given: reference and feedback, and how it takes back what the limit cut off.
 
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;

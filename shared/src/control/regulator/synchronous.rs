@@ -44,9 +44,10 @@ impl Config {
     /// V_d and V_q of figure 10, before any limit:
     ///
     /// V_d = k_p·(i_d* − i_d) + σ_d − ω̂·L·i_q,
-    /// V_q = k_p·(i_q* − i_q) + σ_q + ω̂·L·i_d + ω̂·φ̂,
+    /// V_q = k_p·(i_q* − i_q) + σ_q + ω̂·L·i_d + ω̂·φ̂ + u_q*,
     ///
-    /// where the last i_d and i_q are those of the model.
+    /// where the last i_d and i_q are those of the model, and u_q* is the voltage that the reference brings: none but in
+    /// voltage mode.
     #[inline(always)]
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let e = error(wanted, fb);

@@ -22,7 +22,7 @@ pub(in crate::drive) fn any(
 }
 
 /// The frame, imposed by a start or where the observer sees the rotor.
-// A call: where the two ways meet, the compiler would multiply what it no longer knows to be of 32 bits.
+// A call: inlined, the two ways would meet in values whose width the compiler forgets, and it would multiply 64 bits.
 #[inline(never)]
 fn frame(
     config: &Config,
