@@ -1,11 +1,13 @@
 //! The ESC outside the PWM interrupt: what the tasks of the firmware and the loop of the emulator
 //! share. It takes edges, frames and snapshots in, and gives set-points, frames and requests out.
 
+use core::mem::MaybeUninit;
+
 use heapless::Vec;
 
 use crate::answer::info::info;
 use crate::check::Check;
-use crate::drive::{Config, Phase, Setpoint, Snapshot};
+use crate::drive::{Config, Phase, Setpoint, Snapshot, put_default};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
@@ -115,7 +117,8 @@ impl Given {
 /// The parameter that does not fit the board.
 #[inline(never)]
 pub fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
-    build_in(params, board, &mut Config::default())
+    let mut place = MaybeUninit::<Config>::uninit();
+    build_in(params, board, put_default(&mut place))
 }
 
 impl Esc {

@@ -3,6 +3,8 @@
 
 use core::mem::MaybeUninit;
 
+use siskin_control::drive::put_default;
+
 use super::sync::{AtomicU8, Ordering, UnsafeCell, with_mut};
 
 /// No offer: the slot that is not in use is the task's.
@@ -42,13 +44,6 @@ impl<T: Default> Swap<T> {
         unsafe { fill(&self.slots[user.used], make) };
         user
     }
-}
-
-/// Never inlined: where the slot is an argument, the default is made in it, and not copied into it from a
-/// stack.
-#[inline(never)]
-fn put_default<T: Default>(place: &mut MaybeUninit<T>) -> &mut T {
-    place.write(T::default())
 }
 
 /// Puts a default into a slot, and has `make` change it there: a copy would take much of a stack.

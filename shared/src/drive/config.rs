@@ -3,6 +3,8 @@
 pub mod six_step;
 pub mod tone;
 
+use core::mem::MaybeUninit;
+
 use crate::control::delay::Delay;
 use crate::control::{
     catch, dead_time, inductance, low_speed, modulator, observer, regulator, sensing, speed, start,
@@ -108,6 +110,13 @@ pub struct Config {
     pub lost_periods: u32,
     /// Least voltage along q in voltage mode: the back-EMF of the least speed that the observer can know.
     pub least_u_q: Voltage,
+}
+
+/// Makes a default in its place. Never inlined: so it is not copied there from a stack, and the chip has a
+/// configuration's code once.
+#[inline(never)]
+pub fn put_default<T: Default>(place: &mut MaybeUninit<T>) -> &mut T {
+    place.write(T::default())
 }
 
 impl Config {

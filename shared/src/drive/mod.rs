@@ -74,7 +74,7 @@ mod tone;
 mod transitions;
 
 pub use crate::protection::{Fault, Faults};
-pub use config::{ATTEMPTS, Charge, Config, Direction, Stop};
+pub use config::{ATTEMPTS, Charge, Config, Direction, Stop, put_default};
 pub use excitation::{Excitation, Ripple};
 pub use io::{Bridge, Sample, Setpoint};
 pub use phase::Phase;
