@@ -62,6 +62,15 @@ macro_rules! value {
     };
 }
 
+/// Refuses each parameter of which the formula is below zero, with the reason behind it; the first counts.
+macro_rules! refuse {
+    ($si:expr, { $($param:ident($($formula:tt)*) $reason:expr),* $(,)? }) => {
+        $crate::params::build::formula::formulas!($si, {
+            $(refusing refused($param, $($formula)*)),*
+        }).refuse(&[$($reason),*])
+    };
+}
+
 macro_rules! fill_one {
     ($formulas:ident, $place:expr, define $name:ident) => {};
     ($formulas:ident, $place:expr, $kind:ident $name:ident) => {
@@ -77,13 +86,13 @@ macro_rules! entry {
             terms: $crate::params::build::formula::terms!($($formula)*),
         }
     };
-    (gain $name:ident($param:ident, $($formula:tt)*)) => {
-        $crate::params::build::formula::entry!(refusing $param, $($formula)*)
+    (gain $name:ident($($formula:tt)*)) => {
+        $crate::params::build::formula::entry!(refusing $name($($formula)*))
     };
-    (factor $name:ident($param:ident, $($formula:tt)*)) => {
-        $crate::params::build::formula::entry!(refusing $param, $($formula)*)
+    (factor $name:ident($($formula:tt)*)) => {
+        $crate::params::build::formula::entry!(refusing $name($($formula)*))
     };
-    (refusing $param:ident, $($formula:tt)*) => {
+    (refusing $name:ident($param:ident, $($formula:tt)*)) => {
         $crate::params::build::formula::Entry {
             head: $crate::params::ParamId::$param as u8,
             terms: $crate::params::build::formula::terms!($($formula)*),
@@ -147,7 +156,9 @@ macro_rules! operand {
     };
 }
 
-pub(super) use {define, entry, fill, fill_one, formulas, operand, operator, term, terms, value};
+pub(super) use {
+    define, entry, fill, fill_one, formulas, operand, operator, refuse, term, terms, value,
+};
 
 /// A formula and what its value is for.
 pub(super) struct Entry {
@@ -302,10 +313,24 @@ impl Si<'_> {
     fn coefficient(&self, exponent: i32, shift_max: u32) -> (i32, u32) {
         let (head, value) = self.next();
         let parts = gain_parts(value, exponent - LEAST).filter(|(_, shift)| *shift <= shift_max);
-        if let Some(param) = ParamId::ALL.get(usize::from(head)) {
-            self.refuse_if(parts.is_none(), *param, OUT_OF_RANGE);
-        }
+        self.refuse_head(parts.is_none(), head, OUT_OF_RANGE);
         parts.unwrap_or_default()
+    }
+
+    /// Refuses the parameter of each of the next values that is below zero.
+    #[inline(never)]
+    pub(super) fn refuse(&self, reasons: &[&'static str]) {
+        for reason in reasons {
+            let (head, value) = self.next();
+            self.refuse_head(value < 0.0, head, reason);
+        }
+    }
+
+    /// Refuses the parameter of a head in some case.
+    fn refuse_head(&self, refused: bool, head: u8, reason: &'static str) {
+        if let Some(param) = ParamId::ALL.get(usize::from(head)) {
+            self.refuse_if(refused, *param, reason);
+        }
     }
 
     /// The next value.
@@ -456,5 +481,20 @@ mod tests {
             let _: Gain<I16F16, I16F16> = formulas.gain();
         });
         assert_eq!(refused, Some(ParamId::MotRMohm));
+    }
+
+    #[test]
+    fn the_first_parameter_is_refused_whose_formula_is_below_zero() {
+        let mut said = None;
+        let refused = made(|p| {
+            refuse!(p, {
+                MotLUh([0.018] - R) "zero is not below zero",
+                MotRMohm(R - [0.02]) "less than 20 mΩ",
+                CtlFfA([-1.0]) "it is not the first",
+            });
+            said = p.refused.get();
+        });
+        assert_eq!(refused, Some(ParamId::MotRMohm));
+        assert_eq!(said.map(|said| said.reason), Some("less than 20 mΩ"));
     }
 }

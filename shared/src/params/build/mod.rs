@@ -16,7 +16,7 @@ mod start;
 mod tone;
 
 pub use flux::FluxSettings;
-use formula::{fill, formulas, value};
+use formula::{fill, formulas, refuse, value};
 pub use input::input;
 use quantity::Quantity;
 pub use si::{BuildError, scale};
@@ -212,75 +212,32 @@ pub(crate) fn lost_periods(scale: &Scale) -> u32 {
 
 /// Refuses values that are wrong whatever the coefficients are.
 fn refuse_contradictions(p: &Si) {
-    let (supply_v, unit_v) = (p.of(Quantity::SupplyMaxV), p.of(Quantity::UnitV));
-    let fastest_rpm = p.of(Quantity::FastestRpm);
-    p.refuse_above(
-        supply_v,
-        BUS_UNITS_MAX * unit_v,
-        ParamId::PwmFreqHz,
-        "too low for this flux and LIM_BUS_V_MAX",
-    );
-    p.refuse_above(
-        BUS_UNITS_MIN * unit_v,
-        supply_v,
-        ParamId::PwmFreqHz,
-        "too high for this flux and LIM_BUS_V_MAX",
-    );
     p.refuse_if(
-        p.of(Quantity::SupplyMinV) >= supply_v,
+        p.of(Quantity::SupplyMinV) >= p.of(Quantity::SupplyMaxV),
         ParamId::LimBusVMin,
         "not below LIM_BUS_V_MAX",
     );
-    p.refuse_above(
-        p.of(Quantity::LeastRpm),
-        fastest_rpm,
-        ParamId::CtlRpmMin,
-        ABOVE_FASTEST,
-    );
-    p.refuse_above(
-        p.of(Quantity::RunRpm),
-        fastest_rpm,
-        ParamId::StaRunRpm,
-        ABOVE_FASTEST,
-    );
-    p.refuse_above(
-        p.of(Quantity::CurrentHz),
-        value!(p, [BANDWIDTH_SHARE] * PwmHz),
-        ParamId::CtlBwCurHz,
-        "above a twentieth of PWM_FREQ_HZ",
-    );
-    p.refuse_above(
-        p.of(Quantity::SpeedHz),
-        value!(p, [SPEED_SHARE] * CurrentHz),
-        ParamId::CtlBwSpdHz,
-        "above a fifth of CTL_BW_CUR_HZ",
-    );
-    p.refuse_above(
-        value!(p, LimitA * [TRIP_SHARE]),
-        value!(p, [SHOWN_SHARE] * RangeA),
-        ParamId::LimPhaseA,
-        "the trip at 1.4 times this is beyond the board",
-    );
+    refuse!(p, {
+        PwmFreqHz([BUS_UNITS_MAX] * UnitV - SupplyMaxV) "too low for this flux and LIM_BUS_V_MAX",
+        PwmFreqHz(SupplyMaxV / [BUS_UNITS_MIN] - UnitV) "too high for this flux and LIM_BUS_V_MAX",
+        CtlRpmMin(FastestRpm - LeastRpm) ABOVE_FASTEST,
+        StaRunRpm(FastestRpm - RunRpm) ABOVE_FASTEST,
+        CtlBwCurHz([BANDWIDTH_SHARE] * PwmHz - CurrentHz) "above a twentieth of PWM_FREQ_HZ",
+        CtlBwSpdHz([SPEED_SHARE] * CurrentHz - SpeedHz) "above a fifth of CTL_BW_CUR_HZ",
+        LimPhaseA([SHOWN_SHARE / TRIP_SHARE] * RangeA - LimitA)
+            "the trip at 1.4 times this is beyond the board",
+        PwmFreqHz([0.25] - FastestTurns) "less than four periods a turn at CTL_RPM_MAX",
+    });
     p.refuse_above(
         p.board.least_dead_time.ns,
         p.get(ParamId::PwmDeadtimeNs),
         ParamId::PwmDeadtimeNs,
         p.board.least_dead_time.refusal,
     );
-    let turns = p.of(Quantity::FastestTurns);
-    p.refuse_above(
-        turns,
-        0.25,
-        ParamId::PwmFreqHz,
-        "less than four periods a turn at CTL_RPM_MAX",
-    );
     if p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall) {
-        p.refuse_above(
-            turns,
-            EDGES_TURNS,
-            ParamId::PwmFreqHz,
-            "less than twelve periods a turn at CTL_RPM_MAX",
-        );
+        refuse!(p, {
+            PwmFreqHz([EDGES_TURNS] - FastestTurns) "less than twelve periods a turn at CTL_RPM_MAX",
+        });
     }
     let protocol = p.params.number(ParamId::InpProto);
     p.refuse_if(
