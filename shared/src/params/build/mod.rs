@@ -137,7 +137,10 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
         CtlModulation::Sine => Modulation::Sine,
     };
     let (duty_max, window) = sensing::duty_max(&p, modulation);
-    p.verdict()?;
+    if refused.get().is_some() {
+        // Not by `?`: the chip would copy the refusal field by field.
+        return p.verdict();
+    }
     place.scale = p.scale;
     place.direction = match p.choice() {
         MotDir::Normal => Direction::Normal,

@@ -129,6 +129,7 @@ pub fn scale(params: &Params, board: &Board) -> Scale {
 }
 
 /// As [`scale`], of what is in force.
+#[inline(never)] // the coefficients ask for it too
 fn scale_of(params: &Params, board: &Board) -> Scale {
     let flux_wb = params.get(ParamId::MotFluxMwb) * 1e-3;
     let period_s = 1.0 / params.get(ParamId::PwmFreqHz);
