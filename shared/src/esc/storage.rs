@@ -12,8 +12,8 @@ use crate::store::{self, Kept, StoreError};
 /// Time without a change after which changes are stored, µs: a client that writes a whole
 /// list of parameters wears the flash once.
 const QUIET_US: u64 = 1_000_000;
-/// Longest wait while changes keep coming, µs. Signed frames heard in this time can be played again after a
-/// loss of power.
+/// Longest wait while changes keep coming, µs, and saves without a request are left ([`SAVES_AT_ONCE`]); else
+/// it is [`SAVE_EVERY_US`]. Signed frames heard in this time can be played again after a loss of power.
 const LATEST_US: u64 = 2_000_000;
 
 /// Saves without a request that may follow one another at once. An evening of trying one value

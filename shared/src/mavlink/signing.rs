@@ -4,8 +4,9 @@
 //! component and a link), whatever key signs it. It may be at most a minute older than the newest
 //! timestamp received or sent, and not older than its key. The newest timestamp is stored with the key,
 //! so that a recording cannot be replayed after a loss of power. It is stored together with the
-//! settings, so three things can be replayed if power fails: frames of the last two seconds, frames
-//! since the motor began to turn, and frames refused since the last save.
+//! settings, so three things can be replayed if power fails: frames of the last two seconds (of three
+//! minutes where a hundred saves have gone before), frames since the motor began to turn, and frames
+//! refused since the last save.
 //!
 //! The ESC has no clock: it takes the time from SETUP_SIGNING and from each newer frame. A frame may be
 //! dated at most a minute ahead. The first frame after a start, and the next one after a minute without
