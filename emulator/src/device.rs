@@ -15,6 +15,7 @@ use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
+use siskin_control::units::AdcCounts;
 use thiserror::Error;
 
 use crate::fault::{CHIP_V, Fault, Timeline};
@@ -125,8 +126,21 @@ struct Override {
     stored: f32,
 }
 
-/// The simulated chip for the self-test: it has converters, and neither comparators nor clocks.
-struct Latest(Sample);
+/// The simulated chip for the self-test: it has converters, of which this is the latest sample, and neither
+/// comparators nor clocks.
+pub struct Latest(pub Sample);
+
+impl Latest {
+    /// Without a supply, for an ESC that stands alone.
+    pub const fn at_rest() -> Self {
+        Self(Sample {
+            currents: [AdcCounts::ZERO; 3],
+            bus: AdcCounts::ZERO,
+            terminals: [AdcCounts::ZERO; 3],
+            hall: 7,
+        })
+    }
+}
 
 impl Probe for Latest {
     fn sample(&mut self) -> Sample {

@@ -285,7 +285,9 @@ impl Esc {
                 .map(Setpoint::Pull)
                 .or_else(|| self.identification()),
             too_hot: self.too_hot,
-            barred: self.storage.is_lost() || !self.check.report.may_turn(&self.params),
+            barred: self.check.powers_up()
+                || self.storage.is_lost()
+                || !self.check.report.may_turn(&self.params),
         };
         throttle.reach(|throttle| throttle.tell(told));
     }

@@ -92,8 +92,11 @@ impl Throttle {
     #[inline(never)]
     pub fn new(tick_hz: u32, params: &Params, board: &Board) -> Self {
         let scale = scale(params, board);
+        let mut input = Input::new(tick_hz, params::input(params));
+        // Until the tasks tell that the board has tested itself.
+        input.authority_mut().bar(true);
         Self {
-            input: Input::new(tick_hz, params::input(params)),
+            input,
             answers: Answers::new(tick_hz),
             mapping: Mapping::new(params, &scale),
             basis: Basis::new(params, scale),

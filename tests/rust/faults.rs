@@ -11,6 +11,7 @@ use siskin_control::esc::Esc;
 use siskin_control::mavlink::{Frame, Receiver, Request};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params};
 use siskin_control::throttle::Throttle;
+use siskin_emulator::device::Latest;
 use siskin_emulator::plant::Fidelity;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_emulator::wire::Wire;
@@ -124,6 +125,8 @@ impl Station {
                 listener.push(now_us, frame, |frame| heard.push(message(frame)));
             },
         );
+        self.esc
+            .test_itself(&self.rig.snapshot(), &mut Latest::at_rest());
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             if request == Request::Keep {
                 self.esc.storage_done(&mut self.throttle, Ok(()));

@@ -13,6 +13,7 @@ use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{Board, ParamId, Params};
 use siskin_control::store::Kept;
 use siskin_control::throttle::Throttle;
+use siskin_emulator::device::Latest;
 use siskin_emulator::rig::Bench;
 use siskin_emulator::wire::Wire;
 
@@ -102,6 +103,7 @@ impl Desk {
                 *sent += 1;
                 listener.push(now_us, frame, |_| {});
             });
+        self.esc.test_itself(&self.snapshot, &mut Latest::at_rest());
         while let Some(request) = self.esc.take_request(&mut self.throttle) {
             self.answer(request);
         }

@@ -170,7 +170,8 @@ impl Check {
         self.go(Step::Listen);
     }
 
-    /// Returns true until the measurements of power-up are made: no tune begins before.
+    /// Returns true until the measurements of power-up are made: no tune begins before, and nothing turns the
+    /// motor.
     pub fn powers_up(&self) -> bool {
         self.step == Step::PowerUp
     }

@@ -232,7 +232,7 @@ impl Authority {
             command: matches!(event, Event::Frame { frame, .. } if frame.is_command()),
         };
         self.valid = Some(valid);
-        if demand == Demand::Zero && !self.armed {
+        if demand == Demand::Zero && !self.armed && !self.barred {
             self.count_zero(&valid);
         }
     }
@@ -263,7 +263,7 @@ impl Authority {
             Signal::Pulse(_) => ARMING_PULSES,
         };
         let held = arming.zeros >= least && held_us >= self.timing.arm_us;
-        if valid.identified && held && !self.barred {
+        if valid.identified && held {
             self.armed = true;
             self.arming = None;
         }

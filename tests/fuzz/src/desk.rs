@@ -8,6 +8,7 @@ use siskin_control::input::signal::Signal;
 use siskin_control::mavlink::Request;
 use siskin_control::params::{BOSSO_MOTOR, ParamId, Params};
 use siskin_control::throttle::Throttle;
+use siskin_emulator::device::Latest;
 use siskin_emulator::rig::Bench;
 
 /// The rate of the capturing timer.
@@ -55,10 +56,15 @@ impl Desk {
         }
         let bench = Bench::default();
         let board = bench.sensing.board(bench.delay);
-        let (esc, throttle) =
+        let (mut esc, mut throttle) =
             Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("its motor fits the bench");
         let config = esc.config().expect("its motor fits the bench");
         let snapshot = State::new(&config).snapshot();
+        // The board has tested itself before the wire begins: of what may turn the motor the wire alone is judged.
+        for _ in 0..4 {
+            esc.poll(&mut throttle, 0, &snapshot, 25.0, &mut |_| {});
+            esc.test_itself(&snapshot, &mut Latest::at_rest());
+        }
         Self {
             esc,
             throttle,

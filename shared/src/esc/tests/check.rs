@@ -15,6 +15,19 @@ const AT_REST: Sample = Sample {
     hall: 7,
 };
 
+/// A board that measures nothing by itself.
+pub(super) struct Plain;
+
+impl Probe for Plain {
+    fn sample(&mut self) -> Sample {
+        AT_REST
+    }
+
+    fn own(&mut self, _: Item) -> Own {
+        Own::Absent
+    }
+}
+
 /// A board whose first comparator trips nowhere, and whose bridge conducts for some looks.
 struct Bad {
     busy: u32,
@@ -39,7 +52,7 @@ impl Probe for Bad {
 }
 
 impl Bench {
-    fn test_itself_ms(&mut self, probe: &mut Bad, ms: u32) {
+    fn test_itself_ms(&mut self, probe: &mut impl Probe, ms: u32) {
         for _ in 0..ms {
             self.frames(1, 0);
             self.esc.test_itself(&self.snapshot, probe);
@@ -50,7 +63,7 @@ impl Bench {
 /// It is broken off by what may be sent at any time: nothing is measured then.
 #[test]
 fn a_self_test_lifts_no_bar_before_it_has_measured() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::at_power_up();
     let mut probe = Bad { busy: 0 };
     bench.test_itself_ms(&mut probe, 1_500);
     assert!(!bench.esc.telemetry().armed, "barred since power-up");
@@ -70,7 +83,7 @@ fn a_self_test_lifts_no_bar_before_it_has_measured() {
 /// The comparators are searched while no switch is on: until then no tune begins, and a test waits.
 #[test]
 fn what_the_board_measures_waits_for_a_bridge_that_is_off() {
-    let mut bench = Bench::new();
+    let mut bench = Bench::at_power_up();
     let mut probe = Bad { busy: 50 };
     let misfit = |bench: &Bench| bench.texts.iter().any(|text| text.contains("comparator_a"));
     let sounds = |bench: &Bench| matches!(bench.throttle.setpoint(), Setpoint::Tone { .. });
@@ -85,4 +98,42 @@ fn what_the_board_measures_waits_for_a_bridge_that_is_off() {
     assert_eq!(bench.results.len(), 1, "it is listening");
     bench.test_itself_ms(&mut probe, 100);
     assert_eq!((probe.busy, bench.results.len()), (0, 2), "it goes on");
+}
+
+/// However long a board takes: its comparators, which it has not measured yet, may protect nothing. What the wire
+/// holds meanwhile arms nothing later.
+#[test]
+fn nothing_arms_before_the_board_has_been_measured() {
+    let mut bench = Bench::at_power_up();
+    bench.frames(1_000, 0);
+    assert!(!bench.esc.telemetry().armed, "nothing is measured");
+    bench.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
+    assert_ne!(bench.results.last(), Some(&ACCEPTED));
+    bench.test_itself_ms(&mut Plain, 3);
+    bench.frames(299, 0);
+    assert!(
+        !bench.esc.telemetry().armed,
+        "its time begins with the measurement's end"
+    );
+    bench.frames(3, 0);
+    assert!(bench.esc.telemetry().armed);
+}
+
+/// The wire is heard before the tasks have been at it for the first time.
+#[test]
+fn nothing_arms_before_the_tasks_have_run() {
+    let mut throttle = Throttle::new(TICK_HZ, &Params::of(&BOSSO_MOTOR), &Board::BENCH);
+    let zero = dshot::Frame {
+        value: 0,
+        telemetry: false,
+    };
+    for at_us in (0..500_000).step_by(1_000) {
+        let ticks = |after_ns: u64| ((at_us * 1_000 + after_ns) * 17 / 100) as u32;
+        for (at_ns, level) in edges(zero.to_bits(), Rate::Dshot600) {
+            throttle.edge(at_us, ticks(at_ns.into()), level);
+        }
+        throttle.settle(at_us, ticks(40_000));
+    }
+    assert!(throttle.signal().is_some(), "it has been heard");
+    assert_eq!(throttle.command(), Command::Stop);
 }

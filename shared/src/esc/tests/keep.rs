@@ -386,7 +386,7 @@ fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
         let lost = "Settings lost: set and store them, or reset them";
         let told = |text: &&String| text.as_str() == lost;
         assert_eq!(bench.texts.iter().filter(told).count(), 1);
-        assert!(bench.texts[1].starts_with("storage: "), "{:?}", bench.texts);
+        assert!(bench.texts[0].starts_with("storage: "), "{:?}", bench.texts);
         bench.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 1.0);
         bench.command(MavCmd::MAV_CMD_ACTUATOR_TEST, 0.1);
         bench.wait_ms(1);
