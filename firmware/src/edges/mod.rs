@@ -122,21 +122,22 @@ impl<const TIMER_BITS: u32> Edges<TIMER_BITS> {
         whole
     }
 
-    /// Leaves behind what came before the last frame that has begun, if more than a frame waits: whether it
-    /// did. A frame begins with an edge of this direction, and within it the next of those never comes so
-    /// late.
+    /// Leaves behind what came before the last frame that has begun, if there is something: whether there was.
+    /// A frame begins with an edge of this direction, and within it the next of those never comes so late.
     pub(crate) fn skip_to_last_frame(&mut self, direction: usize, apart_ticks: u32) -> bool {
-        let count = self.rings[direction].count();
-        if count <= BITS {
-            return false;
-        }
-        let word = self.rings[direction].words();
-        let begins =
-            |index: &usize| word(*index).wrapping_sub(word(index - 1)) & Self::MASK >= apart_ticks;
-        let Some(first) = (1..count).rev().find(begins) else {
+        let Some(first) = self.first() else {
             return false;
         };
-        self.skip_before(self.time(word(first)));
+        let ring = &self.rings[direction];
+        let word = ring.words();
+        let begins = |index: &usize| {
+            let before = index.checked_sub(1).map_or(first, &word);
+            word(*index).wrapping_sub(before) & Self::MASK >= apart_ticks
+        };
+        let Some(begin) = (0..ring.count()).rev().find(begins) else {
+            return false;
+        };
+        self.skip_before(self.time(word(begin)));
         true
     }
 

@@ -186,6 +186,18 @@ fn who_is_behind_goes_on_with_the_last_frame_that_has_begun() {
         let left: Vec<_> = frame(third).take(of_third).collect();
         assert_eq!(taken(&mut edges), left);
     }
+    // What is left of a frame that was looked at too early, down to its last edge.
+    for left_of_first in [1, 2, 3, 9] {
+        let begin = chip.now.get() + 100;
+        let second = begin + 9_000;
+        chip.expect(frame(begin).skip(32 - left_of_first));
+        chip.expect(frame(second).take(1));
+        chip.pass(10_000);
+        assert!(chip.fill(&mut edges));
+        assert!(edges.skip_to_last_frame(1, 2 * BIT), "{left_of_first}");
+        assert!(!edges.skip_to_last_frame(1, 2 * BIT));
+        assert_eq!(taken(&mut edges), frame(second).take(1).collect::<Vec<_>>());
+    }
     // One frame that waits alone, or with the beginning of none, is kept.
     let begin = chip.now.get() + 100;
     chip.expect(frame(begin));

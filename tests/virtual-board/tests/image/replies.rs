@@ -137,3 +137,25 @@ fn every_reply_is_read_at_dshot600() {
 fn every_reply_is_read_at_dshot1200() {
     every_reply_is_read(BIDIRECTIONAL_1200, 1.2e6, 90_000.0);
 }
+
+/// A flight controller that has been sending before the ESC starts: it hears the first frame from somewhere within.
+#[test]
+fn who_sends_while_the_esc_starts_is_answered() {
+    for protocol in [BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200] {
+        for from_us in (0..500).step_by(50) {
+            let mut board = Board::new(&image(), &[]);
+            board.protocol = protocol;
+            board.run(from_us * 1_000);
+            board.throttle = Throttle::Dshot(0);
+            board.run(100 * MS);
+            let (played, replies) = (board.played, board.heard.replies.len());
+            board.run(100 * MS);
+            let unanswered = (board.played - played).abs_diff(board.heard.replies.len() - replies);
+            // One may be under way at either end.
+            assert!(
+                unanswered <= 1,
+                "{protocol}, from {from_us} us: {unanswered}"
+            );
+        }
+    }
+}
