@@ -96,6 +96,10 @@ impl Capture {
     /// Waits until a time.
     pub(super) async fn wait_until(&mut self, due_ticks: u32) {
         let is_past = |now_ticks: u32| now_ticks.wrapping_sub(due_ticks) as i32 >= 0;
+        // An alarm takes 2 µs to set.
+        if is_past(self.now()) {
+            return;
+        }
         let alarm_ticks = due_ticks & COUNTER_MASK;
         wait_for_alarm(CAPTURE, alarm_ticks, || is_past(self.now())).await;
     }

@@ -89,7 +89,7 @@ const LATE_LOOK_EIGHTHS: u32 = 144;
 const FRAME_APART_EIGHTHS: u32 = 16;
 
 /// Usual time from the alarm to the look: it then waits for the last edge.
-const WAKING_US: u32 = 5;
+const WAKING_US: u32 = 9;
 
 /// The task's own state, besides that of the replies.
 pub(crate) struct Listener {
@@ -269,12 +269,14 @@ impl Listener {
 
     /// Takes the edges from the DMA; all of a frame's, if the look is at one.
     fn fill_with_frame(&mut self, looks: &Looks) {
-        self.fill();
-        while !looks.is_last()
-            && !self.capture.edges.has_frame()
-            && self.capture.edges.is_before(looks.until_ticks)
-        {
+        let mut waits = !looks.is_last();
+        loop {
             self.fill();
+            if !waits || self.capture.edges.has_frame() {
+                return;
+            }
+            // Once more when the time has passed: the last edge may have come while it was looked.
+            waits = self.capture.edges.is_before(looks.until_ticks);
         }
     }
 
