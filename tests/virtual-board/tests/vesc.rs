@@ -1,5 +1,5 @@
-//! The image of the VESC, which has no virtual board: its start, on a processor whose chip keeps what is written
-//! to its registers and is ready at once. Run with `--release`.
+//! The image of the VESC, which has no virtual board: its start and its control's interrupt, on a processor whose
+//! chip keeps what is written to its registers and is ready at once. Run with `--release`.
 //!
 //! The image is what this makes:
 //!
@@ -13,10 +13,13 @@ mod made;
 
 use std::collections::HashMap;
 use std::fs;
+use std::ops::Range;
 
 use siskin_vboard::memory::Memory;
-use siskin_vboard::processor::{BusError, Lines, Mapped, Processor, Stop, Surroundings, Width};
-use siskin_vboard::time::{Cycles, NEVER};
+use siskin_vboard::processor::{
+    BusError, HandlerEvent, Lines, Mapped, Processor, Stop, Surroundings, Width,
+};
+use siskin_vboard::time::Cycles;
 
 const FLASH: u32 = 0x0800_0000;
 const FLASH_BYTES: usize = 0x10_0000;
@@ -32,6 +35,12 @@ const RCC_CFGR: u32 = 0x4002_3808;
 const SELECTED: u32 = 0b11;
 const RCC_APB2ENR: u32 = 0x4002_3844;
 const TIM1: u32 = 1;
+const TIM1_CR1: u32 = 0x4001_0000;
+const DOWN: u32 = 1 << 4;
+const TIM1_SR: u32 = 0x4001_0010;
+const UPDATED: u32 = 1;
+const TIM1_BDTR: u32 = 0x4001_0044;
+const OUTPUTS_ON: u32 = 1 << 15;
 const RCC_CSR: u32 = 0x4002_3874;
 const PWR_CSR: u32 = 0x4000_7004;
 const SCALED: u32 = 1 << 14;
@@ -42,12 +51,31 @@ const CODE_CACHE: u32 = 1 << 9;
 const CONSTANTS_CACHE: u32 = 1 << 10;
 const DBGMCU_IDCODE: u32 = 0xe004_2000;
 
+/// The time's timer counts microseconds.
+const TIM4_CNT: u32 = 0x4000_0824;
+const CYCLES_A_US: Cycles = 168;
+const ADC1_SR: u32 = 0x4001_2000;
+const USART6_SR: u32 = 0x4001_1400;
+const SENT: u32 = 0b11 << 6;
+const USART6_DR: u32 = 0x4001_1404;
+/// The gate driver's nFAULT is PC12, and its enable PC10.
+const GPIOC_IDR: u32 = 0x4002_0810;
+const GPIOC_BSRR: u32 = 0x4002_0818;
+const FAULT: u32 = 1 << 12;
+const ENABLE: u32 = 1 << 10;
+const DISABLE: u32 = ENABLE << 16;
+const EXTI_IMR: u32 = 0x4001_3c00;
+
 /// Device 0x413: revision A, whose prefetch must stay off (ES0182), and revision 1.
 const REVISION_A: u32 = 0x1000_6413;
 const REVISION_1: u32 = 0x1007_6413;
 
-/// The start takes a tenth of it.
-const END: Cycles = 20_000_000;
+/// The control's interrupt comes in half of it.
+const END: Cycles = 40_000_000;
+
+/// The interrupt at the end of the injected conversions, and how often it comes: 24 kHz.
+const CONVERTED: u16 = 18;
+const PERIOD: Cycles = 7_000;
 
 /// Exceptions of the vector table before the interrupts, and the second DMA's streams behind them.
 const EXCEPTIONS: usize = 16;
@@ -61,13 +89,32 @@ fn image() -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The chip's registers, until its program takes the PWM timer, after the clocks have been set up.
+/// The gate driver's alarm and its enable, as the program has set them up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Driver {
+    heard: bool,
+    enabled: bool,
+}
+
+/// The chip's registers.
+#[derive(Clone)]
 struct Registers {
     revision: u32,
     words: HashMap<u32, u32>,
     lines: Lines,
     now: Cycles,
-    timer_taken: bool,
+    /// When the converters are done next.
+    converted: Cycles,
+    /// The gate driver at the beginning of each control period.
+    periods: Vec<Driver>,
+    /// The control periods in which the gate driver's alarm is low.
+    alarm: Range<usize>,
+    driver_enabled: bool,
+    outputs_were_on: bool,
+    /// What the serial line has sent.
+    sent: Vec<u8>,
+    /// Until then the program runs.
+    ends: fn(&Self) -> bool,
 }
 
 impl Registers {
@@ -78,8 +125,31 @@ impl Registers {
             RCC_CFGR => word | (word & SELECTED) << 2,
             PWR_CSR => word | SCALED,
             DBGMCU_IDCODE => self.revision,
+            TIM4_CNT => (self.now / CYCLES_A_US) as u32 & 0xffff,
+            // It counts down where the control begins.
+            TIM1_CR1 => word | DOWN,
+            TIM1_SR => word | UPDATED,
+            USART6_SR => SENT,
+            GPIOC_IDR => {
+                if self.alarms() {
+                    0
+                } else {
+                    FAULT
+                }
+            }
             _ => word,
         }
+    }
+
+    /// Whether the gate driver's alarm is low in this period.
+    fn alarms(&self) -> bool {
+        let period = self.periods.len().checked_sub(1);
+        period.is_some_and(|period| self.alarm.contains(&period))
+    }
+
+    /// Whether the program has taken the PWM timer, after the clocks have been set up.
+    fn timer_taken(&self) -> bool {
+        self.word(RCC_APB2ENR) & TIM1 != 0
     }
 }
 
@@ -98,20 +168,32 @@ impl Surroundings for Registers {
     }
 
     fn write(&mut self, address: u32, width: Width, value: u32) -> Result<(), BusError> {
-        // What the start sets up is written in whole words.
+        // What is set up is written in whole words.
         if width == Width::Word {
             self.words.insert(address, value);
         }
-        self.timer_taken |= address == RCC_APB2ENR && value & TIM1 != 0;
+        match address {
+            // The control takes the request back.
+            ADC1_SR => self.lines.set(CONVERTED, false),
+            GPIOC_BSRR if value & ENABLE != 0 => self.driver_enabled = true,
+            GPIOC_BSRR if value & DISABLE != 0 => self.driver_enabled = false,
+            TIM1_BDTR => self.outputs_were_on |= value & OUTPUTS_ON != 0,
+            USART6_DR => self.sent.push(value as u8),
+            _ => {}
+        }
         Ok(())
     }
 
     fn pass(&mut self, cycles: Cycles) {
         self.now += cycles;
+        if self.now >= self.converted {
+            self.converted += PERIOD;
+            self.lines.set(CONVERTED, true);
+        }
     }
 
     fn next(&self) -> Cycles {
-        NEVER
+        self.converted
     }
 
     fn lines(&self) -> &Lines {
@@ -119,19 +201,33 @@ impl Surroundings for Registers {
     }
 
     fn asks_to_stop(&self) -> bool {
-        self.timer_taken || self.now > END
+        (self.ends)(self) || self.now > END
     }
 
     fn flash_busy_until(&self) -> Cycles {
         0
     }
+
+    fn exception(&mut self, passage: &HandlerEvent) {
+        if passage.entered && usize::from(passage.exception) == EXCEPTIONS + usize::from(CONVERTED)
+        {
+            self.periods.push(Driver {
+                heard: self.word(EXTI_IMR) & FAULT != 0,
+                enabled: self.driver_enabled,
+            });
+        }
+    }
 }
 
-/// Starts the image on a chip of this revision, and returns how its flash is read from then on.
-fn flash_access(revision: u32) -> u32 {
-    let bytes = image();
+/// Runs these bytes of an image on a chip of this revision.
+fn run(
+    bytes: &[u8],
+    revision: u32,
+    alarm: Range<usize>,
+    ends: fn(&Registers) -> bool,
+) -> Registers {
     let flash = Memory::new(FLASH, FLASH_BYTES, 0xff);
-    flash.load(FLASH, &bytes);
+    flash.load(FLASH, bytes);
     let mapped = |memory, writable| Mapped { memory, writable };
     let memories = [
         mapped(flash, false),
@@ -144,13 +240,24 @@ fn flash_access(revision: u32) -> u32 {
         words: HashMap::from([(RCC_CR, 1)]),
         lines: Lines::default(),
         now: 0,
-        timer_taken: false,
+        converted: PERIOD,
+        periods: Vec::new(),
+        alarm,
+        driver_enabled: false,
+        outputs_were_on: false,
+        sent: Vec::new(),
+        ends,
     };
     let mut processor = Processor::new(registers, &memories);
     processor.reset(FLASH);
     assert_eq!(processor.run(), Stop::Asked);
-    let registers = processor.surroundings();
-    assert!(registers.timer_taken, "the start does not end");
+    processor.surroundings().clone()
+}
+
+/// Starts the image on a chip of this revision, and returns how its flash is read from then on.
+fn flash_access(revision: u32) -> u32 {
+    let registers = run(&image(), revision, 0..0, Registers::timer_taken);
+    assert!(registers.timer_taken(), "the start does not end");
     registers.word(FLASH_ACR)
 }
 
@@ -190,4 +297,59 @@ fn the_second_dma_serves_the_serial_line_alone() {
     let streams: Vec<usize> = (0..SECOND_DMA.len()).filter(served).collect();
     // USART6's, into the memory and out of it (RM0090, table 43).
     assert_eq!(streams, [2, 6]);
+}
+
+/// Control periods for which the gate driver rests after an alarm, and after which it is enabled again
+/// (`firmware/src/interrupt/rest.rs`).
+const REST: usize = 640;
+const ASLEEP: usize = 20;
+
+/// A driver that sleeps or comes up pulls nFAULT low: its alarm is not heard until the rest is over, so that the
+/// edge of that asks for no new rest.
+#[test]
+fn the_gate_drivers_alarm_is_masked_while_it_rests() {
+    const ALARM: usize = 100;
+    let ends = |registers: &Registers| registers.periods.len() > ALARM + REST + 50;
+    // It stays low until shortly before the driver is up.
+    let alarm = ALARM..ALARM + REST - 10;
+    let periods = run(&image(), REVISION_1, alarm, ends).periods;
+    assert!(
+        periods.len() > ALARM + REST + 50,
+        "{} periods",
+        periods.len()
+    );
+    for (period, driver) in periods.into_iter().enumerate() {
+        let rested = period.checked_sub(ALARM + 1);
+        let wanted = Driver {
+            heard: rested.is_none_or(|rested| rested >= REST),
+            enabled: rested.is_none_or(|rested| rested >= ASLEEP),
+        };
+        assert_eq!(driver, wanted, "period {period}");
+    }
+}
+
+/// The last byte that is stamped and one in the midst of the program: it tells so, and the PWM never runs.
+#[test]
+fn a_damaged_image_goes_no_further_than_to_say_so() {
+    let told = |registers: &Registers| registers.sent.len() >= 62;
+    let sound = image();
+    for at in [0x1d4, sound.len() / 2, sound.len() - 1] {
+        let mut bytes = sound.clone();
+        bytes[at] ^= 1 << 4;
+        let registers = run(&bytes, REVISION_1, 0..0, told);
+        let text = b"Image damaged: flash it anew";
+        let says = registers
+            .sent
+            .windows(text.len())
+            .any(|piece| piece == text);
+        assert!(says, "{at:#x}: {:02x?}", registers.sent);
+        assert!(registers.periods.is_empty());
+        assert!(!registers.outputs_were_on && !registers.driver_enabled);
+    }
+    // A sound one runs the PWM and says nothing of it.
+    let registers = run(&sound, REVISION_1, 0..0, |registers| {
+        registers.periods.len() > 10
+    });
+    assert!(registers.periods.len() > 10 && registers.driver_enabled);
+    assert!(registers.sent.is_empty(), "{:02x?}", registers.sent);
 }
