@@ -1,6 +1,7 @@
 //! A watch on the bridge's gates, as a logic analyser at the pins would keep it: it knows nothing of the
 //! timer that makes them.
 
+use crate::gate_supply::GateSupply;
 use crate::time::{Cycles, NEVER};
 
 /// Legs of the bridge.
@@ -29,11 +30,12 @@ pub struct Violation {
     pub fault: Fault,
 }
 
-/// A leg's gates: high side, low side.
+/// A leg's gates: high side, low side; and the supply of the high side's driver.
 #[derive(Clone, Copy, Debug, Default)]
 struct Leg {
     on: [bool; 2],
     off_at: [Option<Cycles>; 2],
+    supply: GateSupply,
 }
 
 /// The watch. All gates are off at first.
@@ -45,6 +47,7 @@ pub struct Bridge {
     off_since: Cycles,
     kept: Vec<Violation>,
     count: u64,
+    starved: u64,
 }
 
 impl Bridge {
@@ -57,6 +60,7 @@ impl Bridge {
             off_since: 0,
             kept: Vec::with_capacity(KEPT),
             count: 0,
+            starved: 0,
         }
     }
 
@@ -65,6 +69,10 @@ impl Bridge {
         let was_off = self.is_off();
         let on = [high, low];
         let before = self.legs[leg].on;
+        self.legs[leg].supply.pass(before[1], now);
+        if high && !before[0] && !self.legs[leg].supply.turn_on() {
+            self.starved += 1;
+        }
         for side in 0..2 {
             self.edges += u64::from(on[side] != before[side]);
             if before[side] && !on[side] {
@@ -129,6 +137,12 @@ impl Bridge {
     /// The first of them.
     pub fn first(&self) -> &[Violation] {
         &self.kept
+    }
+
+    /// How often a high side was to go on that its driver had no supply for. None of the violations: a self-test
+    /// tries each high side as it charges its supply.
+    pub fn starved(&self) -> u64 {
+        self.starved
     }
 }
 

@@ -27,6 +27,7 @@
 pub mod board;
 pub mod bridge;
 pub mod chip;
+pub mod gate_supply;
 pub mod image;
 pub mod load;
 pub mod machine;

@@ -137,3 +137,18 @@ fn a_signal_of_4_khz_is_found_out_and_answered() {
         }
     }
 }
+
+/// The tunes of power-up, a start, a stop of which the supplies last only for some of the time, and another
+/// start: all begin with the low sides.
+#[test]
+fn the_high_sides_drivers_are_supplied_before_a_high_side_goes_on() {
+    let mut board = Board::new(&image(), &[]);
+    for _ in 0..2 {
+        board.spin_up();
+        board.throttle = Throttle::Dshot(0);
+        let still = board.run_until(50 * MS, 5_000 * MS, |board| board.rpm() < 1.0);
+        assert!(still.is_some(), "{} rpm", board.rpm());
+    }
+    assert!(board.world().bridge().edges() > 10_000);
+    assert_eq!(board.world().bridge().starved(), 0);
+}
