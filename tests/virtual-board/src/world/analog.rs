@@ -35,6 +35,10 @@ pub(super) struct Coupling {
     pub(super) bench: Bench,
     pub(super) bridge: Bridge,
     gates: [Gate; 3],
+    /// Which high sides' drivers have lost their supply.
+    pub(super) unsupplied: [bool; 3],
+    /// What a damaged thermistor shows, °C.
+    pub(super) sensor_c: Option<f64>,
     /// Voltages of the shunts' grounds above the chip's, V.
     pub(super) grounds_v: [f64; 3],
     /// Up to here the bench has been simulated.
@@ -53,6 +57,8 @@ impl Coupling {
             bench,
             bridge: Bridge::new(DEAD_TIME),
             gates: [Gate::default(); 3],
+            unsupplied: [false; 3],
+            sensor_c: None,
             grounds_v: [0.0; 3],
             at: 0,
             began: 0,
@@ -128,7 +134,8 @@ impl World {
             grounds_v: self.coupling.grounds_v,
             terminals_v: truth.terminals_v,
             bus_v: truth.bus_v,
-            temperature_c: self.coupling.bench.sensor_c(),
+            temperature_c: (self.coupling.sensor_c)
+                .unwrap_or_else(|| self.coupling.bench.sensor_c()),
             grounded: ground.mode(pin) == Moder::OUTPUT && !ground.level(pin),
         }
     }
@@ -140,7 +147,7 @@ impl World {
         };
         let [of_high, of_low] = GATE_PINS[leg];
         let gate = Gate {
-            high: high && reaches(of_high),
+            high: high && reaches(of_high) && !self.coupling.unsupplied[leg],
             low: low && reaches(of_low),
         };
         self.set_gate(leg, gate);

@@ -238,6 +238,16 @@ impl World {
         self.parts.flash.options = options;
     }
 
+    /// Takes its supply from the driver of a leg's high side, which never turns on from then on.
+    pub fn open_gate_supply(&mut self, leg: usize) {
+        self.coupling.unsupplied[leg] = true;
+    }
+
+    /// Damages the thermistor, which shows this from then on, °C: at absolute zero it does not conduct.
+    pub fn damage_thermistor(&mut self, shown_c: f64) {
+        self.coupling.sensor_c = Some(shown_c);
+    }
+
     /// Moves the grounds of the three shunts above the chip's, V: currents beside them do so on a board.
     pub fn shift_grounds(&mut self, grounds_v: [f64; 3]) {
         self.coupling.grounds_v = grounds_v;
