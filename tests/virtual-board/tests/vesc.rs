@@ -328,7 +328,8 @@ fn the_gate_drivers_alarm_is_masked_while_it_rests() {
     }
 }
 
-/// The last byte that is stamped and one in the midst of the program: it tells so, and the PWM never runs.
+/// A wrong bit among the vectors, in the midst of the program or in its last byte: it says so, and neither the PWM
+/// nor the gate driver comes on.
 #[test]
 fn a_damaged_image_goes_no_further_than_to_say_so() {
     let told = |registers: &Registers| registers.sent.len() >= 62;
