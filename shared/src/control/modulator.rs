@@ -6,7 +6,7 @@ use fixed::types::extra::U20;
 use fixed::types::{I0F32, I1F31, I8F24};
 
 use super::dead_time;
-use super::transform::{AlphaBeta, Dq, Order, phases_in};
+use super::transform::{AlphaBeta, Dq, PhaseOrder, phases_in};
 use crate::math::{Held, Multiplier, Quantity, Real, SQRT_3, TopProduct, TopSum, other_leg};
 use crate::trace::traced;
 use crate::units::dimension::Volt;
@@ -233,7 +233,7 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
 pub fn duties(
     config: &Config,
     supply: &Supply,
-    (v, order): (AlphaBeta<TurnedVoltage>, Order),
+    (v, order): (AlphaBeta<TurnedVoltage>, PhaseOrder),
     (dead_time, certainty): (&dead_time::Config, AlphaBeta<I8F24>),
 ) -> [Duty; 3] {
     let share: AlphaBeta<Share> = AlphaBeta {
@@ -307,7 +307,7 @@ mod tests {
                 beta: TurnedVoltage::from_num(beta),
             };
             let none = (&dead_time::Config::NONE, AlphaBeta::default());
-            let made = vector(duties(&config, &supply, (v, Order::NORMAL), none), bus);
+            let made = vector(duties(&config, &supply, (v, PhaseOrder::NORMAL), none), bus);
             let error = (made.0 - alpha).hypot(made.1 - beta);
             prop_assert!(error < 2e-3 * length.max(1.0), "{error}");
         }
@@ -330,7 +330,7 @@ mod tests {
                         let made = duties(
                             &config,
                             &supply,
-                            (v, Order::NORMAL),
+                            (v, PhaseOrder::NORMAL),
                             (&dead_time::Config::NONE, AlphaBeta::default()),
                         );
                         let (alpha, beta) = vector(made, bus);
@@ -354,7 +354,7 @@ mod tests {
         let [a, b, c] = duties(
             &config,
             &supply,
-            (v, Order::NORMAL),
+            (v, PhaseOrder::NORMAL),
             (&dead_time::Config::NONE, AlphaBeta::default()),
         )
         .map(|d| d.to_num::<f64>());
@@ -399,7 +399,7 @@ mod tests {
             alpha: I8F24::from_num(20),
             beta: I8F24::from_num(-20.0 / 3.0_f64.sqrt()),
         };
-        let v = (AlphaBeta::default(), Order::NORMAL);
+        let v = (AlphaBeta::default(), PhaseOrder::NORMAL);
         let made = duties(&config, &supply, v, (&dead_time, certainty));
         let [a, b, c] = made.map(|d| d.to_num::<f64>());
         assert!((a - 0.505).abs() < 1e-6, "{a}");

@@ -30,21 +30,21 @@ traced! {
 
 /// The order in which three phases follow one another.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Order {
+pub struct PhaseOrder {
     /// ±√3/4: what fits a factor below a half.
     root_3_quarter: I0F32,
     /// ±1.
     sign: i32,
 }
 
-impl Trace for Order {
+impl Trace for PhaseOrder {
     /// One word: 1 if the phases b and c have changed places.
     fn trace(&self, out: &mut impl FnMut(u32)) {
         (*self == Self::SWAPPED).trace(out);
     }
 }
 
-impl Order {
+impl PhaseOrder {
     /// a, b, c.
     pub const NORMAL: Self = Self {
         root_3_quarter: I0F32::from_bits(1_859_775_393),
@@ -70,12 +70,12 @@ impl Order {
 /// Readings are within ±2048 counts, which makes each component at most 2 of ±8.
 #[inline(always)]
 pub fn clarke(readings: [AdcCounts; 3]) -> AlphaBeta<Current> {
-    clarke_in(Order::NORMAL, readings)
+    clarke_in(PhaseOrder::NORMAL, readings)
 }
 
 /// Clarke's transform of phases in this order.
 #[inline(always)]
-pub fn clarke_in(order: Order, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> {
+pub fn clarke_in(order: PhaseOrder, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> {
     let (a, b, c) = (a.to_bits(), b.to_bits(), c.to_bits());
     // (2a − b − c)/3 counts are (2a − b − c)/4096 units: 2^28 of them a unit.
     let alpha = 2 * a - (b + c);
@@ -136,12 +136,12 @@ where
 /// The three phases' values of a vector (11).
 #[inline(always)]
 pub fn phases<T: Number>(v: AlphaBeta<T>) -> [T; 3] {
-    phases_in(Order::NORMAL, v)
+    phases_in(PhaseOrder::NORMAL, v)
 }
 
 /// The three phases' values of a vector (11), in this order.
 #[inline(always)]
-pub fn phases_in<T: Number>(order: Order, v: AlphaBeta<T>) -> [T; 3] {
+pub fn phases_in<T: Number>(order: PhaseOrder, v: AlphaBeta<T>) -> [T; 3] {
     let alpha = v.alpha.to_bits();
     // √3/2 = 2·√3/4, and the product keeps the top half.
     let product = i64::from(v.beta.to_bits()) * i64::from(order.root_3_quarter.to_bits());

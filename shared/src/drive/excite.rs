@@ -18,7 +18,7 @@ use super::shared::Shared;
 use crate::control::dead_time;
 use crate::control::delay::Delay;
 use crate::control::modulator;
-use crate::control::transform::{AlphaBeta, Dq, Order, clarke};
+use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, clarke};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
 
@@ -107,7 +107,7 @@ pub(super) fn period(
         beta: across.scaled(),
     };
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
-    let v = (v, Order::NORMAL);
+    let v = (v, PhaseOrder::NORMAL);
     let turned = modulator::duties(&config.modulator, &shared.supply, v, none);
     let mut duties = [Duty::ZERO; 3];
     for (behind, duty) in turned.into_iter().enumerate() {

@@ -84,7 +84,7 @@ impl Setpoint {
 
     /// Which way it asks the motor to turn. The other way is for who has asked for `both_ways`, or for a test,
     /// which is of either direction.
-    pub(super) fn asks(self, both_ways: bool) -> Asked {
+    pub(super) fn rotation(self, both_ways: bool) -> Rotation {
         let sign = match self {
             Self::Speed(speed) => speed.to_bits(),
             Self::Torque(current) | Self::Test(current) => current.to_bits(),
@@ -97,11 +97,11 @@ impl Setpoint {
             | Self::Excite(_) => 0,
         };
         if sign > 0 {
-            Asked::Forward
+            Rotation::Forward
         } else if sign < 0 && (both_ways || matches!(self, Self::Test(_))) {
-            Asked::Backward
+            Rotation::Backward
         } else {
-            Asked::Nothing
+            Rotation::Rest
         }
     }
 
@@ -124,9 +124,9 @@ impl Setpoint {
 
 /// Which way a set-point asks the motor to turn, against the configured direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Asked {
+pub(super) enum Rotation {
     /// Not at all.
-    Nothing,
+    Rest,
     /// In the configured direction.
     Forward,
     /// The other way.

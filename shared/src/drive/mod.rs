@@ -1,7 +1,7 @@
 //! One control period: [`step()`] takes a sample and a set-point, and says what the bridge does.
 //!
 //! # A period, from top to bottom
-//! `step.rs`: the mode is decided (`asked.rs`, and by what the rotor does in each mode's own file) and this
+//! `step.rs`: the mode is decided (`mode_change.rs`, and by what the rotor does in each mode's own file) and this
 //! period's slice of the outer loop's work is done (`schedule.rs`, 32 periods), both from what the last period
 //! saw. Then the sample is read and judged (`shared.rs`, [`protection`](crate::protection)), and the mode does
 //! its own work: it says what the bridge does, and perhaps why it ends. The default observer and regulator have
@@ -50,15 +50,15 @@
 //! # The files' order
 //! Each file uses those before it, and none behind it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
 //! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `state`,
-//! `asked`, `step`.
+//! `mode_change`, `step`.
 
-mod asked;
 mod charge;
 pub mod config;
 mod excitation;
 mod excite;
 mod foc;
 mod io;
+mod mode_change;
 mod off;
 mod phase;
 mod pull;

@@ -1,10 +1,10 @@
 //! The control period, from top to bottom.
 
-use super::asked::asked;
 use super::config::Config;
 use super::foc::period::period;
 use super::foc::{begin, brake, open_loop, outer_loop};
-use super::io::{Asked, Bridge, Sample, Setpoint};
+use super::io::{Bridge, Rotation, Sample, Setpoint};
+use super::mode_change::mode_change;
 use super::phase::Phase;
 use super::schedule::{self, Work};
 use super::state::State;
@@ -113,7 +113,7 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
         }
         (Phase::Idle, _) => state.off.is_looking(),
         (Phase::Sense, Setpoint::Speed(_)) => {
-            config.six_step.is_none() && setpoint.asks(config.both_ways) != Asked::Nothing
+            config.six_step.is_none() && setpoint.rotation(config.both_ways) != Rotation::Rest
         }
         _ => false,
     }
@@ -131,7 +131,7 @@ fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
         state.change(config, Why::Tripped(*fault));
     }
     if state.shared.latch.faults.is_empty()
-        && let Some(why) = asked(config, state, setpoint)
+        && let Some(why) = mode_change(config, state, setpoint)
     {
         state.change(config, why);
     }
@@ -179,7 +179,7 @@ fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) 
     }
     outer_loop::work(config, foc, shared, due);
     if due.includes(Work::SETPOINT) {
-        asked(config, state, setpoint)
+        mode_change(config, state, setpoint)
     } else {
         None
     }
@@ -227,8 +227,8 @@ fn energised(
         (Phase::Park | Phase::Ramp | Phase::Run | Phase::Stopping, Some(six_step)) => {
             let position = six_step::given::position(config, &state.foc.observer, shared);
             let drive = (&mut state.six_step, shared);
-            let asked = (sample, setpoint);
-            six_step::period::period(config, six_step, drive, (phase, position), asked, currents)
+            let input = (sample, setpoint);
+            six_step::period::period(config, six_step, drive, (phase, position), input, currents)
         }
         // Off has its own period, and so has what field-oriented control drives.
         _ => return Bridge::Off,

@@ -24,7 +24,7 @@ use super::seen::{Seen, bus_current, greatest, reading};
 use super::shared::Shared;
 use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
-use crate::control::transform::{AlphaBeta, Dq, Order};
+use crate::control::transform::{AlphaBeta, Dq, PhaseOrder};
 use crate::math::{Held, SinCos, TopProduct, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
@@ -114,15 +114,15 @@ pub(super) fn period(
         alpha: u.scaled(),
         beta: TurnedVoltage::ZERO,
     };
-    let v = (v, Order::NORMAL);
+    let v = (v, PhaseOrder::NORMAL);
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
     let duties = modulator::duties(&config.modulator, &shared.supply, v, none);
     // A tone's voltage may be as long as the supply gives.
-    let asked = Dq {
+    let wanted = Dq {
         d: wide(u),
         q: WideVoltage::ZERO,
     };
-    if modulator::square_of(asked) > shared.supply.readable {
+    if modulator::square_of(wanted) > shared.supply.readable {
         shared.applied.expect_unreadable();
     }
     shared.applied.command(duties);

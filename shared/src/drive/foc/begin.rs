@@ -5,9 +5,9 @@ use super::state::State;
 use crate::control::catch::Rotor;
 use crate::control::observer;
 use crate::control::regulator::Reference;
-use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, rotate, voltages};
+use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, rotate, voltages};
 use crate::drive::config::{Config, Direction};
-use crate::drive::io::{Asked, Sample, Setpoint, hall};
+use crate::drive::io::{Rotation, Sample, Setpoint, hall};
 use crate::drive::schedule;
 use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
@@ -77,7 +77,7 @@ fn go(
     (sample, setpoint): (&Sample, &Setpoint),
     omega: Option<Speed>,
 ) -> Why {
-    let backward = setpoint.asks(config.both_ways) == Asked::Backward;
+    let backward = setpoint.rotation(config.both_ways) == Rotation::Backward;
     // The first period takes its reference.
     foc.loops.slot = schedule::LAST;
     if omega.is_none() {
@@ -85,9 +85,9 @@ fn go(
     }
     let swapped = shared.swapped(config);
     foc.loops.order = if swapped {
-        Order::SWAPPED
+        PhaseOrder::SWAPPED
     } else {
-        Order::NORMAL
+        PhaseOrder::NORMAL
     };
     let speed = &mut foc.loops.speed;
     if let Some(omega) = omega {

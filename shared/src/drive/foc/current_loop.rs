@@ -4,7 +4,7 @@ use super::state::{Loops, State};
 use crate::control::delay::Delay;
 use crate::control::observer::{Input, Observer};
 use crate::control::regulator::Regulator;
-use crate::control::transform::{AlphaBeta, Dq, Order, inverse_park, park, rotate, voltages};
+use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, park, rotate, voltages};
 use crate::control::{modulator, start};
 use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample, hall};
@@ -78,12 +78,12 @@ pub(super) fn current_loop(
 
     // The voltage that brings the current to its reference, as far as the supply gives it.
     let fb = observer.feedback(of, (omega, i), loops.inductance.factor);
-    let asked = regulator.voltage(&loops.regulator, &loops.reference, &fb);
+    let wanted = regulator.voltage(&loops.regulator, &loops.reference, &fb);
     regulator.integrate(&mut loops.regulator, &loops.reference, &fb);
-    let u = if modulator::square_of(asked) <= shared.supply.readable {
-        modulator::short(asked)
+    let u = if modulator::square_of(wanted) <= shared.supply.readable {
+        modulator::short(wanted)
     } else {
-        limited(regulator, loops, shared, asked)
+        limited(regulator, loops, shared, wanted)
     };
     observer.advance(of, &fb, u);
     shared.seen.u = u;
@@ -109,10 +109,10 @@ fn limited(
     regulator: &impl Regulator,
     loops: &mut Loops,
     shared: &mut Shared,
-    asked: Dq<WideVoltage>,
+    wanted: Dq<WideVoltage>,
 ) -> Dq<Voltage> {
     shared.applied.expect_unreadable();
-    let (u, cut) = modulator::limit(asked, &shared.supply.longest);
+    let (u, cut) = modulator::limit(wanted, &shared.supply.longest);
     if let Some(cut) = cut {
         regulator.give_way(&mut loops.regulator, cut);
         loops.deficit = loops.reference.i.q.minus(shared.seen.i.q);
@@ -128,7 +128,7 @@ pub(super) fn input(
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Input {
-    let swapped = loops.order == Order::SWAPPED;
+    let swapped = loops.order == PhaseOrder::SWAPPED;
     let [now, before] = loops.commanded;
     Input {
         i: stator,

@@ -3,7 +3,7 @@
 use crate::control::inductance;
 use crate::control::regulator::{self, Reference};
 use crate::control::speed::Bounds;
-use crate::control::transform::{AlphaBeta, Dq, Order};
+use crate::control::transform::{AlphaBeta, Dq, PhaseOrder};
 use crate::control::{dead_time, observer, speed, start, torque};
 use crate::drive::config::Config;
 use crate::drive::schedule::Slot;
@@ -25,7 +25,7 @@ traced! {
         /// Slot of the last period in the schedule.
         pub(in crate::drive) slot: Slot,
         /// The phases' order as the control sees it.
-        pub(in crate::drive) order: Order,
+        pub(in crate::drive) order: PhaseOrder,
         /// Reference of the current regulator.
         pub(in crate::drive) reference: Reference,
         pub(in crate::drive) regulator: regulator::State,
@@ -57,7 +57,7 @@ impl State {
         Self {
             loops: Loops {
                 slot: 0,
-                order: Order::NORMAL,
+                order: PhaseOrder::NORMAL,
                 reference: Reference::default(),
                 regulator: regulator::State::default(),
                 advance: SinCos::of(Angle::ZERO),

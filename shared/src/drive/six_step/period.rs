@@ -9,7 +9,7 @@ use crate::control::six_step::crossing;
 use crate::control::six_step::tracking::KNOWN;
 use crate::drive::config;
 use crate::drive::config::six_step::{Config, LOST_SEXTANTS};
-use crate::drive::io::{Asked, Bridge, Sample, Setpoint, in_order};
+use crate::drive::io::{Bridge, Rotation, Sample, Setpoint, in_order};
 use crate::drive::phase::Phase;
 use crate::drive::seen::reading;
 use crate::drive::shared::Shared;
@@ -28,7 +28,7 @@ const STILL_PERIODS: u16 = 1000;
 type Position = Option<(Angle, Speed)>;
 
 /// The mode that a set-point asks for while this drive drives.
-pub(in crate::drive) fn asked(
+pub(in crate::drive) fn mode_change(
     config: &config::Config,
     shared: &Shared,
     phase: Phase,
@@ -46,11 +46,11 @@ pub(in crate::drive) fn asked(
 /// Returns true if the set-point wants the motor to turn the way in which it is being started.
 fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
-        Asked::Backward
+        Rotation::Backward
     } else {
-        Asked::Forward
+        Rotation::Forward
     };
-    setpoint.asks(config.both_ways) == present
+    setpoint.rotation(config.both_ways) == present
 }
 
 /// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
@@ -77,7 +77,7 @@ pub(in crate::drive) fn begin(
     (position, setpoint): (Position, &Setpoint),
 ) -> Why {
     *s = State::default();
-    shared.reversed = setpoint.asks(config.both_ways) == Asked::Backward;
+    shared.reversed = setpoint.rotation(config.both_ways) == Rotation::Backward;
     match position {
         Some(position) => {
             given::begin(config, six_step, (s, shared), position);

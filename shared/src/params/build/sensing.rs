@@ -155,7 +155,7 @@ mod tests {
 
     use super::*;
     use crate::control::modulator::{Supply, duties};
-    use crate::control::transform::{AlphaBeta, Order};
+    use crate::control::transform::{AlphaBeta, PhaseOrder};
     use crate::drive::Config;
     use crate::params::{BOSSO_BENCH, Board, Params, build};
     use crate::units::{TurnedVoltage, Voltage};
@@ -218,7 +218,12 @@ mod tests {
                     beta: I8F24::from_num(20.0 * sin),
                 };
                 let dead_time = (&config.dead_time, certainty);
-                let made = duties(&config.modulator, &supply, (v, Order::NORMAL), dead_time);
+                let made = duties(
+                    &config.modulator,
+                    &supply,
+                    (v, PhaseOrder::NORMAL),
+                    dead_time,
+                );
                 let mut made = made.map(|d| d.to_num::<f32>());
                 made.sort_by(f32::total_cmp);
                 greatest = (greatest.0.max(made[2]), greatest.1.max(made[1]));

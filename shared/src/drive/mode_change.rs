@@ -1,7 +1,7 @@
 //! The mode that a set-point asks for.
 
 use super::config::{Config, Stop};
-use super::io::{Asked, Setpoint};
+use super::io::{Rotation, Setpoint};
 use super::phase::Phase;
 use super::shared::Shared;
 use super::six_step;
@@ -11,24 +11,24 @@ use crate::control::catch::Rotor;
 use crate::units::Speed;
 
 /// The reason why the present mode ends, if the set-point asks for another.
-pub(super) fn asked(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
+pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     match (state.phase, &config.six_step) {
         (Phase::Idle | Phase::Sense | Phase::Charge | Phase::Brake | Phase::Tone, _) => {
             at_rest(config, state, setpoint)
         }
         (phase, None) => driving(config, &mut state.shared, phase, setpoint),
-        (phase, Some(_)) => six_step::period::asked(config, &state.shared, phase, setpoint),
+        (phase, Some(_)) => six_step::period::mode_change(config, &state.shared, phase, setpoint),
     }
 }
 
 /// Returns true if a set-point wants the motor to turn the way it does, or is being started.
 fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
-        Asked::Backward
+        Rotation::Backward
     } else {
-        Asked::Forward
+        Rotation::Forward
     };
-    setpoint.asks(config.both_ways) == present
+    setpoint.rotation(config.both_ways) == present
 }
 
 /// While field-oriented control drives.
@@ -47,7 +47,7 @@ fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoi
     // A torque against the rotation slows the motor down within Run, but does not turn it round.
     let holds = matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
         && shared.seen.speed >= config.slow;
-    let nothing = setpoint.asks(config.both_ways) == Asked::Nothing;
+    let nothing = setpoint.rotation(config.both_ways) == Rotation::Rest;
     if config.stop == Stop::Coast && nothing && !holds {
         // The bridge is off at once: without current, and the terminals tell how the shaft turns.
         Some(Why::Coasts)
@@ -66,7 +66,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
         Setpoint::Tone(_) => config.tone.is_some(),
         _ => false,
     };
-    let drives = setpoint.asks(config.both_ways) != Asked::Nothing;
+    let drives = setpoint.rotation(config.both_ways) != Rotation::Rest;
     let stands = state.off.rotor == Rotor::Standing;
     match state.phase {
         Phase::Tone | Phase::Sense if wants_tone => None,
