@@ -11,6 +11,35 @@
 //! looked at, in the next. One of the same kind that only
 //! changes its sign is obeyed within a cycle of the schedule, at most 32 periods later.
 //!
+//! # From the sample to the duties
+//! In Run, with the files in which to read it:
+//!
+//! | step | file |
+//! |---|---|
+//! | the converters' counts become a [`Sample`] | `firmware/src/interrupt/sample.rs`; emulator: `plant/sensing.rs` |
+//! | less their zeros, and a phase that could not be read from the other two | `shared.rs`, [`control::sensing`](crate::control::sensing) |
+//! | a current or a voltage beyond its trip ends the drive | `step.rs`, [`protection`](crate::protection) |
+//! | Clarke, then the observer's angle and speed, then Park | `foc/period.rs`, `foc/current_loop.rs`, [`control::observer`](crate::control::observer) |
+//! | the current regulator's voltage, with its decoupling; anti-windup where the supply gives less | `foc/current_loop.rs`, [`control::regulator`](crate::control::regulator) |
+//! | turned ahead by the delay, inverse Park, dead time, duties | [`control::delay`](crate::control::delay), [`control::modulator`](crate::control::modulator) |
+//! | the duties reach the timer, in force from the next period on | `firmware/src/interrupt/pwm.rs`; emulator: `plant/inverter.rs` |
+//!
+//! The regulator's reference is the outer loop's: speed regulator, limits, delay compensation and dead-time sign
+//! are pieces of `foc/outer_loop.rs`.
+//!
+//! # What ends a drive
+//!
+//! | reason | decided in |
+//! |---|---|
+//! | the set-point asks for rest, or for the other rotation | `mode_change.rs`; six-step: `six_step/period.rs` |
+//! | the set-point is a fault: found outside the drive, or by the hardware | `step.rs` |
+//! | a sample beyond a trip | `step.rs`, by [`protection::check`](crate::protection::check) |
+//! | a stop has come to rest; a start has failed; the rotor is lost, or stuck | `foc/open_loop.rs`; six-step: `six_step/start.rs`, `six_step/period.rs` |
+//! | a current sensor's zero is off | `off.rs` |
+//!
+//! Throttle that is lost, closed or not armed is a set-point of rest by the time that it comes here:
+//! [`Throttle::setpoint`](crate::throttle::Throttle::setpoint) makes it so.
+//!
 //! # The modes
 //! They are the values of [`Phase`].
 //!
