@@ -15,7 +15,7 @@ use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warnin
 use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale};
 use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
-use crate::throttle::{Reach, Reached, Throttle, Told};
+use crate::throttle::{Polled, Reach, Reached, Throttle};
 use crate::tune::Tune;
 use crate::units::Scale;
 use storage::{Asker, Storage, Unstored};
@@ -277,9 +277,9 @@ impl Esc {
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
         self.tunes.look(now_us, snapshot, rests);
         self.look_at_motor(now_us, snapshot);
-        let told = Told {
+        let polled = Polled {
             note: self.tunes.note().filter(|_| !self.check.powers_up()),
-            asked: self
+            test: self
                 .check
                 .pull()
                 .map(Setpoint::Pull)
@@ -289,7 +289,7 @@ impl Esc {
                 || self.storage.is_lost()
                 || !self.check.report.may_turn(&self.params),
         };
-        throttle.reach(|throttle| throttle.tell(told));
+        throttle.reach(|throttle| throttle.take_polled(polled));
     }
 
     /// Takes in the state of the drive and the board.

@@ -26,7 +26,7 @@ use crate::units::Scale;
 
 /// Time for which the tasks' demands on the drive hold, µs: they poll each millisecond, and a task that has died
 /// turns no motor.
-const TOLD_US: u64 = 100_000;
+const POLLED_US: u64 = 100_000;
 
 /// A throttle wire, the answers on it, and its demands on the drive.
 pub struct Throttle {
@@ -37,10 +37,10 @@ pub struct Throttle {
     /// The state from the tasks, for answers.
     telemetry: Telemetry,
     info: [u8; info::BYTES],
-    told: Told,
+    polled: Polled,
     /// The time, and when the tasks' demands on the drive end if they do not renew them, µs.
     now_us: u64,
-    told_until_us: u64,
+    polled_until_us: u64,
     /// Orders of DShot commands since the last poll, and those that wait to be done: one of each kind,
     /// and there are seven for the tasks.
     orders: Vec<Order, 7>,
@@ -50,11 +50,11 @@ pub struct Throttle {
 
 /// The tasks' part of each poll.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Told {
+pub(crate) struct Polled {
     /// The note that is due, to be played while nothing turns the motor.
     pub(crate) note: Option<Note>,
-    /// What a self-test or an identification asks of the drive, in place of notes.
-    pub(crate) asked: Option<Setpoint>,
+    /// The set-point of a self-test or an identification, in place of notes.
+    pub(crate) test: Option<Setpoint>,
     /// True if the temperature is past its limit.
     pub(crate) too_hot: bool,
     /// True if nothing may turn the motor.
@@ -102,9 +102,9 @@ impl Throttle {
             basis: Basis::new(params, scale),
             telemetry: Telemetry::new(),
             info: info::info(params, false, &board.image),
-            told: Told::default(),
+            polled: Polled::default(),
             now_us: 0,
-            told_until_us: 0,
+            polled_until_us: 0,
             orders: Vec::new(),
             storing: false,
         }
@@ -193,15 +193,15 @@ impl Throttle {
 
     /// The drive's set-point.
     pub fn setpoint(&self) -> Setpoint {
-        if self.told.too_hot {
+        if self.polled.too_hot {
             return Setpoint::Fault(Fault::OverTemperature);
         }
         if self.storing {
             return Setpoint::Stop;
         }
         let command = self.command();
-        match (self.told.asked, self.told.note) {
-            (Some(asked), _) if command.rests() && self.now_us < self.told_until_us => asked,
+        match (self.polled.test, self.polled.note) {
+            (Some(test), _) if command.rests() && self.now_us < self.polled_until_us => test,
             (None, Some(note)) if command.rests() => self.mapping.tone(note),
             _ => self.mapping.setpoint(command),
         }
@@ -220,7 +220,7 @@ impl Throttle {
     /// Lets time pass, and takes in the drive's state.
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
-        self.told_until_us = now_us + TOLD_US;
+        self.polled_until_us = now_us + POLLED_US;
         self.input.poll(now_us, telemetry.drive(self.command()));
         self.follow_wire();
         let authority = self.input.authority();
@@ -270,9 +270,9 @@ impl Throttle {
     }
 
     /// Takes in the tasks' part.
-    pub(crate) fn tell(&mut self, told: Told) {
-        self.told = told;
-        self.input.authority_mut().bar(told.barred);
+    pub(crate) fn take_polled(&mut self, polled: Polled) {
+        self.polled = polled;
+        self.input.authority_mut().bar(polled.barred);
     }
 
     /// Takes the answer for a wire that asks for the ESC's information.

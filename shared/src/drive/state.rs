@@ -204,11 +204,11 @@ impl State {
         let shared = &self.shared;
         let seen = &shared.seen;
         let signed = |speed: Speed| if shared.reversed { -speed } else { speed };
-        let trouble = if self.phase.drives() {
-            self.six_step.trouble()
+        let losses = if self.phase.drives() {
+            self.six_step.losses()
         } else {
             // What the six-step drive counts is left where it was when it ended.
-            six_step::state::Trouble::default()
+            six_step::state::Losses::default()
         };
         Snapshot {
             phase: seen.phase,
@@ -224,9 +224,9 @@ impl State {
             trip: self.trip_level(),
             inductance: self.foc.loops.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.foc.observer),
-            failed_starts: shared.failed_starts.max(trouble.failed_starts),
+            failed_starts: shared.failed_starts.max(losses.failed_starts),
             lost_periods: shared.progress.lost_periods,
-            missed_sextants: trouble.missed_sextants,
+            missed_sextants: losses.missed_sextants,
         }
     }
 

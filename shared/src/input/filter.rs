@@ -14,7 +14,7 @@ pub(super) struct Edge {
 
 /// The result of an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Told {
+pub(super) struct Filtered {
     /// The edge before, if this one confirms it.
     pub(super) believed: Option<Edge>,
     /// An edge was missed before this one: its level is the one that the line already had.
@@ -42,7 +42,7 @@ impl Filter {
     }
 
     /// Takes an edge as the timer saw it.
-    pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Told {
+    pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Filtered {
         // A short way for the edges of a sound signal.
         if let Some(pending) = self.pending
             && pending.level != level
@@ -50,7 +50,7 @@ impl Filter {
         {
             self.level = Some(pending.level);
             self.pending = Some(Edge { at_ticks, level });
-            return Told {
+            return Filtered {
                 believed: Some(pending),
                 missed: false,
             };
@@ -73,7 +73,7 @@ impl Filter {
             self.level = Some(!level);
             self.pending = Some(Edge { at_ticks, level });
         }
-        Told { believed, missed }
+        Filtered { believed, missed }
     }
 
     /// Believes the last edge, if its level has lasted until now.
@@ -191,9 +191,9 @@ mod tests {
     fn an_edge_to_the_same_level_tells_of_a_missed_one() {
         let mut filter = Filter::new(10);
         assert!(!filter.edge(100, true).missed, "no level was known");
-        let told = filter.edge(200, true);
-        assert!(told.missed);
-        assert_eq!(told.believed.map(|edge| edge.at_ticks), Some(100));
+        let filtered = filter.edge(200, true);
+        assert!(filtered.missed);
+        assert_eq!(filtered.believed.map(|edge| edge.at_ticks), Some(100));
         assert!(!filter.edge(300, false).missed);
         assert_eq!(filter.settle(400).map(|edge| edge.at_ticks), Some(300));
         assert!(filter.edge(500, false).missed);

@@ -69,12 +69,12 @@ impl Line {
     pub fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
         self.edge_at = at_ticks;
         self.silent = false;
-        let told = self.filter.edge(at_ticks, level);
-        let event = match told.believed {
+        let filtered = self.filter.edge(at_ticks, level);
+        let event = match filtered.believed {
             Some(edge) if !self.pass(edge) => self.decode(edge),
             _ => None,
         };
-        if told.missed {
+        if filtered.missed {
             self.frames.spoil(at_ticks);
             self.pulses.spoil();
         }

@@ -22,7 +22,7 @@ use super::warnings::{Warning, Warnings};
 use super::{ftp, news};
 use crate::drive::Faults;
 use crate::image::Image;
-use crate::input::News as WireNews;
+use crate::input::News;
 use crate::params::{ParamId, Params};
 
 mod send;
@@ -264,8 +264,8 @@ impl Component {
     }
 
     /// Reports the throttle wire's news.
-    pub fn tell(&mut self, news: WireNews) {
-        if let WireNews::Calibration(step) = news {
+    pub fn tell(&mut self, news: News) {
+        if let News::Calibration(step) = news {
             self.commands.follow_stick(step, &mut self.replies);
         }
         if let Some((severity, text)) = news::words(news) {

@@ -6,9 +6,9 @@ use crate::drive::{Fault, Faults};
 /// comes and goes each millisecond must not fill the link.
 const APART_US: u64 = 1_000_000;
 
-/// News.
+/// A fault that has begun or ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum News {
+pub(super) enum FaultEvent {
     Began(Fault),
     Ended(Fault),
 }
@@ -32,7 +32,7 @@ impl Announcer {
 
     /// The next fault whose state differs from the one reported and may be reported now. What has to wait
     /// is reported later if it still differs then.
-    pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<News> {
+    pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<FaultEvent> {
         for (i, fault) in Fault::ALL.into_iter().enumerate() {
             let present = faults.contains(fault);
             if present == self.told[i] {
@@ -49,9 +49,9 @@ impl Announcer {
             *last_us = Some(now_us);
             self.told[i] = present;
             return Some(if present {
-                News::Began(fault)
+                FaultEvent::Began(fault)
             } else {
-                News::Ended(fault)
+                FaultEvent::Ended(fault)
             });
         }
         None

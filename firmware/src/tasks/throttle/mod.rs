@@ -118,9 +118,9 @@ pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
             if after_ticks > 0 {
                 listener.capture.wait_until(at_ticks).await;
             }
-            let asked = listener.look(&mut looks, ready.as_ref());
-            if let Some((asked, ready)) = asked.zip(ready.as_ref()) {
-                listener.answer(asked, &looks, ready, armed.take()).await;
+            let query = listener.look(&mut looks, ready.as_ref());
+            if let Some((query, ready)) = query.zip(ready.as_ref()) {
+                listener.answer(query, &looks, ready, armed.take()).await;
             }
         }
     }
@@ -151,8 +151,8 @@ impl Ready {
     }
 }
 
-/// The requests of a frame, and the reply to it on the wire.
-struct Asked {
+/// A frame that is to be answered, and the reply to it on the wire.
+struct Query {
     ask: Ask,
     reply: Option<Reply>,
 }
@@ -242,29 +242,29 @@ impl Listener {
     /// which is soon enough for an answer in time, and all else edge by edge.
     // Inlined, it is 0.2 KB more flash.
     #[inline(never)]
-    fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Asked> {
+    fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Query> {
         self.fill_with_frame(looks);
         let edges = &mut self.capture.edges;
-        let (asked, setpoint) = self.port.reach(|throttle| {
+        let (query, setpoint) = self.port.reach(|throttle| {
             if throttle.is_storing() {
                 edges.forget();
                 return Some((None, Some(throttle.setpoint())));
             }
             let ask = take_in(throttle, edges, looks, ready)?;
-            let asked = ask.zip(ready).map(|(ask, ready)| Asked {
+            let query = ask.zip(ready).map(|(ask, ready)| Query {
                 ask,
                 reply: throttle.reply(ask, ready.speed_bits),
             });
-            if ask.is_some_and(|ask| ask.bidirectional) && asked.is_none() {
+            if ask.is_some_and(|ask| ask.bidirectional) && query.is_none() {
                 TROUBLE.late_reply();
             }
             let heard = looks.unheard.is_none();
-            Some((asked, heard.then(|| throttle.setpoint())))
+            Some((query, heard.then(|| throttle.setpoint())))
         })?;
         if let Some(setpoint) = setpoint {
             self.renew(setpoint);
         }
-        asked
+        query
     }
 
     /// Takes the edges from the DMA; all of a frame's, if the look is at one.
@@ -288,12 +288,12 @@ impl Listener {
 
     async fn answer(
         &mut self,
-        asked: Asked,
+        query: Query,
         looks: &Looks,
         ready: &Ready,
         armed: Option<Armed<'_>>,
     ) {
-        let Asked { ask, reply } = asked;
+        let Query { ask, reply } = query;
         let sending = reply
             .as_ref()
             .zip(armed)

@@ -6,14 +6,14 @@
 //! commutates by a speed that grows by `STA_RAMP_RPM_S`; crossings correct that as soon as there are
 //! some. Run begins when a turn of them has been seen in a row at `STA_RUN_RPM`.
 //!
-//! Files, each above those that it uses: `state`, `duty`, `tell`, `given`, `start`, `period`.
+//! Files, each above those that it uses: `state`, `duty`, `telemetry`, `given`, `start`, `period`.
 
 mod duty;
 pub(super) mod given;
 pub(super) mod period;
 mod start;
 pub(super) mod state;
-mod tell;
+mod telemetry;
 
 #[cfg(test)]
 mod tests;

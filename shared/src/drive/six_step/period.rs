@@ -2,7 +2,7 @@
 
 use super::duty::{self, NO_CURRENT, bridge, hold, take_over};
 use super::state::State;
-use super::tell::tell;
+use super::telemetry;
 use super::{given, start};
 use crate::control::six_step::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::six_step::crossing;
@@ -152,7 +152,7 @@ pub(in crate::drive) fn period(
     } else {
         duty::run(config, six_step, (s, shared), i, setpoint);
     }
-    tell(config, (s, shared), shown, (currents, i));
+    telemetry::update(config, (s, shared), shown, (currents, i));
     let bridge = bridge(s, swapped, None);
     if ramping {
         return (bridge, why);

@@ -4,7 +4,7 @@ use fixed::types::I36F28;
 
 use super::duty::{bridge, hold};
 use super::state::{FIRST_PARK, State};
-use super::tell::tell;
+use super::telemetry;
 use crate::control::six_step::commutation::{Legs, Sector};
 use crate::control::six_step::{crossing, tracking};
 use crate::drive::config;
@@ -88,11 +88,11 @@ pub(super) fn park(
             s.sector = FIRST_RAMP;
             s.tracking = tracking::State::at_rest(six_step.ramp.apply(wanted));
             s.crossing = crossing::State::default();
-            tell(config, (s, shared), Phase::Ramp, (currents, switching));
+            telemetry::update(config, (s, shared), Phase::Ramp, (currents, switching));
             return (bridge(s, swapped, None), Some(Why::Aligned));
         }
     }
-    tell(config, (s, shared), Phase::Park, (currents, switching));
+    telemetry::update(config, (s, shared), Phase::Park, (currents, switching));
     (bridge(s, swapped, Some(Duty::ZERO)), None)
 }
 

@@ -38,9 +38,9 @@ traced! {
     }
 }
 
-/// What goes wrong, as telemetry has it.
+/// Signs of lost synchronism, for telemetry.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::drive) struct Trouble {
+pub(in crate::drive) struct Losses {
     /// Starts in a row that have failed.
     pub(in crate::drive) failed_starts: u8,
     /// Sextants in a row without a crossing.
@@ -73,9 +73,9 @@ impl State {
         self.planner = planner::State::default();
     }
 
-    /// What goes wrong just now.
-    pub(in crate::drive) fn trouble(&self) -> Trouble {
-        Trouble {
+    /// The present signs of lost synchronism.
+    pub(in crate::drive) fn losses(&self) -> Losses {
+        Losses {
             failed_starts: self.failed,
             missed_sextants: self.missed,
         }

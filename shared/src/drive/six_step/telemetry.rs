@@ -17,7 +17,7 @@ use crate::units::{AdcCounts, Current, Speed, Voltage};
 const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);
 
 /// Telemetry of this period, and the bounds by the supply's current.
-pub(super) fn tell(
+pub(super) fn update(
     config: &Config,
     (s, shared): (&State, &mut Shared),
     phase: Phase,

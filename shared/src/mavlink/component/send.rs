@@ -9,7 +9,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Component, Context, START_TEXT};
-use crate::mavlink::faults::News;
+use crate::mavlink::faults::FaultEvent;
 use crate::mavlink::frame::Address;
 use crate::mavlink::payload::{Payload, id_of};
 use crate::mavlink::reply::Reply;
@@ -81,8 +81,10 @@ impl Component {
         }
         while let Some(news) = self.announcer.next(context.now_us, faults) {
             let (severity, word, fault) = match news {
-                News::Began(fault) => (MavSeverity::MAV_SEVERITY_CRITICAL, "Fault: ", fault),
-                News::Ended(fault) => (MavSeverity::MAV_SEVERITY_NOTICE, "Fault ended: ", fault),
+                FaultEvent::Began(fault) => (MavSeverity::MAV_SEVERITY_CRITICAL, "Fault: ", fault),
+                FaultEvent::Ended(fault) => {
+                    (MavSeverity::MAV_SEVERITY_NOTICE, "Fault ended: ", fault)
+                }
             };
             self.text(severity, &[word, fault.text()], send);
         }
