@@ -73,13 +73,11 @@ impl Ring {
     }
 
     /// One of its times, the next is 0.
-    #[inline(always)]
     pub(super) fn word(&self, index: usize) -> u32 {
         self.words()(index)
     }
 
     /// Its times, the next is 0.
-    #[inline(always)]
     pub(super) fn words(&self) -> impl Fn(usize) -> u32 + use<> {
         let (memory, at) = (self.memory, self.at);
         move |index| memory[(at + index) % LEN].load(Ordering::Relaxed)

@@ -87,7 +87,6 @@ pub struct RunningEnd {
 
 impl RunningEnd {
     /// Looks for a new set-point; to be called once a period, which is how its age is counted.
-    #[inline(always)]
     pub(crate) fn listen(&mut self) {
         let word = SETPOINT.load(Ordering::Relaxed);
         if word != self.word {
@@ -100,7 +99,6 @@ impl RunningEnd {
     }
 
     /// The set-point for this period.
-    #[inline(always)]
     pub(crate) fn setpoint(&self) -> &Setpoint {
         &self.setpoint
     }
@@ -115,19 +113,16 @@ impl RunningEnd {
 
     /// Changes over to the configuration that is offered, if one is, after `change` has seen the one
     /// before and the new one.
-    #[inline(always)]
     pub(crate) fn adopt(&mut self, change: impl FnOnce(&Config, &Config)) {
         CONFIG.adopt(&mut self.config, change);
     }
 
     /// Works with the configuration in use.
-    #[inline(always)]
     pub(crate) fn with_config<R>(&self, work: impl FnOnce(&Config) -> R) -> R {
         CONFIG.with(&self.config, work)
     }
 
     /// Offers the snapshot to the tasks.
-    #[inline(always)]
     pub(crate) fn publish(&mut self, snapshot: Snapshot) {
         SNAPSHOT.publish(&mut self.snapshot, snapshot);
     }

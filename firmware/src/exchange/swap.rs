@@ -86,7 +86,6 @@ impl<T> Swap<T> {
     }
 
     /// The way to offer a value, or `None` while one before it waits.
-    #[inline(always)]
     pub(crate) fn free<'a>(&'a self, hand: &'a mut Offerer) -> Option<Free<'a, T>> {
         // Acquire: the user is done with the slot that it has left.
         let waits = self.state.load(Ordering::Acquire) == OFFERED;
@@ -95,7 +94,6 @@ impl<T> Swap<T> {
 
     /// Changes over to what is offered, if anything is, after a look at what was and what will be in
     /// use.
-    #[inline(always)]
     pub(crate) fn adopt(&self, hand: &mut User, change: impl FnOnce(&T, &T)) {
         if self.state.load(Ordering::Acquire) == OFFERED {
             let next = hand.used ^ 1;
@@ -108,12 +106,10 @@ impl<T> Swap<T> {
     }
 
     /// Works with the value in use.
-    #[inline(always)]
     pub(crate) fn with<R>(&self, hand: &User, work: impl FnOnce(&T) -> R) -> R {
         self.look(hand.used, work)
     }
 
-    #[inline(always)]
     fn look<R>(&self, slot: usize, work: impl FnOnce(&T) -> R) -> R {
         let slot = &self.slots[slot & 1];
         #[cfg(not(test))]

@@ -69,7 +69,6 @@ impl Interrupt {
     }
 
     /// One control period.
-    #[inline(always)]
     pub fn run(&mut self) {
         chip::acknowledge(&self.registers.converters);
         if chip::flash::is_writing() {
@@ -131,7 +130,6 @@ impl Interrupt {
     }
 
     /// Changes over to a new configuration, if one is offered.
-    #[inline(always)]
     fn adopt(&mut self) {
         let Self { state, end, .. } = self;
         end.adopt(|before, now| adopt(state, before, now));
@@ -146,7 +144,6 @@ fn adopt(state: &mut State, before: &Config, now: &Config) {
 
 /// Counts one more, and says how many it was before. There is one writer: this need not be one
 /// indivisible step.
-#[inline(always)]
 fn count(counter: &AtomicU32) -> u32 {
     let before = counter.load(Ordering::Relaxed);
     counter.store(before.wrapping_add(1), Ordering::Relaxed);

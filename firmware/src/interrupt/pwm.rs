@@ -109,7 +109,6 @@ impl Pwm {
     }
 
     #[cold]
-    #[inline(never)]
     fn second(&mut self) {
         if let Some(legs) = self.deferred.take() {
             self.set_modes(legs);
@@ -118,7 +117,6 @@ impl Pwm {
     }
 
     /// Returns true if the break has turned the bridge off since [`clear_break`](Self::clear_break).
-    #[inline(always)]
     pub(crate) fn broken(&self) -> bool {
         self.timer.sr().read().bif(0)
     }
@@ -155,7 +153,6 @@ impl Pwm {
 
     /// Every bridge that differs from the one before in more than its duties.
     #[cold]
-    #[inline(never)]
     fn change(&mut self, bridge: Bridge) {
         let switching =
             |[a, b, c]: [Duty; 3]| [Leg::Switching(a), Leg::Switching(b), Leg::Switching(c)];
@@ -200,7 +197,6 @@ impl Pwm {
     }
 
     // Channel by channel, here and below: a loop would keep the checks of the channels' numbers.
-    #[inline(always)]
     fn set_compares(&mut self, values: [u32; 3]) {
         let timer = self.timer;
         timer.ccr(0).write_value(Ccr1ch(values[PHASES[0]]));

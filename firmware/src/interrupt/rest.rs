@@ -29,14 +29,11 @@ pub(crate) struct Rest {
 
 impl Rest {
     /// Returns true if there is none.
-    #[inline(always)]
     pub(crate) fn is_over(&self) -> bool {
         self.periods == 0
     }
 
     /// A period of the rest, or an alarm with which one begins. `alarm` is the line's level.
-    // Into its one caller, which is in RAM.
-    #[inline(always)]
     pub(crate) fn step(&mut self, alarm: bool) -> Order {
         if self.is_over() {
             self.periods = REST_PERIODS;

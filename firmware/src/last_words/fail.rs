@@ -27,7 +27,6 @@ pub fn turn_off() {
 
 /// Turns the bridge off, writes the cause down, and resets the chip.
 #[cold]
-#[inline(never)]
 pub fn fail(failure: Failure, details: [u32; DETAILS]) -> ! {
     turn_off();
     let record = Record::new(failure, details);

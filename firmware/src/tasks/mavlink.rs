@@ -92,7 +92,6 @@ impl MainTask<'_> {
         }
     }
 
-    #[inline(never)]
     fn receive(&mut self, bytes: &[u8]) {
         let now_us = now().as_micros();
         let (esc, throttle) = (&mut self.esc, &mut self.throttle);
