@@ -106,7 +106,6 @@ pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) ->
 }
 
 /// A look at the terminals.
-#[inline(always)]
 fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let [a, b, c] = readings;
     let highest = I16F16::from_bits(a.max(b).max(c).to_bits() << 1);
@@ -199,7 +198,6 @@ fn begin(config: &Config, state: &mut State) {
 }
 
 /// Every later look.
-#[inline(always)]
 fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let (theta, readings) = if state.is_slow() {
         let [before_a, before_b, before_c] = state.readings;

@@ -17,7 +17,6 @@ pub enum Delay {
 impl Delay {
     /// Delay compensation: the angle by which the rotor's frame turns from the sample to the middle
     /// of the voltage, (0.5 + delay) periods at this speed.
-    #[inline(always)]
     pub fn advance(self, speed: Speed) -> Angle {
         let half = speed.over_half_period();
         match self {
@@ -28,7 +27,6 @@ impl Delay {
     }
 
     /// The voltage between this sample and the next, of what is commanded now and what was before.
-    #[inline(always)]
     pub fn applied(self, now: Voltage, before: Voltage) -> Voltage {
         match self {
             Self::None => now,

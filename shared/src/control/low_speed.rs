@@ -70,7 +70,6 @@ impl Config {
     }
 
     /// i_d*, and what of the bounds of i_q* this and the speed leave.
-    #[inline(always)]
     pub fn bounds(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         if speed > self.end {
             (Current::ZERO, full)

@@ -114,7 +114,6 @@ fn judge(config: &Config, state: &mut State) -> Zeroing {
 }
 
 /// The readings of a sample less their offsets.
-#[inline(always)]
 pub fn read(state: &State, raw: [AdcCounts; 3]) -> [AdcCounts; 3] {
     let [a, b, c] = raw;
     let [offset_a, offset_b, offset_c] = state.offsets;

@@ -102,7 +102,6 @@ pub fn ramp(config: &Config, state: &mut State, current: Current) {
 }
 
 /// Takes the frame on by a period and returns its speed in it.
-#[inline(always)]
 pub fn advance(state: &mut State) -> Speed {
     state.omega_s = state.omega_s.plus(state.acceleration);
     let omega = state.omega_s.plus(state.yielding);
@@ -116,7 +115,6 @@ pub fn advance(state: &mut State) -> Speed {
 /// time disturbs the back-EMF h_d = R·i_d − ω·L·i_q − u_d (5).
 ///
 /// Called every so many `periods`, which are few against those of a swing.
-#[inline(always)]
 pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage>), periods: u32) {
     state.yielded = state
         .yielded

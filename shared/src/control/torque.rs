@@ -27,7 +27,6 @@ traced! {
 }
 
 /// `wanted` with its i_q* within the bounds, and not far from the last one.
-#[inline(always)]
 pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
     let i_q = bounds
         .hold(wanted.i.q)
@@ -40,7 +39,6 @@ pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bou
 /// `wanted` with an i_q* that has grown by no more than that, for the speed regulator; it may fall at
 /// once. Where L is stated wrongly the rotor seems to turn by asin(ΔL·i_q/φ), and the observer needs
 /// time to follow.
-#[inline(always)]
 pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
     let least = state.i_q.min(Current::ZERO).minus(config.slew);
     let most = state.i_q.max(Current::ZERO).plus(config.slew);

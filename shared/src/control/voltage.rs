@@ -12,13 +12,11 @@ use crate::math::TopProduct;
 use crate::units::{Current, Voltage};
 
 /// The voltage of a share, −1 to 1, of the longest vector that the supply can give.
-#[inline(always)]
 pub fn of_share(share: I1F31, vector_max: Voltage) -> Voltage {
     vector_max.top(share).scaled()
 }
 
 /// The current at which the regulator gives `u_q`, whatever it is.
-#[inline(always)]
 pub fn reference(
     config: &regulator::Config,
     state: &regulator::State,

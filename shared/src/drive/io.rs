@@ -66,7 +66,6 @@ pub enum Bridge {
 
 impl Setpoint {
     /// A number for each kind.
-    #[inline(always)]
     pub(super) fn kind(self) -> u8 {
         match self {
             Self::Stop => 0,
@@ -134,7 +133,6 @@ pub(super) enum Rotation {
 }
 
 /// The Hall sensors in the order of the control's phases.
-#[inline(always)]
 pub(super) fn hall(sample: &Sample, swapped: bool) -> u8 {
     if swapped {
         sample.hall & 1 | (sample.hall & 2) << 1 | (sample.hall & 4) >> 1
@@ -144,7 +142,6 @@ pub(super) fn hall(sample: &Sample, swapped: bool) -> u8 {
 }
 
 /// Phases b and c change places where the motor turns the other way than a, b, c.
-#[inline(always)]
 pub(super) fn in_order<T>(swapped: bool, [a, b, c]: [T; 3]) -> [T; 3] {
     if swapped { [a, c, b] } else { [a, b, c] }
 }

@@ -47,7 +47,6 @@ impl State {
     }
 
     /// Nothing has been measured yet.
-    #[inline(always)]
     pub(super) fn begin(&mut self) {
         self.settling_periods = SETTLING_PERIODS;
         self.looks = 0;

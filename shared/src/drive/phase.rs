@@ -41,19 +41,16 @@ impl Phase {
     ];
 
     /// Returns true if the control's frame is imposed on the rotor.
-    #[inline(always)]
     pub(super) fn is_open_loop(self) -> bool {
         matches!(self, Self::Park | Self::Ramp)
     }
 
     /// Returns true if all switches are off.
-    #[inline(always)]
     pub(super) fn is_off(self) -> bool {
         matches!(self, Self::Idle | Self::Sense)
     }
 
     /// Returns true if the motor is turned, or slowed down.
-    #[inline(always)]
     pub fn drives(self) -> bool {
         matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)
     }

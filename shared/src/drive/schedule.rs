@@ -67,7 +67,6 @@ impl Work {
         .with(Self::HAND_OVER);
 
     /// Returns true if any of these pieces is among them.
-    #[inline(always)]
     pub(super) const fn includes(self, pieces: Self) -> bool {
         self.0 & pieces.0 != 0
     }
@@ -181,7 +180,6 @@ const _: () = {
 pub(super) type Slot = u8;
 
 /// Takes the slot on by a period, and says what is done in it.
-#[inline(always)]
 pub(super) fn next(slot: &mut Slot) -> Work {
     *slot = (*slot & !(CYCLE as u8 - 1)) | ((*slot + 1) % CYCLE as u8);
     SLOTS.as_flattened()[usize::from(*slot) % (2 * CYCLE as usize)]
@@ -193,7 +191,6 @@ pub(super) fn choose(slot: &mut Slot, open_loop: bool) {
 }
 
 /// Returns true if a slot is of the open-loop start's schedule.
-#[inline(always)]
 pub(super) fn is_start(slot: Slot) -> bool {
     slot >= CYCLE as u8
 }

@@ -66,7 +66,6 @@ pub(super) fn greatest([a, b, c]: [Current; 3]) -> Current {
 }
 
 /// Current from the supply: 1.5·(v·i)/V_bus.
-#[inline(always)]
 pub(super) fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
     // 24 + 28 − 32 fraction bits; 28 wanted.
     let two_thirds: Current = (u.d.top(i.d) + u.q.top(i.q))

@@ -18,7 +18,6 @@ pub trait Held {
 }
 
 impl<T: Number> Held for T {
-    #[inline(always)]
     fn plus(self, rhs: Self) -> Self {
         let (a, b) = (self.to_bits(), rhs.to_bits());
         Self::from_bits(if cfg!(target_arch = "arm") {
@@ -28,7 +27,6 @@ impl<T: Number> Held for T {
         })
     }
 
-    #[inline(always)]
     fn minus(self, rhs: Self) -> Self {
         let (a, b) = (self.to_bits(), rhs.to_bits());
         Self::from_bits(if cfg!(target_arch = "arm") {
@@ -40,7 +38,6 @@ impl<T: Number> Held for T {
 }
 
 /// The end of the type on the side of `a`.
-#[inline(always)]
 fn end(a: i32) -> i32 {
     if a.is_negative() { i32::MIN } else { i32::MAX }
 }

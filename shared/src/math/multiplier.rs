@@ -71,19 +71,16 @@ impl<A: Number, B: Number> Multiplier<A, B> {
     }
 
     /// The product with `x`, rounded towards minus infinity.
-    #[inline(always)]
     pub fn of(self, x: A) -> B {
         B::from_bits(((i64::from(self.bits) * i64::from(x.to_bits())) >> 32) as i32)
     }
 
     /// `sum` and the product with `x`; it wraps, so the caller knows the range of both.
-    #[inline(always)]
     pub fn added(self, sum: B, x: A) -> B {
         B::from_bits(sum.to_bits().wrapping_add(self.of(x).to_bits()))
     }
 
     /// `sum` less the product with `x`, likewise.
-    #[inline(always)]
     pub fn taken(self, sum: B, x: A) -> B {
         B::from_bits(super::product::less(sum.to_bits(), self.bits, x.to_bits()))
     }

@@ -20,12 +20,10 @@ pub trait Number: Copy {
 impl<F: Unsigned> Number for FixedI32<F> {
     type Frac = F;
 
-    #[inline(always)]
     fn from_bits(bits: i32) -> Self {
         Self::from_bits(bits)
     }
 
-    #[inline(always)]
     fn to_bits(self) -> i32 {
         self.to_bits()
     }

@@ -49,107 +49,91 @@ impl<D, F> Quantity<D, F> {
     }
 
     /// The quantity of these bits.
-    #[inline(always)]
     pub const fn from_bits(bits: i32) -> Self {
         Self::of(FixedI32::from_bits(bits))
     }
 
     /// Its bits.
-    #[inline(always)]
     pub const fn to_bits(self) -> i32 {
         self.number.to_bits()
     }
 
     /// Returns true if it is below zero.
-    #[inline(always)]
     pub const fn is_negative(self) -> bool {
         self.to_bits() < 0
     }
 
     /// Returns true if it is above zero.
-    #[inline(always)]
     pub const fn is_positive(self) -> bool {
         self.to_bits() > 0
     }
 
     /// self + rhs, wrapped.
-    #[inline(always)]
     #[must_use]
     pub const fn wrapping_add(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().wrapping_add(rhs.to_bits()))
     }
 
     /// self − rhs, wrapped.
-    #[inline(always)]
     #[must_use]
     pub const fn wrapping_sub(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().wrapping_sub(rhs.to_bits()))
     }
 
     /// self + rhs, held at the ends of the type.
-    #[inline(always)]
     #[must_use]
     pub const fn saturating_add(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().saturating_add(rhs.to_bits()))
     }
 
     /// self − rhs, held at the ends of the type.
-    #[inline(always)]
     #[must_use]
     pub const fn saturating_sub(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().saturating_sub(rhs.to_bits()))
     }
 
     /// self·rhs, wrapped.
-    #[inline(always)]
     #[must_use]
     pub const fn wrapping_mul_int(self, rhs: i32) -> Self {
         Self::from_bits(self.to_bits().wrapping_mul(rhs))
     }
 
     /// self·rhs, held at the ends of the type.
-    #[inline(always)]
     #[must_use]
     pub const fn saturating_mul_int(self, rhs: i32) -> Self {
         Self::from_bits(self.to_bits().saturating_mul(rhs))
     }
 
     /// self/rhs, if that exists.
-    #[inline(always)]
     pub fn checked_div_int(self, rhs: i32) -> Option<Self> {
         self.to_bits().checked_div(rhs).map(Self::from_bits)
     }
 
     /// −self, wrapped.
-    #[inline(always)]
     #[must_use]
     pub const fn wrapping_neg(self) -> Self {
         Self::from_bits(self.to_bits().wrapping_neg())
     }
 
     /// −self, held at the ends of the type.
-    #[inline(always)]
     #[must_use]
     pub const fn saturating_neg(self) -> Self {
         Self::from_bits(self.to_bits().saturating_neg())
     }
 
     /// |self|, held at the end of the type.
-    #[inline(always)]
     #[must_use]
     pub const fn saturating_abs(self) -> Self {
         Self::from_bits(self.to_bits().saturating_abs())
     }
 
     /// |self|.
-    #[inline(always)]
     #[must_use]
     pub const fn abs(self) -> Self {
         Self::from_bits(self.to_bits().abs())
     }
 
     /// |self| in bits.
-    #[inline(always)]
     pub const fn magnitude_bits(self) -> u32 {
         self.to_bits().unsigned_abs()
     }
@@ -164,7 +148,6 @@ impl<D, F: Unsigned> Quantity<D, F> {
 
     /// This quantity with `G` fraction bits: of fewer the last are left out, and what more leave
     /// no room for wraps.
-    #[inline(always)]
     #[must_use]
     pub const fn scaled<G: Unsigned>(self) -> Quantity<D, G> {
         let bits = self.to_bits();
@@ -206,12 +189,10 @@ impl<D, F: LeEqU32> Quantity<D, F> {
 impl<D, F: Unsigned> Number for Quantity<D, F> {
     type Frac = F;
 
-    #[inline(always)]
     fn from_bits(bits: i32) -> Self {
         Self::from_bits(bits)
     }
 
-    #[inline(always)]
     fn to_bits(self) -> i32 {
         self.to_bits()
     }
@@ -225,7 +206,6 @@ impl<D, F> Trace for Quantity<D, F> {
 
 // By hand: what is derived would ask the same of the dimension.
 impl<D, F> Clone for Quantity<D, F> {
-    #[inline(always)]
     fn clone(&self) -> Self {
         *self
     }
@@ -240,7 +220,6 @@ impl<D, F> Default for Quantity<D, F> {
 }
 
 impl<D, F> PartialEq for Quantity<D, F> {
-    #[inline(always)]
     fn eq(&self, other: &Self) -> bool {
         self.to_bits() == other.to_bits()
     }
@@ -249,44 +228,36 @@ impl<D, F> PartialEq for Quantity<D, F> {
 impl<D, F> Eq for Quantity<D, F> {}
 
 impl<D, F> PartialOrd for Quantity<D, F> {
-    #[inline(always)]
     fn partial_cmp(&self, other: &Self) -> Option<core::cmp::Ordering> {
         Some(self.cmp(other))
     }
 
-    #[inline(always)]
     fn lt(&self, other: &Self) -> bool {
         self.to_bits() < other.to_bits()
     }
 
-    #[inline(always)]
     fn le(&self, other: &Self) -> bool {
         self.to_bits() <= other.to_bits()
     }
 
-    #[inline(always)]
     fn gt(&self, other: &Self) -> bool {
         self.to_bits() > other.to_bits()
     }
 
-    #[inline(always)]
     fn ge(&self, other: &Self) -> bool {
         self.to_bits() >= other.to_bits()
     }
 }
 
 impl<D, F> Ord for Quantity<D, F> {
-    #[inline(always)]
     fn cmp(&self, other: &Self) -> core::cmp::Ordering {
         self.to_bits().cmp(&other.to_bits())
     }
 
-    #[inline(always)]
     fn max(self, other: Self) -> Self {
         Self::from_bits(self.to_bits().max(other.to_bits()))
     }
 
-    #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self::from_bits(self.to_bits().min(other.to_bits()))
     }
@@ -307,7 +278,6 @@ impl<D, F: LeEqU32> fmt::Display for Quantity<D, F> {
 impl<D, F> Add for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn add(self, rhs: Self) -> Self {
         Self::of(self.number + rhs.number)
     }
@@ -316,7 +286,6 @@ impl<D, F> Add for Quantity<D, F> {
 impl<D, F> Sub for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn sub(self, rhs: Self) -> Self {
         Self::of(self.number - rhs.number)
     }
@@ -325,21 +294,18 @@ impl<D, F> Sub for Quantity<D, F> {
 impl<D, F> Neg for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn neg(self) -> Self {
         Self::of(-self.number)
     }
 }
 
 impl<D, F> AddAssign for Quantity<D, F> {
-    #[inline(always)]
     fn add_assign(&mut self, rhs: Self) {
         *self = *self + rhs;
     }
 }
 
 impl<D, F> SubAssign for Quantity<D, F> {
-    #[inline(always)]
     fn sub_assign(&mut self, rhs: Self) {
         *self = *self - rhs;
     }
@@ -348,7 +314,6 @@ impl<D, F> SubAssign for Quantity<D, F> {
 impl<D, F> Mul<i32> for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn mul(self, rhs: i32) -> Self {
         Self::from_bits(self.to_bits() * rhs)
     }
@@ -357,7 +322,6 @@ impl<D, F> Mul<i32> for Quantity<D, F> {
 impl<D, F> Div<i32> for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn div(self, rhs: i32) -> Self {
         Self::from_bits(self.to_bits() / rhs)
     }
@@ -366,7 +330,6 @@ impl<D, F> Div<i32> for Quantity<D, F> {
 impl<D, F> Shl<u32> for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn shl(self, rhs: u32) -> Self {
         Self::from_bits(self.to_bits() << rhs)
     }
@@ -375,7 +338,6 @@ impl<D, F> Shl<u32> for Quantity<D, F> {
 impl<D, F> Shr<u32> for Quantity<D, F> {
     type Output = Self;
 
-    #[inline(always)]
     fn shr(self, rhs: u32) -> Self {
         Self::from_bits(self.to_bits() >> rhs)
     }
@@ -390,7 +352,6 @@ where
 {
     type Output = Quantity<D, Diff<Sum<A, B>, U32>>;
 
-    #[inline(always)]
     fn top(self, rhs: FixedI32<B>) -> Self::Output {
         Quantity::of(self.number.top(rhs))
     }
@@ -405,7 +366,6 @@ where
 {
     type Output = Quantity<D, Diff<Sum<A, B>, U32>>;
 
-    #[inline(always)]
     fn top(self, rhs: Quantity<D, B>) -> Self::Output {
         Quantity::of(self.top(rhs.number))
     }
@@ -421,7 +381,6 @@ where
 {
     type Output = D::Product<Diff<Sum<A, B>, U32>>;
 
-    #[inline(always)]
     fn top(self, rhs: Quantity<E, B>) -> Self::Output {
         D::Product::from_bits(self.number.top(rhs.number).to_bits())
     }

@@ -83,7 +83,6 @@ impl Times<Self> for Volt {
 
 impl<F> Quantity<Volt, F> {
     /// The flux linkage that the voltage adds in a period.
-    #[inline(always)]
     pub const fn over_period(self) -> Quantity<Weber, F> {
         Quantity::from_bits(self.to_bits())
     }
@@ -98,7 +97,6 @@ pub type Charge = I36F28;
 
 impl Quantity<Ampere, U28> {
     /// The charge of so many periods.
-    #[inline(always)]
     pub fn over_periods(self, periods: u32) -> Charge {
         Charge::from_bits(i64::from(self.to_bits())) * i64::from(periods)
     }
@@ -106,25 +104,21 @@ impl Quantity<Ampere, U28> {
 
 impl<F> Quantity<TurnPerPeriod, F> {
     /// ω·T_s in turns, a plain number.
-    #[inline(always)]
     pub const fn turns(self) -> FixedI32<F> {
         FixedI32::from_bits(self.to_bits())
     }
 
     /// The angle that the rotor turns by in a period.
-    #[inline(always)]
     pub const fn over_period(self) -> Quantity<Turn, F> {
         Quantity::from_bits(self.to_bits())
     }
 
     /// The angle of half a period.
-    #[inline(always)]
     pub const fn over_half_period(self) -> Quantity<Turn, F> {
         Quantity::from_bits(self.to_bits() >> 1)
     }
 
     /// The angle of so many periods; it wraps.
-    #[inline(always)]
     pub const fn over_periods(self, periods: i32) -> Quantity<Turn, F> {
         Quantity::from_bits(self.to_bits().wrapping_mul(periods))
     }
@@ -132,7 +126,6 @@ impl<F> Quantity<TurnPerPeriod, F> {
 
 impl<F> Quantity<Turn, F> {
     /// The speed that turns by the angle in a period.
-    #[inline(always)]
     pub const fn per_period(self) -> Quantity<TurnPerPeriod, F> {
         Quantity::from_bits(self.to_bits())
     }
@@ -140,7 +133,6 @@ impl<F> Quantity<Turn, F> {
 
 impl<F> Quantity<TurnPerPeriodSquare, F> {
     /// The change of a speed in a period: of ω²·T_s one turn is a number, as a radian is.
-    #[inline(always)]
     pub const fn over_period(self) -> Quantity<TurnPerPeriod, F> {
         Quantity::from_bits(self.to_bits())
     }

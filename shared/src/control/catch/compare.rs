@@ -32,7 +32,6 @@ traced! {
 type Phase = (I2F30, I2F30, I17F15);
 
 /// Compares readings with what a vector at `theta` of this amplitude makes the terminals show.
-#[inline(always)]
 pub(super) fn compare(
     diode: AdcCounts,
     theta: Angle,

@@ -57,7 +57,6 @@ pub(super) fn learn(config: &Config, state: &mut State) {
 
 /// Makes the sums a look older, forgets a share of them, and adds the last look's weights: what that
 /// says of the speed.
-#[inline(always)]
 fn weigh(config: &Config, state: &mut State) {
     let omega = state.omega.to_bits().saturating_abs().min(FORGET_MAX);
     // A turn is 1/(4·ω) looks.
@@ -95,7 +94,6 @@ fn weigh(config: &Config, state: &mut State) {
 }
 
 /// Corrects the vector by what the last look has difference.
-#[inline(always)]
 fn correct(state: &mut State) {
     let amplitude = state.amplitude.to_bits();
     if state.weight >= WEIGHT_MIN {
@@ -127,7 +125,6 @@ fn correct(state: &mut State) {
 
 /// Sees whether the speed is known to 1 % by what has been seen, over nearly half a turn, and
 /// amplitude, speed and residual fit each other.
-#[inline(always)]
 fn judge(config: &Config, state: &mut State) {
     state.residual += (state.difference.misfit - state.residual) >> RESIDUAL_SHIFT;
     let omega = state.omega.magnitude_bits();

@@ -119,7 +119,6 @@ pub fn estimate(
 }
 
 /// Fluxes and their comparator; crossings that the Hall sensors should have seen.
-#[inline(always)]
 fn observe(
     config: &Config,
     state: &mut State,
@@ -154,7 +153,6 @@ fn observe(
 }
 
 /// Chooses the source: by the sensors that there are and, where both are, by the speed.
-#[inline(always)]
 fn choose(config: &Config, state: &mut State) {
     let omega = state.position.omega;
     let wanted = match (config.sensors, state.source) {
@@ -208,7 +206,6 @@ fn sensed(config: &Config, state: &mut State, step: Step) {
 const HALL_LATE: Periods = Periods::from_bits((2 * hall::SAMPLES - 1) << (Periods::FRAC_NBITS - 1));
 
 /// Without edges for long the rotor stands, somewhere in its sector.
-#[inline(always)]
 fn rest(config: &Config, state: &mut State) {
     let position = &mut state.position;
     if position.since >= config.crossing.patience

@@ -77,7 +77,6 @@ impl Default for State {
 }
 
 /// One period: `v` are the mean phase voltages since the last sample, `i` the currents at this one.
-#[inline(always)]
 pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current; 3]) {
     let lambda_max: Flux = state.amplitude + (state.amplitude >> 2);
     let psi_max = lambda_max.plus(config.stator_max);

@@ -53,7 +53,6 @@ const CONTRADICTION: u8 = 8;
 const FAULT: u8 = 20;
 
 /// One period: takes the code of this sample.
-#[inline(always)]
 pub fn read(config: &Config, state: &mut State, code: u8) -> Option<Step> {
     let code = code & 7;
     let lasts = code == state.code;

@@ -78,13 +78,11 @@ const THIRD_TURN: u64 = (1 << 32) / 3;
 const OMEGA_MAX: u64 = (1 << 30) - 1;
 
 /// The angle in turns, 32 fraction bits, of so many periods at this speed.
-#[inline(always)]
 pub(super) fn turned(periods: u32, omega: Speed) -> u64 {
     u64::from(periods) * u64::from(omega.to_bits().max(0) as u32)
 }
 
 /// One period without news: extrapolates (2.4.1).
-#[inline(always)]
 pub fn advance(state: &mut State) {
     let step = state.omega.over_period().min(LIMIT - state.theta_inc);
     state.theta = state.theta.wrapping_add(step);

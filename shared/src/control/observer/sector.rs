@@ -51,7 +51,6 @@ impl Sector {
     }
 
     /// The sector that follows in the positive direction.
-    #[inline(always)]
     pub fn next(self) -> Self {
         Self(if self.0 >= 5 { 0 } else { self.0 + 1 })
     }
@@ -72,7 +71,6 @@ impl Sector {
     }
 
     /// The crossing with which it begins.
-    #[inline(always)]
     pub fn edge(self) -> Edge {
         Edge {
             // c, b, a, c, b, a; every second one rises.

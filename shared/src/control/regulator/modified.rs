@@ -44,7 +44,6 @@ const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
 
 impl Config {
     /// The voltage of length V at the phase δ ahead of q, before any limit: (−V·sin δ, V·cos δ).
-    #[inline(always)]
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let length = self.length(state, wanted, fb);
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
@@ -58,7 +57,6 @@ impl Config {
     }
 
     /// V.
-    #[inline(always)]
     fn length(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Voltage {
         let e_q = wanted.i.q.minus(fb.i.q);
         let length = state.length.plus(self.k_p.held(e_q)).plus(wanted.u_q);
@@ -67,7 +65,6 @@ impl Config {
     }
 
     /// The current i_q* for which the voltage has the length `u_q`; the one that is wanted does not matter.
-    #[inline(always)]
     pub fn current_at(
         &self,
         state: &State,
@@ -81,7 +78,6 @@ impl Config {
     }
 
     /// Takes the integrators on by a period.
-    #[inline(always)]
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let step = self.k_i.held(wanted.i.q.minus(fb.i.q));
         // The limit keeps the part along d: while it cuts, the phase alone holds i_d.
@@ -127,7 +123,6 @@ impl State {
 }
 
 /// i_d's error as the phase sees it: with a negative length the other way.
-#[inline(always)]
 fn leads_with(length: Voltage, error: Current) -> Current {
     if length.is_negative() {
         error.saturating_neg()
@@ -136,7 +131,6 @@ fn leads_with(length: Voltage, error: Current) -> Current {
     }
 }
 
-#[inline(always)]
 fn bounded(phase: Angle) -> Angle {
     phase.min(QUARTER_TURN).max(-QUARTER_TURN)
 }

@@ -34,7 +34,6 @@ traced! {
 
 impl Config {
     /// The voltage that brings the estimated currents to (i_d*, i_q*), before any limit (10).
-    #[inline(always)]
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let u = self.forced(wanted, fb);
         Dq {
@@ -44,7 +43,6 @@ impl Config {
     }
 
     /// The current i_q* for which the voltage along q is `u_q`; the one that is wanted does not matter.
-    #[inline(always)]
     pub fn current_at(
         &self,
         state: &State,
@@ -81,7 +79,6 @@ impl Config {
     }
 
     /// Takes the integrators on by a period.
-    #[inline(always)]
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
         let sigma = &mut state.sigma;
@@ -108,7 +105,6 @@ impl Config {
 }
 
 /// e_d and e_q: the estimated currents against their references.
-#[inline(always)]
 fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
         d: fb.i_hat.d.minus(wanted.i.d),
