@@ -70,13 +70,11 @@ pub type TurnedVoltage = Quantity<Volt, U26>;
 pub type InverseVoltage = Quantity<PerVolt, U28>;
 
 /// The voltage, with room for sums.
-#[inline(always)]
 pub fn wide(u: Voltage) -> WideVoltage {
     u.scaled()
 }
 
 /// The voltage, held at the ends of its type but for the bits that the wide one has not.
-#[inline(always)]
 pub fn narrow(u: WideVoltage) -> Voltage {
     Voltage::from_bits(u.to_bits().clamp(i32::MIN >> 4, i32::MAX >> 4) << 4)
 }
@@ -112,14 +110,12 @@ pub type InverseFlux = Quantity<PerWeber, U32>;
 pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
 
 /// The back-EMF of the motor's stated flux at a speed, |h| = ω/ξ.
-#[inline(always)]
 pub fn stated_emf(omega: Speed) -> Voltage {
     // ξ = 1/4, and a speed has 32 fraction bits.
     Voltage::from_bits(omega.to_bits() >> 2)
 }
 
 /// The torque of a current along q with the motor's stated flux, T = i_q/ξ, held at the type's ends.
-#[inline(always)]
 pub fn stated_torque(i_q: Current) -> Torque {
     Torque::from_bits(i_q.to_bits().saturating_mul(4))
 }

@@ -8,7 +8,6 @@ static RECIPROCAL_ROOT: [u8; 96] = reciprocal_root_table();
 /// √(x² + y²), held at the type's end.
 ///
 /// The error is at most 2^-25 of the value and one bit.
-#[inline(always)]
 pub fn magnitude<T: Number>(x: T, y: T) -> T {
     T::from_bits(hypotenuse(x.to_bits(), y.to_bits()))
 }
@@ -16,7 +15,6 @@ pub fn magnitude<T: Number>(x: T, y: T) -> T {
 /// The other leg of a right triangle, √(c² − a²), or 0 if the leg `a` is the longer.
 ///
 /// The error is as that of [`magnitude`].
-#[inline(always)]
 pub fn other_leg<T: Number>(c: T, a: T) -> T {
     T::from_bits(leg(c.to_bits(), a.to_bits()))
 }
@@ -34,7 +32,6 @@ fn leg(c: i32, a: i32) -> i32 {
     root(square(c).saturating_sub(square(a))).min(i32::MAX as u32) as i32
 }
 
-#[inline(always)]
 fn square(x: i32) -> u64 {
     let x = u64::from(x.unsigned_abs());
     x * x
@@ -59,7 +56,6 @@ fn root(x: u64) -> u32 {
     ((u64::from(top(m, y)) << 2) >> (even / 2)) as u32
 }
 
-#[inline(always)]
 fn top(a: u32, b: u32) -> u32 {
     ((u64::from(a) * u64::from(b)) >> 32) as u32
 }

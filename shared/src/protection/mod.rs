@@ -113,7 +113,6 @@ pub fn check(
 }
 
 /// Returns true if a phase's current is beyond ±`trip`.
-#[inline(always)]
 fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     let trip = trip.to_bits();
     // Below −trip wraps round to above 2·trip: one comparison a phase.

@@ -107,7 +107,6 @@ pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
 ///
 /// With an `imposed` speed the frame does not follow the rotor: nothing is adapted. `planned` is
 /// the change of the speed's reference in a period; only the cure uses it.
-#[inline(always)]
 pub fn estimate(
     config: &Config,
     state: &mut State,
@@ -179,7 +178,6 @@ fn cured(
 
 /// Takes ξ̂ on by a period, within the range in which the stated flux can be wrong. True if it
 /// stands at an end of that range.
-#[inline(always)]
 fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
     let xi = state.xi.plus(xi_step);
     state.xi = xi.max(config.xi_min).min(config.xi_max);
@@ -190,7 +188,6 @@ fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
 ///
 /// The feedback's speed is that of the frame: ω̂ when the observer leads, an imposed one during
 /// start-up. `u` is the voltage that this period commands.
-#[inline(always)]
 pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
     let Feedback {
         omega,

@@ -75,7 +75,6 @@ pub fn begin(state: &mut State, lambda_angle: Angle) {
 ///
 /// Only the flux that is next in the order of commutation is compared, and with a level: a crossing
 /// that was missed is made up for, and from a wrong sector the state comes to the right one.
-#[inline(always)]
 pub fn detect(
     config: &Config,
     state: &mut State,

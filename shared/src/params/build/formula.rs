@@ -289,12 +289,10 @@ impl Si<'_> {
     }
 
     /// The next value as a charge.
-    #[inline(never)]
     pub(super) fn charge(&self) -> Charge {
         Charge::from_f32(self.value())
     }
 
-    #[inline(never)]
     fn whole(&self, places: i32) -> i32 {
         whole(self.value(), places)
     }
@@ -309,7 +307,6 @@ impl Si<'_> {
         self.coefficient(exponent, u32::MAX)
     }
 
-    #[inline(never)]
     fn coefficient(&self, exponent: i32, shift_max: u32) -> (i32, u32) {
         let (head, value) = self.next();
         let parts = gain_parts(value, exponent - LEAST).filter(|(_, shift)| *shift <= shift_max);
@@ -318,7 +315,6 @@ impl Si<'_> {
     }
 
     /// Refuses the parameter of each of the next values that is below zero.
-    #[inline(never)]
     pub(super) fn refuse(&self, reasons: &[&'static str]) {
         for reason in reasons {
             let (head, value) = self.next();
@@ -344,7 +340,6 @@ impl Si<'_> {
     }
 
     /// Defines quantities up to the next formula for something else: its head and value.
-    #[inline(never)]
     fn next(&self) -> (u8, f32) {
         loop {
             let (head, value) = (self.byte(), self.formula());
