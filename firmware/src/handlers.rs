@@ -22,7 +22,7 @@ unsafe extern "C" {
 
 /// The addresses to which the innermost calls return. On this target every function keeps in r7 the
 /// address of two words: its caller's r7, and its own return address.
-#[inline(always)]
+#[inline(always)] // it reads its caller's frame
 fn return_addresses() -> [u32; DETAILS] {
     let stack = &raw const _stack_end as u32..&raw const _stack_start as u32 - 4;
     let mut frame: u32;

@@ -19,7 +19,7 @@ pub(crate) fn push(text: &mut StringView, words: &str) {
     let _ = text.push_str(words);
 }
 
-#[inline(never)]
+#[inline(never)] // many call it
 fn push_digits(text: &mut StringView, number: u32, base: u32) {
     let mut worth = 1;
     while number / worth >= base {

@@ -23,11 +23,15 @@
 //! `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
 //! and that each folder has one.
 //!
-//! # What is inlined
-//! The chip's code is made as small as it can be, and little is inlined by itself. What a control period
-//! passes through is `#[inline(always)]`: a call, and the registers that it saves, would cost each period
-//! more time than its copies take flash. What only some periods do is `#[inline(never)]`: the others would
-//! save registers for it. Any other reason stands beside the attribute.
+//! # Inlining
+//! The chip's code is made as small as it can be, and the compiler inlines only what is no longer than a call. Each
+//! attribute says why it is there. Those that are many:
+//!
+//! - `#[inline(always)] // in each period`: a call, and the registers that it saves, would cost each control period
+//!   more time than the copies take flash. *In the longest period* likewise, of the outer loop.
+//! - `#[inline(never)] // only some periods`: the others would save registers for it.
+//!
+//! One that changes neither the image nor the counts of instructions does not stay.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -121,7 +121,7 @@ impl Throttle {
     /// of each bit, much sooner than [`Throttle::edge`] does one by one; nothing, and none of them is taken,
     /// if they are no frame, or one of another signal than that which is known. What is found is to be given
     /// to [`Throttle::hear`], before its answer or, where that cannot wait, behind it.
-    #[inline(always)]
+    #[inline(always)] // in time for the reply
     pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
         self.input.whole(rests_high, bit)
     }

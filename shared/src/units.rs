@@ -173,7 +173,7 @@ impl Scale {
     }
 
     /// The control's current for amperes, held at the type's ends.
-    #[inline(never)]
+    #[inline(never)] // every limit needs one
     pub fn current_from_a(&self, current_a: f32) -> Current {
         Current::from_f32(current_a / self.current_a)
     }

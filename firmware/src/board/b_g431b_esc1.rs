@@ -248,7 +248,7 @@ impl Temperature {
 impl Hardware {
     /// Starts the chip, and sets up the pins, the op-amps, the comparators and the converters. The
     /// gate signals are low until the timer drives them. To be called once.
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     pub fn claim() -> Self {
         let p = chip::start();
         // Before any of them is used: critical sections rely on it.

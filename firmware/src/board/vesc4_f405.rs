@@ -225,7 +225,7 @@ impl Temperature {
 impl Hardware {
     /// Starts the chip, and sets up the pins and the converters. The gate driver is off. To be called
     /// once.
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     pub fn claim() -> Self {
         let p = chip::start();
         // Before any of them is used: critical sections rely on it.

@@ -18,7 +18,7 @@ static WAKER: AtomicWaker = AtomicWaker::new();
 static EDGE: AtomicBool = AtomicBool::new(false);
 
 /// The timer's interrupt.
-#[inline(always)]
+#[inline(always)] // one caller
 pub(crate) fn attend(timer: TimGp32) {
     let wanted = timer.dier().read();
     if !wanted.ccie(ALARM) {

@@ -84,7 +84,7 @@ fn ended() -> Sr {
 }
 
 /// The flash stalls who fetches from it: this is in RAM.
-#[inline(never)]
+#[inline(never)] // to stay where its section is
 #[unsafe(link_section = ".data.flash")]
 fn start_and_wait(control: Cr) {
     FLASH.cr().write_value(control);

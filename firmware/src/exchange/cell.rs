@@ -27,7 +27,7 @@ impl<T> InterruptCell<T> {
     ///
     /// # Safety
     /// For one context, which nothing that calls this or [`with`](Self::with) interrupts.
-    #[inline(always)]
+    #[inline(always)] // the value is made in place
     pub(crate) unsafe fn put(&self, make: impl FnOnce() -> T) -> bool {
         if self.filled.load(Ordering::Relaxed) {
             return false;

@@ -104,7 +104,7 @@ impl RunningEnd {
     }
 
     /// Two words that follow one another differ in their sequence number.
-    #[inline(never)]
+    #[inline(never)] // only some periods
     fn renew(&mut self, word: u32) {
         self.word = word;
         self.setpoint = word::unpack(word);

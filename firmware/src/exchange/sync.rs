@@ -16,7 +16,7 @@ pub(super) use loom::{
 ///
 /// # Safety
 /// Nobody else is at it.
-#[inline(always)]
+#[inline(always)] // one access
 pub(super) unsafe fn write<T>(cell: &UnsafeCell<T>, value: T) {
     #[cfg(not(test))]
     // SAFETY: as the caller promises.
@@ -32,7 +32,7 @@ pub(super) unsafe fn write<T>(cell: &UnsafeCell<T>, value: T) {
 ///
 /// # Safety
 /// Nobody else is at it.
-#[inline(always)]
+#[inline(always)] // one access
 pub(super) unsafe fn with_mut<T, R>(cell: &UnsafeCell<T>, work: impl FnOnce(&mut T) -> R) -> R {
     #[cfg(not(test))]
     // SAFETY: as the caller promises.
@@ -47,7 +47,7 @@ pub(super) unsafe fn with_mut<T, R>(cell: &UnsafeCell<T>, work: impl FnOnce(&mut
 ///
 /// # Safety
 /// Nobody writes to it meanwhile.
-#[inline(always)]
+#[inline(always)] // one access
 pub(super) unsafe fn read<T: Copy>(cell: &UnsafeCell<T>) -> T {
     #[cfg(not(test))]
     // SAFETY: as the caller promises.

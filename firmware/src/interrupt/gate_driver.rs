@@ -43,7 +43,7 @@ impl GateDriver {
     }
 
     /// Returns true if the bridge may be turned on.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(crate) fn ready(&mut self) -> bool {
         let Some(pins) = GATE_DRIVER else {
             return true;
@@ -57,7 +57,7 @@ impl GateDriver {
     }
 
     #[cold]
-    #[inline(never)]
+    #[inline(never)] // only with an alarm
     fn attend(&mut self, pins: GateDriverPins, alarm: bool) {
         match self.rest.step(alarm) {
             Order::Sleep => {

@@ -20,7 +20,7 @@ impl Overruns {
     /// Takes note of an overrun in this period, of a number that wraps; whether there have been too
     /// many.
     #[cold]
-    #[inline(never)]
+    #[inline(never)] // only where a period is too long
     pub(crate) fn note(&mut self, period: u32) -> bool {
         let since = period.wrapping_sub(self.last);
         self.last = period;

@@ -81,7 +81,7 @@ impl Interrupt {
     /// A period while the flash is written, when nothing can be fetched from it: the bridge, which was
     /// at rest, is off. An alarm of the hardware in the meantime is reported in the first period after.
     #[cold]
-    #[inline(never)]
+    #[inline(never)] // only some periods
     fn hold(&mut self) {
         self.pwm.commutate();
         self.pwm.apply(Bridge::Off);
@@ -90,7 +90,7 @@ impl Interrupt {
     }
 
     /// Any other period.
-    #[inline(never)]
+    #[inline(never)] // only some periods
     fn control(&mut self) {
         self.pwm.commutate();
         self.end.listen();
@@ -124,7 +124,7 @@ impl Interrupt {
         }
     }
 
-    #[inline(never)]
+    #[inline(never)] // only some periods
     fn publish(&mut self) {
         self.end.publish(self.state.snapshot());
     }
@@ -137,7 +137,7 @@ impl Interrupt {
 }
 
 #[cold]
-#[inline(never)]
+#[inline(never)] // only some periods
 fn adopt(state: &mut State, before: &Config, now: &Config) {
     state.adopt(before, now);
 }

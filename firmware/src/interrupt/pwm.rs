@@ -100,7 +100,7 @@ impl Pwm {
     }
 
     /// Puts the legs of the last [`apply`](Self::apply) in force.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(crate) fn commutate(&mut self) {
         self.timer.egr().write(|w| w.set_comg(true));
         if self.deferred.is_some() {
@@ -123,7 +123,7 @@ impl Pwm {
 
     /// Forgets a break; the hardware holds the bridge off for as long as its cause lasts.
     #[cold]
-    #[inline(never)]
+    #[inline(never)] // only after a break
     pub(crate) fn clear_break(&mut self) {
         // Bits written as 1 stay as they are.
         let mut others = SrAdv(!0);
@@ -133,7 +133,7 @@ impl Pwm {
 
     /// Applies the control's bridge command from the counter's next top on; to turn it off
     /// takes effect at once, and after that all switches stay off until the top.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(crate) fn apply(&mut self, bridge: Bridge) {
         match (bridge, self.low_sides) {
             (Bridge::Duty(duties), LowSides::Switching) => {

@@ -14,7 +14,7 @@ use crate::chip::READINGS_AT_WORD;
 const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
 
 /// The sample of this period.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(crate) fn sample(registers: &Registers) -> Sample {
     let counts = |count: i32| AdcCounts::from_bits(count << FRACTION_BITS);
     let reading =

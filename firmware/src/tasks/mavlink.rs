@@ -115,7 +115,7 @@ impl MainTask<'_> {
 
     /// Takes in what the interrupt and the board report, and lets the ESC act. Returns false while the
     /// interrupt has not reported anything.
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     fn look(&mut self) -> bool {
         let now = now();
         self.supervisor.look(now);
@@ -139,12 +139,12 @@ impl MainTask<'_> {
         true
     }
 
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     fn request(&mut self) -> Option<Request> {
         self.esc.take_request(&mut self.throttle)
     }
 
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     fn obey(&mut self, request: Request) {
         match request {
             Request::ParamsChanged => self.changed = true,
@@ -156,7 +156,7 @@ impl MainTask<'_> {
         }
     }
 
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
         let mut kept = self.esc.kept();
         if !obey(request, &mut self.flash, range(), &mut kept)? {
@@ -182,7 +182,7 @@ impl MainTask<'_> {
     }
 
     /// Gives the interrupt the configuration from the parameters, once it has a place for it.
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     fn configure(&mut self) {
         if !self.changed {
             return;
@@ -193,7 +193,7 @@ impl MainTask<'_> {
     }
 
     /// Has the hardware's trip follow `LIM_PHASE_A`: up before the control does, and down after it.
-    #[inline(never)]
+    #[inline(never)] // its stack is free for what comes next
     fn limit(&mut self) {
         let Some(snapshot) = self.snapshot.read() else {
             return;

@@ -35,7 +35,7 @@ const LINE_BYTES: usize = 512;
 ///
 /// # Panics
 /// If called again.
-#[inline(never)]
+#[inline(never)] // its stack is free for what comes next
 pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) -> MainTask<'_> {
     tell(esc, fit);
     recall_rest(esc, &mut hardware.flash);
@@ -127,7 +127,7 @@ pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
 }
 
 /// Has the ESC tell what became of the stored parameters.
-#[inline(never)]
+#[inline(never)] // its stack is free for what comes next
 fn tell(esc: &mut Esc, fit: Fit) {
     let mut warning = Warning::new();
     match fit {
@@ -157,23 +157,23 @@ fn board() -> Board {
     }
 }
 
-#[inline(never)]
+#[inline(never)] // its stack is free for what comes next
 fn stored_params(flash: &mut Storage) -> Params {
     store::load(flash, range()).kept.params
 }
 
-#[inline(never)]
+#[inline(never)] // its stack is free for what comes next
 fn recall_rest(esc: &mut Esc, flash: &mut Storage) {
     esc.recall(&store::load(flash, range()));
 }
 
-#[inline(never)]
+#[inline(never)] // its stack is free for what comes next
 fn open_port(params: &Params) -> Port {
     Port::open(|| Throttle::new(TICK_HZ, params, &board()))
 }
 
 /// The control's interrupt with what the parameters make.
-#[inline(never)]
+#[inline(never)] // its stack is free for what comes next
 fn start_interrupt(esc: &Esc, bridge: Bridge, converters: Converters, end: InterruptEnd) {
     interrupt::set_trip(esc.params().get(ParamId::LimPhaseA));
     let end = end.begin(|place| {

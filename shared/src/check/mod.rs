@@ -330,7 +330,7 @@ impl Check {
         self.squares[phase] += current_a * current_a;
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     fn judge(&mut self, phase: usize) {
         let [mean_a, square] =
             [self.sums, self.squares].map(|sums| sums[phase] / f32::from(LISTENED));
@@ -341,7 +341,7 @@ impl Check {
     }
 
     /// Records a phase that is off while another one is pulled up.
-    #[inline(never)]
+    #[inline(never)] // as above
     fn followed(&mut self, phase: u8, share: &[f32; 3], current_a: f32) {
         // An open wire follows none of the others; a shorted switch shows at any.
         let before = self.report.get(Kind::Motor, phase);

@@ -73,7 +73,7 @@ impl Trace for Rotor {
 }
 
 /// Takes one sample of the terminals a, b, c with the bridge off and says what is known by now.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) -> Rotor {
     state.theta = state.theta.wrapping_add(state.omega.over_period());
     // 12 bits and their fraction, whatever is above.
@@ -121,7 +121,7 @@ fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
 
 /// One look of a beginning: two of them, a period apart, where the back-EMF is large.
 #[cold]
-#[inline(never)]
+#[inline(never)] // only some periods
 fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let Some((theta, amplitude)) = vector(config, readings) else {
         state.restart();

@@ -49,7 +49,7 @@ pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certain
 const MORE_BITS: u32 = 6;
 
 /// The value, or for a negative one a bit less: what counts is its leading zeros.
-#[inline(always)]
+#[inline(always)] // in each period
 fn magnitude(bits: i32) -> u32 {
     (bits ^ (bits >> 31)) as u32
 }
@@ -63,7 +63,7 @@ impl Config {
 
     /// A phase's share of the supply and what the dead time takes away of it, for the certainty of its
     /// current's sign.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn compensated(&self, share: Share, certainty: I8F24) -> Share {
         let sign = certainty.to_bits().clamp(-CERTAIN, CERTAIN - 1);
         share.plus_top(I8F24::from_bits(sign), self.duty)

@@ -39,7 +39,7 @@ impl Factor {
     }
 
     /// The product with `x`, held at the ends of its type.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn of<T: Number>(self, x: T) -> T {
         Gain::from_parts(self.0.to_bits(), 2).saturating_apply(x)
     }
@@ -121,7 +121,7 @@ impl State {
 
 /// One period: takes the measured i_d and the estimated flux φ̂ along d, and returns what is added
 /// to i_d*.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn step(config: &Config, state: &mut State, i_d: Current, flux: Flux) -> Current {
     state.count += 1;
     if state.count > config.half_periods.saturating_sub(config.mean_periods) {

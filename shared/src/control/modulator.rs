@@ -56,7 +56,7 @@ impl Config {
     }
 
     /// The duty of a phase.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn duty(&self, common: I1F31, share: Share) -> Duty {
         let duty = common.wrapping_add(whole(share)).max(I1F31::ZERO);
         Duty::from_bits(duty.min(self.duty_max).to_bits() as u32)
@@ -124,7 +124,7 @@ impl Longest {
     }
 
     /// The most along q beside this part along d.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn beside(&self, d: Voltage) -> WideVoltage {
         // Both squares are below 12, and the slope is below 8.
         let less = self.slope.of(d.top(d) - self.d_square).scaled();
@@ -147,7 +147,7 @@ impl Supply {
     }
 
     /// Takes another voltage; [`reach`](Self::reach) takes what it is enough for.
-    #[inline(never)]
+    #[inline(never)] // only some periods
     pub fn follow(&mut self, bus: Voltage) {
         // 2^56/bus: a division of 32 bits by the voltage's upper bits, right to 2^-11 at the worst, and one step of
         // Newton's method. A bus below 1/8 of a unit counts as 1/8, which bounds the reciprocal.
@@ -161,7 +161,7 @@ impl Supply {
     }
 
     /// Takes the lengths that a vector can have, while its part along d is near this one.
-    #[inline(never)]
+    #[inline(never)] // only some periods
     pub fn reach(&mut self, config: &Config, d: Voltage) {
         let length = config.vector_max.top(self.bus).scaled();
         self.longest = Longest::new(length, d);
@@ -184,7 +184,7 @@ const TOO_LONG: u32 = 10;
 /// regulator left, and stays where it is beyond its bound: ω·L·i_q is then what the part along d cancels.
 ///
 /// Returns the vector and what was cut off, if it was shortened.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<WideVoltage>>) {
     if square_of(u) <= longest.square {
         return (short(u), None);
@@ -206,18 +206,18 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
 }
 
 /// The square of a vector's length. No component is above 128: the sum is below 2^15.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn square_of(u: Dq<WideVoltage>) -> WideVoltageSquare {
     square(u.d).plus_top(u.q, u.q)
 }
 
-#[inline(always)]
+#[inline(always)] // in each period
 fn square(u: WideVoltage) -> WideVoltageSquare {
     u.top(u)
 }
 
 /// A vector that is known to be within ±8.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
     Dq {
         d: u.d.scaled(),
@@ -229,7 +229,7 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
 ///
 /// The dead time takes away from each phase's duty what `dead_time` makes of the certainty of its
 /// current's sign, which is added.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn duties(
     config: &Config,
     supply: &Supply,
@@ -257,7 +257,7 @@ pub fn duties(
 }
 
 /// The share as a duty: a vector is at most 1/√3 long.
-#[inline(always)]
+#[inline(always)] // in each period
 fn whole(share: Share) -> I1F31 {
     I1F31::from_bits(share.to_bits() << 9)
 }

@@ -45,7 +45,7 @@ impl State {
 
     /// The step that ω* may take in this period, ω̇*·T_s. The drive says by
     /// [`State::advance`] which it takes.
-    #[inline(always)]
+    #[inline(always)] // in the longest period
     pub fn plan(&mut self, config: &Config, command: Speed) -> Speed {
         let moved = command.minus(self.command);
         let left = self.command.minus(self.reference);
@@ -65,7 +65,7 @@ impl State {
     }
 
     /// Takes ω* on by a step.
-    #[inline(always)]
+    #[inline(always)] // in the longest period
     pub fn advance(&mut self, step: Speed) {
         self.reference = self.reference.plus(step);
         self.step = step;

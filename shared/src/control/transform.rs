@@ -58,6 +58,7 @@ impl PhaseOrder {
     };
 
     /// An angle of the frame of the phases in this order, with the phases in the order a, b, c.
+    #[inline(always)] // in each period
     pub fn angle(self, theta: Angle) -> Angle {
         theta.wrapping_mul_int(self.sign)
     }
@@ -72,6 +73,7 @@ pub fn clarke(readings: [AdcCounts; 3]) -> AlphaBeta<Current> {
 }
 
 /// Clarke's transform of phases in this order.
+#[inline(always)] // in each period
 pub fn clarke_in(order: PhaseOrder, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> {
     let (a, b, c) = (a.to_bits(), b.to_bits(), c.to_bits());
     // (2a − b − c)/3 counts are (2a − b − c)/4096 units: 2^28 of them a unit.
@@ -85,6 +87,7 @@ pub fn clarke_in(order: PhaseOrder, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Curr
 }
 
 /// The voltages of a vector that is turned twice, as the control's voltages: it is within ±8.
+#[inline(always)] // in each period
 pub fn voltages(v: AlphaBeta<TurnedVoltage>) -> AlphaBeta<Voltage> {
     AlphaBeta {
         alpha: v.alpha.scaled(),
@@ -94,6 +97,7 @@ pub fn voltages(v: AlphaBeta<TurnedVoltage>) -> AlphaBeta<Voltage> {
 
 /// Park's transform (12): the stator's vector as the rotor sees it. Components are held at the ends of
 /// their type.
+#[inline(always)] // in each period
 pub fn park<T>(v: AlphaBeta<T>, SinCos { cos, sin }: SinCos) -> Dq<T>
 where
     T: Number + TopProduct<I1F31, Output: Number>,
@@ -107,6 +111,7 @@ where
 }
 
 /// The inverse of Park's transform (11); the sine takes a fraction bit.
+#[inline(always)] // in each period
 pub fn inverse_park<T>(v: Dq<T>, SinCos { cos, sin }: SinCos) -> AlphaBeta<T::Output>
 where
     T: Number + TopProduct<I1F31, Output: Number>,
@@ -118,6 +123,7 @@ where
 }
 
 /// Turns a vector of the rotor's frame ahead by an angle; the sine takes a fraction bit.
+#[inline(always)] // in each period
 pub fn rotate<T>(v: Dq<T>, ahead: SinCos) -> Dq<T::Output>
 where
     T: Number + TopProduct<I1F31, Output: Number>,
@@ -127,11 +133,13 @@ where
 }
 
 /// The three phases' values of a vector (11).
+#[inline(always)] // in each period
 pub fn phases<T: Number>(v: AlphaBeta<T>) -> [T; 3] {
     phases_in(PhaseOrder::NORMAL, v)
 }
 
 /// The three phases' values of a vector (11), in this order.
+#[inline(always)] // in each period
 pub fn phases_in<T: Number>(order: PhaseOrder, v: AlphaBeta<T>) -> [T; 3] {
     let alpha = v.alpha.to_bits();
     // √3/2 = 2·√3/4, and the product keeps the top half.

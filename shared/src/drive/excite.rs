@@ -56,7 +56,7 @@ traced! {
 /// A period of an excitation. The snapshot's current and voltage along d are the means along the axis, those
 /// along q the amplitudes of the square wave.
 #[cold]
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(super) fn period(
     config: &Config,
     (state, shared): (&mut State, &mut Shared),

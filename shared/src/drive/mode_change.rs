@@ -32,7 +32,7 @@ fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
 }
 
 /// While field-oriented control drives.
-#[inline(always)]
+#[inline(always)] // in the longest period
 fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
     let along = is_along(config, shared, setpoint);
     match phase {

@@ -66,7 +66,7 @@ impl State {
 
 /// The rotor is watched at the open terminals. The currents are not looked at: a reading is its offset,
 /// which may not have been measured yet.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(super) fn watch(config: &Config, state: &mut State, shared: &mut Shared, sample: &Sample) {
     state.rotor = catch::observe(&config.catch, &mut state.catch, sample.terminals);
     match state.rotor {

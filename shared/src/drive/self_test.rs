@@ -35,7 +35,7 @@ traced! {
 /// A period of a self-test. The snapshot's currents d and q are those into the phases that follow the
 /// pulled one.
 #[cold]
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(super) fn period(
     config: &Config,
     (state, shared): (&mut State, &mut Shared),

@@ -95,7 +95,7 @@ impl Shared {
     }
 
     /// The currents of a sample.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn currents(&mut self, config: &Config, sample: &Sample) -> [AdcCounts; 3] {
         let mut currents = sensing::read(&self.zeros, sample.currents);
         if self.applied.unreadable != 0 {
@@ -119,7 +119,7 @@ impl Shared {
     }
 
     /// Returns true if phases b and c change places for the control, which always turns one way.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn swapped(&self, config: &Config) -> bool {
         (config.direction == Direction::Reversed) != self.reversed
     }
@@ -147,7 +147,7 @@ impl Latch {
 
     /// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
     /// by then, and a limit that is grazed does not come and go. True where it ends.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn clear(&mut self, config: &Config, at_zero: bool) -> bool {
         if !at_zero {
             self.clear_periods = 0;
@@ -163,7 +163,7 @@ impl Latch {
 
 impl Applied {
     /// Notes the duties of a command.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn command(&mut self, duties: [Duty; 3]) {
         self.duties[0] = duties;
     }

@@ -83,13 +83,13 @@ impl State {
 
     /// Returns true if field-oriented control drives for this kind of set-point: only its schedule says when
     /// the mode is looked at again.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn is_decided_for(&self, setpoint: &Setpoint) -> bool {
         self.decided == setpoint.kind()
     }
 
     /// Returns true if field-oriented control drives.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn is_decided(&self) -> bool {
         self.decided != UNDECIDED
     }
@@ -192,7 +192,7 @@ impl State {
     }
 
     /// Magnitude of a phase's reading that turns the bridge off now.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn trip_level(&self) -> AdcCounts {
         self.shared.protection.trip
     }

@@ -17,7 +17,7 @@ use crate::units::AdcCounts;
 ///
 /// Pure: no clock, no allocation, no logging, and no result but the state and the returned value.
 /// Called once a PWM period, in the interrupt of the chip and in the emulator's loop.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
     // Decide the mode from what the last period saw. While field-oriented control drives, only its schedule does
     // so: once in a cycle, and in a start where its own pieces are due. This comes before the sample is read, so
@@ -101,7 +101,7 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
 /// - a drive at rest is asked for nothing, which also ends a row of failed starts;
 /// - one in Sense is still asked to turn;
 /// - in Idle a turning rotor is looked at in this period, the longest of four: what is asked for begins in the next.
-#[inline(always)]
+#[inline(always)] // in each period
 fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
         (Phase::Idle | Phase::Brake, Setpoint::Stop | Setpoint::Zero) => {
@@ -120,7 +120,7 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
 }
 
 /// The mode that the set-point asks for. Whether field-oriented control drives.
-#[inline(never)]
+#[inline(never)] // only some periods
 fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     // This period's slice of the outer loop is left out, since it comes round again; but not the damping of a
     // start, in which the observer is told once where the aligned rotor is. No other mode has this schedule.
@@ -169,7 +169,7 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> 
 }
 
 /// The pieces that may be due in one period, and what they make of the mode.
-#[inline(always)]
+#[inline(always)] // in each period
 fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> Option<Why> {
     let State { foc, shared, .. } = state;
     if due.includes(Work::ROTOR)
@@ -186,7 +186,7 @@ fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) 
 }
 
 /// A period with the bridge off.
-#[inline(never)]
+#[inline(never)] // only some periods
 fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoint)) -> Bridge {
     let shared = &mut state.shared;
     if state.phase == Phase::Idle {
@@ -203,7 +203,7 @@ fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoi
 }
 
 /// A period of Charge, of a tone, or of the six-step drive.
-#[inline(never)]
+#[inline(never)] // only some periods
 fn energised(
     config: &Config,
     state: &mut State,
@@ -242,7 +242,7 @@ fn energised(
 
 /// After Charge, in its period `n`, from 1 on: what makes ready for the mode that follows.
 #[cold]
-#[inline(never)]
+#[inline(never)] // only some periods
 fn ready(
     config: &Config,
     state: &mut State,
@@ -274,7 +274,7 @@ fn ready(
 }
 
 /// A period of a tone or of a self-test.
-#[inline(never)]
+#[inline(never)] // only some periods
 fn tone_or_test(
     config: &Config,
     state: &mut State,

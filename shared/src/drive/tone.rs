@@ -162,7 +162,7 @@ fn play(
 }
 
 /// The voltage that the dead time takes.
-#[inline(always)]
+#[inline(always)] // one caller
 fn dead(tone: &tone::Config, supply: &Supply) -> Voltage {
     tone.dead.top(supply.bus).scaled()
 }

@@ -254,7 +254,7 @@ impl Decoder {
     }
 
     /// The frame of 16 bits, of which the whole bits take `span`.
-    #[inline(always)]
+    #[inline(always)] // in time for the reply
     fn sound(
         &self,
         first_edge_ticks: u32,
@@ -283,7 +283,7 @@ impl Decoder {
 }
 
 /// Reads 16 bits, of which the whole ones take `span`, from the first and the second edge of each.
-#[inline(always)]
+#[inline(always)] // in time for the reply
 fn read(span: u32, bit: impl Fn(usize) -> (u32, u32)) -> Option<u16> {
     // Whole ticks on the inner side of so many shares of the mean bit. A span is below 500 000.
     let least = |shares: u32| (shares * span).div_ceil(SHARES * WHOLE_BITS);

@@ -124,7 +124,7 @@ impl Input {
 
     /// Takes all edges of a DShot frame at once, as [`Line::whole`] does. What is found is to be given to
     /// [`Input::heard`]; with that it is what [`Input::edge`] does edge by edge.
-    #[inline(always)]
+    #[inline(always)] // in time for the reply
     pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
         self.line.whole(rests_high, bit)
     }

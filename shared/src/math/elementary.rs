@@ -5,7 +5,7 @@
 pub const SQRT_3: f32 = 1.732_050_8;
 
 /// √x of a number above 0, within 2^-22 of its value.
-#[inline(never)]
+#[inline(never)] // many call it
 pub fn square_root(x: f32) -> f32 {
     // Half the exponent, and a straight line between powers of two: right to 4 %. Newton's rule
     // squares that.
@@ -18,7 +18,7 @@ pub fn square_root(x: f32) -> f32 {
 
 /// 1 − e^(−x) of a number from 0 to 10 000, within 2^-20 of its value: the share of its way that a
 /// filter goes in x time constants.
-#[inline(never)]
+#[inline(never)] // many call it
 pub fn settled(x: f32) -> f32 {
     // In a thousandth of the time it is nearly a straight line; after twice a time, the same share of
     // what is left has been gone once more.

@@ -52,7 +52,7 @@ impl<A: Number, B: Number> Gain<A, B> {
     }
 
     /// The gain `mantissa·2^shift/2^32`, in bits out per bit in; the shift is at most 30.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub const fn from_parts(mantissa: i32, shift: u32) -> Self {
         Self {
             factor: Factor::new(mantissa, shift),
@@ -64,7 +64,7 @@ impl<A: Number, B: Number> Gain<A, B> {
     ///
     /// The result wraps if it leaves its type: the caller bounds `x`, or uses
     /// [`Gain::saturating_apply`].
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn apply(self, x: A) -> B {
         B::from_bits(self.factor.wrapping(x.to_bits()))
     }
@@ -77,7 +77,7 @@ impl<A: Number, B: Number> Gain<A, B> {
     }
 
     /// The product with `x`, held at the ends of its type.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn saturating_apply(self, x: A) -> B {
         B::from_bits(self.factor.saturating(x.to_bits()))
     }

@@ -31,7 +31,7 @@ where
 {
     type Output = FixedI32<Diff<Sum<A, B>, U32>>;
 
-    #[inline(always)]
+    #[inline(always)] // one instruction
     fn top(self, rhs: FixedI32<B>) -> Self::Output {
         let product = i64::from(self.to_bits()) * i64::from(rhs.to_bits());
         FixedI32::from_bits((product >> 32) as i32)
@@ -43,7 +43,7 @@ where
 /// They wrap: the caller knows the range of what it adds.
 pub trait TopSum: Number {
     /// self + a·b.
-    #[inline(always)]
+    #[inline(always)] // one instruction
     #[must_use]
     fn plus_top<A, B>(self, a: A, b: B) -> Self
     where
@@ -53,7 +53,7 @@ pub trait TopSum: Number {
     }
 
     /// self − a·b.
-    #[inline(always)]
+    #[inline(always)] // one instruction
     #[must_use]
     fn minus_top<A, B>(self, a: A, b: B) -> Self
     where
@@ -67,7 +67,7 @@ pub trait TopSum: Number {
 impl<T: Number> TopSum for T {}
 
 /// The top half of 2^32·sum − a·b, which is what SMMLS makes: it rounds the product up.
-#[inline(always)]
+#[inline(always)] // one instruction
 pub(super) fn less(sum: i32, a: i32, b: i32) -> i32 {
     let whole = i64::from(sum) << 32;
     (whole.wrapping_sub(i64::from(a) * i64::from(b)) >> 32) as i32

@@ -9,7 +9,7 @@ pub fn quotient(numerator: u64, divisor: u32) -> u32 {
 ///
 /// A Cortex-M4 divides 32 bits. For 64 the compiler takes a routine of 1 KB that is made to be fast;
 /// this one takes a tenth of it, and about 300 instructions for each quotient.
-#[inline(never)]
+#[inline(never)] // many call it
 pub fn divide(numerator: u64, divisor: u32) -> u64 {
     let high = (numerator >> 32) as u32;
     let mut rest = high % divisor;

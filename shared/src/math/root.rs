@@ -26,7 +26,7 @@ fn hypotenuse(x: i32, y: i32) -> i32 {
     length.min(i32::MAX as u32) as i32
 }
 
-#[inline(never)]
+#[inline(never)] // as above
 fn leg(c: i32, a: i32) -> i32 {
     // Below 2^31, since c² is at most 2^62.
     root(square(c).saturating_sub(square(a))).min(i32::MAX as u32) as i32

@@ -52,7 +52,7 @@ const EIGHTH_TURN: I1F31 = I1F31::from_bits(1_686_629_713);
 /// Cosine and sine of an angle in turns.
 ///
 /// The error is at most 0.0001° in direction; the length is 1 − 8e-5 to 1.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn sin_cos(angle: Angle) -> SinCos {
     let bits = angle.to_bits() as u32;
     let half_section = 1 << (31 - TABLE_BITS);
@@ -75,7 +75,7 @@ pub fn sin_cos(angle: Angle) -> SinCos {
 ///
 /// A polynomial over one octant with an error below 0.02°. It divides, so it is for the events of
 /// a start, not for each period.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn atan2_turns<T: Number>(y: T, x: T) -> Angle {
     Angle::from_bits(direction(y.to_bits(), x.to_bits()))
 }

@@ -48,7 +48,7 @@ impl Payload {
         self.put(&field.to_le_bytes());
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     pub(super) fn u32(&mut self, field: u32) {
         self.put(&field.to_le_bytes());
     }
@@ -57,7 +57,7 @@ impl Payload {
         self.u32(field.to_bits());
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     pub(super) fn u64(&mut self, field: u64) {
         self.put(&field.to_le_bytes());
     }

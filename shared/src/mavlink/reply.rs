@@ -100,7 +100,7 @@ impl Replies {
         }
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     pub(super) fn ack(&mut self, to: Address, command: u16, result: MavResult) {
         let progress = if result == MavResult::MAV_RESULT_IN_PROGRESS {
             PROGRESS_UNKNOWN

@@ -82,7 +82,7 @@ impl Config {
 /// Takes a sample's supply voltage into the filter and looks for a reason to turn the bridge off.
 ///
 /// `currents` is `None` if the readings are those of no current.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn check(
     config: &Config,
     state: &mut State,

@@ -27,7 +27,7 @@ pub(crate) const ALARM: interrupt::Interrupt = interrupt::EXTI15_10;
 pub(crate) const READINGS_AT_WORD: usize = 0x3c / 4;
 
 /// Takes the interrupt's request back. Both sequences have the same length.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(crate) fn acknowledge(converters: &[Adc; 2]) {
     // Bits written as 1 stay as they are.
     let mut others = Sr(!0);

@@ -36,7 +36,7 @@ const RESIDUAL_SHIFT: u32 = 3;
 const QUIET: I17F15 = I17F15::lit("7");
 
 /// A period after a look.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(super) fn learn(config: &Config, state: &mut State) {
     match state.stage {
         Stage::Look => {}
@@ -166,7 +166,7 @@ fn judge(config: &Config, state: &mut State) {
 /// and `fraction` at most 33.
 ///
 /// One division of 32 bits by 16: of 64 bits the chip has none.
-#[inline(never)]
+#[inline(never)] // only some periods
 fn quotient(a: i32, by: u32, fraction: u32) -> i32 {
     let zeros = by.leading_zeros();
     // 2^32 over the divisor's upper 16 bits: 17 bits, and 1/by = reciprocal·2^(zeros − 48).

@@ -192,7 +192,7 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor) {
 ///
 /// `imposed` is the speed that an open-loop start gives the rotor: the loop then follows its phase
 /// only.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn estimate(
     config: &Config,
     state: &mut State,
@@ -285,7 +285,7 @@ pub fn slow_estimate(config: &Config, state: &State, periods: u32) -> SlowEstima
 }
 
 /// L·i.
-#[inline(always)]
+#[inline(always)] // in each period
 fn stator_flux(
     inductance: Multiplier<Current, WideFlux>,
     i: AlphaBeta<Current>,
@@ -298,7 +298,7 @@ fn stator_flux(
 }
 
 /// φ·e^{jθ}.
-#[inline(always)]
+#[inline(always)] // in each period
 fn rotor_flux(phi: Flux, frame: SinCos) -> AlphaBeta<Flux> {
     // φ̂ is at most twice the stated flux: a bit is free.
     AlphaBeta {
@@ -308,7 +308,7 @@ fn rotor_flux(phi: Flux, frame: SinCos) -> AlphaBeta<Flux> {
 }
 
 /// ε/2: z_q over the stated flux, held at ±1, and all of that where the rotor points backwards.
-#[inline(always)]
+#[inline(always)] // in each period
 fn half_epsilon(config: &Config, z: Dq<Component>) -> I0F32 {
     let quarter = config.quarter_per_flux.of(z.q).to_bits();
     let held = if z.d.is_negative() {
@@ -321,7 +321,7 @@ fn half_epsilon(config: &Config, z: Dq<Component>) -> I0F32 {
 
 /// All of it, with the sign.
 #[cold]
-#[inline(never)]
+#[inline(never)] // seldom
 fn whole(quarter: i32) -> i32 {
     (quarter >> 31) ^ (ONE_QUARTER - 1)
 }
@@ -337,13 +337,13 @@ pub fn found(state: &State) -> Option<Angle> {
 
 impl State {
     /// The back-EMF.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn emf(&self) -> WideVoltage {
         self.pace.emf.of(self.omega_i)
     }
 
     /// ω̄̂.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn omega_bar(&self) -> Speed {
         self.omega_i.plus(self.smooth)
     }

@@ -90,17 +90,17 @@ impl Observer for Config {
 }
 
 impl Observer for compensated::Config {
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
         compensated::estimate(self, &mut state.compensated, input, imposed)
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn follows_park(&self) -> bool {
         false
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback {
         let (omega, i) = frame;
         Feedback {
@@ -115,7 +115,7 @@ impl Observer for compensated::Config {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn advance(&self, _: &mut State, _: &Feedback, _: Dq<Voltage>) {}
 }
 
@@ -129,7 +129,7 @@ impl Config {
 /// Takes the observer in use from the last sample to this one.
 ///
 /// `imposed` is the speed that an open-loop start gives the rotor.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn estimate(
     config: &Config,
     state: &mut State,
@@ -200,7 +200,7 @@ pub fn sensor_fault(state: &State) -> bool {
 
 /// The current regulator's feedback: the speed of the control's frame, the measured current in it
 /// and what the observer makes of it.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn feedback(
     config: &Config,
     state: &State,
@@ -226,7 +226,7 @@ pub fn feedback(
 }
 
 /// ĥ of a flux along d, ω·φ against q.
-#[inline(always)]
+#[inline(always)] // in each period
 fn emf(omega: Speed, flux: Flux) -> Dq<WideVoltage> {
     // A speed in turns takes 2π: 16·π/8, and the sixteenth is what the fraction bits are apart.
     let length = omega.top(flux).top(EIGHTH_PI).to_bits();
@@ -248,7 +248,7 @@ pub fn flux(config: &Config, state: &State) -> Flux {
 
 /// Tells the observer the voltage `u` that a period commands, in the frame of the feedback. Only the
 /// adaptive back-EMF observer works in that frame.
-#[inline(always)]
+#[inline(always)] // in each period
 pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
     if let Config::BackEmf(config) = config {
         back_emf::advance(config, &mut state.back_emf, fb, u);

@@ -44,7 +44,7 @@ traced! {
 
 impl Config {
     /// The voltage that brings the currents to their references, before any limit.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let u = match self {
             Self::ObserverBased(c) => c.voltage(&state.observer_based, wanted, fb),
@@ -62,7 +62,7 @@ impl Config {
     ///
     /// Regulated so, the current goes where the voltage takes it, and a bound of i_q* is a bound of
     /// the current, reached with the regulator's own dynamics.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn current_at(
         &self,
         state: &State,
@@ -78,7 +78,7 @@ impl Config {
     }
 
     /// Takes the integrators on by a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         match self {
             Self::ObserverBased(c) => c.integrate(&mut state.observer_based, wanted, fb),
@@ -145,12 +145,12 @@ impl Regulator for Config {
 }
 
 impl Regulator for synchronous::Config {
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         Self::voltage(self, &state.synchronous, wanted, fb)
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         Self::integrate(self, &mut state.synchronous, wanted, fb);
     }

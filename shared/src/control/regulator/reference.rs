@@ -72,7 +72,7 @@ pub struct Feedback {
 }
 
 /// The current that the voltage that is cut off would have brought, by the loop's first order.
-#[inline(always)]
+#[inline(always)] // in the longest period
 pub(super) fn beyond(admittance: Gain<Voltage, Current>, cut: Dq<WideVoltage>) -> Dq<Current> {
     Dq {
         d: admittance.saturating_apply(narrow(cut.d)),

@@ -48,7 +48,7 @@ impl Config {
     ///
     /// where the last i_d and i_q are those of the model, and u_q* is the voltage that the reference brings: none but in
     /// voltage mode.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let e = error(wanted, fb);
         let model = &state.model;
@@ -76,7 +76,7 @@ impl Config {
     }
 
     /// Takes the integrators on by a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
         let sigma = &mut state.sigma;
@@ -122,7 +122,7 @@ impl Config {
 }
 
 /// The references against the measured currents.
-#[inline(always)]
+#[inline(always)] // in each period
 fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
         d: wanted.i.d.minus(fb.i.d),

@@ -37,7 +37,7 @@ traced! {
 impl Config {
     /// I_qr and the voltage that is fed forward, for the commanded speed ω_r behind its slew limit.
     /// The integrator stands still where the current is at a bound and the error pushes it further.
-    #[inline(always)]
+    #[inline(always)] // in the longest period
     pub(super) fn current(&self, state: &mut State, omega_r: Speed, input: &Input) -> Reference {
         let omega = input.speed;
         let error = omega_r.minus(omega);
@@ -70,7 +70,7 @@ impl Config {
     }
 
     /// K_FFi·ω_r², against the rotation.
-    #[inline(always)]
+    #[inline(always)] // in the longest period
     fn propeller(&self, omega_r: Speed) -> Current {
         let square = omega_r.top(omega_r.saturating_abs());
         self.k_ffi.saturating_apply(square)

@@ -33,7 +33,7 @@ traced! {
 
 impl Bounds {
     /// The current, held within.
-    #[inline(always)]
+    #[inline(always)] // in the longest period
     pub fn hold(self, i_q: Current) -> Current {
         i_q.min(self.max).max(self.min)
     }

@@ -49,7 +49,7 @@ impl Config {
     /// The current that takes the speed to its reference (8), (9), within the bounds.
     ///
     /// `step` is what the planner wants ω* to do in this period, and `slew` the most that it may.
-    #[inline(always)]
+    #[inline(always)] // in the longest period
     pub(super) fn current(
         &self,
         state: &mut State,

@@ -9,7 +9,7 @@ use crate::drive::schedule;
 use crate::units::Current;
 
 /// A period with any observer, regulator and delay, and with the adaptation of the inductance if it is asked for.
-#[inline(never)]
+#[inline(never)] // not the default drive
 pub(in crate::drive) fn any(
     config: &Config,
     (foc, shared): Drive<'_>,

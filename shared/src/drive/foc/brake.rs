@@ -18,7 +18,7 @@ const READY_SLOTS: u32 = 4;
 
 /// With the low sides on the voltage is known to be zero: the observer goes on, so that the speed
 /// is reported down to where its back-EMF drowns in noise.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn watch(
     config: &Config,
     (foc, shared): (&mut State, &mut Shared),

@@ -20,7 +20,7 @@ pub(in crate::drive) type Drive<'a> = (&'a mut State, &'a mut Shared);
 pub(super) type Frame = (SinCos, Speed);
 
 /// The frame where the observer sees the rotor.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn observed(
     (observer, delay): (&impl Observer, Delay),
     (foc, shared): Drive<'_>,
@@ -39,7 +39,7 @@ pub(super) fn observed(
 }
 
 /// The frame that an open-loop start imposes, while the observer runs along.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn imposed(
     (observer, delay): (&impl Observer, Delay),
     (foc, shared): Drive<'_>,
@@ -61,7 +61,7 @@ pub(super) fn imposed(
 }
 
 /// From the current in a frame to the duties, with this observer and this regulator.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn current_loop(
     (observer, regulator): (&impl Observer, &impl Regulator),
     config: &Config,
@@ -121,7 +121,7 @@ fn limited(
 }
 
 /// The observer's input at this sample.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn input(
     loops: &Loops,
     delay: Delay,

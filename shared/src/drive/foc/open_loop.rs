@@ -20,7 +20,7 @@ fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
 }
 
 /// The rotor's swing; once, at the end of Park, where the rotor is.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, phase: Phase) {
     let attempt = attempt(config, shared);
     let start = &mut foc.loops.start;
@@ -34,7 +34,7 @@ pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, 
 }
 
 /// The current, and what it makes of the frame's speed.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn current(
     config: &Config,
     foc: &mut State,
@@ -67,7 +67,7 @@ fn expect(config: &Config, foc: &mut State, shared: &Shared) {
 
 /// Every [`CYCLE`], what the rotor makes of the phase: another attempt where it has not followed or has
 /// become too slow, the end of a stop, a fault where it is lost.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn rotor(
     config: &Config,
     foc: &mut State,
@@ -138,7 +138,7 @@ pub(in crate::drive) fn stand_by(config: &Config, foc: &mut State) {
 /// The ramp's end: turns the control's frame from where the ramp held it to where the rotor is, and begins
 /// Run with the torque that there is.
 #[cold]
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn hand_over(
     config: &Config,
     foc: &mut State,

@@ -68,26 +68,26 @@ pub(in crate::drive) fn work(config: &Config, foc: &mut State, shared: &mut Shar
 }
 
 /// The trip follows its limit.
-#[inline(always)]
+#[inline(always)] // in the longest period
 pub(in crate::drive) fn trip_level(config: &Config, shared: &mut Shared) {
     protection::follow_limit(&config.protection, &mut shared.protection, shared.seen.i);
 }
 
 /// The supply's voltage and current.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn supply(shared: &mut Shared) {
     shared.supply.follow(shared.protection.bus);
     shared.seen.bus_current = bus_current(shared.seen.u, shared.seen.i, &shared.supply);
 }
 
 /// The longest vector that the supply gives.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn longest_vector(config: &Config, shared: &mut Shared) {
     shared.supply.reach(&config.modulator, shared.seen.u.d);
 }
 
 /// Bounds of i_q by the supply's current.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: &mut Shared) {
     let seen = &shared.seen;
     protection::bound(
@@ -103,7 +103,7 @@ pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: 
 }
 
 /// Bounds of i_q by the speed, and i_d.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &Shared) {
     let bounds = shared.protection.bounds;
     let loops = &mut foc.loops;
@@ -113,7 +113,7 @@ pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &
 }
 
 /// Run and Stopping: the current's reference.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn reference(
     config: &Config,
     foc: &mut State,
@@ -177,7 +177,7 @@ fn at_voltage(
 }
 
 /// A current that is commanded, while the speed regulator stands by to take over.
-#[inline(always)]
+#[inline(always)] // in the longest period
 fn commanded(config: &Config, foc: &mut State, shared: &Shared, reference: Reference) {
     let loops = &mut foc.loops;
     let reference = torque::follow(&config.torque, &mut loops.torque, reference, loops.bounds);
@@ -191,7 +191,7 @@ fn commanded(config: &Config, foc: &mut State, shared: &Shared, reference: Refer
 /// Delay compensation: the voltage acts from `delay` to `delay + 1` periods after the sample, while the
 /// rotor turns on; it is meant for the middle of that time. Without this the loop is unstable above
 /// 4489 rpm on the bench at 15 kHz.
-#[inline(always)]
+#[inline(always)] // in the longest period
 pub(in crate::drive) fn delay_compensation(config: &Config, foc: &mut State, shared: &Shared) {
     foc.loops.advance = sin_cos(config.delay.advance(shared.seen.speed));
 }
@@ -199,7 +199,7 @@ pub(in crate::drive) fn delay_compensation(config: &Config, foc: &mut State, sha
 /// Which way the phases' currents go, for the dead time: two periods behind each reference. Where
 /// braking begins i_q* passes zero at 3 A/ms on the bench: once a cycle the sign would be wrong for a
 /// millisecond, after which the adaptive back-EMF observer as published swings by 45°.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
     let loops = &mut foc.loops;
     loops.dead_time_sign =
@@ -207,14 +207,14 @@ pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
 }
 
 /// Update of the observer's gains, which follow the speed.
-#[inline(never)]
+#[inline(never)] // only some periods
 pub(in crate::drive) fn observer_gains(config: &Config, foc: &mut State) {
     let factor = foc.loops.inductance.factor;
     observer::pace(&config.observer, &mut foc.observer, factor, CYCLE);
 }
 
 /// Decoupling of the regulator's axes at this speed.
-#[inline(always)]
+#[inline(always)] // in the longest period
 pub(in crate::drive) fn decoupling(config: &Config, foc: &mut State, shared: &Shared) {
     let factor = foc.loops.inductance.factor;
     config

@@ -14,7 +14,7 @@ use crate::units::{AdcCounts, Current};
 
 /// A period of Park, Ramp, Run or Stopping. The default observer and regulator have a piece of
 /// code of their own; any others share one.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(in crate::drive) fn period(
     config: &Config,
     (foc, shared): Drive<'_>,
@@ -38,7 +38,7 @@ pub(in crate::drive) fn period(
 }
 
 /// A period of an open-loop start with the default parts.
-#[inline(never)]
+#[inline(never)] // only a start
 fn start(
     (observer, regulator): (&compensated::Config, &synchronous::Config),
     config: &Config,

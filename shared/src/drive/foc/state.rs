@@ -77,7 +77,7 @@ impl State {
     }
 
     /// As at power-up.
-    #[inline(never)]
+    #[inline(never)] // seldom
     pub(in crate::drive) fn restart(&mut self) {
         *self = Self::new();
     }
@@ -97,7 +97,7 @@ impl State {
     }
 
     /// Every word; of the observers those of the one in use.
-    #[inline(always)]
+    #[inline(always)] // as for `State::trace`
     pub(in crate::drive) fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
         self.loops.trace(out);
         self.observer.trace(&config.observer, out);

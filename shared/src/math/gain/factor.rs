@@ -23,14 +23,14 @@ impl Short {
     }
 
     /// The product, wrapped.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn wrapping(self, x: i32) -> i32 {
         // Masked, a shift cannot be out of range.
         self.top(x) << (self.shift & 31)
     }
 
     /// The product, held at the ends of the type.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn saturating(self, x: i32) -> i32 {
         let top = self.top(x);
         let shift = self.shift & 31;
@@ -42,7 +42,7 @@ impl Short {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn top(self, x: i32) -> i32 {
         ((i64::from(self.mantissa) * i64::from(x)) >> 32) as i32
     }
@@ -66,13 +66,13 @@ impl Long {
     }
 
     /// The product, wrapped.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn wrapping(self, x: i32) -> i32 {
         self.left(self.whole.wrapping_mul(i64::from(x)))
     }
 
     /// The product, held at the ends of the type: it leaves 64 bits where the other form leaves 32.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn saturating(self, x: i32) -> i32 {
         match self.whole.checked_mul(i64::from(x)) {
             Some(product) => self.left(product),
@@ -80,7 +80,7 @@ impl Long {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn left(self, product: i64) -> i32 {
         (product >> 32) as i32 & self.mask
     }
@@ -95,7 +95,7 @@ fn beyond(top: i32, shift: u32) -> i32 {
 }
 
 /// The last product on a side of zero.
-#[inline(always)]
+#[inline(always)] // in each period
 fn end(negative: bool, mask: i32) -> i32 {
     if negative { i32::MIN } else { i32::MAX & mask }
 }

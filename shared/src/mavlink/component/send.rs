@@ -225,7 +225,7 @@ impl Component {
         }
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     fn send_file(
         &mut self,
         to: Address,
@@ -247,7 +247,7 @@ impl Component {
         sender.send_payload(self.identity.address, FILE, &payload, send);
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     fn send_metadata(&mut self, id: u32, now_us: u64, send: &mut dyn FnMut(&[u8])) {
         let message = (id, check::extra_crc(id));
         let payload = ftp::metadata(id, now_us);

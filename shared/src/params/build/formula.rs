@@ -297,12 +297,12 @@ impl Si<'_> {
         whole(self.value(), places)
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     fn bits(&self, exponent: i32) -> i32 {
         self.coefficient(exponent, 0).0
     }
 
-    #[inline(never)]
+    #[inline(never)] // as above
     fn parts(&self, exponent: i32) -> (i32, u32) {
         self.coefficient(exponent, u32::MAX)
     }
@@ -383,7 +383,7 @@ impl Si<'_> {
     }
 
     /// The next byte; behind the last one, [`END`].
-    #[inline(never)]
+    #[inline(never)] // as above
     fn byte(&self) -> u8 {
         let Some((byte, rest)) = self.formulas.get().split_first() else {
             return END;
