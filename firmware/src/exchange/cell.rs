@@ -43,6 +43,7 @@ impl<T> InterruptCell<T> {
     /// # Safety
     /// For the cell's interrupt, which does not interrupt itself, and before it is enabled; and only
     /// once the cell is filled.
+    #[inline(always)] // in each period
     pub(crate) unsafe fn with(&self, work: impl FnOnce(&mut T)) {
         // SAFETY: it is filled, and nobody else is at the value, as the caller promises.
         work(unsafe { (*self.value.get()).assume_init_mut() });

@@ -87,6 +87,7 @@ pub struct RunningEnd {
 
 impl RunningEnd {
     /// Looks for a new set-point; to be called once a period, which is how its age is counted.
+    #[inline(always)] // in each period
     pub(crate) fn listen(&mut self) {
         let word = SETPOINT.load(Ordering::Relaxed);
         if word != self.word {
@@ -99,6 +100,7 @@ impl RunningEnd {
     }
 
     /// The set-point for this period.
+    #[inline(always)] // in each period
     pub(crate) fn setpoint(&self) -> &Setpoint {
         &self.setpoint
     }
@@ -113,16 +115,19 @@ impl RunningEnd {
 
     /// Changes over to the configuration that is offered, if one is, after `change` has seen the one
     /// before and the new one.
+    #[inline(always)] // in each period
     pub(crate) fn adopt(&mut self, change: impl FnOnce(&Config, &Config)) {
         CONFIG.adopt(&mut self.config, change);
     }
 
     /// Works with the configuration in use.
+    #[inline(always)] // in each period
     pub(crate) fn with_config<R>(&self, work: impl FnOnce(&Config) -> R) -> R {
         CONFIG.with(&self.config, work)
     }
 
     /// Offers the snapshot to the tasks.
+    #[inline(always)] // in each period
     pub(crate) fn publish(&mut self, snapshot: Snapshot) {
         SNAPSHOT.publish(&mut self.snapshot, snapshot);
     }

@@ -57,6 +57,7 @@ impl<T: Copy> Latest<T> {
     }
 
     /// Writes the latest value.
+    #[inline(always)] // in each period
     pub(crate) fn publish(&self, hand: &mut Writer, value: T) {
         // SAFETY: the place is in the writer's hand. The mask says no more than that to the
         // compiler, which then needs no check.

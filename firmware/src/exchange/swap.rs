@@ -86,6 +86,7 @@ impl<T> Swap<T> {
     }
 
     /// The way to offer a value, or `None` while one before it waits.
+    #[inline(always)] // in each period
     pub(crate) fn free<'a>(&'a self, hand: &'a mut Offerer) -> Option<Free<'a, T>> {
         // Acquire: the user is done with the slot that it has left.
         let waits = self.state.load(Ordering::Acquire) == OFFERED;
@@ -94,6 +95,7 @@ impl<T> Swap<T> {
 
     /// Changes over to what is offered, if anything is, after a look at what was and what will be in
     /// use.
+    #[inline(always)] // in each period
     pub(crate) fn adopt(&self, hand: &mut User, change: impl FnOnce(&T, &T)) {
         if self.state.load(Ordering::Acquire) == OFFERED {
             let next = hand.used ^ 1;
@@ -106,10 +108,12 @@ impl<T> Swap<T> {
     }
 
     /// Works with the value in use.
+    #[inline(always)] // in each period
     pub(crate) fn with<R>(&self, hand: &User, work: impl FnOnce(&T) -> R) -> R {
         self.look(hand.used, work)
     }
 
+    #[inline(always)] // in each period
     fn look<R>(&self, slot: usize, work: impl FnOnce(&T) -> R) -> R {
         let slot = &self.slots[slot & 1];
         #[cfg(not(test))]

@@ -69,6 +69,7 @@ impl Interrupt {
     }
 
     /// One control period.
+    #[inline(always)] // in each period
     pub fn run(&mut self) {
         chip::acknowledge(&self.registers.converters);
         if chip::flash::is_writing() {
@@ -130,6 +131,7 @@ impl Interrupt {
     }
 
     /// Changes over to a new configuration, if one is offered.
+    #[inline(always)] // in each period
     fn adopt(&mut self) {
         let Self { state, end, .. } = self;
         end.adopt(|before, now| adopt(state, before, now));
@@ -144,6 +146,7 @@ fn adopt(state: &mut State, before: &Config, now: &Config) {
 
 /// Counts one more, and says how many it was before. There is one writer: this need not be one
 /// indivisible step.
+#[inline(always)] // in each period
 fn count(counter: &AtomicU32) -> u32 {
     let before = counter.load(Ordering::Relaxed);
     counter.store(before.wrapping_add(1), Ordering::Relaxed);

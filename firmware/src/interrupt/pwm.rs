@@ -117,6 +117,7 @@ impl Pwm {
     }
 
     /// Returns true if the break has turned the bridge off since [`clear_break`](Self::clear_break).
+    #[inline(always)] // in each period
     pub(crate) fn broken(&self) -> bool {
         self.timer.sr().read().bif(0)
     }
@@ -197,6 +198,7 @@ impl Pwm {
     }
 
     // Channel by channel, here and below: a loop would keep the checks of the channels' numbers.
+    #[inline(always)] // in each period
     fn set_compares(&mut self, values: [u32; 3]) {
         let timer = self.timer;
         timer.ccr(0).write_value(Ccr1ch(values[PHASES[0]]));

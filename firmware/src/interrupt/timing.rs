@@ -31,6 +31,7 @@ impl Timing {
 /// The compare value of a duty: top·duty. A duty has 31 fraction bits, so with twice the top the
 /// product's upper half is the result. A duty above 1, which the control does not give, is all of the
 /// period too.
+#[inline(always)] // in each period
 pub(crate) const fn compare(duty: Duty, top: u16) -> u32 {
     let product = duty.to_bits() as u64 * (2 * top as u32) as u64;
     (product >> 32) as u32

@@ -26,6 +26,7 @@ pub(crate) const CONVERTED: interrupt::Interrupt = interrupt::ADC1_2;
 pub(crate) const READINGS_AT_WORD: usize = 0x80 / 4;
 
 /// Takes the interrupt's request back. The first converter's sequence is the longer one.
+#[inline(always)] // in each period
 pub(crate) fn acknowledge(converters: &[Adc; 2]) {
     converters[0].isr().write(|w| w.set_jeos(true));
 }
