@@ -11,6 +11,8 @@ use crate::drive::{Config, Phase, Setpoint, Snapshot, put_default};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
+#[cfg(feature = "group")]
+use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
 use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale};
 use crate::statistics::{Recorder, Sight};
@@ -22,6 +24,8 @@ use storage::{Asker, Storage, Unstored};
 use tunes::Tunes;
 
 mod check;
+#[cfg(feature = "group")]
+mod group;
 mod identify;
 mod kept;
 mod storage;
@@ -67,6 +71,9 @@ pub struct Esc {
     reassumes: bool,
     /// There are two such commands.
     unstored: Vec<Unstored, 2>,
+    /// The ESCs that it tells of besides.
+    #[cfg(feature = "group")]
+    four: Option<Four>,
 }
 
 /// The values that the drive runs with in place of the parameters.
@@ -171,6 +178,8 @@ impl Esc {
             storage: Storage::default(),
             reassumes: false,
             unstored: Vec::new(),
+            #[cfg(feature = "group")]
+            four: None,
         }
     }
 
@@ -440,6 +449,8 @@ impl Esc {
             params: &mut self.params,
             board: &board,
             telemetry: &self.telemetry,
+            #[cfg(feature = "group")]
+            four: self.four.as_ref(),
             check: &self.check.report,
             identification: &self.identify.report,
             authority: &mut Reached(throttle),

@@ -246,6 +246,24 @@ impl Component {
         self.commands.stores_all()
     }
 
+    /// The number of its motor in the vehicle, from 0, if its component id numbers it.
+    #[cfg(feature = "group")]
+    pub fn number(&self) -> Option<u8> {
+        self.identity.number()
+    }
+
+    /// Leaves the messages for four ESCs to another one.
+    #[cfg(feature = "group")]
+    pub fn follow(&mut self) {
+        self.schedule.follow();
+    }
+
+    /// Returns true if it leaves them to another.
+    #[cfg(feature = "group")]
+    pub fn follows(&self) -> bool {
+        self.schedule.follows()
+    }
+
     /// A request for storage is done: `Ok` if the values would survive a loss of power now, or
     /// a few words on why not. The command is acknowledged with this.
     pub fn storage_done(&mut self, result: Result<(), &'static str>) {

@@ -1,5 +1,6 @@
 //! The interface of the component to its caller.
 
+use super::group::Four;
 use crate::check;
 use crate::identify;
 use crate::input::access::Access;
@@ -17,6 +18,9 @@ pub struct Context<'a> {
     pub board: &'a Board,
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
+    /// The ESCs of which its messages tell besides; they are one program's, and not the chip's.
+    #[cfg(feature = "group")]
+    pub four: Option<&'a Four>,
     /// The result of the last self-test.
     pub check: &'a check::Report,
     /// The result of the last identification.
@@ -27,7 +31,15 @@ pub struct Context<'a> {
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    pub(super) fn four(&self) -> Option<&'a Four> {
+        #[cfg(feature = "group")]
+        let four = self.four;
+        #[cfg(not(feature = "group"))]
+        let four = None;
+        four
+    }
+
     pub(super) fn drive(&mut self) -> DriveStatus {
         self.telemetry.drive(self.authority.command())
     }

@@ -51,6 +51,12 @@ impl Identity {
         }
     }
 
+    /// The number of its motor, from 0, if its component id numbers it.
+    #[cfg(feature = "group")]
+    pub(super) fn number(&self) -> Option<u8> {
+        Place::number_of_component(self.address.component)
+    }
+
     /// Returns true if something for this target is for this ESC.
     pub(super) fn is_for(&self, target: Address) -> bool {
         (target.system == 0 || target.system == self.address.system)

@@ -4,9 +4,9 @@ use mavlink::dialects::ardupilotmega::{
     EscConnectionType, EscFailureFlags, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
 };
 
+use super::group::Escs;
 use super::identity::Identity;
 use super::payload::Payload;
-use super::place::Place;
 use crate::drive::{Fault, Faults};
 use crate::image::{Image, VERSION};
 use crate::input::signal::{Pulse, Signal};
@@ -49,35 +49,29 @@ pub(super) fn heartbeat(
 }
 
 /// `counter` is the number of this message.
-pub(super) fn esc_info(
-    payload: &mut Payload,
-    now_us: u64,
-    telemetry: &Telemetry,
-    place: Place,
-    counter: u16,
-) {
-    let errors = telemetry.fault_count.saturating_add(telemetry.bad_frames);
-    let temperature_cdegc = if telemetry.temperature_c.is_nan() {
+pub(super) fn esc_info(payload: &mut Payload, now_us: u64, escs: &Escs, counter: u16) {
+    payload.u64(now_us);
+    let errors = |esc: &Telemetry| esc.fault_count.saturating_add(esc.bad_frames);
+    payload.slots(4, escs.each(0, errors));
+    payload.u16(counter);
+    payload.slots(2, escs.each(0, |esc| failure_flags(esc.faults).into()));
+    payload.slots(2, escs.each(NO_TEMPERATURE as u32, temperature_cdegc));
+    payload.put(&[
+        escs.place.index(),
+        escs.count(),
+        connection_type(escs.own.signal) as u8,
+        escs.online(),
+    ]);
+}
+
+/// Temperature as `ESC_INFO` has it: an i16 in the lower half.
+fn temperature_cdegc(esc: &Telemetry) -> u32 {
+    let cdegc = if esc.temperature_c.is_nan() {
         NO_TEMPERATURE
     } else {
-        (round(telemetry.temperature_c * 100.0) as i16).min(NO_TEMPERATURE - 1)
+        (round(esc.temperature_c * 100.0) as i16).min(NO_TEMPERATURE - 1)
     };
-    payload.u64(now_us);
-    payload.slots(place, &errors.to_le_bytes(), &[0; 4]);
-    payload.u16(counter);
-    let flags = failure_flags(telemetry.faults);
-    payload.slots(place, &flags.to_le_bytes(), &[0; 2]);
-    payload.slots(
-        place,
-        &temperature_cdegc.to_le_bytes(),
-        &NO_TEMPERATURE.to_le_bytes(),
-    );
-    payload.put(&[
-        place.index(),
-        place.count(),
-        connection_type(telemetry.signal) as u8,
-        place.online(),
-    ]);
+    cdegc as u32
 }
 
 /// DShot, as long as nothing else is known.
@@ -97,38 +91,27 @@ pub(super) fn named_value(payload: &mut Payload, now_us: u64, name: &str, value:
     payload.put(name.as_bytes());
 }
 
-pub(super) fn esc_status(payload: &mut Payload, now_us: u64, telemetry: &Telemetry, place: Place) {
+pub(super) fn esc_status(payload: &mut Payload, now_us: u64, escs: &Escs) {
     payload.u64(now_us);
-    let words = [
-        round(telemetry.rpm) as i32 as u32,
-        telemetry.bus_v.to_bits(),
-        telemetry.bus_a.to_bits(),
-    ];
-    for word in words {
-        payload.slots(place, &word.to_le_bytes(), &[0; 4]);
-    }
-    payload.put(&[place.index()]);
+    payload.slots(4, escs.each(0, |esc| round(esc.rpm) as i32 as u32));
+    payload.slots(4, escs.each(0, |esc| esc.bus_v.to_bits()));
+    payload.slots(4, escs.each(0, |esc| esc.bus_a.to_bits()));
+    payload.put(&[escs.place.index()]);
 }
 
 /// The message has no signs: speed is its magnitude, and a current into the supply is 0. Those for
-/// later ESCs are laid out alike ([`Place::telemetry`]).
-pub(super) fn esc_telemetry(
-    payload: &mut Payload,
-    telemetry: &Telemetry,
-    place: Place,
-    count: u16,
-) {
-    let values = [
-        telemetry.bus_v * 100.0,
-        telemetry.bus_a * 100.0,
-        telemetry.consumed_mah,
-        telemetry.rpm.abs(),
-        f32::from(count),
-    ];
-    for value in values {
-        payload.slots(place, &(round(value) as u16).to_le_bytes(), &[0; 2]);
-    }
-    payload.slots(place, &[round(telemetry.temperature_c) as u8], &[0]);
+/// later ESCs are laid out alike ([`Place::telemetry`](super::place::Place::telemetry)).
+pub(super) fn esc_telemetry(payload: &mut Payload, escs: &Escs, count: u16) {
+    let u16 = |value: f32| u32::from(round(value) as u16);
+    payload.slots(2, escs.each(0, |esc| u16(esc.bus_v * 100.0)));
+    payload.slots(2, escs.each(0, |esc| u16(esc.bus_a * 100.0)));
+    payload.slots(2, escs.each(0, |esc| u16(esc.consumed_mah)));
+    payload.slots(2, escs.each(0, |esc| u16(esc.rpm.abs())));
+    payload.slots(2, escs.each(0, |_| count.into()));
+    payload.slots(
+        1,
+        escs.each(0, |esc| u32::from(round(esc.temperature_c) as u8)),
+    );
 }
 
 pub(super) fn autopilot_version(payload: &mut Payload, image: &Image) {
@@ -201,6 +184,7 @@ mod tests {
     use mavlink::{MavlinkVersion, MessageData};
 
     use super::*;
+    use crate::mavlink::place::Place;
     use crate::mavlink::tests::TELEMETRY;
 
     /// The message that the dialect reads in a payload.
@@ -210,8 +194,12 @@ mod tests {
         D::deser(MavlinkVersion::V2, payload.bytes()).expect("it is whole")
     }
 
+    fn alone(telemetry: &Telemetry) -> Escs<'_> {
+        Escs::of(Place::FIRST, telemetry, None)
+    }
+
     fn info(telemetry: &Telemetry) -> ESC_INFO_DATA {
-        read(|payload| esc_info(payload, 5, telemetry, Place::FIRST, 1))
+        read(|payload| esc_info(payload, 5, &alone(telemetry), 1))
     }
 
     #[test]
@@ -225,14 +213,13 @@ mod tests {
             ..TELEMETRY
         };
         let message: ESC_TELEMETRY_1_TO_4_DATA =
-            read(|payload| esc_telemetry(payload, &telemetry, Place::FIRST, 7));
+            read(|payload| esc_telemetry(payload, &alone(&telemetry), 7));
         assert_eq!(message.rpm, [65_535, 0, 0, 0]);
         assert_eq!(message.current[0], 0);
         assert_eq!(message.temperature[0], 255);
         assert_eq!(message.voltage[0], 0);
         assert_eq!(message.totalcurrent[0], 65_535);
-        let status: ESC_STATUS_DATA =
-            read(|payload| esc_status(payload, 5, &telemetry, Place::FIRST));
+        let status: ESC_STATUS_DATA = read(|payload| esc_status(payload, 5, &alone(&telemetry)));
         assert_eq!(status.rpm[0], -70_000);
         let info = info(&telemetry);
         assert_eq!(info.temperature[0], i16::MAX - 1);

@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::{
     ESC_TELEMETRY_13_TO_16_DATA,
 };
 
-use super::payload::{Payload, id_of};
+use super::payload::id_of;
 
 /// Component ids of servos and motor controllers, `MAV_COMP_ID_SERVO1` to `_SERVO14`.
 const FIRST_COMPONENT: u8 = 140;
@@ -24,9 +24,17 @@ impl Place {
 
     /// The place of a peripheral: component 140 is the first.
     pub(super) const fn of_component(component: u8) -> Self {
+        match Self::number_of_component(component) {
+            Some(number) => Self(number),
+            None => Self::FIRST,
+        }
+    }
+
+    /// The number of an ESC whose component id gives it one.
+    pub(super) const fn number_of_component(component: u8) -> Option<u8> {
         match component {
-            FIRST_COMPONENT..=LAST_COMPONENT => Self(component - FIRST_COMPONENT),
-            _ => Self::FIRST,
+            FIRST_COMPONENT..=LAST_COMPONENT => Some(component - FIRST_COMPONENT),
+            _ => None,
         }
     }
 
@@ -35,12 +43,12 @@ impl Place {
         self.0 - self.0 % SLOTS as u8
     }
 
-    /// The least number of ESCs that there are. It is not known here; readers ignore what is above it.
+    /// The least number of ESCs that there are.
     pub(super) const fn count(self) -> u8 {
         self.0 + 1
     }
 
-    /// `ESC_INFO.info`: its own bit. The field has none for a ninth ESC and those after it.
+    /// Its bit in `ESC_INFO.info`.
     pub(super) const fn online(self) -> u8 {
         if self.0 < 8 { 1 << self.0 } else { 0 }
     }
@@ -48,6 +56,11 @@ impl Place {
     /// `ACTUATOR_OUTPUT_FUNCTION` of its motor.
     pub(super) fn motor_function(self) -> f32 {
         f32::from(self.0 + 1)
+    }
+
+    /// The place of another slot of the same four.
+    pub(super) const fn beside(self, slot: usize) -> Self {
+        Self(self.index() + slot as u8)
     }
 
     /// Its slot in an array of [`SLOTS`].
@@ -62,15 +75,6 @@ impl Place {
             4 => id_of::<ESC_TELEMETRY_5_TO_8_DATA>(),
             8 => id_of::<ESC_TELEMETRY_9_TO_12_DATA>(),
             _ => id_of::<ESC_TELEMETRY_13_TO_16_DATA>(),
-        }
-    }
-}
-
-impl Payload {
-    /// An array with a value for each of four ESCs: this one's in its slot, and another for the rest.
-    pub(super) fn slots(&mut self, place: Place, own: &[u8], other: &[u8]) {
-        for slot in 0..SLOTS {
-            self.put(if slot == place.slot() { own } else { other });
         }
     }
 }

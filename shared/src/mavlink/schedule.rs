@@ -144,6 +144,8 @@ pub(super) struct Schedule {
     timers: [Timer; Stream::ALL.len()],
     pace: Pace,
     place: Place,
+    /// Another ESC sends the messages for four.
+    led: bool,
     /// The stream that is looked at first, so that on a link too slow for all each gets its turn.
     first: usize,
 }
@@ -157,6 +159,7 @@ impl Schedule {
             }; Stream::ALL.len()],
             pace: Pace::new(bytes_per_s),
             place,
+            led: false,
             first: 0,
         }
     }
@@ -165,7 +168,27 @@ impl Schedule {
     pub(super) fn find(&self, message: u32) -> Option<Stream> {
         Stream::ALL
             .into_iter()
-            .find(|stream| stream.message(self.place) == message)
+            .find(|stream| stream.message(self.place) == message && self.sends(*stream))
+    }
+
+    /// Leaves the messages for four to another ESC.
+    #[cfg(feature = "group")]
+    pub(super) fn follow(&mut self) {
+        self.led = true;
+    }
+
+    /// Returns true if it leaves them to another.
+    #[cfg(feature = "group")]
+    pub(super) fn follows(&self) -> bool {
+        self.led
+    }
+
+    fn sends(&self, stream: Stream) -> bool {
+        let for_four = matches!(
+            stream,
+            Stream::EscInfo | Stream::EscStatus | Stream::EscTelemetry
+        );
+        !(cfg!(feature = "group") && self.led && for_four)
     }
 
     /// Makes a stream due now, unless it is off.
@@ -199,6 +222,9 @@ impl Schedule {
 
     /// Microseconds between two, none when it is off.
     pub(super) fn interval_us(&self, stream: Stream, params: &Params) -> Option<u64> {
+        if !self.sends(stream) {
+            return None;
+        }
         match self.timers[stream as usize].interval {
             Interval::Default => stream.default_interval_us(params),
             Interval::Off => None,

@@ -116,6 +116,8 @@ impl Bench {
             params,
             board: &Board::BENCH,
             telemetry,
+            #[cfg(feature = "group")]
+            four: None,
             check: &check,
             identification: &identify::Report::default(),
             authority,
@@ -141,6 +143,8 @@ impl Bench {
             params: &mut self.params,
             board: &Board::BENCH,
             telemetry: &self.telemetry,
+            #[cfg(feature = "group")]
+            four: None,
             check: &check,
             identification: &identify::Report::default(),
             authority: &mut self.authority,

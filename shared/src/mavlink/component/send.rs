@@ -11,6 +11,7 @@ use mavlink::dialects::ardupilotmega::{
 use super::{Component, Context, START_TEXT};
 use crate::mavlink::faults::FaultEvent;
 use crate::mavlink::frame::Address;
+use crate::mavlink::group::Escs;
 use crate::mavlink::payload::{Payload, id_of};
 use crate::mavlink::reply::Reply;
 use crate::mavlink::schedule::{self, Stream};
@@ -146,6 +147,7 @@ impl Component {
     fn send_stream(&mut self, stream: Stream, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         let place = self.identity.place;
         let telemetry = context.telemetry;
+        let escs = Escs::of(place, telemetry, context.four());
         let mut payload = Payload::new();
         let message = match stream {
             Stream::Heartbeat => {
@@ -156,7 +158,7 @@ impl Component {
             }
             Stream::EscInfo => {
                 self.infos = self.infos.wrapping_add(1);
-                messages::esc_info(&mut payload, context.now_us, telemetry, place, self.infos);
+                messages::esc_info(&mut payload, context.now_us, &escs, self.infos);
                 id_of::<ESC_INFO_DATA>()
             }
             Stream::BadFrames => {
@@ -173,12 +175,12 @@ impl Component {
                 return;
             }
             Stream::EscStatus => {
-                messages::esc_status(&mut payload, context.now_us, telemetry, place);
+                messages::esc_status(&mut payload, context.now_us, &escs);
                 id_of::<ESC_STATUS_DATA>()
             }
             Stream::EscTelemetry => {
                 self.telemetries = self.telemetries.wrapping_add(1);
-                messages::esc_telemetry(&mut payload, telemetry, place, self.telemetries);
+                messages::esc_telemetry(&mut payload, &escs, self.telemetries);
                 place.telemetry()
             }
         };
