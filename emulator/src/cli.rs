@@ -21,7 +21,7 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Runs one ESC in real time (the default)
+    /// Runs one ESC or several in real time, or in lockstep with a simulator (the default)
     Run(RunArgs),
     /// Runs a scenario from a file, offline
     Scenario(ScenarioArgs),

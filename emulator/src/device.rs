@@ -4,12 +4,13 @@ mod answer;
 mod capture;
 mod machine;
 mod reply;
+mod run;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use siskin_control::check::{Item, Own, Probe};
-use siskin_control::drive::{Sample, Setpoint};
+use siskin_control::drive::Sample;
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
@@ -23,8 +24,9 @@ use crate::flash::{FLASH_BYTES, FileFlash, FlashError};
 use crate::link::LinkId;
 use crate::rig::{Bench, Rig};
 use crate::summary::Rejected;
+use crate::surroundings::Surroundings;
 use crate::wire::Wire;
-use capture::{CAPTURE_HZ, ticks};
+use capture::CAPTURE_HZ;
 use reply::Driven;
 
 pub use crate::machine::Onlooker;
@@ -161,7 +163,12 @@ struct Clock {
 
 impl Clock {
     fn now_ns(&self) -> u64 {
-        (self.origin_ns + self.periods as f64 * self.period_ns) as u64
+        self.now() as u64
+    }
+
+    /// The same to its fraction.
+    fn now(&self) -> f64 {
+        self.origin_ns + self.periods as f64 * self.period_ns
     }
 }
 
@@ -231,6 +238,11 @@ impl Device {
         self.clock.now_ns()
     }
 
+    /// When the period that comes begins, s.
+    pub fn begins_s(&self) -> f64 {
+        self.clock.now() * 1e-9
+    }
+
     /// Whether a period is left until this time, to the nearest one: a period's length is no whole
     /// number of nanoseconds.
     pub fn is_before(&self, until_ns: u64) -> bool {
@@ -252,6 +264,21 @@ impl Device {
     /// The throttle wire, to be polled or played.
     pub fn wire(&mut self) -> &mut Wire {
         &mut self.wire
+    }
+
+    /// What stands around it, to be changed.
+    pub fn around_mut(&mut self) -> &mut Surroundings {
+        self.rig.around_mut()
+    }
+
+    /// The tasks' side, to tell it of other ESCs.
+    pub fn esc_mut(&mut self) -> &mut Esc {
+        &mut self.esc
+    }
+
+    /// Whether the tasks' side is called in the period that comes.
+    pub fn task_is_due(&self) -> bool {
+        self.now_ns() >= self.task_due_ns
     }
 
     /// Bytes that came in on a MAVLink stream; a chip in reset hears none.
@@ -285,68 +312,8 @@ impl Device {
             wire_datagrams: wire.rejected + wire.dropped,
             wire_frames: self.esc.telemetry().bad_frames,
             mavlink_frames: self.rejected_frames + open,
+            lockstep_requests: None,
         }
-    }
-
-    /// Runs control periods until `until_ns`. `imposed` replaces what the wire asks for; `send`
-    /// gets every MAVLink frame.
-    pub fn advance(
-        &mut self,
-        until_ns: u64,
-        imposed: impl Fn(f64, &Rig) -> Option<Setpoint>,
-        onlooker: &mut impl Onlooker,
-        send: &mut dyn FnMut(&[u8]),
-    ) {
-        while self.is_before(until_ns) {
-            let now_ns = self.now_ns();
-            let t_s = now_ns as f64 * 1e-9;
-            if t_s >= self.faults.due_s {
-                self.disturb(t_s);
-            }
-            self.hear(now_ns, onlooker);
-            if now_ns >= self.task_due_ns {
-                self.task_due_ns = now_ns - now_ns % TASK_NS + TASK_NS;
-                if !self.rig.is_held() {
-                    self.tasks(now_ns, onlooker, send);
-                }
-            }
-            // Past the wire or not, a task that has found a fault is heard.
-            let setpoint = match (self.throttle.setpoint(), imposed(t_s, &self.rig)) {
-                (fault @ Setpoint::Fault(_), _) => fault,
-                (setpoint, imposed) => imposed.unwrap_or(setpoint),
-            };
-            let period = self.rig.period(setpoint);
-            self.latest = Some(period.sample);
-            onlooker.period(t_s, &period, &self.rig);
-            self.clock.periods += 1;
-        }
-    }
-
-    /// Hands what came on the throttle wire before this time to the ESC, and lets it answer.
-    fn hear(&mut self, now_ns: u64, onlooker: &mut impl Onlooker) {
-        while let Some((edge_ns, level)) = self.wire.next_edge(now_ns) {
-            self.settle(edge_ns, onlooker);
-            if self.driven.is_output(edge_ns) {
-                continue;
-            }
-            onlooker.edge(edge_ns, level);
-            if !self.rig.is_held()
-                && let Some(ask) = self.throttle.edge(edge_ns / 1000, ticks(edge_ns), level)
-            {
-                self.answer(edge_ns, ask, onlooker);
-            }
-        }
-        self.settle(now_ns, onlooker);
-    }
-
-    /// Tells the ESC the time, and shows what it has put on the wire before.
-    fn settle(&mut self, now_ns: u64, onlooker: &mut impl Onlooker) {
-        if !self.rig.is_held()
-            && let Some(ask) = self.throttle.settle(now_ns / 1000, ticks(now_ns))
-        {
-            self.answer(now_ns, ask, onlooker);
-        }
-        self.driven.show(now_ns, onlooker);
     }
 
     /// Lets the faults of this time act.
@@ -454,6 +421,7 @@ impl Device {
             return;
         };
         esc.recall(&loaded);
+        esc.regroup(&self.esc);
         let Ok(config) = esc.config() else { return };
         self.esc = esc;
         self.throttle = throttle;
@@ -461,7 +429,7 @@ impl Device {
         self.receivers.clear();
         self.rig.restart(config);
         self.clock = Clock {
-            origin_ns: self.clock.origin_ns + self.clock.periods as f64 * self.clock.period_ns,
+            origin_ns: self.clock.now(),
             period_ns: self.rig.period_s() * 1e9,
             periods: 0,
         };

@@ -1,9 +1,11 @@
 //! [`rig`]: crate::rig
 //! [`plant`]: crate::plant
 //! [`device`]: crate::device
+//! [`rack`]: crate::rack
 //! [`wire`]: crate::wire
 //! [`flash`]: crate::flash
 //! [`live`]: crate::live
+//! [`lockstep`]: crate::lockstep
 //! [`link`]: crate::link
 //! [`scenario`]: crate::scenario
 //! [`watch`]: crate::watch
@@ -25,6 +27,7 @@ pub mod flash;
 pub mod interrupt;
 pub mod link;
 pub mod live;
+pub mod lockstep;
 pub mod machine;
 pub mod measure;
 pub mod options;
@@ -32,6 +35,7 @@ pub mod parameter;
 pub mod plant;
 #[cfg(feature = "plot")]
 pub mod plot;
+pub mod rack;
 pub mod record;
 #[cfg(test)]
 mod reference;

@@ -1,4 +1,4 @@
-//! An ESC in real time, on its MAVLink links and its throttle wire.
+//! ESCs in real time, on their MAVLink links and their throttle wires.
 //!
 //! One thread: it wakes each millisecond, takes in what has come on the sockets, simulates up to
 //! the present and sends. An answer leaves within two milliseconds.
@@ -6,9 +6,11 @@
 mod keeping;
 mod pace;
 
-use std::path::PathBuf;
-use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use siskin_control::params::ParamId;
 use thiserror::Error;
@@ -22,7 +24,7 @@ use crate::machine::{Machine, Stopped};
 use crate::record::Recorder;
 use crate::rig::Bench;
 use crate::summary::Report;
-use crate::watch::{Watch, WatchError};
+use crate::watch::{Watch, WatchError, Watches};
 use crate::wire::{SignalAddress, Wire, WireError};
 use keeping::Keeping;
 pub use pace::Pace;
@@ -40,15 +42,15 @@ pub struct Session {
     pub pace: Pace,
     /// For how long, simulated.
     pub duration: Option<Duration>,
-    /// Where parameters are kept.
-    pub flash: FileFlash,
+    /// Where the parameters of each ESC are kept: there are as many ESCs.
+    pub flash: Vec<FileFlash>,
     /// Parameters over the stored ones.
     pub params: Vec<(ParamId, f32)>,
     /// Parameters in place of the factory's values.
     pub defaults: Vec<(ParamId, f32)>,
     /// What goes wrong.
     pub faults: Vec<Fault>,
-    /// Where each period is written.
+    /// Where each period is written; each of several ESCs has its number before the extension.
     pub record: Option<PathBuf>,
 }
 
@@ -81,8 +83,108 @@ pub struct Opened {
     pub links: Vec<String>,
     /// The MAVLink endpoints as they came to be.
     pub endpoints: Vec<Endpoint>,
-    /// Where the throttle wire listens.
-    pub signal: Option<std::net::SocketAddr>,
+    /// Where the throttle wire of each ESC listens.
+    pub signals: Vec<SocketAddr>,
+}
+
+/// A session whose sockets and recordings are open.
+pub(crate) struct Open {
+    pub(crate) links: Links,
+    pub(crate) watches: Watches,
+    /// An interrupt has come.
+    pub(crate) stop: Arc<AtomicBool>,
+    pub(crate) end_ns: u64,
+    pub(crate) about: Opened,
+    pub(crate) began: Instant,
+}
+
+impl Session {
+    /// Opens what it needs; gives it with what the ESCs start with.
+    ///
+    /// # Errors
+    /// The session cannot begin.
+    pub(crate) fn open(self) -> Result<(Open, Vec<Start>), LiveError> {
+        let stop = interrupt::flag().map_err(LiveError::Interrupt)?;
+        let links = Links::open(&self.mavlink)?;
+        let link_bytes_per_s = links.slowest_bytes_per_s();
+        let end_s = self.duration.map_or(f64::MAX, |end| end.as_secs_f64());
+        let several = self.flash.len() > 1;
+        let mut about = Opened {
+            links: links.describe(),
+            endpoints: links.endpoints(),
+            signals: Vec::new(),
+        };
+        let (mut watches, mut starts) = (Vec::new(), Vec::new());
+        for (esc, flash) in self.flash.into_iter().enumerate() {
+            let wire = Wire::open(&self.signal, esc as u16)?;
+            about.signals.extend(wire.local_address());
+            let path = self.record.as_deref();
+            let path = path.map(|path| {
+                if several {
+                    numbered(path, esc)
+                } else {
+                    path.into()
+                }
+            });
+            let recorder = path.as_deref().map(Recorder::live).transpose();
+            let window = ("all".to_owned(), 0.0, end_s);
+            let recorder = recorder.map_err(WatchError::Record)?;
+            watches.push(Watch::new([window], recorder));
+            starts.push(Start {
+                bench: self.bench.clone(),
+                wire,
+                flash,
+                overrides: self.params.clone(),
+                defaults: self.defaults.clone(),
+                faults: self.faults.clone(),
+                link_bytes_per_s,
+            });
+        }
+        let open = Open {
+            links,
+            watches: Watches::new(watches),
+            stop,
+            end_ns: self.duration.map_or(u64::MAX, |end| end.as_nanos() as u64),
+            about,
+            began: Instant::now(),
+        };
+        Ok((open, starts))
+    }
+}
+
+impl Open {
+    /// Whether the session goes on.
+    pub(crate) fn goes_on(&self) -> bool {
+        !self.stop.load(Ordering::Relaxed) && !self.watches.failed()
+    }
+
+    /// Hands what has come by MAVLink to a machine.
+    pub(crate) fn receive(&mut self, machine: &mut impl Machine) {
+        let watches = &mut self.watches;
+        self.links
+            .receive(self.began.elapsed(), |stream, event| match event {
+                Event::Bytes(bytes) => machine.receive(stream, bytes, watches),
+                Event::Ended => machine.forget(stream),
+            });
+    }
+
+    /// The figures at the end.
+    pub(crate) fn finish(self, machine: &impl Machine) -> Result<Report, WatchError> {
+        let rejected: Vec<_> = (0..machine.escs())
+            .map(|esc| machine.rejected(esc))
+            .collect();
+        let sim_s = machine.now_ns() as f64 * 1e-9;
+        let report = self
+            .watches
+            .finish(sim_s, self.began.elapsed().as_secs_f64())?;
+        Ok(report.with_rejected(&rejected))
+    }
+}
+
+/// The recording of one ESC of several: its number before the extension, which says the format.
+fn numbered(path: &Path, esc: usize) -> PathBuf {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    path.with_extension(format!("{esc}.{extension}"))
 }
 
 /// Runs a session until its duration or an interrupt: on what `start` makes, with a warning where what
@@ -93,69 +195,43 @@ pub struct Opened {
 /// The session cannot begin or go on.
 pub fn run<M: Machine>(
     session: Session,
-    start: impl FnOnce(Start) -> Result<(M, Option<&'static str>), LiveError>,
+    start: impl FnOnce(Vec<Start>) -> Result<(M, Vec<&'static str>), LiveError>,
     opened: impl FnOnce(&Opened, &M),
     warn: impl Fn(&str),
 ) -> Result<(Report, M), LiveError> {
-    let stop = interrupt::flag().map_err(LiveError::Interrupt)?;
-    let mut links = Links::open(&session.mavlink)?;
-    let wire = Wire::open(&session.signal, 0)?;
-    let signal = wire.local_address();
-    let end_s = session.duration.map(|duration| duration.as_secs_f64());
-    let window = ("all".to_owned(), 0.0, end_s.unwrap_or(f64::MAX));
-    let recorder = session.record.as_deref().map(Recorder::live).transpose();
-    let mut watch = Watch::new([window], recorder.map_err(WatchError::Record)?);
-    let link_bytes_per_s = links.slowest_bytes_per_s();
-    let (mut machine, warning) = start(Start {
-        bench: session.bench,
-        wire,
-        flash: session.flash,
-        overrides: session.params,
-        defaults: session.defaults,
-        faults: session.faults,
-        link_bytes_per_s,
-    })?;
-    let about = Opened {
-        links: links.describe(),
-        endpoints: links.endpoints(),
-        signal,
-    };
-    if let Some(warning) = warning {
-        warn(warning);
-    }
-    opened(&about, &machine);
+    let pace = session.pace;
+    let (mut open, starts) = session.open()?;
+    let (mut machine, warnings) = start(starts)?;
+    warnings.into_iter().for_each(&warn);
+    opened(&open.about, &machine);
 
-    let mut pacer = Pacer::new(session.pace);
-    let mut keeping = Keeping::new(session.pace);
-    let end_ns = session.duration.map_or(u64::MAX, |d| d.as_nanos() as u64);
-    while !stop.load(Ordering::Relaxed) && machine.is_before(end_ns) && !watch.failed() {
-        let now = pacer.began.elapsed();
-        links.receive(now, |stream, event| match event {
-            Event::Bytes(bytes) => machine.receive(stream, bytes, &mut watch),
-            Event::Ended => machine.forget(stream),
-        });
+    let mut pacer = Pacer::new(pace);
+    let mut keeping = Keeping::new(pace);
+    while open.goes_on() && machine.is_before(open.end_ns) {
+        open.receive(&mut machine);
         let now_ns = machine.now_ns();
-        machine.wire().poll(now_ns);
-        let until_ns = pacer.until_ns(now_ns).min(end_ns);
-        let advanced = machine.advance(until_ns, &mut watch, &mut |frame| {
+        for esc in 0..machine.escs() {
+            machine.wire(esc).poll(now_ns);
+        }
+        let until_ns = pacer.until_ns(now_ns).min(open.end_ns);
+        let links = &mut open.links;
+        let advanced = machine.advance(until_ns, &mut open.watches, &mut |frame| {
             // A peer without room loses the frame, as on any datagram link.
             links.send(frame);
         });
         if let Err(stopped) = advanced {
             // The recording of what led there is worth having.
-            watch.finish(0.0, 0.0)?;
+            open.watches.finish(0.0, 0.0)?;
             return Err(stopped.into());
         }
         pacer.wait(machine.now_ns());
-        let played = machine.wire().counts().played;
+        let played = (0..machine.escs()).map(|esc| machine.wire(esc).counts().played);
+        // One sender sends to all of them.
+        let played = played.max().unwrap_or(0);
         if let Some(line) = keeping.look(pacer.began.elapsed(), machine.now_ns(), played) {
             warn(&line);
         }
     }
-    let sim_s = machine.now_ns() as f64 * 1e-9;
-    let report = Report {
-        rejected: Some(machine.rejected()),
-        ..watch.finish(sim_s, pacer.began.elapsed().as_secs_f64())?
-    };
+    let report = open.finish(&machine)?;
     Ok((report, machine))
 }

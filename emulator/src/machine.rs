@@ -17,8 +17,13 @@ pub trait Machine {
     /// Whether it has something left to do until this time.
     fn is_before(&self, until_ns: u64) -> bool;
 
-    /// The throttle wire, to be polled or played.
-    fn wire(&mut self) -> &mut Wire;
+    /// How many ESCs there are: what follows counts them from 0.
+    fn escs(&self) -> usize {
+        1
+    }
+
+    /// The throttle wire of an ESC, to be polled or played.
+    fn wire(&mut self, esc: usize) -> &mut Wire;
 
     /// Bytes that came in on a MAVLink stream.
     fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker);
@@ -37,8 +42,8 @@ pub trait Machine {
         send: &mut dyn FnMut(&[u8]),
     ) -> Result<(), Stopped>;
 
-    /// What came in since the start and was refused.
-    fn rejected(&self) -> Rejected;
+    /// What came in for an ESC since the start and was refused.
+    fn rejected(&self, esc: usize) -> Rejected;
 }
 
 /// Why a machine cannot start or go on: one line.
@@ -48,6 +53,11 @@ pub struct Stopped(pub String);
 
 /// Who looks on as a machine runs. A closure sees the periods.
 pub trait Onlooker {
+    /// What follows is of this ESC, of several.
+    fn esc(&mut self, esc: usize) {
+        let _ = esc;
+    }
+
     /// A control period that began at `t_s`, of a machine whose control is at hand.
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig);
 
@@ -67,9 +77,10 @@ pub trait Onlooker {
         let _ = (time_ns, level);
     }
 
-    /// The ESC has answered the edges so far on the throttle wire or on its serial line, with this datagram.
-    fn answer(&mut self, datagram: &[u8]) {
-        let _ = datagram;
+    /// The ESC has answered the edges so far on the throttle wire or on its serial line, with this datagram; the
+    /// frame that asked for it began at `asked_ns`.
+    fn answer(&mut self, asked_ns: u64, datagram: &[u8]) {
+        let _ = (asked_ns, datagram);
     }
 
     /// A whole MAVLink frame was sent, or was received and understood.

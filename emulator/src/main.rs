@@ -1,4 +1,4 @@
-//! The emulator's command line: one ESC in real time, scenarios offline, pictures of recordings.
+//! The emulator's command line: ESCs in real time or in lockstep, scenarios offline, pictures of recordings.
 #![forbid(unsafe_code)]
 
 mod cli;
@@ -7,12 +7,13 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use indicatif::ProgressBar;
-use siskin_emulator::device::Device;
 use siskin_emulator::interrupt;
 use siskin_emulator::live::{self, Opened};
+use siskin_emulator::lockstep;
 use siskin_emulator::measure;
-use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
+use siskin_emulator::options::{self, RunArgs, ScenarioArgs, Speed};
 use siskin_emulator::plot;
+use siskin_emulator::rack::Rack;
 use siskin_emulator::report;
 use siskin_emulator::reproduce;
 
@@ -46,17 +47,18 @@ fn run(args: RunArgs) -> Result<ExitCode, String> {
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
     let warn = |warning: &str| eprintln!("siskin-emulator: {warning}");
     warning.as_deref().into_iter().for_each(warn);
-    let start = |start| Ok(Device::start(start)?);
-    let opened = |opened: &Opened, device: &Device| {
-        if !args.common.json {
-            // Where nobody reads it, the ESC runs all the same.
-            let params = device.esc().params();
-            let greeting = report::greeting("emulated", &args, &standing, opened, params);
-            let _ = report::print(&greeting);
-        }
+    let opened = |opened: &Opened, rack: &Rack| {
+        let params = rack.escs()[0].esc().params();
+        report::opened("emulated", &args, &standing, opened, params);
     };
-    let ended = live::run(session, start, opened, warn);
-    let (report, _) = ended.map_err(|error| line(&error))?;
+    let report = match args.speed {
+        Speed::Paced(_) => {
+            let start = |starts| Ok(Rack::start(starts)?);
+            live::run(session, start, opened, warn).map(|(report, _)| report)
+        }
+        Speed::Lockstep => lockstep::serve(session, opened, warn),
+    };
+    let report = report.map_err(|error| line(&error))?;
     report::print(&if args.common.json {
         report::json(&report)?
     } else {

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
+use clap::builder::RangedU64ValueParser;
 use siskin_control::params::{ParamId, Preset};
 
 use crate::bench::library;
@@ -15,6 +16,7 @@ use crate::link::Endpoint;
 use crate::live::{Pace, Session};
 use crate::parameter;
 use crate::plant::Fidelity;
+use crate::rack::ESCS_MAX;
 use crate::rig::Bench;
 use crate::scenario::{self, Plan, ScenarioError, Standing};
 use crate::wire::SignalAddress;
@@ -23,7 +25,16 @@ use crate::wire::SignalAddress;
 const MAVLINK_HELP: &str = "MAVLink endpoint: udpout:H:P, udpin:H:P, tcpin:H:P, serial:PATH:BAUD, \
     pty[:LINK[:BAUD]] or none; repeatable [default: udpout:127.0.0.1:14550 and tcpin:127.0.0.1:5760]";
 
-/// What one ESC in real time is run with.
+/// How simulated time passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// By the wall's clock, or as fast as the machine can.
+    Paced(Pace),
+    /// As a client says ([`lockstep`](crate::lockstep)).
+    Lockstep,
+}
+
+/// What one ESC in real time is run with, or several.
 #[derive(Args, Debug)]
 pub struct RunArgs {
     /// MAVLink endpoints.
@@ -32,6 +43,10 @@ pub struct RunArgs {
     /// Where the throttle wire listens
     #[arg(long, value_name = "udp:H:P", default_value = "udp:127.0.0.1:14600")]
     pub signal: SignalAddress,
+    /// ESCs on one MAVLink link and one supply: above 1 they are peripherals, components MAV_COMP_ID (140) and
+    /// on; ESC i takes throttle on the port i higher
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=ESCS_MAX as u64))]
+    pub escs: usize,
     /// A built-in bench or a TOML file
     #[arg(long, value_name = "NAME|FILE", help = bench_help())]
     pub bench: Option<String>,
@@ -47,16 +62,17 @@ pub struct RunArgs {
     /// How the inverter is simulated
     #[arg(long, value_enum, default_value_t = Fidelity::Averaged)]
     pub plant: Fidelity,
-    /// Simulated seconds a second, or max
-    #[arg(long, value_name = "X|max", default_value = "1", value_parser = pace)]
-    pub speed: Pace,
+    /// Simulated seconds a second, max, or lockstep: as a client on the throttle wire says
+    #[arg(long, value_name = "X|max|lockstep", default_value = "1", value_parser = speed)]
+    pub speed: Speed,
     /// Simulated seconds after which to end
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub duration: Option<f64>,
     /// Seed of all randomness
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// File behind the simulated flash, or none [default: a file in your state folder]
+    /// File behind the simulated flash, PATH.0, PATH.1 ... of several ESCs, or none [default: a file in your
+    /// state folder]
     #[arg(long, value_name = "PATH|none")]
     pub storage: Option<PathBuf>,
     /// A fault as a scenario has it, from the start on where it says no at_s, as kind = "mosfet_open", phase = 1; repeatable
@@ -168,7 +184,7 @@ impl RunArgs {
     /// # Errors
     /// The file behind `--storage` cannot serve.
     pub fn session(&self, standing: &Standing) -> Result<(Session, Option<String>), StorageError> {
-        let (flash, warning) = storage(self.storage.as_deref())?;
+        let (flash, warning) = storage(self.storage.as_deref(), self.escs)?;
         let of_bench = standing.params.clone();
         // The default bench is there unasked, and lasts from run to run: what was stored on it is found again.
         let (defaults, mut params) = match self.bench {
@@ -184,7 +200,10 @@ impl RunArgs {
                 self.mavlink.clone()
             },
             signal: self.signal.clone(),
-            pace: self.speed,
+            pace: match self.speed {
+                Speed::Paced(pace) => pace,
+                Speed::Lockstep => Pace::Max,
+            },
             duration: self.duration.map(Duration::from_secs_f64),
             flash,
             params,
@@ -210,20 +229,37 @@ impl CommonArgs {
 ///
 /// # Errors
 /// The file that was given cannot serve.
-fn storage(given: Option<&Path>) -> Result<(FileFlash, Option<String>), StorageError> {
+fn storage(
+    given: Option<&Path>,
+    escs: usize,
+) -> Result<(Vec<FileFlash>, Option<String>), StorageError> {
+    let in_memory = || (0..escs).map(|_| FileFlash::in_memory()).collect();
     match given {
-        Some(path) if path == Path::new("none") => Ok((FileFlash::in_memory(), None)),
-        Some(path) => Ok((FileFlash::open(path)?, None)),
+        Some(path) if path == Path::new("none") => Ok((in_memory(), None)),
+        Some(path) => Ok((files(path, escs)?, None)),
         None => {
-            let why = match state_file().map(|path| FileFlash::open(&path)) {
+            let why = match state_file().map(|path| files(&path, escs)) {
                 Some(Ok(flash)) => return Ok((flash, None)),
                 Some(Err(error)) => format!("{error};"),
                 None => "no home folder:".to_owned(),
             };
             let warning = format!("{why} settings are kept until the end only");
-            Ok((FileFlash::in_memory(), Some(warning)))
+            Ok((in_memory(), Some(warning)))
         }
     }
+}
+
+/// The file of the only ESC, or one of each of several.
+fn files(path: &Path, escs: usize) -> Result<Vec<FileFlash>, StorageError> {
+    if escs == 1 {
+        return Ok(vec![FileFlash::open(path)?]);
+    }
+    let numbered = |esc| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!(".{esc}"));
+        FileFlash::open(Path::new(&name))
+    };
+    (0..escs).map(numbered).collect()
 }
 
 /// Where settings stay between runs: the state folder of the XDG base directories.
@@ -270,15 +306,17 @@ fn bench_help() -> String {
     )
 }
 
-fn pace(text: &str) -> Result<Pace, String> {
-    if text == "max" {
-        return Ok(Pace::Max);
+fn speed(text: &str) -> Result<Speed, String> {
+    match text {
+        "max" => return Ok(Speed::Paced(Pace::Max)),
+        "lockstep" => return Ok(Speed::Lockstep),
+        _ => {}
     }
     let times = text.parse().ok();
     let times = times.filter(|times| (0.001..=1000.0).contains(times));
     times
-        .map(Pace::Times)
-        .ok_or_else(|| "give 0.001 to 1000, or max".to_owned())
+        .map(|times| Speed::Paced(Pace::Times(times)))
+        .ok_or_else(|| "give 0.001 to 1000, max or lockstep".to_owned())
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

@@ -4,13 +4,14 @@
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 
+use serde::Serialize;
 use siskin_control::params::{ParamId, Params};
 
 use crate::bench::DEFAULT_MOTOR;
 use crate::interrupt;
 use crate::link::Endpoint;
 use crate::live::Opened;
-use crate::options::RunArgs;
+use crate::options::{RunArgs, Speed};
 use crate::scenario::{Outcome, Standing, Survey, Verdict};
 use crate::summary::Report;
 
@@ -33,13 +34,71 @@ pub fn print(text: &str) -> Result<(), String> {
 ///
 /// # Errors
 /// What cannot be spelt so.
-pub fn json(value: &impl serde::Serialize) -> Result<String, String> {
+pub fn json(value: &impl Serialize) -> Result<String, String> {
     let text = serde_json::to_string(value).map_err(|error| error.to_string())?;
     Ok(text + "\n")
 }
 
+/// What is printed once a session is open: the first screen, or one JSON object with every port. Where nobody reads
+/// it, the ESC runs all the same.
+pub fn opened(what: &str, args: &RunArgs, standing: &Standing, opened: &Opened, params: &Params) {
+    let text = if !args.common.json {
+        greeting(what, args, standing, opened, params)
+    } else if !opened.endpoints.is_empty() || args.speed == Speed::Lockstep {
+        json(&Ready::of(opened)).unwrap_or_default()
+    } else {
+        // Who asked for no link reads the summary alone.
+        return;
+    };
+    let _ = print(&text);
+}
+
+/// The first line of JSON.
+#[derive(Serialize)]
+struct Ready {
+    ready: Ports,
+}
+
+/// Where all is reached.
+#[derive(Serialize)]
+struct Ports {
+    /// MAVLink, as `--mavlink` has it.
+    mavlink: Vec<String>,
+    /// The throttle wire of the only or the first ESC, as `--signal` has it.
+    signal: Option<String>,
+    /// Of several ESCs, each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    escs: Vec<Port>,
+}
+
+/// Where an ESC is reached.
+#[derive(Serialize)]
+struct Port {
+    signal: String,
+}
+
+impl Ready {
+    fn of(opened: &Opened) -> Self {
+        let signals = opened.signals.iter();
+        let mut signals = signals.map(|address| format!("udp:{address}"));
+        let signal = signals.clone().next();
+        let escs = if opened.signals.len() > 1 {
+            signals.by_ref().map(|signal| Port { signal }).collect()
+        } else {
+            Vec::new()
+        };
+        Self {
+            ready: Ports {
+                mavlink: opened.endpoints.iter().map(Endpoint::to_string).collect(),
+                signal,
+                escs,
+            },
+        }
+    }
+}
+
 /// The first screen: `what` runs, where it is reached, what to type next. `params` are in force.
-pub fn greeting(
+fn greeting(
     what: &str,
     args: &RunArgs,
     standing: &Standing,
@@ -66,9 +125,12 @@ pub fn greeting(
             .iter()
             .map(|link| format!("  MAVLink   {link}")),
     );
-    if let Some(address) = opened.signal {
-        lines.push(format!("  throttle  udp:{address}, a datagram a frame"));
-    }
+    lines.extend(
+        opened
+            .signals
+            .iter()
+            .map(|address| format!("  throttle  udp:{address}, a datagram a frame")),
+    );
     if args
         .motor
         .as_ref()
@@ -112,6 +174,10 @@ pub fn figures(report: &Report) -> String {
         "{:.3} s simulated in {:.3} s ({pace:.1} times real time), {} control periods, trace {}\n",
         report.sim_s, report.wall_s, report.steps, report.trace_hash
     );
+    for (index, esc) in report.escs.iter().enumerate() {
+        line(&mut text, format_args!("ESC {index}:"));
+        text.push_str(&figures(esc));
+    }
     for fault in report.faults.iter().flatten() {
         line(&mut text, format_args!("fault: {fault}"));
     }

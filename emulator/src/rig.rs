@@ -99,6 +99,16 @@ impl Rig {
         self.around.bus_v()
     }
 
+    /// What stands there outside the chip.
+    pub fn around(&self) -> &Surroundings {
+        &self.around
+    }
+
+    /// What stands there outside the chip, to be changed.
+    pub fn around_mut(&mut self) -> &mut Surroundings {
+        &mut self.around
+    }
+
     /// Motor, load and inverter.
     pub fn plant(&self) -> &Plant {
         self.around.plant()

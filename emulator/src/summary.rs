@@ -8,6 +8,8 @@ mod window;
 use serde::Serialize;
 use siskin_control::drive::{Fault, Faults, Phase};
 
+use xxhash_rust::xxh3::Xxh3;
+
 use crate::rig::{Period, Rig};
 use crate::shaft::Units;
 use crate::surroundings::Passage;
@@ -46,8 +48,52 @@ pub struct Report {
     /// What came in from outside and was refused; not for a scenario, where nothing does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejected>,
-    /// The measuring windows.
+    /// The measuring windows; none of several ESCs together.
     pub windows: Vec<Figures>,
+    /// Of several ESCs, each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub escs: Vec<Report>,
+}
+
+impl Report {
+    /// Several ESCs together: what they add up to, and a hash over their hashes in their order.
+    fn over(escs: Vec<Self>, sim_s: f64, wall_s: f64) -> Self {
+        let mut hash = Xxh3::new();
+        let mut faults = Vec::new();
+        for esc in &escs {
+            hash.update(esc.trace_hash.as_bytes());
+            faults.extend(esc.faults.iter().flatten());
+        }
+        let known = Fault::ALL.into_iter().map(Fault::text);
+        Self {
+            sim_s,
+            wall_s,
+            sim_per_wall: (wall_s > 0.0).then(|| sim_s / wall_s),
+            steps: escs.iter().map(|esc| esc.steps).sum(),
+            trace_hash: format!("{:016x}", hash.digest()),
+            faults: Some(known.filter(|fault| faults.contains(fault)).collect()),
+            rejected: None,
+            windows: Vec::new(),
+            escs,
+        }
+    }
+
+    /// The only ESC, or several together.
+    pub fn of(mut escs: Vec<Self>, sim_s: f64, wall_s: f64) -> Self {
+        match escs.pop() {
+            Some(only) if escs.is_empty() => only,
+            last => Self::over(escs.into_iter().chain(last).collect(), sim_s, wall_s),
+        }
+    }
+
+    /// With what each ESC has refused.
+    pub fn with_rejected(mut self, rejected: &[Rejected]) -> Self {
+        self.rejected = Some(rejected.iter().fold(Rejected::default(), Rejected::and));
+        for (esc, rejected) in self.escs.iter_mut().zip(rejected) {
+            esc.rejected = Some(*rejected);
+        }
+        self
+    }
 }
 
 /// What came in and was refused.
@@ -59,6 +105,21 @@ pub struct Rejected {
     pub wire_frames: u32,
     /// MAVLink frames that failed their check, are unknown, or cannot be trusted.
     pub mavlink_frames: u64,
+    /// Requests of a client in lockstep that were malformed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lockstep_requests: Option<u32>,
+}
+
+impl Rejected {
+    /// Its sum with that of another ESC.
+    fn and(self, other: &Self) -> Self {
+        Self {
+            wire_datagrams: self.wire_datagrams + other.wire_datagrams,
+            wire_frames: self.wire_frames + other.wire_frames,
+            mavlink_frames: self.mavlink_frames + other.mavlink_frames,
+            lockstep_requests: self.lockstep_requests.or(other.lockstep_requests),
+        }
+    }
 }
 
 impl Summary {
@@ -131,6 +192,7 @@ impl Summary {
             faults: (!self.blind).then(|| self.faults.iter().map(Fault::text).collect()),
             rejected: None,
             windows: self.windows.iter().map(|w| w.figures(sim_s)).collect(),
+            escs: Vec::new(),
         }
     }
 }

@@ -10,7 +10,7 @@ use siskin_control::drive::{Bridge, Sample};
 
 use crate::bench::Bench;
 use crate::fault::InForce;
-use crate::plant::{Bus, Flow, Gate, Noise, Plant, Sensing, Thermal, Truth};
+use crate::plant::{Air, Bus, Flow, Gate, Noise, Plant, Sensing, Thermal, Truth};
 
 /// The first period's length to expect, s, before there was one.
 const USUAL_S: f64 = 1.0 / 24_000.0;
@@ -54,6 +54,9 @@ pub struct Surroundings {
     bus: Bus,
     thermal: Thermal,
     noise: Noise,
+    air: Air,
+    /// What faults add to the air's torque, Nm, and wind, rad/s.
+    struck: [f64; 2],
     /// The sensors as they are now.
     sensing: Sensing,
     /// What stuck current sensors show, A.
@@ -85,6 +88,8 @@ impl Surroundings {
             bus: Bus::new(bench.supply),
             thermal: Thermal::new(),
             noise: Noise::new(bench.seed),
+            air: Air::default(),
+            struck: [0.0; 2],
             sensing: bench.sensing,
             stuck_a: [None; 3],
             hall_stuck: [None; 3],
@@ -107,6 +112,34 @@ impl Surroundings {
     /// Voltage of the bus, V.
     pub fn bus_v(&self) -> f64 {
         self.bus.volts()
+    }
+
+    /// The bus, to be fed by another or to be given another supply.
+    pub fn bus_mut(&mut self) -> &mut Bus {
+        &mut self.bus
+    }
+
+    /// What acts from outside now.
+    pub fn air(&self) -> Air {
+        self.air
+    }
+
+    /// What acts from outside from now on.
+    pub fn surround(&mut self, air: Air) {
+        let before = std::mem::replace(&mut self.air, air);
+        if [air.torque_nm, air.wind_rad_s] != [before.torque_nm, before.wind_rad_s] {
+            self.push();
+        }
+        self.plant.set_ambient_c(air.ambient_c);
+        self.thermal.set_ambient_c(air.ambient_c);
+    }
+
+    /// Lets air and faults act on the shaft.
+    fn push(&mut self) {
+        let [torque_nm, wind_rad_s] = self.struck;
+        self.plant.set_wind_rad_s(self.air.wind_rad_s + wind_rad_s);
+        self.plant
+            .set_extra_torque_nm(self.air.torque_nm + torque_nm);
     }
 
     /// Temperature of the board as the emulator's thermistor and converter show it, °C.
@@ -259,11 +292,10 @@ impl Surroundings {
             self.plant.block(now.blocked);
         }
         self.plant.kick(now.kicked_rad_s - before.kicked_rad_s);
-        if now.wind_rad_s != before.wind_rad_s {
-            self.plant.set_wind_rad_s(now.wind_rad_s);
-        }
-        if now.torque_nm != before.torque_nm {
-            self.plant.set_extra_torque_nm(now.torque_nm);
+        let struck = [now.torque_nm, now.wind_rad_s];
+        if struck != self.struck {
+            self.struck = struck;
+            self.push();
         }
         self.bus.sag(now.sag_v);
         self.bus.limit(now.brown_out_v);

@@ -59,6 +59,58 @@ impl Watch {
     }
 }
 
+/// The onlookers of several ESCs, each of its own.
+pub struct Watches {
+    each: Vec<Watch>,
+    esc: usize,
+}
+
+impl Watches {
+    /// One for each ESC.
+    pub fn new(each: Vec<Watch>) -> Self {
+        Self { each, esc: 0 }
+    }
+
+    /// Whether the run cannot go on.
+    pub fn failed(&self) -> bool {
+        self.each.iter().any(Watch::failed)
+    }
+
+    /// Ends the recordings and gives the figures, after `sim_s` simulated and `wall_s` real seconds.
+    pub fn finish(self, sim_s: f64, wall_s: f64) -> Result<Report, WatchError> {
+        let reports = self.each.into_iter();
+        let reports = reports.map(|watch| watch.finish(sim_s, wall_s));
+        let reports = reports.collect::<Result<_, _>>()?;
+        Ok(Report::of(reports, sim_s, wall_s))
+    }
+}
+
+impl Onlooker for Watches {
+    fn esc(&mut self, esc: usize) {
+        self.esc = esc;
+    }
+
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        self.each[self.esc].period(t_s, period, rig);
+    }
+
+    fn passage(&mut self, t_s: f64, passage: &Passage) {
+        self.each[self.esc].passage(t_s, passage);
+    }
+
+    fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
+        self.each[self.esc].gates(time_ns, leg, gate);
+    }
+
+    fn edge(&mut self, time_ns: u64, level: bool) {
+        self.each[self.esc].edge(time_ns, level);
+    }
+
+    fn frame(&mut self, time_ns: u64, frame: &[u8]) {
+        self.each[self.esc].frame(time_ns, frame);
+    }
+}
+
 impl Watch {
     fn check(&mut self, motion: &Motion) {
         if motion.diverged() {

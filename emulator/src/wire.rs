@@ -11,6 +11,7 @@ use std::fmt;
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::str::FromStr;
+use std::time::Duration;
 
 use thiserror::Error;
 
@@ -87,6 +88,14 @@ pub enum WireError {
     Socket(SignalAddress, io::Error),
 }
 
+/// Checks that a datagram could be played.
+///
+/// # Errors
+/// It is malformed.
+pub fn check(datagram: &[u8]) -> Result<(), Rejected> {
+    Frame::parse(datagram).map(|_| ())
+}
+
 /// What became of the datagrams so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WireCounts {
@@ -114,9 +123,11 @@ pub struct WireErrors {
 /// Time is the simulation's, in ns. Times given to it do not go back.
 pub struct Wire {
     socket: Option<UdpSocket>,
+    /// Whether the socket waits for datagrams.
+    waits: bool,
     buffer: Vec<u8>,
-    /// Who sends, and from which time on: to whom answers go.
-    senders: VecDeque<(u64, SocketAddr)>,
+    /// Who sends, and from which time on: to whom answers go. None is who plays without a socket.
+    senders: VecDeque<(u64, Option<SocketAddr>)>,
     counts: WireCounts,
     edges: VecDeque<(u64, bool)>,
     /// The level after all that waits.
@@ -134,6 +145,7 @@ impl Wire {
     pub fn detached() -> Self {
         Self {
             socket: None,
+            waits: false,
             buffer: Vec::new(),
             senders: VecDeque::new(),
             counts: WireCounts::default(),
@@ -207,7 +219,7 @@ impl Wire {
             match socket.recv_from(&mut buffer) {
                 Ok((length, sender)) => {
                     if let Ok(Some(start_ns)) = self.take(now_ns, &buffer[..length]) {
-                        self.sends(start_ns, sender);
+                        self.sends(start_ns, Some(sender));
                     }
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
@@ -219,22 +231,65 @@ impl Wire {
         self.buffer = buffer;
     }
 
+    /// Waits for a datagram, for `time` at most, and plays it; but one that `is_request` is put into `request`, and who
+    /// sent it is given back.
+    pub fn wait(
+        &mut self,
+        now_ns: u64,
+        time: Duration,
+        is_request: fn(&[u8]) -> bool,
+        request: &mut Vec<u8>,
+    ) -> Option<SocketAddr> {
+        let socket = self.socket.as_ref()?;
+        if !self.waits {
+            socket.set_nonblocking(false).ok()?;
+            socket.set_read_timeout(Some(time)).ok()?;
+            self.waits = true;
+        }
+        // Some systems report here that an earlier answer found nobody.
+        let (length, sender) = socket.recv_from(&mut self.buffer).ok()?;
+        let buffer = std::mem::take(&mut self.buffer);
+        let datagram = &buffer[..length];
+        let asks = is_request(datagram);
+        if asks {
+            request.clear();
+            request.extend(datagram);
+        } else if let Ok(Some(start_ns)) = self.take(now_ns, datagram) {
+            self.sends(start_ns, Some(sender));
+        }
+        self.buffer = buffer;
+        asks.then_some(sender)
+    }
+
+    /// Sends a datagram to who asked for it; one who does not take it loses it.
+    pub fn send_to(&self, peer: SocketAddr, datagram: &[u8]) {
+        if let Some(socket) = &self.socket {
+            let _ = socket.send_to(datagram, peer);
+        }
+    }
+
     /// Plays one datagram from `now_ns` on, or after what still plays, and counts it.
     pub fn play(&mut self, now_ns: u64, datagram: &[u8]) -> Result<(), Rejected> {
-        self.take(now_ns, datagram).map(|_| ())
+        let start_ns = self.take(now_ns, datagram)?;
+        if let Some(start_ns) = start_ns
+            && !self.senders.is_empty()
+        {
+            self.sends(start_ns, None);
+        }
+        Ok(())
     }
 
     /// Sends an answer to who sent what was played at `asked_ns`, if that is known. A sender that
     /// does not take it loses it, as on a wire that nobody listens to.
     pub fn send(&mut self, asked_ns: u64, datagram: &[u8]) {
         self.forget_senders(asked_ns.saturating_add(EARLY_NS));
-        if let (Some(socket), Some((_, sender))) = (&self.socket, self.senders.front()) {
+        if let (Some(socket), Some((_, Some(sender)))) = (&self.socket, self.senders.front()) {
             let _ = socket.send_to(datagram, sender);
         }
     }
 
     /// Notes who sends from this time on.
-    fn sends(&mut self, start_ns: u64, sender: SocketAddr) {
+    fn sends(&mut self, start_ns: u64, sender: Option<SocketAddr>) {
         // Most signals are not answered.
         self.forget_senders(self.taken_ns.saturating_sub(ANSWERED_NS));
         if self.senders.back().is_none_or(|last| last.1 != sender) {

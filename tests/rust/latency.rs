@@ -26,7 +26,7 @@ impl Onlooker for Latency {
         }
     }
 
-    fn answer(&mut self, _: &[u8]) {
+    fn answer(&mut self, _: u64, _: &[u8]) {
         self.answered = true;
     }
 

@@ -17,7 +17,7 @@ impl Device {
         let asked_ns = time_ns(ask.first_edge_ticks, now_ns);
         let mut send = |code: u8, payload: &[&[u8]]| {
             let datagram = [&[code], payload.concat().as_slice()].concat();
-            onlooker.answer(&datagram);
+            onlooker.answer(asked_ns, &datagram);
             self.wire.send(asked_ns, &datagram);
         };
         let reply = reply.map(|reply| (reply, time_ns(reply.at_ticks, now_ns)));

@@ -15,7 +15,7 @@ impl Machine for Device {
         self.is_before(until_ns)
     }
 
-    fn wire(&mut self) -> &mut Wire {
+    fn wire(&mut self, _: usize) -> &mut Wire {
         self.wire()
     }
 
@@ -37,7 +37,7 @@ impl Machine for Device {
         Ok(())
     }
 
-    fn rejected(&self) -> Rejected {
+    fn rejected(&self, _: usize) -> Rejected {
         self.rejected()
     }
 }

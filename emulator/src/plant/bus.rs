@@ -17,6 +17,8 @@ pub struct Bus {
     /// The most that the source gives, V.
     limit_v: f64,
     connected: bool,
+    /// Another bus feeds it, which stands for the source and the capacitor.
+    fed: bool,
 }
 
 impl Bus {
@@ -29,7 +31,31 @@ impl Bus {
             sag_v: 0.0,
             limit_v: f64::INFINITY,
             connected: true,
+            fed: false,
         }
+    }
+
+    /// Takes its voltage from another bus, V, as far as its own source would be connected and sound.
+    pub fn feed(&mut self, volts: f64) {
+        self.fed = true;
+        if self.connected {
+            self.volts = (volts - self.sag_v).min(self.limit_v).max(0.0);
+        }
+    }
+
+    /// Whether what the bridge takes comes from the source.
+    pub fn is_connected(&self) -> bool {
+        self.connected
+    }
+
+    /// The supply as it is now.
+    pub fn supply(&self) -> Supply {
+        self.supply
+    }
+
+    /// Puts another supply in its place; the capacitor keeps its voltage until time goes on.
+    pub fn set_supply(&mut self, supply: Supply) {
+        self.supply = supply;
     }
 
     /// Voltage of the bus in the period that begins, V.
@@ -61,6 +87,9 @@ impl Bus {
     /// Ends a period in which the bridge took this mean current, A; negative is given back.
     #[inline]
     pub fn advance(&mut self, time_s: f64, current_a: f64) {
+        if self.fed && self.connected {
+            return;
+        }
         let Supply {
             resistance_ohm,
             capacitance_f,

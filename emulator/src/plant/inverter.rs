@@ -134,6 +134,11 @@ impl Plant {
         self.stage.machine.shaft_mut().torque_nm = torque_nm;
     }
 
+    /// The temperature of the surroundings, °C.
+    pub fn set_ambient_c(&mut self, ambient_c: f64) {
+        self.stage.machine.set_ambient_c(ambient_c);
+    }
+
     /// Energy stored in motor and shaft, J.
     #[cfg(test)]
     pub(super) fn stored_j(&self) -> f64 {

@@ -156,6 +156,13 @@ impl Machine {
         self.shaft.get_or_insert_with(free)
     }
 
+    /// Changes the temperature of the surroundings, °C.
+    pub(super) fn set_ambient_c(&mut self, ambient_c: f64) {
+        if let Some(warming) = &mut self.warming {
+            warming.set_ambient_c(ambient_c);
+        }
+    }
+
     /// Electrical angle at the start of the period in turns, 0..1.
     pub(super) fn angle_turns(&self) -> f64 {
         self.angle_turns

@@ -3,6 +3,7 @@
 //! Double precision, `libm`'s functions and a fixed order of operations: equal inputs give equal
 //! bits on every machine.
 
+mod air;
 mod breaks;
 mod bus;
 mod circuit;
@@ -25,6 +26,7 @@ mod thermal;
 mod timing;
 mod vector;
 
+pub use air::Air;
 pub use breaks::{Breaks, LegBreaks};
 pub use bus::Bus;
 pub use extras::{Cogging, Drag, Extras, Harmonic, Winding};

@@ -5,8 +5,8 @@ use siskin_control::units::AdcCounts;
 
 use super::Winding;
 
-/// Of the surroundings, and of everything at the start, °C.
-const AMBIENT_C: f64 = 25.0;
+/// Of everything at the start, and of the surroundings, °C.
+pub(super) const AMBIENT_C: f64 = 25.0;
 
 /// What copper's resistance grows by, 1/K.
 const COPPER_PER_K: f64 = 3.93e-3;
@@ -33,6 +33,8 @@ pub struct Thermal {
     board_c: f64,
     /// Temperature of the sensor, °C.
     sensor_c: f64,
+    /// Temperature of the surroundings, °C.
+    ambient_c: f64,
 }
 
 impl Thermal {
@@ -41,14 +43,20 @@ impl Thermal {
         Self {
             board_c: AMBIENT_C,
             sensor_c: AMBIENT_C,
+            ambient_c: AMBIENT_C,
         }
+    }
+
+    /// Changes the temperature of the surroundings, °C.
+    pub fn set_ambient_c(&mut self, ambient_c: f64) {
+        self.ambient_c = ambient_c;
     }
 
     /// Takes the temperatures on by `time_s`, short against 2 s, at the mean square of a current
     /// vector, A².
     pub fn advance(&mut self, time_s: f64, current_square: f64) {
         let heat_w = 1.5 * PATH_OHM * current_square;
-        let settled_c = AMBIENT_C + BOARD_K_PER_W * heat_w;
+        let settled_c = self.ambient_c + BOARD_K_PER_W * heat_w;
         self.board_c += (settled_c - self.board_c) * (time_s * (1.0 / BOARD_S));
         self.sensor_c += (self.board_c - self.sensor_c) * (time_s * (1.0 / SENSOR_S));
     }
@@ -85,6 +93,8 @@ pub(super) struct Warming {
     winding: Winding,
     /// Resistance at 25 °C, Ω.
     cold_ohm: f64,
+    /// Above 25 °C: of the surroundings, and by its own heat above them, K.
+    ambient_k: f64,
     excess_k: f64,
 }
 
@@ -93,21 +103,29 @@ impl Warming {
         Self {
             winding,
             cold_ohm,
+            ambient_k: 0.0,
             excess_k: 0.0,
         }
+    }
+
+    /// Changes the temperature of the surroundings, °C. The winding is as warm as before.
+    pub(super) fn set_ambient_c(&mut self, ambient_c: f64) {
+        let ambient_k = ambient_c - AMBIENT_C;
+        self.excess_k += self.ambient_k - ambient_k;
+        self.ambient_k = ambient_k;
     }
 
     /// Heats the winding for a time that is short against its time constant; its resistance then, Ω.
     pub(super) fn advance(&mut self, time_s: f64, copper_w: f64) -> f64 {
         let heat_w = copper_w - self.excess_k / self.winding.resistance_k_per_w;
         self.excess_k += heat_w * time_s / self.winding.capacity_j_per_k;
-        self.cold_ohm * (1.0 + COPPER_PER_K * self.excess_k)
+        self.cold_ohm * (1.0 + COPPER_PER_K * (self.ambient_k + self.excess_k))
     }
 
     /// Temperature, °C.
     #[cfg(test)]
     pub(super) fn temperature_c(&self) -> f64 {
-        AMBIENT_C + self.excess_k
+        AMBIENT_C + self.ambient_k + self.excess_k
     }
 }
 

@@ -112,7 +112,7 @@ fn run<M: Machine>(
         if let Some(Demand::Throttle(throttle)) = demand {
             let datagram = wire.datagram(throttle, &params);
             // The longest pulse and its rest take 2.34 of 2.5 ms: there is room.
-            let _ = machine.wire().play(slice_ns, &datagram);
+            let _ = machine.wire(0).play(slice_ns, &datagram);
         }
         slice_ns += wire.interval_ns();
         advance(&mut machine, slice_ns.min(end_ns), &mut watch)?;

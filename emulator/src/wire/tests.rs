@@ -278,14 +278,14 @@ fn poll(wire: &mut Wire, now_ns: u64, played: u64) {
         if wire.counts().played == played {
             break;
         }
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
     }
 }
 
 /// A socket whose silence fails a test.
 fn sender() -> UdpSocket {
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let patience = std::time::Duration::from_secs(5);
+    let patience = Duration::from_secs(5);
     sender.set_read_timeout(Some(patience)).unwrap();
     sender
 }

@@ -65,7 +65,7 @@ impl Onlooker for Seen {
         self.edges.push((time_ns, level));
     }
 
-    fn answer(&mut self, datagram: &[u8]) {
+    fn answer(&mut self, _: u64, datagram: &[u8]) {
         if datagram[0] >= 30 {
             self.serial.push(datagram.to_vec());
             return;

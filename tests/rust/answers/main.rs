@@ -126,7 +126,7 @@ impl siskin_emulator::device::Onlooker for Counter {
         self.edges += 1;
     }
 
-    fn answer(&mut self, _: &[u8]) {
+    fn answer(&mut self, _: u64, _: &[u8]) {
         self.answers += 1;
     }
 }

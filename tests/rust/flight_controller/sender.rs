@@ -35,7 +35,7 @@ impl Onlooker for Seen {
         self.tone |= matches!(period.setpoint, Setpoint::Tone(pitch) if pitch != Speed::ZERO);
     }
 
-    fn answer(&mut self, datagram: &[u8]) {
+    fn answer(&mut self, _: u64, datagram: &[u8]) {
         if datagram[0] != BIDIRECTIONAL_DSHOT600 {
             return;
         }

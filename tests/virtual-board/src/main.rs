@@ -6,9 +6,10 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use siskin_emulator::device::Start;
 use siskin_emulator::interrupt;
 use siskin_emulator::live::{self, Opened};
-use siskin_emulator::options::{self, RunArgs, ScenarioArgs};
+use siskin_emulator::options::{self, RunArgs, ScenarioArgs, Speed};
 use siskin_emulator::report;
 use siskin_emulator::scenario::Outcome;
 use siskin_emulator::summary::Report;
@@ -73,18 +74,23 @@ fn run(cli: &Cli) -> Result<ExitCode, String> {
     let args = &cli.run;
     let line = |error: &dyn std::error::Error| error.to_string();
     let image = Image::read(&cli.image).map_err(|error| line(&error))?;
+    if args.escs > 1 || args.speed == Speed::Lockstep {
+        return Err(
+            "--escs and --speed lockstep are the emulator's; run one board for each ESC".to_owned(),
+        );
+    }
     let standing = args.standing().map_err(|error| line(&error))?;
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
     let warn = |warning: &str| eprintln!("siskin-vboard: {warning}");
     warning.as_deref().into_iter().for_each(warn);
-    let start = |start| Ok(VirtualBoard::new(&image, start)?);
+    let start = |starts: Vec<Start>| {
+        let start = starts.into_iter().next().unwrap_or_default();
+        let (board, warning) = VirtualBoard::new(&image, start)?;
+        Ok((board, warning.into_iter().collect()))
+    };
     let opened = |opened: &Opened, board: &VirtualBoard| {
-        if !args.common.json {
-            // Where nobody reads it, the board runs all the same.
-            let what = "image on a virtual board";
-            let greeting = report::greeting(what, args, &standing, opened, board.params());
-            let _ = report::print(&greeting);
-        }
+        let what = "image on a virtual board";
+        report::opened(what, args, &standing, opened, board.params());
     };
     let ended = live::run(session, start, opened, warn);
     let (report, mut board) = ended.map_err(|error| line(&error))?;

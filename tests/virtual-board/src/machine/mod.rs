@@ -226,7 +226,7 @@ impl VirtualBoard {
                 Event::Edge(at, level) => onlooker.edge(ns(at), level),
                 Event::Reply(reply) => {
                     let datagram = reply.datagram();
-                    onlooker.answer(&datagram);
+                    onlooker.answer(reply.asked_ns, &datagram);
                     self.wire.send(reply.asked_ns, &datagram);
                 }
                 Event::Byte(at, MAVLINK, byte) => self.mavlink.sent(at, &[byte], |frame| {
@@ -241,7 +241,7 @@ impl VirtualBoard {
             send(frame);
         });
         if let Some(datagram) = self.telemetry.take(now) {
-            onlooker.answer(&datagram);
+            onlooker.answer(reply.asked_ns, &datagram);
             let asked_ns = self.processor.surroundings().throttle.frame_ns();
             self.wire.send(asked_ns.unwrap_or(0), &datagram);
         }
@@ -275,7 +275,7 @@ impl Machine for VirtualBoard {
         self.now_ns < until_ns
     }
 
-    fn wire(&mut self) -> &mut Wire {
+    fn wire(&mut self, _: usize) -> &mut Wire {
         &mut self.wire
     }
 
@@ -313,13 +313,14 @@ impl Machine for VirtualBoard {
         ran
     }
 
-    fn rejected(&self) -> Rejected {
+    fn rejected(&self, _: usize) -> Rejected {
         let wire = self.wire.counts();
         Rejected {
             wire_datagrams: wire.rejected + wire.dropped,
             // What the chip refuses it tells by MAVLink.
             wire_frames: 0,
             mavlink_frames: self.mavlink.refused(),
+            lockstep_requests: None,
         }
     }
 }

@@ -98,7 +98,7 @@ impl FlightController {
         let mut sent_ns = Vec::with_capacity(frames);
         for frame in 0..frames {
             let at_ns = due_ns.ceil() as u64;
-            board.board.wire().play(at_ns, &datagram).expect("a frame");
+            board.board.wire(0).play(at_ns, &datagram).expect("a frame");
             sent_ns.push(at_ns);
             due_ns += apart_ns(frame);
             if frame % FRAMES_AT_ONCE == FRAMES_AT_ONCE - 1 || frame == frames - 1 {

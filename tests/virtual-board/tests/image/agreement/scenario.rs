@@ -104,7 +104,7 @@ pub(crate) fn play(machine: &mut impl Machine, steps: &[Step], onlooker: &mut im
     for step in steps {
         while frame < step.until_ms {
             if let Some(value) = step.value {
-                let played = machine.wire().play(frame * FRAME_NS, &datagram(value));
+                let played = machine.wire(0).play(frame * FRAME_NS, &datagram(value));
                 played.expect("a frame");
             }
             frame += 1;

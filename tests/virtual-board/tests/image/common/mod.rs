@@ -189,7 +189,7 @@ impl Onlooker for Heard {
         }
     }
 
-    fn answer(&mut self, datagram: &[u8]) {
+    fn answer(&mut self, _: u64, datagram: &[u8]) {
         datagram.hash(&mut self.hash);
         if let [BIDIRECTIONAL_300..=BIDIRECTIONAL_1200, rest @ ..] = datagram
             && let Some((bits, after)) = rest.split_first_chunk()
@@ -287,7 +287,7 @@ impl Board {
             let now_ns = self.now_ns();
             if now_ns >= self.due_ns {
                 if let Some(datagram) = self.throttle.datagram(self.protocol) {
-                    self.board.wire().play(now_ns, &datagram).expect("a frame");
+                    self.board.wire(0).play(now_ns, &datagram).expect("a frame");
                     self.played += 1;
                 }
                 self.due_ns = now_ns + self.throttle.period_ns();

@@ -1,0 +1,66 @@
+#![doc = include_str!("../LOCKSTEP.md")]
+
+mod clock;
+mod request;
+mod state;
+
+use std::time::Duration;
+
+use crate::live::{LiveError, Opened, Session};
+use crate::machine::Machine;
+use crate::rack::Rack;
+use crate::summary::Report;
+use clock::Clock;
+use request::is_request;
+
+/// For how long a client is waited for at once: interrupts and new MAVLink streams are looked at in between.
+const WAIT: Duration = Duration::from_millis(10);
+
+/// Runs a session whose clock a client on the first throttle wire has, until its duration or an interrupt: it ends
+/// with the advance that reaches its end. Tells `opened` once all is open, and `warn` in a line what a person
+/// should know.
+///
+/// # Errors
+/// The session cannot begin or go on.
+pub fn serve(
+    session: Session,
+    opened: impl FnOnce(&Opened, &Rack),
+    warn: impl Fn(&str),
+) -> Result<Report, LiveError> {
+    let (mut open, starts) = session.open()?;
+    let (mut rack, warnings) = Rack::start(starts)?;
+    warnings.into_iter().for_each(&warn);
+    opened(&open.about, &rack);
+
+    let mut clock = Clock::default();
+    let mut request = Vec::new();
+    while open.goes_on() && rack.now_ns() < open.end_ns {
+        let now_ns = rack.now_ns();
+        let sender = rack.wire(0).wait(now_ns, WAIT, is_request, &mut request);
+        open.receive(&mut rack);
+        for esc in 1..rack.escs().len() {
+            rack.wire(esc).poll(now_ns);
+        }
+        let Some(sender) = sender else {
+            continue;
+        };
+        let links = &mut open.links;
+        let obeyed = clock.obey(&request, &mut rack, &mut open.watches, &mut |frame| {
+            // A peer without room loses the frame, as on any datagram link.
+            links.send(frame);
+        });
+        if let Err(malformed) = obeyed
+            && clock.refused() == 1
+        {
+            warn(&format!(
+                "a request in lockstep is malformed: {malformed}; others are counted only"
+            ));
+        }
+        rack.wire(0).send_to(sender, clock.answer());
+    }
+    let mut report = open.finish(&rack)?;
+    if let Some(rejected) = &mut report.rejected {
+        rejected.lockstep_requests = Some(clock.refused());
+    }
+    Ok(report)
+}

@@ -1,0 +1,312 @@
+//! Several ESCs on one clock, one supply and one MAVLink link, taken on by calls.
+//!
+//! No socket and no wall clock: the program and other languages' modules run this. The ESCs go on a control period
+//! at a time, the one furthest behind first, each at the voltage to which all have brought their supply. Each is what
+//! it would be alone, bit for bit, where the supply does not give way.
+
+mod group;
+mod heard;
+mod pack;
+mod state;
+
+use siskin_control::params::ParamId;
+
+use crate::device::{Device, Start, StartError};
+use crate::link::LinkId;
+use crate::machine::{Machine, Onlooker, Stopped};
+use crate::plant::{Air, Source};
+use crate::summary::Rejected;
+use crate::wire::{self, Wire};
+use group::Part;
+use heard::Heard;
+use pack::Pack;
+use state::Means;
+
+pub use heard::Answer;
+pub use state::{EscState, Reported};
+
+/// The most ESCs: `ESC_INFO` has a bit for so many.
+pub const ESCS_MAX: usize = 8;
+
+/// The component id of the first of several ESCs, where none is given.
+const FIRST_COMPONENT: f32 = 140.0;
+
+/// The highest component id that `MAV_COMP_ID` takes.
+const LAST_COMPONENT: f32 = 250.0;
+
+/// ESCs that run together.
+pub struct Rack {
+    escs: Vec<Device>,
+    /// What they share; one alone has its own supply.
+    pack: Option<Pack>,
+    parts: Vec<Part>,
+    means: Vec<Means>,
+    answers: Vec<Answer>,
+    now_ns: u64,
+}
+
+/// What changes around the ESCs; `None` leaves it as it is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Environment {
+    /// Voltage of the supply without load, V: in place of a battery's, which then is never empty.
+    pub supply_v: Option<f64>,
+    /// Resistance of the supply, Ω.
+    pub supply_ohm: Option<f64>,
+    /// Temperature of the air, °C.
+    pub ambient_c: Option<f64>,
+    /// For each ESC in turn: torque on its shaft, Nm, and wind, rad/s, as [`Air`] has them.
+    pub shafts: Vec<[Option<f64>; 2]>,
+}
+
+impl Rack {
+    /// Powers the ESCs up. Of several, each is a peripheral on MAVLink, with component ids that count from the
+    /// first one's `MAV_COMP_ID`, or from 140; and the supply is the first one's.
+    ///
+    /// Returns them with a warning for each whose stored parameters are not whole.
+    ///
+    /// # Errors
+    /// As [`Device::start`].
+    pub fn start(mut starts: Vec<Start>) -> Result<(Self, Vec<&'static str>), StartError> {
+        let several = starts.len() > 1;
+        if several {
+            number(&mut starts)?;
+        }
+        let supplies: Vec<_> = starts.iter().map(|start| start.bench.supply).collect();
+        let started = starts.into_iter().map(Device::start);
+        let started = started.collect::<Result<Vec<_>, _>>()?;
+        let (mut escs, warnings): (Vec<_>, Vec<_>) = started.into_iter().unzip();
+        let parts = group::parts(&escs);
+        for (esc, part) in escs.iter_mut().zip(&parts) {
+            if matches!(part, Part::Follows) {
+                esc.esc_mut().follow();
+            }
+        }
+        let rack = Self {
+            pack: several.then(|| Pack::new(&supplies)).flatten(),
+            means: vec![Means::default(); escs.len()],
+            answers: Vec::new(),
+            now_ns: 0,
+            parts,
+            escs,
+        };
+        Ok((rack, warnings.into_iter().flatten().collect()))
+    }
+
+    /// The ESCs.
+    pub fn escs(&self) -> &[Device] {
+        &self.escs
+    }
+
+    /// Up to where [`Rack::advance_to`] has gone on, ns.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Plays a datagram of the throttle wire on an ESC's wire, from `start_ns` on or after what still plays.
+    ///
+    /// # Errors
+    /// It is malformed, or too much waits.
+    pub fn play(
+        &mut self,
+        esc: usize,
+        start_ns: u64,
+        datagram: &[u8],
+    ) -> Result<(), wire::Rejected> {
+        self.escs[esc].wire().play(start_ns, datagram)
+    }
+
+    /// Changes what is around the ESCs, from their next control periods on.
+    pub fn surround(&mut self, change: &Environment) {
+        let pack = self.pack.as_mut().map(Pack::bus_mut);
+        let own = self.escs.first_mut().map(|esc| esc.around_mut().bus_mut());
+        if let Some(bus) = pack.or(own) {
+            let mut supply = bus.supply();
+            if let Some(volts) = change.supply_v {
+                let sinks = supply.sinks();
+                supply.source = Source::Fixed { volts, sinks };
+            }
+            supply.resistance_ohm = change.supply_ohm.unwrap_or(supply.resistance_ohm);
+            bus.set_supply(supply);
+        }
+        for (index, esc) in self.escs.iter_mut().enumerate() {
+            let around = esc.around_mut();
+            let before = around.air();
+            let [torque_nm, wind_rad_s] = change.shafts.get(index).copied().unwrap_or_default();
+            around.surround(Air {
+                torque_nm: torque_nm.unwrap_or(before.torque_nm),
+                wind_rad_s: wind_rad_s.unwrap_or(before.wind_rad_s),
+                ambient_c: change.ambient_c.unwrap_or(before.ambient_c),
+            });
+        }
+    }
+
+    /// Runs all control periods that begin before `until_ns`: what comes of it does not depend on how a time is
+    /// divided into calls. `send` gets every MAVLink frame.
+    pub fn advance_to(
+        &mut self,
+        until_ns: u64,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        self.answers.clear();
+        self.run(|esc| esc.now_ns() < until_ns, onlooker, send);
+        self.now_ns = self.now_ns.max(until_ns);
+    }
+
+    /// What the ESCs have answered in the latest advance, in the order in which they did.
+    pub fn answers(&self) -> &[Answer] {
+        &self.answers
+    }
+
+    /// The ESCs and their motors as they are now.
+    pub fn states(&self) -> impl Iterator<Item = EscState> {
+        let escs = self.escs.iter().zip(&self.means);
+        escs.map(|(esc, means)| state::state(esc, means))
+    }
+
+    /// Bytes that came in on a MAVLink stream, for all of them.
+    pub fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
+        for (index, esc) in self.escs.iter_mut().enumerate() {
+            onlooker.esc(index);
+            esc.receive(stream, bytes, onlooker);
+        }
+    }
+
+    /// A MAVLink stream that has ended.
+    pub fn forget(&mut self, stream: LinkId) {
+        self.escs.iter_mut().for_each(|esc| esc.forget(stream));
+    }
+
+    fn run(
+        &mut self,
+        is_left: impl Fn(&Device) -> bool,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        let mut means = vec![Means::default(); self.escs.len()];
+        let mut ran = false;
+        while let Some(esc) = self.furthest_behind(&is_left) {
+            self.step(esc, &mut means[esc], onlooker, send);
+            ran = true;
+        }
+        if ran {
+            self.means = means;
+        }
+        let next = self.escs.iter().map(Device::begins_s).reduce(f64::min);
+        if let (Some(pack), Some(next_s)) = (&mut self.pack, next) {
+            // As the next period would find it.
+            let volts = pack.volts_at(next_s);
+            for esc in &mut self.escs {
+                esc.around_mut().bus_mut().feed(volts);
+            }
+        }
+    }
+
+    /// The ESC whose next period begins first, of those that have one left.
+    fn furthest_behind(&self, is_left: impl Fn(&Device) -> bool) -> Option<usize> {
+        let mut first = None;
+        let mut first_s = f64::INFINITY;
+        for (index, esc) in self.escs.iter().enumerate() {
+            let begins_s = esc.begins_s();
+            if begins_s < first_s && is_left(esc) {
+                (first, first_s) = (Some(index), begins_s);
+            }
+        }
+        first
+    }
+
+    fn step(
+        &mut self,
+        index: usize,
+        means: &mut Means,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
+        if let Part::Leads(slots) = &self.parts[index]
+            && self.escs[index].task_is_due()
+        {
+            let four = group::four(&self.escs, slots);
+            self.escs[index].esc_mut().lead(four);
+        }
+        onlooker.esc(index);
+        let mut heard = Heard {
+            onlooker,
+            answers: &mut self.answers,
+            esc: index,
+        };
+        let esc = &mut self.escs[index];
+        if let Some(pack) = &mut self.pack {
+            let volts = pack.volts_at(esc.begins_s());
+            esc.around_mut().bus_mut().feed(volts);
+        }
+        let motion = esc.step(&|_, _| None, &mut heard, send);
+        means.add(&motion, esc.rig().period_s());
+        if let Some(pack) = &mut self.pack {
+            let is_connected = esc.around_mut().bus_mut().is_connected();
+            pack.draw(index, if is_connected { motion.bus_a } else { 0.0 });
+        }
+    }
+}
+
+/// Gives each its component id, and its share of the link.
+fn number(starts: &mut [Start]) -> Result<(), StartError> {
+    let escs = starts.len();
+    let given = starts[0].overrides.iter().rev();
+    let mut given = given.filter(|(id, _)| *id == ParamId::MavCompId);
+    let first = given.next().map_or(FIRST_COMPONENT, |(_, value)| *value);
+    if first + (escs - 1) as f32 > LAST_COMPONENT {
+        return Err(StartError::Params {
+            name: ParamId::MavCompId.entry().name,
+            reason: "leaves no component id up to 250 for the last ESC; give a lower one",
+        });
+    }
+    for (index, start) in starts.iter_mut().enumerate() {
+        start.overrides.extend([
+            (ParamId::MavRole, 1.0),
+            (ParamId::MavCompId, first + index as f32),
+        ]);
+        start.link_bytes_per_s /= escs as u32;
+    }
+    Ok(())
+}
+
+impl Machine for Rack {
+    fn now_ns(&self) -> u64 {
+        self.escs.iter().map(Device::now_ns).min().unwrap_or(0)
+    }
+
+    fn is_before(&self, until_ns: u64) -> bool {
+        self.escs.iter().any(|esc| esc.is_before(until_ns))
+    }
+
+    fn escs(&self) -> usize {
+        self.escs.len()
+    }
+
+    fn wire(&mut self, esc: usize) -> &mut Wire {
+        self.escs[esc].wire()
+    }
+
+    fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
+        self.receive(stream, bytes, onlooker);
+    }
+
+    fn forget(&mut self, stream: LinkId) {
+        self.forget(stream);
+    }
+
+    fn advance(
+        &mut self,
+        until_ns: u64,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) -> Result<(), Stopped> {
+        self.answers.clear();
+        self.run(|esc| esc.is_before(until_ns), onlooker, send);
+        Ok(())
+    }
+
+    fn rejected(&self, esc: usize) -> Rejected {
+        self.escs[esc].rejected()
+    }
+}

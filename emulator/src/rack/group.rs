@@ -1,0 +1,47 @@
+//! Which ESC of a rack tells of which by MAVLink.
+
+use siskin_control::mavlink::Four;
+
+use crate::device::Device;
+
+/// An ESC's part in the messages for four.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Part {
+    /// It tells of itself.
+    Alone,
+    /// Another tells of it.
+    Follows,
+    /// It tells of those in these slots.
+    Leads([Option<usize>; 4]),
+}
+
+/// The parts of all: of those whose component ids number them, the lowest of each group of four leads.
+pub(super) fn parts(escs: &[Device]) -> Vec<Part> {
+    if escs.len() < 2 {
+        return vec![Part::Alone; escs.len()];
+    }
+    let numbers: Vec<_> = escs.iter().map(|esc| esc.esc().number()).collect();
+    let part = |number: &Option<u8>| {
+        let Some(own) = *number else {
+            return Part::Alone;
+        };
+        let four = own - own % 4;
+        let in_slot = |slot| numbers.iter().position(|n| *n == Some(four + slot));
+        let slots = [0, 1, 2, 3].map(in_slot);
+        let first = slots.into_iter().flatten().next();
+        match first {
+            Some(first) if numbers[first] == Some(own) => Part::Leads(slots),
+            _ => Part::Follows,
+        }
+    };
+    numbers.iter().map(part).collect()
+}
+
+/// What one that leads tells, with its ESCs as they are now.
+pub(super) fn four(escs: &[Device], slots: &[Option<usize>; 4]) -> Four {
+    let last = escs.iter().filter_map(|esc| esc.esc().number()).max();
+    Four {
+        escs: slots.map(|esc| esc.map(|esc| *escs[esc].esc().telemetry())),
+        count: last.map_or(0, |last| last + 1),
+    }
+}
