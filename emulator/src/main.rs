@@ -6,7 +6,7 @@ mod cli;
 use std::process::ExitCode;
 
 use clap::Parser;
-use indicatif::ProgressBar;
+use indicatif::{ProgressBar, ProgressStyle};
 use siskin_emulator::interrupt;
 use siskin_emulator::live::{self, Opened};
 use siskin_emulator::lockstep;
@@ -16,8 +16,13 @@ use siskin_emulator::plot;
 use siskin_emulator::rack::Rack;
 use siskin_emulator::report;
 use siskin_emulator::reproduce;
+use siskin_emulator::scenario::{Place, Row, Table, Verdict};
+use siskin_emulator::summary::Report;
 
 use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs};
+
+/// How far a sweep has come, and how long it still takes.
+const PROGRESS: &str = "{wide_bar} {pos} of {len} runs, {eta} to go";
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -72,12 +77,27 @@ fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
     let plan = args.plan().map_err(line)?;
     let stop = interrupt::flag();
     let stop = stop.map_err(|error| format!("cannot listen for interrupts: {error}"))?;
+    let table = args.table.as_deref().map(Table::create).transpose();
+    let table = table.map_err(|error| error.to_string())?;
+    let wanted = table.is_some();
+    let finish = |rows: &[Row]| match table {
+        Some(table) => table.finish(rows).map_err(|error| error.to_string()),
+        None => Ok(()),
+    };
     if args.seeds.is_some() || plan.runs() > 1 {
         // On standard error, and nothing where that is no terminal.
-        let bar = ProgressBar::new(plan.runs() as u64);
-        let survey = plan.survey(&stop, || bar.inc(1));
+        let style = ProgressStyle::with_template(PROGRESS).map_err(|error| error.to_string())?;
+        let bar = ProgressBar::new(plan.runs() as u64).with_style(style);
+        let mut rows = Vec::new();
+        let row = |place: &Place, report: &Report, verdicts: &[Verdict]| {
+            if wanted {
+                rows.push(Row::of(place, report, verdicts));
+            }
+        };
+        let survey = plan.survey(&stop, || bar.inc(1), row);
         bar.finish_and_clear();
         let survey = survey.map_err(line)?;
+        finish(&rows)?;
         report::print(&if args.common.json {
             report::json(&survey)?
         } else {
@@ -86,6 +106,11 @@ fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
         return Ok(ExitCode::from(survey.exit_status()));
     }
     let outcome = plan.play(&stop).map_err(line)?;
+    finish(&[Row::of(
+        &outcome.place,
+        &outcome.report,
+        &outcome.expectations,
+    )])?;
     report::print(&if args.common.json {
         report::json(&outcome)?
     } else {

@@ -98,6 +98,9 @@ pub struct ScenarioArgs {
     /// or signal.0.rpm=3000.0 (entries count from 0); repeatable
     #[arg(long, value_name = "KEY=VALUE", value_parser = key)]
     pub set: Vec<(String, toml::Value)>,
+    /// Writes a row for each run: its seed, swept and drawn keys, figures and verdicts, to .csv or .parquet
+    #[arg(long, value_name = "PATH")]
+    pub table: Option<PathBuf>,
     /// What runs in real time and offline have in common.
     #[command(flatten)]
     pub common: CommonArgs,

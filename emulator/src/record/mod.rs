@@ -41,6 +41,9 @@ pub enum RecordError {
         "cannot record to {}: the name must end in .csv, .parquet, .vcd or .tlog", .0.display()
     )]
     Extension(PathBuf),
+    /// No format of a table has it.
+    #[error("--table {}: the name must end in .csv or .parquet", .0.display())]
+    Table(PathBuf),
     /// The format is not in this build.
     #[error("cannot record to {}: {}", .0.display(), NO_PARQUET)]
     NoParquet(PathBuf),

@@ -34,6 +34,7 @@ mod play;
 mod signal;
 mod stand;
 mod survey;
+mod table;
 mod vary;
 mod wire;
 
@@ -48,6 +49,7 @@ use rayon::prelude::*;
 
 use crate::device::Start;
 use crate::machine::Machine;
+use crate::summary::Report;
 use courses::Courses;
 pub use error::ScenarioError;
 pub use fault::from_text as fault;
@@ -57,6 +59,7 @@ pub use place::Place;
 use play::Played;
 pub use stand::{Standing, stand};
 pub use survey::{Expected, Failure, Survey};
+pub use table::{Cell, Row, Table};
 use vary::{Case, Variations};
 
 /// The longest file, bytes: one of a hundred times the usual length. An entry takes a few KB while it is
@@ -139,7 +142,8 @@ impl Plan {
         }
     }
 
-    /// Plays all runs on all processors; `each` is called after each of them. Once `stop` is set none
+    /// Plays all runs on all processors; `each` is called after each of them, and `row` at the end for each in the
+    /// order of the runs. Once `stop` is set none
     /// begins or goes on: the survey is of those that have been played to their end.
     ///
     /// # Errors
@@ -148,6 +152,7 @@ impl Plan {
         &self,
         stop: &AtomicBool,
         each: impl Fn() + Sync,
+        mut row: impl FnMut(&Place, &Report, &[Verdict]),
     ) -> Result<Survey, ScenarioError> {
         let began = Instant::now();
         let played = (0..self.runs()).into_par_iter().filter_map(|index| {
@@ -163,6 +168,9 @@ impl Plan {
         });
         let played = played.collect::<Result<Vec<_>, _>>()?;
         let left_out = self.runs() - played.len();
+        for (place, played) in &played {
+            row(place, &played.report, &played.verdicts);
+        }
         Ok(Survey::of(played, left_out, began.elapsed().as_secs_f64()))
     }
 

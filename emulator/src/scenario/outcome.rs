@@ -21,6 +21,9 @@ pub struct Outcome {
     /// What the seed drew, if anything.
     #[serde(serialize_with = "place::map", skip_serializing_if = "Vec::is_empty")]
     pub drawn: Vec<(String, toml::Value)>,
+    /// Which run it is.
+    #[serde(skip)]
+    pub place: Place,
 }
 
 impl Outcome {
@@ -34,7 +37,8 @@ impl Outcome {
             report,
             expectations: verdicts,
             interrupted,
-            drawn: place.drawn,
+            drawn: place.drawn.clone(),
+            place,
         }
     }
 

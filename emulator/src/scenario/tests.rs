@@ -53,9 +53,13 @@ fn a_survey_counts_and_names_the_worst_run() {
     let plan = plan(FILE, &seeds(1, 3)).unwrap();
     let played = AtomicUsize::new(0);
     let survey = plan
-        .survey(&AtomicBool::new(false), || {
-            played.fetch_add(1, Ordering::Relaxed);
-        })
+        .survey(
+            &AtomicBool::new(false),
+            || {
+                played.fetch_add(1, Ordering::Relaxed);
+            },
+            |_, _, _| (),
+        )
         .unwrap();
     assert_eq!(played.into_inner(), 12);
     assert_eq!((survey.runs, survey.failed), (12, 6));
@@ -89,10 +93,14 @@ fn an_interrupt_keeps_what_has_been_played() {
     let plan = plan(FILE, &seeds(1, 3)).unwrap();
     let stop = AtomicBool::new(false);
     let played = AtomicUsize::new(0);
-    let survey = plan.survey(&stop, || {
-        played.fetch_add(1, Ordering::Relaxed);
-        stop.store(true, Ordering::Relaxed);
-    });
+    let survey = plan.survey(
+        &stop,
+        || {
+            played.fetch_add(1, Ordering::Relaxed);
+            stop.store(true, Ordering::Relaxed);
+        },
+        |_, _, _| (),
+    );
     let survey = survey.unwrap();
     // Runs beside the first are cut short, unless they have ended too.
     assert_eq!(survey.runs, played.into_inner());
@@ -125,7 +133,7 @@ fn threads_and_order_change_nothing() {
         let survey = pool
             .build()
             .unwrap()
-            .install(|| plan.survey(&AtomicBool::new(false), || ()));
+            .install(|| plan.survey(&AtomicBool::new(false), || (), |_, _, _| ()));
         let mut survey = serde_json::to_value(survey.unwrap()).unwrap();
         for key in ["wall_s", "sim_per_wall"] {
             survey[key].take();
@@ -138,9 +146,11 @@ fn threads_and_order_change_nothing() {
 #[test]
 fn seeds_make_other_runs() {
     let hash = |first, last| {
-        plan(FILE, &seeds(first, last))
-            .unwrap()
-            .survey(&AtomicBool::new(false), || ())
+        plan(FILE, &seeds(first, last)).unwrap().survey(
+            &AtomicBool::new(false),
+            || (),
+            |_, _, _| (),
+        )
     };
     let hash = |first, last| hash(first, last).unwrap().trace_hash;
     assert_eq!(hash(1, 1), hash(1, 1));
@@ -165,9 +175,11 @@ fn a_run_without_the_figure_is_the_worst() {
         [sweep]
         "window.0.t0_s" = [0.0, 0.00999]
     "#;
-    let survey = plan(text, &Options::default())
-        .unwrap()
-        .survey(&AtomicBool::new(false), || ());
+    let survey = plan(text, &Options::default()).unwrap().survey(
+        &AtomicBool::new(false),
+        || (),
+        |_, _, _| (),
+    );
     let survey = survey.unwrap();
     assert_eq!((survey.failed, survey.expectations[0].worst), (1, None));
     assert_eq!(

@@ -6,7 +6,7 @@ use crate::rig::Rig;
 use crate::surroundings::{Motion, Passage};
 
 /// Bytes that wait to be hashed at once, at most: the hash's set-up costs more than a period's words.
-const BYTES: usize = 16_384;
+const BYTES: usize = 2_048;
 
 /// Bytes of one period's words, at most: there are some 200 of four.
 const PERIOD_BYTES: usize = 4_096;

@@ -11,7 +11,7 @@ use siskin_emulator::interrupt;
 use siskin_emulator::live::{self, Opened};
 use siskin_emulator::options::{self, RunArgs, ScenarioArgs, Speed};
 use siskin_emulator::report;
-use siskin_emulator::scenario::Outcome;
+use siskin_emulator::scenario::{Outcome, Row, Table};
 use siskin_emulator::summary::Report;
 use siskin_vboard::image::Image;
 use siskin_vboard::load::Figures;
@@ -120,6 +120,11 @@ fn scenario(image: &Path, args: &ScenarioArgs) -> Result<ExitCode, String> {
         processor = board.figures();
     });
     let outcome = played.map_err(line)?;
+    if let Some(path) = &args.table {
+        let row = Row::of(&outcome.place, &outcome.report, &outcome.expectations);
+        let written = Table::create(path).and_then(|table| table.finish(&[row]));
+        written.map_err(|error| error.to_string())?;
+    }
     let status = outcome.exit_status();
     let text = if args.common.json {
         report::json(&Played { outcome, processor })?
