@@ -5,10 +5,10 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
-#include <poll.h>
 #include <stdint.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #define SISKIN_VERSION 1
@@ -120,10 +120,8 @@ static inline int siskin_read(struct siskin *s) {
 static inline int siskin_call(struct siskin *s, uint32_t sequence, int ask) {
     for (int attempt = 0; attempt < 50; attempt++) {
         if (send(s->socket, s->request, s->request_len, 0) < 0 && errno != ECONNREFUSED) return -1;
-        struct pollfd ready = {.fd = s->socket, .events = POLLIN};
-        while (poll(&ready, 1, 200) > 0) {
-            ssize_t got = recv(s->socket, s->state, sizeof s->state, 0);
-            if (got < 24) break;
+        ssize_t got;
+        while ((got = recv(s->socket, s->state, sizeof s->state, 0)) >= 24) {
             uint32_t refused = s->refused;
             s->state_len = (size_t)got;
             if (siskin_read(s) < 0) return -1;
@@ -152,6 +150,8 @@ static inline int siskin_open(struct siskin *s, const char *address, uint16_t po
     }
     s->socket = socket(AF_INET, SOCK_DGRAM, 0);
     if (s->socket < 0 || connect(s->socket, (struct sockaddr *)&to, sizeof to) < 0) return -1;
+    struct timeval wait = {.tv_usec = 200000};
+    if (setsockopt(s->socket, SOL_SOCKET, SO_RCVTIMEO, &wait, sizeof wait) < 0) return -1;
     s->request[0] = 43;
     s->request[1] = SISKIN_VERSION;
     s->request_len = 2;

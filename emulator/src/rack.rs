@@ -185,8 +185,14 @@ impl Rack {
     ) {
         let mut means = vec![Means::default(); self.escs.len()];
         let mut ran = false;
-        while let Some(esc) = self.furthest_behind(&is_left) {
+        let mut begin_s: Vec<_> = self.escs.iter().map(Device::begins_s).collect();
+        while let Some(esc) = first(&begin_s) {
+            if !is_left(&self.escs[esc]) {
+                begin_s[esc] = f64::INFINITY;
+                continue;
+            }
             self.step(esc, &mut means[esc], onlooker, send);
+            begin_s[esc] = self.escs[esc].begins_s();
             ran = true;
         }
         if ran {
@@ -200,19 +206,6 @@ impl Rack {
                 esc.around_mut().bus_mut().feed(volts);
             }
         }
-    }
-
-    /// The ESC whose next period begins first, of those that have one left.
-    fn furthest_behind(&self, is_left: impl Fn(&Device) -> bool) -> Option<usize> {
-        let mut first = None;
-        let mut first_s = f64::INFINITY;
-        for (index, esc) in self.escs.iter().enumerate() {
-            let begins_s = esc.begins_s();
-            if begins_s < first_s && is_left(esc) {
-                (first, first_s) = (Some(index), begins_s);
-            }
-        }
-        first
     }
 
     fn step(
@@ -246,6 +239,17 @@ impl Rack {
             pack.draw(index, if is_connected { motion.bus_a } else { 0.0 });
         }
     }
+}
+
+/// Whose period begins first, of those that begin at all.
+fn first(begin_s: &[f64]) -> Option<usize> {
+    let (mut first, mut first_s) = (None, f64::INFINITY);
+    for (esc, begins_s) in begin_s.iter().enumerate() {
+        if *begins_s < first_s {
+            (first, first_s) = (Some(esc), *begins_s);
+        }
+    }
+    first
 }
 
 /// Gives each its component id, and its share of the link.

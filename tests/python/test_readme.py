@@ -1,5 +1,6 @@
 """What the READMEs have a person type: every command and script, as it is pasted."""
 
+import json
 import os
 import re
 import subprocess
@@ -15,6 +16,8 @@ from paths import PROGRAM, ROOT, SCENARIOS, TOOL, VIRTUAL_BOARD
 from readme import FRONT, READMES, blocks, commands
 
 CONTRIBUTING = ROOT / "CONTRIBUTING.md"
+EMULATOR = ROOT / "emulator" / "README.md"
+LOCKSTEP = ROOT / "emulator" / "LOCKSTEP.md"
 
 SCRIPT = """
 from pymavlink import mavutil
@@ -69,6 +72,42 @@ def test_a_script_of_a_readme_works_as_pasted(start, index, speed):
     printed = run_script(blocks("python")[index], start(*PATIENT, speed=speed))
     rpm = [int(number) for number in re.findall(r"(-?\d+) rpm", printed)]
     assert abs(rpm[-1] - 3150) <= 32, f"half throttle: {rpm}"
+
+
+def recipe(word: str) -> str:
+    """The recipe of the emulator's README that has this word."""
+    return next(block for block in blocks("py", EMULATOR) if word in block)
+
+
+def test_the_recipe_for_pytest_passes(tmp_path):
+    (tmp_path / "test_esc.py").write_text(recipe("pytest").replace('"target/release/siskin-emulator"', repr(str(PROGRAM))))
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_esc.py"]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0 and "1 passed" in ended.stdout, ended.stdout
+
+
+def test_the_recipe_for_four_escs_turns_them(start):
+    printed = run_script(recipe("range(4)"), start("--escs", 4, *PATIENT))
+    *speeds, _ = printed.splitlines()[-1].split()
+    assert len(speeds) == 4 and all(abs(int(rpm) - 3150) <= 32 for rpm in speeds), printed[-200:]
+
+
+def test_the_recipe_for_lockstep_names_what_is_there():
+    example = (ROOT / "emulator" / "lockstep" / "example.c").read_text()
+    # test_lockstep.py builds and runs it.
+    assert "cargo run --release -- --speed lockstep --escs 4 --bus 6s" in example
+    assert "--speed lockstep --escs 4 --bus 6s" in EMULATOR.read_text()
+
+
+def test_the_container_builds_what_the_workspace_has():
+    text = (ROOT / "emulator" / "Containerfile").read_text()
+    channel = re.search(r'channel = "(\d+\.\d+)', (ROOT / "rust-toolchain.toml").read_text()).group(1)
+    assert f"rust:{channel}-slim" in text
+    entry = json.loads(re.search(r"^ENTRYPOINT (\[.*\])$", text, re.MULTILINE).group(1))
+    # Ports of the machine's choice, since others may hold these.
+    options = [re.sub(r":(5760|14600)$", ":0", word) for word in entry[1:]]
+    ended = run(*options, "--json", "--duration", 0.01)
+    assert entry[0] == PROGRAM.name and ended.returncode == 0, ended.stderr
 
 
 # The programs that `cargo run` starts, by what stands behind -p.
@@ -178,7 +217,7 @@ def anchors(text: str) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("file", [*READMES, CONTRIBUTING, ROOT / "CHANGELOG.md"], ids=str)
+@pytest.mark.parametrize("file", [*READMES, CONTRIBUTING, LOCKSTEP, ROOT / "CHANGELOG.md"], ids=str)
 def test_every_link_leads_somewhere(file):
     text = re.sub(r"^ *```.*?^ *```", "", file.read_text(), flags=re.MULTILINE | re.DOTALL)
     links = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r"^\[[^\]]+\]: (\S+)$", text, re.MULTILINE)

@@ -3,9 +3,13 @@
 /// Rate of the timer that captures the wire's edges: that of the STM32G431.
 pub(super) const CAPTURE_HZ: u32 = 170_000_000;
 
+/// The greatest rate of which both the timer's and that of nanoseconds are multiples.
+const STEP_HZ: u32 = 10_000_000;
+
 /// The capturing timer's count at a time.
 pub(super) fn ticks(time_ns: u64) -> u32 {
-    (u128::from(time_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000) as u32
+    // Each control period asks: a product that 34 years fill is divided in a fifth of the time of a wider one.
+    (time_ns * u64::from(CAPTURE_HZ / STEP_HZ) / u64::from(1_000_000_000 / STEP_HZ)) as u32
 }
 
 /// When the capturing timer shows a count: the time nearest to `near_ns`, to the next nanosecond.

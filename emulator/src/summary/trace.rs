@@ -6,7 +6,7 @@ use crate::rig::Rig;
 use crate::surroundings::{Motion, Passage};
 
 /// Bytes that wait to be hashed at once, at most: the hash's set-up costs more than a period's words.
-const BYTES: usize = 2_048;
+const BYTES: usize = 16_384;
 
 /// Bytes of one period's words, at most: there are some 200 of four.
 const PERIOD_BYTES: usize = 4_096;
@@ -14,32 +14,31 @@ const PERIOD_BYTES: usize = 4_096;
 /// Hashes the words of the control state.
 pub(super) struct Trace {
     hash: Xxh3,
-    /// The latest period's words, little-endian.
-    room: Box<[u8; PERIOD_BYTES]>,
-    /// Those that have not been hashed yet.
-    bytes: Vec<u8>,
+    /// Words, little-endian, with room for a period's behind them.
+    bytes: Box<[u8; BYTES + PERIOD_BYTES]>,
+    /// How many of them have not been hashed yet.
+    waiting: usize,
 }
 
 impl Trace {
     pub(super) fn new() -> Self {
         Self {
             hash: Xxh3::new(),
-            room: Box::new([0; PERIOD_BYTES]),
-            bytes: Vec::with_capacity(BYTES),
+            bytes: Box::new([0; BYTES + PERIOD_BYTES]),
+            waiting: 0,
         }
     }
 
     /// Takes in the state after a period.
     #[inline]
     pub(super) fn take(&mut self, rig: &Rig) {
-        // Each word has a fixed place there: nothing is checked word by word.
-        let room = &mut *self.room;
+        let Some(room) = self.room() else { return };
         let mut len = 0;
         rig.trace(&mut |word: u32| {
             room[len..len + 4].copy_from_slice(&word.to_le_bytes());
             len += 4;
         });
-        self.keep(len);
+        self.waiting += len;
     }
 
     /// Takes in what the motor did in a period.
@@ -54,28 +53,29 @@ impl Trace {
         } = passage.motion;
         let motor = [angle_turns, speed_rad_s, a, b, c, bus_v, bus_a];
         let means = [passage.length_s, flow.torque_nm];
+        let Some(room) = self.room() else { return };
         let mut len = 0;
         for value in motor.into_iter().chain(means) {
-            self.room[len..len + 8].copy_from_slice(&value.to_le_bytes());
+            room[len..len + 8].copy_from_slice(&value.to_le_bytes());
             len += 8;
         }
-        self.keep(len);
+        self.waiting += len;
     }
 
-    /// Keeps what is in the room to be hashed.
+    /// Room for a period behind what waits, where each word has a fixed place: nothing is checked word by word.
     #[inline]
-    fn keep(&mut self, len: usize) {
-        if self.bytes.len() + len > BYTES {
-            self.hash.update(&self.bytes);
-            self.bytes.clear();
+    fn room(&mut self) -> Option<&mut [u8; PERIOD_BYTES]> {
+        if self.waiting > BYTES {
+            self.hash.update(&self.bytes[..self.waiting]);
+            self.waiting = 0;
         }
-        self.bytes.extend_from_slice(&self.room[..len]);
+        self.bytes[self.waiting..].first_chunk_mut()
     }
 
     /// The hash so far.
     pub(super) fn digest(&self) -> u64 {
         let mut hash = self.hash.clone();
-        hash.update(&self.bytes);
+        hash.update(&self.bytes[..self.waiting]);
         hash.digest()
     }
 }

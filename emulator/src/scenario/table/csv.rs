@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io;
 
-use super::{Cell, Row};
+use super::row::{Cell, Row};
 
 /// Numbers as the shortest text that is the same double.
 pub(super) fn write(file: File, columns: &[String], rows: &[Row]) -> io::Result<()> {

@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::Type;
 
-use super::{Cell, Row};
+use super::row::{Cell, Row};
 
 /// How a column is stored.
 #[derive(Clone, Copy, PartialEq)]
@@ -122,4 +122,43 @@ fn fill<T: DataType>(
         .typed::<T>()
         .write_batch(&values, Some(&there), None)?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+
+    use super::*;
+
+    #[test]
+    fn a_table_is_read_back() {
+        let cell = |name: &str, cell| (name.to_owned(), cell);
+        let rows = [
+            Row(vec![
+                cell("seed", Cell::Whole(u64::MAX)),
+                cell("signal.0.rpm", Cell::Number(3e3)),
+                cell("mixed", Cell::Number(0.5)),
+                cell("held", Cell::Flag(true)),
+            ]),
+            Row(vec![
+                cell("seed", Cell::Whole(2)),
+                cell("signal.0.rpm", Cell::Nothing),
+                cell("mixed", Cell::Text("6s".to_owned())),
+                cell("held", Cell::Flag(false)),
+            ]),
+        ];
+        let columns = crate::scenario::table::row::columns(&rows);
+        let file = tempfile::tempfile().unwrap();
+        write(file.try_clone().unwrap(), &columns, &rows).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
+        let read: Vec<_> = reader
+            .into_iter()
+            .map(|row| row.unwrap().to_string())
+            .collect();
+        let wanted = [
+            r#"{seed: 18446744073709551615, signal.0.rpm: 3000.0, mixed: "0.5", held: true}"#,
+            r#"{seed: 2, signal.0.rpm: null, mixed: "6s", held: false}"#,
+        ];
+        assert_eq!(read, wanted);
+    }
 }
