@@ -261,6 +261,21 @@ mod tests {
     }
 
     #[test]
+    fn a_fed_bus_is_the_other_s_until_it_is_cut_off() {
+        let mut bus = Bus::new(Supply::battery(4));
+        bus.feed(15.0);
+        bus.advance(PERIOD_S, 30.0);
+        assert_eq!(bus.volts(), 15.0);
+        bus.sag(2.0);
+        bus.feed(15.0);
+        assert_eq!(bus.volts(), 13.0);
+        bus.connect(false);
+        bus.feed(16.0);
+        bus.advance(1e-3, 2.0);
+        assert!((bus.volts() - (13.0 - 2e-3 / 470e-6)).abs() < 1e-9);
+    }
+
+    #[test]
     fn disconnected_the_capacitor_alone_carries_the_bus() {
         let mut bus = Bus::new(Supply::stiff(24.0));
         bus.connect(false);

@@ -162,6 +162,28 @@ mod tests {
     }
 
     #[test]
+    fn the_surroundings_warm_board_and_winding() {
+        let mut thermal = Thermal::new();
+        thermal.set_ambient_c(60.0);
+        (0..200_000).for_each(|_| thermal.advance(1e-3, 0.0));
+        assert!((thermal.sensor_c() - 60.0).abs() < 0.1);
+        let winding = Winding {
+            resistance_k_per_w: 5.0,
+            capacity_j_per_k: 10.0,
+        };
+        let mut warming = Warming::new(winding, 0.1);
+        warming.set_ambient_c(60.0);
+        assert!(
+            (warming.temperature_c() - 25.0).abs() < 1e-9,
+            "at once it is as warm as before"
+        );
+        (0..500_000).for_each(|_| {
+            warming.advance(1e-3, 0.0);
+        });
+        assert!((warming.temperature_c() - 60.0).abs() < 0.01);
+    }
+
+    #[test]
     fn a_winding_warms_up_and_its_resistance_with_it() {
         let winding = Winding {
             resistance_k_per_w: 5.0,
