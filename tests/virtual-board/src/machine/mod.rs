@@ -241,9 +241,10 @@ impl VirtualBoard {
             send(frame);
         });
         if let Some(datagram) = self.telemetry.take(now) {
-            onlooker.answer(reply.asked_ns, &datagram);
             let asked_ns = self.processor.surroundings().throttle.frame_ns();
-            self.wire.send(asked_ns.unwrap_or(0), &datagram);
+            let asked_ns = asked_ns.unwrap_or(0);
+            onlooker.answer(asked_ns, &datagram);
+            self.wire.send(asked_ns, &datagram);
         }
     }
 
