@@ -1,0 +1,7 @@
+"""Where what these tests share with the others is."""
+
+import sys
+
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
