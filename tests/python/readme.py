@@ -8,7 +8,7 @@ from paths import ROOT
 
 FRONT = ROOT / "README.md"
 READMES = [FRONT, *(ROOT / crate / "README.md" for crate in ("emulator", "firmware", "shared", "tools"))]
-READMES += [ROOT / "tests" / "virtual-board" / "README.md"]
+READMES += [ROOT / "tests" / folder / "README.md" for folder in ("flight", "virtual-board")]
 
 
 def blocks(language: str, *readmes: Path) -> list[str]:
