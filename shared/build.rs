@@ -33,8 +33,10 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=src/checksum.rs");
     let folder = env::var_os("OUT_DIR").expect("cargo sets it");
     let folder = Path::new(&folder);
-    let parameter = compress(&parameters())?;
+    let parameters = parameters();
+    let parameter = compress(&parameters)?;
     let general = compress(&general(checksum::checksum(0, &parameter)))?;
+    fs::write(folder.join("parameter.json"), parameters)?;
     fs::write(folder.join("parameter.json.xz"), parameter)?;
     fs::write(folder.join("general.json.xz"), general)
 }

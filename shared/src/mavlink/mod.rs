@@ -33,6 +33,7 @@ pub use component::Component;
 pub use context::{Act, Context, Request};
 pub use frame::{Address, Frame};
 pub use group::Four;
+pub use ftp::PARAMETER_METADATA;
 pub use receiver::{Counters, Receiver};
 pub use schedule::Intervals;
 pub use signing::{Kept as KeptSigning, Key};

@@ -10,6 +10,10 @@ use crate::checksum::checksum;
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
 static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
 
+/// The metadata of all parameters as ground stations read it, JSON, for programs that have the table at hand. No
+/// image holds it: what is served is compressed.
+pub const PARAMETER_METADATA: &str = include_str!(concat!(env!("OUT_DIR"), "/parameter.json"));
+
 /// Checksum of the general metadata.
 pub(super) const GENERAL_CHECKSUM: u32 = checksum(
     0,

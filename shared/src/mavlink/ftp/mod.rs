@@ -26,6 +26,7 @@ mod text;
 mod view;
 
 pub(super) use answer::{Answer, PAYLOAD_MAX};
+pub use files::PARAMETER_METADATA;
 pub(super) use metadata::{is_metadata, metadata};
 pub(super) use server::Server;
 pub(super) use view::View;
