@@ -303,6 +303,20 @@ impl Device {
         }
     }
 
+    /// Lets a fault act from its time on, in place of one of its kind.
+    pub fn inject(&mut self, fault: Fault) {
+        self.faults.inject(self.t_s(), fault);
+    }
+
+    /// Makes whole again all that faults have broken by now.
+    pub fn mend(&mut self) {
+        self.faults.mend(self.t_s());
+    }
+
+    fn t_s(&self) -> f64 {
+        self.now_ns() as f64 * 1e-9
+    }
+
     /// What came in since the start and was refused.
     pub fn rejected(&self) -> Rejected {
         let wire = self.wire.counts();

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::fault::Fault;
 use crate::link::LinkId;
 use crate::plant::Gate;
 use crate::rig::{Period, Rig};
@@ -41,6 +42,18 @@ pub trait Machine {
         onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) -> Result<(), Stopped>;
+
+    /// Lets a fault act from its time on, in place of one of its kind.
+    ///
+    /// # Errors
+    /// A line on why nothing can be broken here.
+    fn inject(&mut self, esc: usize, fault: Fault) -> Result<(), &'static str>;
+
+    /// Makes whole again all that faults have broken by now.
+    ///
+    /// # Errors
+    /// Likewise.
+    fn mend(&mut self, esc: usize) -> Result<(), &'static str>;
 
     /// What came in for an ESC since the start and was refused.
     fn rejected(&self, esc: usize) -> Rejected;

@@ -12,6 +12,7 @@ mod state;
 use siskin_control::params::ParamId;
 
 use crate::device::{Device, Start, StartError};
+use crate::fault::Fault;
 use crate::link::LinkId;
 use crate::machine::{Machine, Onlooker, Stopped};
 use crate::plant::{Air, Source};
@@ -307,6 +308,16 @@ impl Machine for Rack {
     ) -> Result<(), Stopped> {
         self.answers.clear();
         self.run(|esc| esc.is_before(until_ns), onlooker, send);
+        Ok(())
+    }
+
+    fn inject(&mut self, esc: usize, fault: Fault) -> Result<(), &'static str> {
+        self.escs[esc].inject(fault);
+        Ok(())
+    }
+
+    fn mend(&mut self, esc: usize) -> Result<(), &'static str> {
+        self.escs[esc].mend();
         Ok(())
     }
 

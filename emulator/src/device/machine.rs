@@ -1,6 +1,7 @@
 //! The emulated ESC as a machine that runs: what the wire asks for counts.
 
 use super::Device;
+use crate::fault::Fault;
 use crate::link::LinkId;
 use crate::machine::{Machine, Onlooker, Stopped};
 use crate::summary::Rejected;
@@ -34,6 +35,16 @@ impl Machine for Device {
         send: &mut dyn FnMut(&[u8]),
     ) -> Result<(), Stopped> {
         self.advance(until_ns, |_, _| None, onlooker, send);
+        Ok(())
+    }
+
+    fn inject(&mut self, _: usize, fault: Fault) -> Result<(), &'static str> {
+        self.inject(fault);
+        Ok(())
+    }
+
+    fn mend(&mut self, _: usize) -> Result<(), &'static str> {
+        self.mend();
         Ok(())
     }
 

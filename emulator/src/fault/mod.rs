@@ -58,6 +58,21 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether it is the same but for a value.
+    fn is_like(&self, other: &Self) -> bool {
+        let place = |kind: &Self| match *kind {
+            Self::PhaseOpen(phase)
+            | Self::SensorStuck(phase, _)
+            | Self::OffsetDrift(phase, _)
+            | Self::HallStuck(phase, _) => Some((phase, None)),
+            Self::MosfetOpen(phase, side) | Self::MosfetShort(phase, side) => {
+                Some((phase, Some(side)))
+            }
+            _ => None,
+        };
+        std::mem::discriminant(self) == std::mem::discriminant(other) && place(self) == place(other)
+    }
+
     /// Whether the bus may fall so low by it that the chip is in reset.
     const fn weakens_bus(&self) -> bool {
         matches!(

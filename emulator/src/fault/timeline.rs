@@ -51,6 +51,8 @@ pub struct Timeline {
     pub due_s: f64,
     /// What was in force at the last look.
     pub now: InForce,
+    /// What faults have left that are not in the list any more.
+    past: InForce,
 }
 
 impl Timeline {
@@ -60,8 +62,35 @@ impl Timeline {
         Self {
             due_s: due_s.fold(f64::INFINITY, f64::min),
             now: InForce::default(),
+            past: InForce::default(),
             faults,
         }
+    }
+
+    /// Adds a fault at a time, in place of one of its kind, phase and switch that has begun.
+    pub fn inject(&mut self, t_s: f64, fault: Fault) {
+        self.forget(t_s, |old| old.kind.is_like(&fault.kind));
+        self.faults.push(fault);
+        self.due_s = t_s;
+    }
+
+    /// Ends at a time all that has begun. What it has done to the shaft stays.
+    pub fn mend(&mut self, t_s: f64) {
+        self.forget(t_s, |_| true);
+        self.due_s = t_s;
+    }
+
+    /// Takes off faults that have begun.
+    fn forget(&mut self, t_s: f64, which: impl Fn(&Fault) -> bool) {
+        for fault in self
+            .faults
+            .extract_if(.., |fault| fault.has_begun(t_s) && which(fault))
+        {
+            self.past.grow(&fault, t_s);
+        }
+        // These end with their fault.
+        self.past.drift_a = [0.0; 3];
+        self.past.held = false;
     }
 
     /// Looks at `t_s`, which does not go back: gives what was in force before.
@@ -74,7 +103,7 @@ impl Timeline {
     /// What is in force at a time. Of two faults of a kind and phase that give a value the later entry
     /// counts; what adds up is added.
     fn at(&self, t_s: f64) -> InForce {
-        let mut now = InForce::default();
+        let mut now = self.past;
         for fault in self.faults.iter().filter(|fault| fault.has_begun(t_s)) {
             now.grow(fault, t_s);
             if fault.acts(t_s) {
@@ -86,7 +115,8 @@ impl Timeline {
 
     /// When something changes after `t_s`: `t_s` itself where it does in every period.
     fn next_s(&self, t_s: f64) -> f64 {
-        if self.faults.iter().any(|fault| fault.moves(t_s)) {
+        // A bus that was weakened comes back after its fault.
+        if self.past.bus_weakened || self.faults.iter().any(|fault| fault.moves(t_s)) {
             return t_s;
         }
         let times = self.faults.iter();
@@ -193,6 +223,45 @@ mod tests {
         assert_eq!([1.0, 1.5, 2.25].map(&mut due), [1.5, 2.0, 2.25]);
         assert_eq!(due(3.0), f64::INFINITY);
         assert_eq!(timeline.now.drift_a[0], 1.0);
+    }
+
+    #[test]
+    fn what_is_injected_takes_the_place_of_its_like_and_can_be_mended() {
+        let mut timeline = Timeline::new(vec![fault(9.0, None, Kind::BusDisconnect)]);
+        for (t_s, kind) in [
+            (1.0, Kind::Strike(0.1)),
+            (2.0, Kind::Strike(0.2)),
+            (2.0, Kind::RotorKick(50.0)),
+            (3.0, Kind::RotorKick(50.0)),
+            (3.0, Kind::OffsetDrift(1, 2.0)),
+            (3.0, Kind::MosfetOpen(1, Side::Low)),
+            (3.0, Kind::MosfetOpen(1, Side::High)),
+            (3.0, Kind::Reset),
+        ] {
+            timeline.inject(t_s, fault(t_s, None, kind));
+            assert_eq!(timeline.due_s, t_s);
+            timeline.look(t_s);
+        }
+        assert_eq!(timeline.now.torque_nm, 0.2);
+        assert_eq!(
+            (timeline.now.kicked_rad_s, timeline.now.drift_a[1]),
+            (100.0, 2.0)
+        );
+        assert_eq!(timeline.now.breaks.0[1].open, [true, true]);
+        timeline.mend(4.0);
+        timeline.look(4.0);
+        let left = InForce {
+            kicked_rad_s: 100.0,
+            resets: 1,
+            ..InForce::default()
+        };
+        assert_eq!((timeline.now, timeline.due_s), (left, 9.0));
+        timeline.look(9.0);
+        assert!(timeline.now.disconnected);
+        timeline.mend(10.0);
+        timeline.look(10.0);
+        assert_eq!(timeline.due_s, 10.0, "the bus is watched");
+        assert!(!timeline.now.disconnected);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use siskin_control::mavlink::Request;
 use siskin_control::params::Params;
 use siskin_control::store;
 use siskin_emulator::device::Start;
-use siskin_emulator::fault::Timeline;
+use siskin_emulator::fault::{Fault, Timeline};
 use siskin_emulator::flash::{FLASH_BYTES, FileFlash, PAGE_BYTES};
 use siskin_emulator::link::LinkId;
 use siskin_emulator::machine::{Machine, Onlooker, Stopped};
@@ -312,6 +312,16 @@ impl Machine for VirtualBoard {
         self.tell(onlooker, send);
         self.persist()?;
         ran
+    }
+
+    fn inject(&mut self, _: usize, fault: Fault) -> Result<(), &'static str> {
+        self.faults.inject(self.now_ns as f64 * 1e-9, fault);
+        Ok(())
+    }
+
+    fn mend(&mut self, _: usize) -> Result<(), &'static str> {
+        self.faults.mend(self.now_ns as f64 * 1e-9);
+        Ok(())
     }
 
     fn rejected(&self, _: usize) -> Rejected {
