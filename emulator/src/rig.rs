@@ -220,8 +220,7 @@ impl Rig {
 impl Period {
     /// Estimated less true electrical angle at the sample, degrees, ±180.
     pub fn angle_error_deg(&self, snapshot: &Snapshot) -> f64 {
-        let turns = snapshot.angle.to_num::<f64>() - self.motion.angle_turns;
-        (turns - libm::round(turns)) * 360.0
+        self.motion.angle_error_deg(snapshot)
     }
 
     /// Mechanical speed, rpm.

@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use siskin_control::drive::{Bridge, Sample};
+use siskin_control::drive::{Bridge, Sample, Snapshot};
 
 use crate::bench::Bench;
 use crate::fault::InForce;
@@ -316,6 +316,12 @@ impl Motion {
     /// Whether the plant's numbers have become none.
     pub fn diverged(&self) -> bool {
         !(self.speed_rad_s.is_finite() && self.flow.torque_nm.is_finite())
+    }
+
+    /// Estimated less true electrical angle, degrees, ±180.
+    pub fn angle_error_deg(&self, snapshot: &Snapshot) -> f64 {
+        let turns = snapshot.angle.to_num::<f64>() - self.angle_turns;
+        (turns - libm::round(turns)) * 360.0
     }
 
     /// Mechanical speed, rpm.

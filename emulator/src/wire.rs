@@ -138,6 +138,10 @@ pub struct Wire {
     last: Option<(u64, u64)>,
     errors: WireErrors,
     noise: Noise,
+    /// When the socket has last given a frame.
+    heard_ns: Option<u64>,
+    /// What the latest frame asks for, 0 to 1.
+    throttle: f64,
 }
 
 impl Wire {
@@ -155,6 +159,8 @@ impl Wire {
             last: None,
             errors: WireErrors::default(),
             noise: Noise::new(0),
+            heard_ns: None,
+            throttle: 0.0,
         }
     }
 
@@ -208,6 +214,17 @@ impl Wire {
         self.counts
     }
 
+    /// When the socket has last given a frame that was played, ns.
+    pub fn heard_ns(&self) -> Option<u64> {
+        self.heard_ns
+    }
+
+    /// What the latest frame asks for, 0 to 1 of its range, for a person to see; 0 before there was one, and of
+    /// raw edges.
+    pub fn throttle(&self) -> f64 {
+        self.throttle
+    }
+
     /// Plays the datagrams that have come in, the first from `now_ns` on. Never waits.
     pub fn poll(&mut self, now_ns: u64) {
         // Taken out for the loop, since playing borrows the whole wire.
@@ -219,6 +236,7 @@ impl Wire {
             match socket.recv_from(&mut buffer) {
                 Ok((length, sender)) => {
                     if let Ok(Some(start_ns)) = self.take(now_ns, &buffer[..length]) {
+                        self.heard_ns = Some(now_ns);
                         self.sends(start_ns, Some(sender));
                     }
                 }
@@ -311,6 +329,7 @@ impl Wire {
             if self.errors.lost {
                 return Ok(None);
             }
+            self.throttle = frame.throttle();
             let frame = self.flipped(frame);
             self.append(now_ns, &frame).map(Some)
         });

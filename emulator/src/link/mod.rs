@@ -77,6 +77,11 @@ impl Links {
         self.links.iter_mut().map(|link| link.send(frame)).sum()
     }
 
+    /// A number for a stream that another part of the program carries.
+    pub fn stream(&mut self) -> LinkId {
+        self.ids.next()
+    }
+
     /// What the slowest link carries, bytes/s: a terminal's rate, or what a loopback socket takes
     /// without loss where there is none.
     pub fn slowest_bytes_per_s(&self) -> u32 {

@@ -3,7 +3,7 @@
 #[cfg(feature = "parquet")]
 use serde::Deserializer;
 use serde::{Deserialize, Serialize};
-use siskin_control::drive::{Bridge, Phase};
+use siskin_control::drive::{Bridge, Phase, Snapshot};
 
 use crate::rig::{Period, Rig};
 use crate::shaft::Units;
@@ -141,9 +141,18 @@ impl Row {
     /// The period that began at `t_s`, and what the control of the rig made of it.
     pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Self {
         let (snapshot, units) = (&rig.snapshot(), Units::of(rig.config()));
+        Self::seen(t_s, (period.bridge, &period.motion), (snapshot, units))
+    }
+
+    /// The same of what was kept of it.
+    pub fn seen(
+        t_s: f64,
+        (bridge, motion): (Bridge, &Motion),
+        (snapshot, units): (&Snapshot, Units<'_>),
+    ) -> Self {
         let scale = units.scale;
         let turns = snapshot.angle.to_num::<f64>();
-        let duties = match period.bridge {
+        let duties = match bridge {
             Bridge::Off | Bridge::Charge(_) => [None; 3],
             Bridge::Legs(legs) => legs.map(|leg| leg.map(|duty| duty.to_num::<f32>())),
             Bridge::Brake => [Some(0.0); 3],
@@ -155,7 +164,7 @@ impl Row {
             rpm_est: Some(units.rpm(snapshot.speed) as f32),
             rpm_ref: Some(units.rpm(snapshot.speed_reference) as f32),
             angle_est_deg: Some(((turns - turns.floor()) * 360.0) as f32),
-            angle_error_deg: Some(period.angle_error_deg(snapshot) as f32),
+            angle_error_deg: Some(motion.angle_error_deg(snapshot) as f32),
             i_d_a: Some(scale.amperes(snapshot.i.d)),
             i_q_a: Some(scale.amperes(snapshot.i.q)),
             u_d_v: Some(scale.volts(snapshot.u.d)),
@@ -163,7 +172,7 @@ impl Row {
             duty_a: duties[0],
             duty_b: duties[1],
             duty_c: duties[2],
-            ..Self::outside(t_s, &period.motion)
+            ..Self::outside(t_s, motion)
         }
     }
 

@@ -61,6 +61,7 @@ pub use stand::{Standing, stand};
 pub use survey::{Expected, Failure, Survey};
 pub use table::{Cell, Row, Table};
 use vary::{Case, Variations};
+pub(crate) use wire::bits as dshot_bits;
 
 /// The longest file, bytes: one of a hundred times the usual length. An entry takes a few KB while it is
 /// understood.

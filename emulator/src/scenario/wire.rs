@@ -71,8 +71,8 @@ impl Wire {
     }
 }
 
-/// The 16 bits of a frame.
-fn bits(throttle: f64, bidirectional: bool) -> u16 {
+/// The 16 bits of a DShot frame of a throttle, 0 to 1.
+pub(crate) fn bits(throttle: f64, bidirectional: bool) -> u16 {
     let value = if throttle > 0.0 {
         48 + libm::round(throttle * 1999.0) as u16
     } else {

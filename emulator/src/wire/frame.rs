@@ -92,6 +92,22 @@ impl<'a> Frame<'a> {
         }
     }
 
+    /// What it asks for, 0 to 1 of its range; 0 of raw levels.
+    pub(super) fn throttle(&self) -> f64 {
+        let share = |value: f64, from: f64, to: f64| ((value - from) / (to - from)).clamp(0.0, 1.0);
+        match *self {
+            Self::DShot { bits, .. } => share(f64::from(bits >> 5), 47.0, 2047.0),
+            Self::Pulse { width_ns } => {
+                // Servo, OneShot125, OneShot42, Multishot: no two of them have a width in common.
+                let ranges = [(1000.0, 2000.0), (125.0, 250.0), (42.0, 84.0), (5.0, 25.0)];
+                let width_us = width_ns as f64 * 1e-3;
+                let found = ranges.iter().find(|(from, _)| width_us > 0.7 * from);
+                found.map_or(0.0, |(from, to)| share(width_us, *from, *to))
+            }
+            Self::Raw { .. } => 0.0,
+        }
+    }
+
     /// Calls `set` with the time from the frame's start, ns, and the level from then on.
     pub(super) fn levels(&self, mut set: impl FnMut(u64, bool)) {
         match *self {
