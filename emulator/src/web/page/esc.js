@@ -1,0 +1,110 @@
+// One ESC as a MAVLink client sees it: parameters, commands and files.
+
+const ANSWER_MS = 1500;
+const REAL32 = 9;
+const RESULTS = ["accepted", "temporarily rejected", "denied", "not supported", "failed", "in progress", "cancelled"];
+const IN_PROGRESS = 5;
+const FTP = { terminate: 1, open: 4, read: 5, ack: 128 };
+const FTP_DATA = 12;
+
+export class Esc extends EventTarget {
+  constructor(link, system, component) {
+    super();
+    Object.assign(this, { link, system, component, params: new Map(), count: 0, waiting: [], sequence: 0 });
+  }
+
+  send(name, message) {
+    this.link.mavlink(name, { target_system: this.system, target_component: this.component, ...message });
+  }
+
+  take(message) {
+    if (message.name === "PARAM_VALUE") {
+      this.params.set(message.param_id, message.param_value);
+      this.count = message.param_count;
+      this.dispatchEvent(new CustomEvent("param", { detail: message.param_id }));
+    }
+    this.waiting = this.waiting.filter((look) => !look(message));
+  }
+
+  /** The first message for which `match` gives something, or null in time. */
+  next(match, time = ANSWER_MS) {
+    return new Promise((resolve) => {
+      const timer = setTimeout(() => resolve(null), time);
+      this.waiting.push((message) => {
+        const found = match(message);
+        if (found) {
+          clearTimeout(timer);
+          resolve(message);
+        }
+        return found;
+      });
+    });
+  }
+
+  async readParams() {
+    this.params.clear();
+    this.count = 0;
+    this.send("PARAM_REQUEST_LIST", {});
+    for (let tries = 0; tries < 20; tries++) {
+      await new Promise((resolve) => setTimeout(resolve, 300));
+      if (this.count > 0 && this.params.size >= this.count) return true;
+      if (this.count === 0) this.send("PARAM_REQUEST_LIST", {});
+    }
+    return false;
+  }
+
+  /** Sets a parameter; what is in force afterwards, or null without an answer. */
+  async setParam(name, value) {
+    const answer = this.next((m) => m.name === "PARAM_VALUE" && m.param_id === name);
+    this.send("PARAM_SET", { param_id: name, param_value: value, param_type: REAL32 });
+    return (await answer)?.param_value ?? null;
+  }
+
+  /** Sends a command; `progress` hears percentages until the result, a text, is there. */
+  async command(command, params, progress = () => {}) {
+    const ack = (time) => this.next((m) => m.name === "COMMAND_ACK" && m.command === command, time);
+    let answer = ack(ANSWER_MS);
+    this.send("COMMAND_LONG", { command, params });
+    for (;;) {
+      const got = await answer;
+      if (!got) return "no answer";
+      if (got.result !== IN_PROGRESS) return RESULTS[got.result] ?? `result ${got.result}`;
+      progress(got.progress);
+      answer = ack(20 * ANSWER_MS);
+    }
+  }
+
+  async request(opcode, fields) {
+    const payload = new Uint8Array(251);
+    const view = new DataView(payload.buffer);
+    const sequence = (this.sequence = (this.sequence + 2) & 0xffff);
+    view.setUint16(0, sequence, true);
+    payload.set([fields.session ?? 0, opcode, fields.size ?? 0], 2);
+    view.setUint32(8, fields.offset ?? 0, true);
+    payload.set(fields.data ?? [], FTP_DATA);
+    const match = (m) => m.name === "FILE_TRANSFER_PROTOCOL" && (m.payload[0] | (m.payload[1] << 8)) === ((sequence + 1) & 0xffff);
+    for (let tries = 0; tries < 3; tries++) {
+      const answer = this.next(match);
+      this.send("FILE_TRANSFER_PROTOCOL", { payload });
+      const got = await answer;
+      if (got) return got.payload;
+    }
+    return null;
+  }
+
+  /** A text file of the ESC's, or null. */
+  async file(path) {
+    const data = new TextEncoder().encode(path);
+    const opened = await this.request(FTP.open, { data, size: data.length });
+    if (opened?.[3] !== FTP.ack) return null;
+    const [, , session] = opened;
+    const bytes = [];
+    for (;;) {
+      const part = await this.request(FTP.read, { session, offset: bytes.length, size: 200 });
+      if (part?.[3] !== FTP.ack || part[4] === 0) break;
+      bytes.push(...part.slice(FTP_DATA, FTP_DATA + part[4]));
+    }
+    await this.request(FTP.terminate, { session });
+    return new TextDecoder().decode(new Uint8Array(bytes));
+  }
+}

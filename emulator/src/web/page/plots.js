@@ -1,0 +1,163 @@
+// The plots: one uPlot each, with a common time axis, cursor and marks.
+
+const HEIGHT = 128;
+const AXIS = 52;
+const COLOURS = ["--trace-0", "--trace-1", "--trace-2"];
+
+/** What can be plotted: name, unit, channels with their labels, and whether it is shown from the start. */
+export const PLOTS = [
+  ["Speed", "rpm", [["rpm", "true"], ["rpm_est", "estimated"], ["rpm_ref", "reference"]], true],
+  ["Phase currents", "A", [["i_a_a", "a"], ["i_b_a", "b"], ["i_c_a", "c"]], true],
+  ["Currents d, q", "A", [["i_d_a", "d"], ["i_q_a", "q"]], true],
+  ["Angle error", "°", [["angle_error_deg", "estimated less true"]], true],
+  ["Throttle", "", [["throttle", "throttle"]], true],
+  ["Angle", "°", [["angle_deg", "true"], ["angle_est_deg", "estimated"]], false],
+  ["Duty", "", [["duty_a", "a"], ["duty_b", "b"], ["duty_c", "c"]], false],
+  ["Voltages d, q", "V", [["u_d_v", "d"], ["u_q_v", "q"]], false],
+  ["Flux linkages", "Wb", [["flux_a_wb", "a"], ["flux_b_wb", "b"], ["flux_c_wb", "c"]], false],
+  ["Supply voltage", "V", [["bus_v", "supply"]], false],
+  ["Supply current", "A", [["bus_a", "supply"]], true],
+  ["Torque", "Nm", [["torque_nm", "torque"]], false],
+];
+
+const colours = new Map();
+
+/** A colour of the style sheet as the canvas takes it, of the scheme in force. */
+export function colour(name) {
+  if (!colours.has(name)) {
+    const probe = document.createElement("i");
+    probe.style.color = `var(${name})`;
+    document.body.append(probe);
+    colours.set(name, getComputedStyle(probe).color);
+    probe.remove();
+  }
+  return colours.get(name);
+}
+
+/** Lets what else is due have its turn: whoever holds the throttle must be heard. */
+const breath = () => new Promise((resolve) => setTimeout(resolve));
+
+const digits = (value) => (value == null ? "–" : Math.abs(value) >= 100 ? value.toFixed(1) : value.toPrecision(4));
+
+export class Plots {
+  /** `zoomed` hears of a piece that was selected, from and to in seconds. */
+  constructor(place, choice, zoomed) {
+    Object.assign(this, { place, zoomed, shown: [], marks: {}, data: null, cursor: null });
+    for (const [index, [name, , , first]] of PLOTS.entries()) {
+      const label = document.createElement("label");
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: first });
+      box.addEventListener("change", () => this.choose(index, box.checked));
+      label.append(box, ` ${name}`);
+      choice.append(label);
+    }
+    this.wanted = PLOTS.map((plot) => plot[3]);
+    new ResizeObserver(() => this.resize()).observe(place);
+    this.rebuild();
+  }
+
+  choose(index, wanted) {
+    this.wanted[index] = wanted;
+    this.rebuild();
+  }
+
+  get width() {
+    return Math.max(200, this.place.clientWidth - 12);
+  }
+
+  resize() {
+    for (const { plot } of this.shown) plot.setSize({ width: this.width, height: HEIGHT });
+  }
+
+  /** Makes all plots anew, as after a change of the scheme or of the choice. */
+  rebuild() {
+    colours.clear();
+    for (const { plot } of this.shown) plot.destroy();
+    this.place.replaceChildren();
+    this.shown = PLOTS.flatMap((plot, index) => (this.wanted[index] ? [this.make(plot)] : []));
+    if (this.data) this.draw(this.data);
+  }
+
+  make([name, unit, channels]) {
+    const box = document.createElement("div");
+    box.className = "plot";
+    const head = document.createElement("h3");
+    head.textContent = unit ? `${name}, ${unit}` : name;
+    box.append(head);
+    this.place.append(box);
+    const [text, line] = [colour("--dim"), colour("--line")];
+    const axis = { stroke: text, grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "11px system-ui" };
+    const options = {
+      width: this.width,
+      height: HEIGHT,
+      legend: { live: true },
+      cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false }, points: { size: 5 } },
+      scales: { x: { time: false }, y: { range: (_, min, max) => room(min, max) } },
+      axes: [{ ...axis, size: 28, values: (_, at) => at.map((t) => `${+t.toFixed(5)}`) }, { ...axis, size: AXIS, space: 18, values: (_, at) => at.map((value) => `${+value.toPrecision(4)}`) }],
+      series: [
+        { label: "t, s", value: (_, t) => (t == null ? "–" : t.toFixed(5)) },
+        ...channels.map(([, label], i) => ({
+          label, stroke: colour(COLOURS[i]), width: 1, points: { show: false }, value: (_, value) => digits(value),
+        })),
+      ],
+      hooks: {
+        setSelect: [(plot) => this.select(plot)],
+        setCursor: [(plot) => { if (plot.cursor.left >= 0) this.cursor = plot.posToVal(plot.cursor.left, "x"); }],
+        draw: [(plot) => this.drawMarks(plot)],
+      },
+    };
+    const plot = new globalThis.uPlot(options, [[], ...channels.map(() => [])], box);
+    return { plot, channels: channels.map(([channel]) => channel), name, unit, labels: channels.map((c) => c[1]) };
+  }
+
+  select(plot) {
+    const { left, width } = plot.select;
+    if (width < 3) return;
+    this.zoomed(plot.posToVal(left, "x"), plot.posToVal(left + width, "x"));
+    plot.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+  }
+
+  drawMarks(plot) {
+    const { ctx, bbox } = plot;
+    for (const [name, t] of Object.entries(this.marks)) {
+      if (t == null || t < plot.scales.x.min || t > plot.scales.x.max) continue;
+      const x = plot.valToPos(t, "x", true);
+      ctx.save();
+      ctx.strokeStyle = ctx.fillStyle = colour("--accent");
+      ctx.setLineDash([4, 3]);
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+      ctx.fillText(name, x + 3, bbox.top + 10);
+      ctx.restore();
+    }
+  }
+
+  /** The channels that are shown. */
+  get channels() {
+    return [...new Set(this.shown.flatMap((shown) => shown.channels))];
+  }
+
+  /** Draws a piece: times, values by the channel's name, and the range of time. */
+  async draw(data) {
+    this.data = data;
+    const { shown } = this;
+    for (const { plot, channels } of shown) {
+      await breath();
+      if (shown !== this.shown) return;
+      plot.batch(() => {
+        plot.setData([data.t, ...channels.map((channel) => data.values[channel] ?? [])], false);
+        plot.setScale("x", { min: data.from, max: data.to });
+      });
+    }
+  }
+}
+
+/** The range of the vertical axis: with some room, and never less than what noise is. */
+function room(min, max) {
+  if (min == null) return [0, 1];
+  if (min === 0 && max === 0) return [-1, 1];
+  const least = Math.max(Math.abs(min), Math.abs(max)) * 0.02 + 1e-6;
+  const spare = Math.max((max - min) * 0.08, least);
+  return [min - spare, max + spare];
+}

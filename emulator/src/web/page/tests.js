@@ -1,0 +1,43 @@
+// Self-test and identification, with their progress and what they have found.
+
+const SELF_TEST = 401;
+const IDENTIFY = 31010;
+const BEGIN = 1;
+const KEEP = 2;
+
+const element = (id) => document.getElementById(id);
+
+export class Tests {
+  constructor(esc, told) {
+    Object.assign(this, { esc, told });
+    element("self-test").addEventListener("click", () => this.run("Self-test", SELF_TEST, [1], "@SYS/check.txt"));
+    element("identify").addEventListener("click", async () => {
+      const result = await this.run("Identification", IDENTIFY, [BEGIN], "@SYS/identify.txt");
+      element("keep").disabled = result !== "accepted";
+    });
+    element("keep").addEventListener("click", async () => {
+      const result = await this.esc()?.command(IDENTIFY, [KEEP]);
+      this.told(`Keeping what was found: ${result}`, result !== "accepted");
+    });
+  }
+
+  async run(name, command, params, path) {
+    const esc = this.esc();
+    if (!esc) return null;
+    const [bar, report] = [element("progress"), element("report")];
+    const buttons = ["self-test", "identify"].map(element);
+    buttons.forEach((button) => { button.disabled = true; });
+    report.hidden = true;
+    bar.hidden = false;
+    bar.value = 0;
+    this.told(`${name} begins`);
+    const result = await esc.command(command, params, (percent) => { if (percent <= 100) bar.value = percent; });
+    this.told(`${name}: ${result}`, result !== "accepted");
+    const text = await esc.file(path);
+    bar.hidden = true;
+    buttons.forEach((button) => { button.disabled = false; });
+    report.hidden = !text;
+    report.textContent = text ?? "";
+    return result;
+  }
+}

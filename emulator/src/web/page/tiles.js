@@ -1,0 +1,65 @@
+// The figures above the plots.
+
+const NAMES = [
+  ["rpm", "Speed, rpm"], ["amps", "Supply, A"], ["volts", "Supply, V"], ["watts", "Power, W"],
+  ["celsius", "Board, °C"], ["efficiency", "Efficiency, %"], ["faults", "Faults"],
+];
+const LEAST_W = 1;
+
+/** A number to some digits, without the sign of nothing. */
+const digits = (value, count) => value.toFixed(count).replace(/^-(0(\.0*)?)$/, "$1");
+
+/** ESC_FAILURE_FLAGS in words. */
+const FLAGS = ["over-current", "over-voltage", "over-temperature", "over-speed", "inconsistent command", "motor stuck", "fault"];
+
+export class Tiles {
+  constructor(place) {
+    this.tiles = {};
+    for (const [name, label] of NAMES) {
+      const tile = document.createElement("div");
+      tile.className = name === "faults" ? "tile wide" : "tile";
+      const [value, text] = [document.createElement("b"), document.createElement("span")];
+      value.id = `tile-${name}`;
+      [value.textContent, text.textContent] = ["–", label];
+      tile.append(value, text);
+      place.append(tile);
+      this.tiles[name] = value;
+    }
+  }
+
+  set(name, text) {
+    if (this.tiles[name].textContent !== text) this.tiles[name].textContent = text;
+  }
+
+  status({ rpm, voltage, current }, slot) {
+    this.set("rpm", String(rpm[slot]));
+    this.set("volts", digits(voltage[slot], 2));
+    this.set("amps", digits(current[slot], 2));
+    this.set("watts", digits(voltage[slot] * current[slot], 1));
+  }
+
+  info({ temperature, failure_flags }, slot) {
+    this.set("celsius", digits(temperature[slot] / 100, 1));
+    const flags = failure_flags[slot];
+    this.flags = FLAGS.filter((_, bit) => flags & (1 << bit));
+    this.showFaults();
+  }
+
+  /** What the traces tell: the faults as they come, and power into the shaft against that from the supply. */
+  traces({ values }, names) {
+    const bits = values.faults?.at(-1);
+    this.known = bits == null ? null : names.filter((_, bit) => bits & (1 << bit));
+    this.showFaults();
+    const mean = (list) => list.reduce((sum, value) => sum + value, 0) / list.length;
+    const [torque, rpm, volts, amps] = ["torque_nm", "rpm", "bus_v", "bus_a"].map((name) => mean(values[name]));
+    const watts = volts * amps;
+    const shaft = (torque * rpm * 2 * Math.PI) / 60;
+    this.set("efficiency", watts > LEAST_W && shaft > 0 ? ((100 * shaft) / watts).toFixed(1) : "–");
+  }
+
+  showFaults() {
+    const faults = this.known ?? this.flags ?? [];
+    this.set("faults", faults.length ? faults.join(", ") : "none");
+    this.tiles.faults.parentElement.classList.toggle("bad", faults.length > 0);
+  }
+}

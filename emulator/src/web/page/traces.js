@@ -1,0 +1,169 @@
+// Which piece of the traces is shown: the latest, a triggered one, or one that a person looks at.
+
+const FRAME_MS = 40;
+const SPANS = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
+const DEFAULT_SPAN_S = 2;
+const BEFORE = 0.2;
+const ALWAYS = ["rpm", "i_d_a", "i_q_a", "u_d_v", "u_q_v", "bus_v", "bus_a", "torque_nm", "faults", "phase", "throttle"];
+
+const element = (id) => document.getElementById(id);
+
+export class Traces {
+  /** `seen` hears each piece that is drawn. */
+  constructor(link, plots, seen) {
+    Object.assign(this, { link, plots, seen, channels: [], id: 0, span: DEFAULT_SPAN_S, to: null, paused: false });
+    this.after = 0;
+    this.latest = 0;
+    this.busy = null;
+    for (const span of SPANS) {
+      const text = span < 1 ? `${span * 1000} ms` : `${span} s`;
+      element("span").append(new Option(text, span, false, span === DEFAULT_SPAN_S));
+    }
+    element("span").addEventListener("change", () => this.zoom(Number(element("span").value)));
+    element("pause").addEventListener("click", () => this.pause(!this.paused));
+    element("live").addEventListener("click", () => this.live());
+    element("zoom-in").addEventListener("click", () => this.zoom(this.span / 2));
+    element("zoom-out").addEventListener("click", () => this.zoom(this.span * 2));
+    element("trigger").addEventListener("change", () => this.arm());
+    document.addEventListener("keydown", (event) => this.key(event));
+    this.loop();
+  }
+
+  hello({ channels }) {
+    this.channels = channels;
+    element("trigger-channel").replaceChildren(...channels.map((name, i) => new Option(name, i, false, name === "i_a_a")));
+  }
+
+  arm() {
+    element("trigger-level").hidden = element("trigger").value !== "level";
+    this.after = this.latest;
+    this.live();
+  }
+
+  pause(paused) {
+    this.paused = paused;
+    if (paused) this.to ??= this.latest;
+    else this.to = null;
+    element("pause").setAttribute("aria-pressed", paused);
+    this.dirty = true;
+  }
+
+  live() {
+    this.pause(false);
+    this.zoom(Math.max(this.span, SPANS[0]));
+  }
+
+  zoom(span) {
+    const old = this.span;
+    this.span = Math.min(Math.max(span, 1e-4), SPANS.at(-1));
+    // About the middle of what a person looks at.
+    if (this.paused) this.to = this.to - old / 2 + this.span / 2;
+    element("span").value = SPANS.includes(this.span) ? this.span : "";
+    this.dirty = true;
+  }
+
+  look(from, to) {
+    this.pause(true);
+    this.to = to;
+    this.span = to - from;
+    element("span").value = "";
+    this.dirty = true;
+  }
+
+  key(event) {
+    if (event.target.closest("input, select, textarea, summary") || event.ctrlKey || event.metaKey || event.altKey) return;
+    const pan = (share) => { this.pause(true); this.to += share * this.span; };
+    const keys = {
+      p: () => this.pause(!this.paused), l: () => this.live(),
+      "+": () => this.zoom(this.span / 2), "-": () => this.zoom(this.span * 2),
+      ArrowLeft: () => pan(-0.25), ArrowRight: () => pan(0.25),
+      a: () => this.mark("A"), b: () => this.mark("B"),
+    };
+    if (!keys[event.key] || element("scope").hidden) return;
+    keys[event.key]();
+    event.preventDefault();
+  }
+
+  mark(name) {
+    const { marks, cursor } = this.plots;
+    marks[name] = marks[name] == null || marks[name] !== cursor ? cursor : null;
+    const { A, B } = marks;
+    const apart = A != null && B != null ? `, B − A ${((B - A) * 1e3).toFixed(3)} ms, ${(1 / Math.abs(B - A)).toFixed(2)} Hz` : "";
+    const told = Object.entries(marks).filter(([, t]) => t != null).map(([name, t]) => `${name} ${t.toFixed(5)} s`);
+    element("cursors").textContent = told.join(", ") + apart;
+    this.dirty = true;
+  }
+
+  trigger() {
+    const kind = element("trigger").value;
+    if (kind === "none" || this.paused) return null;
+    const common = { before: BEFORE, after_s: this.after };
+    const channel = (name) => this.channels.indexOf(name);
+    if (kind === "level") {
+      const level = Number(element("trigger-value").value);
+      return { ...common, channel: Number(element("trigger-channel").value), level, rising: element("trigger-edge").value === "up" };
+    }
+    // A start-up is where the throttle opens: its first step is a 2000th.
+    const [name, level] = kind === "fault" ? ["faults", 0.5] : ["throttle", 1e-4];
+    return { ...common, channel: channel(name), level, rising: true };
+  }
+
+  async loop() {
+    for (;;) {
+      const begun = performance.now();
+      if (this.link.isOpen && this.channels.length && !document.hidden && (!this.paused || this.dirty)) {
+        this.dirty = false;
+        await this.fetch();
+      }
+      // A page that is slow to draw leaves the machine to the others.
+      const took = performance.now() - begun;
+      await new Promise((resolve) => setTimeout(resolve, Math.max(FRAME_MS - took, took)));
+    }
+  }
+
+  fetch() {
+    const names = [...new Set([...this.plots.channels, ...ALWAYS])];
+    const view = {
+      id: ++this.id, esc: this.link.esc, to_s: this.paused ? this.to : null, span_s: this.span,
+      columns: Math.round(this.plots.width), channels: names.map((name) => this.channels.indexOf(name)),
+      trigger: this.trigger(), hold: this.paused,
+    };
+    this.link.ask({ view });
+    return new Promise((resolve) => {
+      this.busy = { id: view.id, names, resolve };
+      setTimeout(resolve, 1000);
+    });
+  }
+
+  /** An answer, as the program's `view.rs` lays it out. */
+  async take(buffer) {
+    const view = new DataView(buffer);
+    const [id, , points] = [4, 8, 12].map((at) => view.getUint32(at, true));
+    if (this.busy?.id !== id) return;
+    const { names, resolve } = this.busy;
+    const t = Array.from(new Float64Array(buffer, 32, points));
+    const start = 32 + 8 * points;
+    const known = (value) => (Number.isNaN(value) ? null : value);
+    const values = Object.fromEntries(names.map((name, i) => [name, Array.from(new Float32Array(buffer, start + 4 * i * points, points), known)]));
+    const crossing = view.getUint8(1) === 1 ? view.getFloat64(24, true) : null;
+    if (points) await this.show(t, values, crossing);
+    resolve();
+  }
+
+  async show(t, values, crossing) {
+    const kind = element("trigger").value;
+    if (!this.paused && crossing === null) this.latest = t.at(-1);
+    this.plots.marks.T = crossing ?? (this.paused ? this.plots.marks.T : null);
+    const to = crossing === null ? (this.paused ? this.to : t.at(-1)) : crossing + (1 - BEFORE) * this.span;
+    const data = { t, values, from: to - this.span, to };
+    // The figures need not wait for the plots.
+    this.seen(data);
+    await this.plots.draw(data);
+    if (crossing !== null && (kind === "fault" || kind === "start")) {
+      // The next one is another.
+      this.after = crossing;
+      this.to = to;
+      this.pause(true);
+    }
+  }
+}
