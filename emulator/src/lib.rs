@@ -7,6 +7,7 @@
 //! [`live`]: crate::live
 //! [`lockstep`]: crate::lockstep
 //! [`link`]: crate::link
+//! [`web`]: crate::web
 //! [`scenario`]: crate::scenario
 //! [`watch`]: crate::watch
 //! [`summary`]: crate::summary
@@ -48,5 +49,6 @@ pub mod shaft;
 pub mod summary;
 pub mod surroundings;
 pub mod watch;
+pub mod web;
 pub mod wire;
 pub mod yardstick;

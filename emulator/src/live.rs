@@ -25,6 +25,7 @@ use crate::record::Recorder;
 use crate::rig::Bench;
 use crate::summary::Report;
 use crate::watch::{Watch, WatchError, Watches};
+use crate::web::{Web, WebAddress, WebError};
 use crate::wire::{SignalAddress, Wire, WireError};
 use keeping::Keeping;
 pub use pace::Pace;
@@ -52,6 +53,8 @@ pub struct Session {
     pub faults: Vec<Fault>,
     /// Where each period is written; each of several ESCs has its number before the extension.
     pub record: Option<PathBuf>,
+    /// Where the page is served.
+    pub web: WebAddress,
 }
 
 /// Why a session cannot run or go on; one line.
@@ -69,6 +72,9 @@ pub enum LiveError {
     /// The ESC cannot start or go on, for a reason of its own.
     #[error("{0}")]
     Stopped(#[from] Stopped),
+    /// The page.
+    #[error("{0}")]
+    Web(#[from] WebError),
     /// The plant or the recording.
     #[error("{0}")]
     Watch(#[from] WatchError),
@@ -85,6 +91,8 @@ pub struct Opened {
     pub endpoints: Vec<Endpoint>,
     /// Where the throttle wire of each ESC listens.
     pub signals: Vec<SocketAddr>,
+    /// Where the page is served, and what a person opens.
+    pub page: Option<(SocketAddr, String)>,
 }
 
 /// A session whose sockets and recordings are open.
@@ -113,6 +121,7 @@ impl Session {
             links: links.describe(),
             endpoints: links.endpoints(),
             signals: Vec::new(),
+            page: None,
         };
         let (mut watches, mut starts) = (Vec::new(), Vec::new());
         for (esc, flash) in self.flash.into_iter().enumerate() {
@@ -200,9 +209,14 @@ pub fn run<M: Machine>(
     warn: impl Fn(&str),
 ) -> Result<(Report, M), LiveError> {
     let pace = session.pace;
+    let (mut web, no_page) = Web::open(&session.web, session.flash.len())?;
     let (mut open, starts) = session.open()?;
+    open.about.page = web.as_ref().map(Web::place);
     let (mut machine, warnings) = start(starts)?;
-    warnings.into_iter().for_each(&warn);
+    warnings
+        .into_iter()
+        .chain(no_page.as_deref())
+        .for_each(&warn);
     opened(&open.about, &machine);
 
     let mut pacer = Pacer::new(pace);
@@ -213,12 +227,21 @@ pub fn run<M: Machine>(
         for esc in 0..machine.escs() {
             machine.wire(esc).poll(now_ns);
         }
+        if let Some(web) = &mut web {
+            web.receive(&mut open.links, &mut machine, &mut open.watches);
+        }
         let until_ns = pacer.until_ns(now_ns).min(open.end_ns);
         let links = &mut open.links;
-        let advanced = machine.advance(until_ns, &mut open.watches, &mut |frame| {
+        let mut to_pages = Vec::new();
+        let mut onlooker = Web::tapped(web.as_mut(), &mut open.watches);
+        let advanced = machine.advance(until_ns, &mut onlooker, &mut |frame| {
             // A peer without room loses the frame, as on any datagram link.
             links.send(frame);
+            to_pages.extend_from_slice(frame);
         });
+        if let Some(web) = &web {
+            web.send(&to_pages);
+        }
         if let Err(stopped) = advanced {
             // The recording of what led there is worth having.
             open.watches.finish(0.0, 0.0)?;

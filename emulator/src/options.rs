@@ -19,6 +19,7 @@ use crate::plant::Fidelity;
 use crate::rack::ESCS_MAX;
 use crate::rig::Bench;
 use crate::scenario::{self, Plan, ScenarioError, Standing};
+use crate::web::WebAddress;
 use crate::wire::SignalAddress;
 
 /// The help of `--mavlink`, whose brackets would be links in the documentation.
@@ -59,6 +60,9 @@ pub struct RunArgs {
     /// Supply: volts, a battery as 4s or 6s, or a TOML file [default: the bench's]
     #[arg(long, value_name = "VOLTS|Ns|FILE", allow_hyphen_values = true)]
     pub bus: Option<String>,
+    /// Where the scope's page is served, or none [default: 127.0.0.1:8080, or nowhere if that is taken]
+    #[arg(long, value_name = "HOST:PORT|none")]
+    pub web: Option<WebAddress>,
     /// How the inverter is simulated
     #[arg(long, value_enum, default_value_t = Fidelity::Averaged)]
     pub plant: Fidelity,
@@ -213,6 +217,7 @@ impl RunArgs {
             defaults,
             faults: self.fault.clone(),
             record: self.common.record.clone(),
+            web: self.web.clone().unwrap_or_default(),
         };
         Ok((session, warning))
     }

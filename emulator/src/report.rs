@@ -66,6 +66,8 @@ struct Ports {
     mavlink: Vec<String>,
     /// The throttle wire of the only or the first ESC, as `--signal` has it.
     signal: Option<String>,
+    /// The page, as `--web` has it.
+    web: Option<String>,
     /// Of several ESCs, each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     escs: Vec<Port>,
@@ -91,6 +93,7 @@ impl Ready {
             ready: Ports {
                 mavlink: opened.endpoints.iter().map(Endpoint::to_string).collect(),
                 signal,
+                web: opened.page.as_ref().map(|(at, _)| at.to_string()),
                 escs,
             },
         }
@@ -131,6 +134,9 @@ fn greeting(
             .iter()
             .map(|address| format!("  throttle  udp:{address}, a datagram a frame")),
     );
+    if let Some((_, url)) = &opened.page {
+        lines.push(format!("  scope     {url} in a browser"));
+    }
     if args
         .motor
         .as_ref()

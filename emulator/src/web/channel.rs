@@ -1,0 +1,64 @@
+//! What is traced.
+
+use siskin_control::drive::{Bridge, Direction, Snapshot};
+use siskin_control::units::Scale;
+
+use crate::record::Row;
+use crate::shaft::Units;
+use crate::surroundings::Motion;
+
+/// How many channels there are.
+pub(super) const COUNT: usize = 25;
+
+/// A control period as the simulation leaves it. What it comes to is computed where it is looked at: taking it off
+/// must cost next to nothing.
+#[derive(Clone, Copy)]
+pub(super) struct Point {
+    /// Its beginning, s.
+    pub(super) t_s: f64,
+    /// The motor.
+    pub(super) motion: Motion,
+    /// On the wire, 0 to 1.
+    pub(super) throttle: f32,
+    /// The control, where it is at hand.
+    pub(super) control: Option<Control>,
+}
+
+/// The control in a period.
+#[derive(Clone, Copy)]
+pub(super) struct Control {
+    pub(super) bridge: Bridge,
+    pub(super) snapshot: Snapshot,
+    pub(super) scale: Scale,
+    pub(super) direction: Direction,
+    pub(super) flux_wb: [f64; 3],
+}
+
+/// The channels' names, with the unit as the last part: those of a recording after its time, and what it has not.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    let of_row = Row::COLUMNS[1..].iter().copied();
+    of_row.chain(["throttle", "flux_a_wb", "flux_b_wb", "flux_c_wb"])
+}
+
+/// Their values in a control period; what is not known is not a number.
+#[rustfmt::skip]
+pub(super) fn values(point: &Point) -> [f32; COUNT] {
+    let (row, flux_wb) = match &point.control {
+        None => (Row::outside(point.t_s, &point.motion), [f32::NAN; 3]),
+        Some(Control { bridge, snapshot, scale, direction, flux_wb }) => {
+            let units = Units { scale, direction: *direction };
+            let row = Row::seen(point.t_s, (*bridge, &point.motion), (snapshot, units));
+            (row, flux_wb.map(|flux_wb| flux_wb as f32))
+        }
+    };
+    let or = |value: Option<f32>| value.unwrap_or(f32::NAN);
+    let number = |value: Option<u8>| value.map_or(f32::NAN, f32::from);
+    [
+        number(row.phase.map(|phase| phase as u8)), number(row.faults),
+        row.rpm, or(row.rpm_est), or(row.rpm_ref),
+        row.angle_deg, or(row.angle_est_deg), or(row.angle_error_deg),
+        row.i_a_a, row.i_b_a, row.i_c_a, or(row.i_d_a), or(row.i_q_a), or(row.u_d_v), or(row.u_q_v),
+        or(row.duty_a), or(row.duty_b), or(row.duty_c), row.bus_v, row.bus_a, row.torque_nm,
+        point.throttle, flux_wb[0], flux_wb[1], flux_wb[2],
+    ]
+}

@@ -1,0 +1,229 @@
+//! The scope: a page in the browser that shows a running ESC and lets a person play with it.
+//!
+//! The page is a MAVLink client, as a ground station is: parameters, commands and telemetry are MAVLink frames over
+//! its socket. Beside them it has what only a simulation has: traces at the control's rate, a throttle wire, and
+//! faults.
+
+mod address;
+mod assets;
+mod channel;
+mod guard;
+mod head;
+mod hub;
+mod message;
+mod ring;
+mod server;
+mod tap;
+#[cfg(test)]
+mod tests;
+mod throttle;
+mod view;
+mod viewer;
+
+pub use address::{WebAddress, WebAddressError};
+pub use tap::Tapped;
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+use std::time::Instant;
+
+use siskin_control::drive::{Fault, Phase};
+use thiserror::Error;
+
+use crate::link::{HostPort, LinkId, Links};
+use crate::machine::{Machine, Onlooker};
+use crate::scenario;
+use guard::Guard;
+use hub::{Hub, Message, Order, ViewerId, What};
+use message::FromPage;
+use server::Server;
+use tap::Taps;
+use throttle::Throttle;
+
+/// Why there is no page; one line, with what to do.
+#[derive(Debug, Error)]
+pub enum WebError {
+    /// The host's name has no address.
+    #[error("--web {0}: the host cannot be resolved ({1}); give an address, such as 127.0.0.1")]
+    Host(HostPort, io::Error),
+    /// Another program listens there.
+    #[error("--web {0}: port {port} is taken; give another port, or none", port = .0.port)]
+    Taken(HostPort),
+    /// The system refuses the socket.
+    #[error("--web {0}: cannot listen ({1}); give an address of this machine")]
+    Socket(HostPort, io::Error),
+}
+
+/// The page's side of a running simulation.
+pub struct Web {
+    hub: Arc<Hub>,
+    orders: Receiver<Order>,
+    local: SocketAddr,
+    url: String,
+    links: BTreeMap<ViewerId, LinkId>,
+    taps: Taps,
+    /// One for each ESC.
+    throttles: Vec<Throttle>,
+}
+
+impl Web {
+    /// Serves the page of so many ESCs where it is wanted; with a line for a person where the usual port is taken.
+    ///
+    /// # Errors
+    /// It cannot be served where a person wants it.
+    pub fn open(
+        address: &WebAddress,
+        escs: usize,
+    ) -> Result<(Option<Self>, Option<String>), WebError> {
+        match address {
+            WebAddress::None => Ok((None, None)),
+            WebAddress::At(address) => Ok((Some(Self::listen(address, escs)?), None)),
+            WebAddress::Usual => match Self::listen(&WebAddress::usual(), escs) {
+                Ok(web) => Ok((Some(web), None)),
+                Err(error) => Ok((None, Some(format!("no page: {error}")))),
+            },
+        }
+    }
+
+    fn listen(address: &HostPort, escs: usize) -> Result<Self, WebError> {
+        let local = address.resolve();
+        let local = local.map_err(|error| WebError::Host(address.clone(), error))?;
+        let refused = |error: io::Error| match error.kind() {
+            io::ErrorKind::AddrInUse => WebError::Taken(address.clone()),
+            _ => WebError::Socket(address.clone(), error),
+        };
+        let listener = TcpListener::bind(local).map_err(refused)?;
+        let local = listener.local_addr().map_err(refused)?;
+        let guard = Guard::new(local).map_err(refused)?;
+        let url = guard.url();
+        let (hub, orders) = Hub::new(escs);
+        let hub = Arc::new(hub);
+        let server = Server {
+            guard,
+            hub: Arc::clone(&hub),
+            greeting: greeting(escs),
+        };
+        server::serve(listener, server);
+        Ok(Self {
+            taps: Taps::new(&hub, escs),
+            hub,
+            orders,
+            local,
+            url,
+            links: BTreeMap::new(),
+            throttles: (0..escs).map(|_| Throttle::default()).collect(),
+        })
+    }
+
+    /// Where it is served, and what a person opens.
+    pub fn place(&self) -> (SocketAddr, String) {
+        (self.local, self.url.clone())
+    }
+
+    /// Does what the pages ask for, and drives the throttle wire for who holds it. Never waits.
+    pub fn receive<M: Machine>(
+        &mut self,
+        links: &mut Links,
+        machine: &mut M,
+        onlooker: &mut impl Onlooker,
+    ) {
+        while let Ok(Order { viewer, came, what }) = self.orders.try_recv() {
+            match what {
+                What::Mavlink(bytes) => {
+                    let stream = self.links.entry(viewer).or_insert_with(|| links.stream());
+                    machine.receive(*stream, &bytes, onlooker);
+                }
+                What::Ended => {
+                    for throttle in &mut self.throttles {
+                        throttle.release(viewer, came);
+                    }
+                    if let Some(stream) = self.links.remove(&viewer) {
+                        machine.forget(stream);
+                    }
+                }
+                What::Asked(asked) => {
+                    if let Err(reason) = self.obey((viewer, came), asked, machine) {
+                        let text = serde_json::json!({ "refused": reason }).to_string();
+                        self.hub.send(Some(viewer), || Message::Text(text.clone()));
+                    }
+                }
+            }
+        }
+        let now_ns = machine.now_ns();
+        for (esc, throttle) in self.throttles.iter_mut().enumerate() {
+            let wire = machine.wire(esc);
+            throttle.play(Instant::now(), wire, now_ns);
+            self.taps.look(esc, wire.throttle());
+        }
+    }
+
+    fn obey(
+        &mut self,
+        from: (ViewerId, Instant),
+        asked: FromPage,
+        machine: &mut impl Machine,
+    ) -> Result<(), String> {
+        let now_ns = machine.now_ns();
+        let (FromPage::Throttle { esc, .. }
+        | FromPage::Silence { esc }
+        | FromPage::Fault { esc, .. }
+        | FromPage::Mend { esc }) = asked
+        else {
+            // A viewer sees to its views itself.
+            return Ok(());
+        };
+        let throttle = self.throttles.get_mut(esc);
+        let throttle = throttle.ok_or_else(|| "there is no such ESC".to_owned())?;
+        match asked {
+            FromPage::Throttle { value, signal, .. } => {
+                let asked = throttle.ask(from, (value, signal), machine.wire(esc), now_ns);
+                asked.map_err(|refused| refused.line().to_owned())
+            }
+            FromPage::Silence { .. } => {
+                throttle.release(from.0, from.1);
+                Ok(())
+            }
+            FromPage::Fault { keys, .. } => {
+                let mut fault = scenario::fault(&keys)?;
+                fault.at_s = now_ns as f64 * 1e-9;
+                machine.inject(esc, fault).map_err(str::to_owned)
+            }
+            FromPage::Mend { .. } => machine.mend(esc).map_err(str::to_owned),
+            FromPage::View(_) => Ok(()),
+        }
+    }
+
+    /// Sends MAVLink frames to every page.
+    pub fn send(&self, frames: &[u8]) {
+        if !frames.is_empty() && self.hub.is_viewed() {
+            self.hub.send(None, || Message::Mavlink(frames.to_vec()));
+        }
+    }
+
+    /// An onlooker that takes off the traces beside `onlooker`, where there is a page.
+    pub fn tapped<'a, O>(web: Option<&'a mut Self>, onlooker: &'a mut O) -> Tapped<'a, O> {
+        Tapped {
+            onlooker,
+            taps: web.map(|web| &mut web.taps),
+        }
+    }
+}
+
+/// What a page is told first: what there is.
+fn greeting(escs: usize) -> String {
+    let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
+    let channels: Vec<_> = channel::names().collect();
+    serde_json::json!({
+        "hello": {
+            "version": env!("CARGO_PKG_VERSION"),
+            "escs": escs,
+            "channels": channels,
+            "phases": phases,
+            "faults": Fault::ALL.map(Fault::text),
+        }
+    })
+    .to_string()
+}

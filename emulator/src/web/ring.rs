@@ -1,0 +1,111 @@
+//! The latest ten seconds of one ESC at its control rate.
+//!
+//! The simulation fills a chunk and hands it over whole; from then on it does not change, so that who looks at it
+//! holds up nobody. Columns are made when somebody first looks, and lie together, since a page looks at few of them.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, OnceLock};
+
+use super::channel::{self, COUNT, Point};
+
+/// Control periods in a chunk: 11 ms at 24 kHz, which is how old the latest point of a trace is at most.
+pub(super) const CHUNK: usize = 256;
+
+/// Chunks in a ring: 10.7 s at 24 kHz, in some 90 MB.
+const CHUNKS: usize = 1000;
+
+/// Some control periods that follow each other.
+pub(super) struct Chunk {
+    points: Vec<Point>,
+    columns: OnceLock<Columns>,
+}
+
+/// A chunk by channel.
+struct Columns {
+    values: Vec<[f32; CHUNK]>,
+    /// The least and the greatest of each.
+    bounds: Vec<[f32; 2]>,
+}
+
+impl Chunk {
+    pub(super) fn new() -> Self {
+        Self {
+            points: Vec::with_capacity(CHUNK),
+            columns: OnceLock::new(),
+        }
+    }
+
+    pub(super) fn push(&mut self, point: Point) {
+        self.points.push(point);
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.points.len() == CHUNK
+    }
+
+    /// The beginning of a control period, s.
+    pub(super) fn t_s(&self, place: usize) -> f64 {
+        self.points[place].t_s
+    }
+
+    /// The first place whose time is this or later.
+    pub(super) fn at(&self, t_s: f64) -> usize {
+        self.points.partition_point(|point| point.t_s < t_s)
+    }
+
+    /// The values of a channel.
+    pub(super) fn values(&self, channel: usize) -> &[f32; CHUNK] {
+        &self.columns().values[channel]
+    }
+
+    /// The least and the greatest of a channel; not numbers if there are none.
+    pub(super) fn bounds(&self, channel: usize) -> [f32; 2] {
+        self.columns().bounds[channel]
+    }
+
+    fn columns(&self) -> &Columns {
+        self.columns.get_or_init(|| {
+            let mut values = vec![[f32::NAN; CHUNK]; COUNT];
+            for (place, point) in self.points.iter().enumerate() {
+                for (column, value) in values.iter_mut().zip(channel::values(point)) {
+                    column[place] = value;
+                }
+            }
+            let bounds = values.iter().map(|column| bounds(column)).collect();
+            Columns { values, bounds }
+        })
+    }
+}
+
+/// The least and the greatest of some values; not numbers if there are none.
+pub(super) fn bounds(values: &[f32]) -> [f32; 2] {
+    values
+        .iter()
+        .fold([f32::NAN; 2], |[least, greatest], value| {
+            [least.min(*value), greatest.max(*value)]
+        })
+}
+
+/// The chunks, the oldest first.
+#[derive(Default)]
+pub(super) struct Ring(VecDeque<Arc<Chunk>>);
+
+impl Ring {
+    /// Takes in a chunk, and forgets the oldest for it.
+    pub(super) fn push(&mut self, chunk: Chunk) {
+        if self.0.len() == CHUNKS {
+            self.0.pop_front();
+        }
+        self.0.push_back(Arc::new(chunk));
+    }
+
+    /// Forgets all.
+    pub(super) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// All that there is.
+    pub(super) fn chunks(&self) -> Vec<Arc<Chunk>> {
+        self.0.iter().cloned().collect()
+    }
+}

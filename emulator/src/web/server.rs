@@ -1,0 +1,126 @@
+//! The page's HTTP server: one request a connection, each on a thread of its own.
+
+use std::io::{self, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use tungstenite::handshake::derive_accept_key;
+
+use super::assets;
+use super::guard::Guard;
+use super::head::Head;
+use super::hub::Hub;
+use super::viewer;
+
+/// Connections at a time; more are closed at once.
+const MAX_CONNECTIONS: usize = 32;
+
+/// A peer that does not read or write for so long is dropped.
+const STUCK: Duration = Duration::from_secs(1);
+
+/// The page may use what is its own, and nothing may use the page.
+const HEADERS: &str = "\
+Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; \
+connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n\
+Cross-Origin-Opener-Policy: same-origin\r\n\
+Cross-Origin-Resource-Policy: same-origin\r\n\
+Referrer-Policy: no-referrer\r\n\
+X-Content-Type-Options: nosniff\r\n\
+Cache-Control: no-store\r\n\
+Connection: close\r\n";
+
+/// What all connections share.
+pub(super) struct Server {
+    pub(super) guard: Guard,
+    pub(super) hub: Arc<Hub>,
+    /// The first message to each page.
+    pub(super) greeting: String,
+}
+
+/// Serves from now on, until the program ends.
+pub(super) fn serve(listener: TcpListener, server: Server) {
+    let (server, open) = (Arc::new(server), Arc::new(AtomicUsize::new(0)));
+    thread::spawn(move || {
+        for stream in listener.incoming() {
+            let Ok(stream) = stream else {
+                // Too many open files, say: others may close some.
+                thread::sleep(STUCK);
+                continue;
+            };
+            if open.fetch_add(1, Ordering::Relaxed) >= MAX_CONNECTIONS {
+                open.fetch_sub(1, Ordering::Relaxed);
+                continue;
+            }
+            let (server, open) = (Arc::clone(&server), Arc::clone(&open));
+            thread::spawn(move || {
+                // A peer that is gone hears no reason.
+                let _ = answer(stream, &server);
+                open.fetch_sub(1, Ordering::Relaxed);
+            });
+        }
+    });
+}
+
+fn answer(mut stream: TcpStream, server: &Server) -> io::Result<()> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(STUCK))?;
+    stream.set_write_timeout(Some(STUCK))?;
+    let (head, rest) = match Head::read(&mut stream) {
+        Ok(read) => read,
+        Err(error) if error.kind() == io::ErrorKind::InvalidData => {
+            return reply(&mut stream, "400 Bad Request", &error.to_string());
+        }
+        Err(error) => return Err(error),
+    };
+    if let Err(reason) = server.guard.admits(&head) {
+        return reply(&mut stream, "403 Forbidden", reason);
+    }
+    if head.path == "/socket" {
+        let Some(key) = &head.websocket_key else {
+            return reply(
+                &mut stream,
+                "400 Bad Request",
+                "this is for the page's socket",
+            );
+        };
+        let Some(seat) = server.hub.join() else {
+            return reply(
+                &mut stream,
+                "503 Service Unavailable",
+                "too many pages view already",
+            );
+        };
+        let accept = derive_accept_key(key.as_bytes());
+        let upgrade =
+            "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n";
+        // A peer that is gone is found so by the socket.
+        let _ = write!(stream, "{upgrade}Sec-WebSocket-Accept: {accept}\r\n\r\n");
+        viewer::serve(stream, rest, &server.hub, &seat, server.greeting.clone());
+        return Ok(());
+    }
+    match assets::find(&head.path) {
+        Some((kind, content)) => send(&mut stream, "200 OK", kind, content),
+        None => reply(&mut stream, "404 Not Found", "there is no such file"),
+    }
+}
+
+fn reply(stream: &mut TcpStream, status: &str, line: &str) -> io::Result<()> {
+    send(
+        stream,
+        status,
+        "text/plain; charset=utf-8",
+        &format!("{line}\n"),
+    )
+}
+
+fn send(stream: &mut TcpStream, status: &str, kind: &str, content: &str) -> io::Result<()> {
+    let length = content.len();
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{HEADERS}\r\n"
+    );
+    stream.write_all(head.as_bytes())?;
+    stream.write_all(content.as_bytes())
+}

@@ -1,0 +1,143 @@
+//! Takes the traces off a running simulation while somebody views them.
+
+use std::mem;
+use std::sync::Arc;
+
+use super::channel::{Control, Point};
+use super::hub::Hub;
+use super::ring::Chunk;
+use crate::machine::Onlooker;
+use crate::plant::Gate;
+use crate::rig::{Period, Rig};
+use crate::surroundings::{Motion, Passage};
+
+/// The tap of one ESC.
+pub(super) struct Tap {
+    hub: Arc<Hub>,
+    esc: usize,
+    /// Nothing while nobody views.
+    chunk: Option<Chunk>,
+    throttle: f32,
+}
+
+impl Tap {
+    pub(super) fn new(hub: Arc<Hub>, esc: usize) -> Self {
+        Self {
+            hub,
+            esc,
+            chunk: None,
+            throttle: 0.0,
+        }
+    }
+
+    /// Looks whether somebody views; `throttle` is on the wire.
+    pub(super) fn look(&mut self, throttle: f64) {
+        self.throttle = throttle as f32;
+        match (self.hub.is_viewed(), &self.chunk) {
+            (true, None) => self.chunk = Some(Chunk::new()),
+            (false, Some(_)) => self.chunk = None,
+            _ => {}
+        }
+    }
+
+    fn take(&mut self, t_s: f64, motion: &Motion, control: Option<Control>) {
+        let Some(chunk) = &mut self.chunk else { return };
+        chunk.push(Point {
+            t_s,
+            motion: *motion,
+            throttle: self.throttle,
+            control,
+        });
+        if chunk.is_full()
+            && let Some(mut ring) = self.hub.ring(self.esc)
+        {
+            ring.push(mem::replace(chunk, Chunk::new()));
+        }
+    }
+
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        if self.chunk.is_some() {
+            let config = rig.config();
+            let control = Control {
+                bridge: period.bridge,
+                snapshot: rig.snapshot(),
+                scale: config.scale,
+                direction: config.direction,
+                flux_wb: rig.flux_linkages_wb(),
+            };
+            self.take(t_s, &period.motion, Some(control));
+        }
+    }
+
+    fn passage(&mut self, t_s: f64, passage: &Passage) {
+        self.take(t_s, &passage.motion, None);
+    }
+}
+
+/// The taps of all ESCs.
+pub(super) struct Taps {
+    each: Vec<Tap>,
+    /// Whose periods are told.
+    esc: usize,
+}
+
+impl Taps {
+    /// One for each of so many ESCs.
+    pub(super) fn new(hub: &Arc<Hub>, escs: usize) -> Self {
+        let each = (0..escs).map(|esc| Tap::new(Arc::clone(hub), esc));
+        Self {
+            each: each.collect(),
+            esc: 0,
+        }
+    }
+
+    /// As [`Tap::look`] of one.
+    pub(super) fn look(&mut self, esc: usize, throttle: f64) {
+        self.each[esc].look(throttle);
+    }
+}
+
+/// An onlooker and the taps, where there are any.
+pub struct Tapped<'a, O> {
+    pub(super) onlooker: &'a mut O,
+    pub(super) taps: Option<&'a mut Taps>,
+}
+
+impl<O: Onlooker> Onlooker for Tapped<'_, O> {
+    fn esc(&mut self, esc: usize) {
+        self.onlooker.esc(esc);
+        if let Some(taps) = &mut self.taps {
+            taps.esc = esc;
+        }
+    }
+
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        self.onlooker.period(t_s, period, rig);
+        if let Some(taps) = &mut self.taps {
+            taps.each[taps.esc].period(t_s, period, rig);
+        }
+    }
+
+    fn passage(&mut self, t_s: f64, passage: &Passage) {
+        self.onlooker.passage(t_s, passage);
+        if let Some(taps) = &mut self.taps {
+            taps.each[taps.esc].passage(t_s, passage);
+        }
+    }
+
+    fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
+        self.onlooker.gates(time_ns, leg, gate);
+    }
+
+    fn edge(&mut self, time_ns: u64, level: bool) {
+        self.onlooker.edge(time_ns, level);
+    }
+
+    fn answer(&mut self, asked_ns: u64, datagram: &[u8]) {
+        self.onlooker.answer(asked_ns, datagram);
+    }
+
+    fn frame(&mut self, time_ns: u64, frame: &[u8]) {
+        self.onlooker.frame(time_ns, frame);
+    }
+}
