@@ -45,7 +45,7 @@ def run(*arguments: object, timeout: float = 60.0) -> subprocess.CompletedProces
 def simulate(*arguments: object) -> dict:
     """Runs the emulator as fast as it goes, without MAVLink, and gives its summary."""
     wire = f"udp:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
-    fixed = ("--speed", "max", "--mavlink", "none", "--signal", wire, "--json")
+    fixed = ("--speed", "max", "--mavlink", "none", "--signal", wire, "--web", "none", "--json")
     ended = run("run", *fixed, "--storage", "none", *arguments)
     assert ended.returncode == 0, ended.stderr
     return json.loads(ended.stdout)
@@ -72,13 +72,14 @@ class Emulator:
         storage: object = "none",
         program: tuple = (PROGRAM,),
         speed: object = 1,
+        web: object = "none",
     ):
         self.port = free_port()
         self.signal_port = free_port(socket.SOCK_DGRAM)
         self._output = tempfile.TemporaryFile("w+")
         command = [*program, "--signal", f"udp:127.0.0.1:{self.signal_port}", "--speed", speed]
         # The server stands last: when it answers, the endpoints among the options are open.
-        command += ["--storage", storage, *options, "--mavlink", f"tcpin:127.0.0.1:{self.port}"]
+        command += ["--storage", storage, "--web", web, *options, "--mavlink", f"tcpin:127.0.0.1:{self.port}"]
         self.process = subprocess.Popen(
             [str(part) for part in command],
             stdin=subprocess.DEVNULL,
