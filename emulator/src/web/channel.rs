@@ -1,7 +1,7 @@
 //! What is traced.
 
 use siskin_control::drive::{Bridge, Direction, Snapshot};
-use siskin_control::units::Scale;
+use siskin_control::units::{Flux, Scale};
 
 use crate::record::Row;
 use crate::shaft::Units;
@@ -31,7 +31,8 @@ pub(super) struct Control {
     pub(super) snapshot: Snapshot,
     pub(super) scale: Scale,
     pub(super) direction: Direction,
-    pub(super) flux_wb: [f64; 3],
+    /// λ̂ of the phases, in the control's units.
+    pub(super) flux: [Flux; 3],
 }
 
 /// The channels' names, with the unit as the last part: those of a recording after its time, and what it has not.
@@ -45,10 +46,11 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
 pub(super) fn values(point: &Point) -> [f32; COUNT] {
     let (row, flux_wb) = match &point.control {
         None => (Row::outside(point.t_s, &point.motion), [f32::NAN; 3]),
-        Some(Control { bridge, snapshot, scale, direction, flux_wb }) => {
+        Some(Control { bridge, snapshot, scale, direction, flux }) => {
             let units = Units { scale, direction: *direction };
             let row = Row::seen(point.t_s, (*bridge, &point.motion), (snapshot, units));
-            (row, flux_wb.map(|flux_wb| flux_wb as f32))
+            let unit_wb = scale.flux_wb();
+            (row, flux.map(|flux| flux.to_num::<f32>() * unit_wb))
         }
     };
     let or = |value: Option<f32>| value.unwrap_or(f32::NAN);

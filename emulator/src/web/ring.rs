@@ -35,6 +35,12 @@ impl Chunk {
         }
     }
 
+    fn emptied(mut self) -> Self {
+        self.points.clear();
+        self.columns.take();
+        self
+    }
+
     pub(super) fn push(&mut self, point: Point) {
         self.points.push(point);
     }
@@ -91,12 +97,14 @@ pub(super) fn bounds(values: &[f32]) -> [f32; 2] {
 pub(super) struct Ring(VecDeque<Arc<Chunk>>);
 
 impl Ring {
-    /// Takes in a chunk, and forgets the oldest for it.
-    pub(super) fn push(&mut self, chunk: Chunk) {
-        if self.0.len() == CHUNKS {
-            self.0.pop_front();
-        }
+    /// Takes in a full chunk, and gives an empty one: the oldest, unless somebody still looks at that. Memory that
+    /// the program has already costs nothing, where the system would have to clear what is new.
+    pub(super) fn push(&mut self, chunk: Chunk) -> Chunk {
+        let is_full = self.0.len() == CHUNKS;
+        let oldest = if is_full { self.0.pop_front() } else { None };
         self.0.push_back(Arc::new(chunk));
+        let unseen = oldest.and_then(|chunk| Arc::try_unwrap(chunk).ok());
+        unseen.map_or_else(Chunk::new, Chunk::emptied)
     }
 
     /// Forgets all.

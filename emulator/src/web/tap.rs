@@ -1,6 +1,5 @@
 //! Takes the traces off a running simulation while somebody views them.
 
-use std::mem;
 use std::sync::Arc;
 
 use super::channel::{Control, Point};
@@ -49,9 +48,10 @@ impl Tap {
             control,
         });
         if chunk.is_full()
-            && let Some(mut ring) = self.hub.ring(self.esc)
+            && let Some(full) = self.chunk.take()
         {
-            ring.push(mem::replace(chunk, Chunk::new()));
+            let ring = self.hub.ring(self.esc);
+            self.chunk = ring.map(|mut ring| ring.push(full));
         }
     }
 
@@ -63,7 +63,7 @@ impl Tap {
                 snapshot: rig.snapshot(),
                 scale: config.scale,
                 direction: config.direction,
-                flux_wb: rig.flux_linkages_wb(),
+                flux: rig.state().flux_linkages(),
             };
             self.take(t_s, &period.motion, Some(control));
         }
