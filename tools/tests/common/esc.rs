@@ -197,6 +197,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             params: &mut params,
             board: &board,
             telemetry: &telemetry,
+            four: None,
             check: &Report::new(40.0, 0.02),
             identification: &siskin_control::identify::Report::default(),
             authority: &mut authority,

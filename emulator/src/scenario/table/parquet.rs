@@ -60,7 +60,7 @@ fn write_table(file: File, columns: &[String], rows: &[Row]) -> Result<(), Parqu
                 _ => None,
             })?,
             Kind::Text => {
-                fill::<ByteArrayType>(to, &cells, |cell| Some(text(cell)?.into_bytes().into()))?
+                fill::<ByteArrayType>(to, &cells, |cell| Some(text(cell)?.into_bytes().into()))?;
             }
         }
         column.close()?;
@@ -126,7 +126,7 @@ fn fill<T: DataType>(
 
 #[cfg(test)]
 mod tests {
-    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::file::reader::SerializedFileReader;
 
     use super::*;
 
