@@ -216,10 +216,10 @@ impl Rack {
         onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) {
-        if let Part::Leads(slots) = &self.parts[index]
+        if let Part::Leads(slots, count) = self.parts[index]
             && self.escs[index].task_is_due()
         {
-            let four = group::four(&self.escs, slots);
+            let four = group::four(&self.escs, slots, count);
             self.escs[index].esc_mut().lead(four);
         }
         onlooker.esc(index);

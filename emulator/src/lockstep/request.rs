@@ -257,7 +257,7 @@ mod tests {
             supply_v: Some(12.5),
             supply_ohm: None,
             ambient_c: Some(40.0),
-            shafts: vec![[None, Some(TAU)]],
+            shafts: vec![[None, Some(60.0 * TAU / 60.0)]],
         };
         assert_eq!(parse(&bytes, 1), Ok(Request::Turn(9, Turn::Change(wanted))));
         assert_eq!(parse(&bytes, 2), Err(Malformed::Count(1)));

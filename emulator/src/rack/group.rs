@@ -11,8 +11,8 @@ pub(super) enum Part {
     Alone,
     /// Another tells of it.
     Follows,
-    /// It tells of those in these slots.
-    Leads([Option<usize>; 4]),
+    /// It tells of those in these slots, of so many ESCs in the vehicle.
+    Leads([Option<usize>; 4], u8),
 }
 
 /// The parts of all: of those whose component ids number them, the lowest of each group of four leads.
@@ -21,6 +21,8 @@ pub(super) fn parts(escs: &[Device]) -> Vec<Part> {
         return vec![Part::Alone; escs.len()];
     }
     let numbers: Vec<_> = escs.iter().map(|esc| esc.esc().number()).collect();
+    let last = numbers.iter().flatten().max();
+    let count = last.map_or(0, |last| last + 1);
     let part = |number: &Option<u8>| {
         let Some(own) = *number else {
             return Part::Alone;
@@ -30,7 +32,7 @@ pub(super) fn parts(escs: &[Device]) -> Vec<Part> {
         let slots = [0, 1, 2, 3].map(in_slot);
         let first = slots.into_iter().flatten().next();
         match first {
-            Some(first) if numbers[first] == Some(own) => Part::Leads(slots),
+            Some(first) if numbers[first] == Some(own) => Part::Leads(slots, count),
             _ => Part::Follows,
         }
     };
@@ -38,10 +40,9 @@ pub(super) fn parts(escs: &[Device]) -> Vec<Part> {
 }
 
 /// What one that leads tells, with its ESCs as they are now.
-pub(super) fn four(escs: &[Device], slots: &[Option<usize>; 4]) -> Four {
-    let last = escs.iter().filter_map(|esc| esc.esc().number()).max();
+pub(super) fn four(escs: &[Device], slots: [Option<usize>; 4], count: u8) -> Four {
     Four {
         escs: slots.map(|esc| esc.map(|esc| *escs[esc].esc().telemetry())),
-        count: last.map_or(0, |last| last + 1),
+        count,
     }
 }
