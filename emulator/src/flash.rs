@@ -16,8 +16,8 @@ use thiserror::Error;
 /// Bytes of a page, which is erased as one.
 pub const PAGE_BYTES: usize = 2048;
 
-/// Bytes of the flash: four pages.
-pub const FLASH_BYTES: usize = 4 * PAGE_BYTES;
+/// Bytes of the flash: two pages.
+pub const FLASH_BYTES: usize = 2 * PAGE_BYTES;
 
 /// Bytes of a double word, which is written as one.
 pub const WORD_BYTES: usize = 8;
@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn it_behaves_as_the_chip() {
         let mut flash = FileFlash::in_memory();
-        assert_eq!((flash.capacity(), flash.is_persistent()), (8192, false));
+        assert_eq!((flash.capacity(), flash.is_persistent()), (4096, false));
         let word: [u8; 8] = *b"siskin 1";
         flash.write(2040, &word).unwrap();
         flash.write(2048, &word).unwrap();
@@ -391,8 +391,8 @@ mod tests {
         for (offset, length, kind) in [
             (4, 8, NotAligned),
             (0, 7, NotAligned),
-            (8192, 8, OutOfBounds),
-            (8184, 16, OutOfBounds),
+            (4096, 8, OutOfBounds),
+            (4088, 16, OutOfBounds),
             (u32::MAX, 8, OutOfBounds),
         ] {
             let error = flash.write(offset, &vec![0; length]).unwrap_err();
@@ -402,14 +402,14 @@ mod tests {
             (0, 2047, NotAligned),
             (8, 2048, NotAligned),
             (2048, 0, OutOfBounds),
-            (0, 8193, OutOfBounds),
+            (0, 4097, OutOfBounds),
             (0, u32::MAX, OutOfBounds),
         ] {
             let error = flash.erase(from, to).unwrap_err();
             assert_eq!(error.kind(), kind, "{from} {to}");
         }
-        assert!(flash.read(8191, &mut [0; 2]).is_err());
-        assert_eq!(read(&mut flash, 0, 8192), [0xFF; 8192]);
+        assert!(flash.read(4095, &mut [0; 2]).is_err());
+        assert_eq!(read(&mut flash, 0, 4096), [0xFF; 4096]);
     }
 
     #[test]
@@ -418,17 +418,17 @@ mod tests {
         let path = folder.path().join("a/b/flash");
         let mut flash = FileFlash::open(&path).unwrap();
         assert!(flash.is_persistent());
-        flash.write(4096, &[7; 24]).unwrap();
+        flash.write(2048, &[7; 24]).unwrap();
         // What another process would find, had this one been killed here.
         let mut wanted = vec![0xFF; FLASH_BYTES];
-        wanted[4096..4120].fill(7);
+        wanted[2048..2072].fill(7);
         assert_eq!(fs::read(&path).unwrap(), wanted);
         flash.sync().unwrap();
         drop(flash);
 
         let mut flash = FileFlash::open(&path).unwrap();
         assert_eq!(read(&mut flash, 0, FLASH_BYTES), wanted);
-        flash.erase(4096, 6144).unwrap();
+        flash.erase(2048, 4096).unwrap();
         assert_eq!(fs::read(&path).unwrap(), [0xFF; FLASH_BYTES]);
         let left: Vec<_> = fs::read_dir(path.parent().unwrap()).unwrap().collect();
         assert_eq!(left.len(), 1, "no file of the creation is left");
@@ -446,7 +446,7 @@ mod tests {
         let path = folder.path().join("flash");
         for bytes in [0, FLASH_BYTES - 1, FLASH_BYTES + 1] {
             fs::write(&path, vec![ERASED; bytes]).unwrap();
-            assert!(line(&path).contains(&format!("{bytes} bytes instead of 8192")));
+            assert!(line(&path).contains(&format!("{bytes} bytes instead of 4096")));
         }
         assert!(line(&path.join("below")).contains("cannot be opened"));
         assert!(line(folder.path()).contains("not a file"));

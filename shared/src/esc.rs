@@ -41,10 +41,6 @@ const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 /// is written stalls the processor, and so a flight controller's frames are missed.
 const REST_US: u64 = 1_000_000;
 
-/// Whether the identification of the motor is in this build: it takes 4 KB of code, which not every board's flash
-/// has left.
-const IDENTIFIES: bool = cfg!(feature = "identify");
-
 /// One ESC without its interrupt and its throttle.
 pub struct Esc {
     board: Board,
@@ -202,7 +198,7 @@ impl Esc {
     /// The parameters as the drive runs with them: for the motor of an identification, while one is under way.
     fn running(&self) -> Params {
         let mut running = self.given.running(&self.params);
-        if IDENTIFIES && self.identify.is_under_way() {
+        if self.identify.is_under_way() {
             self.identify.assume(&mut running);
         }
         running

@@ -37,7 +37,7 @@ class Board:
 BOARDS = {
     "b-g431b-esc1": Board(
         # All but the store. The aim is 96 KB, beside a resident loader.
-        flash=Region("flash", 0x0800_0000, 128 * KB, 120 * KB),
+        flash=Region("flash", 0x0800_0000, 128 * KB, 124 * KB),
         memories=(
             Region("CCM", 0x1000_0000, 10 * KB, 9 * KB),
             Region("SRAM", 0x2000_0000, 22 * KB, 18 * KB),

@@ -1,6 +1,6 @@
 //! The identification of the motor as the ESC runs, reports and keeps it.
 
-use super::{Esc, IDENTIFIES, check};
+use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
 use crate::identify::{Outcome, Sight};
 use crate::mavlink::Warning;
@@ -9,29 +9,24 @@ use crate::params::ParamId;
 impl Esc {
     /// Begins an identification.
     pub(super) fn identify(&mut self, now_us: u64) {
-        if IDENTIFIES {
-            let outcome = self.identify.begin(now_us);
-            self.identified(outcome);
-        }
+        let outcome = self.identify.begin(now_us);
+        self.identified(outcome);
     }
 
     /// Ends it, if there is one.
     pub(super) fn end_identification(&mut self, reason: &'static str) {
-        if IDENTIFIES && let Some(outcome) = self.identify.end(reason) {
+        if let Some(outcome) = self.identify.end(reason) {
             self.identified(outcome);
         }
     }
 
     /// What it asks of the drive, while one is under way.
     pub(super) fn identification(&self) -> Option<Setpoint> {
-        IDENTIFIES.then(|| self.identify.setpoint()).flatten()
+        self.identify.setpoint()
     }
 
     /// Takes over what has been found, and has it stored. False, with a text, where it makes no drive.
     pub(super) fn keep_identified(&mut self) -> bool {
-        if !IDENTIFIES {
-            return false;
-        }
         let settings = self.identify.report.settings();
         let kept = match settings.map(|settings| self.change(&settings)) {
             Some(Ok(())) => {
@@ -47,7 +42,7 @@ impl Esc {
 
     /// Goes on with an identification.
     pub(super) fn look_at_motor(&mut self, now_us: u64, snapshot: &Snapshot) {
-        if !IDENTIFIES || !self.identify.is_under_way() {
+        if !self.identify.is_under_way() {
             return;
         }
         let sight = Sight {

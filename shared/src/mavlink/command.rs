@@ -242,9 +242,7 @@ impl Commands {
             RUN_PREARM_CHECKS if command.exact || self.role == Role::Standalone => {
                 self.measure(command, Act::Check, drive, context)
             }
-            IDENTIFY if command.exact && cfg!(feature = "identify") => {
-                self.identify(command, drive, context)
-            }
+            IDENTIFY if command.exact => self.identify(command, drive, context),
             COMPONENT_ARM_DISARM => {
                 let arm = command.choice(0);
                 if arm == Some(0) {

@@ -50,7 +50,7 @@ impl Board {
     /// stored lies behind them on the one board, and in a hole of the image on the other.
     pub(crate) fn flash(self) -> Range<u32> {
         match self {
-            Self::BG431bEsc1 => 0x0800_0000..0x0801_E000,
+            Self::BG431bEsc1 => 0x0800_0000..0x0801_F000,
             Self::Vesc4F405 => 0x0800_0000..0x0810_0000,
         }
     }

@@ -12,8 +12,8 @@ use super::random::Random;
 
 pub(super) const PAGE: usize = 2048;
 pub(super) const WORD: usize = 8;
-/// Two pages, as on the first board: an erase may be cut between them.
-pub(super) const HALF: usize = 2 * PAGE;
+/// One page, as on the first board.
+pub(super) const HALF: usize = PAGE;
 pub(super) const RANGE: Range<u32> = 0..2 * HALF as u32;
 
 /// Pages of 2 KB, words of 8 bytes, each written once after an erase.

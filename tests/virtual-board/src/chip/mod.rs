@@ -117,10 +117,10 @@ pub trait Part {
 }
 
 /// The flash that has code: all but the store.
-pub const CODE: std::ops::Range<u32> = 0x0800_0000..0x0801_e000;
+pub const CODE: std::ops::Range<u32> = 0x0800_0000..0x0801_f000;
 
-/// The flash's last four pages, which keep the parameters.
-pub const STORE: std::ops::Range<u32> = 0x0801_e000..0x0802_0000;
+/// The flash's last two pages, which keep the parameters.
+pub const STORE: std::ops::Range<u32> = 0x0801_f000..0x0802_0000;
 
 /// The chip's own number (RM0440, 48.1).
 pub const UNIQUE_ID: std::ops::Range<u32> = 0x1fff_7590..0x1fff_759c;

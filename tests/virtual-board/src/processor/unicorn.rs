@@ -28,7 +28,7 @@ use crate::time::Cycles;
 
 /// Where the chip's registers are, and the store that is handed out like them.
 const REGISTERS: [Range<u64>; 4] = [
-    0x0801_e000..0x0802_0000,
+    0x0801_f000..0x0802_0000,
     0x1fff_0000..0x2000_0000,
     0x4000_0000..0x6000_0000,
     0xe000_0000..0xe010_0000,

@@ -8,6 +8,7 @@
 //! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
 //! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
 //! | [`self_test`] | a sound board passes its self-test, and each defect is named |
+//! | [`identify`] | it finds out what motor it has, by command and by parameter, and keeps it |
 //! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
 //! | [`damaged`] | a damaged image never turns the bridge on |
 //! | [`agreement`] | the control's state and the motor are those of the emulator |
@@ -25,6 +26,7 @@ mod common;
 mod damaged;
 mod failures;
 mod flight_controller;
+mod identify;
 mod readings;
 mod replies;
 mod self_test;

@@ -449,7 +449,7 @@ pub(crate) fn us(cycles: Cycles) -> f64 {
 }
 
 /// The address of an instruction within the flash that the image has no part of: erased, it is none.
-pub(crate) const ERASED: u32 = 0x0801_dff0;
+pub(crate) const ERASED: u32 = 0x0801_eff0;
 
 /// Puts a jump to itself where SRAM is free: behind all that the image has, below the chip's 22 KB.
 pub(crate) fn endless_loop(board: &mut Board) -> u32 {
