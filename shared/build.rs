@@ -75,8 +75,11 @@ fn parameter(id: ParamId) -> String {
     } else {
         fields.bare("default", entry.default);
     }
-    if entry.kind == Kind::Whole {
+    if matches!(entry.kind, Kind::Whole | Kind::Order) {
         fields.bare("decimalPlaces", 0);
+    }
+    if entry.kind == Kind::Order {
+        fields.bare("volatile", true);
     }
     if text.restart {
         fields.bare("rebootRequired", true);

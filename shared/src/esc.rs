@@ -56,6 +56,8 @@ pub struct Esc {
     tunes: Tunes,
     check: Check,
     identify: Identify,
+    /// True if what it finds is to be kept.
+    keeps: bool,
     light: bool,
     /// The motor's command at the last poll.
     command: Command,
@@ -167,6 +169,7 @@ impl Esc {
             tunes: Tunes::default(),
             check: Check::new(&board),
             identify: Identify::default(),
+            keeps: false,
             light: false,
             command: Command::Stop,
             rests_since_us: None,
@@ -277,6 +280,7 @@ impl Esc {
         if let Some(act) = self.component.take_act() {
             self.act(throttle, now_us, act);
         }
+        self.end_order();
         self.command = throttle.reach(|throttle| throttle.command());
         let rests = self.command.rests();
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));

@@ -5,7 +5,8 @@ mod station;
 
 use core::f64::consts::TAU;
 
-use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
+use mavlink::dialects::ardupilotmega::{MavCmd, MavResult, PARAM_SET_DATA};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
@@ -13,6 +14,8 @@ use siskin_control::drive::Phase;
 use siskin_control::params::ParamId;
 use siskin_emulator::bench::library;
 use siskin_emulator::device::Start;
+use siskin_emulator::link::LinkId;
+use siskin_emulator::rig::{Period, Rig};
 use siskin_emulator::scenario::stand;
 use station::{HALF, Station, ZERO};
 
@@ -324,6 +327,110 @@ fn it_ends_by_command_by_disarming_and_by_the_throttle_and_sets_nothing() {
             assert_eq!(station.texts, ["Not kept: nothing is identified"]);
         }
     }
+}
+
+/// Writes MOT_IDENTIFY.
+fn write(station: &mut Station, value: f32) {
+    let mut raw = MAVLinkV2MessageRaw::new();
+    raw.serialize_message_data(
+        MavHeader::default(),
+        &PARAM_SET_DATA {
+            param_value: value,
+            target_system: 1,
+            target_component: 1,
+            param_id: ParamId::MotIdentify.entry().name.into(),
+            ..PARAM_SET_DATA::default()
+        },
+    );
+    let link = LinkId::default();
+    let bytes = raw.raw_bytes();
+    station
+        .device
+        .receive(link, bytes, &mut |_: f64, _: &Period, _: &Rig| {});
+}
+
+/// Holds the stick so long, by servo pulses.
+fn hold(station: &mut Station, for_ms: u64, width_us: u32) {
+    for _ in 0..for_ms / 20 {
+        let now_ns = station.device.now_ns();
+        let [a, b, c, d] = (1000 * width_us).to_le_bytes();
+        let wire = station.device.wire();
+        wire.play(now_ns, &[1, a, b, c, d]).expect("there is room");
+        station.run(20, None);
+    }
+}
+
+fn order(station: &Station) -> f32 {
+    station.device.esc().params().get(ParamId::MotIdentify)
+}
+
+fn has_said(station: &Station, text: &str) -> bool {
+    station.texts.iter().any(|said| said == text)
+}
+
+fn asserts_found(station: &Station) {
+    let errors = errors(station, truth(&Start::default()));
+    assert!(within(errors), "{errors:?}, {:?}", station.texts);
+}
+
+#[test]
+fn a_parameter_begins_it_ends_it_and_keeps_what_it_has_found() {
+    let mut station = default();
+    station.run(500, Some(ZERO));
+    for (value, text) in [
+        (BEGIN, "Identification: phase A"),
+        (END, "Not identified: cancelled"),
+        (KEEP, "Not kept: nothing is identified"),
+        (BEGIN, "Identification: phase A"),
+    ] {
+        station.texts.clear();
+        write(&mut station, value);
+        station.run(200, Some(ZERO));
+        let under_way = if value == BEGIN { BEGIN } else { 0.0 };
+        assert_eq!(order(&station), under_way);
+        assert!(has_said(&station, text), "{text}: {:?}", station.texts);
+    }
+    station.run(LONGEST_MS, Some(ZERO));
+    for step in ["phase C", "spinning", "running up", "running down", "done"] {
+        let text = format!("Identification: {step}");
+        assert!(has_said(&station, &text), "{text}: {:?}", station.texts);
+    }
+    assert_eq!(
+        found(&station),
+        [0.0; 4],
+        "nothing is set before it is kept"
+    );
+    write(&mut station, KEEP);
+    station.run(200, Some(ZERO));
+    asserts_found(&station);
+    assert_eq!(order(&station), 0.0);
+    // Nor is it begun while the motor turns.
+    station.run(3000, Some(HALF));
+    write(&mut station, BEGIN);
+    station.run(20, Some(HALF));
+    assert!(has_said(&station, "Not now: the motor turns"));
+    assert_eq!(order(&station), 0.0);
+    let phase = station.device.rig().snapshot().phase;
+    assert_eq!(phase, Phase::Run);
+}
+
+#[test]
+fn the_stick_begins_it_and_what_is_found_is_kept() {
+    let mut station = default();
+    for _ in 0..2 {
+        hold(&mut station, 3000, 1900);
+        assert_eq!(station.rpm, 0.0);
+        hold(&mut station, 1800, 1100);
+    }
+    assert!(has_said(&station, "Identification: phase A"));
+    hold(&mut station, LONGEST_MS, 1100);
+    assert!(has_said(&station, "Identification: done"));
+    asserts_found(&station);
+    station.texts.clear();
+    hold(&mut station, 3000, 1500);
+    assert!(station.texts.is_empty(), "{:?}", station.texts);
+    let phase = station.device.rig().snapshot().phase;
+    assert_eq!(phase, Phase::Run);
 }
 
 #[test]

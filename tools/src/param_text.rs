@@ -41,7 +41,8 @@ pub(crate) fn remedy(name: &str, value: f32) -> String {
         return String::new();
     };
     let entry = id.entry();
-    let fits = entry.allows(value) && (entry.kind != Kind::Whole || value.fract() == 0.0);
+    let whole = matches!(entry.kind, Kind::Whole | Kind::Order);
+    let fits = entry.allows(value) && (!whole || value.fract() == 0.0);
     match entry.kind {
         // The ESC has said that nobody sets it.
         Kind::Derived => String::new(),
@@ -100,7 +101,7 @@ fn range(id: ParamId) -> String {
     }
     let whole = match entry.kind {
         Kind::Whole => "a whole number from ",
-        Kind::Real | Kind::FromMotor | Kind::OfMotor | Kind::Derived => "",
+        Kind::Real | Kind::FromMotor | Kind::OfMotor | Kind::Derived | Kind::Order => "",
     };
     let range = format!("{whole}{}", entry.range());
     match text.unit {

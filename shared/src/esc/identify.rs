@@ -3,12 +3,36 @@
 use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
 use crate::identify::{Outcome, Sight};
+use crate::input::access::Access;
 use crate::mavlink::Warning;
 use crate::params::ParamId;
+use crate::throttle::{Reach, Reached};
+
+/// What a person is told of, each with the progress at which it begins, percent.
+const STEPS: [(u8, &str); 6] = [
+    (0, "phase A"),
+    (20, "phase B"),
+    (40, "phase C"),
+    (60, "spinning"),
+    (80, "running up"),
+    (90, "running down"),
+];
 
 impl Esc {
-    /// Begins an identification.
-    pub(super) fn identify(&mut self, now_us: u64) {
+    /// Begins one that the stick asks for, if a command could; what it finds is kept. If settings were lost it could
+    /// not be: the defaults would be stored with it.
+    pub(super) fn identify_by_stick(&mut self, throttle: &mut impl Reach, now_us: u64) {
+        let drive = self.drive();
+        if !self.storage.is_lost() && Reached(throttle).may_test(now_us, drive) {
+            self.identify(now_us, true);
+        } else {
+            self.warn_of("Not identified: a fault, or settings lost");
+        }
+    }
+
+    /// Begins an identification, of which what it finds is kept or not.
+    pub(super) fn identify(&mut self, now_us: u64, keeps: bool) {
+        self.keeps = keeps;
         let outcome = self.identify.begin(now_us);
         self.identified(outcome);
     }
@@ -43,6 +67,10 @@ impl Esc {
     /// Goes on with an identification.
     pub(super) fn look_at_motor(&mut self, now_us: u64, snapshot: &Snapshot) {
         if !self.identify.is_under_way() {
+            // At another look than that of the end: both need stack.
+            if core::mem::take(&mut self.keeps) && self.identify.report.settings().is_some() {
+                self.keep_identified();
+            }
             return;
         }
         let sight = Sight {
@@ -57,6 +85,16 @@ impl Esc {
         }
     }
 
+    /// What MOT_IDENTIFY has asked for is over, or was refused.
+    pub(super) fn end_order(&mut self) {
+        let id = ParamId::MotIdentify;
+        if self.params.get(id) != 0.0 && !self.identify.is_under_way() {
+            // In its range.
+            let _ = self.params.set(id, 0.0);
+            self.component.tell_value(id);
+        }
+    }
+
     fn identified(&mut self, mut outcome: Outcome) {
         if outcome == Outcome::Assume {
             self.reassumes = true;
@@ -68,12 +106,18 @@ impl Esc {
             outcome = Outcome::Done(Err(error.reason));
         }
         match outcome {
-            Outcome::Progress(percent) => self.component.tell_progress(percent),
+            Outcome::Progress(percent) => {
+                self.component.tell_progress(percent);
+                if let Some((_, step)) = STEPS.iter().find(|(begun, _)| *begun == percent) {
+                    self.component.tell_step(step);
+                }
+            }
             Outcome::Assume => {}
             Outcome::Done(result) => {
                 self.reassumes = true;
-                if let Err(reason) = result {
-                    self.warn_in_pieces("Not identified: ", [reason, "", ""]);
+                match result {
+                    Ok(()) => self.component.tell_step("done"),
+                    Err(reason) => self.warn_in_pieces("Not identified: ", [reason, "", ""]),
                 }
                 self.component.check_done(result.is_ok());
             }

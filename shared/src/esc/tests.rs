@@ -430,7 +430,9 @@ fn the_stick_calibrates_and_the_ends_are_stored() {
         (ParamId::InpPulseMaxUs as u16, 1912.0),
     ];
     assert_eq!(values, wanted);
-    // The new ends hold: what was zero throttle by them arms, and their middle is half.
+    // The new ends hold: what was zero throttle by them arms, once the stick may no longer ask for more, and their
+    // middle is half.
+    bench.pulses(90, 1105);
     assert!(!bench.esc.telemetry().armed);
     bench.pulses(40, 1105);
     assert!(bench.esc.telemetry().armed);

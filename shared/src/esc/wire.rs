@@ -22,6 +22,9 @@ impl Esc {
     pub(super) fn follow_wire(&mut self, throttle: &mut impl Reach, now_us: u64) {
         while let Some(news) = throttle.reach(|throttle| throttle.news(now_us)) {
             self.hear(now_us, news);
+            if news == News::Calibration(Step::Identify) {
+                self.identify_by_stick(throttle, now_us);
+            }
         }
         // The motor may have been asked to turn since it was ordered.
         let stopped = self.drive().stopped;
@@ -36,7 +39,7 @@ impl Esc {
             Act::Beep => self.tunes.play(now_us, Tune::Beacon(Beacon::One)),
             Act::Calibrate => throttle.reach(|throttle| throttle.calibrate(now_us, true)),
             Act::Check => self.check.begin(),
-            Act::Identify => self.identify(now_us),
+            Act::Identify => self.identify(now_us, false),
             Act::EndIdentification => self.end_identification("cancelled"),
             Act::KeepIdentified => {
                 let kept = self.keep_identified();
@@ -58,11 +61,11 @@ impl Esc {
             News::Armed => Tune::Armed,
             News::Lost { armed: true } => Tune::Lost,
             News::OpenThrottle => Tune::OpenThrottle,
-            News::Calibration(Step::Full) => Tune::Calibrating,
+            News::Calibration(Step::Full | Step::Again) => Tune::Calibrating,
             News::Calibration(Step::Done(_)) => Tune::Calibrated,
             News::Identified(_)
             | News::Lost { armed: false }
-            | News::Calibration(Step::Cancelled) => return,
+            | News::Calibration(Step::Cancelled | Step::Identify) => return,
         };
         self.tunes.play(now_us, tune);
     }

@@ -5,6 +5,8 @@
 //! half seconds both ends are known. Anything else leaves them as they were, until the next power-up.
 //!
 //! A ground station may ask for the same at any time: the stick then has a minute to come up.
+//!
+//! The same once more after that of a power-up, up within two seconds, asks for the identification of the motor.
 
 use super::endpoints::EndPoints;
 use crate::math::quotient;
@@ -37,6 +39,10 @@ pub enum Step {
     Full,
     /// Both ends have been measured.
     Done(EndPoints),
+    /// Full throttle has been held again; no throttle is awaited.
+    Again,
+    /// No throttle has followed: the motor is to be identified.
+    Identify,
     /// Something else than no throttle followed full throttle, or the stick was not moved as asked.
     Cancelled,
 }
@@ -47,6 +53,8 @@ pub struct Calibration {
     stage: Stage,
     /// Time at which it was asked for, until it ends.
     asked_us: Option<u64>,
+    /// True once both ends have been measured: the stick may ask for more.
+    done: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -79,18 +87,22 @@ struct Held {
 impl Calibration {
     /// Waits for a stick at full throttle from now on.
     pub fn ask(&mut self, now_us: u64) {
-        self.stage = Stage::Fresh;
-        self.asked_us = Some(now_us);
+        *self = Self {
+            asked_us: Some(now_us),
+            ..Self::default()
+        };
     }
 
     /// It ends: the signal carries something else than pulses, or it is no longer wanted. Never inlined:
     /// each way out is one.
     #[inline(never)]
     pub fn end(&mut self) -> Option<Step> {
-        let cancelled = self.is_under_way().then_some(Step::Cancelled);
-        self.stage = Stage::Over;
-        self.asked_us = None;
-        cancelled
+        let cancels = self.is_under_way() && !self.done;
+        *self = Self {
+            stage: Stage::Over,
+            ..Self::default()
+        };
+        cancels.then_some(Step::Cancelled)
     }
 
     /// Returns true if the stick calibrates and is no throttle: a calibration has been asked for, or
@@ -111,7 +123,8 @@ impl Calibration {
     pub fn poll(&mut self, now_us: u64) -> Option<Step> {
         let waits = matches!(self.stage, Stage::Fresh);
         let asked_us = self.asked_us.filter(|_| waits)?;
-        (now_us.saturating_sub(asked_us) > WAIT_US)
+        let most_us = if self.done { WAY_US } else { WAIT_US };
+        (now_us.saturating_sub(asked_us) > most_us)
             .then(|| self.end())
             .flatten()
     }
@@ -129,7 +142,7 @@ impl Calibration {
                         full_us: now_us,
                         held: None,
                     };
-                    return Some(Step::Full);
+                    return Some(if self.done { Step::Again } else { Step::Full });
                 }
             }
             Stage::Fresh | Stage::Full(_) if self.asked_us.is_some() => self.stage = Stage::Fresh,
@@ -152,7 +165,16 @@ impl Calibration {
                             min_us: whole_us(held.mean_ns()),
                             max_us: whole_us(*full_ns),
                         };
+                        let (again, asked) = (self.done, self.asked_us.is_some());
                         self.end();
+                        if again {
+                            return Some(Step::Identify);
+                        }
+                        // Who has a ground station asks it for more.
+                        if !asked {
+                            self.ask(now_us);
+                            self.done = true;
+                        }
                         return Some(Step::Done(ends));
                     }
                 } else {
@@ -243,9 +265,45 @@ mod tests {
         assert_eq!(bench.hold(5_000, |_| 1912), [(2_200, Step::Full)]);
         assert_eq!(bench.hold(400, |n| 1900 - n as u32 * 40), []);
         assert_eq!(bench.hold(2_000, |_| 1105), [(1_500, DONE)]);
-        // Once: nothing that comes later is a calibration.
+        // Once: nothing that comes two seconds later is a calibration, or a wish for more.
+        assert!(bench.calibration.is_under_way());
+        bench.hold(1_600, |_| 1105);
+        assert_eq!(bench.calibration.poll(bench.now_us), None);
+        assert!(!bench.calibration.is_under_way());
         assert_eq!(bench.hold(5_000, |_| 1950), []);
         assert_eq!(bench.hold(5_000, |_| 1050), []);
+    }
+
+    #[test]
+    fn the_same_once_more_asks_for_the_identification() {
+        let taken = || {
+            let mut bench = Bench::default();
+            bench.hold(3_000, |_| 1912);
+            assert_eq!(bench.hold(1_520, |_| 1105), [(1_500, DONE)]);
+            bench
+        };
+        let mut bench = taken();
+        assert_eq!(bench.hold(1_000, |_| 1105), []);
+        assert_eq!(bench.hold(3_000, |_| 1912), [(2_200, Step::Again)]);
+        assert_eq!(bench.hold(400, |n| 1900 - n as u32 * 40), []);
+        assert_eq!(bench.hold(2_000, |_| 1105), [(1_500, Step::Identify)]);
+        assert!(!bench.calibration.is_under_way());
+        assert_eq!(bench.hold(5_000, |_| 1912), []);
+
+        // Too short, left in the middle, and a lost signal: nothing is asked for, and the ends stay taken.
+        let mut bench = taken();
+        bench.hold(2_000, |_| 1912);
+        bench.hold(20, |_| 1105);
+        assert_eq!(bench.calibration.poll(bench.now_us), None);
+        assert_eq!(bench.hold(5_000, |_| 1105), []);
+        let mut bench = taken();
+        assert_eq!(bench.hold(3_000, |_| 1912), [(2_200, Step::Again)]);
+        assert_eq!(bench.hold(5_000, |_| 1500), []);
+        assert_eq!(bench.hold(5_000, |_| 1105), []);
+        let mut bench = taken();
+        assert_eq!(bench.hold(3_000, |_| 1912), [(2_200, Step::Again)]);
+        assert_eq!(bench.calibration.lost(), None);
+        assert_eq!(bench.hold(5_000, |_| 1105), []);
     }
 
     #[test]

@@ -350,7 +350,13 @@ fn the_frame_rate_may_change_in_flight() {
 fn the_stick_teaches_the_end_points_and_turns_nothing() {
     let mut bench = Bench::new(None);
     let mut steps = Vec::new();
-    for (count, width_us) in [(190, 1912), (10, 1500), (100, 1105), (200, 1912)] {
+    for (count, width_us) in [
+        (190, 1912),
+        (10, 1500),
+        (100, 1105),
+        (200, 1912),
+        (80, 1105),
+    ] {
         for _ in 0..count {
             bench.pulses(1, width_us);
             assert!(!bench.turns() && !bench.input.authority().armed());
@@ -365,7 +371,8 @@ fn the_stick_teaches_the_end_points_and_turns_nothing() {
         min_us: 1105,
         max_us: 1912,
     };
-    assert_eq!(steps, [Step::Full, Step::Done(ends)]);
+    let wanted = [Step::Full, Step::Done(ends), Step::Again, Step::Identify];
+    assert_eq!(steps, wanted);
 }
 
 #[test]

@@ -99,6 +99,22 @@ impl Command {
         }
     }
 
+    /// MOT_IDENTIFY is written: the command of the same number.
+    pub(super) fn identify(now_us: u64, frame: &Frame) -> Self {
+        let mut params = [0.0; 7];
+        params[0] = frame.f32(0);
+        Self {
+            from: frame.from,
+            trust: Trust::Full,
+            signed: false,
+            at_us: now_us,
+            exact: true,
+            number: IDENTIFY,
+            confirmation: None,
+            params,
+        }
+    }
+
     /// A parameter that is a whole number from -1 on, or none of these.
     fn choice(&self, parameter: usize) -> Option<i32> {
         let value = self.params[parameter];
@@ -242,7 +258,7 @@ impl Commands {
             RUN_PREARM_CHECKS if command.exact || self.role == Role::Standalone => {
                 self.measure(command, Act::Check, drive, context)
             }
-            IDENTIFY if command.exact => self.identify(command, drive, context),
+            IDENTIFY if command.exact => self.identify(command, drive, context, replies),
             COMPONENT_ARM_DISARM => {
                 let arm = command.choice(0);
                 if arm == Some(0) {

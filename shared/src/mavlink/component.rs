@@ -121,6 +121,7 @@ impl Component {
         // If nobody else has been asked, an unknown name is an error.
         let alone = target.component != 0 || self.identity.role == Role::Standalone;
         let drive = context.drive();
+        let mut command = None;
         match frame.id {
             PING_ID if target.system == 0 && target.component == 0 => {
                 self.replies.push(Reply::Pong {
@@ -139,21 +140,18 @@ impl Component {
                     context,
                     &mut self.replies,
                 );
-                self.params_changed |= taken;
-                self.keep |= taken;
+                self.keep |= taken.is_some();
+                match taken {
+                    Some(ParamId::MotIdentify) => {
+                        command = Some(Command::identify(context.now_us, frame));
+                    }
+                    _ => self.params_changed |= taken.is_some(),
+                }
             }
-            COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => self.commands.handle(
-                &Command::read(
-                    context.now_us,
-                    frame,
-                    trust,
-                    target == self.identity.address,
-                ),
-                drive,
-                context,
-                &mut self.schedule,
-                &mut self.replies,
-            ),
+            COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => {
+                let exact = target == self.identity.address;
+                command = Some(Command::read(context.now_us, frame, trust, exact));
+            }
             SETUP_SIGNING_DATA::ID if trust == Trust::Full => self.set_up_signing(frame),
             MISSION_REQUEST_LIST_DATA::ID if self.identity.role == Role::Standalone => {
                 self.replies.push(Reply::MissionCount {
@@ -178,6 +176,11 @@ impl Component {
                 }
             }
             _ => {}
+        }
+        if let Some(command) = command {
+            let (schedule, replies) = (&mut self.schedule, &mut self.replies);
+            self.commands
+                .handle(&command, drive, context, schedule, replies);
         }
     }
 
@@ -281,6 +284,11 @@ impl Component {
         self.params_changed = true;
     }
 
+    /// As [`Component::changed`], of a value from which no configuration follows.
+    pub fn tell_value(&mut self, id: ParamId) {
+        self.replies.value(id);
+    }
+
     /// Reports the throttle wire's news.
     pub fn tell(&mut self, news: News) {
         if let News::Calibration(step) = news {
@@ -294,6 +302,13 @@ impl Component {
     /// A self-test is so far, percent.
     pub fn tell_progress(&mut self, percent: u8) {
         self.commands.check_progress(percent, &mut self.replies);
+    }
+
+    /// An identification has come to this step.
+    pub fn tell_step(&mut self, step: &'static str) {
+        let text = ["Identification: ", step];
+        self.replies
+            .push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
     }
 
     /// A self-test has ended, and the command for it, if there was one, is acknowledged.

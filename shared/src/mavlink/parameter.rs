@@ -55,7 +55,7 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
     }
 }
 
-/// PARAM_SET. Returns true if the value was taken; it is broadcast either way.
+/// PARAM_SET. Returns the parameter if the value was taken; the value in force is broadcast either way.
 ///
 /// The type that the sender names is not looked at: those that keep integers in floats mean the
 /// same number. Those that put an integer's bytes into the float give a subnormal, which no
@@ -67,13 +67,13 @@ pub(super) fn set(
     stopped: bool,
     context: &mut Context,
     replies: &mut Replies,
-) -> bool {
+) -> Option<ParamId> {
     let name = frame.bytes(6);
     let Some(id) = find(&name) else {
         if alone {
             unknown(frame.from, name, BY_NAME, replies);
         }
-        return false;
+        return None;
     };
     replies.value(id);
     let result = match trust {
@@ -87,7 +87,7 @@ pub(super) fn set(
             refusal,
         });
     }
-    result.is_ok()
+    result.ok().map(|()| id)
 }
 
 fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result<(), Refusal> {

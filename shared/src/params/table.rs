@@ -15,6 +15,9 @@ pub enum Kind {
     OfMotor,
     /// Computed from other parameters; it cannot be set and is not stored.
     Derived,
+    /// Whole numbers in range, each of which has something done by being written: it is 0 again when that is over, and
+    /// is not stored.
+    Order,
 }
 
 /// One parameter's entry.
@@ -38,12 +41,17 @@ pub struct Parameter {
 }
 
 impl Kind {
+    /// Returns true if the value survives a loss of power.
+    pub fn is_kept(self) -> bool {
+        !matches!(self, Self::Derived | Self::Order)
+    }
+
     /// What 0 means, where it is taken outside the range too.
     pub fn zero(self) -> Option<&'static str> {
         match self {
             Self::FromMotor => Some("from the motor"),
             Self::OfMotor => Some("not known"),
-            Self::Real | Self::Whole | Self::Derived => None,
+            Self::Real | Self::Whole | Self::Derived | Self::Order => None,
         }
     }
 }
@@ -239,6 +247,11 @@ parameters! {
             1 Brake "brake";
     18 MotToneA "MOT_TONE_A" "A" Real 0.0..10.0 = 1.5 live
         "Bound of tones' phase current, peak; up to a quarter more with R or L stated wrongly; 0 is silent";
+    19 MotIdentify "MOT_IDENTIFY" "" Order 0.0..2.0 = 0.0 live
+        "Identification of the motor; 0 again when it is over"
+            0 "end it"
+            1 "begin it: the motor turns"
+            2 "keep what it has found";
     20 CtlMode "CTL_MODE" "" Whole 0.0..2.0 = 0.0
         "What throttle commands" one of
             0 Speed "speed"
@@ -389,7 +402,8 @@ mod tests {
                 "{}",
                 p.name
             );
-            assert!(p.kind == Kind::Whole || choices.is_empty(), "{}", p.name);
+            let whole = matches!(p.kind, Kind::Whole | Kind::Order);
+            assert!(whole || choices.is_empty(), "{}", p.name);
             for other in &TABLE[i + 1..] {
                 assert_ne!(p.name, other.name);
                 assert_ne!(p.key, other.key, "{} and {}", p.name, other.name);
@@ -405,6 +419,7 @@ mod tests {
             "MAV_COMP_ID",
             "MAV_ROLE",
             "MOT_TONE_A",
+            "MOT_IDENTIFY",
             "CTL_SLEW_RPM_S",
             "CTL_BW_SPD_HZ",
             "CTL_FF_A",

@@ -103,7 +103,7 @@ impl Params {
         if !entry.allows(value) {
             return Err(SetError::OutOfRange);
         }
-        if entry.kind == Kind::Whole && libm::truncf(value) != value {
+        if matches!(entry.kind, Kind::Whole | Kind::Order) && libm::truncf(value) != value {
             return Err(SetError::NotWhole);
         }
         self.values[id as usize] = value;

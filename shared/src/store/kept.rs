@@ -1,7 +1,7 @@
 //! The values that are kept, and the key of each. A key is never given to another value.
 
 use crate::mavlink::{Intervals, KeptSigning, Key};
-use crate::params::{Kind, ParamId, Params, TABLE};
+use crate::params::{ParamId, Params, TABLE};
 use crate::statistics::Statistics;
 
 /// First key of the intervals of messages. Keys below 0x1000 are the parameters'.
@@ -85,11 +85,11 @@ impl Kept {
         }
     }
 
-    /// The word that has this key. Derived parameters have none.
+    /// The word that has this key. Parameters that are not kept have none.
     pub(super) fn find(key: u16) -> Option<usize> {
         (0..Self::WORDS).find(|word| {
-            let derived = |id: &ParamId| id.entry().kind == Kind::Derived;
-            Self::key(*word) == key && !ParamId::ALL.get(*word).is_some_and(derived)
+            let kept = |id: &ParamId| id.entry().kind.is_kept();
+            Self::key(*word) == key && ParamId::ALL.get(*word).is_none_or(kept)
         })
     }
 
@@ -98,7 +98,7 @@ impl Kept {
         let bits = match Place::of(word) {
             Place::Param(id) => {
                 let (entry, value) = (id.entry(), self.params.get(id));
-                let stays = entry.kind == Kind::Derived || value == entry.default;
+                let stays = !entry.kind.is_kept() || value == entry.default;
                 return (!stays).then_some(value.to_bits());
             }
             Place::Interval(word) => self.intervals.word(word),

@@ -8,7 +8,7 @@ use super::word::key;
 use super::word::{Word, Writer};
 use super::*;
 use crate::mavlink::{Intervals, KeptSigning, Key};
-use crate::params::{Kind, ParamId, Params, TABLE};
+use crate::params::{ParamId, Params, TABLE};
 use crate::statistics::Statistics;
 use flash::{PAGE, RANGE, RamFlash, WORD};
 use random::Random;
@@ -34,7 +34,7 @@ fn everything(shift: f32) -> Kept {
     for id in ParamId::ALL {
         let entry = id.entry();
         let value = libm::floorf(entry.min + shift * (entry.max - entry.min));
-        if entry.kind != Kind::Derived {
+        if entry.kind.is_kept() {
             kept.params
                 .set(id, value.max(entry.min))
                 .expect("between its ends");
@@ -165,7 +165,7 @@ fn the_pages_last_for_so_many_changes() {
     let few = |shift: f32| {
         let mut kept = everything(shift);
         kept.params = Params::default();
-        let writable = |id: &ParamId| id.entry().kind != Kind::Derived;
+        let writable = |id: &ParamId| id.entry().kind.is_kept();
         for id in ParamId::ALL.into_iter().filter(writable).take(40) {
             let value = everything(shift).params.get(id);
             kept.params.set(id, value).expect("in range");

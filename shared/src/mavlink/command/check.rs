@@ -1,12 +1,12 @@
 //! RUN_PREARM_CHECKS: the self-test. It takes most of a second, and is acknowledged step by step. USER_1: the
 //! identification of the motor, which takes some ten seconds; parameter 1 is 1 to begin it, 0 to end it, and 2 to
-//! keep what it has found.
+//! keep what it has found. A write of MOT_IDENTIFY is the same.
 
-use mavlink::dialects::ardupilotmega::MavResult;
+use mavlink::dialects::ardupilotmega::{MavResult, MavSeverity};
 
 use super::{
     ACCEPTED, Act, Command, Commands, Context, DENIED, DriveStatus, IDENTIFY, IN_PROGRESS,
-    RUN_PREARM_CHECKS, Replies, TEMPORARILY_REJECTED,
+    RUN_PREARM_CHECKS, Replies, Reply, TEMPORARILY_REJECTED,
 };
 
 impl Commands {
@@ -16,6 +16,7 @@ impl Commands {
         command: &Command,
         drive: DriveStatus,
         context: &mut Context,
+        replies: &mut Replies,
     ) -> MavResult {
         let act = match command.choice(0) {
             Some(0) => {
@@ -26,7 +27,21 @@ impl Commands {
             Some(2) => Act::KeepIdentified,
             _ => return DENIED,
         };
-        self.measure(command, act, drive, context)
+        let result = self.measure(command, act, drive, context);
+        if result == TEMPORARILY_REJECTED {
+            let reason = if drive.faulted {
+                "a fault holds"
+            } else if !drive.stopped {
+                "the motor turns"
+            } else if self.is_busy() {
+                "another command is under way"
+            } else {
+                "the throttle is open"
+            };
+            let text = ["Not now: ", reason];
+            replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_WARNING, text));
+        }
+        result
     }
 
     /// The bridge is used for it: under the rule of what may turn a motor.
