@@ -31,7 +31,7 @@ pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
                 match step {
                     Step::Full => "full taken, now lower it",
                     Step::Done(_) => "both ends taken",
-                    Step::Again => "lower it to identify the motor",
+                    Step::Again => "lower it to identify",
                     Step::Identify => "over",
                     Step::Cancelled => "given up, nothing changed",
                 },

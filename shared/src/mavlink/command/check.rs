@@ -34,7 +34,7 @@ impl Commands {
             } else if !drive.stopped {
                 "the motor turns"
             } else if self.is_busy() {
-                "another command is under way"
+                "busy"
             } else {
                 "the throttle is open"
             };
