@@ -58,8 +58,10 @@ impl Random {
                 let share = self.below(1001) as f32 / 1000.0;
                 let value = entry.min + share * (entry.max - entry.min);
                 let value = [value, libm::truncf(value), entry.default][self.below(3)];
-                // Fractions of whole numbers and derived ones are refused.
-                let _ = kept.params.set(id, value);
+                if entry.kind.is_kept() {
+                    // A fraction of a whole number is refused.
+                    let _ = kept.params.set(id, value);
+                }
             }
         }
     }
