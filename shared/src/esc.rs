@@ -14,7 +14,9 @@ use crate::math::{Real, magnitude};
 #[cfg(feature = "group")]
 use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
-use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale};
+use crate::params::{
+    Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale, thresholds,
+};
 use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Polled, Reach, Reached, Throttle};
@@ -312,6 +314,7 @@ impl Esc {
         // A reading that is no number is too hot as well.
         self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
         self.telemetry.observe(snapshot, &self.scale, time_us);
+        self.telemetry.limits = thresholds(&self.params, &self.scale).limits(snapshot);
         self.charge
             .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();

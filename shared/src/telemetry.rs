@@ -1,6 +1,6 @@
 //! The ESC's state in SI.
 
-use crate::drive::{Faults, Phase, Snapshot};
+use crate::drive::{Faults, Limits, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
 use crate::input::signal::Signal;
 use crate::math::{SQRT_3, square_root};
@@ -24,6 +24,8 @@ pub struct Telemetry {
     pub phase: Phase,
     /// Faults that hold the bridge off.
     pub faults: Faults,
+    /// Limits that bind.
+    pub limits: Limits,
     /// Number of times that a fault has turned the bridge off since the start.
     pub fault_count: u32,
     /// Starts in a row that have failed: the motor is tried again, a few times.
@@ -89,6 +91,7 @@ impl Telemetry {
             temperature_c: 0.0,
             phase: Phase::Idle,
             faults: Faults::NONE,
+            limits: Limits::NONE,
             fault_count: 0,
             failed_starts: 0,
             armed: false,

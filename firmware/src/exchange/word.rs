@@ -60,17 +60,10 @@ pub fn unpack(word: u32) -> Setpoint {
 
 /// A set-point that does not turn the motor.
 fn rest(number: u32) -> Setpoint {
-    // Written out: a look-up would be a table in flash.
     match number {
+        0 => Setpoint::Stop,
         1 => Setpoint::Zero,
-        2 => Setpoint::Fault(Fault::OverCurrent),
-        3 => Setpoint::Fault(Fault::OverVoltage),
-        4 => Setpoint::Fault(Fault::UnderVoltage),
-        5 => Setpoint::Fault(Fault::OverTemperature),
-        6 => Setpoint::Fault(Fault::ObserverLost),
-        7 => Setpoint::Fault(Fault::Stuck),
-        8 => Setpoint::Fault(Fault::CurrentSensor),
-        _ => Setpoint::Stop,
+        _ => Fault::of_number((number - 2) as u8).map_or(Setpoint::Stop, Setpoint::Fault),
     }
 }
 

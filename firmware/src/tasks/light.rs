@@ -4,8 +4,8 @@ use embassy_stm32::gpio::Output;
 use embassy_time::{Duration, Instant};
 use siskin_control::drive::Snapshot;
 
-/// Flashes once when all is well, and n + 2 times for the fault with the lowest number n; then comes
-/// a pause. Dark: the control does not run. Even blinking is not from here: [`crate::damaged`].
+/// Flashes once when all is well, and as often as the fault with the lowest number has it; then comes a
+/// pause. Dark: the control does not run. Even blinking is not from here: [`crate::damaged`].
 pub(crate) struct Light {
     pin: Output<'static>,
     due: Instant,
@@ -33,7 +33,7 @@ impl Light {
                 None => 0,
                 Some(None) if ordered => 0,
                 Some(None) => 2,
-                Some(Some(fault)) => 2 * (fault as u8 + 2),
+                Some(Some(fault)) => 2 * fault.flashes(),
             };
         }
         let (lit, time_ms) = match self.steps {

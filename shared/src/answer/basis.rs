@@ -1,17 +1,17 @@
 //! The part of the drive's configuration that answers need.
 
 use crate::drive::config::six_step;
-use crate::drive::{ATTEMPTS, Fault, Snapshot};
-use crate::params::{self, ParamId, Params};
-use crate::units::{Current, Scale};
+use crate::drive::{ATTEMPTS, Fault, Snapshot, Thresholds};
+use crate::params::{self, Params};
+use crate::units::Scale;
 
 /// The little of a [`Config`](crate::drive::Config) that is needed to read a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Basis {
     /// The control's units in SI.
     pub scale: Scale,
-    /// Bound of the current's vector, `LIM_PHASE_A`.
-    pub(super) phase: Current,
+    /// Where limits bind.
+    pub(super) thresholds: Thresholds,
     /// As [`Config::lost_periods`](crate::drive::Config::lost_periods).
     pub(super) lost_periods: u32,
 }
@@ -21,7 +21,7 @@ impl Basis {
     pub fn new(params: &Params, scale: Scale) -> Self {
         Self {
             scale,
-            phase: scale.current_from_a(params.get(ParamId::LimPhaseA)),
+            thresholds: params::thresholds(params, &scale),
             lost_periods: params::lost_periods(&scale),
         }
     }
@@ -42,14 +42,5 @@ impl Basis {
                 snapshot.missed_sextants.into(),
                 six_step::LOST_SEXTANTS.into(),
             )) as u8
-    }
-
-    /// Returns true if the current's vector is within a sixteenth of its bound: the regulator holds it
-    /// there within its ripple.
-    pub(super) fn at_limit(&self, snapshot: &Snapshot) -> bool {
-        let square = |bits: i32| i64::from(bits) * i64::from(bits);
-        let bound = self.phase.to_bits();
-        square(snapshot.i.d.to_bits()) + square(snapshot.i.q.to_bits())
-            >= square(bound - bound / 16)
     }
 }

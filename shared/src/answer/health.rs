@@ -6,7 +6,7 @@
 //!
 //! | event | raised by |
 //! |---|---|
-//! | alert | the current is at `LIM_PHASE_A`: there is no more torque |
+//! | alert | a [`Limit`] binds beyond which there is no more torque: the current is at `LIM_PHASE_A`, or the supply gives `LIM_BUS_A` |
 //! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a Hall sensor is at fault |
 //! | error | a fault has turned the bridge off |
 //!
@@ -14,7 +14,7 @@
 
 use super::Basis;
 use super::extended::{Extended, Status};
-use crate::drive::Snapshot;
+use crate::drive::{Limit, Snapshot};
 
 /// Doubt from which on it is worth a warning: a quarter of what is allowed, as one of four starts
 /// that has failed. A crossing that the current hides now and then is none.
@@ -37,7 +37,7 @@ impl Health {
         self.stress = self.stress.max(doubt);
         self.max_stress = self.max_stress.max(doubt);
         let status = &mut self.status;
-        status.alert |= basis.at_limit(snapshot);
+        status.alert |= basis.thresholds.limits(snapshot).iter().any(Limit::alerts);
         status.warning |= doubt >= SUSPECT || snapshot.sensor_fault;
         status.error |= !snapshot.faults.is_empty() || snapshot.fault_count != self.fault_count;
         self.fault_count = snapshot.fault_count;
@@ -69,7 +69,7 @@ impl Health {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::{Fault, State};
+    use crate::drive::{Fault, Phase, State};
     use crate::params::{BOSSO_MOTOR, Board, Params, build};
     use crate::units::Current;
 
@@ -103,8 +103,9 @@ mod tests {
         let (basis, calm) = rig();
         let mut health = Health::default();
         let mut loaded = calm;
+        loaded.phase = Phase::Run;
         for (share, alert) in [(0.9, false), (0.95, true), (-1.0, true)] {
-            loaded.i.q = Current::from_num(basis.phase.to_num::<f64>() * share);
+            loaded.i.q = Current::from_num(basis.thresholds.phase.to_num::<f64>() * share);
             health.observe(&loaded, &basis);
             health.observe(&calm, &basis);
             assert_eq!(status(&mut health).alert, alert, "{share}");

@@ -78,8 +78,8 @@
 //!
 //! # The files' order
 //! Each file uses those before it, and none behind it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
-//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `state`,
-//! `mode_change`, `step`.
+//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
+//! `state`, `mode_change`, `step`.
 
 mod charge;
 pub mod config;
@@ -87,6 +87,7 @@ mod excitation;
 mod excite;
 mod foc;
 mod io;
+mod limited;
 mod mode_change;
 mod off;
 mod phase;
@@ -102,10 +103,11 @@ mod step;
 mod tone;
 mod transitions;
 
-pub use crate::protection::{Fault, Faults};
+pub use crate::protection::{Fault, Faults, Limit, Limits};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop, put_default};
 pub use excitation::{Excitation, Ripple};
 pub use io::{Bridge, Sample, Setpoint};
+pub use limited::Thresholds;
 pub use phase::Phase;
 pub use pull::Pull;
 pub use snapshot::Snapshot;

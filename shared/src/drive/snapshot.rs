@@ -2,6 +2,7 @@
 
 use super::phase::Phase;
 use crate::control::inductance::Factor;
+use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use crate::protection::Faults;
 use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
@@ -30,6 +31,8 @@ pub struct Snapshot {
     pub bus: Voltage,
     /// Current from the supply, 1.5·(v·i)/V_bus; negative while braking.
     pub bus_current: Current,
+    /// Bounds of i_q*, as the supply has moved them.
+    pub bounds: Bounds,
     /// Magnitude of a phase's reading that turns the bridge off.
     pub trip: AdcCounts,
     /// The adapted inductance over the one that the parameters state.

@@ -221,6 +221,7 @@ impl State {
             u: seen.u,
             bus: shared.protection.bus,
             bus_current: seen.bus_current,
+            bounds: shared.protection.bounds,
             trip: self.trip_level(),
             inductance: self.foc.loops.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.foc.observer),

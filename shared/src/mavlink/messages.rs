@@ -1,13 +1,13 @@
 //! Messages about the ESC.
 
 use mavlink::dialects::ardupilotmega::{
-    EscConnectionType, EscFailureFlags, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
+    EscConnectionType, MavModeFlag, MavParamType, MavProtocolCapability, MavState,
 };
 
 use super::group::Escs;
 use super::identity::Identity;
 use super::payload::Payload;
-use crate::drive::{Fault, Faults};
+use crate::drive::Faults;
 use crate::image::{Image, VERSION};
 use crate::input::signal::{Pulse, Signal};
 use crate::math::{quotient, round};
@@ -37,8 +37,9 @@ pub(super) fn heartbeat(
     } else {
         MavState::MAV_STATE_STANDBY
     };
-    // The custom mode comes first; MAVLink's version is 3 in all of its second one.
-    payload.u32(0);
+    // The custom mode comes first: the conditions, each a bit at its number. MAVLink's version is 3 in all of
+    // its second one.
+    payload.u32(telemetry.faults.custom_mode() | telemetry.limits.custom_mode());
     payload.put(&[
         mavtype as u8,
         autopilot as u8,
@@ -147,18 +148,11 @@ pub(super) fn name_bytes(id: ParamId) -> [u8; 16] {
     bytes
 }
 
-/// `ESC_FAILURE_FLAGS`; faults without a flag of their own are GENERIC.
+/// `ESC_FAILURE_FLAGS`.
 fn failure_flags(faults: Faults) -> u16 {
     faults
         .iter()
-        .map(|fault| match fault {
-            Fault::OverCurrent => EscFailureFlags::ESC_FAILURE_OVER_CURRENT,
-            Fault::OverVoltage => EscFailureFlags::ESC_FAILURE_OVER_VOLTAGE,
-            Fault::OverTemperature => EscFailureFlags::ESC_FAILURE_OVER_TEMPERATURE,
-            Fault::Stuck => EscFailureFlags::ESC_FAILURE_MOTOR_STUCK,
-            _ => EscFailureFlags::ESC_FAILURE_GENERIC,
-        })
-        .fold(0, |flags, flag| flags | flag.bits())
+        .fold(0, |flags, fault| flags | fault.failure_flag())
 }
 
 /// Major, minor, patch and release type of the version, a byte each.
@@ -184,6 +178,7 @@ mod tests {
     use mavlink::{MavlinkVersion, MessageData};
 
     use super::*;
+    use crate::drive::Fault;
     use crate::mavlink::place::Place;
     use crate::mavlink::tests::TELEMETRY;
 

@@ -17,7 +17,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::check::Report;
-use crate::drive::{Faults, Phase};
+use crate::drive::{Faults, Limits, Phase};
 use crate::identify;
 use crate::image::Image;
 use crate::input::authority::{Authority, Timing};
@@ -33,6 +33,7 @@ pub(super) const TELEMETRY: Telemetry = Telemetry {
     temperature_c: 25.0,
     phase: Phase::Idle,
     faults: Faults::NONE,
+    limits: Limits::NONE,
     fault_count: 0,
     failed_starts: 0,
     armed: false,

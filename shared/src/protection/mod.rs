@@ -1,9 +1,9 @@
 //! Turns the bridge off, and bounds the current so that it need not.
 
-mod fault;
+mod condition;
 mod ntc;
 
-pub use fault::{Fault, Faults};
+pub use condition::{Condition, Fault, Faults, Limit, Limits};
 pub use ntc::Ntc;
 
 use crate::control::speed::Bounds;

@@ -4,13 +4,17 @@ use super::sink::Sink;
 use super::view::View;
 use crate::drive::Fault;
 
-/// `@SYS/faults.txt`: past faults, and those that hold the bridge off.
+/// `@SYS/faults.txt`: past faults, those that hold the bridge off, and limits that bind.
 pub(super) fn faults(view: &View, sink: &mut Sink) {
     sink.put(b"Faults since the start: ");
     decimal(view.telemetry.fault_count, sink);
     for fault in view.telemetry.faults.iter() {
         sink.put(b"\nNow: ");
         sink.put(fault.text().as_bytes());
+    }
+    for limit in view.telemetry.limits.iter() {
+        sink.put(b"\nLimited by: ");
+        sink.put(limit.text().as_bytes());
     }
     if !view.warning.is_empty() {
         sink.put(b"\nLast warning: ");

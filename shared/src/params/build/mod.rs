@@ -29,8 +29,9 @@ use super::values::Params;
 use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
-use crate::drive::{Config, Direction, Stop};
+use crate::drive::{Config, Direction, Stop, Thresholds};
 use crate::input::signal::Signal;
+use crate::math::Real;
 use crate::protection;
 use crate::units::{Current, Scale, Voltage, stated_emf};
 use core::cell::Cell;
@@ -206,6 +207,15 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
 /// Greatest current of a test of the motor.
 pub(crate) fn test_current(params: &Params, scale: &Scale) -> Current {
     scale.current_from_a(TEST_SHARE * params.get(ParamId::LimPhaseA))
+}
+
+/// Where limits bind.
+pub(crate) fn thresholds(params: &Params, scale: &Scale) -> Thresholds {
+    let return_v = params.get(ParamId::LimBusVMax) - RETURN_BAND_V;
+    Thresholds {
+        phase: scale.current_from_a(params.get(ParamId::LimPhaseA)),
+        bus_return_v: Voltage::from_f32(return_v / scale.voltage_v),
+    }
 }
 
 /// Periods in a row for which the observer's state may be out of its range.

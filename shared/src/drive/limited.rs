@@ -1,0 +1,141 @@
+//! Which limits bind, as a snapshot shows it. The tasks work this out, not the interrupt.
+
+use super::snapshot::Snapshot;
+use crate::protection::{Limit, Limits};
+use crate::units::{Current, Voltage};
+
+/// Where limits bind, in the control's units.
+#[derive(Clone, Copy, Debug)]
+pub struct Thresholds {
+    /// Bound of the current's vector, `LIM_PHASE_A`.
+    pub phase: Current,
+    /// Supply voltage from which less is returned, as [`Config::bus_return_v`](crate::protection::Config::bus_return_v).
+    pub bus_return_v: Voltage,
+}
+
+/// What is held at a bound lies within a sixteenth of it: the regulator's ripple is less.
+const NEAR_SHIFT: u32 = 4;
+
+impl Thresholds {
+    /// The limits that bind now.
+    pub fn limits(&self, snapshot: &Snapshot) -> Limits {
+        let mut limits = Limits::NONE;
+        if !snapshot.phase.drives() {
+            return limits;
+        }
+        let mut note = |binds: bool, limit| {
+            if binds {
+                limits.insert(limit);
+            }
+        };
+        let (i, bounds) = (snapshot.i, snapshot.bounds);
+        let bound = near(self.phase.to_bits());
+        note(
+            length_square(i.d.to_bits(), i.q.to_bits()) >= square(bound),
+            Limit::PhaseCurrent,
+        );
+        let i_q = i.q.to_bits();
+        note(
+            bounds.max < self.phase && i_q >= near(bounds.max.to_bits()),
+            Limit::BusCurrent,
+        );
+        // Without braking there is a bound as well: it stands ready, far from the current.
+        note(
+            i_q < 0 && bounds.min > -self.phase && i_q <= near(bounds.min.to_bits()),
+            Limit::RegenCurrent,
+        );
+        note(snapshot.bus > self.bus_return_v, Limit::BusVoltage);
+        // The longest voltage without over-modulation is 1/√3 of the supply's.
+        let voltage = length_square(snapshot.u.d.to_bits(), snapshot.u.q.to_bits());
+        note(
+            voltage.saturating_mul(3) >= square(near(snapshot.bus.to_bits())),
+            Limit::Duty,
+        );
+        limits
+    }
+}
+
+fn near(bound: i32) -> i32 {
+    bound - (bound >> NEAR_SHIFT)
+}
+
+fn square(bits: i32) -> i64 {
+    i64::from(bits) * i64::from(bits)
+}
+
+fn length_square(d: i32, q: i32) -> i64 {
+    square(d).saturating_add(square(q))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::speed::Bounds;
+    use crate::drive::{Phase, State};
+    use crate::params::{BOSSO_BENCH, Board, Params, build};
+
+    fn at(share_d: f64, share_q: f64) -> (Thresholds, Snapshot) {
+        let config = build(&Params::of(&BOSSO_BENCH), &Board::BENCH).expect("the defaults fit");
+        let protection = &config.protection;
+        let mut snapshot = State::new(&config).snapshot();
+        let share = |share: f64| Current::from_num(protection.phase.to_num::<f64>() * share);
+        snapshot.phase = Phase::Run;
+        snapshot.bounds = Bounds {
+            min: -protection.phase,
+            max: protection.phase,
+        };
+        snapshot.bus = protection.bus_return_v / 2;
+        snapshot.i.d = share(share_d);
+        snapshot.i.q = share(share_q);
+        let thresholds = Thresholds {
+            phase: protection.phase,
+            bus_return_v: protection.bus_return_v,
+        };
+        (thresholds, snapshot)
+    }
+
+    fn only(limits: Limits, wanted: Option<Limit>) {
+        assert!(limits.iter().eq(wanted), "{limits:?} for {wanted:?}");
+    }
+
+    #[test]
+    fn the_length_of_the_current_counts_and_nothing_binds_at_rest() {
+        for (d, q, binds) in [(0.0, 0.9, false), (0.0, -0.97, true), (0.7, 0.7, true)] {
+            let (thresholds, mut snapshot) = at(d, q);
+            only(
+                thresholds.limits(&snapshot),
+                binds.then_some(Limit::PhaseCurrent),
+            );
+            snapshot.phase = Phase::Idle;
+            only(thresholds.limits(&snapshot), None);
+        }
+    }
+
+    #[test]
+    fn a_bound_that_the_supply_has_moved_binds_where_the_current_is_at_it() {
+        for (q, max, min, wanted) in [
+            (0.5, 0.5, -1.0, Some(Limit::BusCurrent)),
+            (0.3, 0.5, -1.0, None),
+            (-0.25, 1.0, -0.25, Some(Limit::RegenCurrent)),
+            (-0.1, 1.0, -0.25, None),
+            (0.3, 1.0, -0.25, None),
+        ] {
+            let (thresholds, mut snapshot) = at(0.0, q);
+            let share = |share: f64| Current::from_num(thresholds.phase.to_num::<f64>() * share);
+            snapshot.bounds = Bounds {
+                min: share(min),
+                max: share(max),
+            };
+            only(thresholds.limits(&snapshot), wanted);
+        }
+    }
+
+    #[test]
+    fn the_supply_binds_near_its_limit_and_where_it_is_used_up() {
+        let (thresholds, mut snapshot) = at(0.0, 0.5);
+        snapshot.u.q = Voltage::from_num(snapshot.bus.to_num::<f64>() / 3.0_f64.sqrt() * 0.97);
+        only(thresholds.limits(&snapshot), Some(Limit::Duty));
+        snapshot.bus = thresholds.bus_return_v + Voltage::DELTA;
+        only(thresholds.limits(&snapshot), Some(Limit::BusVoltage));
+    }
+}

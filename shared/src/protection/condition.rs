@@ -1,0 +1,262 @@
+//! Conditions: faults that stop the bridge and limits that bind it, in one space of numbers.
+//!
+//! The listings below are the one source of numbers, names, flags and of the pilot's page in
+//! `firmware/README.md`: a test compares that with [`Condition`]'s rows.
+
+use crate::trace::Trace;
+
+/// What the pilot's page says of a condition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Condition {
+    /// Its number, which is that of its bit in HEARTBEAT's custom mode.
+    pub number: u8,
+    /// Its name, in texts and files.
+    pub text: &'static str,
+    /// When it is there.
+    pub meaning: &'static str,
+    /// What to do about it, or what the ESC does.
+    pub remedy: &'static str,
+}
+
+macro_rules! conditions {
+    (
+        $(#[$about:meta])* $name:ident, $(#[$of_set:meta])* $set:ident of $count:literal from $first:literal,
+        $(#[$of_mark:meta])* $mark:ident: $kind:ty;
+        $($(#[$doc:meta])* $variant:ident = $number:literal $text:literal $value:literal $meaning:literal $remedy:literal;)*
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum $name {
+            $($(#[$doc])* $variant = $number,)*
+        }
+
+        impl $name {
+            /// All, in the order of their numbers.
+            pub const ALL: [Self; $count] = [$(Self::$variant),*];
+
+            /// The one with this number.
+            // By comparison: in the interrupt a look-up would be a table in flash.
+            pub const fn of_number(number: u8) -> Option<Self> {
+                match number {
+                    $($number => Some(Self::$variant),)*
+                    _ => None,
+                }
+            }
+
+            /// A few words for a person.
+            pub const fn text(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)*
+                }
+            }
+
+            $(#[$of_mark])*
+            pub const fn $mark(self) -> $kind {
+                match self {
+                    $(Self::$variant => $value,)*
+                }
+            }
+
+            /// The row of the pilot's page.
+            pub const fn condition(self) -> Condition {
+                let (meaning, remedy) = match self {
+                    $(Self::$variant => ($meaning, $remedy),)*
+                };
+                Condition { number: self as u8, text: self.text(), meaning, remedy }
+            }
+        }
+
+        $(#[$of_set])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct $set(u8);
+
+        impl $set {
+            /// None.
+            pub const NONE: Self = Self(0);
+
+            /// Adds one.
+            pub fn insert(&mut self, one: $name) {
+                self.0 |= 1 << (one as u8 - $first);
+            }
+
+            /// Returns true if it is in the set.
+            pub const fn contains(self, one: $name) -> bool {
+                self.0 & (1 << (one as u8 - $first)) != 0
+            }
+
+            /// Returns true if there is none.
+            pub const fn is_empty(self) -> bool {
+                self.0 == 0
+            }
+
+            /// Those that are in the set, in the order of their numbers.
+            pub fn iter(self) -> impl Iterator<Item = $name> {
+                $name::ALL.into_iter().filter(move |one| self.contains(*one))
+            }
+
+            #[doc = concat!("A bit each, from the number ", stringify!($first), " on.")]
+            pub const fn bits(self) -> u8 {
+                self.0
+            }
+
+            /// The bits at the conditions' numbers, as HEARTBEAT's custom mode has them.
+            pub const fn custom_mode(self) -> u32 {
+                (self.0 as u32) << $first
+            }
+        }
+    };
+}
+
+conditions! {
+    /// A reason for which the bridge was turned off.
+    Fault,
+    /// A set of faults.
+    Faults of 7 from 0,
+    /// Its flag of `ESC_FAILURE_FLAGS`; of those without one of their own, GENERIC.
+    failure_flag: u16;
+
+    /// A phase current was above 1.4 times `LIM_PHASE_A` for two samples.
+    OverCurrent = 0 "over-current" 1
+        "a phase current above 1.4 · `LIM_PHASE_A` for two samples, the hardware's own trip, or the gate driver's alarm"
+        "look for a short; check `MOT_R_MOHM`, `MOT_L_UH` and the bandwidth `CTL_BW_CUR_HZ`";
+    /// The supply was above `LIM_BUS_V_MAX`.
+    OverVoltage = 1 "bus over-voltage" 2
+        "supply above `LIM_BUS_V_MAX`"
+        "braking into a supply that takes no current back: set `LIM_REGEN_A` lower, or `MOT_STOP` 0";
+    /// The supply was below `LIM_BUS_V_MIN`.
+    UnderVoltage = 2 "bus under-voltage" 64
+        "supply below `LIM_BUS_V_MIN`"
+        "an empty pack, thin wires, a current-limited supply; lower `LIM_BUS_A`";
+    /// The board was hotter than `LIM_TEMP_C`.
+    OverTemperature = 3 "over-temperature" 4
+        "board above `LIM_TEMP_C`"
+        "cool it; lower `LIM_PHASE_A`";
+    /// The observer's state left its range: the rotor's position is not known.
+    ObserverLost = 4 "rotor position lost" 64
+        "the observer's angle cannot be trusted any more"
+        "check the motor's parameters; a loose phase; a blocked propeller";
+    /// All attempts of a start have failed, or the motor was too slow for too long.
+    Stuck = 5 "motor does not start" 32
+        "every attempt of a start has failed"
+        "see below";
+    /// A current sensor's zero is too far off.
+    CurrentSensor = 6 "current sensor defect" 64
+        "a current sensor's zero is too far off"
+        "its shunt and amplifier: `siskin check`";
+}
+
+conditions! {
+    /// A limit that the drive keeps to, at the cost of what is asked for.
+    Limit,
+    /// A set of limits.
+    Limits of 5 from 16,
+    /// Returns true if it raises the alert of extended telemetry's status: there is no more torque.
+    alerts: bool;
+
+    /// The current's vector is at `LIM_PHASE_A`.
+    PhaseCurrent = 16 "phase current" true
+        "the current is at `LIM_PHASE_A`"
+        "holds the current there: there is no more torque";
+    /// The supply gives `LIM_BUS_A`.
+    BusCurrent = 17 "supply current" true
+        "the supply gives `LIM_BUS_A`"
+        "lowers the phase current: there is no more torque";
+    /// The supply takes `LIM_REGEN_A`.
+    RegenCurrent = 18 "returned current" false
+        "braking returns `LIM_REGEN_A`"
+        "brakes more slowly";
+    /// The supply is within a volt of `LIM_BUS_V_MAX`.
+    BusVoltage = 19 "supply voltage" false
+        "the supply is within 1 V of `LIM_BUS_V_MAX`"
+        "returns less to the supply, and turns more into heat in the motor";
+    /// The motor has all the voltage that the supply gives.
+    Duty = 20 "duty" false
+        "the motor has all the voltage that the supply gives"
+        "turns no faster";
+}
+
+impl Fault {
+    /// Flashes of the light until its pause; one is that all is well.
+    pub const fn flashes(self) -> u8 {
+        self as u8 + 2
+    }
+}
+
+impl Trace for Faults {
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        self.0.trace(out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::format;
+    use std::string::String;
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// The rows of the table in the builder's guide that begins with this line.
+    fn rows(head: &str) -> Vec<&'static str> {
+        let guide = include_str!("../../../firmware/README.md");
+        let (_, table) = guide.split_once(head).expect("the table is there");
+        table
+            .lines()
+            .skip(2)
+            .take_while(|line| line.starts_with('|'))
+            .collect()
+    }
+
+    #[test]
+    fn the_pilots_page_is_what_the_listings_say() {
+        let faults = Fault::ALL.map(|fault| {
+            let (row, flashes) = (fault.condition(), fault.flashes());
+            let Condition {
+                number,
+                text,
+                meaning,
+                remedy,
+            } = row;
+            format!("| {number} | `{text}` | {flashes} | {meaning} | {remedy} |")
+        });
+        assert_eq!(rows("| no. | fault |"), faults);
+        let limits = Limit::ALL.map(|limit| {
+            let alert = if limit.alerts() { "alert" } else { "" };
+            let Condition {
+                number,
+                text,
+                meaning,
+                remedy,
+            } = limit.condition();
+            let row = format!("| {number} | `{text}` | {alert} | {meaning} | {remedy} |");
+            row.replace("|  |", "| |")
+        });
+        assert_eq!(rows("| no. | limit |"), limits);
+    }
+
+    #[test]
+    fn numbers_are_distinct_and_bits_stand_at_them() {
+        let mut seen = 0_u32;
+        let mut names: Vec<String> = Vec::new();
+        let faults = Fault::ALL.map(|fault| {
+            let mut set = Faults::NONE;
+            set.insert(fault);
+            assert_eq!(Fault::of_number(fault as u8), Some(fault));
+            (set.custom_mode(), fault.condition())
+        });
+        let limits = Limit::ALL.map(|limit| {
+            let mut set = Limits::NONE;
+            set.insert(limit);
+            assert_eq!(Limit::of_number(limit as u8), Some(limit));
+            (set.custom_mode(), limit.condition())
+        });
+        for (bit, condition) in faults.into_iter().chain(limits) {
+            assert_eq!(bit, 1 << condition.number);
+            assert_eq!(seen & bit, 0, "{condition:?}");
+            seen |= bit;
+            assert!(!names.iter().any(|name| name == condition.text));
+            names.push(condition.text.into());
+        }
+    }
+}
