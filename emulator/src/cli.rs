@@ -63,7 +63,7 @@ pub(crate) struct BenchArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct PlotArgs {
-    /// A recording
+    /// A recording, or the fault record of an ESC (.bin, from siskin faults --save)
     pub(crate) record: PathBuf,
     /// The picture to make
     #[arg(short, long, value_name = "PICTURE.svg|.png")]

@@ -14,6 +14,7 @@ use siskin_control::drive::Sample;
 use siskin_control::esc::{Esc, obey};
 use siskin_control::mavlink::{Receiver, Request};
 use siskin_control::params::{BOSSO_MOTOR, Board, BuildError, ParamId, Params};
+use siskin_control::record::Record;
 use siskin_control::store::{self, Integrity};
 use siskin_control::throttle::Throttle;
 use siskin_control::units::AdcCounts;
@@ -116,6 +117,7 @@ pub struct Device {
     clock: Clock,
     task_due_ns: u64,
     faults: Timeline,
+    record: &'static Record,
 }
 
 /// A parameter from the command line or the bench, which is not stored.
@@ -206,6 +208,10 @@ impl Device {
         let board = bench.sensing.board(bench.delay);
         let (mut esc, throttle) = Esc::new(params.clone(), board, CAPTURE_HZ, link_bytes_per_s)?;
         esc.recall(&loaded);
+        // Memory of the chip, which is there before the program and after it: 1.2 KB that are never given back.
+        let record = &*Box::leak(Box::<Record>::default());
+        record.open();
+        esc.serve(record);
         wire.sow(bench.seed);
         let rig = Rig::new(bench, esc.config()?);
         let clock = Clock {
@@ -229,6 +235,7 @@ impl Device {
             clock,
             task_due_ns: 0,
             faults: Timeline::new(faults),
+            record,
         };
         Ok((device, loaded.trouble()))
     }
@@ -436,6 +443,8 @@ impl Device {
         };
         esc.recall(&loaded);
         esc.regroup(&self.esc);
+        self.record.open();
+        esc.serve(self.record);
         let Ok(config) = esc.config() else { return };
         self.esc = esc;
         self.throttle = throttle;

@@ -17,6 +17,7 @@ use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warnin
 use crate::params::{
     Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale, thresholds,
 };
+use crate::record::Record;
 use crate::statistics::{Recorder, Sight};
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Polled, Reach, Reached, Throttle};
@@ -60,6 +61,7 @@ pub struct Esc {
     identify: Identify,
     /// True if what it finds is to be kept.
     keeps: bool,
+    record: Option<&'static Record>,
     light: bool,
     /// The motor's command at the last poll.
     command: Command,
@@ -172,6 +174,7 @@ impl Esc {
             check: Check::new(&board),
             identify: Identify::default(),
             keeps: false,
+            record: None,
             light: false,
             command: Command::Stop,
             rests_since_us: None,
@@ -456,6 +459,7 @@ impl Esc {
             four: self.four.as_ref(),
             check: &self.check.report,
             identification: &self.identify.report,
+            record: self.record,
             authority: &mut Reached(throttle),
             validate: &|params| given.check(params, &board),
         };

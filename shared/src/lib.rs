@@ -9,6 +9,7 @@
 //! [`answer`]: crate::answer
 //! [`check`]: crate::check
 //! [`identify`]: crate::identify
+//! [`record`]: crate::record
 //! [`tune`]: crate::tune
 //! [`params`]: crate::params
 //! [`store`]: crate::store
@@ -19,8 +20,8 @@
 //!
 //! # The order of the modules
 //! Dependencies run one way: {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control`
-//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `setpoint`, `telemetry`} ← {`answer`,
-//! `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
+//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`} ←
+//! {`answer`, `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
 //! and that each folder has one.
 //!
 //! # Inlining
@@ -51,6 +52,7 @@ pub mod math;
 pub mod mavlink;
 pub mod params;
 pub mod protection;
+pub mod record;
 pub mod setpoint;
 pub mod statistics;
 pub mod store;

@@ -214,6 +214,7 @@ def test_folders_are_listed_and_what_is_in_them_can_be_read(files):
         "/@SYS/statistics.txt",
         "/@SYS/check.txt",
         "/@SYS/identify.txt",
+        "/@SYS/faults.bin",
     }
     for path, size in sizes.items():
         assert len(files.file(path)) == size, path

@@ -59,6 +59,10 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Show the last faults, and what the control did just before one: kept over a reset, not over a power-down.
+    ///
+    /// The exit status is 1 where a fault is on record.
+    Faults(FaultsArgs),
     /// Read, change, save and load parameters.
     #[command(subcommand)]
     Params(ParamsCommand),
@@ -173,6 +177,17 @@ pub(crate) struct MonitorArgs {
     /// End after N samples.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) count: Option<u64>,
+}
+
+/// What to do with the fault record.
+#[derive(Debug, Args)]
+pub(crate) struct FaultsArgs {
+    /// One JSON object: items, a list of the faults, and periods, what the control did before one.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Write the record to a file as well, for siskin-emulator plot: it ends in .bin.
+    #[arg(long, value_name = "FILE.bin")]
+    pub(crate) save: Option<PathBuf>,
 }
 
 /// What to decode.

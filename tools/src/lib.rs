@@ -8,6 +8,7 @@ pub mod decode;
 mod endpoint;
 mod error;
 mod factory;
+mod faults;
 mod flash;
 mod ftp;
 mod given;
@@ -109,6 +110,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         }
         Command::Check { json } => check::run(&mut find()?, *json, &mut out),
         Command::Identify { keep, json } => identify::run(&mut find()?, (*keep, *json), &mut out),
+        Command::Faults(args) => faults::run(&mut find()?, args, &mut out),
         Command::Decode(args) => decode::run(&args.capture, &args.options, &mut out),
         Command::Budget(args) => budget::run(args, cli.component, &mut out),
         Command::Tune(args) => tune::run(args, cli.component, &mut out),

@@ -48,6 +48,12 @@ impl Device {
             (setpoint, imposed) => imposed.unwrap_or(setpoint),
         };
         let period = self.rig.period(setpoint);
+        if !self.rig.is_held() {
+            let io = (&period.sample, &period.bridge);
+            let (config, state) = (self.rig.config(), self.rig.state());
+            self.record
+                .note(config, state, io, self.clock.periods as u32);
+        }
         self.latest = Some(period.sample);
         onlooker.period(t_s, &period, &self.rig);
         self.clock.periods += 1;

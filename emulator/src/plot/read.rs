@@ -4,10 +4,11 @@ use std::fs::File;
 use std::path::Path;
 
 use siskin_control::drive::Phase;
+use siskin_control::record::Recorded;
 
 use super::error::PlotError;
 use super::reduce::Trace;
-use crate::record::Row;
+use crate::record::{Row, trip};
 
 /// A recording as a picture shows it.
 #[derive(Clone, Debug)]
@@ -128,6 +129,7 @@ type Rows = Box<dyn Iterator<Item = Result<(String, Row), PlotError>>>;
 fn rows(path: &Path) -> Result<Rows, PlotError> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("parquet") => packed_rows(path),
+        Some("bin") => rows_of_record(path),
         _ => text_rows(path),
     }
 }
@@ -156,6 +158,24 @@ fn packed_rows(path: &Path) -> Result<Rows, PlotError> {
             Ok(row) => Ok((place, row)),
             Err(reason) => Err(content(&path, format!("{place}: {reason}"))),
         }
+    })))
+}
+
+/// The fault record of an ESC.
+fn rows_of_record(path: &Path) -> Result<Rows, PlotError> {
+    let bytes = std::fs::read(path).map_err(|source| PlotError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let recorded = Recorded::read(&bytes).ok_or_else(|| {
+        content(
+            path,
+            "it is no fault record: `siskin faults --save`".to_owned(),
+        )
+    })?;
+    let rows = trip::rows(&recorded).into_iter().enumerate();
+    Ok(Box::new(rows.map(|(index, row)| {
+        Ok((format!("period {}", index + 1), row))
     })))
 }
 

@@ -12,6 +12,7 @@ mod sink;
 #[cfg(test)]
 mod tests;
 mod tlog;
+pub(crate) mod trip;
 mod vcd;
 
 use std::fs::File;

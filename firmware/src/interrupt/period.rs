@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use siskin_control::drive::{Bridge, Config, Fault, Setpoint, State, step};
+use siskin_control::record::Record;
 
 use super::gate_driver::GateDriver;
 use super::overruns::Overruns;
@@ -19,6 +20,11 @@ use crate::last_words::{Failure, fail};
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 static OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
+/// Where start-up clears nothing. On the G431 in the CCM: it is next to what writes it, no DMA is in its way, and
+/// there is room; the SRAM is the tasks' and the stack's.
+#[unsafe(link_section = ".fault_record")]
+static RECORD: Record = Record::new();
+
 /// Every so many periods the tasks get a snapshot: they look at it once a millisecond, which is 8
 /// periods at the slowest PWM.
 const PUBLISHED_EVERY: u32 = 8;
@@ -26,6 +32,11 @@ const PUBLISHED_EVERY: u32 = 8;
 /// Control periods since the start, wrapping: while it counts, the interrupt lives.
 pub fn periods() -> u32 {
     PERIODS.load(Ordering::Relaxed)
+}
+
+/// The fault record, which this interrupt writes.
+pub fn record() -> &'static Record {
+    &RECORD
 }
 
 /// Control periods since the start that were not done with when the next was due.
@@ -114,6 +125,9 @@ impl Interrupt {
             .with_config(|config| step(config, state, sample, setpoint));
         self.pwm.apply(bridge);
         let period = count(&PERIODS);
+        let state = &self.state;
+        self.end
+            .with_config(|config| RECORD.note(config, state, (&sample, &bridge), period));
         if period.is_multiple_of(PUBLISHED_EVERY) {
             self.publish();
         }

@@ -43,6 +43,9 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     if let Some(text) = last_words::take() {
         esc.warn(text);
     }
+    let record = interrupt::record();
+    record.open();
+    esc.serve(record);
     let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
     let baud = esc.params().get(ParamId::TelBaud) as u32;
     // One of them has the pin of the serial line on some boards.

@@ -1,6 +1,7 @@
 //! Which limits bind, as a snapshot shows it. The tasks work this out, not the interrupt.
 
 use super::snapshot::Snapshot;
+use crate::math::magnitude;
 use crate::protection::{Limit, Limits};
 use crate::units::{Current, Voltage};
 
@@ -29,42 +30,30 @@ impl Thresholds {
             }
         };
         let (i, bounds) = (snapshot.i, snapshot.bounds);
-        let bound = near(self.phase.to_bits());
+        note(magnitude(i.d, i.q) >= near(self.phase), Limit::PhaseCurrent);
         note(
-            length_square(i.d.to_bits(), i.q.to_bits()) >= square(bound),
-            Limit::PhaseCurrent,
-        );
-        let i_q = i.q.to_bits();
-        note(
-            bounds.max < self.phase && i_q >= near(bounds.max.to_bits()),
+            bounds.max < self.phase && i.q >= near(bounds.max),
             Limit::BusCurrent,
         );
         // Without braking there is a bound as well: it stands ready, far from the current.
         note(
-            i_q < 0 && bounds.min > -self.phase && i_q <= near(bounds.min.to_bits()),
+            i.q.is_negative() && bounds.min > -self.phase && i.q <= near(bounds.min),
             Limit::RegenCurrent,
         );
         note(snapshot.bus > self.bus_return_v, Limit::BusVoltage);
-        // The longest voltage without over-modulation is 1/√3 of the supply's.
-        let voltage = length_square(snapshot.u.d.to_bits(), snapshot.u.q.to_bits());
+        // The longest voltage without over-modulation is 1/√3 of the supply's: 1/2 and 1/16 are 3 % less.
+        let bus = snapshot.bus;
+        let most = (bus >> 1) + (bus >> NEAR_SHIFT);
         note(
-            voltage.saturating_mul(3) >= square(near(snapshot.bus.to_bits())),
+            magnitude(snapshot.u.d, snapshot.u.q) >= most - (most >> 5),
             Limit::Duty,
         );
         limits
     }
 }
 
-fn near(bound: i32) -> i32 {
+fn near(bound: Current) -> Current {
     bound - (bound >> NEAR_SHIFT)
-}
-
-fn square(bits: i32) -> i64 {
-    i64::from(bits) * i64::from(bits)
-}
-
-fn length_square(d: i32, q: i32) -> i64 {
-    square(d).saturating_add(square(q))
 }
 
 #[cfg(test)]

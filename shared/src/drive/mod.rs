@@ -111,7 +111,7 @@ pub use limited::Thresholds;
 pub use phase::Phase;
 pub use pull::Pull;
 pub use snapshot::Snapshot;
-pub use state::State;
+pub use state::{LastFault, State};
 pub use step::step;
 
 #[cfg(test)]

@@ -38,6 +38,8 @@ traced! {
         pub(super) faults: Faults,
         /// Faults that have turned the bridge off.
         pub(super) count: u32,
+        /// The last of them, and the phase that it ended.
+        pub(super) last: (Fault, Phase),
         /// Periods at zero throttle since the last sample that was a fault.
         clear_periods: u32,
     }
@@ -79,6 +81,7 @@ impl Shared {
             latch: Latch {
                 faults: Faults::NONE,
                 count: 0,
+                last: (Fault::OverCurrent, Phase::Idle),
                 clear_periods: 0,
             },
             reversed: false,
@@ -140,6 +143,7 @@ impl Latch {
         let known = self.faults.contains(fault);
         if !known {
             self.count = self.count.saturating_add(1);
+            self.last = (fault, phase);
             self.faults.insert(fault);
         }
         !known || phase != Phase::Idle

@@ -8,11 +8,23 @@ use super::snapshot::Snapshot;
 use super::transitions::{Why, next};
 use super::{charge, excite, foc, off, schedule, self_test, six_step, tone};
 use crate::control::{inductance, observer};
+use crate::protection::Fault;
 use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Flux, Speed};
 
 /// No kind of set-point.
 const UNDECIDED: u8 = u8::MAX;
+
+/// The last fault that has turned the bridge off; any before the first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastFault {
+    /// Faults since the start.
+    pub count: u32,
+    /// What it was.
+    pub fault: Fault,
+    /// The phase that it ended.
+    pub phase: Phase,
+}
 
 /// Everything that `step` remembers.
 #[derive(Clone, Debug, PartialEq)]
@@ -195,6 +207,24 @@ impl State {
     #[inline(always)] // in each period
     pub fn trip_level(&self) -> AdcCounts {
         self.shared.protection.trip
+    }
+
+    /// The rotor as the last period saw it: its electrical angle with the phases in the order a, b, c, and its speed
+    /// the way it turns.
+    #[inline(always)]
+    pub fn rotor(&self) -> (Angle, Speed) {
+        (self.shared.seen.angle, self.shared.seen.speed)
+    }
+
+    /// The last fault that has turned the bridge off.
+    pub fn last_fault(&self) -> LastFault {
+        let latch = &self.shared.latch;
+        let (fault, phase) = latch.last;
+        LastFault {
+            count: latch.count,
+            fault,
+            phase,
+        }
     }
 
     /// A copy for the tasks.

@@ -2,6 +2,7 @@
 
 use super::Esc;
 use crate::params::{BuildError, ParamId};
+use crate::record::Record;
 use crate::store::{Kept, Loaded};
 use crate::throttle::Reach;
 
@@ -22,6 +23,11 @@ impl Esc {
         if self.params.get(ParamId::MotPolePairs) == 0.0 {
             self.warn_of("MOT_POLE_PAIRS not known: speeds are told as of 7");
         }
+    }
+
+    /// Serves the fault record that the interrupt writes.
+    pub fn serve(&mut self, record: &'static Record) {
+        self.record = Some(record);
     }
 
     /// Leaves the stored settings alone because they are not those in force, and keeps the motor off,

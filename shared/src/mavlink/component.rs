@@ -166,6 +166,7 @@ impl Component {
                     telemetry: context.telemetry,
                     check: context.check,
                     identification: context.identification,
+                    record: context.record,
                     warning: self.warnings.last(),
                 };
                 if let Some(answer) = self.files.handle(context.now_us, frame, &view) {

@@ -6,6 +6,7 @@ use crate::identify;
 use crate::input::access::Access;
 use crate::input::authority::DriveStatus;
 use crate::params::{Board, BuildError, Params};
+use crate::record::Record;
 use crate::telemetry::Telemetry;
 
 /// The component's surroundings: what it reads and may change.
@@ -25,6 +26,8 @@ pub struct Context<'a> {
     pub check: &'a check::Report,
     /// The result of the last identification.
     pub identification: &'a identify::Report,
+    /// The fault record, where there is one.
+    pub record: Option<&'a Record>,
     /// Decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
     /// Checks that values make a drive; a value that breaks it is refused with the reason.

@@ -121,6 +121,7 @@ impl Bench {
             four: None,
             check: &check,
             identification: &identify::Report::default(),
+            record: None,
             authority,
             validate: &refuse_slow_pwm,
         };
@@ -148,6 +149,7 @@ impl Bench {
             four: None,
             check: &check,
             identification: &identify::Report::default(),
+            record: None,
             authority: &mut self.authority,
             validate: &refuse_slow_pwm,
         };

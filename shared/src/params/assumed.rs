@@ -11,7 +11,7 @@ use super::values::Params;
 use crate::math::SQRT_3;
 
 /// Pole pairs of most small motors: 12 slots and 14 magnets.
-const POLE_PAIRS: f32 = 7.0;
+pub(crate) const POLE_PAIRS: f32 = 7.0;
 
 /// Periods of the PWM in an electrical turn at full speed: hardly more than four in each sextant, which the
 /// six-step drive needs.

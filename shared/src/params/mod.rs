@@ -9,6 +9,7 @@ mod preset;
 mod table;
 mod values;
 
+pub(crate) use assumed::POLE_PAIRS;
 pub use board::{Board, LeastDeadTime};
 pub use build::{BuildError, FluxSettings, build, build_in, input, scale};
 pub(crate) use build::{TRIP_SHARE, lost_periods, test_current, thresholds};

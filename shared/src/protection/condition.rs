@@ -183,6 +183,12 @@ impl Fault {
     }
 }
 
+impl Trace for Fault {
+    fn trace(&self, out: &mut impl FnMut(u32)) {
+        (*self as u8).trace(out);
+    }
+}
+
 impl Trace for Faults {
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.0.trace(out);

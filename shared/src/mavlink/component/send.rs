@@ -241,6 +241,7 @@ impl Component {
             telemetry: context.telemetry,
             check: context.check,
             identification: context.identification,
+            record: context.record,
             warning: self.warnings.last(),
         };
         let mut payload = [0; ftp::PAYLOAD_MAX];

@@ -6,6 +6,7 @@ use super::sink::Sink;
 use super::text;
 use super::view::View;
 use crate::checksum::checksum;
+use crate::params::ParamId;
 
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
 static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
@@ -36,6 +37,8 @@ enum Content {
     Check,
     /// The result of the last identification.
     Identification,
+    /// The fault record.
+    Record,
 }
 
 /// An entry of a folder.
@@ -47,7 +50,7 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 9] = [
+static ENTRIES: [Entry; 10] = [
     Entry {
         folder: "",
         name: "general.json.xz",
@@ -93,6 +96,11 @@ static ENTRIES: [Entry; 9] = [
         name: "identify.txt",
         content: Content::Identification,
     },
+    Entry {
+        folder: "@SYS/",
+        name: "faults.bin",
+        content: Content::Record,
+    },
 ];
 
 /// One file.
@@ -131,6 +139,21 @@ impl File {
             Content::Statistics => text::statistics(view, sink),
             Content::Check => text::check(view, sink),
             Content::Identification => text::identification(view, sink),
+            Content::Record => {
+                if let Some(record) = view.record {
+                    let pole_pairs = view.params.get(ParamId::MotPolePairs);
+                    record.tell(view.board, pole_pairs, &mut |word| {
+                        sink.put(&word.to_le_bytes());
+                    });
+                }
+            }
+        }
+    }
+
+    /// It has been read to its end.
+    pub(super) fn read(&self, view: &View) {
+        if let (Content::Record, Some(record)) = (&self.entry.content, view.record) {
+            record.taken();
         }
     }
 

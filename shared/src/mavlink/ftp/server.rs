@@ -288,12 +288,16 @@ impl Server {
     ) -> Result<(), Error> {
         let session =
             self.session_if(|session| session.reader == reader && session.number == number)?;
+        let end = offset as usize + room.len();
         let mut sink = Sink::new(offset as usize, room);
         session.file.write(view, &mut sink);
         if sink.checksum != session.checksum {
             room.fill(0);
             self.session = None;
             return Err(Error::InvalidSession);
+        }
+        if end >= sink.len {
+            session.file.read(view);
         }
         Ok(())
     }

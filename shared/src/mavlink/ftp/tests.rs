@@ -35,6 +35,7 @@ fn view(params: &Params) -> View<'_> {
         telemetry: &TELEMETRY,
         check: &CHECK,
         identification: &IDENTIFICATION,
+        record: None,
         warning: "",
     }
 }

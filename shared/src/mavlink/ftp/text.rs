@@ -8,17 +8,17 @@ use crate::drive::Fault;
 pub(super) fn faults(view: &View, sink: &mut Sink) {
     sink.put(b"Faults since the start: ");
     decimal(view.telemetry.fault_count, sink);
-    for fault in view.telemetry.faults.iter() {
-        sink.put(b"\nNow: ");
-        sink.put(fault.text().as_bytes());
-    }
-    for limit in view.telemetry.limits.iter() {
-        sink.put(b"\nLimited by: ");
-        sink.put(limit.text().as_bytes());
-    }
+    let mut name = |word: &str, text: &str| {
+        sink.put(word.as_bytes());
+        sink.put(text.as_bytes());
+    };
+    let telemetry = view.telemetry;
+    let faults = telemetry.faults.iter();
+    faults.for_each(|fault| name("\nNow: ", fault.text()));
+    let limits = telemetry.limits.iter();
+    limits.for_each(|limit| name("\nLimited by: ", limit.text()));
     if !view.warning.is_empty() {
-        sink.put(b"\nLast warning: ");
-        sink.put(view.warning.as_bytes());
+        name("\nLast warning: ", view.warning);
     }
     sink.put(b"\n");
 }

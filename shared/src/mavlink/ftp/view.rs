@@ -3,6 +3,7 @@
 use crate::check;
 use crate::identify;
 use crate::params::{Board, Params};
+use crate::record::Record;
 use crate::telemetry::Telemetry;
 
 /// The sources of those files that are made when they are read.
@@ -15,6 +16,8 @@ pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) check: &'a check::Report,
     /// The result of the last identification.
     pub(in crate::mavlink) identification: &'a identify::Report,
+    /// The fault record, where there is one.
+    pub(in crate::mavlink) record: Option<&'a Record>,
     /// The last that a person was warned of; empty if there was none.
     pub(in crate::mavlink) warning: &'a str,
 }

@@ -1,0 +1,225 @@
+//! The fault record: the last faults, and the control periods before a trip, in memory that a reset leaves alone.
+//!
+//! The interrupt writes it, outside [`step`](crate::drive::step); tasks read it whenever they like. All is words,
+//! each written at once, so neither waits for the other.
+//!
+//! Only periods in which the bridge drives are noted: those before a trip stay, however long the drive rests after
+//! it. The first trip holds them, and later faults are noted without: the first is the cause more often than what
+//! follows it. They are held until somebody has read them ([`Record::taken`]) and the bridge drives again, or the
+//! supply is gone.
+
+mod file;
+
+use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
+
+pub use file::{FaultSeen, PeriodSeen, Recorded};
+
+use crate::drive::{Bridge, Config, Sample, State};
+use crate::units::{AdcCounts, Duty};
+
+/// Control periods that are kept.
+pub const PERIODS: usize = 64;
+
+/// Faults that are kept.
+pub const FAULTS: usize = 8;
+
+/// What memory after power-up does not hold by chance, together with its inverse.
+const MAGIC: u32 = 0x5369_4661;
+
+/// Places of words. All up to [`WRITTEN`] change at a start and at a fault only.
+mod place {
+    /// [`MAGIC`](super::MAGIC), and behind it its inverse.
+    pub(super) const MAGIC: usize = 0;
+    /// Starts since power-up.
+    pub(super) const STARTS: usize = 2;
+    /// Faults since power-up.
+    pub(super) const NOTED: usize = 3;
+    /// Which of them has held the periods last, from 1 on.
+    pub(super) const HOLDER: usize = 4;
+    /// Length of the periods that it holds, s, as a float's bits.
+    pub(super) const PERIOD_S: usize = 5;
+    /// The ring of the faults.
+    pub(super) const FAULTS: usize = 6;
+    /// Periods that have been written, and [`HELD`](super::HELD).
+    pub(super) const WRITTEN: usize = FAULTS + super::ROW * super::FAULTS;
+    /// The ring of the periods, which has an array of its own: its rows are found without a look at the bounds.
+    pub(super) const PERIODS: usize = WRITTEN + 1;
+}
+
+type Row = [AtomicU32; ROW];
+
+/// Words of a fault, and of a period.
+const ROW: usize = 4;
+
+/// In the count of the periods: a trip holds them.
+const HELD: u32 = 1 << 31;
+
+/// A leg whose switches are both off: its duty in full is not as long.
+const NO_DUTY: u32 = u32::MAX;
+
+/// The record.
+#[derive(Debug)]
+pub struct Record {
+    words: [AtomicU32; place::PERIODS],
+    periods: [Row; PERIODS],
+    /// Periods that had been written when the bridge was last off.
+    rested: AtomicU32,
+    /// Faults that the drive has counted since this start.
+    counted: AtomicU32,
+    /// Not 0 once somebody has read the periods that are held.
+    taken: AtomicU32,
+}
+
+impl Record {
+    /// An empty one, which is to be opened.
+    pub const fn new() -> Self {
+        Self {
+            words: [const { AtomicU32::new(0) }; place::PERIODS],
+            periods: [const { [const { AtomicU32::new(0) }; ROW] }; PERIODS],
+            rested: AtomicU32::new(0),
+            counted: AtomicU32::new(0),
+            taken: AtomicU32::new(0),
+        }
+    }
+
+    /// Begins a start, before the interrupt does: what was left over a reset stays, what memory holds after
+    /// power-up does not.
+    pub fn open(&self) {
+        if self.get(place::MAGIC) != MAGIC || self.get(place::MAGIC + 1) != !MAGIC {
+            for word in &self.words {
+                word.store(0, Relaxed);
+            }
+            self.put(place::MAGIC, MAGIC);
+            self.put(place::MAGIC + 1, !MAGIC);
+        }
+        self.put(place::STARTS, self.get(place::STARTS).wrapping_add(1));
+        self.counted.store(0, Relaxed);
+        self.rested.store(self.get(place::WRITTEN), Relaxed);
+    }
+
+    /// Notes a period: what `step` was given, its state after that, and what it said; to be called in each.
+    #[inline(always)] // in the interrupt: of a period that is driven only what is here
+    pub fn note(&self, config: &Config, state: &State, io: (&Sample, &Bridge), period: u32) {
+        let written = self.get(place::WRITTEN);
+        match io.1 {
+            Bridge::Duty([a, b, c]) if written & HELD == 0 => {
+                let duties = [a.to_bits(), b.to_bits(), c.to_bits()];
+                self.write(written, state, io.0, duties);
+                self.put(place::WRITTEN, next(written));
+            }
+            _ => self.note_rest(config, state, io, period),
+        }
+    }
+
+    /// A period's row: the readings of b and a; of the supply and c; speed and angle, the upper half of each; the
+    /// upper 11, 11 and 10 bits of the duties.
+    // Word by word: a loop over them stays one, where the code is made small.
+    #[inline(always)]
+    fn write(&self, written: u32, state: &State, sample: &Sample, duties: [u32; 3]) {
+        let [a, b, c] = sample.currents;
+        let [duty_a, duty_b, duty_c] = duties;
+        let (angle, speed) = state.rotor();
+        let row = &self.periods[written as usize % PERIODS];
+        let duties = (duty_a & 0xffe0_0000) | (duty_b >> 21 << 10) | duty_c >> 22;
+        row[0].store(halves(counts(b), counts(a)), Relaxed);
+        row[1].store(halves(counts(sample.bus), counts(c)), Relaxed);
+        let rotor = halves(speed.to_bits() as u32, angle.to_bits() as u32);
+        row[2].store(rotor, Relaxed);
+        row[3].store(duties, Relaxed);
+    }
+
+    /// Any other period.
+    #[cold]
+    #[inline(never)]
+    fn note_rest(&self, config: &Config, state: &State, io: (&Sample, &Bridge), period: u32) {
+        let (sample, bridge) = io;
+        let written = self.get(place::WRITTEN);
+        let free = written & HELD == 0;
+        let duties = match bridge {
+            Bridge::Legs(legs) => legs.map(|leg| leg.map_or(NO_DUTY, Duty::to_bits)),
+            Bridge::Duty(_) | Bridge::Brake => [0; 3],
+            Bridge::Off | Bridge::Charge(_) => [NO_DUTY; 3],
+        };
+        let mut tripped = false;
+        if matches!(bridge, Bridge::Off) {
+            let last = state.last_fault();
+            if self.counted.load(Relaxed) != last.count {
+                self.counted.store(last.count, Relaxed);
+                let noted = self.get(place::NOTED);
+                let what = last.fault as u32 | (last.phase as u32) << 8;
+                let (_, speed) = state.rotor();
+                let at = place::FAULTS + ROW * (noted as usize % FAULTS);
+                self.put(at, what | self.get(place::STARTS) << 16);
+                self.put(at + 1, period);
+                let speed = speed.to_bits() as u32;
+                self.put(at + 2, halves(speed, counts(sample.bus)));
+                let period_s = config.scale.period_s.to_bits();
+                self.put(at + 3, period_s);
+                self.put(place::NOTED, noted + 1);
+                tripped = free && written != self.rested.load(Relaxed);
+                if tripped {
+                    self.put(place::PERIOD_S, period_s);
+                    self.put(place::HOLDER, noted + 1);
+                    self.taken.store(0, Relaxed);
+                }
+            }
+            self.rested.store(written, Relaxed);
+            if !tripped {
+                return;
+            }
+        } else if !free {
+            if self.taken.load(Relaxed) != 0 {
+                self.taken.store(0, Relaxed);
+                self.put(place::WRITTEN, 0);
+            }
+            return;
+        }
+        self.write(written, state, sample, duties);
+        self.put(
+            place::WRITTEN,
+            next(written) | if tripped { HELD } else { 0 },
+        );
+    }
+
+    /// Somebody has read the periods that are held: the next that are driven may take their place.
+    pub fn taken(&self) {
+        self.taken.store(1, Relaxed);
+    }
+
+    #[inline(always)]
+    fn get(&self, place: usize) -> u32 {
+        self.words[place].load(Relaxed)
+    }
+
+    #[inline(always)]
+    fn put(&self, place: usize, word: u32) {
+        self.words[place].store(word, Relaxed);
+    }
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The count after this one. After 2^31 periods, a day of them, it begins anew, and so do the rows.
+#[inline(always)]
+fn next(written: u32) -> u32 {
+    (written + 1) & !HELD
+}
+
+/// The upper half of both: one instruction.
+#[inline(always)]
+fn halves(upper: u32, lower: u32) -> u32 {
+    (upper & 0xffff_0000) | lower >> 16
+}
+
+/// Whole counts stand in the upper half.
+#[inline(always)]
+fn counts(reading: AdcCounts) -> u32 {
+    reading.to_bits() as u32
+}
+
+#[cfg(test)]
+mod tests;
