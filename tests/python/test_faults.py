@@ -10,6 +10,8 @@ from emulator import PATIENT, Emulator, run
 from paths import TOOL
 
 HALF_RPM = 3150
+SAG_S = 6.0
+POLE_PAIRS = 12
 
 
 def faults(emulator: Emulator, *arguments: object) -> subprocess.CompletedProcess:
@@ -20,7 +22,8 @@ def faults(emulator: Emulator, *arguments: object) -> subprocess.CompletedProces
 
 
 def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path):
-    emulator = start(*PATIENT)
+    # When the motor turns, a busy machine included, the supply falls below the 9 V of LIM_BUS_V_MIN.
+    emulator = start(*PATIENT, "--fault", f'at_s = {SAG_S}, for_s = 1.0, kind = "bus_sag", value = 18.0')
     ended = faults(emulator, "--json")
     assert (ended.returncode, ended.stderr) == (0, "")
     assert json.loads(ended.stdout) == {"items": [], "periods_of": None, "periods": []}
@@ -28,13 +31,9 @@ def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path
         esc.wait_armed()
         throttle.value = HALF
         esc.wait_rpm(HALF_RPM - 50, HALF_RPM + 50)
-        # Above the supply of 24 V.
-        assert esc.set_param("LIM_BUS_V_MIN", 26.0) == 26.0
-        esc.wait("STATUSTEXT", lambda m: m.text == "Fault: bus under-voltage")
-        beat = esc.next("HEARTBEAT")
-        assert beat.custom_mode == 1 << 2, "the fault's number"
+        esc.next("STATUSTEXT", lambda m: m.text == "Fault: bus under-voltage")
+        assert esc.next("HEARTBEAT").custom_mode == 1 << 2, "the fault's number"
         throttle.value = STOP
-        esc.set_param("LIM_BUS_V_MIN", 9.0)
         esc.next("STATUSTEXT", lambda m: m.text == "Fault ended: bus under-voltage")
         assert esc.next("HEARTBEAT").custom_mode == 0
     record = tmp_path / "record.bin"
@@ -44,19 +43,26 @@ def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path
     [fault] = told["items"]
     assert (fault["number"], fault["condition"], fault["name"]) == (1, 2, "bus under-voltage")
     assert (fault["phase"], fault["starts_ago"]) == ("run", 0)
-    # Reading the supply is exact to 0.02 V, the speed to a step of the record.
-    assert abs(fault["rpm"] - HALF_RPM) < 60 and abs(fault["bus_v"] - 24.0) < 0.3
+    # What the ESC believes: with a supply at once too low for the speed, its estimate is off by then.
+    assert abs(fault["rpm"] / HALF_RPM - 1.0) < 0.2
+    assert abs(fault["bus_v"] - 6.0) < 0.1
+    # When the chip has found it, by the clock of the emulator.
+    assert SAG_S < fault["time_s"] < SAG_S + 0.05
     periods = told["periods"]
     assert told["periods_of"] == 1 and len(periods) == 64
     assert periods[-1]["duties"] == [None] * 3
     step = periods[1]["time_s"] - periods[0]["time_s"]
     assert abs(step - 1 / 24_000) < 1e-8 and abs(periods[-1]["time_s"] + step) < 1e-8
-    for before, period in zip(periods, periods[1:-1]):
+    # The supply's filter takes some 10 periods to the limit.
+    sound = periods[:48]
+    assert all(abs(period["bus_v"] - 24.0) < 0.1 for period in sound)
+    for before, period in zip(sound, sound[1:]):
         assert all(0.0 <= duty <= 1.0 for duty in period["duties"])
         # 0.02 A a count: three shunts, each read by itself.
         assert abs(sum(period["currents_a"])) < 0.5
         turned = (period["angle_deg"] - before["angle_deg"]) % 360.0
-        assert abs(turned - period["rpm"] / 60 * 7 * 360 / 24_000) < 0.5
+        assert abs(turned - period["rpm"] / 60 * POLE_PAIRS * 360 / 24_000) < 0.5
+        assert abs(period["rpm"] - HALF_RPM) < 50
     assert max(abs(period["currents_a"][0]) for period in periods) > 1.0
 
     picture = tmp_path / "record.svg"
@@ -66,6 +72,8 @@ def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path
 
     # It was read, but nothing has turned since; a restart leaves it alone.
     with emulator.connect() as esc:
+        esc.wait_rpm(-100, 100)
+        esc.wait_armed(False)
         assert esc.command(dialect.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == dialect.MAV_RESULT_ACCEPTED
         esc.wait("STATUSTEXT", lambda m: m.text.startswith("Siskin ESC "))
     again = faults(emulator)

@@ -216,6 +216,12 @@ impl State {
         (self.shared.seen.angle, self.shared.seen.speed)
     }
 
+    /// Returns true if the motor is turned, or slowed down.
+    #[inline(always)] // a comparison
+    pub fn drives(&self) -> bool {
+        self.phase.drives()
+    }
+
     /// The last fault that has turned the bridge off.
     pub fn last_fault(&self) -> LastFault {
         let latch = &self.shared.latch;

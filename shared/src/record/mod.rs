@@ -5,7 +5,7 @@
 //!
 //! Only periods in which the bridge drives are noted: those before a trip stay, however long the drive rests after
 //! it. The first trip holds them, and later faults are noted without: the first is the cause more often than what
-//! follows it. They are held until somebody has read them ([`Record::taken`]) and the bridge drives again, or the
+//! follows it. They are held until somebody has read them ([`Record::taken`]) and the motor turns again, or the
 //! supply is gone.
 
 mod file;
@@ -168,7 +168,8 @@ impl Record {
                 return;
             }
         } else if !free {
-            if self.taken.load(Relaxed) != 0 {
+            // A tune at the next start, or a shaft that is held, takes nobody's place.
+            if self.taken.load(Relaxed) != 0 && state.drives() {
                 self.taken.store(0, Relaxed);
                 self.put(place::WRITTEN, 0);
             }

@@ -53,6 +53,24 @@ impl Bench {
         self.run(periods, Bridge::Duty(duties));
     }
 
+    /// A start, as far as it goes without a motor.
+    fn turn(&mut self) {
+        let speed = self.config.scale.speed_from_rpm(3000.0);
+        let nothing = Sample {
+            currents: [AdcCounts::ZERO; 3],
+            ..Self::sample(0)
+        };
+        while !self.state.drives() {
+            step(
+                &self.config,
+                &mut self.state,
+                nothing,
+                Setpoint::Speed(speed),
+            );
+            assert!(self.state.snapshot().faults.is_empty());
+        }
+    }
+
     fn trip(&mut self, fault: Fault) {
         let sample = Self::sample(0);
         let bridge = step(
@@ -142,6 +160,9 @@ fn the_first_trip_holds_its_periods_until_they_are_read_and_the_bridge_drives() 
     bench.run(10, Bridge::Off);
     assert_eq!(bench.read().periods, first.periods, "may be read again");
     bench.clear();
+    bench.drive(20);
+    assert_eq!(bench.read().periods, first.periods, "a tune");
+    bench.turn();
     bench.drive(20);
     assert_eq!(bench.read().holder, None);
     bench.trip(Fault::Stuck);

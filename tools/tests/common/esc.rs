@@ -200,6 +200,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
             four: None,
             check: &Report::new(40.0, 0.02),
             identification: &siskin_control::identify::Report::default(),
+            record: None,
             authority: &mut authority,
             validate: &validate,
         };
