@@ -36,18 +36,29 @@ impl<'a> Escs<'a> {
         slots.filter(|(slot, _)| *slot != self.place.slot())
     }
 
-    /// A value for each slot: of the ESC there, or another where there is none.
+    /// Puts a value for each slot, of which `len` bytes count: of the ESC there, or another where there is none.
     ///
-    /// Inlined: where nobody else is told of, two stores are left of it.
+    /// Inlined: where nobody else is told of, one call is left of it.
     #[inline(always)]
-    pub(super) fn each(&self, none: u32, field: impl Fn(&Telemetry) -> u32) -> [u32; SLOTS] {
-        let mut values = [none; SLOTS];
-        values[self.place.slot()] = field(self.own);
+    pub(super) fn put(
+        &self,
+        payload: &mut Payload,
+        len: usize,
+        none: u32,
+        field: impl Fn(&Telemetry) -> u32,
+    ) {
+        let own = (self.place.slot(), field(self.own));
         if cfg!(feature = "group") {
+            let mut values = [none; SLOTS];
+            values[own.0] = own.1;
             self.others()
                 .for_each(|(slot, esc)| values[slot] = field(esc));
+            for value in values {
+                payload.value(len, value);
+            }
+        } else {
+            payload.slot(len, own, none);
         }
-        values
     }
 
     /// ESCs in the vehicle: of one that is alone the least number that there are. It is not known here; readers
@@ -66,13 +77,18 @@ impl<'a> Escs<'a> {
 }
 
 impl Payload {
-    /// An array with the lowest `len` bytes of the value in each slot.
+    /// An array with a value in one slot, and another in the rest.
     ///
     /// Never inlined: each message calls it for each array.
     #[inline(never)]
-    pub(super) fn slots(&mut self, len: usize, values: [u32; SLOTS]) {
-        for value in values {
-            self.put(value.to_le_bytes().get(..len).unwrap_or_default());
+    fn slot(&mut self, len: usize, (own, value): (usize, u32), none: u32) {
+        for slot in 0..SLOTS {
+            self.value(len, if slot == own { value } else { none });
         }
+    }
+
+    /// The lowest `len` bytes.
+    fn value(&mut self, len: usize, value: u32) {
+        self.put(value.to_le_bytes().get(..len).unwrap_or_default());
     }
 }

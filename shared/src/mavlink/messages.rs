@@ -53,10 +53,10 @@ pub(super) fn heartbeat(
 pub(super) fn esc_info(payload: &mut Payload, now_us: u64, escs: &Escs, counter: u16) {
     payload.u64(now_us);
     let errors = |esc: &Telemetry| esc.fault_count.saturating_add(esc.bad_frames);
-    payload.slots(4, escs.each(0, errors));
+    escs.put(payload, 4, 0, errors);
     payload.u16(counter);
-    payload.slots(2, escs.each(0, |esc| failure_flags(esc.faults).into()));
-    payload.slots(2, escs.each(NO_TEMPERATURE as u32, temperature_cdegc));
+    escs.put(payload, 2, 0, |esc| failure_flags(esc.faults).into());
+    escs.put(payload, 2, NO_TEMPERATURE as u32, temperature_cdegc);
     payload.put(&[
         escs.place.index(),
         escs.count(),
@@ -94,9 +94,9 @@ pub(super) fn named_value(payload: &mut Payload, now_us: u64, name: &str, value:
 
 pub(super) fn esc_status(payload: &mut Payload, now_us: u64, escs: &Escs) {
     payload.u64(now_us);
-    payload.slots(4, escs.each(0, |esc| round(esc.rpm) as i32 as u32));
-    payload.slots(4, escs.each(0, |esc| esc.bus_v.to_bits()));
-    payload.slots(4, escs.each(0, |esc| esc.bus_a.to_bits()));
+    escs.put(payload, 4, 0, |esc| round(esc.rpm) as i32 as u32);
+    escs.put(payload, 4, 0, |esc| esc.bus_v.to_bits());
+    escs.put(payload, 4, 0, |esc| esc.bus_a.to_bits());
     payload.put(&[escs.place.index()]);
 }
 
@@ -104,15 +104,14 @@ pub(super) fn esc_status(payload: &mut Payload, now_us: u64, escs: &Escs) {
 /// later ESCs are laid out alike ([`Place::telemetry`](super::place::Place::telemetry)).
 pub(super) fn esc_telemetry(payload: &mut Payload, escs: &Escs, count: u16) {
     let u16 = |value: f32| u32::from(round(value) as u16);
-    payload.slots(2, escs.each(0, |esc| u16(esc.bus_v * 100.0)));
-    payload.slots(2, escs.each(0, |esc| u16(esc.bus_a * 100.0)));
-    payload.slots(2, escs.each(0, |esc| u16(esc.consumed_mah)));
-    payload.slots(2, escs.each(0, |esc| u16(esc.rpm.abs())));
-    payload.slots(2, escs.each(0, |_| count.into()));
-    payload.slots(
-        1,
-        escs.each(0, |esc| u32::from(round(esc.temperature_c) as u8)),
-    );
+    escs.put(payload, 2, 0, |esc| u16(esc.bus_v * 100.0));
+    escs.put(payload, 2, 0, |esc| u16(esc.bus_a * 100.0));
+    escs.put(payload, 2, 0, |esc| u16(esc.consumed_mah));
+    escs.put(payload, 2, 0, |esc| u16(esc.rpm.abs()));
+    escs.put(payload, 2, 0, |_| count.into());
+    escs.put(payload, 1, 0, |esc| {
+        u32::from(round(esc.temperature_c) as u8)
+    });
 }
 
 pub(super) fn autopilot_version(payload: &mut Payload, image: &Image) {
