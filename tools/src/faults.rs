@@ -133,7 +133,7 @@ mod tests {
             starts_ago: 0,
             time_s: 1234.5678,
             rpm: 12_345.0,
-            bus_v: 23.95,
+            bus_v: 23.94,
         };
         let told = " 12 current sensor defect in stopping at  1234.568 s  12345 rpm  23.9 V";
         assert_eq!(line(&seen), told);

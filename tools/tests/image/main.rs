@@ -123,7 +123,7 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
         (with(Vec::new()).bytes(), "nothing in it"),
         (untagged.bytes(), "no tag"),
         (Elf::of("third").bytes(), "'third'"),
-        (tagged(0x0801_DFF0).bytes(), "0x0801e000"),
+        (tagged(0x0801_EFF0).bytes(), "0x0801f000"),
         (tagged(0x1000_0000).bytes(), "0x10000000"),
         (tagged(0xFFFF_FFF0).bytes(), "0xfffffff0"),
         (tagged(0x0800_0000).bytes(), "damaged"),
