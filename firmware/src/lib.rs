@@ -53,7 +53,7 @@
 //! | parameters, MAVLink, storage | the MAVLink task | the same |
 //! | two configurations | the task of the parameters, only the one not in use | PWM interrupt |
 //! | three snapshots | PWM interrupt | tasks |
-//! | fault record: `.fault_record`, CCM on the G431, kept over a reset | PWM interrupt; tasks mark it as read | tasks |
+//! | fault record: `.fault_record`, kept over a reset; only where [`record::KEPT`](siskin_control::record::KEPT) | PWM interrupt; tasks mark it as read | tasks |
 //! | counts of periods and overruns | PWM interrupt | tasks |
 //! | last snapshot read, its reader | tasks, in a critical section | tasks |
 //! | the gate driver's alarm | its interrupt sets it, the PWM interrupt takes it | |

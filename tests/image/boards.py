@@ -39,8 +39,7 @@ BOARDS = {
         # All but the store. The aim is 96 KB, beside a resident loader.
         flash=Region("flash", 0x0800_0000, 128 * KB, 124 * KB),
         memories=(
-            # With the fault record of 1.2 KB.
-            Region("CCM", 0x1000_0000, 10 * KB, 10 * KB - 256),
+            Region("CCM", 0x1000_0000, 10 * KB, 9 * KB),
             Region("SRAM", 0x2000_0000, 22 * KB, 18 * KB),
         ),
         pwm="ADC1_2",

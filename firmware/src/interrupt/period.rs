@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use siskin_control::drive::{Bridge, Config, Fault, Setpoint, State, step};
-use siskin_control::record::Record;
+use siskin_control::record::{self, Record};
 
 use super::gate_driver::GateDriver;
 use super::overruns::Overruns;
@@ -20,8 +20,8 @@ use crate::last_words::{Failure, fail};
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 static OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
-/// Where start-up clears nothing. On the G431 in the CCM: it is next to what writes it, no DMA is in its way, and
-/// there is room; the SRAM is the tasks' and the stack's.
+/// Where start-up clears nothing. On the G431 it would lie in the CCM, next to what writes it and in no DMA's way:
+/// the SRAM is the tasks' and the stack's.
 #[unsafe(link_section = ".fault_record")]
 static RECORD: Record = Record::new();
 
@@ -125,9 +125,11 @@ impl Interrupt {
             .with_config(|config| step(config, state, sample, setpoint));
         self.pwm.apply(bridge);
         let period = count(&PERIODS);
-        let state = &self.state;
-        self.end
-            .with_config(|config| RECORD.note(config, state, (&sample, &bridge), period));
+        if record::KEPT {
+            let state = &self.state;
+            self.end
+                .with_config(|config| RECORD.note(config, state, (&sample, &bridge), period));
+        }
         if period.is_multiple_of(PUBLISHED_EVERY) {
             self.publish();
         }

@@ -7,6 +7,7 @@ use siskin_control::image::Image;
 use siskin_control::mavlink::{Receiver, Warning};
 use siskin_control::params::choice::CtlObserver;
 use siskin_control::params::{Board, ParamId, Params};
+use siskin_control::record;
 use siskin_control::store;
 use siskin_control::throttle::Throttle;
 use static_cell::StaticCell;
@@ -43,9 +44,11 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     if let Some(text) = last_words::take() {
         esc.warn(text);
     }
-    let record = interrupt::record();
-    record.open();
-    esc.serve(record);
+    if record::KEPT {
+        let record = interrupt::record();
+        record.open();
+        esc.serve(record);
+    }
     let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
     let baud = esc.params().get(ParamId::TelBaud) as u32;
     // One of them has the pin of the serial line on some boards.

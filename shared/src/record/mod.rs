@@ -17,6 +17,9 @@ pub use file::{FaultSeen, PeriodSeen, Recorded};
 use crate::drive::{Bridge, Config, Sample, State};
 use crate::units::{AdcCounts, Duty};
 
+/// Whether this program keeps a record: the feature `record`.
+pub const KEPT: bool = cfg!(feature = "record");
+
 /// Control periods that are kept.
 pub const PERIODS: usize = 64;
 

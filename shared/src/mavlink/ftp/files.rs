@@ -7,6 +7,7 @@ use super::text;
 use super::view::View;
 use crate::checksum::checksum;
 use crate::params::ParamId;
+use crate::record::{self, Record};
 
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
 static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
@@ -103,6 +104,17 @@ static ENTRIES: [Entry; 10] = [
     },
 ];
 
+/// Those that this program has: the fault record is the last of all.
+fn entries() -> &'static [Entry] {
+    let left_out = usize::from(!record::KEPT);
+    ENTRIES.get(..ENTRIES.len() - left_out).unwrap_or_default()
+}
+
+/// The fault record, where this program keeps one.
+fn record<'a>(view: &View<'a>) -> Option<&'a Record> {
+    view.record.filter(|_| record::KEPT)
+}
+
 /// One file.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct File {
@@ -119,7 +131,7 @@ impl File {
             Some(at) => (path.get(..at)?, path.get(at + 1..)),
             None => (path, None),
         };
-        let entry = ENTRIES.iter().find(|entry| {
+        let entry = entries().iter().find(|entry| {
             path.strip_prefix(entry.folder.as_bytes()) == Some(entry.name.as_bytes())
         })?;
         let selection = match (&entry.content, query) {
@@ -140,7 +152,7 @@ impl File {
             Content::Check => text::check(view, sink),
             Content::Identification => text::identification(view, sink),
             Content::Record => {
-                if let Some(record) = view.record {
+                if let Some(record) = record(view) {
                     let pole_pairs = view.params.get(ParamId::MotPolePairs);
                     record.tell(view.board, pole_pairs, &mut |word| {
                         sink.put(&word.to_le_bytes());
@@ -152,7 +164,7 @@ impl File {
 
     /// It has been read to its end.
     pub(super) fn read(&self, view: &View) {
-        if let (Content::Record, Some(record)) = (&self.entry.content, view.record) {
+        if let (Content::Record, Some(record)) = (&self.entry.content, record(view)) {
             record.taken();
         }
     }
@@ -181,7 +193,7 @@ impl Entry {
         let path = trim(path);
         let mut before = 0;
         let mut error = Error::FileNotFound;
-        for entry in &ENTRIES {
+        for entry in entries() {
             if trim(entry.folder.as_bytes()) == path {
                 if before == number {
                     return Ok(entry);
@@ -197,7 +209,7 @@ impl Entry {
     /// and a zero.
     pub(super) fn write_rest(&'static self, view: &View, sink: &mut Sink) {
         let mut begun = false;
-        for entry in &ENTRIES {
+        for entry in entries() {
             begun |= core::ptr::eq(entry, self);
             if !begun || entry.folder != self.folder {
                 continue;
