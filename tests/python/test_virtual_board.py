@@ -153,7 +153,7 @@ def test_the_scenario_of_the_readme_holds_and_what_nobody_sees_is_no_failure():
         ((__file__,), "no ELF file"),
         ((VIRTUAL_BOARD,), "no ELF file of 32 bits"),
         ((IMAGES / "vesc4-f405.elf",), "is not in the flash"),
-        ((IMAGE, "--speed", "fast"), "give 0.001 to 1000, or max"),
+        ((IMAGE, "--speed", "fast"), "give 0.001 to 1000, max or lockstep"),
     ],
 )
 def test_bad_input_gets_one_line(arguments, said):

@@ -12,6 +12,7 @@ mod sink;
 #[cfg(test)]
 mod tests;
 mod tlog;
+#[cfg(feature = "plot")]
 pub(crate) mod trip;
 mod vcd;
 
