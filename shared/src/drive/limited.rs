@@ -1,7 +1,6 @@
 //! Which limits bind, as a snapshot shows it. The tasks work this out, not the interrupt.
 
 use super::snapshot::Snapshot;
-use crate::math::magnitude;
 use crate::protection::{Limit, Limits};
 use crate::units::{Current, Voltage};
 
@@ -29,8 +28,11 @@ impl Thresholds {
                 limits.insert(limit);
             }
         };
-        let (i, bounds) = (snapshot.i, snapshot.bounds);
-        note(magnitude(i.d, i.q) >= near(self.phase), Limit::PhaseCurrent);
+        let (i, u, bounds) = (snapshot.i, snapshot.u, snapshot.bounds);
+        note(
+            reaches(i.d.to_bits(), i.q.to_bits(), near(self.phase).to_bits()),
+            Limit::PhaseCurrent,
+        );
         note(
             bounds.max < self.phase && i.q >= near(bounds.max),
             Limit::BusCurrent,
@@ -45,11 +47,21 @@ impl Thresholds {
         let bus = snapshot.bus;
         let most = (bus >> 1) + (bus >> NEAR_SHIFT);
         note(
-            magnitude(snapshot.u.d, snapshot.u.q) >= most - (most >> 5),
+            reaches(u.d.to_bits(), u.q.to_bits(), (most - (most >> 5)).to_bits()),
             Limit::Duty,
         );
         limits
     }
+}
+
+/// Returns true if a vector is as long as a bound. By squares: each frame of the throttle asks, and a root takes
+/// the time that its reply is due in.
+///
+/// Never inlined: two bounds are asked for.
+#[inline(never)]
+fn reaches(d: i32, q: i32, bound: i32) -> bool {
+    let square = |bits: i32| i64::from(bits) * i64::from(bits);
+    square(d) + square(q) >= square(bound)
 }
 
 fn near(bound: Current) -> Current {
