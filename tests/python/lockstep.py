@@ -1,15 +1,31 @@
 """A client of the emulator in lockstep, written after emulator/LOCKSTEP.md alone."""
 
+import shutil
 import socket
 import struct
+import subprocess
 from dataclasses import dataclass
+from pathlib import Path
 
 from dshot import BIDIRECTIONAL_DSHOT600, datagram
+from paths import ROOT
 
 VERSION = 1
 HEAD = struct.Struct("<BBBBIQII")
 ESC = struct.Struct("<9d4fIBBH")
 MS = 1_000_000
+
+# What the example in C drives.
+FOUR = ("--escs", 4, "--bus", "6s")
+
+
+def build_example(folder: Path) -> Path:
+    """The example in C, compiled without a warning."""
+    path = folder / "example"
+    source = ROOT / "emulator" / "lockstep" / "example.c"
+    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
+    subprocess.run([shutil.which("cc"), *strict, "-o", path, source, "-lm"], check=True)
+    return path
 
 
 @dataclass

@@ -2,10 +2,7 @@
 
 import json
 import math
-import os
 import random
-import resource
-import shutil
 import struct
 import subprocess
 import time
@@ -14,10 +11,8 @@ import pytest
 
 from dshot import BIDIRECTIONAL_DSHOT600, HALF, datagram, erpm, is_extended, reply
 from emulator import Emulator
-from lockstep import MS, Lockstep, State, frame
-from paths import PROGRAM, ROOT
+from lockstep import FOUR, MS, Lockstep, State, build_example, frame
 
-FOUR = ("--escs", 4, "--bus", "6s")
 STEPS = 2000
 
 
@@ -39,12 +34,8 @@ def lockstep(start):
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory):
-    """The example in C, without a warning."""
-    path = tmp_path_factory.mktemp("c") / "example"
-    source = ROOT / "emulator" / "lockstep" / "example.c"
-    strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
-    subprocess.run([shutil.which("cc"), *strict, "-o", path, source, "-lm"], check=True)
-    return path
+    """The example in C."""
+    return build_example(tmp_path_factory.mktemp("c"))
 
 
 def play(client: Lockstep, pause=lambda: None) -> tuple[list[State], int]:
@@ -240,30 +231,6 @@ def test_mavlink_goes_by_simulated_time(lockstep):
         beats = {m.get_srcComponent() for m in esc.since(mark, "HEARTBEAT")}
         assert beats == {140, 141, 142, 143}
         assert {m.get_srcSystem() for m in esc.since(mark, "HEARTBEAT")} == {1}
-
-
-ONE_CORE = (shutil.which("taskset"), "-c", str(min(os.sched_getaffinity(0))))
-
-
-def spent_s() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
-def test_four_escs_in_steps_of_a_millisecond_run_at_twenty_times_real_time_on_a_core(example):
-    times = []
-    while len(times) < 3 and max(times, default=0.0) < 20:
-        before_s = spent_s()
-        options = ["--speed", "lockstep", "--duration", "20", "--mavlink", "none", "--signal", "udp:127.0.0.1:0", "--json"]
-        command = [*ONE_CORE, PROGRAM, *map(str, FOUR), *options, "--storage", "none"]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as emulator:
-            port = json.loads(emulator.stdout.readline())["ready"]["signal"].rpartition(":")[2]
-            subprocess.run([*ONE_CORE, example, port, "20000"], check=True, capture_output=True, timeout=120)
-            emulator.stdout.read()
-        # By the processor's time of both; what else the machine has to do costs some of it too, by its caches.
-        times.append(20.0 / (spent_s() - before_s))
-    print("times real time:", *(f"{each:.1f}" for each in times))
-    assert max(times) > 20, times
 
 
 def test_the_end_counts_what_was_refused():
