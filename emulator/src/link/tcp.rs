@@ -36,6 +36,8 @@ struct Client {
     pending: VecDeque<u8>,
     /// When it has connected, or bytes came from it.
     heard: Duration,
+    /// True once bytes have come from it.
+    begun: bool,
 }
 
 impl TcpServer {
@@ -75,6 +77,7 @@ impl TcpServer {
                     id: inbox.ids.next(),
                     pending: VecDeque::new(),
                     heard: inbox.now,
+                    begun: false,
                 });
             }
         }
@@ -111,11 +114,16 @@ impl TcpServer {
 }
 
 impl Client {
-    /// Reads once. An error or the end of the stream is an error.
+    /// Reads once. An error or the end of the stream is an error, and so is a request of HTTP: any page of a browser on
+    /// this machine could hide frames in one.
     fn receive(&mut self, inbox: &mut Inbox<'_>) -> io::Result<()> {
         match self.stream.read(&mut inbox.buffer[..READ_BYTES]) {
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(length) if !self.begun && is_http(&inbox.buffer[..length]) => {
+                Err(io::ErrorKind::InvalidData.into())
+            }
             Ok(length) => {
+                self.begun = true;
                 self.heard = inbox.now;
                 (inbox.handle)(self.id, Event::Bytes(&inbox.buffer[..length]));
                 Ok(())
@@ -143,6 +151,14 @@ impl Client {
         self.pending.extend(frame);
         self.flush()
     }
+}
+
+/// Whether the first bytes of a client are what a browser sends, or a part of it.
+fn is_http(first: &[u8]) -> bool {
+    let methods: [&[u8]; 4] = [b"GET ", b"HEAD ", b"OPTIONS ", b"POST "];
+    methods
+        .iter()
+        .any(|method| first.starts_with(method) || method.starts_with(first))
 }
 
 impl Link for TcpServer {

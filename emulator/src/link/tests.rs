@@ -242,6 +242,20 @@ fn tcp_serves_several_clients_of_which_one_comes_back() {
 }
 
 #[test]
+fn a_page_of_a_browser_is_no_client_whatever_its_request_carries() {
+    let mut bench = Bench::open(&["tcpin:127.0.0.1:0"]);
+    for (count, first) in [&b"POST / HTTP/1.1\r\n\r\n"[..], b"GET /", b"P"]
+        .iter()
+        .enumerate()
+    {
+        let mut page = bench.connect(0);
+        page.write_all(first).unwrap();
+        bench.until(MS, |b| b.ended.len() == count + 1);
+        assert!(bench.streams.is_empty());
+    }
+}
+
+#[test]
 fn a_client_that_does_not_read_is_dropped_and_the_others_get_every_byte() {
     let mut bench = Bench::open(&["tcpin:127.0.0.1:0"]);
     let [mut slow, mut quick] = bench.connect_two();
