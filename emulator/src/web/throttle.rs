@@ -90,7 +90,9 @@ impl Throttle {
         } else {
             0.0
         };
-        let was_let_go = held.is_some_and(|held| held.let_go || silence > SILENT);
+        // Whoever takes the wire begins at zero too: the ESC may still be armed.
+        let was_let_go =
+            held.is_none_or(|held| held.viewer != viewer || held.let_go || silence > SILENT);
         self.holder = Some(Holder {
             viewer,
             heard: came,
@@ -205,6 +207,9 @@ mod tests {
     fn a_silent_page_has_let_go_until_it_asks_for_zero() {
         let mut desk = Desk::new();
         assert_eq!(desk.after(1), None);
+        assert_eq!(desk.ask(1, 0.5), Err(Refused::LetGo), "nobody had it");
+        assert!(near(desk.after(1), 0.0));
+        desk.ask(1, 0.0).unwrap();
         desk.ask(1, 0.5).unwrap();
         assert!(near(desk.after(150), 0.5));
         desk.ask(1, 0.6).unwrap();
@@ -223,6 +228,7 @@ mod tests {
     #[test]
     fn a_page_that_is_gone_means_zero_at_once_then_silence() {
         let mut desk = Desk::new();
+        desk.ask(1, 0.0).unwrap();
         desk.ask(1, 0.5).unwrap();
         assert!(near(desk.after(10), 0.5));
         let now = desk.now();
@@ -250,6 +256,8 @@ mod tests {
             "zeros are still sent for it"
         );
         assert_eq!(desk.after(600), None);
+        assert_eq!(desk.ask(2, 0.5), Err(Refused::LetGo), "it was another's");
+        desk.ask(2, 0.0).unwrap();
         desk.ask(2, 0.5).unwrap();
         assert!(near(desk.after(1), 0.5));
     }
