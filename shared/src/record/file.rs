@@ -128,7 +128,8 @@ impl Recorded {
                 |duty: u32, one: u32| (duty < 2 * one - 1).then(|| duty as f32 / one as f32);
             let currents = [lower(of_b_a), upper(of_b_a), lower(of_bus_c)];
             let seen = PeriodSeen {
-                time_s: (number as f32 - end as f32) * period_s,
+                // The difference first: a float has no room for days of periods.
+                time_s: -((end - number) as f32) * period_s,
                 currents_a: currents.map(|counts| counts * a_per_count),
                 bus_v: upper(of_bus_c) * v_per_count,
                 angle_deg: f32::from(of_rotor as u16) / 65_536.0 * 360.0,

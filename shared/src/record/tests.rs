@@ -215,3 +215,18 @@ fn of_many_faults_the_last_are_kept() {
     let numbers: Vec<_> = kinds(&bench.read()).iter().map(|seen| seen.0).collect();
     assert_eq!(numbers, (5..=12).collect::<Vec<_>>());
 }
+
+#[test]
+fn after_hours_of_driving_each_period_still_has_its_time() {
+    let mut bench = Bench::new();
+    bench.record.put(place::WRITTEN, 1 << 28);
+    bench.drive(100);
+    bench.trip(Fault::OverCurrent);
+    let read = bench.read();
+    assert_eq!(read.periods.len(), PERIODS);
+    let period_s = bench.config.scale.period_s;
+    for (n, period) in read.periods.iter().enumerate() {
+        let ago = (n as f32 - PERIODS as f32) * period_s;
+        assert!((period.time_s - ago).abs() < 1e-9, "{n}");
+    }
+}
