@@ -78,7 +78,9 @@ impl Guard {
     /// Whether a `Host` is a name of this machine that nobody else can turn to it.
     fn is_own(&self, host: &str) -> bool {
         let suffix = format!(":{}", self.local.port());
-        let Some(name) = host.strip_suffix(&suffix) else {
+        // Browsers leave out the port that is HTTP's own.
+        let usual = (self.local.port() == 80).then_some(host);
+        let Some(name) = host.strip_suffix(&suffix).or(usual) else {
             return false;
         };
         if name.eq_ignore_ascii_case("localhost") {

@@ -12,7 +12,7 @@ use super::ring::Ring;
 pub(super) const MAX_VIEWERS: usize = 8;
 
 /// Messages to the simulation that may wait: it takes them each millisecond, and a viewer waits behind them.
-const ORDERS: usize = 256;
+pub(super) const ORDERS: usize = 256;
 
 /// Messages that may wait for a viewer, who takes them a hundred times a second: some seconds of MAVLink. Whoever
 /// lets them pile up does not read, and is dropped.

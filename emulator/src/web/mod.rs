@@ -130,7 +130,11 @@ impl Web {
         machine: &mut M,
         onlooker: &mut impl Onlooker,
     ) {
-        while let Ok(Order { viewer, came, what }) = self.orders.try_recv() {
+        // No more than the queue has held: pages that go on sending hold nothing up.
+        for _ in 0..hub::ORDERS {
+            let Ok(Order { viewer, came, what }) = self.orders.try_recv() else {
+                break;
+            };
             match what {
                 What::Mavlink(bytes) => {
                     let stream = self.links.entry(viewer).or_insert_with(|| links.stream());
