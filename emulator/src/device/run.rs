@@ -23,7 +23,7 @@ impl Device {
     }
 
     /// Runs the control period that comes; what the motor did in it.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn step(
         &mut self,
         imposed: &impl Fn(f64, &Rig) -> Option<Setpoint>,

@@ -24,7 +24,7 @@ pub(super) struct Heard<'a, O> {
 }
 
 impl<O: Onlooker> Onlooker for Heard<'_, O> {
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.onlooker.period(t_s, period, rig);
     }

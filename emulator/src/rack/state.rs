@@ -56,7 +56,7 @@ pub(super) struct Means {
 }
 
 impl Means {
-    #[inline]
+    #[inline] // in each period
     pub(super) fn add(&mut self, motion: &Motion, time_s: f64) {
         self.time_s += time_s;
         self.torque_nms += motion.flow.torque_nm * time_s;

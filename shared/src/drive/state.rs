@@ -211,7 +211,7 @@ impl State {
 
     /// The rotor as the last period saw it: its electrical angle with the phases in the order a, b, c, and its speed
     /// the way it turns.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn rotor(&self) -> (Angle, Speed) {
         (self.shared.seen.angle, self.shared.seen.speed)
     }

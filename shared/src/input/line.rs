@@ -96,7 +96,7 @@ impl Line {
     /// Takes all edges of a DShot frame at once, the first and the second of each of its 16 bits and whether
     /// the line was high before them, as [`Line::edge`] would one by one; nothing, and none of them is taken,
     /// if they are no frame, or one of another signal than that which is known.
-    #[inline(always)]
+    #[inline(always)] // in each frame, whose reply is due
     pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
         let pulses = matches!(self.signal, Some(Signal::Pulse(_)));
         if pulses || !self.filter.rests_at(rests_high) {

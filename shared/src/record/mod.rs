@@ -117,7 +117,7 @@ impl Record {
     /// A period's row: the readings of b and a; of the supply and c; speed and angle, the upper half of each; the
     /// upper 11, 11 and 10 bits of the duties.
     // Word by word: a loop over them stays one, where the code is made small.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn write(&self, written: u32, state: &State, sample: &Sample, duties: [u32; 3]) {
         let [a, b, c] = sample.currents;
         let [duty_a, duty_b, duty_c] = duties;
@@ -190,12 +190,12 @@ impl Record {
         self.taken.store(1, Relaxed);
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn get(&self, place: usize) -> u32 {
         self.words[place].load(Relaxed)
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn put(&self, place: usize, word: u32) {
         self.words[place].store(word, Relaxed);
     }
@@ -208,19 +208,19 @@ impl Default for Record {
 }
 
 /// The count after this one. After 2^31 periods, a day of them, it begins anew, and so do the rows.
-#[inline(always)]
+#[inline(always)] // in each period
 fn next(written: u32) -> u32 {
     (written + 1) & !HELD
 }
 
 /// The upper half of both: one instruction.
-#[inline(always)]
+#[inline(always)] // in each period
 fn halves(upper: u32, lower: u32) -> u32 {
     (upper & 0xffff_0000) | lower >> 16
 }
 
 /// Whole counts stand in the upper half.
-#[inline(always)]
+#[inline(always)] // in each period
 fn counts(reading: AdcCounts) -> u32 {
     reading.to_bits() as u32
 }
