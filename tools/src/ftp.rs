@@ -30,13 +30,15 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
         sequence += 1;
         ask(session, path, (sequence, opcode), (offset, data, size))
     };
-    let refused = |number| Error::Refused {
+    let refused = |number| {
+        Error::Refused {
         what: path.into(),
         reason: match number {
             NO_SESSIONS_AVAILABLE => "another program reads a file of it; try again in 10 s",
-            _ => "this component does not have it; is its image older than this program?",
+            _ => "this component does not have it: its image is older than this program, or has no room for it",
         }
         .into(),
+    }
     };
     // One that a run of this program has left open would be in the way.
     request(RESET_SESSIONS, 0, &[], 0)?.map_err(refused)?;

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: 3 frames where the list takes 50; with `?withdefaults=1` or `?start=N&count=N` |
 //! | `@SYS/faults.txt` | faults and the last warning, in words |
-//! | `@SYS/faults.bin` | the [fault record](crate::record), while the motor is at rest or a trip holds it |
+//! | `@SYS/faults.bin` | the [fault record](crate::record), while the motor is at rest or a trip holds it; where the program [keeps](crate::record::KEPT) one |
 //! | `@SYS/statistics.txt` | what has happened in the life of the ESC, in words |
 //! | `general.json.xz` | the place of the next one ([`metadata()`] has that of this one) |
 //! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
