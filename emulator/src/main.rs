@@ -18,6 +18,7 @@ use siskin_emulator::report;
 use siskin_emulator::reproduce;
 use siskin_emulator::scenario::{Place, Row, Table, Verdict};
 use siskin_emulator::summary::Report;
+use siskin_emulator::web::WebAddress;
 
 use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs};
 
@@ -48,6 +49,9 @@ fn main() -> ExitCode {
 
 fn run(args: RunArgs) -> Result<ExitCode, String> {
     let line = |error: &dyn std::error::Error| error.to_string();
+    if args.speed == Speed::Lockstep && matches!(args.web, Some(WebAddress::At(_))) {
+        return Err("--web: no page is served in lockstep; leave it out".to_owned());
+    }
     let standing = args.standing().map_err(|error| line(&error))?;
     let (session, warning) = args.session(&standing).map_err(|error| line(&error))?;
     let warn = |warning: &str| eprintln!("siskin-emulator: {warning}");

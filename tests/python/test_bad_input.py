@@ -57,6 +57,7 @@ def short_run(*options: str) -> list:
         (["--param", "MOT_STOP=nan"], "MOT_STOP"),
         (["--param", "MOT_KV=100"], "MOT_KV"),
         (["--record", "/nowhere/at/all.csv"], "/nowhere/at/all.csv"),
+        (["--speed", "lockstep", "--web", "127.0.0.1:0"], "no page is served in lockstep"),
         (["scenario", "/nowhere.toml"], "/nowhere.toml"),
         (["scenario", "x.toml", "--seeds", "9..1"], "9..1"),
         (["scenario", "x.toml", "--seeds", "1"], "--seeds"),
