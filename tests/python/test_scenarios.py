@@ -22,9 +22,15 @@ FAULTS = {
 # A part of the seeds that the files name for all.
 SEEDS = {
     "bench-cinelifter": "1..4",
+    "bench-ducted-fan": "1..4",
+    "bench-gimbal": "1..4",
+    "bench-helicopter": "1..4",
     "bench-lift-28-inch": "1..4",
+    "bench-quad-15-inch": "1..4",
     "bench-quad-3-inch": "1..4",
     "bench-quad-7-inch": "1..4",
+    "bench-skateboard": "1..4",
+    "bench-whoop": "1..4",
     "catch": "1..3",
     "catch-forwards": "1..3",
     "fault-bit-errors": "1..3",

@@ -14,10 +14,11 @@ use super::text::toml_reason;
 use super::word::word;
 
 /// The files in the binary; the first is the default.
-const FILES: [(&str, &str); 10] = [
+const FILES: [(&str, &str); 16] = [
     ("bosso", include_str!("../../library/bosso.toml")),
     ("bosso-real", include_str!("../../library/bosso-real.toml")),
     ("bare", include_str!("../../library/bare.toml")),
+    ("whoop", include_str!("../../library/whoop.toml")),
     (
         "quad-3-inch",
         include_str!("../../library/quad-3-inch.toml"),
@@ -34,11 +35,19 @@ const FILES: [(&str, &str); 10] = [
         "quad-10-inch",
         include_str!("../../library/quad-10-inch.toml"),
     ),
+    (
+        "quad-15-inch",
+        include_str!("../../library/quad-15-inch.toml"),
+    ),
     ("cinelifter", include_str!("../../library/cinelifter.toml")),
     (
         "lift-28-inch",
         include_str!("../../library/lift-28-inch.toml"),
     ),
+    ("ducted-fan", include_str!("../../library/ducted-fan.toml")),
+    ("helicopter", include_str!("../../library/helicopter.toml")),
+    ("gimbal", include_str!("../../library/gimbal.toml")),
+    ("skateboard", include_str!("../../library/skateboard.toml")),
     ("scooter", include_str!("../../library/scooter.toml")),
 ];
 
