@@ -49,6 +49,15 @@ fn default() -> Station {
     bench(Start::default(), &[])
 }
 
+fn of_the_library(name: &str) -> Start {
+    let standing = stand(name, toml::Table::new()).expect("built in");
+    Start {
+        bench: standing.bench,
+        defaults: standing.params,
+        ..Start::default()
+    }
+}
+
 fn last(station: &Station) -> MavResult {
     station.acks.last().expect("it is acknowledged").0
 }
@@ -254,14 +263,10 @@ fn any_motor_is_found_out_within_20_s_or_refused_with_a_reason() {
 /// And turns as it does with the figures of the library.
 #[test]
 fn each_bench_is_found_out_and_flies() {
-    // A scooter's wheel has its rider on it.
-    for name in library::names().filter(|name| *name != "scooter") {
-        let standing = stand(name, toml::Table::new()).expect("built in");
-        let start = Start {
-            bench: standing.bench,
-            defaults: standing.params,
-            ..Start::default()
-        };
+    // On those two there is a rider.
+    let ridden = ["scooter", "skateboard"];
+    for name in library::names().filter(|name| !ridden.contains(name)) {
+        let start = of_the_library(name);
         let truth = truth(&start);
         let mut station = bench(start, &[]);
         let result = identify(&mut station);
@@ -280,6 +285,17 @@ fn each_bench_is_found_out_and_flies() {
         let esc = station.device.esc();
         assert_eq!(esc.telemetry().phase, Phase::Run, "{name}");
     }
+}
+
+/// STATUSTEXT has room for 50 letters.
+#[test]
+fn a_reason_that_is_too_long_for_a_text_is_cut_and_not_left_out() {
+    // The slow motor's flux is too great for it.
+    let fast = [(ParamId::PwmFreqHz, 24_000.0)];
+    let mut station = bench(of_the_library("gimbal"), &fast);
+    assert_eq!(identify(&mut station), MavResult::MAV_RESULT_FAILED);
+    let last = station.texts.last().expect("the reason");
+    assert_eq!(last, "Not identified: too high for this flux and LIM_BUS");
 }
 
 #[test]

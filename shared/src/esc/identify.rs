@@ -126,10 +126,11 @@ impl Esc {
 
     fn warn_in_pieces(&mut self, what: &str, why: [&str; 3]) {
         let mut text = Warning::new();
-        // Whatever is longer than a text on MAVLink would be cut there as well.
         let _ = text.push_str(what);
         for piece in why {
-            let _ = text.push_str(piece);
+            // What is longer than a text on MAVLink is cut: it would be left out as a whole.
+            let room = text.capacity() - text.len();
+            let _ = text.push_str(piece.get(..room).unwrap_or(piece));
         }
         self.warn(text);
     }

@@ -12,7 +12,7 @@ const RUN_SHARE: f32 = 0.4;
 const RUN_TURNS: f32 = 1.0 / 30.0;
 
 /// The share of that speed at which a run down ends.
-const SLOW_SHARE: f32 = 0.3;
+const SLOW_SHARE: f32 = 0.45;
 
 /// The greatest speed of the drive, of that of the runs.
 const RESERVE: f32 = 1.5;
