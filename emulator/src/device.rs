@@ -315,6 +315,11 @@ impl Device {
         self.faults.inject(self.t_s(), fault);
     }
 
+    /// The faults that act, have acted or are to come, without those that were mended.
+    pub fn faults(&self) -> &[Fault] {
+        self.faults.faults()
+    }
+
     /// Makes whole again all that faults have broken by now.
     pub fn mend(&mut self) {
         self.faults.mend(self.t_s());

@@ -1,8 +1,9 @@
 //! The flash in which the parameters are kept, as a file or in memory only.
 //!
-//! It has the geometry and the manners of the STM32G4's flash, so that the storage code meets on a
-//! PC what it meets on the chip (RM0440, 3.3): pages of 2 KiB erase to ones, and a double word is
-//! written once after an erase.
+//! It has the geometry and the manners of the STM32G4's flash, so that the storage code meets on a PC what it meets on
+//! the chip (RM0440, 3.3): pages of 2 KiB erase to ones, and a double word is written once after an erase.
+
+mod each;
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};

@@ -6,6 +6,7 @@
 //! [`flash`]: crate::flash
 //! [`live`]: crate::live
 //! [`lockstep`]: crate::lockstep
+//! [`laboratory`]: crate::laboratory
 //! [`link`]: crate::link
 //! [`web`]: crate::web
 //! [`scenario`]: crate::scenario
@@ -26,6 +27,7 @@ pub mod device;
 pub mod fault;
 pub mod flash;
 pub mod interrupt;
+pub mod laboratory;
 pub mod link;
 pub mod live;
 pub mod lockstep;

@@ -244,9 +244,9 @@ fn storage(
     let in_memory = || (0..escs).map(|_| FileFlash::in_memory()).collect();
     match given {
         Some(path) if path == Path::new("none") => Ok((in_memory(), None)),
-        Some(path) => Ok((files(path, escs)?, None)),
+        Some(path) => Ok((FileFlash::open_each(path, escs)?, None)),
         None => {
-            let why = match state_file().map(|path| files(&path, escs)) {
+            let why = match state_file().map(|path| FileFlash::open_each(&path, escs)) {
                 Some(Ok(flash)) => return Ok((flash, None)),
                 Some(Err(error)) => format!("{error};"),
                 None => "no home folder:".to_owned(),
@@ -255,19 +255,6 @@ fn storage(
             Ok((in_memory(), Some(warning)))
         }
     }
-}
-
-/// The file of the only ESC, or one of each of several.
-fn files(path: &Path, escs: usize) -> Result<Vec<FileFlash>, StorageError> {
-    if escs == 1 {
-        return Ok(vec![FileFlash::open(path)?]);
-    }
-    let numbered = |esc| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(format!(".{esc}"));
-        FileFlash::open(Path::new(&name))
-    };
-    (0..escs).map(numbered).collect()
 }
 
 /// Where settings stay between runs: the state folder of the XDG base directories.

@@ -4,6 +4,7 @@
 //! at a time, the one furthest behind first, each at the voltage to which all have brought their supply. Each is what
 //! it would be alone, bit for bit, where the supply does not give way.
 
+mod environment;
 mod group;
 mod heard;
 mod pack;
@@ -23,6 +24,7 @@ use heard::Heard;
 use pack::Pack;
 use state::Means;
 
+pub use environment::{Environment, OutOfRange, Shaft};
 pub use heard::Answer;
 pub use state::{EscState, Reported};
 
@@ -43,20 +45,9 @@ pub struct Rack {
     parts: Vec<Part>,
     means: Vec<Means>,
     answers: Vec<Answer>,
+    /// Nothing has run in the latest advance: the means are of the one before.
+    means_are_old: bool,
     now_ns: u64,
-}
-
-/// What changes around the ESCs; `None` leaves it as it is.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Environment {
-    /// Voltage of the supply without load, V: in place of a battery's, which then is never empty.
-    pub supply_v: Option<f64>,
-    /// Resistance of the supply, Ω.
-    pub supply_ohm: Option<f64>,
-    /// Temperature of the air, °C.
-    pub ambient_c: Option<f64>,
-    /// For each ESC in turn: torque on its shaft, Nm, and wind, rad/s, as [`Air`] has them.
-    pub shafts: Vec<[Option<f64>; 2]>,
 }
 
 impl Rack {
@@ -86,6 +77,7 @@ impl Rack {
             pack: several.then(|| Pack::new(&supplies)).flatten(),
             means: vec![Means::default(); escs.len()],
             answers: Vec::new(),
+            means_are_old: true,
             now_ns: 0,
             parts,
             escs,
@@ -132,10 +124,10 @@ impl Rack {
         for (index, esc) in self.escs.iter_mut().enumerate() {
             let around = esc.around_mut();
             let before = around.air();
-            let [torque_nm, wind_rad_s] = change.shafts.get(index).copied().unwrap_or_default();
+            let shaft = change.shafts.get(index).copied().unwrap_or_default();
             around.surround(Air {
-                torque_nm: torque_nm.unwrap_or(before.torque_nm),
-                wind_rad_s: wind_rad_s.unwrap_or(before.wind_rad_s),
+                torque_nm: shaft.torque_nm.unwrap_or(before.torque_nm),
+                wind_rad_s: shaft.wind_rad_s().unwrap_or(before.wind_rad_s),
                 ambient_c: change.ambient_c.unwrap_or(before.ambient_c),
             });
         }
@@ -149,7 +141,23 @@ impl Rack {
         onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) {
+        self.begin();
+        self.go_on_to(until_ns, onlooker, send);
+    }
+
+    /// Begins an advance that [`Rack::go_on_to`] takes in several strides: answers and means are of all of them.
+    pub fn begin(&mut self) {
         self.answers.clear();
+        self.means_are_old = true;
+    }
+
+    /// Goes on with an advance, as [`Rack::advance_to`] does.
+    pub fn go_on_to(
+        &mut self,
+        until_ns: u64,
+        onlooker: &mut impl Onlooker,
+        send: &mut dyn FnMut(&[u8]),
+    ) {
         self.run(|esc| esc.now_ns() < until_ns, onlooker, send);
         self.now_ns = self.now_ns.max(until_ns);
     }
@@ -167,10 +175,21 @@ impl Rack {
 
     /// Bytes that came in on a MAVLink stream, for all of them.
     pub fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
-        for (index, esc) in self.escs.iter_mut().enumerate() {
-            onlooker.esc(index);
-            esc.receive(stream, bytes, onlooker);
+        for esc in 0..self.escs.len() {
+            self.receive_for(esc, stream, bytes, onlooker);
         }
+    }
+
+    /// The same for one of them.
+    pub fn receive_for(
+        &mut self,
+        esc: usize,
+        stream: LinkId,
+        bytes: &[u8],
+        onlooker: &mut impl Onlooker,
+    ) {
+        onlooker.esc(esc);
+        self.escs[esc].receive(stream, bytes, onlooker);
     }
 
     /// A MAVLink stream that has ended.
@@ -184,20 +203,17 @@ impl Rack {
         onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) {
-        let mut means = vec![Means::default(); self.escs.len()];
-        let mut ran = false;
         let mut begin_s: Vec<_> = self.escs.iter().map(Device::begins_s).collect();
         while let Some(esc) = first(&begin_s) {
             if !is_left(&self.escs[esc]) {
                 begin_s[esc] = f64::INFINITY;
                 continue;
             }
-            self.step(esc, &mut means[esc], onlooker, send);
+            if std::mem::take(&mut self.means_are_old) {
+                self.means.fill(Means::default());
+            }
+            self.step(esc, onlooker, send);
             begin_s[esc] = self.escs[esc].begins_s();
-            ran = true;
-        }
-        if ran {
-            self.means = means;
         }
         let next = self.escs.iter().map(Device::begins_s).reduce(f64::min);
         if let (Some(pack), Some(next_s)) = (&mut self.pack, next) {
@@ -209,13 +225,7 @@ impl Rack {
         }
     }
 
-    fn step(
-        &mut self,
-        index: usize,
-        means: &mut Means,
-        onlooker: &mut impl Onlooker,
-        send: &mut dyn FnMut(&[u8]),
-    ) {
+    fn step(&mut self, index: usize, onlooker: &mut impl Onlooker, send: &mut dyn FnMut(&[u8])) {
         if let Part::Leads(slots, count) = self.parts[index]
             && self.escs[index].task_is_due()
         {
@@ -234,7 +244,7 @@ impl Rack {
             esc.around_mut().bus_mut().feed(volts);
         }
         let motion = esc.step(&|_, _| None, &mut heard, send);
-        means.add(&motion, esc.rig().period_s());
+        self.means[index].add(&motion, esc.rig().period_s());
         if let Some(pack) = &mut self.pack {
             let is_connected = esc.around_mut().bus_mut().is_connected();
             pack.draw(index, if is_connected { motion.bus_a } else { 0.0 });
@@ -306,7 +316,7 @@ impl Machine for Rack {
         onlooker: &mut impl Onlooker,
         send: &mut dyn FnMut(&[u8]),
     ) -> Result<(), Stopped> {
-        self.answers.clear();
+        self.begin();
         self.run(|esc| esc.is_before(until_ns), onlooker, send);
         Ok(())
     }

@@ -106,8 +106,13 @@ impl Fault {
         t_s >= self.at_s
     }
 
+    /// Whether it acts no more.
+    pub fn is_over(&self, t_s: f64) -> bool {
+        t_s >= self.end_s()
+    }
+
     fn acts(&self, t_s: f64) -> bool {
-        self.has_begun(t_s) && t_s < self.end_s()
+        self.has_begun(t_s) && !self.is_over(t_s)
     }
 
     /// How far it has grown, 0..1, where it grows linearly over its time and stays.

@@ -74,6 +74,11 @@ impl Timeline {
         self.due_s = t_s;
     }
 
+    /// The faults that have not been mended.
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
     /// Ends at a time all that has begun. What it has done to the shaft stays.
     pub fn mend(&mut self, t_s: f64) {
         self.forget(t_s, |_| true);

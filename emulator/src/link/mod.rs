@@ -19,19 +19,19 @@ mod udp;
 pub use address::{AddressError, HostPort};
 pub use endpoint::{DEFAULT_BAUD, Endpoint, EndpointError, EndpointReason};
 pub use error::LinkError;
-pub use stream::{Event, LinkId};
+pub use stream::{Event, Ids, LinkId};
 
 #[cfg(not(unix))]
 use std::io;
 use std::time::Duration;
 
-use stream::{Ids, Inbox, Link};
+use stream::{Inbox, Link};
 
 /// Most bytes that one read takes: the longest datagram.
 const READ_BYTES: usize = 65_535;
 
 /// What a loopback socket takes without loss, by far.
-const SOCKET_BYTES_PER_S: u32 = 1_000_000;
+pub const SOCKET_BYTES_PER_S: u32 = 1_000_000;
 
 /// Every open MAVLink link.
 #[derive(Default)]
@@ -79,7 +79,7 @@ impl Links {
 
     /// A number for a stream that another part of the program carries.
     pub fn stream(&mut self) -> LinkId {
-        self.ids.next()
+        self.ids.give()
     }
 
     /// What the slowest link carries, bytes/s: a terminal's rate, or what a loopback socket takes

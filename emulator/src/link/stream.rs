@@ -20,11 +20,12 @@ pub enum Event<'a> {
 }
 
 /// Gives each stream its number.
-#[derive(Default)]
-pub(super) struct Ids(u64);
+#[derive(Clone, Debug, Default)]
+pub struct Ids(u64);
 
 impl Ids {
-    pub(super) fn next(&mut self) -> LinkId {
+    /// A number that no stream has had.
+    pub fn give(&mut self) -> LinkId {
         self.0 += 1;
         LinkId(self.0)
     }

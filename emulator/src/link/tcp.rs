@@ -74,7 +74,7 @@ impl TcpServer {
             if ready.is_ok() && self.has_room(inbox.now) {
                 self.clients.push(Client {
                     stream,
-                    id: inbox.ids.next(),
+                    id: inbox.ids.give(),
                     pending: VecDeque::new(),
                     heard: inbox.now,
                     begun: false,

@@ -70,7 +70,7 @@ impl<P: Port> Tty<P> {
             self.inward.idle(inbox.now);
         }
         if length > 0 {
-            let id = *self.stream.get_or_insert_with(|| inbox.ids.next());
+            let id = *self.stream.get_or_insert_with(|| inbox.ids.give());
             (inbox.handle)(id, Event::Bytes(&inbox.buffer[..length]));
         }
     }

@@ -86,7 +86,7 @@ impl Udp {
                 (inbox.handle)(peer.id, Event::Ended);
             }
         }
-        let id = inbox.ids.next();
+        let id = inbox.ids.give();
         self.peers.push(Peer {
             address,
             id,

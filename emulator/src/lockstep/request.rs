@@ -1,10 +1,8 @@
 //! What a client asks for: the datagrams of `LOCKSTEP.md`, read.
 
-use std::f64::consts::TAU;
-
 use thiserror::Error;
 
-use crate::rack::Environment;
+use crate::rack::{Environment, OutOfRange, Shaft};
 use crate::wire;
 
 /// The version of the datagrams.
@@ -71,8 +69,8 @@ pub(super) enum Malformed {
     Frame(u8, wire::Rejected),
     #[error("it is for {0} ESCs, not for all or none")]
     Count(u8),
-    #[error("{what} = {value} is out of range")]
-    Range { what: &'static str, value: f64 },
+    #[error("{0}")]
+    Range(#[from] OutOfRange),
 }
 
 /// Whether a datagram on the throttle wire is a request.
@@ -144,14 +142,15 @@ fn environment<'a>(fields: &mut Fields<'a>, escs: usize) -> Result<Request<'a>, 
         return Err(Malformed::Count(count));
     }
     let sequence = u32::from_le_bytes(fields.take()?);
-    let supply_v = fields.value("voltage of the supply", 0.0..=100.0)?;
-    let supply_ohm = fields.value("resistance of the supply", 0.0..=100.0)?;
-    let ambient_c = fields.value("temperature of the air", -60.0..=150.0)?;
+    let supply_v = fields.value()?;
+    let supply_ohm = fields.value()?;
+    let ambient_c = fields.value()?;
     let mut shafts = Vec::with_capacity(escs);
     for _ in 0..count {
-        let torque_nm = fields.value("torque", -100.0..=100.0)?;
-        let wind_rpm = fields.value("air speed", -1e5..=1e5)?;
-        shafts.push([torque_nm, wind_rpm.map(|rpm| rpm * TAU / 60.0)]);
+        shafts.push(Shaft {
+            torque_nm: fields.value()?,
+            wind_rpm: fields.value()?,
+        });
     }
     let change = Environment {
         supply_v,
@@ -159,6 +158,7 @@ fn environment<'a>(fields: &mut Fields<'a>, escs: usize) -> Result<Request<'a>, 
         ambient_c,
         shafts,
     };
+    change.check()?;
     Ok(Request::Turn(sequence, Turn::Change(change)))
 }
 
@@ -179,17 +179,9 @@ impl<'a> Fields<'a> {
     }
 
     /// A value that NaN leaves as it is.
-    fn value(
-        &mut self,
-        what: &'static str,
-        range: std::ops::RangeInclusive<f64>,
-    ) -> Result<Option<f64>, Malformed> {
+    fn value(&mut self) -> Result<Option<f64>, Malformed> {
         let value = f64::from_le_bytes(self.take()?);
-        match value {
-            _ if value.is_nan() => Ok(None),
-            _ if range.contains(&value) => Ok(Some(value)),
-            _ => Err(Malformed::Range { what, value }),
-        }
+        Ok((!value.is_nan()).then_some(value))
     }
 }
 
@@ -257,12 +249,15 @@ mod tests {
             supply_v: Some(12.5),
             supply_ohm: None,
             ambient_c: Some(40.0),
-            shafts: vec![[None, Some(60.0 * TAU / 60.0)]],
+            shafts: vec![Shaft {
+                torque_nm: None,
+                wind_rpm: Some(60.0),
+            }],
         };
         assert_eq!(parse(&bytes, 1), Ok(Request::Turn(9, Turn::Change(wanted))));
         assert_eq!(parse(&bytes, 2), Err(Malformed::Count(1)));
         bytes[8..16].copy_from_slice(&f64::INFINITY.to_le_bytes());
-        assert!(matches!(parse(&bytes, 1), Err(Malformed::Range { .. })));
+        assert!(matches!(parse(&bytes, 1), Err(Malformed::Range(_))));
     }
 
     proptest! {

@@ -138,6 +138,43 @@ impl Row {
         PhaseName::deserialize(name)
     }
 
+    /// Bytes of a packed row.
+    pub const PACKED_BYTES: usize = 8 + 1 + 1 + 4 * (Self::COLUMNS.len() - 3);
+
+    /// Adds the row's bytes: its columns in their order, little-endian without gaps, as f64, phase and faults as one
+    /// byte each, and the others as f32. The phase is the number of [`Phase`], and 255 is for nothing, as NaN is.
+    pub fn pack(&self, out: &mut Vec<u8>) {
+        out.extend(self.t_s.to_le_bytes());
+        out.extend([
+            self.phase.map_or(u8::MAX, |phase| phase as u8),
+            self.faults.unwrap_or(u8::MAX),
+        ]);
+        let values = [
+            Some(self.rpm),
+            self.rpm_est,
+            self.rpm_ref,
+            Some(self.angle_deg),
+            self.angle_est_deg,
+            self.angle_error_deg,
+            Some(self.i_a_a),
+            Some(self.i_b_a),
+            Some(self.i_c_a),
+            self.i_d_a,
+            self.i_q_a,
+            self.u_d_v,
+            self.u_q_v,
+            self.duty_a,
+            self.duty_b,
+            self.duty_c,
+            Some(self.bus_v),
+            Some(self.bus_a),
+            Some(self.torque_nm),
+        ];
+        for value in values {
+            out.extend(value.unwrap_or(f32::NAN).to_le_bytes());
+        }
+    }
+
     /// The period that began at `t_s`, and what the control of the rig made of it.
     pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Self {
         let (snapshot, units) = (&rig.snapshot(), Units::of(rig.config()));

@@ -40,7 +40,7 @@ mod wire;
 
 use std::fs::File;
 use std::io::{self, Read};
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -61,6 +61,7 @@ pub use stand::{Standing, stand};
 pub use survey::{Expected, Failure, Survey};
 pub use table::{Cell, Row, Table};
 use vary::{Case, Variations};
+pub use wire::Wire as ThrottleSignal;
 pub(crate) use wire::bits as dshot_bits;
 
 /// The longest file, bytes: one of a hundred times the usual length. An entry takes a few KB while it is
@@ -156,7 +157,33 @@ impl Plan {
         mut row: impl FnMut(&Place, &Report, &[Verdict]),
     ) -> Result<Survey, ScenarioError> {
         let began = Instant::now();
-        let played = (0..self.runs()).into_par_iter().filter_map(|index| {
+        let played = self.play_each(0..self.runs(), stop, each)?;
+        let left_out = self.runs() - played.len();
+        for (place, played) in &played {
+            row(place, &played.report, &played.verdicts);
+        }
+        Ok(Survey::of(played, left_out, began.elapsed().as_secs_f64()))
+    }
+
+    /// Plays some of the runs on all processors, and gives a row for each, in their order: those of a survey. Once
+    /// `stop` is set none begins or goes on, and theirs are left out.
+    ///
+    /// # Errors
+    /// Any [`ScenarioError`] that shows in a run.
+    pub fn rows(&self, runs: Range<usize>, stop: &AtomicBool) -> Result<Vec<Row>, ScenarioError> {
+        let played = self.play_each(runs, stop, || ())?;
+        let rows = played.iter();
+        let rows = rows.map(|(place, played)| Row::of(place, &played.report, &played.verdicts));
+        Ok(rows.collect())
+    }
+
+    fn play_each(
+        &self,
+        runs: Range<usize>,
+        stop: &AtomicBool,
+        each: impl Fn() + Sync,
+    ) -> Result<Vec<(Place, Played)>, ScenarioError> {
+        let played = runs.into_par_iter().filter_map(|index| {
             if stop.load(Ordering::Relaxed) {
                 return None;
             }
@@ -167,12 +194,7 @@ impl Plan {
             each();
             Some(played)
         });
-        let played = played.collect::<Result<Vec<_>, _>>()?;
-        let left_out = self.runs() - played.len();
-        for (place, played) in &played {
-            row(place, &played.report, &played.verdicts);
-        }
-        Ok(Survey::of(played, left_out, began.elapsed().as_secs_f64()))
+        played.collect()
     }
 
     fn check(&self, index: usize) -> Result<(), ScenarioError> {

@@ -13,7 +13,7 @@ const ZERO_SHARE: f64 = 1.0 / ZERO_DIVISOR as f64;
 /// The signal on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
-pub(super) struct Wire(Signal);
+pub struct Wire(Signal);
 
 impl Default for Wire {
     fn default() -> Self {
@@ -44,7 +44,7 @@ impl TryFrom<String> for Wire {
 impl Wire {
     /// From the start of one frame to that of the next, ns: what a flight controller's loop of
     /// 1 kHz sends, and 400 Hz for servo pulses, which take up to 2 ms.
-    pub(super) fn interval_ns(self) -> u64 {
+    pub fn interval_ns(self) -> u64 {
         match self.0 {
             Signal::Pulse(Pulse::Servo) => 2_500_000,
             _ => 1_000_000,
@@ -54,7 +54,7 @@ impl Wire {
     /// The datagram of a throttle, 0 to 1. 0 is motor stop or the pulse that stands for it; above,
     /// the throttle's steps are gone through from the first to the last, with `INP_3D` those of
     /// both directions.
-    pub(super) fn datagram(self, throttle: f64, params: &Params) -> Vec<u8> {
+    pub fn datagram(self, throttle: f64, params: &Params) -> Vec<u8> {
         match self.0 {
             Signal::Dshot { bidirectional, .. } => {
                 let [low, high] = bits(throttle, bidirectional).to_le_bytes();

@@ -68,6 +68,16 @@ impl Row {
         Self(cells)
     }
 
+    /// A row of cells that another has been told, as in another process.
+    pub fn of_cells(cells: Vec<(String, Cell)>) -> Self {
+        Self(cells)
+    }
+
+    /// Its cells with the names of their columns.
+    pub fn cells(&self) -> &[(String, Cell)] {
+        &self.0
+    }
+
     pub(super) fn cell(&self, column: &str) -> &Cell {
         let cell = self.0.iter().find(|(name, _)| name == column);
         cell.map_or(&Cell::Nothing, |(_, cell)| cell)

@@ -1,0 +1,61 @@
+//! Looks on at the ESCs of a laboratory.
+
+use std::mem;
+
+use crate::machine::Onlooker;
+use crate::record::Row;
+use crate::rig::{Period, Rig};
+use crate::summary::Summary;
+
+/// What is kept of each ESC's periods.
+pub(super) struct Look {
+    esc: usize,
+    diverged: bool,
+    /// Packed rows of each ESC, if they are wanted.
+    rows: Option<Vec<Vec<u8>>>,
+    /// A summary of each ESC without windows, if its hash is wanted.
+    summaries: Option<Vec<Summary>>,
+}
+
+impl Look {
+    pub(super) fn new(escs: usize, records: bool, traces: bool) -> Self {
+        Self {
+            esc: 0,
+            diverged: false,
+            rows: records.then(|| vec![Vec::new(); escs]),
+            summaries: traces.then(|| (0..escs).map(|_| Summary::new([])).collect()),
+        }
+    }
+
+    /// Whether a motor has left all bounds.
+    pub(super) fn diverged(&self) -> bool {
+        self.diverged
+    }
+
+    /// The rows of an ESC since they were last taken.
+    pub(super) fn take_recorded(&mut self, esc: usize) -> Option<Vec<u8>> {
+        Some(mem::take(&mut self.rows.as_mut()?[esc]))
+    }
+
+    /// The hash of an ESC so far.
+    pub(super) fn trace_hash(&self, esc: usize) -> Option<String> {
+        let summary = &self.summaries.as_ref()?[esc];
+        Some(summary.report(0.0, 0.0).trace_hash)
+    }
+}
+
+impl Onlooker for Look {
+    fn esc(&mut self, esc: usize) {
+        self.esc = esc;
+    }
+
+    fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        self.diverged |= period.motion.diverged();
+        if let Some(rows) = &mut self.rows {
+            Row::of(t_s, period, rig).pack(&mut rows[self.esc]);
+        }
+        if let Some(summaries) = &mut self.summaries {
+            summaries[self.esc].add(t_s, period, rig);
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! A parameter that a program sets as a ground station does, by PARAM_SET.
+
+use mavlink::dialects::ardupilotmega::{MavParamType, PARAM_SET_DATA};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+use siskin_control::esc;
+use siskin_control::params::ParamId;
+use thiserror::Error;
+
+use super::Laboratory;
+
+/// As a ground station.
+const OWN: MavHeader = MavHeader {
+    system_id: 255,
+    component_id: 190,
+    sequence: 0,
+};
+
+/// Why a value is not taken; one line.
+#[derive(Debug, Error)]
+#[error("{name} = {value} is refused: {reason}")]
+pub struct Refused {
+    name: &'static str,
+    value: f32,
+    reason: &'static str,
+}
+
+impl Laboratory {
+    /// The value of an ESC's parameter that is in force.
+    pub fn param(&self, esc: usize, id: ParamId) -> f32 {
+        self.esc(esc).esc().params().get(id)
+    }
+
+    /// Sets an ESC's parameter to a value in its range. The drive has it within a millisecond.
+    ///
+    /// # Errors
+    /// The ESC refuses it: the motor turns, say, or the drive cannot be built so.
+    pub fn set_param(&mut self, esc: usize, id: ParamId, value: f32) -> Result<(), Refused> {
+        let name = id.entry().name;
+        let mut frame = MAVLinkV2MessageRaw::new();
+        let set = PARAM_SET_DATA {
+            param_value: value,
+            // Whoever hears it, and that is one.
+            target_system: 0,
+            target_component: 0,
+            param_id: name.into(),
+            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+        };
+        frame.serialize_message_data(OWN, &set);
+        // Beside what the program itself sends, of which a frame may be half there.
+        let stream = self.new_stream();
+        self.rack
+            .receive_for(esc, stream, frame.raw_bytes(), &mut self.look);
+        self.rack.forget(stream);
+        if self.param(esc, id) == value {
+            return Ok(());
+        }
+        let device = self.esc(esc);
+        let bench = device.rig().around().bench();
+        let mut wanted = device.esc().params().clone();
+        // It is in its range.
+        let _ = wanted.set(id, value);
+        let reason = if device.rig().is_held() {
+            "the chip is in reset"
+        } else if let Err(error) = esc::check(&wanted, &bench.sensing.board(bench.delay)) {
+            error.reason
+        } else if !id.entry().live {
+            "the motor turns; stop it first"
+        } else {
+            "the ESC takes signed commands only"
+        };
+        Err(Refused {
+            name,
+            value,
+            reason,
+        })
+    }
+}
