@@ -1,0 +1,71 @@
+"""What goes wrong with the ESCs."""
+
+from collections.abc import Sequence
+from typing import overload
+
+from ._siskin import Laboratory
+
+
+class Faults(Sequence[list[str]]):
+    """What is broken of each ESC: ``faults[i]`` lists the faults of ESC i that act or are to come.
+
+    Kinds and values are those of a scenario's ``[[fault]]``, which the emulator's guide lists.
+    """
+
+    def __init__(self, laboratory: Laboratory) -> None:
+        self._laboratory = laboratory
+
+    def inject(
+        self,
+        esc: int,
+        kind: str,
+        *,
+        phase: int | None = None,
+        side: str | None = None,
+        value: float | None = None,
+        at_s: float | None = None,
+        for_s: float | None = None,
+    ) -> None:
+        """Lets a fault act, in place of one of its kind.
+
+        :param kind: as ``"mosfet_open"``, ``"bus_sag"`` or ``"signal_loss"``.
+        :param phase: 0 to 2.
+        :param side: ``"low"`` or ``"high"``.
+        :param value: in the kind's unit.
+        :param at_s: when, in simulated time; now if it is left out.
+        :param for_s: for how long, s; until it is mended if it is left out.
+        :raises siskin.Error: if there is no such fault, with what would do.
+        """
+        at_s = self._laboratory.now_ns * 1e-9 if at_s is None else at_s
+        given = {"kind": kind, "phase": phase, "side": side, "value": value, "at_s": at_s, "for_s": for_s}
+        keys = {"phase": int, "value": float, "at_s": float, "for_s": float}
+        words = [f"{key} = {_toml(keys.get(key, str)(v))}" for key, v in given.items() if v is not None]
+        self._laboratory.inject(esc, ", ".join(words))
+
+    def mend(self, esc: int | None = None) -> None:
+        """Makes whole again all that faults have broken by now, of one ESC or of all."""
+        for each in range(len(self)) if esc is None else [esc]:
+            self._laboratory.mend(each)
+
+    @overload
+    def __getitem__(self, esc: int) -> list[str]: ...
+    @overload
+    def __getitem__(self, esc: slice) -> list[list[str]]: ...
+    def __getitem__(self, esc: int | slice) -> list[str] | list[list[str]]:
+        if isinstance(esc, slice):
+            return [self._laboratory.faults(index) for index in range(len(self))[esc]]
+        return self._laboratory.faults(esc if esc >= 0 else esc + len(self))
+
+    def __len__(self) -> int:
+        return self._laboratory.escs
+
+    def __repr__(self) -> str:
+        return f"Faults({self[:]})"
+
+
+def _toml(value: object) -> str:
+    """A value as TOML has it."""
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    return repr(value)

@@ -1,0 +1,46 @@
+"""The ESCs' parameters as a mapping."""
+
+from collections.abc import Iterator, MutableMapping
+
+from ._siskin import PARAMETERS, Laboratory
+
+
+class Params(MutableMapping[str, float]):
+    """The parameters of the ESCs by name, as in the table of the control's guide.
+
+    ``params["CTL_MODE"]`` is the value of the first ESC, and ``params["CTL_MODE"] = 2`` sets that of all; ``params.of(2)``
+    has those of ESC 2 alone. A value is taken as from a ground station: it is in force within a millisecond, it stores
+    itself, and most are refused while the motor turns.
+
+    :raises KeyError: for a name that no parameter has.
+    :raises siskin.Error: for a value that is out of range or refused, with the reason.
+    """
+
+    def __init__(self, laboratory: Laboratory, escs: range | None = None) -> None:
+        self._laboratory = laboratory
+        self._escs = range(laboratory.escs) if escs is None else escs
+
+    def of(self, esc: int) -> "Params":
+        """The parameters of one ESC."""
+        if esc not in range(self._laboratory.escs):
+            raise IndexError(f"ESC {esc} is not there; give 0 to {self._laboratory.escs - 1}")
+        return Params(self._laboratory, range(esc, esc + 1))
+
+    def __getitem__(self, name: str) -> float:
+        return self._laboratory.param(self._escs[0], name)
+
+    def __setitem__(self, name: str, value: float) -> None:
+        for esc in self._escs:
+            self._laboratory.set_param(esc, name, value)
+
+    def __delitem__(self, name: str) -> None:
+        raise TypeError("a parameter cannot be deleted; set it")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(PARAMETERS)
+
+    def __len__(self) -> int:
+        return len(PARAMETERS)
+
+    def __repr__(self) -> str:
+        return f"Params({dict(self)})"

@@ -1,0 +1,150 @@
+"""Many runs of a scenario, here or on a Dask cluster."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias, overload
+
+import numpy as np
+
+from ._siskin import Error, Plan, write_table
+
+Cell: TypeAlias = None | bool | int | float | str
+"""A value in a row."""
+
+Cells: TypeAlias = list[tuple[str, Cell]]
+
+
+class Table(Sequence[Mapping[str, Cell]]):
+    """A row for each run: its seed, the keys that were swept or drawn, every figure of every window, and the verdicts.
+
+    ``table[0]["held"]`` is whether all expectations of the first run held; ``table["steady.rpm_mean"]`` is a column.
+    ``pandas.DataFrame(list(table))`` makes a frame of it. Two tables are equal if every bit of them is.
+    """
+
+    def __init__(self, rows: list[Cells]) -> None:
+        self._rows = rows
+
+    @overload
+    def __getitem__(self, at: int) -> dict[str, Cell]: ...
+    @overload
+    def __getitem__(self, at: slice) -> Table: ...
+    @overload
+    def __getitem__(self, at: str) -> np.ndarray[Any, np.dtype[Any]]: ...
+    def __getitem__(self, at: int | slice | str) -> dict[str, Cell] | Table | np.ndarray[Any, np.dtype[Any]]:
+        if isinstance(at, slice):
+            return Table(self._rows[at])
+        if isinstance(at, int):
+            return dict(self._rows[at])
+        if at not in self.columns:
+            raise KeyError(f"there is no column {at}")
+        return _array([row.get(at) for row in self])
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __iter__(self) -> Iterator[dict[str, Cell]]:
+        return (dict(row) for row in self._rows)
+
+    def __eq__(self, other: object) -> bool:
+        # By their texts, which say each double exactly, and are equal for nothing and nothing.
+        return isinstance(other, Table) and repr(self._rows) == repr(other._rows)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        failed = sum(row["held"] is False for row in self)
+        return f"<Table of {len(self)} runs, {failed} failed>"
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of all columns, in the order in which they come."""
+        return list(dict.fromkeys(name for row in self._rows for name, _ in row))
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Writes the table: byte for byte what the program writes with ``--table``.
+
+        :raises siskin.Error: if the path does not end in ``.csv``, or cannot be written.
+        """
+        write_table(path, self._rows)
+
+
+def sweep(
+    path: str | os.PathLike[str],
+    *,
+    seeds: range | None = None,
+    threads: int | None = None,
+    client: Any = None,
+    retries: int = 3,
+    **overrides: Any,
+) -> Table:
+    """Plays all runs that a scenario stands for, on all cores or on a cluster; the table is the same, bit for bit.
+
+    :param path: the scenario, a TOML file.
+    :param seeds: plays it for each of these seeds, as ``range(1, 201)``.
+    :param threads: how many at once here; all cores if it is left out.
+    :param client: a ``dask.distributed.Client``: its workers play the runs, of which it takes care. The scenario, and
+        the files that it names, have to be there under the same path.
+    :param retries: how often the cluster tries a part again that has failed.
+    :param overrides: keys of the file with the one value that each takes, as :func:`siskin.scenario` has them.
+    :raises siskin.Error: if it makes no sense or cannot be played, with the program's text.
+    """
+    ends = _ends(seeds)
+    if client is None:
+        plan = Plan(path, ends, overrides, None)
+        return Table(plan.rows(0, plan.runs, threads))
+    if threads is not None:
+        raise Error("threads are for this machine and client is for others; give one of them")
+    return Table(_on_cluster(client, Path(path).resolve(), ends, overrides, retries))
+
+
+def _on_cluster(
+    client: Any, path: Path, ends: tuple[int, int] | None, overrides: dict[str, Any], retries: int
+) -> list[Cells]:
+    runs = Plan(path, ends, overrides, None).runs
+    text = _hash(path)
+    # Small enough for all to end at about the same time, and for little to be lost with a worker.
+    workers = sum(client.nthreads().values()) or 1
+    step = max(1, runs // (16 * workers))
+    parts = [(first, min(first + step, runs)) for first in range(0, runs, step)]
+    # `pure` would let an equal sweep of before answer, whatever has become of the files since.
+    futures = client.map(
+        _part, parts, path=path, ends=ends, overrides=overrides, text=text, pure=False, retries=retries
+    )
+    return [row for rows in client.gather(futures) for row in rows]
+
+
+def _part(
+    part: tuple[int, int], path: Path, ends: tuple[int, int] | None, overrides: dict[str, Any], text: str
+) -> list[Cells]:
+    """Some of the runs, on a worker: on one thread, since each thread of a worker has a part of its own."""
+    if _hash(path) != text:
+        raise Error(f"{path}: the file differs between this worker and who has asked it; give both the same")
+    return Plan(path, ends, overrides, None).rows(*part, 1)
+
+
+def _hash(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror}") from error
+
+
+def _ends(seeds: range | None) -> tuple[int, int] | None:
+    if seeds is None:
+        return None
+    if seeds.step != 1 or not seeds or seeds[0] < 0:
+        raise Error(f"seeds = {seeds}: give them from the first on without gaps, as range(1, 201)")
+    return seeds[0], seeds[-1]
+
+
+def _array(values: list[Cell]) -> np.ndarray[Any, np.dtype[Any]]:
+    """A column: numbers as f64 with NaN for nothing, flags as bool, and what else there is as objects."""
+    if all(isinstance(value, bool) for value in values):
+        return np.array(values, dtype=bool)
+    if all(value is None or isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+    return np.array(values, dtype=object)

@@ -1,0 +1,48 @@
+//! What the Python package `siskin` is made on: the emulator's laboratory and its scenarios, by calls from Python.
+//!
+//! The package's own files give it the shape that a person uses. Whatever runs for long lets other threads of Python
+//! go on, and ends with Ctrl-C.
+#![deny(unsafe_code)] // not `forbid`: what PyO3's macros write allows it
+
+mod convert;
+mod interrupt;
+mod laboratory;
+mod plan;
+mod state;
+
+use pyo3::exceptions::PyValueError;
+
+pyo3::create_exception!(
+    siskin,
+    Error,
+    PyValueError,
+    "Something cannot be done; its text is one line, as the program prints it."
+);
+
+/// The compiled part of siskin.
+#[pyo3::pymodule]
+mod _siskin {
+    use pyo3::prelude::*;
+    use siskin_control::params::ParamId;
+    use siskin_emulator::bench::library;
+    use siskin_emulator::record::Row;
+
+    #[pymodule_export]
+    use crate::Error;
+    #[pymodule_export]
+    use crate::laboratory::Laboratory;
+    #[pymodule_export]
+    use crate::plan::{Plan, write_table};
+    #[pymodule_export]
+    use crate::state::{EscState, Reply, Reported};
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("BENCHES", library::names().collect::<Vec<_>>())?;
+        let parameters = ParamId::ALL.iter().map(|id| id.entry().name);
+        module.add("PARAMETERS", parameters.collect::<Vec<_>>())?;
+        module.add("PHASES", crate::state::PHASES.to_vec())?;
+        module.add("COLUMNS", Row::COLUMNS.to_vec())
+    }
+}
