@@ -82,7 +82,8 @@ class Emulator:
     :param seed: of all randomness.
     :param params: parameters over the bench's, by name. They are not stored.
     :param wire: how throttle is sent, as a scenario's ``bench.wire`` has it: ``"dshot600"``, ``"servo"``...
-    :param storage: the file behind the flash, ``PATH.i`` where there are several ESCs. Without one nothing is kept.
+    :param storage: the file behind the flash, ``PATH.i`` where there are several ESCs; it is this emulator's alone as
+        long as that lives. Without one nothing is kept.
     :param record: whether each control period is kept for :meth:`record`.
     :param trace: whether the control's state is hashed for :attr:`trace_hashes`.
     :param keys: other keys of a scenario's ``[bench]``, as ``bus="6s"``, ``load="none"`` or ``plant="switching"``.

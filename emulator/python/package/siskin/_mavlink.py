@@ -29,7 +29,8 @@ class MavlinkPipe:
     def connection(self, *, dialect: str = "ardupilotmega", source_system: int = 255, step_s: float = 0.01) -> Any:
         """A ``mavutil.mavfile`` on this pipe, for whatever is written for pymavlink.
 
-        Where it waits for a message, simulated time goes on, by ``step_s`` at a time.
+        Where it waits for a message, simulated time goes on, by ``step_s`` at a time. What has waited to be read
+        until now is left out.
 
         :raises ImportError: without pymavlink: ``pip install pymavlink``.
         """
@@ -38,6 +39,7 @@ class MavlinkPipe:
         if dialect != mavutil.current_dialect:
             mavutil.set_dialect(dialect)
         pipe, laboratory = self, self._laboratory
+        pipe.read()
 
         class Connection(mavutil.mavfile):  # type: ignore[misc]
             def __init__(self) -> None:
