@@ -8,6 +8,7 @@ from paths import ROOT
 
 FRONT = ROOT / "README.md"
 READMES = [FRONT, *(ROOT / crate / "README.md" for crate in ("emulator", "firmware", "shared", "tools"))]
+READMES.append(ROOT / "emulator" / "python" / "README.md")
 READMES += [ROOT / "tests" / folder / "README.md" for folder in ("flight", "virtual-board")]
 
 

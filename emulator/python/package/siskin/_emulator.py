@@ -124,7 +124,7 @@ class Emulator:
     @property
     def time_s(self) -> float:
         """Simulated time since the start, s."""
-        return self._laboratory.now_ns * 1e-9
+        return self._laboratory.now_ns / 1e9
 
     @property
     def state(self) -> list[EscState]:

@@ -36,7 +36,7 @@ class Faults(Sequence[list[str]]):
         :param for_s: for how long, s; until it is mended if it is left out.
         :raises siskin.Error: if there is no such fault, with what would do.
         """
-        at_s = self._laboratory.now_ns * 1e-9 if at_s is None else at_s
+        at_s = self._laboratory.now_ns / 1e9 if at_s is None else at_s
         given = {"kind": kind, "phase": phase, "side": side, "value": value, "at_s": at_s, "for_s": for_s}
         keys = {"phase": int, "value": float, "at_s": float, "for_s": float}
         words = [f"{key} = {_toml(keys.get(key, str)(v))}" for key, v in given.items() if v is not None]

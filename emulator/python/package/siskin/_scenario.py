@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,19 +39,21 @@ class Outcome:
 
 def scenario(
     path: str | os.PathLike[str],
+    overrides: Mapping[str, Any] | None = None,
+    /,
     *,
     seed: int | None = None,
     record: str | os.PathLike[str] | None = None,
-    **overrides: Any,
+    **more: Any,
 ) -> Outcome:
     """Plays the only run of a scenario, or the first, as ``siskin-emulator scenario`` does: equal bits, equal figures.
 
     :param path: the scenario, a TOML file.
     :param seed: another seed than the file's.
     :param record: where each control period is written, as ``--record`` has it.
-    :param overrides: keys of the file with the value that each takes, as ``**{"params.CTL_RPM_MAX": 5000,
-        "bench.load": "none"}``; the entries of an array count from 0.
+    :param overrides: keys of the file with the value that each takes, as ``{"params.CTL_RPM_MAX": 5000,
+        "bench.load": "none"}``; the entries of an array count from 0. ``**more`` are others.
     :raises siskin.Error: if it makes no sense or cannot be played, with the program's text.
     """
     seeds = None if seed is None else (seed, seed)
-    return Outcome(json.loads(Plan(path, seeds, overrides, record).play()))
+    return Outcome(json.loads(Plan(path, seeds, {**(overrides or {}), **more}, record).play()))

@@ -74,12 +74,14 @@ class Table(Sequence[Mapping[str, Cell]]):
 
 def sweep(
     path: str | os.PathLike[str],
+    overrides: Mapping[str, Any] | None = None,
+    /,
     *,
     seeds: range | None = None,
     threads: int | None = None,
     client: Any = None,
     retries: int = 3,
-    **overrides: Any,
+    **more: Any,
 ) -> Table:
     """Plays all runs that a scenario stands for, on all cores or on a cluster; the table is the same, bit for bit.
 
@@ -92,13 +94,13 @@ def sweep(
     :param overrides: keys of the file with the one value that each takes, as :func:`siskin.scenario` has them.
     :raises siskin.Error: if it makes no sense or cannot be played, with the program's text.
     """
-    ends = _ends(seeds)
+    ends, given = _ends(seeds), {**(overrides or {}), **more}
     if client is None:
-        plan = Plan(path, ends, overrides, None)
+        plan = Plan(path, ends, given, None)
         return Table(plan.rows(0, plan.runs, threads))
     if threads is not None:
         raise Error("threads are for this machine and client is for others; give one of them")
-    return Table(_on_cluster(client, Path(path).resolve(), ends, overrides, retries))
+    return Table(_on_cluster(client, Path(path).resolve(), ends, given, retries))
 
 
 def _on_cluster(
