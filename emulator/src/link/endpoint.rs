@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::address::{AddressError, HostPort};
+use siskin_scope::{AddressError, HostPort};
 
 /// Baud of a `pty` endpoint that names none: what telemetry radios and boards start with.
 pub const DEFAULT_BAUD: u32 = 115_200;

@@ -3,7 +3,6 @@
 //! Nothing here blocks or reads a clock: the emulator's one loop calls [`Links::receive`] at least
 //! once a millisecond and says what time it is, and [`Links::send`] whenever there is a frame.
 
-mod address;
 mod endpoint;
 mod error;
 mod pacer;
@@ -16,9 +15,9 @@ mod tcp;
 mod tty;
 mod udp;
 
-pub use address::{AddressError, HostPort};
 pub use endpoint::{DEFAULT_BAUD, Endpoint, EndpointError, EndpointReason};
 pub use error::LinkError;
+pub use siskin_scope::{AddressError, HostPort};
 pub use stream::{Event, Ids, LinkId};
 
 #[cfg(not(unix))]

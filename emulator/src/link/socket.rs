@@ -3,9 +3,9 @@
 use std::io;
 use std::net::SocketAddr;
 
-use super::address::HostPort;
 use super::endpoint::Endpoint;
 use super::error::LinkError;
+use siskin_scope::HostPort;
 
 /// What refuses a socket: a port that is taken has another remedy than an address that is wrong.
 pub(super) fn socket_error(endpoint: &Endpoint, source: io::Error) -> LinkError {

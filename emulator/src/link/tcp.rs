@@ -5,9 +5,11 @@ use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::time::Duration;
 
+use siskin_scope::HostPort;
+
 use super::socket::{resolve, socket_error};
 use super::stream::{Event, Inbox, Link, LinkId, is_pending};
-use super::{Endpoint, HostPort, LinkError};
+use super::{Endpoint, LinkError};
 
 /// Clients at once. One more takes the place of the one that has been silent for longest, if any is, and
 /// is turned away otherwise.

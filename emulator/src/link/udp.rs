@@ -4,9 +4,11 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::Duration;
 
+use siskin_scope::HostPort;
+
 use super::socket::{resolve, socket_error};
 use super::stream::{Event, Inbox, Link, LinkId, is_pending};
-use super::{Endpoint, HostPort, LinkError};
+use super::{Endpoint, LinkError};
 
 /// Datagrams taken in one call: more than a ground station sends in the millisecond between two.
 const DATAGRAMS_PER_CALL: usize = 64;

@@ -1,12 +1,9 @@
 //! What the page and the program say to each other over the socket.
 //!
-//! Text is JSON. Binary begins with a byte that says what it is: [`MAVLINK`] frames, in both directions, or a
-//! [`TRACE`], an answer to [`FromPage::View`].
+//! Text is JSON. Binary begins with a byte that says what it is: [`siskin_scope::MAVLINK`] frames, in both
+//! directions, or a [`TRACE`], an answer to [`FromPage::View`].
 
 use serde::Deserialize;
-
-/// MAVLink bytes follow.
-pub(super) const MAVLINK: u8 = 0;
 
 /// A piece of the traces follows.
 pub(super) const TRACE: u8 = 1;

@@ -1,68 +1,43 @@
 //! The scope: a page in the browser that shows a running ESC and lets a person play with it.
 //!
-//! The page is a MAVLink client, as a ground station is: parameters, commands and telemetry are MAVLink frames over
-//! its socket. Beside them it has what only a simulation has: traces at the control's rate, a throttle wire, and
-//! faults.
+//! The page and its server are those of every ESC ([`siskin_scope`]), by MAVLink. Beside that there is what only a
+//! simulation has: traces at the control's rate, a throttle wire, and faults.
 
 mod address;
-mod assets;
 mod channel;
-mod guard;
-mod head;
-mod hub;
 mod message;
 mod ring;
-mod server;
+mod rings;
 mod tap;
 #[cfg(test)]
 mod tests;
 mod throttle;
 mod view;
-mod viewer;
 
 pub use address::{WebAddress, WebAddressError};
 pub use tap::Tapped;
 
 use std::collections::BTreeMap;
-use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use siskin_control::drive::{Fault, Phase};
-use thiserror::Error;
+use siskin_scope::{ORDERS, Order, Site, ViewerId, What};
 
 use crate::link::{HostPort, LinkId, Links};
 use crate::machine::{Machine, Onlooker};
 use crate::scenario;
-use guard::Guard;
-use hub::{Hub, Message, Order, ViewerId, What};
 use message::FromPage;
-use server::Server;
+use rings::Rings;
 use tap::Taps;
 use throttle::Throttle;
 
-/// Why there is no page; one line, with what to do.
-#[derive(Debug, Error)]
-pub enum WebError {
-    /// The host's name has no address.
-    #[error("--web {0}: the host cannot be resolved ({1}); give an address, such as 127.0.0.1")]
-    Host(HostPort, io::Error),
-    /// Another program listens there.
-    #[error("--web {0}: port {port} is taken; give another port, or none", port = .0.port)]
-    Taken(HostPort),
-    /// The system refuses the socket.
-    #[error("--web {0}: cannot listen ({1}); give an address of this machine")]
-    Socket(HostPort, io::Error),
-}
+pub use siskin_scope::SiteError as WebError;
 
 /// The page's side of a running simulation.
 pub struct Web {
-    hub: Arc<Hub>,
-    orders: Receiver<Order>,
-    local: SocketAddr,
-    url: String,
+    site: Site<Rings>,
     links: BTreeMap<ViewerId, LinkId>,
     taps: Taps,
     /// One for each ESC.
@@ -89,30 +64,10 @@ impl Web {
     }
 
     fn listen(address: &HostPort, escs: usize) -> Result<Self, WebError> {
-        let local = address.resolve();
-        let local = local.map_err(|error| WebError::Host(address.clone(), error))?;
-        let refused = |error: io::Error| match error.kind() {
-            io::ErrorKind::AddrInUse => WebError::Taken(address.clone()),
-            _ => WebError::Socket(address.clone(), error),
-        };
-        let listener = TcpListener::bind(local).map_err(refused)?;
-        let local = listener.local_addr().map_err(refused)?;
-        let guard = Guard::new(local).map_err(refused)?;
-        let url = guard.url();
-        let (hub, orders) = Hub::new(escs);
-        let hub = Arc::new(hub);
-        let server = Server {
-            guard,
-            hub: Arc::clone(&hub),
-            greeting: greeting(escs),
-        };
-        server::serve(listener, server);
+        let rings = Arc::new(Rings::new(escs));
         Ok(Self {
-            taps: Taps::new(&hub, escs),
-            hub,
-            orders,
-            local,
-            url,
+            taps: Taps::new(&rings, escs),
+            site: Site::open(address, rings, greeting(escs))?,
             links: BTreeMap::new(),
             throttles: (0..escs).map(|_| Throttle::default()).collect(),
         })
@@ -120,7 +75,7 @@ impl Web {
 
     /// Where it is served, and what a person opens.
     pub fn place(&self) -> (SocketAddr, String) {
-        (self.local, self.url.clone())
+        (self.site.local(), self.site.url().to_owned())
     }
 
     /// Does what the pages ask for, and drives the throttle wire for who holds it. Never waits.
@@ -131,8 +86,8 @@ impl Web {
         onlooker: &mut impl Onlooker,
     ) {
         // No more than the queue has held: pages that go on sending hold nothing up.
-        for _ in 0..hub::ORDERS {
-            let Ok(Order { viewer, came, what }) = self.orders.try_recv() else {
+        for _ in 0..ORDERS {
+            let Some(Order { viewer, came, what }) = self.site.order() else {
                 break;
             };
             match what {
@@ -151,7 +106,7 @@ impl Web {
                 What::Asked(asked) => {
                     if let Err(reason) = self.obey((viewer, came), asked, machine) {
                         let text = serde_json::json!({ "refused": reason }).to_string();
-                        self.hub.send(Some(viewer), || Message::Text(text.clone()));
+                        self.site.tell(Some(viewer), &text);
                     }
                 }
             }
@@ -202,9 +157,7 @@ impl Web {
 
     /// Sends MAVLink frames to every page.
     pub fn send(&self, frames: &[u8]) {
-        if !frames.is_empty() && self.hub.is_viewed() {
-            self.hub.send(None, || Message::Mavlink(frames.to_vec()));
-        }
+        self.site.send(frames);
     }
 
     /// An onlooker that takes off the traces beside `onlooker`, where there is a page.

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::channel::{Control, Point};
-use super::hub::Hub;
 use super::ring::Chunk;
+use super::rings::Rings;
 use crate::machine::Onlooker;
 use crate::plant::Gate;
 use crate::rig::{Period, Rig};
@@ -12,7 +12,7 @@ use crate::surroundings::{Motion, Passage};
 
 /// The tap of one ESC.
 pub(super) struct Tap {
-    hub: Arc<Hub>,
+    rings: Arc<Rings>,
     esc: usize,
     /// Nothing while nobody views.
     chunk: Option<Chunk>,
@@ -20,9 +20,9 @@ pub(super) struct Tap {
 }
 
 impl Tap {
-    pub(super) fn new(hub: Arc<Hub>, esc: usize) -> Self {
+    pub(super) fn new(rings: Arc<Rings>, esc: usize) -> Self {
         Self {
-            hub,
+            rings,
             esc,
             chunk: None,
             throttle: 0.0,
@@ -32,7 +32,7 @@ impl Tap {
     /// Looks whether somebody views; `throttle` is on the wire.
     pub(super) fn look(&mut self, throttle: f64) {
         self.throttle = throttle as f32;
-        match (self.hub.is_viewed(), &self.chunk) {
+        match (self.rings.is_viewed(), &self.chunk) {
             (true, None) => self.chunk = Some(Chunk::new()),
             (false, Some(_)) => self.chunk = None,
             _ => {}
@@ -50,8 +50,7 @@ impl Tap {
         if chunk.is_full()
             && let Some(full) = self.chunk.take()
         {
-            let ring = self.hub.ring(self.esc);
-            self.chunk = ring.map(|mut ring| ring.push(full));
+            self.chunk = self.rings.push(self.esc, full);
         }
     }
 
@@ -83,8 +82,8 @@ pub(super) struct Taps {
 
 impl Taps {
     /// One for each of so many ESCs.
-    pub(super) fn new(hub: &Arc<Hub>, escs: usize) -> Self {
-        let each = (0..escs).map(|esc| Tap::new(Arc::clone(hub), esc));
+    pub(super) fn new(rings: &Arc<Rings>, escs: usize) -> Self {
+        let each = (0..escs).map(|esc| Tap::new(Arc::clone(rings), esc));
         Self {
             each: each.collect(),
             esc: 0,

@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use siskin_control::input::signal::Signal;
 
-use super::hub::ViewerId;
 use crate::scenario::dshot_bits;
 use crate::wire::Wire;
+use siskin_scope::ViewerId;
 
 /// A page that has been silent for so long has let go.
 const SILENT: Duration = Duration::from_millis(200);

@@ -1,45 +1,47 @@
-//! What the simulation and the viewers share.
+//! What the program and the viewers share.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::message::FromPage;
-use super::ring::Ring;
+use crate::show::Show;
 
 /// Viewers at a time.
-pub(super) const MAX_VIEWERS: usize = 8;
+pub(crate) const MAX_VIEWERS: usize = 8;
 
-/// Messages to the simulation that may wait: it takes them each millisecond, and a viewer waits behind them.
-pub(super) const ORDERS: usize = 256;
+/// Messages to the program that may wait: a simulation takes them each millisecond, and a viewer waits behind them.
+pub const ORDERS: usize = 256;
 
 /// Messages that may wait for a viewer, who takes them a hundred times a second: some seconds of MAVLink. Whoever
 /// lets them pile up does not read, and is dropped.
 const WAITING: usize = 1024;
 
 /// A viewer.
-pub(super) type ViewerId = u64;
+pub type ViewerId = u64;
 
-/// Something from a viewer, and when it came.
-pub(super) struct Order {
-    pub(super) viewer: ViewerId,
-    pub(super) came: Instant,
-    pub(super) what: What,
+/// Something from a viewer.
+pub struct Order<A> {
+    /// From whom.
+    pub viewer: ViewerId,
+    /// When it came.
+    pub came: Instant,
+    /// What it is.
+    pub what: What<A>,
 }
 
-/// What it is.
-pub(super) enum What {
+/// What a viewer sends.
+pub enum What<A> {
     /// MAVLink bytes.
     Mavlink(Vec<u8>),
     /// Something else.
-    Asked(FromPage),
+    Asked(A),
     /// The viewer is gone.
     Ended,
 }
 
 /// Something for a viewer.
-pub(super) enum Message {
+pub(crate) enum Message {
     /// A MAVLink frame.
     Mavlink(Vec<u8>),
     /// JSON.
@@ -53,60 +55,55 @@ struct Viewer {
 }
 
 /// A viewer's side of the hub.
-pub(super) struct Seat {
-    pub(super) id: ViewerId,
-    pub(super) orders: SyncSender<Order>,
-    pub(super) inbox: Receiver<Message>,
+pub(crate) struct Seat<A> {
+    pub(crate) id: ViewerId,
+    pub(crate) orders: SyncSender<Order<A>>,
+    pub(crate) inbox: Receiver<Message>,
     /// Raised when it has not read in time.
-    pub(super) dropped: Arc<AtomicBool>,
+    pub(crate) dropped: Arc<AtomicBool>,
 }
 
 /// The hub.
-pub(super) struct Hub {
+pub(crate) struct Hub<S: Show> {
     viewers: Mutex<Vec<Viewer>>,
     count: AtomicUsize,
     next: Mutex<ViewerId>,
-    orders: SyncSender<Order>,
-    rings: Vec<Mutex<Ring>>,
+    orders: SyncSender<Order<S::Asked>>,
+    show: Arc<S>,
 }
 
-impl Hub {
-    /// For so many ESCs; the other part is the simulation's.
-    pub(super) fn new(escs: usize) -> (Self, Receiver<Order>) {
+impl<S: Show> Hub<S> {
+    /// Of what is shown; the other part is the program's.
+    pub(crate) fn new(show: Arc<S>) -> (Self, Receiver<Order<S::Asked>>) {
         let (orders, from_viewers) = sync_channel(ORDERS);
         let hub = Self {
             viewers: Mutex::default(),
             count: AtomicUsize::new(0),
             next: Mutex::default(),
             orders,
-            rings: (0..escs).map(|_| Mutex::default()).collect(),
+            show,
         };
         (hub, from_viewers)
     }
 
     /// How many view.
-    pub(super) fn viewers(&self) -> usize {
+    pub(crate) fn viewers(&self) -> usize {
         self.count.load(Ordering::Relaxed)
     }
 
-    /// Whether somebody views.
-    pub(super) fn is_viewed(&self) -> bool {
-        self.viewers() > 0
+    /// What is shown.
+    pub(crate) fn show(&self) -> &S {
+        &self.show
     }
 
-    /// The ring of an ESC, if there is such a one.
-    pub(super) fn ring(&self, esc: usize) -> Option<MutexGuard<'_, Ring>> {
-        Some(lock(self.rings.get(esc)?))
-    }
-
-    /// A seat for a viewer, if one is free. The first one finds no old traces.
-    pub(super) fn join(&self) -> Option<Seat> {
+    /// A seat for a viewer, if one is free.
+    pub(crate) fn join(&self) -> Option<Seat<S::Asked>> {
         let mut viewers = lock(&self.viewers);
         if viewers.len() == MAX_VIEWERS {
             return None;
         }
         if viewers.is_empty() {
-            self.rings.iter().for_each(|ring| lock(ring).clear());
+            self.show.viewed(true);
         }
         let mut next = lock(&self.next);
         *next += 1;
@@ -126,18 +123,18 @@ impl Hub {
         Some(seat)
     }
 
-    /// Takes a viewer off; the last one takes the traces along.
-    pub(super) fn leave(&self, id: ViewerId) {
+    /// Takes a viewer off.
+    pub(crate) fn leave(&self, id: ViewerId) {
         let mut viewers = lock(&self.viewers);
         viewers.retain(|viewer| viewer.id != id);
         self.count.store(viewers.len(), Ordering::Relaxed);
         if viewers.is_empty() {
-            self.rings.iter().for_each(|ring| lock(ring).clear());
+            self.show.viewed(false);
         }
     }
 
     /// Puts a message into the outbox of one viewer, or of all. Never waits.
-    pub(super) fn send(&self, to: Option<ViewerId>, message: impl Fn() -> Message) {
+    pub(crate) fn send(&self, to: Option<ViewerId>, message: impl Fn() -> Message) {
         for viewer in lock(&self.viewers).iter() {
             if to.is_none_or(|id| id == viewer.id)
                 && let Err(TrySendError::Full(_)) = viewer.outbox.try_send(message())

@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message as Socket, WebSocket};
 
-use super::hub::{Hub, Message, Order, Seat, What};
-use super::message::{FromPage, MAVLINK};
-use super::view;
+use crate::MAVLINK;
+use crate::hub::{Hub, Message, Order, Seat, What};
+use crate::show::Show;
 
 /// How long one look for messages from the page waits, and so what waits for the page.
 const LOOK: Duration = Duration::from_millis(10);
@@ -22,19 +22,25 @@ const MAX_BYTES: usize = 1 << 16;
 const MAX_WRITE_BYTES: usize = 1 << 22;
 
 /// Serves a viewer until it goes, or does not read. `greeting` comes first.
-pub(super) fn serve(stream: TcpStream, rest: Vec<u8>, hub: &Hub, seat: &Seat, greeting: String) {
+pub(crate) fn serve<S: Show>(
+    stream: TcpStream,
+    rest: Vec<u8>,
+    hub: &Hub<S>,
+    seat: &Seat<S::Asked>,
+    greeting: String,
+) {
     // Why it has ended concerns nobody: the page says so, and connects anew.
     let _ = converse(stream, rest, hub, seat, greeting);
     hub.leave(seat.id);
-    // Where the simulation has ended, nobody takes it.
+    // Where the program has ended, nobody takes it.
     let _ = tell(seat, What::Ended);
 }
 
-fn converse(
+fn converse<S: Show>(
     stream: TcpStream,
     rest: Vec<u8>,
-    hub: &Hub,
-    seat: &Seat,
+    hub: &Hub<S>,
+    seat: &Seat<S::Asked>,
     greeting: String,
 ) -> Result<(), Error> {
     stream.set_read_timeout(Some(LOOK))?;
@@ -44,7 +50,7 @@ fn converse(
         .max_write_buffer_size(MAX_WRITE_BYTES);
     let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(limits));
     socket.send(Socket::text(greeting))?;
-    let mut held = None;
+    let mut held = S::Held::default();
     while !seat.dropped.load(Ordering::Relaxed) {
         match socket.read() {
             Ok(Socket::Binary(bytes)) => match bytes.split_first() {
@@ -52,18 +58,10 @@ fn converse(
                 _ => return Ok(()),
             },
             Ok(Socket::Text(text)) => match serde_json::from_str(&text) {
-                Ok(FromPage::View(view)) => {
-                    // Looked at here, so that it holds up no other.
-                    let latest = || {
-                        hub.ring(view.esc)
-                            .map(|ring| ring.chunks())
-                            .unwrap_or_default()
-                    };
-                    let chunks = if view.hold { held.take() } else { None }.unwrap_or_else(latest);
-                    socket.write(Socket::binary(view::answer(&view, &chunks)))?;
-                    held = view.hold.then_some(chunks);
-                }
-                Ok(asked) => tell(seat, What::Asked(asked))?,
+                Ok(asked) => match hub.show().answer(&mut held, asked) {
+                    Ok(bytes) => socket.write(Socket::binary(bytes))?,
+                    Err(asked) => tell(seat, What::Asked(asked))?,
+                },
                 // Of another version, or no page.
                 Err(_) => return Ok(()),
             },
@@ -77,7 +75,7 @@ fn converse(
 }
 
 /// Sends what waits, MAVLink in one piece.
-fn deliver(socket: &mut WebSocket<TcpStream>, seat: &Seat) -> Result<(), Error> {
+fn deliver<A>(socket: &mut WebSocket<TcpStream>, seat: &Seat<A>) -> Result<(), Error> {
     let mut frames = vec![MAVLINK];
     for message in seat.inbox.try_iter() {
         match message {
@@ -91,7 +89,7 @@ fn deliver(socket: &mut WebSocket<TcpStream>, seat: &Seat) -> Result<(), Error> 
     socket.flush()
 }
 
-fn tell(seat: &Seat, what: What) -> Result<(), Error> {
+fn tell<A>(seat: &Seat<A>, what: What<A>) -> Result<(), Error> {
     let order = Order {
         viewer: seat.id,
         came: Instant::now(),

@@ -36,7 +36,10 @@ pub enum AddressError {
 impl HostPort {
     /// The address to use. Of several it is the first IPv4 one: `localhost` stands for both
     /// families on most machines, and ground stations listen on IPv4.
-    pub(crate) fn resolve(&self) -> io::Result<SocketAddr> {
+    ///
+    /// # Errors
+    /// The name has none, or cannot be looked up.
+    pub fn resolve(&self) -> io::Result<SocketAddr> {
         let addresses: Vec<_> = (self.host.as_str(), self.port).to_socket_addrs()?.collect();
         let v4 = addresses.iter().find(|a| a.is_ipv4());
         v4.or(addresses.first())

@@ -8,13 +8,13 @@ use std::fmt::Write as _;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 
-use super::head::Head;
+use crate::head::Head;
 
 /// Bytes of a token: too many to be tried.
 const TOKEN_BYTES: usize = 16;
 
 /// What is looked at before anything is answered.
-pub(super) struct Guard {
+pub(crate) struct Guard {
     local: SocketAddr,
     token: Option<String>,
 }
@@ -24,7 +24,7 @@ impl Guard {
     ///
     /// # Errors
     /// The system gives no random numbers.
-    pub(super) fn new(local: SocketAddr) -> io::Result<Self> {
+    pub(crate) fn new(local: SocketAddr) -> io::Result<Self> {
         let token = if local.ip().is_loopback() {
             None
         } else {
@@ -41,7 +41,7 @@ impl Guard {
     }
 
     /// What a person opens.
-    pub(super) fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         let local = self.local;
         match &self.token {
             Some(token) => format!("http://{local}/?token={token}"),
@@ -53,7 +53,7 @@ impl Guard {
     ///
     /// # Errors
     /// A line on why not.
-    pub(super) fn admits(&self, head: &Head) -> Result<(), &'static str> {
+    pub(crate) fn admits(&self, head: &Head) -> Result<(), &'static str> {
         let Some(host) = head.host.as_deref().filter(|host| self.is_own(host)) else {
             return Err("this name is not served: open the page by its IP address or as localhost");
         };

@@ -9,11 +9,12 @@ use std::time::Duration;
 
 use tungstenite::handshake::derive_accept_key;
 
-use super::assets;
-use super::guard::Guard;
-use super::head::Head;
-use super::hub::Hub;
-use super::viewer;
+use crate::assets;
+use crate::guard::Guard;
+use crate::head::Head;
+use crate::hub::Hub;
+use crate::show::Show;
+use crate::viewer;
 
 /// Connections at a time; more are closed at once.
 const MAX_CONNECTIONS: usize = 32;
@@ -33,15 +34,15 @@ Cache-Control: no-store\r\n\
 Connection: close\r\n";
 
 /// What all connections share.
-pub(super) struct Server {
-    pub(super) guard: Guard,
-    pub(super) hub: Arc<Hub>,
+pub(crate) struct Server<S: Show> {
+    pub(crate) guard: Guard,
+    pub(crate) hub: Arc<Hub<S>>,
     /// The first message to each page.
-    pub(super) greeting: String,
+    pub(crate) greeting: String,
 }
 
 /// Serves from now on, until the program ends.
-pub(super) fn serve(listener: TcpListener, server: Server) {
+pub(crate) fn serve<S: Show>(listener: TcpListener, server: Server<S>) {
     let (server, open) = (Arc::new(server), Arc::new(AtomicUsize::new(0)));
     thread::spawn(move || {
         for stream in listener.incoming() {
@@ -64,7 +65,7 @@ pub(super) fn serve(listener: TcpListener, server: Server) {
     });
 }
 
-fn answer(mut stream: TcpStream, server: &Server) -> io::Result<()> {
+fn answer<S: Show>(mut stream: TcpStream, server: &Server<S>) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(STUCK))?;
     stream.set_write_timeout(Some(STUCK))?;

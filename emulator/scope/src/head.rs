@@ -18,13 +18,13 @@ const DEADLINE: Duration = Duration::from_secs(5);
 
 /// What a request asks for, and who asks.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Head {
-    pub(super) path: String,
+pub(crate) struct Head {
+    pub(crate) path: String,
     query: String,
-    pub(super) host: Option<String>,
-    pub(super) origin: Option<String>,
+    pub(crate) host: Option<String>,
+    pub(crate) origin: Option<String>,
     /// Of a request for a WebSocket.
-    pub(super) websocket_key: Option<String>,
+    pub(crate) websocket_key: Option<String>,
     /// Its length.
     bytes: usize,
 }
@@ -34,7 +34,7 @@ impl Head {
     ///
     /// # Errors
     /// It is none, or does not come in time.
-    pub(super) fn read(stream: &mut TcpStream) -> io::Result<(Self, Vec<u8>)> {
+    pub(crate) fn read(stream: &mut TcpStream) -> io::Result<(Self, Vec<u8>)> {
         let wrong = |what| io::Error::new(io::ErrorKind::InvalidData, what);
         let begun = Instant::now();
         let mut bytes = Vec::new();
@@ -56,7 +56,7 @@ impl Head {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub(super) fn parse(bytes: &[u8]) -> Result<Option<Self>, &'static str> {
+    pub(crate) fn parse(bytes: &[u8]) -> Result<Option<Self>, &'static str> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         let parsed = request.parse(bytes);
@@ -93,7 +93,7 @@ impl Head {
     }
 
     /// The token that came along, or nothing.
-    pub(super) fn token(&self) -> &str {
+    pub(crate) fn token(&self) -> &str {
         let fields = self.query.split('&');
         let mut tokens = fields.filter_map(|field| field.strip_prefix("token="));
         tokens.next().unwrap_or_default()

@@ -11,7 +11,7 @@ const TEXT: &str = "text/plain; charset=utf-8";
 
 macro_rules! files {
     ($($path:literal $kind:ident $file:literal),* $(,)?) => {
-        &[$(($path, $kind, include_str!(concat!("page/", $file)))),*]
+        &[$(($path, $kind, include_str!(concat!("../page/", $file)))),*]
     };
 }
 
@@ -39,7 +39,7 @@ static FILES: &[(&str, &str, &str)] = files! {
 };
 
 /// The type and the content of what a path names.
-pub(super) fn find(path: &str) -> Option<(&'static str, &'static str)> {
+pub(crate) fn find(path: &str) -> Option<(&'static str, &'static str)> {
     if path == "/parameters.json" {
         return Some((JSON, PARAMETER_METADATA));
     }
