@@ -35,12 +35,14 @@ def port():
 
 
 @pytest.fixture
-def esc(start, port):
+def esc(start, port, browser):
     """An ESC with a page, as a MAVLink client sees it."""
     emulator = start(web=f"127.0.0.1:{port}")
     with emulator.connect() as esc:
         esc.emulator = emulator
         yield esc
+        # A page that is left would go on looking for its program.
+        browser.open("about:blank")
 
 
 def look(browser, port):

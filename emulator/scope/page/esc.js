@@ -94,6 +94,12 @@ export class Esc extends EventTarget {
 
   /** A text file of the ESC's, or null. */
   async file(path) {
+    const bytes = await this.bytes(path);
+    return bytes && new TextDecoder().decode(bytes);
+  }
+
+  /** A file of the ESC's, or null. */
+  async bytes(path) {
     const data = new TextEncoder().encode(path);
     const opened = await this.request(FTP.open, { data, size: data.length });
     if (opened?.[3] !== FTP.ack) return null;
@@ -105,6 +111,6 @@ export class Esc extends EventTarget {
       bytes.push(...part.slice(FTP_DATA, FTP_DATA + part[4]));
     }
     await this.request(FTP.terminate, { session });
-    return new TextDecoder().decode(new Uint8Array(bytes));
+    return new Uint8Array(bytes);
   }
 }

@@ -15,6 +15,7 @@ const MESSAGES = {
   76: ["COMMAND_LONG", 152, [["params", "f32", 7], ["command", "u16"], ["target_system", "u8"], ["target_component", "u8"], ["confirmation", "u8"]]],
   77: ["COMMAND_ACK", 143, [["command", "u16"], ["result", "u8"], ["progress", "u8"], ["result_param2", "i32"], ["target_system", "u8"], ["target_component", "u8"]]],
   110: ["FILE_TRANSFER_PROTOCOL", 84, [["target_network", "u8"], ["target_system", "u8"], ["target_component", "u8"], ["payload", "u8", 251]]],
+  251: ["NAMED_VALUE_FLOAT", 170, [["time_boot_ms", "u32"], ["value", "f32"], ["signal", "text", 10]]],
   253: ["STATUSTEXT", 83, [["severity", "u8"], ["text", "text", 50], ["id", "u16"], ["chunk_seq", "u8"]]],
   290: ["ESC_INFO", 251, [["time_usec", "u64"], ["error_count", "u32", 4], ["counter", "u16"], ["failure_flags", "u16", 4], ["temperature", "i16", 4], ["index", "u8"], ["count", "u8"], ["connection_type", "u8"], ["info", "u8"]]],
   291: ["ESC_STATUS", 10, [["time_usec", "u64"], ["rpm", "i32", 4], ["voltage", "f32", 4], ["current", "f32", 4], ["index", "u8"]]],

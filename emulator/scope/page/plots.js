@@ -4,8 +4,8 @@ const HEIGHT = 128;
 const AXIS = 52;
 const COLOURS = ["--trace-0", "--trace-1", "--trace-2"];
 
-/** What can be plotted: name, unit, channels with their labels, and whether it is shown from the start. */
-export const PLOTS = [
+/** What can be plotted of a simulated ESC: name, unit, channels with their labels, and whether it is shown from the start. */
+export const SIMULATED = [
   ["Speed", "rpm", [["rpm", "true"], ["rpm_est", "estimated"], ["rpm_ref", "reference"]], true],
   ["Phase currents", "A", [["i_a_a", "a"], ["i_b_a", "b"], ["i_c_a", "c"]], true],
   ["Currents d, q", "A", [["i_d_a", "d"], ["i_q_a", "q"]], true],
@@ -18,6 +18,17 @@ export const PLOTS = [
   ["Supply voltage", "V", [["bus_v", "supply"]], false],
   ["Supply current", "A", [["bus_a", "supply"]], true],
   ["Torque", "Nm", [["torque_nm", "torque"]], false],
+];
+
+/** And of one on a link. */
+export const LINKED = [
+  ["Speed", "rpm", [["rpm", "estimated"], ["rpm_ref", "reference"]], true],
+  ["Currents d, q", "A", [["i_d_a", "d"], ["i_q_a", "q"]], true],
+  ["Voltages d, q", "V", [["u_d_v", "d"], ["u_q_v", "q"]], false],
+  ["Duty", "", [["duty", "share of the supply"]], true],
+  ["Supply voltage", "V", [["bus_v", "supply"]], true],
+  ["Supply current", "A", [["bus_a", "supply"]], true],
+  ["Temperature", "°C", [["celsius", "board"]], false],
 ];
 
 const colours = new Map();
@@ -42,16 +53,23 @@ const digits = (value) => (value == null ? "–" : Math.abs(value) >= 100 ? valu
 export class Plots {
   /** `zoomed` hears of a piece that was selected, from and to in seconds. */
   constructor(place, choice, zoomed) {
-    Object.assign(this, { place, zoomed, shown: [], marks: {}, data: null, cursor: null });
-    for (const [index, [name, , , first]] of PLOTS.entries()) {
+    Object.assign(this, { place, choice, zoomed, plots: [], shown: [], marks: {}, data: null, cursor: null });
+    new ResizeObserver(() => this.resize()).observe(place);
+  }
+
+  /** Offers these plots. */
+  offer(plots) {
+    if (this.plots === plots) return;
+    this.plots = plots;
+    this.choice.replaceChildren();
+    for (const [index, [name, , , first]] of plots.entries()) {
       const label = document.createElement("label");
       const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: first });
       box.addEventListener("change", () => this.choose(index, box.checked));
       label.append(box, ` ${name}`);
-      choice.append(label);
+      this.choice.append(label);
     }
-    this.wanted = PLOTS.map((plot) => plot[3]);
-    new ResizeObserver(() => this.resize()).observe(place);
+    this.wanted = plots.map((plot) => plot[3]);
     this.rebuild();
   }
 
@@ -73,7 +91,7 @@ export class Plots {
     colours.clear();
     for (const { plot } of this.shown) plot.destroy();
     this.place.replaceChildren();
-    this.shown = PLOTS.flatMap((plot, index) => (this.wanted[index] ? [this.make(plot)] : []));
+    this.shown = this.plots.flatMap((plot, index) => (this.wanted[index] ? [this.make(plot)] : []));
     if (this.data) this.draw(this.data);
   }
 
@@ -96,7 +114,7 @@ export class Plots {
       series: [
         { label: "t, s", value: (_, t) => (t == null ? "–" : t.toFixed(5)) },
         ...channels.map(([, label], i) => ({
-          label, stroke: colour(COLOURS[i]), width: 1, points: { show: false }, value: (_, value) => digits(value),
+          label, stroke: colour(COLOURS[i]), width: 1, points: { show: false }, spanGaps: this.plots === LINKED, value: (_, value) => digits(value),
         })),
       ],
       hooks: {

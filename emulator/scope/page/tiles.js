@@ -2,22 +2,21 @@
 
 const NAMES = [
   ["rpm", "Speed, rpm"], ["amps", "Supply, A"], ["volts", "Supply, V"], ["watts", "Power, W"],
-  ["celsius", "Board, °C"], ["efficiency", "Efficiency, %"], ["faults", "Faults"],
+  ["celsius", "Board, °C"], ["efficiency", "Efficiency, %"], ["faults", "Faults"], ["limits", "Limits"],
 ];
+const WIDE = ["faults", "limits"];
 const LEAST_W = 1;
+const NO_TEMPERATURE = 32767;
 
 /** A number to some digits, without the sign of nothing. */
 const digits = (value, count) => value.toFixed(count).replace(/^-(0(\.0*)?)$/, "$1");
-
-/** ESC_FAILURE_FLAGS in words. */
-const FLAGS = ["over-current", "over-voltage", "over-temperature", "over-speed", "inconsistent command", "motor stuck", "fault"];
 
 export class Tiles {
   constructor(place) {
     this.tiles = {};
     for (const [name, label] of NAMES) {
       const tile = document.createElement("div");
-      tile.className = name === "faults" ? "tile wide" : "tile";
+      tile.className = WIDE.includes(name) ? "tile wide" : "tile";
       const [value, text] = [document.createElement("b"), document.createElement("span")];
       value.id = `tile-${name}`;
       [value.textContent, text.textContent] = ["–", label];
@@ -38,27 +37,38 @@ export class Tiles {
     this.set("watts", digits(voltage[slot] * current[slot], 1));
   }
 
-  info({ temperature, failure_flags }, slot) {
-    this.set("celsius", digits(temperature[slot] / 100, 1));
-    const flags = failure_flags[slot];
-    this.flags = FLAGS.filter((_, bit) => flags & (1 << bit));
+  info({ temperature }, slot) {
+    this.set("celsius", temperature[slot] === NO_TEMPERATURE ? "–" : digits(temperature[slot] / 100, 1));
+  }
+
+  /** What the heartbeat tells: the bits of faults and of limits, by their names. */
+  heartbeat({ custom_mode }, { faults, limits }) {
+    const named = (names) => Object.entries(names).filter(([bit]) => custom_mode & (1 << bit)).map(([, name]) => name);
+    this.set("limits", named(limits).join(", ") || "none");
+    this.told = named(faults);
     this.showFaults();
   }
 
   /** What the traces tell: the faults as they come, and power into the shaft against that from the supply. */
   traces({ values }, names) {
     const bits = values.faults?.at(-1);
-    this.known = bits == null ? null : names.filter((_, bit) => bits & (1 << bit));
+    this.known = bits == null ? null : Object.entries(names).filter(([bit]) => bits & (1 << bit)).map(([, name]) => name);
     this.showFaults();
     const mean = (list) => list.reduce((sum, value) => sum + value, 0) / list.length;
+    if (!values.torque_nm) return;
     const [torque, rpm, volts, amps] = ["torque_nm", "rpm", "bus_v", "bus_a"].map((name) => mean(values[name]));
     const watts = volts * amps;
     const shaft = (torque * rpm * 2 * Math.PI) / 60;
     this.set("efficiency", watts > LEAST_W && shaft > 0 ? ((100 * shaft) / watts).toFixed(1) : "–");
   }
 
+  /** Whether there are traces that tell the power into the shaft. */
+  simulated(isSimulated) {
+    this.tiles.efficiency.parentElement.hidden = !isSimulated;
+  }
+
   showFaults() {
-    const faults = this.known ?? this.flags ?? [];
+    const faults = this.known ?? this.told ?? [];
     this.set("faults", faults.length ? faults.join(", ") : "none");
     this.tiles.faults.parentElement.classList.toggle("bad", faults.length > 0);
   }

@@ -2,7 +2,9 @@
 
 const FRAME_MS = 40;
 const SPANS = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10];
-const DEFAULT_SPAN_S = 2;
+/** Of telemetry, which is slower and kept for longer. */
+const SLOW_SPANS = [0.5, 1, 2, 5, 10, 20, 60];
+const DEFAULT_SPAN_S = { fast: 2, slow: 10 };
 const BEFORE = 0.2;
 const ALWAYS = ["rpm", "i_d_a", "i_q_a", "u_d_v", "u_q_v", "bus_v", "bus_a", "torque_nm", "faults", "phase", "throttle"];
 
@@ -11,14 +13,9 @@ const element = (id) => document.getElementById(id);
 export class Traces {
   /** `seen` hears each piece that is drawn. */
   constructor(link, plots, seen) {
-    Object.assign(this, { link, plots, seen, channels: [], id: 0, span: DEFAULT_SPAN_S, to: null, paused: false });
+    Object.assign(this, { link, plots, seen, source: null, spans: [], id: 0, span: 1, to: null, paused: false });
     this.after = 0;
     this.latest = 0;
-    this.busy = null;
-    for (const span of SPANS) {
-      const text = span < 1 ? `${span * 1000} ms` : `${span} s`;
-      element("span").append(new Option(text, span, false, span === DEFAULT_SPAN_S));
-    }
     element("span").addEventListener("change", () => this.zoom(Number(element("span").value)));
     element("pause").addEventListener("click", () => this.pause(!this.paused));
     element("live").addEventListener("click", () => this.live());
@@ -29,9 +26,17 @@ export class Traces {
     this.loop();
   }
 
-  hello({ channels }) {
-    this.channels = channels;
-    element("trigger-channel").replaceChildren(...channels.map((name, i) => new Option(name, i, false, name === "i_a_a")));
+  /** Takes the traces from there. */
+  from(source, isSlow) {
+    if (this.source === source) return;
+    this.source = source;
+    this.spans = isSlow ? SLOW_SPANS : SPANS;
+    this.span = isSlow ? DEFAULT_SPAN_S.slow : DEFAULT_SPAN_S.fast;
+    const told = (span) => (span < 1 ? `${span * 1000} ms` : `${span} s`);
+    element("span").replaceChildren(...this.spans.map((span) => new Option(told(span), span, false, span === this.span)));
+    const usual = isSlow ? "rpm" : "i_a_a";
+    element("trigger-channel").replaceChildren(...source.channels.map((name) => new Option(name, name, false, name === usual)));
+    this.live();
   }
 
   arm() {
@@ -50,15 +55,15 @@ export class Traces {
 
   live() {
     this.pause(false);
-    this.zoom(Math.max(this.span, SPANS[0]));
+    this.zoom(Math.max(this.span, this.spans[0]));
   }
 
   zoom(span) {
     const old = this.span;
-    this.span = Math.min(Math.max(span, 1e-4), SPANS.at(-1));
+    this.span = Math.min(Math.max(span, 1e-4), this.spans.at(-1));
     // About the middle of what a person looks at.
     if (this.paused) this.to = this.to - old / 2 + this.span / 2;
-    element("span").value = SPANS.includes(this.span) ? this.span : "";
+    element("span").value = this.spans.includes(this.span) ? this.span : "";
     this.dirty = true;
   }
 
@@ -98,20 +103,19 @@ export class Traces {
     const kind = element("trigger").value;
     if (kind === "none" || this.paused) return null;
     const common = { before: BEFORE, after_s: this.after };
-    const channel = (name) => this.channels.indexOf(name);
     if (kind === "level") {
       const level = Number(element("trigger-value").value);
-      return { ...common, channel: Number(element("trigger-channel").value), level, rising: element("trigger-edge").value === "up" };
+      return { ...common, channel: element("trigger-channel").value, level, rising: element("trigger-edge").value === "up" };
     }
     // A start-up is where the throttle opens: its first step is a 2000th.
     const [name, level] = kind === "fault" ? ["faults", 0.5] : ["throttle", 1e-4];
-    return { ...common, channel: channel(name), level, rising: true };
+    return { ...common, channel: name, level, rising: true };
   }
 
   async loop() {
     for (;;) {
       const begun = performance.now();
-      if (this.link.isOpen && this.channels.length && !document.hidden && (!this.paused || this.dirty)) {
+      if (this.link.isOpen && this.source && !document.hidden && (!this.paused || this.dirty)) {
         this.dirty = false;
         await this.fetch();
       }
@@ -121,33 +125,14 @@ export class Traces {
     }
   }
 
-  fetch() {
-    const names = [...new Set([...this.plots.channels, ...ALWAYS])];
+  async fetch() {
+    const names = [...new Set([...this.plots.channels, ...ALWAYS.filter((name) => this.source.channels.includes(name))])];
     const view = {
       id: ++this.id, esc: this.link.esc, to_s: this.paused ? this.to : null, span_s: this.span,
-      columns: Math.round(this.plots.width), channels: names.map((name) => this.channels.indexOf(name)),
-      trigger: this.trigger(), hold: this.paused,
+      columns: Math.round(this.plots.width), trigger: this.trigger(), hold: this.paused,
     };
-    this.link.ask({ view });
-    return new Promise((resolve) => {
-      this.busy = { id: view.id, names, resolve };
-      setTimeout(resolve, 1000);
-    });
-  }
-
-  /** An answer, as the program's `view.rs` lays it out. */
-  async take(buffer) {
-    const view = new DataView(buffer);
-    const [id, , points] = [4, 8, 12].map((at) => view.getUint32(at, true));
-    if (this.busy?.id !== id) return;
-    const { names, resolve } = this.busy;
-    const t = Array.from(new Float64Array(buffer, 32, points));
-    const start = 32 + 8 * points;
-    const known = (value) => (Number.isNaN(value) ? null : value);
-    const values = Object.fromEntries(names.map((name, i) => [name, Array.from(new Float32Array(buffer, start + 4 * i * points, points), known)]));
-    const crossing = view.getUint8(1) === 1 ? view.getFloat64(24, true) : null;
-    if (points) await this.show(t, values, crossing);
-    resolve();
+    const found = await this.source.view(view, names);
+    if (found?.t.length) await this.show(found.t, found.values, found.crossing);
   }
 
   async show(t, values, crossing) {

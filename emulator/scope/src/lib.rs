@@ -7,6 +7,7 @@
 
 mod address;
 mod assets;
+mod greeting;
 mod guard;
 mod head;
 mod hub;
@@ -16,6 +17,7 @@ mod site;
 mod viewer;
 
 pub use address::{AddressError, HostPort};
+pub use greeting::greeting;
 pub use hub::{ORDERS, Order, ViewerId, What};
 pub use show::Show;
 pub use site::{Site, SiteError};

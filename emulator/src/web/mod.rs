@@ -22,7 +22,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Instant;
 
-use siskin_control::drive::{Fault, Phase};
+use siskin_control::drive::Phase;
 use siskin_scope::{ORDERS, Order, Site, ViewerId, What};
 
 use crate::link::{HostPort, LinkId, Links};
@@ -173,14 +173,10 @@ impl Web {
 fn greeting(escs: usize) -> String {
     let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
     let channels: Vec<_> = channel::names().collect();
-    serde_json::json!({
-        "hello": {
-            "version": env!("CARGO_PKG_VERSION"),
-            "escs": escs,
-            "channels": channels,
-            "phases": phases,
-            "faults": Fault::ALL.map(Fault::text),
-        }
-    })
-    .to_string()
+    let mut hello = serde_json::Map::new();
+    hello.insert("simulated".into(), true.into());
+    hello.insert("escs".into(), escs.into());
+    hello.insert("channels".into(), channels.into());
+    hello.insert("phases".into(), phases.to_vec().into());
+    siskin_scope::greeting(hello)
 }
