@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use siskin_scope::HostPort;
 
 use crate::decode;
 use crate::endpoint::Endpoint;
@@ -68,6 +69,11 @@ pub(crate) enum Command {
     Params(ParamsCommand),
     /// Show speed, voltage, current and faults as they come.
     Monitor(MonitorArgs),
+    /// Serve a page for the browser that shows the ESC: traces, parameters, tests, faults on record.
+    ///
+    /// It turns the motor by a motor test alone: for three seconds at most, with a fifth of LIM_PHASE_A at most,
+    /// while its button is held. Until Ctrl-C.
+    Scope(ScopeArgs),
     /// Show what a logic analyser has seen on a throttle wire: frames, commands, replies, errors and
     /// timing.
     ///
@@ -177,6 +183,15 @@ pub(crate) struct MonitorArgs {
     /// End after N samples.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) count: Option<u64>,
+}
+
+/// Where the page is.
+#[derive(Debug, Args)]
+pub(crate) struct ScopeArgs {
+    /// HOST:PORT to serve the page at; beyond this machine, 0.0.0.0:PORT say, its address holds a token.
+    // The emulator's own page has 8080.
+    #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8081")]
+    pub(crate) web: HostPort,
 }
 
 /// What to do with the fault record.

@@ -20,6 +20,10 @@ pub(crate) enum Error {
         remedy: &'static str,
     },
 
+    /// The page cannot be served.
+    #[error("{0}")]
+    Page(#[from] siskin_scope::SiteError),
+
     /// Nothing that could be an ESC was heard.
     #[error("{endpoint}: {heard}")]
     NoComponent { endpoint: String, heard: String },
@@ -78,6 +82,7 @@ impl Error {
         match self {
             Self::Usage(_)
             | Self::Link { .. }
+            | Self::Page(_)
             | Self::NoComponent { .. }
             | Self::File { .. }
             | Self::Missing { .. } => ExitCode::from(2),

@@ -25,6 +25,7 @@ mod param_text;
 mod params;
 mod program;
 mod sample;
+mod scope;
 mod session;
 mod step_by_step;
 mod tune;
@@ -116,6 +117,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Tune(args) => tune::run(args, cli.component, &mut out),
         Command::Image(args) => image::run(args, &mut out),
         Command::Flash(args) => flash::run(args, &mut out),
+        Command::Scope(args) => scope::run(find()?, args, cli.component, &mut out),
         Command::Monitor(args) => monitor::run(&mut find()?, args, &mut out, &mut complaints),
     }
 }

@@ -133,6 +133,40 @@ impl Session {
         self.link.send(frame.raw_bytes())
     }
 
+    /// Waits at most `wait` for bytes, and hands on what they complete: whole frames of the ESC's system, as they
+    /// were sent.
+    ///
+    /// # Errors
+    /// As [`Link::receive`].
+    pub(crate) fn relay(
+        &mut self,
+        wait: Duration,
+        mut hand_on: impl FnMut(&[u8]),
+    ) -> Result<(), Error> {
+        let mut buffer = [0; 2048];
+        let length = self.link.receive(&mut buffer, wait)?;
+        let (now_us, system) = (self.now_us(), self.target.system);
+        self.receiver.push(now_us, &buffer[..length], |frame| {
+            if frame.from.system == system {
+                hand_on(frame.raw);
+            }
+        });
+        Ok(())
+    }
+
+    /// Sends another's bytes.
+    ///
+    /// # Errors
+    /// As [`Link::send`].
+    pub(crate) fn pass(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.link.send(bytes)
+    }
+
+    /// Time since the start, µs.
+    fn now_us(&self) -> u64 {
+        u64::try_from(self.started.elapsed().as_micros()).unwrap_or(u64::MAX)
+    }
+
     /// The next message of anyone; `None` at the deadline.
     ///
     /// # Errors
@@ -154,7 +188,7 @@ impl Session {
     fn fill(&mut self, wait: Duration) -> Result<(), Error> {
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer, wait.min(RECEIVER_PERIOD))?;
-        let now_us = u64::try_from(self.started.elapsed().as_micros()).unwrap_or(u64::MAX);
+        let now_us = self.now_us();
         let (arrived, texts) = (&mut self.arrived, &mut self.texts);
         self.receiver.push(now_us, &buffer[..length], |frame| {
             let from = frame.from;
