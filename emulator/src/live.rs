@@ -107,6 +107,15 @@ pub(crate) struct Open {
 }
 
 impl Session {
+    /// Where each ESC is recorded, if it is.
+    fn recordings(&self) -> Vec<PathBuf> {
+        let escs = self.flash.len();
+        match &self.record {
+            Some(path) if escs > 1 => (0..escs).map(|esc| numbered(path, esc)).collect(),
+            path => path.iter().cloned().collect(),
+        }
+    }
+
     /// Opens what it needs; gives it with what the ESCs start with.
     ///
     /// # Errors
@@ -116,25 +125,18 @@ impl Session {
         let links = Links::open(&self.mavlink)?;
         let link_bytes_per_s = links.slowest_bytes_per_s();
         let end_s = self.duration.map_or(f64::MAX, |end| end.as_secs_f64());
-        let several = self.flash.len() > 1;
         let mut about = Opened {
             links: links.describe(),
             endpoints: links.endpoints(),
             signals: Vec::new(),
             page: None,
         };
+        let mut recordings = self.recordings().into_iter();
         let (mut watches, mut starts) = (Vec::new(), Vec::new());
         for (esc, flash) in self.flash.into_iter().enumerate() {
             let wire = Wire::open(&self.signal, esc as u16)?;
             about.signals.extend(wire.local_address());
-            let path = self.record.as_deref();
-            let path = path.map(|path| {
-                if several {
-                    numbered(path, esc)
-                } else {
-                    path.into()
-                }
-            });
+            let path = recordings.next();
             let recorder = path.as_deref().map(Recorder::live).transpose();
             let window = ("all".to_owned(), 0.0, end_s);
             let recorder = recorder.map_err(WatchError::Record)?;
@@ -209,7 +211,7 @@ pub fn run<M: Machine>(
     warn: impl Fn(&str),
 ) -> Result<(Report, M), LiveError> {
     let pace = session.pace;
-    let (mut web, no_page) = Web::open(&session.web, session.flash.len())?;
+    let (mut web, no_page) = Web::open(&session.web, session.flash.len(), &session.recordings())?;
     let (mut open, starts) = session.open()?;
     open.about.page = web.as_ref().map(Web::place);
     let (mut machine, warnings) = start(starts)?;

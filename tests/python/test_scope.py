@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from browser import Browser
+from browser import TIMEOUT_S, Browser
 from dshot import HALF
 from emulator import free_port, run
 
@@ -52,7 +52,7 @@ def look(browser, port):
     browser.wait("/^-?\\d+$/.test(document.querySelector('#tile-rpm').textContent)")
 
 
-def spin(browser, esc) -> tuple[float, float]:
+def spin(browser, esc, escs=(0,)) -> tuple[float, float]:
     """Arms, and holds the throttle at its middle until the motor has that speed; where the mouse holds it.
 
     A busy machine may keep the page from saying for 200 ms that it is held, and that means zero: as often as that
@@ -63,7 +63,7 @@ def spin(browser, esc) -> tuple[float, float]:
             browser.click("#arm")
         browser.wait("document.querySelector('#drive').textContent.includes('armed')")
         at = browser.press("#throttle", 0.5)
-        if esc.wait("ESC_STATUS", lambda m: abs(m.rpm[0] - HOLD_RPM) < 60, esc.mark(), 5.0):
+        if esc.wait("ESC_STATUS", lambda m: all(abs(m.rpm[i] - HOLD_RPM) < 60 for i in escs), esc.mark(), 5.0):
             return at
         browser.mouse("mouseReleased", *at)
     raise AssertionError(f"never at {HOLD_RPM} rpm: {browser.text('#events')}")
@@ -236,3 +236,52 @@ def test_closing_the_page_stops_the_motor(esc, port):
         browser.leave()
         esc.wait_rpm(-100, 1000)
         esc.wait_armed(False)
+
+
+def test_each_of_several_is_shown_and_driven_and_all_together(browser, start, port):
+    emulator = start("--escs", 4, web=f"127.0.0.1:{port}")
+    with emulator.connect(component=140) as esc:
+        look(browser, port)
+        assert browser.run("document.querySelectorAll('#fleet button').length") == 4
+        browser.click("#fleet button:nth-child(3)")
+        browser.wait("document.querySelector('#fleet [aria-pressed=true] b').textContent === 'ESC 3'")
+        browser.wait("document.querySelector('#param-MAV_COMP_ID').value === '142'")
+        spin(browser, esc, escs=[2])
+        status = esc.status()
+        assert [abs(rpm) < 100 for rpm in status.rpm] == [True, True, False, True]
+        # The third's figures and its trace, not another's.
+        browser.wait(f"Math.abs(Number(document.querySelector('#tile-rpm').textContent) - {HOLD_RPM}) < 60")
+        shown = "Number.parseInt(document.querySelector('#fleet button:nth-child(3) .rpm').textContent)"
+        browser.wait(f"Math.abs({shown} - {HOLD_RPM}) < 60")
+        assert browser.text("#fleet button:first-child .rpm") == "0 rpm"
+
+        browser.click("#stop")
+        esc.next("ESC_STATUS", lambda m: max(m.rpm) < 100)
+        box = browser.box("#throttle-all")
+        at = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        browser.mouse("mousePressed", *at)
+        browser.mouse("mouseReleased", *at)
+        assert browser.run("document.querySelector('#throttle-all').checked")
+        spin(browser, esc, escs=range(4))
+        browser.click("#stop")
+        esc.next("ESC_STATUS", lambda m: max(m.rpm) < 100)
+        assert browser.problems == []
+        browser.open("about:blank")
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.tlog"])
+def test_what_is_recorded_can_be_fetched_while_it_is_recorded(browser, start, port, tmp_path, name):
+    path = tmp_path / name
+    start("--record", path, web=f"127.0.0.1:{port}")
+    look(browser, port)
+    assert browser.text("#recording") == f"{name} so far"
+    fetched = "fetch(document.querySelector('#recording').href).then((answer) => answer.text())"
+    until = time.monotonic() + TIMEOUT_S
+    while not (text := browser.run(fetched)):
+        # It is written in pieces.
+        assert time.monotonic() < until
+    if name == "run.csv":
+        assert text.startswith("t_s,") and text.endswith("\n")
+        columns = {row.count(",") for row in text.splitlines()}
+        assert len(columns) == 1
+    browser.open("about:blank")

@@ -65,6 +65,7 @@ pub(crate) fn run(
         &args.web,
         Arc::new(LinkAlone),
         siskin_scope::greeting(hello),
+        Vec::new(),
     )?;
     writeln!(out, "open {} in a browser; Ctrl-C ends it", site.url())?;
     out.flush()?;

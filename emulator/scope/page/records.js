@@ -13,6 +13,9 @@ const FILES = [
 
 export class Records {
   constructor(esc, told) {
+    this.names = [];
+    this.link = Object.assign(document.createElement("a"), { className: "button", id: "recording", hidden: true });
+    element("records").append(this.link);
     for (const [path, name, label] of FILES) {
       const button = Object.assign(document.createElement("button"), { textContent: label, id: `record-${name.replace(".", "-")}` });
       button.addEventListener("click", async () => {
@@ -24,5 +27,20 @@ export class Records {
       });
       element("records").append(button);
     }
+  }
+
+  /** What the program records of each ESC, null where it cannot be fetched before its end. */
+  recorded(names, i) {
+    this.names = names;
+    this.choose(i);
+  }
+
+  choose(i) {
+    const name = this.names[i];
+    this.link.hidden = !name;
+    if (!name) return;
+    this.link.href = `recording/${i}${location.search}`;
+    this.link.download = name;
+    this.link.textContent = `${name} so far`;
   }
 }

@@ -2,6 +2,7 @@
 
 import { Esc } from "./esc.js";
 import { csv, download, png, svg } from "./export.js";
+import { Fleet } from "./fleet.js";
 import { Lab } from "./lab.js";
 import { MotorTest } from "./motor.js";
 import { Parameters } from "./parameters.js";
@@ -69,6 +70,8 @@ const handlers = {
     if (content.simulated) remote.channels = content.channels;
     plots.offer(content.simulated ? SIMULATED : LINKED);
     traces.from(content.simulated ? remote : samples, !content.simulated);
+    throttle.several(content.escs);
+    records.recorded(content.recordings ?? [], link.esc);
     offer();
   },
   refused(reason) {
@@ -79,18 +82,7 @@ const handlers = {
   mavlink(message) {
     if (message.name === "HEARTBEAT" && mayBeEsc(message)) heartbeat(message);
     const esc = escs.get(message.component);
-    if (message.name === "ESC_STATUS" && esc) esc.tells = true;
-    if (message.index === SLOTS * Math.floor(place() / SLOTS) && isOfCurrent(message)) {
-      const slot = place() % SLOTS;
-      if (message.name === "ESC_STATUS") {
-        tiles.status(message, slot);
-        samples.status(message, slot);
-      }
-      if (message.name === "ESC_INFO") {
-        tiles.info(message, slot);
-        samples.last("celsius", message.temperature[slot] / 100);
-      }
-    }
+    if (message.name === "ESC_STATUS" || message.name === "ESC_INFO") telemetry(message);
     esc?.take(message);
     if (message.name === "NAMED_VALUE_FLOAT" && esc === current()) samples.signal(message);
     if (message.name === "STATUSTEXT") {
@@ -104,18 +96,21 @@ const plots = new Plots(element("plots"), element("plot-choice"), (from, to) => 
 const remote = new Remote(link);
 const samples = new Samples();
 const traces = new Traces(link, plots, seen);
-const handles = [new ThrottleHandle(link, current, told), new MotorTest(current, told)];
+const throttle = new ThrottleHandle(link, current, told);
+const handles = [throttle, new MotorTest(current, told)];
 const parameters = new Parameters(current, told);
 new Lab(link, told);
 new Tests(current, told);
-new Records(current, told);
+const records = new Records(current, told);
+const fleet = new Fleet(element("fleet"), choose);
 
 function components() {
   return [...escs.keys()].sort((a, b) => a - b);
 }
 
-/** The ESC that is looked at, if it has been heard. */
+/** The ESC that is looked at, once it is known which one that is. */
 function current() {
+  if (escs.size < (hello?.escs ?? 1)) return undefined;
   return escs.get(components()[link.esc]);
 }
 
@@ -129,26 +124,48 @@ function mayBeEsc({ type, autopilot, component }) {
   return type === SERVO || (type === GENERIC && autopilot === GENERIC);
 }
 
-/** The number of the ESC that is looked at, by its component. */
-function place() {
-  if (hello?.simulated) return link.esc;
-  const component = current()?.component;
+/** The number of an ESC in messages of four, by its component or among those that are simulated. */
+function place(i, component) {
+  if (hello?.simulated) return i;
   return component >= FIRST && component <= LAST ? component - FIRST : 0;
 }
 
-/** Of several, one may tell of all: then the others do not tell of themselves. */
-function isOfCurrent({ component }) {
-  const esc = current();
-  return esc && (component === esc.component || !esc.tells);
+/** Messages of four: of several ESCs one may tell of all, and then the others do not tell of themselves. */
+function telemetry(message) {
+  const sender = escs.get(message.component);
+  if (sender) sender.tells = true;
+  if (!current()) return;
+  for (const [i, component] of components().entries()) {
+    const [esc, number] = [escs.get(component), place(i, component)];
+    const isOf = message.index === SLOTS * Math.floor(number / SLOTS) && (sender === esc || !esc.tells);
+    if (!isOf) continue;
+    const slot = number % SLOTS;
+    if (message.name === "ESC_STATUS") fleet.status(i, message, slot);
+    if (esc !== current()) continue;
+    if (message.name === "ESC_STATUS") {
+      tiles.status(message, slot);
+      samples.status(message, slot);
+    } else {
+      tiles.info(message, slot);
+      samples.last("celsius", message.temperature[slot] / 100);
+    }
+  }
 }
 
 /** Offers the ESCs to choose from: all that there are, or all that have been heard. */
 function offer() {
-  const choice = element("esc");
-  const count = hello?.escs ?? escs.size;
-  const name = (i) => (hello?.escs ? `ESC ${i + 1}` : `ESC ${i + 1}, component ${components()[i]}`);
-  choice.replaceChildren(...Array.from({ length: count }, (_, i) => new Option(name(i), i, false, i === link.esc)));
-  choice.hidden = count < 2;
+  const named = (_, i) => (hello?.escs ? `ESC ${i + 1}` : `ESC ${i + 1} (${components()[i]})`);
+  fleet.offer(Array.from({ length: hello?.escs ?? escs.size }, named), link.esc);
+}
+
+function choose(i) {
+  letGo();
+  link.esc = i;
+  offer();
+  samples.clear();
+  traces.live();
+  parameters.read();
+  records.choose(i);
 }
 
 function heartbeat(message) {
@@ -156,14 +173,18 @@ function heartbeat(message) {
   if (!escs.has(component)) {
     const esc = new Esc(link, system, component);
     esc.addEventListener("param", ({ detail }) => { if (esc === current()) shown(detail); });
+    const before = current();
     escs.set(component, esc);
     offer();
-    if (esc === current()) parameters.read();
+    if (current() && current() !== before) parameters.read();
   }
   const esc = escs.get(component);
   esc.isArmed = Boolean(base_mode & ARMED);
-  if (esc !== current() || !hello) return;
-  tiles.heartbeat(message, hello);
+  if (!hello || !current()) return;
+  const faults = named(message.custom_mode, hello.faults);
+  fleet.faults(components().indexOf(component), faults);
+  if (esc !== current()) return;
+  tiles.conditions(faults, named(message.custom_mode, hello.limits));
   samples.last("faults", message.custom_mode & 0xffff);
   if (!hello.simulated) drive(STATES[system_status] ?? "starting");
 }
@@ -171,6 +192,11 @@ function heartbeat(message) {
 function shown(name) {
   parameters.show(name);
   if (name === "TEL_SIGNALS") element("stream").setAttribute("aria-pressed", current().params.get(name) !== 0);
+}
+
+/** The names of the bits that are set. */
+function named(bits, names) {
+  return Object.entries(names).filter(([bit]) => bits & (1 << bit)).map(([, name]) => name);
 }
 
 /** The drive's state, and whether its throttle is open. */
@@ -185,21 +211,14 @@ element("stream").addEventListener("click", async () => {
   await parameters.set("TEL_SIGNALS", isOn ? 0 : ALL_SIGNALS);
 });
 
-element("esc").addEventListener("change", () => {
-  letGo();
-  link.esc = Number(element("esc").value);
-  samples.clear();
-  traces.live();
-  parameters.read();
-});
-
 /** A piece of the traces has been drawn. */
 function seen({ values }) {
   const last = (name) => values[name]?.at(-1);
   const [i_d, i_q, u_d, u_q] = ["i_d_a", "i_q_a", "u_d_v", "u_q_v"].map(last);
   element("plane").hidden = !hello.simulated && i_d == null;
   drawPhasor({ i_d, i_q, u_d, u_q });
-  tiles.traces({ values }, hello.faults);
+  const faults = last("faults");
+  tiles.traces({ values }, faults == null ? null : named(faults, hello.faults));
   if (hello.simulated) drive(hello.phases[last("phase")] ?? "");
 }
 

@@ -10,9 +10,12 @@ const element = (id) => document.getElementById(id);
 export class ThrottleHandle {
   /** `esc` gives the ESC, `told` a line for the log. */
   constructor(link, esc, told) {
-    Object.assign(this, { link, esc, told, armed: false, held: false });
+    Object.assign(this, { link, esc, told, armed: false, held: false, count: 1, all: element("throttle-all") });
     this.slider = element("throttle");
     element("arm").addEventListener("click", () => this.arm(!this.armed));
+    // Those that are not driven any more hold nothing.
+    this.all.addEventListener("pointerdown", () => this.arm(false));
+    this.all.addEventListener("keydown", () => this.arm(false));
     element("stop").addEventListener("click", () => this.stop());
     this.slider.addEventListener("pointerdown", () => this.hold(true));
     for (const event of ["pointerup", "pointercancel", "blur"]) this.slider.addEventListener(event, () => this.hold(false));
@@ -24,6 +27,17 @@ export class ThrottleHandle {
     document.addEventListener("visibilitychange", () => document.hidden && this.arm(false));
     window.addEventListener("pagehide", () => this.arm(false));
     setInterval(() => this.send(), EVERY_MS);
+  }
+
+  /** There are so many ESCs, which may be driven together. */
+  several(count) {
+    this.count = count;
+    this.all.parentElement.hidden = !(count > 1);
+  }
+
+  /** Those that are driven: of several the one that is looked at, or all. */
+  get escs() {
+    return this.all.checked ? Array.from({ length: this.count }, (_, i) => i) : [this.link.esc];
   }
 
   key(event) {
@@ -57,7 +71,7 @@ export class ThrottleHandle {
       this.told("The page sends DShot, and INP_PROTO wants pulses: set it to 0 (automatic)", true);
       return;
     }
-    if (this.armed && !armed) this.link.ask({ silence: { esc: this.link.esc } });
+    if (this.armed && !armed) for (const esc of this.escs) this.link.ask({ silence: { esc } });
     this.armed = armed;
     this.signal = signal;
     this.slider.disabled = !armed;
@@ -80,7 +94,7 @@ export class ThrottleHandle {
 
   send() {
     if (!this.armed) return;
-    this.link.ask({ throttle: { esc: this.link.esc, value: this.value, signal: this.signal } });
+    for (const esc of this.escs) this.link.ask({ throttle: { esc, value: this.value, signal: this.signal } });
     this.show();
   }
 

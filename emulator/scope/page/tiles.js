@@ -41,18 +41,16 @@ export class Tiles {
     this.set("celsius", temperature[slot] === NO_TEMPERATURE ? "–" : digits(temperature[slot] / 100, 1));
   }
 
-  /** What the heartbeat tells: the bits of faults and of limits, by their names. */
-  heartbeat({ custom_mode }, { faults, limits }) {
-    const named = (names) => Object.entries(names).filter(([bit]) => custom_mode & (1 << bit)).map(([, name]) => name);
-    this.set("limits", named(limits).join(", ") || "none");
-    this.told = named(faults);
+  /** What the heartbeat tells. */
+  conditions(faults, limits) {
+    this.set("limits", limits.join(", ") || "none");
+    this.told = faults;
     this.showFaults();
   }
 
   /** What the traces tell: the faults as they come, and power into the shaft against that from the supply. */
-  traces({ values }, names) {
-    const bits = values.faults?.at(-1);
-    this.known = bits == null ? null : Object.entries(names).filter(([bit]) => bits & (1 << bit)).map(([, name]) => name);
+  traces({ values }, faults) {
+    this.known = faults;
     this.showFaults();
     const mean = (list) => list.reduce((sum, value) => sum + value, 0) / list.length;
     if (!values.torque_nm) return;

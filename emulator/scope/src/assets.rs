@@ -24,6 +24,7 @@ static FILES: &[(&str, &str, &str)] = files! {
     "/socket.js" JS "socket.js",
     "/mavlink.js" JS "mavlink.js",
     "/esc.js" JS "esc.js",
+    "/fleet.js" JS "fleet.js",
     "/motor.js" JS "motor.js",
     "/records.js" JS "records.js",
     "/remote.js" JS "remote.js",

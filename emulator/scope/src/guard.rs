@@ -9,6 +9,7 @@ use std::io;
 use std::net::{IpAddr, SocketAddr};
 
 use crate::head::Head;
+use crate::recording;
 
 /// Bytes of a token: too many to be tried.
 const TOKEN_BYTES: usize = 16;
@@ -66,7 +67,8 @@ impl Guard {
             }
             _ => {}
         }
-        let is_open = head.path != "/" && head.websocket_key.is_none();
+        let is_own = head.path == "/" || recording::is_one(&head.path);
+        let is_open = !is_own && head.websocket_key.is_none();
         match &self.token {
             Some(token) if !is_open && !same(token, head.token()) => {
                 Err("the token is missing or wrong: open the address that the program has printed")
@@ -184,6 +186,10 @@ mod tests {
             );
             assert_eq!(
                 admits(&guard, &format!("/socket{query}"), &socket),
+                is_right
+            );
+            assert_eq!(
+                admits(&guard, &format!("/recording/0{query}"), host),
                 is_right
             );
         }

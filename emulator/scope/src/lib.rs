@@ -11,6 +11,7 @@ mod greeting;
 mod guard;
 mod head;
 mod hub;
+mod recording;
 mod server;
 mod show;
 mod site;

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::net::{TcpListener, TcpStream};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -13,6 +14,7 @@ use crate::assets;
 use crate::guard::Guard;
 use crate::head::Head;
 use crate::hub::Hub;
+use crate::recording;
 use crate::show::Show;
 use crate::viewer;
 
@@ -39,6 +41,7 @@ pub(crate) struct Server<S: Show> {
     pub(crate) hub: Arc<Hub<S>>,
     /// The first message to each page.
     pub(crate) greeting: String,
+    pub(crate) recordings: Vec<PathBuf>,
 }
 
 /// Serves from now on, until the program ends.
@@ -102,6 +105,13 @@ fn answer<S: Show>(mut stream: TcpStream, server: &Server<S>) -> io::Result<()> 
         viewer::serve(stream, rest, &server.hub, &seat, server.greeting.clone());
         return Ok(());
     }
+    if let Some(path) = recording::named(&server.recordings, &head.path) {
+        let Ok((mut file, length)) = recording::open(path) else {
+            return reply(&mut stream, "404 Not Found", "it cannot be read any more");
+        };
+        begin(&mut stream, "200 OK", "application/octet-stream", length)?;
+        return io::copy(&mut file, &mut stream).map(drop);
+    }
     match assets::find(&head.path) {
         Some((kind, content)) => send(&mut stream, "200 OK", kind, content),
         None => reply(&mut stream, "404 Not Found", "there is no such file"),
@@ -118,10 +128,14 @@ fn reply(stream: &mut TcpStream, status: &str, line: &str) -> io::Result<()> {
 }
 
 fn send(stream: &mut TcpStream, status: &str, kind: &str, content: &str) -> io::Result<()> {
-    let length = content.len();
+    begin(stream, status, kind, content.len() as u64)?;
+    stream.write_all(content.as_bytes())
+}
+
+/// All that stands before the content.
+fn begin(stream: &mut TcpStream, status: &str, kind: &str, length: u64) -> io::Result<()> {
     let head = format!(
         "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{HEADERS}\r\n"
     );
-    stream.write_all(head.as_bytes())?;
-    stream.write_all(content.as_bytes())
+    stream.write_all(head.as_bytes())
 }

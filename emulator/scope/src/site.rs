@@ -2,6 +2,7 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
@@ -36,11 +37,17 @@ pub struct Site<S: Show> {
 }
 
 impl<S: Show> Site<S> {
-    /// Serves the page from now on; each viewer is told `greeting`, JSON, first.
+    /// Serves the page from now on; each viewer is told `greeting`, JSON, first. What has been written of recording N
+    /// by then is there to be fetched at `/recording/N`.
     ///
     /// # Errors
     /// It cannot be served there.
-    pub fn open(address: &HostPort, show: Arc<S>, greeting: String) -> Result<Self, SiteError> {
+    pub fn open(
+        address: &HostPort,
+        show: Arc<S>,
+        greeting: String,
+        recordings: Vec<PathBuf>,
+    ) -> Result<Self, SiteError> {
         let local = address.resolve();
         let local = local.map_err(|error| SiteError::Host(address.clone(), error))?;
         let refused = |error: io::Error| match error.kind() {
@@ -57,6 +64,7 @@ impl<S: Show> Site<S> {
             guard,
             hub: Arc::clone(&hub),
             greeting,
+            recordings,
         };
         server::serve(listener, server);
         Ok(Self {

@@ -19,6 +19,7 @@ pub use tap::Tapped;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -45,29 +46,36 @@ pub struct Web {
 }
 
 impl Web {
-    /// Serves the page of so many ESCs where it is wanted; with a line for a person where the usual port is taken.
+    /// Serves the page of so many ESCs where it is wanted, with what is recorded of each, if anything is; with a line
+    /// for a person where the usual port is taken.
     ///
     /// # Errors
     /// It cannot be served where a person wants it.
     pub fn open(
         address: &WebAddress,
         escs: usize,
+        recordings: &[PathBuf],
     ) -> Result<(Option<Self>, Option<String>), WebError> {
         match address {
             WebAddress::None => Ok((None, None)),
-            WebAddress::At(address) => Ok((Some(Self::listen(address, escs)?), None)),
-            WebAddress::Usual => match Self::listen(&WebAddress::usual(), escs) {
+            WebAddress::At(address) => Ok((Some(Self::listen(address, escs, recordings)?), None)),
+            WebAddress::Usual => match Self::listen(&WebAddress::usual(), escs, recordings) {
                 Ok(web) => Ok((Some(web), None)),
                 Err(error) => Ok((None, Some(format!("no page: {error}")))),
             },
         }
     }
 
-    fn listen(address: &HostPort, escs: usize) -> Result<Self, WebError> {
+    fn listen(address: &HostPort, escs: usize, recordings: &[PathBuf]) -> Result<Self, WebError> {
         let rings = Arc::new(Rings::new(escs));
         Ok(Self {
             taps: Taps::new(&rings, escs),
-            site: Site::open(address, rings, greeting(escs))?,
+            site: Site::open(
+                address,
+                rings,
+                greeting(escs, recordings),
+                recordings.to_vec(),
+            )?,
             links: BTreeMap::new(),
             throttles: (0..escs).map(|_| Throttle::default()).collect(),
         })
@@ -170,13 +178,22 @@ impl Web {
 }
 
 /// What a page is told first: what there is.
-fn greeting(escs: usize) -> String {
+fn greeting(escs: usize, recordings: &[PathBuf]) -> String {
     let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
     let channels: Vec<_> = channel::names().collect();
     let mut hello = serde_json::Map::new();
     hello.insert("simulated".into(), true.into());
     hello.insert("escs".into(), escs.into());
     hello.insert("channels".into(), channels.into());
+    // What is no file before its end is none to be fetched.
+    let names = recordings.iter().map(|path| match path.extension() {
+        Some(extension) if extension == "parquet" => None,
+        _ => path.file_name().map(|name| name.to_string_lossy()),
+    });
+    hello.insert(
+        "recordings".into(),
+        serde_json::json!(names.collect::<Vec<_>>()),
+    );
     hello.insert("phases".into(), phases.to_vec().into());
     siskin_scope::greeting(hello)
 }
