@@ -285,3 +285,28 @@ def test_what_is_recorded_can_be_fetched_while_it_is_recorded(browser, start, po
         columns = {row.count(",") for row in text.splitlines()}
         assert len(columns) == 1
     browser.open("about:blank")
+
+
+def test_the_six_switches_of_a_period_are_shown(browser, start, port):
+    emulator = start("--plant", "switching", web=f"127.0.0.1:{port}")
+    with emulator.connect() as esc:
+        look(browser, port)
+        browser.run("document.querySelector('#switches').open = true")
+        # At rest with its brake the low sides are on all the time.
+        browser.wait("document.querySelectorAll('#switch-times dd').length === 6")
+        spin(browser, esc)
+        edges = "[...document.querySelectorAll('#switch-times dd')].map((edges) => edges.textContent)"
+        browser.wait(f"{edges}.every((edges) => /^(on|off) [0-9.]+, (on|off) [0-9.]+$/.test(edges))")
+        browser.click("#pause")
+        highs, lows = [], []
+        for place, text in enumerate(browser.run(edges)):
+            times = {word: float(at) for word, at in (part.split() for part in text.split(", "))}
+            assert all(0.0 <= at <= 1e6 / 24000 for at in times.values()), text
+            (lows if place % 2 else highs).append(times)
+        # A high side is on within the time for which its low side is off, half a microsecond away.
+        for high, low in zip(highs, lows):
+            assert abs(high["on"] - low["off"] - 0.5) < 0.002 and abs(low["on"] - high["off"] - 0.5) < 0.002
+        assert "as the plant was switched" in browser.text("#switch-text")
+        assert browser.run("document.querySelectorAll('#switch-plots canvas').length") == 3
+        assert browser.problems == []
+        browser.open("about:blank")

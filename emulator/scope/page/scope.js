@@ -12,6 +12,7 @@ import { Records } from "./records.js";
 import { Remote } from "./remote.js";
 import { Samples } from "./samples.js";
 import { Link } from "./socket.js";
+import { Switches } from "./switches.js";
 import { Tests } from "./tests.js";
 import { ThrottleHandle } from "./throttle.js";
 import { Tiles } from "./tiles.js";
@@ -79,6 +80,7 @@ const handlers = {
     if (reason.includes("throttle")) letGo();
   },
   trace: (buffer) => remote.take(buffer),
+  switching: (seen) => switches.take(seen),
   mavlink(message) {
     if (message.name === "HEARTBEAT" && mayBeEsc(message)) heartbeat(message);
     const esc = escs.get(message.component);
@@ -96,6 +98,7 @@ const plots = new Plots(element("plots"), element("plot-choice"), (from, to) => 
 const remote = new Remote(link);
 const samples = new Samples();
 const traces = new Traces(link, plots, seen);
+const switches = new Switches(link, () => traces.paused);
 const throttle = new ThrottleHandle(link, current, told);
 const handles = [throttle, new MotorTest(current, told)];
 const parameters = new Parameters(current, told);
@@ -235,6 +238,7 @@ element("show-parameters").addEventListener("click", () => page("parameters"));
 const dark = matchMedia("(prefers-color-scheme: dark)");
 function repaint() {
   plots.rebuild();
+  switches.rebuild();
   if (plots.data) seen(plots.data);
 }
 function scheme(theme) {

@@ -25,6 +25,7 @@ static FILES: &[(&str, &str, &str)] = files! {
     "/mavlink.js" JS "mavlink.js",
     "/esc.js" JS "esc.js",
     "/fleet.js" JS "fleet.js",
+    "/switches.js" JS "switches.js",
     "/motor.js" JS "motor.js",
     "/records.js" JS "records.js",
     "/remote.js" JS "remote.js",

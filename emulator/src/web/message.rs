@@ -18,6 +18,8 @@ pub(super) enum FromPage {
     Throttle { esc: usize, value: f64, signal: u8 },
     /// No throttle signal any more.
     Silence { esc: usize },
+    /// A period of the PWM edge by edge.
+    Switching { esc: usize },
     /// A fault that begins now, by its keys as `--fault` takes them.
     Fault { esc: usize, keys: String },
     /// All that was broken is whole again.

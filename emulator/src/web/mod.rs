@@ -8,6 +8,7 @@ mod channel;
 mod message;
 mod ring;
 mod rings;
+mod switching;
 mod tap;
 #[cfg(test)]
 mod tests;
@@ -124,6 +125,12 @@ impl Web {
             let wire = machine.wire(esc);
             throttle.play(Instant::now(), wire, now_ns);
             self.taps.look(esc, wire.throttle());
+            for (viewers, seen) in self.taps.seen(esc) {
+                let text = serde_json::json!({ "switching": seen }).to_string();
+                for viewer in viewers {
+                    self.site.tell(Some(viewer), &text);
+                }
+            }
         }
     }
 
@@ -136,6 +143,7 @@ impl Web {
         let now_ns = machine.now_ns();
         let (FromPage::Throttle { esc, .. }
         | FromPage::Silence { esc }
+        | FromPage::Switching { esc }
         | FromPage::Fault { esc, .. }
         | FromPage::Mend { esc }) = asked
         else {
@@ -151,6 +159,10 @@ impl Web {
             }
             FromPage::Silence { .. } => {
                 throttle.release(from.0, from.1);
+                Ok(())
+            }
+            FromPage::Switching { .. } => {
+                self.taps.ask(esc, from.0);
                 Ok(())
             }
             FromPage::Fault { keys, .. } => {

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use siskin_scope::ViewerId;
+
 use super::channel::{Control, Point};
 use super::ring::Chunk;
 use super::rings::Rings;
+use super::switching::{Look, Switching};
 use crate::machine::Onlooker;
 use crate::plant::Gate;
 use crate::rig::{Period, Rig};
@@ -17,6 +20,9 @@ pub(super) struct Tap {
     /// Nothing while nobody views.
     chunk: Option<Chunk>,
     throttle: f32,
+    look: Look,
+    /// Periods that were asked for, by whom; none where it cannot be known.
+    seen: Vec<(Vec<ViewerId>, Option<Switching>)>,
 }
 
 impl Tap {
@@ -26,6 +32,8 @@ impl Tap {
             esc,
             chunk: None,
             throttle: 0.0,
+            look: Look::default(),
+            seen: Vec::new(),
         }
     }
 
@@ -55,6 +63,9 @@ impl Tap {
     }
 
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        if let Some((viewers, seen)) = self.look.period(t_s, period, rig) {
+            self.seen.push((viewers, Some(seen)));
+        }
         if self.chunk.is_some() {
             let config = rig.config();
             let control = Control {
@@ -69,6 +80,9 @@ impl Tap {
     }
 
     fn passage(&mut self, t_s: f64, passage: &Passage) {
+        if let Some(viewers) = self.look.unknown() {
+            self.seen.push((viewers, None));
+        }
         self.take(t_s, &passage.motion, None);
     }
 }
@@ -93,6 +107,16 @@ impl Taps {
     /// As [`Tap::look`] of one.
     pub(super) fn look(&mut self, esc: usize, throttle: f64) {
         self.each[esc].look(throttle);
+    }
+
+    /// A viewer asks for a period of an ESC's PWM.
+    pub(super) fn ask(&mut self, esc: usize, viewer: ViewerId) {
+        self.each[esc].look.ask(viewer);
+    }
+
+    /// The periods that have been asked for, and by whom.
+    pub(super) fn seen(&mut self, esc: usize) -> Vec<(Vec<ViewerId>, Option<Switching>)> {
+        std::mem::take(&mut self.each[esc].seen)
     }
 }
 

@@ -1,0 +1,241 @@
+//! One period of the PWM edge by edge: the six switches, the terminals' voltages and the phases' currents.
+//!
+//! A period that has passed tells its commands, and what stood on the bench before it is played through it anew,
+//! stretch by stretch. That costs the simulation a copy, and only where somebody asks.
+
+use serde::Serialize;
+use siskin_scope::ViewerId;
+
+use crate::plant::{Fidelity, Gate, Gates};
+use crate::rig::{Period, Rig};
+use crate::surroundings::Surroundings;
+
+/// Stretches between which the currents are told, beside those that the edges make.
+const STRETCHES: u32 = 200;
+
+/// Microseconds, to the picosecond: an edge stands at any time.
+fn microseconds(seconds: f64) -> f64 {
+    (seconds * 1e12).round() * 1e-6
+}
+
+/// A period.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct Switching {
+    /// When it began, s.
+    pub(super) t_s: f64,
+    /// Its length, µs.
+    pub(super) length_us: f64,
+    /// Whether the plant is driven by these edges.
+    pub(super) is_switching: bool,
+    /// Each change of a leg's gates: when, µs, the leg, and whether the high side and the low side are on.
+    pub(super) edges: Vec<(f64, usize, bool, bool)>,
+    /// The ends of the stretches, µs.
+    pub(super) t_us: Vec<f64>,
+    /// In each stretch whether the high side and the low side of each leg are on, a bit each.
+    pub(super) gates: Vec<u8>,
+    /// At its end the terminals' voltages, V.
+    pub(super) terminals_v: [Vec<f32>; 3],
+    /// And the currents into the phases, A.
+    pub(super) currents_a: [Vec<f32>; 3],
+}
+
+/// Looks at periods where somebody asks.
+#[derive(Default)]
+pub(super) enum Look {
+    /// Nobody asks.
+    #[default]
+    Nowhere,
+    /// Who asks.
+    Asked(Vec<ViewerId>),
+    /// And what there was before the period that comes.
+    Before(Vec<ViewerId>, Box<Before>),
+}
+
+/// What there is before a period.
+pub(super) struct Before {
+    around: Surroundings,
+    gates: Gates,
+    on: [Gate; 3],
+}
+
+impl Look {
+    /// Somebody asks.
+    pub(super) fn ask(&mut self, viewer: ViewerId) {
+        match self {
+            Self::Nowhere => *self = Self::Asked(vec![viewer]),
+            Self::Asked(viewers) | Self::Before(viewers, _) => viewers.push(viewer),
+        }
+    }
+
+    /// A period has passed: who asked for one, and that.
+    pub(super) fn period(
+        &mut self,
+        t_s: f64,
+        period: &Period,
+        rig: &Rig,
+    ) -> Option<(Vec<ViewerId>, Switching)> {
+        match std::mem::take(self) {
+            Self::Nowhere => None,
+            Self::Asked(viewers) => {
+                *self = Self::Before(viewers, Box::new(Before::after(period, rig)));
+                None
+            }
+            Self::Before(viewers, before) => Some((viewers, before.play(t_s, period, rig))),
+        }
+    }
+
+    /// A period of which nobody knows the commands: who asked.
+    pub(super) fn unknown(&mut self) -> Option<Vec<ViewerId>> {
+        match std::mem::take(self) {
+            Self::Nowhere => None,
+            Self::Asked(viewers) | Self::Before(viewers, _) => Some(viewers),
+        }
+    }
+}
+
+impl Before {
+    /// What there is after a period, and so before the next one.
+    fn after(period: &Period, rig: &Rig) -> Self {
+        let mut before = Self {
+            around: rig.around().clone(),
+            gates: Gates::default(),
+            on: [Gate::default(); 3],
+        };
+        let on = &mut before.on;
+        let times = (rig.period_s(), rig.dead_time_s());
+        before
+            .gates
+            .period(period.halves, times.0, times.1, |_, leg, gate| {
+                on[leg] = gate;
+            });
+        before
+    }
+
+    /// Plays the period.
+    fn play(mut self: Box<Self>, t_s: f64, period: &Period, rig: &Rig) -> Switching {
+        let (period_s, dead_time_s) = (rig.period_s(), rig.dead_time_s());
+        let mut seen = Switching {
+            t_s,
+            length_us: microseconds(period_s),
+            is_switching: self.around.bench().plant == Fidelity::Switching,
+            ..Switching::default()
+        };
+        let mut changes = Vec::new();
+        self.gates
+            .period(period.halves, period_s, dead_time_s, |at_s, leg, gate| {
+                changes.push((at_s, Some((leg, gate))));
+            });
+        let part_s = period_s / f64::from(STRETCHES);
+        changes.extend((1..=STRETCHES).map(|part| (f64::from(part) * part_s, None)));
+        // Of one time, edges stand in the order in which they come.
+        changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut now_s = 0.0;
+        seen.tell(now_s, self.on, &self.around);
+        for (at_s, change) in changes {
+            if at_s > now_s {
+                self.around.stretch(self.on, at_s - now_s);
+                now_s = at_s;
+                seen.tell(now_s, self.on, &self.around);
+            }
+            if let Some((leg, gate)) = change
+                && self.on[leg] != gate
+            {
+                self.on[leg] = gate;
+                seen.edges
+                    .push((microseconds(at_s), leg, gate.high, gate.low));
+            }
+        }
+        seen
+    }
+}
+
+impl Switching {
+    fn tell(&mut self, at_s: f64, on: [Gate; 3], around: &Surroundings) {
+        self.t_us.push(microseconds(at_s));
+        let bits = on.iter().rev().fold(0, |bits, gate| {
+            bits << 2 | u8::from(gate.low) << 1 | u8::from(gate.high)
+        });
+        self.gates.push(bits);
+        let truth = around.truth();
+        for phase in 0..3 {
+            self.terminals_v[phase].push(truth.terminals_v[phase] as f32);
+            self.currents_a[phase].push(around.plant().currents_a()[phase] as f32);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use siskin_control::drive::Setpoint;
+    use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
+
+    use super::*;
+    use crate::rig::Bench;
+
+    /// A period of a motor at speed as it is seen, what it really was, s, and the phases' currents after it, A.
+    fn seen(plant: Fidelity) -> (Switching, Period, f64, [f64; 3]) {
+        let mut params = Params::of(&BOSSO_BENCH);
+        params.set(ParamId::PwmDeadtimeNs, 500.0).expect("in range");
+        let bench = Bench {
+            plant,
+            ..Bench::default()
+        };
+        let config = build(&params, &bench.sensing.board(bench.delay)).expect("it fits the bench");
+        let mut rig = Rig::new(bench, config);
+        let fast = Setpoint::Speed(rig.config().scale.speed_from_rpm(4500.0));
+        for _ in 0..48_000 {
+            rig.period(fast);
+        }
+        let mut look = Look::default();
+        assert!(look.period(0.0, &rig.period(fast), &rig).is_none());
+        look.ask(1);
+        let before = rig.period(fast);
+        assert!(look.period(1.0, &before, &rig).is_none());
+        look.ask(2);
+        let period = rig.period(fast);
+        let after_a = rig.plant().currents_a();
+        let (viewers, seen) = look.period(2.0, &period, &rig).expect("it was asked for");
+        assert_eq!((viewers.as_slice(), seen.t_s), (&[1, 2][..], 2.0));
+        assert!(look.period(3.0, &rig.period(fast), &rig).is_none());
+        (seen, period, rig.period_s(), after_a)
+    }
+
+    #[test]
+    fn a_period_has_its_edges_and_ends_where_the_next_begins() {
+        let (seen, period, period_s, after_a) = seen(Fidelity::Switching);
+        assert!(seen.is_switching);
+        assert!((seen.length_us - 1e6 * period_s).abs() < 1e-5);
+        // Both sides of each leg turn on and off once.
+        for leg in 0..3 {
+            let edges: Vec<_> = seen.edges.iter().filter(|edge| edge.1 == leg).collect();
+            assert_eq!(edges.len(), 4, "{edges:?}");
+            assert!(edges.iter().all(|edge| !(edge.2 && edge.3)));
+            // Low off, high on, high off, low on: between off and on lies the dead time.
+            let dead = [edges[1].0 - edges[0].0, edges[3].0 - edges[2].0];
+            assert!(dead.iter().all(|us| (us - 0.5).abs() < 1e-3), "{dead:?}");
+        }
+        assert!(seen.t_us.is_sorted());
+        for phase in 0..3 {
+            let current = &seen.currents_a[phase];
+            let begin = period.motion.currents_a[phase];
+            assert!((f64::from(current[0]) - begin).abs() < 1e-5);
+            // Played stretch by stretch it is what the plant has made of it: `Surroundings` has the tolerance.
+            let end = f64::from(current[current.len() - 1]);
+            let apart = (end - after_a[phase]).abs();
+            assert!(apart < 5e-3 * (1.0 + after_a[phase].abs()), "{apart}");
+            let volts = &seen.terminals_v[phase];
+            let [least, greatest] = [volts.iter(), volts.iter()].map(|v| v.copied());
+            let (least, greatest) = (
+                least.fold(f32::INFINITY, f32::min),
+                greatest.fold(0.0, f32::max),
+            );
+            // Between the diodes' drops beyond the rails.
+            assert!((-1.5..1.0).contains(&least) && (23.0..25.5).contains(&greatest));
+        }
+    }
+
+    #[test]
+    fn of_the_averaged_plant_it_says_so() {
+        assert!(!seen(Fidelity::Averaged).0.is_switching);
+    }
+}
