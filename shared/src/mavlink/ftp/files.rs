@@ -51,7 +51,7 @@ pub(super) struct Entry {
     content: Content,
 }
 
-static ENTRIES: [Entry; 10] = [
+static ENTRIES: [Entry; 9] = [
     Entry {
         folder: "",
         name: "general.json.xz",
@@ -97,17 +97,18 @@ static ENTRIES: [Entry; 10] = [
         name: "identify.txt",
         content: Content::Identification,
     },
-    Entry {
-        folder: "@SYS/",
-        name: "faults.bin",
-        content: Content::Record,
-    },
 ];
 
-/// Those that this program has: the fault record is the last of all.
-fn entries() -> &'static [Entry] {
-    let left_out = usize::from(!record::KEPT);
-    ENTRIES.get(..ENTRIES.len() - left_out).unwrap_or_default()
+/// The fault record: an entry of its own, so that a program without one has none of it.
+static RECORD: Entry = Entry {
+    folder: "@SYS/",
+    name: "faults.bin",
+    content: Content::Record,
+};
+
+/// Those that this program has.
+fn entries() -> impl Iterator<Item = &'static Entry> {
+    ENTRIES.iter().chain(record::KEPT.then_some(&RECORD))
 }
 
 /// The fault record, where this program keeps one.
@@ -131,7 +132,7 @@ impl File {
             Some(at) => (path.get(..at)?, path.get(at + 1..)),
             None => (path, None),
         };
-        let entry = entries().iter().find(|entry| {
+        let entry = entries().find(|entry| {
             path.strip_prefix(entry.folder.as_bytes()) == Some(entry.name.as_bytes())
         })?;
         let selection = match (&entry.content, query) {
