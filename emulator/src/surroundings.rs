@@ -86,7 +86,7 @@ impl Surroundings {
         Self {
             plant,
             bus: Bus::new(bench.supply),
-            thermal: Thermal::new(),
+            thermal: Thermal::new(bench.board_k_per_w),
             noise: Noise::new(bench.seed),
             air: Air::default(),
             struck: [0.0; 2],

@@ -9,6 +9,9 @@ from emulator import SETTINGS, scenario, windows_of
 from paths import TOOL
 
 
+# Of a phase's current through the board: two transistors and a shunt, as the emulator has them.
+BOARD_OHM = 6e-3
+
 # What follows from the motor where it is 0.
 FROM_MOTOR = ["CTL_RPM_MIN", *SETTINGS]
 
@@ -62,13 +65,18 @@ def motor_of(draw: random.Random) -> dict:
 
 
 def drawn_bench(motor: dict) -> dict[str, dict]:
-    """The tables of a scenario with a drawn motor: half of its inertia is the bell's."""
+    """The tables of a scenario with a drawn motor: half of its inertia is the bell's.
+
+    The board suits the limit: a small one of 6 K/W, or one that is 60 K warmer than the air at that current.
+    """
     of = motor["params"]
+    heat_w = 1.5 * BOARD_OHM * of["LIM_PHASE_A"] ** 2
     j = of["MOT_J_GCM2"] * 1e-7 / 2
     return {
         "bench": {
             "bus": motor["supply_v"],
             "adc_range_a": 2 * of["LIM_PHASE_A"],
+            "board_k_per_w": min(6.0, 60 / heat_w),
             "initial_angle_deg": motor["angle_deg"],
         },
         "bench.motor": {

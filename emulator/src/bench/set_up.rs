@@ -6,7 +6,7 @@ use siskin_control::drive::Config;
 use super::choice::Choice;
 use super::load::LoadTable;
 use super::motor::MotorTable;
-use crate::plant::{Extras, Fidelity, Load, Motor, Sensing, Supply};
+use crate::plant::{BOARD_K_PER_W, Extras, Fidelity, Load, Motor, Sensing, Supply};
 
 /// The motor of the default bench.
 pub const DEFAULT_MOTOR: &str = "antigravity-4006-kv380";
@@ -46,6 +46,8 @@ pub struct Bench {
     pub delay: Delay,
     /// Dead time of the inverter, s; `None` is what the parameters set the timer to.
     pub dead_time_s: Option<f64>,
+    /// Thermal resistance from the board to the air, K/W.
+    pub board_k_per_w: f64,
     /// Speed that the shaft is held at, rad/s.
     pub imposed_rad_s: Option<f64>,
     /// Speed at the start, rad/s.
@@ -75,6 +77,7 @@ impl Default for Bench {
             sensing: Sensing::default(),
             delay: Delay::One,
             dead_time_s: None,
+            board_k_per_w: BOARD_K_PER_W,
             imposed_rad_s: None,
             initial_rad_s: 0.0,
             initial_angle_turns: 0.0,

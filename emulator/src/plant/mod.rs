@@ -40,7 +40,7 @@ pub use rail::Rail;
 pub use sensing::{Sensing, Truth};
 pub use stage::DIODE_V;
 pub use supply::{CAPACITANCE_F, CAPACITY_C, CELL_OHM, Source, Supply};
-pub use thermal::Thermal;
+pub use thermal::{BOARD_K_PER_W, Thermal};
 
 #[cfg(test)]
 mod tests;

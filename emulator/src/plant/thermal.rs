@@ -14,8 +14,8 @@ const COPPER_PER_K: f64 = 3.93e-3;
 /// Two transistors and their shunts carry each phase's current in turn: about 6 mΩ.
 const PATH_OHM: f64 = 6e-3;
 
-/// A small board in moving air.
-const BOARD_K_PER_W: f64 = 6.0;
+/// Thermal resistance of a small board to moving air, K/W.
+pub const BOARD_K_PER_W: f64 = 6.0;
 
 /// Its time constant, s.
 const BOARD_S: f64 = 20.0;
@@ -29,6 +29,8 @@ const NTC: Ntc = Ntc::VESC;
 /// Board, with its transistors on it, and the sensor beside them.
 #[derive(Clone, Copy, Debug)]
 pub struct Thermal {
+    /// From the board to the air, K/W.
+    k_per_w: f64,
     /// Temperature of the board, °C.
     board_c: f64,
     /// Temperature of the sensor, °C.
@@ -38,9 +40,10 @@ pub struct Thermal {
 }
 
 impl Thermal {
-    /// At the temperature of the surroundings.
-    pub const fn new() -> Self {
+    /// At the temperature of the surroundings, with this thermal resistance from the board to the air, K/W.
+    pub const fn new(k_per_w: f64) -> Self {
         Self {
+            k_per_w,
             board_c: AMBIENT_C,
             sensor_c: AMBIENT_C,
             ambient_c: AMBIENT_C,
@@ -56,7 +59,7 @@ impl Thermal {
     /// vector, A².
     pub fn advance(&mut self, time_s: f64, current_square: f64) {
         let heat_w = 1.5 * PATH_OHM * current_square;
-        let settled_c = self.ambient_c + BOARD_K_PER_W * heat_w;
+        let settled_c = self.ambient_c + self.k_per_w * heat_w;
         self.board_c += (settled_c - self.board_c) * (time_s * (1.0 / BOARD_S));
         self.sensor_c += (self.board_c - self.sensor_c) * (time_s * (1.0 / SENSOR_S));
     }
@@ -83,7 +86,7 @@ impl Thermal {
 
 impl Default for Thermal {
     fn default() -> Self {
-        Self::new()
+        Self::new(BOARD_K_PER_W)
     }
 }
 
@@ -135,7 +138,7 @@ mod tests {
 
     #[test]
     fn the_sensor_follows_the_board() {
-        let mut thermal = Thermal::new();
+        let mut thermal = Thermal::default();
         let mut advance = |time_s: f64, current_a| {
             for _ in 0..(time_s / 1e-3) as u32 {
                 thermal.advance(1e-3, current_a * current_a);
@@ -151,8 +154,16 @@ mod tests {
     }
 
     #[test]
+    fn a_board_with_a_heat_sink_stays_cooler() {
+        let mut thermal = Thermal::new(0.6);
+        (0..200_000).for_each(|_| thermal.advance(1e-3, 900.0));
+        // A tenth of the 48.6 K of a small board.
+        assert!((thermal.sensor_c() - 29.86).abs() < 0.1);
+    }
+
+    #[test]
     fn what_the_control_makes_of_the_reading_is_the_sensor_s_temperature() {
-        let mut thermal = Thermal::new();
+        let mut thermal = Thermal::default();
         for sensor_c in [0.0, 25.0, 60.0, 100.0, 125.0] {
             thermal.sensor_c = sensor_c;
             let shown_c = f64::from(thermal.measured_c());
@@ -163,7 +174,7 @@ mod tests {
 
     #[test]
     fn the_surroundings_warm_board_and_winding() {
-        let mut thermal = Thermal::new();
+        let mut thermal = Thermal::default();
         thermal.set_ambient_c(60.0);
         (0..200_000).for_each(|_| thermal.advance(1e-3, 0.0));
         assert!((thermal.sensor_c() - 60.0).abs() < 0.1);

@@ -18,7 +18,7 @@ use crate::bench::{
 };
 use crate::fault::Fault;
 use crate::parameter::parameter;
-use crate::plant::{Fidelity, Sensing};
+use crate::plant::{BOARD_K_PER_W, Fidelity, Sensing};
 use crate::rig::{Bench, Position};
 
 /// The fastest decay of currents that are taken on step by step, 1/s: 500 steps in a period of 50 µs.
@@ -117,6 +117,8 @@ pub(super) struct BenchTable {
     pub(super) hall_error_deg: [f64; 3],
     /// Dead time of the inverter.
     pub(super) dead_time_ns: f64,
+    /// How warm the board gets.
+    pub(super) board_k_per_w: f64,
     /// Speed at the start.
     pub(super) initial_rpm: f64,
     /// Electrical angle at the start.
@@ -146,6 +148,7 @@ impl Default for BenchTable {
             settling_ns: 100.0,
             hall_error_deg: [0.0; 3],
             dead_time_ns: 500.0,
+            board_k_per_w: BOARD_K_PER_W,
             initial_rpm: 0.0,
             initial_angle_deg: 0.0,
         }
@@ -291,6 +294,7 @@ impl BenchTable {
             },
             delay,
             dead_time_s: Some(range("bench.dead_time_ns", self.dead_time_ns, 0.0, 1e4)? * 1e-9),
+            board_k_per_w: range("bench.board_k_per_w", self.board_k_per_w, 0.0, 100.0)?,
             imposed_rad_s: match self.imposed_rpm {
                 Some(rpm) => Some(rad_s(range("bench.imposed_rpm", rpm, -2e5, 2e5)?)),
                 None => None,

@@ -1,0 +1,130 @@
+"""Slams: a throttle that jumps at random between idle and full, on motors that the ESC is told wrongly, with any
+dead time of a board.
+
+    target/venv/bin/python tests/python/slams.py --motors 20 --steps 150 --jobs 2
+
+plays each of so many random motors in speed and in voltage mode, on both plants, and prints a row for each; it ends
+with status 1 if one does not hold.
+"""
+
+import argparse
+import random
+import statistics
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import paths
+
+sys.path.insert(0, str(paths.DIALECT))
+
+from motors import FROM_MOTOR, drawn_bench, flown, motor_of, tune  # noqa: E402  (they need the dialect's folder)
+
+IDLE = 0.055
+DEAD_TIMES_NS = [200, 300, 500, 750]
+SPEED, VOLTAGE = 0, 2
+MODES = {"speed": SPEED, "voltage": VOLTAGE}
+PLANTS = ["averaged", "switching"]
+TRANSIENT_DEG = 45.0
+IDLE_DEG = 20.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What slams have made of a drive."""
+
+    faults: list
+    starts: int
+    lost: bool
+    """90 degrees of error or more."""
+    worst_deg: float
+    """Greatest error of the angle, from the first step to the end."""
+    idle_deg: float
+    """The error's rms in the last of half a second of idle."""
+
+    def holds(self) -> bool:
+        turned_on = not self.faults and self.starts == 0 and not self.lost
+        return turned_on and self.worst_deg < TRANSIENT_DEG and self.idle_deg < IDLE_DEG
+
+
+def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outcome:
+    """Plays steps of the throttle, 50 to 300 ms apart, a third of them from end to end, then half a second of idle.
+
+    R, L and J are told wrong by up to 30 %, the flux by 10 %; settings follow from the motor.
+    """
+    at_s, throttle = 1.5, [(0.0, 0.0), (0.5, 0.3)]
+    for _ in range(steps):
+        share = draw.choice([IDLE, 1.0]) if draw.random() < 1 / 3 else draw.uniform(IDLE, 1.0)
+        throttle.append((at_s, share))
+        at_s += draw.uniform(0.05, 0.3)
+    throttle.append((at_s, IDLE))
+    end_s = at_s + 0.5
+    dead_time_ns = tables["params"]["PWM_DEADTIME_NS"]
+    tables["bench"] |= {"duration_s": end_s, "dead_time_ns": float(dead_time_ns)}
+    tables["bench.scale"] = {key: draw.uniform(0.7, 1.3) for key in "RLJ"} | {"flux": draw.uniform(0.9, 1.1)}
+    tables["params"] |= dict.fromkeys(FROM_MOTOR, 0)
+    faults, windows = flown(folder, tables, throttle, {"all": (1.4, end_s), "idle": (end_s - 0.2, end_s)})
+    whole = windows["all"]
+    # A drive that is off has no error, but knows no angle either.
+    worst_deg, idle_deg = whole["angle_error_max_deg"], windows["idle"]["angle_error_rms_deg"]
+    known = worst_deg is not None and idle_deg is not None
+    errors_deg = (worst_deg, idle_deg) if known else (180.0, 180.0)
+    return Outcome(faults, whole["starts"], whole["lock_lost"], *errors_deg)
+
+
+def drawn(folder: Path, number: int, mode: str, plant: str, steps: int) -> Outcome:
+    """Slams of the random motor of this number, with a dead time and errors that are drawn for mode and plant."""
+    draw = random.Random(f"{number} {mode} {plant}")
+    motor = motor_of(random.Random(number))
+    params = motor["params"] | {"PWM_DEADTIME_NS": draw.choice(DEAD_TIMES_NS)}
+    params |= {"PWM_FREQ_HZ": tune(params)["PWM_FREQ_HZ"], "CTL_MODE": MODES[mode]}
+    tables = drawn_bench(motor) | {"params": params}
+    tables["bench"]["plant"] = plant
+    return slammed(folder, draw, tables, steps)
+
+
+def campaign(numbers: range, steps: int, jobs: int):
+    """Each case of these motors with its outcome, in order."""
+    cases = list(product(numbers, MODES, PLANTS))
+
+    def play(case: tuple) -> Outcome:
+        with tempfile.TemporaryDirectory() as folder:
+            return drawn(Path(folder), *case, steps)
+
+    # Each waits for a program of its own.
+    with ThreadPoolExecutor(jobs) as pool:
+        yield from zip(cases, pool.map(play, cases))
+
+
+def main() -> int:
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    words.add_argument("--motors", type=int, default=20, help="how many random motors")
+    words.add_argument("--first", type=int, default=0, help="number of the first")
+    words.add_argument("--steps", type=int, default=150, help="steps of the throttle")
+    words.add_argument("--jobs", type=int, default=2, help="runs at a time")
+    given = words.parse_args()
+    if min(given.motors, given.steps, given.jobs) < 1:
+        words.error("--motors, --steps and --jobs take 1 or more")
+    outcomes = []
+    print(f"{'motor':>5} {'mode':<8} {'plant':<10} {'held':<5} {'starts':>6} {'worst':>6} {'idle':>5}  faults")
+    numbers = range(given.first, given.first + given.motors)
+    for (number, mode, plant), outcome in campaign(numbers, given.steps, given.jobs):
+        outcomes.append(outcome)
+        held = "yes" if outcome.holds() else "NO"
+        figures = f"{outcome.starts:>6} {outcome.worst_deg:>6.1f} {outcome.idle_deg:>5.1f}"
+        faults = ", ".join(map(str, outcome.faults))
+        print(f"{number:>5} {mode:<8} {plant:<10} {held:<5} {figures}  {faults}".rstrip(), flush=True)
+    held = sum(outcome.holds() for outcome in outcomes)
+    worst = [outcome.worst_deg for outcome in outcomes]
+    idle = [outcome.idle_deg for outcome in outcomes]
+    print(f"{held} of {len(outcomes)} hold; degrees, median and most:", end=" ")
+    print(f"transient {statistics.median(worst):.1f} and {max(worst):.1f}", end=", ")
+    print(f"idle {statistics.median(idle):.1f} and {max(idle):.1f} rms")
+    return 0 if held == len(outcomes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
