@@ -9,8 +9,9 @@ from typing import Any, overload
 
 import numpy as np
 
-from . import _record
+from . import _index, _record
 from ._faults import Faults
+from ._index import Values
 from ._mavlink import MavlinkPipe
 from ._params import Params
 from ._scenario import scenario
@@ -38,19 +39,16 @@ class Throttle(Sequence["float | None"]):
     def __getitem__(self, esc: slice) -> list[float | None]: ...
     def __getitem__(self, esc: int | slice) -> float | None | list[float | None]:
         if isinstance(esc, slice):
-            return [self._laboratory.throttle(index) for index in self._range(esc)]
-        return self._laboratory.throttle(self._range(esc)[0])
+            return [self._laboratory.throttle(index) for index in range(len(self))[esc]]
+        return self._laboratory.throttle(_index.one(len(self), esc))
 
     @overload
     def __setitem__(self, esc: int, throttle: float | None) -> None: ...
     @overload
-    def __setitem__(self, esc: slice, throttle: float | Sequence[float | None] | None) -> None: ...
-    def __setitem__(self, esc: int | slice, throttle: float | Sequence[float | None] | None) -> None:
-        escs = self._range(esc)
-        values = throttle if isinstance(throttle, Sequence | np.ndarray) else [throttle] * len(escs)
-        if len(values) != len(escs):
-            raise Error(f"{len(values)} throttles for {len(escs)} ESCs")
-        for index, value in zip(escs, values, strict=True):
+    def __setitem__(self, esc: slice, throttle: Values) -> None: ...
+    def __setitem__(self, esc: int | slice, throttle: Values) -> None:
+        escs = range(len(self))[esc] if isinstance(esc, slice) else [_index.one(len(self), esc)]
+        for index, value in zip(escs, _index.each("throttle", len(escs), throttle), strict=True):
             self._laboratory.set_throttle(index, value)
 
     def __iter__(self) -> Iterator[float | None]:
@@ -58,15 +56,6 @@ class Throttle(Sequence["float | None"]):
 
     def __repr__(self) -> str:
         return f"Throttle({self[:]})"
-
-    def _range(self, esc: int | slice) -> range:
-        every = range(len(self))
-        if isinstance(esc, slice):
-            return every[esc]
-        try:
-            return every[esc : esc + 1] if esc >= 0 and every[esc] >= 0 else every[every[esc] : every[esc] + 1]
-        except IndexError:
-            raise IndexError(f"ESC {esc} is not there; give 0 to {len(self) - 1}") from None
 
 
 class Emulator:
@@ -137,7 +126,7 @@ class Emulator:
         return self._throttle
 
     @throttle.setter
-    def throttle(self, throttle: float | Sequence[float | None] | None) -> None:
+    def throttle(self, throttle: Values) -> None:
         self._throttle[:] = throttle
 
     def send(self, esc: int, datagram: bytes, after_s: float = 0.0) -> None:
@@ -147,7 +136,7 @@ class Emulator:
         :param after_s: when its first edge comes, s from now. One that still plays is waited for.
         :raises siskin.Error: if it is malformed, or more than 100 ms wait.
         """
-        self._laboratory.send(esc, datagram, after_s)
+        self._laboratory.send(_index.one(self._laboratory.escs, esc), datagram, after_s)
 
     def environment(
         self,
@@ -155,8 +144,8 @@ class Emulator:
         supply_v: float | None = None,
         supply_ohm: float | None = None,
         ambient_c: float | None = None,
-        torque_nm: float | Sequence[float | None] | None = None,
-        wind_rpm: float | Sequence[float | None] | None = None,
+        torque_nm: Values = None,
+        wind_rpm: Values = None,
     ) -> None:
         """Changes what is around the ESCs from now on. What is left out, or ``None``, stays as it is.
 
@@ -169,7 +158,9 @@ class Emulator:
         :param wind_rpm: air speed, as the speed at which it would turn the propeller by itself, rpm, ±100 000, likewise.
         :raises siskin.Error: if one is out of its range; nothing has changed then.
         """
-        torques, winds = self._each("torque_nm", torque_nm), self._each("wind_rpm", wind_rpm)
+        escs = self._laboratory.escs
+        torques = _index.each("torque_nm", escs, torque_nm)
+        winds = _index.each("wind_rpm", escs, wind_rpm)
         self._laboratory.environment(supply_v, supply_ohm, ambient_c, torques, winds)
 
     @property
@@ -195,7 +186,7 @@ class Emulator:
 
         :raises siskin.Error: if the emulator was made without ``record=True``.
         """
-        return _record.rows(self._laboratory.take_recorded(esc))
+        return _record.rows(self._laboratory.take_recorded(_index.one(self._laboratory.escs, esc)))
 
     @property
     def trace_hashes(self) -> list[str]:
@@ -210,11 +201,3 @@ class Emulator:
 
     scenario = staticmethod(scenario)
     sweep = staticmethod(sweep)
-
-    def _each(self, name: str, value: float | Sequence[float | None] | None) -> list[float | None]:
-        escs = self._laboratory.escs
-        if value is None or isinstance(value, int | float):
-            return [value] * escs
-        if len(value) != escs:
-            raise Error(f"{name}: {len(value)} values for {escs} ESCs")
-        return list(value)

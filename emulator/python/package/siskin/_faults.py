@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import overload
 
+from . import _index
 from ._siskin import Laboratory
 
 
@@ -40,11 +41,11 @@ class Faults(Sequence[list[str]]):
         given = {"kind": kind, "phase": phase, "side": side, "value": value, "at_s": at_s, "for_s": for_s}
         keys = {"phase": int, "value": float, "at_s": float, "for_s": float}
         words = [f"{key} = {_toml(keys.get(key, str)(v))}" for key, v in given.items() if v is not None]
-        self._laboratory.inject(esc, ", ".join(words))
+        self._laboratory.inject(_index.one(len(self), esc), ", ".join(words))
 
     def mend(self, esc: int | None = None) -> None:
         """Makes whole again all that faults have broken by now, of one ESC or of all."""
-        for each in range(len(self)) if esc is None else [esc]:
+        for each in range(len(self)) if esc is None else [_index.one(len(self), esc)]:
             self._laboratory.mend(each)
 
     @overload
@@ -54,7 +55,7 @@ class Faults(Sequence[list[str]]):
     def __getitem__(self, esc: int | slice) -> list[str] | list[list[str]]:
         if isinstance(esc, slice):
             return [self._laboratory.faults(index) for index in range(len(self))[esc]]
-        return self._laboratory.faults(esc if esc >= 0 else esc + len(self))
+        return self._laboratory.faults(_index.one(len(self), esc))
 
     def __len__(self) -> int:
         return self._laboratory.escs

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, MutableMapping
 
+from . import _index
 from ._siskin import PARAMETERS, Laboratory
 
 
@@ -22,8 +23,7 @@ class Params(MutableMapping[str, float]):
 
     def of(self, esc: int) -> "Params":
         """The parameters of one ESC."""
-        if esc not in range(self._laboratory.escs):
-            raise IndexError(f"ESC {esc} is not there; give 0 to {self._laboratory.escs - 1}")
+        esc = _index.one(self._laboratory.escs, esc)
         return Params(self._laboratory, range(esc, esc + 1))
 
     def __getitem__(self, name: str) -> float:
