@@ -5,6 +5,7 @@ import math
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -189,3 +190,15 @@ def test_other_threads_go_on(four, unasked):
     done = True
     thread.join()
     assert meanwhile > 0
+
+
+def test_emulators_on_threads_of_their_own_are_what_they_are_alone():
+    def turned(seed: int) -> list[str]:
+        emulator = siskin.Emulator("bosso", escs=2, seed=seed, trace=True)
+        turning(emulator)
+        return emulator.trace_hashes
+
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(turned, range(4)))
+    assert together == [turned(seed) for seed in range(4)]
+    assert len({tuple(hashes) for hashes in together}) == 4

@@ -1,5 +1,6 @@
 """The Python module: scenarios and sweeps are the program's, whoever plays them."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -20,11 +21,18 @@ ALL = range(1, 1001)
 FEW = range(1, 7)
 
 
-@pytest.fixture(scope="module")
-def client():
+@contextlib.contextmanager
+def two_workers():
     """A cluster of two workers, each a process with one thread, which are started again when they die."""
     options = {"host": "127.0.0.1", "dashboard_address": None, "threads_per_worker": 1}
     with LocalCluster(n_workers=2, processes=True, **options) as cluster, Client(cluster) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def client():
+    """A cluster that is left as it is."""
+    with two_workers() as client:
         yield client
 
 
@@ -153,11 +161,8 @@ def test_a_worker_with_another_file_is_found_out(client, grid):
         future.result()
 
 
-def test_a_thousand_drives_give_one_table_though_a_worker_is_killed(client, tmp_path):
-    wanted = of_program(DRIVES, tmp_path / "program.csv", "--seeds", f"{ALL[0]}..{ALL[-1]}", threads=1)
-    every_core = siskin.sweep(DRIVES, seeds=ALL)
-    assert written(every_core, tmp_path / "cores.csv") == wanted
-
+def sweep_with_one_killed(client) -> siskin.Table:
+    """All drives by two workers, of which one is killed once some are done and others are not."""
     tables = []
     sweep = threading.Thread(target=lambda: tables.append(siskin.sweep(DRIVES, seeds=ALL, client=client)))
     before = client.run(os.getpid)
@@ -173,10 +178,18 @@ def test_a_thousand_drives_give_one_table_though_a_worker_is_killed(client, tmp_
     os.kill(next(iter(before.values())), signal.SIGKILL)
     assert played() < len(tasks), "in mid-sweep"
     sweep.join()
-    assert written(tables[0], tmp_path / "cluster.csv") == wanted
     after = client.run(os.getpid)
     assert len(set(before.values()) - set(after.values())) == 1, "that one has died"
+    return tables[0]
+
+
+def test_a_thousand_drives_give_one_table_though_a_worker_is_killed(tmp_path):
+    wanted = of_program(DRIVES, tmp_path / "program.csv", "--seeds", f"{ALL[0]}..{ALL[-1]}", threads=1)
     assert len(wanted.splitlines()) == 1 + len(ALL)
+    assert written(siskin.sweep(DRIVES, seeds=ALL), tmp_path / "cores.csv") == wanted
+    with two_workers() as client:
+        together = sweep_with_one_killed(client)
+    assert written(together, tmp_path / "cluster.csv") == wanted
 
 
 def test_ctrl_c_ends_a_sweep():
