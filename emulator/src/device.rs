@@ -2,6 +2,7 @@
 
 mod answer;
 mod capture;
+mod fit;
 mod machine;
 mod reply;
 mod run;

@@ -5,7 +5,7 @@ use thiserror::Error;
 use crate::fault::Fault;
 use crate::link::LinkId;
 use crate::plant::Gate;
-use crate::rig::{Period, Rig};
+use crate::rig::{Bench, Period, Rig};
 use crate::summary::Rejected;
 use crate::surroundings::Passage;
 use crate::wire::Wire;
@@ -54,6 +54,16 @@ pub trait Machine {
     /// # Errors
     /// Likewise.
     fn mend(&mut self, esc: usize) -> Result<(), &'static str>;
+
+    /// Puts the motor of a bench and its load in place of those that stand there, at rest, and its supply in place of
+    /// one that no other ESC shares. What the ESC knows of its motor is left to whoever tells it.
+    ///
+    /// # Errors
+    /// A line on why not.
+    fn fit(&mut self, esc: usize, bench: &Bench) -> Result<(), &'static str> {
+        let _ = (esc, bench);
+        Err("another motor cannot be put here")
+    }
 
     /// What came in for an ESC since the start and was refused.
     fn rejected(&self, esc: usize) -> Rejected;

@@ -17,6 +17,7 @@ use crate::fault::Fault;
 use crate::link::LinkId;
 use crate::machine::{Machine, Onlooker, Stopped};
 use crate::plant::{Air, Source};
+use crate::rig::Bench;
 use crate::summary::Rejected;
 use crate::wire::{self, Wire};
 use group::Part;
@@ -328,6 +329,15 @@ impl Machine for Rack {
 
     fn mend(&mut self, esc: usize) -> Result<(), &'static str> {
         self.escs[esc].mend();
+        Ok(())
+    }
+
+    fn fit(&mut self, esc: usize, bench: &Bench) -> Result<(), &'static str> {
+        let device = &mut self.escs[esc];
+        device.fit(bench)?;
+        if self.pack.is_none() {
+            device.around_mut().bus_mut().set_supply(bench.supply);
+        }
         Ok(())
     }
 

@@ -4,6 +4,8 @@
 //! start. Whoever has the edges themselves takes it on stretch by stretch, asks for what a pin shows at
 //! any instant, and ends each period of the PWM.
 
+mod fit;
+
 use std::f64::consts::TAU;
 
 use siskin_control::drive::{Bridge, Sample, Snapshot};

@@ -85,13 +85,36 @@ def parameters(browser):
     browser.wait("document.querySelectorAll('.param.changed').length > 0")
 
 
-SCENES = {scene.__name__: scene for scene in (start, flight, fault, identification, parameters)}
+def switches(browser):
+    hold(browser, 0.6, 3700)
+    browser.run("document.querySelector('#switches').open = true")
+    browser.wait("document.querySelectorAll('#switch-plots canvas').length === 3")
+    browser.click("#pause")
+    for name in ("plots", "cursors"):
+        browser.run(f"document.querySelector('#{name}').hidden = true")
+
+
+def several(browser):
+    box = browser.box("#throttle-all")
+    at = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    browser.mouse("mousePressed", *at)
+    browser.mouse("mouseReleased", *at)
+    hold(browser, 0.5, 3100)
+
+
+SCENES = {scene.__name__: scene for scene in (start, flight, fault, identification, parameters, switches, several)}
+OPTIONS = {"switches": ("--plant", "switching"), "several": ("--escs", 4)}
+IN_README = {
+    "start": ("wide", False), "flight": ("wide", False), "fault": ("wide", True), "identification": ("wide", False),
+    "parameters": ("wide", True), "switches": ("wide", False), "several": ("narrow", True),
+}
+"""The size, and whether the dark scheme is shown."""
 
 
 def pictures(name, looks):
     """One scene, as it looks in each way: its name, size and scheme."""
     port = free_port()
-    emulator = Emulator(web=f"127.0.0.1:{port}")
+    emulator = Emulator(*OPTIONS.get(name, ()), web=f"127.0.0.1:{port}")
     try:
         with Browser() as browser:
             browser.show(*SIZES["wide"], dark=False)
@@ -112,7 +135,7 @@ def main():
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     for name in SCENES:
         if folder is None:
-            looks = [(f"scope-{name}", "wide", name in ("fault", "parameters"))]
+            looks = [(f"scope-{name}", *IN_README[name])]
         else:
             folder.mkdir(parents=True, exist_ok=True)
             looks = [

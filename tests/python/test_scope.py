@@ -2,6 +2,7 @@
 
 import csv
 import http.client
+import json
 import re
 import time
 from xml.etree import ElementTree
@@ -52,7 +53,7 @@ def look(browser, port):
     browser.wait("/^-?\\d+$/.test(document.querySelector('#tile-rpm').textContent)")
 
 
-def spin(browser, esc, escs=(0,)) -> tuple[float, float]:
+def spin(browser, esc, escs=(0,), components=(1,)) -> tuple[float, float]:
     """Arms, and holds the throttle at its middle until the motor has that speed; where the mouse holds it.
 
     A busy machine may keep the page from saying for 200 ms that it is held, and that means zero: as often as that
@@ -62,6 +63,8 @@ def spin(browser, esc, escs=(0,)) -> tuple[float, float]:
         if browser.text("#arm") == "Arm":
             browser.click("#arm")
         browser.wait("document.querySelector('#drive').textContent.includes('armed')")
+        for component in components:
+            esc.next("HEARTBEAT", lambda m: m.get_srcComponent() == component and m.base_mode & 128)
         at = browser.press("#throttle", 0.5)
         if esc.wait("ESC_STATUS", lambda m: all(abs(m.rpm[i] - HOLD_RPM) < 60 for i in escs), esc.mark(), 5.0):
             return at
@@ -246,7 +249,7 @@ def test_each_of_several_is_shown_and_driven_and_all_together(browser, start, po
         browser.click("#fleet button:nth-child(3)")
         browser.wait("document.querySelector('#fleet [aria-pressed=true] b').textContent === 'ESC 3'")
         browser.wait("document.querySelector('#param-MAV_COMP_ID').value === '142'")
-        spin(browser, esc, escs=[2])
+        spin(browser, esc, escs=[2], components=[142])
         status = esc.status()
         assert [abs(rpm) < 100 for rpm in status.rpm] == [True, True, False, True]
         # The third's figures and its trace, not another's.
@@ -262,7 +265,7 @@ def test_each_of_several_is_shown_and_driven_and_all_together(browser, start, po
         browser.mouse("mousePressed", *at)
         browser.mouse("mouseReleased", *at)
         assert browser.run("document.querySelector('#throttle-all').checked")
-        spin(browser, esc, escs=range(4))
+        spin(browser, esc, escs=range(4), components=range(140, 144))
         browser.click("#stop")
         esc.next("ESC_STATUS", lambda m: max(m.rpm) < 100)
         assert browser.problems == []
@@ -310,3 +313,74 @@ def test_the_six_switches_of_a_period_are_shown(browser, start, port):
         assert browser.run("document.querySelectorAll('#switch-plots canvas').length") == 3
         assert browser.problems == []
         browser.open("about:blank")
+
+
+def test_another_motor_takes_the_place_of_one_at_rest(browser, esc, port):
+    look(browser, port)
+    browser.wait("document.querySelector('#param-MOT_POLE_PAIRS')?.value === '12'")
+    at = spin(browser, esc)
+    browser.run("document.querySelector('#bench').value = 'quad-5-inch'")
+    browser.run("document.querySelector('#fit').dispatchEvent(new Event('click'))")
+    browser.wait("document.querySelector('#events').textContent.includes('the motor turns: stop it')")
+    browser.mouse("mouseReleased", *at)
+    browser.click("#stop")
+    esc.next("ESC_STATUS", lambda m: m.rpm[0] == 0)
+
+    refused = "[...document.querySelectorAll('#events li')].filter((line) => line.textContent.includes('stop it')).length"
+    browser.run("document.querySelector('#events').replaceChildren()")
+    until = time.monotonic() + TIMEOUT_S
+    # The shaft has some turns left where its speed cannot be measured any more.
+    while "The ESC knows this motor" not in browser.text("#events"):
+        assert time.monotonic() < until, browser.text("#events")
+        browser.click("#fit")
+        browser.wait(f"{refused} > 0 || document.querySelector('#events').textContent.includes('The ESC knows')")
+        browser.run("document.querySelectorAll('#events li').forEach((line) => line.textContent.includes('stop it') && line.remove())")
+    # The board's sensors do not reach so far as that bench's.
+    assert "refused LIM_PHASE_A" in browser.text("#events")
+    assert esc.read_param("MOT_POLE_PAIRS").param_value == 7
+    # A pack of four cells in place of 24 V.
+    browser.wait("Number(document.querySelector('#tile-volts').textContent) < 18")
+    assert browser.problems == []
+
+
+SCENARIO = """
+bench.duration_s = 4.0
+signal = [
+    { at_s = 0.0, throttle = 0.0 },
+    { at_s = 1.0, throttle = 0.5, shape = "ramp", for_s = 0.5 },
+    { at_s = 3.5, throttle = 0.0 },
+]
+fault = [{ at_s = 3.0, for_s = 0.3, kind = "bus_sag", value = 2.0 }]
+"""
+
+
+def play(browser, text):
+    """Gives the page a scenario's file."""
+    browser.run(f"""{{
+        const files = new DataTransfer();
+        files.items.add(new File([{json.dumps(text)}], "some.toml"));
+        const input = document.querySelector("#scenario");
+        input.files = files.files;
+        input.dispatchEvent(new Event("change"));
+    }}""")
+
+
+def test_a_scenario_is_played_on_what_runs(browser, esc, port):
+    look(browser, port)
+    events = "document.querySelector('#events').textContent"
+    play(browser, "signal = [{ at_s = 0.0, rpm = 3000.0 }]")
+    browser.wait(f"{events}.includes('goes past the wire')")
+    play(browser, SCENARIO)
+    esc.next("ESC_STATUS", lambda m: abs(m.rpm[0] - HOLD_RPM) < 60)
+    esc.next("ESC_STATUS", lambda m: abs(m.voltage[0] - 22.0) < 0.3)
+    browser.wait(f"{events}.includes('Scenario: over')")
+    esc.wait_rpm(-100, 1000)
+
+    # Stopped by a person, it does not go on.
+    play(browser, SCENARIO)
+    esc.next("ESC_STATUS", lambda m: m.rpm[0] > 1000)
+    browser.click("#stop")
+    esc.wait_rpm(-100, 500)
+    esc.wait_armed(False)
+    assert "Scenario: stopped" in browser.text("#events")
+    assert browser.problems == []

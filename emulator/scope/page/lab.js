@@ -16,15 +16,75 @@ const FAULTS = {
 };
 
 export class Lab {
-  constructor(link, told) {
-    Object.assign(this, { link, told });
+  /** `esc` gives the ESC, `letGo` has the throttle let go, and `told` hears a line for the log. */
+  constructor(link, esc, letGo, told) {
+    Object.assign(this, { link, esc, letGo, told, plays: false });
     for (const [kind, [label]] of Object.entries(FAULTS)) element("fault").append(new Option(label, kind));
     element("fault").addEventListener("change", () => this.choose());
     element("inject").addEventListener("click", () => this.inject());
     element("mend").addEventListener("click", () => this.mend());
     element("supply").addEventListener("input", () => this.vary("supply", "V", (value) => `kind = "bus_sag", value = ${-value}`));
     element("load").addEventListener("input", () => this.vary("load", "Nm", (value) => `kind = "strike", value = ${-value}`));
+    element("fit").addEventListener("click", () => this.link.ask({ fit: { esc: this.link.esc, bench: element("bench").value } }));
+    element("scenario").addEventListener("change", ({ target }) => this.play(target));
+    element("scenario").parentElement.addEventListener("keydown", ({ key }) => key === "Enter" && element("scenario").click());
+    document.addEventListener("visibilitychange", () => document.hidden && this.stop());
+    document.addEventListener("keydown", ({ key }) => key === "Escape" && this.stop());
+    element("stop").addEventListener("click", () => this.stop());
     this.choose();
+  }
+
+  /** There are these benches. */
+  benches(names) {
+    element("bench").replaceChildren(...names.map((name) => new Option(name, name)));
+  }
+
+  /** Another motor stands there, and the ESC would have to know this of it. */
+  async fitted({ names: [motor, load], params }) {
+    this.told(`Laboratory: ${motor} with ${load}`);
+    if (!element("fit-tell").checked) {
+      this.told("The ESC knows nothing of this motor: identify it, or set its parameters");
+      return;
+    }
+    const esc = this.esc();
+    let left = params;
+    // What does not go with the old values may go with the others' new ones.
+    for (let tries = 0; left.length && tries < 2; tries++) {
+      const again = [];
+      for (const [name, value] of left) if ((await esc.setParam(name, value)) !== Math.fround(value)) again.push([name, value]);
+      left = again;
+    }
+    const refused = left.map(([name]) => name).join(", ");
+    this.told(`The ESC knows this motor${refused && `, but refused ${refused}`}`, refused !== "");
+  }
+
+  /** Plays a scenario's file on what runs. */
+  async play(input) {
+    const [file] = input.files;
+    const text = await file?.text();
+    input.value = "";
+    if (text === undefined) return;
+    this.letGo();
+    this.plays = true;
+    this.link.ask({ scenario: { esc: this.link.esc, text } });
+    this.told(`Scenario: ${file.name} begins`);
+  }
+
+  /** It has come to its end. */
+  over() {
+    this.plays = false;
+    this.told("Scenario: over");
+  }
+
+  refused() {
+    this.stop();
+  }
+
+  stop() {
+    if (!this.plays) return;
+    this.plays = false;
+    this.link.ask({ silence: { esc: this.link.esc } });
+    this.told("Scenario: stopped");
   }
 
   choose() {

@@ -15,6 +15,7 @@ import { Link } from "./socket.js";
 import { Switches } from "./switches.js";
 import { Tests } from "./tests.js";
 import { ThrottleHandle } from "./throttle.js";
+import { Texts } from "./texts.js";
 import { Tiles } from "./tiles.js";
 import { Traces } from "./traces.js";
 
@@ -71,6 +72,7 @@ const handlers = {
     if (content.simulated) remote.channels = content.channels;
     plots.offer(content.simulated ? SIMULATED : LINKED);
     traces.from(content.simulated ? remote : samples, !content.simulated);
+    lab.benches(content.benches ?? []);
     throttle.several(content.escs);
     records.recorded(content.recordings ?? [], link.esc);
     offer();
@@ -80,6 +82,8 @@ const handlers = {
     if (reason.includes("throttle")) letGo();
   },
   trace: (buffer) => remote.take(buffer),
+  fitted: (content) => lab.fitted(content),
+  scenario: () => lab.over(),
   switching: (seen) => switches.take(seen),
   mavlink(message) {
     if (message.name === "HEARTBEAT" && mayBeEsc(message)) heartbeat(message);
@@ -87,14 +91,15 @@ const handlers = {
     if (message.name === "ESC_STATUS" || message.name === "ESC_INFO") telemetry(message);
     esc?.take(message);
     if (message.name === "NAMED_VALUE_FLOAT" && esc === current()) samples.signal(message);
-    if (message.name === "STATUSTEXT") {
-      const of = escs.size > 1 && esc ? `ESC ${components().indexOf(message.component) + 1}: ` : "";
-      told(of + message.text, message.severity <= WARNING);
-    }
+    if (message.name === "STATUSTEXT") texts.take(message);
   },
 };
 const link = new Link(handlers);
 const plots = new Plots(element("plots"), element("plot-choice"), (from, to) => traces.look(from, to));
+const texts = new Texts(({ component, text, severity }) => {
+  const of = escs.size > 1 && escs.has(component) ? `ESC ${components().indexOf(component) + 1}: ` : "";
+  told(of + text, severity <= WARNING);
+});
 const remote = new Remote(link);
 const samples = new Samples();
 const traces = new Traces(link, plots, seen);
@@ -102,7 +107,8 @@ const switches = new Switches(link, () => traces.paused);
 const throttle = new ThrottleHandle(link, current, told);
 const handles = [throttle, new MotorTest(current, told)];
 const parameters = new Parameters(current, told);
-new Lab(link, told);
+const lab = new Lab(link, current, letGo, told);
+handles.push(lab);
 new Tests(current, told);
 const records = new Records(current, told);
 const fleet = new Fleet(element("fleet"), choose);

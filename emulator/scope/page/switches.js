@@ -34,18 +34,18 @@ export class Switches {
     element("switch-text").textContent = seen.is_switching
       ? `A period that began at ${seen.t_s.toFixed(6)} s, as the plant was switched.`
       : `What the duties make of the period that began at ${seen.t_s.toFixed(6)} s. The averaged plant is driven by their means; --plant switching by these edges.`;
-    this.table(seen.edges);
+    this.table(seen);
     this.draw();
   }
 
   /** When each gate turns on and off. */
-  table(edges) {
+  table({ edges, gates: [first] }) {
     const rows = PHASES.flatMap((phase, leg) => ["high", "low"].map((side, low) => {
       const times = [];
-      let before = null;
+      let before = Boolean(first & (1 << (2 * leg + low)));
       for (const [t, of, ...on] of edges) {
         if (of !== leg) continue;
-        if (before === null || on[low] !== before) times.push(`${on[low] ? "on" : "off"} ${t.toFixed(3)}`);
+        if (on[low] !== before) times.push(`${on[low] ? "on" : "off"} ${t.toFixed(3)}`);
         before = on[low];
       }
       return [`${phase} ${side}`, times.join(", ") || "no edge"];

@@ -13,9 +13,7 @@ export class ThrottleHandle {
     Object.assign(this, { link, esc, told, armed: false, held: false, count: 1, all: element("throttle-all") });
     this.slider = element("throttle");
     element("arm").addEventListener("click", () => this.arm(!this.armed));
-    // Those that are not driven any more hold nothing.
-    this.all.addEventListener("pointerdown", () => this.arm(false));
-    this.all.addEventListener("keydown", () => this.arm(false));
+    this.all.addEventListener("change", () => this.arm(false));
     element("stop").addEventListener("click", () => this.stop());
     this.slider.addEventListener("pointerdown", () => this.hold(true));
     for (const event of ["pointerup", "pointercancel", "blur"]) this.slider.addEventListener(event, () => this.hold(false));
@@ -31,8 +29,8 @@ export class ThrottleHandle {
 
   /** There are so many ESCs, which may be driven together. */
   several(count) {
-    this.count = count;
-    this.all.parentElement.hidden = !(count > 1);
+    this.count = count ?? 1;
+    this.all.parentElement.hidden = this.count < 2;
   }
 
   /** Those that are driven: of several the one that is looked at, or all. */
@@ -71,7 +69,8 @@ export class ThrottleHandle {
       this.told("The page sends DShot, and INP_PROTO wants pulses: set it to 0 (automatic)", true);
       return;
     }
-    if (this.armed && !armed) for (const esc of this.escs) this.link.ask({ silence: { esc } });
+    // To all, whichever were driven.
+    if (this.armed && !armed) for (let esc = 0; esc < this.count; esc++) this.link.ask({ silence: { esc } });
     this.armed = armed;
     this.signal = signal;
     this.slider.disabled = !armed;

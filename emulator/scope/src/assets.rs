@@ -36,6 +36,7 @@ static FILES: &[(&str, &str, &str)] = files! {
     "/tiles.js" JS "tiles.js",
     "/throttle.js" JS "throttle.js",
     "/lab.js" JS "lab.js",
+    "/texts.js" JS "texts.js",
     "/tests.js" JS "tests.js",
     "/parameters.js" JS "parameters.js",
     "/export.js" JS "export.js",

@@ -4,6 +4,7 @@ use super::Device;
 use crate::fault::Fault;
 use crate::link::LinkId;
 use crate::machine::{Machine, Onlooker, Stopped};
+use crate::rig::Bench;
 use crate::summary::Rejected;
 use crate::wire::Wire;
 
@@ -45,6 +46,12 @@ impl Machine for Device {
 
     fn mend(&mut self, _: usize) -> Result<(), &'static str> {
         self.mend();
+        Ok(())
+    }
+
+    fn fit(&mut self, _: usize, bench: &Bench) -> Result<(), &'static str> {
+        self.fit(bench)?;
+        self.around_mut().bus_mut().set_supply(bench.supply);
         Ok(())
     }
 

@@ -20,6 +20,10 @@ pub(super) enum FromPage {
     Silence { esc: usize },
     /// A period of the PWM edge by edge.
     Switching { esc: usize },
+    /// Another motor with its load and supply: a bench of the library.
+    Fit { esc: usize, bench: String },
+    /// A scenario's throttle and faults, by its text. Throttle or silence from this page ends it.
+    Scenario { esc: usize, text: String },
     /// A fault that begins now, by its keys as `--fault` takes them.
     Fault { esc: usize, keys: String },
     /// All that was broken is whole again.

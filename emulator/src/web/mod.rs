@@ -6,6 +6,7 @@
 mod address;
 mod channel;
 mod message;
+mod playing;
 mod ring;
 mod rings;
 mod switching;
@@ -27,10 +28,12 @@ use std::time::Instant;
 use siskin_control::drive::Phase;
 use siskin_scope::{ORDERS, Order, Site, ViewerId, What};
 
+use crate::bench::library;
 use crate::link::{HostPort, LinkId, Links};
 use crate::machine::{Machine, Onlooker};
-use crate::scenario;
+use crate::scenario::{self, Script};
 use message::FromPage;
+use playing::{Playing, Stage};
 use rings::Rings;
 use tap::Taps;
 use throttle::Throttle;
@@ -44,6 +47,8 @@ pub struct Web {
     taps: Taps,
     /// One for each ESC.
     throttles: Vec<Throttle>,
+    /// Likewise: what is played on it.
+    playing: Vec<Option<Playing>>,
 }
 
 impl Web {
@@ -79,6 +84,7 @@ impl Web {
             )?,
             links: BTreeMap::new(),
             throttles: (0..escs).map(|_| Throttle::default()).collect(),
+            playing: (0..escs).map(|_| None).collect(),
         })
     }
 
@@ -105,8 +111,8 @@ impl Web {
                     machine.receive(*stream, &bytes, onlooker);
                 }
                 What::Ended => {
-                    for throttle in &mut self.throttles {
-                        throttle.release(viewer, came);
+                    for esc in 0..self.throttles.len() {
+                        self.release(esc, (viewer, came));
                     }
                     if let Some(stream) = self.links.remove(&viewer) {
                         machine.forget(stream);
@@ -120,10 +126,11 @@ impl Web {
                 }
             }
         }
-        let now_ns = machine.now_ns();
+        let (now, now_ns) = (Instant::now(), machine.now_ns());
+        self.go_on(now, machine);
         for (esc, throttle) in self.throttles.iter_mut().enumerate() {
             let wire = machine.wire(esc);
-            throttle.play(Instant::now(), wire, now_ns);
+            throttle.play(now, wire, now_ns);
             self.taps.look(esc, wire.throttle());
             for (viewers, seen) in self.taps.seen(esc) {
                 let text = serde_json::json!({ "switching": seen }).to_string();
@@ -131,6 +138,26 @@ impl Web {
                     self.site.tell(Some(viewer), &text);
                 }
             }
+        }
+    }
+
+    /// A viewer wants no throttle any more, or is gone.
+    fn release(&mut self, esc: usize, (viewer, came): (ViewerId, Instant)) {
+        self.playing[esc].take_if(|playing| playing.viewer() == viewer);
+        self.throttles[esc].release(viewer, came);
+    }
+
+    /// Goes on with what is played.
+    fn go_on(&mut self, now: Instant, machine: &mut impl Machine) {
+        for (esc, place) in self.playing.iter_mut().enumerate() {
+            let Some(playing) = place else { continue };
+            let told = match playing.play(now, &mut self.throttles[esc], esc, machine) {
+                Stage::GoesOn => continue,
+                Stage::Over => serde_json::json!({ "scenario": "over" }),
+                Stage::Refused(reason) => serde_json::json!({ "refused": reason }),
+            };
+            self.site.tell(Some(playing.viewer()), &told.to_string());
+            *place = None;
         }
     }
 
@@ -144,6 +171,8 @@ impl Web {
         let (FromPage::Throttle { esc, .. }
         | FromPage::Silence { esc }
         | FromPage::Switching { esc }
+        | FromPage::Fit { esc, .. }
+        | FromPage::Scenario { esc, .. }
         | FromPage::Fault { esc, .. }
         | FromPage::Mend { esc }) = asked
         else {
@@ -154,11 +183,22 @@ impl Web {
         let throttle = throttle.ok_or_else(|| "there is no such ESC".to_owned())?;
         match asked {
             FromPage::Throttle { value, signal, .. } => {
+                self.playing[esc].take_if(|playing| playing.viewer() == from.0);
                 let asked = throttle.ask(from, (value, signal), machine.wire(esc), now_ns);
                 asked.map_err(|refused| refused.line().to_owned())
             }
             FromPage::Silence { .. } => {
-                throttle.release(from.0, from.1);
+                self.release(esc, from);
+                Ok(())
+            }
+            FromPage::Fit { bench, .. } => {
+                let told = fit(esc, &bench, machine)?;
+                self.site.tell(Some(from.0), &told);
+                Ok(())
+            }
+            FromPage::Scenario { text, .. } => {
+                let script = Script::read(&text)?;
+                self.playing[esc] = Some(Playing::new(from.0, script, now_ns));
                 Ok(())
             }
             FromPage::Switching { .. } => {
@@ -189,6 +229,22 @@ impl Web {
     }
 }
 
+/// Puts a bench of the library there: what a page is told of it, with what the ESC would have to know.
+fn fit(esc: usize, bench: &str, machine: &mut impl Machine) -> Result<String, String> {
+    if !library::names().any(|known| known == bench) {
+        // A page has no right to this machine's files.
+        return Err("there is no such bench in the library".to_owned());
+    }
+    let standing = scenario::stand(bench, toml::Table::new()).map_err(|error| error.to_string())?;
+    machine.fit(esc, &standing.bench)?;
+    let params = standing.params.iter();
+    let params: Vec<_> = params
+        .map(|(id, value)| (id.entry().name, *value))
+        .collect();
+    let fitted = serde_json::json!({ "names": standing.names, "params": params });
+    Ok(serde_json::json!({ "fitted": fitted }).to_string())
+}
+
 /// What a page is told first: what there is.
 fn greeting(escs: usize, recordings: &[PathBuf]) -> String {
     let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
@@ -197,6 +253,10 @@ fn greeting(escs: usize, recordings: &[PathBuf]) -> String {
     hello.insert("simulated".into(), true.into());
     hello.insert("escs".into(), escs.into());
     hello.insert("channels".into(), channels.into());
+    hello.insert(
+        "benches".into(),
+        library::names().collect::<Vec<_>>().into(),
+    );
     // What is no file before its end is none to be fetched.
     let names = recordings.iter().map(|path| match path.extension() {
         Some(extension) if extension == "parquet" => None,

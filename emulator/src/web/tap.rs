@@ -63,10 +63,12 @@ impl Tap {
     }
 
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
-        if let Some((viewers, seen)) = self.look.period(t_s, period, rig) {
-            self.seen.push((viewers, Some(seen)));
-        }
         if self.chunk.is_some() {
+            if self.look.is_asked()
+                && let Some((viewers, seen)) = self.look.period(t_s, period, rig)
+            {
+                self.seen.push((viewers, Some(seen)));
+            }
             let config = rig.config();
             let control = Control {
                 bridge: period.bridge,
