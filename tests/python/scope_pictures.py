@@ -86,6 +86,7 @@ def parameters(browser):
 
 
 def switches(browser):
+    span(browser, 0.01)
     hold(browser, 0.6, 3700)
     browser.run("document.querySelector('#switches').open = true")
     browser.wait("document.querySelectorAll('#switch-plots canvas').length === 3")

@@ -78,7 +78,7 @@ export class Switches {
     const plot = new globalThis.uPlot({
       title: unit ? `${name}, ${unit}` : name, width: this.width, height,
       cursor: { sync: { key: "switches" }, drag: { x: true, y: false }, points: { show: false } },
-      legend: { live: options.live },
+      legend: { show: options.hasLegend },
       scales: { x: { time: false }, y: options.scale ?? {} },
       axes: [{ ...axis, size: 28 }, { ...axis, size: AXIS, space: 18, ...options.axis }],
       series: [
@@ -98,11 +98,11 @@ export class Switches {
     const row = (i) => gates.length - 1 - i;
     this.plots ??= [
       this.make("Gates", "", gates, HEIGHT.gates, {
-        live: false, isStepped: true, colour: (i) => i >> 1, scale: { range: [-0.25, gates.length] },
+        hasLegend: false, isStepped: true, colour: (i) => i >> 1, scale: { range: [-0.25, gates.length] },
         axis: { grid: { show: false }, splits: () => gates.map((_, i) => row(i) + ON / 2), values: () => gates },
       }),
-      this.make("Terminals", "V", PHASES, HEIGHT.others, { live: true, isStepped: true }),
-      this.make("Phase currents", "A", PHASES, HEIGHT.others, { live: true }),
+      this.make("Terminals", "V", PHASES, HEIGHT.others, { hasLegend: true, isStepped: true }),
+      this.make("Phase currents", "A", PHASES, HEIGHT.others, { hasLegend: true }),
     ];
     const { t_us, gates: bits, terminals_v, currents_a } = this.seen;
     const levels = gates.map((_, i) => bits.map((set) => row(i) + (set & (1 << i) ? ON : 0)));
