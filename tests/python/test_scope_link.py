@@ -1,5 +1,6 @@
 """`siskin scope`: the page in a browser, of an ESC on a MAVLink link."""
 
+import http.client
 import json
 import re
 import subprocess
@@ -51,10 +52,19 @@ def look(browser, url):
     browser.wait("document.querySelector('#param-state').textContent.includes('parameters')")
 
 
-def hold(browser):
-    """Holds the button of the motor test; where the mouse is."""
+def hold(browser, esc) -> tuple[float, float]:
+    """Holds the button of the motor test until the motor turns; where the mouse is.
+
+    While the ESC still tests itself it refuses: then it is asked anew.
+    """
     browser.run("document.querySelector('#test-value').value = 100")
-    return browser.press("#turn", 0.5)
+    for _ in range(8):
+        mark = esc.mark()
+        at = browser.press("#turn", 0.5)
+        if esc.wait("ESC_STATUS", lambda m: m.rpm[0] > TURNING_RPM, mark, 5.0):
+            return at
+        browser.mouse("mouseReleased", *at)
+    raise AssertionError(f"it does not turn: {browser.text('#events')}")
 
 
 def shows(browser, selector):
@@ -83,10 +93,15 @@ def test_the_motor_turns_while_the_button_is_held_and_its_trace_moves(browser, s
     assert esc.read_param("TEL_SIGNALS").param_value == 511
     picture = "document.querySelector('#plots canvas').toDataURL()"
     first = browser.run(picture)
-    at = hold(browser)
-    turning = esc.wait("ESC_STATUS", lambda m: m.rpm[0] > TURNING_RPM, esc.mark())
-    assert turning is not None, browser.text("#events")
-    browser.wait(f"Number(document.querySelector('#tile-rpm').textContent) > {TURNING_RPM}")
+    browser.run("""
+        const tile = document.querySelector('#tile-rpm');
+        window.fastest = 0;
+        const look = () => { window.fastest = Math.max(window.fastest, Number(tile.textContent)); };
+        new MutationObserver(look).observe(tile, { childList: true, characterData: true, subtree: true });
+    """)
+    at = hold(browser, esc)
+    # It turns for three seconds at most, however slow the browser is.
+    browser.wait(f"window.fastest > {TURNING_RPM}")
     browser.wait(f"{picture} !== {first!r}")
     # With the streamed currents there is a d-q plane.
     browser.wait("document.querySelector('#plane').checkVisibility()")
@@ -166,12 +181,23 @@ def test_closing_the_page_ends_the_test(served):
     # A page that is closed does not open again.
     with Browser() as browser:
         look(browser, url)
-        hold(browser)
-        assert esc.wait("ESC_STATUS", lambda m: m.rpm[0] > TURNING_RPM, esc.mark()) is not None
+        hold(browser, esc)
         browser.process.kill()
-        ended = esc.wait("HEARTBEAT", since=esc.mark())
-        assert ended is not None
         esc.wait_rpm(-100, 100)
+
+
+def test_a_foreign_page_and_a_foreign_name_are_refused(served):
+    _, url = served
+    host = url.removeprefix("http://").rstrip("/")
+    for headers, status in [
+        ({"Host": host}, 200),
+        ({"Host": f"rebound.example:{host.split(':')[1]}"}, 403),
+        ({"Host": host, "Origin": "http://evil.example"}, 403),
+    ]:
+        connection = http.client.HTTPConnection(host, timeout=10)
+        connection.request("GET", "/", headers=headers)
+        assert connection.getresponse().status == status, headers
+        connection.close()
 
 
 def test_bad_addresses_are_one_line(served):

@@ -132,3 +132,37 @@ impl Tests {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mavlink::{MAVLinkV2MessageRaw, MavHeader};
+
+    use super::*;
+
+    fn frame(message: &impl MessageData) -> Vec<u8> {
+        let mut frame = MAVLinkV2MessageRaw::new();
+        frame.serialize_message_data(MavHeader::default(), message);
+        frame.raw_bytes().to_vec()
+    }
+
+    #[test]
+    fn only_a_page_that_has_begun_a_test_ends_one_by_going() {
+        let command = |command| COMMAND_LONG_DATA {
+            param1: 0.5,
+            param2: 3.0,
+            command,
+            target_system: 7,
+            target_component: 142,
+            ..COMMAND_LONG_DATA::DEFAULT
+        };
+        let mut tests = Tests::default();
+        tests.look(1, &frame(&command(MavCmd::MAV_CMD_ACTUATOR_TEST)));
+        tests.look(2, &frame(&command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS)));
+        tests.look(3, b"no frame");
+        assert!(tests.end(2).is_none() && tests.end(3).is_none());
+        let end = tests.end(1).expect("it has begun one");
+        assert!(end.param1.is_nan() && end.command == MavCmd::MAV_CMD_ACTUATOR_TEST);
+        assert_eq!((end.target_system, end.target_component), (7, 142));
+        assert!(tests.end(1).is_none());
+    }
+}

@@ -62,12 +62,18 @@ impl Tap {
         }
     }
 
+    /// Looks at a period edge by edge.
+    #[cold]
+    fn see(&mut self, t_s: f64, period: &Period, rig: &Rig) {
+        if let Some((viewers, seen)) = self.look.period(t_s, period, rig) {
+            self.seen.push((viewers, Some(seen)));
+        }
+    }
+
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         if self.chunk.is_some() {
-            if self.look.is_asked()
-                && let Some((viewers, seen)) = self.look.period(t_s, period, rig)
-            {
-                self.seen.push((viewers, Some(seen)));
+            if self.look.is_asked() {
+                self.see(t_s, period, rig);
             }
             let config = rig.config();
             let control = Control {

@@ -229,3 +229,42 @@ fn a_taken_port_is_an_error_only_where_it_was_named() {
         Ok((None, None))
     ));
 }
+
+#[test]
+fn a_scenario_plays_until_its_page_is_gone() {
+    let mut desk = Desk::new();
+    let mut page = desk.page();
+    page.read().unwrap();
+    let text = "bench.duration_s = 60.0
+        signal = [{ at_s = 0.0, throttle = 0.0 }, { at_s = 2.0, throttle = 0.5 }]";
+    ask(
+        &mut page,
+        &json!({ "scenario": { "esc": 0, "text": text } }),
+    );
+    let mut turns = 0;
+    while (desk.rpm - 3150.0).abs() > 30.0 {
+        assert!(turns < 800, "{} rpm after {turns} turns", desk.rpm);
+        turns += 1;
+        desk.run(10);
+    }
+    drop(page);
+    desk.run(1500);
+    assert!(desk.rpm < 1000.0, "{}", desk.rpm);
+}
+
+#[test]
+fn a_motor_is_one_of_the_library_and_no_file() {
+    let mut desk = Desk::new();
+    let mut page = desk.page();
+    page.read().unwrap();
+    for (bench, key) in [("/etc/hostname", "refused"), ("bare", "fitted")] {
+        ask(&mut page, &json!({ "fit": { "esc": 0, "bench": bench } }));
+        desk.run(50);
+        let mut told = Value::Null;
+        while told.is_null() {
+            if let Socket::Text(text) = page.read().unwrap() {
+                told = serde_json::from_str::<Value>(&text).unwrap()[key].take();
+            }
+        }
+    }
+}
