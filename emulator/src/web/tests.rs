@@ -60,6 +60,22 @@ impl Desk {
         tungstenite::client(request, stream).unwrap().0
     }
 
+    /// Runs until the page is told something under this key: an order may come in later than any one run.
+    fn answer(&mut self, page: &mut WebSocket<TcpStream>, key: &str) -> Value {
+        page.get_ref()
+            .set_read_timeout(Some(Duration::from_millis(10)))
+            .unwrap();
+        loop {
+            self.run(10);
+            if let Ok(Socket::Text(text)) = page.read() {
+                let told = serde_json::from_str::<Value>(&text).unwrap()[key].take();
+                if !told.is_null() {
+                    return told;
+                }
+            }
+        }
+    }
+
     /// The status line and all else of an answer.
     fn get(&self, path: &str, lines: &str) -> String {
         let mut stream = TcpStream::connect(self.web.place().0).unwrap();
@@ -180,14 +196,7 @@ fn a_page_breaks_and_mends_and_is_told_what_it_cannot() {
         json!({ "fault": { "esc": 1, "keys": "kind = \"reset\"" } }),
     ] {
         ask(&mut page, &wrong);
-        desk.run(50);
-        let mut refused = Value::Null;
-        while refused.is_null() {
-            if let Socket::Text(text) = page.read().unwrap() {
-                refused = serde_json::from_str::<Value>(&text).unwrap()["refused"].take();
-            }
-        }
-        assert!(refused.is_string());
+        assert!(desk.answer(&mut page, "refused").is_string());
     }
 }
 
@@ -259,12 +268,6 @@ fn a_motor_is_one_of_the_library_and_no_file() {
     page.read().unwrap();
     for (bench, key) in [("/etc/hostname", "refused"), ("bare", "fitted")] {
         ask(&mut page, &json!({ "fit": { "esc": 0, "bench": bench } }));
-        desk.run(50);
-        let mut told = Value::Null;
-        while told.is_null() {
-            if let Socket::Text(text) = page.read().unwrap() {
-                told = serde_json::from_str::<Value>(&text).unwrap()[key].take();
-            }
-        }
+        desk.answer(&mut page, key);
     }
 }
