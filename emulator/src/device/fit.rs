@@ -17,7 +17,8 @@ impl Device {
     pub fn fit(&mut self, bench: &Bench) -> Result<(), &'static str> {
         let phase = self.rig.snapshot().phase;
         let rests = self.rig.plant().speed_rad_s().abs() < AT_REST_RAD_S;
-        if !rests || !matches!(phase, Phase::Idle | Phase::Brake) {
+        // A tone does not turn it.
+        if !rests || !matches!(phase, Phase::Idle | Phase::Brake | Phase::Tone) {
             return Err("the motor turns: stop it before another takes its place");
         }
         self.rig.around_mut().fit(bench);

@@ -266,6 +266,8 @@ fn a_motor_is_one_of_the_library_and_no_file() {
     let mut desk = Desk::new();
     let mut page = desk.page();
     page.read().unwrap();
+    // The board tests itself, and sounds.
+    desk.run(1500);
     for (bench, key) in [("/etc/hostname", "refused"), ("bare", "fitted")] {
         ask(&mut page, &json!({ "fit": { "esc": 0, "bench": bench } }));
         desk.answer(&mut page, key);
