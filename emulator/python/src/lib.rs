@@ -2,7 +2,7 @@
 //!
 //! The package's own files give it the shape that a person uses. Whatever runs for long lets other threads of Python
 //! go on, and ends with Ctrl-C.
-#![deny(unsafe_code)] // not `forbid`: what PyO3's macros write allows it
+#![forbid(unsafe_code)]
 
 mod convert;
 mod interrupt;
