@@ -156,7 +156,7 @@ impl Rig {
     /// Dead time of the inverter, s.
     pub(crate) fn dead_time_s(&self) -> f64 {
         self.around.bench().dead_time_s.unwrap_or_else(|| {
-            let share: f64 = self.config.dead_time.duty.to_num();
+            let share: f64 = self.config.dead_time.share.to_num();
             share * self.period_s()
         })
     }

@@ -18,7 +18,7 @@ impl Timing {
     /// steps.
     pub(crate) fn new(config: &Config, clock_hz: u32) -> Self {
         let period_clocks = clock_hz as f32 * config.scale.period_s;
-        let dead_clocks = period_clocks * config.dead_time.duty.to_f32();
+        let dead_clocks = period_clocks * config.dead_time.share.to_f32();
         Self {
             // The table's 8 to 60 kHz give 10625 to 1400 clocks.
             top: (0.5 * period_clocks + 0.5) as u16,

@@ -3,7 +3,7 @@
 //! While both switches of a phase are off its current flows through a diode: through the low side's
 //! when it flows into the motor, so the phase is low for the dead time of each period in which it
 //! should be high, and the other way round. The duty that this takes is the dead time over the
-//! period, with the current's sign.
+//! period, and a little more for the diode's own drop, with the current's sign.
 
 use fixed::FixedI32;
 use fixed::types::extra::{U22, U25};
@@ -21,8 +21,10 @@ pub type Share = FixedI32<U22>;
 pub struct Config {
     /// Phase current over the least whose sign is certain.
     pub certainty: Gain<Current, I12F20>,
-    /// The whole compensation: dead time over period.
+    /// The whole compensation: dead time over period, and the diodes' part.
     pub duty: I2F30,
+    /// Dead time over period, as the bridge has it.
+    pub share: I2F30,
 }
 
 /// A current over the least whose sign is certain, in the rotor's frame and as seen from where that
@@ -59,6 +61,7 @@ impl Config {
     pub const NONE: Self = Self {
         certainty: Gain::ZERO,
         duty: I2F30::ZERO,
+        share: I2F30::ZERO,
     };
 
     /// A phase's share of the supply and what the dead time takes away of it, for the certainty of its
@@ -86,6 +89,7 @@ mod tests {
         Config {
             certainty: Gain::new(1.0 / 0.3).expect("in range"),
             duty: I2F30::from_num(0.0075),
+            ..Config::NONE
         }
     }
 

@@ -1,4 +1,5 @@
-//! Support of the observer at low speed: a current along d, and a bound of the one along q.
+//! Support of the observer at low speed: a current along d, and a bound of the one along q; and at any speed the
+//! bound of a winding whose own flux would hide the rotor's.
 //!
 //! There the back-EMF is small against what is not known: the dead time's loss around zero current,
 //! and the drop across a resistance that may be stated wrongly.
@@ -18,7 +19,7 @@ pub struct Config {
     i_q: Current,
     /// Bound of i_q over the speed, where that is more.
     i_q_slope: Gain<Speed, Current>,
-    /// `LIM_PHASE_A`, which bounds both.
+    /// What bounds both: `LIM_PHASE_A`, or what the winding's flux allows.
     phase: Current,
     /// The last speed at which anything is done.
     end: Speed,
@@ -26,11 +27,12 @@ pub struct Config {
 
 impl Config {
     /// `i_d` along d at standstill and `i_d_slope` less over the speed; at most `i_q` along q, or
-    /// `i_q_slope` times the speed, where that is more. No slope is negative.
+    /// `i_q_slope` times the speed, where that is more. No slope is negative. Both are at most `phase`, where the
+    /// drive itself has them up to `limit`.
     pub fn new(
         (i_d, i_d_slope): (Current, Gain<Speed, Current>),
         (i_q, i_q_slope): (Current, Gain<Speed, Current>),
-        phase: Current,
+        (phase, limit): (Current, Current),
     ) -> Self {
         let mut config = Self {
             i_d,
@@ -40,22 +42,22 @@ impl Config {
             phase,
             end: Speed::MAX,
         };
-        config.end = config.last();
+        config.end = config.last(limit);
         config
     }
 
     /// Nothing is done at any speed.
     pub fn none(phase: Current) -> Self {
         let i_d = (Current::ZERO, Gain::ZERO);
-        Self::new(i_d, (Current::MAX, Gain::ZERO), phase)
+        Self::new(i_d, (Current::MAX, Gain::ZERO), (phase, phase))
     }
 
     /// The last speed at which anything is done, by bisection: with the speed i_d* only falls and
     /// the bound of i_q only rises.
-    fn last(&self) -> Speed {
+    fn last(&self, limit: Current) -> Speed {
         let acts = |bits| {
             let speed = Speed::from_bits(bits);
-            self.i_d_at(speed) > Current::ZERO || self.i_q_at(speed) < self.phase
+            self.i_d_at(speed) > Current::ZERO || self.i_q_at(speed).min(self.phase) < limit
         };
         if !acts(0) {
             return Speed::MIN;
@@ -115,7 +117,7 @@ mod tests {
     fn config() -> Config {
         let gain = |k| Gain::new(k).expect("in range");
         let at_rest = Current::from_num(0.2);
-        Config::new((at_rest, gain(10.0)), (at_rest, gain(40.0)), PHASE)
+        Config::new((at_rest, gain(10.0)), (at_rest, gain(40.0)), (PHASE, PHASE))
     }
 
     #[test]
@@ -150,10 +152,21 @@ mod tests {
         for share in [0.01, 0.1, 0.3] {
             let i_d = PHASE.to_num::<f64>() * share;
             let wide = (Current::MAX, Gain::ZERO);
-            let config = Config::new((Current::from_num(i_d), Gain::ZERO), wide, PHASE);
+            let config = Config::new((Current::from_num(i_d), Gain::ZERO), wide, (PHASE, PHASE));
             let (_, bounds) = config.bounds(FULL, Speed::ZERO);
             let together = bounds.max.to_num::<f64>().hypot(i_d) / PHASE.to_num::<f64>();
             assert!((0.965..1.0).contains(&together), "{share}: {together}");
+        }
+    }
+
+    #[test]
+    fn a_bound_below_the_drive_s_own_holds_at_any_speed() {
+        let none = (Current::ZERO, Gain::ZERO);
+        let bound = Current::lit("0.7");
+        let config = Config::new(none, (Current::MAX, Gain::ZERO), (bound, PHASE));
+        for speed in [Speed::MIN, Speed::ZERO, Speed::MAX] {
+            let (_, bounds) = config.bounds(FULL, speed);
+            assert_eq!((bounds.min, bounds.max), (-bound, bound));
         }
     }
 

@@ -6,8 +6,12 @@ use super::formula::define;
 use super::quantity::Quantity;
 use super::si::{LINEARISED_SHARE, SLOW_SHARE, Si};
 use crate::control::PERIODS;
+use crate::params::choice::CtlObserver;
 use crate::params::from_motor::FromMotor;
 use crate::params::table::ParamId;
+
+/// Drop of the two body diodes that carry a phase's current in a period's dead times, V.
+const DIODES_V: f32 = 1.4;
 
 /// The quantities that parameters give, in the unit of the parameter's times a factor.
 const GIVEN: &[(Quantity, ParamId, f32)] = &[
@@ -52,6 +56,9 @@ impl Si<'_> {
         self.set(Quantity::UnitA, self.scale.current_a);
         self.set(Quantity::UnitV, self.scale.voltage_v);
         self.set(Quantity::PolePairs, self.scale.pole_pairs);
+        // The crossings of the flux at 100 rpm are lost if no part of the dead time's loss is left to damp the current.
+        let follows_flux = self.chosen(CtlObserver::Compensated);
+        self.set(Quantity::DiodesV, if follows_flux { DIODES_V } else { 0.0 });
         define!(self, {
             Tau([TAU]),
             UnitWb(UnitV * T),
@@ -76,6 +83,9 @@ impl Si<'_> {
             SlowestRpm(RunRpm min LeastRpm),
             SlowRpm([SLOW_SHARE] * SlowestRpm),
             StartA(RampA min LimitA),
+            // In the dead time a phase is by a diode's drop beyond the supply's poles, at both ends. Of the highest
+            // supply that is the least share: what is compensated by too much is not stable around zero current.
+            DeadShare(DiodesV / SupplyMaxV + [1.0] * DeadTime / T),
         });
     }
 }

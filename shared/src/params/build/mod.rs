@@ -16,7 +16,7 @@ mod start;
 mod tone;
 
 pub use flux::FluxSettings;
-use formula::{fill, formulas, refuse, value};
+use formula::{fill, formulas, refuse};
 pub use input::input;
 use quantity::Quantity;
 pub use si::{BuildError, scale};
@@ -58,7 +58,8 @@ const SENSED_S: f32 = 0.8;
 /// Time for which the observer must have led before a start counts as done, s.
 const PROVEN_S: f32 = 0.3;
 
-/// i_d at standstill over `STA_RAMP_A`.
+/// i_d at standstill over `STA_RAMP_A`, and its resistive drop over what the dead time takes beyond the back-EMF at
+/// the least speed.
 const BIAS_SHARE: f32 = 0.3;
 
 /// Back-EMF over the resistive drop of i_d at standstill, at the speed at which i_d ends: 2000 rad/s
@@ -101,6 +102,9 @@ const BURN_SHARE: f32 = 0.25;
 
 /// Rate at which the bounds of i_q follow the bus current, 1/s.
 const BOUND_RATE: f32 = 600.0;
+
+/// The reason to refuse a PWM: an observer needs four periods a turn, edges need twelve, six-step 24.
+const TOO_FEW_PERIODS: &str = "too few periods a turn at CTL_RPM_MAX";
 
 /// The reason to refuse a speed.
 const ABOVE_FASTEST: &str = "above CTL_RPM_MAX";
@@ -178,7 +182,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
         duty_max,
         match board.shunts {
             // The dead time's compensation comes on top of what the vector makes.
-            Shunts::Three => window - value!(p, DeadTime / T),
+            Shunts::Three => window - p.of(Quantity::DeadShare),
             Shunts::Two => 0.0,
         },
     );
@@ -239,7 +243,7 @@ fn refuse_contradictions(p: &Si) {
         CtlBwSpdHz([SPEED_SHARE] * CurrentHz - SpeedHz) "above a fifth of CTL_BW_CUR_HZ",
         LimPhaseA([SHOWN_SHARE / TRIP_SHARE] * RangeA - LimitA)
             "the trip at 1.4 times this is beyond the board",
-        PwmFreqHz([0.25] - FastestTurns) "less than four periods a turn at CTL_RPM_MAX",
+        PwmFreqHz([0.25] - FastestTurns) TOO_FEW_PERIODS,
     });
     p.refuse_above(
         p.board.least_dead_time.ns,
@@ -249,7 +253,7 @@ fn refuse_contradictions(p: &Si) {
     );
     if p.chosen(CtlObserver::FluxCrossings) || p.chosen(CtlObserver::Hall) {
         refuse!(p, {
-            PwmFreqHz([EDGES_TURNS] - FastestTurns) "less than twelve periods a turn at CTL_RPM_MAX",
+            PwmFreqHz([EDGES_TURNS] - FastestTurns) TOO_FEW_PERIODS,
         });
     }
     let protocol = p.params.number(ParamId::InpProto);
@@ -279,8 +283,17 @@ fn least_u_q(p: &Si) -> Voltage {
 /// Keeps an observer that lives by the back-EMF in lock where there is little of it.
 fn low_speed(p: &Si) -> low_speed::Config {
     let formulas = formulas!(p, {
-        number phase(LimitA / UnitA),
-        define BiasA([BIAS_SHARE] * StartA),
+        number limit(LimitA / UnitA),
+        // A current whose flux is above the rotor's takes more voltage than the rotor makes: the supply cannot
+        // hold it in braking, and an L that is wrong by 30 % turns the flux by more than 17°.
+        define BoundA(Flux / L min LimitA),
+        number phase(BoundA / UnitA),
+        // At the least speed each phase's current keeps its sign but for short: it is above the PWM's ripple, and
+        // the more the dead time is worth the shorter it is without a sign.
+        define SlowV(LeastRpm * PolePairs * Tau / [60.0] * Flux),
+        define RippleA(SlowV * T / L),
+        define HiddenA(DeadV - SlowV / R * [BIAS_SHARE]),
+        define BiasA([BIAS_SHARE] * StartA max RippleA max HiddenA min StartA),
         define DeadEndV([BIAS_DEAD_END] * DeadV),
         define EndV([BIAS_END] * R * BiasA max DeadEndV),
         define EndRadS(EndV / Flux),
@@ -289,13 +302,14 @@ fn low_speed(p: &Si) -> low_speed::Config {
         number i_q([TORQUE_LEAST_SHARE] * StartA / UnitA),
         gain i_q_slope(MotRMohm, [TORQUE_DROP_SHARE] * Flux / R * RadPerUnit / UnitA),
     });
-    let phase = formulas.number();
+    let limit = formulas.number();
     if !is_helped(p) {
-        return low_speed::Config::none(phase);
+        return low_speed::Config::none(limit);
     }
+    let phase = formulas.number();
     let i_d = (formulas.number(), formulas.gain());
     let i_q = (formulas.number(), formulas.gain());
-    low_speed::Config::new(i_d, i_q, phase)
+    low_speed::Config::new(i_d, i_q, (phase, limit))
 }
 
 fn limits(p: &Si, place: &mut protection::Config) {

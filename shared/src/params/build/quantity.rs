@@ -80,6 +80,9 @@ quantities! {
         RunRpm,
         /// What the dead time takes of a phase's voltage.
         DeadV,
+        /// And of its duty, with what the diodes take.
+        DeadShare,
+        DiodesV,
         // Of the board.
         APerCount,
         BusVPerCount,
@@ -130,7 +133,7 @@ quantities! {
         BoundA,
     }
     // Of low speed and the limits.
-    own { BiasA, DeadEndV, ReturnV, EndV, EndRadS }
+    own { SlowV, RippleA, HiddenA, BiasA, DeadEndV, ReturnV, EndV, EndRadS }
     // Of the edges.
     own {
         StatorFlux, CornerS, Turns, Ae, SlowRadS, TauInt, Edges, Acceleration, Known, Lag,

@@ -78,7 +78,7 @@ pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
                 Modulation::SpaceVector => 0.5 + SQRT_3 / 4.0,
                 Modulation::Sine => 0.75,
             };
-            (window - dead_time_s / period_s) / second
+            (window - p.of(Quantity::DeadShare)) / second
         }
     };
     let duty_max = read.min(supplied);
@@ -130,7 +130,8 @@ pub(super) fn catch(p: &Si, place: &mut catch::Config) {
 pub(super) fn dead_time(p: &Si, place: &mut dead_time::Config) {
     fill!(p, place, {
         gain certainty(PwmDeadtimeNs, UnitA / [SIGN_CERTAIN_A]),
-        number duty(DeadTime / T),
+        number duty(DeadShare),
+        number share(DeadTime / T),
     });
 }
 

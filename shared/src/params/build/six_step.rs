@@ -53,7 +53,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
         value!(p, [6.0] * FastestTurns * [LEAST_PERIODS]),
         1.0,
         ParamId::PwmFreqHz,
-        "less than four periods a sextant at CTL_RPM_MAX",
+        super::TOO_FEW_PERIODS,
     );
     outer::planner(p, Quantity::T, &mut place.planner);
     let crossing = &mut place.crossing;

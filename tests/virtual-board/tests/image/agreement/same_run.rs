@@ -130,7 +130,7 @@ impl Run {
 impl Onlooker for Run {
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         let length_s = rig.period_s();
-        let dead_time_s = rig.config().dead_time.duty.to_num::<f64>() * length_s;
+        let dead_time_s = rig.config().dead_time.share.to_num::<f64>() * length_s;
         let high_sides = &mut self.high_sides;
         self.gates
             .period(period.halves, length_s, dead_time_s, |at_s, leg, gate| {
