@@ -1,13 +1,14 @@
 //! The observers' coefficients.
 
+use super::TORQUE_DROP_SHARE;
 use super::flux;
-use super::formula::{fill, value};
+use super::formula::{fill, formulas, value};
 use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::delay::Delay;
 use crate::control::observer::back_emf::Cure;
 use crate::control::observer::{self, back_emf, compensated, edges};
-use crate::math::{EIGHTH_PI, Multiplier, settled};
+use crate::math::{EIGHTH_PI, Multiplier, settled, square_root};
 use crate::params::ParamId;
 use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux};
@@ -25,8 +26,19 @@ const CURE_RAD_S: f32 = 400.0;
 /// ω⁺ at the least, 1/s.
 const OMEGA_MIN_RAD_S: f32 = 60.0;
 
-/// Least and greatest ω_n of the loop, 1/s.
+/// Least and greatest ω_n of the loop, 1/s, where what follows is less.
 const OMEGA_N_RAD_S: [f32; 2] = [150.0, 1000.0];
+
+/// ω_n over the root of what the current accelerates the rotor by, rad/s²: the loop then lags by 1/1.5² of a radian,
+/// 25°. Slower, a rotor that is light for its speed would leave it behind.
+const FOLLOWING: f32 = 1.5;
+
+/// Up to `LIM_PHASE_A` the current's bound rises with the speed (`TORQUE_DROP_SHARE`), and ω_n with it
+/// (`compensated::OMEGA_N_SHARE`): where it has caught up with what such a current needs, no more is needed.
+const CAUGHT_UP: f32 = TORQUE_DROP_SHARE / 0.35;
+
+/// ω_n over the PWM's frequency, at most: the loop goes in steps.
+const OMEGA_N_SHARE_MAX: f32 = 0.05;
 
 /// Corner of the speed's part above the loop's integrator, 1/s.
 const SMOOTHING_RAD_S: f32 = 300.0;
@@ -57,11 +69,18 @@ pub(super) fn observer(p: &Si, place: &mut observer::Config) {
 
 /// The compensated flux observer.
 fn compensated(p: &Si, place: &mut compensated::Config) {
+    let formulas = formulas!(p, {
+        value own_flux(L * FluxPerCurrent),
+        // The square of ω_n over the current.
+        define Following([1.5 * FOLLOWING * FOLLOWING] * PolePairs * PolePairs * Flux / J),
+        value following(Following * LimitA),
+    });
     p.refuse_if(
-        value!(p, L * FluxPerCurrent) >= INDUCTANCE_MAX,
+        formulas.value() >= INDUCTANCE_MAX,
         ParamId::MotLUh,
         "too high for this flux and the board's range",
     );
+    p.set(Quantity::OmegaN, square_root(formulas.value()));
     // Under a voltage that changes in the middle of the period β is half, the other way.
     let share = match p.board.delay {
         Delay::None | Delay::One => 1.0,
@@ -74,8 +93,9 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
         // β = R·T_s²/(12·L). The square of the speed is in turns a period.
         gain bias(MotLUh, R * T / L * Tau * Tau / [12.0] * Share),
         number omega_min([OMEGA_MIN_RAD_S] * T / Tau),
-        number omega_n_min([OMEGA_N_RAD_S[0]] * T / Tau),
-        number omega_n_max([OMEGA_N_RAD_S[1]] * T / Tau),
+        define OmegaN(Following * Flux / R * [CAUGHT_UP] min OmegaN * T min [OMEGA_N_SHARE_MAX] / Tau),
+        number omega_n_min([OMEGA_N_RAD_S[0]] * T / Tau max OmegaN),
+        number omega_n_max([OMEGA_N_RAD_S[1]] * T / Tau max OmegaN),
         factor smoothing(PwmFreqHz, [SMOOTHING_RAD_S] * T),
     });
     place.xi_nominal = INVERSE_FLUX_NOMINAL;

@@ -145,7 +145,7 @@ quantities! {
         ParkCharge, HalfCharge,
     }
     // Of the other observers.
-    own { Decay, ActsS, Chi, ChiSquare, OmegaN }
+    own { Decay, ActsS, Chi, ChiSquare, OmegaN, Following }
     // Of the regulators.
     own { KI, SlopeV, EmfTurns, TurnsPerVoltage }
     // Of the outer loop.
