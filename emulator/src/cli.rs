@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Reproduce(ReproduceArgs),
     /// Measures how fast the emulator is on this machine
     Bench(BenchArgs),
+    /// Plays every fault at every moment of a flight with either drive, and judges what the ESC makes of it
+    Matrix(MatrixArgs),
     /// Draws a recording
     Plot(PlotArgs),
 }
@@ -57,6 +59,13 @@ pub(crate) enum Paper {
 #[derive(Args, Debug)]
 pub(crate) struct BenchArgs {
     /// Prints the figures as one JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct MatrixArgs {
+    /// Prints the cells as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -15,6 +15,7 @@
 //! [`record`]: crate::record
 //! [`shaft`]: crate::shaft
 //! [`fault`]: crate::fault
+//! [`matrix`]: crate::matrix
 //! [`measure`]: crate::measure
 //! [`yardstick`]: crate::yardstick
 #![cfg_attr(feature = "plot", doc = "[`plot`]: crate::plot")]
@@ -32,6 +33,7 @@ pub mod link;
 pub mod live;
 pub mod lockstep;
 pub mod machine;
+pub mod matrix;
 pub mod measure;
 pub mod options;
 pub mod parameter;

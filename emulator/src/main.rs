@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use siskin_emulator::interrupt;
 use siskin_emulator::live::{self, Opened};
 use siskin_emulator::lockstep;
+use siskin_emulator::matrix::Matrix;
 use siskin_emulator::measure;
 use siskin_emulator::options::{self, RunArgs, ScenarioArgs, Speed};
 use siskin_emulator::plot;
@@ -20,7 +21,7 @@ use siskin_emulator::scenario::{Place, Row, Table, Verdict};
 use siskin_emulator::summary::Report;
 use siskin_emulator::web::WebAddress;
 
-use cli::{BenchArgs, Cli, Command, Paper, PlotArgs, ReproduceArgs};
+use cli::{BenchArgs, Cli, Command, MatrixArgs, Paper, PlotArgs, ReproduceArgs};
 
 /// How far a sweep has come, and how long it still takes.
 const PROGRESS: &str = "{wide_bar} {pos} of {len} runs, {eta} to go";
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Some(Command::Scenario(args)) => scenario(&args),
         Some(Command::Reproduce(args)) => reproduce(&args),
         Some(Command::Bench(args)) => bench(&args),
+        Some(Command::Matrix(args)) => matrix(&args),
         Some(Command::Plot(args)) => plot(&args),
     };
     match result {
@@ -150,6 +152,16 @@ fn bench(args: &BenchArgs) -> Result<ExitCode, String> {
         report::json(&figures)?
     } else {
         figures.to_string()
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn matrix(args: &MatrixArgs) -> Result<ExitCode, String> {
+    let matrix = Matrix::play(|_, _, _| true).map_err(|error| error.to_string())?;
+    report::print(&if args.json {
+        report::json(&matrix)?
+    } else {
+        matrix.to_string()
     })?;
     Ok(ExitCode::SUCCESS)
 }

@@ -153,8 +153,8 @@ def is_run_elsewhere(command: list[str]) -> bool:
         seeds = test_scenarios.SEEDS.get(scenario.stem)
         assert words[2:] == (["--seeds", seeds] if seeds else []), f"test_scenarios.py plays {seeds}"
         return True
-    # test_reproduce.py
-    return words[0] in ("reproduce", "plot") or "target/first-spin.csv" in words
+    # test_reproduce.py, test_matrix.py
+    return words[0] in ("reproduce", "plot", "matrix") or "target/first-spin.csv" in words
 
 
 def first_has(readme: Path) -> list[list[str]]:

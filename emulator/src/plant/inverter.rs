@@ -104,8 +104,7 @@ impl Plant {
     }
 
     /// Temperature of the winding, °C, if it is simulated.
-    #[cfg(test)]
-    pub(super) fn winding_c(&self) -> Option<f64> {
+    pub fn winding_c(&self) -> Option<f64> {
         self.stage.machine.winding_c()
     }
 

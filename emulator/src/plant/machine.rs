@@ -114,7 +114,6 @@ impl Machine {
     }
 
     /// Temperature of the winding, °C, if it is simulated.
-    #[cfg(test)]
     pub(super) fn winding_c(&self) -> Option<f64> {
         self.warming.as_ref().map(Warming::temperature_c)
     }

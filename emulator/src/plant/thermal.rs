@@ -126,7 +126,6 @@ impl Warming {
     }
 
     /// Temperature, °C.
-    #[cfg(test)]
     pub(super) fn temperature_c(&self) -> f64 {
         AMBIENT_C + self.ambient_k + self.excess_k
     }

@@ -1,0 +1,258 @@
+//! The faults of the matrix, and what each is by its nature: what may be named for it, and what may come of it.
+
+use serde::Serialize;
+
+use super::moment::Moment;
+use crate::fault::{Kind, Side};
+
+/// For how long a fault acts that has no time of its own, s.
+const FAULT_S: f64 = 0.5;
+
+/// A fault of the matrix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Row {
+    /// Nothing, to see that nothing is named.
+    Nothing,
+    /// The shaft is held.
+    RotorBlocked,
+    /// Nine tenths of the speed go within 10 ms.
+    Strike,
+    /// 0.3 Nm against the rotation for 20 ms: four times the load at half throttle.
+    StrikeTorque,
+    /// Air that moves as the propeller would at 2000 rpm.
+    Gust,
+    /// The wire of a phase is open.
+    PhaseOpen,
+    /// A high side never turns on.
+    HighOpen,
+    /// A low side never turns on.
+    LowOpen,
+    /// A high side is always on.
+    HighShort,
+    /// A low side is always on.
+    LowShort,
+    /// A current sensor that shows nothing.
+    SensorZero,
+    /// A current sensor at its full scale.
+    SensorFull,
+    /// A current sensor's zero moves by 5 A within 0.1 s.
+    Drift,
+    /// 1 A rms on the currents.
+    Noise,
+    /// A Hall sensor always shows the same, with `CTL_OBSERVER` 2.
+    HallStuck,
+    /// 4 V less.
+    Sag,
+    /// 16 V less: below `LIM_BUS_V_MIN`.
+    DeepSag,
+    /// The supply is gone; the capacitor is left.
+    Disconnect,
+    /// 3 V for 0.1 s.
+    BrownOut,
+    /// The chip starts anew.
+    Reset,
+    /// The flash refuses to change.
+    FlashFail,
+    /// Nothing comes over the throttle wire.
+    SignalLoss,
+    /// A bit of a hundred.
+    BitErrors,
+    /// 100 ns rms on each edge.
+    Jitter,
+}
+
+/// What came of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reaction {
+    /// The motor has turned on as it is asked to.
+    GoesOn,
+    /// It turns again as it is asked to, after the bridge was off or a start was begun.
+    Recovers,
+    /// It is at rest, or on its way there, as it is asked to be.
+    Rests,
+    /// The bridge is off until the throttle is closed, and it is said why.
+    Stops,
+    /// The motor does not turn as it is asked to, and nothing holds the bridge off.
+    Fails,
+}
+
+use Reaction::{GoesOn, Recovers, Rests, Stops};
+
+const OVER_CURRENT: &str = "over-current";
+const OVER_VOLTAGE: &str = "bus over-voltage";
+const UNDER_VOLTAGE: &str = "bus under-voltage";
+const LOST: &str = "rotor position lost";
+const STUCK: &str = "motor does not start";
+const SENSOR: &str = "current sensor defect";
+const HALL: &str = "position sensor";
+const FAILED_START: &str = "Start failed: the motor is tried again";
+const FLASH: &str = "storage";
+/// A chip that starts anew says its name.
+const RESTART: &str = "Siskin ESC";
+const SIGNAL_LOST: &str = "Throttle: signal lost while armed";
+
+/// What is expected of a cell.
+pub(super) struct Expected {
+    /// What may be named: the right cause first, then its neighbours.
+    pub(super) causes: &'static [&'static str],
+    /// Whether one of them must be named.
+    pub(super) named: bool,
+    /// What may come of it.
+    pub(super) reactions: &'static [Reaction],
+}
+
+impl Row {
+    /// All, in the order of the table.
+    pub const ALL: [Self; 24] = [
+        Self::Nothing,
+        Self::RotorBlocked,
+        Self::Strike,
+        Self::StrikeTorque,
+        Self::Gust,
+        Self::PhaseOpen,
+        Self::HighOpen,
+        Self::LowOpen,
+        Self::HighShort,
+        Self::LowShort,
+        Self::SensorZero,
+        Self::SensorFull,
+        Self::Drift,
+        Self::Noise,
+        Self::HallStuck,
+        Self::Sag,
+        Self::DeepSag,
+        Self::Disconnect,
+        Self::BrownOut,
+        Self::Reset,
+        Self::FlashFail,
+        Self::SignalLoss,
+        Self::BitErrors,
+        Self::Jitter,
+    ];
+
+    /// Its name in the table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "nothing",
+            Self::RotorBlocked => "rotor blocked",
+            Self::Strike => "strike, 90 % in 10 ms",
+            Self::StrikeTorque => "strike, 0.3 Nm",
+            Self::Gust => "gust",
+            Self::PhaseOpen => "phase open",
+            Self::HighOpen => "high side open",
+            Self::LowOpen => "low side open",
+            Self::HighShort => "high side shorted",
+            Self::LowShort => "low side shorted",
+            Self::SensorZero => "sensor stuck at zero",
+            Self::SensorFull => "sensor stuck at full",
+            Self::Drift => "sensor drifts 5 A",
+            Self::Noise => "noise, 1 A",
+            Self::HallStuck => "Hall sensor stuck",
+            Self::Sag => "supply sags 4 V",
+            Self::DeepSag => "supply sags 16 V",
+            Self::Disconnect => "supply disconnected",
+            Self::BrownOut => "brown-out",
+            Self::Reset => "reset",
+            Self::FlashFail => "flash fails",
+            Self::SignalLoss => "signal lost",
+            Self::BitErrors => "bit errors, 1 %",
+            Self::Jitter => "jitter, 100 ns",
+        }
+    }
+
+    /// What is wrong, and for how long, s, at a shaft that turns at this speed, rad/s.
+    pub(super) fn kind(self, speed_rad_s: f64) -> Option<(Kind, f64)> {
+        let rpm = std::f64::consts::TAU / 60.0;
+        let lasting = |kind| Some((kind, FAULT_S));
+        match self {
+            Self::Nothing => None,
+            Self::RotorBlocked => lasting(Kind::RotorBlocked),
+            Self::Strike => Some((Kind::RotorKick(-0.9 * speed_rad_s), 0.01)),
+            Self::StrikeTorque => Some((Kind::Strike(-0.3), 0.02)),
+            Self::Gust => lasting(Kind::Gust(2000.0 * rpm)),
+            Self::PhaseOpen => lasting(Kind::PhaseOpen(1)),
+            Self::HighOpen => lasting(Kind::MosfetOpen(1, Side::High)),
+            Self::LowOpen => lasting(Kind::MosfetOpen(1, Side::Low)),
+            Self::HighShort => lasting(Kind::MosfetShort(1, Side::High)),
+            Self::LowShort => lasting(Kind::MosfetShort(1, Side::Low)),
+            Self::SensorZero => lasting(Kind::SensorStuck(1, 0.0)),
+            Self::SensorFull => lasting(Kind::SensorStuck(1, 40.0)),
+            Self::Drift => Some((Kind::OffsetDrift(1, 5.0), 0.1)),
+            Self::Noise => lasting(Kind::Noise(1.0)),
+            Self::HallStuck => lasting(Kind::HallStuck(1, true)),
+            Self::Sag => lasting(Kind::BusSag(4.0)),
+            Self::DeepSag => lasting(Kind::BusSag(16.0)),
+            Self::Disconnect => lasting(Kind::BusDisconnect),
+            Self::BrownOut => Some((Kind::BrownOut(3.0), 0.1)),
+            Self::Reset => Some((Kind::Reset, 0.0)),
+            Self::FlashFail => lasting(Kind::FlashFail),
+            Self::SignalLoss => lasting(Kind::SignalLoss),
+            Self::BitErrors => lasting(Kind::BitErrors(0.01)),
+            Self::Jitter => lasting(Kind::Jitter(100.0)),
+        }
+    }
+
+    /// What is expected of it at a moment, from what it is.
+    pub(super) fn expected(self, moment: Moment) -> Expected {
+        let drives = moment.drives();
+        let expected = |causes, named, reactions| Expected {
+            causes,
+            named,
+            // At rest, or on the way there, a fault ends with its cause: the throttle is closed.
+            reactions: if drives { reactions } else { &[Rests, Stops] },
+        };
+        match self {
+            // What the drive can hold it holds; limits say where it binds.
+            Self::Nothing
+            | Self::Gust
+            | Self::StrikeTorque
+            | Self::Noise
+            | Self::BitErrors
+            | Self::Jitter
+            | Self::Sag => expected(&[], false, &[GoesOn]),
+            // Told when it is written to.
+            Self::FlashFail => expected(&[FLASH], false, &[GoesOn]),
+            // Faster than the currents follow: a back-EMF that is gone within a period drives 14 A in the next
+            // at full speed.
+            Self::RotorBlocked if moment.is_fast() => expected(
+                &[STUCK, LOST, FAILED_START, OVER_CURRENT],
+                drives,
+                &[Recovers],
+            ),
+            Self::RotorBlocked => expected(&[STUCK, LOST, FAILED_START], drives, &[Recovers]),
+            // Where the rotor is lost, it is caught.
+            Self::Strike => expected(&[LOST, FAILED_START], false, &[GoesOn, Recovers]),
+            // Without current nothing shows. A motor that turns on with two phases is better than none, if it is told.
+            Self::PhaseOpen | Self::HighOpen | Self::LowOpen => expected(
+                &[LOST, STUCK, FAILED_START],
+                drives,
+                &[GoesOn, Recovers, Stops],
+            ),
+            // With the low sides on one more that is on is nothing; the high one shoots through.
+            Self::LowShort if moment == Moment::Standstill => expected(&[], false, &[]),
+            Self::HighShort | Self::LowShort => expected(&[OVER_CURRENT], true, &[Stops]),
+            Self::SensorZero | Self::Drift => {
+                expected(&[SENSOR, OVER_CURRENT], drives, &[GoesOn, Recovers, Stops])
+            }
+            Self::SensorFull => expected(&[SENSOR, OVER_CURRENT], true, &[Stops]),
+            Self::HallStuck => expected(&[HALL], drives, &[GoesOn, Recovers, Stops]),
+            // The rotor's own voltage between the lines is above what is left: it feeds the supply by the diodes, more
+            // than the trip allows.
+            Self::DeepSag if moment.is_fast() => {
+                expected(&[UNDER_VOLTAGE, OVER_CURRENT], true, &[Stops])
+            }
+            Self::DeepSag => expected(&[UNDER_VOLTAGE], true, &[Stops]),
+            Self::Disconnect if moment == Moment::Braking => expected(&[OVER_VOLTAGE], true, &[]),
+            Self::Disconnect if moment.is_fast() => {
+                expected(&[UNDER_VOLTAGE, OVER_CURRENT], drives, &[Stops])
+            }
+            // At rest the capacitor keeps the chip for as long as it takes to empty it.
+            Self::Disconnect => expected(&[UNDER_VOLTAGE], drives, &[Stops]),
+            Self::BrownOut => expected(&[RESTART, UNDER_VOLTAGE], true, &[Stops]),
+            Self::Reset => expected(&[RESTART], true, &[Stops]),
+            Self::SignalLoss => expected(&[SIGNAL_LOST], true, &[Stops]),
+        }
+    }
+}
