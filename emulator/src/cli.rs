@@ -65,6 +65,9 @@ pub(crate) struct BenchArgs {
 
 #[derive(Args, Debug)]
 pub(crate) struct MatrixArgs {
+    /// Draws them
+    #[arg(short, long, value_name = "PICTURE.svg|.png")]
+    pub(crate) output: Option<PathBuf>,
     /// Prints the cells as one JSON object
     #[arg(long)]
     pub(crate) json: bool,

@@ -158,6 +158,10 @@ fn bench(args: &BenchArgs) -> Result<ExitCode, String> {
 
 fn matrix(args: &MatrixArgs) -> Result<ExitCode, String> {
     let matrix = Matrix::play(|_, _, _| true).map_err(|error| error.to_string())?;
+    if let Some(picture) = &args.output {
+        let drawn = matrix.grid().draw_to(picture);
+        drawn.map_err(|error| error.to_string())?;
+    }
     report::print(&if args.json {
         report::json(&matrix)?
     } else {

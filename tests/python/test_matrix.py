@@ -4,7 +4,9 @@ import json
 
 import pytest
 
+import readme
 from emulator import run
+from paths import ROOT
 
 FOC, SIX = "field_oriented", "six_step"
 TURNING = ["start", "idle", "half", "full"]
@@ -49,11 +51,25 @@ OPEN = {
 }
 
 
+PICTURE = ROOT / "emulator" / "pictures" / "fault-matrix.svg"
+
+
 @pytest.fixture(scope="module")
-def matrix() -> dict:
-    ended = run("matrix", "--json", timeout=600)
+def drawn(tmp_path_factory):
+    """Where the README's command has drawn, and what it prints."""
+    (command,) = readme.commands("--", "matrix")
+    words = command[command.index("--") + 1 :]
+    picture = tmp_path_factory.mktemp("matrix") / PICTURE.name
+    words = [word.replace(str(PICTURE.relative_to(ROOT)), str(picture)) for word in words]
+    ended = run(*words, "--json", timeout=600)
     assert ended.returncode == 0, ended.stderr
-    return {(cell["drive"], cell["fault"], cell["moment"]): cell for cell in json.loads(ended.stdout)["cells"]}
+    return picture, json.loads(ended.stdout)["cells"]
+
+
+@pytest.fixture(scope="module")
+def matrix(drawn) -> dict:
+    _, cells = drawn
+    return {(cell["drive"], cell["fault"], cell["moment"]): cell for cell in cells}
 
 
 def test_every_fault_is_played_at_every_moment_with_either_drive(matrix):
@@ -78,3 +94,8 @@ def test_without_a_fault_nothing_is_named(matrix):
     nothing = {place: cell["named"] for place, cell in matrix.items() if place[1] == "nothing"}
     assert len(nothing) == 12
     assert set(map(len, nothing.values())) == {0}
+
+
+def test_the_picture_is_the_one_in_the_readme(drawn):
+    picture, _ = drawn
+    assert picture.read_bytes() == PICTURE.read_bytes(), "draw it again by the README's command, and look at it"

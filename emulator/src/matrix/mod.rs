@@ -8,6 +8,8 @@ mod bound;
 mod cell;
 mod drive;
 mod moment;
+#[cfg(feature = "plot")]
+mod picture;
 mod row;
 mod table;
 

@@ -1,9 +1,10 @@
-//! Pictures of recordings, and [`chart`]s of anything else.
+//! Pictures of recordings, and [`chart`]s and tables ([`grid`]) of anything else.
 
 mod canvas;
 pub mod chart;
 mod error;
 mod figure;
+pub mod grid;
 mod phases;
 mod read;
 mod reduce;

@@ -1,0 +1,74 @@
+//! The matrix as a picture.
+
+use plotters::style::RGBColor;
+
+use super::bound::Miss;
+use super::drive::Drive;
+use super::moment::Moment;
+use super::row::{Reaction, Row};
+use super::{Judged, Matrix};
+use crate::plot::grid::{Grid, Place};
+
+// Light enough for the text on them, and told apart by the colour-blind.
+const GOES_ON: RGBColor = RGBColor(0xd5, 0xec, 0xe4);
+const RECOVERS: RGBColor = RGBColor(0xd9, 0xea, 0xf7);
+const RESTS: RGBColor = RGBColor(0xf0, 0xf0, 0xf0);
+const STOPS: RGBColor = RGBColor(0xfb, 0xe6, 0xc4);
+const FAILS: RGBColor = RGBColor(0xf3, 0xc4, 0xa5);
+
+impl Reaction {
+    fn tint(self) -> RGBColor {
+        match self {
+            Self::GoesOn => GOES_ON,
+            Self::Recovers => RECOVERS,
+            Self::Rests => RESTS,
+            Self::Stops => STOPS,
+            Self::Fails => FAILS,
+        }
+    }
+}
+
+impl Matrix {
+    /// Faults by moments, drive beside drive; a cell that was not played is left out.
+    pub fn grid(&self) -> Grid {
+        let columns = || Moment::ALL.map(|moment| moment.name().to_owned()).to_vec();
+        let rows = Row::ALL.map(|row| {
+            let cells = self.cells.iter().filter(|judged| judged.cell.fault == row);
+            (row.name().to_owned(), cells.map(place).collect())
+        });
+        let key = [
+            (GOES_ON, "goes on"),
+            (RECOVERS, "turns again by itself"),
+            (RESTS, "at rest, as asked"),
+            (STOPS, "off until zero throttle, and said why"),
+            (FAILS, "does not turn, and nothing is said"),
+        ];
+        Grid {
+            title: "What the ESC makes of each fault: time to its answer, greatest phase current and supply; \
+                    framed: what is missed"
+                .to_owned(),
+            groups: Drive::ALL.map(|drive| (drive.name().to_owned(), columns())).to_vec(),
+            rows: rows.to_vec(),
+            key: key.map(|(tint, meaning)| (tint, meaning.to_owned())).to_vec(),
+        }
+    }
+}
+
+fn place(judged: &Judged) -> Place {
+    let Judged { cell, misses, .. } = judged;
+    let mut lines = vec![match cell.after_ms {
+        Some(ms) if ms < 10.0 => format!("{ms:.2} ms"),
+        Some(ms) => format!("{ms:.0} ms"),
+        None => "-".to_owned(),
+    }];
+    lines.push(format!("{:.1} A  {:.1} V", cell.current_a, cell.bus_v));
+    let missed: Vec<&str> = misses.iter().map(|miss| Miss::name(*miss)).collect();
+    if !missed.is_empty() {
+        lines.push(missed.join(", "));
+    }
+    Place {
+        tint: cell.reaction.tint(),
+        lines,
+        warns: !missed.is_empty(),
+    }
+}
