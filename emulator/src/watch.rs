@@ -20,6 +20,16 @@ pub enum WatchError {
         "the simulated motor diverged: its inertia is too small for its load and the PWM frequency"
     )]
     Diverged,
+    /// Both switches of a leg are on, which no command may do.
+    #[error(
+        "both switches of the leg of phase {phase} are on at {t_s:.6} s: there is no dead time between them"
+    )]
+    Both {
+        /// The phase, from 0.
+        phase: usize,
+        /// When, s: the period's start where only that is known.
+        t_s: f64,
+    },
 }
 
 /// The onlooker.
@@ -131,6 +141,9 @@ impl Onlooker for Watch {
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.summary.add(t_s, period, rig);
         self.check(&period.motion);
+        if let Some(phase) = rig.plant().crossed() {
+            self.failed = Some(WatchError::Both { phase, t_s });
+        }
         self.record(|recorder| recorder.period(t_s, period, rig));
     }
 
@@ -141,6 +154,10 @@ impl Onlooker for Watch {
     }
 
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
+        if gate.shoots() {
+            let t_s = time_ns as f64 * 1e-9;
+            self.failed = Some(WatchError::Both { phase: leg, t_s });
+        }
         self.record(|recorder| recorder.gates(time_ns, leg, gate));
     }
 
@@ -150,5 +167,24 @@ impl Onlooker for Watch {
 
     fn frame(&mut self, time_ns: u64, frame: &[u8]) {
         self.record(|recorder| recorder.frame(time_ns, frame));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_switches_of_a_leg_end_a_run() {
+        let mut watch = Watch::new(Vec::new(), None);
+        let on = |high, low| Gate { high, low };
+        for gate in [on(true, false), on(false, false), on(false, true)] {
+            watch.gates(1_000_000, 2, gate);
+            assert!(!watch.failed());
+        }
+        watch.gates(2_000_000, 2, on(true, true));
+        assert!(watch.failed());
+        let line = watch.finish(1.0, 1.0).unwrap_err().to_string();
+        assert!(line.contains("phase 2 are on at 0.002000 s"), "{line}");
     }
 }

@@ -86,7 +86,7 @@ impl Gate {
     }
 
     /// Whether both are on.
-    pub(super) fn shoots(self) -> bool {
+    pub fn shoots(self) -> bool {
         self.high && self.low
     }
 

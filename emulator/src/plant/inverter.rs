@@ -46,6 +46,8 @@ pub struct Plant {
     trip_a: f64,
     /// Whether they have, and the drive has not yet.
     tripped: bool,
+    /// See [`Self::crossed`].
+    crossed: Option<usize>,
     /// Where all legs are, with none waiting.
     settled: Option<Rail>,
     /// The longest stretch that the circuit's solution is prepared for between a period's own edges, s.
@@ -68,6 +70,7 @@ impl Plant {
             timers: [Timer::default(); 3],
             trip_a: f64::INFINITY,
             tripped: false,
+            crossed: None,
             settled: None,
             longest_s: 0.0,
         }
@@ -91,6 +94,13 @@ impl Plant {
     /// Whether the comparators hold all switches off, until the drive turns them off as well.
     pub fn tripped(&self) -> bool {
         self.tripped
+    }
+
+    /// A leg that has gone from one switch straight to the other in the last period: with real switches both would
+    /// have been on. Where there is no dead time it is none.
+    #[inline(always)] // in each period
+    pub fn crossed(&self) -> Option<usize> {
+        self.crossed
     }
 
     /// Gives the motor at rest what a real one has beyond the ideal.
@@ -214,6 +224,7 @@ impl Plant {
                 }
             }
         }
+        self.crossed = self.stage.crossed().filter(|_| dead_time_s > 0.0);
         let mut flow = self.stage.machine.finish(period_s);
         flow.bus_a += self.stage.shot_as() / period_s;
         flow
@@ -261,6 +272,8 @@ impl Plant {
                 output: Some(Rail::Low),
                 waiting_s: 0.0,
             };
+            // No edge of a timer's.
+            self.stage.set(leg, None);
             self.stage.set(leg, Some(Rail::Low));
         }
         self.settled = Some(Rail::Low);
@@ -404,5 +417,60 @@ impl Plant {
         ];
         let fits = first_s > 0.0 && last_s + 0.5 * dead_time_s < half_s;
         fits.then(|| at_s.map(|at_s| delayed(at_s, dead_time_s)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use siskin_control::units::Duty;
+
+    use super::*;
+    use crate::rig::Bench;
+
+    fn plant() -> Plant {
+        let motor = Bench::default().motor;
+        let mut plant = Plant::new(Fidelity::Switching, motor, Load::default(), 0.0, 0.1);
+        plant.impose(100.0);
+        plant
+    }
+
+    /// Without a dead time a leg goes from one switch straight to the other, which is noticed at the stage; with one
+    /// there is a time with both off at each edge.
+    #[test]
+    fn switches_without_a_time_between_them_are_noticed() {
+        let [low, high] = [0.2, 0.8].map(|share| Some(Duty::from_num::<f64>(share)));
+        // With a leg off each edge is played.
+        let legs = Bridge::Legs([low, None, high]);
+        for (dead_time_s, noticed) in [(500e-9, false), (0.0, true)] {
+            let mut plant = plant();
+            for _ in 0..3 {
+                plant.period([legs; 2], 24.0, 41e-6, dead_time_s);
+                assert_eq!(plant.stage.crossed().is_some(), noticed, "{dead_time_s}");
+                // Who has asked for none has none.
+                assert_eq!(plant.crossed(), None);
+            }
+        }
+    }
+
+    /// A timer that forgets nearly all of its dead time is found in the period.
+    #[test]
+    fn a_missing_dead_time_is_found() {
+        let mut plant = plant();
+        let low = Bridge::Legs([Some(Duty::ZERO), None, None]);
+        plant.period([low; 2], 24.0, 41e-6, 500e-9);
+        assert_eq!(plant.crossed(), None);
+        for (waiting_s, off, found) in [(500e-9, true, None), (0.1e-9, false, Some(0))] {
+            plant.stage.set(0, None);
+            plant.stage.set(0, Some(Rail::High));
+            if off {
+                plant.stage.set(0, None);
+            }
+            plant.timers[0] = Timer {
+                output: Some(Rail::Low),
+                waiting_s,
+            };
+            plant.period([low; 2], 24.0, 41e-6, 500e-9);
+            assert_eq!(plant.crossed(), found);
+        }
     }
 }

@@ -68,6 +68,8 @@ pub(super) struct Stage {
     breaks: Breaks,
     /// Charge that has flowed from pole to pole in this period, As.
     shot_as: f64,
+    /// A leg that has gone from one switch straight to the other in this period.
+    crossed: Option<usize>,
 }
 
 impl Stage {
@@ -85,6 +87,7 @@ impl Stage {
             sound: true,
             breaks: Breaks::default(),
             shot_as: 0.0,
+            crossed: None,
         }
     }
 
@@ -97,6 +100,7 @@ impl Stage {
         }
         self.now_s = 0.0;
         self.shot_as = 0.0;
+        self.crossed = None;
         self.machine.begin(period_s);
     }
 
@@ -105,9 +109,18 @@ impl Stage {
         self.bus_v
     }
 
+    /// A leg that has been told to go from one switch straight to the other in this period.
+    #[inline(always)]
+    pub(super) fn crossed(&self) -> Option<usize> {
+        self.crossed
+    }
+
     /// Turns one of a leg's switches on, or both off.
     #[inline(always)]
     pub(super) fn set(&mut self, leg: usize, on: Option<Rail>) {
+        if on.is_some_and(|rail| self.paths[leg] == Path::Switch(rail.other())) {
+            self.cross(leg);
+        }
         if !self.sound {
             return self.set_broken(leg, on);
         }
@@ -122,6 +135,14 @@ impl Stage {
                 self.connect(leg, self.diode(leg));
             }
             None => {}
+        }
+    }
+
+    #[cold]
+    fn cross(&mut self, leg: usize) {
+        // A shorted switch is on by itself.
+        if self.sound {
+            self.crossed = Some(leg);
         }
     }
 

@@ -1,8 +1,10 @@
 //! A watch on the bridge's gates, as a logic analyser at the pins would keep it: it knows nothing of the
 //! timer that makes them.
 
+use std::fmt;
+
 use crate::gate_supply::GateSupply;
-use crate::time::{Cycles, NEVER};
+use crate::time::{CLOCK_HZ, Cycles, NEVER};
 
 /// Legs of the bridge.
 const LEGS: usize = 3;
@@ -19,7 +21,7 @@ pub enum Fault {
     Short(Cycles),
 }
 
-/// Something that must not be, where and when.
+/// Something that must not be, where and when. One line says it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Violation {
     /// The time.
@@ -28,6 +30,20 @@ pub struct Violation {
     pub leg: usize,
     /// What it is.
     pub fault: Fault,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { at, leg, fault } = self;
+        let t_s = *at as f64 / CLOCK_HZ as f64;
+        match fault {
+            Fault::Both => write!(f, "both gates of the leg of phase {leg} are on at {t_s:.6} s"),
+            Fault::Short(cycles) => write!(
+                f,
+                "a gate of the leg of phase {leg} goes on {cycles} cycles after the other has gone off, at {t_s:.6} s"
+            ),
+        }
+    }
 }
 
 /// A leg's gates: high side, low side; and the supply of the high side's driver.

@@ -182,6 +182,9 @@ impl VirtualBoard {
             if let Some(stopped) = world.failed.clone() {
                 return Err(stopped);
             }
+            if let Some(violation) = world.bridge().first().first() {
+                return Err(Stopped(violation.to_string()));
+            }
             match stop {
                 Stop::Asked => {}
                 Stop::Reset => world.reset = Some(Cause::Software),
