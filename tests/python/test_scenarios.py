@@ -40,6 +40,8 @@ SEEDS = {
     "fault-phase-open": "1..5",
     "fault-phase-open-start": "1..5",
     "fault-sensor-stuck": "1..5",
+    "flight-calm": "1..2",
+    "flight-weather": "1..3",
     "hall": "1..20",
     "low-100": "1..5",
     "low-150": "1..5",
