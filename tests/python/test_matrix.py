@@ -61,7 +61,7 @@ def drawn(tmp_path_factory):
     words = command[command.index("--") + 1 :]
     picture = tmp_path_factory.mktemp("matrix") / PICTURE.name
     words = [word.replace(str(PICTURE.relative_to(ROOT)), str(picture)) for word in words]
-    ended = run(*words, "--json", timeout=600)
+    ended = run(*words, "--json", timeout=1800)
     assert ended.returncode == 0, ended.stderr
     return picture, json.loads(ended.stdout)["cells"]
 

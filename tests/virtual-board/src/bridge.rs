@@ -37,7 +37,10 @@ impl fmt::Display for Violation {
         let Self { at, leg, fault } = self;
         let t_s = *at as f64 / CLOCK_HZ as f64;
         match fault {
-            Fault::Both => write!(f, "both gates of the leg of phase {leg} are on at {t_s:.6} s"),
+            Fault::Both => write!(
+                f,
+                "both gates of the leg of phase {leg} are on at {t_s:.6} s"
+            ),
             Fault::Short(cycles) => write!(
                 f,
                 "a gate of the leg of phase {leg} goes on {cycles} cycles after the other has gone off, at {t_s:.6} s"
@@ -200,6 +203,11 @@ mod tests {
             fault: Fault::Both,
         };
         assert_eq!((bridge.violations(), bridge.first()), (1, &[both][..]));
+        let line = both.to_string();
+        assert_eq!(
+            line,
+            "both gates of the leg of phase 2 are on at 0.000001 s"
+        );
     }
 
     #[test]
