@@ -41,7 +41,7 @@ SEEDS = {
     "fault-phase-open-start": "1..5",
     "fault-sensor-stuck": "1..5",
     "flight-calm": "1..2",
-    "flight-weather": "1..3",
+    "flight-weather": "1..2",
     "hall": "1..20",
     "low-100": "1..5",
     "low-150": "1..5",
