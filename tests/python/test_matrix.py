@@ -46,6 +46,9 @@ OPEN = {
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
     # 10 A on 470 µF are 0.9 V a period: the supply is at its limit before the bounds of the current have followed.
     **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
+    # At full speed the capacitors are empty in a period, and the rotor's own voltage drives the current of a short
+    # circuit into them: while it rises it is a little above the steady one.
+    **cells([FOC], ["disconnect"], ["full"], "current"),
     # The six-step drive shoots a short through the winding in its start, and has the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }
