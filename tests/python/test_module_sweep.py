@@ -195,6 +195,8 @@ def test_a_thousand_drives_give_one_table_though_a_worker_is_killed(tmp_path):
 def test_ctrl_c_ends_a_sweep():
     script = f"""
 import os, signal, threading, siskin
+# A shell in the background hands on that interrupts are ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:
     siskin.sweep({str(DRIVES)!r}, seeds=range(1, 100001))
