@@ -71,8 +71,8 @@ pub(crate) enum Command {
     Monitor(MonitorArgs),
     /// Serve a page for the browser that shows the ESC: traces, parameters, tests, faults on record.
     ///
-    /// It turns the motor by a motor test alone: for three seconds at most, with a fifth of LIM_PHASE_A at most,
-    /// while its button is held. Until Ctrl-C.
+    /// It turns the motor by a motor test, for three seconds at most, with a fifth of LIM_PHASE_A at most, while its
+    /// button is held, and by an identification. Both end when the page goes, and with the program, by Ctrl-C.
     Scope(ScopeArgs),
     /// Show what a logic analyser has seen on a throttle wire: frames, commands, replies, errors and
     /// timing.

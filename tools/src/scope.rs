@@ -3,15 +3,17 @@
 //! The page is a MAVLink client, and this a bridge between its socket and the link. Nothing else goes over it, so
 //! that a page can do no more than a ground station can.
 
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
+use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_SET_DATA};
+use mavlink::{MavlinkVersion, MessageData};
 use serde::Deserialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
 use siskin_control::mavlink::{Address, Receiver};
+use siskin_control::params::ParamId;
 use siskin_control::telemetry::SIGNALS;
 use siskin_scope::{ORDERS, Order, Show, Site, ViewerId, What};
 
@@ -25,8 +27,8 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Our own heartbeat, without which some links forget us.
 const GREETING_PERIOD: Duration = Duration::from_secs(1);
 
-/// Where COMMAND_LONG has the command, and the two ids that it is for.
-const COMMAND_AT: usize = 28;
+/// Identification of the motor: `param1` 1 begins it, 0 ends it.
+const IDENTIFY: MavCmd = MavCmd::MAV_CMD_USER_1;
 
 /// All goes by MAVLink.
 struct LinkAlone;
@@ -69,9 +71,29 @@ pub(crate) fn run(
     )?;
     writeln!(out, "open {} in a browser; Ctrl-C ends it", site.url())?;
     out.flush()?;
-    let mut tests = Tests::default();
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop))?;
+    }
+    let mut turners = Turners::default();
+    let served = serve(&mut session, &site, &mut turners, &stop);
+    // However it ends: nobody holds a button any more.
+    for end in turners.end(|_| true) {
+        // Where the link is lost it is the ESC's three seconds that end a test.
+        let _ = session.send(&end);
+    }
+    served
+}
+
+/// Until it is to stop, which is the end of a program that is interrupted.
+fn serve(
+    session: &mut Session,
+    site: &Site<LinkAlone>,
+    turners: &mut Turners,
+    stop: &AtomicBool,
+) -> Result<(), Error> {
     let mut greeted = Instant::now();
-    loop {
+    while !stop.load(Ordering::Relaxed) {
         if greeted.elapsed() >= GREETING_PERIOD {
             session.greet()?;
             greeted = Instant::now();
@@ -83,11 +105,11 @@ pub(crate) fn run(
         for Order { viewer, what, .. } in (0..ORDERS).map_while(|_| site.order()) {
             match what {
                 What::Mavlink(bytes) => {
-                    tests.look(viewer, &bytes);
+                    turners.look(viewer, &bytes);
                     session.pass(&bytes)?;
                 }
                 What::Ended => {
-                    if let Some(end) = tests.end(viewer) {
+                    for end in turners.end(|of| of == viewer) {
                         session.send(&end)?;
                     }
                 }
@@ -95,41 +117,59 @@ pub(crate) fn run(
             }
         }
     }
+    Ok(())
 }
 
-/// Who turns a motor by a test: a page that is gone must not go on with it.
+/// Pages, and the ESCs whose motors they have had turned by a test or by an identification: what is gone must not go
+/// on with it.
 #[derive(Default)]
-struct Tests(BTreeMap<ViewerId, Address>);
+struct Turners(Vec<(ViewerId, Address)>);
 
-impl Tests {
+impl Turners {
     /// Looks at the frames that a page sends.
     fn look(&mut self, viewer: ViewerId, bytes: &[u8]) {
         // A page sends whole frames.
         Receiver::new().push(0, bytes, |frame| {
-            let Some(&[low, high, system, component]) =
-                frame.payload.get(COMMAND_AT..COMMAND_AT + 4)
-            else {
-                return;
+            let version = MavlinkVersion::V2;
+            let (system, component) = match frame.id {
+                COMMAND_LONG_DATA::ID => match COMMAND_LONG_DATA::deser(version, frame.payload) {
+                    Ok(long)
+                        if [MavCmd::MAV_CMD_ACTUATOR_TEST, IDENTIFY].contains(&long.command) =>
+                    {
+                        (long.target_system, long.target_component)
+                    }
+                    _ => return,
+                },
+                PARAM_SET_DATA::ID => match PARAM_SET_DATA::deser(version, frame.payload) {
+                    Ok(set) if set.param_id == ParamId::MotIdentify.entry().name.into() => {
+                        (set.target_system, set.target_component)
+                    }
+                    _ => return,
+                },
+                _ => return,
             };
-            let command = u32::from(u16::from_le_bytes([low, high]));
-            if frame.id == COMMAND_LONG_DATA::ID && command == MavCmd::MAV_CMD_ACTUATOR_TEST as u32
-            {
-                self.0.insert(viewer, Address { system, component });
+            let turner = (viewer, Address { system, component });
+            if !self.0.contains(&turner) {
+                self.0.push(turner);
             }
         });
     }
 
-    /// What ends the test of a page that is gone.
-    fn end(&mut self, viewer: ViewerId) -> Option<COMMAND_LONG_DATA> {
-        let of = self.0.remove(&viewer)?;
-        Some(COMMAND_LONG_DATA {
-            // No value.
-            param1: f32::NAN,
-            command: MavCmd::MAV_CMD_ACTUATOR_TEST,
-            target_system: of.system,
-            target_component: of.component,
-            ..COMMAND_LONG_DATA::DEFAULT
-        })
+    /// What ends the tests and identifications of these pages.
+    fn end(&mut self, these: impl Fn(ViewerId) -> bool) -> Vec<COMMAND_LONG_DATA> {
+        let ended = self.0.extract_if(.., |(viewer, _)| these(*viewer));
+        // A test of no value, and the identification's end.
+        let ends = [(MavCmd::MAV_CMD_ACTUATOR_TEST, f32::NAN), (IDENTIFY, 0.0)];
+        let both = |(_, of): (ViewerId, Address)| {
+            ends.map(|(command, param1)| COMMAND_LONG_DATA {
+                param1,
+                command,
+                target_system: of.system,
+                target_component: of.component,
+                ..COMMAND_LONG_DATA::DEFAULT
+            })
+        };
+        ended.flat_map(both).collect()
     }
 }
 
@@ -146,23 +186,52 @@ mod tests {
     }
 
     #[test]
-    fn only_a_page_that_has_begun_a_test_ends_one_by_going() {
+    fn only_a_page_that_has_had_a_motor_turned_ends_that_by_going() {
         let command = |command| COMMAND_LONG_DATA {
-            param1: 0.5,
-            param2: 3.0,
+            param1: 1.0,
             command,
             target_system: 7,
             target_component: 142,
             ..COMMAND_LONG_DATA::DEFAULT
         };
-        let mut tests = Tests::default();
-        tests.look(1, &frame(&command(MavCmd::MAV_CMD_ACTUATOR_TEST)));
-        tests.look(2, &frame(&command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS)));
-        tests.look(3, b"no frame");
-        assert!(tests.end(2).is_none() && tests.end(3).is_none());
-        let end = tests.end(1).expect("it has begun one");
-        assert!(end.param1.is_nan() && end.command == MavCmd::MAV_CMD_ACTUATOR_TEST);
-        assert_eq!((end.target_system, end.target_component), (7, 142));
-        assert!(tests.end(1).is_none());
+        let parameter = PARAM_SET_DATA {
+            param_value: 1.0,
+            target_system: 7,
+            target_component: 142,
+            param_id: "MOT_IDENTIFY".into(),
+            ..PARAM_SET_DATA::DEFAULT
+        };
+        let other = PARAM_SET_DATA {
+            param_id: "MOT_DIR".into(),
+            ..parameter.clone()
+        };
+        let mut turners = Turners::default();
+        for (viewer, frame) in [
+            (1, frame(&command(MavCmd::MAV_CMD_ACTUATOR_TEST))),
+            (2, frame(&command(IDENTIFY))),
+            (3, frame(&parameter)),
+            (4, frame(&command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS))),
+            (5, frame(&other)),
+            (6, b"no frame".to_vec()),
+        ] {
+            turners.look(viewer, &frame);
+            turners.look(viewer, &frame);
+        }
+        for viewer in [1, 2, 3] {
+            let ends = turners.end(|of| of == viewer);
+            let [test, identification] = &ends[..] else {
+                panic!("{ends:?}");
+            };
+            assert!(test.param1.is_nan() && test.command == MavCmd::MAV_CMD_ACTUATOR_TEST);
+            assert_eq!(
+                (identification.param1, identification.command),
+                (0.0, IDENTIFY)
+            );
+            assert!(
+                ends.iter()
+                    .all(|end| (end.target_system, end.target_component) == (7, 142))
+            );
+        }
+        assert!(turners.end(|_| true).is_empty());
     }
 }

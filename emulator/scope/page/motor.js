@@ -1,5 +1,4 @@
-// A motor test, which is all that may turn the motor of an ESC on a link from here: while the button is held, and
-// for no longer than the ESC allows.
+// A motor test of an ESC on a link: while the button is held, and for no longer than the ESC allows.
 
 const ACTUATOR_TEST = 310;
 const DISARM = 400;

@@ -2,6 +2,7 @@
 
 const SELF_TEST = 401;
 const IDENTIFY = 31010;
+const END = 0;
 const BEGIN = 1;
 const KEEP = 2;
 
@@ -12,9 +13,15 @@ export class Tests {
     Object.assign(this, { esc, told });
     element("self-test").addEventListener("click", () => this.run("Self-test", SELF_TEST, [1], "@SYS/check.txt"));
     element("identify").addEventListener("click", async () => {
+      this.identified = this.esc();
       const result = await this.run("Identification", IDENTIFY, [BEGIN], "@SYS/identify.txt");
+      this.identified = null;
       element("keep").disabled = result !== "accepted";
     });
+    // Nobody looks any more at what turns.
+    const end = () => { if (this.identified) this.identified.send("COMMAND_LONG", { command: IDENTIFY, params: [END] }); };
+    window.addEventListener("pagehide", end);
+    document.addEventListener("visibilitychange", () => document.hidden && end());
     element("keep").addEventListener("click", async () => {
       const result = await this.esc()?.command(IDENTIFY, [KEEP]);
       this.told(`Keeping what was found: ${result}`, result !== "accepted");
