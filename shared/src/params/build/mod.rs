@@ -20,7 +20,7 @@ use formula::{fill, formulas, refuse};
 pub use input::input;
 use quantity::Quantity;
 pub use si::{BuildError, scale};
-use si::{Si, TEST_SHARE};
+use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 
 use super::board::Board;
 use super::choice::{CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, MotDir, MotStop};
@@ -102,9 +102,6 @@ const BURN_SHARE: f32 = 0.25;
 
 /// Rate at which the bounds of i_q follow the bus current, 1/s.
 const BOUND_RATE: f32 = 600.0;
-
-/// The reason to refuse a PWM: an observer needs four periods a turn, edges need twelve, six-step 24.
-const TOO_FEW_PERIODS: &str = "too few periods a turn at CTL_RPM_MAX";
 
 /// The reason to refuse a speed.
 const ABOVE_FASTEST: &str = "above CTL_RPM_MAX";

@@ -18,6 +18,9 @@ pub struct BuildError {
     pub reason: &'static str,
 }
 
+/// The reason to refuse a PWM: an observer needs four periods a turn, edges need twelve, six-step 24.
+pub(super) const TOO_FEW_PERIODS: &str = "too few periods a turn at CTL_RPM_MAX";
+
 /// Share of `LIM_PHASE_A` that a test of the motor may use.
 pub(super) const TEST_SHARE: f32 = 0.2;
 

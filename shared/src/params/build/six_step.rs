@@ -7,7 +7,7 @@ use fixed::types::I1F31;
 use super::formula::{fill, value};
 use super::outer;
 use super::quantity::Quantity;
-use super::si::{Si, TEST_SHARE};
+use super::si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 use crate::control::delay::Delay;
 use crate::drive::config::six_step::Config;
 use crate::math::Real;
@@ -53,7 +53,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
         value!(p, [6.0] * FastestTurns * [LEAST_PERIODS]),
         1.0,
         ParamId::PwmFreqHz,
-        super::TOO_FEW_PERIODS,
+        TOO_FEW_PERIODS,
     );
     outer::planner(p, Quantity::T, &mut place.planner);
     let crossing = &mut place.crossing;
