@@ -365,17 +365,15 @@ fn reaction(
     named: &BTreeSet<String>,
 ) -> Reaction {
     let latched = !snapshot.faults.is_empty();
-    if !moment.drives() {
-        return if latched {
-            Reaction::Stops
-        } else {
-            Reaction::Rests
-        };
-    }
-    match (turns, broken_off) {
-        (true, false) => Reaction::GoesOn,
-        (true, true) => Reaction::Recovers,
-        _ if latched || !named.is_empty() => Reaction::Stops,
+    // A motor that is slowed down is not driven.
+    let driven = snapshot.phase.drives() && snapshot.phase != Phase::Stopping;
+    match (moment.drives(), turns, broken_off) {
+        (false, ..) if driven => Reaction::Fails,
+        (false, ..) if latched => Reaction::Stops,
+        (false, ..) => Reaction::Rests,
+        (true, true, false) => Reaction::GoesOn,
+        (true, true, true) => Reaction::Recovers,
+        _ if !driven && (latched || !named.is_empty()) => Reaction::Stops,
         _ => Reaction::Fails,
     }
 }

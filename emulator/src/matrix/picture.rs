@@ -41,7 +41,7 @@ impl Matrix {
             (RECOVERS, "turns again by itself"),
             (RESTS, "at rest, as asked"),
             (STOPS, "off until zero throttle, and said why"),
-            (FAILS, "does not turn, and nothing is said"),
+            (FAILS, "still tries at the end, or is off without a word"),
         ];
         Grid {
             title: "What the ESC makes of each fault: time to its answer, greatest phase current and supply; \

@@ -74,7 +74,7 @@ pub enum Reaction {
     Rests,
     /// The bridge is off until the throttle is closed, and it is said why.
     Stops,
-    /// The motor does not turn as it is asked to, and nothing holds the bridge off.
+    /// It is driven where it must not be, still tries at the end, or is off without a word.
     Fails,
 }
 
