@@ -110,7 +110,6 @@ impl Stage {
     }
 
     /// A leg that has been told to go from one switch straight to the other in this period.
-    #[inline(always)]
     pub(super) fn crossed(&self) -> Option<usize> {
         self.crossed
     }

@@ -27,8 +27,8 @@ pub struct Config {
 
 impl Config {
     /// `i_d` along d at standstill and `i_d_slope` less over the speed; at most `i_q` along q, or
-    /// `i_q_slope` times the speed, where that is more. No slope is negative. Both are at most `phase`, where the
-    /// drive itself has them up to `limit`.
+    /// `i_q_slope` times the speed, where that is more. No slope is negative. The current along q is at most `phase`,
+    /// where the drive itself has it up to `limit`.
     pub fn new(
         (i_d, i_d_slope): (Current, Gain<Speed, Current>),
         (i_q, i_q_slope): (Current, Gain<Speed, Current>),
