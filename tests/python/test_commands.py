@@ -114,12 +114,18 @@ def test_an_actuator_test_turns_the_motor_for_its_time_only(esc):
     assert not esc.armed()
 
 
+def stops_within_its_braking(esc) -> None:
+    """From the order on, not from the start of the test: between them a busy machine may let time pass."""
+    ordered = esc.status().time_usec
+    assert esc.wait_rpm(-50, 50).time_usec - ordered < 2.2e6
+
+
 def test_an_actuator_test_is_ended_by_nan(esc):
     esc.stream(ESC_STATUS, 20_000)
     assert esc.command(ACTUATOR_TEST, 1.0, 3.0, 0, 0, 1) == ACCEPTED
-    begin = esc.wait_rpm(100, 6000).time_usec
+    esc.wait_rpm(100, 6000)
     assert esc.command(ACTUATOR_TEST, math.nan, 0, 0, 0, 1) == ACCEPTED
-    assert esc.wait_rpm(-100, 100).time_usec - begin < 2.5e6
+    stops_within_its_braking(esc)
 
 
 def test_an_actuator_test_has_limits(esc):
@@ -139,10 +145,10 @@ def test_a_motor_test_turns_the_motor_and_one_of_nothing_ends_it(esc):
     assert esc.command(MOTOR_TEST, 2, percent, 100, 2.0) == DENIED, "another motor"
     for throttle in [(percent, 100), (pulse, 2000)]:
         assert esc.command(MOTOR_TEST, 1, *throttle, 3.0) == ACCEPTED
-        begin = esc.wait_rpm(100, 6000).time_usec
+        esc.wait_rpm(100, 6000)
         assert esc.command(MOTOR_TEST, 1, *throttle, 3.0) == REJECTED, "it turns"
         assert esc.command(MOTOR_TEST, 1, percent, 0, 0) == ACCEPTED
-        assert esc.wait_rpm(-50, 50).time_usec - begin < 2.5e6
+        stops_within_its_braking(esc)
 
 
 def test_a_direction_by_command_survives_a_kill(start, tmp_path):
