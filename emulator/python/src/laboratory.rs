@@ -1,7 +1,7 @@
 //! ESCs that run as a Python program says.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 
 use pyo3::exceptions::{PyIndexError, PyKeyError};
 use pyo3::prelude::*;
@@ -34,17 +34,18 @@ pub(crate) struct Laboratory {
 }
 
 impl Laboratory {
-    fn lock(&self) -> MutexGuard<'_, laboratory::Laboratory> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Does something with the ESCs, while Python's other threads run: one of them may have hold of them.
+    ///
+    /// After a panic it refuses: what that has left half done is no ESC any more.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut laboratory::Laboratory) -> T + Send,
-    ) -> T {
-        py.detach(|| work(&mut self.lock()))
+    ) -> PyResult<T> {
+        py.detach(|| match self.inner.lock() {
+            Ok(mut inner) => Ok(work(&mut inner)),
+            Err(_) => Err(wrong("the emulator has failed; make a new one")),
+        })
     }
 
     fn check(&self, esc: usize) -> PyResult<usize> {
@@ -84,7 +85,7 @@ impl Laboratory {
     )]
     fn new(
         bench: &str,
-        escs: usize,
+        escs: i64,
         given: &Bound<'_, PyDict>,
         signal: String,
         params: Vec<(String, f32)>,
@@ -92,9 +93,10 @@ impl Laboratory {
         records: bool,
         traces: bool,
     ) -> PyResult<Self> {
-        if !(1..=ESCS_MAX).contains(&escs) {
+        let some = usize::try_from(escs).ok();
+        let Some(escs) = some.filter(|escs| (1..=ESCS_MAX).contains(escs)) else {
             return Err(wrong(format!("{escs} ESCs; give 1 to {ESCS_MAX}")));
-        }
+        };
         let Standing {
             bench,
             params: of_bench,
@@ -125,13 +127,13 @@ impl Laboratory {
     }
 
     #[getter]
-    fn now_ns(&self, py: Python<'_>) -> u64 {
+    fn now_ns(&self, py: Python<'_>) -> PyResult<u64> {
         self.with(py, |inner| inner.rack().now_ns())
     }
 
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let mut left_ns = ns(seconds)?;
-        self.with(py, laboratory::Laboratory::begin);
+        self.with(py, laboratory::Laboratory::begin)?;
         loop {
             let stride_ns = left_ns.min(LOOK_NS);
             left_ns -= stride_ns;
@@ -139,7 +141,7 @@ impl Laboratory {
                 let until_ns = inner.rack().now_ns() + stride_ns;
                 inner.go_on_to(until_ns)
             });
-            gone.map_err(wrong)?;
+            gone?.map_err(wrong)?;
             if left_ns == 0 {
                 return Ok(());
             }
@@ -149,7 +151,7 @@ impl Laboratory {
 
     fn throttle(&self, py: Python<'_>, esc: usize) -> PyResult<Option<f64>> {
         let esc = self.check(esc)?;
-        Ok(self.with(py, |inner| inner.throttles()[esc]))
+        self.with(py, |inner| inner.throttles()[esc])
     }
 
     fn set_throttle(&self, py: Python<'_>, esc: usize, throttle: Option<f64>) -> PyResult<()> {
@@ -160,14 +162,13 @@ impl Laboratory {
             let what = format!("throttle = {value} is out of range; give 0 to 1, or None");
             return Err(wrong(what));
         }
-        self.with(py, |inner| inner.set_throttle(esc, throttle));
-        Ok(())
+        self.with(py, |inner| inner.set_throttle(esc, throttle))
     }
 
     fn send(&self, py: Python<'_>, esc: usize, datagram: &[u8], after_s: f64) -> PyResult<()> {
         let (esc, after_ns) = (self.check(esc)?, ns(after_s)?);
         let sent = self.with(py, |inner| inner.send(esc, after_ns, datagram));
-        sent.map_err(wrong)
+        sent?.map_err(wrong)
     }
 
     #[pyo3(signature = (supply_v, supply_ohm, ambient_c, torques_nm, winds_rpm))]
@@ -192,10 +193,10 @@ impl Laboratory {
             shafts: shafts.collect(),
         };
         let changed = self.with(py, |inner| inner.surround(&change));
-        changed.map_err(wrong)
+        changed?.map_err(wrong)
     }
 
-    fn states(&self, py: Python<'_>) -> Vec<EscState> {
+    fn states(&self, py: Python<'_>) -> PyResult<Vec<EscState>> {
         self.with(py, |inner| {
             let rack = inner.rack();
             let states = rack.states().map(|state| EscState {
@@ -215,7 +216,7 @@ impl Laboratory {
 
     fn param(&self, py: Python<'_>, esc: usize, name: &str) -> PyResult<f32> {
         let (esc, id) = (self.check(esc)?, known(name)?);
-        Ok(self.with(py, |inner| inner.param(esc, id)))
+        self.with(py, |inner| inner.param(esc, id))
     }
 
     fn set_param(&self, py: Python<'_>, esc: usize, name: &str, value: f32) -> PyResult<()> {
@@ -223,33 +224,32 @@ impl Laboratory {
         known(name)?;
         let (id, value) = parameter(name, value).map_err(wrong)?;
         let set = self.with(py, |inner| inner.set_param(esc, id, value));
-        set.map_err(wrong)
+        set?.map_err(wrong)
     }
 
-    fn receive(&self, py: Python<'_>, bytes: &[u8]) {
-        self.with(py, |inner| inner.receive(bytes));
+    fn receive(&self, py: Python<'_>, bytes: &[u8]) -> PyResult<()> {
+        self.with(py, |inner| inner.receive(bytes))
     }
 
-    fn take_sent<'py>(&self, py: Python<'py>, most: usize) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.with(py, |inner| inner.take_sent(most)))
+    fn take_sent<'py>(&self, py: Python<'py>, most: usize) -> PyResult<Bound<'py, PyBytes>> {
+        let sent = self.with(py, |inner| inner.take_sent(most))?;
+        Ok(PyBytes::new(py, &sent))
     }
 
     fn inject(&self, py: Python<'_>, esc: usize, text: String) -> PyResult<()> {
         let esc = self.check(esc)?;
         let fault = scenario::fault(&text).map_err(wrong)?;
-        self.with(py, |inner| inner.inject(esc, fault, text));
-        Ok(())
+        self.with(py, |inner| inner.inject(esc, fault, text))
     }
 
     fn mend(&self, py: Python<'_>, esc: usize) -> PyResult<()> {
         let esc = self.check(esc)?;
-        self.with(py, |inner| inner.mend(esc));
-        Ok(())
+        self.with(py, |inner| inner.mend(esc))
     }
 
     fn faults(&self, py: Python<'_>, esc: usize) -> PyResult<Vec<String>> {
         let esc = self.check(esc)?;
-        Ok(self.with(py, |inner| inner.faults(esc)))
+        self.with(py, |inner| inner.faults(esc))
     }
 
     fn take_recorded<'py>(
@@ -258,12 +258,12 @@ impl Laboratory {
         esc: usize,
     ) -> PyResult<Option<Bound<'py, PyBytes>>> {
         let esc = self.check(esc)?;
-        let rows = self.with(py, |inner| inner.take_recorded(esc));
+        let rows = self.with(py, |inner| inner.take_recorded(esc))?;
         Ok(rows.map(|rows| PyBytes::new(py, &rows)))
     }
 
     fn trace_hash(&self, py: Python<'_>, esc: usize) -> PyResult<Option<String>> {
         let esc = self.check(esc)?;
-        Ok(self.with(py, |inner| inner.trace_hash(esc)))
+        self.with(py, |inner| inner.trace_hash(esc))
     }
 }
