@@ -20,7 +20,7 @@ from paths import PROGRAM, SCENARIOS  # noqa: E402
 
 SECONDS = 5
 DRIVES = SCENARIOS / "random-drives.toml"
-SEEDS = range(1, 21)
+SEEDS = range(1, 11)
 
 
 def lockstep(read: bool, **keys: object) -> float:
