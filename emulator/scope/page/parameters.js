@@ -60,6 +60,8 @@ export class Parameters {
     const value = this.esc().params.get(name);
     if (!found || value === undefined) return;
     if (document.activeElement !== found.input) found.input.value = found.about.values ? String(value) : spelt(value);
+    // A long choice is cut where it stands; whole, it is a hint.
+    if (found.about.values) found.input.title = found.input.selectedOptions[0]?.textContent ?? "";
     const changed = !found.about.readOnly && Math.fround(found.about.default) !== value;
     found.row.classList.toggle("changed", changed);
   }
