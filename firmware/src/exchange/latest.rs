@@ -4,14 +4,16 @@
 //! Each swaps its place for the one between when it is done. The reader finds the last value whole; a
 //! reader that comes late misses earlier values, and gets no mixture.
 
+use core::mem::MaybeUninit;
+
 use super::sync::{AtomicU8, Ordering, UnsafeCell, read, write};
 
 /// In the number of the place between: it was written since the last swap of the reader.
 const NEW: u8 = 4;
 
-/// The three places.
+/// The three places. Empty they are all zeros, which take no room in the flash, as an `Option`'s `None` need not be.
 pub(crate) struct Latest<T> {
-    places: [UnsafeCell<Option<T>>; 3],
+    places: [UnsafeCell<MaybeUninit<T>>; 3],
     between: AtomicU8,
 }
 
@@ -27,6 +29,8 @@ pub(crate) struct Writer {
 /// The reader's hand.
 pub(crate) struct Reader {
     place: u8,
+    /// True once a value has come.
+    filled: bool,
 }
 
 impl<T: Copy> Latest<T> {
@@ -34,7 +38,7 @@ impl<T: Copy> Latest<T> {
     #[cfg(not(test))]
     pub(crate) const fn new() -> Self {
         Self {
-            places: [const { UnsafeCell::new(None) }; 3],
+            places: [const { UnsafeCell::new(MaybeUninit::uninit()) }; 3],
             between: AtomicU8::new(0),
         }
     }
@@ -43,7 +47,7 @@ impl<T: Copy> Latest<T> {
     #[cfg(test)]
     pub(crate) fn new() -> Self {
         Self {
-            places: core::array::from_fn(|_| UnsafeCell::new(None)),
+            places: core::array::from_fn(|_| UnsafeCell::new(MaybeUninit::uninit())),
             between: AtomicU8::new(0),
         }
     }
@@ -53,7 +57,11 @@ impl<T: Copy> Latest<T> {
     /// # Safety
     /// To be called once for these places.
     pub(crate) unsafe fn hands() -> (Writer, Reader) {
-        (Writer { place: 1 }, Reader { place: 2 })
+        let reader = Reader {
+            place: 2,
+            filled: false,
+        };
+        (Writer { place: 1 }, reader)
     }
 
     /// Writes the latest value.
@@ -61,7 +69,12 @@ impl<T: Copy> Latest<T> {
     pub(crate) fn publish(&self, hand: &mut Writer, value: T) {
         // SAFETY: the place is in the writer's hand. The mask says no more than that to the
         // compiler, which then needs no check.
-        unsafe { write(&self.places[usize::from(hand.place & 3) % 3], Some(value)) };
+        unsafe {
+            write(
+                &self.places[usize::from(hand.place & 3) % 3],
+                MaybeUninit::new(value),
+            );
+        }
         // Release: who gets the place sees what is in it. Acquire: who has left the other is done.
         hand.place = self.between.swap(hand.place | NEW, Ordering::AcqRel) & !NEW;
     }
@@ -71,9 +84,11 @@ impl<T: Copy> Latest<T> {
         // A value that is not new is in the reader's hand already.
         if self.between.load(Ordering::Relaxed) & NEW != 0 {
             hand.place = self.between.swap(hand.place, Ordering::AcqRel) & !NEW;
+            hand.filled = true;
         }
-        // SAFETY: the place is in the reader's hand.
-        unsafe { read(&self.places[usize::from(hand.place)]) }
+        // SAFETY: the place is in the reader's hand, and the writer has filled it.
+        hand.filled
+            .then(|| unsafe { read(&self.places[usize::from(hand.place)]).assume_init() })
     }
 }
 
