@@ -7,7 +7,7 @@ use crate::plant::Gate;
 use crate::record::{RecordError, Recorder};
 use crate::rig::{Period, Rig};
 use crate::summary::{Report, Summary};
-use crate::surroundings::{Motion, Passage};
+use crate::surroundings::Passage;
 
 /// Why a run cannot go on; one line.
 #[derive(Debug, Error)]
@@ -15,6 +15,14 @@ pub enum WatchError {
     /// The recording cannot be written.
     #[error("{0}")]
     Record(#[from] RecordError),
+    /// It is void.
+    #[error("{0}")]
+    Void(#[from] Void),
+}
+
+/// Why what is simulated is void; one line.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum Void {
     /// The simulated motor has left all bounds.
     #[error(
         "the simulated motor diverged: its inertia is too small for its load and the PWM frequency"
@@ -30,6 +38,17 @@ pub enum WatchError {
         /// When, s: the period's start where only that is known.
         t_s: f64,
     },
+}
+
+impl Void {
+    /// Whether a period is a reason.
+    pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Option<Self> {
+        if period.motion.diverged() {
+            return Some(Self::Diverged);
+        }
+        let phase = rig.plant().crossed()?;
+        Some(Self::Both { phase, t_s })
+    }
 }
 
 /// The onlooker.
@@ -122,12 +141,6 @@ impl Onlooker for Watches {
 }
 
 impl Watch {
-    fn check(&mut self, motion: &Motion) {
-        if motion.diverged() {
-            self.failed = Some(WatchError::Diverged);
-        }
-    }
-
     fn record(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
         if let Some(recorder) = &mut self.recorder
             && self.failed.is_none()
@@ -140,23 +153,24 @@ impl Watch {
 impl Onlooker for Watch {
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.summary.add(t_s, period, rig);
-        self.check(&period.motion);
-        if let Some(phase) = rig.plant().crossed() {
-            self.failed = Some(WatchError::Both { phase, t_s });
+        if let Some(void) = Void::of(t_s, period, rig) {
+            self.failed = Some(void.into());
         }
         self.record(|recorder| recorder.period(t_s, period, rig));
     }
 
     fn passage(&mut self, t_s: f64, passage: &Passage) {
         self.summary.pass(t_s, passage);
-        self.check(&passage.motion);
+        if passage.motion.diverged() {
+            self.failed = Some(Void::Diverged.into());
+        }
         self.record(|recorder| recorder.passage(t_s, passage));
     }
 
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
         if gate.shoots() {
             let t_s = time_ns as f64 * 1e-9;
-            self.failed = Some(WatchError::Both { phase: leg, t_s });
+            self.failed = Some(Void::Both { phase: leg, t_s }.into());
         }
         self.record(|recorder| recorder.gates(time_ns, leg, gate));
     }

@@ -11,7 +11,7 @@ use siskin_emulator::laboratory::{self, Setup};
 use siskin_emulator::parameter::parameter;
 use siskin_emulator::rack::{ESCS_MAX, Environment, Shaft};
 use siskin_emulator::scenario::{self, Standing, ThrottleSignal, stand};
-use siskin_emulator::watch::WatchError;
+use siskin_emulator::watch::Void;
 
 use crate::Error;
 use crate::convert::to_table;
@@ -137,7 +137,7 @@ impl Laboratory {
         loop {
             let stride_ns = left_ns.min(LOOK_NS);
             left_ns -= stride_ns;
-            let gone = self.with(py, |inner| -> Result<(), WatchError> {
+            let gone = self.with(py, |inner| -> Result<(), Void> {
                 let until_ns = inner.rack().now_ns() + stride_ns;
                 inner.go_on_to(until_ns)
             });

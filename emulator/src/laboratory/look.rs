@@ -6,11 +6,13 @@ use crate::machine::Onlooker;
 use crate::record::Row;
 use crate::rig::{Period, Rig};
 use crate::summary::Summary;
+use crate::watch::Void;
 
 /// What is kept of each ESC's periods.
 pub(super) struct Look {
     esc: usize,
-    diverged: bool,
+    /// Why it cannot go on, from the first reason on.
+    failed: Option<Void>,
     /// Packed rows of each ESC, if they are wanted.
     rows: Option<Vec<Vec<u8>>>,
     /// A summary of each ESC without windows, if its hash is wanted.
@@ -21,15 +23,15 @@ impl Look {
     pub(super) fn new(escs: usize, records: bool, traces: bool) -> Self {
         Self {
             esc: 0,
-            diverged: false,
+            failed: None,
             rows: records.then(|| vec![Vec::new(); escs]),
             summaries: traces.then(|| (0..escs).map(|_| Summary::new([])).collect()),
         }
     }
 
-    /// Whether a motor has left all bounds.
-    pub(super) fn diverged(&self) -> bool {
-        self.diverged
+    /// Why the laboratory cannot go on, if it cannot.
+    pub(super) fn failed(&self) -> Option<Void> {
+        self.failed
     }
 
     /// The rows of an ESC since they were last taken.
@@ -50,7 +52,7 @@ impl Onlooker for Look {
     }
 
     fn period(&mut self, t_s: f64, period: &Period, rig: &Rig) {
-        self.diverged |= period.motion.diverged();
+        self.failed = self.failed.or_else(|| Void::of(t_s, period, rig));
         if let Some(rows) = &mut self.rows {
             Row::of(t_s, period, rig).pack(&mut rows[self.esc]);
         }

@@ -22,7 +22,7 @@ use crate::machine::Machine;
 use crate::rack::{Environment, OutOfRange, Rack};
 use crate::rig::Bench;
 use crate::scenario::ThrottleSignal;
-use crate::watch::WatchError;
+use crate::watch::Void;
 use crate::wire::{self, Wire};
 use look::Look;
 use outbox::Outbox;
@@ -133,8 +133,8 @@ impl Laboratory {
     /// Runs all control periods that begin before `until_ns`, with the frames that are due.
     ///
     /// # Errors
-    /// The simulated motor has left all bounds.
-    pub fn go_on_to(&mut self, until_ns: u64) -> Result<(), WatchError> {
+    /// The simulated motor has left all bounds, or both switches of a leg may have been on.
+    pub fn go_on_to(&mut self, until_ns: u64) -> Result<(), Void> {
         let outbox = &mut self.outbox;
         while self.rack.now_ns() < until_ns {
             let now_ns = self.rack.now_ns();
@@ -152,8 +152,8 @@ impl Laboratory {
             let stride_ns = until_ns.min(self.frames_due_ns);
             let mut send = |frame: &[u8]| outbox.push(frame);
             self.rack.go_on_to(stride_ns, &mut self.look, &mut send);
-            if self.look.diverged() {
-                return Err(WatchError::Diverged);
+            if let Some(void) = self.look.failed() {
+                return Err(void);
             }
         }
         Ok(())

@@ -46,8 +46,6 @@ pub struct Plant {
     trip_a: f64,
     /// Whether they have, and the drive has not yet.
     tripped: bool,
-    /// See [`Self::crossed`].
-    crossed: Option<usize>,
     /// Where all legs are, with none waiting.
     settled: Option<Rail>,
     /// The longest stretch that the circuit's solution is prepared for between a period's own edges, s.
@@ -70,7 +68,6 @@ impl Plant {
             timers: [Timer::default(); 3],
             trip_a: f64::INFINITY,
             tripped: false,
-            crossed: None,
             settled: None,
             longest_s: 0.0,
         }
@@ -96,11 +93,11 @@ impl Plant {
         self.tripped
     }
 
-    /// A leg that has gone from one switch straight to the other in the last period: with real switches both would
-    /// have been on. Where there is no dead time it is none.
+    /// A leg that has had less than the dead time between its switches in the last period: real ones might both have
+    /// been on. Means have no edges.
     #[inline(always)] // in each period
     pub fn crossed(&self) -> Option<usize> {
-        self.crossed
+        self.stage.crossed()
     }
 
     /// Gives the motor at rest what a real one has beyond the ideal.
@@ -204,7 +201,7 @@ impl Plant {
         period_s: f64,
         dead_time_s: f64,
     ) -> Flow {
-        self.stage.begin(bus_v, period_s);
+        self.stage.begin(bus_v, period_s, dead_time_s);
         let half_s = 0.5 * period_s;
         if self.tripped {
             self.tripped = halves != [Bridge::Off; 2];
@@ -224,7 +221,6 @@ impl Plant {
                 }
             }
         }
-        self.crossed = self.stage.crossed().filter(|_| dead_time_s > 0.0);
         let mut flow = self.stage.machine.finish(period_s);
         flow.bus_a += self.stage.shot_as() / period_s;
         flow
@@ -240,7 +236,7 @@ impl Plant {
     ///
     /// The means are over the stretch; the shaft takes its torque at the end.
     pub fn legs(&mut self, legs: [Option<Rail>; 3], bus_v: f64, time_s: f64) -> Flow {
-        self.stage.begin(bus_v, time_s);
+        self.stage.begin(bus_v, time_s, 0.0);
         self.settled = None;
         for (leg, rail) in legs.into_iter().enumerate() {
             self.timers[leg] = Timer {
@@ -267,15 +263,11 @@ impl Plant {
     /// Means stand for legs that are low at the samples.
     #[cold]
     fn close_low(&mut self) {
-        for (leg, timer) in self.timers.iter_mut().enumerate() {
-            *timer = Timer {
-                output: Some(Rail::Low),
-                waiting_s: 0.0,
-            };
-            // No edge of a timer's.
-            self.stage.set(leg, None);
-            self.stage.set(leg, Some(Rail::Low));
-        }
+        self.timers = [Timer {
+            output: Some(Rail::Low),
+            waiting_s: 0.0,
+        }; 3];
+        self.stage.hold(Rail::Low);
         self.settled = Some(Rail::Low);
     }
 
@@ -434,43 +426,71 @@ mod tests {
         plant
     }
 
-    /// Without a dead time a leg goes from one switch straight to the other, which is noticed at the stage; with one
-    /// there is a time with both off at each edge.
+    /// A leg with both switches off has each edge played; with three legs that switch, all follow from one solution.
+    fn commands() -> [Bridge; 2] {
+        let [low, high] = [0.2, 0.8].map(Duty::from_num::<f64>);
+        [
+            Bridge::Legs([Some(low), None, Some(high)]),
+            Bridge::Duty([low, high, low]),
+        ]
+    }
+
+    /// Whoever asks for no dead time has none.
     #[test]
-    fn switches_without_a_time_between_them_are_noticed() {
-        let [low, high] = [0.2, 0.8].map(|share| Some(Duty::from_num::<f64>(share)));
-        // With a leg off each edge is played.
-        let legs = Bridge::Legs([low, None, high]);
-        for (dead_time_s, noticed) in [(500e-9, false), (0.0, true)] {
-            let mut plant = plant();
-            for _ in 0..3 {
-                plant.period([legs; 2], 24.0, 41e-6, dead_time_s);
-                assert_eq!(plant.stage.crossed().is_some(), noticed, "{dead_time_s}");
-                // Who has asked for none has none.
-                assert_eq!(plant.crossed(), None);
+    fn there_is_a_dead_time_between_the_switches() {
+        for bridge in commands() {
+            for dead_time_s in [500e-9, 0.0] {
+                let mut plant = plant();
+                for _ in 0..5 {
+                    plant.period([bridge; 2], 24.0, 41e-6, dead_time_s);
+                    assert_eq!(plant.crossed(), None, "{bridge:?} {dead_time_s}");
+                }
             }
         }
     }
 
-    /// A timer that forgets nearly all of its dead time is found in the period.
+    /// A timer that forgets a tenth of its dead time is found in the half period in which it does.
     #[test]
-    fn a_missing_dead_time_is_found() {
-        let mut plant = plant();
-        let low = Bridge::Legs([Some(Duty::ZERO), None, None]);
-        plant.period([low; 2], 24.0, 41e-6, 500e-9);
-        assert_eq!(plant.crossed(), None);
-        for (waiting_s, off, found) in [(500e-9, true, None), (0.1e-9, false, Some(0))] {
-            plant.stage.set(0, None);
-            plant.stage.set(0, Some(Rail::High));
-            if off {
-                plant.stage.set(0, None);
+    fn a_dead_time_that_is_too_short_is_found() {
+        const HALF_S: f64 = 20e-6;
+        for bridge in commands() {
+            for to in [Rail::High, Rail::Low] {
+                for (dead_time_s, found) in [(500e-9, false), (450e-9, true), (0.0, true)] {
+                    let mut plant = plant();
+                    plant.period([bridge; 2], 24.0, 2.0 * HALF_S, 500e-9);
+                    plant.stage.begin(24.0, 2.0 * HALF_S, 500e-9);
+                    if to == Rail::Low {
+                        plant.switch(bridge, Rail::High, HALF_S, 500e-9);
+                    }
+                    assert_eq!(plant.crossed(), None);
+                    let edges_s = plant.plain(bridge, to, HALF_S, dead_time_s);
+                    let swept = edges_s.is_some_and(|edges_s| {
+                        let mut stage = plant.stage.clone();
+                        stage.sweep(to, edges_s, dead_time_s, HALF_S)
+                    });
+                    assert_eq!(swept, matches!(bridge, Bridge::Duty(_)));
+                    plant.switch(bridge, to, HALF_S, dead_time_s);
+                    let crossed = plant.crossed().is_some();
+                    assert_eq!(crossed, found, "{bridge:?} {to:?} {dead_time_s}");
+                }
             }
-            plant.timers[0] = Timer {
-                output: Some(Rail::Low),
-                waiting_s,
-            };
-            plant.period([low; 2], 24.0, 41e-6, 500e-9);
-            assert_eq!(plant.crossed(), found);
+        }
+    }
+
+    /// A leg that has been off waits for no dead time: it must have been for as long.
+    #[test]
+    fn a_leg_that_was_off_too_shortly_is_found() {
+        let mut plant = plant();
+        for (off_s, found) in [(400e-9, Some(1)), (500e-9, None)] {
+            plant.stage.begin(24.0, 41e-6, 500e-9);
+            plant.stage.set(1, Some(Rail::High));
+            plant.stage.run(10e-6);
+            plant.stage.set(1, None);
+            plant.stage.run(off_s);
+            plant.stage.set(1, Some(Rail::Low));
+            assert_eq!(plant.crossed(), found, "{off_s}");
+            plant.stage.set(1, None);
+            plant.stage.run(10e-6);
         }
     }
 }

@@ -5,6 +5,7 @@
 
 mod broken;
 mod diodes;
+mod guard;
 mod sweep;
 
 use super::breaks::Breaks;
@@ -12,6 +13,7 @@ use super::circuit::{Drive, Way};
 use super::machine::Machine;
 use super::rail::Rail;
 use super::vector::{AXES, along_axes, dot};
+use guard::Guard;
 
 /// Forward voltage of the switches' body diodes, V: silicon at some amperes. The switches' own
 /// resistance counts as part of the motor's.
@@ -68,8 +70,7 @@ pub(super) struct Stage {
     breaks: Breaks,
     /// Charge that has flowed from pole to pole in this period, As.
     shot_as: f64,
-    /// A leg that has gone from one switch straight to the other in this period.
-    crossed: Option<usize>,
+    guard: Guard,
 }
 
 impl Stage {
@@ -87,20 +88,20 @@ impl Stage {
             sound: true,
             breaks: Breaks::default(),
             shot_as: 0.0,
-            crossed: None,
+            guard: Guard::new(),
         }
     }
 
-    /// Begins a period at a supply's voltage.
+    /// Begins a period at a supply's voltage, in which there must be `dead_s` between the switches of a leg.
     #[inline(always)]
-    pub(super) fn begin(&mut self, bus_v: f64, period_s: f64) {
+    pub(super) fn begin(&mut self, bus_v: f64, period_s: f64, dead_s: f64) {
         self.bus_v = bus_v;
+        self.guard.begin(dead_s, self.now_s);
         for from_s in &mut self.low_from_s {
             *from_s -= self.now_s;
         }
         self.now_s = 0.0;
         self.shot_as = 0.0;
-        self.crossed = None;
         self.machine.begin(period_s);
     }
 
@@ -109,17 +110,29 @@ impl Stage {
         self.bus_v
     }
 
-    /// A leg that has been told to go from one switch straight to the other in this period.
+    /// A leg that has had less than the dead time between its switches in this period.
     pub(super) fn crossed(&self) -> Option<usize> {
-        self.crossed
+        self.guard.crossed()
     }
 
     /// Turns one of a leg's switches on, or both off.
     #[inline(always)]
     pub(super) fn set(&mut self, leg: usize, on: Option<Rail>) {
-        if on.is_some_and(|rail| self.paths[leg] == Path::Switch(rail.other())) {
-            self.cross(leg);
+        self.guard.turn(leg, on, self.now_s);
+        self.switch(leg, on);
+    }
+
+    /// The legs have been at a rail for long.
+    #[cold]
+    pub(super) fn hold(&mut self, rail: Rail) {
+        self.guard.hold(rail);
+        for leg in 0..3 {
+            self.switch(leg, Some(rail));
         }
+    }
+
+    #[inline(always)]
+    fn switch(&mut self, leg: usize, on: Option<Rail>) {
         if !self.sound {
             return self.set_broken(leg, on);
         }
@@ -134,14 +147,6 @@ impl Stage {
                 self.connect(leg, self.diode(leg));
             }
             None => {}
-        }
-    }
-
-    #[cold]
-    fn cross(&mut self, leg: usize) {
-        // A shorted switch is on by itself.
-        if self.sound {
-            self.crossed = Some(leg);
         }
     }
 

@@ -13,7 +13,8 @@ use super::Plant;
 impl Plant {
     /// Begins a period at a supply's voltage; `expected_s` is about its length.
     pub fn begin(&mut self, bus_v: f64, expected_s: f64) {
-        self.stage.begin(bus_v, expected_s);
+        // Whoever makes the edges sees to what is between them.
+        self.stage.begin(bus_v, expected_s, 0.0);
         self.settled = None;
         // The circuit's solution is prepared for halves of a period.
         self.longest_s = 0.5 * expected_s;

@@ -36,6 +36,7 @@ impl Stage {
         if !machine.circuit.sweep(&mut machine.course, &sweep) {
             return false;
         }
+        self.guard.sweep(to, dead_s);
         self.paths = [Path::Switch(to); 3];
         self.high = [if rises { 1.0 } else { 0.0 }; 3];
         // A leg that goes low conducts there from its step on; after the other one nobody asks.

@@ -1,0 +1,82 @@
+//! Watches over the legs' switches: none is turned on before the other one of its leg has been off for the dead
+//! time.
+//!
+//! It is told of each edge as the stage is, and when it is by the stage's own clock. So it knows nothing of the
+//! timers whose work it checks; nor of what is broken: a shorted switch is on, but nobody has turned it on.
+
+use super::super::rail::Rail;
+
+/// What rounding may take of a dead time, s.
+const ROUNDING_S: f64 = 1e-12;
+
+/// What is known of the legs' switches.
+#[derive(Clone, Debug)]
+pub(super) struct Guard {
+    /// What must pass between the switches of a leg, s.
+    dead_s: f64,
+    /// The switch of each leg that is on.
+    on: [Option<Rail>; 3],
+    /// The last one that was turned off, and when in the period, s.
+    off: [(Rail, f64); 3],
+    /// A leg that has had less in this period.
+    crossed: Option<usize>,
+}
+
+impl Guard {
+    /// All switches have been off for long.
+    pub(super) fn new() -> Self {
+        Self {
+            dead_s: 0.0,
+            on: [None; 3],
+            off: [(Rail::Low, f64::NEG_INFINITY); 3],
+            crossed: None,
+        }
+    }
+
+    /// Begins a period with this dead time, after one of `past_s`.
+    #[inline(always)] // in each period
+    pub(super) fn begin(&mut self, dead_s: f64, past_s: f64) {
+        self.dead_s = dead_s;
+        self.crossed = None;
+        for (_, at_s) in &mut self.off {
+            *at_s -= past_s;
+        }
+    }
+
+    /// A leg that has had less than the dead time between its switches in this period.
+    pub(super) fn crossed(&self) -> Option<usize> {
+        self.crossed
+    }
+
+    /// One of a leg's switches is on from now on, or none.
+    #[inline(always)] // at each edge
+    pub(super) fn turn(&mut self, leg: usize, on: Option<Rail>, now_s: f64) {
+        let before = std::mem::replace(&mut self.on[leg], on);
+        if before == on {
+            return;
+        }
+        if let Some(rail) = before {
+            self.off[leg] = (rail, now_s);
+        }
+        if let Some(rail) = on {
+            let (other, since_s) = self.off[leg];
+            if other != rail && now_s - since_s < self.dead_s - ROUNDING_S {
+                self.crossed = Some(leg);
+            }
+        }
+    }
+
+    /// Each leg goes over to a rail, with so much time between its switches.
+    #[inline(always)] // in each half of a period
+    pub(super) fn sweep(&mut self, to: Rail, dead_s: f64) {
+        if dead_s < self.dead_s - ROUNDING_S {
+            self.crossed = Some(0);
+        }
+        self.on = [Some(to); 3];
+    }
+
+    /// The legs have been at a rail for long, without an edge that anybody has made.
+    pub(super) fn hold(&mut self, rail: Rail) {
+        self.on = [Some(rail); 3];
+    }
+}
