@@ -13,7 +13,7 @@ pub(super) use sweep::Sweep;
 
 use super::Motor;
 use super::series::{DECAY_MAX, ROTATION_MAX, rotation, small_decay, small_rotation};
-use super::vector::{AXES, back, dot, turn};
+use super::vector::{AXES, back, dot, largest, turn};
 
 /// Which currents can flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,6 +106,17 @@ pub(super) struct Course {
     pub(super) now: Moment,
     /// What has flowed.
     pub(super) sums: Sums,
+    /// Greatest magnitude of a phase current so far, A.
+    pub(super) most_a: f64,
+}
+
+impl Course {
+    /// Goes on to a stretch's end.
+    #[inline(always)]
+    pub(super) fn go(&mut self, to: Moment) {
+        self.now = to;
+        self.most_a = self.most_a.max(largest(to.stator_a()));
+    }
 }
 
 /// The circuit at one speed, and in a form that needs no division.
@@ -244,7 +255,7 @@ impl Circuit {
         let now = course.now;
         let next = solution.end;
         let [mut from, mut to] = solution.settled;
-        course.now = next;
+        course.go(next);
         match drive.way {
             Way::Star => {}
             Way::Without(phase) => {

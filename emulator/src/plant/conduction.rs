@@ -55,7 +55,7 @@ impl Conduction<'_> {
     /// is left.
     pub(super) fn conduct(&self, course: &mut Course, drive: &Drive, time_s: f64, flux_wb: f64) {
         let (now, flowed) = self.integrate(&course.now, drive, time_s);
-        course.now = now;
+        course.go(now);
         let r = self.circuit.resistance_ohm();
         let [torque, torque_square] = flowed.torque;
         let q_square = torque_square / (flux_wb * flux_wb);

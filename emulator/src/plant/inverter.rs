@@ -7,6 +7,7 @@
 //! current falls by e/L while the low sides are on, its mean would be missed by 0.06 A at 4500 rpm
 //! and 0.5 µs. The period runs from sample to sample.
 
+mod comparators;
 mod edges;
 
 use siskin_control::drive::Bridge;
@@ -17,6 +18,7 @@ use super::rail::Rail;
 use super::stage::{DIODE_V, Stage};
 use super::timing::{Half, Timer, delayed, duties, first_half, second_half, share};
 use super::{Extras, Load, Motor};
+use comparators::Comparators;
 
 /// How the inverter is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, clap::ValueEnum)]
@@ -32,20 +34,13 @@ pub enum Fidelity {
 /// The phase current below which a dead time's loss is in proportion to the current, A.
 const SIGN_CERTAIN_A: f64 = 0.1;
 
-/// Time from a current beyond the comparators' level to switches that are off, s: their filter and the
-/// gates' drivers.
-const TRIP_S: f64 = 1e-6;
-
 /// Motor, load and inverter.
 #[derive(Clone, Debug)]
 pub struct Plant {
     fidelity: Fidelity,
     stage: Stage,
     timers: [Timer; 3],
-    /// Current through a low side at which the comparators turn all switches off, A.
-    trip_a: f64,
-    /// Whether they have, and the drive has not yet.
-    tripped: bool,
+    comparators: Comparators,
     /// Where all legs are, with none waiting.
     settled: Option<Rail>,
     /// The longest stretch that the circuit's solution is prepared for between a period's own edges, s.
@@ -66,8 +61,7 @@ impl Plant {
             fidelity,
             stage: Stage::new(Machine::new(motor, load, speed_rad_s, angle_turns)),
             timers: [Timer::default(); 3],
-            trip_a: f64::INFINITY,
-            tripped: false,
+            comparators: Comparators::new(),
             settled: None,
             longest_s: 0.0,
         }
@@ -76,8 +70,8 @@ impl Plant {
     /// Breaks parts of the stage and mends all others.
     ///
     /// While something is broken every switch edge is simulated, and a comparator at each low side's
-    /// shunt turns all switches off where it sees more than its level. It looks at each edge, and acts
-    /// a microsecond later: with a sound stage the drive's own trip at the samples comes first.
+    /// shunt turns all switches off where it sees more than its level: with a sound stage the drive's own
+    /// trip at the samples comes first.
     pub fn break_legs(&mut self, breaks: &Breaks) {
         let on = [0, 1, 2].map(|leg| self.timers[leg].on());
         self.stage.break_legs(breaks, on);
@@ -85,12 +79,17 @@ impl Plant {
 
     /// Sets the comparators' level, A; it is infinite at the start.
     pub fn set_comparator_a(&mut self, level_a: f64) {
-        self.trip_a = level_a;
+        self.comparators.level_a = level_a;
     }
 
     /// Whether the comparators hold all switches off, until the drive turns them off as well.
     pub fn tripped(&self) -> bool {
-        self.tripped
+        self.comparators.tripped
+    }
+
+    /// From a current beyond the comparators' level to switches that were off, s, the last time that they acted.
+    pub fn trip_answer_s(&self) -> Option<f64> {
+        self.comparators.answer_s()
     }
 
     /// A leg that has had less than the dead time between its switches in the last period: real ones might both have
@@ -203,8 +202,8 @@ impl Plant {
     ) -> Flow {
         self.stage.begin(bus_v, period_s, dead_time_s);
         let half_s = 0.5 * period_s;
-        if self.tripped {
-            self.tripped = halves != [Bridge::Off; 2];
+        if self.comparators.tripped {
+            self.comparators.tripped = halves != [Bridge::Off; 2];
         }
         let [first, second] = halves;
         let first = self.gated(first);
@@ -228,7 +227,11 @@ impl Plant {
 
     /// What the comparators let through of a command.
     fn gated(&self, bridge: Bridge) -> Bridge {
-        if self.tripped { Bridge::Off } else { bridge }
+        if self.comparators.tripped {
+            Bridge::Off
+        } else {
+            bridge
+        }
     }
 
     /// Takes the plant on by a stretch of any length with each leg at a rail, or with both switches
@@ -327,19 +330,22 @@ impl Plant {
             }
             next_s[leg] = timer.next_s(0.0).min(half.edge_s);
         }
+        let watched = !self.stage.is_sound();
+        if !watched {
+            self.comparators.rest();
+        }
         let mut now_s = 0.0;
-        let mut trip_s = f64::INFINITY;
         loop {
-            if !self.stage.is_sound() && trip_s == f64::INFINITY && self.sees_too_much() {
-                trip_s = now_s + TRIP_S;
-            }
-            let end_s = next_s[0].min(next_s[1]).min(next_s[2]).min(half_s);
-            if trip_s <= end_s {
-                return self.trip(now_s, trip_s, half_s);
+            let mut end_s = next_s[0].min(next_s[1]).min(next_s[2]).min(half_s);
+            if watched {
+                end_s = end_s.min(now_s + self.comparators.look(self.stage.shunts_a()));
             }
             let time_s = end_s - now_s;
             if time_s > 0.0 {
                 self.stage.run(time_s);
+            }
+            if watched && self.comparators.pass(time_s) {
+                return self.trip(half_s - end_s);
             }
             for timer in &mut self.timers {
                 timer.waiting_s -= time_s;
@@ -365,22 +371,14 @@ impl Plant {
         }
     }
 
-    /// Whether a comparator sees more than its level.
-    fn sees_too_much(&self) -> bool {
-        let shunts_a = self.stage.shunts_a();
-        shunts_a.iter().any(|shunt_a| shunt_a.abs() > self.trip_a)
-    }
-
-    /// Goes on to `trip_s`, where the comparators turn all switches off, and to the half's end.
+    /// The comparators turn all switches off for the rest of a half.
     #[cold]
-    fn trip(&mut self, now_s: f64, trip_s: f64, half_s: f64) {
-        self.tripped = true;
-        self.stage.run(trip_s - now_s);
-        for (leg, timer) in self.timers.iter_mut().enumerate() {
-            *timer = Timer::default();
+    fn trip(&mut self, left_s: f64) {
+        self.timers = Default::default();
+        for leg in 0..3 {
             self.stage.set(leg, None);
         }
-        self.stage.run(half_s - trip_s);
+        self.stage.run(left_s);
     }
 
     /// The legs' edges, where solutions add up, each leg has one from the other rail, and there is time

@@ -11,7 +11,7 @@ use super::magnetics::Magnetics;
 use super::series::{fraction, settle};
 use super::shaft::Shaft;
 use super::thermal::Warming;
-use super::vector::{back, phases, turn};
+use super::vector::{back, largest, phases, turn};
 use super::{Cogging, Drag, Extras, Load, Motor};
 
 /// Means over a period.
@@ -27,6 +27,9 @@ pub struct Flow {
     pub copper_w: f64,
     /// Current from the supply, A.
     pub bus_a: f64,
+    /// Greatest magnitude of a phase current among those that were worked out: with the switches, at each of their
+    /// edges, A.
+    pub most_a: f64,
     /// Power lost to the motor's friction and in its iron while the shaft is free, W.
     pub drag_w: f64,
 }
@@ -83,6 +86,7 @@ impl Machine {
                     direction: [cos, sin],
                 },
                 sums: Sums::default(),
+                most_a: 0.0,
             },
         }
     }
@@ -224,6 +228,7 @@ impl Machine {
         }
         self.circuit.turn_at(omega, 0.5 * period_s);
         self.course.sums = Sums::default();
+        self.course.most_a = largest(self.now().stator_a());
     }
 
     /// Speed to expect at the middle of the period, rad/s.
@@ -307,7 +312,7 @@ impl Machine {
         let angle_turns = self.angle_turns;
         self.angle_turns = fraction(angle_turns + turns);
         let middle_rad_s = self.middle_rad_s(period_s);
-        let Course { now, sums } = &mut self.course;
+        let Course { now, sums, most_a } = &mut self.course;
         let [cos, sin] = now.direction;
         // One Newton step towards length 1 keeps the rounding from adding up.
         let correction = 1.5 - 0.5 * (cos * cos + sin * sin);
@@ -343,6 +348,7 @@ impl Machine {
             motor_w: 1.5 * self.circuit.inverse_r * sums.energy * share,
             copper_w: 1.5 * self.motor.resistance_ohm * (sums.squares[0] + sums.squares[1]) * share,
             bus_a: self.circuit.inverse_r * sums.charge * share,
+            most_a: *most_a,
             drag_w,
         };
         if let Some(warming) = &mut self.warming {

@@ -84,13 +84,16 @@ fn compare_brute(
 ) {
     let mut peak_a = 0.0_f64;
     let mut worst_a = 0.0_f64;
+    let mut most_apart_a = 0.0_f64;
     let list = |f: Flow| [f.torque_nm, f.torque_square, f.motor_w, f.copper_w, f.bus_a];
     let (mut apart, mut gross) = ([0.0; 5], [0.0; 5]);
     let (mut sums, mut brute_sums) = ([0.0; 2], [0.0; 2]);
     for k in 0..periods {
         let halves = command(k, &plant);
-        let flow = list(plant.period(halves, bus_v, PERIOD_S, DEAD_TIME_S));
-        let brute_flow = list(brute.period(halves, bus_v, PERIOD_S));
+        let flow = plant.period(halves, bus_v, PERIOD_S, DEAD_TIME_S);
+        let brute_flow = brute.period(halves, bus_v, PERIOD_S);
+        most_apart_a = most_apart_a.max((flow.most_a - brute_flow.most_a).abs());
+        let (flow, brute_flow) = (list(flow), list(brute_flow));
         for n in 0..2 {
             sums[n] += flow[n];
             brute_sums[n] += brute_flow[n];
@@ -106,6 +109,11 @@ fn compare_brute(
     }
     assert!(peak_a > 0.1, "nothing flows");
     assert!(worst_a < 1e-6 * peak_a, "{worst_a} A of {peak_a} A");
+    // A sweep has the currents at the steps of voltage without what a dead time's diode adds.
+    assert!(
+        most_apart_a < 0.01 * peak_a,
+        "{most_apart_a} A of {peak_a} A"
+    );
     for (apart, gross) in apart.into_iter().zip(gross) {
         assert!(apart.abs() <= 1e-4 * gross + 1e-9, "{apart} of {gross}");
     }

@@ -1,6 +1,7 @@
 //! Vectors in the plane: complex numbers, and three phases.
 
-const HALF_ROOT_3: f64 = 0.866_025_403_784_438_6;
+pub(super) const ROOT_3: f64 = 1.732_050_807_568_877_2;
+const HALF_ROOT_3: f64 = 0.5 * ROOT_3;
 
 /// The phases' axes in the stator's frame.
 pub(super) const AXES: [[f64; 2]; 3] = [[1.0, 0.0], [-0.5, HALF_ROOT_3], [-0.5, -HALF_ROOT_3]];
@@ -22,6 +23,14 @@ pub(super) fn phases([alpha, beta]: [f64; 2]) -> [f64; 3] {
     ]
 }
 
+/// The greatest magnitude of a vector's three phases.
+#[inline(always)]
+pub(super) fn largest([alpha, beta]: [f64; 2]) -> f64 {
+    let (alpha, beta) = (alpha.abs(), beta.abs());
+    // Of b and c, the one in which both parts have one sign.
+    alpha.max(HALF_ROOT_3 * beta + 0.5 * alpha)
+}
+
 /// The product of two vectors as complex numbers.
 #[inline(always)]
 pub(super) fn turn([a, b]: [f64; 2], [cos, sin]: [f64; 2]) -> [f64; 2] {
@@ -38,4 +47,19 @@ pub(super) fn back([a, b]: [f64; 2], [cos, sin]: [f64; 2]) -> [f64; 2] {
 #[inline(always)]
 pub(super) fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_phase_is_that_of_the_three() {
+        for turns in 0..24 {
+            let (sin, cos) = libm::sincos(f64::from(turns) * 0.27);
+            let vector = [3.0 * cos, 3.0 * sin];
+            let wanted = phases(vector).map(f64::abs).into_iter().fold(0.0, f64::max);
+            assert!((largest(vector) - wanted).abs() < 1e-12, "{vector:?}");
+        }
+    }
 }

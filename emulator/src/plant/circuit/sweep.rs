@@ -13,7 +13,7 @@ use std::array;
 use wide::f64x4;
 
 use super::super::series::{rotation, small_decay, small_rotation};
-use super::super::vector::{AXES, back, turn};
+use super::super::vector::{AXES, ROOT_3, back, turn};
 use super::{Circuit, Course, Moment};
 
 /// By how much of itself a current's change in a dead time may differ from a straight line's: R/L
@@ -252,6 +252,10 @@ impl Circuit {
         sums.squares[1] += q_square;
         sums.energy += sum(charge * volts + (stored + spent) * r);
         sums.charge += sum(charge + missing * during * r);
+        // The largest phase current of each vector, as `largest` has it.
+        let (x, y) = (end.x.abs(), end.y.abs());
+        let [a, b, c, d] = x.max((x + y * ROOT_3) * 0.5).to_array();
+        course.most_a = course.most_a.max(a.max(b)).max(c.max(d));
         let direction = to.last();
         course.now = Moment {
             i: back(end.last(), direction),

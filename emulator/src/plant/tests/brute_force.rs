@@ -74,6 +74,7 @@ impl BruteForce {
         let steps = (period_s / STEP_S).round() as i64;
         let mut sum = Flow::default();
         for step in 0..steps {
+            sum.most_a = self.i.iter().fold(sum.most_a, |most, i| most.max(i.abs()));
             let share = (step as f64 + 0.5) / steps as f64;
             let bridge = halves[usize::from(share > 0.5)];
             // 0 at the samples, 1 in the middle of the period; the counter is half a dead time ahead.
@@ -97,6 +98,7 @@ impl BruteForce {
             motor_w: sum.motor_w * share,
             copper_w: sum.copper_w * share,
             bus_a: sum.bus_a * share,
+            most_a: sum.most_a,
             drag_w: 0.0,
         }
     }

@@ -281,8 +281,7 @@ mod tests {
             torque_square: torque_nm * torque_nm + 0.03 * 0.03,
             motor_w: 500.0 * torque_nm,
             copper_w: 300.0 * torque_nm * torque_nm,
-            bus_a: 0.0,
-            drag_w: 0.0,
+            ..Flow::default()
         };
         let mut means = Means::default();
         means.add(&flow, 1.0);

@@ -92,8 +92,7 @@ mod tests {
             torque_square: torque_nm * torque_nm,
             motor_w: 100.0 * torque_nm,
             copper_w: 5.0,
-            bus_a: 0.0,
-            drag_w: 0.0,
+            ..Flow::default()
         };
         // A square wave of 1 ± 0.5 Nm.
         let mut means = Means::default();

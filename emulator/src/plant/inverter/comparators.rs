@@ -1,0 +1,98 @@
+//! The comparators at the low sides' shunts, which turn all switches off without the control's help.
+
+/// Time from a current beyond their level to switches that are off, s: their filter and the gates' drivers.
+const ACT_S: f64 = 1e-6;
+
+/// Time from one look at the currents to the next, s: real ones look all the time.
+const LOOK_S: f64 = 0.25e-6;
+
+/// What rounding may leave of a time, s.
+const ROUNDING_S: f64 = 1e-15;
+
+/// The comparators of all legs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Comparators {
+    /// Current through a low side at which they act, A.
+    pub(super) level_a: f64,
+    /// Whether they have, and the drive has not yet.
+    pub(super) tripped: bool,
+    /// When they will, s from now; never is infinite.
+    act_s: f64,
+    /// For how long there may have been more than their level, s.
+    beyond_s: f64,
+    /// That time at their last act, s.
+    answer_s: Option<f64>,
+}
+
+impl Comparators {
+    /// Without a level.
+    pub(super) fn new() -> Self {
+        Self {
+            level_a: f64::INFINITY,
+            tripped: false,
+            act_s: f64::INFINITY,
+            beyond_s: 0.0,
+            answer_s: None,
+        }
+    }
+
+    /// Nothing of what they have seen counts any more.
+    pub(super) fn rest(&mut self) {
+        self.act_s = f64::INFINITY;
+        self.beyond_s = 0.0;
+    }
+
+    /// They see these currents of the shunts now. Gives the time until they must look again, or act, s.
+    pub(super) fn look(&mut self, shunts_a: [f64; 3]) -> f64 {
+        if self.act_s < f64::INFINITY {
+            return self.act_s;
+        }
+        if shunts_a.iter().any(|shunt_a| shunt_a.abs() > self.level_a) {
+            self.act_s = ACT_S;
+            return ACT_S;
+        }
+        self.beyond_s = 0.0;
+        LOOK_S
+    }
+
+    /// Time passes; true where they act at its end.
+    pub(super) fn pass(&mut self, time_s: f64) -> bool {
+        self.act_s -= time_s;
+        self.beyond_s += time_s;
+        let acts = self.act_s < ROUNDING_S;
+        if acts {
+            self.tripped = true;
+            self.answer_s = Some(self.beyond_s);
+            self.rest();
+        }
+        acts
+    }
+
+    /// From a current beyond their level to switches that were off, s, the last time that they acted.
+    pub(super) fn answer_s(&self) -> Option<f64> {
+        self.answer_s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The current may have come to its level just behind the look before.
+    #[test]
+    fn they_act_a_microsecond_after_they_have_seen_it() {
+        let mut comparators = Comparators::new();
+        comparators.level_a = 30.0;
+        for _ in 0..3 {
+            assert_eq!(comparators.look([29.9, -29.9, 0.0]), LOOK_S);
+            assert!(!comparators.pass(LOOK_S));
+        }
+        assert_eq!(comparators.look([0.0, -30.1, 0.0]), ACT_S);
+        assert!(!comparators.pass(0.6e-6) && !comparators.tripped);
+        // What it is meanwhile does not matter.
+        assert!(comparators.look([0.0; 3]) < 0.5e-6);
+        assert!(comparators.pass(0.4e-6) && comparators.tripped);
+        let answer_s = comparators.answer_s().expect("they have acted");
+        assert!((answer_s - 1.25e-6).abs() < 1e-12, "{answer_s}");
+    }
+}
