@@ -7,16 +7,14 @@ plays each of so many random motors in speed and in voltage mode, on both plants
 with status 1 if one does not hold.
 """
 
-import argparse
 import random
 import statistics
 import sys
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
+import campaign
 import paths
 
 sys.path.insert(0, str(paths.DIALECT))
@@ -50,10 +48,10 @@ class Outcome:
         return turned_on and self.worst_deg < TRANSIENT_DEG and self.idle_deg < IDLE_DEG
 
 
-def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outcome:
-    """Plays steps of the throttle, 50 to 300 ms apart, a third of them from end to end, then half a second of idle.
+def throttles(draw: random.Random, steps: int) -> tuple[list, float]:
+    """Steps of the throttle, 50 to 300 ms apart, a third of them from end to end, then half a second of idle.
 
-    R, L and J are told wrong by up to 30 %, the flux by 10 %; settings follow from the motor.
+    Gives times and throttles, and when that has ended.
     """
     at_s, throttle = 1.5, [(0.0, 0.0), (0.5, 0.3)]
     for _ in range(steps):
@@ -61,18 +59,31 @@ def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outc
         throttle.append((at_s, share))
         at_s += draw.uniform(0.05, 0.3)
     throttle.append((at_s, IDLE))
-    end_s = at_s + 0.5
-    dead_time_ns = tables["params"]["PWM_DEADTIME_NS"]
-    tables["bench"] |= {"duration_s": end_s, "dead_time_ns": float(dead_time_ns)}
-    tables["bench.scale"] = {key: draw.uniform(0.7, 1.3) for key in "RLJ"} | {"flux": draw.uniform(0.9, 1.1)}
-    tables["params"] |= dict.fromkeys(FROM_MOTOR, 0)
-    faults, windows = flown(folder, tables, throttle, {"all": (1.4, end_s), "idle": (end_s - 0.2, end_s)})
+    return throttle, at_s + 0.5
+
+
+def slams_of(faults: list, windows: dict) -> Outcome:
+    """The outcome by the windows "all" and "idle"."""
     whole = windows["all"]
     # A drive that is off has no error, but knows no angle either.
     worst_deg, idle_deg = whole["angle_error_max_deg"], windows["idle"]["angle_error_rms_deg"]
     known = worst_deg is not None and idle_deg is not None
     errors_deg = (worst_deg, idle_deg) if known else (180.0, 180.0)
     return Outcome(faults, whole["starts"], whole["lock_lost"], *errors_deg)
+
+
+def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outcome:
+    """Plays slams.
+
+    R, L and J are told wrong by up to 30 %, the flux by 10 %; settings follow from the motor.
+    """
+    throttle, end_s = throttles(draw, steps)
+    dead_time_ns = tables["params"]["PWM_DEADTIME_NS"]
+    tables["bench"] |= {"duration_s": end_s, "dead_time_ns": float(dead_time_ns)}
+    tables["bench.scale"] = {key: draw.uniform(0.7, 1.3) for key in "RLJ"} | {"flux": draw.uniform(0.9, 1.1)}
+    tables["params"] |= dict.fromkeys(FROM_MOTOR, 0)
+    windows = {"all": (1.4, end_s), "idle": (end_s - 0.2, end_s)}
+    return slams_of(*flown(folder, tables, throttle, windows))
 
 
 def drawn(folder: Path, number: int, mode: str, plant: str, steps: int) -> Outcome:
@@ -86,32 +97,14 @@ def drawn(folder: Path, number: int, mode: str, plant: str, steps: int) -> Outco
     return slammed(folder, draw, tables, steps)
 
 
-def campaign(numbers: range, steps: int, jobs: int):
-    """Each case of these motors with its outcome, in order."""
-    cases = list(product(numbers, MODES, PLANTS))
-
-    def play(case: tuple) -> Outcome:
-        with tempfile.TemporaryDirectory() as folder:
-            return drawn(Path(folder), *case, steps)
-
-    # Each waits for a program of its own.
-    with ThreadPoolExecutor(jobs) as pool:
-        yield from zip(cases, pool.map(play, cases))
-
-
 def main() -> int:
-    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    words.add_argument("--motors", type=int, default=20, help="how many random motors")
-    words.add_argument("--first", type=int, default=0, help="number of the first")
-    words.add_argument("--steps", type=int, default=150, help="steps of the throttle")
-    words.add_argument("--jobs", type=int, default=2, help="runs at a time")
-    given = words.parse_args()
-    if min(given.motors, given.steps, given.jobs) < 1:
-        words.error("--motors, --steps and --jobs take 1 or more")
+    given = campaign.words(__doc__, motors=20, steps=(150, "steps of the throttle"))
+    cases = list(product(campaign.numbers(given), MODES, PLANTS))
     outcomes = []
     print(f"{'motor':>5} {'mode':<8} {'plant':<10} {'held':<5} {'starts':>6} {'worst':>6} {'idle':>5}  faults")
-    numbers = range(given.first, given.first + given.motors)
-    for (number, mode, plant), outcome in campaign(numbers, given.steps, given.jobs):
+    for (number, mode, plant), outcome in campaign.played(
+        cases, lambda folder, case: drawn(folder, *case, given.steps), given.jobs
+    ):
         outcomes.append(outcome)
         held = "yes" if outcome.holds() else "NO"
         figures = f"{outcome.starts:>6} {outcome.worst_deg:>6.1f} {outcome.idle_deg:>5.1f}"

@@ -1,0 +1,90 @@
+"""Motors at an ESC out of the bag: of the motor it knows nothing, of the board's limits and PWM all.
+
+    target/venv/bin/python tests/python/out_of_the_bag.py --motors 500 --jobs 2
+
+opens the throttle of each to 30 % and prints a row for each; it ends with status 1 if one neither turns nor is said
+to be at fault, if one has more than a fifth above its limit, or if more than one in fifty stays at rest.
+"""
+
+import random
+import statistics
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import campaign
+import paths
+
+sys.path.insert(0, str(paths.DIALECT))
+
+from emulator import MOTOR  # noqa: E402  (it needs the dialect's folder)
+from motors import FROM_MOTOR, any_motor, drawn_bench, flown  # noqa: E402
+
+FACTORY = {**dict.fromkeys([*MOTOR, *FROM_MOTOR], 0), "CTL_DRIVE": 2}
+"""What the default bench sets, as the factory has it."""
+OPENS_S, SHARE = 0.5, 0.3
+END_S = OPENS_S + 3.0
+LEAST_SPEED = 0.5
+MOST_CURRENT = 1.2
+AT_REST = 0.02
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What 3 s of open throttle have made of a motor."""
+
+    faults: list
+    speed: float
+    """The least in the last fifth of a second, over what the throttle's share is of full speed; one that is the wrong
+    way is negative."""
+    current: float
+    """The greatest of a phase, over LIM_PHASE_A."""
+
+    def turns(self) -> bool:
+        # Half of what a share of the supply makes of a motor without its load's losses.
+        return not self.faults and self.speed > LEAST_SPEED
+
+    def holds(self) -> bool:
+        """It turns or is said not to, within the current."""
+        return (self.turns() or bool(self.faults)) and self.current < MOST_CURRENT
+
+
+def limits(motor: dict) -> dict:
+    """What is known: of the board and the supply."""
+    return {name: value for name, value in motor["params"].items() if name.startswith(("LIM_", "PWM_"))}
+
+
+def opened(folder: Path, number: int) -> Outcome:
+    """The throttle is opened for the motor of this number. Of half of them two wires are swapped, which MOT_DIR has
+    put right."""
+    draw = random.Random(f"bag {number}")
+    motor, swapped = any_motor(draw), draw.random() < 0.5
+    tables = drawn_bench(motor)
+    tables["bench"]["duration_s"] = END_S
+    tables["params"] = FACTORY | limits(motor) | {"MOT_DIR": int(swapped)}
+    windows = {"all": (0.0, END_S), "end": (END_S - 0.2, END_S)}
+    faults, windows = flown(folder, tables, [(0.0, 0.0), (OPENS_S, SHARE)], windows)
+    rpm = -windows["end"]["rpm_max"] if swapped else windows["end"]["rpm_min"]
+    current = windows["all"]["current_max_a"] / motor["params"]["LIM_PHASE_A"]
+    return Outcome(faults, rpm / (SHARE * motor["rpm"]), current)
+
+
+def main() -> int:
+    given = campaign.words(__doc__, motors=500)
+    outcomes = []
+    print(f"{'motor':>5} {'turns':<5} {'speed':>6} {'current':>7}  faults")
+    for number, outcome in campaign.played(campaign.numbers(given), opened, given.jobs):
+        outcomes.append(outcome)
+        turns = "yes" if outcome.turns() else "NO"
+        row = f"{number:>5} {turns:<5} {outcome.speed:>6.2f} {outcome.current:>7.2f}  {', '.join(outcome.faults)}"
+        print(row.rstrip(), flush=True)
+    turn = sum(outcome.turns() for outcome in outcomes)
+    hold = sum(outcome.holds() for outcome in outcomes)
+    currents = [outcome.current for outcome in outcomes]
+    print(f"{turn} of {len(outcomes)} turn, {hold} hold; current over the limit, median and most:", end=" ")
+    print(f"{statistics.median(currents):.2f} and {max(currents):.2f}")
+    return 0 if hold == len(outcomes) and turn >= (1 - AT_REST) * len(outcomes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
