@@ -92,7 +92,7 @@ macro_rules! conditions {
 
             /// Those that are in the set, in the order of their numbers.
             pub fn iter(self) -> impl Iterator<Item = $name> {
-                $name::ALL.into_iter().filter(move |one| self.contains(*one))
+                $name::ALL.iter().copied().filter(move |one| self.contains(*one))
             }
 
             #[doc = concat!("A bit each, from the number ", stringify!($first), " on.")]

@@ -26,35 +26,27 @@ pub(super) fn faults(view: &View, sink: &mut Sink) {
 /// `@SYS/statistics.txt`: one answer holds it as long as few kinds of faults have been.
 pub(super) fn statistics(view: &View, sink: &mut Sink) {
     let statistics = &view.telemetry.statistics;
-    let rows = [
-        ("Run time: ", statistics.run_s, " s\n"),
-        ("Starts: ", statistics.starts, "\n"),
-        (
-            "Highest temperature: ",
-            statistics.temperature_max_c as u32,
-            " C\n",
-        ),
-        (
-            "Highest phase current: ",
-            statistics.phase_max_a as u32,
-            " A\n",
-        ),
-    ];
-    let faults = Fault::ALL.into_iter().zip(statistics.faults);
-    let faults = faults.filter(|(_, count)| *count > 0);
-    let faults = faults.map(|(fault, count)| (fault.text(), count));
-    for (name, number, unit) in rows {
-        sink.put(name.as_bytes());
-        decimal(number, sink);
-        sink.put(unit.as_bytes());
+    row("Run time", statistics.run_s, " s\n", sink);
+    row("Starts", statistics.starts, "\n", sink);
+    let temperature_c = statistics.temperature_max_c as u32;
+    row("Highest temperature", temperature_c, " C\n", sink);
+    let phase_a = statistics.phase_max_a as u32;
+    row("Highest phase current", phase_a, " A\n", sink);
+    for (fault, count) in Fault::ALL.iter().zip(&statistics.faults) {
+        if *count > 0 {
+            sink.put(b"Fault, ");
+            row(fault.text(), *count, "\n", sink);
+        }
     }
-    for (name, number) in faults {
-        sink.put(b"Fault, ");
-        sink.put(name.as_bytes());
-        sink.put(b": ");
-        decimal(number, sink);
-        sink.put(b"\n");
-    }
+}
+
+// Out of line: there are five.
+#[inline(never)]
+fn row(name: &str, number: u32, unit: &str, sink: &mut Sink) {
+    sink.put(name.as_bytes());
+    sink.put(b": ");
+    decimal(number, sink);
+    sink.put(unit.as_bytes());
 }
 
 /// `@SYS/check.txt`: a line for each item that was measured, with its name, value, unit, bounds and
