@@ -100,12 +100,12 @@ impl Shared {
     /// The currents of a sample.
     #[inline(always)] // in each period
     pub(super) fn currents(&mut self, config: &Config, sample: &Sample) -> [AdcCounts; 3] {
-        let mut currents = sensing::read(&self.zeros, sample.currents);
         if self.applied.unreadable != 0 {
-            // Not by a reference to `currents`, which would then be in memory in every period.
-            currents = self.reconstructed(config, sample);
+            // One by one: what may come in memory as a whole would be there in every period.
+            let [a, b, c] = self.reconstructed(config, sample);
+            return [a, b, c];
         }
-        currents
+        sensing::read(&self.zeros, sample.currents)
     }
 
     /// The currents of a sample at which a phase may be unreadable.
