@@ -45,37 +45,39 @@ const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 const REST_US: u64 = 1_000_000;
 
 /// One ESC without its interrupt and its throttle.
+// In this order: what is used most stands where the chip's short instructions reach it.
+#[repr(C)]
 pub struct Esc {
-    board: Board,
-    given: Given,
-    params: Params,
-    scale: Scale,
-    component: Component,
-    telemetry: Telemetry,
-    charge: Charge,
-    recorder: Recorder,
+    light: bool,
     too_hot: bool,
-    polled_us: Option<u64>,
-    tunes: Tunes,
-    check: Check,
-    identify: Identify,
     /// True if what it finds is to be kept.
     keeps: bool,
-    record: Option<&'static Record>,
-    light: bool,
-    /// The motor's command at the last poll.
-    command: Command,
-    rests_since_us: Option<u64>,
     /// True if the wire carried signals then.
     traffic: bool,
-    storage: Storage,
     /// The motor that is assumed has changed.
     reassumes: bool,
+    /// The motor's command at the last poll.
+    command: Command,
+    polled_us: Option<u64>,
+    rests_since_us: Option<u64>,
+    storage: Storage,
+    record: Option<&'static Record>,
+    given: Given,
+    tunes: Tunes,
+    telemetry: Telemetry,
+    params: Params,
+    scale: Scale,
+    charge: Charge,
+    recorder: Recorder,
     /// There are two such commands.
     unstored: Vec<Unstored, 2>,
     /// The ESCs that it tells of besides.
     #[cfg(feature = "group")]
     four: Option<Four>,
+    check: Check,
+    identify: Identify,
+    board: Board,
+    component: Component,
 }
 
 /// The values that the drive runs with in place of the parameters.

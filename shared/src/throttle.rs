@@ -29,23 +29,25 @@ use crate::units::Scale;
 const POLLED_US: u64 = 100_000;
 
 /// A throttle wire, the answers on it, and its demands on the drive.
+// In this order: what is used most stands where the chip's short instructions reach it.
+#[repr(C)]
 pub struct Throttle {
-    input: Input,
-    answers: Answers,
-    mapping: Mapping,
-    basis: Basis,
-    /// The state from the tasks, for answers.
-    telemetry: Telemetry,
-    info: [u8; info::BYTES],
-    polled: Polled,
+    /// While the flash is written: the bridge must stay at rest until the processor is back.
+    storing: bool,
     /// The time, and when the tasks' demands on the drive end if they do not renew them, µs.
     now_us: u64,
     polled_until_us: u64,
+    polled: Polled,
     /// Orders of DShot commands since the last poll, and those that wait to be done: one of each kind,
     /// and there are seven for the tasks.
     orders: Vec<Order, 7>,
-    /// While the flash is written: the bridge must stay at rest until the processor is back.
-    storing: bool,
+    info: [u8; info::BYTES],
+    mapping: Mapping,
+    basis: Basis,
+    answers: Answers,
+    /// The state from the tasks, for answers.
+    telemetry: Telemetry,
+    input: Input,
 }
 
 /// The tasks' part of each poll.

@@ -37,15 +37,9 @@ const KEPT: usize = 64;
 
 /// Finds frames in the edges of one line.
 #[derive(Clone, Debug)]
+// In this order: what is used most stands where the chip's short instructions reach it.
+#[repr(C)]
 pub(super) struct Decoder {
-    rates: [Option<Limits>; 4],
-    /// The rate that is taken, and true if bidirectional; `None` takes all of them.
-    only: Option<(Rate, bool)>,
-    /// A level at least this long is no part of a frame.
-    rest_ticks: u32,
-    /// A level shorter than this is no rest before a frame, however fast that is: 1.375 bits.
-    rest_least: u32,
-    times: [u32; KEPT],
     newest: usize,
     /// Of the times, those that count: no more than a frame and the edge before it.
     held: u8,
@@ -53,6 +47,14 @@ pub(super) struct Decoder {
     run: u8,
     /// Edges that have not been reported, as a frame or as a bad one.
     unread: u8,
+    /// The rate that is taken, and true if bidirectional; `None` takes all of them.
+    only: Option<(Rate, bool)>,
+    /// A level at least this long is no part of a frame.
+    rest_ticks: u32,
+    /// A level shorter than this is no rest before a frame, however fast that is: 1.375 bits.
+    rest_least: u32,
+    times: [u32; KEPT],
+    rates: [Option<Limits>; 4],
 }
 
 /// The durations that one rate's bits may have.
