@@ -61,8 +61,6 @@ traced! {
         pub omega_i: Speed,
         /// φ̂.
         pub phi: Flux,
-        /// z_d at the last sample, with which a rotor that is lost shows.
-        z_d: Flux,
         /// ψ, the stator's flux.
         psi: AlphaBeta<Flux>,
         /// ω̂ − ω̂_i, smoothed.
@@ -103,7 +101,6 @@ impl Default for State {
             theta: Angle::ZERO,
             omega_i: Speed::ZERO,
             phi: FLUX_NOMINAL,
-            z_d: FLUX_NOMINAL,
             psi: AlphaBeta::default(),
             smooth: Speed::ZERO,
             i_before: AlphaBeta::default(),
@@ -127,6 +124,10 @@ const EIGHTH_TURN: Speed = Speed::from_bits(1 << 29);
 /// Least and greatest φ̂ over the stated flux: 0.3 and 2.
 const PHI_MIN: Flux = Flux::from_bits(51_267_396);
 const PHI_MAX: Flux = Flux::from_bits(341_782_638);
+
+/// φ̂ below which the rotor is lost, over the stated flux: 0.4. One that has been stopped leaves what the drop of its
+/// current over a stated R that is off looks like, and φ̂ near its least, z_d now above and now below it.
+const PHI_LOST: Flux = Flux::from_bits(68_356_528);
 
 /// The observer where the rotor's speed is known, and its angle at the coming sample.
 pub fn begin(config: &Config, state: &mut State, rotor: (Angle, Speed), i: AlphaBeta<Current>) {
@@ -232,7 +233,7 @@ pub fn estimate(
         d: psi_r.alpha.top(frame.cos).plus_top(psi_r.beta, frame.sin),
         q: psi_r.beta.top(frame.cos).minus_top(psi_r.alpha, frame.sin),
     };
-    state.z_d = Flux::from_bits(z.d.plus(z.d).to_bits());
+    let z_d = Flux::from_bits(z.d.plus(z.d).to_bits());
 
     // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})). The leak is below a half: a bit is free.
     let led: Quantity<Weber, U29> = state.phi.top(pace.leak).scaled();
@@ -248,7 +249,7 @@ pub fn estimate(
     };
 
     // φ̂ += 0.15·T_s·ω⁺·(z_d − φ̂).
-    let off = state.z_d.minus(state.phi);
+    let off = z_d.minus(state.phi);
     state.phi = state.phi.plus_top(off, pace.phi);
 
     // ω̂_i += T_s·ω_n²·ε, ω̂ = ω̂_i + 1.8·ω_n·ε.
@@ -280,7 +281,7 @@ pub fn slow_estimate(config: &Config, state: &State, periods: u32) -> SlowEstima
         omega_bar_step: change / periods as i32,
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,
-        lost: state.z_d < PHI_MIN || state.z_d > PHI_MAX,
+        lost: state.phi < PHI_LOST || state.phi > PHI_MAX,
     }
 }
 

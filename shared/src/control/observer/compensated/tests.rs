@@ -152,7 +152,8 @@ proptest! {
         let plus_rad_s = omega_i.abs().max(60.0);
         // 2, whose φ̂ step 3 sees a period later: it moves by 0.15·ω·T_s, 5 %, at most.
         let phi_step = 0.15 * TS * plus_rad_s * (z.0 - phi);
-        let next_phi = (phi + phi_step).clamp(0.3 * PHI, 2.0 * PHI);
+        let moved_phi = phi + phi_step;
+        let next_phi = moved_phi.clamp(0.3 * PHI, 2.0 * PHI);
         // 3, with the voltage's half-period delay.
         let half = if delay == Delay::Half { -0.5 } else { 1.0 };
         let beta = half * R * TS * TS / (12.0 * L);
@@ -191,8 +192,8 @@ proptest! {
         near("θ̂ at the sample", at, 0.0, 1e-8)?;
         let moved = wrapped(state.theta.to_num::<f64>() * TAU - theta - omega * TS);
         near("θ̂ after it", moved, 0.0, 1e-5)?;
-        let out = z.0 < 0.299 * PHI || z.0 > 2.001 * PHI;
-        let within = z.0 > 0.301 * PHI && z.0 < 1.999 * PHI;
+        let out = moved_phi < 0.399 * PHI || moved_phi > 2.001 * PHI;
+        let within = moved_phi > 0.401 * PHI && moved_phi < 1.999 * PHI;
         prop_assert!(slow.lost || !out);
         prop_assert!(!slow.lost || !within);
     }
