@@ -106,6 +106,9 @@ pub struct Config {
     pub proven_periods: u32,
     /// Periods at zero throttle after which a fault whose cause is gone has ended.
     pub clear_periods: u32,
+    /// Periods without its cause after which a fault ends for the first retry of a drive that has proven itself; 0 if
+    /// there is none.
+    pub retry_periods: u32,
     /// Periods in a row for which the observer's state may be out of its range.
     pub lost_periods: u32,
     /// Least voltage along q in voltage mode: the back-EMF of the least speed that the observer can know.

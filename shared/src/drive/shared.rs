@@ -1,7 +1,7 @@
 //! State that every mode is handed and none owns: protection, the currents' zeros, faults, what was applied.
 
 use super::config::{Config, Direction};
-use super::io::Sample;
+use super::io::{Sample, Setpoint};
 use super::phase::Phase;
 use super::seen::Seen;
 use crate::control::delay::Delay;
@@ -40,7 +40,9 @@ traced! {
         pub(super) count: u32,
         /// The last of them, and the phase that it ended.
         pub(super) last: (Fault, Phase),
-        /// Periods at zero throttle since the last sample that was a fault.
+        /// Periods after which a fault ends for the next retry; 0 if there is none.
+        pub(super) retry_periods: u32,
+        /// Periods since the last sample that was a fault, for which it has been on its way to its end.
         clear_periods: u32,
     }
 }
@@ -73,6 +75,12 @@ traced! {
 /// Samples after a long voltage vector in which its duties may still count.
 const UNREADABLE: u8 = 3;
 
+/// A retry's pause over that before.
+const LONGER: u32 = 4;
+
+/// The last retry's pause over the first one's: there are three.
+const LAST_PAUSE: u32 = LONGER * LONGER;
+
 impl Shared {
     /// At power-up.
     pub(super) fn new(config: &Config) -> Self {
@@ -82,6 +90,7 @@ impl Shared {
                 faults: Faults::NONE,
                 count: 0,
                 last: (Fault::OverCurrent, Phase::Idle),
+                retry_periods: 0,
                 clear_periods: 0,
             },
             reversed: false,
@@ -140,6 +149,9 @@ impl Latch {
     /// Notes a fault in this phase; false where it has been noted, and the bridge is off for it.
     pub(super) fn note(&mut self, fault: Fault, phase: Phase) -> bool {
         self.clear_periods = 0;
+        if !fault.is_retried() {
+            self.retry_periods = 0;
+        }
         let known = self.faults.contains(fault);
         if !known {
             self.count = self.count.saturating_add(1);
@@ -150,18 +162,29 @@ impl Latch {
     }
 
     /// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
-    /// by then, and a limit that is grazed does not come and go. True where it ends.
-    #[inline(always)] // in each period
-    pub(super) fn clear(&mut self, config: &Config, at_zero: bool) -> bool {
-        if !at_zero {
+    /// by then, and a limit that is grazed does not come and go. Under an open throttle it ends for a retry, if
+    /// there is one left: the first comes after a pause, each other one after a longer one.
+    pub(super) fn clear(&mut self, config: &Config, setpoint: &Setpoint) {
+        if matches!(setpoint, Setpoint::Stop | Setpoint::Zero) {
+            self.retry_periods = 0;
+        }
+        let periods = if *setpoint == Setpoint::Zero {
+            config.clear_periods
+        } else {
+            self.retry_periods
+        };
+        if periods == 0 {
             self.clear_periods = 0;
-        } else if self.clear_periods < config.clear_periods {
+        } else if self.clear_periods < periods {
             self.clear_periods += 1;
         } else {
             self.faults = Faults::NONE;
-            return true;
+            self.retry_periods = if periods < config.retry_periods * LAST_PAUSE {
+                self.retry_periods * LONGER
+            } else {
+                0
+            };
         }
-        false
     }
 }
 

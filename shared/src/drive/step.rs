@@ -108,6 +108,7 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
             let nothing = !state.tone.shorted_before && state.shared.latch.faults.is_empty();
             if nothing {
                 state.shared.failed_starts = 0;
+                state.shared.latch.retry_periods = 0;
             }
             nothing
         }
@@ -191,10 +192,8 @@ fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoi
     let shared = &mut state.shared;
     if state.phase == Phase::Idle {
         off::watch(config, &mut state.off, shared, sample);
-        if !shared.latch.faults.is_empty()
-            && shared.latch.clear(config, *setpoint == Setpoint::Zero)
-        {
-            shared.failed_starts = 0;
+        if !shared.latch.faults.is_empty() {
+            shared.latch.clear(config, setpoint);
         }
     } else if let Some(why) = off::sense(config, &mut state.off, shared, sample) {
         state.change(config, why);

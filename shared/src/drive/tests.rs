@@ -12,6 +12,7 @@ mod any;
 mod at_rest;
 mod faults;
 mod pull;
+mod retries;
 mod shunts;
 mod starts;
 mod tones;

@@ -42,7 +42,7 @@ pub(super) enum Why {
     Failed,
     /// The six-step drive's loss of synchronism in a start: it aligns the rotor anew.
     Retried,
-    /// The bridge is off until zero throttle.
+    /// The bridge is off until zero throttle, or a retry.
     Tripped(Fault),
 }
 

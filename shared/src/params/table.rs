@@ -359,6 +359,10 @@ parameters! {
         "Supply voltage above which the bridge is turned off";
     65 LimTempC "LIM_TEMP_C" "degC" Real 40.0..150.0 = 100.0
         "Temperature of the board above which the bridge is turned off";
+    66 LimPolicy "LIM_POLICY" "" Whole 0.0..1.0 = 1.0
+        "After a fault of a drive that has proven itself" one of
+            0 Bench "bench: the bridge stays off until zero throttle"
+            1 Flight "flight: if the fault can pass, the motor is tried again up to three times";
     70 StaParkAs "STA_PARK_AS" "A.s" FromMotor 0.01..100.0 = 0.0
         "Current times time for which the rotor is aligned before the ramp; 0 follows from the motor";
     71 StaRampA "STA_RAMP_A" "A" FromMotor 0.1..100.0 = 0.0

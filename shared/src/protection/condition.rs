@@ -181,6 +181,14 @@ impl Fault {
     pub const fn flashes(self) -> u8 {
         self as u8 + 2
     }
+
+    /// Returns true if it can pass by itself, so that a drive that has proven itself may be tried again.
+    pub const fn is_retried(self) -> bool {
+        match self {
+            Self::OverCurrent | Self::OverVoltage | Self::UnderVoltage | Self::ObserverLost => true,
+            Self::OverTemperature | Self::Stuck | Self::CurrentSensor => false,
+        }
+    }
 }
 
 impl Trace for Fault {
@@ -224,7 +232,12 @@ mod tests {
                 meaning,
                 remedy,
             } = row;
-            format!("| {number} | `{text}` | {flashes} | {meaning} | {remedy} |")
+            let in_flight = if fault.is_retried() {
+                "tried again"
+            } else {
+                "off"
+            };
+            format!("| {number} | `{text}` | {flashes} | {in_flight} | {meaning} | {remedy} |")
         });
         assert_eq!(rows("| no. | fault |"), faults);
         let limits = Limit::ALL.map(|limit| {

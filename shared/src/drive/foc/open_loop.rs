@@ -107,6 +107,7 @@ pub(in crate::drive) fn rotor(
             progress.run_periods += CYCLE;
             if progress.run_periods >= config.proven_periods {
                 shared.failed_starts = 0;
+                shared.latch.retry_periods = config.retry_periods;
             }
             None
         }

@@ -192,6 +192,7 @@ fn rotor(
             *run_periods += 1;
             if *run_periods == config.proven_periods {
                 s.failed = 0;
+                shared.latch.retry_periods = config.retry_periods;
             }
             None
         }

@@ -23,7 +23,9 @@ pub use si::{BuildError, scale};
 use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 
 use super::board::Board;
-use super::choice::{CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, MotDir, MotStop};
+use super::choice::{
+    CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, LimPolicy, MotDir, MotStop,
+};
 use super::table::ParamId;
 use super::values::Params;
 use crate::control::low_speed;
@@ -51,6 +53,10 @@ const LOST_S: f32 = 0.1;
 
 /// Time for which zero throttle must hold before a fault ends, s.
 const CLEAR_S: f32 = 0.3;
+
+/// Time without its cause after which a fault ends for the first retry, s: the tasks have seen it by then, and the
+/// terminals have told how the shaft turns.
+const RETRY_S: f32 = 0.02;
 
 /// Time for which a motor whose sensors know its position may be slow before it counts as stuck, s.
 const SENSED_S: f32 = 0.8;
@@ -200,6 +206,10 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
         p.periods(SENSED_S)
     } else {
         0
+    };
+    place.retry_periods = match p.choice() {
+        LimPolicy::Bench => 0,
+        LimPolicy::Flight => p.periods(RETRY_S),
     };
     place.least_u_q = least_u_q(&p);
     p.verdict()
