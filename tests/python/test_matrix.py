@@ -33,11 +33,11 @@ OPEN = {
     # The control knows of a Hall sensor that is at fault, and turns on without it at speed; nobody is told.
     **cells([FOC, SIX], ["hall_stuck"], TURNING, "cause"),
     **cells([FOC], ["hall_stuck"], ["idle"], "cause", "reaction"),
-    # A rotor that jams at speed is an over-current or a lost rotor, which hold the bridge off until the throttle is
-    # closed: nothing is tried again.
+    # A rotor that jams at speed is tried again, by starts of which each takes longer than the one before: 1.5 s after it
+    # was freed one is still under way. What jams in a start, or turns too fast for the six-step drive, is not.
     **cells([FOC], ["rotor_blocked"], ["start", "full"], "reaction"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "reaction"),
-    **cells([SIX], ["rotor_blocked"], ["idle", "half", "full"], "reaction"),
+    **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
@@ -47,8 +47,9 @@ OPEN = {
     # 10 A on 470 µF are 0.9 V a period: the supply is at its limit before the bounds of the current have followed.
     **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
     # At full speed the capacitors are empty in a period, and the rotor's own voltage drives the current of a short
-    # circuit into them: while it rises it is a little above the steady one.
-    **cells([FOC], ["disconnect"], ["full"], "current"),
+    # circuit into them: while it rises it is a little above the steady one. A retry that has nothing but these
+    # capacitors takes them above the limit, as braking does.
+    **cells([FOC], ["disconnect"], ["full"], "current", "supply"),
     # The six-step drive shoots a short through the winding in its start, and has the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }

@@ -232,24 +232,33 @@ impl Row {
             ),
             // With the low sides on one more that is on is nothing; the high one shoots through.
             Self::LowShort if moment == Moment::Standstill => expected(&[], false, &[]),
-            Self::HighShort | Self::LowShort => expected(&[OVER_CURRENT], true, &[Stops]),
+            // A retry behind its end turns the motor on.
+            Self::HighShort => expected(&[OVER_CURRENT], true, &[Recovers, Stops]),
+            // What the rotor drives through it between two retries is measured as a sensor's zero.
+            Self::LowShort if drives => {
+                expected(&[OVER_CURRENT, SENSOR], true, &[Recovers, Stops])
+            }
+            Self::LowShort => expected(&[OVER_CURRENT], true, &[Stops]),
             Self::SensorZero | Self::Drift => {
                 expected(&[SENSOR, OVER_CURRENT], drives, &[GoesOn, Recovers, Stops])
             }
-            Self::SensorFull => expected(&[SENSOR, OVER_CURRENT], true, &[Stops]),
+            Self::SensorFull => expected(&[SENSOR, OVER_CURRENT], true, &[Recovers, Stops]),
             Self::HallStuck => expected(&[HALL], drives, &[GoesOn, Recovers, Stops]),
             // The rotor's own voltage between the lines is above what is left: it feeds the supply by the diodes, more
-            // than the trip allows.
+            // than the trip allows. Once the supply is back the rotor is caught; the six-step drive cannot.
             Self::DeepSag if moment.is_fast() => {
-                expected(&[UNDER_VOLTAGE, OVER_CURRENT], true, &[Stops])
+                expected(&[UNDER_VOLTAGE, OVER_CURRENT], true, &[Recovers, Stops])
             }
-            Self::DeepSag => expected(&[UNDER_VOLTAGE], true, &[Stops]),
+            Self::DeepSag => expected(&[UNDER_VOLTAGE], true, &[Recovers, Stops]),
             Self::Disconnect if moment == Moment::Braking => expected(&[OVER_VOLTAGE], true, &[]),
-            Self::Disconnect if moment.is_fast() => {
-                expected(&[UNDER_VOLTAGE, OVER_CURRENT], drives, &[Stops])
-            }
+            // A retry that has the capacitor alone charges it from the rotor.
+            Self::Disconnect if moment.is_fast() => expected(
+                &[UNDER_VOLTAGE, OVER_CURRENT, OVER_VOLTAGE],
+                drives,
+                &[Recovers, Stops],
+            ),
             // At rest the capacitor keeps the chip for as long as it takes to empty it.
-            Self::Disconnect => expected(&[UNDER_VOLTAGE], drives, &[Stops]),
+            Self::Disconnect => expected(&[UNDER_VOLTAGE], drives, &[Recovers, Stops]),
             Self::BrownOut => expected(&[RESTART, UNDER_VOLTAGE], true, &[Stops]),
             Self::Reset => expected(&[RESTART], true, &[Stops]),
             Self::SignalLoss => expected(&[SIGNAL_LOST], true, &[Stops]),
