@@ -167,7 +167,7 @@ fn matrix(args: &MatrixArgs) -> Result<ExitCode, String> {
     } else {
         matrix.to_string()
     })?;
-    Ok(ExitCode::SUCCESS)
+    Ok(ExitCode::from(u8::from(matrix.failed().next().is_some())))
 }
 
 fn plot(args: &PlotArgs) -> Result<ExitCode, String> {

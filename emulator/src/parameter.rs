@@ -1,5 +1,7 @@
-//! Parameters from a command line or a scenario.
+//! Parameters from a command line, a scenario or a program.
 
+use mavlink::dialects::ardupilotmega::{MavParamType, PARAM_SET_DATA};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use siskin_control::params::{PRESETS, ParamId, Params, Preset, SetError};
 
 /// A parameter by name, its value checked against the table.
@@ -50,6 +52,28 @@ pub fn preset(name: &str) -> Result<&'static Preset, String> {
             let names: Vec<_> = PRESETS.iter().map(|preset| preset.name).collect();
             format!("there is no preset {name}; there is {}", names.join(", "))
         })
+}
+
+/// As a ground station.
+const OWN: MavHeader = MavHeader {
+    system_id: 255,
+    component_id: 190,
+    sequence: 0,
+};
+
+/// The frame by which a ground station sets a parameter.
+pub fn set_frame(id: ParamId, value: f32) -> MAVLinkV2MessageRaw {
+    let mut frame = MAVLinkV2MessageRaw::new();
+    let set = PARAM_SET_DATA {
+        param_value: value,
+        // Whoever hears it, and that is one.
+        target_system: 0,
+        target_component: 0,
+        param_id: id.entry().name.into(),
+        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+    };
+    frame.serialize_message_data(OWN, &set);
+    frame
 }
 
 #[cfg(test)]

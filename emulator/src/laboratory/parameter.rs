@@ -1,19 +1,11 @@
 //! A parameter that a program sets as a ground station does, by PARAM_SET.
 
-use mavlink::dialects::ardupilotmega::{MavParamType, PARAM_SET_DATA};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use siskin_control::esc;
 use siskin_control::params::ParamId;
 use thiserror::Error;
 
 use super::Laboratory;
-
-/// As a ground station.
-const OWN: MavHeader = MavHeader {
-    system_id: 255,
-    component_id: 190,
-    sequence: 0,
-};
+use crate::parameter::set_frame;
 
 /// Why a value is not taken; one line.
 #[derive(Debug, Error)]
@@ -36,16 +28,7 @@ impl Laboratory {
     /// The ESC refuses it: the motor turns, say, or the drive cannot be built so.
     pub fn set_param(&mut self, esc: usize, id: ParamId, value: f32) -> Result<(), Refused> {
         let name = id.entry().name;
-        let mut frame = MAVLinkV2MessageRaw::new();
-        let set = PARAM_SET_DATA {
-            param_value: value,
-            // Whoever hears it, and that is one.
-            target_system: 0,
-            target_component: 0,
-            param_id: name.into(),
-            param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
-        };
-        frame.serialize_message_data(OWN, &set);
+        let frame = set_frame(id, value);
         // Beside what the program itself sends, of which a frame may be half there.
         let stream = self.new_stream();
         self.rack

@@ -26,6 +26,10 @@ pub struct Bounds {
     pub winding_c: f64,
     /// Stage, °C.
     pub stage_c: f64,
+    /// From the fault to what is first done or named, ms, where anything must be.
+    pub within_ms: Option<f64>,
+    /// From a current beyond the comparators' level to gates that are off, µs, where they must act.
+    pub trip_us: Option<f64>,
 }
 
 /// What a cell misses.
@@ -44,12 +48,17 @@ pub enum Miss {
     Cause,
     /// What is made of it.
     Reaction,
+    /// The time that it took, or that of the comparators.
+    Time,
+    /// A leg had less than the dead time between its switches.
+    Gates,
     /// After the throttle was closed, with the fault mended, it does not turn.
     Again,
 }
 
 impl Bounds {
     pub(super) fn of(cell: &Cell) -> Self {
+        let expected = cell.expected();
         let limit_a = 1.2 * PHASE_A;
         let shorts = match cell.fault {
             Row::HighShort | Row::LowShort => 2.0,
@@ -62,11 +71,13 @@ impl Bounds {
             bus_v: SUPPLY_V,
             winding_c: WINDING_C,
             stage_c: STAGE_C,
+            within_ms: expected.within_s.map(|s| 1e3 * s),
+            trip_us: expected.trip_s.map(|s| 1e6 * s),
         }
     }
 
     pub(super) fn misses(&self, cell: &Cell) -> Vec<Miss> {
-        let expected = cell.fault.expected(cell.moment);
+        let expected = cell.expected();
         let is_cause = |named: &String| {
             let mut causes = expected.causes.iter();
             causes.any(|cause| named.starts_with(cause))
@@ -82,11 +93,21 @@ impl Bounds {
                 Miss::Reaction,
                 cell.reaction == Reaction::Fails || !expected.reactions.contains(&cell.reaction),
             ),
+            (
+                Miss::Time,
+                is_late(cell.after_ms, self.within_ms) || is_late(cell.trip_us, self.trip_us),
+            ),
+            (Miss::Gates, cell.crossed),
             (Miss::Again, !cell.again),
         ];
         let missed = misses.into_iter().filter(|(_, missed)| *missed);
         missed.map(|(miss, _)| miss).collect()
     }
+}
+
+/// Whether something that must come within a time has not.
+fn is_late(after: Option<f64>, within: Option<f64>) -> bool {
+    within.is_some_and(|within| after.is_none_or(|after| after > within))
 }
 
 /// Amplitude of the phase currents with all phases shorted, A.

@@ -1,6 +1,7 @@
 //! One cell: an ESC flies, a fault comes, and what came of it is noted.
 
 use std::collections::BTreeSet;
+use std::f64::consts::TAU;
 
 use serde::Serialize;
 use siskin_control::drive::{Bridge, Limit, Phase, Snapshot};
@@ -8,10 +9,12 @@ use siskin_control::params::{BOSSO_BENCH, ParamId};
 
 use super::drive::Drive;
 use super::moment::{Moment, OPENS_S};
-use super::row::{Reaction, Row};
+use super::row::{Expected, Reaction, Row};
 use crate::device::{Device, Start, StartError};
 use crate::fault::Fault;
+use crate::link::Ids;
 use crate::machine::Onlooker;
+use crate::parameter;
 use crate::plant::{Extras, Fidelity, Winding};
 use crate::rig::{Bench, Period, Rig};
 use crate::scenario::dshot_bits;
@@ -40,6 +43,9 @@ const DSHOT600: u8 = 12;
 /// Texts on the throttle, which follow from what has been named, and on what has ended.
 const FOLLOWS: [&str; 3] = ["Throttle: DShot", "Throttle is open", "Fault ended: "];
 
+/// What is set while the flash fails, and to what: it acts at once, in flight too.
+const CHANGED: (ParamId, f32) = (ParamId::TelRateHz, 20.0);
+
 /// `CTL_OBSERVER` of a motor with Hall sensors.
 const HALL_OBSERVER: f32 = 2.0;
 
@@ -66,7 +72,9 @@ pub struct Cell {
     pub limits: BTreeSet<&'static str>,
     /// From the fault to what was first done or named, ms.
     pub after_ms: Option<f64>,
-    /// Greatest magnitude of a phase current at a sample from 200 µs after the fault on, A.
+    /// From a current beyond the comparators' level to gates that were off, µs, if they have acted since the fault.
+    pub trip_us: Option<f64>,
+    /// Greatest magnitude of a phase current from 200 µs after the fault on, A, at each edge of the switches.
     pub current_a: f64,
     /// Greatest voltage of the supply since the fault, V.
     pub bus_v: f64,
@@ -76,8 +84,19 @@ pub struct Cell {
     pub stage_c: f64,
     /// Whether the motor was flown again after the throttle had been closed, with the fault mended.
     pub again: bool,
+    /// Whether a leg ever had less than the dead time between its switches.
+    pub crossed: bool,
     /// Speed when the fault came, rad/s.
     pub speed_rad_s: f64,
+}
+
+impl Cell {
+    /// What its fault is expected to come to.
+    pub(super) fn expected(&self) -> Expected {
+        let pole_pairs = f64::from(Bench::default().motor.pole_pairs);
+        let turns_per_s = self.speed_rad_s * pole_pairs / TAU;
+        self.fault.expected(self.moment, self.drive, turns_per_s)
+    }
 }
 
 /// What is noted from the fault on.
@@ -91,6 +110,8 @@ struct Notes {
     faults_before: u32,
     after_s: Option<f64>,
     off: bool,
+    trip_s: Option<f64>,
+    crossed: bool,
     current_a: f64,
     bus_v: f64,
     winding_c: f64,
@@ -109,6 +130,7 @@ impl Onlooker for Notes {
         self.speed_rad_s = speed_rad_s;
         self.least_rad_s = self.least_rad_s.min(speed_rad_s);
         self.most_rad_s = self.most_rad_s.max(speed_rad_s);
+        self.crossed |= rig.plant().crossed().is_some();
         if !self.watched {
             return;
         }
@@ -120,11 +142,9 @@ impl Onlooker for Notes {
             return;
         }
         if t_s >= self.from_s + SETTLED_S {
-            let currents_a = period.motion.currents_a;
-            self.current_a = currents_a
-                .iter()
-                .fold(self.current_a, |most, i| most.max(i.abs()));
+            self.current_a = self.current_a.max(period.motion.flow.most_a);
         }
+        self.trip_s = self.trip_s.or(rig.plant().trip_answer_s());
         self.bus_v = self.bus_v.max(period.motion.bus_v);
         self.winding_c = self
             .winding_c
@@ -152,6 +172,8 @@ impl Notes {
             faults_before: 0,
             after_s: None,
             off: false,
+            trip_s: None,
+            crossed: false,
             current_a: 0.0,
             bus_v: 0.0,
             winding_c: 0.0,
@@ -165,7 +187,8 @@ impl Notes {
     }
 
     fn note(&mut self, t_s: f64) {
-        self.after_s = self.after_s.or(Some(t_s - self.from_s));
+        let after_s = t_s - self.from_s;
+        self.after_s = Some(self.after_s.map_or(after_s, |first| first.min(after_s)));
     }
 
     fn look(&mut self) {
@@ -265,7 +288,7 @@ fn asked_rad_s(device: &Device, throttle: f64) -> f64 {
     let params = device.esc().params();
     let [least, most] =
         [ParamId::CtlRpmMin, ParamId::CtlRpmMax].map(|id| f64::from(params.get(id)));
-    (least + throttle * (most - least)) * std::f64::consts::TAU / 60.0
+    (least + throttle * (most - least)) * TAU / 60.0
 }
 
 /// Plays a cell.
@@ -293,12 +316,18 @@ pub(super) fn play(row: Row, moment: Moment, drive: Drive) -> Result<Cell, Start
     flight.fly(throttle, fault_s);
     let speed_rad_s = flight.notes.speed_rad_s;
     if let Some((kind, for_s)) = row.kind(speed_rad_s) {
-        let for_s = (for_s > 0.0).then_some(for_s);
+        let for_s = (for_s > 0.0 && !row.outlasts_flight()).then_some(for_s);
         flight.device.inject(Fault {
             at_s: fault_s,
             for_s,
             kind,
         });
+    }
+    if row == Row::FlashFail {
+        let frame = parameter::set_frame(CHANGED.0, CHANGED.1);
+        let stream = Ids::default().give();
+        let notes = &mut flight.notes;
+        flight.device.receive(stream, frame.raw_bytes(), notes);
     }
     let end_s = fault_s + WATCHED_S;
     flight.fly(throttle, end_s - LOOKED_S);
@@ -307,6 +336,10 @@ pub(super) fn play(row: Row, moment: Moment, drive: Drive) -> Result<Cell, Start
     let asked = asked_rad_s(&flight.device, throttle);
     let turns = flight.notes.near(asked);
     let snapshot = flight.device.rig().snapshot();
+    let closed_s = end_s + CLOSED_S;
+    if row.outlasts_flight() {
+        flight.fly(0.0, closed_s);
+    }
     // What stays of a fault is mended, and what is told from here on is of no interest.
     flight.notes.watched = false;
     flight.device.mend();
@@ -325,10 +358,10 @@ pub(super) fn play(row: Row, moment: Moment, drive: Drive) -> Result<Cell, Start
         flight.notes.note(t_s);
     }
 
-    flight.fly(0.0, end_s + CLOSED_S);
-    flight.fly(AGAIN, end_s + CLOSED_S + AGAIN_S - LOOKED_S);
+    flight.fly(0.0, closed_s);
+    flight.fly(AGAIN, closed_s + AGAIN_S - LOOKED_S);
     flight.notes.look();
-    flight.fly(AGAIN, end_s + CLOSED_S + AGAIN_S);
+    flight.fly(AGAIN, closed_s + AGAIN_S);
     let again = flight.notes.near(asked_rad_s(&flight.device, AGAIN));
     let notes = flight.notes;
     Ok(Cell {
@@ -339,6 +372,8 @@ pub(super) fn play(row: Row, moment: Moment, drive: Drive) -> Result<Cell, Start
         named,
         limits: notes.limits,
         after_ms: notes.after_s.map(|after_s| 1e3 * after_s),
+        trip_us: notes.trip_s.map(|trip_s| 1e6 * trip_s),
+        crossed: notes.crossed,
         current_a: notes.current_a,
         bus_v: notes.bus_v,
         winding_c: notes.winding_c,

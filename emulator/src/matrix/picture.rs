@@ -56,10 +56,11 @@ impl Matrix {
 
 fn place(judged: &Judged) -> Place {
     let Judged { cell, misses, .. } = judged;
-    let mut lines = vec![match cell.after_ms {
-        Some(ms) if ms < 10.0 => format!("{ms:.2} ms"),
-        Some(ms) => format!("{ms:.0} ms"),
-        None => "-".to_owned(),
+    let mut lines = vec![match (cell.trip_us, cell.after_ms) {
+        (Some(us), _) => format!("{us:.2} µs"),
+        (_, Some(ms)) if ms < 10.0 => format!("{ms:.2} ms"),
+        (_, Some(ms)) => format!("{ms:.0} ms"),
+        _ => "-".to_owned(),
     }];
     lines.push(format!("{:.1} A  {:.1} V", cell.current_a, cell.bus_v));
     let missed: Vec<&str> = misses.iter().map(|miss| Miss::name(*miss)).collect();

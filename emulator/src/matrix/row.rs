@@ -2,11 +2,26 @@
 
 use serde::Serialize;
 
+use super::drive::Drive;
 use super::moment::Moment;
 use crate::fault::{Kind, Side};
 
 /// For how long a fault acts that has no time of its own, s.
 const FAULT_S: f64 = 0.5;
+
+/// Within which what ends a drive must have ended it, s: two samples, or the chip's own reset.
+const AT_ONCE_S: f64 = 200e-6;
+/// Within which a supply that has gone must be known, s: its reading is smoothed over eight periods.
+const SMOOTHED_S: f64 = 2e-3;
+/// Within which a rotor that is lost must be known, s, or electrical turns, whichever takes longer.
+const LOST_S: f64 = 5e-3;
+const LOST_TURNS: f64 = 3.0;
+/// Within which a pilot must be told of what the motor goes on with, s.
+const TOLD_S: f64 = 0.2;
+/// `INP_LOSS_MS`, with a frame and a round of the tasks, s.
+const SIGNAL_S: f64 = 0.105;
+/// Within which comparators must have turned a short off, from when the current passed their level, s.
+const TRIP_S: f64 = 3e-6;
 
 /// A fault of the matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -52,7 +67,7 @@ pub enum Row {
     BrownOut,
     /// The chip starts anew.
     Reset,
-    /// The flash refuses to change.
+    /// The flash refuses to change, and a parameter has just been set.
     FlashFail,
     /// Nothing comes over the throttle wire.
     SignalLoss,
@@ -85,7 +100,9 @@ const OVER_VOLTAGE: &str = "bus over-voltage";
 const UNDER_VOLTAGE: &str = "bus under-voltage";
 const LOST: &str = "rotor position lost";
 const STUCK: &str = "motor does not start";
+const PHASE_OPEN: &str = "phase open";
 const SENSOR: &str = "current sensor defect";
+const SENSOR_DRIFTS: &str = "current sensor drifts";
 const HALL: &str = "position sensor";
 const FAILED_START: &str = "Start failed: the motor is tried again";
 const FLASH: &str = "storage";
@@ -101,6 +118,10 @@ pub(super) struct Expected {
     pub(super) named: bool,
     /// What may come of it.
     pub(super) reactions: &'static [Reaction],
+    /// Within which the first of that must have been done or said, s.
+    pub(super) within_s: Option<f64>,
+    /// Within which comparators must have acted, s, from when the current passed their level.
+    pub(super) trip_s: Option<f64>,
 }
 
 impl Row {
@@ -194,14 +215,62 @@ impl Row {
         }
     }
 
-    /// What is expected of it at a moment, from what it is.
-    pub(super) fn expected(self, moment: Moment) -> Expected {
+    /// Whether it lasts until the motor has been stopped and has rested: only then is it met with.
+    pub(super) fn outlasts_flight(self) -> bool {
+        self == Self::FlashFail
+    }
+
+    /// Whether nothing shows of it.
+    fn is_hidden(self, moment: Moment, drive: Drive) -> bool {
+        match self {
+            // Half an ampere turns the motor, a quarter of what a sensor's zero may be off by before it is told.
+            Self::PhaseOpen | Self::HighOpen | Self::LowOpen | Self::SensorZero => {
+                (moment, drive) == (Moment::Idle, Drive::SixStep)
+            }
+            // It goes by the crossings, whatever the observer.
+            Self::HallStuck => drive == Drive::SixStep,
+            _ => false,
+        }
+    }
+
+    /// Within which something must have been done or said, s, if anything must, at a shaft that turned so many
+    /// electrical turns a second.
+    fn within_s(self, moment: Moment, drive: Drive, turns_per_s: f64) -> Option<f64> {
         let drives = moment.drives();
+        match self {
+            _ if self.is_hidden(moment, drive) => None,
+            // A start has its time to fail.
+            Self::RotorBlocked if moment == Moment::Start => Some(FAULT_S),
+            Self::RotorBlocked if drives => Some(LOST_S.max(LOST_TURNS / turns_per_s)),
+            Self::PhaseOpen | Self::HighOpen | Self::LowOpen | Self::HallStuck if drives => {
+                Some(TOLD_S)
+            }
+            Self::SensorZero | Self::Drift if drives => Some(TOLD_S),
+            Self::SensorFull | Self::BrownOut | Self::Reset => Some(AT_ONCE_S),
+            Self::DeepSag => Some(SMOOTHED_S),
+            // As long as its capacitor lasts.
+            Self::Disconnect if drives => Some(FAULT_S),
+            Self::SignalLoss => Some(SIGNAL_S),
+            _ => None,
+        }
+    }
+
+    /// What is expected of it at a moment with a drive, from what it is, at a shaft that turned so many electrical
+    /// turns a second.
+    pub(super) fn expected(self, moment: Moment, drive: Drive, turns_per_s: f64) -> Expected {
+        let drives = moment.drives();
+        let shows = drives && !self.is_hidden(moment, drive);
+        let shorted = match self {
+            Self::LowShort => moment != Moment::Standstill,
+            _ => self == Self::HighShort,
+        };
         let expected = |causes, named, reactions| Expected {
             causes,
             named,
             // At rest, or on the way there, a fault ends with its cause: the throttle is closed.
             reactions: if drives { reactions } else { &[Rests, Stops] },
+            within_s: self.within_s(moment, drive, turns_per_s),
+            trip_s: shorted.then_some(TRIP_S),
         };
         match self {
             // What the drive can hold it holds; limits say where it binds.
@@ -212,8 +281,8 @@ impl Row {
             | Self::BitErrors
             | Self::Jitter
             | Self::Sag => expected(&[], false, &[GoesOn]),
-            // Told when it is written to.
-            Self::FlashFail => expected(&[FLASH], false, &[GoesOn]),
+            // What was set in flight is written at rest.
+            Self::FlashFail => expected(&[FLASH], true, &[GoesOn]),
             // Faster than the currents follow: a back-EMF that is gone within a period drives 14 A in the next
             // at full speed.
             Self::RotorBlocked if moment.is_fast() => expected(
@@ -226,8 +295,8 @@ impl Row {
             Self::Strike => expected(&[LOST, FAILED_START], false, &[GoesOn, Recovers]),
             // Without current nothing shows. A motor that turns on with two phases is better than none, if it is told.
             Self::PhaseOpen | Self::HighOpen | Self::LowOpen => expected(
-                &[LOST, STUCK, FAILED_START],
-                drives,
+                &[PHASE_OPEN, LOST, STUCK, FAILED_START],
+                shows,
                 &[GoesOn, Recovers, Stops],
             ),
             // With the low sides on one more that is on is nothing; the high one shoots through.
@@ -239,18 +308,24 @@ impl Row {
                 expected(&[OVER_CURRENT, SENSOR], true, &[Recovers, Stops])
             }
             Self::LowShort => expected(&[OVER_CURRENT], true, &[Stops]),
-            Self::SensorZero | Self::Drift => {
-                expected(&[SENSOR, OVER_CURRENT], drives, &[GoesOn, Recovers, Stops])
-            }
+            // Slow, a motor takes less current than its sensor is off by, and is lost and started again.
+            Self::SensorZero | Self::Drift => expected(
+                &[SENSOR_DRIFTS, SENSOR, OVER_CURRENT, FAILED_START],
+                shows,
+                &[GoesOn, Recovers, Stops],
+            ),
             Self::SensorFull => expected(&[SENSOR, OVER_CURRENT], true, &[Recovers, Stops]),
-            Self::HallStuck => expected(&[HALL], drives, &[GoesOn, Recovers, Stops]),
+            Self::HallStuck => expected(&[HALL], shows, &[GoesOn, Recovers, Stops]),
             // The rotor's own voltage between the lines is above what is left: it feeds the supply by the diodes, more
             // than the trip allows. Once the supply is back the rotor is caught; the six-step drive cannot.
             Self::DeepSag if moment.is_fast() => {
                 expected(&[UNDER_VOLTAGE, OVER_CURRENT], true, &[Recovers, Stops])
             }
             Self::DeepSag => expected(&[UNDER_VOLTAGE], true, &[Recovers, Stops]),
-            Self::Disconnect if moment == Moment::Braking => expected(&[OVER_VOLTAGE], true, &[]),
+            // Braking holds the supply up, and when the motor stands it empties.
+            Self::Disconnect if moment == Moment::Braking => {
+                expected(&[OVER_VOLTAGE, UNDER_VOLTAGE], false, &[])
+            }
             // A retry that has the capacitor alone charges it from the rotor.
             Self::Disconnect if moment.is_fast() => expected(
                 &[UNDER_VOLTAGE, OVER_CURRENT, OVER_VOLTAGE],

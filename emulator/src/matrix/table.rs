@@ -28,6 +28,8 @@ impl Miss {
             Self::Stage => "stage",
             Self::Cause => "cause",
             Self::Reaction => "reaction",
+            Self::Time => "time",
+            Self::Gates => "gates",
             Self::Again => "again",
         }
     }
@@ -50,8 +52,19 @@ impl fmt::Display for Matrix {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         writeln!(
             f,
-            "{:14} {:22} {:10} {:8} {:>8} {:>6} {:>6} {:>6} {:>5} {:>5}  named (limits); MISSED",
-            "drive", "fault", "moment", "reaction", "after ms", "A", "below", "V", "wind.", "stage"
+            "{:14} {:22} {:10} {:8} {:>8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>5} {:>5}  named (limits); MISSED",
+            "drive",
+            "fault",
+            "moment",
+            "reaction",
+            "after ms",
+            "within",
+            "trip µs",
+            "A",
+            "below",
+            "V",
+            "wind.",
+            "stage"
         )?;
         for Judged {
             cell,
@@ -59,12 +72,14 @@ impl fmt::Display for Matrix {
             misses,
         } in &self.cells
         {
-            let after = cell
-                .after_ms
-                .map_or_else(|| "-".to_owned(), |ms| format!("{ms:.2}"));
+            let time = |time: Option<f64>, places: usize| {
+                time.map_or_else(|| "-".to_owned(), |time| format!("{time:.places$}"))
+            };
+            let (after, within) = (time(cell.after_ms, 2), time(bounds.within_ms, 1));
+            let trip = time(cell.trip_us, 2);
             write!(
                 f,
-                "{:14} {:22} {:10} {:8} {after:>8} {:>6.1} {:>6.1} {:>6.2} {:>5.1} {:>5.1}  {}",
+                "{:14} {:22} {:10} {:8} {after:>8} {within:>7} {trip:>7} {:>6.1} {:>6.1} {:>6.2} {:>5.1} {:>5.1}  {}",
                 cell.drive.name(),
                 cell.fault.name(),
                 cell.moment.name(),
