@@ -12,6 +12,10 @@ use crate::math::{Gain, Held, Multiplier, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Current, Voltage};
 
+/// Periods by which the supply's voltage is looked ahead while the motor brakes: eight that the filter is behind, and
+/// as many as it takes until a bound is looked at again and the current has followed.
+const AHEAD_PERIODS: i32 = 32;
+
 /// Samples in a row above the trip level that are an over-current, so that one disturbed reading
 /// is not.
 const OVER_CURRENT_SAMPLES: u8 = 2;
@@ -53,6 +57,8 @@ traced! {
         pub over_current_samples: u8,
         /// Supply voltage behind a low-pass filter.
         pub bus: Voltage,
+        /// By how much that has risen in the last period.
+        pub rise: Voltage,
         /// Bounds of i_q*, moved by what the supply gives and takes.
         pub bounds: Bounds,
     }
@@ -65,6 +71,7 @@ impl State {
             trip: config.trip,
             over_current_samples: 0,
             bus: config.bus_min / 2 + config.bus_max / 2,
+            rise: Voltage::ZERO,
             bounds: config.full_bounds(),
         }
     }
@@ -91,7 +98,8 @@ pub fn check(
 ) -> Option<Fault> {
     // An eighth of the difference a period: one reading that is off moves it by little.
     // Both are from 0 to 8, the type is of ±8: nothing here wraps.
-    state.bus = state.bus.wrapping_add(bus.wrapping_sub(state.bus) >> 3);
+    state.rise = bus.wrapping_sub(state.bus) >> 3;
+    state.bus = state.bus.wrapping_add(state.rise);
 
     if currents.is_some_and(|currents| beyond(state.trip, currents)) {
         state.over_current_samples = state.over_current_samples.saturating_add(1);
@@ -155,6 +163,9 @@ fn burnt(config: &Config, state: &State) -> Current {
 /// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw`
 /// and takes no more than `bus_return`, and less of that as its voltage nears the limit.
 ///
+/// A supply that takes nothing back any more rises by volts a millisecond: what it comes to if it goes on so counts as its
+/// voltage, and where that is beyond the limit nothing is returned at once.
+///
 /// Braking begins at a bound that returns no more than that at any speed; only then is it moved by
 /// what is returned. From the full bound it would return too much for some milliseconds.
 pub fn bound(
@@ -173,7 +184,8 @@ pub fn bound(
         let lowered = bounds.max.minus(rate(too_much_drawn));
         bounds.max = lowered.min(config.phase).max(Current::ZERO);
     }
-    let above = state.bus.minus(config.bus_return_v);
+    let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
+    let above = ahead.minus(config.bus_return_v);
     let may_return = if above.is_positive() {
         let less = config.bus_return_slope.saturating_apply(above);
         config.bus_return.minus(less)
@@ -181,7 +193,9 @@ pub fn bound(
         config.bus_return
     };
     let min = bounds.min;
-    let raised = if i_q.is_negative() {
+    let raised = if may_return.is_negative() {
+        Current::ZERO
+    } else if i_q.is_negative() {
         let too_much_returned = bus_current.saturating_neg().minus(may_return);
         // While the current is on its way to the bound there is nothing to say that more may be had.
         let arrived = i_q < min - (min >> 3);

@@ -100,8 +100,15 @@ pub(crate) const TRIP_SHARE: f32 = 1.4;
 /// below the rest.
 const SHOWN_SHARE: f32 = 0.97;
 
-/// Volts below `LIM_BUS_V_MAX` over which the returned current is brought to zero.
+/// Volts below `LIM_BUS_V_MAX` from which on less is returned.
 const RETURN_BAND_V: f32 = 1.0;
+
+/// Volts over which the returned current is brought to zero: what is measured of it, and the voltage, need the rest.
+const RETURN_V: f32 = 0.5;
+
+/// Volts below `LIM_BUS_V_MAX` from which on the bridge is off: what is in the inductances goes into the supply then, and
+/// what is measured is behind by its filter.
+const TRIP_V: f32 = 0.25;
 
 /// i_d at `LIM_BUS_V_MAX` over `LIM_PHASE_A`: 4 W on the bench, where an i_q of zero returns 1 W.
 const BURN_SHARE: f32 = 0.25;
@@ -237,7 +244,7 @@ pub(crate) fn lost_periods(scale: &Scale) -> u32 {
 /// Refuses values that are wrong whatever the coefficients are.
 fn refuse_contradictions(p: &Si) {
     p.refuse_if(
-        p.of(Quantity::SupplyMinV) >= p.of(Quantity::SupplyMaxV),
+        p.of(Quantity::SupplyMinV) + TRIP_V >= p.of(Quantity::SupplyMaxV),
         ParamId::LimBusVMin,
         "not below LIM_BUS_V_MAX",
     );
@@ -323,13 +330,13 @@ fn limits(p: &Si, place: &mut protection::Config) {
     fill!(p, place, {
         number trip([TRIP_SHARE] * LimitA / APerCount),
         number bus_min(SupplyMinV / UnitV),
-        number bus_max(SupplyMaxV / UnitV),
+        number bus_max(SupplyMaxV - [TRIP_V] / UnitV),
         number phase(LimitA / UnitA),
         number bus_draw(SupplyA / UnitA),
         number bus_return(RegenA / UnitA),
         define ReturnV(SupplyMaxV - [RETURN_BAND_V]),
         number bus_return_v(ReturnV / UnitV),
-        gain bus_return_slope(LimRegenA, RegenA / [RETURN_BAND_V] * UnitV / UnitA),
+        gain bus_return_slope(LimRegenA, RegenA / [RETURN_V] * UnitV / UnitA),
         gain burn_slope(LimPhaseA, [BURN_SHARE / RETURN_BAND_V] * LimitA * UnitV / UnitA),
         factor bound_rate(PwmFreqHz, [BOUND_RATE] * T),
     });
