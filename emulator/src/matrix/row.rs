@@ -304,9 +304,7 @@ impl Row {
             // A retry behind its end turns the motor on.
             Self::HighShort => expected(&[OVER_CURRENT], true, &[Recovers, Stops]),
             // What the rotor drives through it between two retries is measured as a sensor's zero.
-            Self::LowShort if drives => {
-                expected(&[OVER_CURRENT, SENSOR], true, &[Recovers, Stops])
-            }
+            Self::LowShort if drives => expected(&[OVER_CURRENT, SENSOR], true, &[Recovers, Stops]),
             Self::LowShort => expected(&[OVER_CURRENT], true, &[Stops]),
             // Slow, a motor takes less current than its sensor is off by, and is lost and started again.
             Self::SensorZero | Self::Drift => expected(

@@ -4,6 +4,7 @@ use super::config::{Config, Direction};
 use super::io::{Sample, Setpoint};
 use super::phase::Phase;
 use super::seen::Seen;
+use super::witness;
 use crate::control::delay::Delay;
 use crate::control::modulator::Supply;
 use crate::control::sensing::{self, Shunts};
@@ -25,6 +26,7 @@ traced! {
         pub(super) protection: protection::State,
         /// The currents' zeros.
         pub(super) zeros: sensing::State,
+        pub(super) witness: witness::State,
         pub(super) applied: Applied,
         /// The supply's voltage and the vectors that it gives.
         pub(super) supply: Supply,
@@ -98,6 +100,7 @@ impl Shared {
             progress: Progress::default(),
             protection: protection::State::new(&config.protection),
             zeros: sensing::State::default(),
+            witness: witness::State::default(),
             applied: Applied {
                 duties: [[Duty::ZERO; 3]; 2],
                 unreadable: UNREADABLE,
@@ -114,7 +117,9 @@ impl Shared {
             let [a, b, c] = self.reconstructed(config, sample);
             return [a, b, c];
         }
-        sensing::read(&self.zeros, sample.currents)
+        let currents = sensing::read(&self.zeros, sample.currents);
+        self.witness.note(currents);
+        currents
     }
 
     /// The currents of a sample at which a phase may be unreadable.
@@ -127,7 +132,9 @@ impl Shared {
         }
         let elapsed = duties[usize::from(config.delay == Delay::One)];
         duties[1] = duties[0];
-        sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed)
+        let currents = sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed);
+        self.witness.note(currents);
+        currents
     }
 
     /// Returns true if phases b and c change places for the control, which always turns one way.
