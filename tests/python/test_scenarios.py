@@ -22,6 +22,13 @@ FAULTS = {
     "under-voltage": "under-voltage",
 }
 
+# What the motor goes on with is told; without a fault, nothing.
+WARNINGS = {
+    "fault-mosfet-open": {"phase open"},
+    "fault-phase-open": {"phase open"},
+    "fault-sensor-stuck": {"current sensor drifts"},
+}
+
 # A part of the seeds that the files name for all.
 SEEDS = {
     "bench-cinelifter": "1..4",
@@ -66,6 +73,7 @@ def test_scenario(name):
     seeds = ["--seeds", SEEDS[name]] if name in SEEDS else []
     status, summary = scenario(SCENARIOS / f"{name}.toml", *seeds)
     expectations = summary["expectations"]
+    assert set(summary.get("warnings", [])) == WARNINGS.get(name, set())
     if "runs" in summary:
         failed = [expected for expected in expectations if expected["failed"] > 0]
         assert (status, summary["failed"], failed) == (0, 0, [])
