@@ -350,6 +350,7 @@ fn a_rotor_that_the_published_observer_has_lost_is_a_fault() {
         let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in [
             (ParamId::CtlObserver, 0.0),
+            (ParamId::LimPolicy, 0.0),
             (ParamId::MotRMohm, resistance_mohm),
         ] {
             params.set(id, value).expect("in range");

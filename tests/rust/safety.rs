@@ -4,6 +4,7 @@
 use siskin_control::drive::{Bridge, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, ParamId};
 use siskin_emulator::device::{Device, Start};
+use siskin_emulator::fault::{Fault, Kind, Side};
 use siskin_emulator::rig::{Period, Rig};
 
 const MS_NS: u64 = 1_000_000;
@@ -272,6 +273,55 @@ fn it_turns_again_from_any_speed_while_braking() {
             seen.least_rpm > 0.99 * HALF_RPM && seen.most_rpm < 1.01 * HALF_RPM,
             "{stop_ms} ms of brake: {seen:?}"
         );
+    }
+}
+
+#[test]
+fn a_short_is_tried_three_times_in_flight_and_then_held() {
+    for (policy, attempts) in [(0.0, 1), (1.0, 4)] {
+        let mut flight = Flight::turning(&[(ParamId::LimPolicy, policy)]);
+        let short = Fault {
+            at_s: flight.device.now_ns() as f64 * 1e-9,
+            for_s: None,
+            kind: Kind::MosfetShort(1, Side::High),
+        };
+        flight.device.inject(short);
+        flight.send(1_000, frame(DSHOT600, HALF));
+        let trips = |flight: &Flight| flight.device.esc().telemetry().fault_count;
+        assert_eq!(trips(&flight), attempts, "{policy}");
+        let held = flight.send(2_000, frame(DSHOT600, HALF));
+        assert!(!held.driven, "{policy}: {held:?}");
+        assert_eq!(trips(&flight), attempts, "{policy}");
+        // Mended, it is flown again behind zero throttle, and not before.
+        flight.device.mend();
+        let waiting = flight.send(500, frame(DSHOT600, HALF));
+        assert!(!waiting.driven, "{policy}: {waiting:?}");
+        flight.send(500, frame(DSHOT600, STOP));
+        flight.send(3_000, frame(DSHOT600, HALF));
+        let again = flight.send(100, frame(DSHOT600, HALF));
+        assert!(again.least_rpm > 0.99 * HALF_RPM, "{policy}: {again:?}");
+    }
+}
+
+#[test]
+fn zero_throttle_and_a_lost_signal_win_over_a_retry() {
+    for signal in [true, false] {
+        let mut flight = Flight::turning(&[]);
+        let sag = Fault {
+            at_s: flight.device.now_ns() as f64 * 1e-9,
+            for_s: Some(0.2),
+            kind: Kind::BusSag(16.0),
+        };
+        flight.device.inject(sag);
+        // Longer than INP_LOSS_MS, and shorter than the sag.
+        let wire = frame(DSHOT600, STOP);
+        flight.run(150, |_| signal.then_some(wire));
+        assert_ne!(flight.device.esc().telemetry().fault_count, 0);
+        let after = flight.run(1_000, |_| signal.then_some(wire));
+        assert!(!after.driven, "{signal}: {after:?}");
+        let open = flight.send(500, frame(DSHOT600, HALF));
+        // Zero throttle has armed it again; after a lost signal it must be.
+        assert_eq!(open.driven, signal, "{open:?}");
     }
 }
 
