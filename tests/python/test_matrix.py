@@ -19,33 +19,32 @@ def cells(drives, faults, moments, *misses) -> dict:
 # What is not as it is to be, and why. The trip is at 1.4 times LIM_PHASE_A for two samples and the comparators' at
 # 1.6: where a current rises as far as that, it passes 1.2 times the limit before.
 OPEN = {
-    # Nothing watches the balance of the phases: two phases turn the motor on where it is fast enough, and where they do
-    # not, the regulator's voltage rises until the current trips.
-    **cells([FOC], ["phase_open", "high_open", "low_open"], ["half", "full"], "cause"),
+    # A wire that opens is known by its current in some turns. Where two phases do not turn the motor for as long, the
+    # regulator's voltage rises until the current trips.
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
-    **cells([SIX], ["phase_open"], ["start", "half", "full", "braking"], "current", "cause"),
-    **cells([SIX], ["high_open", "low_open"], ["idle", "half", "full"], "cause"),
+    **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
+    **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
-    # Nor the sum of the three currents: a sensor's zero is measured only before a start.
-    **cells([FOC, SIX], ["sensor_zero", "drift"], TURNING, "cause"),
-    **cells([SIX], ["sensor_zero"], ["start"], "current", "cause"),
-    # The control knows of a Hall sensor that is at fault, and turns on without it at speed; nobody is told.
-    **cells([FOC, SIX], ["hall_stuck"], TURNING, "cause"),
-    **cells([FOC], ["hall_stuck"], ["idle"], "cause", "reaction"),
+    # The six-step drive's start meets a sensor that shows nothing with more current.
+    **cells([SIX], ["sensor_zero"], ["start"], "current"),
+    # The control knows of a Hall sensor that is at fault, and cannot turn on without it where it is slow.
+    **cells([FOC], ["hall_stuck"], ["idle"], "current", "reaction"),
     # A rotor that jams at speed is tried again, by starts of which each takes longer than the one before: 1.5 s after it
-    # was freed one is still under way. What jams in a start, or turns too fast for the six-step drive, is not.
+    # was freed one is still under way. What jams in a start, or turns too fast for the six-step drive, is not. It is
+    # known for lost by its flux after 0.1 s where no current trips.
     **cells([FOC], ["rotor_blocked"], ["start", "full"], "reaction"),
-    **cells([FOC], ["rotor_blocked"], ["half"], "current", "reaction"),
+    **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
+    **cells([FOC], ["rotor_blocked"], ["half"], "current", "reaction", "time"),
     **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
-    **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction"),
+    **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
+    # Nearly all of the back-EMF is gone faster than the currents are regulated.
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
+    **cells([SIX], ["strike"], ["half"], "current"),
     # A start that is struck is tried again, and takes its time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
-    # 10 A on 470 µF are 0.9 V a period: the supply is at its limit before the bounds of the current have followed.
-    **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
     # At full speed the capacitors are empty in a period, and the rotor's own voltage drives the current of a short
     # circuit into them: while it rises it is a little above the steady one. A retry that has nothing but these
     # capacitors takes them above the limit, as braking does.
