@@ -218,8 +218,8 @@ def test_a_flood_of_frames_is_dropped_and_the_esc_goes_on(start):
             spin(esc, throttle)
 
 
-def test_a_fault_latches_until_zero_throttle(start):
-    emulator = start(*PATIENT)
+def test_a_fault_on_the_bench_latches_until_zero_throttle(start):
+    emulator = start(*PATIENT, "--param", "LIM_POLICY=0")
     with emulator.connect() as esc, emulator.throttle() as throttle:
         fast(esc)
         esc.wait_armed()
