@@ -1,0 +1,37 @@
+"""The least time of a climb, as `thrust.py` works it out, on shafts whose time can be worked out by hand."""
+
+import math
+
+import pytest
+
+from thrust import STEP_S, Punch, least_s
+
+RPM_PER_RAD_S = 60 / math.tau
+
+
+def shaft(volts: float) -> dict:
+    """7 pole pairs of 1 mWb: 20 A make 0.21 Nm, and 21 000 rad/s^2 of 1e-5 kg*m^2."""
+    motor = {"R": 1e-3, "L": 1e-9, "flux": 1e-3, "pole_pairs": 7, "J": 0.6e-5}
+    load = {"c2": 0.0, "J": 0.4e-5}
+    return {"bench": {"motor": motor, "load": load, "bus": volts}, "params": {"LIM_PHASE_A": 20, "LIM_BUS_A": 200}}
+
+
+def test_without_a_load_it_is_the_time_of_the_limit_s_torque():
+    climb = Punch(100 * RPM_PER_RAD_S, 520 * RPM_PER_RAD_S, 60.0, None)
+    assert least_s(shaft(60.0), climb) == pytest.approx(0.02, abs=2 * STEP_S)
+
+
+def test_a_load_takes_its_part_of_the_torque():
+    tables = shaft(60.0)
+    # Half of it.
+    tables["bench"]["load"]["torque_nm"] = 0.105
+    climb = Punch(0.0, 210 * RPM_PER_RAD_S, 60.0, None)
+    assert least_s(tables, climb) == pytest.approx(0.02, abs=2 * STEP_S)
+
+
+def test_a_speed_that_the_supply_does_not_give_is_never_reached():
+    # 5 V turn 1 mWb with 412 rad/s of the shaft.
+    tables = shaft(5.0)
+    tables["bench"]["load"]["c2"] = 1e-7
+    assert least_s(tables, Punch(0.0, 420 * RPM_PER_RAD_S, 5.0, None)) == math.inf
+    assert math.isfinite(least_s(tables, Punch(0.0, 400 * RPM_PER_RAD_S, 5.0, None)))
