@@ -115,7 +115,16 @@ impl Course {
     #[inline(always)]
     pub(super) fn go(&mut self, to: Moment) {
         self.now = to;
-        self.most_a = self.most_a.max(largest(to.stator_a()));
+        self.reach(largest(to.stator_a()));
+    }
+
+    /// A phase current came to this, A.
+    // By comparison: `max` looks for what is no number.
+    #[inline(always)]
+    pub(super) fn reach(&mut self, current_a: f64) {
+        if current_a > self.most_a {
+            self.most_a = current_a;
+        }
     }
 }
 

@@ -338,7 +338,8 @@ impl Plant {
         loop {
             let mut end_s = next_s[0].min(next_s[1]).min(next_s[2]).min(half_s);
             if watched {
-                end_s = end_s.min(now_s + self.comparators.look(self.stage.shunts_a()));
+                let shunts_a = self.stage.shunts_a();
+                end_s = end_s.min(now_s + self.comparators.look(shunts_a, self.may_short()));
             }
             let time_s = end_s - now_s;
             if time_s > 0.0 {
@@ -369,6 +370,11 @@ impl Plant {
                 next_s[leg] = timer.next_s(now_s).min(half.edge_s);
             }
         }
+    }
+
+    /// Whether a switch that is on may make a short with one that is always on.
+    fn may_short(&self) -> bool {
+        self.stage.is_shorted() && self.timers.iter().any(|timer| timer.output.is_some())
     }
 
     /// The comparators turn all switches off for the rest of a half.

@@ -254,8 +254,10 @@ impl Circuit {
         sums.charge += sum(charge + missing * during * r);
         // The largest phase current of each vector, as `largest` has it.
         let (x, y) = (end.x.abs(), end.y.abs());
-        let [a, b, c, d] = x.max((x + y * ROOT_3) * 0.5).to_array();
-        course.most_a = course.most_a.max(a.max(b)).max(c.max(d));
+        let largest = x.fast_max((x + y * ROOT_3) * 0.5).to_array();
+        for current_a in largest {
+            course.reach(current_a);
+        }
         let direction = to.last();
         course.now = Moment {
             i: back(end.last(), direction),

@@ -3,7 +3,8 @@
 /// Time from a current beyond their level to switches that are off, s: their filter and the gates' drivers.
 const ACT_S: f64 = 1e-6;
 
-/// Time from one look at the currents to the next, s: real ones look all the time.
+/// Time from one look at the currents of a short to the next, s: real ones look all the time. Any others are looked at
+/// at the switches' edges.
 const LOOK_S: f64 = 0.25e-6;
 
 /// What rounding may leave of a time, s.
@@ -42,8 +43,9 @@ impl Comparators {
         self.beyond_s = 0.0;
     }
 
-    /// They see these currents of the shunts now. Gives the time until they must look again, or act, s.
-    pub(super) fn look(&mut self, shunts_a: [f64; 3]) -> f64 {
+    /// They see these currents of the shunts now, which may be those of a short. Gives the time until they must look
+    /// again, or act, s.
+    pub(super) fn look(&mut self, shunts_a: [f64; 3], shorts: bool) -> f64 {
         if self.act_s < f64::INFINITY {
             return self.act_s;
         }
@@ -52,7 +54,7 @@ impl Comparators {
             return ACT_S;
         }
         self.beyond_s = 0.0;
-        LOOK_S
+        if shorts { LOOK_S } else { f64::INFINITY }
     }
 
     /// Time passes; true where they act at its end.
@@ -84,13 +86,13 @@ mod tests {
         let mut comparators = Comparators::new();
         comparators.level_a = 30.0;
         for _ in 0..3 {
-            assert_eq!(comparators.look([29.9, -29.9, 0.0]), LOOK_S);
+            assert_eq!(comparators.look([29.9, -29.9, 0.0], true), LOOK_S);
             assert!(!comparators.pass(LOOK_S));
         }
-        assert_eq!(comparators.look([0.0, -30.1, 0.0]), ACT_S);
+        assert_eq!(comparators.look([0.0, -30.1, 0.0], true), ACT_S);
         assert!(!comparators.pass(0.6e-6) && !comparators.tripped);
         // What it is meanwhile does not matter.
-        assert!(comparators.look([0.0; 3]) < 0.5e-6);
+        assert!(comparators.look([0.0; 3], true) < 0.5e-6);
         assert!(comparators.pass(0.4e-6) && comparators.tripped);
         let answer_s = comparators.answer_s().expect("they have acted");
         assert!((answer_s - 1.25e-6).abs() < 1e-12, "{answer_s}");

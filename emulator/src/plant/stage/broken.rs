@@ -25,6 +25,11 @@ impl Stage {
         self.sound
     }
 
+    /// Whether a switch is always on.
+    pub(in super::super) fn is_shorted(&self) -> bool {
+        self.breaks.0.iter().any(|leg| leg.shorted.contains(&true))
+    }
+
     /// Breaks these parts and mends all others, while the timer has these switches on.
     pub(in super::super) fn break_legs(&mut self, breaks: &Breaks, on: [Option<Rail>; 3]) {
         self.breaks = *breaks;

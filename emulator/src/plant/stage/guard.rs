@@ -16,8 +16,10 @@ pub(super) struct Guard {
     dead_s: f64,
     /// The switch of each leg that is on.
     on: [Option<Rail>; 3],
-    /// The last one that was turned off, and when in the period, s.
-    off: [(Rail, f64); 3],
+    /// The last one that was turned off.
+    last: [Rail; 3],
+    /// When that was in the period, s.
+    off_s: [f64; 3],
     /// A leg that has had less in this period.
     crossed: Option<usize>,
 }
@@ -28,7 +30,8 @@ impl Guard {
         Self {
             dead_s: 0.0,
             on: [None; 3],
-            off: [(Rail::Low, f64::NEG_INFINITY); 3],
+            last: [Rail::Low; 3],
+            off_s: [f64::NEG_INFINITY; 3],
             crossed: None,
         }
     }
@@ -38,8 +41,8 @@ impl Guard {
     pub(super) fn begin(&mut self, dead_s: f64, past_s: f64) {
         self.dead_s = dead_s;
         self.crossed = None;
-        for (_, at_s) in &mut self.off {
-            *at_s -= past_s;
+        for off_s in &mut self.off_s {
+            *off_s -= past_s;
         }
     }
 
@@ -56,11 +59,12 @@ impl Guard {
             return;
         }
         if let Some(rail) = before {
-            self.off[leg] = (rail, now_s);
+            self.last[leg] = rail;
+            self.off_s[leg] = now_s;
         }
         if let Some(rail) = on {
-            let (other, since_s) = self.off[leg];
-            if other != rail && now_s - since_s < self.dead_s - ROUNDING_S {
+            let off_for_s = now_s - self.off_s[leg];
+            if self.last[leg] != rail && off_for_s < self.dead_s - ROUNDING_S {
                 self.crossed = Some(leg);
             }
         }
