@@ -49,6 +49,9 @@ OPEN = {
     # circuit into them: while it rises it is a little above the steady one. A retry that has nothing but these
     # capacitors takes them above the limit, as braking does.
     **cells([FOC], ["disconnect"], ["full"], "current", "supply"),
+    # The braking has backed off, but what is left of its current, some tenths of an ampere, takes the supply over its
+    # limit before the trip's filter has followed.
+    **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
     # The six-step drive shoots a short through the winding in its start, and has the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }

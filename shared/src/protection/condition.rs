@@ -120,9 +120,9 @@ conditions! {
     OverCurrent = 0 "over-current" 1
         "a phase current above 1.4 · `LIM_PHASE_A` for two samples, the hardware's own trip, or the gate driver's alarm"
         "look for a short; check `MOT_R_MOHM`, `MOT_L_UH` and the bandwidth `CTL_BW_CUR_HZ`";
-    /// The supply was less than a quarter of a volt below `LIM_BUS_V_MAX`.
+    /// The supply was above `LIM_BUS_V_MAX`.
     OverVoltage = 1 "bus over-voltage" 2
-        "supply within 0.25 V of `LIM_BUS_V_MAX`, or above it"
+        "supply above `LIM_BUS_V_MAX`"
         "braking into a supply that takes no current back: set `LIM_REGEN_A` lower, or `MOT_STOP` 0";
     /// The supply was below `LIM_BUS_V_MIN`.
     UnderVoltage = 2 "bus under-voltage" 64

@@ -106,10 +106,6 @@ const RETURN_BAND_V: f32 = 1.0;
 /// Volts over which the returned current is brought to zero: what is measured of it, and the voltage, need the rest.
 const RETURN_V: f32 = 0.5;
 
-/// Volts below `LIM_BUS_V_MAX` from which on the bridge is off: what is in the inductances goes into the supply then, and
-/// what is measured is behind by its filter.
-const TRIP_V: f32 = 0.25;
-
 /// i_d at `LIM_BUS_V_MAX` over `LIM_PHASE_A`: 4 W on the bench, where an i_q of zero returns 1 W.
 const BURN_SHARE: f32 = 0.25;
 
@@ -244,7 +240,7 @@ pub(crate) fn lost_periods(scale: &Scale) -> u32 {
 /// Refuses values that are wrong whatever the coefficients are.
 fn refuse_contradictions(p: &Si) {
     p.refuse_if(
-        p.of(Quantity::SupplyMinV) + TRIP_V >= p.of(Quantity::SupplyMaxV),
+        p.of(Quantity::SupplyMinV) >= p.of(Quantity::SupplyMaxV),
         ParamId::LimBusVMin,
         "not below LIM_BUS_V_MAX",
     );
@@ -330,7 +326,7 @@ fn limits(p: &Si, place: &mut protection::Config) {
     fill!(p, place, {
         number trip([TRIP_SHARE] * LimitA / APerCount),
         number bus_min(SupplyMinV / UnitV),
-        number bus_max(SupplyMaxV - [TRIP_V] / UnitV),
+        number bus_max(SupplyMaxV / UnitV),
         number phase(LimitA / UnitA),
         number bus_draw(SupplyA / UnitA),
         number bus_return(RegenA / UnitA),
