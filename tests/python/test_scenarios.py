@@ -24,7 +24,11 @@ FAULTS = {
 
 # What the motor goes on with is told; without a fault, nothing.
 WARNINGS = {
+    "fault-hall-stuck": {"position sensor defect"},
     "fault-mosfet-open": {"phase open"},
+    # 3 A rms on each: no sensor is sound that shows that.
+    "fault-noise": {"current sensor drifts"},
+    "fault-offset-drift": {"current sensor drifts"},
     "fault-phase-open": {"phase open"},
     "fault-sensor-stuck": {"current sensor drifts"},
 }
