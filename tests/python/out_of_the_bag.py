@@ -54,11 +54,8 @@ def limits(motor: dict) -> dict:
     return {name: value for name, value in motor["params"].items() if name.startswith(("LIM_", "PWM_"))}
 
 
-def opened(folder: Path, number: int) -> Outcome:
-    """The throttle is opened for the motor of this number. Of half of them two wires are swapped, which MOT_DIR has
-    put right."""
-    draw = random.Random(f"bag {number}")
-    motor, swapped = any_motor(draw), draw.random() < 0.5
+def opened(folder: Path, motor: dict, swapped: bool) -> Outcome:
+    """The throttle is opened for a motor, of which two wires may be swapped, which MOT_DIR has put right."""
     tables = drawn_bench(motor)
     tables["bench"]["duration_s"] = END_S
     tables["params"] = FACTORY | limits(motor) | {"MOT_DIR": int(swapped)}
@@ -69,11 +66,18 @@ def opened(folder: Path, number: int) -> Outcome:
     return Outcome(faults, rpm / (SHARE * motor["rpm"]), current)
 
 
+def drawn(folder: Path, number: int) -> Outcome:
+    """The random motor of this number; of half of them two wires are swapped."""
+    draw = random.Random(f"bag {number}")
+    motor = any_motor(draw)
+    return opened(folder, motor, draw.random() < 0.5)
+
+
 def main() -> int:
     given = campaign.words(__doc__, motors=500)
     outcomes = []
     print(f"{'motor':>5} {'turns':<5} {'speed':>6} {'current':>7}  faults")
-    for number, outcome in campaign.played(campaign.numbers(given), opened, given.jobs):
+    for number, outcome in campaign.played(campaign.numbers(given), drawn, given.jobs):
         outcomes.append(outcome)
         turns = "yes" if outcome.turns() else "NO"
         row = f"{number:>5} {turns:<5} {outcome.speed:>6.2f} {outcome.current:>7.2f}  {', '.join(outcome.faults)}"
