@@ -150,7 +150,8 @@ def test_faults_come_and_are_mended(two):
     two.faults.mend(1)
     assert two.faults[1] == [] and len(two.faults[0]) == 1
     two.faults.inject(0, "mosfet_short", phase=2, side="low")
-    two.advance(0.1)
+    # Before the first retry.
+    two.advance(0.01)
     assert two.state[0].phase == "idle" and two.state[0].faults == ["over-current"]
     # One that has had its time is not there any more.
     two.faults.inject(1, "signal_loss", for_s=0.05)

@@ -30,6 +30,7 @@ WARNINGS = {
     "fault-noise": {"current sensor drifts"},
     "fault-offset-drift": {"current sensor drifts"},
     "fault-phase-open": {"phase open"},
+    "fault-phase-open-start": {"phase open"},
     "fault-sensor-stuck": {"current sensor drifts"},
 }
 
