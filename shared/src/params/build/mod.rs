@@ -1,6 +1,8 @@
 //! The configuration that the parameters make: SI values become the control's coefficients, once.
 
 mod base;
+#[cfg(test)]
+mod by_hand;
 mod flux;
 mod formula;
 mod inductance;

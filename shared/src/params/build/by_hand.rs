@@ -1,0 +1,114 @@
+//! Coefficients against figures that are worked out by hand, of a 5-inch racing motor.
+
+use core::cell::Cell;
+
+use super::quantity::Quantity;
+use super::si::Si;
+use super::{low_speed, observer, sensing};
+use crate::control::speed::Bounds;
+use crate::control::{dead_time, observer as observers};
+use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
+use crate::units::{Current, Speed};
+
+/// R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs, 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. All else follows.
+///
+/// By [`FromMotor`](crate::params::FromMotor)'s formulas it starts with 8 A, which drop 0.264 V; the dead time takes
+/// 4/π·200 ns·48 kHz·20 V, 0.2445 V; at the least speed the back-EMF is 1.5·0.264 V and a quarter of that, 0.4571 V.
+const RACING: [(ParamId, f32); 11] = [
+    (ParamId::CtlRpmMin, 0.0),
+    (ParamId::MotPolePairs, 7.0),
+    (ParamId::MotRMohm, 33.0),
+    (ParamId::MotLUh, 12.0),
+    (ParamId::MotFluxMwb, 0.3215),
+    (ParamId::MotJGcm2, 63.0),
+    (ParamId::CtlRpmMax, 20_000.0),
+    (ParamId::PwmFreqHz, 48_000.0),
+    (ParamId::PwmDeadtimeNs, 200.0),
+    (ParamId::LimPhaseA, 40.0),
+    (ParamId::LimBusVMax, 20.0),
+];
+
+/// What a block makes of that motor with these changes.
+fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
+    let mut params = Params::of(&BOSSO_MOTOR);
+    for (id, value) in RACING.iter().chain(changes) {
+        params.set(*id, *value).expect("in range");
+    }
+    let (made, quantities, refused) = (params.in_force(), Si::quantities(), Cell::new(None));
+    let p = Si::new(&made, &Board::BENCH, &quantities, &refused);
+    p.prepare();
+    block(&p)
+}
+
+fn near(what: &str, got: f32, wanted: f32) {
+    assert!(
+        (got / wanted - 1.0).abs() < 2e-3,
+        "{what}: {got} for {wanted}"
+    );
+}
+
+/// i_d at standstill, A.
+fn bias_a(changes: &[(ParamId, f32)]) -> f32 {
+    made(changes, |p| {
+        let full = Bounds {
+            min: -Current::ONE,
+            max: Current::ONE,
+        };
+        let (i_d, _) = low_speed(p).bounds(full, Speed::ZERO);
+        p.scale.amperes(i_d)
+    })
+}
+
+#[test]
+fn the_bias_along_d_is_the_greatest_of_three() {
+    // 0.3 of 8 A. The ripple is 0.4571 V over 48 kHz·12 µH, 0.79 A, and the back-EMF more than the dead time takes.
+    near("share", bias_a(&[]), 2.4);
+    // A ripple of 0.4571 V over 48 kHz·3 µH.
+    near("ripple", bias_a(&[(ParamId::MotLUh, 3.0)]), 3.174);
+    // A dead time of 1 µs takes 1.2223 V, and the back-EMF is 0.396 V and a quarter of that, 0.7016 V: what is left
+    // of the one, over 33 mΩ, and 0.3 of it.
+    near("hidden", bias_a(&[(ParamId::PwmDeadtimeNs, 1000.0)]), 4.734);
+    // And none is more than the start's current: 0.4571 V over 48 kHz·1 µH are 9.5 A.
+    near("start", bias_a(&[(ParamId::MotLUh, 1.0)]), 8.0);
+}
+
+#[test]
+fn the_compensation_is_the_dead_time_s_share_and_the_diodes() {
+    // 200 ns of 48 kHz, 0.0096, and 1.4 V of 20 V more of it.
+    let duty = made(&[], |p| {
+        let mut place = dead_time::Config::default();
+        sensing::dead_time(p, &mut place);
+        place.duty.to_num::<f32>()
+    });
+    near("duty", duty, 0.0096 * 1.07);
+}
+
+/// The observer's least and greatest ω_n, 1/s.
+fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
+    made(changes, |p| {
+        let mut place = observers::Config::default();
+        observer::observer(p, &mut place);
+        let observers::Config::Compensated(place) = place else {
+            panic!("it is the default");
+        };
+        let per_s = p.of(Quantity::Tau) / p.of(Quantity::T);
+        [place.omega_n_min, place.omega_n_max].map(|turns| turns.to_num::<f32>() * per_s)
+    })
+}
+
+#[test]
+fn the_observer_s_loop_is_as_fast_as_the_rotor_asks() {
+    // An ampere makes 1.5·7²·0.3215 mWb over 6.3 µkg·m², 3751 rad/s²; times 1.5² that is 8439, and with 0.5/0.35 of
+    // φ/R, 9.742 ms, it asks for 117 1/s: less than the least.
+    let [least, most] = omega_n(&[]);
+    near("least", least, 150.0);
+    near("most", most, 1000.0);
+    // A rotor of 10 g·cm² asks for 53 168 times that.
+    let [least, most] = omega_n(&[(ParamId::MotJGcm2, 10.0)]);
+    near("light", least, 740.0);
+    near("most", most, 1000.0);
+    // With 10 mΩ it would be 2442 1/s; the root of what 40 A accelerate it by is less.
+    let [least, most] = omega_n(&[(ParamId::MotJGcm2, 10.0), (ParamId::MotRMohm, 10.0)]);
+    near("light", least, 1458.0);
+    near("most", most, 1458.0);
+}
