@@ -6,7 +6,7 @@ mod turning;
 mod window;
 
 use serde::Serialize;
-use siskin_control::drive::{Fault, Faults, Limit, Limits, Phase};
+use siskin_control::drive::{Fault, Faults, Phase};
 
 use xxhash_rust::xxh3::Xxh3;
 
@@ -24,8 +24,6 @@ pub struct Summary {
     /// Whether nobody sees the control.
     blind: bool,
     faults: Faults,
-    /// What the motor has gone on with.
-    warnings: Limits,
     /// What the drive did in the period before.
     phase: Phase,
     windows: Vec<Window>,
@@ -47,9 +45,6 @@ pub struct Report {
     pub trace_hash: String,
     /// Faults that have turned the bridge off; `None` where nobody sees the control.
     pub faults: Option<Vec<&'static str>>,
-    /// What was wrong while the motor went on, if anything was.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<&'static str>,
     /// What came in from outside and was refused; not for a scenario, where nothing does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejected>,
@@ -70,7 +65,6 @@ impl Report {
             faults.extend(esc.faults.iter().flatten());
         }
         let known = Fault::ALL.into_iter().map(Fault::text);
-        let warned = |limit: &&'static str| escs.iter().any(|esc| esc.warnings.contains(limit));
         Self {
             sim_s,
             wall_s,
@@ -78,11 +72,6 @@ impl Report {
             steps: escs.iter().map(|esc| esc.steps).sum(),
             trace_hash: format!("{:016x}", hash.digest()),
             faults: Some(known.filter(|fault| faults.contains(fault)).collect()),
-            warnings: Limit::ALL
-                .into_iter()
-                .map(Limit::text)
-                .filter(warned)
-                .collect(),
             rejected: None,
             windows: Vec::new(),
             escs,
@@ -142,7 +131,6 @@ impl Summary {
             steps: 0,
             blind: false,
             faults: Faults::NONE,
-            warnings: Limits::NONE,
             phase: Phase::Idle,
             windows: windows
                 .map(|(name, t0_s, t1_s)| Window::new(name, t0_s, t1_s))
@@ -158,9 +146,6 @@ impl Summary {
         let snapshot = rig.snapshot();
         if !snapshot.faults.is_empty() {
             snapshot.faults.iter().for_each(|f| self.faults.insert(f));
-        }
-        for warning in snapshot.warnings().iter() {
-            self.warnings.insert(warning);
         }
         let started = snapshot.phase == Phase::Park && self.phase != Phase::Park;
         self.phase = snapshot.phase;
@@ -205,7 +190,6 @@ impl Summary {
             steps: self.steps,
             trace_hash: format!("{:016x}", self.trace.digest()),
             faults: (!self.blind).then(|| self.faults.iter().map(Fault::text).collect()),
-            warnings: self.warnings.iter().map(Limit::text).collect(),
             rejected: None,
             windows: self.windows.iter().map(|w| w.figures(sim_s)).collect(),
             escs: Vec::new(),

@@ -319,13 +319,7 @@ impl Esc {
         // A reading that is no number is too hot as well.
         self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
         self.telemetry.observe(snapshot, &self.scale, time_us);
-        let limits = thresholds(&self.params, &self.scale).limits(snapshot);
-        for limit in limits.iter() {
-            if limit.warns() && !self.telemetry.limits.contains(limit) {
-                self.warn_of(limit.text());
-            }
-        }
-        self.telemetry.limits = limits;
+        self.telemetry.limits = thresholds(&self.params, &self.scale).limits(snapshot);
         self.charge
             .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();

@@ -11,7 +11,7 @@ use super::magnetics::Magnetics;
 use super::series::{fraction, settle};
 use super::shaft::Shaft;
 use super::thermal::Warming;
-use super::vector::{back, phases, turn};
+use super::vector::{back, largest, phases, turn};
 use super::{Cogging, Drag, Extras, Load, Motor};
 
 /// Means over a period.
@@ -27,7 +27,8 @@ pub struct Flow {
     pub copper_w: f64,
     /// Current from the supply, A.
     pub bus_a: f64,
-    /// Greatest magnitude of a phase current at the switches' edges, A; 0 where means stand for them.
+    /// Greatest magnitude of a phase current among those that were worked out: with the switches, at each of their
+    /// edges, A.
     pub most_a: f64,
     /// Power lost to the motor's friction and in its iron while the shaft is free, W.
     pub drag_w: f64,
@@ -227,7 +228,7 @@ impl Machine {
         }
         self.circuit.turn_at(omega, 0.5 * period_s);
         self.course.sums = Sums::default();
-        self.course.most_a = 0.0;
+        self.course.most_a = largest(self.now().stator_a());
     }
 
     /// Speed to expect at the middle of the period, rad/s.

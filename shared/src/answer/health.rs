@@ -7,7 +7,7 @@
 //! | event | raised by |
 //! |---|---|
 //! | alert | a [`Limit`] binds beyond which there is no more torque: the current is at `LIM_PHASE_A`, or the supply gives `LIM_BUS_A` |
-//! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a phase or a sensor is at fault ([`Limit::warns`]) |
+//! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a Hall sensor is at fault |
 //! | error | a fault has turned the bridge off |
 //!
 //! An event is reported once, by the next status word, and again as long as it lasts.
@@ -37,9 +37,8 @@ impl Health {
         self.stress = self.stress.max(doubt);
         self.max_stress = self.max_stress.max(doubt);
         let status = &mut self.status;
-        let limits = basis.thresholds.limits(snapshot);
-        status.alert |= limits.iter().any(Limit::alerts);
-        status.warning |= doubt >= SUSPECT || limits.iter().any(Limit::warns);
+        status.alert |= basis.thresholds.limits(snapshot).iter().any(Limit::alerts);
+        status.warning |= doubt >= SUSPECT || snapshot.sensor_fault;
         status.error |= !snapshot.faults.is_empty() || snapshot.fault_count != self.fault_count;
         self.fault_count = snapshot.fault_count;
     }

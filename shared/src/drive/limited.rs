@@ -19,10 +19,10 @@ const NEAR_SHIFT: u32 = 4;
 impl Thresholds {
     /// The limits that bind now.
     pub fn limits(&self, snapshot: &Snapshot) -> Limits {
+        let mut limits = Limits::NONE;
         if !snapshot.phase.drives() {
-            return Limits::NONE;
+            return limits;
         }
-        let mut limits = snapshot.warnings();
         let mut note = |binds: bool, limit| {
             if binds {
                 limits.insert(limit);

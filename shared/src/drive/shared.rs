@@ -4,7 +4,6 @@ use super::config::{Config, Direction};
 use super::io::{Sample, Setpoint};
 use super::phase::Phase;
 use super::seen::Seen;
-use super::witness;
 use crate::control::delay::Delay;
 use crate::control::modulator::Supply;
 use crate::control::sensing::{self, Shunts};
@@ -26,7 +25,6 @@ traced! {
         pub(super) protection: protection::State,
         /// The currents' zeros.
         pub(super) zeros: sensing::State,
-        pub(super) witness: witness::State,
         pub(super) applied: Applied,
         /// The supply's voltage and the vectors that it gives.
         pub(super) supply: Supply,
@@ -100,7 +98,6 @@ impl Shared {
             progress: Progress::default(),
             protection: protection::State::new(&config.protection),
             zeros: sensing::State::default(),
-            witness: witness::State::default(),
             applied: Applied {
                 duties: [[Duty::ZERO; 3]; 2],
                 unreadable: UNREADABLE,
@@ -117,9 +114,7 @@ impl Shared {
             let [a, b, c] = self.reconstructed(config, sample);
             return [a, b, c];
         }
-        let currents = sensing::read(&self.zeros, sample.currents);
-        self.witness.note(currents);
-        currents
+        sensing::read(&self.zeros, sample.currents)
     }
 
     /// The currents of a sample at which a phase may be unreadable.
@@ -132,9 +127,7 @@ impl Shared {
         }
         let elapsed = duties[usize::from(config.delay == Delay::One)];
         duties[1] = duties[0];
-        let currents = sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed);
-        self.witness.note(currents);
-        currents
+        sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed)
     }
 
     /// Returns true if phases b and c change places for the control, which always turns one way.

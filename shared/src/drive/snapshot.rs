@@ -4,7 +4,7 @@ use super::phase::Phase;
 use crate::control::inductance::Factor;
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
-use crate::protection::{Faults, Limit, Limits};
+use crate::protection::Faults;
 use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
 
 /// The control's figures for the tasks, copied out of the interrupt.
@@ -37,8 +37,6 @@ pub struct Snapshot {
     pub trip: AdcCounts,
     /// The adapted inductance over the one that the parameters state.
     pub inductance: Factor,
-    /// What is wrong with a sensor of the currents or with a phase.
-    pub found: Limits,
     /// True if a position sensor is at fault.
     pub sensor_fault: bool,
     /// Attempts of the present start that have failed.
@@ -47,18 +45,4 @@ pub struct Snapshot {
     pub lost_periods: u32,
     /// Sextants in a row in which the six-step drive has seen no crossing where it drives.
     pub missed_sextants: u8,
-}
-
-impl Snapshot {
-    /// What is wrong with which the motor goes on: see [`Limit::warns`].
-    pub fn warnings(&self) -> Limits {
-        if !self.phase.drives() {
-            return Limits::NONE;
-        }
-        let mut warnings = self.found;
-        if self.sensor_fault {
-            warnings.insert(Limit::PositionSensor);
-        }
-        warnings
-    }
 }

@@ -191,7 +191,6 @@ impl State {
         self.enters_rest = why != Why::Retried;
         self.decided = UNDECIDED;
         shared.progress = Default::default();
-        shared.witness = Default::default();
         shared.seen.rest();
         self.foc.rest();
         self.six_step.rest();
@@ -261,7 +260,6 @@ impl State {
             bounds: shared.protection.bounds,
             trip: self.trip_level(),
             inductance: self.foc.loops.inductance.factor,
-            found: shared.witness.found,
             sensor_fault: observer::sensor_fault(&self.foc.observer),
             failed_starts: shared.failed_starts.max(losses.failed_starts),
             lost_periods: shared.progress.lost_periods,

@@ -7,7 +7,6 @@ use super::io::{Bridge, Rotation, Sample, Setpoint};
 use super::mode_change::mode_change;
 use super::phase::Phase;
 use super::schedule::{self, Work};
-use super::shared::Shared;
 use super::state::State;
 use super::transitions::Why;
 use super::{charge, excite, off, self_test, six_step, tone};
@@ -174,12 +173,10 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> 
 #[inline(always)] // in each period
 fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> Option<Why> {
     let State { foc, shared, .. } = state;
-    if due.includes(Work::ROTOR) {
-        let Shared { witness, seen, .. } = shared;
-        witness.look(config, seen, foc.loops.order);
-        if let Some(why) = open_loop::rotor(config, foc, shared, state.phase) {
-            return Some(why);
-        }
+    if due.includes(Work::ROTOR)
+        && let Some(why) = open_loop::rotor(config, foc, shared, state.phase)
+    {
+        return Some(why);
     }
     outer_loop::work(config, foc, shared, due);
     if due.includes(Work::SETPOINT) {

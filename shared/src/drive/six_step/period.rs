@@ -7,7 +7,6 @@ use super::{given, start};
 use crate::control::six_step::commutation::{HALF_SEXTANT, SEXTANT};
 use crate::control::six_step::crossing;
 use crate::control::six_step::tracking::KNOWN;
-use crate::control::transform::PhaseOrder;
 use crate::drive::config;
 use crate::drive::config::six_step::{Config, LOST_SEXTANTS};
 use crate::drive::io::{Bridge, Rotation, Sample, Setpoint, in_order};
@@ -154,17 +153,6 @@ pub(in crate::drive) fn period(
         duty::run(config, six_step, (s, shared), i, setpoint);
     }
     telemetry::update(config, (s, shared), shown, (currents, i));
-    if position.is_none() && s.crossing.samples == 0 {
-        // What is commanded from here on acts in the next period.
-        let order = if swapped {
-            PhaseOrder::SWAPPED
-        } else {
-            PhaseOrder::NORMAL
-        };
-        shared
-            .witness
-            .look_after_sextant(config, &shared.seen, order);
-    }
     let bridge = bridge(s, swapped, None);
     if ramping {
         return (bridge, why);
