@@ -11,13 +11,13 @@ from emulator import scenario, windows_of
 from paths import IMAGES, VIRTUAL_BOARD
 
 IMAGE = IMAGES / "b-g431b-esc1.elf"
-HALF, FULL, BRAKING = "half", "full", "braking"
-FAULT_S = {HALF: 1.8, FULL: 2.6, BRAKING: 2.62}
-"""When the fault comes: speeds are settled, or the motor has been braked for 20 ms."""
+HALF, FULL = "half", "full"
+FAULT_S = {HALF: 1.8, FULL: 2.6}
+"""When the fault comes: speeds are settled."""
 OPENS_S = 0.4
 
-# Without a supply that comes off while the motor drives: it then lives on what the rotor gives, once more and once less,
-# and two runs part.
+# Without a supply that comes off: the motor then lives on what the rotor gives, once more and once less, and two runs
+# part.
 CELLS = {
     "high side shorted at full speed": (FULL, 'kind = "mosfet_short"\nphase = 1\nside = "high"'),
     "low side shorted at half": (HALF, 'kind = "mosfet_short"\nphase = 1\nside = "low"'),
@@ -28,7 +28,7 @@ CELLS = {
     "rotor blocked at half": (HALF, 'kind = "rotor_blocked"'),
     "supply sags by 16 V at half": (HALF, 'kind = "bus_sag"\nvalue = 16.0'),
     "supply sags by 16 V at full speed": (FULL, 'kind = "bus_sag"\nvalue = 16.0'),
-    "supply disconnected while braking": (BRAKING, 'kind = "bus_disconnect"'),
+    "low side shorted at full speed": (FULL, 'kind = "mosfet_short"\nphase = 1\nside = "low"'),
 }
 
 WINDOWS_S = {"before": (-0.01, 0.0), "at once": (0.0, 0.002), "soon": (0.002, 0.02), "after": (0.02, 0.2)}
@@ -38,10 +38,7 @@ has taken half of the power from before for longer."""
 
 def written(path, moment: str, fault: str) -> None:
     at_s = FAULT_S[moment]
-    opened = {HALF: 0.5, FULL: 1.0, BRAKING: 1.0}[moment]
-    throttle = [(0.0, 0.0), (OPENS_S, opened)]
-    if moment == BRAKING:
-        throttle.append((at_s - 0.02, 0.0))
+    throttle = [(0.0, 0.0), (OPENS_S, {HALF: 0.5, FULL: 1.0}[moment])]
     parts = [f'[bench]\nduration_s = {at_s + 0.21}\nplant = "switching"']
     parts += [f"[[signal]]\nat_s = {signal_s}\nthrottle = {value}" for signal_s, value in throttle]
     parts += [f"[[fault]]\nat_s = {at_s}\n{fault}"]
