@@ -261,7 +261,7 @@ fn text<const N: usize>(bounds: [f32; N], in_force: f32, texts: [&'static str; N
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::params::{BOSSO_MOTOR, Kind};
 
@@ -277,7 +277,8 @@ mod tests {
         FromMotor::new(&params(values))
     }
 
-    const RACING: [(ParamId, f32); 11] = [
+    /// R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs, 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. All else follows.
+    pub(in crate::params) const RACING: [(ParamId, f32); 11] = [
         (ParamId::CtlRpmMin, 0.0),
         (ParamId::MotPolePairs, 7.0),
         (ParamId::MotRMohm, 33.0),

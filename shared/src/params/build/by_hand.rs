@@ -1,4 +1,7 @@
 //! Coefficients against figures that are worked out by hand, of a 5-inch racing motor.
+//!
+//! By [`FromMotor`](crate::params::FromMotor)'s formulas it starts with 8 A, which drop 0.264 V; the dead time takes
+//! 4/π·200 ns·48 kHz·20 V, 0.2445 V; at the least speed the back-EMF is 1.5·0.264 V and a quarter of that, 0.4571 V.
 
 use core::cell::Cell;
 
@@ -7,26 +10,9 @@ use super::si::Si;
 use super::{low_speed, observer, sensing};
 use crate::control::speed::Bounds;
 use crate::control::{dead_time, observer as observers};
+use crate::params::from_motor::tests::RACING;
 use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
 use crate::units::{Current, Speed};
-
-/// R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs, 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. All else follows.
-///
-/// By [`FromMotor`](crate::params::FromMotor)'s formulas it starts with 8 A, which drop 0.264 V; the dead time takes
-/// 4/π·200 ns·48 kHz·20 V, 0.2445 V; at the least speed the back-EMF is 1.5·0.264 V and a quarter of that, 0.4571 V.
-const RACING: [(ParamId, f32); 11] = [
-    (ParamId::CtlRpmMin, 0.0),
-    (ParamId::MotPolePairs, 7.0),
-    (ParamId::MotRMohm, 33.0),
-    (ParamId::MotLUh, 12.0),
-    (ParamId::MotFluxMwb, 0.3215),
-    (ParamId::MotJGcm2, 63.0),
-    (ParamId::CtlRpmMax, 20_000.0),
-    (ParamId::PwmFreqHz, 48_000.0),
-    (ParamId::PwmDeadtimeNs, 200.0),
-    (ParamId::LimPhaseA, 40.0),
-    (ParamId::LimBusVMax, 20.0),
-];
 
 /// What a block makes of that motor with these changes.
 fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
