@@ -16,7 +16,8 @@ from esc import Esc, gaps_us
 def test_several_clients_see_the_same_esc_and_one_may_leave_and_come_back(start):
     emulator = start()
     clients = [emulator.connect() for _ in range(4)]
-    for client in clients:
+    # Each sees every answer: the first reads last, so that an old value cannot come after what it sets.
+    for client in reversed(clients):
         assert client.read_param("MOT_STOP").param_value == 1.0
     clients.pop().close()
     assert clients[0].set_param("MOT_STOP", 0.0) == 0.0
