@@ -154,7 +154,7 @@ quantities! {
         CurrentPerSpeed,
     }
     // Of the sensing.
-    own { LookS, CountS, CountsPerTurn, PerLook, Standing, RiseAS }
+    own { LookS, CountS, CountsPerTurn, PerLook, Standing, RiseAS, CertainA }
     // Of the six-step drive.
     own { CornerRadS, LeastV, GreatestV }
     // Of the tones.

@@ -21,9 +21,9 @@ const ZERO_S: f32 = 0.005;
 /// times 16 make up to 8 %.
 const OFFSET_SHARE: f32 = 0.1;
 
-/// The phase current from which its sign is certain; below, the dead time is compensated in
-/// proportion.
-const SIGN_CERTAIN_A: f32 = 0.3;
+/// The phase current from which its sign is certain, over what the supply changes it by in a dead time; below, the
+/// dead time is compensated in proportion. 0.3 A on the bench.
+const SIGN_CERTAIN_SHARE: f32 = 0.6;
 
 /// Time for which a turning rotor may be unseen, s: a propeller at full speed is 2° behind by then, where
 /// it would be tens of degrees behind after a long charge. The bridge supplies the drivers as it switches.
@@ -129,7 +129,9 @@ pub(super) fn catch(p: &Si, place: &mut catch::Config) {
 /// The dead time's compensation.
 pub(super) fn dead_time(p: &Si, place: &mut dead_time::Config) {
     fill!(p, place, {
-        gain certainty(PwmDeadtimeNs, UnitA / [SIGN_CERTAIN_A]),
+        // A count of the converter at the least: there may be no dead time.
+        define CertainA([SIGN_CERTAIN_SHARE] * SupplyMaxV * DeadTime / L max APerCount),
+        gain certainty(PwmDeadtimeNs, UnitA / CertainA),
         number duty(DeadShare),
         number share(DeadTime / T),
     });
