@@ -41,6 +41,10 @@ pub struct Config {
     pub omega_min: Speed,
     /// Least ω_n of the loop, in turns a period.
     pub omega_n_min: Speed,
+    /// Least ω_n over the current along q, which accelerates the rotor.
+    pub omega_n_per_current: Gain<Current, Speed>,
+    /// The most that this makes of it.
+    pub omega_n_following: Speed,
     /// Greatest ω_n.
     pub omega_n_max: Speed,
     /// Share of a new sample in what ω̂ has above ω̂_i.
@@ -132,7 +136,7 @@ const PHI_LOST: Flux = Flux::from_bits(68_356_528);
 /// The observer where the rotor's speed is known, and its angle at the coming sample.
 pub fn begin(config: &Config, state: &mut State, rotor: (Angle, Speed), i: AlphaBeta<Current>) {
     place(config, state, rotor, i);
-    pace(config, state, Factor::ONE);
+    pace(config, state, Factor::ONE, Current::MAX);
 }
 
 /// As [`begin`], but the coefficients stay as [`pace`] has left them.
@@ -160,8 +164,8 @@ pub fn place(
     };
 }
 
-/// Takes the coefficients that follow the speed, every few periods.
-pub fn pace(config: &Config, state: &mut State, inductance: Factor) {
+/// Takes the coefficients that follow the speed and the current that is asked for along q, every few periods.
+pub fn pace(config: &Config, state: &mut State, inductance: Factor, i_q: Current) {
     state.phi = state.phi.max(PHI_MIN).min(PHI_MAX);
     let omega = state.omega_i;
     // An eighth of a turn a period bounds the leak below one.
@@ -171,9 +175,16 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor) {
         .min(EIGHTH_TURN);
     // Half of ω⁺·T_s is π times its turns.
     let leak = omega_plus.turns().top(EIGHTH_PI) << 3;
+    // Fast where the rotor may be accelerated. At idle, where the back-EMF tells little of it, a loop that is faster
+    // than the rotor turns would swing by what the dead times' signs make of its angle.
+    let following = config
+        .omega_n_per_current
+        .saturating_apply(i_q.saturating_abs())
+        .min(config.omega_n_following);
     let omega_n = omega
         .top(OMEGA_N_SHARE)
         .max(config.omega_n_min)
+        .max(following)
         .min(config.omega_n_max);
     let four_pi_omega_n = omega_n.top(EIGHTH_PI) << 5;
     state.pace = Pace {

@@ -169,12 +169,17 @@ pub fn estimate(
     }
 }
 
-/// Update of gains, every so many `periods`: coefficients follow the speed, and [`State::slow_estimate`] is
-/// brought up to date.
-pub fn pace(config: &Config, state: &mut State, inductance: Factor, periods: u32) {
+/// Update of gains, every so many `periods`: coefficients follow the speed and the current `i_q` that is asked for,
+/// and [`State::slow_estimate`] is brought up to date.
+pub fn pace(
+    config: &Config,
+    state: &mut State,
+    (inductance, i_q): (Factor, Current),
+    periods: u32,
+) {
     if let Config::Compensated(config) = config {
         state.slow_estimate = compensated::slow_estimate(config, &state.compensated, periods);
-        compensated::pace(config, &mut state.compensated, inductance);
+        compensated::pace(config, &mut state.compensated, inductance, i_q);
     }
 }
 

@@ -206,11 +206,11 @@ pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
         dead_time::certainty(&config.dead_time, loops.reference.i, loops.advance);
 }
 
-/// Update of the observer's gains, which follow the speed.
+/// Update of the observer's gains, which follow the speed and the torque.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn observer_gains(config: &Config, foc: &mut State) {
-    let factor = foc.loops.inductance.factor;
-    observer::pace(&config.observer, &mut foc.observer, factor, CYCLE);
+    let follows = (foc.loops.inductance.factor, foc.loops.reference.i.q);
+    observer::pace(&config.observer, &mut foc.observer, follows, CYCLE);
 }
 
 /// Decoupling of the regulator's axes at this speed.

@@ -69,7 +69,7 @@ fn the_compensation_is_the_dead_time_s_share_and_the_diodes() {
     near("duty", duty, 0.0096 * 1.07);
 }
 
-/// The observer's least and greatest ω_n, 1/s.
+/// The observer's ω_n that follows `LIM_PHASE_A` and the greatest, 1/s.
 fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
     made(changes, |p| {
         let mut place = observers::Config::default();
@@ -78,23 +78,49 @@ fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
             panic!("it is the default");
         };
         let per_s = p.of(Quantity::Tau) / p.of(Quantity::T);
-        [place.omega_n_min, place.omega_n_max].map(|turns| turns.to_num::<f32>() * per_s)
+        // A fifth of the limit asks for all of it.
+        let fifth = p.scale.current_from_a(p.of(Quantity::LimitA) / 5.0);
+        let following = place.omega_n_per_current.saturating_apply(fifth);
+        let [following, bound, most] = [following, place.omega_n_following, place.omega_n_max]
+            .map(|turns| turns.to_num::<f32>() * per_s);
+        near("a fifth", following, bound);
+        [bound, most]
     })
 }
 
 #[test]
 fn the_observer_s_loop_is_as_fast_as_the_rotor_asks() {
-    // An ampere makes 1.5·7²·0.3215 mWb over 6.3 µkg·m², 3751 rad/s²; times 1.5² that is 8439, and with 0.5/0.35 of
-    // φ/R, 9.742 ms, it asks for 117 1/s: less than the least.
-    let [least, most] = omega_n(&[]);
-    near("least", least, 150.0);
+    // An ampere makes 1.5·7²·0.3215 mWb over 6.3 µkg·m², 3751 rad/s²; times 2² that is 15 004, and with 1/0.35 of
+    // φ/R, 9.742 ms, it asks for 417.6 1/s.
+    let [following, most] = omega_n(&[]);
+    near("following", following, 417.6);
     near("most", most, 1000.0);
-    // A rotor of 10 g·cm² asks for 53 168 times that.
-    let [least, most] = omega_n(&[(ParamId::MotJGcm2, 10.0)]);
-    near("light", least, 740.0);
-    near("most", most, 1000.0);
-    // With 10 mΩ it would be 2442 1/s; the root of what 40 A accelerate it by is less.
-    let [least, most] = omega_n(&[(ParamId::MotJGcm2, 10.0), (ParamId::MotRMohm, 10.0)]);
-    near("light", least, 1458.0);
-    near("most", most, 1458.0);
+    // A rotor of 10 g·cm² asks for 94 521 times 27.83 ms; the root of what 40 A accelerate it by is less.
+    let [following, most] = omega_n(&[(ParamId::MotJGcm2, 10.0)]);
+    near("light", following, 1944.0);
+    near("most", most, 1944.0);
+    // Of 5 g·cm² that root is 2750 1/s; a twentieth of 48 kHz is less.
+    let [following, most] = omega_n(&[(ParamId::MotJGcm2, 5.0)]);
+    near("lighter", following, 2400.0);
+    near("most", most, 2400.0);
+}
+
+#[test]
+fn the_compensation_is_whole_from_a_current_that_the_supply_makes_in_a_dead_time() {
+    // 0.6 of 20 V·200 ns over 12 µH are 0.2 A; without a dead time it is a count of the converter.
+    let certain_a = |changes: &[(ParamId, f32)]| {
+        made(changes, |p| {
+            let mut place = dead_time::Config::default();
+            sensing::dead_time(p, &mut place);
+            let certainty = place.certainty.apply(Current::from_num(0.01));
+            0.01 / certainty.to_num::<f32>() * p.of(Quantity::UnitA)
+        })
+    };
+    near("certain", certain_a(&[]), 0.2);
+    let count_a = Board::BENCH.current_a_per_count;
+    near(
+        "least",
+        certain_a(&[(ParamId::PwmDeadtimeNs, 0.0)]),
+        count_a,
+    );
 }

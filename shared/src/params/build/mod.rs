@@ -80,9 +80,9 @@ const BIAS_DEAD_END: f32 = 5.5;
 /// Least bound of i_q over `STA_RAMP_A`.
 const TORQUE_LEAST_SHARE: f32 = 0.5;
 
-/// Greatest resistive drop of i_q as a share of the back-EMF: with R stated 30 % too high, three times
-/// that leaves no estimate; and with more, the start accelerates faster than the loop can follow.
-const TORQUE_DROP_SHARE: f32 = 0.5;
+/// Greatest resistive drop of i_q as a share of the back-EMF: with R stated 30 % too high, three times that leaves no
+/// estimate.
+const TORQUE_DROP_SHARE: f32 = 1.0;
 
 /// Time constant with which the reported speed falls while the bridge is off, s. The bench's
 /// propeller takes 1.1 s.

@@ -26,12 +26,16 @@ const CURE_RAD_S: f32 = 400.0;
 /// ω⁺ at the least, 1/s.
 const OMEGA_MIN_RAD_S: f32 = 60.0;
 
-/// Least and greatest ω_n of the loop, 1/s, where what follows is less.
+/// Least and greatest ω_n of the loop, 1/s, where what follows the current is less.
 const OMEGA_N_RAD_S: [f32; 2] = [150.0, 1000.0];
 
-/// ω_n over the root of what the current accelerates the rotor by, rad/s²: the loop then lags by 1/1.5² of a radian,
-/// 25°. Slower, a rotor that is light for its speed would leave it behind.
-const FOLLOWING: f32 = 1.5;
+/// ω_n over the root of what `LIM_PHASE_A` accelerates the rotor by, rad/s²: the loop then lags by 1/2² of a radian,
+/// 14°. Slower, a rotor that is light for its speed would leave it behind.
+const FOLLOWING: f32 = 2.0;
+
+/// The current that asks for all of that, of `LIM_PHASE_A`; of less, ω_n is in proportion, and the loop lags by no
+/// more down to a 25th of the limit.
+const FOLLOWING_SHARE: f32 = 0.2;
 
 /// Up to `LIM_PHASE_A` the current's bound rises with the speed (`TORQUE_DROP_SHARE`), and ω_n with it
 /// (`compensated::OMEGA_N_SHARE`): where it has caught up with what such a current needs, no more is needed.
@@ -94,7 +98,9 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
         gain bias(MotLUh, R * T / L * Tau * Tau / [12.0] * Share),
         number omega_min([OMEGA_MIN_RAD_S] * T / Tau),
         define OmegaN(Following * Flux / R * [CAUGHT_UP] min OmegaN * T min [OMEGA_N_SHARE_MAX] / Tau),
-        number omega_n_min([OMEGA_N_RAD_S[0]] * T / Tau max OmegaN),
+        number omega_n_min([OMEGA_N_RAD_S[0]] * T / Tau),
+        gain omega_n_per_current(MotJGcm2, OmegaN * [1.0 / FOLLOWING_SHARE] / LimitA * UnitA),
+        number omega_n_following(OmegaN),
         number omega_n_max([OMEGA_N_RAD_S[1]] * T / Tau max OmegaN),
         factor smoothing(PwmFreqHz, [SMOOTHING_RAD_S] * T),
     });
