@@ -16,38 +16,32 @@ pub(super) enum FaultEvent {
 /// The state of each fault as reported last.
 #[derive(Clone, Debug)]
 pub(super) struct Announcer {
-    told: [bool; Fault::ALL.len()],
-    began_us: [Option<u64>; Fault::ALL.len()],
-    ended_us: [Option<u64>; Fault::ALL.len()],
+    told: Faults,
+    /// When its end, and when its beginning, may be told again, µs.
+    due_us: [[u64; Fault::ALL.len()]; 2],
 }
 
 impl Announcer {
     pub(super) const fn new() -> Self {
         Self {
-            told: [false; Fault::ALL.len()],
-            began_us: [None; Fault::ALL.len()],
-            ended_us: [None; Fault::ALL.len()],
+            told: Faults::NONE,
+            due_us: [[0; Fault::ALL.len()]; 2],
         }
     }
 
     /// The next fault whose state differs from the one reported and may be reported now. What has to wait
     /// is reported later if it still differs then.
     pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<FaultEvent> {
-        for (i, fault) in Fault::ALL.into_iter().enumerate() {
+        let began = faults.without(self.told);
+        let ended = self.told.without(faults);
+        for fault in began.and(ended).iter() {
             let present = faults.contains(fault);
-            if present == self.told[i] {
+            let due_us = &mut self.due_us[usize::from(present)][fault as usize];
+            if now_us < *due_us {
                 continue;
             }
-            let last_us = if present {
-                &mut self.began_us[i]
-            } else {
-                &mut self.ended_us[i]
-            };
-            if last_us.is_some_and(|last_us| now_us.saturating_sub(last_us) < APART_US) {
-                continue;
-            }
-            *last_us = Some(now_us);
-            self.told[i] = present;
+            *due_us = now_us + APART_US;
+            self.told.toggle(fault);
             return Some(if present {
                 FaultEvent::Began(fault)
             } else {

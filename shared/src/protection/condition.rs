@@ -80,6 +80,11 @@ macro_rules! conditions {
                 self.0 |= 1 << (one as u8 - $first);
             }
 
+            /// Adds one, or takes it away if it is there.
+            pub fn toggle(&mut self, one: $name) {
+                self.0 ^= 1 << (one as u8 - $first);
+            }
+
             /// Returns true if it is in the set.
             pub const fn contains(self, one: $name) -> bool {
                 self.0 & (1 << (one as u8 - $first)) != 0
@@ -90,9 +95,20 @@ macro_rules! conditions {
                 self.0 == 0
             }
 
+            /// Those of both sets.
+            pub const fn and(self, other: Self) -> Self {
+                Self(self.0 | other.0)
+            }
+
+            /// Those that are not in the other set.
+            pub const fn without(self, other: Self) -> Self {
+                Self(self.0 & !other.0)
+            }
+
             /// Those that are in the set, in the order of their numbers.
             pub fn iter(self) -> impl Iterator<Item = $name> {
-                $name::ALL.iter().copied().filter(move |one| self.contains(*one))
+                let numbers = $first..$first + $count;
+                numbers.filter_map($name::of_number).filter(move |one| self.contains(*one))
             }
 
             #[doc = concat!("A bit each, from the number ", stringify!($first), " on.")]
