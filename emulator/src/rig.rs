@@ -132,6 +132,11 @@ impl Rig {
         lambda.map(|flux| flux.to_num::<f64>() * flux_wb)
     }
 
+    /// The adapted inductance over the one that the parameters state.
+    pub fn inductance(&self) -> f64 {
+        self.state.inductance().get().to_num()
+    }
+
     /// Every word of the control state.
     #[inline(always)]
     pub fn trace(&self, out: &mut impl FnMut(u32)) {

@@ -31,7 +31,7 @@ fn found_over_true(stated_uh: f32) -> f64 {
         rig.period(setpoint);
     }
     assert!(rig.snapshot().faults.is_empty());
-    let factor: f64 = rig.snapshot().inductance.get().to_num();
+    let factor: f64 = rig.inductance();
     factor * f64::from(stated_uh) / L_UH
 }
 

@@ -1,7 +1,6 @@
 //! A copy of the control's figures for the tasks.
 
 use super::phase::Phase;
-use crate::control::inductance::Factor;
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use crate::protection::Faults;
@@ -35,8 +34,6 @@ pub struct Snapshot {
     pub bounds: Bounds,
     /// Magnitude of a phase's reading that turns the bridge off.
     pub trip: AdcCounts,
-    /// The adapted inductance over the one that the parameters state.
-    pub inductance: Factor,
     /// True if a position sensor is at fault.
     pub sensor_fault: bool,
     /// Attempts of the present start that have failed.

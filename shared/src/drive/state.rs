@@ -259,12 +259,16 @@ impl State {
             bus_current: seen.bus_current,
             bounds: shared.protection.bounds,
             trip: self.trip_level(),
-            inductance: self.foc.loops.inductance.factor,
             sensor_fault: observer::sensor_fault(&self.foc.observer),
             failed_starts: shared.failed_starts.max(losses.failed_starts),
             lost_periods: shared.progress.lost_periods,
             missed_sextants: losses.missed_sextants,
         }
+    }
+
+    /// The adapted inductance over the one that the parameters state.
+    pub fn inductance(&self) -> inductance::Factor {
+        self.foc.loops.inductance.factor
     }
 
     /// λ̂ of the phases in the order of the configured direction, where flux crossings are observed
