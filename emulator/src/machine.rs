@@ -1,5 +1,6 @@
 //! What runs on the bench: an ESC in any form, as the links, the clock and those who look on see it.
 
+use siskin_control::drive::Limits;
 use thiserror::Error;
 
 use crate::fault::Fault;
@@ -92,6 +93,11 @@ pub trait Onlooker {
     /// A leg's gates changed at `time_ns`, in the period that is told next, of such a machine.
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
         let _ = (time_ns, leg, gate);
+    }
+
+    /// After a round of an ESC's tasks: the limits that bind, and what the motor goes on with.
+    fn limits(&mut self, limits: Limits) {
+        let _ = limits;
     }
 
     /// The throttle wire's level changed at `time_ns`, before the next period and after all that

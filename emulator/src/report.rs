@@ -187,6 +187,9 @@ pub fn figures(report: &Report) -> String {
     for fault in report.faults.iter().flatten() {
         line(&mut text, format_args!("fault: {fault}"));
     }
+    for warning in &report.warnings {
+        line(&mut text, format_args!("warning: {warning}"));
+    }
     if let Some(refused) = report.rejected {
         line(
             &mut text,
@@ -260,6 +263,9 @@ pub fn survey(survey: &Survey) -> String {
     }
     for (fault, runs) in &survey.faults {
         line(&mut text, format_args!("fault in {runs}: {fault}"));
+    }
+    for (warning, runs) in &survey.warnings {
+        line(&mut text, format_args!("warning in {runs}: {warning}"));
     }
     for failure in &survey.failures {
         let broken: Vec<_> = failure.expectations.iter().map(sentence).collect();

@@ -6,7 +6,7 @@ mod turning;
 mod window;
 
 use serde::Serialize;
-use siskin_control::drive::{Fault, Faults, Phase};
+use siskin_control::drive::{Fault, Faults, Limit, Limits, Phase};
 
 use xxhash_rust::xxh3::Xxh3;
 
@@ -24,6 +24,8 @@ pub struct Summary {
     /// Whether nobody sees the control.
     blind: bool,
     faults: Faults,
+    /// What the motor has gone on with.
+    warnings: Limits,
     /// What the drive did in the period before.
     phase: Phase,
     windows: Vec<Window>,
@@ -45,6 +47,9 @@ pub struct Report {
     pub trace_hash: String,
     /// Faults that have turned the bridge off; `None` where nobody sees the control.
     pub faults: Option<Vec<&'static str>>,
+    /// What was wrong while the motor went on, if anything was.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<&'static str>,
     /// What came in from outside and was refused; not for a scenario, where nothing does.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejected>,
@@ -65,6 +70,7 @@ impl Report {
             faults.extend(esc.faults.iter().flatten());
         }
         let known = Fault::ALL.into_iter().map(Fault::text);
+        let warned = |limit: &&'static str| escs.iter().any(|esc| esc.warnings.contains(limit));
         Self {
             sim_s,
             wall_s,
@@ -72,6 +78,11 @@ impl Report {
             steps: escs.iter().map(|esc| esc.steps).sum(),
             trace_hash: format!("{:016x}", hash.digest()),
             faults: Some(known.filter(|fault| faults.contains(fault)).collect()),
+            warnings: Limit::ALL
+                .into_iter()
+                .map(Limit::text)
+                .filter(warned)
+                .collect(),
             rejected: None,
             windows: Vec::new(),
             escs,
@@ -131,6 +142,7 @@ impl Summary {
             steps: 0,
             blind: false,
             faults: Faults::NONE,
+            warnings: Limits::NONE,
             phase: Phase::Idle,
             windows: windows
                 .map(|(name, t0_s, t1_s)| Window::new(name, t0_s, t1_s))
@@ -165,6 +177,13 @@ impl Summary {
         }
     }
 
+    /// Takes in the limits that bind, of which some are warnings.
+    pub fn limited(&mut self, limits: Limits) {
+        for warning in limits.iter().filter(|limit| limit.warns()) {
+            self.warnings.insert(warning);
+        }
+    }
+
     /// Takes in a period that began at `t_s` of a machine whose control nobody sees.
     pub fn pass(&mut self, t_s: f64, passage: &Passage) {
         self.steps += 1;
@@ -190,6 +209,7 @@ impl Summary {
             steps: self.steps,
             trace_hash: format!("{:016x}", self.trace.digest()),
             faults: (!self.blind).then(|| self.faults.iter().map(Fault::text).collect()),
+            warnings: self.warnings.iter().map(Limit::text).collect(),
             rejected: None,
             windows: self.windows.iter().map(|w| w.figures(sim_s)).collect(),
             escs: Vec::new(),

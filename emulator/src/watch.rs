@@ -1,5 +1,6 @@
 //! Looks on at a run: figures of it, and a recording where one is wanted.
 
+use siskin_control::drive::Limits;
 use thiserror::Error;
 
 use crate::machine::Onlooker;
@@ -131,6 +132,10 @@ impl Onlooker for Watches {
         self.each[self.esc].gates(time_ns, leg, gate);
     }
 
+    fn limits(&mut self, limits: Limits) {
+        self.each[self.esc].limits(limits);
+    }
+
     fn edge(&mut self, time_ns: u64, level: bool) {
         self.each[self.esc].edge(time_ns, level);
     }
@@ -173,6 +178,10 @@ impl Onlooker for Watch {
             self.failed = Some(Void::Both { phase: leg, t_s }.into());
         }
         self.record(|recorder| recorder.gates(time_ns, leg, gate));
+    }
+
+    fn limits(&mut self, limits: Limits) {
+        self.summary.limited(limits);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

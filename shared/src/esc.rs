@@ -7,7 +7,7 @@ use heapless::Vec;
 
 use crate::answer::info::info;
 use crate::check::Check;
-use crate::drive::{Config, Phase, Setpoint, Snapshot, put_default};
+use crate::drive::{Config, Phase, Setpoint, Snapshot, Witness, put_default};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
@@ -16,6 +16,7 @@ use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
 use crate::params::{
     Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale, thresholds,
+    unbalance_max,
 };
 use crate::record::Record;
 use crate::statistics::{Recorder, Sight};
@@ -68,6 +69,7 @@ pub struct Esc {
     params: Params,
     scale: Scale,
     charge: Charge,
+    witness: Witness,
     recorder: Recorder,
     /// There are two such commands.
     unstored: Vec<Unstored, 2>,
@@ -168,6 +170,7 @@ impl Esc {
             component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),
+            witness: Witness::default(),
             recorder: Recorder::default(),
             params,
             too_hot: false,
@@ -319,7 +322,12 @@ impl Esc {
         // A reading that is no number is too hot as well.
         self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
         self.telemetry.observe(snapshot, &self.scale, time_us);
-        self.telemetry.limits = thresholds(&self.params, &self.scale).limits(snapshot);
+        let found = self.witness.look(snapshot, unbalance_max(&self.board));
+        for limit in found.without(self.telemetry.limits).iter() {
+            self.warn_of(limit.text());
+        }
+        let binding = thresholds(&self.params, &self.scale).limits(snapshot);
+        self.telemetry.limits = binding.and(found);
         self.charge
             .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();

@@ -101,7 +101,7 @@ impl Throttle {
             input,
             answers: Answers::new(tick_hz),
             mapping: Mapping::new(params, &scale),
-            basis: Basis::new(params, scale),
+            basis: Basis::new(scale),
             telemetry: Telemetry::new(),
             info: info::info(params, false, &board.image),
             polled: Polled::default(),
@@ -285,7 +285,7 @@ impl Throttle {
     /// Goes on with other parameters.
     pub(crate) fn adopt(&mut self, params: &Params, scale: Scale) {
         self.mapping = Mapping::new(params, &scale);
-        self.basis = Basis::new(params, scale);
+        self.basis = Basis::new(scale);
         self.input.set(params::input(params));
     }
 

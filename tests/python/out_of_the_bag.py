@@ -34,19 +34,23 @@ class Outcome:
     """What 3 s of open throttle have made of a motor."""
 
     faults: list
+    """And warnings."""
     speed: float
     """The least in the last fifth of a second, over what the throttle's share is of full speed; one that is the wrong
     way is negative."""
     current: float
     """The greatest of a phase, over LIM_PHASE_A."""
 
-    def turns(self) -> bool:
+    def is_fast(self) -> bool:
         # Half of what a share of the supply makes of a motor without its load's losses.
-        return not self.faults and self.speed > LEAST_SPEED
+        return self.speed > LEAST_SPEED
+
+    def turns(self) -> bool:
+        return not self.faults and self.is_fast()
 
     def holds(self) -> bool:
-        """It turns or is said not to, within the current."""
-        return (self.turns() or bool(self.faults)) and self.current < MOST_CURRENT
+        """It turns and nothing is said to be wrong, or it does not and something is; within the current."""
+        return bool(self.faults) != self.is_fast() and self.current < MOST_CURRENT
 
 
 def limits(motor: dict) -> dict:

@@ -35,6 +35,7 @@ class Outcome:
     """What slams have made of a drive."""
 
     faults: list
+    """And warnings."""
     starts: int
     lost: bool
     """90 degrees of error or more."""

@@ -22,6 +22,18 @@ FAULTS = {
     "under-voltage": "under-voltage",
 }
 
+# What the motor goes on with is told; without a fault, nothing.
+WARNINGS = {
+    "fault-hall-stuck": {"position sensor defect"},
+    "fault-mosfet-open": {"phase open"},
+    # 3 A rms on each: no sensor is sound that shows that.
+    "fault-noise": {"current sensor drifts"},
+    "fault-offset-drift": {"current sensor drifts"},
+    "fault-phase-open": {"phase open"},
+    "fault-phase-open-start": {"phase open"},
+    "fault-sensor-stuck": {"current sensor drifts"},
+}
+
 # A part of the seeds that the files name for all.
 SEEDS = {
     "bench-cinelifter": "1..4",
@@ -66,6 +78,7 @@ def test_scenario(name):
     seeds = ["--seeds", SEEDS[name]] if name in SEEDS else []
     status, summary = scenario(SCENARIOS / f"{name}.toml", *seeds)
     expectations = summary["expectations"]
+    assert set(summary.get("warnings", [])) == WARNINGS.get(name, set())
     if "runs" in summary:
         failed = [expected for expected in expectations if expected["failed"] > 0]
         assert (status, summary["failed"], failed) == (0, 0, [])

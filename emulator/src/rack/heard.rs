@@ -1,5 +1,7 @@
 //! The answers of a rack's ESCs, kept as they pass an onlooker.
 
+use siskin_control::drive::Limits;
+
 use crate::machine::Onlooker;
 use crate::plant::Gate;
 use crate::rig::{Period, Rig};
@@ -35,6 +37,10 @@ impl<O: Onlooker> Onlooker for Heard<'_, O> {
 
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
         self.onlooker.gates(time_ns, leg, gate);
+    }
+
+    fn limits(&mut self, limits: Limits) {
+        self.onlooker.limits(limits);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

@@ -26,6 +26,9 @@ pub struct Survey {
     pub failed: usize,
     /// Faults that turned the bridge off, each with the number of runs.
     pub faults: BTreeMap<&'static str, usize>,
+    /// What was wrong while the motor went on, each with the number of runs.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub warnings: BTreeMap<&'static str, usize>,
     /// Simulated time of all runs, s.
     pub sim_s: f64,
     /// Wall time, s.
@@ -90,6 +93,7 @@ impl Survey {
             left_out,
             failed: 0,
             faults: BTreeMap::new(),
+            warnings: BTreeMap::new(),
             sim_s: 0.0,
             wall_s,
             sim_per_wall: None,
@@ -122,6 +126,9 @@ impl Survey {
         self.runs += 1;
         for fault in report.faults.iter().flatten() {
             *self.faults.entry(fault).or_default() += 1;
+        }
+        for warning in &report.warnings {
+            *self.warnings.entry(warning).or_default() += 1;
         }
         self.sim_s += report.sim_s;
         self.steps += report.steps;

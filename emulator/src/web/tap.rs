@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use siskin_control::drive::Limits;
 use siskin_scope::ViewerId;
 
 use super::channel::{Control, Point};
@@ -158,6 +159,10 @@ impl<O: Onlooker> Onlooker for Tapped<'_, O> {
 
     fn gates(&mut self, time_ns: u64, leg: usize, gate: Gate) {
         self.onlooker.gates(time_ns, leg, gate);
+    }
+
+    fn limits(&mut self, limits: Limits) {
+        self.onlooker.limits(limits);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

@@ -1,8 +1,8 @@
 //! The part of the drive's configuration that answers need.
 
 use crate::drive::config::six_step;
-use crate::drive::{ATTEMPTS, Fault, Snapshot, Thresholds};
-use crate::params::{self, Params};
+use crate::drive::{ATTEMPTS, Fault, Snapshot};
+use crate::params;
 use crate::units::Scale;
 
 /// The little of a [`Config`](crate::drive::Config) that is needed to read a snapshot.
@@ -10,18 +10,15 @@ use crate::units::Scale;
 pub struct Basis {
     /// The control's units in SI.
     pub scale: Scale,
-    /// Where limits bind.
-    pub(super) thresholds: Thresholds,
     /// As [`Config::lost_periods`](crate::drive::Config::lost_periods).
     pub(super) lost_periods: u32,
 }
 
 impl Basis {
-    /// Of the drive that these parameters make, whose units have this scale.
-    pub fn new(params: &Params, scale: Scale) -> Self {
+    /// Of a drive whose units have this scale.
+    pub fn new(scale: Scale) -> Self {
         Self {
             scale,
-            thresholds: params::thresholds(params, &scale),
             lost_periods: params::lost_periods(&scale),
         }
     }

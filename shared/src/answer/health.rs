@@ -6,15 +6,15 @@
 //!
 //! | event | raised by |
 //! |---|---|
-//! | alert | a [`Limit`] binds beyond which there is no more torque: the current is at `LIM_PHASE_A`, or the supply gives `LIM_BUS_A` |
-//! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a Hall sensor is at fault |
+//! | alert | a [`Limit`](crate::drive::Limit) binds beyond which there is no more torque: the current is at `LIM_PHASE_A`, or the supply gives `LIM_BUS_A` |
+//! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a phase or a sensor is at fault ([`Limits::warn`]) |
 //! | error | a fault has turned the bridge off |
 //!
 //! An event is reported once, by the next status word, and again as long as it lasts.
 
 use super::Basis;
 use super::extended::{Extended, Status};
-use crate::drive::{Limit, Snapshot};
+use crate::drive::{Limits, Snapshot};
 
 /// Doubt from which on it is worth a warning: a quarter of what is allowed, as one of four starts
 /// that has failed. A crossing that the current hides now and then is none.
@@ -31,14 +31,14 @@ pub(super) struct Health {
 }
 
 impl Health {
-    /// Takes in the drive's snapshot, at each reply.
-    pub(super) fn observe(&mut self, snapshot: &Snapshot, basis: &Basis) {
+    /// Takes in the drive's snapshot and the limits that bind, at each reply.
+    pub(super) fn observe(&mut self, snapshot: &Snapshot, basis: &Basis, limits: Limits) {
         let doubt = basis.doubt(snapshot);
         self.stress = self.stress.max(doubt);
         self.max_stress = self.max_stress.max(doubt);
         let status = &mut self.status;
-        status.alert |= basis.thresholds.limits(snapshot).iter().any(Limit::alerts);
-        status.warning |= doubt >= SUSPECT || snapshot.sensor_fault;
+        status.alert |= limits.alert();
+        status.warning |= doubt >= SUSPECT || limits.warn();
         status.error |= !snapshot.faults.is_empty() || snapshot.fault_count != self.fault_count;
         self.fault_count = snapshot.fault_count;
     }
@@ -69,17 +69,13 @@ impl Health {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::{Fault, Phase, State};
+    use crate::drive::{Fault, Limit, State};
     use crate::params::{BOSSO_MOTOR, Board, Params, build};
-    use crate::units::Current;
 
     fn rig() -> (Basis, Snapshot) {
         let config = build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit");
         let snapshot = State::new(&config).snapshot();
-        (
-            Basis::new(&Params::of(&BOSSO_MOTOR), config.scale),
-            snapshot,
-        )
+        (Basis::new(config.scale), snapshot)
     }
 
     fn status(health: &mut Health) -> Status {
@@ -93,23 +89,24 @@ mod tests {
     fn a_drive_without_trouble_has_nothing_to_tell() {
         let (basis, snapshot) = rig();
         let mut health = Health::default();
-        health.observe(&snapshot, &basis);
+        health.observe(&snapshot, &basis, Limits::NONE);
         assert_eq!(status(&mut health), Status::default());
         assert_eq!(health.stress(), Extended::Stress(0));
     }
 
     #[test]
-    fn a_current_at_its_bound_is_an_alert_and_told_once() {
+    fn a_limit_is_told_once_as_what_it_is() {
         let (basis, calm) = rig();
         let mut health = Health::default();
-        let mut loaded = calm;
-        loaded.phase = Phase::Run;
-        for (share, alert) in [(0.9, false), (0.95, true), (-1.0, true)] {
-            loaded.i.q = Current::from_num(basis.thresholds.phase.to_num::<f64>() * share);
-            health.observe(&loaded, &basis);
-            health.observe(&calm, &basis);
-            assert_eq!(status(&mut health).alert, alert, "{share}");
-            assert!(!status(&mut health).alert);
+        for limit in Limit::ALL {
+            let mut limits = Limits::NONE;
+            limits.insert(limit);
+            health.observe(&calm, &basis, limits);
+            health.observe(&calm, &basis, Limits::NONE);
+            let told = status(&mut health);
+            let wanted = (limit.alerts(), limit.warns(), false);
+            assert_eq!((told.alert, told.warning, told.error), wanted, "{limit:?}");
+            assert_eq!(status(&mut health), Status::default());
         }
     }
 
@@ -122,7 +119,7 @@ mod tests {
                 failed_starts,
                 ..calm
             };
-            health.observe(&snapshot, &basis);
+            health.observe(&snapshot, &basis, Limits::NONE);
             assert_eq!(health.stress(), Extended::Stress(stress));
             let told = status(&mut health);
             assert_eq!(told.max_stress, stress >> 4);
@@ -130,7 +127,7 @@ mod tests {
         }
         let mut stuck = calm;
         stuck.faults.insert(Fault::Stuck);
-        health.observe(&stuck, &basis);
+        health.observe(&stuck, &basis, Limits::NONE);
         assert_eq!(health.stress(), Extended::Stress(255));
         let told = status(&mut health);
         assert!(told.warning && told.error);
@@ -144,8 +141,8 @@ mod tests {
             lost_periods: basis.lost_periods / 2,
             ..calm
         };
-        health.observe(&lost, &basis);
-        health.observe(&calm, &basis);
+        health.observe(&lost, &basis, Limits::NONE);
+        health.observe(&calm, &basis, Limits::NONE);
         assert_eq!(health.stress(), Extended::Stress(127));
         assert_eq!(health.stress(), Extended::Stress(0), "it is over");
         assert_eq!(status(&mut health).max_stress, 7, "but was not told here");
@@ -163,9 +160,9 @@ mod tests {
         let (basis, calm) = rig();
         let mut health = Health::default();
         let after = after_a_fault(calm);
-        health.observe(&after, &basis);
+        health.observe(&after, &basis, Limits::NONE);
         assert!(status(&mut health).error);
-        health.observe(&after, &basis);
+        health.observe(&after, &basis, Limits::NONE);
         assert!(!status(&mut health).error);
     }
 
@@ -174,9 +171,9 @@ mod tests {
         let (basis, calm) = rig();
         let mut health = Health::default();
         let after = after_a_fault(calm);
-        health.observe(&after, &basis);
+        health.observe(&after, &basis, Limits::NONE);
         health.begin();
-        health.observe(&after, &basis);
+        health.observe(&after, &basis, Limits::NONE);
         assert_eq!(status(&mut health), Status::default());
     }
 }

@@ -187,7 +187,7 @@ impl Answers {
         basis: &Basis,
         telemetry: &Telemetry,
     ) -> Serial {
-        self.health.observe(snapshot, basis);
+        self.health.observe(snapshot, basis, telemetry.limits);
         let free = self.busy_ticks == 0;
         let info = self.info.take_if(|_| free);
         // A flight controller that asks for the information sets the telemetry bit as well, and reads

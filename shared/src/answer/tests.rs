@@ -21,7 +21,7 @@ impl Rig {
         Self {
             answers: Answers::new(TICK_HZ),
             snapshot: State::new(&config).snapshot(),
-            basis: Basis::new(&Params::of(&BOSSO_MOTOR), config.scale),
+            basis: Basis::new(config.scale),
             telemetry: Telemetry {
                 temperature_c: 40.6,
                 bus_v: 23.9,

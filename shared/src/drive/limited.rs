@@ -54,8 +54,7 @@ impl Thresholds {
     }
 }
 
-/// Returns true if a vector is as long as a bound. By squares: each frame of the throttle asks, and a root takes
-/// the time that its reply is due in.
+/// Returns true if a vector is as long as a bound, by squares: no root is needed.
 ///
 /// Never inlined: two bounds are asked for.
 #[inline(never)]

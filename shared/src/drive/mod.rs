@@ -37,6 +37,8 @@
 //! | a stop has come to rest; a start has failed; the rotor is lost, or stuck | `foc/open_loop.rs`; six-step: `six_step/start.rs`, `six_step/period.rs` |
 //! | a current sensor's zero is off | `off.rs` |
 //!
+//! What is wrong with a sensor or a phase of a motor that turns is told, and ends no drive: `witness.rs`.
+//!
 //! Throttle that is lost, closed or not armed is a set-point of rest by the time that it comes here:
 //! [`Throttle::setpoint`](crate::throttle::Throttle::setpoint) makes it so.
 //!
@@ -78,7 +80,7 @@
 //!
 //! # The files' order
 //! Each file uses those before it, and none behind it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
-//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
+//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`, `witness`,
 //! `state`, `mode_change`, `step`.
 
 mod charge;
@@ -102,6 +104,7 @@ mod state;
 mod step;
 mod tone;
 mod transitions;
+mod witness;
 
 pub use crate::protection::{Fault, Faults, Limit, Limits};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop, put_default};
@@ -113,6 +116,7 @@ pub use pull::Pull;
 pub use snapshot::Snapshot;
 pub use state::{LastFault, State};
 pub use step::step;
+pub use witness::Witness;
 
 #[cfg(test)]
 mod tests;

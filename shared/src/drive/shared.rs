@@ -25,6 +25,9 @@ traced! {
         pub(super) protection: protection::State,
         /// The currents' zeros.
         pub(super) zeros: sensing::State,
+        /// The phases' currents for who watches a motor that turns: of the last sample, with the six-step drive of the
+        /// one at the end of the last sextant with a crossing.
+        pub(super) shown: [AdcCounts; 3],
         pub(super) applied: Applied,
         /// The supply's voltage and the vectors that it gives.
         pub(super) supply: Supply,
@@ -98,6 +101,7 @@ impl Shared {
             progress: Progress::default(),
             protection: protection::State::new(&config.protection),
             zeros: sensing::State::default(),
+            shown: [AdcCounts::ZERO; 3],
             applied: Applied {
                 duties: [[Duty::ZERO; 3]; 2],
                 unreadable: UNREADABLE,

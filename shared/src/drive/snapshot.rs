@@ -26,6 +26,9 @@ pub struct Snapshot {
     pub i: Dq<Current>,
     /// Voltage that was commanded.
     pub u: Dq<Voltage>,
+    /// Readings of the three phases' currents, in an order that stays while the motor turns: of the last sample, with
+    /// the six-step drive of the end of the last sextant with a crossing.
+    pub currents: [AdcCounts; 3],
     /// Supply voltage.
     pub bus: Voltage,
     /// Current from the supply, 1.5·(v·i)/V_bus; negative while braking.

@@ -255,6 +255,7 @@ impl State {
             speed_reference: signed(self.speed_reference()),
             i: seen.i,
             u: seen.u,
+            currents: shared.shown,
             bus: shared.protection.bus,
             bus_current: seen.bus_current,
             bounds: shared.protection.bounds,

@@ -42,12 +42,11 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
         return other(config, state, &sample, &setpoint);
     }
     match sense(config, state, &sample, true) {
-        Some(currents) => period(
-            config,
-            (&mut state.foc, &mut state.shared),
-            &sample,
-            currents,
-        ),
+        Some(currents) => {
+            state.shared.shown = currents;
+            let drive = (&mut state.foc, &mut state.shared);
+            period(config, drive, &sample, currents)
+        }
         None => state.enters_rest().unwrap_or(Bridge::Off),
     }
 }

@@ -21,6 +21,7 @@ mod actions;
 mod check;
 mod keep;
 mod storage;
+mod warnings;
 
 const TICK_HZ: u32 = 170_000_000;
 

@@ -14,6 +14,7 @@ use super::reply::{Replies, Reply};
 use super::schedule::{Interval, Schedule};
 use super::signing::Trust;
 use crate::input::authority::{self, DriveStatus};
+use crate::math::round;
 
 mod calibration;
 mod check;
@@ -416,7 +417,7 @@ fn arm_disarm(arm: Option<i32>, context: &mut Context) -> MavResult {
 }
 
 fn message_id(value: f32) -> Option<u32> {
-    let whole = (0.0..=MESSAGE_MAX).contains(&value) && libm::truncf(value) == value;
+    let whole = (0.0..=MESSAGE_MAX).contains(&value) && round(value) == value;
     whole.then_some(value as u32)
 }
 

@@ -12,7 +12,7 @@ mod values;
 pub(crate) use assumed::POLE_PAIRS;
 pub use board::{Board, LeastDeadTime};
 pub use build::{BuildError, FluxSettings, build, build_in, input, scale};
-pub(crate) use build::{TRIP_SHARE, lost_periods, test_current, thresholds};
+pub(crate) use build::{TRIP_SHARE, lost_periods, test_current, thresholds, unbalance_max};
 pub use from_motor::FromMotor;
 pub use preset::{BOSSO_BENCH, BOSSO_MOTOR, BOSSO_TABLE_III, PRESETS, Preset};
 pub use table::{Choice, Kind, ParamId, Parameter, TABLE, Text, choice};

@@ -3,7 +3,7 @@
 use super::board::Board;
 use super::preset::Preset;
 use super::table::{Choice, Kind, ParamId, TABLE};
-use crate::math::SQRT_3;
+use crate::math::{SQRT_3, round};
 
 /// The reason why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +103,7 @@ impl Params {
         if !entry.allows(value) {
             return Err(SetError::OutOfRange);
         }
-        if matches!(entry.kind, Kind::Whole | Kind::Order) && libm::truncf(value) != value {
+        if matches!(entry.kind, Kind::Whole | Kind::Order) && round(value) != value {
             return Err(SetError::NotWhole);
         }
         self.values[id as usize] = value;

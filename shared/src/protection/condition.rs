@@ -163,10 +163,10 @@ conditions! {
 }
 
 conditions! {
-    /// A limit that the drive keeps to, at the cost of what is asked for.
+    /// A limit that the drive keeps to, at the cost of what is asked for, or something wrong that it goes on with.
     Limit,
     /// A set of limits.
-    Limits of 5 from 16,
+    Limits of 8 from 16,
     /// Returns true if it raises the alert of extended telemetry's status: there is no more torque.
     alerts: bool;
 
@@ -190,6 +190,18 @@ conditions! {
     Duty = 20 "duty" false
         "the motor has all the voltage that the supply gives"
         "turns no faster";
+    /// A phase carries no current in one direction or in both.
+    PhaseOpen = 21 "phase open" false
+        "a phase carries no current, or in one direction only: a loose wire, or a switch that does not turn on"
+        "turns on, with less torque: land, then `siskin check`";
+    /// The phases' currents do not come to none.
+    SensorDrift = 22 "current sensor drifts" false
+        "the phases' currents do not come to none: a current sensor's zero has moved, or it shows nothing"
+        "turns on, with a torque that swings: land, then `siskin check`";
+    /// A Hall sensor does not switch as the others do.
+    PositionSensor = 23 "position sensor defect" false
+        "a Hall sensor does not switch as the others do"
+        "goes on with the others, and without them at speed";
 }
 
 impl Fault {
@@ -204,6 +216,38 @@ impl Fault {
             Self::OverCurrent | Self::OverVoltage | Self::UnderVoltage | Self::ObserverLost => true,
             Self::OverTemperature | Self::Stuck | Self::CurrentSensor => false,
         }
+    }
+}
+
+impl Limit {
+    /// Returns true if nothing binds but something is wrong, with which the motor goes on: it is told as a warning.
+    pub const fn warns(self) -> bool {
+        self as u8 >= Self::PhaseOpen as u8
+    }
+}
+
+impl Limits {
+    /// Those that raise the alert of extended telemetry's status, and those that raise its warning.
+    const TOLD: [Self; 2] = {
+        let mut told = [Self::NONE; 2];
+        let mut n = 0;
+        while n < Limit::ALL.len() {
+            let limit = Limit::ALL[n];
+            told[0].0 |= (limit.alerts() as u8) << (limit as u8 - 16);
+            told[1].0 |= (limit.warns() as u8) << (limit as u8 - 16);
+            n += 1;
+        }
+        told
+    };
+
+    /// Returns true if one of them raises the alert.
+    pub const fn alert(self) -> bool {
+        self.0 & Self::TOLD[0].0 != 0
+    }
+
+    /// Returns true if one of them raises the warning.
+    pub const fn warn(self) -> bool {
+        self.0 & Self::TOLD[1].0 != 0
     }
 }
 
@@ -257,14 +301,18 @@ mod tests {
         });
         assert_eq!(rows("| no. | fault |"), faults);
         let limits = Limit::ALL.map(|limit| {
-            let alert = if limit.alerts() { "alert" } else { "" };
+            let told = match (limit.alerts(), limit.warns()) {
+                (true, _) => "alert",
+                (_, true) => "warning",
+                _ => "",
+            };
             let Condition {
                 number,
                 text,
                 meaning,
                 remedy,
             } = limit.condition();
-            let row = format!("| {number} | `{text}` | {alert} | {meaning} | {remedy} |");
+            let row = format!("| {number} | `{text}` | {told} | {meaning} | {remedy} |");
             row.replace("|  |", "| |")
         });
         assert_eq!(rows("| no. | limit |"), limits);

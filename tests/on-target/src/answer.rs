@@ -1,7 +1,7 @@
 //! What both sides must agree on after each control period.
 
 use siskin_control::drive::{Bridge, Config, Snapshot, State};
-use siskin_control::units::Duty;
+use siskin_control::units::{AdcCounts, Duty};
 use xxhash_rust::xxh32::xxh32;
 
 /// Words that say what a period has done: the bridge's and the digest of the state.
@@ -30,6 +30,7 @@ pub const INTERRUPT_WORDS: usize = 2;
 
 /// A digest of what the interrupt publishes.
 pub fn snapshot(snapshot: &Snapshot) -> u32 {
+    let [a, b, c] = snapshot.currents.map(AdcCounts::to_bits);
     let words = [
         snapshot.phase as i32,
         snapshot.faults.iter().count() as i32,
@@ -41,8 +42,11 @@ pub fn snapshot(snapshot: &Snapshot) -> u32 {
         snapshot.u.d.to_bits(),
         snapshot.u.q.to_bits(),
         snapshot.bus.to_bits(),
+        a,
+        b,
+        c,
     ];
-    let mut bytes = [0; 40];
+    let mut bytes = [0; 52];
     for (to, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
         *to = word.to_le_bytes();
     }

@@ -77,6 +77,7 @@ pub(in crate::drive) fn begin(
     (position, setpoint): (Position, &Setpoint),
 ) -> Why {
     *s = State::default();
+    shared.shown = Default::default();
     shared.reversed = setpoint.rotation(config.both_ways) == Rotation::Backward;
     match position {
         Some(position) => {

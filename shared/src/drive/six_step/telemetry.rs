@@ -54,6 +54,10 @@ pub(super) fn update(
         (false, 0) => s.tracking.omega,
         (false, _) => s.tracking.omega_bar,
     };
+    if s.tracking.crossings > 0 && s.crossing.samples == 0 && s.missed == 0 {
+        // A sextant has ended in which the released phase's current died, or no crossing would have been found.
+        shared.shown = currents;
+    }
     shared.seen = Seen {
         phase,
         angle: if shared.swapped(config) {

@@ -21,6 +21,7 @@ pub use flux::FluxSettings;
 use formula::{fill, formulas, refuse};
 pub use input::input;
 use quantity::Quantity;
+pub(crate) use sensing::unbalance_max;
 pub use si::{BuildError, scale};
 use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 

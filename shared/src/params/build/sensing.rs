@@ -10,8 +10,8 @@ use crate::control::sensing::{self, Shunts};
 use crate::control::{catch, dead_time};
 use crate::drive::Charge;
 use crate::math::{Real, SQRT_3};
-use crate::params::ParamId;
-use crate::units::Duty;
+use crate::params::{Board, ParamId};
+use crate::units::{AdcCounts, Duty};
 
 /// Time for which the offsets are measured, s; rounded to a power of two of periods. 5 ms leave a
 /// tenth of one reading's noise.
@@ -60,6 +60,10 @@ const SURE_S: f32 = 0.001;
 /// Time for which it may not fit before the observation starts over, s.
 const UNFIT_S: f32 = 0.004;
 
+/// What the sum of the currents of sound sensors may be off by on average, of the converter's range: half of what a
+/// zero may.
+const UNBALANCE_SHARE: f32 = 0.5 * OFFSET_SHARE;
+
 /// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high
 /// sides supplied; and the greatest duty of a phase that is read.
 pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
@@ -100,6 +104,11 @@ pub(super) fn sensing(p: &Si, window: f32, place: &mut sensing::Config) {
     // 5 at 8 kHz to 8 at 60 kHz.
     place.zero_readings_log2 = readings.checked_ilog2().unwrap_or(0);
     fill!(p, place, { number offset_max([OFFSET_SHARE] * RangeA / APerCount) });
+}
+
+/// What the sum of the currents may be off by on average.
+pub(crate) fn unbalance_max(board: &Board) -> AdcCounts {
+    AdcCounts::from_f32(UNBALANCE_SHARE * board.current_range_a / board.current_a_per_count)
 }
 
 /// The observation of the terminals while the bridge is off.
@@ -160,7 +169,7 @@ mod tests {
     use crate::control::modulator::{Supply, duties};
     use crate::control::transform::{AlphaBeta, PhaseOrder};
     use crate::drive::Config;
-    use crate::params::{BOSSO_BENCH, Board, Params, build};
+    use crate::params::{BOSSO_BENCH, Params, build};
     use crate::units::{TurnedVoltage, Voltage};
     use fixed::types::I8F24;
 
