@@ -221,7 +221,7 @@ impl Writer {
         for (chunk, part) in parts.take(chunks).enumerate() {
             let mut payload = [0; 1 + CHUNK_LEN + 3];
             payload[0] = severity as u8;
-            payload[1..=CHUNK_LEN].copy_from_slice(part);
+            payload[1..][..CHUNK_LEN].copy_from_slice(part);
             payload[1 + CHUNK_LEN..].copy_from_slice(&[id_low, id_high, chunk as u8]);
             let message = id_of::<STATUSTEXT_DATA>();
             self.sender
