@@ -60,8 +60,8 @@ const SURE_S: f32 = 0.001;
 /// Time for which it may not fit before the observation starts over, s.
 const UNFIT_S: f32 = 0.004;
 
-/// What the sum of the currents of sound sensors may be off by on average, of the converter's range: half of what a
-/// zero may.
+/// What the sum of the currents of sound sensors may be off by on average, of the converter's range: half of what a zero
+/// may. That has been measured before the start, and moves by less.
 const UNBALANCE_SHARE: f32 = 0.5 * OFFSET_SHARE;
 
 /// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high
