@@ -141,7 +141,7 @@ def drawn_bench(motor: dict) -> dict[str, dict]:
 def flown(folder, tables: dict, throttle: list, windows: dict) -> tuple[list, dict]:
     """Plays a scenario with these tables, with times and throttles, and with windows by name.
 
-    Gives its faults, and its windows by name.
+    Gives its faults and warnings, and its windows by name.
     """
     heads = [(f"[{name}]", table) for name, table in tables.items()]
     heads += [("[[signal]]", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]
@@ -150,4 +150,4 @@ def flown(folder, tables: dict, throttle: list, windows: dict) -> tuple[list, di
     file.write_text("\n".join(f"{head}\n{toml(table)}" for head, table in heads))
     status, found = scenario(file)
     assert status == 0
-    return found["faults"], windows_of(found)
+    return found["faults"] + found.get("warnings", []), windows_of(found)
