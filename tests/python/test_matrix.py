@@ -27,7 +27,8 @@ OPEN = {
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
     **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
-    **cells([SIX], ["high_open"], ["full"], "time"),
+    **cells([FOC], ["low_open"], ["start"], "time"),
+    **cells([SIX], ["high_open"], ["half", "full"], "cause", "time"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
     # nothing with more current.

@@ -57,7 +57,7 @@ const QUARTER: Angle = Angle::from_bits(1 << 30);
 
 /// Rounds after which a current that has not flowed never does. A torque that swings would have to do so with the rotor's
 /// turns, as the looks see them, for as long.
-const ROUNDS: u8 = 6;
+const ROUNDS: u8 = 8;
 
 /// Looks over which the sum is smoothed, as a power of two: 32 ms.
 const LOOKS_LOG2: u32 = 5;
