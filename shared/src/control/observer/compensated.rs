@@ -133,14 +133,9 @@ const PHI_MAX: Flux = Flux::from_bits(341_782_638);
 /// current over a stated R that is off looks like, and φ̂ near its least, z_d now above and now below it.
 const PHI_LOST: Flux = Flux::from_bits(68_356_528);
 
-/// The observer where the rotor's speed is known, and its angle at the coming sample.
-pub fn begin(config: &Config, state: &mut State, rotor: (Angle, Speed), i: AlphaBeta<Current>) {
-    place(config, state, rotor, i);
-    pace(config, state, Factor::ONE, Current::MAX);
-}
-
-/// As [`begin`], but the coefficients stay as [`pace`] has left them.
-pub fn place(
+/// The observer where the rotor's speed is known, and its angle at the coming sample. The coefficients stay as
+/// [`pace`] has left them.
+pub fn begin(
     config: &Config,
     state: &mut State,
     (theta, omega): (Angle, Speed),
@@ -160,6 +155,7 @@ pub fn place(
             beta: rotor.beta.plus(own.beta),
         },
         i_before: i,
+        pace: state.pace,
         ..State::default()
     };
 }
@@ -179,7 +175,7 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor, i_q: Current
     // than the rotor turns would swing by what the dead times' signs make of its angle.
     let following = config
         .omega_n_per_current
-        .saturating_apply(i_q.saturating_abs())
+        .held(i_q.abs())
         .min(config.omega_n_following);
     let omega_n = omega
         .top(OMEGA_N_SHARE)

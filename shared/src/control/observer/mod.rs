@@ -277,7 +277,7 @@ pub fn begin(
             edges::begin(config, &mut state.edges, before, omega, phases(i));
         }
         Config::Compensated(config) => {
-            compensated::place(config, &mut state.compensated, (theta, omega), i);
+            compensated::begin(config, &mut state.compensated, (theta, omega), i);
         }
         Config::Given => {}
     }

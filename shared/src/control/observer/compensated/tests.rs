@@ -269,6 +269,7 @@ impl Bench {
         let i = self.units.current(self.current(self.theta));
         let angle = Angle::wrapping_from_num(coming / TAU);
         begin(&self.config, &mut self.state, (angle, speed(self.omega)), i);
+        pace(&self.config, &mut self.state, Factor::ONE, Current::ZERO);
     }
 
     /// One period; the error of the angle in degrees.
