@@ -53,9 +53,6 @@ OPEN = {
     # A start that is struck is tried again, and takes its time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
-    # The braking has backed off, but what is left of its current, some tenths of an ampere, takes the supply over its
-    # limit before the trip's filter has followed.
-    **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
     # 10 A on 470 µF are 0.9 V a period: braking backs off ahead of the limit, and what is in the inductances still takes
     # the supply a tenth of a volt beyond it.
     **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
