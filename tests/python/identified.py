@@ -24,7 +24,7 @@ import siskin_dialect as dialect  # noqa: E402  (it needs the dialect's folder)
 from motors import any_motor, drawn_bench, flown, toml  # noqa: E402
 from out_of_the_bag import FACTORY, limits  # noqa: E402
 from slams import Outcome as Slams  # noqa: E402
-from slams import throttles, slams_of  # noqa: E402
+from slams import PLANTS, throttles, slams_of  # noqa: E402
 
 BOUNDS = {"MOT_R_MOHM": 0.03, "MOT_L_UH": 0.05, "MOT_FLUX_MWB": 0.02, "MOT_J_GCM2": 0.1}
 WRONG = 2.0
@@ -121,7 +121,8 @@ def identified(folder: Path, motor: dict, params: dict) -> tuple[Found, dict]:
 
 
 def flies(folder: Path, number: int, steps: int) -> Outcome:
-    """The motor of this number is identified, and then slammed and brought to full speed."""
+    """The motor of this number is identified, and then slammed and brought to full speed; one of odd number is on the
+    switching plant there."""
     motor = any_motor(random.Random(f"bag {number}"))
     # The builder's are the limits, the pole pairs and the speed at full throttle, all before it turns.
     known = {name: motor["params"][name] for name in ("MOT_POLE_PAIRS", "CTL_RPM_MAX")}
@@ -132,7 +133,7 @@ def flies(folder: Path, number: int, steps: int) -> Outcome:
     throttle, end_s = throttles(random.Random(f"slams {number}"), steps)
     full_s = end_s + 2.0
     tables = drawn_bench(motor) | {"params": params | kept}
-    tables["bench"]["duration_s"] = full_s
+    tables["bench"] |= {"duration_s": full_s, "plant": PLANTS[number % 2]}
     windows = {"all": (1.4, end_s), "idle": (end_s - 0.2, end_s), "full": (full_s - 0.2, full_s)}
     faults, windows = flown(folder, tables, [*throttle, (end_s, 1.0)], windows)
     return Outcome(found, windows["full"]["rpm_min"] / motor["rpm"], slams_of(faults, windows))

@@ -1,21 +1,26 @@
-"""Identified motors, as `identified.py` draws them, over the whole range."""
+"""Identified motors, as `identified.py` draws and flies them, over the whole range."""
 
-import random
+import pytest
 
-from identified import identified
-from motors import any_motor
-from out_of_the_bag import FACTORY, limits
+from identified import flies
 
-MOTORS = 20
+MOTORS, STEPS = 20, 60
 
 
-def test_random_motors_are_found_or_refused_with_a_reason(tmp_path):
-    found = {}
-    for number in range(MOTORS):
-        motor = any_motor(random.Random(f"bag {number}"))
-        known = {name: motor["params"][name] for name in ("MOT_POLE_PAIRS", "CTL_RPM_MAX")}
-        found[number], _ = identified(tmp_path, motor, FACTORY | limits(motor) | known)
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory) -> dict:
+    folder = tmp_path_factory.mktemp("identified")
+    return {number: flies(folder, number, STEPS) for number in range(MOTORS)}
+
+
+def test_random_motors_are_found_or_refused_with_a_reason(outcomes):
+    found = {number: outcome.found for number, outcome in outcomes.items()}
     assert {number: one for number, one in found.items() if not one.is_sound()} == {}
     off = {number: one for number, one in found.items() if not one.is_near()}
     # Of many it is to be one in twenty: of twenty two may be.
     assert len(off) <= 2, off
+
+
+def test_what_is_found_flies_untouched(outcomes):
+    accepted = {number: outcome for number, outcome in outcomes.items() if outcome.slams}
+    assert {number: outcome for number, outcome in accepted.items() if not outcome.flies()} == {}

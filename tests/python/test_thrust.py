@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from thrust import STEP_S, Punch, least_s
+from thrust import FIELD_ORIENTED, STEP_S, Punch, bench, least_s, punched
 
 RPM_PER_RAD_S = 60 / math.tau
 
@@ -35,3 +35,10 @@ def test_a_speed_that_the_supply_does_not_give_is_never_reached():
     tables["bench"]["load"]["c2"] = 1e-7
     assert least_s(tables, Punch(0.0, 420 * RPM_PER_RAD_S, 5.0, None)) == math.inf
     assert math.isfinite(least_s(tables, Punch(0.0, 400 * RPM_PER_RAD_S, 5.0, None)))
+
+
+# Over the least time. A bound of their own keeps others: the winding's flux, or what the back-EMF is at idle.
+@pytest.mark.parametrize("name", ["bosso", "quad-7-inch"])
+def test_thrust_comes_in_little_more_than_the_least_time(tmp_path, name):
+    punch = punched(tmp_path, name, FIELD_ORIENTED)
+    assert punch.took_s < 1.15 * least_s(bench(name), punch)
