@@ -327,7 +327,7 @@ impl Esc {
             self.warn_of(limit.text());
         }
         let binding = thresholds(&self.params, &self.scale).limits(snapshot);
-        self.telemetry.limits = binding.and(found);
+        self.telemetry.limits = binding.with(found);
         self.charge
             .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();

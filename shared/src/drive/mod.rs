@@ -80,8 +80,8 @@
 //!
 //! # The files' order
 //! Each file uses those before it, and none behind it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
-//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`, `witness`,
-//! `state`, `mode_change`, `step`.
+//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
+//! `witness`, `state`, `mode_change`, `step`.
 
 mod charge;
 pub mod config;

@@ -34,7 +34,7 @@ impl Announcer {
     pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<FaultEvent> {
         let began = faults.without(self.told);
         let ended = self.told.without(faults);
-        for fault in began.and(ended).iter() {
+        for fault in began.with(ended).iter() {
             let present = faults.contains(fault);
             let due_us = &mut self.due_us[usize::from(present)][fault as usize];
             if now_us < *due_us {

@@ -96,7 +96,7 @@ macro_rules! conditions {
             }
 
             /// Those of both sets.
-            pub const fn and(self, other: Self) -> Self {
+            pub const fn with(self, other: Self) -> Self {
                 Self(self.0 | other.0)
             }
 

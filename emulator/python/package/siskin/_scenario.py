@@ -32,6 +32,11 @@ class Outcome:
         return list(self.summary["faults"])
 
     @property
+    def warnings(self) -> list[str]:
+        """What the ESC has told while the motor turned on with it: an open phase, a sensor at fault."""
+        return list(self.summary["warnings"])
+
+    @property
     def trace_hash(self) -> str:
         """Hash over the control's state in every step."""
         return str(self.summary["trace_hash"])

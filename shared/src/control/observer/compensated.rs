@@ -133,8 +133,8 @@ const PHI_MAX: Flux = Flux::from_bits(341_782_638);
 /// current over a stated R that is off looks like, and φ̂ near its least, z_d now above and now below it.
 const PHI_LOST: Flux = Flux::from_bits(68_356_528);
 
-/// The observer where the rotor's speed is known, and its angle at the coming sample. The coefficients stay as
-/// [`pace`] has left them.
+/// The observer where the rotor's speed is known, and its angle at the coming sample. The coefficients stay as they are:
+/// Park has taken those of a rotor at rest, and those of one that was caught are taken by [`pace`] after this.
 pub fn begin(
     config: &Config,
     state: &mut State,

@@ -255,7 +255,7 @@ fn refuse_contradictions(p: &Si) {
         CtlBwCurHz([BANDWIDTH_SHARE] * PwmHz - CurrentHz) "above a twentieth of PWM_FREQ_HZ",
         CtlBwSpdHz([SPEED_SHARE] * CurrentHz - SpeedHz) "above a fifth of CTL_BW_CUR_HZ",
         LimPhaseA([SHOWN_SHARE / TRIP_SHARE] * RangeA - LimitA)
-            "1.4 times this is beyond the board",
+            "its trip is beyond the board",
         PwmFreqHz([0.25] - FastestTurns) TOO_FEW_PERIODS,
     });
     p.refuse_above(

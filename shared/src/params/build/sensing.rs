@@ -21,8 +21,8 @@ const ZERO_S: f32 = 0.005;
 /// times 16 make up to 8 %.
 const OFFSET_SHARE: f32 = 0.1;
 
-/// The phase current from which its sign is certain, over what the supply changes it by in a dead time; below, the
-/// dead time is compensated in proportion. 0.3 A on the bench.
+/// The phase current from which its sign is certain, over what the highest supply changes it by in a dead time; below,
+/// the dead time is compensated in proportion. 0.3 A on the bench.
 const SIGN_CERTAIN_SHARE: f32 = 0.6;
 
 /// Time for which a turning rotor may be unseen, s: a propeller at full speed is 2° behind by then, where
