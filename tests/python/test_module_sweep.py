@@ -99,6 +99,11 @@ def test_keys_are_set_as_on_the_command_line():
     assert outcome.trace_hash != siskin.scenario(path, seed=7).trace_hash
 
 
+def test_what_the_motor_turns_on_with_is_told_beside_the_faults():
+    outcome = siskin.scenario(SCENARIOS / "fault-phase-open.toml")
+    assert (outcome.faults, outcome.warnings) == ([], ["phase open"])
+
+
 @pytest.mark.parametrize(
     "path, keys",
     [
