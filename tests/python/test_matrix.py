@@ -20,8 +20,8 @@ def cells(drives, faults, moments, *misses) -> dict:
 # 1.6: where a current rises as far as that, it passes 1.2 times the limit before.
 OPEN = {
     # A phase is known to be open once the rotor has been seen everywhere in some turns. Where two phases do not turn the
-    # motor for as long, the regulator's voltage rises until the current trips; where a look comes each half turn, as at
-    # 500 turns a second, it is not known until the speed is another.
+    # motor for as long, the regulator's voltage rises until the current trips; where the looks meet the same five places
+    # of a turn, as at 1200 turns a second, it is not known until the speed is another.
     **cells([FOC], ["phase_open", "high_open", "low_open"], ["full"], "cause", "time"),
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
