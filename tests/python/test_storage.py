@@ -82,6 +82,8 @@ def test_statistics_outlive_a_kill(stored):
         esc.wait_armed()
         throttle.value = HALF
         esc.wait_rpm(3000, 3300)
+        # The run time is told in whole seconds, and half throttle may be reached in less than one.
+        time.sleep(1.0)
         throttle.value = 0
         time.sleep(2 * QUIET_S)
     emulator.kill()
