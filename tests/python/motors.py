@@ -123,6 +123,7 @@ def drawn_bench(motor: dict) -> dict[str, dict]:
             "bus": motor["supply_v"],
             "dead_time_ns": float(of["PWM_DEADTIME_NS"]),
             "adc_range_a": 2 * of["LIM_PHASE_A"],
+            "noise_a": 0.05 / 40 * 2 * of["LIM_PHASE_A"],
             "board_k_per_w": min(6.0, 60 / heat_w),
             "initial_angle_deg": motor["angle_deg"],
         },
