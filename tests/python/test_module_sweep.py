@@ -102,6 +102,7 @@ def test_keys_are_set_as_on_the_command_line():
 def test_what_the_motor_turns_on_with_is_told_beside_the_faults():
     outcome = siskin.scenario(SCENARIOS / "fault-phase-open.toml")
     assert (outcome.faults, outcome.warnings) == ([], ["phase open"])
+    assert siskin.scenario(SCENARIOS / "half-throttle.toml").warnings == []
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ class Outcome:
     @property
     def warnings(self) -> list[str]:
         """What the ESC has told while the motor turned on with it: an open phase, a sensor at fault."""
-        return list(self.summary["warnings"])
+        return list(self.summary.get("warnings", []))
 
     @property
     def trace_hash(self) -> str:
