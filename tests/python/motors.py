@@ -118,12 +118,13 @@ def drawn_bench(motor: dict) -> dict[str, dict]:
     of = motor["params"]
     heat_w = 1.5 * BOARD_OHM * of["LIM_PHASE_A"] ** 2
     j = of["MOT_J_GCM2"] * 1e-7 / 2
+    range_a = 2 * of["LIM_PHASE_A"]
     return {
         "bench": {
             "bus": motor["supply_v"],
             "dead_time_ns": float(of["PWM_DEADTIME_NS"]),
-            "adc_range_a": 2 * of["LIM_PHASE_A"],
-            "noise_a": 0.05 / 40 * 2 * of["LIM_PHASE_A"],
+            "adc_range_a": range_a,
+            "noise_a": 0.05 / 40 * range_a,
             "board_k_per_w": min(6.0, 60 / heat_w),
             "initial_angle_deg": motor["angle_deg"],
         },

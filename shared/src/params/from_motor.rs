@@ -1,8 +1,8 @@
 //! The settings that follow from the motor, and from what: each parameter of [`Kind::FromMotor`] does where it
 //! is 0.
 //!
-//! Each share below, but the alignment's and the slew's, is one that two benches set by hand have in common: a 5-inch racing
-//! motor's, and that of the first paper's motor with its propeller.
+//! Each share below, but the alignment's and the slew's, is one that two benches set by hand have in common: a 5-inch
+//! racing motor's, and that of the first paper's motor with its propeller.
 
 use core::f32::consts::{PI, TAU};
 
