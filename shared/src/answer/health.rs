@@ -71,6 +71,7 @@ mod tests {
     use super::*;
     use crate::drive::{Fault, Limit, State};
     use crate::params::{BOSSO_MOTOR, Board, Params, build};
+    use crate::protection::Raised;
 
     fn rig() -> (Basis, Snapshot) {
         let config = build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit");
@@ -104,7 +105,8 @@ mod tests {
             health.observe(&calm, &basis, limits);
             health.observe(&calm, &basis, Limits::NONE);
             let told = status(&mut health);
-            let wanted = (limit.alerts(), limit.warns(), false);
+            let raises = |status| limit.raises() == Some(status);
+            let wanted = (raises(Raised::Alert), raises(Raised::Warning), false);
             assert_eq!((told.alert, told.warning, told.error), wanted, "{limit:?}");
             assert_eq!(status(&mut health), Status::default());
         }

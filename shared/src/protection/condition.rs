@@ -22,7 +22,7 @@ macro_rules! conditions {
     (
         $(#[$about:meta])* $name:ident, $(#[$of_set:meta])* $set:ident of $count:literal from $first:literal,
         $(#[$of_mark:meta])* $mark:ident: $kind:ty;
-        $($(#[$doc:meta])* $variant:ident = $number:literal $text:literal $value:literal $meaning:literal $remedy:literal;)*
+        $($(#[$doc:meta])* $variant:ident = $number:literal $text:literal $value:expr, $meaning:literal $remedy:literal;)*
     ) => {
         $(#[$about])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +76,7 @@ macro_rules! conditions {
             pub const NONE: Self = Self(0);
 
             /// Adds one.
-            pub fn insert(&mut self, one: $name) {
+            pub const fn insert(&mut self, one: $name) {
                 self.0 |= 1 << (one as u8 - $first);
             }
 
@@ -124,6 +124,15 @@ macro_rules! conditions {
     };
 }
 
+/// What a [`Limit`] raises of extended telemetry's status.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Raised {
+    /// There is no more torque.
+    Alert,
+    /// Something is broken, and the motor runs on with it.
+    Warning,
+}
+
 conditions! {
     /// A reason for which the bridge was turned off.
     Fault,
@@ -133,31 +142,31 @@ conditions! {
     failure_flag: u16;
 
     /// A phase current was above 1.4 times `LIM_PHASE_A` for two samples.
-    OverCurrent = 0 "over-current" 1
+    OverCurrent = 0 "over-current" 1,
         "a phase current above 1.4 · `LIM_PHASE_A` for two samples, the hardware's own trip, or the gate driver's alarm"
         "look for a short; check `MOT_R_MOHM`, `MOT_L_UH` and the bandwidth `CTL_BW_CUR_HZ`";
     /// The supply was above `LIM_BUS_V_MAX`.
-    OverVoltage = 1 "bus over-voltage" 2
+    OverVoltage = 1 "bus over-voltage" 2,
         "supply above `LIM_BUS_V_MAX`"
         "braking into a supply that takes no current back: set `LIM_REGEN_A` lower, or `MOT_STOP` 0";
     /// The supply was below `LIM_BUS_V_MIN`.
-    UnderVoltage = 2 "bus under-voltage" 64
+    UnderVoltage = 2 "bus under-voltage" 64,
         "supply below `LIM_BUS_V_MIN`"
         "an empty pack, thin wires, a current-limited supply; lower `LIM_BUS_A`";
     /// The board was hotter than `LIM_TEMP_C`.
-    OverTemperature = 3 "over-temperature" 4
+    OverTemperature = 3 "over-temperature" 4,
         "board above `LIM_TEMP_C`"
         "cool it; lower `LIM_PHASE_A`";
     /// The observer's state left its range: the rotor's position is not known.
-    ObserverLost = 4 "rotor position lost" 64
+    ObserverLost = 4 "rotor position lost" 64,
         "the observer's angle cannot be trusted any more"
         "check the motor's parameters; a loose phase; a blocked propeller";
     /// All attempts of a start have failed, or the motor was too slow for too long.
-    Stuck = 5 "motor does not start" 32
+    Stuck = 5 "motor does not start" 32,
         "every attempt of a start has failed"
         "see below";
     /// A current sensor's zero is too far off.
-    CurrentSensor = 6 "current sensor defect" 64
+    CurrentSensor = 6 "current sensor defect" 64,
         "a current sensor's zero is too far off"
         "its shunt and amplifier: `siskin check`";
 }
@@ -167,39 +176,39 @@ conditions! {
     Limit,
     /// A set of limits.
     Limits of 8 from 16,
-    /// Returns true if it raises the alert of extended telemetry's status: there is no more torque.
-    alerts: bool;
+    /// What of extended telemetry's status it raises.
+    raises: Option<Raised>;
 
     /// The current's vector is at `LIM_PHASE_A`.
-    PhaseCurrent = 16 "phase current" true
+    PhaseCurrent = 16 "phase current" Some(Raised::Alert),
         "the current is at `LIM_PHASE_A`"
         "holds the current there: there is no more torque";
     /// The supply gives `LIM_BUS_A`.
-    BusCurrent = 17 "supply current" true
+    BusCurrent = 17 "supply current" Some(Raised::Alert),
         "the supply gives `LIM_BUS_A`"
         "lowers the phase current: there is no more torque";
     /// The supply takes `LIM_REGEN_A`.
-    RegenCurrent = 18 "returned current" false
+    RegenCurrent = 18 "returned current" None,
         "braking returns `LIM_REGEN_A`"
         "brakes more slowly";
     /// The supply is within a volt of `LIM_BUS_V_MAX`.
-    BusVoltage = 19 "supply voltage" false
+    BusVoltage = 19 "supply voltage" None,
         "the supply is within 1 V of `LIM_BUS_V_MAX`"
         "returns less to the supply, and turns more into heat in the motor";
     /// The motor has all the voltage that the supply gives.
-    Duty = 20 "duty" false
+    Duty = 20 "duty" None,
         "the motor has all the voltage that the supply gives"
         "turns no faster";
     /// A phase carries no current in one direction or in both.
-    PhaseOpen = 21 "phase open" false
+    PhaseOpen = 21 "phase open" Some(Raised::Warning),
         "a phase carries no current, or in one direction only: a loose wire, or a switch that does not turn on"
         "turns on, with less torque: land, then `siskin check`";
     /// The phases' currents do not come to none.
-    SensorDrift = 22 "current sensor drifts" false
+    SensorDrift = 22 "current sensor drifts" Some(Raised::Warning),
         "the phases' currents do not come to none: a current sensor's zero has moved, or it shows nothing"
         "turns on, with a torque that swings: land, then `siskin check`";
     /// A Hall sensor does not switch as the others do.
-    PositionSensor = 23 "position sensor defect" false
+    PositionSensor = 23 "position sensor defect" Some(Raised::Warning),
         "a Hall sensor does not switch as the others do"
         "goes on with the others, and without them at speed";
 }
@@ -220,34 +229,40 @@ impl Fault {
 }
 
 impl Limit {
-    /// Returns true if nothing binds but something is wrong, with which the motor goes on: it is told as a warning.
+    /// Returns true if it is a warning: nothing is bounded, but the motor runs on with something broken.
     pub const fn warns(self) -> bool {
-        self as u8 >= Self::PhaseOpen as u8
+        matches!(self.raises(), Some(Raised::Warning))
     }
 }
 
 impl Limits {
-    /// Those that raise the alert of extended telemetry's status, and those that raise its warning.
-    const TOLD: [Self; 2] = {
-        let mut told = [Self::NONE; 2];
+    /// Those that raise the alert.
+    const ALERTS: Self = Self::that_raise(Raised::Alert);
+
+    /// Those that raise the warning.
+    const WARNINGS: Self = Self::that_raise(Raised::Warning);
+
+    const fn that_raise(status: Raised) -> Self {
+        let mut those = Self::NONE;
         let mut n = 0;
         while n < Limit::ALL.len() {
             let limit = Limit::ALL[n];
-            told[0].0 |= (limit.alerts() as u8) << (limit as u8 - 16);
-            told[1].0 |= (limit.warns() as u8) << (limit as u8 - 16);
+            if matches!(limit.raises(), Some(raised) if raised as u8 == status as u8) {
+                those.insert(limit);
+            }
             n += 1;
         }
-        told
-    };
+        those
+    }
 
     /// Returns true if one of them raises the alert.
     pub const fn alert(self) -> bool {
-        self.0 & Self::TOLD[0].0 != 0
+        self.0 & Self::ALERTS.0 != 0
     }
 
     /// Returns true if one of them raises the warning.
     pub const fn warn(self) -> bool {
-        self.0 & Self::TOLD[1].0 != 0
+        self.0 & Self::WARNINGS.0 != 0
     }
 }
 
@@ -301,10 +316,10 @@ mod tests {
         });
         assert_eq!(rows("| no. | fault |"), faults);
         let limits = Limit::ALL.map(|limit| {
-            let told = match (limit.alerts(), limit.warns()) {
-                (true, _) => "alert",
-                (_, true) => "warning",
-                _ => "",
+            let told = match limit.raises() {
+                Some(Raised::Alert) => "alert",
+                Some(Raised::Warning) => "warning",
+                None => "",
             };
             let Condition {
                 number,

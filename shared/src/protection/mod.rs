@@ -3,7 +3,7 @@
 mod condition;
 mod ntc;
 
-pub use condition::{Condition, Fault, Faults, Limit, Limits};
+pub use condition::{Condition, Fault, Faults, Limit, Limits, Raised};
 pub use ntc::Ntc;
 
 use crate::control::speed::Bounds;
