@@ -20,9 +20,7 @@ def cells(drives, faults, moments, *misses) -> dict:
 # 1.6: where a current rises as far as that, it passes 1.2 times the limit before.
 OPEN = {
     # A phase is known to be open once the rotor has been seen everywhere in some turns. Where two phases do not turn the
-    # motor for as long, the regulator's voltage rises until the current trips; where the looks meet the same five places
-    # of a turn, as at 1200 turns a second, it is not known until the speed is another.
-    **cells([FOC], ["phase_open", "high_open", "low_open"], ["full"], "cause", "time"),
+    # motor for as long, the regulator's voltage rises until the current trips.
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
     **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
@@ -30,11 +28,10 @@ OPEN = {
     # With a switch that never turns on, the torque that low speed allows, a drop as great as the back-EMF, takes the
     # currents of the others up to 2.6 A over 1.2 times the limit in a start, and 1 A in braking. With half of that
     # torque it is met, and thrust comes later.
-    **cells([FOC], ["high_open", "low_open"], ["start"], "current", "time"),
-    **cells([FOC], ["high_open", "low_open"], ["braking"], "current"),
+    **cells([FOC], ["high_open", "low_open"], ["start", "braking"], "current"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
-    # Nor does the six-step drive tell of a high side that never turns on, where it goes on with it.
-    **cells([SIX], ["high_open"], ["half", "full"], "cause", "time"),
+    # Nor does the six-step drive tell of a high side that never turns on at full speed, where it goes on with it.
+    **cells([SIX], ["high_open"], ["full"], "cause", "time"),
     # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
     # nothing with more current.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),

@@ -1,141 +1,168 @@
-//! What the currents of a motor that turns say of sensors, wires and switches, as snapshots show it. The tasks work this
-//! out, not the interrupt.
+//! Warnings of a broken current sensor, wire or switch, drawn from the currents of a turning motor.
 //!
-//! Nothing here ends a drive: a motor that turns on by two phases, or by two sensors, is better than none in the air.
-//! It is told, and stays so until the motor rests ([`Limit::warns`]).
+//! This works on snapshots, in the tasks; the interrupt only keeps the three readings. Nothing here stops the motor: in
+//! the air, one that limps on two phases or two sensors beats none. A warning stays until the motor rests.
 //!
-//! - **A sensor.** The three currents of a sound motor come to none. Where their sum is off by more than half of what a
-//!   sound sensor's zero is, always or with the turns, a sensor's zero has moved, or it shows nothing any more.
-//!   Noise is neither. A phase that cannot be read, and so each third phase without a shunt, is made up so that the sum is
-//!   none: then nothing is known.
-//! - **A phase.** Each of a sound motor's phases carries a current in either direction within a turn, and each direction
-//!   of it flows through a switch of its own at the least. A phase that never did in one of them, wherever in a turn the
-//!   rotor was, and that for some rounds, has an open wire, or a switch that never turns on. That the rotor has been
-//!   everywhere is asked for because a speed may meet the pace of the looks.
+//! - **Current sensor.** The three phase currents of a sound motor sum to zero. If the mean of the sum, or its component
+//!   that turns with the rotor, exceeds half of the zero error that a sound sensor may have, a sensor has drifted or
+//!   reads nothing. Noise of up to 3 % of the range averages out. A phase that cannot be read, such as one without a
+//!   shunt, is reconstructed from the other two: the sum is then zero by construction, and tells nothing.
+//! - **Phase.** Within an electrical turn each phase of a sound motor conducts in both directions, and each direction
+//!   passes through at least one switch of its own. A direction that has not conducted in several turns, wherever the
+//!   rotor was, means an open wire or a switch that does not turn on.
 
 use super::snapshot::Snapshot;
 use crate::protection::{Limit, Limits};
-use crate::units::{AdcCounts, Angle};
+use crate::units::{AdcCounts, Angle, Current};
 
-/// What has been seen since the motor rested.
+/// What the currents have shown since the motor rested.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Witness {
     /// Means of the currents' sum: as it is, and with the signs of the angle's sine and cosine.
     sums: [AdcCounts; 3],
     rounds: Rounds,
-    /// What is wrong.
-    found: Limits,
+    warnings: Limits,
 }
 
-/// Directions of the three phases' currents, a bit each: forth, and then back.
-type Directions = u8;
+/// Directions of the phases' currents, a bit each: into a, b and c, then out of them.
+type Directions = u32;
 
 const ALL_DIRECTIONS: Directions = 0b11_1111;
-const FORTH: Directions = 0b00_0111;
 
-/// The last rounds, in each of which the rotor has been in every sixth of a turn.
-///
-/// Where its speed meets the pace of the looks these are of two places half a turn apart, or about one: between two such
-/// places a phase may be that carries none there. They do not come to six sixths, and those of three and more places show
-/// each phase's currents.
+/// Rounds since all directions were last seen to conduct.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Rounds {
-    /// How many they are.
-    count: u8,
-    /// Directions that a current has had in any of them, or in the present one.
-    flowed: Directions,
-    /// Of the present one: the sixths, a bit each.
-    sixths: u8,
-    /// Of the present one: the greatest current.
-    greatest: AdcCounts,
+    /// Rounds of steady torque.
+    steady: u32,
+    /// Directions that have conducted in any round.
+    conducted: Directions,
+    round: Round,
 }
 
-const ALL_SIXTHS: u8 = 0b11_1111;
+/// Looks at one turn or a few, until the rotor has been seen in five sextants.
+///
+/// At a speed that meets the pace of the looks, these see the same few places of each turn. Two places half a turn apart
+/// may miss a sound phase's current altogether, and count as four sextants as the speed wavers. Five places, 72 degrees
+/// apart, show at least 0.8 of each direction's peak. At four places a turn an open phase goes unseen.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Round {
+    /// Sextants in which the rotor has been, a bit each.
+    sextants: u32,
+    /// The greatest current of each direction.
+    peaks: [AdcCounts; 6],
+    /// Looks with a torque forwards, and backwards.
+    torques: [u32; 2],
+}
+
+const ALL_SEXTANTS: u32 = 0b11_1111;
+
+/// Rounds of steady torque after which a direction that has not conducted is open.
+const OPEN_ROUNDS: u32 = 8;
 
 /// A quarter of a turn.
 const QUARTER: Angle = Angle::from_bits(1 << 30);
 
-/// Rounds after which a current that has not flowed never does. A torque that swings would have to do so with the rotor's
-/// turns, as the looks see them, for as long: with half as many, one of 240 slams of sound motors does.
-const ROUNDS: u8 = 16;
-
-/// Looks over which the sum is smoothed, as a power of two: 32 ms.
-const LOOKS_LOG2: u32 = 5;
+/// Time constant of the sum's means, in looks, as a power of two: 32 ms.
+const MEAN_LOOKS_LOG2: u32 = 5;
 
 impl Witness {
-    /// Looks at a snapshot, about each millisecond; `most` is what the currents' sum may be off by. Returns what is
-    /// wrong.
+    /// Looks at a snapshot, about once a millisecond, and returns the warnings.
+    ///
+    /// `unbalance_max` is what the currents of sound sensors may sum to on average.
     // In its own registers: the caller has none left.
     #[inline(never)]
-    pub fn look(&mut self, snapshot: &Snapshot, most: AdcCounts) -> Limits {
+    pub fn look(&mut self, snapshot: &Snapshot, unbalance_max: AdcCounts) -> Limits {
         if !snapshot.phase.drives() {
             *self = Self::default();
-        } else if snapshot.missed_sextants > 0 || !self.is_balanced(snapshot, most) {
+        } else if snapshot.missed_sextants > 0 || !self.is_balanced(snapshot, unbalance_max) {
             self.rounds = Rounds::default();
-        } else if self.rounds.look(&snapshot.currents, snapshot.angle, most) {
-            self.found.insert(Limit::PhaseOpen);
+        } else if self.rounds.look(snapshot, unbalance_max) {
+            self.warnings.insert(Limit::PhaseOpen);
         }
         if snapshot.sensor_fault {
-            self.found.insert(Limit::PositionSensor);
+            self.warnings.insert(Limit::PositionSensor);
         }
-        self.found
+        self.warnings
     }
 
-    /// Smooths the currents' sum. True where it is as it is to be, now and on average.
-    fn is_balanced(&mut self, snapshot: &Snapshot, most: AdcCounts) -> bool {
+    /// Averages the sum of the currents. Returns true if it is within bounds, now and on average.
+    fn is_balanced(&mut self, snapshot: &Snapshot, unbalance_max: AdcCounts) -> bool {
         let [a, b, c] = snapshot.currents;
-        let now = a.wrapping_add(b).wrapping_add(c);
+        let sum = a.wrapping_add(b).wrapping_add(c);
         let signed = |angle: Angle| {
             if angle.is_negative() {
-                now.wrapping_neg()
+                sum.wrapping_neg()
             } else {
-                now
+                sum
             }
         };
         let [constant, sine, cosine] = &mut self.sums;
-        let with_turns = smooth(sine, signed(snapshot.angle))
-            .wrapping_add(smooth(cosine, signed(snapshot.angle.wrapping_add(QUARTER))));
-        let off = smooth(constant, now).max(with_turns);
-        if off > most {
-            self.found.insert(Limit::SensorDrift);
+        let turning = average(sine, signed(snapshot.angle)).wrapping_add(average(
+            cosine,
+            signed(snapshot.angle.wrapping_add(QUARTER)),
+        ));
+        let unbalance = average(constant, sum).max(turning);
+        if unbalance > unbalance_max {
+            self.warnings.insert(Limit::SensorDrift);
         }
-        off.max(now.wrapping_abs()) <= most
+        unbalance.max(sum.wrapping_abs()) <= unbalance_max
     }
 }
 
-/// Another look at something. Returns the magnitude of its mean.
-fn smooth(mean: &mut AdcCounts, now: AdcCounts) -> AdcCounts {
-    *mean += now.wrapping_sub(*mean) >> LOOKS_LOG2;
+/// Takes a value into a mean, and returns the mean's magnitude.
+fn average(mean: &mut AdcCounts, value: AdcCounts) -> AdcCounts {
+    *mean += value.wrapping_sub(*mean) >> MEAN_LOOKS_LOG2;
     mean.wrapping_abs()
 }
 
 impl Rounds {
-    /// Takes in currents at an angle of the rotor; up to `none` there is none. True where for so many rounds one has not
-    /// flowed in a direction of its.
-    fn look(&mut self, currents: &[AdcCounts; 3], angle: Angle, none: AdcCounts) -> bool {
-        let mut phase: Directions = 0b00_1001;
-        for current in currents {
-            let magnitude = current.wrapping_abs();
-            self.greatest = self.greatest.max(magnitude);
-            // Of a current that is cut off nothing is left but noise.
-            let most: AdcCounts = self.greatest >> 1;
-            if magnitude > most.max(none) >> 3 {
-                self.flowed |= phase & if current.is_negative() { !FORTH } else { FORTH };
-            }
-            phase <<= 1;
-        }
-        // The top of the product with six counts them.
-        self.sixths |= 1 << ((u64::from(angle.to_bits() as u32) * 6) >> 32) as u32;
-        if self.sixths != ALL_SIXTHS {
+    /// Looks at the currents; one of up to `none` may be no current. Returns true if a direction is open.
+    fn look(&mut self, snapshot: &Snapshot, none: AdcCounts) -> bool {
+        let round = &mut self.round;
+        if !round.look(snapshot) {
             return false;
         }
-        self.sixths = 0;
-        self.count = self.count.saturating_add(1);
-        // A round without any current tells nothing, nor do those before it.
-        if core::mem::take(&mut self.greatest) <= none || self.flowed == ALL_DIRECTIONS {
+        let greatest = round
+            .peaks
+            .iter()
+            .fold(AdcCounts::ZERO, |most, peak| most.max(*peak));
+        // A direction that does not conduct still shows noise.
+        let noise = greatest >> 3;
+        let mut direction: Directions = 1;
+        for peak in &round.peaks {
+            if *peak > noise {
+                self.conducted |= direction;
+            }
+            direction <<= 1;
+        }
+        // A torque that swings in step with the turns may keep a sound phase's current to one direction. That of two
+        // phases alone is against the rest for at most a sixth of a turn.
+        let [forwards, backwards] = round.torques;
+        if forwards.min(backwards) <= (forwards + backwards) / 4 {
+            self.steady += 1;
+        }
+        *round = Round::default();
+        // Without any current the rotor may have gone anywhere.
+        if self.conducted == ALL_DIRECTIONS || greatest <= none {
             *self = Self::default();
         }
-        self.count >= ROUNDS
+        self.steady >= OPEN_ROUNDS
+    }
+}
+
+impl Round {
+    /// Looks at the currents. Returns true if this completes the round.
+    fn look(&mut self, snapshot: &Snapshot) -> bool {
+        for (phase, current) in snapshot.currents.iter().enumerate() {
+            let [forth, back] = [phase, phase + 3];
+            self.peaks[forth] = self.peaks[forth].max(*current);
+            self.peaks[back] = self.peaks[back].max(current.wrapping_neg());
+        }
+        self.torques[usize::from(snapshot.i.q < Current::ZERO)] += 1;
+        // The top of the product with six counts the sextants.
+        self.sextants |= 1 << ((u64::from(snapshot.angle.to_bits() as u32) * 6) >> 32) as u32;
+        let missing = ALL_SEXTANTS ^ self.sextants;
+        missing & missing.wrapping_sub(1) == 0
     }
 }
 
@@ -149,13 +176,13 @@ mod tests {
     use crate::drive::{Phase, State};
     use crate::params::{BOSSO_BENCH, Board, Params, build};
 
-    /// Turns of the rotor from look to look: at idle, near a half, and nearly one.
-    const STEPS: [f64; 3] = [0.094, 0.49, 0.933];
+    /// Turns of the rotor from look to look: at idle, at 1200 turns a second, near a half, and nearly one.
+    const STEPS: [f64; 4] = [0.094, 0.2, 0.49, 0.933];
 
     const MOST: AdcCounts = AdcCounts::lit("100");
 
-    /// What is found in so many looks of a rotor that turns so far from one to the next, of currents and readings, in
-    /// parts of what a sensor may be off by, at each angle.
+    /// The warnings after so many looks at a rotor that turns so far from one to the next. Currents and their readings
+    /// are in parts of `MOST`.
     fn found(
         step: f64,
         looks: u32,
@@ -166,7 +193,7 @@ mod tests {
         found_at(turns, looks, currents, shown)
     }
 
-    /// The same of a rotor that is so many turns on at each look.
+    /// The same with the rotor at so many turns at each look.
     fn found_at(
         turns: impl Fn(u32) -> f64,
         looks: u32,
@@ -179,10 +206,16 @@ mod tests {
             let turns = turns(look);
             let read = shown(currents(look, turns));
             snapshot.currents = read.map(|part| MOST * AdcCounts::from_num(part));
+            let torque: f64 = read
+                .iter()
+                .zip(unit(turns))
+                .map(|(i, along)| i * along)
+                .sum();
+            snapshot.i.q = Current::from_num(torque.signum());
             snapshot.angle = Angle::wrapping_from_num(turns);
             witness.look(&snapshot, MOST);
         }
-        witness.found.iter().collect()
+        witness.warnings.iter().collect()
     }
 
     /// Of a motor that runs.
@@ -194,9 +227,14 @@ mod tests {
         }
     }
 
-    /// Phase b's current leads by a third of a turn; negative brakes.
+    /// Currents of unit torque.
+    fn unit(turns: f64) -> [f64; 3] {
+        [0.0, 1.0, 2.0].map(|third| (TAU * (turns - third / 3.0)).cos())
+    }
+
+    /// A negative amplitude brakes.
     fn sound(amplitude: f64) -> impl Fn(u32, f64) -> [f64; 3] {
-        move |_, turns| [0.0, 1.0, 2.0].map(|third| amplitude * (TAU * (turns - third / 3.0)).cos())
+        move |_, turns| unit(turns).map(|current| amplitude * current)
     }
 
     fn as_is(currents: [f64; 3]) -> [f64; 3] {
