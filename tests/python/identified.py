@@ -135,15 +135,15 @@ def flies(folder: Path, number: int, steps: int) -> Outcome:
     tables = drawn_bench(motor) | {"params": params | kept}
     tables["bench"] |= {"duration_s": full_s, "plant": PLANTS[number % 2]}
     windows = {"all": (1.4, end_s), "idle": (end_s - 0.2, end_s), "full": (full_s - 0.2, full_s)}
-    faults, windows = flown(folder, tables, [*throttle, (end_s, 1.0)], windows)
-    return Outcome(found, windows["full"]["rpm_min"] / motor["rpm"], slams_of(faults, windows))
+    told, windows = flown(folder, tables, [*throttle, (end_s, 1.0)], windows)
+    return Outcome(found, windows["full"]["rpm_min"] / motor["rpm"], slams_of(told, windows))
 
 
 def main() -> int:
     given = campaign.words(__doc__, motors=500, steps=(150, "steps of the throttle"))
     outcomes = []
     heads = " ".join(f"{name[4:]:>9}" for name in BOUNDS)
-    print(f"{'motor':>5} {heads} {'took':>5} {'full':>5} {'starts':>6} {'worst':>6} {'idle':>5}  texts or faults")
+    print(f"{'motor':>5} {heads} {'took':>5} {'full':>5} {'starts':>6} {'worst':>6} {'idle':>5}  texts, or faults and warnings")
     for number, outcome in campaign.played(
         campaign.numbers(given), lambda folder, number: flies(folder, number, given.steps), given.jobs
     ):
@@ -154,7 +154,7 @@ def main() -> int:
         if slams:
             angles = f"{slams.worst_deg:>6.1f} {slams.idle_deg:>5.1f}"
             flown_so = f"{outcome.full_speed:>5.2f} {slams.starts:>6} {angles}"
-        told = ", ".join([*found.texts, *(slams.faults if slams else [])])
+        told = ", ".join([*found.texts, *(slams.told if slams else [])])
         print(f"{number:>5} {errors} {found.took_s:>5.1f} {flown_so}  {told}".rstrip(), flush=True)
     found = [outcome.found for outcome in outcomes]
     near = sum(one.is_near() for one in found)

@@ -33,8 +33,8 @@ AT_REST = 0.02
 class Outcome:
     """What 3 s of open throttle have made of a motor."""
 
-    faults: list
-    """And warnings."""
+    told: list
+    """Faults and warnings."""
     speed: float
     """The least in the last fifth of a second, over what the throttle's share is of full speed; one that is the wrong
     way is negative."""
@@ -46,11 +46,11 @@ class Outcome:
         return self.speed > LEAST_SPEED
 
     def turns(self) -> bool:
-        return not self.faults and self.is_fast()
+        return not self.told and self.is_fast()
 
     def holds(self) -> bool:
         """It turns and nothing is said to be wrong, or it does not and something is; within the current."""
-        return bool(self.faults) != self.is_fast() and self.current < MOST_CURRENT
+        return bool(self.told) != self.is_fast() and self.current < MOST_CURRENT
 
 
 def limits(motor: dict) -> dict:
@@ -64,10 +64,10 @@ def opened(folder: Path, motor: dict, swapped: bool) -> Outcome:
     tables["bench"]["duration_s"] = END_S
     tables["params"] = FACTORY | limits(motor) | {"MOT_DIR": int(swapped)}
     windows = {"all": (0.0, END_S), "end": (END_S - 0.2, END_S)}
-    faults, windows = flown(folder, tables, [(0.0, 0.0), (OPENS_S, SHARE)], windows)
+    told, windows = flown(folder, tables, [(0.0, 0.0), (OPENS_S, SHARE)], windows)
     rpm = -windows["end"]["rpm_max"] if swapped else windows["end"]["rpm_min"]
     current = windows["all"]["current_max_a"] / motor["params"]["LIM_PHASE_A"]
-    return Outcome(faults, rpm / (SHARE * motor["rpm"]), current)
+    return Outcome(told, rpm / (SHARE * motor["rpm"]), current)
 
 
 def drawn(folder: Path, number: int) -> Outcome:
@@ -80,11 +80,11 @@ def drawn(folder: Path, number: int) -> Outcome:
 def main() -> int:
     given = campaign.words(__doc__, motors=500)
     outcomes = []
-    print(f"{'motor':>5} {'turns':<5} {'speed':>6} {'current':>7}  faults")
+    print(f"{'motor':>5} {'turns':<5} {'speed':>6} {'current':>7}  faults, warnings")
     for number, outcome in campaign.played(campaign.numbers(given), drawn, given.jobs):
         outcomes.append(outcome)
         turns = "yes" if outcome.turns() else "NO"
-        row = f"{number:>5} {turns:<5} {outcome.speed:>6.2f} {outcome.current:>7.2f}  {', '.join(outcome.faults)}"
+        row = f"{number:>5} {turns:<5} {outcome.speed:>6.2f} {outcome.current:>7.2f}  {', '.join(outcome.told)}"
         print(row.rstrip(), flush=True)
     turn = sum(outcome.turns() for outcome in outcomes)
     hold = sum(outcome.holds() for outcome in outcomes)

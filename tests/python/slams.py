@@ -34,8 +34,8 @@ IDLE_DEG = 20.0
 class Outcome:
     """What slams have made of a drive."""
 
-    faults: list
-    """And warnings."""
+    told: list
+    """Faults and warnings."""
     starts: int
     lost: bool
     """90 degrees of error or more."""
@@ -45,7 +45,7 @@ class Outcome:
     """The error's rms in the last of half a second of idle."""
 
     def holds(self) -> bool:
-        turned_on = not self.faults and self.starts == 0 and not self.lost
+        turned_on = not self.told and self.starts == 0 and not self.lost
         return turned_on and self.worst_deg < TRANSIENT_DEG and self.idle_deg < IDLE_DEG
 
 
@@ -63,14 +63,14 @@ def throttles(draw: random.Random, steps: int) -> tuple[list, float]:
     return throttle, at_s + 0.5
 
 
-def slams_of(faults: list, windows: dict) -> Outcome:
+def slams_of(told: list, windows: dict) -> Outcome:
     """The outcome by the windows "all" and "idle"."""
     whole = windows["all"]
     # A drive that is off has no error, but knows no angle either.
     worst_deg, idle_deg = whole["angle_error_max_deg"], windows["idle"]["angle_error_rms_deg"]
     known = worst_deg is not None and idle_deg is not None
     errors_deg = (worst_deg, idle_deg) if known else (180.0, 180.0)
-    return Outcome(faults, whole["starts"], whole["lock_lost"], *errors_deg)
+    return Outcome(told, whole["starts"], whole["lock_lost"], *errors_deg)
 
 
 def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outcome:
@@ -102,15 +102,15 @@ def main() -> int:
     given = campaign.words(__doc__, motors=20, steps=(150, "steps of the throttle"))
     cases = list(product(campaign.numbers(given), MODES, PLANTS))
     outcomes = []
-    print(f"{'motor':>5} {'mode':<8} {'plant':<10} {'held':<5} {'starts':>6} {'worst':>6} {'idle':>5}  faults")
+    print(f"{'motor':>5} {'mode':<8} {'plant':<10} {'held':<5} {'starts':>6} {'worst':>6} {'idle':>5}  faults, warnings")
     for (number, mode, plant), outcome in campaign.played(
         cases, lambda folder, case: drawn(folder, *case, given.steps), given.jobs
     ):
         outcomes.append(outcome)
         held = "yes" if outcome.holds() else "NO"
         figures = f"{outcome.starts:>6} {outcome.worst_deg:>6.1f} {outcome.idle_deg:>5.1f}"
-        faults = ", ".join(map(str, outcome.faults))
-        print(f"{number:>5} {mode:<8} {plant:<10} {held:<5} {figures}  {faults}".rstrip(), flush=True)
+        told = ", ".join(map(str, outcome.told))
+        print(f"{number:>5} {mode:<8} {plant:<10} {held:<5} {figures}  {told}".rstrip(), flush=True)
     held = sum(outcome.holds() for outcome in outcomes)
     worst = [outcome.worst_deg for outcome in outcomes]
     idle = [outcome.idle_deg for outcome in outcomes]

@@ -16,7 +16,7 @@ def test_any_motor_turns_the_right_way_within_3_s_of_the_throttle(tmp_path):
         motor = motor_of(draw)
         outcomes[number] = opened(tmp_path, motor, draw.random() < 0.5)
     assert {number: outcome for number, outcome in outcomes.items() if outcome.current >= MOST_CURRENT} == {}
-    suspected = {number: outcome for number, outcome in outcomes.items() if outcome.is_fast() and outcome.faults}
+    suspected = {number: outcome for number, outcome in outcomes.items() if outcome.is_fast() and outcome.told}
     assert suspected == {}, "nothing is wrong with them"
     at_rest = {number: outcome for number, outcome in outcomes.items() if not outcome.turns()}
     assert len(at_rest) <= AT_REST * MOTORS, at_rest
