@@ -18,21 +18,22 @@
 //! [`esc`]: crate::esc
 #![doc = include_str!("../README.md")]
 //!
-//! # The order of the modules
-//! Dependencies run one way: {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control`
-//! ← `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`} ←
-//! {`answer`, `mavlink`} ← {`throttle`, `store`} ← `esc`. Those in braces do not use each other. A test holds this order,
-//! and that each folder has one.
+//! # Module order
+//! Dependencies run one way: {`trace`, `tune`, `checksum`, `image`} ← `math` ← {`units`, `input`} ← `control` ←
+//! `protection` ← `drive` ← {`params`, `statistics`} ← {`check`, `identify`, `record`, `setpoint`, `telemetry`}
+//! ← {`answer`, `mavlink`} ← {`throttle`, `store`} ← `esc`. Modules in the same braces do not use each other. A
+//! test enforces this order, and that every folder has a place in it.
 //!
 //! # Inlining
-//! The chip's code is made as small as it can be, and the compiler inlines only what is no longer than a call. Each
-//! attribute says why it is there. Those that are many:
+//! The chip build optimizes for size, so the compiler inlines only what is no longer than a call. Every inline
+//! attribute states its reason. The common ones:
 //!
-//! - `#[inline(always)] // in each period`: a call, and the registers that it saves, would cost each control period
-//!   more time than the copies take flash. *In the longest period* likewise, of the outer loop.
-//! - `#[inline(never)] // only some periods`: the others would save registers for it.
+//! - `#[inline(always)] // in each period`: a call and its register saves would cost every control period more
+//!   time than the copies cost flash. *In the longest period* means the same for the outer loop.
+//! - `#[inline(never)] // only some periods`: inlined, it would make the other periods save registers for it
+//!   too.
 //!
-//! One that changes neither the image nor the counts of instructions does not stay.
+//! An attribute that changes neither the image nor the instruction counts is removed.
 #![no_std]
 #![forbid(unsafe_code)]
 

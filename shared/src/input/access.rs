@@ -1,28 +1,28 @@
-//! The authority as others than the wire use it. It may belong to a task that interrupts them.
+//! Access to the authority for callers other than the wire. Its owner may be a task that preempts them.
 
 use super::authority::{Authority, Command, Denied, DriveStatus, TestError};
 
-/// The requests that others than the wire may make of the [`Authority`], each at one moment.
+/// The requests that others than the wire may make of the [`Authority`]; each is atomic.
 pub trait Access {
-    /// As [`Authority::command`].
+    /// See [`Authority::command`].
     fn command(&mut self) -> Command;
 
-    /// As [`Authority::armed`].
+    /// See [`Authority::armed`].
     fn armed(&mut self) -> bool;
 
-    /// As [`Authority::disarm`].
+    /// See [`Authority::disarm`].
     fn disarm(&mut self);
 
-    /// As [`Authority::arm`].
+    /// See [`Authority::arm`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Authority::arm`].
     fn arm(&mut self, now_us: u64) -> Result<(), Denied>;
 
-    /// As [`Authority::actuator_test`].
+    /// See [`Authority::actuator_test`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Authority::actuator_test`].
     fn actuator_test(
         &mut self,
         now_us: u64,
@@ -31,7 +31,7 @@ pub trait Access {
         drive: DriveStatus,
     ) -> Result<(), TestError>;
 
-    /// As [`Authority::may_test`].
+    /// See [`Authority::may_test`].
     fn may_test(&mut self, now_us: u64, drive: DriveStatus) -> bool;
 }
 

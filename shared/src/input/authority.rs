@@ -1,14 +1,13 @@
-//! Decides whether the motor may turn: by an armed wire, or by a test of limited time. Nothing else
-//! turns it but an identification, which is begun under the rule of a test, and only while nobody here asks for
-//! anything (`Throttle::setpoint`).
+//! Decides whether the motor may turn: only an armed wire or a time-limited test turns it. The one exception is
+//! an identification, which starts under the same rule as a test, and only while nothing here demands anything
+//! (`Throttle::setpoint`).
 //!
-//! The wire is armed by zero throttle held for a time, in a signal that has been identified. It is
-//! disarmed when that signal is lost, and never turns a motor before it is armed. Only a frame whose
-//! checksum is right, or a pulse, can change the command to the motor. If nearly all other frames fail,
-//! as random words do, the right ones do not count either: of random words one in sixteen is right by
-//! chance. That judgement takes some twelve frames, so a wire at zero opens only after several
-//! throttles in a row: of armed wires that become noise at zero, one in 2170 turns the motor, where the
-//! first throttle alone would turn it in 57 of 100.
+//! Zero throttle, held for a set time in an identified signal, arms the wire. Losing that signal disarms it,
+//! and an unarmed wire never turns the motor. Only a frame with a correct checksum, or a pulse, changes the
+//! command. When nearly all other frames fail their check, as random words do, the valid ones do not count
+//! either: one random word in sixteen passes by chance. That judgement takes some twelve frames, so a wire at
+//! zero opens only after several throttle frames in a row. Of armed wires that turn to noise at zero, one in
+//! 2170 then turns the motor; opening on the first throttle frame would let 57 of 100 turn it.
 
 use super::Share;
 use super::command::within;
@@ -19,32 +18,32 @@ use super::signal::Signal;
 use super::trust::Trust;
 use crate::math::Real;
 
-/// Zero-throttle frames that arm a wire, at least.
+/// The minimum number of zero-throttle frames that arm a wire.
 const ARMING_FRAMES: u32 = 30;
-/// Pulses that arming takes; a servo's come 50 times a second.
+/// The minimum number of zero-throttle pulses that arm a wire; a servo signal has 50 a second.
 const ARMING_PULSES: u32 = 5;
 
-/// DShot zeros, with no throttle between, that close an armed wire. In flight some may be other frames with errors
-/// that their check does not show: these stop the motor until the next throttle.
+/// DShot zeros, without throttle in between, that close an armed wire. In flight a zero may be another frame
+/// with errors that its checksum misses: it stops the motor until the next throttle frame.
 const CLOSING_FRAMES: u8 = 10;
-/// DShot throttles in a row, with no bad frame between, that open it again: 0.75 ms later than the first at
-/// 4 kHz, 3 ms at 1 kHz. A pulse has no checksum to be right by chance: it opens at once. Edges that pass for
-/// pulses do so in a row too, and spikes never do.
+/// Consecutive DShot throttle frames, without a bad one in between, that reopen it. They delay the first by
+/// 0.75 ms at 4 kHz, 3 ms at 1 kHz. A pulse has no checksum to pass by chance and opens at once: edges that
+/// look like pulses do so repeatedly, and spikes never do.
 const OPENING_FRAMES: u8 = 4;
 
-/// The longest silence after a DShot command that is no loss, µs. The protocol leaves 260 ms after a
-/// beacon, and Betaflight's loop, which waits for it, 110 ms until the next frame.
+/// The longest silence after a DShot command that is not a loss, µs. The protocol allows 260 ms after a beacon,
+/// and Betaflight's loop, which waits for it, sends the next frame 110 ms later.
 const COMMAND_GAP_US: u64 = 300_000;
 
 /// The longest test, s.
 const TEST_MOST_S: f32 = 3.0;
 
-/// Times of the wire.
+/// Arming and loss times of the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
-    /// Time for which zero throttle must be held to arm, µs.
+    /// How long zero throttle must be held to arm, µs.
     pub arm_us: u64,
-    /// The longest time without a valid frame; past it the signal is lost, µs.
+    /// The longest time without a valid frame before the signal counts as lost, µs.
     pub loss_us: u64,
 }
 
@@ -53,12 +52,11 @@ pub struct Timing {
 pub enum Command {
     /// Do not turn.
     Stop,
-    /// Do not turn, because the armed wire holds zero throttle, or somebody has disarmed: an earlier fault
-    /// is forgiven.
+    /// Do not turn: the armed wire holds zero throttle, or somebody disarmed. Clears an earlier fault.
     Zero,
-    /// Turn, by the wire's throttle.
+    /// Turn by the wire's throttle.
     Throttle(Share),
-    /// Turn, by a test's value.
+    /// Turn by a test's value.
     Test(Share),
 }
 
@@ -69,32 +67,32 @@ impl Command {
     }
 }
 
-/// The drive's state, for those who may test only a motor at rest.
+/// The drive's state, for tests that need the motor at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DriveStatus {
-    /// The drive does not turn the motor, nothing asks it to, and the shaft is at rest.
+    /// The drive is not turning the motor, nothing asks it to, and the shaft is at rest.
     pub stopped: bool,
     /// A fault holds the bridge off.
     pub faulted: bool,
 }
 
-/// Arming was refused: the wire does not hold valid zero throttle, or nothing may turn the motor.
+/// Arming refused: the wire does not hold valid zero throttle, or the authority is barred.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Denied;
 
-/// The reason why a test was refused.
+/// The reason a test was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TestError {
-    /// A value outside 0 to 1, or −1 to 1 with two directions, or a time outside 0 to 3 s.
+    /// Value outside 0 to 1 (−1 to 1 with two directions), or time outside 0 to 3 s.
     OutOfRange,
-    /// The motor turns, a fault holds, the wire is neither silent nor at valid zero, or nothing may turn
-    /// the motor.
+    /// The motor turns, a fault holds, the wire is neither silent nor at valid zero, or the authority is
+    /// barred.
     TemporarilyRejected,
 }
 
 /// Decides whether the motor may turn.
 ///
-/// Times are in µs since any start, and do not run backwards.
+/// Times are in µs from an arbitrary origin, and monotonic.
 #[derive(Clone, Debug)]
 pub struct Authority {
     timing: Timing,
@@ -103,20 +101,20 @@ pub struct Authority {
     arming: Option<Arming>,
     valid: Option<Valid>,
     trust: Trust,
-    /// Zeros since the throttle was open.
+    /// Zeros since the last throttle that was let through.
     closing: u8,
-    /// Throttles since the last zero or bad frame.
+    /// Throttle frames since the last zero or bad frame.
     opening: u8,
     event_us: Option<u64>,
     test: Option<Test>,
-    /// Somebody has disarmed since the last drive: until the fault that may hold has ended, that is as good as zero
+    /// Somebody disarmed since the motor was last driven: until the present fault ends, this counts as zero
     /// throttle on the wire.
     forgiven: bool,
-    /// True if nothing may turn the motor, whoever asks.
+    /// Nothing may turn the motor, whoever asks.
     barred: bool,
 }
 
-/// Zero throttle since some time.
+/// Zero throttle being held to arm.
 #[derive(Clone, Copy, Debug)]
 struct Arming {
     since_us: u64,
@@ -124,15 +122,15 @@ struct Arming {
     failed: u32,
 }
 
-/// The last frame with a right checksum, or pulse.
+/// The last frame with a correct checksum, or pulse.
 #[derive(Clone, Copy, Debug)]
 struct Valid {
     at_us: u64,
     signal: Signal,
-    /// True if the wire was known to carry this signal, and it means what it says.
+    /// The wire was known to carry this signal, so the demand may be trusted.
     identified: bool,
     demand: Demand,
-    /// True if it was a DShot command.
+    /// It was a DShot command.
     command: bool,
 }
 
@@ -143,7 +141,7 @@ struct Test {
 }
 
 impl Authority {
-    /// Unarmed, with no signal.
+    /// Creates an unarmed authority without a signal.
     pub fn new(timing: Timing) -> Self {
         Self {
             timing,
@@ -161,8 +159,8 @@ impl Authority {
         }
     }
 
-    /// Lets nothing turn the motor from now on, neither the wire nor a test, or lets them again. The wire
-    /// must be armed again then.
+    /// Bars everything, wire and tests, from turning the motor, or lifts the bar. The wire must then be armed
+    /// again.
     pub fn bar(&mut self, barred: bool) {
         self.barred = barred;
         if barred {
@@ -171,13 +169,13 @@ impl Authority {
         }
     }
 
-    /// Changes the times, at once.
+    /// Changes the times, effective at once.
     pub fn set_timing(&mut self, timing: Timing) {
         self.timing = timing;
     }
 
-    /// Changes how frames and pulses are read, and the directions of tests. What was zero may be
-    /// full throttle now: the wire must be armed again if anything changes.
+    /// Changes how frames and pulses are read, and the directions of tests. What was zero may now be full
+    /// throttle, so any change disarms the wire.
     pub fn set_reading(&mut self, reading: Reading) {
         if self.reading != reading {
             self.reading = reading;
@@ -185,11 +183,11 @@ impl Authority {
         }
     }
 
-    /// Takes the decoder's event, and the signal identified so far.
+    /// Processes a decoder event, given the signal identified so far.
     ///
-    /// Before one is identified, zero throttle counts and does not arm. Later, any other is bad.
+    /// Before identification zero throttle counts but does not arm; after it, any other signal is bad.
     pub fn wire(&mut self, now_us: u64, event: Event, identified: Option<Signal>) {
-        // Time-outs before this event apply, however late `poll` is.
+        // Timeouts before this event apply even when `poll` is late.
         self.poll(now_us);
         self.event_us = Some(now_us);
         let (Some(signal), Some(demand)) = (event.signal(), self.reading.demand(&event)) else {
@@ -210,8 +208,8 @@ impl Authority {
             }
         }
         if matches!(signal, Signal::Dshot { .. }) && !self.trust.good() {
-            // It keeps no signal and opens no throttle. To stop is right in either case, and the sender is not
-            // silent any more.
+            // It neither keeps the signal alive nor opens the throttle. Stopping is right either way, and it
+            // ends the sender's silence after a command.
             if let Some(valid) = &mut self.valid {
                 valid.command = false;
                 if demand == Demand::Zero {
@@ -237,7 +235,7 @@ impl Authority {
         }
     }
 
-    /// The demand; an armed wire at zero stays there for the first throttles.
+    /// Returns the demand to act on: an armed wire at zero holds it for the first throttle frames.
     fn opened(&mut self, signal: Signal, demand: Demand) -> Demand {
         let closed = self.armed && self.closing >= CLOSING_FRAMES;
         let waits = closed && self.opening < OPENING_FRAMES;
@@ -269,7 +267,7 @@ impl Authority {
         }
     }
 
-    /// More bad frames than good ones: what arrives may be noise, and zero by chance.
+    /// Counts a bad frame. More bad frames than good: what arrives may be noise, and the zeros chance.
     fn count_failure(&mut self) {
         self.trust.bad();
         self.opening = 0;
@@ -281,13 +279,13 @@ impl Authority {
         }
     }
 
-    /// The wire must be armed again.
+    /// Disarms: the wire must be armed again.
     pub fn restart(&mut self) {
         self.armed = false;
         self.arming = None;
     }
 
-    /// The stick teaches its end points: for now it is no throttle, not even zero.
+    /// Starts learning the stick's end points: for now it is not throttle, not even zero.
     pub fn learn(&mut self) {
         self.restart();
         self.test = None;
@@ -296,10 +294,9 @@ impl Authority {
         }
     }
 
-    /// Applies time-outs: of a lost signal's arming, and of a test.
+    /// Applies the timeouts of signal and test; returns true once for each lost signal.
     ///
-    /// Between two calls a lost signal or a test lasts longer than it should; otherwise it does not
-    /// matter how rarely it is called. Returns true once for each signal that was lost.
+    /// How rarely it is called only affects how long a lost signal or a test outlasts its time.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if self.test.is_some_and(|test| now_us >= test.ends_us) {
             self.test = None;
@@ -312,7 +309,7 @@ impl Authority {
         lost
     }
 
-    /// The command to the motor, as of the last [`Authority::poll`] or event.
+    /// Returns the command to the motor as of the last [`Authority::poll`] or event.
     pub fn command(&self) -> Command {
         if let Some(test) = self.test {
             return Command::Test(test.value);
@@ -325,18 +322,18 @@ impl Authority {
         }
     }
 
-    /// Returns true if the wire shows zero throttle, and no test runs.
+    /// Returns true if the wire shows zero throttle and no test runs.
     pub fn rests_by_wire(&self) -> bool {
         let zero = |valid: Valid| valid.identified && valid.demand == Demand::Zero;
         self.test.is_none() && self.valid.is_some_and(zero)
     }
 
-    /// Returns true if a throttle on the wire would turn the motor.
+    /// Returns true if throttle on the wire would turn the motor.
     pub fn armed(&self) -> bool {
         self.armed
     }
 
-    /// Returns true if the wire asks the motor to turn, and may not.
+    /// Returns true if the wire demands throttle but is not armed.
     pub fn refuses(&self) -> bool {
         let open = self
             .valid
@@ -344,8 +341,8 @@ impl Authority {
         open && !self.armed
     }
 
-    /// Returns true if a valid frame or pulse has come within the loss time. After a command an armed
-    /// wire at rest may be silent for longer: that stops nothing which is not stopped already.
+    /// Returns true if a valid frame or pulse arrived within the loss time. After a command an armed wire at
+    /// rest may stay silent longer: nothing turns that a loss would have to stop.
     pub fn signal_present(&self, now_us: u64) -> bool {
         let loss_us = match self.valid {
             Some(valid) if self.armed && valid.command => self.timing.loss_us.max(COMMAND_GAP_US),
@@ -361,12 +358,12 @@ impl Authority {
         self.forgiven = true;
     }
 
-    /// A request to arm. It grants nothing that the wire does not: only its own zero throttle,
+    /// Answers a request to arm. It grants nothing that the wire does not: only the wire's own zero throttle,
     /// held for its time, arms it.
     ///
     /// # Errors
-    /// [`Denied`] unless the last valid frame is zero throttle and not older than the loss time, and the
-    /// wire may turn the motor.
+    /// [`Denied`] unless the last valid frame is zero throttle and within the loss time, and the authority is
+    /// not barred.
     pub fn arm(&self, now_us: u64) -> Result<(), Denied> {
         if self.holds_zero(now_us) && !self.barred {
             Ok(())
@@ -375,14 +372,14 @@ impl Authority {
         }
     }
 
-    /// Turns the motor by `value`, 0 to 1 or −1 to 1 with two directions, for `duration_s`; NaN ends
-    /// a running test.
+    /// Turns the motor by `value`, 0 to 1 (−1 to 1 with two directions), for `duration_s`; NaN ends a running
+    /// test.
     ///
-    /// It ends at its time, at any throttle on the wire but zero, at [`Authority::disarm`] and at
+    /// The test ends on time, at any non-zero throttle on the wire, at [`Authority::disarm`] and at
     /// [`Authority::fault`].
     ///
     /// # Errors
-    /// See [`TestError`]. A refused test leaves a running one as it is.
+    /// See [`TestError`]. A refused test leaves a running one alone.
     pub fn actuator_test(
         &mut self,
         now_us: u64,
@@ -407,7 +404,7 @@ impl Authority {
             return Err(TestError::TemporarilyRejected);
         }
         let duration_us = u64::from((duration_s * 1e6) as u32);
-        // No time at all, or nothing to turn by, is no test.
+        // Zero time or zero value is no test.
         self.test = (duration_us > 0 && value != 0.0).then(|| Test {
             value: Share::from_f32(value),
             ends_us: now_us.saturating_add(duration_us),
@@ -415,16 +412,15 @@ impl Authority {
         Ok(())
     }
 
-    /// Returns true if something else than the wire may use the motor: it rests without a fault, and
-    /// the wire is silent or at valid zero. Even if nothing may turn the motor, a self-test may still
-    /// find out why.
+    /// Returns true if something other than the wire may use the motor: it is at rest without a fault, and the
+    /// wire is silent or at valid zero. This holds even when barred, so that a self-test can find out why.
     pub fn may_test(&self, now_us: u64, drive: DriveStatus) -> bool {
         let silent = !within(now_us, self.event_us, self.timing.loss_us);
         drive.stopped && !drive.faulted && (silent || self.holds_zero(now_us))
     }
 
-    /// To be called at each look with true if a fault holds the bridge off: that ends a test. When the fault
-    /// has ended, a disarming no longer forgives anything.
+    /// Reports on each poll whether a fault holds the bridge off. A fault ends a test; once it has cleared, an
+    /// earlier disarm no longer clears anything.
     pub fn fault(&mut self, holds: bool) {
         if holds {
             self.test = None;

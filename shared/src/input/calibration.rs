@@ -1,91 +1,91 @@
-//! Calibration of the pulses' end points by the stick.
+//! Stick calibration of the pulse end points.
 //!
-//! It works as with other ESCs: the ESC is powered up with the stick at full throttle and reports after
-//! two seconds that it has measured it; the stick is then pulled to no throttle, and after one and a
-//! half seconds both ends are known. Anything else leaves them as they were, until the next power-up.
+//! It works as on other ESCs: power up with the stick at full throttle, and after two seconds the ESC reports
+//! that it has measured it; pull the stick to no throttle, and after one and a half seconds both ends are
+//! known. Anything else leaves them as they were until the next power-up.
 //!
-//! A ground station may ask for the same at any time: the stick then has a minute to come up.
+//! A ground station may request the same at any time; the stick then has a minute to come up.
 //!
-//! The same once more after that of a power-up, up within two seconds, asks for the identification of the motor.
+//! Repeating the sequence right after one from power-up, with the stick up within two seconds, requests
+//! identification of the motor.
 
 use super::endpoints::EndPoints;
 use crate::math::quotient;
 
-/// Servo pulses that may be full throttle, ns: the upper part of the accepted range. The middle of a
-/// stick for two directions must not begin a calibration.
+/// Servo pulses accepted as full throttle, ns: the upper part of the valid range. The centre of a two-direction
+/// stick must not start a calibration.
 const FULL_NS: core::ops::RangeInclusive<u32> = 1_700_000..=2_200_000;
-/// Servo pulses that may be no throttle, ns.
+/// Servo pulses accepted as no throttle, ns.
 const NONE_NS: core::ops::RangeInclusive<u32> = 800_000..=1_300_000;
-/// The least distance of the two ends, ns.
+/// The minimum distance between the two ends, ns.
 const SPAN_NS: u32 = 500_000;
 
-/// Time for which full throttle must be held, µs. PX4 holds it for 3.00 to 3.05 s from the battery on,
-/// ArduPilot for 5 s; the ESC's start and the signal's identification, 0.1 s each, come off that.
+/// How long full throttle must be held, µs. PX4 holds it for 3.00 to 3.05 s from battery connection, ArduPilot
+/// for 5 s; the ESC's startup and signal identification take 0.1 s each out of that.
 const FULL_US: u64 = 2_200_000;
-/// Time for which no throttle must be held, µs.
+/// How long no throttle must be held, µs.
 const NONE_US: u64 = 1_500_000;
-/// The most that a held stick strays from its first width at rest, ns: receivers jitter by
-/// some µs.
+/// The most a held stick may stray from its first width, ns; receivers jitter by a few µs.
 const STEADY_NS: u32 = 16_000;
-/// The longest way of the stick from one end to the other, µs.
+/// The longest time for the stick to travel from one end to the other, µs.
 const WAY_US: u64 = 2_000_000;
-/// Timeout for the stick once a ground station has asked for a calibration, µs.
+/// How long to wait for the stick after a ground station's request, µs.
 const WAIT_US: u64 = 60_000_000;
 
-/// A step to report.
+/// A calibration step to report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Full throttle has been measured; no throttle is awaited.
+    /// Full throttle measured; waiting for no throttle.
     Full,
-    /// Both ends have been measured.
+    /// Both ends measured.
     Done(EndPoints),
-    /// Full throttle has been held again; no throttle is awaited.
+    /// Full throttle held again; waiting for no throttle.
     Again,
-    /// No throttle has followed: the motor is to be identified.
+    /// No throttle followed: identify the motor.
     Identify,
-    /// Something else than no throttle followed full throttle, or the stick was not moved as asked.
+    /// Something other than no throttle followed full throttle, or the stick did not move as asked.
     Cancelled,
 }
 
-/// Watches the first signal after power-up, and any when it is asked to.
+/// Watches the first signal after power-up, and any later one on request.
 #[derive(Clone, Debug, Default)]
 pub struct Calibration {
     stage: Stage,
-    /// Time at which it was asked for, until it ends.
+    /// When it was requested, until it ends.
     asked_us: Option<u64>,
-    /// True once both ends have been measured: the stick may ask for more.
+    /// Both ends are measured: the stick may now request identification.
     done: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 enum Stage {
-    /// Nothing has come.
+    /// No pulse yet.
     #[default]
     Fresh,
     /// The stick is at full throttle.
     Full(Held),
-    /// Full throttle has been measured.
+    /// Full throttle is measured.
     None {
         full_ns: u32,
-        /// Time at which the stick was last at full throttle.
+        /// When the stick was last at full throttle.
         full_us: u64,
         held: Option<Held>,
     },
     Over,
 }
 
-/// A stick that is held.
+/// A stick held in one position.
 #[derive(Clone, Copy, Debug)]
 struct Held {
     since_us: u64,
     first_ns: u32,
-    /// Against the first width.
+    /// Sum of the deviations from the first width.
     sum_ns: i64,
     count: u32,
 }
 
 impl Calibration {
-    /// Waits for a stick at full throttle from now on.
+    /// Starts a calibration: waits for the stick at full throttle.
     pub fn ask(&mut self, now_us: u64) {
         *self = Self {
             asked_us: Some(now_us),
@@ -93,8 +93,8 @@ impl Calibration {
         };
     }
 
-    /// It ends: the signal carries something else than pulses, or it is no longer wanted. Never inlined:
-    /// each way out is one.
+    /// Ends the calibration: the signal is not pulses, or it is no longer wanted. Never inlined, because every
+    /// exit calls it.
     #[inline(never)]
     pub fn end(&mut self) -> Option<Step> {
         let cancels = self.is_under_way() && !self.done;
@@ -105,13 +105,13 @@ impl Calibration {
         cancels.then_some(Step::Cancelled)
     }
 
-    /// Returns true if the stick calibrates and is no throttle: a calibration has been asked for, or
-    /// full throttle has been measured and no throttle is awaited.
+    /// Returns true while the stick calibrates and is not throttle: a calibration was requested, or full
+    /// throttle is measured and no throttle is still to come.
     pub fn is_under_way(&self) -> bool {
         self.asked_us.is_some() || matches!(self.stage, Stage::None { .. })
     }
 
-    /// The signal was lost, if there was an identified one.
+    /// Ends the calibration when an identified signal, if any, is lost.
     pub fn lost(&mut self) -> Option<Step> {
         match (&self.stage, self.asked_us) {
             (Stage::Fresh, None) => None,
@@ -119,7 +119,7 @@ impl Calibration {
         }
     }
 
-    /// Lets time pass: a stick that does not come up is not waited for any longer.
+    /// Times out when the stick does not come up.
     pub fn poll(&mut self, now_us: u64) -> Option<Step> {
         let waits = matches!(self.stage, Stage::Fresh);
         let asked_us = self.asked_us.filter(|_| waits)?;
@@ -129,7 +129,7 @@ impl Calibration {
             .flatten()
     }
 
-    /// A pulse of an identified signal, by the servo pulse that means the same.
+    /// Processes a pulse of an identified signal, converted to the equivalent servo pulse.
     pub fn pulse(&mut self, now_us: u64, servo_ns: u32) -> Option<Step> {
         let full = FULL_NS.contains(&servo_ns);
         match &mut self.stage {
@@ -170,7 +170,7 @@ impl Calibration {
                         if again {
                             return Some(Step::Identify);
                         }
-                        // Who has a ground station asks it for more.
+                        // With a ground station, identification is requested there.
                         if !asked {
                             self.ask(now_us);
                             self.done = true;
@@ -200,7 +200,7 @@ impl Held {
         }
     }
 
-    /// One more pulse; a stick that has moved starts over.
+    /// Adds a pulse; a stick that moved starts over.
     fn add(&mut self, now_us: u64, width_ns: u32) {
         if self.first_ns.abs_diff(width_ns) > STEADY_NS {
             *self = Self::new(now_us, width_ns);
@@ -215,7 +215,7 @@ impl Held {
 
     fn mean_ns(&self) -> u32 {
         let mean_ns = quotient(self.sum_ns.unsigned_abs(), self.count.max(1));
-        // The mean strays no further from the first than any of the widths.
+        // The mean deviates from the first width no more than any single width does.
         if self.sum_ns < 0 {
             self.first_ns.saturating_sub(mean_ns)
         } else {
@@ -224,7 +224,7 @@ impl Held {
     }
 }
 
-/// To the nearest.
+/// Rounds to the nearest µs.
 fn whole_us(ns: u32) -> u16 {
     ((ns + 500) / 1000) as u16
 }

@@ -1,78 +1,78 @@
-//! From believed edges to DShot frames.
+//! Decodes DShot frames from filtered edges.
 //!
-//! The last 32 edges are a frame if the line rested before them, if they lie as evenly as a frame's
-//! and if the checksum fits. A frame is reported at its last edge. Edges that belong to none are
-//! reported once for every 32 of them, or when the line comes to rest.
+//! The last 32 edges are a frame if the line was at rest before them, if their spacing is a frame's and if the
+//! checksum matches. A frame is reported at its last edge. Edges that belong to none are reported once per 32,
+//! or when the line comes to rest.
 
 use super::dshot::{Frame, Rate, check_mask};
 use super::event::Event;
 use super::filter::{Edge, since};
 use crate::math::quotient;
 
-/// Edges of a frame: two a bit.
+/// Edges in a frame: two per bit.
 const EDGES: u8 = 32;
 
-/// From the last edge of a frame back to its first.
+/// Offset from a frame's last edge back to its first.
 const EDGES_BEFORE: usize = EDGES as usize - 1;
 
-/// Whole bits of a frame, from a first edge to a first edge.
+/// Full bit periods in a frame, from leading edge to leading edge.
 const WHOLE_BITS: u32 = 15;
 
-/// Shares of the mean bit in sixteenths.
+/// Thresholds below are in sixteenths of the mean bit.
 ///
-/// A zero is active for 6/16 and a one for 12/16. At DShot1200, 5 % too fast, a bit lasts 794 ns,
-/// and two edges that each stray by 60 ns and a tick of 84 MHz move a width by 132 ns, 2.7/16.
+/// A zero is active for 6/16, a one for 12/16. At DShot1200, 5 % fast, a bit lasts 794 ns, and two edges, each
+/// off by 60 ns plus one tick at 84 MHz, change a width by 132 ns, or 2.7/16.
 const SHARES: u32 = 16;
 const SHORTEST: u32 = 3;
 const ONE: u32 = 9;
 const LONGEST: u32 = 15;
-/// The most that a single bit may stray from the mean one.
+/// The most a single bit may deviate from the mean.
 const STRAY: u32 = 3;
 
-/// Ticks that a bit must have for its pulses to be told apart: 7.2 MHz for DShot600.
+/// The minimum ticks per bit to tell a zero from a one: 7.2 MHz for DShot600.
 const LEAST_TICKS: u32 = 12;
 
-/// Times that are kept: a frame's and the edge before it, to the next power of two.
+/// Edge times to keep: a frame's and the one before it, rounded up to a power of two.
 const KEPT: usize = 64;
 
-/// Finds frames in the edges of one line.
+/// Finds DShot frames in one line's edges.
 #[derive(Clone, Debug)]
-// In this order: what is used most stands where the chip's short instructions reach it.
+// Ordered by use: the hottest fields are within reach of the short load and store encodings.
 #[repr(C)]
 pub(super) struct Decoder {
     newest: usize,
-    /// Of the times, those that count: no more than a frame and the edge before it.
+    /// Valid entries in `times`: at most a frame and the edge before it.
     held: u8,
-    /// Edges since the line has rested for `rest_least`.
+    /// Edges since the line last rested for `rest_least`.
     run: u8,
-    /// Edges that have not been reported, as a frame or as a bad one.
+    /// Edges not yet reported as a frame or as bad.
     unread: u8,
-    /// The rate that is taken, and true if bidirectional; `None` takes all of them.
+    /// The only rate to accept, and whether bidirectional; `None` accepts all.
     only: Option<(Rate, bool)>,
-    /// A level at least this long is no part of a frame.
+    /// A level at least this long is not part of a frame.
     rest_ticks: u32,
-    /// A level shorter than this is no rest before a frame, however fast that is: 1.375 bits.
+    /// A level shorter than this is not the rest before a frame, even the fastest: 1.375 bits.
     rest_least: u32,
     times: [u32; KEPT],
     rates: [Option<Limits>; 4],
 }
 
-/// The durations that one rate's bits may have.
+/// Timing limits of one rate.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     rate: Rate,
-    /// All whole bits of a frame, ticks: the mean within a twelfth.
+    /// Total of a frame's full bit periods, ticks: the mean within a twelfth.
     ///
-    /// Of that, 5 % are the sender's clock, and 1 % is jitter: 132 ns at most, a fifteenth a bit.
+    /// Of that, 5 % is the sender's clock and 1 % jitter: at most 132 ns, a fifteenth per bit.
     span_least: u32,
     span_most: u32,
-    /// 1.5 bits. Within a frame no level exceeds 0.95 bits; after it, senders leave at least 2
-    /// bits and what remains of the last one.
+    /// 1.5 bits. Within a frame no level exceeds 0.95 bits; after it, senders leave at least 2 bits plus the
+    /// remainder of the last one.
     rest_ticks: u32,
 }
 
 impl Decoder {
-    /// A decoder for a timer of `tick_hz`, which takes every rate that has at least 12 ticks a bit.
+    /// Creates a decoder for a timer of `tick_hz` that accepts every rate with at least 12 ticks per bit.
     pub(super) fn new(tick_hz: u32) -> Self {
         let mut decoder = Self {
             rates: Rate::ALL.map(|rate| Limits::new(tick_hz, rate)),
@@ -89,20 +89,19 @@ impl Decoder {
         decoder
     }
 
-    /// Takes one rate of one direction; nothing for all of them.
+    /// Accepts only one rate and direction; `None` accepts all.
     pub(super) fn take_only(&mut self, only: Option<(Rate, bool)>) {
         self.only = only;
         let rates = self.rates.iter().flatten();
         let mut taken = rates.filter(|limits| only.is_none_or(|(rate, _)| rate == limits.rate));
-        // The slowest comes first and the fastest last, and with them the longest and shortest rest.
+        // The rates are sorted: the slowest, with the longest rest, first and the fastest last.
         let slowest = taken.next();
         let fastest = taken.next_back().or(slowest);
         self.rest_ticks = slowest.map_or(u32::MAX, |limits| limits.rest_ticks);
         self.rest_least = fastest.map_or(u32::MAX, |limits| rest(limits.span_least));
     }
 
-    /// Takes an edge within a frame of the rate that is taken, and says so: a short way for nearly
-    /// all of them.
+    /// Takes an edge inside a frame of the accepted rate and returns true: the fast path for nearly every edge.
     pub(super) fn pass(&mut self, at_ticks: u32) -> bool {
         let run = self.run_with(at_ticks);
         let begins_or_goes_on = run > 1 || self.unread == 0;
@@ -114,7 +113,7 @@ impl Decoder {
         passes
     }
 
-    /// Takes an edge of another level than the one before.
+    /// Takes an edge whose level differs from the previous one.
     pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
         let cut = self.settle(at_ticks);
         self.push(at_ticks);
@@ -131,9 +130,9 @@ impl Decoder {
         event
     }
 
-    /// Takes an edge if a frame ends with it, and returns that one.
+    /// Takes an edge only if it completes a frame, and returns that frame.
     pub(super) fn end(&mut self, edge: Edge) -> Option<Event> {
-        // Within a frame of the rate that is taken no level is as long as a rest.
+        // Within a frame of the accepted rate no level is as long as a rest.
         if self.only.is_some() && self.run != EDGES - 1 {
             return None;
         }
@@ -148,9 +147,9 @@ impl Decoder {
         event
     }
 
-    /// Takes all edges of a frame at once, the first and the second of each of its 16 bits, after a rest at
-    /// the level that this kind of wire has; nothing, and none of them is taken, if they are no such frame. It
-    /// comes to what the edges one by one come to, in a tenth of the time.
+    /// Takes a whole frame's edges at once, the leading and trailing edge of each of its 16 bits, after a rest
+    /// at this kind of wire's idle level. Returns `None`, and takes none of them, if they are not such a frame.
+    /// Equivalent to taking them one by one, in a tenth of the time.
     #[inline(always)]
     pub(super) fn whole(
         &mut self,
@@ -169,13 +168,13 @@ impl Decoder {
             return None;
         }
         let event = self.sound(first, span, bidirectional, bit)?;
-        // The next frame must know when this one ended.
+        // The next frame needs the time at which this one ended.
         self.push_of_run(end, EDGES);
         self.held = 1;
         Some(event)
     }
 
-    /// Reports edges that were no frame, once the line has come to rest after them.
+    /// Reports edges that formed no frame, once the line has come to rest after them.
     pub(super) fn settle(&mut self, now_ticks: u32) -> Option<Event> {
         let cut = self.rests(now_ticks);
         if cut {
@@ -184,29 +183,29 @@ impl Decoder {
         cut.then_some(Event::Bad)
     }
 
-    /// An edge was missed before `at_ticks`: no frame goes over it. One may begin there, as the
-    /// next one does when the last edge of a frame was missed.
+    /// Records that an edge was missed before `at_ticks`: no frame spans it. A frame may start there, as the
+    /// next one does when a frame's last edge was missed.
     pub(super) fn spoil(&mut self, at_ticks: u32) {
-        // The edge before shows how long the line may have rested.
+        // Keep the previous edge: it shows how long the line may have rested.
         self.held = self.held.min(1);
         self.run = self.held;
         self.push(at_ticks);
         self.unread = self.unread.max(1);
     }
 
-    /// Forgets every edge: the line has been at rest for long.
+    /// Forgets every edge, after a long rest.
     pub(super) fn clear(&mut self) {
         self.held = 0;
         self.run = 0;
         self.unread = 0;
     }
 
-    /// Returns true if the line has come to rest after edges that have not been reported.
+    /// Returns true if the line has come to rest after unreported edges.
     fn rests(&self, now_ticks: u32) -> bool {
         self.unread > 0 && since(now_ticks, self.back(0)) >= self.rest_ticks
     }
 
-    /// The run of edges with one more at this time.
+    /// Returns the run length including an edge at this time.
     fn run_with(&self, at_ticks: u32) -> u8 {
         if at_ticks.wrapping_sub(self.back(0)) >= self.rest_least {
             1
@@ -228,14 +227,14 @@ impl Decoder {
         }
     }
 
-    /// The time of the edge that came `edges` before the newest one.
+    /// Returns the time of the edge `edges` before the newest.
     fn back(&self, edges: usize) -> u32 {
         self.times[(self.newest + KEPT - edges) % KEPT]
     }
 
-    /// The frame that ends with the newest edge, after which the line is at `level`.
+    /// Returns the frame that ends with the newest edge, after which the line is at `level`.
     fn frame(&self, level: bool) -> Option<Event> {
-        // After a frame the line rests: high, if it is bidirectional.
+        // After a bidirectional frame the line rests high.
         let bidirectional = level;
         let other = self.only.is_some_and(|(_, only)| only != bidirectional);
         if other || self.held < EDGES {
@@ -244,7 +243,7 @@ impl Decoder {
         let first_edge_ticks = self.back(EDGES_BEFORE);
         let span = self.back(1).wrapping_sub(first_edge_ticks);
         let before_ticks = first_edge_ticks.wrapping_sub(self.back(EDGES_BEFORE + 1));
-        // The time before the first edge of all counts as a rest.
+        // The time before the very first edge counts as a rest.
         let rested = self.held == EDGES || before_ticks >= rest(span);
         if !rested {
             return None;
@@ -255,7 +254,7 @@ impl Decoder {
         })
     }
 
-    /// The frame of 16 bits, of which the whole bits take `span`.
+    /// Checks and decodes a frame of 16 bits whose full bit periods take `span`.
     #[inline(always)] // in time for the reply
     fn sound(
         &self,
@@ -274,7 +273,7 @@ impl Decoder {
         })
     }
 
-    /// The rate at which the whole bits take `span`.
+    /// Returns the accepted rate whose full bit periods take `span`.
     fn rate(&self, span: u32) -> Option<Rate> {
         let mut taken = self.rates.iter().flatten();
         let limits = taken.find(|limits| (limits.span_least..=limits.span_most).contains(&span))?;
@@ -284,10 +283,11 @@ impl Decoder {
     }
 }
 
-/// Reads 16 bits, of which the whole ones take `span`, from the first and the second edge of each.
+/// Reads 16 bits from their leading and trailing edges; their full bit periods take `span`.
 #[inline(always)] // in time for the reply
 fn read(span: u32, bit: impl Fn(usize) -> (u32, u32)) -> Option<u16> {
-    // Whole ticks on the inner side of so many shares of the mean bit. A span is below 500 000.
+    // Whole ticks, rounded towards the accepted side, of so many sixteenths of the mean bit. A span is below
+    // 500 000.
     let least = |shares: u32| (shares * span).div_ceil(SHARES * WHOLE_BITS);
     let most = |shares: u32| shares * span / (SHARES * WHOLE_BITS);
     let (active_least, active_most) = (least(SHORTEST), most(LONGEST));
@@ -297,7 +297,7 @@ fn read(span: u32, bit: impl Fn(usize) -> (u32, u32)) -> Option<u16> {
     let mut bits = 0;
     for index in 0..16 {
         let (start, end) = bit(index);
-        // The last bit has no next edge to end it.
+        // The last bit has no following edge to end its period.
         let period = start.wrapping_sub(last);
         if index > 0 && period.wrapping_sub(period_least) > period_most - period_least {
             return None;
@@ -312,13 +312,13 @@ fn read(span: u32, bit: impl Fn(usize) -> (u32, u32)) -> Option<u16> {
     Some(bits)
 }
 
-/// The least rest before a frame, 1.5 bits of it, where its whole bits take `span`.
+/// Returns the minimum rest before a frame, 1.5 of its bits, whose full bit periods take `span`.
 fn rest(span: u32) -> u32 {
     span / (WHOLE_BITS * 2 / 3)
 }
 
 impl Limits {
-    /// Nothing when the timer is too coarse for the rate.
+    /// Returns `None` when the timer is too coarse for the rate.
     fn new(tick_hz: u32, rate: Rate) -> Option<Self> {
         let ticks = |numerator: u32, denominator: u32| {
             let ticks = u64::from(tick_hz) * u64::from(numerator);

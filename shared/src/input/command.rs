@@ -12,50 +12,46 @@
 //! | 22, 26 | the light on, off | 1 |
 //! | 31 | silent mode on, off: no tunes but beacons | 6 |
 //!
-//! The others are received and ignored, and count as zero throttle like these: 11 asks for settings in
-//! a form that nobody has published, 23 to 25 and 27 to 29 are for lights that no board here has, 30
-//! is an audio stream, 32 to 35 switch a telemetry that bidirectional DShot has replaced, and the
-//! rest has no meaning.
+//! All others are accepted, ignored, and count as zero throttle, as these do: 11 asks for settings in an
+//! unpublished format, 23 to 25 and 27 to 29 are for lights that no board here has, 30 is an audio stream, 32
+//! to 35 switch a telemetry that bidirectional DShot has replaced, and the rest is undefined.
 //!
-//! A command counts at zero throttle. If the motor still turns then, extended telemetry is switched at
-//! once: Betaflight asks for it at each arming, and a pilot may arm again before the propeller has
-//! stopped. A direction and the save after it wait until the motor stands, as long as the wire stays at
-//! zero: Betaflight's configurator sends them 400 ms after a stop, and a motor that coasts takes
-//! longer. Within 100 ms of throttle they are ignored, as they are under throttle. The others are
-//! obeyed only while the motor stands.
+//! A command counts at zero throttle. Extended telemetry switches at once even while the motor turns:
+//! Betaflight requests it at each arming, and a pilot may rearm before the propeller has stopped. A direction,
+//! and the save after it, wait until the motor stands, as long as the wire stays at zero: Betaflight's
+//! configurator sends them 400 ms after a stop, and a coasting motor takes longer. Within 100 ms of throttle
+//! they are ignored, as they are under throttle. All others are obeyed only while the motor stands.
 //!
-//! A command is obeyed once for all its repeats: flight controllers send most of them ten times. A
-//! single bad frame among them, or before the first, does not end the row: when a flight controller
-//! starts, the rise of the line spoils one. Two bad frames do.
+//! A command is obeyed once, however often it repeats: flight controllers send most of them ten times. A single
+//! bad frame in the row, or before it, does not break it: when a flight controller boots, the rise of the line
+//! spoils one. Two bad frames in succession do.
 //!
-//! A command that counts at once may be another frame with errors that its checksum has not shown. So
-//! it needs six in a row, like the rest, just after a bad frame, and for longer after two within half a
-//! second. Flight controllers send a beacon once, and an occasional bad frame must not silence all of
-//! them. This cannot prevent that on any other wire one frame with undetected errors sounds a beacon,
-//! sends the information or switches the light; of random words it is one in 4096. Commands that change
-//! something always take six.
+//! A command that counts at once may be another frame with errors that its checksum missed. Just after a bad
+//! frame, and for longer after two within half a second, it therefore needs six in a row like the rest. Flight
+//! controllers send a beacon once, and an occasional bad frame must not silence all of them. On any other wire
+//! a single frame with undetected errors can still sound a beacon, send the information or switch the light; of
+//! random words one in 4096 does. Commands that change something always take six.
 
 use super::dshot::Frame;
 use crate::tune::Beacon;
 
-/// Frames in a row that a command takes which changes something.
+/// Consecutive frames needed for a command that changes something.
 const REPEATS: u8 = 6;
 
-/// Time after a bad frame for which single frames prove nothing, µs.
+/// How long after a bad frame a single frame is not proof enough, µs.
 const DOUBT_US: u64 = 50_000;
-/// The time for two of them.
+/// The same after two bad frames, µs.
 const DOUBT_OF_TWO_US: u64 = 1_000_000;
 /// The longest time between those two, µs.
 const BAD_APART_US: u64 = 500_000;
 
-/// Time for which the wire must be at zero throttle before a command waits for a motor that still
-/// turns, µs.
+/// How long the wire must be at zero throttle before a command may wait for a motor that still turns, µs.
 const SETTLED_US: u64 = 100_000;
 
-/// The least time between two beacons, which flight controllers leave too, µs.
+/// The minimum time between two beacons, as flight controllers leave it too, µs.
 const BEACON_APART_US: u64 = 260_000;
 
-/// The order that a command gives.
+/// What a command orders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// Sound a beacon.
@@ -85,7 +81,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// The order of this value.
+    /// Returns the order that a value gives, if any.
     pub(crate) fn of(value: u16) -> Option<Self> {
         Some(match value {
             1 => Self::Beacon(Beacon::One),
@@ -110,7 +106,7 @@ impl Order {
         })
     }
 
-    /// Returns true if it waits until the motor stands, if it comes before.
+    /// Returns true if an order given earlier waits until the motor stands.
     pub(crate) fn waits(self) -> bool {
         matches!(
             self,
@@ -118,14 +114,14 @@ impl Order {
         )
     }
 
-    /// Returns true if it may be given now: the motor stands, or the wire has been at zero throttle for
-    /// so long, µs.
+    /// Returns true if the order may be given now: the motor stands, or the wire has been at zero throttle for
+    /// long enough, `zero_us`.
     pub(super) fn is_in_time(self, stopped: bool, zero_us: u64) -> bool {
         stopped || matches!(self, Self::Extended(_)) || self.waits() && zero_us >= SETTLED_US
     }
 
-    /// Frames in a row that it takes. One is enough if its effect ends by itself or is only to
-    /// be seen.
+    /// Returns how many consecutive frames it takes. One suffices if its effect ends by itself or is only
+    /// visible.
     fn repeats(self) -> u8 {
         match self {
             Self::Beacon(_) | Self::Info | Self::Light(_) => 1,
@@ -134,30 +130,30 @@ impl Order {
     }
 }
 
-/// Frames in a row that the command of this value takes if none has been bad of late; nothing
-/// for one that is ignored.
+/// Returns how many consecutive frames the command of this value takes without recent bad frames, or `None` if
+/// it is ignored.
 pub fn repeats(value: u16) -> Option<u8> {
     Order::of(value).map(Order::repeats)
 }
 
-/// Counts repeats.
+/// Counts repeated commands.
 #[derive(Clone, Debug, Default)]
 pub struct Commands {
     value: u16,
-    /// Valid frames of this value in a row; it stops at [`REPEATS`].
+    /// Consecutive valid frames with this value, up to [`REPEATS`].
     count: u8,
-    /// True if this value has been obeyed since it came.
+    /// This row has been obeyed already.
     done: bool,
-    /// True if the last frame was bad.
+    /// The last frame was bad.
     spoilt: bool,
     bad_us: Option<u64>,
-    /// True if another bad frame came shortly before that.
+    /// Another bad frame came shortly before that one.
     doubted: bool,
     beacon_us: Option<u64>,
 }
 
 impl Commands {
-    /// A valid frame while its command may be given. The telemetry bit makes no difference.
+    /// Processes a valid frame while commands may be given. The telemetry bit makes no difference.
     pub fn frame(&mut self, now_us: u64, frame: Frame) -> Option<Order> {
         if frame.value != self.value {
             self.interrupt();
@@ -186,7 +182,7 @@ impl Commands {
         Some(order)
     }
 
-    /// A bad frame. After a second one at once the next are in a row only with each other.
+    /// Records a bad frame. A second one in succession restarts the count.
     pub fn bad(&mut self, now_us: u64) {
         self.doubted = within(now_us, self.bad_us, BAD_APART_US);
         self.bad_us = Some(now_us);
@@ -195,7 +191,7 @@ impl Commands {
         }
     }
 
-    /// The signal was lost, or the value is no command now: forgets the row.
+    /// Forgets the row: the signal was lost, or the value is not a command now.
     pub fn interrupt(&mut self) {
         self.value = 0;
         self.count = 0;
@@ -203,7 +199,7 @@ impl Commands {
     }
 }
 
-/// Returns true if at most `most_us` have passed since some time.
+/// Returns true if at most `most_us` have passed since `since_us`.
 pub(super) fn within(now_us: u64, since_us: Option<u64>, most_us: u64) -> bool {
     since_us.is_some_and(|since_us| now_us.saturating_sub(since_us) <= most_us)
 }

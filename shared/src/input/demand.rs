@@ -1,16 +1,16 @@
-//! The demand on the motor that a frame or a pulse makes.
+//! What a frame or a pulse demands of the motor.
 
 use super::dshot::Kind;
 pub use super::endpoints::Demand;
 use super::endpoints::EndPoints;
 use super::event::Event;
 
-/// The way frames and pulses are read.
+/// How frames and pulses are read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
-    /// True if throttle has two directions (`INP_3D`).
+    /// Throttle has two directions (`INP_3D`).
     pub two_directions: bool,
-    /// The ends of the pulses' range.
+    /// End points of the pulse range.
     pub ends: EndPoints,
 }
 
@@ -28,7 +28,7 @@ impl Default for Reading {
 }
 
 impl Reading {
-    /// The demand of an event; a bad one has none.
+    /// Returns the demand of an event; a bad one has none.
     pub fn demand(&self, event: &Event) -> Option<Demand> {
         Some(match *event {
             Event::Frame { frame, .. } => match frame.kind(self.two_directions) {

@@ -1,24 +1,24 @@
-//! Detects the signal that a line carries, from the decoders' events.
+//! Detects the signal on a line from the decoders' events.
 //!
-//! DShot and pulses have a candidate each, with the evidence for and against it. A candidate that lasts
-//! is the signal.
+//! DShot and pulses each have a candidate, with the evidence for and against it. The candidate that lasts is
+//! the signal.
 
 use super::event::Event;
 use super::signal::{Pulse, Signal};
 
-/// Hits after which a signal is believed, with the time below. At 50 Hz four pulses take 60 ms, and the
-/// first one may come 20 ms late.
+/// Hits needed to accept a signal, along with the time below. At 50 Hz four pulses take 60 ms, and the first
+/// may come 20 ms late.
 const HITS: u32 = 4;
 const HELD_MS: u32 = 50;
 
-/// The longest time between two hits, ms.
+/// The longest gap between two hits, ms.
 const GAP_MS: u32 = 100;
 
-/// Greatest difference between the widths of two pulses, as a part of the range: that of a stick that
-/// goes from end to end in 0.16 s, at 50 Hz. Random edges differ by more.
+/// The most two successive pulse widths may differ, as a divisor of the range: a stick going from end to end in
+/// 0.16 s at 50 Hz. Random edges differ by more.
 const STEADY_PART: u32 = 8;
 
-/// The candidates of one line.
+/// The candidates on one line.
 #[derive(Clone, Debug)]
 pub(super) struct Detector {
     held_ticks: u32,
@@ -34,7 +34,7 @@ struct Candidate {
     misses: u32,
     first_at: u32,
     last_at: u32,
-    /// Of the last pulse, ns.
+    /// Width of the last pulse, ns.
     width_ns: u32,
 }
 
@@ -54,23 +54,23 @@ impl Detector {
         self.pulses = None;
     }
 
-    /// The signal, once it is known.
+    /// Returns the signal once it is known.
     pub(super) fn signal(&self) -> Option<Signal> {
         let known = |candidate: &Candidate| {
             candidate.hits >= HITS
                 && candidate.misses <= candidate.hits / 2
                 && candidate.last_at.wrapping_sub(candidate.first_at) >= self.held_ticks
         };
-        // A right checksum says more than a width.
+        // A correct checksum outweighs a width.
         let leading = self.frames.or(self.pulses);
         leading.filter(known).map(|candidate| candidate.signal)
     }
 
-    /// Weighs the DShot decoder's event, and returns it if it is to be passed on.
+    /// Weighs an event of the DShot decoder, and returns it if it should be passed on.
     pub(super) fn frame(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
         let Some(signal) = event.signal() else {
             self.frames = self.frames.and_then(Candidate::missed);
-            // While pulses lead, these edges are theirs.
+            // While pulses lead, these edges belong to them.
             return self.pulses.is_none().then_some(event);
         };
         let gap_ticks = self.gap_ticks;
@@ -91,12 +91,12 @@ impl Detector {
         Some(event)
     }
 
-    /// Weighs the pulse decoder's event, and returns it if it is to be passed on.
+    /// Weighs an event of the pulse decoder, and returns it if it should be passed on.
     pub(super) fn pulse(&mut self, at_ticks: u32, event: Event) -> Option<Event> {
         let before = self.pulses.take();
         if let Event::Pulse { kind, width_ns } = event {
             let signal = Signal::Pulse(kind);
-            // Nothing may speak against pulses, which have no checksum.
+            // Pulses have no checksum, so nothing may count against them.
             let same = before.filter(|pulses| {
                 pulses.signal == signal
                     && pulses.lasts(at_ticks, self.gap_ticks)
@@ -109,13 +109,13 @@ impl Detector {
         } else if before.is_none() {
             return None;
         }
-        // While frames lead, these edges are theirs.
+        // While frames lead, these edges belong to them.
         self.frames.is_none().then_some(event)
     }
 }
 
 impl Candidate {
-    /// A first hit.
+    /// Creates a candidate with its first hit.
     fn new(signal: Signal, at_ticks: u32, width_ns: u32) -> Self {
         Self {
             signal,
@@ -136,7 +136,7 @@ impl Candidate {
         }
     }
 
-    /// Nothing when the misses outweigh the hits.
+    /// Counts a miss; returns `None` when misses outweigh hits.
     fn missed(self) -> Option<Self> {
         let misses = self.misses.saturating_add(1);
         (misses <= self.hits).then_some(Self { misses, ..self })

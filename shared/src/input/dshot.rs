@@ -1,18 +1,17 @@
 //! DShot frames: 16 bits, most significant first, each a pulse whose width is its value.
 //!
-//! 11 bits are the value, one asks for telemetry, four are a checksum.
+//! 11 bits are the value, one requests telemetry, four are a checksum.
 
 use super::{Share, reverse};
 
-/// Value from which a frame is throttle; below are stop (0) and the commands.
+/// The lowest throttle value; below are stop (0) and the commands.
 const FIRST_THROTTLE: u16 = 48;
 /// The highest value of a frame.
 const LAST_THROTTLE: u16 = 2047;
-/// The first value of the second direction, if throttle has two.
+/// The lowest value of the second direction, when throttle has two.
 const FIRST_FORWARD: u16 = 1048;
 
-/// The bits to flip in a frame on this kind of wire: a bidirectional one inverts all four bits of the
-/// checksum.
+/// Returns the bits to flip in a frame: bidirectional DShot inverts all four checksum bits.
 pub const fn check_mask(bidirectional: bool) -> u16 {
     if bidirectional { 0xF } else { 0 }
 }
@@ -22,24 +21,24 @@ pub const fn check_mask(bidirectional: bool) -> u16 {
 pub struct Frame {
     /// 0 stop, 1 to 47 commands, 48 to 2047 throttle; higher bits are not sent.
     pub value: u16,
-    /// True if the sender asks for telemetry.
+    /// The sender requests telemetry.
     pub telemetry: bool,
 }
 
-/// The meaning of a frame's value.
+/// What a frame's value means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Stop the motor: value 0.
     Stop,
     /// A command, 1 to 47. It counts as zero throttle.
     Command(u8),
-    /// Turn: values 48 to 2047, linearly from 0 to 1. With two directions 48 to 1047 are so in
-    /// reverse, and 1048 to 2047 forward.
+    /// Turn: values 48 to 2047, linear from 0 to 1. With two directions, 48 to 1047 are reverse and 1048 to
+    /// 2047 forward.
     Throttle(Share),
 }
 
 impl Frame {
-    /// The frame of 16 bits from the wire, or nothing when the checksum does not fit.
+    /// Decodes the 16 bits on the wire; returns `None` if the checksum does not match.
     pub fn from_bits(bits: u16) -> Option<Self> {
         let data = bits >> 4;
         (bits & 0xF == check_sum(data)).then_some(Self {
@@ -48,18 +47,18 @@ impl Frame {
         })
     }
 
-    /// The 16 bits for the wire.
+    /// Encodes the frame as the 16 bits on the wire.
     pub fn to_bits(self) -> u16 {
         let data = (self.value & LAST_THROTTLE) << 1 | u16::from(self.telemetry);
         data << 4 | check_sum(data)
     }
 
-    /// Returns true for a command: a value from 1 to 47.
+    /// Returns true for a command, values 1 to 47.
     pub fn is_command(self) -> bool {
         (1..FIRST_THROTTLE).contains(&self.value)
     }
 
-    /// The meaning of the value, if throttle has two directions (`INP_3D`) or one.
+    /// Returns what the value means with one throttle direction or two (`INP_3D`).
     pub fn kind(self, two_directions: bool) -> Kind {
         match self.value {
             0 => Kind::Stop,
@@ -73,22 +72,22 @@ impl Frame {
     }
 }
 
-/// The share of the way from the first to the last value.
+/// Returns the position of `value` between `first` and `last`, as a share.
 fn share(value: u16, first: u16, last: u16) -> Share {
     let (step, steps) = (u32::from(value.min(last) - first), u32::from(last - first));
-    // step·2^31/steps in 32 bits: the whole part of 2^31/steps, and its rest.
+    // step·2^31/steps in 32-bit arithmetic, from quotient and remainder of 2^31/steps.
     let whole = (1 << Share::FRAC_NBITS) / steps;
     let rest = (1 << Share::FRAC_NBITS) % steps;
     let share = step * whole + step * rest / steps;
     Share::from_bits(share.min(i32::MAX as u32) as i32)
 }
 
-/// The four check bits of 12 data bits: the exclusive or of their nibbles.
+/// Returns the four check bits of 12 data bits: the XOR of their nibbles.
 pub const fn check_sum(data: u16) -> u16 {
     (data ^ data >> 4 ^ data >> 8) & 0xF
 }
 
-/// The bit rate of a frame.
+/// A DShot bit rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rate {
     /// 150 kbit/s.
@@ -102,7 +101,7 @@ pub enum Rate {
 }
 
 impl Rate {
-    /// Every rate, the slowest first.
+    /// Every rate, slowest first.
     pub const ALL: [Self; 4] = [
         Self::Dshot150,
         Self::Dshot300,
@@ -110,7 +109,7 @@ impl Rate {
         Self::Dshot1200,
     ];
 
-    /// Bits a second.
+    /// Returns the bit rate in bits per second.
     pub const fn bit_hz(self) -> u32 {
         match self {
             Self::Dshot150 => 150_000,
@@ -120,25 +119,25 @@ impl Rate {
         }
     }
 
-    /// The time of one bit, ns: 6667, 3333, 1667 or 833.
+    /// Returns the duration of a bit, ns: 6667, 3333, 1667 or 833.
     pub const fn bit_ns(self) -> u32 {
         self.eighths_ns(8)
     }
 
-    /// The time from a frame's first edge to its end, 16 bits later, ns.
+    /// Returns the time from a frame's first edge to the end of its 16th bit, ns.
     pub const fn frame_ns(self) -> u32 {
         self.eighths_ns(16 * 8)
     }
 
-    /// A time in eighths of a bit, in ns to the nearest: no bit is a whole number of them.
+    /// Converts eighths of a bit to ns, rounded to nearest: no bit is a whole number of them.
     pub const fn eighths_ns(self, eighths: u32) -> u32 {
         // 10⁹/8 over the rate is 5000/6, 2500/6, 1250/6 or 625/6.
         (eighths * (750_000_000 / self.bit_hz()) + 3) / 6
     }
 }
 
-/// The 32 edges of a frame of these bits, checksum included: time since the first edge in ns, and
-/// the level from then on. A one is high for 75 % of its bit, a zero for 37.5 %.
+/// Returns the 32 edges of a frame with these bits, checksum included: time since the first edge in ns, and the
+/// level from then on. A one is high for 75 % of its bit, a zero for 37.5 %.
 pub fn edges(bits: u16, rate: Rate) -> impl Iterator<Item = (u32, bool)> {
     (0..16_u32).flat_map(move |bit| {
         let high_eighths = if bits << bit & 0x8000 != 0 { 6 } else { 3 };

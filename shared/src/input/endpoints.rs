@@ -1,4 +1,4 @@
-//! The width of a pulse as a throttle.
+//! Maps a pulse's width to throttle.
 
 use super::signal::Pulse;
 use super::{Share, reverse};
@@ -6,36 +6,36 @@ use crate::math::quotient;
 
 const NS_PER_US: u32 = 1000;
 
-/// The demand on the motor.
+/// What the wire demands of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
-    /// Not to turn. So do DShot's stop and its commands.
+    /// Do not turn; also DShot's stop and commands.
     Zero,
-    /// To turn.
+    /// Turn.
     Throttle(Share),
 }
 
-/// One over this is the share of the range, from its lower end, that is zero: 2 %.
+/// The reciprocal of the share of the range that is zero at its lower end: 2 %.
 pub const ZERO_DIVISOR: u32 = 50;
 
-/// One over this is the share of the range, to either side of its middle, that is zero where there
-/// are two directions: 4 %. It is twice that of an end, because a stick's spring returns it less
-/// exactly than an end stop does, and within the ±5 % that flight controllers leave free there.
+/// The reciprocal of the share of the range that is zero on either side of the centre, with two directions: 4
+/// %. Twice that at an end, because a stick's spring centres it less exactly than an end stop, and within the
+/// ±5 % that flight controllers leave free there.
 const CENTRE_DIVISOR: u32 = 25;
 
-/// Widths of servo pulses that mean no throttle and full throttle; in 3D, full in reverse and full
-/// forward. The other kinds of pulse are measured by the servo pulse of the same meaning.
+/// Servo pulse widths of no throttle and full throttle; in 3D, of full reverse and full forward. Other pulse
+/// kinds are measured by their equivalent servo pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EndPoints {
-    /// The lower end, µs.
+    /// Lower end, µs.
     pub min_us: u16,
-    /// The upper end, µs, above the lower.
+    /// Upper end, µs, above the lower.
     pub max_us: u16,
 }
 
 impl Pulse {
-    /// The width of the servo pulse that means the same, ns: 1000 to 2000 µs where this kind has
-    /// 125 to 250, 42 to 84 or 5 to 25 µs.
+    /// Returns the equivalent servo pulse width, ns: 1000 to 2000 µs for this kind's 125 to 250, 42 to 84 or 5
+    /// to 25 µs.
     pub const fn servo_ns(self, width_ns: u32) -> u32 {
         match self {
             Self::Servo => width_ns,
@@ -45,8 +45,8 @@ impl Pulse {
         }
     }
 
-    /// The width of this kind's pulse that means what a servo pulse does, ns: the inverse of
-    /// [`Pulse::servo_ns`], to the next shorter nanosecond.
+    /// Returns this kind's width for a servo pulse width, ns: the inverse of [`Pulse::servo_ns`], rounded down
+    /// to a nanosecond.
     pub const fn width_ns(self, servo_ns: u32) -> u32 {
         match self {
             Self::Servo => servo_ns,
@@ -58,7 +58,7 @@ impl Pulse {
 }
 
 impl EndPoints {
-    /// The demand of a pulse. Beyond an end it is as at the end.
+    /// Returns the demand of a pulse, clamped at the ends.
     pub fn demand(self, kind: Pulse, width_ns: u32, two_directions: bool) -> Demand {
         let width_ns = kind.servo_ns(width_ns);
         let min_ns = u32::from(self.min_us) * NS_PER_US;
@@ -73,7 +73,7 @@ impl EndPoints {
         let middle_ns = min_ns + range_ns / 2;
         let band_ns = range_ns / CENTRE_DIVISOR;
         let forward = above(width_ns, middle_ns + band_ns, max_ns);
-        // Both sides are one, mirrored at the middle.
+        // Mirrored at the middle, both sides are computed the same way.
         let mirrored_ns = (2 * middle_ns).saturating_sub(width_ns);
         let back = above(mirrored_ns, middle_ns + band_ns, max_ns);
         match (forward, back) {
@@ -84,7 +84,7 @@ impl EndPoints {
     }
 }
 
-/// The share of the way to full throttle by which a width is above the widest that is zero.
+/// Returns where a width lies between the widest zero and full throttle; `None` at zero.
 fn above(width_ns: u32, zero_ns: u32, full_ns: u32) -> Option<Share> {
     let over_ns = width_ns.min(full_ns).checked_sub(zero_ns)?;
     if over_ns == 0 {

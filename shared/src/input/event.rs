@@ -3,28 +3,28 @@
 use super::dshot::{Frame, Rate};
 use super::signal::{Pulse, Signal};
 
-/// A finding on the wire.
+/// What a decoder found on the wire.
 ///
-/// In whole words, tag and all: a chip copies it in a few instructions at every edge.
+/// Laid out in whole words, tag included: the chip copies it at every edge in a few instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Event {
-    /// A DShot frame with a right checksum.
+    /// A DShot frame with a correct checksum.
     Frame {
-        /// Its rate.
+        /// Bit rate.
         rate: Rate,
-        /// True if the line rests high and the checksum is inverted.
+        /// The line rests high and the checksum is inverted.
         bidirectional: bool,
-        /// Its contents.
+        /// Contents.
         frame: Frame,
-        /// Time of its first edge, in ticks of the capturing timer.
+        /// Time of the first edge, in ticks of the capture timer.
         first_edge_ticks: u32,
     },
     /// A pulse.
     Pulse {
-        /// Its kind.
+        /// Kind.
         kind: Pulse,
-        /// Its width, ns.
+        /// Width, ns.
         width_ns: u32,
     },
     /// Edges that were neither.
@@ -32,7 +32,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// The signal that it belongs to; nothing for a bad one.
+    /// Returns the signal it belongs to; `None` for a bad one.
     pub fn signal(&self) -> Option<Signal> {
         match *self {
             Self::Frame {

@@ -1,34 +1,34 @@
-//! Drops levels that are too short to be part of a signal.
+//! Glitch filter: drops levels too short to be part of a signal.
 //!
-//! An edge is believed when its level has lasted for the filter's time. A shorter level is dropped, and
-//! the level around it goes on.
+//! An edge is accepted once its level has lasted for the filter time. A shorter level is dropped, and the level
+//! around it continues.
 
-/// An edge that is believed.
+/// An accepted edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
-    /// Its time.
+    /// Capture time.
     pub(super) at_ticks: u32,
     /// The level from then on.
     pub(super) level: bool,
 }
 
-/// The result of an edge.
+/// The result of one edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Filtered {
-    /// The edge before, if this one confirms it.
+    /// The previous edge, if this one confirms it.
     pub(super) believed: Option<Edge>,
-    /// An edge was missed before this one: its level is the one that the line already had.
+    /// An edge was missed before this one: the line already had this level.
     pub(super) missed: bool,
 }
 
-/// The filter of one line.
+/// The glitch filter of one line.
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
-    /// Time for which a level must last, ticks.
+    /// How long a level must last, ticks.
     pub(super) time_ticks: u32,
-    /// The level that is believed; nothing before the first edge.
+    /// The accepted level; `None` before the first edge.
     level: Option<bool>,
-    /// An edge away from it, which is not believed yet.
+    /// An edge away from it, not yet accepted.
     pending: Option<Edge>,
 }
 
@@ -41,9 +41,9 @@ impl Filter {
         }
     }
 
-    /// Takes an edge as the timer saw it.
+    /// Takes an edge as the timer captured it.
     pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Filtered {
-        // A short way for the edges of a sound signal.
+        // Fast path for the edges of a clean signal.
         if let Some(pending) = self.pending
             && pending.level != level
             && at_ticks.wrapping_sub(pending.at_ticks) >= self.time_ticks
@@ -66,7 +66,7 @@ impl Filter {
             .map_or(self.level, |pending| Some(pending.level));
         let missed = before == Some(level);
         if missed || self.level == Some(level) {
-            // Nobody knows since when the line has had a level that was missed.
+            // The missed edge hides when this level began.
             self.level = Some(level);
             self.pending = None;
         } else {
@@ -76,7 +76,7 @@ impl Filter {
         Filtered { believed, missed }
     }
 
-    /// Believes the last edge, if its level has lasted until now.
+    /// Accepts the last edge if its level has lasted until now.
     pub(super) fn settle(&mut self, now_ticks: u32) -> Option<Edge> {
         let pending = self.pending?;
         (since(now_ticks, pending.at_ticks) >= self.time_ticks)
@@ -84,27 +84,27 @@ impl Filter {
             .flatten()
     }
 
-    /// Returns true if the line is believed to be at this level, or nothing is known of it.
+    /// Returns true if the line is known to rest at this level, or nothing is known of it.
     pub(super) fn rests_at(&self, level: bool) -> bool {
         self.pending.is_none() && self.level.is_none_or(|believed| believed == level)
     }
 
-    /// The line is at this level: its edges have been judged otherwise.
+    /// Sets the line's level after its edges were judged elsewhere.
     pub(super) fn settled(&mut self, level: bool) {
         self.level = Some(level);
     }
 
-    /// The line has been silent: its former level does not matter to the next edge.
+    /// Forgets the level after a silence, so that it cannot affect the next edge.
     pub(super) fn rest(&mut self) {
         self.level = None;
     }
 
-    /// The last edge, while it is not believed.
+    /// Returns the last edge while it is not yet accepted.
     pub(super) fn pending(&self) -> Option<Edge> {
         self.pending
     }
 
-    /// Believes the last edge, however short its level.
+    /// Accepts the last edge, however short its level.
     pub(super) fn believe(&mut self) -> Option<Edge> {
         let edge = self.pending.take()?;
         self.level = Some(edge.level);
@@ -112,8 +112,8 @@ impl Filter {
     }
 }
 
-/// The ticks from `at_ticks` to `now_ticks`; none for a time that is still to come, since an edge
-/// may be captured after the time was read.
+/// Returns the ticks from `at_ticks` to `now_ticks`, or 0 if `at_ticks` is later: an edge may be captured after
+/// the time was read.
 pub(super) fn since(now_ticks: u32, at_ticks: u32) -> u32 {
     (now_ticks.wrapping_sub(at_ticks) as i32).max(0) as u32
 }

@@ -1,4 +1,4 @@
-//! One throttle wire: timed edges in, frames and pulses out.
+//! Decodes one throttle wire: timed edges in, frames and pulses out.
 
 use super::capture;
 use super::detect::Detector;
@@ -9,10 +9,10 @@ use super::pulse;
 use super::signal::{Pulse, Signal};
 use crate::math::quotient;
 
-/// A line without an edge for so long is at rest, whatever was on it. At 50 Hz pulses leave 19 ms.
+/// Without an edge for this long a line is at rest, whatever it carried. At 50 Hz pulses leave 19 ms.
 const SILENCE_MS: u32 = 100;
 
-/// The wire's decoder.
+/// The decoder of one wire.
 #[derive(Clone, Debug)]
 pub struct Line {
     tick_hz: u32,
@@ -23,12 +23,12 @@ pub struct Line {
     signal: Option<Signal>,
     forced: bool,
     edge_at: u32,
-    /// The line has been silent for long.
+    /// No edge for [`SILENCE_MS`].
     silent: bool,
 }
 
 impl Line {
-    /// A quiet line, captured by a timer of `tick_hz`.
+    /// Creates the decoder of a quiet line, captured by a timer of `tick_hz`.
     pub fn new(tick_hz: u32) -> Self {
         Self {
             tick_hz,
@@ -43,29 +43,29 @@ impl Line {
         }
     }
 
-    /// Takes one signal only, and counts others as bad; `None` detects it again from now on.
+    /// Accepts one signal only and counts others as bad; `None` restarts detection.
     pub fn force(&mut self, signal: Option<Signal>) {
         self.forced = signal.is_some();
         self.begin(signal);
     }
 
-    /// The signal that was forced or has been detected. Before it is known, events may come from
-    /// any signal, and must not turn a motor.
+    /// Returns the forced or detected signal. Before it is known, events may come from any signal and must not
+    /// turn a motor.
     pub fn signal(&self) -> Option<Signal> {
         self.signal
     }
 
-    /// The signal is lost: a detected one is forgotten, a forced one stays.
+    /// Handles a lost signal: forgets a detected one, keeps a forced one.
     pub fn lost(&mut self) {
         if self.signal.is_some() && !self.forced {
             self.begin(None);
         }
     }
 
-    /// Takes one edge: when it came, in ticks that wrap, and the level from then on.
+    /// Takes one edge: its capture time in wrapping ticks, and the level from then on.
     ///
-    /// An edge is believed when its level has lasted for the filter's time, or when a frame ends with
-    /// it: a checksum says more. So what this returns may come from the edge before.
+    /// An edge is accepted once its level has lasted for the filter time, or when it completes a frame, since a
+    /// checksum is stronger evidence. The returned event may therefore come from the previous edge.
     pub fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
         self.edge_at = at_ticks;
         self.silent = false;
@@ -93,9 +93,9 @@ impl Line {
         }
     }
 
-    /// Takes all edges of a DShot frame at once, the first and the second of each of its 16 bits and whether
-    /// the line was high before them, as [`Line::edge`] would one by one; nothing, and none of them is taken,
-    /// if they are no frame, or one of another signal than that which is known.
+    /// Takes all edges of a DShot frame at once: the leading and trailing edge of each of its 16 bits, and
+    /// whether the line was high before them. Equivalent to [`Line::edge`] on each; returns `None`, and takes
+    /// none of them, if they are no frame or belong to a signal other than the known one.
     #[inline(always)] // in each frame, whose reply is due
     pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
         let pulses = matches!(self.signal, Some(Signal::Pulse(_)));
@@ -103,13 +103,13 @@ impl Line {
             return None;
         }
         let (_, end) = bit(15);
-        // The line rests high if it is bidirectional.
+        // A bidirectional line rests high.
         let event = self.frames.whole(rests_high, bit)?;
         self.edge_at = end;
         self.silent = false;
         self.filter.settled(rests_high);
         if self.signal.is_none() {
-            // No pulse goes over it.
+            // No pulse spans it.
             self.pulses.spoil();
             let _ = self.detector.pulse(end, Event::Bad);
             let event = self.detector.frame(end, event);
@@ -119,8 +119,8 @@ impl Line {
         Some(event)
     }
 
-    /// Believes the last edge if the filter's time has passed since. To be called once a control
-    /// period or more often, so that the end of a frame does not wait for the next one's edges.
+    /// Accepts the last edge if the filter time has passed. Call it at least once per control period, so that
+    /// the end of a frame need not wait for the next one's edges.
     pub fn settle(&mut self, now_ticks: u32) -> Option<Event> {
         if self.silent {
             return None;
@@ -129,7 +129,7 @@ impl Line {
             return self.decode(edge);
         }
         if since(now_ticks, self.edge_at) >= self.tick_hz / 1000 * SILENCE_MS {
-            // Well before the ticks wrap, which would make a long level look like a short one.
+            // Well before the ticks wrap, after which a long level would look short.
             self.silent = true;
             self.filter.rest();
             self.clear();
@@ -145,7 +145,7 @@ impl Line {
         }
     }
 
-    /// Takes an edge if it is within a frame; false otherwise.
+    /// Takes an edge inside a frame; returns false if it is not in one.
     fn pass(&mut self, edge: Edge) -> bool {
         matches!(self.signal, Some(Signal::Dshot { .. })) && self.frames.pass(edge.at_ticks)
     }
@@ -162,7 +162,7 @@ impl Line {
         }
     }
 
-    /// Weighs an edge, and the DShot decoder's event at it, while the signal is not known.
+    /// Weighs an edge, and the DShot decoder's event at it, while the signal is unknown.
     fn detect(&mut self, edge: Edge, frame: Option<Event>) -> Option<Event> {
         let Edge { at_ticks, level } = edge;
         let pulse = self.pulses.edge(at_ticks, level);
@@ -172,7 +172,7 @@ impl Line {
         frame.or(pulse)
     }
 
-    /// Takes the detected signal and no other, once there is one.
+    /// Locks onto the detected signal, once there is one.
     fn know(&mut self) {
         let signal = self.detector.signal();
         if signal.is_some() {
@@ -180,7 +180,7 @@ impl Line {
         }
     }
 
-    /// Begins to listen to one signal, or to find out which there is.
+    /// Starts listening to one signal, or detecting it.
     fn begin(&mut self, signal: Option<Signal>) {
         self.take_only(signal);
         self.clear();
@@ -209,10 +209,10 @@ impl Line {
     }
 }
 
-/// Time for which a level must last to be believed, ticks.
+/// Returns how long a level must last to be accepted, ticks.
 fn filter_ticks(tick_hz: u32, signal: Option<Signal>) -> u32 {
     let time_ns = match signal {
-        // A sixteenth of a bit. The shortest level of DShot1200 with its errors is 66 ns.
+        // A sixteenth of a bit. The shortest level of DShot1200 with its tolerances is 66 ns.
         None => Rate::Dshot1200.bit_ns() / 16,
         Some(Signal::Dshot { rate, .. }) => rate.bit_ns() / 16,
         Some(Signal::Pulse(Pulse::Multishot)) => 200,

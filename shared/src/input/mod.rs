@@ -1,4 +1,4 @@
-//! From the edges of the throttle wire to the decision whether the motor may turn.
+//! Throttle input: turns wire edges into the decision whether the motor may turn.
 //!
 //! ```text
 //! timer edges → line::Line → Event → authority::Authority → Command
@@ -6,9 +6,9 @@
 //!                                  → calibration::Calibration → the pulses' end points
 //! ```
 //!
-//! [`dshot`] has the meaning of a frame and [`endpoints`] that of a pulse, [`line`](mod@line) decodes
-//! both from a timer's edges, and [`authority`] alone decides whether the motor may turn. None of them
-//! has a clock: the caller says when something happened. [`Input`] is all of it.
+//! [`dshot`] defines what a frame means and [`endpoints`] what a pulse means; [`line`](mod@line) decodes both
+//! from timer edges; [`authority`] alone decides whether the motor may turn. None of them owns a clock: the
+//! caller passes the time of every event. [`Input`] ties them together.
 
 pub mod access;
 pub mod authority;
@@ -45,27 +45,27 @@ use news::{Announcer, Standing};
 use signal::Signal;
 use tally::Tally;
 
-/// The settings of the wire, from the parameters.
+/// Wire settings, from the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// The signal that is taken and no other (`INP_PROTO`); any if there is none.
+    /// The only signal to accept (`INP_PROTO`); `None` accepts any.
     pub protocol: Option<Signal>,
-    /// Durations.
+    /// Arming and loss times.
     pub timing: Timing,
-    /// The way frames and pulses are read.
+    /// How frames and pulses map to throttle.
     pub reading: Reading,
 }
 
-/// The result of an edge.
+/// The result of one edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heard {
-    /// A frame or pulse of the signal that the wire is known to carry.
+    /// A frame or pulse of the identified signal.
     pub event: Event,
-    /// The order of the frame, if it gives one.
+    /// The order that the frame gives, if any.
     pub order: Option<Order>,
 }
 
-/// One throttle wire, with all that is decided by it.
+/// One throttle wire, from the decoder to the authority.
 #[derive(Clone, Debug)]
 pub struct Input {
     settings: Settings,
@@ -75,16 +75,16 @@ pub struct Input {
     calibration: Calibration,
     tally: Tally,
     announcer: Announcer,
-    /// As of the last poll.
+    /// Whether the motor was at rest at the last poll.
     stopped: bool,
-    /// Since when the wire has been at zero throttle.
+    /// When the wire went to zero throttle.
     zero_since_us: Option<u64>,
-    /// A signal was lost since this was last asked.
+    /// A signal was lost since the last [`Input::take_loss`].
     lost: bool,
 }
 
 impl Input {
-    /// A quiet wire at power-up, captured by a timer of `tick_hz`.
+    /// Creates the input for a quiet wire at power-up, captured by a timer running at `tick_hz`.
     pub fn new(tick_hz: u32, settings: Settings) -> Self {
         let mut line = Line::new(tick_hz);
         line.force(settings.protocol);
@@ -104,37 +104,37 @@ impl Input {
         }
     }
 
-    /// Puts other settings in force. The wire must be armed again, unless only times have changed.
+    /// Applies new settings. Anything but a change of times disarms the wire.
     pub fn set(&mut self, settings: Settings) {
         self.authority.set_timing(settings.timing);
         self.authority.set_reading(settings.reading);
         if settings.protocol != self.settings.protocol {
-            // The decoder starts over with it: not for every change, while frames come in.
+            // A new protocol restarts the decoder, so do this only when it changes: frames keep arriving.
             self.line.force(settings.protocol);
             self.authority.restart();
         }
         self.settings = settings;
     }
 
-    /// An edge: when the capturing timer saw it, and the level after it.
+    /// Takes one edge: its capture time, and the level after it.
     pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Heard> {
         let event = self.line.edge(at_ticks, level);
         self.take(now_us, event.as_ref()?)
     }
 
-    /// Takes all edges of a DShot frame at once, as [`Line::whole`] does. What is found is to be given to
-    /// [`Input::heard`]; with that it is what [`Input::edge`] does edge by edge.
+    /// Takes all edges of a DShot frame at once, as [`Line::whole`] does. Pass the result to [`Input::heard`];
+    /// together they are equivalent to [`Input::edge`] on each edge.
     #[inline(always)] // in time for the reply
     pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
         self.line.whole(rests_high, bit)
     }
 
-    /// Takes the event of [`Input::whole`].
+    /// Processes the event from [`Input::whole`].
     pub fn heard(&mut self, now_us: u64, event: &Event) -> Option<Heard> {
         self.take(now_us, event)
     }
 
-    /// The time of the timer that captures the edges, once a control period or more often.
+    /// Advances the decoder to the capture timer's current time. Call it at least once per control period.
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Heard> {
         let event = self.line.settle(now_ticks);
         self.take(now_us, event.as_ref()?)
@@ -146,7 +146,7 @@ impl Input {
         self.hear(now_us, event, identified)
     }
 
-    /// Takes the decoder's event, and the signal identified so far.
+    /// Processes a decoder event, given the signal identified so far.
     fn hear(&mut self, now_us: u64, event: &Event, identified: Option<Signal>) -> Option<Heard> {
         self.authority.wire(now_us, *event, identified);
         let known = identified.is_some() && event.signal() == identified;
@@ -168,7 +168,7 @@ impl Input {
                 let in_time = in_time.is_some_and(|(since_us, order)| {
                     order.is_in_time(self.stopped, now_us.saturating_sub(since_us))
                 });
-                // At another time it is no command, however often it is repeated.
+                // Outside that window it is not a command, however often it repeats.
                 if in_time {
                     self.commands.frame(now_us, frame)
                 } else {
@@ -192,7 +192,7 @@ impl Input {
         })
     }
 
-    /// Lets time pass, each millisecond or so, and takes in the drive's state.
+    /// Advances time and takes in the drive's state. Call it about once per millisecond.
     pub fn poll(&mut self, now_us: u64, drive: DriveStatus) {
         self.stopped = drive.stopped;
         self.expire(now_us);
@@ -202,19 +202,19 @@ impl Input {
         self.tally.poll(now_us);
     }
 
-    /// Begins a calibration by stick: from now on the stick is no throttle, not even zero.
+    /// Starts a stick calibration: from now on the stick is not throttle, not even zero.
     pub fn calibrate(&mut self, now_us: u64) {
         self.calibration.ask(now_us);
         self.authority.learn();
     }
 
-    /// Ends a calibration by stick, if there is one.
+    /// Ends a running stick calibration.
     pub fn end_calibration(&mut self) {
         let cancelled = self.calibration.end();
         self.announcer.calibration(cancelled);
     }
 
-    /// Applies time-outs.
+    /// Applies timeouts.
     fn expire(&mut self, now_us: u64) {
         let armed = self.authority.armed();
         if self.authority.poll(now_us) {
@@ -228,13 +228,13 @@ impl Input {
         }
     }
 
-    /// Returns true if a signal has been lost since the last call: the next one may come from another
+    /// Returns true if a signal was lost since the last call, in which case the next one may come from another
     /// sender.
     pub fn take_loss(&mut self) -> bool {
         core::mem::take(&mut self.lost)
     }
 
-    /// The next news for a person; to be called after each poll until there is none.
+    /// Returns the next news for the user. Call it after each poll until it returns `None`.
     pub fn news(&mut self, now_us: u64) -> Option<News> {
         let standing = Standing {
             signal: self.signal(now_us),
@@ -244,33 +244,33 @@ impl Input {
         self.announcer.next(now_us, standing)
     }
 
-    /// The signal on the wire; none before it has been identified, and none on a silent wire.
+    /// Returns the signal on the wire, or `None` before identification and on a silent wire.
     pub fn signal(&self, now_us: u64) -> Option<Signal> {
         let present = self.authority.signal_present(now_us);
         self.line.signal().filter(|_| present)
     }
 
-    /// The signal that has been identified or forced, whether it is there or not.
+    /// Returns the identified or forced signal, whether or not it is present.
     pub fn known(&self) -> Option<Signal> {
         self.line.signal()
     }
 
-    /// The authority over the motor.
+    /// Returns the authority over the motor.
     pub fn authority(&self) -> &Authority {
         &self.authority
     }
 
-    /// The authority, for those who may disarm it or test.
+    /// Returns the authority for callers that may disarm it or run a test.
     pub fn authority_mut(&mut self) -> &mut Authority {
         &mut self.authority
     }
 
-    /// Frames and pulses that were bad, since the start.
+    /// Returns the number of bad frames and pulses since power-up.
     pub fn bad_frames(&self) -> u32 {
         self.tally.bad_total()
     }
 
-    /// The share of bad ones in the last whole second, 0 to 1.
+    /// Returns the share of bad frames in the last full second, 0 to 1.
     pub fn bad_share(&self) -> f32 {
         self.tally.bad_share()
     }

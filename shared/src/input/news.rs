@@ -1,51 +1,51 @@
-//! The wire's news for a person.
+//! News of the wire for the user.
 
 use super::calibration::Step;
 use super::signal::Signal;
 
-/// The least time between two of the same kind, µs: a wire that fails again and again must not fill
-/// the MAVLink link.
+/// The minimum time between two news of the same kind, µs: a wire that keeps failing must not fill the MAVLink
+/// link.
 const APART_US: u64 = 1_000_000;
 
-/// Time for which throttle is open before the ESC complains, µs.
+/// How long throttle must be open before the ESC complains, µs.
 const OPEN_US: u64 = 500_000;
 /// Time between two complaints, µs.
 const OPEN_AGAIN_US: u64 = 3_000_000;
 
-/// News, in words or by a tune.
+/// News to tell in words or by a tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum News {
     /// The wire carries this signal.
     Identified(Signal),
-    /// The signal is gone.
+    /// The signal was lost.
     Lost {
-        /// True if the wire was armed.
+        /// The wire was armed.
         armed: bool,
     },
     /// The wire is armed.
     Armed,
-    /// The wire asks the motor to turn, and must show zero throttle first.
+    /// The wire demands throttle, but must show zero throttle first.
     OpenThrottle,
-    /// A step of the stick's calibration.
+    /// A step of the stick calibration.
     Calibration(Step),
 }
 
-/// The present state of the wire.
+/// The current state of the wire.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
-    /// The signal that has been identified and is there.
+    /// The identified signal, while present.
     pub(super) signal: Option<Signal>,
     pub(super) armed: bool,
-    /// True if the wire asks the motor to turn, may not, and this is nobody's calibration.
+    /// The wire demands throttle without being armed, and it is not a calibration.
     pub(super) open: bool,
 }
 
-/// News that has been reported.
+/// Tracks what has been reported.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Announcer {
     signal: Option<Signal>,
     identified_us: Option<u64>,
-    /// A loss that is still to be reported; true if the wire was armed.
+    /// A loss still to be reported; true if the wire was armed.
     loss: Option<bool>,
     lost_us: Option<u64>,
     armed: bool,
@@ -55,20 +55,20 @@ pub(super) struct Announcer {
 }
 
 impl Announcer {
-    /// A signal was lost.
+    /// Records a lost signal.
     pub(super) fn lost(&mut self, armed: bool) {
-        // Noise looks like signals that come and go; they have not been reported.
+        // Noise looks like signals that come and go; unreported ones are not worth a loss.
         if armed || self.signal.is_some() {
             self.loss = Some(armed || self.loss == Some(true));
         }
     }
 
-    /// The calibration has come a step further.
+    /// Records a calibration step.
     pub(super) fn calibration(&mut self, step: Option<Step>) {
         self.step = step.or(self.step);
     }
 
-    /// The next news; to be called until there is none.
+    /// Returns the next news. Call it until it returns `None`.
     pub(super) fn next(&mut self, now_us: u64, standing: Standing) -> Option<News> {
         if let Some(armed) = self.loss
             && is_apart(now_us, self.lost_us, APART_US)
@@ -76,7 +76,7 @@ impl Announcer {
             self.loss = None;
             self.lost_us = Some(now_us);
             self.signal = None;
-            // It may be armed again already.
+            // It may have been armed again since.
             self.armed = false;
             return Some(News::Lost { armed });
         }

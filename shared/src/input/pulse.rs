@@ -1,48 +1,48 @@
-//! From believed edges to pulses whose width is the throttle.
+//! Decodes pulses, whose width is the throttle, from filtered edges.
 //!
-//! A pulse has no checksum. It is told from other edges by its width, by the time since the one
-//! before, and by following another such pulse.
+//! A pulse has no checksum. Its width, the time since the previous one, and a valid pulse before it tell it
+//! from other edges.
 
 use super::event::Event;
 use super::signal::Pulse;
 use crate::math::quotient;
 
-/// The least time from a Multishot pulse to the next, ns: 32 kHz, 5 % fast and 5 % early. The bits
-/// of DShot150 are as wide as its pulses, but follow each other in 7 µs.
+/// The minimum period of Multishot, ns: 32 kHz, 5 % fast and 5 % early. DShot150's bits are as wide as
+/// Multishot's pulses, but come every 7 µs.
 const MULTISHOT_PERIOD_NS: u32 = 28_000;
 
-/// The least low time between two pulses: this, ns, and no less than 1/64 of the later one.
+/// The minimum low time between two pulses, ns; at least 1/64 of the later one also applies.
 const LOW_NS: u32 = 1_000;
 
-/// Binary places of the time of a tick.
+/// Fraction bits of the tick duration.
 const TICK_PLACES: u32 = 24;
 
-/// Finds pulses in the edges of one line.
+/// Finds pulses in one line's edges.
 #[derive(Clone, Debug)]
 pub(super) struct Decoder {
     kinds: [Limits; 4],
-    /// The kind that is taken; nothing for all of them.
+    /// The only kind to accept; `None` accepts all.
     only: Option<Pulse>,
     low_ticks: u32,
-    /// The time of a tick, ns · 2²⁴.
+    /// Duration of a tick, ns · 2²⁴.
     tick: u64,
-    /// The rising edge of the latest pulse; nothing before the first one.
+    /// The rising edge of the latest pulse; `None` before the first.
     rise_at: Option<u32>,
     fall_at: u32,
-    /// From the pulse before to the latest one, ticks.
+    /// From the previous pulse to the latest.
     spacing: Option<Spacing>,
-    /// True if the last pulse was one.
+    /// The last pulse was valid.
     sound: bool,
 }
 
-/// Widths of one kind, ticks: from 0.8 of its least to 1.1 of its greatest, for senders whose end
-/// points are wider and for stick calibration.
+/// Width limits of one kind, ticks: 0.8 of its minimum to 1.1 of its maximum, for senders with wider end points
+/// and for stick calibration.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     kind: Pulse,
     least: u32,
     most: u32,
-    /// From one pulse to the next.
+    /// The minimum period from pulse to pulse.
     period: u32,
 }
 
@@ -53,7 +53,7 @@ struct Spacing {
 }
 
 impl Decoder {
-    /// A decoder for a timer of `tick_hz`, which takes every kind.
+    /// Creates a decoder for a timer of `tick_hz` that accepts every kind.
     pub(super) fn new(tick_hz: u32) -> Self {
         let nanoseconds = 1_000_000_000_u64 << TICK_PLACES;
         Self {
@@ -68,13 +68,12 @@ impl Decoder {
         }
     }
 
-    /// Takes one kind; nothing for all of them.
+    /// Accepts only one kind; `None` accepts all.
     pub(super) fn take_only(&mut self, only: Option<Pulse>) {
         self.only = only;
     }
 
-    /// Takes an edge. A pulse, good or bad, is reported at its end, except for a good one
-    /// after a bad one.
+    /// Takes an edge. A pulse, good or bad, is reported at its end, except a good one that follows a bad one.
     pub(super) fn edge(&mut self, at_ticks: u32, level: bool) -> Option<Event> {
         if level {
             self.spacing = self.rise_at.map(|rise_at| Spacing {
@@ -97,19 +96,19 @@ impl Decoder {
         })
     }
 
-    /// An edge was missed: the next pulse follows a bad one.
+    /// Records that an edge was missed: the next pulse counts as following a bad one.
     pub(super) fn spoil(&mut self) {
         self.clear();
         self.sound = false;
     }
 
-    /// Forgets every edge: the line has been at rest for long.
+    /// Forgets every edge, after a long rest.
     pub(super) fn clear(&mut self) {
         self.rise_at = None;
         self.sound = true;
     }
 
-    /// The kind of the latest pulse.
+    /// Returns the kind of the latest pulse.
     fn kind(&self, width: u32) -> Option<Pulse> {
         let mut kinds = self.kinds.iter();
         let limits = kinds.find(|limits| (limits.least..=limits.most).contains(&width))?;

@@ -1,4 +1,4 @@
-//! The signals that a throttle wire may carry.
+//! The signals a throttle wire may carry.
 
 use super::dshot::Rate;
 
@@ -16,7 +16,7 @@ pub enum Pulse {
 }
 
 impl Pulse {
-    /// Every kind, the longest first.
+    /// Every kind, longest first.
     pub const ALL: [Self; 4] = [
         Self::Servo,
         Self::OneShot125,
@@ -24,7 +24,7 @@ impl Pulse {
         Self::Multishot,
     ];
 
-    /// The widths of least and most throttle by the protocol, ns.
+    /// Returns the nominal widths of minimum and maximum throttle, ns.
     pub const fn end_points_ns(self) -> EndPointsNs {
         let (least, most) = match self {
             Self::Servo => (1_000_000, 2_000_000),
@@ -36,31 +36,30 @@ impl Pulse {
     }
 }
 
-/// The widths of a pulse's least and most throttle, ns.
+/// The widths of minimum and maximum throttle, ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EndPointsNs {
-    /// Of the least throttle.
+    /// Minimum throttle.
     pub least: u32,
-    /// Of the most.
+    /// Maximum throttle.
     pub most: u32,
 }
 
-/// A signal that a wire may carry.
+/// A signal a wire may carry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
     /// Pulses.
     Pulse(Pulse),
     /// DShot frames.
     Dshot {
-        /// Their bit rate.
+        /// Bit rate.
         rate: Rate,
-        /// True if the line rests high, the checksum is inverted and each frame is answered on the
-        /// same wire.
+        /// The line rests high, the checksum is inverted and each frame is answered on the same wire.
         bidirectional: bool,
     },
 }
 
-/// Each signal with its number in `INP_PROTO` and its name.
+/// Every signal with its number in `INP_PROTO` and its name.
 const TABLE: [(Signal, u8, &str); 12] = [
     (Signal::Pulse(Pulse::Servo), 1, "servo"),
     (Signal::Pulse(Pulse::OneShot125), 2, "OneShot125"),
@@ -84,18 +83,18 @@ const fn dshot(rate: Rate, bidirectional: bool) -> Signal {
 }
 
 impl Signal {
-    /// Every signal, in the order of the numbers.
+    /// Returns every signal, in numerical order.
     pub fn all() -> impl Iterator<Item = Self> {
         TABLE.iter().map(|(signal, ..)| *signal)
     }
 
-    /// The signal of this number in `INP_PROTO`; nothing for 0, which is automatic.
+    /// Returns the signal with this number in `INP_PROTO`, or `None` for 0, automatic detection.
     pub fn from_number(number: u8) -> Option<Self> {
         let row = TABLE.iter().find(|(_, other, _)| *other == number)?;
         Some(row.0)
     }
 
-    /// Returns true if the line is high between its frames.
+    /// Returns true if the line is high between frames.
     pub fn rests_high(self) -> bool {
         matches!(
             self,
@@ -106,12 +105,12 @@ impl Signal {
         )
     }
 
-    /// Its number in `INP_PROTO`.
+    /// Returns its number in `INP_PROTO`.
     pub fn number(self) -> u8 {
         self.row().1
     }
 
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         self.row().2
     }

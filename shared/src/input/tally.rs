@@ -1,6 +1,6 @@
-//! The share of the frames on the wire that are bad.
+//! Measures the share of bad frames on the wire.
 
-/// The time over which a share is taken, µs.
+/// The window over which the share is measured, µs.
 const WINDOW_US: u64 = 1_000_000;
 
 /// Counts good and bad frames and pulses.
@@ -14,7 +14,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Counts one.
+    /// Counts a frame or pulse.
     pub(super) fn count(&mut self, good: bool) {
         if good {
             self.good = self.good.saturating_add(1);
@@ -24,7 +24,7 @@ impl Tally {
         }
     }
 
-    /// Lets time pass.
+    /// Advances time.
     pub(super) fn poll(&mut self, now_us: u64) {
         if now_us.saturating_sub(self.since_us) < WINDOW_US {
             return;
@@ -35,12 +35,12 @@ impl Tally {
         (self.good, self.bad) = (0, 0);
     }
 
-    /// The share of bad ones in the last whole second, 0 to 1; 0 on a silent wire.
+    /// Returns the share of bad frames in the last full second, 0 to 1; 0 on a silent wire.
     pub(super) fn bad_share(&self) -> f32 {
         self.bad_share
     }
 
-    /// All bad ones since the start; it stops at its greatest value.
+    /// Returns the number of bad frames since power-up, saturating.
     pub(super) fn bad_total(&self) -> u32 {
         self.bad_total
     }

@@ -1,43 +1,42 @@
-//! Tells a sender's frames from noise that passes the check now and then.
+//! Tells a sender's frames from noise that occasionally passes the check.
 //!
-//! Of random words one in sixteen passes the four check bits, and nearly all of those are throttle. So
-//! each frame is evidence: on a link where half of the frames are good, a good one is 8 times as likely
-//! as in noise (1/2 to 1/16), and a bad one half as likely (1/2 to 15/16). The logarithms of the two
-//! are as 3 to −1 (2.08 and −0.63): their sum, kept between two ends, is compared with a threshold.
+//! One random word in sixteen passes the four check bits, and nearly all of those are throttle. Each frame is
+//! therefore evidence: on a link where half of the frames are good, a good one is 8 times as likely as in noise
+//! (1/2 to 1/16), and a bad one half as likely (1/2 to 15/16). Their log-likelihood ratios are about 3 to −1
+//! (2.08 and −0.63); their sum, clamped at both ends, is compared with a threshold.
 //!
-//! In random words the sum falls by 3/4 a word and then stays near 0. It reaches the threshold with one
-//! word in 143 000; at 1 kHz the wire therefore counts as silent within 0.2 s of the first word in all
-//! but one case of 26 000. The sum rises if more than a quarter of the frames are good. On a link where
-//! half are, one good frame in 2760 is missed, and at 1 kHz a silence of a tenth of a second comes once
-//! in three years. Twelve bad frames in a row cost none of the good ones after them, any number at most
-//! four.
+//! In random words the sum falls by 3/4 per word and then stays near 0. One word in 143 000 takes it to the
+//! threshold; at 1 kHz the wire thus counts as silent within 0.2 s of the first word in all but one case in 26
+//! 000. The sum rises if more than a quarter of the frames are good. On a link where half are, one good frame
+//! in 2760 is missed, and at 1 kHz a silence of 0.1 s occurs once in three years. Twelve bad frames in a row
+//! cost none of the good ones after them; any number costs at most four.
 
-/// Evidence of a good frame; a bad one takes 1.
+/// Evidence added by a good frame; a bad one subtracts 1.
 const GOOD: u8 = 3;
-/// From here on frames are believed.
+/// Frames are believed from here on.
 const BELIEVED: u8 = 15;
-/// The end of the count: after a long good time twelve bad frames in a row raise doubt.
+/// Upper clamp: after a long good run, up to twelve bad frames in a row cost no good one.
 const MOST: u8 = 24;
 
-/// The evidence of a wire's frames.
+/// The evidence that a wire's frames are genuine.
 #[derive(Clone, Debug)]
 pub(super) struct Trust(u8);
 
 impl Default for Trust {
-    /// Full trust, until there are bad frames.
+    /// Starts with full trust, until there are bad frames.
     fn default() -> Self {
         Self(MOST)
     }
 }
 
 impl Trust {
-    /// Takes in a frame with a right checksum. Returns true if it is to be believed.
+    /// Adds a frame with a correct checksum. Returns true if it is to be believed.
     pub(super) fn good(&mut self) -> bool {
         self.0 = MOST.min(self.0 + GOOD);
         self.0 >= BELIEVED
     }
 
-    /// Takes in one that fails it.
+    /// Adds a frame that fails its check.
     pub(super) fn bad(&mut self) {
         self.0 = self.0.saturating_sub(1);
     }
