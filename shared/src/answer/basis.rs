@@ -5,17 +5,17 @@ use crate::drive::{ATTEMPTS, Fault, Snapshot};
 use crate::params;
 use crate::units::Scale;
 
-/// The little of a [`Config`](crate::drive::Config) that is needed to read a snapshot.
+/// The parts of a [`Config`](crate::drive::Config) needed to interpret a snapshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Basis {
-    /// The control's units in SI.
+    /// Converts the control's units to SI.
     pub scale: Scale,
-    /// As [`Config::lost_periods`](crate::drive::Config::lost_periods).
+    /// See [`Config::lost_periods`](crate::drive::Config::lost_periods).
     pub(super) lost_periods: u32,
 }
 
 impl Basis {
-    /// Of a drive whose units have this scale.
+    /// Creates the basis of a drive with this scale.
     pub fn new(scale: Scale) -> Self {
         Self {
             scale,
@@ -23,10 +23,10 @@ impl Basis {
         }
     }
 
-    /// Doubt of the rotor's position: 0 if all is well, 255 if the drive has given it up.
+    /// Returns how doubtful the rotor's position is: 0 if all is well, 255 if the drive has given it up.
     ///
-    /// It is the greatest share that has been used of what is allowed: of the attempts of a start,
-    /// of the periods without an estimate, and of the six-step drive's sextants without a crossing.
+    /// It is the largest used-up fraction of three allowances: start attempts, periods without an estimate,
+    /// and, in six-step, sextants without a crossing.
     pub(super) fn doubt(&self, snapshot: &Snapshot) -> u8 {
         let faults = snapshot.faults;
         if faults.contains(Fault::ObserverLost) || faults.contains(Fault::Stuck) {

@@ -1,31 +1,30 @@
-//! Speed in a reply: the time of an electrical turn.
+//! Speed in a reply, as the period of an electrical turn.
 //!
-//! `eeemmmmmmmmm` is m·2^e µs. Betaflight and ArduPilot shift by e, and some descriptions that say
-//! e − 1 are wrong. The mantissa is normalised: if e is not 0 its highest bit is set, since words
-//! without it are extended telemetry.
+//! `eeemmmmmmmmm` is m·2^e µs. Betaflight and ArduPilot shift by e; some descriptions say e − 1 and are wrong.
+//! The mantissa is normalised: unless e is 0 its top bit is set, since words without it are extended telemetry.
 
 use crate::units::{Scale, Speed};
 
-/// The word for a shaft that stands, or turns in 65.3 ms or more: below 919 eRPM.
+/// The word for a standing shaft, or a period of 65.3 ms and more: below 919 eRPM.
 pub const STOPPED: u16 = 0xFFF;
 
 /// The period from which the nearest word would be 511·2^7 µs, which is [`STOPPED`].
 const LONGEST_US: f32 = 510.5 * 128.0;
 
-/// Bits of one turn a control period.
+/// One turn per control period, in bits of [`Speed`].
 const TURN: f32 = 4_294_967_296.0;
 
-/// The word of a speed, whatever its direction.
+/// Returns the word for a speed, whatever its direction.
 pub fn of_speed(speed: Speed, scale: &Scale) -> u16 {
     let turns = speed.to_bits().unsigned_abs() as f32 / TURN;
     of_period_us(scale.period_s * 1e6 / turns)
 }
 
-/// The word nearest to a period in µs; at least 1 µs, since no turn takes none.
+/// Returns the word nearest to a period in µs; at least 1 µs, since no turn takes none.
 fn of_period_us(period_us: f32) -> u16 {
     if period_us < LONGEST_US {
         let (mut mantissa, mut exponent) = (period_us, 0);
-        // From here on the nearest would be 512, which is 256 of the next exponent.
+        // From here on rounding would give 512, which is 256 with the next exponent.
         while mantissa >= 511.5 {
             mantissa *= 0.5;
             exponent += 1;
@@ -36,7 +35,7 @@ fn of_period_us(period_us: f32) -> u16 {
     }
 }
 
-/// The period of a word, µs; `None` if the shaft stands, and for 0, which is never sent.
+/// Returns the period of a word, µs; `None` for a standing shaft, and for 0, which is never sent.
 pub fn period_us(data: u16) -> Option<u32> {
     let period_us = u32::from(data & 0x1FF) << (data >> 9 & 7);
     (data & 0xFFF != STOPPED && period_us != 0).then_some(period_us)

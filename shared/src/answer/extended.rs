@@ -1,4 +1,4 @@
-//! Extended DShot telemetry 2.0.0: words that no normalised speed has
+//! Extended DShot telemetry 2.0.0, in the words that no normalised speed uses
 //! (<https://github.com/bird-sanctuary/extended-dshot-telemetry>).
 
 /// The contents of an extended word.
@@ -6,43 +6,43 @@
 pub enum Extended {
     /// Temperature, °C.
     Temperature(u8),
-    /// Supply voltage in 0.25 V.
+    /// Supply voltage, 0.25 V.
     Voltage(u8),
     /// Supply current, A.
     Current(u8),
-    /// For the ESC's developer; Siskin sends neither.
+    /// First debug value, for the ESC's developer; Siskin sends neither.
     Debug1(u8),
-    /// A second value for debugging.
+    /// Second debug value.
     Debug2(u8),
-    /// The effort to keep the motor turning: 0 no trouble, 255 it cannot be done.
+    /// The effort to keep the motor turning: 0 none, 255 cannot be done.
     Stress(u8),
-    /// Events since the last word of this kind; see [`Status`]. It also announces that extended
-    /// telemetry is on ([`ENABLED`]) or off ([`DISABLED`]).
+    /// Events since the last status word; see [`Status`]. Also announces that extended telemetry is on
+    /// ([`ENABLED`]) or off ([`DISABLED`]).
     Status(u8),
 }
 
-/// Answer to the command that turns extended telemetry on. Betaflight accepts no other.
+/// Reply to the command that turns extended telemetry on. Betaflight accepts no other.
 pub const ENABLED: Extended = Extended::Status(0);
 
-/// Answer to the command that turns it off.
+/// Reply to the command that turns it off.
 pub const DISABLED: Extended = Extended::Status(0xFF);
 
 /// The events in [`Extended::Status`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
-    /// Bit 7: something to be counted.
+    /// Bit 7: an event worth counting.
     pub alert: bool,
     /// Bit 6: something suspect.
     pub warning: bool,
     /// Bit 5: a serious problem.
     pub error: bool,
-    /// Bits 3 to 0: the greatest stress in sixteenths of its range. The specification's text says
-    /// bits 3 to 1 for 0 to 15; Bluejay sends and ArduPilot reads four bits.
+    /// Bits 3 to 0: maximum stress in sixteenths of its range. The specification says bits 3 to 1 for 0 to 15;
+    /// Bluejay sends and ArduPilot reads four bits.
     pub max_stress: u8,
 }
 
 impl Extended {
-    /// The 12 bits of data.
+    /// Encodes the 12 data bits.
     pub const fn data(self) -> u16 {
         let (kind, value) = match self {
             Self::Temperature(value) => (0x2, value),
@@ -56,7 +56,7 @@ impl Extended {
         kind << 8 | value as u16
     }
 
-    /// The word in 12 bits of data; `None` if they are a speed.
+    /// Decodes 12 data bits; `None` if they are a speed.
     pub const fn from_data(data: u16) -> Option<Self> {
         let value = data as u8;
         Some(match data >> 8 & 0xF {
@@ -73,7 +73,7 @@ impl Extended {
 }
 
 impl Status {
-    /// The word.
+    /// Encodes the status word.
     pub const fn word(self) -> Extended {
         Extended::Status(
             (self.alert as u8) << 7
@@ -83,7 +83,7 @@ impl Status {
         )
     }
 
-    /// The status in the value of a word.
+    /// Decodes the value of a status word.
     pub const fn from_value(value: u8) -> Self {
         Self {
             alert: value & 1 << 7 != 0,

@@ -1,20 +1,19 @@
-//! The line code of a reply: 12 bits of data as 21 levels on the wire.
+//! Line code of a reply: 12 data bits as 21 levels on the wire.
 //!
-//! Four check bits follow the data. Each nibble becomes five bits of a group code without long runs
-//! of zeros, and the line changes its level at each one, from a start bit that is low. Betaflight and
-//! ArduPilot decode it so, and refuse a word whose nibbles, check bits included, do not come to 0xF
-//! by exclusive or.
+//! Four check bits follow the data. Each nibble maps to a five-bit group without long runs of zeros, and every
+//! one toggles the line, starting from a low start bit. Betaflight and ArduPilot decode it this way, and reject
+//! a word whose nibbles, check bits included, do not XOR to 0xF.
 
 /// The group code of each nibble.
 const CODE: [u8; 16] = [
     0x19, 0x1B, 0x12, 0x13, 0x1D, 0x15, 0x16, 0x17, 0x1A, 0x09, 0x0A, 0x0B, 0x1E, 0x0D, 0x0E, 0x0F,
 ];
 
-/// The nibble of each group code, and a marker if there is none.
+/// The nibble of each group code, [`NONE`] if invalid.
 const NIBBLE: [u8; 32] = nibbles();
 const NONE: u8 = 0xFF;
 
-/// Levels of a reply.
+/// Levels in a reply.
 pub const BITS: u32 = 21;
 
 const fn nibbles() -> [u8; 32] {
@@ -27,16 +26,16 @@ const fn nibbles() -> [u8; 32] {
     nibbles
 }
 
-/// The 21 levels of 12 bits of data: bit 20, the start bit, comes first; 1 is high. The last one is high in
-/// every reply: a group has an even number of ones where the lowest three bits of its nibble have an odd one,
-/// and the check bits see to it that an odd number of the four nibbles do.
+/// Encodes 12 data bits as 21 levels: bit 20, the start bit, comes first; 1 is high. The last level is high in
+/// every reply: a group has even parity exactly where its nibble's lowest three bits have odd parity, and the
+/// check bits make that so for an odd number of the four nibbles.
 pub fn encode(data: u16) -> u32 {
     let data = data & 0xFFF;
     let word = data << 4 | check_sum(data);
     let code = (0..4).rev().fold(0, |code, place| {
         code << 5 | u32::from(CODE[usize::from(word >> (4 * place) & 0xF)])
     });
-    // A level is the exclusive or of all bits up to its own.
+    // Each level is the XOR of all bits up to its own.
     let mut levels = code;
     for shift in [1, 2, 4, 8, 16] {
         levels ^= levels >> shift;
@@ -44,7 +43,7 @@ pub fn encode(data: u16) -> u32 {
     levels
 }
 
-/// The 12 bits of data of 21 levels; `None` if they are no reply.
+/// Decodes 21 levels to 12 data bits; `None` if they are not a valid reply.
 pub fn decode(levels: u32) -> Option<u16> {
     if levels >> (BITS - 1) != 0 {
         return None;
@@ -58,7 +57,7 @@ pub fn decode(levels: u32) -> Option<u16> {
     (word & 0xF == check_sum(data)).then_some(data)
 }
 
-/// The complement of the exclusive or of the three nibbles.
+/// Returns the complement of the XOR of the three nibbles.
 fn check_sum(data: u16) -> u16 {
     !(data ^ data >> 4 ^ data >> 8) & 0xF
 }

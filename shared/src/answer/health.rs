@@ -1,8 +1,8 @@
 //! The drive's health, for the status and stress words of extended telemetry.
 //!
-//! The specification calls stress the effort to keep commutation going: 0 is perfect, and the end
-//! of the range is that it cannot be kept. Here it is [`Basis::doubt`]: how near the drive is to
-//! giving the rotor up. It says nothing of load, which the current shows.
+//! The specification defines stress as the effort to keep commutating: 0 is perfect, full scale is impossible.
+//! Here it is [`Basis::doubt`]: how close the drive is to giving the rotor up. Load is not part of it; the
+//! current shows that.
 //!
 //! | event | raised by |
 //! |---|---|
@@ -10,28 +10,28 @@
 //! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a phase or a sensor is at fault ([`Limits::warn`]) |
 //! | error | a fault has turned the bridge off |
 //!
-//! An event is reported once, by the next status word, and again as long as it lasts.
+//! The next status word reports an event once, and the ones after it repeat it while it lasts.
 
 use super::Basis;
 use super::extended::{Extended, Status};
 use crate::drive::{Limits, Snapshot};
 
-/// Doubt from which on it is worth a warning: a quarter of what is allowed, as one of four starts
-/// that has failed. A crossing that the current hides now and then is none.
+/// The doubt that warrants a warning: a quarter of what is allowed, as one failed start of four. A crossing
+/// that the current masks now and then stays below it.
 const SUSPECT: u8 = 63;
 
 /// Events since the last report.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Health {
     status: Status,
-    /// The greatest stress since the last word of it, and since the last status.
+    /// The maximum stress since the last stress word, and since the last status word.
     stress: u8,
     max_stress: u8,
     fault_count: u32,
 }
 
 impl Health {
-    /// Takes in the drive's snapshot and the limits that bind, at each reply.
+    /// Takes in the drive's snapshot and the active limits, at each reply.
     pub(super) fn observe(&mut self, snapshot: &Snapshot, basis: &Basis, limits: Limits) {
         let doubt = basis.doubt(snapshot);
         self.stress = self.stress.max(doubt);
@@ -51,12 +51,12 @@ impl Health {
         };
     }
 
-    /// The stress word.
+    /// Returns the stress word and restarts its maximum.
     pub(super) fn stress(&mut self) -> Extended {
         Extended::Stress(core::mem::take(&mut self.stress))
     }
 
-    /// The status word.
+    /// Returns the status word and restarts its events.
     pub(super) fn status(&mut self) -> Extended {
         let status = Status {
             max_stress: core::mem::take(&mut self.max_stress) >> 4,

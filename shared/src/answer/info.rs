@@ -1,7 +1,6 @@
-//! The ESC's information, which DShot's command 6 asks for: 64 bytes on the serial line.
+//! The ESC's information, requested by DShot command 6: 64 bytes on the serial line.
 //!
-//! The layout is that of BLHeli_32, which flight controllers know and print (Betaflight:
-//! `dshotprog 0 6`):
+//! The layout is BLHeli_32's, which flight controllers know and print (Betaflight: `dshotprog 0 6`):
 //!
 //! | byte | what it is |
 //! |---|---|
@@ -22,27 +21,27 @@ use crate::image::{Image, VERSION};
 use crate::math::round;
 use crate::params::{ParamId, Params};
 
-/// Bytes of the information.
+/// Length in bytes.
 pub const BYTES: usize = 64;
 
-/// From its start to that of the next frame on its line at least, µs: its 640 bits take 5556.
+/// The minimum time from its start to the next frame's on the line, µs: its 640 bits take 5556.
 pub const SPACING_US: u32 = 6000;
 
-/// By this in byte 12 a reader knows the layout.
+/// In byte 12, tells a reader the layout.
 const LAYOUT: u8 = 254;
-/// There is no such thing.
+/// Marks a missing feature.
 const UNSUPPORTED: u8 = 255;
-/// The highest value that is not taken for [`UNSUPPORTED`].
+/// The highest value that cannot be mistaken for [`UNSUPPORTED`].
 const MOST: f32 = 254.0;
 
 const NAME: &[u8] = b"Siskin ";
-/// Bytes 31 to 62.
+/// Length of bytes 31 to 62.
 const NAME_BYTES: usize = 32;
 
-/// The information of an ESC with these parameters and this state of its light.
+/// Returns the information for these parameters and this state of the light.
 pub fn info(params: &Params, light: bool, image: &Image) -> [u8; BYTES] {
     let get = |id| params.get(id);
-    // Conversions saturate, and a limit below the unit is still one.
+    // Conversions saturate, and a limit below one unit still shows as a limit.
     let limit = |value: f32| {
         let least = if value > 0.0 { 1.0 } else { 0.0 };
         round(value).clamp(least, MOST) as u8
@@ -62,17 +61,17 @@ pub fn info(params: &Params, light: bool, image: &Image) -> [u8; BYTES] {
     bytes
 }
 
-/// Major version, and minor version with the patch: 0.1.0 is 0 and 10, printed as 0.10.
+/// Returns the major version, and the minor one with the patch: 0.1.0 becomes 0 and 10, printed as 0.10.
 fn version() -> [u8; 2] {
     let [major, minor, patch] = VERSION;
     [major, minor.saturating_mul(10).saturating_add(patch)]
 }
 
-/// The name, followed by the board's if there is room.
+/// Returns the product name and as much of the board's as fits.
 fn name(board: &str) -> [u8; NAME_BYTES] {
     let mut name = [0; NAME_BYTES];
     let bytes = NAME.iter().copied().chain(board.bytes());
-    // Zeros end it.
+    // Keep a terminating zero.
     for (to, byte) in name[..NAME_BYTES - 1].iter_mut().zip(bytes) {
         *to = byte;
     }

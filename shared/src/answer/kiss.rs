@@ -1,21 +1,21 @@
-//! KISS telemetry on a serial line: 115200 baud, 8N1, ten bytes with the highest first.
+//! KISS telemetry on a serial line: 115200 baud, 8N1, ten bytes, big-endian.
 
 use crate::math::round;
 use crate::telemetry::Telemetry;
 
-/// Bytes of a frame.
+/// Bytes in a frame.
 pub const BYTES: usize = 10;
 
-/// From the start of one frame to that of the next at least, µs: its 100 bits take 868.
+/// The minimum time from one frame's start to the next, µs: a frame's 100 bits take 868.
 pub const SPACING_US: u32 = 1000;
 
-/// The frame: °C, 0.01 V, 0.01 A, mAh and hundreds of electrical rpm, each held at the ends of its
-/// range, and a checksum. A negative current, of braking, is sent as 0: it has no sign. So is a
-/// temperature below 0 °C: the protocol gives it a sign, but Betaflight, PX4 and ArduPilot read the
-/// byte without one, and took −10 °C for 246.
+/// Returns a frame: °C, 0.01 V, 0.01 A, mAh and hundreds of electrical rpm, each saturated, and a checksum. A
+/// negative, braking current is sent as 0, since the field is unsigned. So is a temperature below 0 °C: the
+/// protocol makes it signed, but Betaflight, PX4 and ArduPilot read the byte as unsigned, and took −10 °C for
+/// 246.
 pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
     let mut frame = [0; BYTES];
-    // A float's conversion saturates, and turns NaN into 0.
+    // Float conversion saturates and maps NaN to 0.
     frame[0] = (round(telemetry.temperature_c) as i8).max(0) as u8;
     let words = [
         telemetry.bus_v * 100.0,
@@ -30,7 +30,7 @@ pub fn frame(telemetry: &Telemetry, erpm: f32) -> [u8; BYTES] {
     frame
 }
 
-/// The checksum of KISS frames: polynomial 0x07, from 0.
+/// Returns the KISS frames' CRC-8: polynomial 0x07, initial value 0.
 pub fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| {
         (0..8).fold(crc ^ byte, |crc, _| {

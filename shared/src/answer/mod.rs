@@ -1,8 +1,7 @@
-//! Answers to the flight controller: on the throttle wire and on a serial line.
+//! Answers the flight controller on the throttle wire and on a serial line.
 //!
-//! A bidirectional frame is answered on its own wire ([`gcr`]) with the speed ([`erpm`]) or a word
-//! of extended telemetry ([`extended`]); a frame with its telemetry bit set, on the serial line
-//! ([`kiss`]).
+//! A bidirectional frame is answered on its own wire ([`gcr`]) with the speed ([`erpm`]) or a word of extended
+//! telemetry ([`extended`]); a frame with its telemetry bit set, on the serial line ([`kiss`]).
 
 mod basis;
 pub mod erpm;
@@ -24,37 +23,37 @@ use extended::Extended;
 use health::Health;
 use schedule::{Kind, Schedule};
 
-/// From the end of a frame to its reply, ns, at every rate.
+/// Time from the end of a frame to its reply, ns, at every rate.
 pub const REPLY_DELAY_NS: u32 = 30_000;
 
-/// The answers that a frame may ask for.
+/// The answers a frame requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ask {
-    /// Time of the frame's first edge, in ticks of the capturing timer.
+    /// Time of the frame's first edge, in ticks of the capture timer.
     pub first_edge_ticks: u32,
-    /// The frame's rate.
+    /// Bit rate of the frame.
     pub rate: Rate,
-    /// True if it is to be answered on its wire.
+    /// The frame is to be answered on its wire.
     pub bidirectional: bool,
-    /// True if telemetry is to be sent on the serial line.
+    /// Telemetry is to be sent on the serial line.
     pub telemetry: bool,
 }
 
 /// The answer to a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// On the wire.
+    /// The reply on the wire.
     pub reply: Option<Reply>,
-    /// On the serial line: a frame of KISS telemetry.
+    /// For the serial line: a KISS telemetry frame.
     pub kiss: Option<[u8; kiss::BYTES]>,
-    /// On the serial line, without a KISS frame: the ESC's information, which a command has asked for.
+    /// For the serial line, instead of a KISS frame: the ESC's information, requested by a command.
     pub info: Option<[u8; info::BYTES]>,
 }
 
-/// The part that goes to the serial line, as in [`Answer`].
+/// The serial part of an [`Answer`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Serial {
-    /// A frame of KISS telemetry.
+    /// A KISS telemetry frame.
     pub kiss: Option<[u8; kiss::BYTES]>,
     /// The ESC's information.
     pub info: Option<[u8; info::BYTES]>,
@@ -63,16 +62,16 @@ pub struct Serial {
 /// A reply on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
-    /// 21 bits, the highest first; 1 is line high.
+    /// 21 bits, first bit highest; 1 is line high.
     pub bits: u32,
-    /// Bits a second: 5/4 of the frame's.
+    /// Bits per second: 5/4 of the frame's.
     pub bit_hz: u32,
-    /// Time of its first bit, in ticks of the capturing timer.
+    /// Time of the first bit, in ticks of the capture timer.
     pub at_ticks: u32,
 }
 
 impl Ask {
-    /// The answers that the sender of a frame or pulse may want; `None` if none.
+    /// Returns the answers that a frame requests, or `None`.
     pub fn of(event: &Event) -> Option<Self> {
         let Event::Frame {
             rate,
@@ -93,20 +92,20 @@ impl Ask {
     }
 }
 
-/// State from answer to answer.
+/// State carried from answer to answer.
 #[derive(Clone, Debug)]
 pub struct Answers {
-    /// From a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
+    /// Time from a frame's first edge to its reply, ticks, in the order of [`Rate::ALL`].
     reply_ticks: [u32; Rate::ALL.len()],
-    /// Times for which a KISS frame, and the ESC's information, take the serial line.
+    /// How long a KISS frame, and the ESC's information, occupy the serial line.
     kiss_ticks: u32,
     info_ticks: u32,
-    /// Time at which the frame before began.
+    /// When the previous frame began.
     asked_at_ticks: Option<u32>,
-    /// Time for which the serial line is still taken.
+    /// How long the serial line is still occupied.
     busy_ticks: u32,
     extended: bool,
-    /// The answer to the command that turned extended telemetry on or off.
+    /// The reply to the command that turned extended telemetry on or off.
     announcement: Option<Extended>,
     schedule: Schedule,
     health: Health,
@@ -114,7 +113,7 @@ pub struct Answers {
 }
 
 impl Answers {
-    /// Nothing sent yet; `tick_hz` is the rate of the timer that captures the wire's edges.
+    /// Creates the initial state; `tick_hz` is the rate of the timer that captures the wire's edges.
     pub fn new(tick_hz: u32) -> Self {
         let ticks = |time_us| quotient(u64::from(tick_hz) * u64::from(time_us), 1_000_000);
         Self {
@@ -131,8 +130,7 @@ impl Answers {
         }
     }
 
-    /// Turns extended telemetry on or off, and announces it with the next reply that may be an
-    /// extended word.
+    /// Turns extended telemetry on or off, and announces it in the next reply that may be an extended word.
     pub fn set_extended(&mut self, on: bool) {
         self.extended = on;
         self.announcement = Some(if on {
@@ -144,8 +142,8 @@ impl Answers {
         self.health.begin();
     }
 
-    /// The signal is lost: whoever comes back on the wire has not asked for anything, and takes every word
-    /// for a speed until it has.
+    /// Resets on a lost signal: whoever appears next has requested nothing, and until it does takes every word
+    /// for a speed.
     pub fn lost(&mut self) {
         self.extended = false;
         self.announcement = None;
@@ -157,8 +155,8 @@ impl Answers {
         self.info = Some(info);
     }
 
-    /// The reply to a frame on its wire, if it asks for one. It must be quick: `speed_bits` are those of a
-    /// reply with the drive's speed ([`speed_bits`]), and [`Answers::serial`] is to follow.
+    /// Returns the reply to a frame on its wire, if it requests one. Kept short to meet the deadline: the
+    /// caller passes the encoded speed ([`speed_bits`]), and calls [`Answers::serial`] afterwards.
     pub fn reply(&mut self, ask: Ask, speed_bits: u32, telemetry: &Telemetry) -> Option<Reply> {
         self.pass(ask.first_edge_ticks);
         ask.bidirectional.then(|| {
@@ -178,8 +176,8 @@ impl Answers {
         })
     }
 
-    /// The bytes for the serial line that answer a frame, with the drive's present state, of which the
-    /// next words of extended telemetry tell too.
+    /// Returns the bytes that answer a frame on the serial line. The drive's current state also feeds the next
+    /// words of extended telemetry.
     pub fn serial(
         &mut self,
         ask: Ask,
@@ -190,8 +188,8 @@ impl Answers {
         self.health.observe(snapshot, basis, telemetry.limits);
         let free = self.busy_ticks == 0;
         let info = self.info.take_if(|_| free);
-        // A flight controller that asks for the information sets the telemetry bit as well, and reads
-        // the bytes that it gets as the information.
+        // A flight controller that requests the information also sets the telemetry bit, and takes whatever
+        // bytes arrive for the information.
         let kiss = free && info.is_none() && ask.telemetry;
         if info.is_some() {
             self.busy_ticks = self.info_ticks;
@@ -208,8 +206,8 @@ impl Answers {
         }
     }
 
-    /// Takes in when a frame has come. The ticks wrap, in 25 s at 170 MHz: after a longer rest a
-    /// word or a frame may come late by its interval.
+    /// Advances time to that of a frame. The ticks wrap, in 25 s at 170 MHz: after a longer silence a word or a
+    /// frame may be late by its interval.
     fn pass(&mut self, now_ticks: u32) {
         let before_ticks = self.asked_at_ticks.replace(now_ticks).unwrap_or(now_ticks);
         let ticks = now_ticks.wrapping_sub(before_ticks);
@@ -217,7 +215,7 @@ impl Answers {
         self.schedule.pass(ticks);
     }
 
-    /// The extended word that this reply shall be, if any.
+    /// Returns the extended word to send as this reply, if any.
     fn extended(&mut self, telemetry: &Telemetry) -> Option<Extended> {
         if !self.schedule.is_free() {
             return None;
@@ -228,7 +226,7 @@ impl Answers {
         if !self.extended {
             return None;
         }
-        // A float's conversion saturates.
+        // Float conversion saturates.
         let whole = |value: f32| round(value) as u8;
         Some(match self.schedule.due()? {
             Kind::Status => self.health.status(),
@@ -240,20 +238,20 @@ impl Answers {
     }
 }
 
-/// The bits of a reply that carries the speed.
+/// Returns the bits of a reply that carries the speed.
 pub fn speed_bits(snapshot: &Snapshot, basis: &Basis) -> u32 {
     gcr::encode(erpm::of_speed(snapshot.speed, &basis.scale))
 }
 
-/// Bits a second of the reply to a frame of this rate.
+/// Returns the bit rate of the reply to a frame of this rate, in bits per second.
 pub const fn reply_bit_hz(rate: Rate) -> u32 {
     rate.bit_hz() / 4 * 5
 }
 
-/// From a frame's first edge to its reply, in ticks to the nearest: 16 nominal bits, whatever the
-/// frame's own were, and the delay.
+/// Returns the time from a frame's first edge to its reply, in ticks rounded to nearest: 16 nominal bits,
+/// whatever the frame's own timing, and the delay.
 fn reply_ticks(tick_hz: u32, rate: Rate) -> u32 {
-    // 16 bits in units of 10⁻⁹/3 s, which every rate's bit is a whole number of.
+    // 16 bits in units of 10⁻⁹/3 s, of which every rate's bit is a whole number.
     let frame = 16 * (1_000_000_000 / (rate.bit_hz() / 3));
     let whole = u64::from(frame + 3 * REPLY_DELAY_NS);
     quotient(whole * u64::from(tick_hz) + 1_500_000_000, 3_000_000_000)

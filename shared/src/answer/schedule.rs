@@ -1,6 +1,6 @@
-//! The schedule of extended telemetry among the replies.
+//! Schedules extended telemetry among the replies.
 
-/// A kind of extended word that is sent in turn.
+/// A kind of extended word sent in rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     Status,
@@ -10,7 +10,7 @@ pub(super) enum Kind {
     Stress,
 }
 
-/// The order. Each turn brings the status and the temperature once, the rest twice.
+/// The rotation: status and temperature once, the rest twice.
 const TURN: [Kind; 8] = [
     Kind::Status,
     Kind::Current,
@@ -22,23 +22,23 @@ const TURN: [Kind; 8] = [
     Kind::Stress,
 ];
 
-/// From one extended word to the next: 16 a second, a turn in half a second. They take 0.2 % of the
-/// speed's words at 8 kHz and a third at 50 Hz, and there is one a second down to 2 frames a second.
+/// Time from one extended word to the next: 16 per second, a rotation in half a second. They take 0.2 % of the
+/// speed words at 8 kHz and a third at 50 Hz, and one a second remains down to 2 frames a second.
 pub(super) const SLOT_US: u32 = 62_500;
 
-/// The schedule. Time is counted in ticks between replies.
+/// The schedule. It counts ticks between replies.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
     slot_ticks: u32,
     /// Ticks since the slot of the last extended word began.
     since_ticks: u32,
     next: usize,
-    /// True if the last reply was an extended word: another must not follow at once.
+    /// The last reply was an extended word: no two in succession.
     was_extended: bool,
 }
 
 impl Schedule {
-    /// For a timer with so many ticks a slot.
+    /// Creates a schedule whose slots last this many ticks.
     pub(super) fn new(slot_ticks: u32) -> Self {
         Self {
             slot_ticks,
@@ -48,33 +48,33 @@ impl Schedule {
         }
     }
 
-    /// Begins with the status, a slot from now.
+    /// Restarts with the status word, one slot from now.
     pub(super) fn begin(&mut self) {
         self.since_ticks = 0;
         self.next = 0;
     }
 
-    /// Takes in the time since the reply before.
+    /// Adds the time since the previous reply.
     pub(super) fn pass(&mut self, ticks: u32) {
         self.since_ticks = self.since_ticks.saturating_add(ticks);
     }
 
-    /// Returns true if this reply may be an extended word. To be asked once a reply.
+    /// Returns true if this reply may be an extended word. Call it once per reply.
     pub(super) fn is_free(&mut self) -> bool {
         !core::mem::take(&mut self.was_extended)
     }
 
-    /// Notes that this reply is an extended word.
+    /// Records that this reply is an extended word.
     pub(super) fn sends(&mut self) {
         self.was_extended = true;
     }
 
-    /// The word that is due, if one is.
+    /// Returns the word that is due, if any.
     pub(super) fn due(&mut self) -> Option<Kind> {
         if self.since_ticks < self.slot_ticks {
             return None;
         }
-        // A late frame is made up for; lateness of several frames is given up.
+        // Make up for one late slot; drop any more.
         self.since_ticks = (self.since_ticks - self.slot_ticks).min(self.slot_ticks);
         let kind = TURN[self.next];
         self.next = (self.next + 1) % TURN.len();

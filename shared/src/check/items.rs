@@ -1,4 +1,4 @@
-//! The lines of the self-test: names, units, bounds.
+//! Items of the self-test: names, units, bounds.
 //!
 //! | name | unit | bounds | what it shows |
 //! |---|---|---|---|
@@ -14,8 +14,8 @@
 //! | `low_a`.. | A | −1 to −0.1 of `LIM_PHASE_A` | the current that comes back through the low side, as its shunt shows it |
 //! | `off_a`.. | A | ± 0.1 of `LIM_PHASE_A` | the current through a phase that is off, while another is pulled up |
 //!
-//! Percents are of the supply or, where the divider ends below it, of the most that it shows: of 18.3 V on
-//! the B-G431B-ESC1, above which a reading is clamped and shows no more than that.
+//! Percentages are of the supply, or of the divider's full scale where that is lower: 18.3 V on the
+//! B-G431B-ESC1, where readings clamp.
 
 use core::ops::Range;
 
@@ -25,47 +25,47 @@ use crate::params::{ParamId, Params};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
-    /// The supply's voltage, V.
+    /// Supply voltage, V.
     Supply,
-    /// Temperature of the board, °C.
+    /// Board temperature, °C.
     Temperature,
-    /// 1 if the chip is set to start from its flash, else 0.
+    /// 1 if the option bytes make the chip boot from flash, else 0.
     OptionBytes,
-    /// Current at which a phase's comparator would trip with its level moved to where it does, A.
+    /// A phase current at which its comparator would trip, with the level shifted to where it does trip, A.
     Comparator,
-    /// Mean of a phase's readings without current, A.
+    /// Mean of a phase's zero-current readings, A.
     Zero,
-    /// Their standard deviation, A.
+    /// Standard deviation of the same readings, A.
     Noise,
-    /// A terminal with all switches off, percent of the supply.
+    /// Terminal with all switches off, percent of the supply.
     Rest,
-    /// A terminal with its high side on, percent of the supply.
+    /// Terminal with its own high side on, percent of the supply.
     High,
-    /// A terminal with another's high side on, percent of the supply.
+    /// Terminal with another phase's high side on, percent of the supply.
     Motor,
-    /// Current out of the motor through a low side, A, negative as all that flows out.
+    /// Current out of the motor through a low side, A; negative, as any outflow.
     Low,
     /// Current into a phase that is off, A.
     Off,
 }
 
-/// Kinds of which there is one; of the others there is one for each phase.
+/// The number of kinds with one item; each later kind has one per phase.
 const SINGLE: usize = Kind::Comparator as usize;
 
 const ROWS_LEN: usize = Kind::Off as usize + 1;
 
-/// The basis of bounds.
+/// What bounds are relative to.
 #[derive(Clone, Copy)]
 enum Basis {
     /// The item's unit.
     One,
-    /// The board's range.
+    /// The board's current range.
     Range,
     /// `LIM_PHASE_A`.
     Limit,
 }
 
-/// A kind's row: name, unit, bounds. Some bounds are parameters instead.
+/// A row of the table: name, unit, bounds. Parameters replace some bounds.
 struct Row {
     name: &'static str,
     unit: &'static str,
@@ -84,7 +84,7 @@ const fn row(name: &'static str, unit: &'static str, (low, high): (f32, f32), of
     }
 }
 
-/// In the order of [`Kind`].
+/// Indexed by [`Kind`].
 static ROWS: [Row; ROWS_LEN] = [
     row("supply", "V", (0.0, 0.0), Basis::One),
     row("temperature", "degC", (-20.0, 0.0), Basis::One),
@@ -101,17 +101,17 @@ static ROWS: [Row; ROWS_LEN] = [
 
 const ITEMS: usize = SINGLE + 3 * (ROWS_LEN - SINGLE);
 
-/// One line's subject.
+/// What a line is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
     /// The kind of measurement.
     pub kind: Kind,
-    /// Of which phase, 0, 1, 2 for a, b, c; 0 if there is only one.
+    /// The phase: 0, 1, 2 for a, b, c; 0 if there is only one item.
     pub phase: u8,
 }
 
 impl Item {
-    /// Those that only the board can measure.
+    /// The items that only the board can measure.
     pub const OWN: [Self; 4] = [
         Self::of(Kind::OptionBytes, 0),
         Self::of(Kind::Comparator, 0),
@@ -136,37 +136,36 @@ impl Item {
 /// The results of a self-test.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// Not a number if nothing was measured.
+    /// NaN where nothing was measured.
     values: [f32; ITEMS],
-    /// The greatest current that the board can show, and a count of it, A.
+    /// Full-scale current of the board and one count of it, A.
     scale_a: (f32, f32),
 }
 
-/// A line of a self-test.
+/// A line of the report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// Its name, in two pieces.
+    /// Name, in two pieces.
     pub name: [&'static str; 2],
-    /// The value measured.
+    /// Measured value.
     pub value: f32,
-    /// In this unit; 1 is none.
+    /// Unit; "1" is none.
     pub unit: &'static str,
-    /// The least value that is well.
+    /// Lower bound.
     pub low: f32,
-    /// The greatest.
+    /// Upper bound.
     pub high: f32,
 }
 
 impl Line {
-    /// Returns true if the value is within its bounds; a value that is no number is not.
+    /// Returns true if the value is within its bounds; NaN never is.
     pub fn ok(&self) -> bool {
         (self.low..=self.high).contains(&self.value)
     }
 }
 
 impl Report {
-    /// One without a line, of a board whose converter shows currents up to `range_a` in steps of
-    /// `count_a`, A.
+    /// Creates an empty report for a board that measures currents up to `range_a` in steps of `count_a`, A.
     pub const fn new(range_a: f32, count_a: f32) -> Self {
         Self {
             values: [f32::NAN; ITEMS],
@@ -174,7 +173,7 @@ impl Report {
         }
     }
 
-    /// Forgets all results but those that bar the motor, which hold until measured again.
+    /// Clears all results except those that bar the motor, which stay until measured again.
     pub(super) fn clear(&mut self) {
         let first = Item::of(Kind::Comparator, 0).place();
         for (place, value) in self.values.iter_mut().enumerate() {
@@ -184,18 +183,18 @@ impl Report {
         }
     }
 
-    /// The value measured, or NaN.
+    /// Returns the measured value, or NaN.
     pub(super) fn get(&self, kind: Kind, phase: u8) -> f32 {
         self.values[Item::of(kind, phase).place()]
     }
 
     pub(crate) fn set(&mut self, kind: Kind, phase: u8, value: f32) {
-        // A sensor without a reading has been read: its line must not be missing.
+        // A NaN here is a sensor without a reading: store infinity so that its line appears, and fails.
         let value = if value.is_nan() { f32::INFINITY } else { value };
         self.values[Item::of(kind, phase).place()] = value;
     }
 
-    /// The lines of the items measured, with the bounds from these parameters.
+    /// Calls `tell` with each measured item's line, bounded by these parameters.
     pub fn tell(&self, params: &Params, mut tell: impl FnMut(&Line)) {
         for place in 0..self.values.len() {
             if let Some(line) = self.line(place, params) {
@@ -204,25 +203,24 @@ impl Report {
         }
     }
 
-    /// Returns true if all values measured are within their bounds.
+    /// Returns true if all measured values are within their bounds.
     pub(super) fn fits(&self, params: &Params) -> bool {
         self.fit(0..self.values.len(), params)
     }
 
-    /// Returns true if the motor may turn. Comparators that do not trip where they should protect
-    /// nothing, and those of revisions Z and Y of the STM32G431 are not fully tested in production
-    /// (ES0431).
+    /// Returns true if the motor may turn. Comparators that do not trip where they should give no protection,
+    /// and production tests do not fully cover those of STM32G431 revisions Z and Y (ES0431).
     pub fn may_turn(&self, params: &Params) -> bool {
         self.holds(Kind::Comparator, params)
     }
 
-    /// Returns true if the values of a kind that each phase has are within their bounds.
+    /// Returns true if the three phases' values of a kind are within their bounds.
     pub(super) fn holds(&self, kind: Kind, params: &Params) -> bool {
         let first = Item::of(kind, 0).place();
         self.fit(first..first + 3, params)
     }
 
-    // Never inlined: it would be there for all places, and again for a kind.
+    // Never inlined: that would duplicate it, for all items and for one kind.
     #[inline(never)]
     fn fit(&self, places: Range<usize>, params: &Params) -> bool {
         let mut lines = places.map(|place| self.line(place, params));

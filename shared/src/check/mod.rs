@@ -1,12 +1,11 @@
-//! The self-test of a board before its motor turns.
+//! Self-test of a board before its motor turns.
 //!
-//! Each [`Item`] has a value, a unit and bounds; items that a board cannot measure are left out. At
-//! power-up only those are measured that need neither time nor the bridge. MAV_CMD_RUN_PREARM_CHECKS
-//! asks for all of them. It is obeyed under the rule of what may turn a motor: at rest, without a
-//! fault, the wire silent or at valid zero. It is acknowledged by IN_PROGRESS with a percentage, and at
-//! the end by ACCEPTED, or by FAILED if an item is out of its bounds, with a STATUSTEXT that names such
-//! items. MAVLink FTP has all lines in `@SYS/check.txt`, as `siskin check` shows them. Any throttle or
-//! fault ends the test as failed.
+//! Each [`Item`] has a value, a unit and bounds; items a board cannot measure are omitted. Power-up measures
+//! only those that need neither time nor the bridge; MAV_CMD_RUN_PREARM_CHECKS runs all of them. The command is
+//! accepted under the rule for anything that may turn a motor: at rest, without a fault, the wire silent or at
+//! valid zero. It is acknowledged by IN_PROGRESS with a percentage, and at the end by ACCEPTED, or by FAILED if
+//! an item is out of bounds, with a STATUSTEXT naming such items. MAVLink FTP serves all lines as
+//! `@SYS/check.txt`, which `siskin check` prints. Any throttle or fault fails the test.
 //!
 //! The motor does not turn, and no switch closes before its neighbours have been checked:
 //!
@@ -16,8 +15,8 @@
 //! | pull a, b, c up | one leg from duty 0 to the whole, the others off ([`Pull`]) | `high_*`: its terminal comes to the supply, so its high side and the supply of its driver work. `motor_*`: the others follow it through the windings. `off_*`: no current, so no low side is shorted |
 //! | a to b, b to c, c to a | one leg up to a quarter, the low side of the next on, until a test's current flows | `low_*`: it comes back through that low side and its shunt, with the right sign |
 //!
-//! With all switches off a terminal is at ground by its divider, so the low sides show by their current
-//! alone.
+//! With all switches off the divider pulls a terminal to ground, so only current can show that a low side
+//! works.
 
 mod items;
 
@@ -28,92 +27,92 @@ use crate::math::{Real, square_root};
 use crate::params::{Board, Params};
 use crate::units::{AdcCounts, Scale};
 
-/// The measurements that a board makes for the self-test.
+/// The measurements a board makes for the self-test.
 pub trait Probe {
-    /// The latest sample that the control has, or could have, had.
+    /// Returns the latest sample that the control has had, or could have.
     fn sample(&mut self) -> Sample;
 
-    /// An item that only the board knows: [`Kind::OptionBytes`] and [`Kind::Comparator`]. It may take a
+    /// Measures an item only the board knows: [`Kind::OptionBytes`] or [`Kind::Comparator`]. May take a
     /// millisecond.
     fn own(&mut self, item: Item) -> Own;
 }
 
-/// A board's measurement of an item of its own.
+/// A board's own measurement of an item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Own {
-    /// It has no means for it.
+    /// The board cannot measure it.
     Absent,
-    /// The bridge conducts, and must not do so meanwhile: it is to be asked again.
+    /// The bridge conducts, which it must not during the measurement: ask again.
     Busy,
     /// The value, in the item's unit.
     Value(f32),
 }
 
-/// Looks in which nothing is read: the set-point and its effect are still on their way.
+/// Looks to discard while the set-point and its effect are still in the pipeline.
 const LATENCY: u8 = 8;
 
-/// Looks at power-up until the supply's filter has settled.
+/// Looks at power-up until the supply filter has settled.
 const POWER_UP_LOOKS: u8 = 3;
 
-/// Looks whose readings make a zero and its noise.
+/// Looks averaged for the zero and its noise.
 const LISTENED: u8 = 64;
 
-/// Looks that the drive may take to see that the shaft stands.
+/// Looks the drive may take to see that the shaft is at rest.
 const SHAFT_LOOKS: u8 = 200;
 
-/// Looks for which a leg is pulled up, at most: at 8 kHz it takes 32 ms.
+/// The maximum looks to pull a leg up: at 8 kHz it takes 32 ms.
 const UP_LOOKS: u8 = 60;
 
-/// Looks for which a current through two legs is waited for.
+/// The maximum looks to wait for a current through two legs.
 const THROUGH_LOOKS: u8 = 20;
 
-/// Percent of the supply from which a leg has come up.
+/// The level at which a leg counts as up, percent of the supply.
 const UP_PERCENT: f32 = 90.0;
 
-/// The greatest reading of a terminal, counts.
+/// Full-scale reading of a terminal, counts.
 const FULL_SCALE: f32 = 4095.0;
 
-/// The step of a self-test.
+/// A step of the self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
-    /// No test is under way.
+    /// No test is running.
     Over,
-    /// Measurements that need neither time nor the bridge, and then the end.
+    /// The measurements that need neither time nor the bridge; the test then ends.
     PowerUp,
-    /// Those measurements, and the sensors without current.
+    /// The same measurements, and the sensors without current.
     Listen,
-    /// The shaft must stand.
+    /// Waits until the shaft is at rest.
     Shaft,
-    /// A leg is pulled.
+    /// Pulls a leg.
     Pull(Pull),
 }
 
 /// The outcome of a look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It goes on, so many percent being done.
+    /// The test continues; percent done.
     Progress(u8),
-    /// It has ended.
+    /// The test has ended.
     Done {
-        /// True if everything has been measured, and is within its bounds.
+        /// Everything has been measured and is within its bounds.
         passed: bool,
     },
 }
 
-/// What follows from a look.
+/// What follows a look.
 enum Next {
-    /// The step goes on.
+    /// Stay in this step.
     Wait,
-    /// The next step.
+    /// Go to the next step.
     Go(Step),
-    /// The end, with all measured.
+    /// End, with everything measured.
     Measured,
-    /// The end, with something left that could not be measured.
+    /// End, with something left unmeasured.
     Abandoned,
 }
 
 impl Next {
-    /// The next step, if what it needs is so.
+    /// Goes to `step` if its precondition holds, else abandons the test.
     fn go_if(may: bool, step: Step) -> Self {
         if may { Self::Go(step) } else { Self::Abandoned }
     }
@@ -122,13 +121,13 @@ impl Next {
 /// The drive's state at a look.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
-    /// Of the drive.
+    /// Snapshot of the drive.
     pub snapshot: &'a Snapshot,
-    /// Its units.
+    /// Scale of its units.
     pub scale: &'a Scale,
-    /// Temperature of the board, °C.
+    /// Board temperature, °C.
     pub temperature_c: f32,
-    /// True if nothing else asks the motor to turn.
+    /// Nothing else asks the motor to turn.
     pub rests: bool,
 }
 
@@ -143,17 +142,17 @@ impl Sight<'_> {
 #[derive(Clone, Debug)]
 pub struct Check {
     step: Step,
-    /// Looks in this step.
+    /// Looks taken in this step.
     looks: u8,
-    /// Sums of the readings of the currents, and of their squares, A.
+    /// Sums of the current readings, and of their squares, A and A².
     sums: [f32; 3],
     squares: [f32; 3],
-    /// The results so far.
+    /// Results so far.
     pub report: Report,
 }
 
 impl Check {
-    /// The test at power-up.
+    /// Creates the power-up test.
     pub fn new(board: &Board) -> Self {
         Self {
             step: Step::PowerUp,
@@ -164,19 +163,19 @@ impl Check {
         }
     }
 
-    /// Begins a whole one.
+    /// Starts a full test.
     pub fn begin(&mut self) {
         self.report.clear();
         self.go(Step::Listen);
     }
 
-    /// Returns true until the measurements of power-up are made: no tune begins before, and nothing turns the
+    /// Returns true until the power-up measurements are made; before that no tune starts and nothing turns the
     /// motor.
     pub fn powers_up(&self) -> bool {
         self.step == Step::PowerUp
     }
 
-    /// The pull that is asked of the drive, while nothing turns the motor.
+    /// Returns the pull to ask of the drive while nothing turns the motor.
     pub fn pull(&self) -> Option<Pull> {
         match self.step {
             Step::Over | Step::PowerUp => None,
@@ -185,8 +184,8 @@ impl Check {
         }
     }
 
-    /// Goes on, about each millisecond. Returns the news to report.
-    // Out of line: its stack is free for what the caller does next.
+    /// Advances the test, about every millisecond, and returns news to report.
+    // Out of line, so that its stack is free again for what the caller does next.
     #[inline(never)]
     pub fn look(
         &mut self,
@@ -214,7 +213,7 @@ impl Check {
         }
     }
 
-    /// A look at power-up, after some readings of the supply.
+    /// Handles power-up, once the supply has had some readings.
     fn power_up(&mut self, sight: &Sight, probe: &mut impl Probe) -> Next {
         if self.looks < POWER_UP_LOOKS || !self.own(sight, probe) {
             return Next::Wait;
@@ -222,7 +221,7 @@ impl Check {
         Next::Measured
     }
 
-    /// A look at the sensors without current. Before any leg is pulled no terminal may be at the supply.
+    /// Reads the sensors without current. No leg may be pulled while a terminal is at the supply.
     fn sensors(
         &mut self,
         sight: &Sight,
@@ -249,7 +248,7 @@ impl Check {
         Next::go_if(self.report.holds(Kind::Rest, params), Step::Shaft)
     }
 
-    /// A look whether the drive has seen that the shaft stands.
+    /// Waits for the drive to see that the shaft is at rest.
     fn shaft(&self, sight: &Sight) -> Next {
         let stands = sight.snapshot.phase == Phase::Tone;
         if !stands && !sight.faulted() && self.looks <= SHAFT_LOOKS {
@@ -258,7 +257,7 @@ impl Check {
         Next::go_if(stands, Step::Pull(Pull::UpA))
     }
 
-    /// A look at the legs while one is pulled, the terminals being at this share of the supply.
+    /// Checks the legs while one is pulled; `share` holds the terminals, in percent of the supply.
     fn pulled(&mut self, pull: Pull, sight: &Sight, share: &[f32; 3], params: &Params) -> Next {
         let faulted = sight.faulted();
         let (leg, i) = (pull.leg(), sight.snapshot.i);
@@ -307,7 +306,7 @@ impl Check {
         }
     }
 
-    /// Makes the measurements that need neither time nor the bridge. False if some are to be made later.
+    /// Makes the measurements that need neither time nor the bridge; returns false if some must wait.
     fn own(&mut self, sight: &Sight, probe: &mut impl Probe) -> bool {
         let bus_v = sight.scale.volts(sight.snapshot.bus);
         self.report.set(Kind::Supply, 0, bus_v);
@@ -322,8 +321,8 @@ impl Check {
         true
     }
 
-    /// Takes a reading of a current. Out of line, as what follows for each phase: a loop would be unrolled,
-    /// and all of it be there three times.
+    /// Adds a current reading. Out of line, like the per-phase functions below: the loop would be unrolled,
+    /// with a copy for each phase.
     #[inline(never)]
     fn listen(&mut self, phase: usize, current_a: f32) {
         self.sums[phase] += current_a;
@@ -340,10 +339,10 @@ impl Check {
             .set(Kind::Noise, phase as u8, square_root(variance));
     }
 
-    /// Records a phase that is off while another one is pulled up.
+    /// Records a phase that is off while another is pulled up.
     #[inline(never)] // as above
     fn followed(&mut self, phase: u8, share: &[f32; 3], current_a: f32) {
-        // An open wire follows none of the others; a shorted switch shows at any.
+        // An open wire follows neither of the others; a shorted switch shows with either.
         let before = self.report.get(Kind::Motor, phase);
         let follows = before.max(share[usize::from(phase % 3)]);
         self.report.set(Kind::Motor, phase, follows);
@@ -354,7 +353,7 @@ impl Check {
     }
 }
 
-/// The terminals' voltages, percent of the supply or of the most that they show.
+/// Returns the terminal voltages, percent of the supply or of their full scale.
 fn terminals(board: &Board, sample: &Sample) -> [f32; 3] {
     let bus_v = sample.bus.to_f32() * board.bus_v_per_count;
     let whole = (bus_v / board.terminal_v_per_count).clamp(1.0, FULL_SCALE);
