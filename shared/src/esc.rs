@@ -1,5 +1,5 @@
-//! The ESC outside the PWM interrupt: what the tasks of the firmware and the loop of the emulator
-//! share. It takes edges, frames and snapshots in, and gives set-points, frames and requests out.
+//! The ESC outside the PWM interrupt, shared by the firmware's tasks and the emulator's loop. Edges, frames and
+//! snapshots go in; set-points, frames and requests come out.
 
 use core::mem::MaybeUninit;
 
@@ -38,26 +38,26 @@ mod wire;
 
 pub use storage::obey;
 
-/// Degrees below `LIM_TEMP_C` at which an over-temperature has ended.
+/// How far below `LIM_TEMP_C` an over-temperature clears, °C.
 const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 
-/// Time for which a wire with signals must have asked for rest before the flash is written, µs: what
-/// is written stalls the processor, and so a flight controller's frames are missed.
+/// How long a wire with a signal must have demanded rest before the flash is written, µs: writing stalls the
+/// processor, so a flight controller's frames are missed.
 const REST_US: u64 = 1_000_000;
 
-/// One ESC without its interrupt and its throttle.
-// In this order: what is used most stands where the chip's short instructions reach it.
+/// One ESC, without its interrupt and its throttle.
+// Ordered by use: the most used fields are within reach of the chip's short instructions.
 #[repr(C)]
 pub struct Esc {
     light: bool,
     too_hot: bool,
-    /// True if what it finds is to be kept.
+    /// Keep what the identification finds.
     keeps: bool,
-    /// True if the wire carried signals then.
+    /// The wire carried a signal at the last poll.
     traffic: bool,
-    /// The motor that is assumed has changed.
+    /// The assumed motor has changed.
     reassumes: bool,
-    /// The motor's command at the last poll.
+    /// The command to the motor at the last poll.
     command: Command,
     polled_us: Option<u64>,
     rests_since_us: Option<u64>,
@@ -71,9 +71,9 @@ pub struct Esc {
     charge: Charge,
     witness: Witness,
     recorder: Recorder,
-    /// There are two such commands.
+    /// Two commands set such values.
     unstored: Vec<Unstored, 2>,
-    /// The ESCs that it tells of besides.
+    /// The other ESCs that this one reports.
     #[cfg(feature = "group")]
     four: Option<Four>,
     check: Check,
@@ -82,19 +82,19 @@ pub struct Esc {
     component: Component,
 }
 
-/// The values that the drive runs with in place of the parameters.
+/// Values the drive runs with in place of the parameters.
 #[derive(Clone, Copy, Debug)]
 struct Given {
-    /// As it was at the start: the timer runs with it.
+    /// The frequency at power-up, which the timer runs at, Hz.
     pwm_freq_hz: f32,
     /// Dead time, ns.
     pwm_deadtime_ns: f32,
-    /// True if a command has turned the direction against `MOT_DIR`.
+    /// A command has turned the direction against `MOT_DIR`.
     opposite: bool,
 }
 
 impl Given {
-    /// These parameters as the drive runs with them here.
+    /// Returns the parameters that the drive actually runs with.
     fn running(self, params: &Params) -> Params {
         let mut running = params.clone();
         let direction = params.get(ParamId::MotDir);
@@ -111,20 +111,20 @@ impl Given {
             ),
         ];
         for (id, value) in kept {
-            // The first two were in range at the start, and a direction is 0 or 1.
+            // The first two were in range at power-up, and a direction is 0 or 1.
             let _ = running.set(id, value);
         }
         running
     }
 
-    /// Checks that these parameters make a drive, here and after the next start.
+    /// Checks that these parameters make a valid drive, now and after the next restart.
     fn check(self, params: &Params, board: &Board) -> Result<(), BuildError> {
         check(params, board)?;
         check(&self.running(params), board)
     }
 }
 
-/// Checks that parameters make a drive. Never inlined: a configuration takes 0.9 KB of stack.
+/// Checks that parameters make a valid drive. Never inlined: a configuration takes 0.9 KB of stack.
 ///
 /// # Errors
 /// The parameter that does not fit the board.
@@ -135,10 +135,10 @@ pub fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
 }
 
 impl Esc {
-    /// An ESC at power-up, and its throttle.
+    /// Creates an ESC at power-up, and its throttle.
     ///
-    /// `tick_hz` is the rate of the timer that captures the wire's edges, and `link_bytes_per_s`
-    /// what the slowest MAVLink link carries.
+    /// `tick_hz` is the rate of the timer that captures the wire's edges, and `link_bytes_per_s` the capacity
+    /// of the slowest MAVLink link.
     ///
     /// # Errors
     /// The parameter that does not fit the board.
@@ -153,10 +153,10 @@ impl Esc {
         Ok((Self::unchecked(params, board, link_bytes_per_s), throttle))
     }
 
-    /// An ESC at power-up, without its throttle, whose parameters fit the board ([`check()`]).
+    /// Creates an ESC at power-up without its throttle, from parameters known to fit the board ([`check()`]).
     ///
-    /// Never inlined: on the chip it is made where it stays, by this and by [`Throttle::new`], since
-    /// the two on their way through [`Esc::new`] take 10 KB of stack.
+    /// Never inlined: on the chip this and [`Throttle::new`] construct in place, since moving the two through
+    /// [`Esc::new`] takes 10 KB of stack.
     #[inline(never)]
     pub fn unchecked(params: Params, board: Board, link_bytes_per_s: u32) -> Self {
         Self {
@@ -192,23 +192,24 @@ impl Esc {
         }
     }
 
-    /// The configuration for the interrupt, computed again at each call: it is larger than all else.
+    /// Returns the interrupt's configuration, computed anew at each call: it is larger than everything else.
     ///
     /// # Errors
-    /// Never with the parameters in force, which have been tried before.
+    /// Never with the parameters in force, which have been validated.
     pub fn config(&self) -> Result<Config, BuildError> {
         build(&self.running(), &self.board)
     }
 
-    /// As [`Esc::config`], in a place that the caller has for it.
+    /// Writes the result of [`Esc::config`] to `place`.
     ///
     /// # Errors
-    /// As [`Esc::config`].
+    /// Those of [`Esc::config`].
     pub fn config_in(&self, place: &mut Config) -> Result<(), BuildError> {
         build_in(&self.running(), &self.board, place)
     }
 
-    /// The parameters as the drive runs with them: for the motor of an identification, while one is under way.
+    /// Returns the parameters as the drive runs with them, including the motor assumed by a running
+    /// identification.
     fn running(&self) -> Params {
         let mut running = self.given.running(&self.params);
         if self.identify.is_under_way() {
@@ -217,44 +218,44 @@ impl Esc {
         running
     }
 
-    /// The parameters in force.
+    /// Returns the parameters in force.
     pub fn params(&self) -> &Params {
         &self.params
     }
 
-    /// The bound of the phase currents that a board's own trip is to stand above, peak A:
-    /// `LIM_PHASE_A`, and while the control's trip has not come down to it, the one before.
+    /// Returns the phase current that a board's hardware trip must stay above, peak A: `LIM_PHASE_A`, or the
+    /// previous limit until the control's trip has come down.
     pub fn phase_limit_a(&self, snapshot: &Snapshot) -> f32 {
         let trip_a = snapshot.trip.to_f32() * self.board.current_a_per_count;
         self.params.get(ParamId::LimPhaseA).max(trip_a / TRIP_SHARE)
     }
 
-    /// The state as telemetry reports it.
+    /// Returns the state as telemetry reports it.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry
     }
 
-    /// Warns a person, at the next poll.
+    /// Queues a warning to the user for the next poll.
     pub fn warn(&mut self, warning: Warning) {
         self.component.warn(warning);
     }
 
     fn warn_of(&mut self, trouble: &str) {
         let mut warning = Warning::new();
-        // Whatever is longer than a text on MAVLink would be cut there as well.
+        // A longer one would be cut on MAVLink anyway.
         let _ = warning.push_str(trouble);
         self.warn(warning);
     }
 
-    /// A frame that came in on any MAVLink link.
+    /// Handles a frame from any MAVLink link.
     pub fn receive(&mut self, throttle: &mut impl Reach, now_us: u64, frame: &Frame) {
         self.with_component(throttle, now_us, |component, context| {
             component.handle(frame, context);
         });
     }
 
-    /// Does the work that is due, about each millisecond: time-outs, telemetry, and frames to every
-    /// link.
+    /// Does the work that is due: timeouts, telemetry, and frames to every link. Call it about every
+    /// millisecond.
     pub fn poll(
         &mut self,
         throttle: &mut impl Reach,
@@ -319,7 +320,7 @@ impl Esc {
         } else {
             limit_c
         };
-        // A reading that is no number is too hot as well.
+        // A NaN reading counts as too hot.
         self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
         self.telemetry.observe(snapshot, &self.scale, time_us);
         let found = self.witness.look(snapshot, unbalance_max(&self.board));
@@ -345,12 +346,12 @@ impl Esc {
         }
     }
 
-    /// The next request that only the caller can carry out.
+    /// Returns the next request that only the caller can carry out.
     ///
-    /// After [`Request::ParamsChanged`] the interrupt shall run with [`Esc::config`]; this side has done its
-    /// part. A request for storage waits until the bridge rests and the one before has ended; nothing turns
-    /// the motor from then on until [`Esc::storage_done`]. A restart waits for storage, and is given up if the
-    /// wire is armed meanwhile.
+    /// After [`Request::ParamsChanged`] the interrupt must run with [`Esc::config`]; this side is done. A
+    /// storage request waits until the bridge is at rest and the previous request has finished; from then until
+    /// [`Esc::storage_done`] nothing turns the motor. A restart waits for storage, and is abandoned if the wire
+    /// is armed meanwhile.
     pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
         let now_us = self.polled_us.unwrap_or(0);
         if core::mem::take(&mut self.reassumes) {
@@ -380,7 +381,7 @@ impl Esc {
                     Err(error) => self.component.storage_done(Err(error.reason)),
                 }
             }
-            // A direction is to be stored: all others with it, which nobody has set.
+            // MAVLink would store a direction, and with it all the settings that nobody has restored.
             Some(Request::Save) if self.storage.is_lost() && !self.component.stores_all() => {
                 self.component.storage_done(Err(storage::LOST));
             }
@@ -396,7 +397,7 @@ impl Esc {
         {
             self.warn_of(reason);
         }
-        // Nothing turns the motor from then on.
+        // From here on nothing turns the motor.
         if self.storage.reboots() && throttle.reach(Throttle::store) {
             self.storage.cancel_reboot();
             return Some(Request::Reboot);
@@ -408,8 +409,8 @@ impl Esc {
         None
     }
 
-    /// Flash stalls the chip for up to half a second, in which the bridge is off and nothing is
-    /// controlled: it must not switch, nor be about to.
+    /// Returns true if the flash may be written. It stalls the chip for up to half a second with the bridge off
+    /// and nothing controlled: the bridge must not switch, nor be about to.
     fn may_store(&self) -> bool {
         let holds = matches!(self.telemetry.phase, Phase::Idle | Phase::Brake);
         let rested = match (self.rests_since_us, self.polled_us) {
@@ -426,8 +427,7 @@ impl Esc {
         self.telemetry.drive(self.command)
     }
 
-    /// Tells how a request for storage ended, so that it is acknowledged, and lets the motor turn
-    /// again.
+    /// Reports how a storage request ended, so that it is acknowledged, and releases the motor.
     pub fn storage_done(&mut self, throttle: &mut impl Reach, result: Result<(), &'static str>) {
         throttle.reach(Throttle::stored);
         if self.storage.takes_all() && result.is_ok() {
@@ -442,7 +442,7 @@ impl Esc {
     }
 
     fn apply(&mut self, throttle: &mut impl Reach) {
-        // Each change has been validated: a drive can be made of it.
+        // Every change has been validated: it makes a valid drive.
         self.scale = scale(&self.running(), &self.board);
         throttle.reach(|throttle| throttle.adopt(&self.params, self.scale));
         self.tell_info(throttle);

@@ -1,9 +1,8 @@
-//! The throttle wire's side of an ESC: everything that must keep up with the wire's edges, whatever the
-//! other tasks do.
+//! The throttle side of the ESC: everything that must keep up with the wire's edges, whatever the other tasks
+//! do.
 //!
-//! On the chip it belongs to a task of higher priority than the one with [`Esc`](crate::esc::Esc),
-//! which reaches it through [`Reach`], for a moment at a time. Data that one side needs of the other
-//! are copied then.
+//! On the chip it belongs to a task of higher priority than [`Esc`](crate::esc::Esc)'s, which accesses it
+//! through [`Reach`], briefly. Each side copies what it needs of the other during such an access.
 
 use core::mem::discriminant;
 
@@ -24,42 +23,42 @@ use crate::telemetry::Telemetry;
 use crate::tune::Note;
 use crate::units::Scale;
 
-/// Time for which the tasks' demands on the drive hold, µs: they poll each millisecond, and a task that has died
-/// turns no motor.
+/// How long the tasks' demands on the drive hold, µs: tasks poll every millisecond, and a dead one must not
+/// turn a motor.
 const POLLED_US: u64 = 100_000;
 
 /// A throttle wire, the answers on it, and its demands on the drive.
-// In this order: what is used most stands where the chip's short instructions reach it.
+// Ordered by use: the most used fields are within reach of the chip's short instructions.
 #[repr(C)]
 pub struct Throttle {
-    /// While the flash is written: the bridge must stay at rest until the processor is back.
+    /// The flash is being written: the bridge must stay at rest until the processor is back.
     storing: bool,
-    /// The time, and when the tasks' demands on the drive end if they do not renew them, µs.
+    /// The current time, and when the tasks' demands on the drive expire unless renewed, µs.
     now_us: u64,
     polled_until_us: u64,
     polled: Polled,
-    /// Orders of DShot commands since the last poll, and those that wait to be done: one of each kind,
-    /// and there are seven for the tasks.
+    /// Orders from DShot commands since the last poll, and those that wait: one of each kind, of which seven
+    /// are for the tasks.
     orders: Vec<Order, 7>,
     info: [u8; info::BYTES],
     mapping: Mapping,
     basis: Basis,
     answers: Answers,
-    /// The state from the tasks, for answers.
+    /// The tasks' state, for answers.
     telemetry: Telemetry,
     input: Input,
 }
 
-/// The tasks' part of each poll.
+/// What the tasks demand at each poll.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Polled {
-    /// The note that is due, to be played while nothing turns the motor.
+    /// The note due, played while nothing turns the motor.
     pub(crate) note: Option<Note>,
     /// The set-point of a self-test or an identification, in place of notes.
     pub(crate) test: Option<Setpoint>,
-    /// True if the temperature is past its limit.
+    /// The temperature is over its limit.
     pub(crate) too_hot: bool,
-    /// True if nothing may turn the motor.
+    /// Nothing may turn the motor.
     pub(crate) barred: bool,
 }
 
@@ -69,15 +68,15 @@ pub(crate) struct Standing {
     pub(crate) command: Command,
     pub(crate) armed: bool,
     pub(crate) signal: Option<Signal>,
-    /// True if valid frames or pulses come in.
+    /// Valid frames or pulses arrive.
     pub(crate) traffic: bool,
     pub(crate) bad_frames: u32,
     pub(crate) bad_share: f32,
 }
 
-/// A way to the throttle's side for the tasks, which it may interrupt.
+/// Gives tasks access to the throttle side, which may preempt them.
 pub trait Reach {
-    /// Does this with it, at one moment. On the chip its edges wait meanwhile, so it must be short.
+    /// Calls `act` with it, atomically. On the chip edges are held off meanwhile, so keep it short.
     fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T;
 }
 
@@ -88,14 +87,14 @@ impl Reach for Throttle {
 }
 
 impl Throttle {
-    /// A quiet wire at power-up, captured by a timer of `tick_hz`, with these parameters of this board.
+    /// Creates a quiet wire at power-up, captured by a timer of `tick_hz`, from this board's parameters.
     ///
-    /// Never inlined: on the chip it is made where it stays.
+    /// Never inlined: on the chip it is constructed in place.
     #[inline(never)]
     pub fn new(tick_hz: u32, params: &Params, board: &Board) -> Self {
         let scale = scale(params, board);
         let mut input = Input::new(tick_hz, params::input(params));
-        // Until the tasks tell that the board has tested itself.
+        // Barred until the tasks report the power-up self-test.
         input.authority_mut().bar(true);
         Self {
             input,
@@ -112,30 +111,30 @@ impl Throttle {
         }
     }
 
-    /// An edge on the throttle wire: when the capturing timer saw it, and the level after it. Returns
-    /// what the sender asks for, to be given to [`Throttle::answer`].
+    /// Takes an edge of the throttle wire: its capture time, and the level after it. Returns what the sender
+    /// asks for, to be passed to [`Throttle::answer`].
     pub fn edge(&mut self, now_us: u64, at_ticks: u32, level: bool) -> Option<Ask> {
         let heard = self.input.edge(now_us, at_ticks, level)?;
         self.heard(heard)
     }
 
-    /// Takes all edges of a DShot frame at once, by the line's level before them and the first and the second
-    /// of each bit, much sooner than [`Throttle::edge`] does one by one; nothing, and none of them is taken,
-    /// if they are no frame, or one of another signal than that which is known. What is found is to be given
-    /// to [`Throttle::hear`], before its answer or, where that cannot wait, behind it.
+    /// Takes all edges of a DShot frame at once, from the line's level before them and the leading and trailing
+    /// edge of each bit, much faster than [`Throttle::edge`] on each. Returns `None`, and takes none of them,
+    /// if they are no frame or belong to a signal other than the known one. Pass the result to
+    /// [`Throttle::hear`], before answering or, where the answer cannot wait, after it.
     #[inline(always)] // in time for the reply
     pub fn whole(&mut self, rests_high: bool, bit: impl Fn(usize) -> (u32, u32)) -> Option<Event> {
         self.input.whole(rests_high, bit)
     }
 
-    /// Takes the event of [`Throttle::whole`]. Returns the same as [`Throttle::edge`].
+    /// Processes the event from [`Throttle::whole`]. Returns the same as [`Throttle::edge`].
     pub fn hear(&mut self, now_us: u64, event: &Event) -> Option<Ask> {
         let heard = self.input.heard(now_us, event)?;
         self.heard(heard)
     }
 
-    /// Tells the time of the timer that captures the wire's edges, once a control period or more
-    /// often. Returns the same as [`Throttle::edge`].
+    /// Advances the wire to the capture timer's current time. Call it at least once per control period. Returns
+    /// the same as [`Throttle::edge`].
     pub fn settle(&mut self, now_us: u64, now_ticks: u32) -> Option<Ask> {
         self.now_us = now_us;
         let heard = self.input.settle(now_us, now_ticks)?;
@@ -148,7 +147,7 @@ impl Throttle {
             Some(Order::Info) => self.answers.send_info(self.info),
             Some(Order::Extended(on)) => self.answers.set_extended(on),
             Some(order) => {
-                // The latest of its kind holds.
+                // The latest of its kind wins.
                 let kind = discriminant(&order);
                 self.take_order(|known| discriminant(known) == kind);
                 let _ = self.orders.push(order);
@@ -158,8 +157,8 @@ impl Throttle {
         Ask::of(&heard.event)
     }
 
-    /// Forgets what the sender of a lost signal has asked for, and what waits for a motor at rest when it is
-    /// asked to turn.
+    /// Forgets what the sender of a lost signal requested, and, once the wire demands throttle, orders that
+    /// wait for the motor to stop.
     fn follow_wire(&mut self) {
         if self.input.take_loss() {
             self.answers.lost();
@@ -169,31 +168,32 @@ impl Throttle {
         }
     }
 
-    /// The answer to the flight controller, on the throttle wire and on the serial line, with the
-    /// drive's present state.
+    /// Returns the answers to the flight controller, on the throttle wire and on the serial line, for the
+    /// drive's current state.
     pub fn answer(&mut self, ask: Ask, snapshot: &Snapshot) -> Answer {
         let reply = self.reply(ask, self.speed_bits(snapshot));
         let Serial { kiss, info } = self.serial(ask, snapshot);
         Answer { reply, kiss, info }
     }
 
-    /// The reply of [`Throttle::answer`], with the speed's bits made ready before; the rest is to follow.
+    /// Returns the reply part of [`Throttle::answer`] from a speed encoded beforehand; call
+    /// [`Throttle::serial`] next.
     pub fn reply(&mut self, ask: Ask, speed_bits: u32) -> Option<Reply> {
         self.answers.reply(ask, speed_bits, &self.telemetry)
     }
 
-    /// The rest of [`Throttle::answer`].
+    /// Returns the rest of [`Throttle::answer`].
     pub fn serial(&mut self, ask: Ask, snapshot: &Snapshot) -> Serial {
         self.answers
             .serial(ask, snapshot, &self.basis, &self.telemetry)
     }
 
-    /// The bits of a reply that tells the speed, before anything has been asked.
+    /// Encodes the speed for a reply in advance.
     pub fn speed_bits(&self, snapshot: &Snapshot) -> u32 {
         answer::speed_bits(snapshot, &self.basis)
     }
 
-    /// The drive's set-point.
+    /// Returns the drive's set-point.
     pub fn setpoint(&self) -> Setpoint {
         if self.polled.too_hot {
             return Setpoint::Fault(Fault::OverTemperature);
@@ -209,17 +209,17 @@ impl Throttle {
         }
     }
 
-    /// The motor's command by the wire or by a test.
+    /// Returns the motor's command from the wire or a test.
     pub fn command(&self) -> Command {
         self.input.authority().command()
     }
 
-    /// The signal that the wire is known to carry, or has been forced to.
+    /// Returns the known or forced signal of the wire.
     pub fn signal(&self) -> Option<Signal> {
         self.input.known()
     }
 
-    /// Lets time pass, and takes in the drive's state.
+    /// Advances time and takes in the drive's state.
     pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
         self.telemetry = *telemetry;
         self.polled_until_us = now_us + POLLED_US;
@@ -236,12 +236,12 @@ impl Throttle {
         }
     }
 
-    /// The wire's next news for a person.
+    /// Returns the wire's next news for the user.
     pub(crate) fn news(&mut self, now_us: u64) -> Option<News> {
         self.input.news(now_us)
     }
 
-    /// Begins a calibration by stick, or ends it.
+    /// Starts a stick calibration, or ends it.
     pub(crate) fn calibrate(&mut self, now_us: u64, begin: bool) {
         if begin {
             self.input.calibrate(now_us);
@@ -250,8 +250,8 @@ impl Throttle {
         }
     }
 
-    /// The next order of the wire for the tasks, if the motor stands; else some wait, and the others are
-    /// dropped.
+    /// Returns the wire's next order for the tasks if the motor stands; otherwise drops the orders that do not
+    /// wait.
     pub(crate) fn next_order(&mut self, stopped: bool) -> Option<Order> {
         if stopped {
             return self.take_order(|_| true);
@@ -260,55 +260,54 @@ impl Throttle {
         None
     }
 
-    /// Takes the first order of such.
+    /// Removes the first order that satisfies `is`.
     fn take_order(&mut self, is: impl Fn(&Order) -> bool) -> Option<Order> {
         let at = self.orders.iter().position(is)?;
-        // To its end, past those behind it: the library's way to remove it moves bytes by a copy that
-        // takes 1.6 KB of the chip's RAM.
+        // Swap it to the end and pop: the library's `remove` pulls in a byte copy that takes 1.6 KB of the
+        // chip's RAM.
         for behind in at + 1..self.orders.len() {
             self.orders.swap(behind - 1, behind);
         }
         self.orders.pop()
     }
 
-    /// Takes in the tasks' part.
+    /// Takes over the tasks' demands.
     pub(crate) fn take_polled(&mut self, polled: Polled) {
         self.polled = polled;
         self.input.authority_mut().bar(polled.barred);
     }
 
-    /// Takes the answer for a wire that asks for the ESC's information.
+    /// Sets the answer to a request for the ESC's information.
     pub(crate) fn tell_info(&mut self, info: [u8; info::BYTES]) {
         self.info = info;
     }
 
-    /// Goes on with other parameters.
+    /// Applies other parameters.
     pub(crate) fn adopt(&mut self, params: &Params, scale: Scale) {
         self.mapping = Mapping::new(params, &scale);
         self.basis = Basis::new(scale);
         self.input.set(params::input(params));
     }
 
-    /// Keeps the motor at rest until [`Throttle::stored`], if nothing asks it to turn; else does
-    /// nothing.
+    /// Keeps the motor at rest until [`Throttle::stored`] and returns true, unless something asks it to turn.
     pub(crate) fn store(&mut self) -> bool {
         self.storing = self.command().rests();
         self.storing
     }
 
-    /// Returns true while the flash is being written. Edges are stale then: the processor may have been
-    /// stalled for longer than the capturing timer counts.
+    /// Returns true while the flash is being written. Edges are then stale: the processor may have been stalled
+    /// for longer than the capture timer's range.
     pub fn is_storing(&self) -> bool {
         self.storing
     }
 
-    /// The flash is written.
+    /// Ends the writing of the flash.
     pub(crate) fn stored(&mut self) {
         self.storing = false;
     }
 }
 
-/// The authority of a throttle that is reached.
+/// The authority of a throttle behind [`Reach`].
 pub(crate) struct Reached<'a, R>(pub(crate) &'a mut R);
 
 impl<R: Reach> Reached<'_, R> {

@@ -1,4 +1,4 @@
-//! The self-test as the ESC runs and reports it.
+//! Runs the self-test and reports it.
 
 use super::Esc;
 use crate::check::{Outcome, Probe, Sight};
@@ -6,8 +6,7 @@ use crate::drive::Snapshot;
 use crate::mavlink::Warning;
 
 impl Esc {
-    /// Goes on with a self-test, if there is one, by what the board measures; to be called after each
-    /// [`Esc::poll`].
+    /// Advances a running self-test with the board's measurements. Call it after each [`Esc::poll`].
     pub fn test_itself(&mut self, snapshot: &Snapshot, probe: &mut impl Probe) {
         let sight = Sight {
             snapshot,
@@ -28,7 +27,7 @@ impl Esc {
         }
     }
 
-    /// The items that are out of their bounds, as far as a text holds them: all are in the file.
+    /// Returns the items that are out of bounds, as many as the text holds; the file lists all.
     fn misfits(&self) -> Option<Warning> {
         let mut text = Warning::new();
         self.check.report.tell(&self.params, |line| {

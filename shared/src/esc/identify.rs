@@ -1,4 +1,4 @@
-//! The identification of the motor as the ESC runs, reports and keeps it.
+//! Runs the motor's identification, reports it and keeps the result.
 
 use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
@@ -8,7 +8,7 @@ use crate::mavlink::Warning;
 use crate::params::ParamId;
 use crate::throttle::{Reach, Reached};
 
-/// What a person is told of, each with the progress at which it begins, percent.
+/// Steps reported to the user, each with the progress at which it begins, percent.
 const STEPS: [(u8, &str); 6] = [
     (0, "phase A"),
     (20, "phase B"),
@@ -19,8 +19,8 @@ const STEPS: [(u8, &str); 6] = [
 ];
 
 impl Esc {
-    /// Begins one that the stick asks for, if a command could; what it finds is kept. If settings were lost it could
-    /// not be: the defaults would be stored with it.
+    /// Starts an identification requested by the stick, under the same conditions as a command; its result is
+    /// kept. After a loss of settings it refuses, since the defaults would be stored with the result.
     pub(super) fn identify_by_stick(&mut self, throttle: &mut impl Reach, now_us: u64) {
         let drive = self.drive();
         if !self.storage.is_lost() && Reached(throttle).may_test(now_us, drive) {
@@ -30,26 +30,26 @@ impl Esc {
         }
     }
 
-    /// Begins an identification, of which what it finds is kept or not.
+    /// Starts an identification; `keeps` has its result stored.
     pub(super) fn identify(&mut self, now_us: u64, keeps: bool) {
         self.keeps = keeps;
         let outcome = self.identify.begin(now_us);
         self.identified(outcome);
     }
 
-    /// Ends it, if there is one.
+    /// Ends the identification, if one is running.
     pub(super) fn end_identification(&mut self, reason: &'static str) {
         if let Some(outcome) = self.identify.end(reason) {
             self.identified(outcome);
         }
     }
 
-    /// What it asks of the drive, while one is under way.
+    /// Returns the set-point that a running identification asks for.
     pub(super) fn identification(&self) -> Option<Setpoint> {
         self.identify.setpoint()
     }
 
-    /// Takes over what has been found, and has it stored. False, with a text, where it makes no drive.
+    /// Applies the result and has it stored. Returns false, with a warning, if it makes no valid drive.
     pub(super) fn keep_identified(&mut self) -> bool {
         let settings = self.identify.report.settings();
         let kept = match settings.map(|settings| self.change(&settings)) {
@@ -64,10 +64,10 @@ impl Esc {
         false
     }
 
-    /// Goes on with an identification.
+    /// Advances a running identification.
     pub(super) fn look_at_motor(&mut self, now_us: u64, snapshot: &Snapshot) {
         if !self.identify.is_under_way() {
-            // At another look than that of the end: both need stack.
+            // Not in the look that ends it: both need stack.
             if core::mem::take(&mut self.keeps) && self.identify.report.settings().is_some() {
                 self.keep_identified();
             }
@@ -85,11 +85,11 @@ impl Esc {
         }
     }
 
-    /// What MOT_IDENTIFY has asked for is over, or was refused.
+    /// Clears MOT_IDENTIFY once what it requested is over or refused.
     pub(super) fn end_order(&mut self) {
         let id = ParamId::MotIdentify;
         if self.params.get(id) != 0.0 && !self.identify.is_under_way() {
-            // In its range.
+            // 0 is in range.
             let _ = self.params.set(id, 0.0);
             self.component.tell_value(id);
         }
@@ -128,7 +128,7 @@ impl Esc {
         let mut text = Warning::new();
         let _ = text.push_str(what);
         for piece in why {
-            // What is longer than a text on MAVLink is cut: it would be left out as a whole.
+            // Cut what does not fit: `push_str` would drop it as a whole.
             let room = text.capacity() - text.len();
             let _ = text.push_str(piece.get(..room).unwrap_or(piece));
         }

@@ -1,4 +1,4 @@
-//! The values that the ESC keeps over a loss of power.
+//! The values that survive a loss of power.
 
 use super::Esc;
 use crate::params::{BuildError, ParamId};
@@ -7,7 +7,7 @@ use crate::store::{Kept, Loaded};
 use crate::throttle::Reach;
 
 impl Esc {
-    /// Goes on from what was stored, at power-up. It has been made with the parameters of it already.
+    /// Restores stored values at power-up. The ESC was already created with the stored parameters.
     pub fn recall(&mut self, loaded: &Loaded) {
         let kept = &loaded.kept;
         self.component.keep_intervals(&kept.intervals);
@@ -30,13 +30,13 @@ impl Esc {
         self.record = Some(record);
     }
 
-    /// Leaves the stored settings alone because they are not those in force, and keeps the motor off,
-    /// until somebody asks for settings to be stored or reset.
+    /// Leaves the stored settings untouched because they are not in force, and keeps the motor off, until
+    /// somebody asks for settings to be stored or reset.
     pub fn lose_stored(&mut self) {
         self.storage.lose();
     }
 
-    /// The values to be stored now.
+    /// Returns the values to store now.
     // Never inlined: a copy takes 0.5 KB of the caller's stack.
     #[inline(never)]
     pub fn kept(&self) -> Kept {
@@ -55,8 +55,8 @@ impl Esc {
         kept
     }
 
-    /// Puts other values in force, as [`obey`](super::obey) gives them. The interrupt shall run with
-    /// [`Esc::config`] afterwards.
+    /// Puts other values in force, as returned by [`obey`](super::obey). The interrupt must then run with
+    /// [`Esc::config`].
     ///
     /// # Errors
     /// The parameter that does not fit the board; nothing has changed then.

@@ -1,5 +1,4 @@
-//! Requests for storage, one at a time: how each ends must reach the one who asked. What has changed
-//! is stored without being asked for.
+//! Storage requests, one at a time, so that each result reaches whoever asked. Changes are stored unasked.
 
 use core::ops::Range;
 
@@ -9,100 +8,99 @@ use crate::mavlink::Request;
 use crate::params::ParamId;
 use crate::store::{self, Kept, StoreError};
 
-/// Time without a change after which changes are stored, µs: a client that writes a whole
-/// list of parameters wears the flash once.
+/// How long without a change before changes are stored, µs: a client that writes a whole parameter list wears
+/// the flash once.
 const QUIET_US: u64 = 1_000_000;
-/// Longest wait while changes keep coming, µs, and saves without a request are left ([`SAVES_AT_ONCE`]); else
-/// it is [`SAVE_EVERY_US`]. Signed frames heard in this time can be played again after a loss of power.
+/// The longest wait while changes keep coming, µs, as long as unrequested saves are left ([`SAVES_AT_ONCE`]);
+/// otherwise it is [`SAVE_EVERY_US`]. Signed frames heard meanwhile can be replayed after a loss of power.
 const LATEST_US: u64 = 2_000_000;
 
-/// Saves without a request that may follow one another at once. An evening of trying one value
-/// after another takes as many.
+/// Unrequested saves allowed in succession. An evening of trying one value after another takes as many.
 const SAVES_AT_ONCE: u64 = 100;
-/// Time that earns one more of them, µs. A client that keeps changing a value costs 100 + 480 of the flash's
-/// 40 000 saves on its first day, 1.5 %.
+/// The time that earns one more of them, µs. A client that keeps changing a value costs 100 + 480 of the
+/// flash's 40 000 saves on its first day, 1.5 %.
 const SAVE_EVERY_US: u64 = 180_000_000;
-/// Longest wait for the first of them after a start, µs, where all were taken before it: a person who
-/// has the ESC on for a minute keeps the changes. A client that changes a value and restarts the ESC,
-/// for a day, costs 100 + 1440 saves, 3.9 %.
+/// The longest wait for the first of them after a restart, µs, if all had been used up: changes survive when
+/// the ESC is on for a minute. A client that changes a value and restarts the ESC all day costs 100 + 1440
+/// saves, 3.9 %.
 const FIRST_SAVE_US: u64 = 60_000_000;
-/// What may be owed while one more save is made, µs.
+/// The most that may be owed for one more save to be allowed, µs.
 const OWED_MAX_US: u64 = (SAVES_AT_ONCE - 1) * SAVE_EVERY_US;
 
-/// Time between two reminders that settings were lost, µs: a station may have come since.
+/// Time between two reminders of lost settings, µs: a station may have connected since.
 const REMIND_US: u64 = 10_000_000;
 
-/// The warning to a person, and the refusal to store something else beside lost settings.
+/// Warns the user, and refuses to store anything else over lost settings.
 pub(super) const LOST: &str = "Settings lost: set and store them, or reset them";
 
-/// The sender of the request for storage.
+/// Who requested storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Asker {
     /// A command or a calibration on the throttle wire.
     Wire,
-    /// A MAVLink command, which is acknowledged.
+    /// A MAVLink command, to be acknowledged.
     Mavlink,
-    /// Nobody: something has changed.
+    /// Nobody: something changed.
     Nobody,
 }
 
-/// When what is to be stored has changed.
+/// When values to be stored changed.
 #[derive(Clone, Copy, Debug)]
 struct Changes {
-    /// Time of the first change.
+    /// First change.
     first_us: u64,
-    /// Time of the last one.
+    /// Last change.
     last_us: u64,
 }
 
-/// Requests that wait, and the one under way.
+/// Waiting requests, and the one in progress.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Storage {
-    /// MAVLink has one at a time, and refuses others.
+    /// MAVLink allows one at a time and refuses others.
     mavlink: Option<Request>,
     save: bool,
-    /// What is to be stored without being asked for.
+    /// Changes to be stored unasked.
     changes: Option<Changes>,
-    /// Time at which all saves without a request are available again.
+    /// When the full allowance of unrequested saves is available again.
     refilled_us: u64,
-    /// How far off that was at the last of them, s, to be stored with it.
+    /// The time left until then at the last of them, s, to be stored with it.
     owed_s: u32,
-    /// True if the ESC is to restart when nothing waits any more.
+    /// Restart once nothing is waiting.
     reboot: bool,
-    /// Whose request the caller has been given.
+    /// The request that the caller is carrying out, and its sender.
     under_way: Option<(Asker, Request)>,
-    /// True if it has been reported that changes cannot be stored.
+    /// A failure to store changes has been reported.
     failed: bool,
-    /// True if the stored settings cannot be in force: they stay, and nothing turns the motor, until
-    /// somebody asks for settings to be stored or reset.
+    /// The stored settings cannot be in force: they stay, and nothing turns the motor, until somebody asks for
+    /// settings to be stored or reset.
     lost: bool,
-    /// Time of the last reminder.
+    /// When the last reminder was sent.
     reminded_us: u64,
 }
 
 impl Storage {
-    /// MAVLink asks for this, if for anything.
+    /// Queues MAVLink's request, if there is one.
     pub(super) fn ask(&mut self, request: Option<Request>) {
         self.mavlink = request.or(self.mavlink);
     }
 
-    /// The throttle wire asks for the parameters to be stored.
+    /// Queues the throttle wire's request to store the parameters.
     pub(super) fn save(&mut self) {
         self.save = true;
     }
 
-    /// At the start, with the time owed at the last save before it. How long the ESC was off is not known.
+    /// Restores at power-up the time owed at the last save. How long the ESC was off is unknown.
     pub(super) fn recall(&mut self, owed_s: u32) {
         self.owed_s = owed_s;
         self.refilled_us = (u64::from(owed_s) * 1_000_000).min(OWED_MAX_US + FIRST_SAVE_US);
     }
 
-    /// The time owed at the last save, s.
+    /// Returns the time owed at the last save, s.
     pub(super) fn owed_s(&self) -> u32 {
         self.owed_s
     }
 
-    /// Something that is kept has changed.
+    /// Records a change of a value that is kept.
     pub(super) fn changed(&mut self, now_us: u64) {
         let first_us = self.changes.map_or(now_us, |changes| changes.first_us);
         self.changes = Some(Changes {
@@ -111,12 +109,12 @@ impl Storage {
         });
     }
 
-    /// Settings were lost.
+    /// Records that settings were lost.
     pub(super) fn lose(&mut self) {
         self.lost = true;
     }
 
-    /// Returns true if settings were lost, and none have been stored since.
+    /// Returns true if settings were lost and none have been stored since.
     pub(super) fn is_lost(&self) -> bool {
         self.lost
     }
@@ -130,28 +128,28 @@ impl Storage {
         due
     }
 
-    /// MAVLink asks for a restart, which waits until pending changes are stored.
+    /// Requests a restart for MAVLink, to wait until pending changes are stored.
     pub(super) fn reboot(&mut self) {
         self.reboot = true;
     }
 
     /// Returns true if a restart is due now.
     pub(super) fn reboots(&self) -> bool {
-        // At the end of time all that waits is due.
+        // At the end of time everything that waits is due.
         self.reboot && self.under_way.is_none() && self.next(u64::MAX).is_none()
     }
 
-    /// Returns true if the restart waits for a save that is put off to spare the flash.
+    /// Returns true if the restart waits for a save that is postponed to spare the flash.
     pub(super) fn reboots_later(&self, now_us: u64) -> bool {
         self.next(now_us).is_none() && self.next(u64::MAX).is_some()
     }
 
-    /// The restart begins, or is given up. Returns true if there was to be one.
+    /// Clears the restart, as it begins or is abandoned. Returns true if one was requested.
     pub(super) fn cancel_reboot(&mut self) -> bool {
         core::mem::take(&mut self.reboot)
     }
 
-    /// Returns true if a request waits, and none is under way.
+    /// Returns true if a request waits and none is in progress.
     pub(super) fn waits(&self, now_us: u64) -> bool {
         self.under_way.is_none() && self.next(now_us).is_some()
     }
@@ -168,13 +166,13 @@ impl Storage {
         } else if self.save {
             Some((Asker::Wire, Request::Save))
         } else {
-            // If settings were lost, the few that a companion sets at each start restore none of them.
+            // After a loss, the few settings that a companion sets at each start do not restore the others.
             let due = !self.lost && self.changes.is_some_and(is_due);
             due.then_some((Asker::Nobody, Request::Keep))
         }
     }
 
-    /// The next request, which is under way now.
+    /// Takes the next request and marks it as in progress.
     pub(super) fn take(&mut self, now_us: u64) -> Option<Request> {
         let (asker, request) = self.next(now_us)?;
         self.under_way = Some((asker, request));
@@ -183,34 +181,35 @@ impl Storage {
             Asker::Wire => self.save = false,
             Asker::Nobody => {
                 self.refilled_us = self.refilled_us.max(now_us) + SAVE_EVERY_US;
-                // By 64·15 625, in 32 bits: a day is 2^30.3 parts of 64 µs. A quotient of 64 bits is 900 bytes of code.
+                // Divide by 64·15 625 in 32 bits: a day is 2^30.3 units of 64 µs. A 64-bit division is 900
+                // bytes of code.
                 self.owed_s = ((self.refilled_us - now_us) >> 6) as u32 / 15_625;
             }
         }
         if request != Request::Load {
-            // All else is stored with it.
+            // The request stores all other changes too.
             self.changes = None;
         }
         Some(request)
     }
 
-    /// Returns true if the flash now has all that is in force.
+    /// Returns true if the request in progress stores everything that is in force.
     pub(super) fn takes_all(&self) -> bool {
         self.under_way
             .is_some_and(|(_, request)| request != Request::Keep)
     }
 
-    /// The request that was under way has ended; returns who must be told.
+    /// Ends the request in progress; returns who must be told.
     pub(super) fn done(&mut self, well: bool) -> Option<Asker> {
         let (asker, request) = self.under_way.take()?;
         self.lost &= !well || request == Request::Load;
         let failed = core::mem::replace(&mut self.failed, !well && asker == Asker::Nobody);
-        // Once is enough without a request.
+        // Report an unrequested failure only once.
         (asker != Asker::Nobody || (self.failed && !failed)).then_some(asker)
     }
 }
 
-/// A value that a command on the throttle wire has set, which is not stored until that is asked for.
+/// A value set by a command on the throttle wire, not stored until the wire asks for it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unstored {
     pub(super) id: ParamId,
@@ -220,21 +219,21 @@ pub(super) struct Unstored {
 }
 
 impl Unstored {
-    /// Puts the value that is stored in the place of the one in force, if that is still this one.
+    /// Substitutes the stored value if the command's is still in force.
     pub(super) fn hide(self, kept: &mut Kept) {
         if kept.params.get(self.id) == self.value {
-            // It was in force once.
+            // It was in force once, so it is valid.
             let _ = kept.params.set(self.id, self.stored);
         }
     }
 }
 
-/// Carries out a request for storage, with the values of [`Esc::kept`](super::Esc::kept). Returns true if `kept` now has other
-/// values, which shall be in force from now on: on the chip each copy takes 0.5 KB of stack.
+/// Carries out a storage request with the values of [`Esc::kept`](super::Esc::kept). Returns true if `kept` now
+/// has other values, to be put in force; on the chip each copy takes 0.5 KB of stack.
 ///
 /// # Errors
-/// A few words on why the values would not survive a loss of power.
-// Never inlined: its stack is free for what puts the values in force.
+/// A short reason why the values would not survive a loss of power.
+// Never inlined, so that its stack is free again for putting the values in force.
 #[inline(never)]
 pub fn obey<F: NorFlash>(
     request: Request,

@@ -1,5 +1,5 @@
-//! Acts of the ESC by the throttle wire or by command, beside turning the motor: it obeys DShot's
-//! commands, takes the stick's calibration, and reports what has happened.
+//! What the throttle wire or a command makes the ESC do besides turning the motor: DShot commands, stick
+//! calibration, news.
 
 use super::Esc;
 use super::storage::Unstored;
@@ -13,12 +13,12 @@ use crate::throttle::Reach;
 use crate::tune::{Beacon, Tune};
 
 impl Esc {
-    /// Returns true if the light shall be on, by command.
+    /// Returns true if a command has turned the light on.
     pub fn light(&self) -> bool {
         self.light
     }
 
-    /// Does the tasks' work for the wire.
+    /// Does the tasks' part of the wire's work.
     pub(super) fn follow_wire(&mut self, throttle: &mut impl Reach, now_us: u64) {
         while let Some(news) = throttle.reach(|throttle| throttle.news(now_us)) {
             self.hear(now_us, news);
@@ -26,7 +26,7 @@ impl Esc {
                 self.identify_by_stick(throttle, now_us);
             }
         }
-        // The motor may have been asked to turn since it was ordered.
+        // The motor may have been asked to turn since the order came.
         let stopped = self.drive().stopped;
         while let Some(order) = throttle.reach(|throttle| throttle.next_order(stopped)) {
             self.obey(throttle, now_us, order);
@@ -95,7 +95,7 @@ impl Esc {
         }
     }
 
-    /// Sets a parameter until the next start, or until the wire asks for it to be stored.
+    /// Sets a parameter until the next restart, or until the wire asks for it to be stored.
     fn change_for_now(&mut self, id: ParamId, value: f32) {
         let before = self.params.get(id);
         if self.change(&[(id, value)]).is_err() {
@@ -103,7 +103,7 @@ impl Esc {
         }
         let known = self.unstored.iter_mut().find(|known| known.id == id);
         match known {
-            // Later settings by other ways are stored too.
+            // Values set by other means since then are stored.
             Some(known) if before == known.value => known.value = value,
             Some(known) => (known.value, known.stored) = (value, before),
             None => {
@@ -117,8 +117,8 @@ impl Esc {
         }
     }
 
-    /// Takes the stick's end points and has them stored. Returns true if they fit. If settings were lost they
-    /// do not: the defaults would be stored with them.
+    /// Applies the stick's end points and has them stored. Returns true if they fit. After a loss of settings
+    /// it refuses, since the defaults would be stored with them.
     fn calibrate(&mut self, ends: EndPoints) -> bool {
         let fit = !self.storage.is_lost()
             && self
@@ -136,7 +136,7 @@ impl Esc {
     /// Sets parameters as MAVLink does: all of them, or none if they do not fit.
     ///
     /// # Errors
-    /// The parameter that does not.
+    /// The parameter that does not fit.
     pub(super) fn change(&mut self, values: &[(ParamId, f32)]) -> Result<(), BuildError> {
         let mut params = self.params.clone();
         for (id, value) in values {

@@ -37,7 +37,7 @@ const KEPT: usize = 64;
 
 /// Finds DShot frames in one line's edges.
 #[derive(Clone, Debug)]
-// Ordered by use: the hottest fields are within reach of the short load and store encodings.
+// Ordered by use: the most used fields are within reach of the chip's short instructions.
 #[repr(C)]
 pub(super) struct Decoder {
     newest: usize,
