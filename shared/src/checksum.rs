@@ -1,8 +1,7 @@
-//! The checksum of stored sets and of files, as MAVLink's file transfer has it.
+//! Checksum of stored sets and of files, as MAVLink FTP defines it.
 
-/// CRC-32 of IEEE 802.3, reflected, which begins at 0 and is not inverted at its end, so that a
-/// file's checksum goes on from that of what is before it (NuttX's `crc32part`, which PX4, ArduPilot
-/// and mavros use).
+/// Returns the IEEE 802.3 CRC-32, reflected, with initial value 0 and no final inversion, so that it continues
+/// over consecutive parts (NuttX's `crc32part`, used by PX4, ArduPilot and mavros).
 pub(crate) const fn checksum(before: u32, bytes: &[u8]) -> u32 {
     let mut sum = before;
     let mut at = 0;

@@ -1,17 +1,16 @@
-//! The program's identity: for ground stations by AUTOPILOT_VERSION, for flight controllers by DShot's
-//! command 6.
+//! The program's identity, for ground stations (AUTOPILOT_VERSION) and flight controllers (DShot command 6).
 
-/// Version of every program here: major, minor, patch.
+/// Version of every program in this repository: major, minor, patch.
 pub const VERSION: [u8; 3] = version();
 
-/// A program as it was built for a board, and the chip that it runs on.
+/// A program built for a board, and the chip it runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Name of the board, as the build calls it; its first 24 letters are reported.
+    /// Board name as in the build; its first 24 characters are reported.
     pub board: &'static str,
-    /// The board's number, `board_version` of AUTOPILOT_VERSION; 0 is the emulator.
+    /// Board number, `board_version` of AUTOPILOT_VERSION; 0 is the emulator.
     pub board_number: u16,
-    /// The first eight bytes of the commit; zeros if it is not known.
+    /// First eight bytes of the commit hash; zeros if unknown.
     pub build: [u8; 8],
     /// Serial number of the microcontroller; zeros if there is none.
     pub serial: [u8; 12],
@@ -27,11 +26,11 @@ impl Image {
     };
 }
 
-/// The checksum of no words.
+/// Initial value of the checksum, over no words.
 pub const NO_WORDS: u32 = 0x811C_9DC5;
 
-/// The checksum of an image's words in flash, going on from that of what is before them. Each step can be
-/// undone, so that damage within one word never goes unseen; any other does once in 2^32.
+/// Extends an image checksum by more words of flash. Each step is invertible, so damage confined to one word
+/// never goes undetected; any other does with probability 2^−32.
 pub fn check_sum(before: u32, words: &[u32]) -> u32 {
     words.iter().fold(before, |sum, word| {
         (sum.rotate_left(5) ^ word).wrapping_mul(0x0100_0193)
@@ -42,7 +41,7 @@ const fn version() -> [u8; 3] {
     let text = env!("CARGO_PKG_VERSION").as_bytes();
     let mut parts = [0; 3];
     let (mut part, mut at) = (0, 0);
-    // A suffix such as "-rc1" is left out.
+    // A suffix such as "-rc1" is dropped.
     while at < text.len() && part < parts.len() {
         match text[at] {
             digit @ b'0'..=b'9' => parts[part] = parts[part] * 10 + (digit - b'0'),

@@ -1,4 +1,4 @@
-//! From the command to the motor to the drive's set-point.
+//! Maps the motor command to the drive's set-point.
 
 use crate::drive::Setpoint;
 use crate::drive::config::tone;
@@ -10,7 +10,7 @@ use crate::params::{self, FromMotor, ParamId, Params};
 use crate::tune::Note;
 use crate::units::{Current, Scale, Speed};
 
-/// The mapping of throttle, by `CTL_MODE`.
+/// How throttle maps to a set-point (`CTL_MODE`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mapping {
     mode: Mode,
@@ -20,16 +20,16 @@ pub struct Mapping {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
-    /// Linear from the least to the greatest speed.
+    /// Linear from minimum to maximum speed.
     Speed { least: Speed, span: Speed },
-    /// Linear from no current to the bound.
+    /// Linear from zero current to the limit.
     Torque { full: Current },
-    /// Linear from no voltage to full modulation.
+    /// Linear from zero voltage to full modulation.
     Voltage,
 }
 
 impl Mapping {
-    /// The mapping that the parameters ask for.
+    /// Creates the mapping from the parameters.
     pub fn new(params: &Params, scale: &Scale) -> Self {
         let params = &params.in_force();
         let full = scale.current_from_a(params.get(ParamId::LimPhaseA));
@@ -49,7 +49,7 @@ impl Mapping {
         }
     }
 
-    /// The set-point of a note: octaves lower if the control period is too long for it.
+    /// Returns the set-point of a note, octaves lower if the control period is too long for its pitch.
     pub fn tone(&self, note: Note) -> Setpoint {
         let Note::Pitch { hz } = note else {
             return Setpoint::Tone(Speed::ZERO);
@@ -61,7 +61,7 @@ impl Mapping {
         Setpoint::Tone(pitch)
     }
 
-    /// The set-point of a command.
+    /// Returns the set-point of a command.
     pub fn setpoint(&self, command: Command) -> Setpoint {
         match (command, self.mode) {
             (Command::Stop, _) => Setpoint::Stop,
@@ -84,7 +84,7 @@ impl Mapping {
     }
 }
 
-/// A throttle's share, and true if it is for the other direction.
+/// Splits a throttle into its share and whether it is reversed.
 fn split(throttle: Share) -> (Share, bool) {
     if throttle.is_negative() {
         (reverse(throttle), true)

@@ -1,26 +1,26 @@
-//! Statistics over the ESC's life.
+//! Lifetime statistics.
 
 use crate::drive::{Fault, Faults, Phase};
 
 const SECOND_US: u32 = 1_000_000;
 
-/// Sums and extremes since the first start, and since no reset to the factory's settings.
+/// Totals and maxima since the first power-up; a reset to factory settings does not clear them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
-    /// Time for which the motor has been turned, s.
+    /// Time driven, s.
     pub run_s: u32,
-    /// Number of times that the motor has been brought to run.
+    /// Successful starts.
     pub starts: u32,
-    /// Number of times that each fault has begun, in the order of [`Fault::ALL`].
+    /// Occurrences of each fault, in the order of [`Fault::ALL`].
     pub faults: [u32; Fault::ALL.len()],
-    /// Highest temperature of the board, °C; 0 if it has never been above.
+    /// Maximum board temperature, °C; 0 if never above.
     pub temperature_max_c: f32,
-    /// Highest phase current, A, as seen once a millisecond.
+    /// Maximum phase current, A, sampled every millisecond.
     pub phase_max_a: f32,
 }
 
 impl Statistics {
-    /// Nothing has happened.
+    /// All zero.
     pub const NONE: Self = Self {
         run_s: 0,
         starts: 0,
@@ -29,10 +29,10 @@ impl Statistics {
         phase_max_a: 0.0,
     };
 
-    /// Words under which they are stored.
+    /// Words in storage.
     pub(crate) const WORDS: usize = 4 + Fault::ALL.len();
 
-    /// One of the words, in an order that a new fault does not change.
+    /// Returns one of the words, in an order that a new fault does not disturb.
     pub(crate) fn word(&self, word: usize) -> u32 {
         match word {
             0 => self.run_s,
@@ -43,7 +43,7 @@ impl Statistics {
         }
     }
 
-    /// Takes a stored word. Returns true if it can be one.
+    /// Sets a stored word. Returns true if it is plausible.
     pub(crate) fn set_word(&mut self, word: usize, bits: u32) -> bool {
         let value = f32::from_bits(bits);
         let fits = value.is_finite() && value >= 0.0;
@@ -59,30 +59,30 @@ impl Statistics {
     }
 }
 
-/// State from one look at the drive to the next.
+/// State carried from look to look.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Recorder {
     faults: Faults,
-    /// True if the motor was turned.
+    /// The motor was being driven.
     driven: bool,
-    /// True if that was a start that worked.
+    /// This drive's start has succeeded.
     started: bool,
-    /// Time that is no whole second yet.
+    /// Driven time short of a whole second, µs.
     run_us: u32,
 }
 
-/// The state that the drive and the board show.
+/// State of the drive and the board at a look.
 pub(crate) struct Sight {
     pub(crate) phase: Phase,
     pub(crate) faults: Faults,
     pub(crate) temperature_c: f32,
     pub(crate) phase_a: f32,
-    /// Since the last look, µs.
+    /// Time since the last look, µs.
     pub(crate) time_us: u32,
 }
 
 impl Recorder {
-    /// Takes in one look. Returns true if the motor has come to rest.
+    /// Takes in one look. Returns true if the motor has just come to rest.
     pub(crate) fn look(&mut self, statistics: &mut Statistics, sight: &Sight) -> bool {
         for (fault, count) in Fault::ALL.into_iter().zip(&mut statistics.faults) {
             if sight.faults.contains(fault) && !self.faults.contains(fault) {

@@ -1,4 +1,4 @@
-//! The ESC's state in SI.
+//! The ESC's state in SI units.
 
 use crate::drive::{Faults, Limits, Phase, Snapshot};
 use crate::input::authority::{Command, DriveStatus};
@@ -7,81 +7,80 @@ use crate::math::{SQRT_3, square_root};
 use crate::statistics::Statistics;
 use crate::units::Scale;
 
-/// The state of the ESC as telemetry reports it.
+/// The ESC's state as telemetry reports it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telemetry {
     /// Mechanical speed, rpm, signed.
     pub rpm: f32,
     /// Supply voltage, V.
     pub bus_v: f32,
-    /// Current drawn from the supply, A, negative while braking.
+    /// Supply current, A, negative while braking.
     pub bus_a: f32,
-    /// Charge drawn since the start, mAh.
+    /// Charge drawn since power-up, mAh.
     pub consumed_mah: f32,
-    /// Temperature of the board, °C.
+    /// Board temperature, °C.
     pub temperature_c: f32,
-    /// The drive's phase.
+    /// Phase of the drive.
     pub phase: Phase,
     /// Faults that hold the bridge off.
     pub faults: Faults,
     /// Limits that bind.
     pub limits: Limits,
-    /// Number of times that a fault has turned the bridge off since the start.
+    /// Number of times a fault has turned the bridge off since power-up.
     pub fault_count: u32,
-    /// Starts in a row that have failed: the motor is tried again, a few times.
+    /// Consecutive failed starts; the drive retries a few times.
     pub failed_starts: u8,
-    /// True if the throttle may turn the motor.
+    /// Throttle may turn the motor.
     pub armed: bool,
-    /// Frames on the throttle wire that failed their check, since the start.
+    /// Frames on the throttle wire that failed their check since power-up.
     pub bad_frames: u32,
-    /// Their share in the last second, 0 to 1.
+    /// Share of bad frames in the last second, 0 to 1.
     pub bad_share: f32,
-    /// The signal on the throttle wire; none before it has been identified, and on a silent wire.
+    /// Signal on the throttle wire; `None` before identification and on a silent wire.
     pub signal: Option<Signal>,
-    /// Signals of the control that can be streamed, in the order of [`SIGNALS`].
+    /// Control signals for streaming, in the order of [`SIGNALS`].
     pub signals: [f32; SIGNALS.len()],
-    /// Statistics over its life.
+    /// Lifetime statistics.
     pub statistics: Statistics,
 }
 
-/// Names of the control's signals that can be streamed, in the order of the bits of `TEL_SIGNALS`:
-/// mechanical speed and its reference, rpm; current and voltage in the rotor's frame, A and V;
-/// voltage as a share of what the supply gives without over-modulation; the supply's voltage and
-/// current as they are now, V and A.
+/// Names of the streamable control signals, in the bit order of `TEL_SIGNALS`: mechanical speed and its
+/// reference, rpm; current and voltage in the rotor's frame, A and V; voltage as a share of the maximum without
+/// over-modulation; instantaneous supply voltage and current, V and A.
 pub const SIGNALS: [&str; 9] = [
     "rpm", "rpm_ref", "i_d", "i_q", "v_d", "v_q", "duty", "bus_v", "bus_a",
 ];
 
-/// Below this the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
-/// speed that can be asked for (`CTL_RPM_MIN` goes down to it), and above the noise of an estimate
-/// at standstill.
+/// Below this speed the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
+/// `CTL_RPM_MIN`, and above the noise of an estimate at standstill.
 const AT_REST_RPM: f32 = 100.0;
 
-/// Time over which the current is smoothed, µs: what flows in a period differs from the next by
-/// the current's ripple, and a fifth of a second is what a person can read.
+/// Smoothing time of the current, µs: ripple makes it differ from period to period, and a person can read a
+/// value every fifth of a second.
 const READABLE_US: u32 = 200_000;
 
-/// A charge in µA·µs. Whole numbers: a sum of floats would stop growing after some ampere-hours.
+/// Charge in µA·µs. An integer, since a float sum would stop growing after a few ampere-hours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Charge(i64);
 
 impl Charge {
-    /// Adds a current that has flowed for a while.
+    /// Adds a current that flowed for `time_us`.
     pub fn add(&mut self, current_a: f32, time_us: u64) {
         let charge = i64::from((current_a * 1e6) as i32) * time_us as i64;
         self.0 = self.0.saturating_add(charge);
     }
 
-    /// The charge in mAh.
+    /// Returns the charge in mAh.
     pub fn mah(self) -> f32 {
-        // 3600 s of 1 mA. The upper word counts 0.0012 mAh, and a word is a float in one instruction.
+        // 1 mA for 3600 s. One count of the upper word is 0.0012 mAh, and a word converts to float in one
+        // instruction.
         let upper = (self.0 >> 32) as i32;
         upper as f32 * (4_294_967_296.0 / 3.6e12)
     }
 }
 
 impl Telemetry {
-    /// At power-up, before the first snapshot.
+    /// Creates the state at power-up, before the first snapshot.
     pub const fn new() -> Self {
         Self {
             rpm: 0.0,
@@ -103,8 +102,8 @@ impl Telemetry {
         }
     }
 
-    /// The state that decides on tests: at rest, and sound, with the present command. A start begins
-    /// with phases that do not turn the motor yet.
+    /// Returns the state that decides whether a test may run: at rest and without a fault. The command
+    /// counts too, since a start begins with phases that do not turn the motor yet.
     pub fn drive(&self, command: Command) -> DriveStatus {
         let at_rest = !self.phase.drives() && self.rpm.abs() < AT_REST_RPM;
         DriveStatus {
@@ -113,7 +112,7 @@ impl Telemetry {
         }
     }
 
-    /// Takes in the drive's snapshot after a further `time_us`.
+    /// Takes in the drive's snapshot, `time_us` after the previous one.
     pub fn observe(&mut self, snapshot: &Snapshot, scale: &Scale, time_us: u64) {
         self.rpm = scale.rpm(snapshot.speed);
         self.bus_v = scale.volts(snapshot.bus);
@@ -126,7 +125,7 @@ impl Telemetry {
         self.failed_starts = snapshot.failed_starts;
         let (v_d, v_q) = (scale.volts(snapshot.u.d), scale.volts(snapshot.u.q));
         let square = v_d * v_d + v_q * v_q;
-        // A root is of a number above 0, and without a supply there is no share of it.
+        // The root needs a positive argument, and without a supply the share is undefined.
         let duty = if self.bus_v > 0.0 && square > 0.0 {
             SQRT_3 * square_root(square) / self.bus_v
         } else {

@@ -1,17 +1,17 @@
-//! Every word of a state, one after the other: what two machines must agree on.
+//! Traces a state word by word, for two machines to compare.
 //!
 //! `traced!` declares a state together with its trace, so that no field is forgotten.
 
 use fixed::{FixedI32, FixedI64, FixedU32};
 
-/// A state that hands out every word of itself.
+/// A state that can emit all of its words.
 pub trait Trace {
-    /// Hands out the words, as many and in the same order at all times: a word is known by its place.
+    /// Emits the words, always as many and in the same order: position identifies a word.
     fn trace(&self, out: &mut impl FnMut(u32));
 }
 
-/// Declares a struct (generic in one type at most), or an enum without payload, that hands out the
-/// words of its fields in the order of their declaration.
+/// Declares a struct with at most one type parameter, or a fieldless enum, that emits its fields' words in
+/// declaration order.
 macro_rules! traced {
     (
         $(#[$attribute:meta])*
@@ -66,7 +66,7 @@ macro_rules! traced {
 
 pub(crate) use traced;
 
-/// Numbers without sign, of at most 32 bits.
+/// Implements [`Trace`] for unsigned numbers of at most 32 bits.
 macro_rules! one_word {
     ($($type:ty),*) => {$(
         impl Trace for $type {
@@ -86,7 +86,7 @@ impl Trace for i32 {
 }
 
 impl Trace for i64 {
-    /// The lower word first.
+    /// Emits the lower word first.
     fn trace(&self, out: &mut impl FnMut(u32)) {
         out(*self as u32);
         out((*self >> 32) as u32);
@@ -127,7 +127,7 @@ impl<T: Trace, U: Trace> Trace for (T, U) {
 }
 
 impl<T: Trace + Copy + Default> Trace for Option<T> {
-    /// One word for its presence, then its own words, or those of the default.
+    /// Emits one word for presence, then the value's words, or the default's.
     fn trace(&self, out: &mut impl FnMut(u32)) {
         self.is_some().trace(out);
         self.unwrap_or_default().trace(out);

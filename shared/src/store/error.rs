@@ -1,44 +1,44 @@
-//! The integrity of stored values, and the errors of storage.
+//! Integrity of the stored values, and storage errors.
 
-/// The integrity of the stored values.
+/// Integrity of the stored values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrity {
-    /// Every value is the one that was saved.
+    /// Every value is as saved.
     Sound,
-    /// Nothing was stored: the values are the defaults.
+    /// Nothing was stored: all values are defaults.
     Empty,
-    /// A save was interrupted, or a value has rotted: the values are those of an earlier save, or of the
-    /// other copy of this one.
+    /// A save was interrupted, or a value has rotted: the values are from an earlier save, or from this one's
+    /// other copy.
     Incomplete,
-    /// The first save of all was interrupted: the values are the defaults.
+    /// The very first save was interrupted: all values are defaults.
     Unfinished,
-    /// No order was found in the flash: the values are the defaults.
+    /// The flash holds nothing usable: all values are defaults.
     Corrupt,
-    /// The flash could not be read: the values are the defaults.
+    /// The flash could not be read: all values are defaults.
     Unreadable,
 }
 
 impl Integrity {
-    /// Returns true if there was something and nothing of it can be used: the defaults may be those of
-    /// another motor than the one that was set up.
+    /// Returns true if something was stored and none of it is usable: the defaults may be for a motor other
+    /// than the one that was set up.
     pub const fn is_lost(self) -> bool {
         matches!(self, Self::Unfinished | Self::Corrupt | Self::Unreadable)
     }
 }
 
-/// The reason why stored values cannot be relied on.
+/// Why stored values cannot be relied on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoreError {
-    /// The range is not two halves of whole pages of the flash.
+    /// The range is not two halves of whole flash pages.
     BadRange,
-    /// The flash refused a read, a write or an erase.
+    /// A read, write or erase failed.
     Flash,
-    /// The values do not fit, or the flash does not hold what was written.
+    /// The values do not fit, or the flash does not read back as written.
     NotStored,
 }
 
 impl StoreError {
-    /// A few words for a person.
+    /// Returns a short text for the user.
     pub const fn text(self) -> &'static str {
         match self {
             Self::BadRange => "storage: too few or uneven pages of flash",

@@ -1,23 +1,23 @@
-//! The values that are kept, and the key of each. A key is never given to another value.
+//! The stored values and their keys. A key is never reused for another value.
 
 use crate::mavlink::{Intervals, KeptSigning, Key};
 use crate::params::{ParamId, Params, TABLE};
 use crate::statistics::Statistics;
 
-/// First key of the intervals of messages. Keys below 0x1000 are the parameters'.
+/// First key of the message intervals. Keys below 0x1000 are the parameters'.
 const INTERVALS: u16 = 0x1100;
 /// First key of the statistics.
 const STATISTICS: u16 = 0x1200;
-/// First key of the words of signing: eight of its key, and the newest timestamp.
+/// First key of the signing words: eight of the secret key, and the newest timestamp.
 const SIGNING: u16 = 0x1300;
 const SIGNING_WORDS: usize = 9;
 /// Key of the newest timestamp.
 const TIME: u16 = SIGNING + SIGNING_WORDS as u16 - 1;
-/// Key of the time that saves owe.
+/// Key of the time owed for saves.
 const OWED: u16 = 0x1400;
 
-/// Returns true if the value with this key is set by somebody, so that an older value in its place is a
-/// wrong one. The statistics, the time of signatures and that owed change by themselves.
+/// Returns true if somebody sets the value with this key, so that an older value in its place is wrong. The
+/// statistics, the signing timestamp and the owed time change by themselves.
 pub(super) fn is_setting(key: u16) -> bool {
     !(STATISTICS..SIGNING).contains(&key) && key != TIME && key != OWED
 }
@@ -25,15 +25,15 @@ pub(super) fn is_setting(key: u16) -> bool {
 /// The values that survive a loss of power.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Kept {
-    /// The parameters.
+    /// Parameters.
     pub params: Params,
-    /// The intervals of messages.
+    /// Message intervals.
     pub intervals: Intervals,
-    /// The statistics so far.
+    /// Statistics so far.
     pub statistics: Statistics,
-    /// The key of signatures, if there is one.
+    /// Signing key and newest timestamp, if there is a key.
     pub signing: Option<KeptSigning>,
-    /// Time that saves without a request owe, s: a restart must not give them all back.
+    /// Time owed for unrequested saves, s: a restart must not give them all back.
     pub owed_s: u32,
 }
 
@@ -48,7 +48,7 @@ enum Place {
 }
 
 impl Place {
-    /// That of one of the words, in the order in which they are stored.
+    /// Returns the place of a word, in storage order.
     fn of(mut word: usize) -> Self {
         if let Some(id) = ParamId::ALL.get(word) {
             return Self::Param(*id);
@@ -70,11 +70,11 @@ impl Place {
 }
 
 impl Kept {
-    /// Words in all.
+    /// Number of words.
     pub(super) const WORDS: usize =
         TABLE.len() + Intervals::WORDS + Statistics::WORDS + SIGNING_WORDS + 1;
 
-    /// The key of a word.
+    /// Returns the key of a word.
     pub(super) fn key(word: usize) -> u16 {
         match Place::of(word) {
             Place::Param(id) => id.entry().key,
@@ -85,7 +85,7 @@ impl Kept {
         }
     }
 
-    /// The word that has this key. Parameters that are not kept have none.
+    /// Returns the word with this key. Parameters that are not kept have none.
     pub(super) fn find(key: u16) -> Option<usize> {
         (0..Self::WORDS).find(|word| {
             let kept = |id: &ParamId| id.entry().kind.is_kept();
@@ -93,7 +93,7 @@ impl Kept {
         })
     }
 
-    /// The bits of a word, none if it is the default: zero, but for parameters.
+    /// Returns the bits of a word, or `None` for the default: zero, except for parameters.
     pub(super) fn bits(&self, word: usize) -> Option<u32> {
         let bits = match Place::of(word) {
             Place::Param(id) => {
@@ -113,7 +113,7 @@ impl Kept {
         (bits != 0).then_some(bits)
     }
 
-    /// Takes a stored word. Returns true if this firmware accepts it.
+    /// Sets a stored word. Returns true if this firmware accepts it.
     pub(super) fn set(&mut self, word: usize, bits: u32) -> bool {
         match Place::of(word) {
             Place::Param(id) => self.params.set(id, f32::from_bits(bits)).is_ok(),

@@ -1,4 +1,4 @@
-//! Sets of words, appended to two halves of the flash, so that two sets always have the settings.
+//! A log of sets in two halves of the flash, in which two sets always hold the settings.
 
 use core::ops::Range;
 
@@ -11,17 +11,17 @@ use super::word::{Check, Word, Writer, key};
 /// The contents of the flash.
 pub(super) struct Log {
     halves: [Range<u32>; 2],
-    /// Of the sets with their seals; without words if there is none.
+    /// The newest sealed set; empty if there is none.
     pub(super) newest: Set,
     before: Set,
-    /// True if all that is written belongs to such a set.
+    /// Everything written belongs to a sealed set.
     whole: bool,
-    /// True if all that is written may belong to a first set.
+    /// Everything written may belong to a first set.
     first: bool,
 }
 
 impl Log {
-    /// Looks through the flash.
+    /// Scans the flash.
     pub(super) fn open<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Result<Self, StoreError> {
         Self::look(flash, halves::<F>(range)?)
     }
@@ -43,10 +43,10 @@ impl Log {
                     all_whole &= whole;
                     (start, number, check) = (at, word.number, Check::ORIGIN);
                 }
-                // The last word may have been cut off with any number.
+                // The last word of a torn write may have any number.
                 first &= !torn;
                 torn = number != FIRST;
-                // The check of nothing is zero, as are the words that an erase may leave.
+                // A seal covers at least one word.
                 whole = word.key == key::SEAL && at != start && word.bits == check.0;
                 check = check.over(&word);
                 if !whole {
@@ -84,7 +84,7 @@ impl Log {
         }
     }
 
-    /// The half with the newest set, and the other one.
+    /// Returns the half with the newest set, then the other one.
     fn order(&self) -> [&Range<u32>; 2] {
         let [first, second] = &self.halves;
         if second.contains(&self.newest.values.start) {
@@ -94,8 +94,8 @@ impl Log {
         }
     }
 
-    /// Writes a set with this content after the newest, unless that has it and the set before has its
-    /// settings. Returns true if it did.
+    /// Appends a set with this content, unless the newest has it and the previous one has its settings. Returns
+    /// true if it wrote one.
     pub(super) fn append<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -103,7 +103,7 @@ impl Log {
     ) -> Result<bool, StoreError> {
         let newest = &self.newest;
         let len = length(flash, content)?;
-        // If nothing is stored, a schema without values says no more.
+        // In empty flash, a schema without values adds nothing.
         let nothing = newest.values.is_empty() && len == 2 * Word::BYTES;
         if self.whole
             && (nothing
@@ -118,14 +118,14 @@ impl Log {
             return Ok(true);
         }
         self.move_to(flash, content, there, len)?;
-        // An incomplete set would be found again.
+        // A later scan would find the incomplete set again.
         if !self.whole {
             wipe(flash, here)?;
         }
         Ok(true)
     }
 
-    /// Leaves nothing else than this in the flash.
+    /// Stores this content and nothing else.
     pub(super) fn replace<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -137,7 +137,7 @@ impl Log {
         wipe(flash, here)
     }
 
-    /// Writes a set of this length, if nothing else stays there.
+    /// Erases a half and writes a set of this length to it.
     fn move_to<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -152,7 +152,7 @@ impl Log {
         self.write(flash, content, half.start)
     }
 
-    /// Writes a set, and reads it back.
+    /// Writes a set and verifies it.
     fn write<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -174,7 +174,7 @@ impl Log {
     }
 }
 
-/// The length of a set with this content, with its seal.
+/// Returns the length of a set with this content, including its seal.
 fn length<F: NorFlash>(flash: &mut F, content: &Content) -> Result<u32, StoreError> {
     let mut content = content.clone();
     let mut len = Word::BYTES;

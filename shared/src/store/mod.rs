@@ -1,19 +1,18 @@
-//! Storage that survives a loss of power, in flash.
+//! Flash storage that survives a loss of power.
 //!
-//! A save appends all values as one set, of 8 bytes a value, and ends it with a seal over them. The
-//! newest set with its seal counts, so a loss of power leaves all values of this save, or all of the
-//! one before. If a setting has changed the set is written twice, so that a rotten bit in one leaves
-//! the other; if only the statistics or the time of signatures have changed, the set before has the
-//! same settings. The flash is used in two halves. If one is full, or anything in it is not whole, the
-//! other is erased and takes the set; the sets that it replaces stay until the new one is written and
-//! checked.
+//! A save appends all values as one set, 8 bytes per value, followed by a seal over them. The newest sealed set
+//! counts, so a loss of power leaves all values of this save or all of the previous one. When a setting has
+//! changed, the set is written twice, so that bit rot in one leaves the other; when only the statistics or the
+//! signing timestamp have changed, the previous set has the same settings anyway. The flash is used in two
+//! halves. When one is full, or anything in it is incomplete, the other is erased and takes the set; the sets
+//! it replaces stay until the new one is written and verified.
 //!
 //! # Wear
-//! A set with twenty changed parameters, the statistics and a key has 43 words, 344 bytes. On the
-//! STM32G431, whose pages last for 10 000 erases (DS12589) and of which a half has one of 2 KB, 5 sets
-//! fit a half: it lasts for 100 000 saves of statistics, or 50 000 changes of settings. Up to 40 changed
-//! parameters it is at least 40 000 changes, and with every value changed 20 000. The two sectors of the
-//! STM32F405, of 16 KB (10 000 erases, DS8626), last eight times as long and more.
+//! A set with twenty changed parameters, the statistics and a key has 43 words, 344 bytes. On the STM32G431 a
+//! half is one 2 KB page, which lasts for 10 000 erases (DS12589) and fits 5 sets: 100 000 saves of statistics,
+//! or 50 000 changes of settings. With up to 40 changed parameters it is at least 40 000 changes, and with
+//! every value changed 20 000. The STM32F405's two 16 KB sectors (10 000 erases, DS8626) last at least eight
+//! times as long.
 
 mod error;
 mod kept;
@@ -30,24 +29,24 @@ pub use kept::Kept;
 use log::Log;
 use set::{Content, Set};
 
-/// Sets that have the settings which were saved last.
+/// Sets that hold the settings saved last.
 const COPIES: usize = 2;
 
 /// The stored values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// The values; one that was not stored, or is not accepted, is the default.
+    /// The values, with the default for any that was not stored or is rejected.
     pub kept: Kept,
-    /// Their integrity.
+    /// Integrity of the storage.
     pub integrity: Integrity,
-    /// True if a value is not accepted; the next save drops it.
+    /// A value was rejected; the next save drops it.
     pub out_of_range: bool,
-    /// True if there are values that this firmware does not know; saves keep them.
+    /// Some values are unknown to this firmware; saves preserve them.
     pub unknown: bool,
 }
 
 impl Loaded {
-    /// The trouble that a person must know of, if any.
+    /// Returns the trouble that the user must know of, if any.
     pub const fn trouble(&self) -> Option<&'static str> {
         match self.integrity {
             Integrity::Incomplete => Some("storage: not whole, an older save may be in force"),
@@ -61,7 +60,7 @@ impl Loaded {
     }
 }
 
-/// Reads the stored values from `range` of the flash, whatever is in it.
+/// Loads the stored values from `range` of the flash, whatever its contents.
 pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Loaded {
     let mut loaded = Loaded {
         kept: Kept::default(),
@@ -86,13 +85,13 @@ pub fn load<F: NorFlash>(flash: &mut F, range: Range<u32>) -> Loaded {
     loaded
 }
 
-/// Writes what is not stored yet, and reads it back. When it is done the values survive the
-/// loss of power, and the settings are stored twice.
+/// Writes what is not stored yet, and verifies it. On success the values survive a loss of power, and the
+/// settings are stored twice.
 ///
-/// Defaults are not written; values unknown to this firmware are kept.
+/// Defaults are not written; values unknown to this firmware are preserved.
 ///
 /// # Errors
-/// Any [`StoreError`]; what was stored before is still there then, or these values are.
+/// Any [`StoreError`]; then either the previous values or these are still stored.
 pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, kept: &Kept) -> Result<(), StoreError> {
     for _ in 0..COPIES {
         let log = Log::open(flash, range.clone())?;
@@ -103,11 +102,10 @@ pub fn save<F: NorFlash>(flash: &mut F, range: Range<u32>, kept: &Kept) -> Resul
     Ok(())
 }
 
-/// Leaves nothing in the flash but these values: no values unknown to this firmware, and no earlier
-/// save either.
+/// Stores these values and nothing else: no values unknown to this firmware, and no earlier save.
 ///
 /// # Errors
-/// As with [`save`].
+/// As for [`save`].
 pub fn replace<F: NorFlash>(
     flash: &mut F,
     range: Range<u32>,

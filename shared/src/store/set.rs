@@ -11,33 +11,33 @@ use super::word::{Word, key};
 /// Number of the first set in empty flash.
 pub(super) const FIRST: u16 = 1;
 
-/// The place of a set in the flash.
+/// Where a set lies in the flash.
 #[derive(Clone)]
 pub(super) struct Set {
-    /// Its words but for the seal.
+    /// All words but the seal.
     pub(super) values: Range<u32>,
-    /// Behind the seal.
+    /// The address after the seal.
     pub(super) after: u32,
-    /// One more than that of the set before.
+    /// One more than the previous set's.
     pub(super) number: u16,
 }
 
 impl Set {
-    /// No set.
+    /// Stands for no set.
     pub(super) const NONE: Self = Self {
         values: 0..0,
         after: 0,
         number: FIRST - 1,
     };
 
-    /// Returns true if it was written after that one, or there is no such one.
+    /// Returns true if this set was written after `than`, or `than` is no set.
     pub(super) fn is_newer(&self, than: &Self) -> bool {
         let later = self.number.wrapping_sub(than.number).cast_signed() > 0;
         than.values.is_empty() || later
     }
 
-    /// Returns true if its words are those of the content, in their order, or at least the settings
-    /// among them.
+    /// Returns true if its words are exactly the content's, in order; with `only_settings`, comparing only
+    /// settings.
     pub(super) fn has<F: NorFlash>(
         &self,
         flash: &mut F,
@@ -67,7 +67,7 @@ impl Set {
         }
     }
 
-    /// Every value in it.
+    /// Returns an iterator over its values.
     pub(super) fn values(&self) -> Values {
         Values {
             words: self.values.clone(),
@@ -75,14 +75,14 @@ impl Set {
     }
 }
 
-/// The values of a set, one after another.
+/// Iterates over a set's values.
 #[derive(Clone)]
 pub(super) struct Values {
     words: Range<u32>,
 }
 
 impl Values {
-    /// Key and bits of the next one.
+    /// Returns the key and bits of the next value.
     pub(super) fn next<F: NorFlash>(
         &mut self,
         flash: &mut F,
@@ -98,11 +98,11 @@ impl Values {
     }
 }
 
-/// The schema's number: another one means that keys and values must be converted.
+/// Schema number; another one means that keys and values must be converted.
 const SCHEMA: u32 = 1;
 
-/// The words of a set that is to be written, but for its seal: the schema, what this firmware does not
-/// know of the set before, and each value that is no default.
+/// The words of a set to be written, without its seal: the schema, values of the previous set that this
+/// firmware does not know, and every value that is not the default.
 #[derive(Clone)]
 pub(super) struct Content<'a> {
     schema: Option<u32>,
@@ -121,7 +121,7 @@ impl<'a> Content<'a> {
         }
     }
 
-    /// Key and bits of the next word.
+    /// Returns the key and bits of the next word.
     pub(super) fn next<F: NorFlash>(
         &mut self,
         flash: &mut F,

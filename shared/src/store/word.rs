@@ -1,24 +1,24 @@
-//! The words of sets, and the seal of a set.
+//! The words of a set, and its seal.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use super::error::StoreError;
 use crate::checksum::checksum;
 
-/// Keys of words that are no value's; those of values are in [`kept`](super::kept).
+/// Keys of words that are not values; [`kept`](super::kept) has those of values.
 pub(super) mod key {
-    /// The seal after a set.
+    /// The seal that ends a set.
     pub(in crate::store) const SEAL: u16 = 0;
-    /// The schema of a set, its first word.
+    /// The schema, a set's first word.
     pub(in crate::store) const SCHEMA: u16 = 0x1000;
 }
 
-/// The unit by which the flash is read and written.
+/// The unit of flash reads and writes.
 pub(super) struct Word {
     pub(super) key: u16,
-    /// That of its set.
+    /// Number of its set.
     pub(super) number: u16,
-    /// A value's, or the check of the set.
+    /// A value's bits, or the set's checksum.
     pub(super) bits: u32,
 }
 
@@ -43,28 +43,28 @@ impl Word {
         [a, b, c, d, e, f, g, h]
     }
 
-    /// As an erase leaves it.
+    /// Returns true for erased flash.
     pub(super) fn is_blank(&self) -> bool {
         self.bytes() == [0xFF; Self::BYTES as usize]
     }
 }
 
-/// CRC-32 over the words of a set. One, two or three wrong bits in a set, and a single wrong byte, are always
-/// noticed; of all else, all but one in 2^32.
+/// CRC-32 over the words of a set. It always detects one, two or three wrong bits in a set and any single wrong
+/// byte; of all other errors it misses one in 2^32.
 #[derive(Clone, Copy)]
 pub(super) struct Check(pub(super) u32);
 
 impl Check {
-    /// Over no word.
+    /// Initial value, over no words.
     pub(super) const ORIGIN: Self = Self(!0);
 
-    /// Over one word more.
+    /// Returns the checksum extended by one word.
     pub(super) fn over(self, word: &Word) -> Self {
         Self(checksum(self.0, &word.bytes()))
     }
 }
 
-/// Writes a set.
+/// Writes a set word by word.
 pub(super) struct Writer {
     pub(super) at: u32,
     pub(super) number: u16,
