@@ -1,14 +1,14 @@
-//! The start of a damaged image. It goes no further: the control's interrupt, which alone turns the
-//! bridge on, is never started. The light blinks evenly, five times a second, and the serial line says
-//! why, at the factory rate: nothing stored is read.
+//! Start-up of a damaged image. It goes no further: the control interrupt, which alone turns the bridge on,
+//! never starts. The light blinks evenly, five times a second, and the serial line gives the reason at the
+//! factory baud rate: stored settings are not read.
 
-/// MAVLink 2 frames: a heartbeat in the state *critical*, and a STATUSTEXT of the severity *critical*.
+/// MAVLink 2 frames: a HEARTBEAT in the *critical* state, and a STATUSTEXT of *critical* severity.
 #[cfg(any(board, test))]
 static TOLD: [u8; 62] = *b"\
     \xfd\x09\0\0\0\x01\x01\0\0\0\0\0\0\0\0\0\0\x05\x03\x0c\x98\
     \xfd\x1d\0\0\x01\x01\x01\xfd\0\0\x02Image damaged: flash it anew\xde\x28";
 
-/// Tells it for ever.
+/// Repeats the message forever.
 #[cfg(board)]
 pub fn tell(hardware: crate::board::Hardware) -> ! {
     const BAUD: u32 = 115_200;
@@ -17,7 +17,7 @@ pub fn tell(hardware: crate::board::Hardware) -> ! {
     loop {
         // An error cannot be reported.
         let _ = out.blocking_write(&TOLD);
-        // A heartbeat a second.
+        // One heartbeat per second.
         for _ in 0..10 {
             light.toggle();
             embassy_time::block_for(embassy_time::Duration::from_millis(100));

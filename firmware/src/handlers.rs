@@ -1,4 +1,4 @@
-//! The handlers that end everything: of a panic, a hard fault, an unexpected interrupt.
+//! The final handlers: panic, hard fault, unexpected interrupt.
 
 use core::arch::{asm, naked_asm};
 use core::panic::PanicInfo;
@@ -8,7 +8,7 @@ use cortex_m_rt::exception;
 use siskin_firmware::last_words::{DETAILS, Failure, fail, turn_off};
 use siskin_firmware::storage::take_torn_word;
 
-/// Only the address is kept: the texts of panics are not in the image.
+/// Records only addresses: the image has no panic texts.
 #[panic_handler]
 fn panic(_: &PanicInfo) -> ! {
     turn_off();
@@ -20,30 +20,30 @@ unsafe extern "C" {
     static _stack_start: u32;
 }
 
-/// The addresses to which the innermost calls return. On this target every function keeps in r7 the
-/// address of two words: its caller's r7, and its own return address.
+/// Returns the return addresses of the innermost calls. On this target every function keeps a frame pointer in
+/// r7 to two words: its caller's r7, and its own return address.
 #[inline(always)] // it reads its caller's frame
 fn return_addresses() -> [u32; DETAILS] {
     let stack = &raw const _stack_end as u32..&raw const _stack_start as u32 - 4;
     let mut frame: u32;
-    // SAFETY: a register is read.
+    // SAFETY: reads a register.
     unsafe { asm!("mov {}, r7", out(reg) frame, options(nomem, nostack, preserves_flags)) };
     let mut addresses = [0; DETAILS];
     for address in &mut addresses {
         if !stack.contains(&frame) || !frame.is_multiple_of(4) {
             break;
         }
-        // SAFETY: two words of the stack, whatever is in them.
+        // SAFETY: two words of the stack, whatever their contents.
         let words = unsafe { (frame as *const [u32; 2]).read_volatile() };
         [frame, *address] = words;
     }
     addresses
 }
 
-/// A hard fault, by its raw vector: the stack may be at fault, so the handler begins a new one.
+/// Hard-fault vector: the stack may be the cause, so it starts a new one.
 ///
 /// # Safety
-/// For the processor.
+/// Only the processor may call it.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 #[unsafe(link_section = ".control")]
@@ -57,29 +57,29 @@ unsafe extern "C" fn hard_fault_vector() {
     )
 }
 
-/// The fault with its stack pointer, which is of no use if the stack has left its memory.
+/// Handles a hard fault; `stack` is its stack pointer, of no use if the stack has left its memory.
 extern "C" fn hard_fault(stack: u32) -> ! {
-    // First of all: the rest reads memory that may be wrong.
+    // First of all: the rest reads memory that may be corrupt.
     turn_off();
     let [lowest, highest] = [&raw const _stack_end as u32, &raw const _stack_start as u32];
-    // SAFETY: a register of the processor without side effects.
+    // SAFETY: a core register without side effects.
     let status = unsafe { (*SCB::PTR).cfsr.read() };
-    // The frame of an exception: eight words, of which the seventh is the program counter.
+    // An exception frame is eight words; the seventh is the program counter.
     if stack < lowest {
         fail(Failure::StackOverflow, [0, status, 0, 0])
     } else if !stack.is_multiple_of(4) || stack > highest - 32 {
         fail(Failure::HardFault, [0, status, 0, 0])
     } else {
-        // SAFETY: the processor has put the frame there, within the stack.
+        // SAFETY: the processor stored the frame there, within the stack.
         let at = unsafe { *((stack + 24) as *const u32) };
         fail(Failure::HardFault, [at, status, 0, 0])
     }
 }
 
-/// Of the exceptions of the processor.
+/// The exception's number.
 const NON_MASKABLE: i32 = -14;
 
-// SAFETY: it returns only if a word of the store was read, whose content is not trusted.
+// SAFETY: returns only if a word of the store was read, whose content is not trusted.
 #[exception]
 unsafe fn NonMaskableInt() {
     if !take_torn_word() {
@@ -87,7 +87,7 @@ unsafe fn NonMaskableInt() {
     }
 }
 
-// SAFETY: it runs instead of whatever failed and does not return to it.
+// SAFETY: runs instead of whatever failed and does not return to it.
 #[exception]
 unsafe fn DefaultHandler(interrupt: i16) -> ! {
     fail(

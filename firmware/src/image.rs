@@ -1,18 +1,18 @@
-//! The image's identity, as text right after the vector table where a tool finds it; and its checksum.
+//! The image's identity, as text right after the vector table where a tool finds it, and its checksum.
 //!
-//! After the tag the linker script puts the address range that the checksum covers, and room for the
-//! sum and its inverse. The linker leaves both erased: such an image is not stamped and starts
-//! unchecked, so that what cargo builds runs. `siskin image` stamps; `siskin flash` stamps an image
-//! that is not, and refuses a damaged one; the start of a stamped image that is damaged ends in
-//! [`damaged`](crate::damaged). The check takes 1.4 ms of the start of a G431, on the virtual board.
+//! After the tag the linker script places the address range that the checksum covers, and room for the sum and
+//! its inverse. The linker leaves both erased: such an image is unstamped and starts unchecked, so that cargo's
+//! output runs as it is. `siskin image` stamps; `siskin flash` stamps an unstamped image, and refuses a damaged
+//! one; a stamped image that is damaged starts into [`damaged`](crate::damaged). The check takes 1.4 ms of a
+//! G431's start, on the virtual board.
 
 #[cfg(board)]
 use siskin_control::image::{NO_WORDS, check_sum};
 
-/// Begins the tag; the last byte is the version of its layout.
+/// Starts the tag; the last byte is its layout version.
 const MARK: [u8; 8] = *b"SISKIN\x00\x02";
 
-/// Bytes of each text, padded with zeros.
+/// Bytes of each text, zero-padded.
 const FIELD_BYTES: usize = 24;
 
 /// The tag: a mark, then board, version and git commit.
@@ -25,7 +25,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// The tag of a board's image.
+    /// Creates the tag for a board's image.
     pub const fn of(board: &str) -> Self {
         Self {
             mark: MARK,
@@ -36,7 +36,7 @@ impl Image {
     }
 }
 
-/// Returns true if the flash holds what was stamped, or nothing was stamped.
+/// Returns true if the flash matches its stamp, or has none.
 #[cfg(board)]
 pub fn is_whole() -> bool {
     unsafe extern "C" {
@@ -47,11 +47,11 @@ pub fn is_whole() -> bool {
     }
     let words = |begin: *const u32, end: *const u32| {
         let (begin, end) = (begin as usize, end as usize);
-        // SAFETY: the linker script has the image between the two addresses, which are multiples of four,
+        // SAFETY: the linker script places the image between the two addresses, which are multiples of four,
         // and nothing writes there.
         unsafe { core::slice::from_raw_parts(begin as *const u32, (end - begin) / 4) }
     };
-    // SAFETY: it stands in the flash; what is stamped is not what the compiler has seen.
+    // SAFETY: lies in flash; volatile, since stamping changes what the compiler saw.
     let [sum, inverse] = unsafe { (&raw const __check_sum).read_volatile() };
     if sum & inverse == u32::MAX {
         return true;
@@ -73,7 +73,7 @@ const fn field(text: &str) -> [u8; FIELD_BYTES] {
     field
 }
 
-/// The program's identity on MAVLink; the chip's serial number is added when it runs.
+/// Returns the program's identity for MAVLink; the chip's serial number is filled in at run time.
 pub const fn identity(board: &'static str, board_number: u16) -> siskin_control::image::Image {
     siskin_control::image::Image {
         board,
@@ -83,7 +83,7 @@ pub const fn identity(board: &'static str, board_number: u16) -> siskin_control:
     }
 }
 
-/// The first eight bytes of the commit's number; zeros if it is not known.
+/// Returns the first eight bytes of the commit hash; zeros if it is unknown.
 const fn build(commit: &[u8]) -> [u8; 8] {
     let mut build = [0; 8];
     let mut at = 0;

@@ -1,4 +1,4 @@
-//! The image for a board; see the library's documentation.
+//! Firmware image for one board; see the library's documentation.
 #![no_std]
 #![no_main]
 
@@ -26,8 +26,8 @@ async fn main(spawner: Spawner) {
     if !is_whole() {
         damaged::tell(hardware);
     }
-    // A variable of this task is made where it stays. In a static memory the ESC would be a copy of one on
-    // the stack, which would need 2.9 KB more for that alone.
+    // Locals of this task are constructed in place. In a static the ESC would be moved from the stack, which
+    // would need another 2.9 KB for that alone.
     let mut fit = Fit::default();
     let mut esc = tasks::power_up(&mut hardware.flash, &mut fit);
     let mut main_task = tasks::start(spawner, hardware, &mut esc, fit);

@@ -1,6 +1,6 @@
-//! Copying and clearing, which the compiler calls: two loops for all alignments, in place of the
-//! 1.8 KB of the compiler's own, which would take as much of the RAM that the PWM interrupt runs from.
-//! This processor reads and writes words at any address.
+//! memcpy, memset and memclr for compiler-generated calls: two loops for all alignments instead of the
+//! compiler's own 1.8 KB, which would take as much of the RAM that the PWM interrupt runs from. This processor
+//! accesses words at any address.
 
 use core::arch::global_asm;
 
@@ -12,7 +12,7 @@ global_asm!(
     ".thumb_func",
     "\\name:",
     ".endm",
-    // r0: to, r1: from, r2: bytes. Whole words may go in pairs.
+    // r0: destination, r1: source, r2: bytes. Word-aligned: may move pairs.
     "entry __aeabi_memcpy4",
     "entry __aeabi_memcpy8",
     "subs r2, #8",
@@ -23,7 +23,7 @@ global_asm!(
     "bhs 0b",
     "1: adds r2, #8",
     "entry __aeabi_memcpy",
-    // As C has it, which wants r0 back.
+    // C's version, which returns r0.
     "entry memcpy",
     "mov r12, r0",
     "subs r2, #4",
@@ -43,19 +43,19 @@ global_asm!(
     ".size \\name, . - \\name",
     ".endr",
     ".section .text.memset, \"ax\"",
-    // r0: where, r1: byte, r2: bytes.
+    // r0: destination, r1: byte, r2: bytes.
     "entry memset",
     "mov r3, r1",
     "mov r1, r2",
     "mov r2, r3",
     "b __aeabi_memset",
     ".size memset, . - memset",
-    // r0: where, r1: bytes.
+    // r0: destination, r1: bytes.
     "entry __aeabi_memclr",
     "entry __aeabi_memclr4",
     "entry __aeabi_memclr8",
     "movs r2, #0",
-    // r0: where, r1: bytes, r2: byte.
+    // r0: destination, r1: bytes, r2: byte.
     "entry __aeabi_memset",
     "entry __aeabi_memset4",
     "entry __aeabi_memset8",

@@ -1,8 +1,7 @@
-//! The time that the timer which paces replies waits for the first bit.
+//! Delay of the timer that paces replies before their first bit.
 
-/// Clocks of the pacing timer for these ticks of the capturing one, less one: what its period is set to. None
-/// if the time has passed, is further off than any reply, or is so near that the period would be 0, with which
-/// the timer stands.
+/// Returns the pacing timer's period for a delay in capture ticks: its clocks less one. `None` if the time has
+/// passed, is further off than any reply, or is so near that the period would be 0, which stops the timer.
 pub(crate) fn delay_clocks(ticks: u32, clocks_per_tick: u32) -> Option<u16> {
     let period = ticks.checked_mul(clocks_per_tick)?.checked_sub(1)?;
     u16::try_from(period).ok().filter(|period| *period > 0)

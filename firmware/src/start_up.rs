@@ -1,11 +1,11 @@
-//! The work before the memory is set up: the control's code goes where no erase of the flash holds it
-//! up, and its state is cleared.
+//! Start-up before memory is initialised: copies the control code to where flash erases cannot stall it, and
+//! clears its state.
 
 use core::arch::global_asm;
 
-// The addresses are multiples of four. It uses no memory but what it copies and clears.
+// The addresses are multiples of four. Uses no memory but what it copies and clears.
 global_asm!(
-    // Copies from r2 to between r0 and r1; a part that is used where it lies needs no copy.
+    // Copies from r2 to [r0, r1); a part that runs where it is loaded needs no copy.
     ".macro copy_part part",
     "ldr r0, =\\part",
     "ldr r1, =\\part\\()_end",
@@ -24,8 +24,8 @@ global_asm!(
     ".type __pre_init, %function",
     ".thumb_func",
     "__pre_init:",
-    // A memory's first write after a reset may be lost, unless it has been read (ES0431): SRAM1, SRAM2 and
-    // the CCM SRAM of the G431. The F405 has memory there too.
+    // The first write to a memory after a reset may be lost unless it has been read (ES0431): SRAM1, SRAM2 and
+    // CCM SRAM of the G431. The F405 has memory there too.
     "ldr r0, =0x20000000",
     "ldr r1, [r0]",
     "ldr r0, =0x20004000",

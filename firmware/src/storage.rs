@@ -1,8 +1,8 @@
 //! The part of the flash that keeps the parameters.
 //!
-//! The HAL's driver waits for the flash with code that lies in it, and so stalls the processor with
-//! all its interrupts. This one waits in RAM, where the control's interrupt goes on; all others are
-//! held off meanwhile, since they are in the flash.
+//! The HAL's driver waits in code that itself lies in flash, which stalls the processor with all its
+//! interrupts. This one waits in RAM, so the control interrupt keeps running; all others are masked meanwhile,
+//! since their code is in flash.
 
 use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering, compiler_fence};
@@ -17,13 +17,13 @@ use embedded_storage::nor_flash::{
 use crate::chip::flash::{self, PAGE_BYTES, WORD_BYTES};
 use crate::chip::pages;
 
-/// True while the store is being read.
+/// The store is being read.
 static READING: AtomicBool = AtomicBool::new(false);
 
-/// Cycles from a read within which the flash reports a torn word: several times the delay of its bus.
+/// Cycles after a read within which the flash reports a torn word: several times its bus delay.
 const READ_TOLD_CYCLES: u32 = 32;
 
-/// The place of the store, as the linker script has it: from the beginning of the flash.
+/// Returns the address range of the store, from the linker script.
 fn place() -> Range<usize> {
     unsafe extern "C" {
         static __store: u8;
@@ -32,30 +32,30 @@ fn place() -> Range<usize> {
     (&raw const __store as usize)..(&raw const __store_end as usize)
 }
 
-/// All of the store, in offsets from its beginning.
+/// Returns the whole store, as offsets from its start.
 pub(crate) fn range() -> Range<u32> {
     0..place().len() as u32
 }
 
-/// Returns true if a non-maskable interrupt is for a word of the store that a loss of power has cut
-/// off: any torn word that the flash reports while the store is read. The reader goes on: that word's
-/// set has no seal, or a wrong one.
+/// Returns true if a non-maskable interrupt is for a word of the store that a loss of power has torn: any torn
+/// word that the flash reports while the store is read. The reader carries on: that word's set has no seal, or
+/// a wrong one.
 pub fn take_torn_word() -> bool {
     pages::take_torn_word() && READING.load(Ordering::Relaxed)
 }
 
-/// The store's flash; offsets are from its beginning.
+/// The store's flash; offsets are from its start.
 pub struct Storage {
     _flash: Peri<'static, FLASH>,
     place: Range<usize>,
 }
 
-/// The reason why the flash failed.
+/// Why the flash failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StorageError {
-    /// Outside the store, or not at whole words or pages.
+    /// Outside the store, or not aligned to words or pages.
     Misplaced(NorFlashErrorKind),
-    /// The flash has reported an error.
+    /// The flash reported an error.
     Failed,
 }
 
@@ -69,7 +69,7 @@ impl NorFlashError for StorageError {
 }
 
 impl Storage {
-    /// The store of this chip, which nothing else writes to.
+    /// Creates the store of this chip; nothing else may write to it.
     pub fn new(flash: Peri<'static, FLASH>) -> Self {
         Self {
             _flash: flash,
@@ -90,8 +90,8 @@ impl ReadNorFlash for Storage {
         let from = (self.place.start + offset as usize) as *const u8;
         READING.store(true, Ordering::Relaxed);
         compiler_fence(Ordering::SeqCst);
-        // SAFETY: within the store, which is mapped into memory; its words change only by `write` and
-        // `erase`, for which this must be borrowed as well.
+        // SAFETY: within the store, which is memory-mapped; its words change only in `write` and `erase`, which
+        // also borrow this.
         unsafe { from.copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len()) };
         // The last word's interrupt may come some cycles after the word.
         cortex_m::asm::delay(READ_TOLD_CYCLES);

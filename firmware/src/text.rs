@@ -1,19 +1,19 @@
-//! Numbers as text, for a person: the formatting of the core library would take 3 KB of the image.
+//! Formats numbers for the user: core's formatting would take 3 KB of the image.
 
 use heapless::string::StringView;
 
-/// Appends a number as decimal digits; those that do not fit are left out.
+/// Appends a number in decimal; digits that do not fit are dropped.
 pub(crate) fn push_decimal(text: &mut StringView, number: u32) {
     push_digits(text, number, 10);
 }
 
-/// Appends a number as hexadecimal digits; those that do not fit are left out.
+/// Appends a number in hexadecimal; digits that do not fit are dropped.
 pub(crate) fn push_hex(text: &mut StringView, number: u32) {
     push_digits(text, number, 16);
 }
 
-// As what follows it, never inlined and for strings of any length: it serves all.
-/// Appends words; those that do not fit are left out.
+// Like `push_digits`, never inlined and for strings of any capacity: one copy serves all.
+/// Appends text, unless it does not fit.
 #[inline(never)]
 pub(crate) fn push(text: &mut StringView, words: &str) {
     let _ = text.push_str(words);

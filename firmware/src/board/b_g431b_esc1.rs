@@ -1,6 +1,6 @@
-//! B-G431B-ESC1: STM32G431CB, three low-side shunts through the chip's own op-amps, 6S, 40 A peak.
+//! B-G431B-ESC1: STM32G431CB, three low-side shunts through on-chip op-amps, 6S, 40 A peak.
 //!
-//! Phases U, V, W of the board are a, b, c of the control.
+//! The board's phases U, V, W are a, b, c of the control.
 
 use core::mem;
 
@@ -35,32 +35,32 @@ use crate::storage::Storage;
 pub use crate::chip::TIMER_HZ;
 pub use crate::circuit::b_g431b_esc1::{BOARD, NAME, NTC};
 
-/// Sampling time of the phase currents: 12.5 cycles of the converters' 42.5 MHz, in
-/// clocks of the timer's 170 MHz. 0.29 µs, above the 0.2 µs that an op-amp's output needs.
+/// Sampling time of the phase currents: 12.5 cycles of the converters' 42.5 MHz, in clocks of the 170 MHz
+/// timer: 0.29 µs, above the 0.2 µs that an op-amp's output needs.
 pub(crate) const SAMPLING_CLOCKS: u16 = 50;
 
 /// The comparators break the PWM.
 pub(crate) const BREAKS: bool = true;
 
-/// No gate driver that speaks.
+/// No gate driver with a fault output.
 pub(crate) const GATE_DRIVER: Option<GateDriverPins> = None;
 
-/// The phases, from 0, on the timer's channels 1, 2, 3.
+/// The phases, from 0, on timer channels 1, 2, 3.
 pub(crate) const PHASES: [usize; 3] = [0, 1, 2];
 
-/// The order of [`FIRST`] and [`SECOND`].
+/// Slots refer to [`FIRST`] and [`SECOND`].
 pub(crate) const WIRING: Wiring = Wiring {
     currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), Some(Slot(0, 1))],
     zero: ZERO_COUNTS,
-    // A current into the motor comes up through the low side's shunt and makes its voltage negative.
+    // Current into the motor comes up through the low side's shunt and makes its voltage negative.
     rises: false,
     terminals: [Slot(1, 1), Slot(1, 2), Slot(0, 2)],
     bus: Slot(0, 3),
     hall: Some(6),
 };
 
-/// The pins that stay as they are. The analogue ones need nothing, the op-amps' inverting inputs PA3, PA5
-/// and PB2 among them: the board brings them the shunts' grounds.
+/// Pins with a fixed function. The analogue ones need no set-up, including the op-amps' inverting inputs PA3,
+/// PA5 and PB2, which the board connects to the shunts' grounds.
 const PINS: [Pin; 10] = [
     (Port::A, 8, Use::Gate(6)),
     (Port::C, 13, Use::Gate(4)),
@@ -68,10 +68,10 @@ const PINS: [Pin; 10] = [
     (Port::A, 12, Use::Gate(6)),
     (Port::A, 10, Use::Gate(6)),
     (Port::B, 15, Use::Gate(4)),
-    // Low, it is the ground of the terminals' dividers.
+    // Driven low, this is the ground of the terminal dividers.
     (Port::B, 5, Use::Low),
-    // Hall sensors have open collectors; without sensors the pulls read 7. The telemetry may take the
-    // first one's.
+    // Hall sensors are open-collector; without them the pull-ups read 7. Telemetry may take the first one's
+    // pin.
     (Port::B, 6, Use::PulledUp),
     (Port::B, 7, Use::PulledUp),
     (Port::B, 8, Use::PulledUp),
@@ -81,8 +81,8 @@ const _: () = assert!(
     "a pin is named twice or does not exist"
 );
 
-/// The first converter's channels: op-amp 1 inside the chip, op-amp 3 at PB1, PB11, PA0. The supply's
-/// divider at PA0 has 16 kΩ and is sampled longer than the terminals' with 1.8 kΩ.
+/// First converter's channels: op-amp 1 internally, op-amp 3 at PB1, PB11, PA0. The 16 kΩ supply divider at PA0
+/// is sampled longer than the terminals' 1.8 kΩ.
 const FIRST: [(u8, SampleTime); 4] = [
     (13, SampleTime::CYCLES12_5),
     (12, SampleTime::CYCLES12_5),
@@ -90,17 +90,17 @@ const FIRST: [(u8, SampleTime); 4] = [
     (1, SampleTime::CYCLES47_5),
 ];
 
-/// The second converter's: op-amp 2 inside the chip, PA4, PC4.
+/// Second converter's channels: op-amp 2 internally, PA4, PC4.
 const SECOND: [(u8, SampleTime); 3] = [
     (16, SampleTime::CYCLES12_5),
     (17, SampleTime::CYCLES24_5),
     (5, SampleTime::CYCLES24_5),
 ];
 
-/// The first converter's channel of the thermistor, PB14.
+/// First converter's channel for the thermistor, PB14.
 const THERMISTOR: u8 = 5;
 
-/// The comparators' view: they are at the op-amps' inputs.
+/// The circuit in front of the comparators, which sense the op-amps' inputs.
 const TRIP: TripCircuit = TripCircuit {
     bias_v: BIAS_V,
     v_per_a: SHUNT_OHM * SHUNT_DIVIDER,
@@ -118,7 +118,7 @@ bind_interrupts!(struct Interrupts {
     DMA1_CHANNEL6 => dma::InterruptHandler<DMA1_CH6>;
 });
 
-/// The throttle wire's timers and pin.
+/// Timers and pin of the throttle wire.
 pub(crate) mod wire {
     use embassy_stm32::pac;
     use embassy_stm32::pac::gpio::Gpio;
@@ -126,15 +126,15 @@ pub(crate) mod wire {
     use embassy_stm32::pac::timer::{TimGp16, TimGp32};
     use embassy_stm32::peripherals::{TIM2, TIM3};
 
-    /// Captures the edges.
+    /// Captures edges.
     pub(crate) type CaptureTimer = TIM2;
     /// Its registers.
     pub(crate) const CAPTURE: TimGp32 = pac::TIM2;
-    /// Bits of its counter.
+    /// Width of its counter, bits.
     pub(crate) const TIMER_BITS: u32 = 32;
     /// Divider of its clock.
     pub(crate) const PRESCALER: u16 = 1;
-    /// Its rate.
+    /// Its tick rate.
     pub(crate) const TICK_HZ: u32 = super::TIMER_HZ;
     /// Its channel at the pin, from 0.
     pub(crate) const SIGNAL_CHANNEL: usize = 0;
@@ -142,25 +142,25 @@ pub(crate) mod wire {
     pub(crate) type PaceTimer = TIM3;
     /// Its registers.
     pub(crate) const PACE: TimGp16 = pac::TIM3;
-    /// Its rate.
+    /// Its clock rate.
     pub(crate) const PACE_HZ: u32 = super::TIMER_HZ;
     /// The pin's port.
     const PORT: Gpio = pac::GPIOA;
-    /// The pin's number there.
+    /// The pin's number in the port.
     const PIN: usize = 15;
 
-    /// The register that the DMA writes while the pin is driven: the port's set and reset register.
+    /// Returns the register that the DMA writes while the pin is driven: the port's set/reset register.
     pub(crate) fn level_register() -> *mut u32 {
         PORT.bsrr().as_ptr().cast()
     }
 
-    /// The word to write there for a level.
+    /// Returns the word that sets the pin to a level.
     pub(crate) fn level_word(level: bool) -> u32 {
-        // A zero resets the pin, by the upper half of the register.
+        // The register's upper half resets pins.
         1 << if level { PIN } else { PIN + 16 }
     }
 
-    /// Drives the pin, high at first, or lets it go.
+    /// Drives the pin, initially high, or releases it.
     pub(crate) fn drive_pin(on: bool) {
         PORT.bsrr().write(|w| w.set_bs(PIN, true));
         let mode = if on { Moder::OUTPUT } else { Moder::ALTERNATE };
@@ -180,11 +180,10 @@ pub struct Bridge {
     _timer: Peri<'static, TIM1>,
 }
 
-/// The two converters, which the PWM timer triggers once a period.
+/// The two converters, triggered by the PWM timer once per period.
 ///
-/// A conversion takes 12.5 cycles of 42.5 MHz after its sampling. The sampling windows begin at
-/// these times from the counter's top, in µs, and the end of the first converter's sequence is the
-/// end of both, at 3.3 µs:
+/// A conversion takes 12.5 cycles at 42.5 MHz after sampling. The sampling windows, in µs from the counter's
+/// top, are below; the end of the first converter's sequence, at 3.3 µs, is the end of both:
 ///
 /// | converter | | | | |
 /// |---|---|---|---|---|
@@ -202,7 +201,7 @@ pub struct Mavlink {
 }
 
 impl Mavlink {
-    /// Opens it at a rate that the table of parameters allows.
+    /// Opens the line at a rate within the parameter's range.
     pub fn open(self, baud: u32) -> Uart<'static, Async> {
         let mut config = usart::Config::default();
         config.baudrate = chip::hal_baud(baud);
@@ -212,10 +211,10 @@ impl Mavlink {
     }
 }
 
-/// The KISS telemetry's rate.
+/// Baud rate of KISS telemetry.
 const KISS_HZ: u32 = 115_200;
 
-/// The KISS telemetry, on the pin of Hall sensor a.
+/// KISS telemetry, on the pin of Hall sensor a.
 pub struct Kiss {
     uart: Peri<'static, USART1>,
     pin: Peri<'static, PB6>,
@@ -223,7 +222,7 @@ pub struct Kiss {
 }
 
 impl Kiss {
-    /// Takes the pin from the Hall sensor: for a motor without sensors.
+    /// Takes over the Hall sensor's pin: only for a motor without sensors.
     pub fn open(self) -> UartTx<'static, Async> {
         let mut config = usart::Config::default();
         config.baudrate = chip::hal_baud(KISS_HZ);
@@ -232,35 +231,35 @@ impl Kiss {
     }
 }
 
-/// The board's temperature.
+/// Board temperature sensor.
 pub struct Temperature {
     reading: converters::Reading,
 }
 
 impl Temperature {
-    /// The thermistor's reading, for [`NTC`]; it waits some 8 µs for it.
-    /// `periods` counts the control periods.
+    /// Returns the thermistor's reading, for [`NTC`], after waiting some 8 µs. `periods` counts the control
+    /// periods.
     pub fn read(&mut self, periods: fn() -> u32) -> AdcCounts {
         AdcCounts::from_num(self.reading.counts(periods))
     }
 }
 
 impl Hardware {
-    /// Starts the chip, and sets up the pins, the op-amps, the comparators and the converters. The
-    /// gate signals are low until the timer drives them. To be called once.
+    /// Starts the chip, and sets up pins, op-amps, comparators and converters. The gate signals are low until
+    /// the timer drives them. Call it once.
     #[inline(never)] // its stack is free for what comes next
     pub fn claim() -> Self {
         let p = chip::start();
-        // Before any of them is used: critical sections rely on it.
+        // Before any interrupt is used: critical sections rely on it.
         priority::lower_all(chip::INTERRUPTS);
         rcc::enable_and_reset::<TIM1>();
-        // A debugger that halts the processor stops the timer, and so the bridge is off.
+        // A debugger halt then stops the timer too, and the bridge is off.
         pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
         comparators::set_up(TRIP.level(RATING_A));
         chip::break_on_lock_up();
 
         pins::set_up(&PINS);
-        // The third one's internal way leads to the second converter, which has b at that time.
+        // Op-amp 3's internal output leads to the second converter, which samples b at that time.
         op_amps::amplify_by_16(pac::OPAMP1, true);
         op_amps::amplify_by_16(pac::OPAMP2, true);
         op_amps::amplify_by_16(pac::OPAMP3, false);
@@ -298,22 +297,21 @@ impl Hardware {
     }
 }
 
-/// Prepares what belongs to the interrupt from then on. It waits 1 ms for the amplifiers to settle.
+/// Waits 1 ms for the amplifiers to settle, before the interrupt takes over.
 pub(crate) fn prepare(_bridge: Bridge, _converters: Converters) {
     cortex_m::asm::delay(TIMER_HZ / 1000);
 }
 
-/// Sets the comparators' level for a bound on the phase currents, peak amperes.
+/// Sets the comparators' level for a phase current limit, peak A.
 pub(crate) fn set_trip(phase_a: f32) {
     comparators::set_level(TRIP.level(phase_a));
 }
 
-/// nBOOT0 and nSWBOOT0 among the option bytes (RM0440, FLASH_OPTR): with the first set and the second clear the
-/// chip starts from its flash whatever the level of PB8, BOOT0, which is a Hall sensor's here.
+/// nBOOT0 and nSWBOOT0 in the option bytes (RM0440, FLASH_OPTR): with the first set and the second clear the
+/// chip boots from flash whatever the level of PB8 (BOOT0), which is a Hall sensor input here.
 const BOOT_OPTIONS: (u32, u32) = (1 << 27, 1 << 26);
 
-/// Measures an item of the self-test that is this board's own. The full scale and the slow oscillator are not
-/// measured.
+/// Measures this board's own self-test items. Full scale and the slow oscillator are not measured.
 pub(crate) fn own(item: Item) -> Own {
     match item.kind {
         Kind::OptionBytes => {

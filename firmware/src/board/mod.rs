@@ -1,4 +1,4 @@
-//! The board, chosen by a feature: one file each.
+//! The board, selected by a feature: one file per board.
 #![doc = include_str!("third.md")]
 
 mod parts;

@@ -1,6 +1,6 @@
-//! The parts that every board has alike, by its timers, pins and channels.
+//! Parts that all boards have in common, given their timers, pins and channels.
 
-/// The throttle wire, the interrupt in which its task runs, and the list of the parts.
+/// Declares the throttle wire, the interrupt its task runs in, and the list of parts.
 macro_rules! parts {
     (
         throttle: $pin:ident at $capture:ident $channel:ident,
@@ -10,18 +10,18 @@ macro_rules! parts {
     ) => {
         static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
-        /// Starts the executor of the throttle's task, in an interrupt whose unit is not used.
+        /// Starts the throttle task's executor, in the interrupt of an unused peripheral.
         pub(crate) fn start_executor() -> SendSpawner {
             EXECUTOR.start(interrupt::$executor)
         }
 
         #[interrupt]
         fn $executor() {
-            // SAFETY: it is the interrupt in which the executor is started.
+            // SAFETY: this is the interrupt in which the executor was started.
             unsafe { EXECUTOR.on_interrupt() }
         }
 
-        /// The timer that captures the edges.
+        /// Interrupt of the edge capture timer.
         #[interrupt]
         fn $capture() {
             capture::attend(wire::CAPTURE);
@@ -30,7 +30,7 @@ macro_rules! parts {
         type Edges = ([dma::Channel<'static>; 2], [dma::Request; 2]);
         type Replies = (dma::Channel<'static>, dma::Request);
 
-        /// The throttle wire.
+        /// Throttle wire.
         pub struct Throttle {
             pin: Peri<'static, $pin>,
             _timers: (Peri<'static, $capture>, Peri<'static, $pace>),
@@ -40,10 +40,10 @@ macro_rules! parts {
         }
 
         impl Throttle {
-            /// Its edges' channels, those of the rising ones first, and that of its replies, each with what
-            /// asks for a transfer.
+            /// Returns the DMA channels of its edges, rising first, and that of its replies, each with its
+            /// transfer request.
             pub(crate) fn open(self) -> (Edges, Replies) {
-                // A wire that is not connected is at rest. A dropped pin would be given back.
+                // An unconnected wire is at rest. Dropping the pin would release it.
                 mem::forget(CapturePin::<$capture, $channel>::new(self.pin, Pull::Up));
                 let requests = [
                     Dma::<$capture, Ch1>::request(&*self.rising),
@@ -59,25 +59,25 @@ macro_rules! parts {
             }
         }
 
-        /// The parts of the board, set up.
+        /// The board's parts, set up.
         pub struct Hardware {
             /// Gate signals.
             pub bridge: Bridge,
             /// Currents, voltages and Hall sensors.
             pub converters: Converters,
-            /// The LED.
+            /// LED.
             pub light: Output<'static>,
-            /// The throttle wire.
+            /// Throttle wire.
             pub throttle: Throttle,
             /// MAVLink's serial line.
             pub mavlink: Mavlink,
-            /// The KISS telemetry.
+            /// KISS telemetry.
             pub kiss: Kiss,
-            /// The flash that keeps the parameters.
+            /// Flash that keeps the parameters.
             pub flash: Storage,
-            /// The watchdog, which does not run yet.
+            /// Watchdog, not started yet.
             pub watchdog: Peri<'static, IWDG>,
-            /// The thermistor.
+            /// Thermistor.
             pub temperature: Temperature,
         }
     };

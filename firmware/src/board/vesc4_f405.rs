@@ -1,13 +1,13 @@
 //! VESC 4.10 class: STM32F405, gate driver DRV8302, two low-side shunts.
 //!
-//! Phases a, b, c of the control are the timer's channels 1, 3 and 2: the shunts are those of a and b
-//! (the VESC's own firmware drives two-shunt boards in this order).
+//! Phases a, b, c of the control are timer channels 1, 3 and 2: the shunts are in a and b (the VESC firmware
+//! drives two-shunt boards in this order).
 //!
-//! A DRV8302 has no SPI: six inputs or three, its over-current threshold, whether it then limits or
-//! turns itself off, and the amplifiers' gain are straps (SLES267, pins M_PWM, OC_ADJ, M_OC, GAIN), which
-//! makers of this class of boards set differently. So nothing here counts on its limiter: the control's
-//! own trip is what bounds the current. nFAULT tells of whatever has turned the driver off: a supply of
-//! the gates that is too low, over-temperature, and over-current if it is strapped so.
+//! A DRV8302 has no SPI. Six inputs or three, its over-current threshold, whether it then limits or shuts down,
+//! and the amplifiers' gain are set by straps (SLES267, pins M_PWM, OC_ADJ, M_OC, GAIN), which makers of this
+//! class of boards choose differently. So nothing here relies on its limiter: the control's own trip bounds the
+//! current. nFAULT reports whatever has shut the driver down: gate supply undervoltage, over-temperature, and
+//! over-current if strapped so.
 
 use core::mem;
 
@@ -38,32 +38,31 @@ use crate::storage::Storage;
 pub use crate::chip::TIMER_HZ;
 pub use crate::circuit::vesc4_f405::{BOARD, NAME, NTC};
 
-/// Sampling time of the phase currents: 15 cycles of the converters' 21 MHz, in clocks of
-/// the timer's 168 MHz.
+/// Sampling time of the phase currents: 15 cycles of the converters' 21 MHz, in clocks of the 168 MHz timer.
 pub(crate) const SAMPLING_CLOCKS: u16 = 120;
 
-/// Nothing breaks the PWM: nFAULT is at PC12, and the timer's break at PA6 and PB12 only (DS8626,
-/// alternate functions).
+/// Nothing breaks the PWM: nFAULT is at PC12, and the timer's break at PA6 and PB12 only (DS8626, alternate
+/// functions).
 pub(crate) const BREAKS: bool = false;
 
-/// On port C.
+/// Pins on port C.
 pub(crate) const GATE_DRIVER: Option<GateDriverPins> = Some(GateDriverPins {
     enable: 10,
     fault: 12,
 });
 
-/// The phases, from 0, on the timer's channels 1, 2, 3.
+/// The phases, from 0, on timer channels 1, 2, 3.
 pub(crate) const PHASES: [usize; 3] = [0, 2, 1];
 
-/// The order of the sequences in [`Hardware::claim`].
+/// Slots refer to the sequences in [`Hardware::claim`].
 pub(crate) const WIRING: Wiring = Wiring {
     currents: [Some(Slot(0, 0)), Some(Slot(1, 0)), None],
     zero: ZERO_COUNTS,
-    // As the VESC's own firmware reads them.
+    // As in the VESC firmware.
     rises: true,
     terminals: [Slot(0, 1), Slot(1, 1), Slot(1, 2)],
     bus: Slot(0, 2),
-    // Their pins are those of the serial line.
+    // The serial line uses their pins.
     hall: None,
 };
 
@@ -77,7 +76,7 @@ bind_interrupts!(struct Interrupts {
     DMA2_STREAM6 => dma::InterruptHandler<DMA2_CH6>;
 });
 
-/// The throttle wire's timers and pin.
+/// Timers and pin of the throttle wire.
 pub(crate) mod wire {
     use embassy_stm32::pac;
     use embassy_stm32::pac::timer::regs::CcerGp16;
@@ -87,39 +86,38 @@ pub(crate) mod wire {
 
     use super::capture;
 
-    /// Captures the edges.
+    /// Captures edges.
     pub(crate) type CaptureTimer = TIM3;
     /// Its registers.
-    // SAFETY: the same block; the upper halves of its words, which this view has and the timer has
-    // not, read as zeros.
+    // SAFETY: the same block; the upper halves of its words, which only this view has, read as zeros.
     pub(crate) const CAPTURE: TimGp32 = unsafe { TimGp32::from_ptr(pac::TIM3.as_ptr()) };
-    /// Bits of its counter.
+    /// Width of its counter, bits.
     pub(crate) const TIMER_BITS: u32 = 16;
-    /// Divider of its clock: 16 bits are 3.1 ms.
+    /// Divider of its clock: 16 bits last 3.1 ms.
     pub(crate) const PRESCALER: u16 = 4;
-    /// Its rate.
+    /// Its tick rate.
     pub(crate) const TICK_HZ: u32 = super::TIMER_HZ / 2 / PRESCALER as u32;
     /// Its channel at the pin, from 0.
     pub(crate) const SIGNAL_CHANNEL: usize = 1;
-    /// Paces replies: of the timers whose update the first DMA serves, one without channels.
+    /// Paces replies: of the timers whose update DMA1 serves, one without channels.
     pub(crate) type PaceTimer = TIM6;
     /// Its registers.
-    // SAFETY: the same block, of which this view has the part that every timer has.
+    // SAFETY: the same block; this view has the part common to all timers.
     pub(crate) const PACE: TimGp16 = unsafe { TimGp16::from_ptr(pac::TIM6.as_ptr()) };
-    /// Its rate.
+    /// Its clock rate.
     pub(crate) const PACE_HZ: u32 = super::TIMER_HZ / 2;
 
-    /// The register that the DMA writes while the pin is driven: the capturing timer's CCER.
+    /// Returns the register that the DMA writes while the pin is driven: the capture timer's CCER.
     ///
-    /// Not a port's: only the second DMA reaches the ports, and one that serves an AHB peripheral beside one
-    /// of APB2, as is the serial line, corrupts data (ES0182, 2.1.10). The first DMA cannot reach a port at
-    /// all, and its transfers to timers are what the HAL's types allow for this one.
+    /// Not a port's register: only DMA2 reaches the ports, and serving an AHB peripheral alongside one on APB2,
+    /// as the serial line is, corrupts data (ES0182, 2.1.10). DMA1 cannot reach a port at all, and its
+    /// transfers to timers are what the HAL's types allow for this one.
     pub(crate) fn level_register() -> *mut u32 {
         CAPTURE.ccer().as_ptr().cast()
     }
 
-    /// The word to write there for a level: the channel's output is forced to be active, and its polarity,
-    /// by which it captures falling edges otherwise, makes that low. The other channel goes on.
+    /// Returns the word that sets the pin to a level: the channel's output is forced active, and inverting its
+    /// polarity, otherwise used to capture falling edges, makes that low. The other channel keeps running.
     pub(crate) fn level_word(level: bool) -> u32 {
         let mut enable = CcerGp16(0);
         enable.set_cce(0, true);
@@ -128,9 +126,9 @@ pub(crate) mod wire {
         enable.0
     }
 
-    /// Drives the pin, high at first, or lets it go and captures its edges.
+    /// Drives the pin, initially high, or releases it and captures its edges.
     pub(crate) fn drive_pin(on: bool) {
-        // What a channel is may be changed only while it is off (RM0090, 18.4.7).
+        // A channel's direction may only change while it is off (RM0090, 18.4.7).
         CAPTURE.ccer().modify(|w| w.set_cce(SIGNAL_CHANNEL, false));
         if on {
             CAPTURE.ccmr_output(0).modify(|w| {
@@ -158,10 +156,10 @@ pub struct Bridge {
     _fault: Input<'static>,
 }
 
-/// The two converters, which the PWM timer triggers once a period.
+/// The two converters, triggered by the PWM timer once per period.
 ///
-/// A reading takes 15 cycles of 21 MHz of sampling and 12 of conversion, 1.29 µs. The sampling
-/// windows begin at these times from the counter's top, in µs, and both sequences end at 3.5 µs:
+/// A reading takes 15 cycles at 21 MHz of sampling and 12 of conversion, 1.29 µs. The sampling windows, in µs
+/// from the counter's top, are below; both sequences end at 3.5 µs:
 ///
 /// | converter | | | |
 /// |---|---|---|---|
@@ -180,7 +178,7 @@ pub struct Mavlink {
 }
 
 impl Mavlink {
-    /// Opens it at a rate that the table of parameters allows.
+    /// Opens the line at a rate within the parameter's range.
     pub fn open(self, baud: u32) -> Uart<'static, Async> {
         let mut config = usart::Config::default();
         config.baudrate = baud;
@@ -190,7 +188,7 @@ impl Mavlink {
     }
 }
 
-/// The KISS telemetry, on a pin of its own.
+/// KISS telemetry, on its own pin.
 pub struct Kiss {
     uart: Peri<'static, USART3>,
     pin: Peri<'static, PB10>,
@@ -198,7 +196,7 @@ pub struct Kiss {
 }
 
 impl Kiss {
-    /// Takes the pin.
+    /// Opens the line.
     pub fn open(self) -> UartTx<'static, Async> {
         let config = usart::Config::default();
         UartTx::new(self.uart, self.pin, self.dma, Interrupts, config)
@@ -206,14 +204,14 @@ impl Kiss {
     }
 }
 
-/// The transistors' temperature.
+/// Transistor temperature sensor.
 pub struct Temperature {
     converter: Adc<'static, ADC3>,
     pin: AnyAdcChannel<'static, ADC3>,
 }
 
 impl Temperature {
-    /// The thermistor's reading, for [`NTC`]; it waits 10 µs for it.
+    /// Returns the thermistor's reading, for [`NTC`], after waiting 10 µs.
     pub fn read(&mut self, _periods: fn() -> u32) -> AdcCounts {
         let counts = self
             .converter
@@ -223,25 +221,24 @@ impl Temperature {
 }
 
 impl Hardware {
-    /// Starts the chip, and sets up the pins and the converters. The gate driver is off. To be called
-    /// once.
+    /// Starts the chip, and sets up pins and converters. The gate driver stays off. Call it once.
     #[inline(never)] // its stack is free for what comes next
     pub fn claim() -> Self {
         let p = chip::start();
-        // Before any of them is used: critical sections rely on it.
+        // Before any interrupt is used: critical sections rely on it.
         priority::lower_all(chip::INTERRUPTS);
         let enable = Output::new(p.PC10, Level::Low, Speed::Low);
         rcc::enable_and_reset::<TIM1>();
-        // A debugger that halts the processor stops the timer, and so the bridge is off.
+        // A debugger halt then stops the timer too, and the bridge is off.
         pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
 
-        // The pull keeps the gates off while nothing drives the pin.
+        // The pull-down keeps the gates off while nothing drives the pin.
         let gate = PwmPinConfig {
             output_type: OutputType::PushPull,
             speed: Speed::VeryHigh,
             pull: Pull::Down,
         };
-        // A dropped pin would be given back: these stay the timer's for ever.
+        // Dropping a pin would release it: these stay the timer's for good.
         mem::forget((
             PwmPin::<TIM1, _>::new_with_config(p.PA8, gate),
             ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB13, gate),
@@ -250,7 +247,7 @@ impl Hardware {
             PwmPin::<TIM1, _>::new_with_config(p.PA10, gate),
             ComplementaryPwmPin::<TIM1, _>::new_with_config(p.PB15, gate),
         ));
-        // The amplifiers measure: their calibration is off.
+        // The amplifiers measure: calibration mode is off.
         mem::forget(Output::new(p.PB12, Level::Low, Speed::Low));
 
         let long = SampleTime::CYCLES15;
@@ -313,19 +310,18 @@ impl Hardware {
     }
 }
 
-/// Prepares what belongs to the interrupt from then on. It enables the gate driver and
-/// waits 20 ms: the driver takes up to 10 ms, and its amplifiers must have settled before their zeros
-/// are measured.
+/// Enables the gate driver and waits 20 ms, before the interrupt takes over: the driver takes up to 10 ms, and
+/// its amplifiers must settle before their zeros are measured.
 pub(crate) fn prepare(mut bridge: Bridge, converters: Converters) {
     bridge.enable.set_high();
     mem::forget((bridge, converters));
     cortex_m::asm::delay(TIMER_HZ / 50);
 }
 
-/// No hardware trips at a level that could be set.
+/// Does nothing: no hardware trip has an adjustable level.
 pub(crate) fn set_trip(_phase_a: f32) {}
 
-/// No item of the self-test is this board's own: it has neither comparators nor such option bytes.
+/// Measures nothing: this board has neither comparators nor such option bytes.
 pub(crate) fn own(_item: Item) -> Own {
     Own::Absent
 }

@@ -1,30 +1,30 @@
-//! What a board says of its signals.
+//! Describes how a board's signals are connected.
 
-/// The place of a reading: a converter and the rank in its sequence.
+/// Where a reading is: a converter and the rank in its sequence.
 #[derive(Clone, Copy)]
 pub(crate) struct Slot(pub(crate) usize, pub(crate) usize);
 
-/// The wiring of a board's signals to the converters and pins.
+/// Connections of a board's signals to converters and pins.
 pub(crate) struct Wiring {
-    /// Currents of the phases a, b, c; a phase without a shunt has none.
+    /// Currents of phases a, b, c; `None` without a shunt.
     pub(crate) currents: [Option<Slot>; 3],
-    /// Nominal reading without current, counts: the drive measures what it really is.
+    /// Nominal zero-current reading, counts; the drive measures the actual one.
     pub(crate) zero: i32,
-    /// True if a reading rises with the current into the motor.
+    /// Readings rise with current into the motor.
     pub(crate) rises: bool,
-    /// Voltages of the terminals a, b, c.
+    /// Terminal voltages a, b, c.
     pub(crate) terminals: [Slot; 3],
-    /// The supply.
+    /// Supply voltage.
     pub(crate) bus: Slot,
-    /// The Hall sensors' first pin of port B, with the others after it, if there are any.
+    /// First of three consecutive Hall sensor pins on port B, if there are any.
     pub(crate) hall: Option<u8>,
 }
 
-/// The pins of a gate driver on port C.
+/// Pins of a gate driver on port C.
 #[derive(Clone, Copy)]
 pub(crate) struct GateDriverPins {
-    /// Enables it, high.
+    /// Enable, active high.
     pub(crate) enable: usize,
-    /// Its alarm, low.
+    /// Fault (nFAULT), active low.
     pub(crate) fault: usize,
 }

@@ -1,6 +1,6 @@
-//! The worth of a count on each board: its circuit from shunts, terminals and supply to the converter.
+//! What an ADC count is worth on each board: the circuit from shunts, terminals and supply to the converter.
 //!
-//! Plain numbers, which a PC needs as well to replay what the chip has done.
+//! Plain numbers, which a PC also needs to replay what the chip did.
 
 pub mod b_g431b_esc1;
 #[cfg_attr(

@@ -1,8 +1,7 @@
-//! The level at which hardware turns the bridge off.
+//! Level at which hardware turns the bridge off.
 //!
-//! It is 1.6 times `LIM_PHASE_A` and at most the board's rating. What trips in the end differs from
-//! it, by what the board's circuit has (figures for the B-G431B-ESC1, of 1.71 mV/A at the
-//! comparators):
+//! Nominally 1.6 times `LIM_PHASE_A`, at most the board's rating. The actual trip differs by the tolerances of
+//! the board's circuit (figures for the B-G431B-ESC1, 1.71 mV/A at the comparators):
 //!
 //! | cause | spread |
 //! |---|---|
@@ -12,35 +11,35 @@
 //! | the vector's angle: a comparator sees a current out of the motor only, of which the largest of three is between half and all of the vector's length | 1 to 2 times the level |
 //! | the break's filter of 0.56 µs and the ringing that it keeps out | 0.56 µs of a rise of V/L |
 //!
-//! A turning vector passes its worst angle within a sixth of an electrical turn; at standstill the
-//! software's trip at 1.4 times, which sees both signs of all phases, comes first.
+//! A rotating vector passes its worst angle within a sixth of an electrical turn; at standstill the software
+//! trip at 1.4 times, which sees both signs of all phases, comes first.
 
-/// Of `LIM_PHASE_A`.
+/// The trip relative to `LIM_PHASE_A`.
 const TRIP_SHARE: f32 = 1.6;
 
-/// A board's comparators as they see a current out of the motor.
+/// A board's comparators, as they see current out of the motor.
 #[derive(Clone, Copy)]
 pub(crate) struct TripCircuit {
-    /// Volts at the comparator without current.
+    /// Zero-current voltage at the comparator.
     pub(crate) bias_v: f32,
-    /// Volts at the comparator for each ampere.
+    /// Volts per ampere at the comparator.
     pub(crate) v_per_a: f32,
-    /// The board's rating, peak amperes.
+    /// Current rating of the board, peak A.
     pub(crate) rating_a: f32,
-    /// Volts of one step of the DAC.
+    /// Volts per DAC step.
     pub(crate) v_per_step: f32,
 }
 
 impl TripCircuit {
-    /// The DAC's level for a bound of `phase_a` on the phase currents, peak amperes.
+    /// Returns the DAC level for a phase current limit of `phase_a`, peak A.
     pub(crate) fn level(&self, phase_a: f32) -> u16 {
-        // A bound that is no number asks for the rating: `min` takes the other one.
+        // A NaN limit gives the rating, since `min` returns the other operand.
         let trip_a = (TRIP_SHARE * phase_a).min(self.rating_a).max(0.0);
         let level = (self.bias_v + trip_a * self.v_per_a) / self.v_per_step;
         level as u16
     }
 
-    /// The current at which a level trips, A.
+    /// Returns the current at which a level trips, A.
     pub(crate) fn amperes(&self, level: u16) -> f32 {
         (f32::from(level) * self.v_per_step - self.bias_v) / self.v_per_a
     }

@@ -1,7 +1,7 @@
 //! Ends everything after a failure, and tells the next start why.
 //!
-//! A failure turns the bridge off first; then it writes its cause to memory that start-up does not
-//! clear, and resets the chip. The next start takes the record and reports it.
+//! A failure turns the bridge off first, then writes its cause to memory that start-up does not clear, and
+//! resets the chip. The next start takes the record and reports it.
 
 #[cfg_attr(
     not(any(board, test)),

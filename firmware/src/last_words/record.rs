@@ -1,35 +1,35 @@
-//! The record of a failure, in words that are checked: memory after power-up may hold anything.
+//! The record of a failure, with a checksum: memory may hold anything after power-up.
 
 use heapless::String;
 
 use crate::text::{push, push_decimal, push_hex};
 
-/// Longest text: that of a STATUSTEXT.
+/// Longest text, that of a STATUSTEXT.
 pub const TEXT_BYTES: usize = 50;
 
-/// Words that a failure leaves besides its kind: all fit the text.
+/// Words that a failure records besides its kind; all fit the text.
 pub const DETAILS: usize = 4;
 
-/// The reason why the processor stopped.
+/// Why the processor stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Failure {
-    /// A panic: return addresses, that of the innermost call first. Files and lines are in the
-    /// image's debug information: `addr2line`. In the image, each would take 100 bytes.
+    /// A panic: return addresses, innermost call first. Resolve files and lines with `addr2line` from the debug
+    /// information; in the image each would take 100 bytes.
     Panic = 1,
-    /// A hard fault: program counter and the fault's status.
+    /// A hard fault: program counter and fault status.
     HardFault = 2,
-    /// The stack has left its memory: program counter and the fault's status.
+    /// The stack left its memory: program counter and fault status.
     StackOverflow = 3,
     /// An interrupt without a handler: its number, negative for an exception.
     UnexpectedInterrupt = 4,
-    /// Control periods were again and again not done with when the next was due: how many.
+    /// Control periods repeatedly missed their deadline: how many.
     Overrun = 5,
-    /// The control's interrupt has not come for 50 ms.
+    /// The control interrupt has not run for 50 ms.
     Standstill = 6,
 }
 
-/// The record that is left for the next start.
+/// The record left for the next start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub(super) struct Record {
@@ -39,7 +39,7 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// A failure with its details.
+    /// Creates the record of a failure.
     pub(super) fn new(failure: Failure, details: [u32; DETAILS]) -> Self {
         let mut record = Self {
             failure: failure as u32,
@@ -50,7 +50,7 @@ impl Record {
         record
     }
 
-    /// An empty record.
+    /// Creates an empty record.
     pub(super) const fn empty() -> Self {
         Self {
             failure: 0,
@@ -59,7 +59,7 @@ impl Record {
         }
     }
 
-    /// A sum over all words that zeros and repeated words do not fulfil.
+    /// Returns a checksum over all words that neither zeros nor repeated words satisfy.
     fn sum(&self) -> u32 {
         let mix = |sum: u32, word: u32| (sum.rotate_left(5) ^ word).wrapping_mul(0x0100_0193);
         self.details
@@ -67,7 +67,7 @@ impl Record {
             .fold(mix(0x5151_3c1e, self.failure), |sum, word| mix(sum, *word))
     }
 
-    /// The text for a person; `None` if nothing is recorded.
+    /// Returns the text for the user, or `None` if nothing is recorded.
     pub(super) fn text(&self) -> Option<String<TEXT_BYTES>> {
         if self.check != self.sum() {
             return None;
