@@ -1,5 +1,5 @@
-//! A timer that captures a wire's edges, the rising ones by one channel and the falling ones by another, and
-//! wakes a task: at an edge after a quiet time, or, by a third channel, as an alarm clock.
+//! A timer that captures a wire's edges, rising on one channel and falling on another, and wakes a task: at an
+//! edge after a quiet time or, by a third channel, at an alarm time.
 
 use core::future::poll_fn;
 use core::mem;
@@ -10,37 +10,36 @@ use embassy_stm32::pac::timer::TimGp32;
 use embassy_stm32::pac::timer::vals::{CcmrInputCcs, FilterValue};
 use embassy_sync::waitqueue::AtomicWaker;
 
-/// The alarm clock's channel; the edges have the first and the second.
+/// The alarm's channel; edges use the first and second.
 const ALARM: usize = 2;
 
 static WAKER: AtomicWaker = AtomicWaker::new();
-/// True if it was an edge that woke the task.
+/// An edge woke the task.
 static EDGE: AtomicBool = AtomicBool::new(false);
 
-/// The timer's interrupt.
+/// Handles the timer's interrupt.
 #[inline(always)] // one caller
 pub(crate) fn attend(timer: TimGp32) {
     let wanted = timer.dier().read();
     if !wanted.ccie(ALARM) {
-        // An edge that came before the interrupts were off asks once more.
+        // Pended by an edge before the interrupts were disabled.
         return;
     }
-    // The DMA has read the edge's time by now, and its flag went with that: what is left tells of
-    // the alarm.
+    // By now the DMA has read the edge's time, which cleared its flag: what is left is the alarm's.
     let alarm = timer.sr().read().ccif(ALARM);
     let edges = wanted.ccie(0);
     if !alarm && !edges {
-        // So does one that came before the alarm alone was waited for.
+        // Pended by an edge before waiting for the alarm alone.
         return;
     }
     EDGE.store(edges && !alarm, Ordering::Relaxed);
-    // Once is enough: the task says when it wants to be woken again.
+    // Once is enough: the task re-enables them when it wants to be woken again.
     set_interrupts(timer, false, false);
     WAKER.wake();
 }
 
-/// The interrupts of the edges and of the alarm. Only while they are off does the task call this, and
-/// only their handler while they are on.
+/// Enables or disables the interrupts of edges and alarm. The task calls this only while they are disabled, and
+/// their handler only while they are enabled.
 fn set_interrupts(timer: TimGp32, edges: bool, alarm: bool) {
     timer.dier().modify(|w| {
         for channel in 0..ALARM {
@@ -50,10 +49,10 @@ fn set_interrupts(timer: TimGp32, edges: bool, alarm: bool) {
     });
 }
 
-/// Lets a channel, which is off, capture the edges of the pin that is a channel's own.
+/// Sets a disabled channel to capture the edges of the pin of `pin_channel`.
 pub(crate) fn capture_on(timer: TimGp32, channel: usize, pin_channel: usize) {
     timer.ccmr_input(0).modify(|w| {
-        // Both channels see the one pin: its own directly, its neighbour crosswise.
+        // Both channels use the one pin: its own channel directly, the neighbour crossed over.
         w.set_ccs(
             channel,
             if channel == pin_channel {
@@ -62,8 +61,7 @@ pub(crate) fn capture_on(timer: TimGp32, channel: usize, pin_channel: usize) {
                 CcmrInputCcs::TI3
             },
         );
-        // Four samples of the timer's own clock: spikes shorter than 24 ns (48 ns on the
-        // F405) are nothing.
+        // Four samples at the timer's own clock: rejects spikes shorter than 24 ns (48 ns on the F405).
         w.set_icf(channel, FilterValue::FCK_INT_N4);
     });
 }
@@ -75,9 +73,9 @@ pub(crate) async fn wait_for_edge(
     is_past: impl FnMut() -> bool,
 ) -> bool {
     EDGE.store(false, Ordering::Relaxed);
-    // An edge that came before has been captured: the flags tell of new ones.
+    // Earlier edges have been captured: from here on the flags stand for new ones.
     timer.sr().write(|w| {
-        // Zeros clear, ones leave.
+        // Writing 0 clears, 1 leaves unchanged.
         w.0 = !0;
         for channel in 0..ALARM {
             w.set_ccif(channel, false);
@@ -109,7 +107,7 @@ async fn wait(timer: TimGp32, alarm_ticks: u32, edges: bool, mut is_past: impl F
             set_interrupts(timer, edges, true);
         }
         let is_off = !timer.dier().read().ccie(ALARM);
-        // The alarm may have been set too late to ring.
+        // The alarm may have been set too late to fire.
         if is_off || is_past() {
             set_interrupts(timer, false, false);
             Poll::Ready(())

@@ -1,4 +1,4 @@
-//! Programming and erasing the flash, alike on these chips but for their words and pages.
+//! Programs and erases flash; these chips differ only in word and page size.
 
 use core::sync::atomic::{AtomicBool, Ordering, compiler_fence};
 
@@ -9,27 +9,27 @@ use embassy_stm32::pac::{FLASH, IWDG};
 pub(crate) use super::pages::{PAGE_BYTES, WORD_BYTES};
 use super::pages::{erasing, programming};
 
-/// The beginning of the flash.
+/// Start of the flash.
 const ORIGIN: usize = 0x0800_0000;
 
-/// True while the flash is being written.
+/// The flash is being written.
 static WRITING: AtomicBool = AtomicBool::new(false);
 
-/// Returns true while the flash is being written: the control's interrupt, which goes on, then calls
-/// nothing that lies there, and the bridge is off.
-// Always inlined: as a function it would lie in the flash itself.
+/// Returns true while the flash is being written: the control interrupt, which keeps running, then calls
+/// nothing in flash, and the bridge is off.
+// Always inlined: an out-of-line function would itself be in flash.
 #[inline(always)]
 pub(crate) fn is_writing() -> bool {
     WRITING.load(Ordering::Relaxed)
 }
 
-/// The flash has reported an error.
+/// The flash reported an error.
 pub(crate) struct Failed;
 
-/// Programs a word that has been blank since the last erase.
+/// Programs a word that is blank since the last erase.
 ///
 /// # Safety
-/// Nothing but data lies there.
+/// Nothing but data may be there.
 pub(crate) unsafe fn program(address: usize, word: &[u8; WORD_BYTES]) -> Result<(), Failed> {
     with_unlocked(|| {
         FLASH.cr().write_value(programming());
@@ -38,12 +38,12 @@ pub(crate) unsafe fn program(address: usize, word: &[u8; WORD_BYTES]) -> Result<
     })
 }
 
-/// Erases the page that begins here.
+/// Erases the page that starts here.
 ///
 /// # Safety
-/// Nothing but data lies there.
+/// Nothing but data may be there.
 pub(crate) unsafe fn erase(address: usize) -> Result<(), Failed> {
-    // One erase is as long as the watchdog waits, and several may follow each other.
+    // One erase can take as long as the watchdog's period, and several may follow each other.
     IWDG.kr().write(|w| w.set_key(Key::RESET));
     let mut control = erasing((address - ORIGIN) / PAGE_BYTES);
     let done = with_unlocked(|| {
@@ -55,16 +55,15 @@ pub(crate) unsafe fn erase(address: usize) -> Result<(), Failed> {
     done
 }
 
-/// Does something with the flash unlocked, and no interrupt but the control's; then looks whether
-/// it went well.
+/// Runs `act` with the flash unlocked and no interrupt but the control's, then checks for errors.
 fn with_unlocked(act: impl FnOnce()) -> Result<(), Failed> {
     critical_section::with(|_| {
         FLASH.keyr().write_value(0x4567_0123);
         FLASH.keyr().write_value(0xcdef_89ab);
-        // Flags of errors are removed by ones.
+        // Writing 1 clears error flags.
         FLASH.sr().write_value(FLASH.sr().read());
         WRITING.store(true, Ordering::Relaxed);
-        // The interrupt must know before the flash begins, and until it has ended.
+        // The interrupt must see this before the flash operation starts and until it ends.
         compiler_fence(Ordering::SeqCst);
         act();
         compiler_fence(Ordering::SeqCst);
@@ -75,7 +74,7 @@ fn with_unlocked(act: impl FnOnce()) -> Result<(), Failed> {
     })
 }
 
-/// The status that is no error.
+/// Returns the status bits that are not errors.
 fn ended() -> Sr {
     let mut flags = Sr(0);
     flags.set_eop(true);
@@ -83,7 +82,7 @@ fn ended() -> Sr {
     flags
 }
 
-/// The flash stalls who fetches from it: this is in RAM.
+/// In RAM, since flash stalls whoever fetches from it.
 #[inline(never)] // to stay where its section is
 #[unsafe(link_section = ".data.flash")]
 fn start_and_wait(control: Cr) {
@@ -91,15 +90,15 @@ fn start_and_wait(control: Cr) {
     while FLASH.sr().read().bsy() {}
 }
 
-/// As above.
+/// Writes a word and waits, in RAM as above.
 ///
 /// # Safety
-/// The word is in a part of the flash that is no program's.
+/// The word must be in a part of the flash that belongs to no program.
 #[inline(never)]
 #[unsafe(link_section = ".data.flash")]
 unsafe fn write_and_wait(mut address: *mut u32, word: &[u8; WORD_BYTES]) {
     for bytes in word.as_chunks::<4>().0 {
-        // SAFETY: by the caller; the address is a multiple of a word's bytes.
+        // SAFETY: by the caller; the address is word-aligned.
         unsafe {
             address.write_volatile(u32::from_le_bytes(*bytes));
             address = address.add(1);
@@ -108,7 +107,7 @@ unsafe fn write_and_wait(mut address: *mut u32, word: &[u8; WORD_BYTES]) {
     while FLASH.sr().read().bsy() {}
 }
 
-/// The cache may hold what has been erased.
+/// Flushes the cache, which may hold what has been erased.
 fn forget_cached() {
     FLASH.acr().modify(|w| w.set_dcen(false));
     FLASH.acr().modify(|w| w.set_dcrst(true));

@@ -1,4 +1,4 @@
-//! The chips: code that boards with one share, and that the HAL does not have.
+//! Chip support that the HAL lacks, shared by all boards with a chip.
 
 pub(crate) mod bridge;
 pub(crate) mod capture;

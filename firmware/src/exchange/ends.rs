@@ -1,4 +1,4 @@
-//! The ends of the exchange, given out once, so that the types see to the single writers.
+//! The ends of the exchange, given out once, so that the types enforce single writers.
 
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -24,13 +24,13 @@ pub struct Ends {
     pub setpoint: SetpointWriter,
     /// For the tasks that report its state.
     pub snapshot: SnapshotReader,
-    /// For the task that keeps the parameters.
+    /// For the task that owns the parameters.
     pub config: ConfigWriter,
 }
 
-/// Gives the ends out, the first time that it is called.
+/// Returns the ends on the first call, `None` afterwards.
 ///
-/// A set-point that is not renewed for more than `stale_periods` control periods is `Stop`.
+/// A set-point that is not renewed for more than `stale_periods` control periods becomes `Stop`.
 pub fn open(stale_periods: u32) -> Option<Ends> {
     if OPENED.swap(true, Ordering::Relaxed) {
         return None;
@@ -53,7 +53,7 @@ pub fn open(stale_periods: u32) -> Option<Ends> {
     })
 }
 
-/// The interrupt's end before it has a configuration.
+/// The interrupt's end, before it has a configuration.
 pub struct InterruptEnd {
     stale_periods: u32,
     snapshot: latest::Writer,
@@ -61,7 +61,7 @@ pub struct InterruptEnd {
 }
 
 impl InterruptEnd {
-    /// Puts the first configuration into use: what `make` makes of its place.
+    /// Puts the first configuration into use, as `make` fills it in place.
     pub fn begin(self, make: impl FnOnce(&mut Config)) -> RunningEnd {
         RunningEnd {
             word: 0,
@@ -76,7 +76,7 @@ impl InterruptEnd {
 
 /// The interrupt's end.
 pub struct RunningEnd {
-    /// The last word, and the set-point that it holds.
+    /// The last word, and its set-point.
     word: u32,
     setpoint: Setpoint,
     age_periods: u32,
@@ -86,7 +86,7 @@ pub struct RunningEnd {
 }
 
 impl RunningEnd {
-    /// Looks for a new set-point; to be called once a period, which is how its age is counted.
+    /// Takes a new set-point, if any. Call it once per period, since it counts the set-point's age.
     #[inline(always)] // in each period
     pub(crate) fn listen(&mut self) {
         let word = SETPOINT.load(Ordering::Relaxed);
@@ -99,13 +99,13 @@ impl RunningEnd {
         }
     }
 
-    /// The set-point for this period.
+    /// Returns the set-point for this period.
     #[inline(always)] // in each period
     pub(crate) fn setpoint(&self) -> &Setpoint {
         &self.setpoint
     }
 
-    /// Two words that follow one another differ in their sequence number.
+    /// Takes a new word. Successive words differ in their sequence number.
     #[inline(never)] // only some periods
     fn renew(&mut self, word: u32) {
         self.word = word;
@@ -113,20 +113,19 @@ impl RunningEnd {
         self.age_periods = 0;
     }
 
-    /// Changes over to the configuration that is offered, if one is, after `change` has seen the one
-    /// before and the new one.
+    /// Switches to an offered configuration, if any, after calling `change` with the old one and the new one.
     #[inline(always)] // in each period
     pub(crate) fn adopt(&mut self, change: impl FnOnce(&Config, &Config)) {
         CONFIG.adopt(&mut self.config, change);
     }
 
-    /// Works with the configuration in use.
+    /// Calls `work` with the configuration in use.
     #[inline(always)] // in each period
     pub(crate) fn with_config<R>(&self, work: impl FnOnce(&Config) -> R) -> R {
         CONFIG.with(&self.config, work)
     }
 
-    /// Offers the snapshot to the tasks.
+    /// Publishes the snapshot to the tasks.
     #[inline(always)] // in each period
     pub(crate) fn publish(&mut self, snapshot: Snapshot) {
         SNAPSHOT.publish(&mut self.snapshot, snapshot);
@@ -139,36 +138,35 @@ pub struct SetpointWriter {
 }
 
 impl SetpointWriter {
-    /// Makes this the set-point, and renews it. 31 writes may happen within one control period
-    /// before the interrupt could miss one.
+    /// Sets and renews the set-point. The interrupt could miss a write only after 31 of them within one control
+    /// period.
     pub fn write(&mut self, setpoint: Setpoint) {
         self.sequence = self.sequence.wrapping_add(1);
         SETPOINT.store(word::pack(setpoint, self.sequence), Ordering::Relaxed);
     }
 }
 
-/// The end of the tasks that report the motor's state. They share it by reference, and read one at a
-/// time.
+/// The end of the tasks that report the motor's state. They share it by reference, and read one at a time.
 pub struct SnapshotReader {
     hand: Mutex<CriticalSectionRawMutex, RefCell<latest::Reader>>,
 }
 
 impl SnapshotReader {
-    /// The latest snapshot, or `None` while there has been none.
+    /// Returns the latest snapshot, or `None` before the first.
     pub fn read(&self) -> Option<Snapshot> {
         self.hand.lock(|hand| SNAPSHOT.read(&mut hand.borrow_mut()))
     }
 }
 
-/// The end of the task that keeps the parameters.
+/// The end of the task that owns the parameters.
 pub struct ConfigWriter {
     hand: swap::Offerer,
 }
 
 impl ConfigWriter {
-    /// Offers the configuration that `make` puts where it stays, if it says that it has; the interrupt
-    /// adopts it as a whole at its next period. False if nothing is offered, as while the one before
-    /// has not been adopted yet.
+    /// Offers a configuration that `make` fills in place, if it returns true; the interrupt adopts it as a
+    /// whole in its next period. Returns false if nothing was offered, as while the previous one is not adopted
+    /// yet.
     pub fn offer(&mut self, make: impl FnOnce(&mut Config) -> bool) -> bool {
         CONFIG
             .free(&mut self.hand)

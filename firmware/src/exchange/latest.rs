@@ -1,24 +1,24 @@
-//! The latest value from one writer for one reader, neither ever waiting: three places, one with the
-//! writer, one with the reader, one between them.
+//! Passes the latest value from one writer to one reader without either waiting: three slots, one with the
+//! writer, one with the reader, one in between.
 //!
-//! Each swaps its place for the one between when it is done. The reader finds the last value whole; a
-//! reader that comes late misses earlier values, and gets no mixture.
+//! Each side, when done, swaps its slot for the one in between. The reader always gets the last complete value;
+//! a late reader misses earlier ones, never gets a mixture.
 
 use core::mem::MaybeUninit;
 
 use super::sync::{AtomicU8, Ordering, UnsafeCell, read, write};
 
-/// In the number of the place between: it was written since the last swap of the reader.
+/// Flag in the index in between: written since the reader's last swap.
 const NEW: u8 = 4;
 
-/// The three places. Empty they are all zeros, which take no room in the flash, as an `Option`'s `None` need not be.
+/// The three slots. Empty they are all zeros, which take no flash; an `Option`'s `None` need not be.
 pub(crate) struct Latest<T> {
     places: [UnsafeCell<MaybeUninit<T>>; 3],
     between: AtomicU8,
 }
 
-// SAFETY: each place is reached only by whoever has its number, and a number is in one of three
-// hands: the writer's, the reader's, or `between`. There is one writer and one reader.
+// SAFETY: a slot is accessed only by the holder of its index, and each index is in one of three hands: the
+// writer's, the reader's, or `between`. There is one writer and one reader.
 unsafe impl<T: Copy + Send> Sync for Latest<T> {}
 
 /// The writer's hand.
@@ -29,12 +29,12 @@ pub(crate) struct Writer {
 /// The reader's hand.
 pub(crate) struct Reader {
     place: u8,
-    /// True once a value has come.
+    /// A value has been read.
     filled: bool,
 }
 
 impl<T: Copy> Latest<T> {
-    /// The places, empty.
+    /// Creates empty slots.
     #[cfg(not(test))]
     pub(crate) const fn new() -> Self {
         Self {
@@ -43,7 +43,7 @@ impl<T: Copy> Latest<T> {
         }
     }
 
-    /// The places, empty: loom's are not made at compile time.
+    /// Creates empty slots; loom's cannot be made at compile time.
     #[cfg(test)]
     pub(crate) fn new() -> Self {
         Self {
@@ -52,10 +52,10 @@ impl<T: Copy> Latest<T> {
         }
     }
 
-    /// The hands.
+    /// Returns the hands.
     ///
     /// # Safety
-    /// To be called once for these places.
+    /// Call it once for these slots.
     pub(crate) unsafe fn hands() -> (Writer, Reader) {
         let reader = Reader {
             place: 2,
@@ -64,29 +64,29 @@ impl<T: Copy> Latest<T> {
         (Writer { place: 1 }, reader)
     }
 
-    /// Writes the latest value.
+    /// Publishes a value.
     #[inline(always)] // in each period
     pub(crate) fn publish(&self, hand: &mut Writer, value: T) {
-        // SAFETY: the place is in the writer's hand. The mask says no more than that to the
-        // compiler, which then needs no check.
+        // SAFETY: the slot is in the writer's hand. The mask tells the compiler no more than that, and saves
+        // the bounds check.
         unsafe {
             write(
                 &self.places[usize::from(hand.place & 3) % 3],
                 MaybeUninit::new(value),
             );
         }
-        // Release: who gets the place sees what is in it. Acquire: who has left the other is done.
+        // Release: whoever gets the slot sees its contents. Acquire: whoever left the other is done with it.
         hand.place = self.between.swap(hand.place | NEW, Ordering::AcqRel) & !NEW;
     }
 
-    /// The latest, or `None` while there has been none.
+    /// Returns the latest value, or `None` before the first.
     pub(crate) fn read(&self, hand: &mut Reader) -> Option<T> {
-        // A value that is not new is in the reader's hand already.
+        // Without a new value the reader's hand already has the latest.
         if self.between.load(Ordering::Relaxed) & NEW != 0 {
             hand.place = self.between.swap(hand.place, Ordering::AcqRel) & !NEW;
             hand.filled = true;
         }
-        // SAFETY: the place is in the reader's hand, and the writer has filled it.
+        // SAFETY: the slot is in the reader's hand, and the writer has filled it.
         hand.filled
             .then(|| unsafe { read(&self.places[usize::from(hand.place)]).assume_init() })
     }

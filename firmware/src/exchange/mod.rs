@@ -1,4 +1,4 @@
-//! The memory that the PWM interrupt and the tasks share; each piece has one writer.
+//! Memory shared by the PWM interrupt and the tasks; each piece has a single writer.
 //!
 //! | piece | from | to | how |
 //! |---|---|---|---|
@@ -6,9 +6,8 @@
 //! | configuration | a task | the interrupt | two slots, changed over as a whole at the beginning of a period ([`ConfigWriter`]) |
 //! | snapshot | the interrupt | the tasks | three places, one always between the two ([`SnapshotReader`]) |
 //!
-//! Nobody waits: the interrupt must not, and a task that did would wait for an interrupt that it may
-//! itself hold up. The two folders of places are proven with loom, which tries every order of their
-//! steps.
+//! Nobody waits: the interrupt must not, and a task would wait for an interrupt that it may itself be holding
+//! up. Configuration and snapshot are verified with loom, which tries every interleaving.
 
 #[cfg_attr(
     not(any(board, test)),

@@ -1,5 +1,5 @@
-//! A value that a task replaces as a whole, and the interrupt reads in place: two slots, of which one
-//! is in use. The other belongs to the task until it offers the value that it has put there.
+//! A value that a task replaces as a whole and the interrupt reads in place: two slots, one of them in use. The
+//! other belongs to the task until it offers the value that it has put there.
 
 use core::mem::MaybeUninit;
 
@@ -7,9 +7,9 @@ use siskin_control::drive::put_default;
 
 use super::sync::{AtomicU8, Ordering, UnsafeCell, with_mut};
 
-/// No offer: the slot that is not in use is the task's.
+/// No offer: the unused slot belongs to the task.
 const QUIET: u8 = 0;
-/// The slot that is not in use waits for the interrupt.
+/// The unused slot waits for the interrupt.
 const OFFERED: u8 = 1;
 
 /// The two slots. Their contents need no drop.
@@ -18,26 +18,26 @@ pub(crate) struct Swap<T> {
     state: AtomicU8,
 }
 
-// SAFETY: the user reads only the slot in use, the offerer writes only the other, and only while
-// the state is `QUIET`; the user changes them over while it is `OFFERED`. There is one of each.
+// SAFETY: the user reads only the slot in use; the offerer writes only the other, and only in state `QUIET`;
+// the user switches slots in state `OFFERED`. There is one of each.
 unsafe impl<T: Send> Sync for Swap<T> {}
 
 /// The task's end, which offers.
 pub(crate) struct Offerer {
-    /// The slot that is, or becomes, free.
+    /// The slot that is free, or becomes so next.
     free: usize,
 }
 
-/// The interrupt's end before there is anything to use.
+/// The interrupt's end before there is a value to use.
 pub(crate) struct Beginner(());
 
-/// The interrupt's end, which uses.
+/// The interrupt's end, which uses the value.
 pub(crate) struct User {
     used: usize,
 }
 
 impl<T: Default> Swap<T> {
-    /// Puts the first value into use: what `make` makes of the slot.
+    /// Puts the first value into use, as `make` fills it in place.
     pub(crate) fn begin(&self, _hand: Beginner, make: impl FnOnce(&mut T)) -> User {
         let user = User { used: 0 };
         // SAFETY: the slot in use is the user's.
@@ -46,20 +46,20 @@ impl<T: Default> Swap<T> {
     }
 }
 
-/// Puts a default into a slot, and has `make` change it there: a copy would take much of a stack.
+/// Puts a default into a slot and lets `make` change it in place: a copy would take much stack.
 ///
 /// # Safety
-/// Nobody else may reach the slot meanwhile.
+/// Nobody else may access the slot meanwhile.
 unsafe fn fill<T: Default, R>(
     slot: &UnsafeCell<MaybeUninit<T>>,
     make: impl FnOnce(&mut T) -> R,
 ) -> R {
-    // SAFETY: the caller sees to it.
+    // SAFETY: guaranteed by the caller.
     unsafe { with_mut(slot, |place| make(put_default(place))) }
 }
 
 impl<T> Swap<T> {
-    /// Two empty slots.
+    /// Creates two empty slots.
     #[cfg(not(test))]
     pub(crate) const fn new() -> Self {
         Self {
@@ -68,7 +68,7 @@ impl<T> Swap<T> {
         }
     }
 
-    /// Two empty slots: loom's are not made at compile time.
+    /// Creates two empty slots; loom's cannot be made at compile time.
     #[cfg(test)]
     pub(crate) fn new() -> Self {
         Self {
@@ -77,24 +77,23 @@ impl<T> Swap<T> {
         }
     }
 
-    /// The two who share the slots.
+    /// Returns the two ends.
     ///
     /// # Safety
-    /// To be called once for these slots.
+    /// Call it once for these slots.
     pub(crate) unsafe fn hands() -> (Offerer, Beginner) {
         (Offerer { free: 1 }, Beginner(()))
     }
 
-    /// The way to offer a value, or `None` while one before it waits.
+    /// Returns access to the free slot, or `None` while an earlier offer waits.
     #[inline(always)] // in each period
     pub(crate) fn free<'a>(&'a self, hand: &'a mut Offerer) -> Option<Free<'a, T>> {
-        // Acquire: the user is done with the slot that it has left.
+        // Acquire: the user is done with the slot it left.
         let waits = self.state.load(Ordering::Acquire) == OFFERED;
         (!waits).then_some(Free { swap: self, hand })
     }
 
-    /// Changes over to what is offered, if anything is, after a look at what was and what will be in
-    /// use.
+    /// Switches to an offered value, if any, after calling `change` with the old one and the new one.
     #[inline(always)] // in each period
     pub(crate) fn adopt(&self, hand: &mut User, change: impl FnOnce(&T, &T)) {
         if self.state.load(Ordering::Acquire) == OFFERED {
@@ -107,7 +106,7 @@ impl<T> Swap<T> {
         }
     }
 
-    /// Works with the value in use.
+    /// Calls `work` with the value in use.
     #[inline(always)] // in each period
     pub(crate) fn with<R>(&self, hand: &User, work: impl FnOnce(&T) -> R) -> R {
         self.look(hand.used, work)
@@ -117,8 +116,8 @@ impl<T> Swap<T> {
     fn look<R>(&self, slot: usize, work: impl FnOnce(&T) -> R) -> R {
         let slot = &self.slots[slot & 1];
         #[cfg(not(test))]
-        // SAFETY: the user looks at the slot in use, which holds a value since `begin`, and at the
-        // other one while it is offered, since when it holds one: the offerer writes to neither.
+        // SAFETY: the user reads the slot in use, which has held a value since `begin`, and the other while it
+        // is offered, and therefore filled; the offerer writes to neither.
         let result = work(unsafe { (*slot.get()).assume_init_ref() });
         #[cfg(test)]
         // SAFETY: as above; loom checks it.
@@ -127,17 +126,17 @@ impl<T> Swap<T> {
     }
 }
 
-/// The slot that is the offerer's.
+/// The offerer's slot.
 pub(crate) struct Free<'a, T> {
     swap: &'a Swap<T>,
     hand: &'a mut Offerer,
 }
 
 impl<T: Default> Free<'_, T> {
-    /// Offers what `make` puts into the slot, if it says that it has. Returns true if it did.
+    /// Offers what `make` puts into the slot, if it returns true. Returns true if it did.
     pub(crate) fn offer(self, make: impl FnOnce(&mut T) -> bool) -> bool {
         let slot = &self.swap.slots[self.hand.free & 1];
-        // SAFETY: without an offer the slot that is not in use is the offerer's.
+        // SAFETY: without an offer the unused slot is the offerer's.
         let made = unsafe { fill(slot, make) };
         if made {
             self.hand.free ^= 1;

@@ -1,5 +1,5 @@
-//! The atomics and cells of the exchange: the core's, and in tests those of loom, which tries every
-//! order in which two threads may see them.
+//! Atomics and cells of the exchange: core's, or in tests those of loom, which tries every order in which two
+//! threads may see them.
 
 #[cfg(not(test))]
 pub(super) use core::{
@@ -12,10 +12,10 @@ pub(super) use loom::{
     sync::atomic::{AtomicU8, Ordering},
 };
 
-/// Writes to a cell's content.
+/// Writes a cell's content.
 ///
 /// # Safety
-/// Nobody else is at it.
+/// Nobody else may access it.
 #[inline(always)] // one access
 pub(super) unsafe fn write<T>(cell: &UnsafeCell<T>, value: T) {
     #[cfg(not(test))]
@@ -28,10 +28,10 @@ pub(super) unsafe fn write<T>(cell: &UnsafeCell<T>, value: T) {
     cell.with_mut(|place| unsafe { *place = value });
 }
 
-/// Works on a cell's content.
+/// Calls `work` with a cell's content.
 ///
 /// # Safety
-/// Nobody else is at it.
+/// Nobody else may access it.
 #[inline(always)] // one access
 pub(super) unsafe fn with_mut<T, R>(cell: &UnsafeCell<T>, work: impl FnOnce(&mut T) -> R) -> R {
     #[cfg(not(test))]
@@ -43,10 +43,10 @@ pub(super) unsafe fn with_mut<T, R>(cell: &UnsafeCell<T>, work: impl FnOnce(&mut
     result
 }
 
-/// A copy of a cell's content.
+/// Copies a cell's content.
 ///
 /// # Safety
-/// Nobody writes to it meanwhile.
+/// Nobody may write to it meanwhile.
 #[inline(always)] // one access
 pub(super) unsafe fn read<T: Copy>(cell: &UnsafeCell<T>) -> T {
     #[cfg(not(test))]

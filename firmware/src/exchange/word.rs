@@ -1,10 +1,10 @@
-//! The set-point in one word, which an atomic store hands over whole.
+//! The set-point packed into one word, for a single atomic store.
 
 use fixed::types::I1F31;
 use siskin_control::drive::{Excitation, Fault, Pull, Setpoint};
 use siskin_control::units::{Current, Speed};
 
-/// Kind of set-point, in the word's bits 31 to 29.
+/// Kind of set-point, in bits 31 to 29.
 const KIND_SHIFT: u32 = 29;
 const REST: u32 = 0;
 const SPEED: u32 = 1;
@@ -15,16 +15,16 @@ const TONE: u32 = 5;
 const PULL: u32 = 6;
 const EXCITE: u32 = 7;
 
-/// The sequence number's place: bits 28 to 24.
+/// Sequence number, in bits 28 to 24.
 const SEQUENCE_SHIFT: u32 = 24;
 const SEQUENCE_MASK: u32 = 0x1f;
 
-/// The value's place: bits 23 to 0 hold the upper 24 bits of a speed, a current, a pitch or a share.
-/// The speed's step is then 0.0072 mechanical rpm with 12 pole pairs at 24 kHz.
+/// Value, in bits 23 to 0: the upper 24 bits of a speed, a current, a pitch or a share. A speed's step is then
+/// 0.0072 mechanical rpm with 12 pole pairs at 24 kHz.
 const VALUE_SHIFT: u32 = 8;
 const VALUE_MASK: u32 = 0x00ff_ffff;
 
-/// The word of a set-point with a sequence number, of which the lowest five bits count.
+/// Packs a set-point with the lowest five bits of a sequence number.
 pub fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
     let value = |bits: i32| (bits as u32) >> VALUE_SHIFT;
     let (kind, value) = match setpoint {
@@ -42,9 +42,9 @@ pub fn pack(setpoint: Setpoint, sequence: u32) -> u32 {
     kind << KIND_SHIFT | (sequence & SEQUENCE_MASK) << SEQUENCE_SHIFT | value
 }
 
-/// The set-point of a word.
+/// Unpacks a word's set-point.
 pub fn unpack(word: u32) -> Setpoint {
-    // The shift throws kind and sequence number away and brings the sign back to bit 31.
+    // The shift drops kind and sequence number and puts the sign back at bit 31.
     let bits = (word << VALUE_SHIFT) as i32;
     match word >> KIND_SHIFT {
         SPEED => Setpoint::Speed(Speed::from_bits(bits)),
@@ -58,7 +58,7 @@ pub fn unpack(word: u32) -> Setpoint {
     }
 }
 
-/// A set-point that does not turn the motor.
+/// Returns a set-point that does not turn the motor.
 fn rest(number: u32) -> Setpoint {
     match number {
         0 => Setpoint::Stop,

@@ -1,9 +1,8 @@
 //! The gate driver: its alarm, and when the bridge may be turned on.
 //!
-//! A DRV8302 turns its gates off by itself and pulls nFAULT low. The pin's interrupt then
-//! turns the bridge off and the driver with it; the PWM interrupt reads the pin too, each
-//! period, and lets the driver come up again when some time has passed. Until then the pin's interrupt
-//! is masked: a driver that comes up pulls nFAULT low as well.
+//! A DRV8302 turns its gates off by itself and pulls nFAULT low. The pin's interrupt then turns off the bridge
+//! and the driver; the PWM interrupt also reads the pin every period, and lets the driver come up again after a
+//! while. Until then the pin's interrupt is masked, since a driver that comes up pulls nFAULT low as well.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,17 +23,17 @@ use crate::{
     priority,
 };
 
-/// True if the alarm's interrupt has turned the driver off since the last period.
+/// The alarm's interrupt has turned the driver off since the last period.
 static ALARMED: AtomicBool = AtomicBool::new(false);
 
-/// The gate driver as the PWM interrupt knows it. A board without one is always ready.
+/// The gate driver, as the PWM interrupt sees it. A board without one is always ready.
 pub(crate) struct GateDriver {
     port: Gpio,
     rest: Rest,
 }
 
 impl GateDriver {
-    /// A driver that is enabled.
+    /// Creates an enabled driver.
     pub(crate) fn new(port: Gpio) -> Self {
         Self {
             port,
@@ -74,10 +73,9 @@ impl GateDriver {
     }
 }
 
-/// Lets a falling edge of the alarm's line ask for its interrupt from now on, or no more. This line is
-/// the only one of EXTI that is used.
+/// Unmasks or masks the interrupt of the alarm line's falling edge. No other EXTI line is used.
 fn hear(pins: GateDriverPins, hears: bool) {
-    // An alarm that was masked is not reported later: the level is read each period.
+    // Do not report a masked alarm later: the level is read every period.
     EXTI.pr(0).write(|w| w.set_line(pins.fault, true));
     EXTI.imr(0).modify(|w| w.set_line(pins.fault, hears));
 }
@@ -86,8 +84,7 @@ fn disable(port: Gpio, pins: GateDriverPins) {
     port.bsrr().write(|w| w.set_br(pins.enable, true));
 }
 
-/// Lets the driver's alarm ask for its interrupt, at priority 1: not even the tasks' critical sections hold
-/// it up.
+/// Enables the alarm's interrupt at priority 1: not even the tasks' critical sections hold it up.
 #[cfg(feature = "stm32f405")]
 pub(super) fn begin() {
     let Some(pins) = GATE_DRIVER else {
@@ -96,12 +93,11 @@ pub(super) fn begin() {
     chip::detect(pins.fault);
     hear(pins, true);
     priority::set(chip::ALARM as usize, priority::ALARM);
-    // SAFETY: what the handler needs is in place, and no critical section relies on its being
-    // masked.
+    // SAFETY: everything the handler needs is in place, and no critical section relies on masking it.
     unsafe { cortex_m::peripheral::NVIC::unmask(chip::ALARM) };
 }
 
-/// nFAULT: the bridge off, the driver off.
+/// nFAULT: turns off the bridge and the driver.
 #[cfg(feature = "stm32f405")]
 #[interrupt]
 #[unsafe(link_section = ".control")]

@@ -1,6 +1,6 @@
-//! The interrupt at the end of the injected conversions, once a PWM period: sample, `step`, bridge.
+//! The interrupt at the end of the injected conversions, once per PWM period: sample, `step`, bridge.
 //!
-//! It alone has priority 0. It takes no critical section, does not log and calls no driver.
+//! It alone has priority 0. It uses no critical section, no logging and no driver.
 
 #[cfg(board)]
 mod gate_driver;

@@ -1,24 +1,23 @@
-//! Periods that were not done with when the next was due.
+//! Periods that missed their deadline.
 
 /// Weight of an overrun, in periods without one.
 const WEIGHT: u32 = 100;
 
-/// Overruns in a row that end the drive; more than one in 100 periods do so in time too.
+/// Consecutive overruns that end the drive; in time, so do more than one in 100 periods.
 const REPEATED: u32 = 3;
 
-/// The recent overruns. One is borne: a duty comes a period late. Repeated ones are a processor too
-/// slow for its PWM frequency, and every duty would be late.
+/// Recent overruns. One is tolerated: a duty comes a period late. Repeated ones mean a processor too slow for
+/// its PWM frequency, with every duty late.
 #[derive(Default)]
 pub(crate) struct Overruns {
-    /// It falls by one a period.
+    /// Falls by one per period.
     level: u32,
-    /// The period of the last overrun.
+    /// Period of the last overrun.
     last: u32,
 }
 
 impl Overruns {
-    /// Takes note of an overrun in this period, of a number that wraps; whether there have been too
-    /// many.
+    /// Records an overrun in this period, whose number wraps. Returns true if there have been too many.
     #[cold]
     #[inline(never)] // only where a period is too long
     pub(crate) fn note(&mut self, period: u32) -> bool {

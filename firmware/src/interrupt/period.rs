@@ -20,47 +20,45 @@ use crate::last_words::{Failure, fail};
 static PERIODS: AtomicU32 = AtomicU32::new(0);
 static OVERRUNS: AtomicU32 = AtomicU32::new(0);
 
-/// Where start-up clears nothing. On the G431 it would lie in the CCM, next to what writes it and in no DMA's way:
-/// the SRAM is the tasks' and the stack's.
+/// In memory that start-up does not clear. On the G431 it would go in the CCM, close to its writer and clear of
+/// DMA traffic: the SRAM is for the tasks and the stack.
 #[unsafe(link_section = ".fault_record")]
 static RECORD: Record = Record::new();
 
-/// Every so many periods the tasks get a snapshot: they look at it once a millisecond, which is 8
-/// periods at the slowest PWM.
+/// Periods per snapshot for the tasks: they look once a millisecond, which is 8 periods at the slowest PWM.
 const PUBLISHED_EVERY: u32 = 8;
 
-/// Control periods since the start, wrapping: while it counts, the interrupt lives.
+/// Returns the control periods since start-up, wrapping; while it counts, the interrupt is alive.
 pub fn periods() -> u32 {
     PERIODS.load(Ordering::Relaxed)
 }
 
-/// The fault record, which this interrupt writes.
+/// Returns the fault record, which this interrupt writes.
 pub fn record() -> &'static Record {
     &RECORD
 }
 
-/// Control periods since the start that were not done with when the next was due.
+/// Returns how many control periods since start-up missed their deadline.
 pub fn overruns() -> u32 {
     OVERRUNS.load(Ordering::Relaxed)
 }
 
-/// Everything that the interrupt owns.
+/// Everything the interrupt owns.
 pub struct Interrupt {
     registers: Registers,
     pwm: Pwm,
     gate_driver: GateDriver,
     state: State,
     end: RunningEnd,
-    /// The control's set-point if the hardware has turned the bridge off: it does the same as after a
-    /// fault that it finds itself.
+    /// The set-point after a hardware trip, which the control handles like a fault that it finds itself.
     trip: Setpoint,
     overruns: Overruns,
-    /// True if the gate driver has given an alarm while the flash was written.
+    /// The gate driver gave an alarm while the flash was written.
     alarmed: bool,
 }
 
 impl Interrupt {
-    /// The interrupt at power-up, with the timer set up and all switches off.
+    /// Creates the interrupt at power-up, with the timer set up and all switches off.
     pub fn new(registers: Registers, end: RunningEnd) -> Self {
         Self {
             registers,
@@ -74,12 +72,12 @@ impl Interrupt {
         }
     }
 
-    /// Lets the PWM run.
+    /// Starts the PWM.
     pub(super) fn begin(&mut self) {
         self.pwm.start();
     }
 
-    /// One control period.
+    /// Runs one control period.
     #[inline(always)] // in each period
     pub fn run(&mut self) {
         chip::acknowledge(&self.registers.converters);
@@ -90,8 +88,8 @@ impl Interrupt {
         }
     }
 
-    /// A period while the flash is written, when nothing can be fetched from it: the bridge, which was
-    /// at rest, is off. An alarm of the hardware in the meantime is reported in the first period after.
+    /// Handles a period while the flash is written and nothing can be fetched from it: the bridge, at rest
+    /// before, is off. A hardware alarm meanwhile is reported in the first period afterwards.
     #[cold]
     #[inline(never)] // only some periods
     fn hold(&mut self) {
@@ -101,7 +99,7 @@ impl Interrupt {
         count(&PERIODS);
     }
 
-    /// Any other period.
+    /// Handles any other period.
     #[inline(never)] // only some periods
     fn control(&mut self) {
         self.pwm.commutate();
@@ -146,7 +144,7 @@ impl Interrupt {
         self.end.publish(self.state.snapshot());
     }
 
-    /// Changes over to a new configuration, if one is offered.
+    /// Switches to an offered configuration, if any.
     #[inline(always)] // in each period
     fn adopt(&mut self) {
         let Self { state, end, .. } = self;
@@ -160,8 +158,7 @@ fn adopt(state: &mut State, before: &Config, now: &Config) {
     state.adopt(before, now);
 }
 
-/// Counts one more, and says how many it was before. There is one writer: this need not be one
-/// indivisible step.
+/// Increments a counter and returns its previous value. With a single writer it need not be atomic.
 #[inline(always)] // in each period
 fn count(counter: &AtomicU32) -> u32 {
     let before = counter.load(Ordering::Relaxed);

@@ -1,23 +1,21 @@
 //! The bridge's PWM: TIM1, centre-aligned, complementary, with dead time.
 //!
-//! The counter runs from 0 to the top and back, PWM mode 1: a high side is on below its compare
-//! value, so the top is in the middle of the low sides' on-time. There channel 4 triggers the
-//! converters. New duties are written after the top and taken at the next one, one period later.
+//! The counter runs from 0 to the top and back in PWM mode 1: a high side is on below its compare value, so the
+//! top is in the middle of the low sides' on-time. There channel 4 triggers the converters. New duties are
+//! written after the top and take effect at the next one, a period later.
 //!
-//! The state of a phase ([`Leg`]) is in the channels' modes and enable bits. These are preloaded too
-//! (CCPC), but the timer takes them at its commutation event, not at the top: the control interrupt
-//! causes one as its first act, 3 µs after the top at which the duties that go with them were
-//! taken. In between the old switches see the new duties: a phase that is let go keeps its low side
-//! on for so long, and one that is taken up begins to switch by so much later.
+//! A phase's state ([`Leg`]) is in the channels' mode and enable bits. These are preloaded too (CCPC), but the
+//! timer takes them at its commutation event, not at the top: the control interrupt triggers one first thing, 3
+//! µs after the top at which the matching duties were taken. In between, the old switches see the new duties: a
+//! released phase keeps its low side on for that long, and one that joins starts to switch that much later.
 //!
-//! The hardware changes all bits of all phases in the same clock, so no order of writes can turn on
-//! both switches of a phase. The dead time between them hangs on edges of the reference output,
-//! which a commutation makes where it leaves or enters a forced level. From the low side alone to
-//! both switches there need not be one: the mode changes from 2 to 1, the reference may stay high
-//! until the next comparison, and what it drives would become the high side in the same clock. Such
-//! a change goes by way of all switches off, in two commutations; the other way round, where the
-//! high sides may just have been on, all stays off for a period. [`Bridge::Off`] does not wait for
-//! any of this: the main output enable acts at once.
+//! The hardware changes all bits of all phases in the same clock, so no order of writes can turn on both
+//! switches of a phase. Dead time is inserted on edges of the reference output, which a commutation creates
+//! when it leaves or enters a forced level. From low side alone to both switches there may be no edge: the mode
+//! changes from 2 to 1, the reference may stay high until the next compare match, and what it drives would
+//! become the high side in the same clock. Such a change goes through all switches off, in two commutations; in
+//! the other direction, where the high sides may just have been on, everything stays off for a period.
+//! [`Bridge::Off`] waits for none of this: the main output enable acts at once.
 
 use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::pac::timer::regs::{Ccr1ch, SrAdv};
@@ -34,27 +32,27 @@ pub(crate) struct Pwm {
     timer: TimAdv,
     /// The counter's top.
     top: u16,
-    /// The low sides as the last [`apply`](Self::apply) has written them.
+    /// The low sides as the last [`apply`](Self::apply) wrote them.
     low_sides: LowSides,
-    /// The legs that follow, in the next commutation, on all switches off.
+    /// Legs that follow all switches off, in the next commutation.
     deferred: Option<[Leg; 3]>,
 }
 
 impl Pwm {
-    /// Sets the timer up with all switches off; [`start`](Self::start) lets it count.
+    /// Sets the timer up with all switches off; [`start`](Self::start) starts it.
     pub(crate) fn new(timer: TimAdv, timing: Timing) -> Self {
         timer.cr1().write(|w| {
             w.set_cms(Cms::CENTER_ALIGNED1);
             w.set_arpe(true);
         });
         timer.cr2().write(|w| w.set_mms(Mms::COMPARE_OC4));
-        // Channel 4 has no pin. Its rising edge, half a sampling window before the top, starts the
+        // Channel 4 has no pin. Its rising edge, half a sampling window before the top, triggers the
         // converters; their start delay of two to three of their clocks (0.07 µs) is neglected.
         timer.ccer().write(|w| w.set_cce(3, true));
-        // Without the main output enable the outputs are driven to their idle level, low: both
-        // switches of every phase are off. With it, an output that is not enabled is driven low
-        // where its complement is. The break is taken after six samples at a sixteenth of the
-        // clock, 0.56 µs: the comparators see each switching edge ring.
+        // With the main output disabled the outputs are driven to their idle level, low: both switches of every
+        // phase are off. With it enabled, a disabled output is driven low if its complement is enabled. The
+        // break takes six samples at a sixteenth of the clock, 0.56 µs, since every switching edge rings at the
+        // comparators.
         timer.bdtr().write(|w| {
             w.set_ossi(Ossi::IDLE_LEVEL);
             w.set_ossr(Ossr::IDLE_LEVEL);
@@ -72,19 +70,18 @@ impl Pwm {
             deferred: None,
         };
         pwm.set_modes([Leg::Off; 3]);
-        // From here on modes and enable bits wait for a commutation, those of channel 4 too.
+        // From here on modes and enable bits wait for a commutation, channel 4's too.
         timer.cr2().modify(|w| w.set_ccpc(true));
         pwm.commutate();
         pwm
     }
 
-    /// Lets the counter run with all switches off, and sees to it that duties are taken at the top.
-    /// To be called with interrupts held up, but for its own, which nothing enables yet.
+    /// Starts the counter with all switches off, and makes duties take effect at the top. Call it with
+    /// interrupts masked, except the PWM's own, which is not enabled yet.
     pub(crate) fn start(&mut self) {
         let timer = self.timer;
-        // With a repetition count of 0 the first update is at the first top. The count of 1, written
-        // behind the start, is taken there and makes every second turn an update: the tops, not the
-        // zeros.
+        // With a repetition count of 0 the first update is at the first top. The count of 1, written after the
+        // start, is loaded there and makes every second turning point an update: the tops, not the zeros.
         timer.rcr().write(|w| w.set_rep(0));
         timer.egr().write(|w| w.set_ug(true));
         timer.cr1().modify(|w| w.set_cen(true));
@@ -99,7 +96,7 @@ impl Pwm {
         );
     }
 
-    /// Puts the legs of the last [`apply`](Self::apply) in force.
+    /// Puts the legs of the last [`apply`](Self::apply) into force.
     #[inline(always)] // in each period
     pub(crate) fn commutate(&mut self) {
         self.timer.egr().write(|w| w.set_comg(true));
@@ -122,25 +119,25 @@ impl Pwm {
         self.timer.sr().read().bif(0)
     }
 
-    /// Forgets a break; the hardware holds the bridge off for as long as its cause lasts.
+    /// Clears a break; the hardware holds the bridge off as long as its cause lasts.
     #[cold]
     #[inline(never)] // only after a break
     pub(crate) fn clear_break(&mut self) {
-        // Bits written as 1 stay as they are.
+        // Writing 1 leaves bits unchanged.
         let mut others = SrAdv(!0);
         others.set_bif(0, false);
         self.timer.sr().write_value(others);
     }
 
-    /// Applies the control's bridge command from the counter's next top on; to turn it off
-    /// takes effect at once, and after that all switches stay off until the top.
+    /// Applies the control's bridge command from the counter's next top on. Off takes effect at once, and
+    /// afterwards all switches stay off until the top.
     #[inline(always)] // in each period
     pub(crate) fn apply(&mut self, bridge: Bridge) {
         match (bridge, self.low_sides) {
             (Bridge::Duty(duties), LowSides::Switching) => {
                 let [a, b, c] = duties;
                 let top = self.top;
-                // The main output is on since the period before, or a break has turned it off.
+                // The main output has been on since the previous period, or a break has turned it off.
                 self.set_compares([compare(a, top), compare(b, top), compare(c, top)]);
             }
             (Bridge::Brake, LowSides::Switching) => self.set_compares([0; 3]),
@@ -152,7 +149,7 @@ impl Pwm {
         }
     }
 
-    /// Every bridge that differs from the one before in more than its duties.
+    /// Applies a command that differs from the previous one in more than its duties.
     #[cold]
     fn change(&mut self, bridge: Bridge) {
         let switching =
@@ -191,13 +188,13 @@ impl Pwm {
     }
 
     fn turn_on(&mut self) {
-        // After a break the control is told first.
+        // After a break, tell the control first.
         if !self.broken() {
             self.timer.bdtr().modify(|w| w.set_moe(true));
         }
     }
 
-    // Channel by channel, here and below: a loop would keep the checks of the channels' numbers.
+    // Unrolled, here and below: a loop would keep the bounds checks.
     #[inline(always)] // in each period
     fn set_compares(&mut self, values: [u32; 3]) {
         let timer = self.timer;
@@ -218,7 +215,7 @@ impl Pwm {
         self.timer.ccmr_output(1).write(|w| {
             w.set_ocm(0, third.mode());
             w.set_ocpe(0, true);
-            // The trigger.
+            // Trigger.
             w.set_ocm(1, Ocm::PWM_MODE2);
         });
         self.timer.ccer().write(|w| {
@@ -233,35 +230,35 @@ impl Pwm {
     }
 }
 
-/// The state of a phase for a period.
+/// The state of a phase for one period.
 #[derive(Clone, Copy)]
 enum Leg {
-    /// Both switches are off.
+    /// Both switches off.
     Off,
-    /// The low side is on for this share around the top; the high side is off.
+    /// Low side on for this share, around the top; high side off.
     Low(Duty),
-    /// The high side is on for this share, the low side for the rest.
+    /// High side on for this share, low side for the rest.
     Switching(Duty),
 }
 
-/// The state of the low sides.
+/// What the low sides do.
 #[derive(Clone, Copy, PartialEq)]
 enum LowSides {
-    /// Not at all: all switches are off.
+    /// Nothing: all switches are off.
     None,
-    /// Without the high sides.
+    /// Switch without the high sides.
     Alone,
-    /// In turn with the high sides, in the phases that are not off.
+    /// Alternate with the high sides in the phases that are not off.
     Some,
-    /// In turn with the high sides, in all phases.
+    /// Alternate with the high sides in all phases.
     Switching,
 }
 
 impl Leg {
-    /// The high side is on, or the low side alone, while the reference output is high.
+    /// Returns the mode: while the reference output is high, the high side is on, or the low side alone.
     fn mode(self) -> Ocm {
         match self {
-            // The reference is held low.
+            // The reference is forced low.
             Self::Off => Ocm::FORCE_INACTIVE,
             // High above the compare value: around the top.
             Self::Low(_) => Ocm::PWM_MODE2,
@@ -269,7 +266,7 @@ impl Leg {
         }
     }
 
-    /// Of a phase that is off, one enabled output keeps the other one driven.
+    /// In a phase that is off, one enabled output keeps the other driven.
     fn enables_high(self) -> bool {
         !matches!(self, Self::Low(_))
     }

@@ -1,4 +1,4 @@
-//! The registers that the interrupt reads and writes: their blocks may also be plain memory.
+//! The registers that the interrupt accesses; their blocks may also be plain memory.
 
 use core::sync::atomic::AtomicU32;
 
@@ -9,21 +9,21 @@ use embassy_stm32::pac::{ADC1, ADC2, GPIOB, GPIOC};
 
 use crate::chip::bridge;
 
-/// The blocks that the interrupt is at.
+/// The register blocks that the interrupt accesses.
 #[derive(Clone, Copy)]
 pub struct Registers {
-    /// The PWM timer.
+    /// PWM timer.
     pub(crate) timer: TimAdv,
-    /// The converters that the timer triggers.
+    /// Converters triggered by the timer.
     pub(crate) converters: [Adc; 2],
-    /// The port of the Hall sensors.
+    /// Port of the Hall sensors.
     pub(crate) hall: Gpio,
-    /// The port of the gate driver.
+    /// Port of the gate driver.
     pub(crate) gate_driver: Gpio,
 }
 
 impl Registers {
-    /// The chip's.
+    /// The chip's own.
     pub const CHIP: Self = Self {
         timer: bridge::TIMER,
         converters: [ADC1, ADC2],
@@ -32,14 +32,14 @@ impl Registers {
     };
 }
 
-/// Words of the largest block: 1 KB.
+/// Words in the largest block: 1 KB.
 const WORDS: usize = 256;
 
-/// A block of registers in plain memory.
+/// A register block in plain memory.
 type Block = [AtomicU32; WORDS];
 
-/// Memory in place of the blocks, so that the interrupt can be run without its chip: to count its
-/// instructions on an emulated processor.
+/// Memory in place of the blocks, to run the interrupt without its chip and count its instructions on an
+/// emulated processor.
 pub struct Stand {
     timer: Block,
     pub(super) converters: [Block; 2],
@@ -48,8 +48,7 @@ pub struct Stand {
 }
 
 impl Stand {
-    /// All words 0: no reading, no flag, and the gate driver's alarm, which is low when it is given,
-    /// at rest.
+    /// Creates blocks of zeros: no readings, no flags, and the active-low gate driver alarm inactive.
     #[expect(
         clippy::new_without_default,
         reason = "it is made at compile time, which a default cannot be"
@@ -63,10 +62,10 @@ impl Stand {
         }
     }
 
-    /// The blocks in this memory.
+    /// Returns these blocks as registers.
     pub fn registers(&'static self) -> Registers {
-        // SAFETY: the pointers are to aligned memory of at least the blocks' sizes, which stays where
-        // it is and may change behind a shared reference.
+        // SAFETY: the pointers are to aligned memory of at least the blocks' sizes, which does not move and may
+        // change behind a shared reference.
         unsafe {
             Registers {
                 timer: TimAdv::from_ptr(pointer(&self.timer)),

@@ -1,39 +1,39 @@
-//! Brings a gate driver back that has given an alarm: it sleeps, it wakes, and only when it has had
-//! time to come up is its alarm heard again.
+//! Recovery of a gate driver after an alarm: it sleeps, wakes, and its alarm counts again only once it has had
+//! time to come up.
 
-/// Control periods for which it rests after an alarm: 11 ms at the fastest PWM, 80 ms at the slowest.
+/// Control periods of rest after an alarm: 11 ms at the fastest PWM, 80 ms at the slowest.
 const REST_PERIODS: u16 = 640;
 
-/// Control periods before the end of the rest at which it is enabled again. It takes up to 10 ms, and
-/// says that all is not well until then.
+/// Control periods before the end of the rest at which it is enabled again. It takes up to 10 ms, and signals
+/// an alarm until then.
 const WAKE_PERIODS: u16 = 620;
 
-/// The order to the driver in a period.
+/// What to do with the driver in a period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// Disable it, and take no interrupt from its alarm.
+    /// Disable it, and mask its alarm's interrupt.
     Sleep,
     /// Nothing: it sleeps, or comes up.
     Wait,
-    /// Enable it. Its alarm is not heard yet: it is given whenever a driver comes up.
+    /// Enable it. Its alarm is still masked: every driver gives one while coming up.
     Wake,
-    /// It is well: hear its alarm.
+    /// It is well: unmask its alarm.
     Listen,
 }
 
-/// The rest.
+/// The rest after an alarm.
 #[derive(Debug, Default)]
 pub(crate) struct Rest {
     periods: u16,
 }
 
 impl Rest {
-    /// Returns true if there is none.
+    /// Returns true if no rest is in progress.
     pub(crate) fn is_over(&self) -> bool {
         self.periods == 0
     }
 
-    /// A period of the rest, or an alarm with which one begins. `alarm` is the line's level.
+    /// Advances a rest by a period, or starts one after an alarm. `alarm` is the line's level.
     pub(crate) fn step(&mut self, alarm: bool) -> Order {
         if self.is_over() {
             self.periods = REST_PERIODS;
@@ -42,7 +42,7 @@ impl Rest {
         self.periods -= 1;
         match self.periods {
             WAKE_PERIODS => Order::Wake,
-            // A driver that comes up with an alarm is tried again and again: the cause may end.
+            // Retry a driver that comes up with an alarm for as long as it takes: the cause may end.
             0 if alarm => {
                 self.periods = REST_PERIODS;
                 Order::Sleep

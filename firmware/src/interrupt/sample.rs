@@ -1,4 +1,4 @@
-//! From the converters' counts to a [`Sample`].
+//! Converts ADC counts to a [`Sample`].
 
 use core::sync::atomic::Ordering;
 
@@ -13,7 +13,7 @@ use crate::chip::READINGS_AT_WORD;
 /// Fraction bits of [`AdcCounts`].
 const FRACTION_BITS: u32 = AdcCounts::FRAC_NBITS;
 
-/// The sample of this period.
+/// Returns the sample of this period.
 #[inline(always)] // in each period
 pub(crate) fn sample(registers: &Registers) -> Sample {
     let counts = |count: i32| AdcCounts::from_bits(count << FRACTION_BITS);
@@ -29,7 +29,7 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
         None => 7,
         Some(pin) => (registers.hall.idr().read().0 >> pin) as u8 & 7,
     };
-    // One by one: a loop would keep the checks of the ranks.
+    // Unrolled: a loop would keep the bounds checks of the ranks.
     let [a, b, c] = WIRING.currents;
     let [at_a, at_b, at_c] = WIRING.terminals;
     Sample {
@@ -44,7 +44,7 @@ pub(crate) fn sample(registers: &Registers) -> Sample {
     }
 }
 
-/// The reverse of [`sample`]: the place of each reading, and its value.
+/// Returns the place of each reading and its value: the inverse of [`sample`].
 fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
     let reading = |counts: AdcCounts| counts.to_num::<i32>();
     let current = move |counts: AdcCounts| {
@@ -62,7 +62,7 @@ fn readings(sample: &Sample) -> impl Iterator<Item = (Slot, u32)> {
 }
 
 impl Stand {
-    /// Puts a sample where the converters and the pins of the board would show it.
+    /// Puts a sample where the board's converters and pins would show it.
     pub fn set_sample(&self, sample: &Sample) {
         for (Slot(converter, rank), counts) in readings(sample) {
             self.converters[converter][READINGS_AT_WORD + rank].store(counts, Ordering::Relaxed);

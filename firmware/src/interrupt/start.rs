@@ -1,4 +1,4 @@
-//! The start of the interrupt.
+//! Starts the interrupt.
 
 use core::cell::UnsafeCell;
 
@@ -15,18 +15,17 @@ use crate::priority;
 #[unsafe(link_section = ".control_state")]
 static INTERRUPT: InterruptCell<Interrupt> = InterruptCell::new();
 
-/// Starts the PWM and, with it, the interrupt; all switches are off until a set-point turns the
-/// motor.
+/// Starts the PWM and its interrupt, with all switches off until a set-point turns the motor.
 ///
-/// It waits 20 ms for the gate driver and the amplifiers.
+/// Waits up to 20 ms for gate driver and amplifiers.
 ///
 /// # Panics
 /// If called again.
-// Out of line, here and in the board's `claim`: their stack is given back before the tasks begin.
+// Out of line, like the board's `claim`: their stack is free again before the tasks start.
 #[inline(never)]
 pub fn start(bridge: board::Bridge, converters: board::Converters, end: RunningEnd) {
-    // SAFETY: the processor's own, of which nothing but what follows uses the vector table's
-    // address; embassy has not been given it.
+    // SAFETY: the processor's own peripherals; nothing but the code below uses the vector table's address, and
+    // embassy has not been given it.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     vectors_in_ram(&mut core.SCB);
     board::prepare(bridge, converters);
@@ -38,26 +37,24 @@ pub fn start(bridge: board::Bridge, converters: board::Converters, end: RunningE
     // SAFETY: as above; the cell is filled.
     critical_section::with(|_| unsafe { INTERRUPT.with(Interrupt::begin) });
     priority::set(chip::CONVERTED as usize, priority::PWM);
-    // SAFETY: what the interrupt needs is in place, and no critical section relies on its being
-    // masked.
+    // SAFETY: everything the interrupt needs is in place, and no critical section relies on masking it.
     unsafe { NVIC::unmask(chip::CONVERTED) };
 }
 
-/// Sets the hardware's over-current trip for a bound of `phase_a` on the phase currents, peak
-/// amperes: 1.6 times that, and no more than the board's rating. A board without such a trip has the
-/// software's alone.
+/// Sets the hardware over-current trip for a phase current limit of `phase_a`, peak A: 1.6 times that, at most
+/// the board's rating. A board without such a trip only has the software's.
 pub fn set_trip(phase_a: f32) {
     board::set_trip(phase_a);
 }
 
-/// The vector table moves to where no erase of the flash holds it up.
+/// Moves the vector table to where flash erases cannot stall it.
 fn vectors_in_ram(scb: &mut SCB) {
     unsafe extern "C" {
         static __vector_table: UnsafeCell<u32>;
         static __vector_table_end: UnsafeCell<u32>;
         static __ram_vectors: UnsafeCell<u32>;
     }
-    // SAFETY: the linker script keeps as much room at the one place as the table takes at the other,
+    // SAFETY: the linker script reserves as much room at the destination as the table takes at the source,
     // aligned to 512, and nothing else is there. The table is written before it is used.
     unsafe {
         let from = __vector_table.get();
@@ -68,7 +65,7 @@ fn vectors_in_ram(scb: &mut SCB) {
     cortex_m::asm::dsb();
 }
 
-/// The end of the injected conversions.
+/// End of the injected conversions.
 #[cfg(feature = "stm32g431")]
 #[interrupt]
 #[unsafe(link_section = ".control")]
@@ -77,7 +74,7 @@ fn ADC1_2() {
     unsafe { INTERRUPT.with(Interrupt::run) };
 }
 
-/// The end of the injected conversions.
+/// End of the injected conversions.
 #[cfg(feature = "stm32f405")]
 #[interrupt]
 #[unsafe(link_section = ".control")]

@@ -1,10 +1,10 @@
-//! A drive's frequency and dead time in the timer's clocks.
+//! A drive's frequency and dead time in timer clocks.
 
 use siskin_control::drive::Config;
 use siskin_control::math::Real;
 use siskin_control::units::Duty;
 
-/// The timer's settings.
+/// Timer settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Timing {
     /// The counter's top: half a period.
@@ -14,31 +14,30 @@ pub(crate) struct Timing {
 }
 
 impl Timing {
-    /// The period rounded to twice a whole number of clocks, the dead time up to the generator's
-    /// steps.
+    /// Converts a configuration: the period rounds to an even number of clocks, the dead time up to the
+    /// generator's steps.
     pub(crate) fn new(config: &Config, clock_hz: u32) -> Self {
         let period_clocks = clock_hz as f32 * config.scale.period_s;
         let dead_clocks = period_clocks * config.dead_time.share.to_f32();
         Self {
             // The table's 8 to 60 kHz give 10625 to 1400 clocks.
             top: (0.5 * period_clocks + 0.5) as u16,
-            // A duty of 2^-31 that is too large must not make another step of it.
+            // A share 2^-31 too large must not add a step.
             dead_time: dead_time_code((dead_clocks + 0.99) as u16),
         }
     }
 }
 
-/// The compare value of a duty: top·duty. A duty has 31 fraction bits, so with twice the top the
-/// product's upper half is the result. A duty above 1, which the control does not give, is all of the
-/// period too.
+/// Returns the compare value of a duty, top·duty. A duty has 31 fraction bits, so with twice the top the
+/// product's upper half is the result. A duty above 1, which the control does not give, also fills the period.
 #[inline(always)] // in each period
 pub(crate) const fn compare(duty: Duty, top: u16) -> u32 {
     let product = duty.to_bits() as u64 * (2 * top as u32) as u64;
     (product >> 32) as u32
 }
 
-/// The dead-time generator's code for at least so many clocks: steps of 1 up to 127, of 2 up to
-/// 254, of 8 up to 504, of 16 up to 1008, where it ends (5.9 µs at 170 MHz).
+/// Returns the dead-time generator's code for at least this many clocks: steps of 1 up to 127, of 2 up to 254,
+/// of 8 up to 504, of 16 up to its maximum of 1008 (5.9 µs at 170 MHz).
 const fn dead_time_code(clocks: u16) -> u8 {
     match clocks {
         0..=127 => clocks as u8,

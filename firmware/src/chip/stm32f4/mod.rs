@@ -11,7 +11,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::{Config, Peripherals};
 
-/// Clock of the timers on APB2; those on APB1 have half of it.
+/// Clock of the timers on APB2; those on APB1 run at half of it.
 pub const TIMER_HZ: u32 = 168_000_000;
 
 /// External interrupts (RM0090, vector table).
@@ -20,16 +20,16 @@ pub(crate) const INTERRUPTS: usize = 82;
 /// The interrupt at the end of the injected conversions.
 pub(crate) const CONVERTED: interrupt::Interrupt = interrupt::ADC;
 
-/// The interrupt of the lines 10 to 15.
+/// The interrupt of EXTI lines 10 to 15.
 pub(crate) const ALARM: interrupt::Interrupt = interrupt::EXTI15_10;
 
-/// Word of the converter's block at which the injected readings begin: JDR1 at 0x3c.
+/// Word offset of the injected readings in a converter's registers: JDR1 at 0x3c.
 pub(crate) const READINGS_AT_WORD: usize = 0x3c / 4;
 
-/// Takes the interrupt's request back. Both sequences have the same length.
+/// Clears the interrupt request. Both sequences are equally long.
 #[inline(always)] // in each period
 pub(crate) fn acknowledge(converters: &[Adc; 2]) {
-    // Bits written as 1 stay as they are.
+    // Writing 1 leaves bits unchanged.
     let mut others = Sr(!0);
     others.set_jeoc(false);
     converters[0].sr().write_value(others);
@@ -38,8 +38,8 @@ pub(crate) fn acknowledge(converters: &[Adc; 2]) {
 /// Starts the chip.
 pub(crate) fn start() -> Peripherals {
     let peripherals = embassy_stm32::init(clock());
-    // The HAL has written the register whole, with the wait states alone (embassy-stm32 0.6). A fetch of four
-    // instructions or more takes six clocks then, of which the caches and the prefetch save most (RM0090, 3.5).
+    // The HAL wrote the whole register with nothing but the wait states (embassy-stm32 0.6). A fetch of four
+    // instructions or more then takes six clocks, most of which caches and prefetch save (RM0090, 3.5).
     let id = DBGMCU.idcode().read();
     FLASH.acr().modify(|w| {
         w.set_icen(true);
@@ -49,14 +49,14 @@ pub(crate) fn start() -> Peripherals {
     peripherals
 }
 
-/// Device of these chips (RM0090, DBGMCU_IDCODE). Those of revision A, whose prefetch must stay off
-/// (ES0182), can show another: 0x411, with 0x2000 for the revision.
+/// Device ID of these chips (RM0090, DBGMCU_IDCODE). Revision A, whose prefetch must stay off (ES0182), can
+/// show another: 0x411, with revision 0x2000.
 const STM32F405: u16 = 0x413;
 
-/// Revision A as RM0090 has it.
+/// Revision A according to RM0090.
 const REVISION_A: u16 = 0x1000;
 
-/// 168 MHz from the internal 16 MHz, as no source is sure about this board's crystal.
+/// 168 MHz from the internal 16 MHz, since no source is sure about this board's crystal.
 fn clock() -> Config {
     let mut config = Config::default();
     config.rcc.hsi = true;
@@ -75,22 +75,22 @@ fn clock() -> Config {
     config
 }
 
-/// Makes a falling edge of a pin of port C, from 10 to 15, one that may ask for [`ALARM`].
+/// Lets a falling edge on a pin of port C, 10 to 15, request [`ALARM`].
 pub(crate) fn detect(pin: usize) {
     RCC.apb2enr().modify(|w| w.set_syscfgen(true));
     SYSCFG.exticr(pin / 4).modify(|w| w.set_exti(pin % 4, 2));
     EXTI.ftsr(0).modify(|w| w.set_line(pin, true));
 }
 
-/// Takes that request back.
+/// Clears that request.
 pub(crate) fn heard(pin: usize) {
     EXTI.pr(0).write(|w| w.set_line(pin, true));
 }
 
-/// Returns true if the watchdog has caused the last reset; to be asked once.
+/// Returns true if the watchdog caused the last reset. Call it only once.
 pub(crate) fn take_watchdog_reset() -> bool {
     let starved = RCC.csr().read().wdgrstf();
-    // The flags stay until they are removed.
+    // The flags persist until cleared.
     RCC.csr().modify(|w| w.set_rmvf(true));
     starved
 }

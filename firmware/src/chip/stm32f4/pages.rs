@@ -1,4 +1,4 @@
-//! Words and sectors of the flash (RM0090, section 3.6).
+//! Flash words and sectors (RM0090, section 3.6).
 
 use embassy_stm32::pac::flash::regs::Cr;
 use embassy_stm32::pac::flash::vals::Psize;
@@ -6,10 +6,10 @@ use embassy_stm32::pac::flash::vals::Psize;
 /// Bytes programmed at once.
 pub(crate) const WORD_BYTES: usize = 4;
 
-/// Bytes erased at once, in the sectors 0 to 3: it takes a quarter to half a second.
+/// Bytes erased at once, in sectors 0 to 3: takes a quarter to half a second.
 pub(crate) const PAGE_BYTES: usize = 0x4000;
 
-/// The control register while words are programmed.
+/// Returns the control register's value for programming words.
 pub(crate) fn programming() -> Cr {
     let mut control = Cr(0);
     control.set_pg(true);
@@ -17,7 +17,7 @@ pub(crate) fn programming() -> Cr {
     control
 }
 
-/// The control register before one of the sectors 0 to 3 is erased.
+/// Returns the control register's value for erasing one of sectors 0 to 3.
 pub(crate) fn erasing(sector: usize) -> Cr {
     let mut control = Cr(0);
     control.set_ser(true);
@@ -26,7 +26,7 @@ pub(crate) fn erasing(sector: usize) -> Cr {
     control
 }
 
-/// This flash has no error correction that could report a torn word.
+/// Returns false: this flash has no ECC that could report a torn word.
 pub(crate) fn take_torn_word() -> bool {
     false
 }

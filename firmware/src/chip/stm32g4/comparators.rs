@@ -1,8 +1,8 @@
-//! The comparators that turn the bridge off: over the break input of TIM1, without the processor.
+//! Comparators that turn the bridge off through TIM1's break input, without the processor.
 //!
-//! Each compares an op-amp's input with a level from DAC3 (RM0440, tables of the comparators' inputs
-//! and of TIM1's break). They see the shunt of a phase from one side only: the reading rises with a
-//! current out of the motor, which comes down through the low side.
+//! Each compares an op-amp's input with a level from DAC3 (RM0440, tables of the comparators' inputs and of
+//! TIM1's break). They see one polarity of a phase's shunt: the reading rises with current out of the motor,
+//! which flows down through the low side.
 
 use embassy_stm32::pac::comp::Comp;
 use embassy_stm32::pac::comp::vals::{Hysteresis, Inm};
@@ -10,8 +10,7 @@ use embassy_stm32::pac::dac::vals::Mode;
 use embassy_stm32::pac::timer::regs::SrAdv;
 use embassy_stm32::pac::{COMP1, COMP2, COMP4, DAC3, RCC, TIM1};
 
-/// The comparators with the level that each compares with. All get the first of INPSEL: PA1, PA7
-/// and PB0.
+/// The comparators. All use the first INPSEL input: PA1, PA7 and PB0.
 const COMPARATORS: [Comp; 3] = [COMP1, COMP2, COMP4];
 
 /// Their enables in TIM1_AF1, BKCMP1E, 2E and 4E, counted from 0.
@@ -20,12 +19,11 @@ const BREAKS: [usize; 3] = [0, 1, 3];
 /// The highest level.
 const FULL_SCALE: u16 = 4095;
 
-/// From a level to an output that follows it, cycles of the core: 10 µs, where the DAC takes up to 3 µs without
-/// its buffer (data sheet of the STM32G431) and the comparator 0.1 µs.
+/// Time for the output to follow a level, core cycles: 10 µs, where the DAC takes up to 3 µs without its buffer
+/// (STM32G431 data sheet) and the comparator 0.1 µs.
 const SETTLE: u32 = 1_700;
 
-/// Sets the comparators up with a level of 4096, and lets them break the PWM. The timer's clock must
-/// be on.
+/// Sets the comparators up with a level out of 4096, and lets them break the PWM. The timer's clock must be on.
 pub(crate) fn set_up(level: u16) {
     RCC.ahb2enr().modify(|w| w.set_dac3en(true));
     RCC.apb2enr().modify(|w| w.set_syscfgen(true));
@@ -44,7 +42,7 @@ pub(crate) fn set_up(level: u16) {
     });
     for comparator in COMPARATORS {
         comparator.csr().write(|w| {
-            // DAC3's channel 1 for COMP1, its channel 2 for the others.
+            // DAC3 channel 1 for COMP1, channel 2 for the others.
             w.set_inmsel(Inm::DACA);
             w.set_hyst(Hysteresis::NONE);
             w.set_en(true);
@@ -59,7 +57,7 @@ pub(crate) fn set_up(level: u16) {
     });
 }
 
-/// Sets the level, of 4096.
+/// Sets the level, out of 4096.
 pub(crate) fn set_level(level: u16) {
     for channel in 0..2 {
         DAC3.dhr12r(channel).write(|w| w.set_dhr(level));
@@ -68,15 +66,15 @@ pub(crate) fn set_level(level: u16) {
 
 /// Why a comparator's level was not found.
 pub(crate) enum Unfound {
-    /// It does not trip at 0, or does at full scale.
+    /// It does not trip at 0, or trips at full scale.
     Stuck,
-    /// The bridge conducts, or began to: it needs the comparators.
+    /// The bridge conducts, or started to: it needs the comparators.
     Conducts,
 }
 
-/// The highest level, of 4096, at which a comparator would trip now. None of them breaks the PWM meanwhile, for
-/// 0.2 ms, or, after the bridge has begun to conduct, for 30 µs of this function's own time: interrupts come
-/// on top. Nothing is touched where it conducts already. The control's own trip goes on throughout.
+/// Returns the highest level, out of 4096, at which a comparator would trip now. Meanwhile no comparator breaks
+/// the PWM, for 0.2 ms or, once the bridge starts to conduct, for 30 µs of this function's own time, plus
+/// interrupts. If it already conducts, nothing is touched. The control's own trip stays active throughout.
 pub(crate) fn search(comparator: usize) -> Result<u16, Unfound> {
     if conducts() {
         return Err(Unfound::Conducts);
@@ -91,7 +89,7 @@ pub(crate) fn search(comparator: usize) -> Result<u16, Unfound> {
     let found = bisect(COMPARATORS[comparator]);
     set_level(given);
     cortex_m::asm::delay(SETTLE);
-    // Bits written as 1 stay as they are.
+    // Writing 1 leaves bits unchanged.
     let mut others = SrAdv(!0);
     others.set_bif(0, false);
     TIM1.sr().write_value(others);
@@ -123,8 +121,8 @@ fn bisect(comparator: Comp) -> Result<u16, Unfound> {
     Ok(low)
 }
 
-/// Returns true if a switch is on, or may be from the next commutation on: a leg that is off keeps its low side's
-/// output disabled.
+/// Returns true if a switch is on, or may be from the next commutation on: a leg that is off keeps its low
+/// side's output disabled.
 fn conducts() -> bool {
     let enables = TIM1.ccer().read();
     TIM1.bdtr().read().moe() && (0..3).any(|channel| enables.ccne(channel))

@@ -1,4 +1,4 @@
-//! The two converters: injected sequences at the PWM timer's trigger, and readings in between.
+//! The two converters: injected sequences triggered by the PWM timer, and readings in between.
 
 use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::adc::regs::{Cr, Jsqr};
@@ -8,21 +8,20 @@ use embassy_stm32::pac::{ADC1, ADC2, ADC12_COMMON, RCC};
 
 use super::TIMER_HZ;
 
-/// TIM1_TRGO among the triggers of an injected sequence (RM0440, ADC1/2 injected channels' external
-/// triggers).
+/// TIM1_TRGO among the injected triggers (RM0440, ADC1/2 injected channels' external triggers).
 const TIM1_TRGO: u8 = 0;
 
-/// The longest start of a converter's regulator, in processor clocks: 20 µs (data sheet).
+/// Maximum start-up time of a converter's regulator, in processor clocks: 20 µs (data sheet).
 const REGULATED: u32 = TIMER_HZ / 1_000_000 * 20;
 
-/// More than the four clocks of the converters that must pass between calibration and switching on
-/// (RM0440, calibration), in processor clocks.
+/// More than the four converter clocks required between calibration and enabling (RM0440, calibration), in
+/// processor clocks.
 const CALIBRATED: u32 = 100;
 
-/// A quarter of [`TIMER_HZ`], 42.5 MHz; 60 MHz is the most.
+/// A quarter of [`TIMER_HZ`], 42.5 MHz; the maximum is 60 MHz.
 const DIVIDER: Presc = Presc::DIV4;
 
-/// Calibrates both converters and switches them on. To be called once, after a reset.
+/// Calibrates and enables both converters. Call it once, after a reset.
 pub(crate) fn switch_on() {
     RCC.ahb2enr().modify(|w| w.set_adc12en(true));
     ADC12_COMMON.ccr().write(|w| w.set_presc(DIVIDER));
@@ -39,8 +38,8 @@ pub(crate) fn switch_on() {
     }
 }
 
-/// Has a converter convert these channels, each with its sampling time, at each trigger of TIM1. The end
-/// of the sequence is an interrupt if it `interrupts`.
+/// Makes a converter convert these channels, each with its sampling time, on every TIM1 trigger. With
+/// `interrupts`, the end of the sequence raises an interrupt.
 pub(crate) fn convert(converter: Adc, sequence: &[(u8, SampleTime)], interrupts: bool) {
     let mut ranks = Jsqr(0);
     ranks.set_jl(sequence.len() as u8 - 1);
@@ -55,7 +54,7 @@ pub(crate) fn convert(converter: Adc, sequence: &[(u8, SampleTime)], interrupts:
     command(converter, |w| w.set_jadstart(true));
 }
 
-/// Sets a channel's sampling time: while nothing is converted (RM0440, ADC_SMPR1).
+/// Sets a channel's sampling time; only while nothing is converting (RM0440, ADC_SMPR1).
 fn sample_for(converter: Adc, channel: u8, time: SampleTime) {
     let channel = usize::from(channel);
     if channel < 10 {
@@ -66,9 +65,8 @@ fn sample_for(converter: Adc, channel: u8, time: SampleTime) {
     }
 }
 
-/// Gives a converter that is supplied an order: what it is at stays as it is. Its orders are bits that are set by
-/// ones and left by zeros (RM0440, ADC_CR), so one that has ended since it was read would be given again by being
-/// written back.
+/// Gives a powered converter a command without disturbing its state. Command bits are set by writing 1 and
+/// ignore 0 (RM0440, ADC_CR), so a read-modify-write could repeat one that ended after the read.
 fn command(converter: Adc, order: impl FnOnce(&mut Cr)) {
     converter.cr().write(|w| {
         w.set_advregen(true);
@@ -76,29 +74,30 @@ fn command(converter: Adc, order: impl FnOnce(&mut Cr)) {
     });
 }
 
-/// Tries of a reading, so that a task is not held up for ever.
+/// Attempts at a reading, so that a task is not held up forever.
 const TRIES: u32 = 8;
 
-/// A reading of one of the first converter's pins, between its injected ones.
+/// Reads one of the first converter's pins, between its injected conversions.
 pub(crate) struct Reading {
-    /// The last one that no injected conversion came near.
+    /// The last reading that no injected conversion disturbed.
     counts: u16,
 }
 
 impl Reading {
-    /// Readings of a channel. To be made once the converters are on, and before the first one's sequence.
+    /// Prepares readings of a channel. Call it once the converters are enabled, before the first one's
+    /// sequence.
     pub(crate) fn new(channel: u8) -> Self {
         ADC1.sqr1().write(|w| w.set_sq(0, channel));
         sample_for(ADC1, channel, SampleTime::CYCLES92_5);
         Self { counts: 0 }
     }
 
-    /// The reading, of 4096. For the tasks: it waits for it, some 8 µs, or as often as it is disturbed.
+    /// Returns the reading, out of 4096. For tasks: it waits some 8 µs, or as often as it is disturbed.
     /// `periods` counts the control periods, each of which follows injected conversions.
     ///
-    /// A regular conversion after injected ones may be one of channel 0 (ES0431, 2.5.8): it counts where
-    /// another stands before it and no period has gone by since. Both take half of the fastest PWM's
-    /// period; if something else holds them up each time, the reading before stays.
+    /// A regular conversion after injected ones may be of channel 0 (ES0431, 2.5.8), so a reading counts only
+    /// after another one, with no period in between. Both take half of the fastest PWM period; if something
+    /// else delays them every time, the previous reading stays.
     pub(crate) fn counts(&mut self, periods: impl Fn() -> u32) -> u16 {
         for _ in 0..TRIES {
             let before = periods();

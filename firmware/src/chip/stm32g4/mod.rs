@@ -22,24 +22,24 @@ pub(crate) const INTERRUPTS: usize = 102;
 /// The interrupt at the end of the injected conversions.
 pub(crate) const CONVERTED: interrupt::Interrupt = interrupt::ADC1_2;
 
-/// Word of the converter's block at which the injected readings begin: JDR1 at 0x80.
+/// Word offset of the injected readings in a converter's registers: JDR1 at 0x80.
 pub(crate) const READINGS_AT_WORD: usize = 0x80 / 4;
 
-/// Takes the interrupt's request back. The first converter's sequence is the longer one.
+/// Clears the interrupt request. The first converter's sequence is the longer one.
 #[inline(always)] // in each period
 pub(crate) fn acknowledge(converters: &[Adc; 2]) {
     converters[0].isr().write(|w| w.set_jeos(true));
 }
 
-/// A processor that has locked up turns the bridge off by the timer's break.
+/// Makes a processor lockup turn the bridge off, by the timer's break.
 pub(crate) fn break_on_lock_up() {
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
 }
 
-/// Returns true if the watchdog has caused the last reset; to be asked once.
+/// Returns true if the watchdog caused the last reset. Call it only once.
 pub(crate) fn take_watchdog_reset() -> bool {
     let starved = pac::RCC.csr().read().iwdgrstf();
-    // The flags stay until they are removed.
+    // The flags persist until cleared.
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
     starved
 }

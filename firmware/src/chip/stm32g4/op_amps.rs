@@ -1,11 +1,10 @@
-//! The op-amps.
+//! Op-amps.
 
 use embassy_stm32::pac::opamp::Opamp;
 use embassy_stm32::pac::opamp::vals::{PgaGain, VmSel, VpSel};
 
-/// Turns an op-amp on that amplifies its first input by 16, from the level at its VINM0 and not from the
-/// chip's ground; its output goes to a converter inside the chip or to its pin. The pins are analogue, as
-/// the reset has left them.
+/// Enables an op-amp that amplifies its first input by 16 relative to its VINM0, not to the chip's ground. Its
+/// output goes to a converter inside the chip, or to its pin. The pins are analogue, as after reset.
 pub(crate) fn amplify_by_16(op_amp: Opamp, inside: bool) {
     op_amp.csr().write(|w| {
         w.set_opahsm(true);

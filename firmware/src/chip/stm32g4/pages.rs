@@ -1,4 +1,4 @@
-//! Words and pages of the flash (RM0440, section 3.3).
+//! Flash words and pages (RM0440, section 3.3).
 
 use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::regs::Cr;
@@ -6,17 +6,17 @@ use embassy_stm32::pac::flash::regs::Cr;
 /// Bytes programmed at once.
 pub(crate) const WORD_BYTES: usize = 8;
 
-/// Bytes erased at once: 22 ms.
+/// Bytes erased at once: takes 22 ms.
 pub(crate) const PAGE_BYTES: usize = 2048;
 
-/// The control register while words are programmed.
+/// Returns the control register's value for programming words.
 pub(crate) fn programming() -> Cr {
     let mut control = Cr(0);
     control.set_pg(true);
     control
 }
 
-/// The control register before a page is erased.
+/// Returns the control register's value for erasing a page.
 pub(crate) fn erasing(page: usize) -> Cr {
     let mut control = Cr(0);
     control.set_per(true);
@@ -24,14 +24,14 @@ pub(crate) fn erasing(page: usize) -> Cr {
     control
 }
 
-/// Returns true if a word of the main flash was read that has two wrong bits or more, as one that a
-/// loss of power has cut off, and clears the flag for the next one. The word reads as it is.
+/// Returns true if a word with two or more wrong bits was read from main flash, as one torn by a loss of power,
+/// and clears the flag for the next. The word reads as it is.
 ///
-/// Which word it was is not looked at: RM0440 (3.7.7) does not say whether ADDR_ECC counts bytes or double
+/// It does not check which word it was: RM0440 (3.7.7) does not say whether ADDR_ECC counts bytes or double
 /// words.
 pub(crate) fn take_torn_word() -> bool {
     let status = FLASH.eccr().read();
-    // Flags are removed by ones.
+    // Writing 1 clears flags.
     FLASH.eccr().write_value(status);
     status.eccd() && !status.sysf_ecc()
 }

@@ -1,22 +1,22 @@
-//! Pins that are set up once and stay as they are.
+//! Pins with a fixed function, set up once.
 
 use embassy_stm32::pac;
 use embassy_stm32::pac::gpio::Gpio;
 use embassy_stm32::pac::gpio::vals::{Moder, Ospeedr, Pupdr};
 
-/// The use of a pin. One that is not set up is analogue, as the reset has left it.
+/// What a pin is used for. Pins not set up stay analogue, as after reset.
 #[derive(Clone, Copy)]
 pub(crate) enum Use {
-    /// A gate signal, by this alternate function: as fast as a pin is, and pulled down, so that the gate
-    /// is off while nothing drives it.
+    /// Gate signal by this alternate function: fastest edges, and pulled down so that the gate is off while
+    /// nothing drives it.
     Gate(u8),
-    /// An output that is low for ever.
+    /// Output, always low.
     Low,
-    /// An input that is pulled up.
+    /// Input with pull-up.
     PulledUp,
 }
 
-/// A port of the chip. The PAC's own ports are addresses, which a constant cannot compare.
+/// A port. The PAC's ports are addresses, which cannot be compared in a constant.
 #[derive(Clone, Copy)]
 pub(crate) enum Port {
     A,
@@ -34,10 +34,10 @@ impl Port {
     }
 }
 
-/// A port, the number of a pin there, and what the pin is for.
+/// A port, a pin number in it, and the pin's use.
 pub(crate) type Pin = (Port, u8, Use);
 
-/// Whether each pin and its alternate function exist and no pin is named twice.
+/// Returns true if every pin and its alternate function exist and no pin appears twice.
 pub(crate) const fn exist_once(pins: &[Pin]) -> bool {
     let mut named = [0_u16; 3];
     let mut at = 0;
@@ -56,7 +56,7 @@ pub(crate) const fn exist_once(pins: &[Pin]) -> bool {
     true
 }
 
-/// Sets pins up. What they do comes last, so that none does anything else before.
+/// Sets up pins. The mode comes last, so that no pin does anything else in between.
 pub(crate) fn set_up(pins: &[Pin]) {
     for &(port, number, for_what) in pins {
         let port = port.registers();
