@@ -1,8 +1,8 @@
-//! The time, as the tasks have it.
+//! The tasks' time.
 
 use embassy_time::Instant;
 
-/// The time. Never inlined: the driver's code would stand in each place that asks for it.
+/// Returns the time. Never inlined: the driver's code would be copied to every caller.
 #[inline(never)]
 pub(super) fn now() -> Instant {
     Instant::now()

@@ -1,5 +1,4 @@
-//! Slow protection: the transistors' temperature. The supply's voltage and the currents are the
-//! control's.
+//! Slow protection: transistor temperature. Supply voltage and currents are the control's.
 
 use embassy_time::{Duration, Instant};
 
@@ -10,7 +9,7 @@ use crate::board::{self, NTC, Temperature};
 use crate::interrupt::sample::sample;
 use crate::interrupt::{self, Registers};
 
-/// Time between two readings: the board's copper takes seconds to warm.
+/// Time between two readings: the board's copper takes seconds to warm up.
 const EVERY: Duration = Duration::from_millis(10);
 
 /// The readings.
@@ -21,7 +20,7 @@ pub(crate) struct Health {
 }
 
 impl Health {
-    /// One that has read nothing yet.
+    /// Creates it without a reading.
     pub(crate) fn new(sensor: Temperature) -> Self {
         Self {
             sensor,
@@ -30,7 +29,7 @@ impl Health {
         }
     }
 
-    /// Takes the reading that is due.
+    /// Takes a reading when due.
     pub(crate) fn look(&mut self, now: Instant) {
         if now >= self.due {
             self.due = now + EVERY;
@@ -38,8 +37,7 @@ impl Health {
         }
     }
 
-    /// Temperature of the transistors, °C; not a number if the sensor is torn off, or
-    /// has not been read.
+    /// Returns the transistor temperature, °C; NaN if the sensor is disconnected or not read yet.
     pub(crate) fn temperature_c(&self) -> f32 {
         self.temperature_c
     }
@@ -48,7 +46,7 @@ impl Health {
 /// For the self-test.
 impl Probe for Health {
     fn sample(&mut self) -> Sample {
-        // The converters read again once a period, also between two of these readings.
+        // The converters read again every period, possibly between two of these reads.
         sample(&Registers::CHIP)
     }
 

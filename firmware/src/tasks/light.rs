@@ -1,20 +1,20 @@
-//! The light, by which a person without a ground station sees trouble.
+//! The light, which shows trouble to a user without a ground station.
 
 use embassy_stm32::gpio::Output;
 use embassy_time::{Duration, Instant};
 use siskin_control::drive::Snapshot;
 
-/// Flashes once when all is well, and as often as the fault with the lowest number has it; then comes a
-/// pause. Dark: the control does not run. Even blinking is not from here: [`crate::damaged`].
+/// Flashes once when all is well, or as often as the lowest-numbered fault requires, followed by a pause. Dark
+/// means that the control is not running. Even blinking comes from [`crate::damaged`].
 pub(crate) struct Light {
     pin: Output<'static>,
     due: Instant,
-    /// Times of light and of darkness until the pattern begins again.
+    /// Light and dark times left until the pattern repeats.
     steps: u8,
 }
 
 impl Light {
-    /// One that is dark.
+    /// Creates a dark light.
     pub(crate) fn new(pin: Output<'static>) -> Self {
         Self {
             pin,
@@ -23,7 +23,7 @@ impl Light {
         }
     }
 
-    /// Shows the pattern that is due. If all is well, a flight controller may have ordered it to be on.
+    /// Shows the pattern that is due. If all is well, a flight controller may have ordered the light on.
     pub(crate) fn look(&mut self, now: Instant, snapshot: Option<&Snapshot>, ordered: bool) {
         if now < self.due {
             return;

@@ -1,6 +1,6 @@
 //! The ESC's tasks outside the throttle: MAVLink on the board's serial port, telemetry, requests.
 //!
-//! One task owns the [`Esc`], and with it the parameters; bytes come in and go out by DMA.
+//! One task owns the [`Esc`], and with it the parameters; bytes go in and out by DMA.
 
 use embassy_futures::select::{Either, select};
 use embassy_stm32::mode::Async;
@@ -24,26 +24,26 @@ use crate::{interrupt, last_words};
 /// Time between two polls.
 const POLL: Duration = Duration::from_millis(1);
 
-/// Bytes that wait to be sent: replies to a burst of requests, 90 ms of the slowest link.
+/// Bytes waiting to be sent: replies to a burst of requests, 90 ms of the slowest link.
 static OUT: Pipe<CriticalSectionRawMutex, 1024> = Pipe::new();
 
-/// Sends for ever.
+/// Sends forever.
 #[embassy_executor::task]
 pub(crate) async fn transmit(mut line: UartTx<'static, Async>) -> ! {
     let mut bytes = [0; 64];
     loop {
         let count = OUT.read(&mut bytes).await;
-        // An error on the line itself cannot be reported over it.
+        // An error on the line cannot be reported over it.
         let _ = line.write(&bytes[..count]).await;
     }
 }
 
-/// A whole frame, or, if the line is behind, nothing: half a frame would spoil the next as well.
+/// Queues a whole frame, or nothing if the line is behind: half a frame would spoil the next one too.
 fn send(mut frame: &[u8]) {
     if OUT.free_capacity() < frame.len() {
         return;
     }
-    // In two parts if it goes over the end of the ring.
+    // In two parts if it wraps around the end of the ring.
     while !frame.is_empty()
         && let Ok(count) = OUT.try_write(frame)
     {
@@ -51,11 +51,11 @@ fn send(mut frame: &[u8]) {
     }
 }
 
-/// Polls between the last byte's leaving for the line and a restart: the line still has 64 of them,
-/// 6 ms at the lowest speed.
+/// Polls from the time the queue is empty until a restart: the line still has 64 bytes, 6 ms at the lowest
+/// speed.
 const RESTART_POLLS: u8 = 10;
 
-/// The state of the ESC's task.
+/// State of the ESC's task.
 pub struct MainTask<'a> {
     pub(crate) esc: &'a mut Esc,
     pub(crate) throttle: Port,
@@ -68,17 +68,17 @@ pub struct MainTask<'a> {
     pub(crate) teller: Teller,
     pub(crate) light: Light,
     pub(crate) supervisor: Supervisor,
-    /// True if the interrupt is still to be given the configuration in force.
+    /// The interrupt has yet to receive the configuration in force.
     pub(crate) changed: bool,
-    /// The bound of the phase currents that the hardware's trip stands above, A.
+    /// Phase current limit that the hardware trip is set for, A.
     pub(crate) limit_a: f32,
-    /// Polls until the chip restarts, if it is to.
+    /// Polls until the chip restarts, once requested.
     pub(crate) restart_polls: Option<u8>,
 }
 
-// Each out of line: the stack that one takes is free for the next.
+// Each out of line, so that the stack one takes is free for the next.
 impl MainTask<'_> {
-    /// Attends to the ESC for ever.
+    /// Serves the ESC forever.
     pub async fn attend(&mut self) -> ! {
         let mut ticker = Ticker::every(POLL);
         let mut bytes = [0; 64];
@@ -100,7 +100,7 @@ impl MainTask<'_> {
     }
 
     fn poll(&mut self) {
-        // No bytes tell a receiver that time has passed: what a false start held back is searched.
+        // Empty input tells the receiver that time has passed: it rescans what a false start held back.
         self.receive(&[]);
         if !self.look() {
             return;
@@ -113,8 +113,8 @@ impl MainTask<'_> {
         self.restart();
     }
 
-    /// Takes in what the interrupt and the board report, and lets the ESC act. Returns false while the
-    /// interrupt has not reported anything.
+    /// Takes in what the interrupt and the board report, and lets the ESC act. Returns false until the
+    /// interrupt has reported something.
     #[inline(never)] // its stack is free for what comes next
     fn look(&mut self) -> bool {
         let now = now();
@@ -168,7 +168,7 @@ impl MainTask<'_> {
             .map_err(|error| error.reason)
     }
 
-    /// Restarts the chip when it has been asked to and the acknowledgement is gone.
+    /// Restarts the chip when requested, once the acknowledgement is gone.
     fn restart(&mut self) {
         let Some(polls) = &mut self.restart_polls else {
             return;
@@ -181,18 +181,18 @@ impl MainTask<'_> {
         }
     }
 
-    /// Gives the interrupt the configuration from the parameters, once it has a place for it.
+    /// Gives the interrupt the configuration from the parameters, once there is a slot for it.
     #[inline(never)] // its stack is free for what comes next
     fn configure(&mut self) {
         if !self.changed {
             return;
         }
         let esc = &self.esc;
-        // It can be built, since it has been before.
+        // It builds, since it has before.
         self.changed = !self.config.offer(|place| esc.config_in(place).is_ok());
     }
 
-    /// Has the hardware's trip follow `LIM_PHASE_A`: up before the control does, and down after it.
+    /// Makes the hardware trip follow `LIM_PHASE_A`: raised before the control's, lowered after it.
     #[inline(never)] // its stack is free for what comes next
     fn limit(&mut self) {
         let Some(snapshot) = self.snapshot.read() else {

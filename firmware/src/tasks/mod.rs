@@ -1,11 +1,11 @@
-//! The tasks beside the control's interrupt.
+//! Tasks around the control interrupt.
 //!
 //! | task | does | where |
 //! |---|---|---|
-//! | `throttle::listen` | edges into set-points and answers | an executor of its own, above the others |
-//! | `main`, by [`MainTask::attend`] | the ESC: MAVLink in, telemetry, storage, health, light, watchdog | thread |
-//! | `mavlink::transmit` | MAVLink out | thread |
-//! | `kiss::transmit` | telemetry on the serial line | thread |
+//! | `throttle::listen` | edges into set-points and answers | its own executor, above the others |
+//! | `main`, by [`MainTask::attend`] | the ESC: MAVLink in, telemetry, storage, health, light, watchdog | thread mode |
+//! | `mavlink::transmit` | MAVLink out | thread mode |
+//! | `kiss::transmit` | telemetry on the serial line | thread mode |
 
 mod clock;
 pub(crate) mod health;

@@ -1,4 +1,4 @@
-//! The start of everything.
+//! Starts everything.
 
 use embassy_executor::Spawner;
 use embassy_stm32::uid::uid;
@@ -26,13 +26,13 @@ use crate::storage::{Storage, range};
 use crate::text::push;
 use crate::{exchange, interrupt, last_words};
 
-/// Age at which the interrupt stops obeying a set-point: ten missed renewals.
+/// Set-point age at which the interrupt stops obeying it: ten missed renewals.
 const STALE_S: f32 = 0.01;
 
-/// Bytes that come in between two looks of the task: 5 ms of the fastest link.
+/// Bytes received between two looks of the task: 5 ms of the fastest link.
 const LINE_BYTES: usize = 512;
 
-/// Starts the control's interrupt and all tasks but the ESC's own, which has what is returned.
+/// Starts the control interrupt and all tasks except the ESC's own, which it returns.
 ///
 /// # Panics
 /// If called again.
@@ -51,7 +51,7 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     }
     let pwm_hz = esc.params().get(ParamId::PwmFreqHz);
     let baud = esc.params().get(ParamId::TelBaud) as u32;
-    // One of them has the pin of the serial line on some boards.
+    // On some boards Hall sensors share a pin with the serial line.
     let has_hall_sensors = esc.params().chosen(CtlObserver::Hall);
 
     let stale_periods = (pwm_hz * STALE_S) as u32;
@@ -96,25 +96,24 @@ pub fn start(spawner: Spawner, mut hardware: Hardware, esc: &mut Esc, fit: Fit) 
     }
 }
 
-/// How the stored parameters fit the board.
+/// How well the stored parameters fit the board.
 #[derive(Default)]
 pub enum Fit {
-    /// They do.
+    /// They fit.
     #[default]
     Whole,
-    /// They do with the board's dead time.
+    /// They fit with the board's dead time.
     Raised,
-    /// They do not.
+    /// They do not fit.
     Refused,
 }
 
-/// The ESC with the parameters as they were left or, if they do not fit the board, with the defaults. All
-/// that is stored is read twice: beside the ESC that is being made, the stack has room for the
-/// parameters alone.
+/// Creates the ESC with the stored parameters or, if they do not fit the board, with the defaults. The store is
+/// read twice: while the ESC is constructed, the stack only has room for the parameters.
 ///
 /// # Panics
 /// If the defaults do not fit the board.
-// Out of line, as what follows: the stack that one takes is free for the next.
+// Out of line, like the functions below: the stack one takes is free for the next.
 #[inline(never)]
 pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
     let board = board();
@@ -132,7 +131,7 @@ pub fn power_up(flash: &mut Storage, fit: &mut Fit) -> Esc {
     Esc::unchecked(params, board, bytes_per_s)
 }
 
-/// Has the ESC tell what became of the stored parameters.
+/// Makes the ESC report what became of the stored parameters.
 #[inline(never)] // its stack is free for what comes next
 fn tell(esc: &mut Esc, fit: Fit) {
     let mut warning = Warning::new();
@@ -152,7 +151,7 @@ fn tell(esc: &mut Esc, fit: Fit) {
     esc.warn(warning);
 }
 
-/// This board, with its number.
+/// Returns this board, with its serial number.
 fn board() -> Board {
     Board {
         image: Image {
@@ -178,7 +177,7 @@ fn open_port(params: &Params) -> Port {
     Port::open(|| Throttle::new(TICK_HZ, params, &board()))
 }
 
-/// The control's interrupt with what the parameters make.
+/// Starts the control interrupt with the parameters' configuration.
 #[inline(never)] // its stack is free for what comes next
 fn start_interrupt(esc: &Esc, bridge: Bridge, converters: Converters, end: InterruptEnd) {
     interrupt::set_trip(esc.params().get(ParamId::LimPhaseA));

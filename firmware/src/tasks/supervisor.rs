@@ -1,6 +1,5 @@
-//! The watchdog, fed only by proof of life from the control's interrupt and from the throttle's task,
-//! in the task that attends to the rest: if one of them stops, the chip restarts, and the
-//! bridge is off. An interrupt that stops is noticed sooner.
+//! Feeds the watchdog, from the main task, only while the control interrupt and the throttle task prove that
+//! they are alive: if one stops, the chip restarts with the bridge off. A stopped interrupt is noticed sooner.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -12,21 +11,21 @@ use embassy_time::{Duration, Instant};
 use crate::interrupt;
 use crate::last_words::{DETAILS, Failure, fail};
 
-/// The watchdog outlasts the longest that the tasks are held up: the erase of a sector, at most 0.8 s
-/// (DS8626, table 40), and as much again.
+/// The watchdog's period: twice the longest that the tasks are held up, which is the erase of a sector, at most
+/// 0.8 s (DS8626, table 40).
 const WATCHDOG_US: u32 = 1_600_000;
 
-/// Time between two looks at the others; each shows within it that it lives.
+/// Time between two looks at the others; each must show a sign of life within it.
 const LOOK: Duration = Duration::from_millis(50);
 
 static THROTTLE: AtomicU32 = AtomicU32::new(0);
 
-/// Shows that the throttle's task lives.
+/// Shows that the throttle task is alive.
 pub(crate) fn throttle_lives() {
     THROTTLE.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The state of the task that feeds the watchdog.
+/// State of the task that feeds the watchdog.
 pub(crate) struct Supervisor {
     watchdog: IndependentWatchdog<'static, IWDG>,
     due: Instant,
@@ -41,21 +40,21 @@ impl Supervisor {
         watchdog.unleash();
         Self {
             watchdog,
-            // The first look takes all to live: no count has come that far.
+            // The first look finds everything alive: no count is this high yet.
             due: Instant::MIN,
             periods: u32::MAX,
             throttle: u32::MAX,
         }
     }
 
-    /// Feeds the watchdog when it is due, as long as all live.
+    /// Feeds the watchdog when due, as long as everything is alive.
     pub(crate) fn look(&mut self, now: Instant) {
         if now < self.due {
             return;
         }
         self.due = now + LOOK;
         let periods = interrupt::periods();
-        // The bridge would keep its last duties until the watchdog's time is over.
+        // Otherwise the bridge would keep its last duties until the watchdog's period is over.
         if periods == self.periods {
             fail(Failure::Standstill, [0; DETAILS]);
         }

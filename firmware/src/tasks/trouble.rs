@@ -10,7 +10,7 @@ use crate::text::{push, push_decimal};
 /// Time between two texts, so that they do not fill the link.
 const APART: Duration = Duration::from_secs(5);
 
-/// Counts of trouble since the start.
+/// Counts of trouble since start-up.
 pub(crate) struct Trouble {
     lost_edges: AtomicU32,
     late_replies: AtomicU32,
@@ -23,25 +23,25 @@ pub(crate) static TROUBLE: Trouble = Trouble {
 };
 
 impl Trouble {
-    /// Edges came faster than they were taken in.
+    /// Counts edges that came faster than they were taken in.
     pub(crate) fn lost_edges(&self) {
         self.lost_edges.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// A reply was not ready at its time, and not sent.
+    /// Counts a reply that was not ready in time and not sent.
     pub(crate) fn late_reply(&self) {
         self.late_replies.fetch_add(1, Ordering::Relaxed);
     }
 }
 
-/// Tells a person of new trouble, now and then.
+/// Warns the user of new trouble at intervals.
 pub(crate) struct Teller {
     told: [u32; 2],
     told_at: Instant,
 }
 
 impl Teller {
-    /// One that has reported nothing yet.
+    /// Creates it with nothing reported.
     pub(crate) const fn new() -> Self {
         Self {
             told: [0; 2],
@@ -49,7 +49,7 @@ impl Teller {
         }
     }
 
-    /// The warning that is due, if any.
+    /// Returns the warning that is due, if any.
     pub(crate) fn next(&mut self, now: Instant) -> Option<Warning> {
         let counts =
             [&TROUBLE.lost_edges, &TROUBLE.late_replies].map(|count| count.load(Ordering::Relaxed));
@@ -60,7 +60,7 @@ impl Teller {
         self.told_at = now;
         let mut text = Warning::new();
         let [lost, late] = counts;
-        // 47 letters at the most: it fits.
+        // At most 47 characters: it fits.
         push(&mut text, "Throttle: ");
         push_decimal(&mut text, lost);
         push(&mut text, " gaps, ");

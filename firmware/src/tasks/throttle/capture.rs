@@ -1,7 +1,7 @@
-//! The wire's edges: the timer takes the times of the rising ones by one of its channels and those of the
-//! falling ones by another, each into a ring in memory by DMA, so that an edge costs no interrupt.
+//! The wire's edges: the timer captures the times of rising edges on one channel and of falling ones on
+//! another, each into a ring in memory by DMA, so that an edge costs no interrupt.
 //!
-//! The processor looks at the rings when a frame should be whole.
+//! The processor looks at the rings when a frame should be complete.
 
 use core::ptr;
 use core::sync::atomic::AtomicU32;
@@ -15,14 +15,14 @@ use crate::board::wire::{CAPTURE, CaptureTimer, PRESCALER, SIGNAL_CHANNEL, TICK_
 use crate::chip::capture::{capture_on, wait_for_alarm, wait_for_edge};
 use crate::edges::{Edges, LEN, Memory};
 
-/// An edge that is younger may not be in memory yet: the DMA takes some ten clocks of its bus, and
-/// more while it serves others. 0.5 µs.
+/// A younger edge may not be in memory yet: the DMA takes some ten clocks of its bus, more while it serves
+/// others. 0.5 µs.
 const SETTLED_TICKS: u32 = TICK_HZ / 2_000_000;
 
-/// The greatest value of the timer's counter.
+/// The counter's maximum.
 const COUNTER_MASK: u32 = u32::MAX >> (32 - TIMER_BITS);
 
-/// Ticks of a time.
+/// Converts a time to ticks.
 pub(super) const fn ticks_of_us(time_us: u32) -> u32 {
     (TICK_HZ as u64 * time_us as u64 / 1_000_000) as u32
 }
@@ -30,13 +30,13 @@ pub(super) const fn ticks_of_us(time_us: u32) -> u32 {
 /// The edges of the wire.
 pub(crate) struct Capture {
     pub(super) edges: Edges<TIMER_BITS>,
-    /// Of the rising ones' times, and of the falling ones', into memory.
+    /// DMA transfers of rising and falling edge times into memory.
     transfers: [dma::Transfer<'static>; 2],
 }
 
 impl Capture {
-    /// Starts the timer, which belongs to this from now on, as do the DMA's channels: that of its
-    /// first channel, and of its second. The pin leads to it.
+    /// Starts the timer, and takes it over along with the DMA channels of its first and second capture channel.
+    /// The pin must already lead to it.
     pub(crate) fn new(channels: [dma::Channel<'static>; 2], requests: [dma::Request; 2]) -> Self {
         static MEMORY: [Memory; 2] = [const { [const { AtomicU32::new(0) }; LEN] }; 2];
         static CHANNELS: StaticCell<[dma::Channel<'static>; 2]> = StaticCell::new();
@@ -63,8 +63,8 @@ impl Capture {
             options.circular = true;
             options.half_transfer_ir = false;
             options.complete_transfer_ir = false;
-            // SAFETY: the register is one of a timer that this owns for ever; the memory stays where it is and
-            // may change behind a shared reference.
+            // SAFETY: the register belongs to a timer that this owns for good; the memory does not move and may
+            // change behind a shared reference.
             unsafe { channel.read_raw(requests[index], register, words, options) }
         };
         let [first, second] = CHANNELS.init(channels);
@@ -81,12 +81,12 @@ impl Capture {
 }
 
 impl Capture {
-    /// The time, as [`Edges::now`] has it.
+    /// Returns the time; see [`Edges::now`].
     pub(super) fn now(&mut self) -> u32 {
         self.edges.now(CAPTURE.cnt().read())
     }
 
-    /// Waits for an edge, until a time at most. Returns true if one came.
+    /// Waits for an edge until a time at most. Returns true if one came.
     pub(super) async fn wait_for_edge(&mut self, due_ticks: u32) -> bool {
         let is_past = |now_ticks: u32| now_ticks.wrapping_sub(due_ticks) as i32 >= 0;
         let alarm_ticks = due_ticks & COUNTER_MASK;
@@ -96,7 +96,7 @@ impl Capture {
     /// Waits until a time.
     pub(super) async fn wait_until(&mut self, due_ticks: u32) {
         let is_past = |now_ticks: u32| now_ticks.wrapping_sub(due_ticks) as i32 >= 0;
-        // An alarm takes 2 µs to set.
+        // Setting an alarm takes 2 µs.
         if is_past(self.now()) {
             return;
         }
@@ -104,8 +104,8 @@ impl Capture {
         wait_for_alarm(CAPTURE, alarm_ticks, || is_past(self.now())).await;
     }
 
-    /// Takes in what has come. False if some were lost: the task was kept from its work for longer than
-    /// the memory lasts.
+    /// Takes in new edges. Returns false if some were lost: the task was held up for longer than the memory
+    /// lasts.
     pub(super) fn fill(&mut self) -> bool {
         let left = |ring: usize| self.transfers[ring].get_remaining_transfers() as usize;
         self.edges.fill(|| CAPTURE.cnt().read(), left)

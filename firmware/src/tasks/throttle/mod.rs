@@ -1,9 +1,8 @@
-//! The throttle's task: edges of the wire in, set-points to the interrupt and answers to the flight
-//! controller out.
+//! The throttle task: wire edges in, set-points to the interrupt and answers to the flight controller out.
 //!
-//! It runs in an executor of its own, above all other tasks: a bidirectional frame is answered
-//! 30 µs after its end. The other tasks reach what it knows by [`Port`], with all interrupts but
-//! the control's held off for that moment.
+//! It runs in its own executor, above all other tasks, since a bidirectional frame is answered 30 µs after its
+//! end. The other tasks access its data through [`Port`], with all interrupts but the control's masked
+//! meanwhile.
 
 mod capture;
 mod reply;
@@ -39,17 +38,17 @@ pub(crate) fn start(listener: Listener, replier: Replier) {
     spawner.spawn(listen(listener, replier).expect("spawned here and nowhere else"));
 }
 
-/// The throttle's side of the ESC, which tasks reach one at a time.
+/// The ESC's throttle side, which tasks access one at a time.
 type Shared = Mutex<CriticalSectionRawMutex, RefCell<&'static mut Throttle>>;
 
-/// A way to the throttle's side.
+/// Access to the throttle side.
 #[derive(Clone, Copy)]
 pub(crate) struct Port(&'static Shared);
 
 impl Port {
-    /// Makes the throttle's side where all tasks reach it; to be called once.
+    /// Creates the throttle side where all tasks can access it. Call it once.
     pub(crate) fn open(make: impl FnOnce() -> Throttle) -> Self {
-        // Made apart from its lock, with which it would be copied once more.
+        // Constructed apart from its lock, since moving it in would be another copy.
         static THROTTLE: StaticCell<Throttle> = StaticCell::new();
         static SHARED: StaticCell<Shared> = StaticCell::new();
         let throttle = THROTTLE.init_with(make);
@@ -63,35 +62,35 @@ impl Reach for Port {
     }
 }
 
-/// Never inlined: some twenty reaches have the check and its panic in common.
+/// Never inlined: some twenty accesses share the check and its panic.
 #[inline(never)]
 fn borrow<'a>(throttle: &'a RefCell<&'static mut Throttle>) -> RefMut<'a, &'static mut Throttle> {
     throttle.borrow_mut()
 }
 
-/// Longest time between two looks at the wire, which notice a lost signal and renew set-points.
+/// Longest time between two looks at the wire, which detect a lost signal and renew set-points.
 const RENEWAL_US: u32 = 1000;
 
-/// Times of the looks at the edges after a first one, the last one first. If nothing is known of what comes,
-/// DShot1200 and 600 are whole at the first and DShot300 at the second; at the last one DShot150 is, and all
-/// else is taken edge by edge.
+/// Times of looks after a first edge, last look first, while the signal is unknown. DShot1200 and 600 are
+/// complete at the first look and DShot300 at the second; at the last one DShot150 is, and everything else is
+/// taken edge by edge.
 const UNKNOWN_LOOKS_US: [u32; 3] = [120, 60, 30];
 
-/// Time of the look at a pulse after its first edge; a longer one's second edge is another first one.
+/// Time from a pulse's first edge to the look; if the pulse is longer, its second edge starts another look.
 const PULSE_LOOK_US: u32 = 30;
 
-/// Time of the look at a frame, in eighths of a bit after its first edge: its last edge is there (15
-/// bits and the 3/4 of a one), and half a bit for the DMA; and, if it was late, soon after.
+/// Time from a frame's first edge to the look, in eighths of a bit: its last edge has come (15 bits and the 3/4
+/// of a one) plus half a bit for the DMA; and, if it was late, soon after.
 const FRAME_LOOK_EIGHTHS: u32 = 129;
 const LATE_LOOK_EIGHTHS: u32 = 144;
 
-/// From the first edge of a bit to that of the next in the same frame it is never as long, in eighths of a bit.
+/// More than the time between leading edges within a frame, in eighths of a bit.
 const FRAME_APART_EIGHTHS: u32 = 16;
 
-/// Usual time from the alarm to the look: it then waits for the last edge.
+/// Usual time from the alarm to the look, which then waits for the last edge.
 const WAKING_US: u32 = 9;
 
-/// The task's own state, besides that of the replies.
+/// The task's own state, besides that of replies.
 pub(crate) struct Listener {
     pub(crate) port: Port,
     pub(crate) capture: Capture,
@@ -99,13 +98,13 @@ pub(crate) struct Listener {
     pub(crate) snapshot: &'static SnapshotReader,
 }
 
-/// Listens for ever.
+/// Listens forever.
 #[embassy_executor::task]
 pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
     let renewal_ticks = capture::ticks_of_us(RENEWAL_US);
     loop {
-        // What can be done before a frame comes is not to be done while it does, nor behind it: it is told as
-        // it was at the frame before, or `RENEWAL_US` ago.
+        // Prepare before a frame what need not wait for it: the reply then reports the state at the previous
+        // frame, or `RENEWAL_US` ago.
         let ready = listener.ready();
         let replies = ready.as_ref().filter(|ready| ready.may_reply());
         let mut armed = replies.map(|ready| replier.arm(ready.speed_bits));
@@ -126,17 +125,17 @@ pub(crate) async fn listen(mut listener: Listener, mut replier: Replier) -> ! {
     }
 }
 
-/// The state before a frame comes.
+/// State prepared before a frame comes.
 struct Ready {
     snapshot: Snapshot,
-    /// A reply's bits for its speed.
+    /// The reply bits for the snapshot's speed.
     speed_bits: u32,
-    /// The signal, if it is known.
+    /// The signal, if known.
     signal: Option<Signal>,
 }
 
 impl Ready {
-    /// Returns true if the signal is one that is answered on its wire, as far as is known.
+    /// Returns true unless the signal is known to be one that is not answered on its wire.
     fn may_reply(&self) -> bool {
         !matches!(
             self.signal,
@@ -151,20 +150,20 @@ impl Ready {
     }
 }
 
-/// A frame that is to be answered, and the reply to it on the wire.
+/// A frame to be answered, and its reply on the wire.
 struct Query {
     ask: Ask,
     reply: Option<Reply>,
 }
 
-/// Time of the look at the wire, from the first edge that has come.
+/// Planned looks at the wire, from the first edge on.
 struct Looks {
     begin_ticks: u32,
-    /// Times of those to come, ticks. All but the last one take a whole frame and nothing else.
+    /// Times of looks to come, ticks. All but the last one only take a whole frame.
     after_ticks: Vec<u32, 3>,
-    /// Until when the last edges of an expected frame are waited for.
+    /// How long to wait for the last edges of an expected frame.
     until_ticks: u32,
-    /// A frame whose answer cannot wait until it has been decoded.
+    /// A frame whose answer cannot wait for it to be processed.
     unheard: Option<Event>,
 }
 
@@ -173,14 +172,14 @@ impl Looks {
         self.after_ticks.pop()
     }
 
-    /// Returns true in the last one, or if no other is wanted.
+    /// Returns true in the last look, or if no other is needed.
     fn is_last(&self) -> bool {
         self.after_ticks.is_empty()
     }
 }
 
 impl Listener {
-    /// The drive as the next answer reports it; `None` before the first snapshot.
+    /// Returns the drive's state for the next answer; `None` before the first snapshot.
     fn ready(&mut self) -> Option<Ready> {
         let snapshot = self.snapshot.read()?;
         let (speed_bits, signal) = self
@@ -193,8 +192,7 @@ impl Listener {
         })
     }
 
-    /// A first edge has come: what follows is looked at until the line is quiet. Without one it is once, at
-    /// once.
+    /// Plans looks after a first edge, until the line is quiet; without an edge, one look right away.
     fn begin(&mut self, edge: bool, signal: Option<Signal>) -> Looks {
         self.fill();
         if let Some(Signal::Dshot {
@@ -204,7 +202,7 @@ impl Listener {
         {
             let apart_ticks = eighths_ticks(rate, FRAME_APART_EIGHTHS);
             let first = usize::from(bidirectional);
-            // Edge by edge a frame takes 140 µs: who is behind would stay behind.
+            // Edge by edge a frame takes 140 µs: a task that is behind would stay behind.
             if self.capture.edges.skip_to_last_frame(first, apart_ticks) {
                 TROUBLE.lost_edges();
             }
@@ -238,9 +236,9 @@ impl Listener {
         }
     }
 
-    /// Takes in what has come, and does what follows from it: a whole frame of the known signal at once,
-    /// which is soon enough for an answer in time, and all else edge by edge.
-    // Inlined, it is 0.2 KB more flash.
+    /// Takes in new edges and acts on them: a whole frame of the known signal at once, which is fast enough for
+    /// a timely answer, everything else edge by edge.
+    // Inlined, it would take 0.2 KB more flash.
     #[inline(never)]
     fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Query> {
         self.fill_with_frame(looks);
@@ -267,7 +265,7 @@ impl Listener {
         query
     }
 
-    /// Takes the edges from the DMA; all of a frame's, if the look is at one.
+    /// Takes the edges from the DMA, waiting for a complete frame if one is expected.
     fn fill_with_frame(&mut self, looks: &Looks) {
         let mut waits = !looks.is_last();
         loop {
@@ -275,7 +273,7 @@ impl Listener {
             if !waits || self.capture.edges.has_frame() {
                 return;
             }
-            // Once more when the time has passed: the last edge may have come while it was looked.
+            // Once more after the time has passed: the last edge may have come during the check.
             waits = self.capture.edges.is_before(looks.until_ticks);
         }
     }
@@ -303,7 +301,7 @@ impl Listener {
         }
         let (setpoint, Serial { kiss, info }) = self.port.reach(|throttle| {
             let setpoint = looks.unheard.as_ref().map(|event| {
-                // The answer to its request is being sent.
+                // The answer to its request is already being sent.
                 let _ = throttle.hear(now_us(), event);
                 throttle.setpoint()
             });
@@ -320,14 +318,14 @@ impl Listener {
         }
         if let Some(sending) = sending {
             let over_ticks = sending.end(&mut self.capture).await;
-            // What it has heard of itself. What came later is the next frame's, which may have begun.
+            // Skip the reply's own edges. Later ones belong to the next frame, which may have started.
             self.fill();
             self.capture.edges.skip_before(over_ticks);
         }
     }
 }
 
-/// What the edges that have come ask for; `None` if the next look is to tell.
+/// Returns what the new edges ask for; `None` leaves it to the next look.
 fn take_in(
     throttle: &mut Throttle,
     edges: &mut Edges<TIMER_BITS>,
@@ -337,21 +335,21 @@ fn take_in(
     let whole = edges.frame();
     if let Some(event) = whole.and_then(|(rests_high, bit)| throttle.whole(rests_high, bit)) {
         looks.after_ticks.clear();
-        // It may be none; the next look tells of what is lost.
+        // It may have failed; the next look reports the loss.
         let skipped = edges.skip_frame();
         skipped.then(|| hear(throttle, looks, event, ready))
     } else if looks.is_last() {
         Some(edge_by_edge(throttle, edges))
     } else {
         if throttle.signal().is_none() {
-            // The line had rested before: what was left of the edges then is none of this frame's.
+            // The line had rested before, so edges left from then are not part of this frame.
             let _ = throttle.settle(now_us(), looks.begin_ticks);
         }
         None
     }
 }
 
-/// A whole frame is heard at once, or behind its answer.
+/// Processes a whole frame now, or leaves it until after its answer.
 fn hear(
     throttle: &mut Throttle,
     looks: &mut Looks,
@@ -359,7 +357,7 @@ fn hear(
     ready: Option<&Ready>,
 ) -> Option<Ask> {
     let ask = Ask::of(&event);
-    // The wire is the sender's until it is known that an answer is wanted.
+    // The wire belongs to the sender until an answer is known to be wanted.
     let answers = throttle.signal().is_some() && ready.is_some();
     if ask.is_some_and(|ask| ask.bidirectional) && answers {
         looks.unheard = Some(event);
@@ -369,7 +367,7 @@ fn hear(
     }
 }
 
-/// All edges that have come, one after the other.
+/// Processes all new edges one by one.
 fn edge_by_edge(throttle: &mut Throttle, edges: &mut Edges<TIMER_BITS>) -> Option<Ask> {
     let (mut ask, now_us) = (None, now_us());
     edges.take(|at_ticks, level| {
@@ -378,12 +376,12 @@ fn edge_by_edge(throttle: &mut Throttle, edges: &mut Edges<TIMER_BITS>) -> Optio
     throttle.settle(now_us, edges.settled()).or(ask)
 }
 
-/// The time of the tasks.
+/// Returns the tasks' time.
 fn now_us() -> u64 {
     now().as_micros()
 }
 
-/// So many eighths of a bit of a frame; 144 are the most.
+/// Returns so many eighths of a bit in ticks; 144 at most.
 fn eighths_ticks(rate: Rate, eighths: u32) -> u32 {
     TICK_HZ / 8 * eighths / rate.bit_hz()
 }

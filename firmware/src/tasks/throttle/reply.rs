@@ -1,10 +1,10 @@
-//! The reply to a bidirectional frame, sent from the pin that the frame came in on.
+//! Sends the reply to a bidirectional frame, on the pin that the frame came in on.
 //!
-//! A second timer paces the DMA, which writes a word to the register that sets the pin's level at each
-//! bit: the capturing timer goes on counting.
+//! A second timer paces the DMA, which writes a word per bit to the register that sets the pin's level: the
+//! capture timer keeps counting.
 //!
-//! As much as possible is prepared before the frame has ended: at its end a few accesses start a reply
-//! that is due 30 µs later.
+//! As much as possible is prepared before the frame ends: then a few register accesses start a reply that is
+//! due 30 µs later.
 
 use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -19,7 +19,7 @@ use crate::board::wire::{
 };
 use crate::pace::delay_clocks;
 
-/// Bits of a reply, of which the last one is high in each, as the line rests ([`gcr::encode`]).
+/// Bits of a reply. The last is always high, like the line at rest ([`gcr::encode`]).
 const WORDS: usize = gcr::BITS as usize;
 
 /// Sends replies.
@@ -31,12 +31,12 @@ pub(crate) struct Replier {
 }
 
 impl Replier {
-    /// The pacing timer belongs to this from now on; the DMA's channel serves its update.
+    /// Takes over the pacing timer, and the DMA channel that serves its update.
     pub(crate) fn new(channel: dma::Channel<'static>, request: dma::Request) -> Self {
         embassy_stm32::rcc::enable_and_reset::<PaceTimer>();
         PACE.cr1().modify(|w| {
             w.set_arpe(true);
-            // An update that the program makes, to load the first period, is no request to the DMA.
+            // The update forced by software, to load the first period, must not request DMA.
             w.set_urs(Urs::COUNTER_ONLY);
         });
         Self {
@@ -46,16 +46,16 @@ impl Replier {
         }
     }
 
-    /// Makes ready to send a reply of these bits, or of others.
+    /// Prepares a reply with these bits, which may still change.
     pub(super) fn arm(&mut self, bits: u32) -> Armed<'_> {
         PACE.cnt().write(|w| w.set_cnt(0));
         write_words(&self.words, bits);
         let mut options = TransferOptions::default();
         options.complete_transfer_ir = false;
         let words = ptr::slice_from_raw_parts(self.words.as_ptr().cast::<u32>(), WORDS);
-        // SAFETY: what is written to the register moves the throttle's pin alone; the words live until the
-        // transfer has ended. They may change before it begins: they are read as they go out, but for the
-        // first, which the F405's stream may take at once and which is the start bit in every reply.
+        // SAFETY: writes to the register only move the throttle pin; the words live until the transfer has
+        // ended. They may change before it starts, since they are read as they go out; except the first, which
+        // the F405's stream may prefetch, and which is the start bit in every reply.
         let transfer = unsafe {
             self.channel
                 .write_raw(self.request, words, level_register(), options)
@@ -68,9 +68,9 @@ impl Replier {
     }
 }
 
-/// The words of a reply's bits.
+/// Fills in the words for a reply's bits.
 fn write_words(words: &[AtomicU32; WORDS], bits: u32) {
-    // The highest comes first.
+    // Highest bit first.
     let mut bits = bits << (32 - WORDS);
     for word in words {
         word.store(level_word(bits >> 31 == 1), Ordering::Relaxed);
@@ -78,24 +78,24 @@ fn write_words(words: &[AtomicU32; WORDS], bits: u32) {
     }
 }
 
-/// A reply that can begin.
+/// A reply that is ready to start.
 pub(super) struct Armed<'a> {
     words: &'a [AtomicU32; WORDS],
     bits: u32,
-    /// A dropped one ends.
+    /// Dropping it ends the transfer.
     _transfer: dma::Transfer<'a>,
 }
 
 impl<'a> Armed<'a> {
-    /// Begins to send a reply at its time; nothing, if that has passed.
+    /// Starts the reply at its time; returns `None` if that has passed.
     pub(super) fn begin(self, capture: &mut Capture, reply: &Reply) -> Option<Sending<'a>> {
         if reply.bits != self.bits {
             write_words(self.words, reply.bits);
         }
         let bit_clocks = (PACE_HZ / reply.bit_hz - 1) as u16;
-        // The first update comes at the reply's time and the others a bit apart each: what is written
-        // to the period is loaded by the next update. The control's interrupt would take 3 µs between
-        // reading the time and the start: it waits for these 0.3 µs.
+        // The first update comes at the reply's time and the others one bit apart: what is written to the
+        // period is loaded at the next update. The control interrupt would take 3 µs between reading the time
+        // and the start: it waits for these 0.3 µs.
         let begun = cortex_m::interrupt::free(|_| {
             let ticks = reply.at_ticks.wrapping_sub(capture.now());
             let Some(delay) = delay_clocks(ticks, PACE_HZ / TICK_HZ) else {
@@ -106,11 +106,11 @@ impl<'a> Armed<'a> {
             PACE.arr().write(|w| w.set_arr(bit_clocks));
             PACE.dier().write(|w| w.set_ude(true));
             PACE.cr1().modify(|w| w.set_cen(true));
-            // Not after what would hold it up beyond the first bit.
+            // Before anything could delay it past the first bit.
             drive_pin(true);
             true
         });
-        // In the middle of the last bit.
+        // The middle of the last bit.
         let bit_halves = 2 * WORDS as u32 - 1;
         let over_ticks = TICK_HZ / 2 * bit_halves / reply.bit_hz;
         begun.then(|| Sending {
@@ -120,21 +120,21 @@ impl<'a> Armed<'a> {
     }
 }
 
-/// A reply that is on its way.
+/// A reply on its way.
 pub(super) struct Sending<'a> {
     over_ticks: u32,
     _armed: Armed<'a>,
 }
 
 impl Sending<'_> {
-    /// Waits for its last bit, within which it lets the pin go: the line is high already. Returns when
-    /// that was, as the reply has it: edges before it were the reply's own.
+    /// Waits for the last bit and releases the pin within it, with the line already high. Returns the nominal
+    /// time of that: edges before it were the reply's own.
     pub(super) async fn end(self, capture: &mut Capture) -> u32 {
         capture.wait_until(self.over_ticks).await;
         drive_pin(false);
         PACE.cr1().modify(|w| w.set_cen(false));
-        // The counter has gone on behind the last word, and a request that nothing serves stands until it
-        // is not enabled any more: the next reply would begin with it, whenever that is to be.
+        // The counter has run on past the last word, and its unserved request stays pending until it is
+        // disabled: the next reply would start with it, whenever that is.
         PACE.dier().write(|w| w.set_ude(false));
         self.over_ticks
     }
