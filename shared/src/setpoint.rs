@@ -186,7 +186,7 @@ mod tests {
             let heard_hz = pitch.to_num::<f32>() * pwm_hz;
             assert!((heard_hz / played_hz - 1.0).abs() < 1e-4, "{heard_hz}");
         }
-        // An eighth of the control's rate is the highest that is played as it is.
+        // An eighth of the control rate is the highest pitch played unchanged.
         for pwm_hz in (8_000..=24_000_u16).step_by(8) {
             let mut params = Params::of(&BOSSO_BENCH);
             params

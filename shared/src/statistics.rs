@@ -137,7 +137,7 @@ mod tests {
                 (Phase::Ramp, 250),
                 (Phase::Run, 600),
                 (Phase::Stopping, 150),
-                // The throttle is opened again before the shaft stands.
+                // Throttle is opened again before the shaft stands.
                 (Phase::Run, 250),
                 (Phase::Idle, 1_000),
             ] {

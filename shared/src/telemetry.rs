@@ -192,7 +192,7 @@ mod tests {
         for ((name, found), wanted) in SIGNALS.iter().zip(telemetry.signals).zip(wanted) {
             assert!((found - wanted).abs() < 1e-3, "{name}: {found}");
         }
-        // Values for a person are smoothed.
+        // Displayed values are smoothed.
         assert!(telemetry.bus_a > -0.1);
         snapshot.bus = Voltage::ZERO;
         telemetry.observe(&snapshot, &scale, 1000);

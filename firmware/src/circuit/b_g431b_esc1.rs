@@ -94,7 +94,7 @@ mod tests {
     fn a_refusal_of_a_dead_time_names_the_least() {
         for least in [BOARD, super::super::vesc4_f405::BOARD].map(|board| board.least_dead_time) {
             assert!(least.refusal.contains(&format!(" {} ns", least.ns)));
-            // Behind the parameter's name in a text of 50 bytes, with what has been done.
+            // After the parameter's name in a text of 50 bytes, with what has been done.
             assert!("PWM_DEADTIME_NS , raised".len() + least.refusal.len() <= 50);
         }
     }

@@ -8,16 +8,16 @@ use super::*;
 /// Ticks until an edge is in memory.
 const SETTLING: u32 = 10;
 
-/// Ticks of a bit.
+/// Ticks per bit.
 const BIT: u32 = 280;
 
-/// The timer and its DMA: edges come at their times, whoever looks at what.
+/// The timer and its DMA: edges come at their times, whoever looks.
 struct Chip {
     memories: [&'static Memory; 2],
-    /// The number of times that have gone into each.
+    /// Times written to each memory so far.
     counts: [Cell<usize>; 2],
     now: Cell<u64>,
-    /// Edges to come: when, and the level after each.
+    /// Edges to come: time, and the level after it.
     coming: Cell<Vec<(u64, bool)>>,
     bits: u32,
 }
@@ -56,7 +56,7 @@ impl Chip {
         }
     }
 
-    /// A look at either takes a while.
+    /// Each look takes a while.
     fn shown(&self) -> u32 {
         self.pass(7);
         self.now.get() as u32 & u32::MAX >> (32 - self.bits)
@@ -72,7 +72,7 @@ impl Chip {
     }
 }
 
-/// A frame of ones and zeros on a line that rests high.
+/// A frame of alternating ones and zeros on a line that rests high.
 fn frame(begin: u64) -> impl Iterator<Item = (u64, bool)> {
     (0..16).flat_map(move |bit| {
         let at = begin + u64::from(BIT) * bit;
@@ -89,7 +89,7 @@ fn taken<const BITS: u32>(edges: &mut Edges<BITS>) -> Vec<(u64, bool)> {
 
 #[test]
 fn an_edge_while_it_is_looked_is_dated_right() {
-    // Whenever it comes within the look, also as the counter of 16 bits wraps.
+    // Whenever it comes during the look, also as the 16-bit counter wraps.
     for begin in [20_000, 65_510] {
         for after in 0..40 {
             let chip = Chip::new(16);
@@ -172,7 +172,7 @@ fn what_came_before_a_reply_ended_is_its_own_and_the_rest_is_the_next_frame() {
 fn who_is_behind_goes_on_with_the_last_frame_that_has_begun() {
     let chip = Chip::new(16);
     let mut edges = Edges::<16>::new(chip.memories, SETTLING);
-    // Half of a frame is left, another one came whole, and of the third there is the first edge or more.
+    // Half of a frame is left, another is complete, and of the third there is the first edge or more.
     for of_third in [1, 2, 5] {
         let begin = chip.now.get() + 100;
         let third = begin + 18_000;
@@ -186,7 +186,7 @@ fn who_is_behind_goes_on_with_the_last_frame_that_has_begun() {
         let left: Vec<_> = frame(third).take(of_third).collect();
         assert_eq!(taken(&mut edges), left);
     }
-    // What is left of a frame that was looked at too early, down to its last edge.
+    // The rest of a frame that was looked at too early, down to its last edge.
     for left_of_first in [1, 2, 3, 9] {
         let begin = chip.now.get() + 100;
         let second = begin + 9_000;
@@ -198,7 +198,7 @@ fn who_is_behind_goes_on_with_the_last_frame_that_has_begun() {
         assert!(!edges.skip_to_last_frame(1, 2 * BIT));
         assert_eq!(taken(&mut edges), frame(second).take(1).collect::<Vec<_>>());
     }
-    // One frame that waits alone, or with the beginning of none, is kept.
+    // One frame waiting alone, or before the start of another, is kept.
     let begin = chip.now.get() + 100;
     chip.expect(frame(begin));
     chip.pass(10_000);
@@ -207,7 +207,7 @@ fn who_is_behind_goes_on_with_the_last_frame_that_has_begun() {
     assert!(edges.has_frame());
 }
 
-/// Edges at every second tick of so many, from one on.
+/// This many edges at every 20th tick from `begin` on.
 fn burst(begin: u64, count: u64) -> impl Iterator<Item = (u64, bool)> {
     (0..count).map(move |edge| (begin + 20 * edge, edge % 2 == 1))
 }
@@ -221,7 +221,7 @@ fn more_edges_than_the_memory_takes_are_noticed_between_two_looks() {
         chip.pass(10_000);
         assert!(!chip.fill(&mut edges), "{count}");
         assert_eq!(taken(&mut edges), []);
-        // And what follows is whole again.
+        // And what follows is complete again.
         chip.expect(frame(20_000));
         chip.pass(20_000);
         assert!(chip.fill(&mut edges));
@@ -243,7 +243,7 @@ fn a_frame_that_is_overwritten_while_it_is_read_is_none() {
         assert!(!chip.fill(&mut edges), "{count}");
         assert!(chip.fill(&mut edges));
     }
-    // As many as there is room for beside it are no harm.
+    // As many as fit besides it do no harm.
     let chip = Chip::new(32);
     let mut edges = Edges::<32>::new(chip.memories, SETTLING);
     chip.expect(frame(1000));

@@ -105,7 +105,7 @@ mod tests {
         static SEEN: Mutex<BTreeSet<[Option<u32>; 2]>> = Mutex::new(BTreeSet::new());
         loom::model(|| {
             let latest = Arc::new(Latest::new());
-            // SAFETY: once for these places.
+            // SAFETY: once for these slots.
             let (mut writer, mut reader) = unsafe { Latest::<[u32; 2]>::hands() };
             let theirs = Arc::clone(&latest);
             let interrupt = thread::spawn(move || {
@@ -126,7 +126,7 @@ mod tests {
             SEEN.lock().expect("not poisoned").insert(seen);
         });
         let seen = SEEN.lock().expect("not poisoned");
-        // None, 1, 2 or 3, and then not less: all ten.
+        // None, 1, 2 or 3, and never decreasing: all ten.
         assert_eq!(seen.len(), 10, "{seen:?}");
     }
 }

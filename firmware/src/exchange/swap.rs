@@ -154,8 +154,8 @@ mod tests {
     use std::collections::BTreeSet;
     use std::sync::Mutex;
 
-    /// Three periods use the values while a task offers 1 and then, if it may, 2. Loom goes another way
-    /// where a thread yields between two of its steps, so both are tried.
+    /// Three periods use the values while a task offers 1 and then, if it may, 2. Loom takes another path when
+    /// a thread yields between two of its steps, so both are tried.
     #[test]
     fn a_period_uses_one_whole_value_and_changes_over_in_order() {
         static SEEN: Mutex<BTreeSet<(bool, [u32; 3])>> = Mutex::new(BTreeSet::new());
@@ -169,13 +169,13 @@ mod tests {
         // Without the second: 1 is adopted in one of three periods or after them.
         let refused = seen.iter().filter(|(second, _)| !second).count();
         assert_eq!(refused, 4, "{seen:?}");
-        // With it: 1 in the first and 2 in the second, the third or later; or 1 in the second and 2
-        // in the third or later; or 1 in the third.
+        // With it: 1 in the first and 2 in the second, the third or later; or 1 in the second and 2 in the
+        // third or later; or 1 in the third.
         let taken = seen.iter().filter(|(second, _)| *second).count();
         assert_eq!(taken, 6, "{seen:?}");
     }
 
-    /// Offers the value; false if it could not be offered.
+    /// Offers the value; returns false if it could not be offered.
     fn offer<T: Default>(swap: &Swap<T>, hand: &mut Offerer, value: T) -> bool {
         if let Some(free) = swap.free(hand) {
             return free.offer(|slot| {

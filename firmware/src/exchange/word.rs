@@ -98,7 +98,7 @@ mod tests {
                 assert_ne!(pack(setpoint, number + 1), word);
             }
         }
-        // Bits that the word has no room for are rounded down.
+        // Bits that do not fit the word are rounded down.
         let fine = Setpoint::Speed(Speed::from_bits(0x1234_56ff));
         let coarse = Setpoint::Speed(Speed::from_bits(0x1234_5600));
         assert_eq!(unpack(pack(fine, 5)), coarse);

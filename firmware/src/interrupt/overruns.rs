@@ -32,7 +32,7 @@ impl Overruns {
 mod tests {
     use super::*;
 
-    /// The overrun that is too much, of one every so many periods from here on.
+    /// Returns the overrun that is one too many, when one occurs every `every` periods.
     fn ends_at(begin: u32, every: u32) -> Option<u32> {
         let mut overruns = Overruns::default();
         (0..1000).find(|count| overruns.note(begin.wrapping_add(count * every)))

@@ -57,8 +57,8 @@ impl Rest {
 mod tests {
     use super::*;
 
-    /// A driver as its data sheet has it: nFAULT is low while it comes up, which takes 10 ms of 60 kHz,
-    /// and while it has a reason.
+    /// A driver as in its data sheet: nFAULT is low while it comes up, which takes 10 ms at 60 kHz, and while
+    /// it has a reason.
     struct Driver {
         enabled: bool,
         awake_periods: u16,
@@ -71,7 +71,7 @@ mod tests {
     impl Driver {
         const COMES_UP_PERIODS: u16 = 600;
 
-        /// One that gives an alarm after it has been well.
+        /// A driver that gives an alarm after having been well.
         fn alarmed() -> Self {
             Self {
                 enabled: true,
@@ -83,7 +83,7 @@ mod tests {
             }
         }
 
-        /// A period. Returns true if its alarm's interrupt has come.
+        /// Advances a period. Returns true if its alarm's interrupt has come.
         fn period(&mut self) -> bool {
             self.awake_periods = if self.enabled {
                 self.awake_periods + 1
@@ -95,14 +95,14 @@ mod tests {
             let edge = low && !self.low;
             self.low = low;
             if edge && self.heard {
-                // As the interrupt does it.
+                // As the interrupt does.
                 self.enabled = false;
                 self.alarms += 1;
             }
             edge && self.heard
         }
 
-        /// Runs both; after how many periods the bridge may be on.
+        /// Runs both; returns after how many periods the bridge may be on.
         fn ready(&mut self, rest: &mut Rest, periods: u32) -> Option<u32> {
             (0..periods).find(|_| {
                 let alarmed = self.period();

@@ -70,7 +70,7 @@ mod tests {
         least_dead_time: LeastDeadTime::NONE,
     };
 
-    /// Clocks of a code, as the reference manuals state them (RM0440 and RM0090, TIM1_BDTR.DTG).
+    /// Clocks of a code, from the reference manuals (RM0440 and RM0090, TIM1_BDTR.DTG).
     fn clocks(code: u8) -> u16 {
         let code = u16::from(code);
         match code >> 5 {
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(compare(Duty::ZERO, 3542), 0);
         assert_eq!(compare(Duty::from_num(0.5), 3542), 1771);
         assert_eq!(compare(Duty::from_num(1.0), 3542), 3542);
-        // It fits the register for the longest period, so that it is not taken for a small one.
+        // Fits the register at the longest period, so that it is not taken for a small one.
         assert!((10625..1 << 16).contains(&compare(Duty::MAX, 10625)));
     }
 

@@ -48,7 +48,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Every period that a word can say, with the word.
+    /// Returns every period that a word can express, with the word.
     fn words() -> Vec<(u32, u16)> {
         let words = (1..STOPPED).filter(|&word| Extended::from_data(word).is_none());
         words
@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn each_word_is_that_of_its_own_period() {
         let words = words();
-        // 511 of the exponent 0, 256 of each of the seven others, less the one of standstill.
+        // 511 with exponent 0, 256 with each of the seven others, less the one for standstill.
         assert_eq!(words.len(), 511 + 7 * 256 - 1);
         for (period_us, word) in words {
             assert_eq!(of_period_us(period_us as f32), word);
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_speed_is_told_without_its_direction() {
-        // 6000 rpm of 12 pole pairs are 72000 eRPM: a turn in 833 µs, of which 834 can be said.
+        // 6000 rpm with 12 pole pairs is 72000 eRPM: 833 µs per turn, nearest word 834.
         let scale = Scale {
             period_s: 1.0 / 24_000.0,
             current_a: 1.0,

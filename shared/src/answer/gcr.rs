@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_known_reply() {
-        // 0x000 has the checksum 0xF: 11001 11001 11001 01111, and the line toggles at each 1.
+        // 0x000 has checksum 0xF: 11001 11001 11001 01111, and the line toggles at each 1.
         assert_eq!(encode(0x000), 0b0_10001_01110_10001_10101);
         assert_eq!(decode(0b0_10001_01110_10001_10101), Some(0x000));
     }

@@ -87,7 +87,7 @@ mod tests {
         ..Image::EMULATOR
     };
 
-    /// As Betaflight reads it: `printEscInfo` of its command line.
+    /// As Betaflight reads it: `printEscInfo` in its command line.
     #[test]
     fn a_flight_controller_reads_it() {
         let mut params = Params::default();

@@ -46,7 +46,7 @@ mod tests {
 
     #[test]
     fn the_check_sum_is_crc_8_smbus() {
-        // The check value of that code in every catalogue.
+        // This CRC's check value in every catalogue.
         assert_eq!(crc8(b"123456789"), 0xF4);
     }
 

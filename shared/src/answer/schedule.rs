@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The kinds that come in so many frames of this interval, with their places.
+    /// Returns the words sent in this many frames at this interval, with their positions.
     fn kinds(interval_us: u32, frames: usize) -> Vec<(usize, Kind)> {
         let mut schedule = Schedule::new(SLOT_US);
         let mut kinds = Vec::new();

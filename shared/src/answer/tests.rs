@@ -1,4 +1,4 @@
-//! Answers to frames in a row, as a flight controller reads them.
+//! Answers to successive frames, as a flight controller reads them.
 
 use super::*;
 use crate::drive::State;
@@ -51,7 +51,7 @@ impl Rig {
         Answer { reply, kiss, info }
     }
 
-    /// The data of the reply to the next frame.
+    /// Returns the data of the reply to the next frame.
     fn data(&mut self, after_us: u32) -> u16 {
         let answer = self.ask(after_us, Rate::Dshot600, true, false);
         gcr::decode(answer.reply.expect("asked for").bits).expect("a reply")
@@ -112,7 +112,7 @@ fn the_information_has_the_serial_line_for_itself() {
     let mut rig = Rig::new();
     rig.ask(1000, Rate::Dshot600, false, true);
     rig.answers.send_info([7; info::BYTES]);
-    // 10 bits a byte at 115200 baud.
+    // 10 bits per byte at 115200 baud.
     let length_us = |bytes: usize| (bytes as u32 * 10 * 1_000_000).div_ceil(115_200);
     let mut free_us = length_us(kiss::BYTES);
     let (mut infos_us, mut kisses_us) = (Vec::new(), Vec::new());
@@ -135,7 +135,7 @@ fn without_extended_telemetry_every_reply_is_the_speed() {
     let mut rig = Rig::new();
     rig.snapshot.speed = rig.basis.scale.speed_from_rpm(-3000.0);
     for _ in 0..20_000 {
-        // 36000 eRPM, a turn in 1667 µs, to the nearest 4.
+        // 36000 eRPM: 1667 µs per turn, to the nearest 4.
         assert_eq!(erpm::period_us(rig.data(125)), Some(1668));
     }
 }
@@ -179,7 +179,7 @@ fn with_the_signal_all_that_was_asked_for_is_forgotten() {
     rig.answers.lost();
     assert!((0..8000).all(|_| rig.data(125) == erpm::STOPPED));
     assert_eq!(rig.ask(2000, Rate::Dshot300, false, true).info, None);
-    // Who asks anew gets it.
+    // A new request gets it.
     rig.answers.set_extended(true);
     assert_eq!(rig.data(125), 0xE00);
 }

@@ -1,4 +1,4 @@
-//! An ESC by its edges, polls and requests: what DShot's commands and the stick do.
+//! An ESC with its edges, polls and requests: what DShot commands and the stick do.
 
 use std::string::{String, ToString};
 use std::vec::Vec;
@@ -25,7 +25,7 @@ mod warnings;
 
 const TICK_HZ: u32 = 170_000_000;
 
-/// An ESC, its clock, its drive's snapshot, and all that it has said and asked for.
+/// An ESC, its clock, its drive's snapshot, and everything it has sent and requested.
 struct Bench {
     esc: Esc,
     throttle: Throttle,
@@ -34,22 +34,22 @@ struct Bench {
     texts: Vec<String>,
     /// Index and value of each PARAM_VALUE.
     values: Vec<(u16, f32)>,
-    /// Of commands that came by MAVLink.
+    /// Results of MAVLink commands.
     results: Vec<MavResult>,
     requests: Vec<Request>,
     answers: Vec<Answer>,
-    /// The notes of the last polls, once each.
+    /// The notes of the last polls, without repeats.
     notes: Vec<Note>,
 }
 
 impl Bench {
-    /// One whose board has tested itself, as well as one without comparators can.
+    /// Creates one whose board has finished its power-up test, as far as one without comparators can.
     fn new() -> Self {
         let mut bench = Self::at_power_up();
         for _ in 0..3 {
             bench.esc.test_itself(&bench.snapshot, &mut check::Plain);
         }
-        // There is no supply, and that has been told.
+        // There is no supply, which it has reported.
         bench.poll();
         bench.texts.clear();
         bench
@@ -75,7 +75,7 @@ impl Bench {
         bench
     }
 
-    /// Armed by DShot600 and long enough at rest for storage, with the tunes of it over.
+    /// Armed by DShot600, at rest long enough for storage, with its tunes over.
     fn armed() -> Self {
         let mut bench = Self::new();
         bench.frames(1_100, 0);
@@ -138,7 +138,7 @@ impl Bench {
         ((self.now_us * 1000 + after_ns) * u64::from(TICK_HZ) / 1_000_000_000) as u32
     }
 
-    /// Frames of DShot600, 1 ms apart.
+    /// DShot600 frames, 1 ms apart.
     fn frames(&mut self, count: u32, value: u16) {
         let frame = dshot::Frame {
             value,
@@ -251,7 +251,7 @@ fn a_spin_against_the_direction_is_no_parameter() {
     assert_eq!(bench.get(ParamId::MotDir), 0.0);
     assert_eq!(bench.values, []);
     assert_eq!(bench.requests, [Request::ParamsChanged]);
-    // It is against MOT_DIR, whatever that is.
+    // It turns against MOT_DIR, whatever that is.
     bench.frames(10, 8);
     assert_eq!(bench.config().direction, Direction::Normal);
     bench.frames(10, 20);
@@ -274,7 +274,7 @@ fn a_turning_motor_obeys_no_command() {
     assert_eq!(bench.notes, []);
 }
 
-/// Directions wait for a motor at rest, the latest of each kind, and the save behind them.
+/// Directions wait for a motor at rest, the latest of each kind, followed by the save.
 #[test]
 fn what_waits_is_done_once_when_the_motor_stands() {
     let mut bench = Bench::armed();
@@ -431,8 +431,8 @@ fn the_stick_calibrates_and_the_ends_are_stored() {
         (ParamId::InpPulseMaxUs as u16, 1912.0),
     ];
     assert_eq!(values, wanted);
-    // The new ends hold: what was zero throttle by them arms, once the stick may no longer ask for more, and their
-    // middle is half.
+    // The new ends apply: what is zero throttle by them arms, once the stick may no longer ask for more, and
+    // their middle is half throttle.
     bench.pulses(90, 1105);
     assert!(!bench.esc.telemetry().armed);
     bench.pulses(40, 1105);

@@ -234,7 +234,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// A calibration, a clock, and pulses each 20 ms.
+    /// A calibration, a clock, and pulses every 20 ms.
     #[derive(Default)]
     struct Bench {
         calibration: Calibration,
@@ -242,7 +242,7 @@ mod tests {
     }
 
     impl Bench {
-        /// The steps reported, each with the ms since the first of these pulses.
+        /// Returns the reported steps, each with the ms since the first of these pulses.
         fn hold(&mut self, ms: u64, width_us: impl Fn(u64) -> u32) -> Vec<(u64, Step)> {
             let mut steps = Vec::new();
             for pulse in 0..ms / 20 {
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(bench.hold(5_000, |_| 1912), [(2_200, Step::Full)]);
         assert_eq!(bench.hold(400, |n| 1900 - n as u32 * 40), []);
         assert_eq!(bench.hold(2_000, |_| 1105), [(1_500, DONE)]);
-        // Once: nothing that comes two seconds later is a calibration, or a wish for more.
+        // Once: two seconds later nothing is a calibration or a request any more.
         assert!(bench.calibration.is_under_way());
         bench.hold(1_600, |_| 1105);
         assert_eq!(bench.calibration.poll(bench.now_us), None);
@@ -290,7 +290,7 @@ mod tests {
         assert!(!bench.calibration.is_under_way());
         assert_eq!(bench.hold(5_000, |_| 1912), []);
 
-        // Too short, left in the middle, and a lost signal: nothing is asked for, and the ends stay taken.
+        // Too short, left in the middle, and a lost signal: nothing is requested, and the ends are kept.
         let mut bench = taken();
         bench.hold(2_000, |_| 1912);
         bench.hold(20, |_| 1105);
@@ -364,7 +364,7 @@ mod tests {
     #[test]
     fn one_that_is_asked_for_waits_for_the_stick() {
         let mut bench = Bench::default();
-        // After the first signal, which was none.
+        // After the first signal, which did not calibrate.
         bench.hold(1_000, |_| 1105);
         bench.calibration.ask(bench.now_us);
         assert!(bench.calibration.is_under_way());
@@ -376,7 +376,7 @@ mod tests {
         assert_eq!(bench.hold(1_520, |_| 1105), [(1_500, DONE)]);
         assert!(!bench.calibration.is_under_way());
 
-        // A stick that stays low is waited for a minute, and one that is up is taken.
+        // A stick that stays low times out after a minute; one that comes up is taken.
         for (up_ms, ended) in [(0, Some(Step::Cancelled)), (1_000, None)] {
             bench.calibration.ask(bench.now_us);
             assert_eq!(bench.hold(60_000, |_| 1105), []);

@@ -223,7 +223,7 @@ mod tests {
             }
         }
 
-        /// The orders, each with the frame that gave it, counted from 1.
+        /// Returns the orders, each with the frame that gave it, counted from 1.
         fn play(&mut self, count: usize, value: u16) -> Vec<(usize, Order)> {
             let mut orders = Vec::new();
             for number in 1..=count {
@@ -244,7 +244,7 @@ mod tests {
         }
     }
 
-    /// Every value that means something, and how many frames it takes.
+    /// Every value with a meaning, and how many frames it takes.
     const MEANT: [(u16, usize, Order); 18] = [
         (1, 1, Order::Beacon(Beacon::One)),
         (2, 1, Order::Beacon(Beacon::Two)),

@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn known_frames() {
-        // Value 1046 with telemetry is the example of the protocol's first description.
+        // Value 1046 with telemetry is the example in the protocol's first description.
         let frame = Frame {
             value: 1046,
             telemetry: true,

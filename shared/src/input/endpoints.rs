@@ -163,7 +163,7 @@ mod tests {
             let error = found.unwrap_or(0.0) - wanted.unwrap_or(0.0);
             assert!(error.abs() < 3e-6, "{width_ns}: {error}");
         }
-        // The least of the other direction has that direction too.
+        // The smallest reverse throttle still has its direction.
         assert!(matches!(
             USUAL.demand(Pulse::Servo, 1_459_999, true),
             Demand::Throttle(throttle) if throttle.is_negative()

@@ -123,8 +123,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The levels that a filter of 10 ticks believes for these edges, the last of them long before the
-    /// end.
+    /// Returns the levels that a 10-tick filter accepts for these edges, given time after the last.
     fn believed(edges: &[(u32, bool)]) -> Vec<(u32, bool)> {
         let mut filter = Filter::new(10);
         let mut believed: Vec<_> = edges

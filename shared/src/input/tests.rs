@@ -1,4 +1,4 @@
-//! A wire with all that is decided by it, by edges and by events.
+//! A complete throttle input, driven by edges and by events.
 
 use std::vec::Vec;
 
@@ -25,7 +25,7 @@ const TURNING: DriveStatus = DriveStatus {
     faulted: false,
 };
 
-/// An input, its clock, and all that it has told and ordered.
+/// An input, its clock, and the news and orders it has given.
 struct Bench {
     input: Input,
     now_us: u64,
@@ -74,7 +74,7 @@ impl Bench {
         self.orders.extend(heard.and_then(|heard| heard.order));
     }
 
-    /// Lets time pass in steps of a millisecond, with nothing on the wire.
+    /// Advances time in 1 ms steps, with nothing on the wire.
     fn wait_ms(&mut self, ms: u64) {
         for _ in 0..ms {
             self.now_us += 1_000;
@@ -85,7 +85,7 @@ impl Bench {
         }
     }
 
-    /// Frames of DShot600, 1 ms apart, each by its first edges only: 32 are all.
+    /// DShot600 frames 1 ms apart, each cut off after its first edges; 32 is all of them.
     fn cut_frames(&mut self, count: u32, value: u16, edges_of_it: usize) {
         let frame = Frame {
             value,
@@ -169,7 +169,7 @@ fn a_wire_that_comes_and_goes_does_not_flood_the_link() {
         bench.frames(60, 0);
         bench.wait_ms(140);
     }
-    // 10 s: each kind once a second at most.
+    // 10 s: each kind at most once a second.
     for kind in [News::Identified(DSHOT600), News::Lost { armed: false }] {
         let told = bench.news.iter().filter(|(_, news)| *news == kind).count();
         assert!((8..=10).contains(&told), "{kind:?}: {told}");
@@ -189,7 +189,7 @@ fn throttle_open_at_power_up_never_turns_and_says_so() {
         .filter(|(_, news)| *news == News::OpenThrottle);
     let told_ms: Vec<_> = told.map(|(at_ms, _)| *at_ms).collect();
     assert_eq!(told_ms, [501, 3501, 6501, 9501]);
-    // Lowered, it arms, and is open by right then.
+    // Lowered, it arms, and may open from then on.
     bench.news.clear();
     bench.frames(310, 0);
     bench.frames(10_000, 300);
@@ -224,7 +224,7 @@ fn ten_seconds_of_any_command_at_1_khz_reset_nothing_and_turn_nothing() {
         assert_eq!(bench.input.bad_frames(), 0);
         let means_something = matches!(value, 1..=10 | 12..=14 | 20..=22 | 26 | 31);
         assert_eq!(bench.orders.len(), usize::from(means_something), "{value}");
-        // Its throttle is obeyed as ever.
+        // Its throttle is obeyed as usual.
         bench.frames(4, 1000);
         assert!(bench.turns());
     }
@@ -242,7 +242,7 @@ fn commands_between_throttle_are_zero_throttle_and_not_obeyed() {
     }
     assert_eq!(bench.orders, []);
     assert!(bench.input.authority().armed());
-    // Those that still come when the motor has stopped count from then on.
+    // Repeats that arrive after the motor has stopped count from then on.
     bench.drive = RESTING;
     bench.poll();
     bench.frames(5, 21);
@@ -308,7 +308,7 @@ fn single_frames_are_commands_on_a_clean_wire_only() {
 
 #[test]
 fn a_line_that_sticks_or_is_cut_in_a_frame_stops_the_motor() {
-    // After the frame's last edge the line is low, after the one before high.
+    // The line is low after the frame's last edge, high after the one before.
     for cut in [0, 1, 2, 15, 16, 31] {
         let mut bench = Bench::armed();
         bench.frames(10, 1000);

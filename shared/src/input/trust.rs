@@ -53,7 +53,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// The probability of each count after many frames of which this share is good, in any order.
+    /// Returns the probability of each count after many frames with this share of good ones, in random order.
     fn counts(good: f64) -> Vec<f64> {
         let mut counts = vec![0.0; usize::from(MOST) + 1];
         counts[usize::from(MOST)] = 1.0;
@@ -71,7 +71,7 @@ mod tests {
         counts
     }
 
-    /// The share of frames that are good and believed.
+    /// Returns the share of frames that are good and believed.
     fn believed(good: f64) -> f64 {
         let counts = counts(good);
         let believes = |count: u8| Trust(count).good();

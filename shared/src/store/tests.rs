@@ -28,7 +28,7 @@ fn changed() -> Kept {
     }
 }
 
-/// Every value another one than the default, as far as there are two in the table's range.
+/// Every value differs from its default, as far as the table's range has two.
 fn everything(shift: f32) -> Kept {
     let mut kept = Kept::default();
     for id in ParamId::ALL {
@@ -61,7 +61,7 @@ fn sound(flash: &mut RamFlash) -> Kept {
     loaded.kept
 }
 
-/// Stores words of any kind as the first set.
+/// Stores arbitrary words as the first set.
 fn store(flash: &mut RamFlash, words: &[(u16, u32)]) {
     let mut writer = Writer::new(0, 1);
     for (key, bits) in words {
@@ -70,7 +70,7 @@ fn store(flash: &mut RamFlash, words: &[(u16, u32)]) {
     writer.seal(flash).expect("fits");
 }
 
-/// The words of the newest set but for its seal.
+/// Returns the newest set's words without its seal.
 fn stored(flash: &mut RamFlash) -> Vec<(u16, u32)> {
     let values = Log::open(flash, RANGE).expect("two pages").newest.values;
     values
@@ -97,12 +97,12 @@ fn values_survive_and_nothing_is_written_twice() {
     save(&mut flash, RANGE, &Kept::default()).expect("nothing to write");
     assert_eq!(flash.bytes, RamFlash::new().bytes);
     save(&mut flash, RANGE, &changed()).expect("fits");
-    // The schema, two values and the seal, twice.
+    // Schema, two values and seal, twice.
     assert_eq!(flash.bytes[8 * WORD..], RamFlash::new().bytes[8 * WORD..]);
     let before = flash.bytes.clone();
     save(&mut flash, RANGE, &changed()).expect("nothing to write");
     assert_eq!(flash.bytes, before);
-    // MOT_KV follows though it is not stored.
+    // MOT_KV follows, though it is not stored.
     assert_eq!(sound(&mut flash), changed());
 
     // The stored value must not come back.
@@ -114,7 +114,7 @@ fn values_survive_and_nothing_is_written_twice() {
 fn halves_wrap_under_thousands_of_saves() {
     let mut flash = RamFlash::new();
     let mut kept = changed();
-    // More than the numbers of the sets count to.
+    // More saves than set numbers.
     for i in 0..70_000_u32 {
         let value = 100.0 + (i % 5000) as f32;
         kept.params
@@ -125,11 +125,11 @@ fn halves_wrap_under_thousands_of_saves() {
             assert_eq!(sound(&mut flash), kept, "{i}");
         }
     }
-    // 40 bytes a set: 51 sets fit a half, and two are written at a time.
+    // 40 bytes per set: 51 sets fit a half, written two at a time.
     assert_eq!(flash.erases, 2 * 70_000 / 51);
 }
 
-/// Nothing but what changes by itself is written once.
+/// Only what changes by itself is written once.
 #[test]
 fn settings_are_written_twice_and_statistics_once() {
     let sets = |flash: &RamFlash| {
@@ -200,7 +200,7 @@ fn what_is_replaced_is_nowhere_in_the_flash() {
     };
     replace(&mut flash, RANGE, &rest).expect("fits");
     assert_eq!(sound(&mut flash), rest);
-    // The schema, the statistics and the seal, twice.
+    // Schema, statistics and seal, twice.
     let written = flash
         .bytes
         .chunks(WORD)
@@ -307,7 +307,7 @@ fn a_range_that_is_not_pages_is_refused() {
 fn a_flash_that_cannot_be_read_gives_the_defaults() {
     let mut flash = RamFlash::new();
     save(&mut flash, RANGE, &changed()).expect("fits");
-    // Whenever it begins.
+    // Whenever reads start to fail.
     let mut all = flash.clone();
     assert_eq!(sound(&mut all), changed());
     for reads in 0..all.reads - flash.reads {
@@ -336,7 +336,7 @@ fn keys_are_told_apart() {
 }
 
 proptest! {
-    // Always the same cases: a run can be repeated, and noise may be sound by chance, once in 2^32.
+    // Always the same cases: a run is repeatable, and noise may be valid by chance, once in 2^32.
     #![proptest_config(ProptestConfig {
         cases: 500,
         rng_seed: RngSeed::Fixed(1),
@@ -387,12 +387,12 @@ proptest! {
     fn noise_is_never_taken_for_nothing(
         bytes in prop_oneof![
             prop::collection::vec(any::<u8>(), RANGE.end as usize),
-            // Few bits written, few bits erased, and the marks of the log itself.
+            // Mostly erased, mostly zeros, and the log's own markers.
             prop::collection::vec(prop_oneof![Just(0xFF), Just(0xFE), Just(0x7F)], RANGE.end as usize),
             prop::collection::vec(prop_oneof![Just(0), Just(1), Just(0x80)], RANGE.end as usize),
             prop::collection::vec(prop_oneof![Just(0xFF), Just(0), any::<u8>()], RANGE.end as usize),
             any::<u8>().prop_map(|byte| vec![byte; RANGE.end as usize]),
-            // Erased but for one byte.
+            // Erased except for one byte.
             (0..RANGE.end as usize, any::<u8>()).prop_map(|(at, byte)| {
                 let mut bytes = vec![0xFF; RANGE.end as usize];
                 bytes[at] = byte;

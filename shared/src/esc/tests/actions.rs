@@ -1,4 +1,4 @@
-//! Requests of a ground station beside turning the motor: as the wire would make them, at rest.
+//! Ground station requests besides turning the motor: at rest, as the wire would make them.
 
 use super::*;
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
@@ -10,7 +10,7 @@ const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;
 const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 
 impl Bench {
-    /// An action with the motor of this ESC.
+    /// Configures this ESC's motor.
     fn configure(&mut self, action: f32) {
         self.message(&COMMAND_LONG_DATA {
             param1: action,
@@ -36,7 +36,7 @@ impl Bench {
         core::mem::take(&mut self.results)
     }
 
-    /// Armed by pulses of no throttle, after a first signal that was no calibration.
+    /// Armed by pulses of no throttle, after a first signal that did not calibrate.
     fn armed_by_pulses() -> Self {
         let mut bench = Self::new();
         bench.pulses(60, 1000);
@@ -46,7 +46,7 @@ impl Bench {
     }
 }
 
-/// The others would be stored with it, which are the defaults.
+/// It would store all other settings too, which are the defaults.
 #[test]
 fn a_direction_does_not_store_settings_that_were_lost() {
     let mut bench = Bench::new();
@@ -59,7 +59,7 @@ fn a_direction_does_not_store_settings_that_were_lost() {
     let lost = "Settings lost: set and store them, or reset them";
     assert_eq!(bench.texts.last().map(String::as_str), Some(lost));
     assert!(!bench.esc.telemetry().armed);
-    // Once they are stored on their own, it is stored too.
+    // Once those are stored in their own right, so is it.
     bench.command(MavCmd::MAV_CMD_PREFLIGHT_STORAGE, 1.0);
     bench.frames(2, 0);
     bench.storage_done(Ok(()));
@@ -80,7 +80,7 @@ fn a_direction_is_in_force_at_once_and_acknowledged_when_it_is_stored() {
     bench.storage_done(Ok(()));
     assert_eq!(bench.take_results(), [ACCEPTED]);
 
-    // While the wire turns it, nothing.
+    // While the wire turns the motor, nothing happens.
     bench.requests.clear();
     bench.frames(4, 1000);
     for action in [1.0, 2.0, 4.0] {
@@ -103,7 +103,7 @@ fn a_beep_is_heard() {
     assert_eq!(bench.take_results(), [ACCEPTED]);
 }
 
-/// The stick comes up while the wire is armed: it must teach, and not turn the motor.
+/// The stick comes up while the wire is armed: it must teach, not turn the motor.
 #[test]
 fn a_calibration_on_request_takes_the_stick_and_never_turns_the_motor() {
     let mut bench = Bench::armed_by_pulses();
@@ -134,7 +134,7 @@ fn a_calibration_on_request_takes_the_stick_and_never_turns_the_motor() {
 
 #[test]
 fn a_calibration_that_is_not_followed_changes_nothing_and_gives_the_wire_back() {
-    // Ended by command, by a stick that stays down for a minute, and by a signal that is lost.
+    // Ended by a command, by a stick that stays down for a minute, and by a lost signal.
     for end in 0..3 {
         let mut bench = Bench::armed_by_pulses();
         bench.calibrate(1.0);

@@ -15,7 +15,7 @@ const AT_REST: Sample = Sample {
     hall: 7,
 };
 
-/// A board that measures nothing by itself.
+/// A board without measurements of its own.
 pub(super) struct Plain;
 
 impl Probe for Plain {
@@ -28,7 +28,7 @@ impl Probe for Plain {
     }
 }
 
-/// A board whose first comparator trips nowhere, and whose bridge conducts for some looks.
+/// A board whose first comparator never trips, and whose bridge conducts for some looks.
 struct Bad {
     busy: u32,
 }
@@ -60,7 +60,7 @@ impl Bench {
     }
 }
 
-/// It is broken off by what may be sent at any time: nothing is measured then.
+/// Anything that may be sent at any time can interrupt it: then nothing is measured.
 #[test]
 fn a_self_test_lifts_no_bar_before_it_has_measured() {
     let mut bench = Bench::at_power_up();
@@ -70,7 +70,7 @@ fn a_self_test_lifts_no_bar_before_it_has_measured() {
     bench.results.clear();
     bench.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
     for _ in 0..1_500 {
-        // Its looks do not come.
+        // Without its looks.
         bench.frames(1, 0);
     }
     assert_eq!(bench.results[0], MavResult::MAV_RESULT_IN_PROGRESS);
@@ -80,7 +80,7 @@ fn a_self_test_lifts_no_bar_before_it_has_measured() {
     assert!(!bench.esc.telemetry().armed, "still barred");
 }
 
-/// The comparators are searched while no switch is on: until then no tune begins, and a test waits.
+/// Comparators are searched only while no switch is on: until then no tune starts, and a test waits.
 #[test]
 fn what_the_board_measures_waits_for_a_bridge_that_is_off() {
     let mut bench = Bench::at_power_up();
@@ -100,8 +100,8 @@ fn what_the_board_measures_waits_for_a_bridge_that_is_off() {
     assert_eq!((probe.busy, bench.results.len()), (0, 2), "it goes on");
 }
 
-/// However long a board takes: its comparators, which it has not measured yet, may protect nothing. What the wire
-/// holds meanwhile arms nothing later.
+/// However long a board takes: comparators not measured yet may protect nothing. What the wire holds meanwhile
+/// does not arm later.
 #[test]
 fn nothing_arms_before_the_board_has_been_measured() {
     let mut bench = Bench::at_power_up();
@@ -119,7 +119,7 @@ fn nothing_arms_before_the_board_has_been_measured() {
     assert!(bench.esc.telemetry().armed);
 }
 
-/// The wire is heard before the tasks have been at it for the first time.
+/// The wire is heard before the tasks have run for the first time.
 #[test]
 fn nothing_arms_before_the_tasks_have_run() {
     let mut throttle = Throttle::new(TICK_HZ, &Params::of(&BOSSO_MOTOR), &Board::BENCH);

@@ -1,4 +1,4 @@
-//! Settings that are stored without being asked for, and the times at which they are.
+//! Settings stored unasked, and when.
 
 use super::storage::{ACCEPTED, REBOOT, REJECTED, STORAGE};
 use super::*;
@@ -30,7 +30,7 @@ impl Bench {
         });
     }
 
-    /// Waits for a save, in steps of a millisecond; how long it took.
+    /// Waits for a save in 1 ms steps; returns how long it took.
     fn keeps_after_ms(&mut self) -> u32 {
         for ms in 1..10_000 {
             self.wait_ms(1);
@@ -42,7 +42,7 @@ impl Bench {
     }
 }
 
-/// At rest, with the tune of the start over.
+/// At rest, with the start-up tune over.
 fn rested() -> Bench {
     let mut bench = Bench::new();
     bench.wait_ms(3_000);
@@ -109,7 +109,7 @@ fn an_interval_and_the_key_are_kept_as_well() {
     // 1 s is 1.5 of its units.
     assert!((5..=7).contains(&signing.newest), "{}", signing.newest);
 
-    // So it goes on after a restart.
+    // It continues after a restart.
     let loaded = Loaded {
         kept: kept.clone(),
         integrity: Integrity::Sound,
@@ -179,7 +179,7 @@ fn an_armed_wire_refuses_a_restart() {
     assert_eq!(bench.results, [REJECTED]);
     assert_eq!(bench.texts, ["No reboot: armed"]);
     assert_eq!(bench.requests, []);
-    // With its motor disarmed, and before the wire has held zero again, it may be.
+    // With the motor disarmed, it may, even before the wire holds zero again.
     bench.command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, 0.0);
     bench.command(REBOOT, 1.0);
     bench.wait_ms(2);
@@ -187,7 +187,7 @@ fn an_armed_wire_refuses_a_restart() {
     assert_eq!(bench.requests, [Request::Reboot]);
 }
 
-/// All saves that are made without a request are taken, and one is asked for by a change and a restart.
+/// All unrequested saves are used up, and a change and a restart call for one.
 fn restart_that_waits() -> Bench {
     let mut bench = Bench::new();
     let mut loaded = loaded(Integrity::Sound);
@@ -203,7 +203,7 @@ fn restart_that_waits() -> Bench {
     bench
 }
 
-/// It takes minutes where the flash is spared: nobody should think that the command was lost.
+/// It takes minutes when the flash is being spared: nobody should think that the command was lost.
 #[test]
 fn a_restart_that_waits_says_so() {
     let mut bench = restart_that_waits();
@@ -213,7 +213,7 @@ fn a_restart_that_waits_says_so() {
     bench.storage_done(Ok(()));
     assert_eq!(bench.requests[2..], [Request::Reboot]);
     assert_eq!(bench.texts.len(), 2, "once");
-    // One whose save is made at once does not.
+    // One whose save comes at once does not.
     let mut bench = rested();
     bench.set("LIM_PHASE_A", 12.5);
     bench.command(REBOOT, 1.0);
@@ -286,7 +286,7 @@ fn what_the_wire_has_set_waits_for_the_wire() {
         "not stored by itself"
     );
     assert_eq!(bench.esc.kept().params.get(ParamId::MotDir), 0.0);
-    // Nor with what is.
+    // Nor with one that is.
     bench.set("LIM_PHASE_A", 12.5);
     bench.frames(1_100, 0);
     assert_eq!(bench.requests[1..], [Request::ParamsChanged, Request::Keep]);
@@ -371,7 +371,7 @@ fn loaded(integrity: Integrity) -> Loaded {
     }
 }
 
-/// The defaults may be another motor's.
+/// The defaults may suit another motor.
 #[test]
 fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
     for integrity in [
@@ -395,7 +395,7 @@ fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
         bench.frames(10, 1_000);
         assert_eq!(bench.throttle.setpoint(), Setpoint::Stop);
 
-        // What a station or a companion sets by itself restores nothing, nor does what a stick teaches.
+        // What a station or a companion sets unasked restores nothing, nor does what a stick teaches.
         bench.message(&COMMAND_LONG_DATA {
             param1: 291.0,
             param2: 20_000.0,

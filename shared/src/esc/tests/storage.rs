@@ -1,4 +1,4 @@
-//! Storage by the throttle wire and by MAVLink: it waits until the bridge rests, and one at a time.
+//! Storage by throttle wire and MAVLink: it waits for the bridge to rest, one request at a time.
 
 use super::*;
 use crate::input::authority::Command;
@@ -15,7 +15,7 @@ pub(super) const ACCEPTED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
 pub(super) const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 
 impl Bench {
-    /// A message from a ground station.
+    /// Sends a message from a ground station.
     pub(super) fn message<D: MessageData>(&mut self, data: &D) {
         let mut raw = MAVLinkV2MessageRaw::new();
         let header = MavHeader {
@@ -80,7 +80,7 @@ fn a_silent_wire_is_not_waited_for() {
     bench.command(STORAGE, 1.0);
     bench.wait_ms(95);
     assert_eq!(bench.requests, [], "the signal may come back");
-    // The tune of the loss is over, and not a second has passed.
+    // The tune for the loss is over, and less than a second has passed.
     bench.wait_ms(800);
     assert_eq!(bench.requests, [Request::Save]);
 }

@@ -1,4 +1,4 @@
-//! What a motor goes on with is told.
+//! Warnings of conditions that a motor keeps running with.
 
 use super::*;
 use crate::drive::Limit;

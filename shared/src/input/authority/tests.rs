@@ -1,4 +1,4 @@
-//! Arming, loss of signal and tests, by exact counts and times.
+//! Arming, signal loss and tests, with exact counts and times.
 
 use super::*;
 use crate::input::dshot::{Frame, Rate};
@@ -34,7 +34,7 @@ fn event(value: u16) -> Event {
     }
 }
 
-/// An authority, a clock, and frames that come 1 ms apart unless told otherwise.
+/// An authority, its clock, and frames 1 ms apart unless stated otherwise.
 struct Bench {
     authority: Authority,
     now_us: u64,
@@ -55,7 +55,7 @@ impl Bench {
         bench
     }
 
-    /// Armed, and opened to this throttle.
+    /// Armed and opened to this throttle.
     fn open(value: u16) -> Self {
         let mut bench = Self::armed();
         bench.play(OPENING_FRAMES.into(), event(value));
@@ -74,7 +74,7 @@ impl Bench {
         }
     }
 
-    /// Waits without any event.
+    /// Waits without an event.
     fn wait(&mut self, us: u64) {
         self.now_us += us;
         self.authority.poll(self.now_us);
@@ -194,7 +194,7 @@ fn bad_frames_do_not_disturb_an_armed_wire() {
     }
 }
 
-/// The bad frames outweigh the good ones after at most 24, and the good ones are then no signal.
+/// After at most 24 frames the bad ones outweigh the good ones, which then no longer count as a signal.
 #[test]
 fn a_wire_whose_frames_mostly_fail_is_lost() {
     for bad in [6, 9, 15] {
@@ -213,7 +213,7 @@ fn a_wire_whose_frames_mostly_fail_is_lost() {
         }
         let lost_ms = lost_ms.expect("it is lost");
         assert!((100..=125).contains(&lost_ms), "{bad}: {lost_ms} ms");
-        // The link is well again.
+        // The link has recovered.
         bench.play(4, event(0));
         bench.play(301, event(0));
         assert!(bench.authority.armed());
@@ -266,7 +266,7 @@ fn a_lost_signal_stops_and_disarms() {
             bench.now_us += 100_001;
         }
         assert!(!bench.authority.signal_present(bench.now_us));
-        // The throttle is still open when the signal comes back.
+        // Throttle is still open when the signal returns.
         bench.play(1_000, event(1000));
         assert!(!bench.turns());
         bench.play(300, event(0));
@@ -288,7 +288,7 @@ fn an_armed_wire_may_be_silent_behind_a_command() {
         bench.wait(1);
         assert!(!bench.authority.armed(), "{value}");
     }
-    // A longer time of loss holds as it is.
+    // A longer loss time is used as it is.
     let mut bench = Bench::armed();
     bench.authority.set_timing(Timing {
         loss_us: 500_000,
@@ -299,7 +299,7 @@ fn an_armed_wire_may_be_silent_behind_a_command() {
     assert!(bench.authority.armed());
     bench.wait(1);
     assert!(!bench.authority.armed());
-    // One that is not armed starts over.
+    // An unarmed wire starts over.
     let mut bench = Bench::new();
     bench.play(300, event(1));
     bench.after(100_001, event(1));
@@ -372,14 +372,14 @@ fn new_times_hold_at_once() {
 }
 
 proptest! {
-    /// Whatever happens, the motor turns by the wire only after 30 zero frames in 300 ms, and then
-    /// only until the signal is lost; and by a test only for its time.
+    /// In any sequence, the wire turns the motor only after 30 zero frames in 300 ms and until the signal is
+    /// lost, and a test only for its time.
     #[test]
     fn nothing_else_turns_the_motor(
         steps in prop::collection::vec((0..12_u8, 0..40_000_u64, 0.0..3.0_f32), 1..400),
     ) {
         let mut bench = Bench::new();
-        // Since when only zeros were valid, how many, and whether they have armed: a plain model.
+        // A plain model: since when only zeros were valid, how many, and whether they have armed.
         let mut zero_since_us = None;
         let mut zeros = 0;
         let mut may_turn = false;

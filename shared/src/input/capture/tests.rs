@@ -1,4 +1,4 @@
-//! The decoder against frames that stray, and against what is no frame.
+//! The decoder on frames at their tolerances, and on edges that are not frames.
 
 use super::*;
 use crate::input::dshot::edges;
@@ -10,7 +10,7 @@ const TICK_HZ: u32 = 170_000_000;
 /// Value 1046 with telemetry.
 const WORD: u16 = 0x82D7;
 
-/// Edges at nanoseconds since the start, in ticks of a timer that began at `offset`.
+/// Edges in ns since the start, as ticks of a timer that started at `offset`.
 struct Wire {
     decoder: Decoder,
     tick_hz: u32,
@@ -44,7 +44,7 @@ impl Wire {
         self.decoder.settle(self.ticks(self.now_ns))
     }
 
-    /// Plays active levels and rests of these durations, in turn.
+    /// Plays active levels and rests of these durations, alternating.
     fn durations(&mut self, durations_ns: &[f64]) -> Vec<Option<Event>> {
         let played = durations_ns.iter().enumerate();
         let played = played.map(|(place, duration_ns)| {
@@ -55,8 +55,7 @@ impl Wire {
         played.collect()
     }
 
-    /// Plays the bits of a normal frame as those of this wire at `speed` times the rate, and 2 bits
-    /// of pause.
+    /// Plays a normal frame's bits, as this wire has them, at `speed` times the rate, then 2 bits of pause.
     fn frame(&mut self, bits: u16, rate: Rate, speed: f64) -> Vec<Option<Event>> {
         let start_ns = self.now_ns;
         self.now_ns += f64::from(rate.frame_ns() + 2 * rate.bit_ns()) / speed;
@@ -69,7 +68,7 @@ impl Wire {
         check_mask(self.bidirectional)
     }
 
-    /// The event for a frame of these bits, the first edge of which came at `start_ns`.
+    /// Returns the event for a frame of these bits whose first edge came at `start_ns`.
     fn wanted(&self, bits: u16, rate: Rate, start_ns: f64) -> Option<Event> {
         Frame::from_bits(bits).map(|frame| Event::Frame {
             rate,
@@ -79,14 +78,14 @@ impl Wire {
         })
     }
 
-    /// Returns true if a frame of `WORD` is found at its last edge, and nothing before.
+    /// Returns true if a frame of `WORD` is reported at its last edge, and nothing before.
     fn finds(&mut self, rate: Rate) -> bool {
         let wanted = self.wanted(WORD, rate, self.now_ns);
         at_the_end(&self.frame(WORD, rate, 1.0), wanted)
     }
 }
 
-/// Nothing, but this event at the end.
+/// Returns true if nothing came but this event at the end.
 fn at_the_end(events: &[Option<Event>], wanted: Option<Event>) -> bool {
     let (last, before) = events.split_last().expect("edges were played");
     *last == wanted && before.iter().all(Option::is_none)
@@ -96,7 +95,7 @@ fn is_frame(event: &Event) -> bool {
     matches!(event, Event::Frame { .. })
 }
 
-/// Durations of pulses and lows of a normal frame of `WORD`, the last low being long.
+/// Returns the durations of highs and lows in a normal frame of `WORD`, with a long last low.
 fn word_ns(rate: Rate) -> Vec<f64> {
     let edges: Vec<_> = edges(WORD, rate)
         .map(|(at_ns, _)| f64::from(at_ns))
@@ -279,7 +278,7 @@ fn servo_pulses_are_no_frames() {
 
 #[test]
 fn a_stream_is_found_from_its_middle() {
-    // 32 kHz of DShot600 leave 4.6 µs between frames, less than one bit of DShot150.
+    // DShot600 at 32 kHz leaves 4.6 µs between frames, less than one bit of DShot150.
     for skipped in 0..32 {
         let mut wire = Wire::new(TICK_HZ, false);
         for (at_ns, level) in edges(WORD, Rate::Dshot600).skip(skipped) {
@@ -319,8 +318,8 @@ fn a_missed_edge_spoils_one_frame() {
         wire.now_ns = 50_000.0;
         assert_eq!(wire.settle(), Some(Event::Bad), "{missed}");
         if missed == 31 {
-            // The line seems to be high until the next frame's first edge, which tells no new
-            // level. It is that frame's first edge all the same.
+            // The line seems high until the next frame's first edge, which brings no new level, yet is that
+            // frame's first edge.
             let start_ns = wire.now_ns;
             let wanted = wire.wanted(WORD, Rate::Dshot600, start_ns);
             let played: Vec<_> = edges(WORD, Rate::Dshot600).collect();
@@ -336,7 +335,7 @@ fn a_missed_edge_spoils_one_frame() {
     }
 }
 
-/// Rates with timers that tell their bits apart in spite of 60 ns.
+/// Rates, with timers that can tell their bits apart despite 60 ns of jitter.
 fn rates_and_timers() -> impl Strategy<Value = (Rate, u32)> {
     let fast = prop_oneof![Just(TICK_HZ), Just(84_000_000), 84_000_000_u32..=u32::MAX];
     let slow = prop_oneof![Just(7_200_000), 7_200_000_u32..=84_000_000];
@@ -346,7 +345,7 @@ fn rates_and_timers() -> impl Strategy<Value = (Rate, u32)> {
     ]
 }
 
-/// Displacements of edges, ns: often as far as they may go.
+/// Edge displacements, ns, often at their limits.
 fn jitters() -> impl Strategy<Value = Vec<f64>> {
     let one = prop_oneof![Just(-60.0), Just(60.0), -60.0..60.0];
     prop::collection::vec(one, 32)

@@ -1,4 +1,4 @@
-//! A whole wire: what happens to it while a signal is sent, and what is made of that.
+//! A complete line: disturbances while a signal is sent, and what is decoded.
 
 use super::*;
 use crate::input::dshot::{check_mask, edges};
@@ -10,7 +10,7 @@ mod at_once;
 const TICK_HZ: u32 = 170_000_000;
 const MS: u64 = 1_000_000;
 
-/// Edges at nanoseconds since the start, and a line that is asked 24 000 times a second.
+/// Edges in ns since the start, and a line polled 24 000 times a second.
 struct Wire {
     line: Line,
     now_ns: u64,
@@ -28,7 +28,7 @@ impl Wire {
         }
     }
 
-    /// A wire on which this signal has been detected.
+    /// Creates a wire on which this signal has been detected.
     fn of(signal: Signal) -> Self {
         let mut wire = Self::new();
         wire.edge(0, signal.rests_high());
@@ -64,7 +64,7 @@ impl Wire {
         self.settle_until(self.now_ns);
     }
 
-    /// The edges of a frame of zero throttle or of a pulse of 1/8 of the range, from now on.
+    /// Returns the edges, from now on, of a frame of zero throttle or of a pulse at 1/8 of the range.
     fn edges(&self, signal: Signal) -> Vec<(u64, bool)> {
         match signal {
             Signal::Dshot {
@@ -91,7 +91,7 @@ impl Wire {
         self.play(&self.edges(signal));
     }
 
-    /// Sends one, waits for a millisecond, and returns what was found.
+    /// Sends one, waits a millisecond, and returns the events.
     fn found(&mut self, signal: Signal) -> Vec<Event> {
         self.events.clear();
         self.send(signal);
@@ -109,7 +109,7 @@ fn width_ns(kind: Pulse) -> u32 {
     end_points.least + (end_points.most - end_points.least) / 8
 }
 
-/// Returns true for exactly one event, a frame or pulse of this signal that was sent whole.
+/// Returns true for exactly one event: a frame or pulse of this signal, as sent.
 fn whole(events: &[Event], signal: Signal) -> bool {
     let [event] = events else { return false };
     let right = match *event {
@@ -151,7 +151,7 @@ fn a_known_signal_is_the_only_one() {
         for other in Signal::all().filter(|other| *other != known) {
             let mut wire = Wire::of(known);
             wire.edge(wire.now_ns, other.rests_high());
-            // Longer than any pulse, which this would be otherwise.
+            // Longer than any pulse, or it would count as one.
             wire.wait(5 * MS);
             wire.events.clear();
             for _ in 0..30 {
@@ -160,7 +160,7 @@ fn a_known_signal_is_the_only_one() {
                 assert!(!valid, "{} on {}", other.name(), known.name());
                 assert_eq!(wire.line.signal(), Some(known));
             }
-            // Once it is lost, the other one is detected.
+            // Once lost, the other one is detected.
             wire.line.lost();
             assert_eq!(wire.line.signal(), None);
             wire.detect(other);
@@ -210,7 +210,7 @@ fn glitches_within_the_filter_are_dropped() {
             let mut played = wire.edges(signal);
             let (at_ns, level) = played[place];
             let rest_ns = wire.now_ns - 10_000;
-            // One in the rest before, and one in a level of the frame.
+            // One glitch in the rest before, and one in a level of the frame.
             let start_ns = at_ns + 60;
             let glitches = [
                 (start_ns, !level),
@@ -242,8 +242,8 @@ fn a_line_that_is_stuck_for_longer_than_the_ticks_take_to_wrap() {
                 if cut >= wire_edges(signal) {
                     continue;
                 }
-                // Cut after any edge, high or low, and the others come after the ticks have
-                // wrapped as if nothing had been between.
+                // Cut after any edge, high or low, with the rest sent after the ticks have wrapped as if
+                // nothing had happened in between.
                 let played = wire.edges(signal);
                 let (before, after) = played.split_at(cut);
                 wire.play(before);
@@ -302,7 +302,7 @@ fn a_missed_edge_costs_one_frame_and_a_pulse_more() {
             assert!(!valid, "{}, {missed}", signal.name());
             let spoilt = match signal {
                 Signal::Dshot { .. } => 0,
-                // One that follows what was none, and one that seems to have begun in the other.
+                // The pulse that follows a bad one, and one that seems to have started in another.
                 Signal::Pulse(_) => 1 + missed,
             };
             for _ in 0..spoilt {
@@ -350,7 +350,7 @@ fn frames_back_to_back_are_detected() {
         };
         let mut wire = Wire::new();
         wire.edge(0, signal.rests_high());
-        // Longer than any pulse, which this would be otherwise.
+        // Longer than any pulse, or it would count as one.
         wire.wait(5 * MS);
         wire.events.clear();
         while wire.now_ns < 65 * MS {

@@ -1,4 +1,4 @@
-//! The decoder of pulses at its bounds.
+//! The pulse decoder at its limits.
 
 use super::*;
 use proptest::prelude::*;
@@ -7,7 +7,7 @@ use std::vec::Vec;
 /// A tick is a nanosecond: widths come out as they went in.
 const TICK_HZ: u32 = 1_000_000_000;
 
-/// A decoder and a line that is low.
+/// A decoder, and a line that is low.
 struct Wire {
     decoder: Decoder,
     now: u32,
@@ -121,7 +121,7 @@ fn bits_of_dshot150_are_no_multishot_pulses() {
             events.push(wire.pulse(1_667, 5_000));
         }
     }
-    // The first one of all has none before it that speaks against it.
+    // The very first has no predecessor to disqualify it.
     let (first, others) = events.split_first().expect("pulses were played");
     assert_eq!(*first, pulse(Pulse::Multishot, 5_000));
     assert!(!others.iter().flatten().any(|event| *event != Event::Bad));
@@ -153,7 +153,7 @@ proptest! {
             return Err(TestCaseError::fail("no pulse"));
         };
         let true_ns = ticks * 1e9 / f64::from(tick_hz);
-        // The time of a tick is known to 2⁻²⁴ ns.
+        // The tick duration is accurate to 2⁻²⁴ ns.
         let error_ns = (f64::from(width_ns) - true_ns).abs();
         prop_assert!(error_ns <= 0.5 + ticks / f64::from(1 << TICK_PLACES), "{error_ns}");
     }

@@ -1,4 +1,4 @@
-//! Flash as on the STM32G4, and what becomes of it when its power fails.
+//! Flash as on the STM32G4, and its contents after a power failure.
 
 use core::ops::Range;
 use std::vec;
@@ -24,9 +24,9 @@ pub(super) struct RamFlash {
     pub(super) reads: usize,
     /// Reads until it refuses them.
     pub(super) reads_left: usize,
-    /// Words and pages until the power fails, within the next one.
+    /// Words and pages until power fails, within the next one.
     pub(super) steps_left: usize,
-    /// Decides what is left after the power failed.
+    /// Decides what remains after a power failure.
     pub(super) chance: Random,
 }
 
@@ -59,10 +59,10 @@ impl RamFlash {
         }
     }
 
-    /// Returns true if the next step is done as a whole; an error after the power has failed.
+    /// Returns true if the next step completes; an error after the power has failed.
     fn step(&mut self) -> Result<bool, Refused> {
         match self.steps_left {
-            // It has failed before.
+            // It has already failed.
             0 => Err(Refused),
             1 => {
                 self.steps_left = 0;
@@ -107,7 +107,7 @@ impl NorFlash for RamFlash {
                 self.erases += 1;
                 continue;
             }
-            // An erase first writes zeros, then takes all bits to one; each is as far as it came.
+            // An erase first writes zeros, then sets all bits; each may be partial.
             match chance.below(4) {
                 0 => {}
                 1 => page.iter_mut().for_each(|byte| *byte &= chance.byte()),
@@ -128,7 +128,7 @@ impl NorFlash for RamFlash {
             }
             let whole = self.step()?;
             for (place, byte) in self.bytes[at..at + WORD].iter_mut().zip(word) {
-                // A bit that is to become zero has, or has not.
+                // A bit to be cleared has been, or has not.
                 *place = if whole {
                     *byte
                 } else {

@@ -1,8 +1,8 @@
-//! Losses of power at every write and every erase.
+//! Power failures at every write and every erase.
 
 use super::*;
 
-/// A change of what is kept.
+/// A change of the stored values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Act {
     Save,
@@ -18,8 +18,8 @@ impl Act {
     }
 }
 
-/// Saves and resets of random values, each cut off at each of its words and pages, with random bits
-/// left there. One goes on from any of the wrecks, and cuts the next save off as well.
+/// Saves and resets of random values, each cut off at every word and page, with random bits left there. One
+/// continues from any of the wrecks, and cuts off the next save too.
 #[test]
 fn every_loss_of_power_leaves_all_old_or_all_new_values() {
     let mut random = Random::new(1);
@@ -48,7 +48,7 @@ fn every_loss_of_power_leaves_all_old_or_all_new_values() {
             cut.chance = Random::new(cuts);
             let done = act.run(&mut cut, &new);
             if cut.steps_left > 0 {
-                // It did not come to the cut.
+                // It finished before the cut.
                 done.expect("the power was there");
                 break;
             }
@@ -71,7 +71,7 @@ fn every_loss_of_power_leaves_all_old_or_all_new_values() {
             old = new;
         }
     }
-    // Cuts are before the seal of the first copy, or behind it.
+    // Cuts fall before the first copy's seal, or after it.
     assert!(olds > 10_000 && news > 10_000, "{olds} old, {news} new");
     assert!(wrecks > 100, "{wrecks}");
 }
@@ -91,7 +91,7 @@ fn the_first_save_is_not_taken_for_corruption() {
                 assert_eq!((loaded.kept, loaded.integrity), (wanted, Integrity::Sound));
                 break;
             }
-            // Of the copies the first, or none.
+            // The first of the copies, or none.
             let wanted = if loaded.integrity == Integrity::Unfinished {
                 Kept::default()
             } else {

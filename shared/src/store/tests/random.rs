@@ -1,4 +1,4 @@
-//! Numbers by chance, the same ones each time.
+//! Random numbers, the same ones every time.
 
 use super::*;
 
@@ -59,7 +59,7 @@ impl Random {
                 let value = entry.min + share * (entry.max - entry.min);
                 let value = [value, libm::truncf(value), entry.default][self.below(3)];
                 if entry.kind.is_kept() {
-                    // A fraction of a whole number is refused.
+                    // A fraction of an integer parameter is refused.
                     let _ = kept.params.set(id, value);
                 }
             }

@@ -1,9 +1,9 @@
-//! Bits that have changed by themselves.
+//! Bit rot.
 
 use super::flash::HALF;
 use super::*;
 
-/// Sets, the last of which is in the second half.
+/// Sets, the last of them in the second half.
 fn sets() -> (RamFlash, Vec<Kept>) {
     let mut flash = RamFlash::new();
     let mut sets = Vec::new();
@@ -34,8 +34,8 @@ fn a_wrong_byte_anywhere_is_noticed() {
     }
 }
 
-/// In a set: up to 91 607 bits the check always notices three (P. Koopman, "32-Bit Cyclic Redundancy Codes
-/// for Internet Applications", 2002).
+/// Within a set: up to 91 607 bits the CRC always detects three errors (P. Koopman, "32-Bit Cyclic Redundancy
+/// Codes for Internet Applications", 2002).
 #[test]
 fn two_and_three_wrong_bits_are_noticed() {
     let (mut flash, sets) = sets();
@@ -62,7 +62,7 @@ fn two_and_three_wrong_bits_are_noticed() {
     }
 }
 
-/// So that no motor is driven with the settings of another one.
+/// So that no motor is driven with another one's settings.
 #[test]
 fn a_wrong_bit_in_the_only_save_changes_nothing_that_was_set() {
     let mut flash = RamFlash::new();
@@ -75,7 +75,7 @@ fn a_wrong_bit_in_the_only_save_changes_nothing_that_was_set() {
         let loaded = load(&mut flash, RANGE);
         assert_eq!(loaded.kept, changed(), "{bit}");
         assert_eq!(loaded.integrity, Integrity::Incomplete, "{bit}");
-        // The next save, of whatever, makes two of them again.
+        // The next save, of anything, makes two of them again.
         save(&mut flash, RANGE, &loaded.kept).expect("goes to the other half");
         assert_eq!(sound(&mut flash), changed());
     }

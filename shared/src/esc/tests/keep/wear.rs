@@ -1,4 +1,4 @@
-//! How often settings are stored without being asked for, which is what the flash lasts for.
+//! How often settings are stored unasked, which determines the flash's life.
 
 use super::*;
 use crate::esc::storage::Storage;
@@ -20,7 +20,7 @@ fn changes_without_end_are_stored_every_two_seconds() {
     }
     let first = stored_ms.first().copied().expect("there are some");
     assert!(first <= 2_001, "{stored_ms:?}");
-    // What is stored waits for the next change, and so 0.4 s more.
+    // After a save the next change is up to 0.4 s away.
     assert!(
         stored_ms.windows(2).all(|pair| pair[1] - pair[0] <= 2_401),
         "{stored_ms:?}"
@@ -96,7 +96,7 @@ fn the_time_that_saves_owe_is_stored_with_them() {
         ..loaded(Integrity::Sound)
     };
     assert_eq!(loaded.kept.owed_s, 180);
-    // All are taken.
+    // All are used up.
     loaded.kept.owed_s = 100 * 180;
     let mut bench = Bench::new();
     bench.esc.recall(&loaded);
@@ -110,7 +110,7 @@ fn the_time_that_saves_owe_is_stored_with_them() {
         (60_000_000..60_100_000).contains(&since_start_us),
         "{since_start_us}"
     );
-    // One that is asked for does not wait.
+    // A requested one does not wait.
     bench.storage_done(Ok(()));
     bench.requests.clear();
     bench.set("LIM_PHASE_A", 14.0);

@@ -1,4 +1,4 @@
-//! Motor tests by MAVLink: when one may begin, and what ends it.
+//! Motor tests by MAVLink: when one may start, and what ends it.
 
 use super::*;
 

@@ -1,18 +1,18 @@
-//! An armed wire at zero opens by several throttles in a row.
+//! An armed wire at zero opens after several throttle frames in a row.
 
 use std::collections::BTreeMap;
 
 use super::*;
 
-/// The probability that random words, one a millisecond, turn the motor of an armed wire at zero before they
-/// are a lost signal. Of 2048 values that pass the check, 48 are no throttle. Ways less likely than this are left
-/// out, which together are less than a thousandth of the result.
+/// Returns the probability that random words, one per millisecond, turn the motor of an armed wire at zero
+/// before they count as a lost signal. Of the 2048 values that pass the check, 48 are not throttle. Paths less
+/// likely than `LEAST` are dropped; together they are less than a thousandth of the result.
 fn likely_turned_by_noise() -> f64 {
     const LEAST: f64 = 1e-12;
     const GOOD: f64 = 1.0 / 16.0;
     const ZERO: f64 = 48.0 / 2048.0;
     let armed = Bench::armed();
-    // By what decides what comes next: the trust, the throttles in a row and the age of the signal.
+    // Keyed by what determines the future: trust, throttle frames in a row and age of the signal.
     let mut states = BTreeMap::from([((0, 0, 0), (1.0, armed.authority))]);
     let mut now_us = armed.now_us;
     let mut turned = 0.0;
@@ -62,7 +62,7 @@ fn the_fourth_throttle_in_a_row_opens() {
     assert_eq!(bench.authority.command(), Command::Zero);
     bench.play(1, event(48));
     assert_eq!(bench.authority.command(), Command::Throttle(Share::ZERO));
-    // Open, it obeys each at once, behind bad ones too.
+    // Once open, it obeys each frame at once, even after bad ones.
     bench.play(1, event(2047));
     assert_eq!(bench.authority.command(), Command::Throttle(Share::MAX));
     bench.play(5, Event::Bad);

@@ -1,4 +1,4 @@
-//! Pulses, signals that are not identified yet or not any more, and other readings.
+//! Pulses, signals before and after identification, and other readings.
 
 use super::*;
 use crate::input::signal::Pulse;
@@ -13,7 +13,7 @@ fn pulse(width_us: u32) -> Event {
 const SERVO: Option<Signal> = Some(Signal::Pulse(Pulse::Servo));
 
 impl Bench {
-    /// Events of any signal, 20 ms apart, and what has been identified by then.
+    /// Events of any signal, 20 ms apart, and the signal identified by then.
     fn play_as(&mut self, count: u32, event: Event, identified: Option<Signal>) {
         for _ in 0..count {
             self.now_us += 20_000;
@@ -63,7 +63,7 @@ fn what_is_not_identified_counts_and_does_not_arm() {
         bench.authority.armed(),
         "the time has counted from the first"
     );
-    // An open throttle is none before it is known what it is.
+    // Before identification an open throttle does not count as one.
     let mut bench = Bench::new();
     bench.play_as(100, pulse(1600), None);
     assert!(!bench.authority.refuses() && !bench.turns());
@@ -87,7 +87,7 @@ fn another_signal_begins_anew() {
 #[test]
 fn signals_other_than_the_identified_one_are_bad() {
     let mut bench = Bench::open(1000);
-    // Each event 20 ms after the one before: the signal is lost with the fifth.
+    // Events 20 ms apart: the fifth finds the signal lost.
     bench.play_as(5, pulse(1800), IDENTIFIED);
     let held = bench.authority.command();
     assert!(matches!(held, Command::Throttle(throttle) if throttle < 0.5));
@@ -106,7 +106,7 @@ fn another_reading_must_be_armed_anew_and_the_same_need_not() {
         ..Reading::default()
     });
     assert!(!bench.authority.armed());
-    // What was zero is full reverse now.
+    // What was zero is now full reverse.
     bench.play_as(100, pulse(1000), SERVO);
     assert!(!bench.authority.armed() && !bench.turns());
     assert!(bench.authority.refuses());
@@ -124,7 +124,7 @@ fn a_frame_that_passes_by_chance_neither_turns_nor_arms() {
         bench.after(1_000, event(0));
         assert_eq!(bench.authority.command(), Command::Zero);
     }
-    // On a wire that is open, single zeros arm nothing.
+    // On an open wire, isolated zeros do not arm.
     let mut bench = Bench::new();
     for _ in 0..10_000 {
         bench.play(29, event(1000));

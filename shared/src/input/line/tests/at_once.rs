@@ -1,8 +1,8 @@
-//! Whole frames, taken at once.
+//! Whole frames taken at once.
 
 use super::*;
 
-/// The edges of a frame as bits, as a capture that has all of them gives them.
+/// Returns a frame's edges as bits, as a complete capture gives them.
 fn bits_of(edges: &[(u64, bool)]) -> Option<[(u32, u32); 16]> {
     let bits: Vec<_> = edges
         .chunks_exact(2)
@@ -29,7 +29,7 @@ fn behind_a_cut_frame_the_next_is_taken_at_once_when_its_rest_has_been_told() {
             }
             let event = wire.line.whole(signal.rests_high(), |bit| bits[bit]);
             let found = event.and_then(|event| event.signal());
-            // Behind an odd number of edges the line is at the other level: they go one by one.
+            // After an odd number of edges the line is at the other level: they are taken one by one.
             let wanted = (edges % 2 == 0).then_some(signal);
             assert_eq!(found, wanted, "{}, {edges}", signal.name());
         }
@@ -39,8 +39,8 @@ fn behind_a_cut_frame_the_next_is_taken_at_once_when_its_rest_has_been_told() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
 
-    /// Frames of any content and gap, with edges that stray and some of them lost, of a signal that is known
-    /// or still to be found out: whether whole frames are taken at once or edge by edge, the same is found.
+    /// Frames with any content and gaps, stray edges and lost ones, of a signal that is known or still to be
+    /// detected: taken whole or edge by edge, the result is the same.
     #[test]
     fn a_frame_at_once_is_what_its_edges_are(
         rate in 0..4_usize,
@@ -71,7 +71,7 @@ proptest! {
                 wire.events.clear();
                 wire.wait(now_ns - wire.now_ns);
             }
-            // Between its edges a frame of what is not known yet may look like a pulse for a moment.
+            // Before detection, a frame's edges may look like a pulse for a moment.
             let counts = |event: &&Event| known || matches!(event, Event::Frame { .. });
             let (found, wanted) = (at_once.events.iter(), by_edges.events.iter());
             prop_assert!(found.filter(counts).eq(wanted.filter(counts)));
@@ -85,7 +85,7 @@ proptest! {
                 })
                 .collect();
             match kind {
-                // An edge is lost, two are, or a bit is another one.
+                // An edge is lost, two are, or a bit is changed.
                 0 => drop(sent.remove(usize::from(value) % 32)),
                 1 => drop(sent.drain(usize::from(value) % 31..).take(2).count()),
                 2 => sent[9].0 += u64::from(rate.bit_ns()) / 3,
@@ -96,7 +96,7 @@ proptest! {
                 .filter_map(|(at_ns, level)| by_edges.line.edge(ticks(*at_ns), *level))
                 .collect();
             let whole = bits_of(&sent).and_then(|bits| at_once.line.whole(bidirectional, |bit| bits[bit]));
-            // Behind one that was cut it may have to go edge by edge.
+            // After one that was cut it may have to go edge by edge.
             prop_assert!(whole.is_some() || !clean || kind < 3);
             clean = whole.is_some();
             let found: Vec<_> = match whole {
