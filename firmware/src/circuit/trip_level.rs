@@ -5,11 +5,11 @@
 //!
 //! | cause | spread |
 //! |---|---|
-//! | one step of the DAC, 0.81 mV | 0.47 A, rounded down |
-//! | offset of DAC and comparator, ±9 mV and ±10 mV (data sheet of the STM32G431) | ±11 A at worst |
-//! | resistors of 1 % about the bias of 129 mV | ±1.5 A |
-//! | the vector's angle: a comparator sees a current out of the motor only, of which the largest of three is between half and all of the vector's length | 1 to 2 times the level |
-//! | the break's filter of 0.56 µs and the ringing that it keeps out | 0.56 µs of a rise of V/L |
+//! | one DAC step, 0.81 mV | 0.47 A, rounded down |
+//! | DAC and comparator offset, ±9 mV and ±10 mV (STM32G431 data sheet) | ±11 A at worst |
+//! | 1 % resistors around the 129 mV bias | ±1.5 A |
+//! | angle of the current vector: a comparator only sees current out of the motor, and the largest of the three is between half and all of the vector's length | 1 to 2 times the level |
+//! | break filter, 0.56 µs, and the ringing that it rejects | 0.56 µs of a rise at V/L |
 //!
 //! A rotating vector passes its worst angle within a sixth of an electrical turn; at standstill the software
 //! trip at 1.4 times, which sees both signs of all phases, comes first.

@@ -5,8 +5,8 @@
 //! written after the top and take effect at the next one, a period later.
 //!
 //! A phase's state ([`Leg`]) is in the channels' mode and enable bits. These are preloaded too (CCPC), but the
-//! timer takes them at its commutation event, not at the top: the control interrupt triggers one first thing, 3
-//! µs after the top at which the matching duties were taken. In between, the old switches see the new duties: a
+//! timer takes them at its commutation event, not at the top: the control interrupt triggers one first thing,
+//! 3 µs after the top at which the matching duties were taken. In between, the old switches see the new duties: a
 //! released phase keeps its low side on for that long, and one that joins starts to switch that much later.
 //!
 //! The hardware changes all bits of all phases in the same clock, so no order of writes can turn on both

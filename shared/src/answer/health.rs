@@ -6,8 +6,8 @@
 //!
 //! | event | raised by |
 //! |---|---|
-//! | alert | a [`Limit`](crate::drive::Limit) binds beyond which there is no more torque: the current is at `LIM_PHASE_A`, or the supply gives `LIM_BUS_A` |
-//! | warning | a start has failed and is tried again, the rotor's position is in doubt, or a phase or a sensor is at fault ([`Limits::warn`]) |
+//! | alert | a [`Limit`](crate::drive::Limit) binds that leaves no more torque: the current is at `LIM_PHASE_A`, or the supply at `LIM_BUS_A` |
+//! | warning | a start has failed and is being retried, the rotor's position is in doubt, or a phase or a sensor is at fault ([`Limits::warn`]) |
 //! | error | a fault has turned the bridge off |
 //!
 //! The next status word reports an event once, and the ones after it repeat it while it lasts.

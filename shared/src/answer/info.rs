@@ -6,15 +6,15 @@
 //! |---|---|
 //! | 0 to 11 | serial number of the microcontroller |
 //! | 12 | 254: this layout |
-//! | 13, 14 | version of the firmware, printed as 1.02 |
+//! | 13, 14 | firmware version, printed as 1.02 |
 //! | 15 | type, not printed |
 //! | 16 | direction: 0 normal, 1 reversed |
 //! | 17 | 3D: 0 off, 1 on |
-//! | 18 | least supply voltage in 0.1 V, 0 off |
-//! | 19 | limit of the current in A, 0 off |
-//! | 20 to 23 | lights 0 to 3: 0 off, 1 on, 255 there is none |
-//! | 31 to 62 | name and board, zeros to the end |
-//! | 63 | checksum, as of a KISS frame |
+//! | 18 | minimum supply voltage, 0.1 V, 0 off |
+//! | 19 | current limit, A, 0 off |
+//! | 20 to 23 | lights 0 to 3: 0 off, 1 on, 255 absent |
+//! | 31 to 62 | name and board, zero-padded |
+//! | 63 | checksum, as in a KISS frame |
 
 use super::kiss::crc8;
 use crate::image::{Image, VERSION};

@@ -2,17 +2,17 @@
 //!
 //! | name | unit | bounds | what it shows |
 //! |---|---|---|---|
-//! | `supply` | V | `LIM_BUS_V_MIN` to `LIM_BUS_V_MAX` | the supply, as its divider shows it |
+//! | `supply` | V | `LIM_BUS_V_MIN` to `LIM_BUS_V_MAX` | the supply, through its divider |
 //! | `temperature` | degC | −20 to `LIM_TEMP_C` | the thermistor |
-//! | `option_bytes` | 1 | 1 | 1 if the chip starts from its flash whatever its BOOT0 pin says |
-//! | `comparator_a`.. | A | ± 0.4 of the range | where the comparator trips without current: its level is searched between 0, which must trip, and full scale, which must not |
-//! | `zero_a`.. | A | ± 0.1 of the range | mean of the current's readings without current: the drive takes no greater one for sound |
-//! | `noise_a`.. | A | 0.1 counts to 0.01 of the range | standard deviation of the same; readings that never change are no readings |
-//! | `rest_a`.. | % | −1 to 10 | the terminal with all switches off |
-//! | `high_a`.. | % | 90 to 110 | the terminal with its high side on |
-//! | `motor_a`.. | % | 90 to 110 | the terminal with the high side of another phase on |
-//! | `low_a`.. | A | −1 to −0.1 of `LIM_PHASE_A` | the current that comes back through the low side, as its shunt shows it |
-//! | `off_a`.. | A | ± 0.1 of `LIM_PHASE_A` | the current through a phase that is off, while another is pulled up |
+//! | `option_bytes` | 1 | 1 | 1 if the chip boots from flash whatever its BOOT0 pin |
+//! | `comparator_a`.. | A | ± 0.4 of the range | where the comparator trips without current, searched between 0, which must trip, and full scale, which must not |
+//! | `zero_a`.. | A | ± 0.1 of the range | mean of the zero-current readings; the drive accepts no larger offset |
+//! | `noise_a`.. | A | 0.1 counts to 0.01 of the range | standard deviation of the same readings; ones that never change are not real |
+//! | `rest_a`.. | % | −1 to 10 | terminal with all switches off |
+//! | `high_a`.. | % | 90 to 110 | terminal with its own high side on |
+//! | `motor_a`.. | % | 90 to 110 | terminal with another phase's high side on |
+//! | `low_a`.. | A | −1 to −0.1 of `LIM_PHASE_A` | current returning through the low side, as its shunt shows it |
+//! | `off_a`.. | A | ± 0.1 of `LIM_PHASE_A` | current through a phase that is off while another is pulled up |
 //!
 //! Percentages are of the supply, or of the divider's full scale where that is lower: 18.3 V on the
 //! B-G431B-ESC1, where readings clamp.

@@ -9,11 +9,11 @@
 //!
 //! The motor does not turn, and no switch closes before its neighbours have been checked:
 //!
-//! | step | the bridge | what is seen |
+//! | step | bridge | what it shows |
 //! |---|---|---|
-//! | listen, 72 ms | off | `supply`, `temperature`, `option_bytes`, `comparator_*`, which are all that is measured at power-up; `zero_*`, `noise_*`, `rest_*`: a terminal that is not at ground has a shorted high side, and nothing is pulled |
-//! | pull a, b, c up | one leg from duty 0 to the whole, the others off ([`Pull`]) | `high_*`: its terminal comes to the supply, so its high side and the supply of its driver work. `motor_*`: the others follow it through the windings. `off_*`: no current, so no low side is shorted |
-//! | a to b, b to c, c to a | one leg up to a quarter, the low side of the next on, until a test's current flows | `low_*`: it comes back through that low side and its shunt, with the right sign |
+//! | listen, 72 ms | off | `supply`, `temperature`, `option_bytes`, `comparator_*`: all that power-up measures; `zero_*`, `noise_*`, `rest_*`: a terminal above ground has a shorted high side, and nothing is pulled |
+//! | pull a, b, c up | one leg from duty 0 to full, the others off ([`Pull`]) | `high_*`: its terminal reaches the supply, so its high side and that driver's supply work. `motor_*`: the others follow through the windings. `off_*`: no current, so no low side is shorted |
+//! | a to b, b to c, c to a | one leg up to a quarter, the next one's low side on, until a test's current flows | `low_*`: the current returns through that low side and its shunt, with the right sign |
 //!
 //! With all switches off the divider pulls a terminal to ground, so only current can show that a low side
 //! works.

@@ -2,10 +2,10 @@
 //!
 //! | value | meaning | in a row |
 //! |---|---|---|
-//! | 1 to 5 | beacon, the motor as a loudspeaker | 1 |
+//! | 1 to 5 | beacon, with the motor as a loudspeaker | 1 |
 //! | 6 | the ESC's information on the serial line | 1 |
 //! | 7, 8 | direction 1 or 2: `MOT_DIR` 0 or 1 | 6, waits |
-//! | 9, 10 | one direction of throttle or two: `INP_3D` 0 or 1 | 6 |
+//! | 9, 10 | one or two throttle directions: `INP_3D` 0 or 1 | 6 |
 //! | 12 | save the settings | 6, waits |
 //! | 13, 14 | extended telemetry on, off | 6, at once |
 //! | 20, 21 | turn as `MOT_DIR` says, or against it, until the next start | 6, waits |

@@ -18,8 +18,8 @@ pub enum Demand {
 /// The reciprocal of the share of the range that is zero at its lower end: 2 %.
 pub const ZERO_DIVISOR: u32 = 50;
 
-/// The reciprocal of the share of the range that is zero on either side of the centre, with two directions: 4
-/// %. Twice that at an end, because a stick's spring centres it less exactly than an end stop, and within the
+/// The reciprocal of the share of the range that is zero on either side of the centre, with two directions:
+/// 4 %. Twice that at an end, because a stick's spring centres it less exactly than an end stop, and within the
 /// ±5 % that flight controllers leave free there.
 const CENTRE_DIVISOR: u32 = 25;
 

@@ -6,8 +6,8 @@
 //! (2.08 and −0.63); their sum, clamped at both ends, is compared with a threshold.
 //!
 //! In random words the sum falls by 3/4 per word and then stays near 0. One word in 143 000 takes it to the
-//! threshold; at 1 kHz the wire thus counts as silent within 0.2 s of the first word in all but one case in 26
-//! 000. The sum rises if more than a quarter of the frames are good. On a link where half are, one good frame
+//! threshold; at 1 kHz the wire thus counts as silent within 0.2 s of the first word in all but one case in
+//! 26 000. The sum rises if more than a quarter of the frames are good. On a link where half are, one good frame
 //! in 2760 is missed, and at 1 kHz a silence of 0.1 s occurs once in three years. Twelve bad frames in a row
 //! cost none of the good ones after them; any number costs at most four.
 
