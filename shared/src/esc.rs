@@ -71,7 +71,7 @@ pub struct Esc {
     charge: Charge,
     witness: Witness,
     recorder: Recorder,
-    /// Two commands set such values.
+    /// One entry for each of the two commands that set a value.
     unstored: Vec<Unstored, 2>,
     /// The other ESCs that this one reports.
     #[cfg(feature = "group")]

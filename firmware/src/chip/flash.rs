@@ -43,7 +43,7 @@ pub(crate) unsafe fn program(address: usize, word: &[u8; WORD_BYTES]) -> Result<
 /// # Safety
 /// Nothing but data may be there.
 pub(crate) unsafe fn erase(address: usize) -> Result<(), Failed> {
-    // One erase can take as long as the watchdog's period, and several may follow each other.
+    // The watchdog's period covers one erase, and several may follow each other.
     IWDG.kr().write(|w| w.set_key(Key::RESET));
     let mut control = erasing((address - ORIGIN) / PAGE_BYTES);
     let done = with_unlocked(|| {

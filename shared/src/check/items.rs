@@ -29,7 +29,7 @@ pub enum Kind {
     Supply,
     /// Board temperature, °C.
     Temperature,
-    /// 1 if the option bytes make the chip boot from flash, else 0.
+    /// 1 if the option bytes make the chip boot from flash, 0 otherwise.
     OptionBytes,
     /// A phase current at which its comparator would trip, with the level shifted to where it does trip, A.
     Comparator,
