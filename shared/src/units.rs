@@ -1,11 +1,11 @@
 //! The control's own units.
 //!
-//! Inside the control every quantity is a fraction of a base, so that a product needs only its
-//! top half. Conversion from and to SI happens when the configuration is built and in telemetry,
-//! never in a control period.
+//! Inside the control every quantity is a fraction of a base, so that a product needs only its top
+//! half. Conversion from and to SI happens when the configuration is built and in telemetry, never
+//! in a control period.
 //!
-//! Each is a [`Quantity`], which adds to its like alone; [`dimension`] has every product of two that
-//! there is. A voltage adds to a voltage:
+//! Each is a [`Quantity`], which adds only to its own kind; [`dimension`] lists every product of
+//! two. A voltage adds to a voltage:
 //!
 //! ```
 //! # use siskin_control::units::{Current, Voltage};
@@ -13,7 +13,7 @@
 //! assert_eq!(u + u, Voltage::ONE);
 //! ```
 //!
-//! but not with a current:
+//! but not to a current:
 //!
 //! ```compile_fail,E0308
 //! # use siskin_control::units::{Current, Voltage};
@@ -21,7 +21,7 @@
 //! u + i;
 //! ```
 //!
-//! An angle takes on what a speed turns it by in a period:
+//! An angle adds what a speed turns in a period:
 //!
 //! ```
 //! # use siskin_control::units::{Angle, Speed};
@@ -51,7 +51,7 @@ use dimension::{
     Volt, VoltSquare, Weber,
 };
 
-/// An electrical speed in turns a control period: the angle's step.
+/// Electrical speed in turns per control period: the angle's step.
 pub type Speed = Quantity<TurnPerPeriod, U32>;
 
 /// A current in units of [`Scale::current_a`].
@@ -60,44 +60,44 @@ pub type Current = Quantity<Ampere, U28>;
 /// A voltage in units of [`Scale::voltage_v`].
 pub type Voltage = Quantity<Volt, U28>;
 
-/// A voltage with room for sums of what may be far beyond the supply.
+/// A voltage with headroom for sums far beyond the supply.
 pub type WideVoltage = Quantity<Volt, U24>;
 
-/// A voltage of a vector that has been turned twice: each sine takes a fraction bit.
+/// A voltage of a vector rotated twice: each sine takes a fraction bit.
 pub type TurnedVoltage = Quantity<Volt, U26>;
 
 /// One over a voltage.
 pub type InverseVoltage = Quantity<PerVolt, U28>;
 
-/// The voltage, with room for sums.
+/// Widens a voltage, for sums.
 pub fn wide(u: Voltage) -> WideVoltage {
     u.scaled()
 }
 
-/// The voltage, held at the ends of its type but for the bits that the wide one has not.
+/// Narrows a voltage, saturated; the low four bits, which the wide type lacks, are 0.
 pub fn narrow(u: WideVoltage) -> Voltage {
     Voltage::from_bits(u.to_bits().clamp(i32::MIN >> 4, i32::MAX >> 4) << 4)
 }
 
-/// A square of a voltage.
+/// A voltage squared.
 pub type VoltageSquare = Quantity<VoltSquare, U24>;
 
-/// That with room for sums far beyond the supply.
+/// A voltage squared, with headroom for sums far beyond the supply.
 pub type WideVoltageSquare = Quantity<VoltSquare, U16>;
 
-/// ω·i: how fast a current changes in a frame that turns, in units of current a period, over 2π.
+/// ω·i: how fast a current changes in a rotating frame, in units of current per period, over 2π.
 pub type CurrentRate = Quantity<AmperePerPeriod, U28>;
 
-/// A square of a speed.
+/// A speed squared.
 pub type SpeedSquare = Quantity<TurnPerPeriodSquare, U32>;
 
 /// A torque in units of [`Scale::torque_nm`].
 pub type Torque = Quantity<NewtonMetre, U28>;
 
-/// A flux linkage in units of [`Scale::flux_wb`]: what a unit of voltage adds in a period.
+/// A flux linkage in units of [`Scale::flux_wb`]: what one unit of voltage adds in a period.
 pub type Flux = Quantity<Weber, U28>;
 
-/// A flux linkage with room for that of a current.
+/// A flux linkage with headroom for that of a current.
 pub type WideFlux = Quantity<Weber, U24>;
 
 /// The motor's stated flux, 2/π: the voltage base makes it so for every motor.
@@ -109,29 +109,29 @@ pub type InverseFlux = Quantity<PerWeber, U32>;
 /// The inverse of the motor's stated flux, ξ = 1/4: the voltage base makes it so for every motor.
 pub const INVERSE_FLUX_NOMINAL: InverseFlux = InverseFlux::from_bits(1 << 30);
 
-/// The back-EMF of the motor's stated flux at a speed, |h| = ω/ξ.
+/// Returns the back-EMF of the motor's stated flux at a speed, |h| = ω/ξ.
 pub fn stated_emf(omega: Speed) -> Voltage {
     // ξ = 1/4, and a speed has 32 fraction bits.
     Voltage::from_bits(omega.to_bits() >> 2)
 }
 
-/// The torque of a current along q with the motor's stated flux, T = i_q/ξ, held at the type's ends.
+/// Returns the torque of a q current with the motor's stated flux, T = i_q/ξ, saturated.
 pub fn stated_torque(i_q: Current) -> Torque {
     Torque::from_bits(i_q.to_bits().saturating_mul(4))
 }
 
-/// A reading of the converter in counts, signed and without its offset. The chip's are whole; a
-/// simulation of ideal sensing has fractions.
+/// An ADC reading in counts, signed and without its offset. The chip's are whole; simulated ideal
+/// sensing has fractions.
 pub type AdcCounts = I16F16;
 
-/// A share of the PWM period for which the high side is on, 0 to 1.
+/// The share of the PWM period for which the high side is on, 0 to 1.
 pub type Duty = fixed::types::U1F31;
 
 /// The control's units in SI.
 ///
 /// The bases are chosen so that Clarke's transform is two integer products (one unit of current is
-/// 4096/3 counts), and so that the motor's flux is the same number for every motor: the voltage
-/// base is π·φ/(2·T_s), which makes ξ = 1/4 and ψ = 2/π.
+/// 4096/3 counts), and so that every motor's flux is the same number: the voltage base is
+/// π·φ/(2·T_s), which makes ξ = 1/4 and ψ = 2/π.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scale {
     /// The control period T_s, s.
@@ -145,45 +145,45 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// One unit of [`InverseFlux`], 1/Wb: with it, ω = ξ·|h| holds in the control's units.
+    /// Returns one unit of [`InverseFlux`], 1/Wb: with it, ω = ξ·|h| holds in the control's units.
     pub fn inverse_flux_per_wb(&self) -> f32 {
         core::f32::consts::TAU / (self.voltage_v * self.period_s)
     }
 
-    /// One unit of [`Flux`], Wb: with it, a voltage adds itself to a flux in a period.
+    /// Returns one unit of [`Flux`], Wb: with it, a voltage adds itself to a flux in a period.
     pub fn flux_wb(&self) -> f32 {
         self.voltage_v * self.period_s
     }
 
-    /// One unit of [`Torque`], Nm: with it, i_q = ξ·T (9) holds in the control's units.
+    /// Returns one unit of [`Torque`], Nm: with it, i_q = ξ·T (9) holds in the control's units.
     pub fn torque_nm(&self) -> f32 {
         1.5 * self.pole_pairs * self.current_a / self.inverse_flux_per_wb()
     }
 
-    /// The control's speed for mechanical rpm; held below half a turn a period.
-    // Out of line, as the one for amperes: every limit needs one of them.
+    /// Converts mechanical rpm to a speed, saturated below half a turn per period.
+    // Out of line, like `current_from_a`: every limit calls one of them.
     #[inline(never)]
     pub fn speed_from_rpm(&self, rpm: f32) -> Speed {
         Speed::from_f32(rpm * self.turns_per_rpm())
     }
 
-    /// Mechanical rpm of a control's speed.
+    /// Converts a speed to mechanical rpm.
     pub fn rpm(&self, speed: Speed) -> f32 {
         speed.to_f32() / self.turns_per_rpm()
     }
 
-    /// The control's current for amperes, held at the type's ends.
-    #[inline(never)] // every limit needs one
+    /// Converts amperes to a current, saturated.
+    #[inline(never)] // every limit calls it
     pub fn current_from_a(&self, current_a: f32) -> Current {
         Current::from_f32(current_a / self.current_a)
     }
 
-    /// Amperes of a control's current.
+    /// Converts a current to amperes.
     pub fn amperes(&self, current: Current) -> f32 {
         current.to_f32() * self.current_a
     }
 
-    /// Volts of a control's voltage.
+    /// Converts a voltage to volts.
     pub fn volts(&self, voltage: Voltage) -> f32 {
         voltage.to_f32() * self.voltage_v
     }

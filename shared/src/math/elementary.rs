@@ -1,14 +1,14 @@
-//! The functions of coefficients that single precision has no instruction for, or that the compiler
-//! does not use: each in a tenth of what libm's take of the chip's flash, within a few bits of theirs.
+//! Functions for computing coefficients that the FPU has no instruction for, or whose instruction the compiler does not
+//! use: each takes a tenth of the flash of libm's and is within a few bits of it.
 
-/// √3, which the standard library has not.
+/// √3, which the standard library lacks.
 pub const SQRT_3: f32 = 1.732_050_8;
 
-/// √x of a number above 0, within 2^-22 of its value.
+/// Returns √x for x above 0, within 2^-22 of its value.
 #[inline(never)] // many call it
 pub fn square_root(x: f32) -> f32 {
-    // Half the exponent, and a straight line between powers of two: right to 4 %. Newton's rule
-    // squares that.
+    // Halving the exponent, with a straight line between powers of two, is accurate to 4 %; each Newton step squares
+    // the error.
     let mut root = f32::from_bits((x.to_bits() >> 1) + 0x1fbd_1df5);
     for _ in 0..3 {
         root = 0.5 * (root + x / root);
@@ -16,12 +16,12 @@ pub fn square_root(x: f32) -> f32 {
     root
 }
 
-/// 1 − e^(−x) of a number from 0 to 10 000, within 2^-20 of its value: the share of its way that a
-/// filter goes in x time constants.
+/// Returns 1 − e^(−x) for x from 0 to 10 000, within 2^-20 of its value: the share of a step that a first-order filter
+/// covers in x time constants.
 #[inline(never)] // many call it
 pub fn settled(x: f32) -> f32 {
-    // In a thousandth of the time it is nearly a straight line; after twice a time, the same share of
-    // what is left has been gone once more.
+    // Over x/1024 the curve is nearly a straight line. Doubling the time covers the same share of what is left once
+    // more.
     let part = x / 1024.0;
     let mut share = part / (1.0 + 0.5 * part);
     for _ in 0..10 {

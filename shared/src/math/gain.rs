@@ -11,8 +11,8 @@ use factor::Factor;
 
 /// A factor that turns an `A` into a `B`: a current into a voltage, say.
 ///
-/// It is held with the largest mantissa that fits and a power of two of its own, so that 2^-31 to
-/// 2^30 (in bits out per bit in) can be had with 30 bits of precision near the top of each range.
+/// It stores the largest mantissa that fits and its own power of two, which covers 2^-31 to 2^30
+/// (in bits out per bit in) with 30 bits of precision near the top of each range.
 #[derive(Debug)]
 pub struct Gain<A, B> {
     factor: Factor,
@@ -40,10 +40,10 @@ impl<A: Number, B: Number> Default for Gain<A, B> {
 }
 
 impl<A: Number, B: Number> Gain<A, B> {
-    /// The factor zero.
+    /// The zero gain.
     pub const ZERO: Self = Self::from_parts(0, 0);
 
-    /// The gain of value `k`, or `None` if its magnitude does not fit or is not finite.
+    /// Creates the gain `k`, or returns `None` if its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
@@ -51,7 +51,7 @@ impl<A: Number, B: Number> Gain<A, B> {
         Some(Self::from_parts(mantissa, shift))
     }
 
-    /// The gain `mantissa·2^shift/2^32`, in bits out per bit in; the shift is at most 30.
+    /// Creates the gain `mantissa·2^shift/2^32`, in bits out per bit in; the shift is at most 30.
     #[inline(always)] // in each period
     pub const fn from_parts(mantissa: i32, shift: u32) -> Self {
         Self {
@@ -60,52 +60,52 @@ impl<A: Number, B: Number> Gain<A, B> {
         }
     }
 
-    /// The product with `x`.
+    /// Returns the product with `x`.
     ///
-    /// The result wraps if it leaves its type: the caller bounds `x`, or uses
+    /// The result wraps if it exceeds its type: the caller bounds `x`, or uses
     /// [`Gain::saturating_apply`].
     #[inline(always)] // in each period
     pub fn apply(self, x: A) -> B {
         B::from_bits(self.factor.wrapping(x.to_bits()))
     }
 
-    /// [`Gain::saturating_apply`] where it is called and not inlined, for what is not in the way of
-    /// the default drive: that takes half of the chip's flash.
+    /// Calls [`Gain::saturating_apply`] out of line, which takes half the flash: for code off the
+    /// default drive's hot path.
     #[inline(always)]
     pub fn held(self, x: A) -> B {
         B::from_bits(held(self.factor, x.to_bits()))
     }
 
-    /// The product with `x`, held at the ends of its type.
+    /// Returns the product with `x`, saturated.
     #[inline(always)] // in each period
     pub fn saturating_apply(self, x: A) -> B {
         B::from_bits(self.factor.saturating(x.to_bits()))
     }
 }
 
-/// Once for all types.
+/// Shared by all types.
 #[inline(never)]
 fn held(factor: Factor, x: i32) -> i32 {
     factor.saturating(x)
 }
 
-/// Bits of a float's mantissa, with the one that it does not store.
+/// Mantissa bits of a float, including the implicit one.
 const MANTISSA_BITS: i32 = 24;
 
-/// The [`Gain::from_parts`] of `k·2^exponent`, or `None` if they do not exist.
+/// Returns the [`Gain::from_parts`] of `k·2^exponent`, or `None` if there are none.
 ///
-/// Once for all types, and never inlined: on the chip it is called for every coefficient.
+/// Shared by all types and never inlined: the chip calls it for every coefficient.
 #[inline(never)]
 pub(crate) fn parts(k: f32, exponent: i32) -> Option<(i32, u32)> {
     if !k.is_finite() {
         return None;
     }
     let bits = k.to_bits();
-    // What is too small for the implied one is 0 in the end.
+    // Numbers too small to have the implicit one end up as 0.
     let mantissa = (1 << (MANTISSA_BITS - 1)) | (bits & ((1 << (MANTISSA_BITS - 1)) - 1));
-    // With the implied point behind the mantissa, and the 32 bits that a product leaves behind.
+    // The binary point stands behind the mantissa; 32 more for the bits that a product drops.
     let power = (bits << 1 >> MANTISSA_BITS) as i32 - (127 + MANTISSA_BITS - 1) + exponent + 32;
-    // The smallest shift that leaves the mantissa below half of 2^32 loses the fewest bits.
+    // The smallest shift that keeps the mantissa below half of 2^32 loses the fewest bits.
     let shift = (power - (31 - MANTISSA_BITS)).max(0);
     let left = power - shift;
     let magnitude = if left >= 0 {

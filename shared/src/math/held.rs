@@ -1,12 +1,12 @@
-//! Sums that are held at the ends of their type.
+//! Saturating sums.
 
 use super::Number;
 
-/// Sum and difference, held at the ends of the type: `saturating_add` and `saturating_sub` in fewer
-/// letters, and on a PC in fewer cycles.
+/// Saturating sum and difference: `saturating_add` and `saturating_sub` in fewer letters, and on a
+/// PC in fewer cycles.
 ///
-/// A Cortex-M4 has an instruction for each. A PC has none: what the compiler puts there lengthens
-/// every chain of sums by two cycles a link, and a branch that is not taken does not.
+/// A Cortex-M4 has an instruction for each. A PC has none: what the compiler emits instead adds two
+/// cycles to each link of a chain of sums, whereas a branch not taken adds none.
 pub trait Held {
     /// self + rhs.
     #[must_use]
@@ -37,7 +37,7 @@ impl<T: Number> Held for T {
     }
 }
 
-/// The end of the type on the side of `a`.
+/// Returns the end of the type on the side of `a`.
 fn end(a: i32) -> i32 {
     if a.is_negative() { i32::MIN } else { i32::MAX }
 }

@@ -1,7 +1,7 @@
 //! Fixed-point arithmetic in which every product keeps the top half of its 64 bits.
 //!
-//! `((a as i64 * b as i64) >> 32) as i32` is one SMMUL on a Cortex-M4 and the same bits on a PC.
-//! The fraction bits are part of the types of the [`fixed`] crate, so the compiler keeps the books:
+//! `((a as i64 * b as i64) >> 32) as i32` is one SMMUL on a Cortex-M4 and gives the same bits on a
+//! PC. The [`fixed`] crate's types carry the fraction bits, so the compiler does the bookkeeping:
 //! the product of `a` and `b` fraction bits has `a + b - 32`.
 
 mod elementary;

@@ -9,9 +9,9 @@ use crate::trace::Trace;
 
 /// A factor that turns an `A` into a `B`.
 ///
-/// Its magnitude is below 2^(a − b − 1), where these have a and b fraction bits: then the product is
-/// one SMMUL, and with a sum one SMMLA or SMMLS. What needs another range takes other fraction bits.
-/// [`super::Gain`] has a range of its own, at four times the price.
+/// Its magnitude is below 2^(a − b − 1) for a and b fraction bits, so the product is one SMMUL, and
+/// with a sum one SMMLA or SMMLS. For another range, choose other fraction bits, or a
+/// [`super::Gain`], whose range is its own, at four times the cost.
 #[derive(Debug)]
 pub struct Multiplier<A, B> {
     bits: i32,
@@ -39,7 +39,7 @@ impl<A, B> Default for Multiplier<A, B> {
 }
 
 impl<A, B> Multiplier<A, B> {
-    /// The factor `bits`/2^32, in bits out per bit in.
+    /// Creates the factor `bits`/2^32, in bits out per bit in.
     pub const fn from_bits(bits: i32) -> Self {
         Self {
             bits,
@@ -47,7 +47,7 @@ impl<A, B> Multiplier<A, B> {
         }
     }
 
-    /// The factor's bits, as [`Multiplier::from_bits`] takes them.
+    /// Returns the factor's bits, as [`Multiplier::from_bits`] takes them.
     pub const fn to_bits(self) -> i32 {
         self.bits
     }
@@ -60,7 +60,7 @@ impl<A, B> Trace for Multiplier<A, B> {
 }
 
 impl<A: Number, B: Number> Multiplier<A, B> {
-    /// The factor of value `k`, or `None` if its magnitude does not fit or is not finite.
+    /// Creates the factor `k`, or returns `None` if its magnitude does not fit or is not finite.
     ///
     /// Called when the configuration is built, never in a control period.
     pub fn new(k: f32) -> Option<Self> {
@@ -70,17 +70,17 @@ impl<A: Number, B: Number> Multiplier<A, B> {
         }
     }
 
-    /// The product with `x`, rounded towards minus infinity.
+    /// Returns the product with `x`, rounded towards minus infinity.
     pub fn of(self, x: A) -> B {
         B::from_bits(((i64::from(self.bits) * i64::from(x.to_bits())) >> 32) as i32)
     }
 
-    /// `sum` and the product with `x`; it wraps, so the caller knows the range of both.
+    /// Returns `sum` plus the product with `x`. It wraps: the caller knows the range of both.
     pub fn added(self, sum: B, x: A) -> B {
         B::from_bits(sum.to_bits().wrapping_add(self.of(x).to_bits()))
     }
 
-    /// `sum` less the product with `x`, likewise.
+    /// Returns `sum` minus the product with `x`, likewise.
     pub fn taken(self, sum: B, x: A) -> B {
         B::from_bits(super::product::less(sum.to_bits(), self.bits, x.to_bits()))
     }

@@ -1,22 +1,22 @@
-//! The properties of a number that the arithmetic needs.
+//! What the arithmetic needs to know of a number.
 
 use fixed::FixedI32;
 use fixed::types::extra::Unsigned;
 
-/// A signed number of 32 bits whose fraction bits are part of its type: a [`FixedI32`], or a
-/// [`Quantity`](super::Quantity), which has a dimension besides.
+/// A signed 32-bit number with its fraction bits in the type: a [`FixedI32`], or a
+/// [`Quantity`](super::Quantity), which also has a dimension.
 pub trait Number: Copy {
     /// The fraction bits.
     type Frac: Unsigned;
 
-    /// The number of these bits.
+    /// Creates a number from its bits.
     fn from_bits(bits: i32) -> Self;
 
-    /// Its bits.
+    /// Returns its bits.
     fn to_bits(self) -> i32;
 }
 
-// Inlined: each is no instruction at all.
+// Inlined: each compiles to no instruction.
 impl<F: Unsigned> Number for FixedI32<F> {
     type Frac = F;
 

@@ -13,7 +13,7 @@ pub const EIGHTH_PI: I0F32 = I0F32::lit("0.392699081699");
 
 /// The top 32 bits of the 64-bit product of two fixed-point numbers.
 pub trait TopProduct<Rhs> {
-    /// The product's type: its fraction bits are those of both factors, less 32.
+    /// The product's type: its fraction bits are the sum of the factors', less 32.
     type Output;
 
     /// Multiplies and keeps the top half, rounding towards minus infinity.
@@ -38,9 +38,9 @@ where
     }
 }
 
-/// Sums with a product that keeps its top half: one SMMLA or SMMLS each.
+/// Multiply-accumulate with the top half of the product: one SMMLA or SMMLS each.
 ///
-/// They wrap: the caller knows the range of what it adds.
+/// The sum wraps: the caller knows the range of what it adds.
 pub trait TopSum: Number {
     /// self + a·b.
     #[inline(always)] // one instruction
@@ -66,7 +66,7 @@ pub trait TopSum: Number {
 
 impl<T: Number> TopSum for T {}
 
-/// The top half of 2^32·sum − a·b, which is what SMMLS makes: it rounds the product up.
+/// Returns the top half of 2^32·sum − a·b, as SMMLS does: the product rounds up.
 #[inline(always)] // one instruction
 pub(super) fn less(sum: i32, a: i32, b: i32) -> i32 {
     let whole = i64::from(sum) << 32;

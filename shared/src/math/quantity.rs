@@ -1,7 +1,7 @@
 //! Numbers with a dimension: a current is not a voltage, though both have the same bits.
 //!
-//! Each operator is one instruction or none: they are inlined where a caller is not optimised for
-//! speed, too, since a call would be longer.
+//! Each operator is at most one instruction. They are inlined even into callers that are not
+//! optimised for speed, since a call would be longer.
 
 use core::fmt;
 use core::marker::PhantomData;
@@ -16,31 +16,31 @@ use crate::trace::Trace;
 
 /// A number of dimension `D` with `F` fraction bits.
 ///
-/// It adds to its like alone. A product with a plain number has the same dimension, and what two
-/// dimensions make is what [`Times`] says; no other product compiles.
+/// It adds only to its own kind. Multiplied by a plain number it keeps its dimension; [`Times`]
+/// defines the product of two dimensions, and no other product compiles.
 #[repr(transparent)]
 pub struct Quantity<D, F> {
     number: FixedI32<F>,
     dimension: PhantomData<D>,
 }
 
-/// The product of two dimensions, written once for each that has a meaning.
+/// The product of two dimensions, defined once for each pair that has a meaning.
 pub trait Times<Rhs> {
     /// The product with `F` fraction bits.
     type Product<F: Unsigned>: Number;
 }
 
 impl<D, F> Quantity<D, F> {
-    /// Nothing.
+    /// Zero.
     pub const ZERO: Self = Self::from_bits(0);
-    /// The least step of the type.
+    /// The smallest step of the type.
     pub const DELTA: Self = Self::from_bits(1);
-    /// The lower end of the type.
+    /// The smallest value of the type.
     pub const MIN: Self = Self::from_bits(i32::MIN);
-    /// The upper end of the type.
+    /// The largest value of the type.
     pub const MAX: Self = Self::from_bits(i32::MAX);
 
-    /// The plain number as one of this dimension.
+    /// Gives a plain number this dimension.
     const fn of(number: FixedI32<F>) -> Self {
         Self {
             number,
@@ -48,12 +48,12 @@ impl<D, F> Quantity<D, F> {
         }
     }
 
-    /// The quantity of these bits.
+    /// Creates a quantity from its bits.
     pub const fn from_bits(bits: i32) -> Self {
         Self::of(FixedI32::from_bits(bits))
     }
 
-    /// Its bits.
+    /// Returns its bits.
     pub const fn to_bits(self) -> i32 {
         self.number.to_bits()
     }
@@ -80,13 +80,13 @@ impl<D, F> Quantity<D, F> {
         Self::from_bits(self.to_bits().wrapping_sub(rhs.to_bits()))
     }
 
-    /// self + rhs, held at the ends of the type.
+    /// self + rhs, saturated.
     #[must_use]
     pub const fn saturating_add(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().saturating_add(rhs.to_bits()))
     }
 
-    /// self − rhs, held at the ends of the type.
+    /// self − rhs, saturated.
     #[must_use]
     pub const fn saturating_sub(self, rhs: Self) -> Self {
         Self::from_bits(self.to_bits().saturating_sub(rhs.to_bits()))
@@ -98,13 +98,13 @@ impl<D, F> Quantity<D, F> {
         Self::from_bits(self.to_bits().wrapping_mul(rhs))
     }
 
-    /// self·rhs, held at the ends of the type.
+    /// self·rhs, saturated.
     #[must_use]
     pub const fn saturating_mul_int(self, rhs: i32) -> Self {
         Self::from_bits(self.to_bits().saturating_mul(rhs))
     }
 
-    /// self/rhs, if that exists.
+    /// self/rhs, or `None` on division by zero or overflow.
     pub fn checked_div_int(self, rhs: i32) -> Option<Self> {
         self.to_bits().checked_div(rhs).map(Self::from_bits)
     }
@@ -115,13 +115,13 @@ impl<D, F> Quantity<D, F> {
         Self::from_bits(self.to_bits().wrapping_neg())
     }
 
-    /// −self, held at the ends of the type.
+    /// −self, saturated.
     #[must_use]
     pub const fn saturating_neg(self) -> Self {
         Self::from_bits(self.to_bits().saturating_neg())
     }
 
-    /// |self|, held at the end of the type.
+    /// |self|, saturated.
     #[must_use]
     pub const fn saturating_abs(self) -> Self {
         Self::from_bits(self.to_bits().saturating_abs())
@@ -140,14 +140,13 @@ impl<D, F> Quantity<D, F> {
 }
 
 impl<D, F: Unsigned> Quantity<D, F> {
-    /// One of its base, where the type holds that.
+    /// One unit, where the type can hold it.
     pub const ONE: Self = Self::from_bits(1 << F::U32);
 
-    /// Its fraction bits.
+    /// The number of fraction bits.
     pub const FRAC_NBITS: u32 = F::U32;
 
-    /// This quantity with `G` fraction bits: of fewer the last are left out, and what more leave
-    /// no room for wraps.
+    /// Converts to `G` fraction bits: fewer drop the last bits, more wrap what no longer fits.
     #[must_use]
     pub const fn scaled<G: Unsigned>(self) -> Quantity<D, G> {
         let bits = self.to_bits();
@@ -160,27 +159,27 @@ impl<D, F: Unsigned> Quantity<D, F> {
 }
 
 impl<D, F: LeEqU32> Quantity<D, F> {
-    /// The quantity of a decimal number, for constants.
+    /// Parses a decimal number, for constants.
     pub const fn lit(number: &str) -> Self {
         Self::of(FixedI32::<F>::lit(number))
     }
 
-    /// The nearest quantity to a number that the type can hold, for tests and simulations.
+    /// Rounds a number that the type can hold to the nearest quantity; for tests and simulations.
     pub fn from_num<N: ToFixed>(number: N) -> Self {
         Self::of(FixedI32::from_num(number))
     }
 
-    /// The quantity of any number, wrapped.
+    /// Converts any number, wrapped.
     pub fn wrapping_from_num<N: ToFixed>(number: N) -> Self {
         Self::of(FixedI32::wrapping_from_num(number))
     }
 
-    /// The quantity of any number, held at the ends of the type.
+    /// Converts any number, saturated.
     pub fn saturating_from_num<N: ToFixed>(number: N) -> Self {
         Self::of(FixedI32::saturating_from_num(number))
     }
 
-    /// Its number, for tests and simulations.
+    /// Converts to a plain number; for tests and simulations.
     pub fn to_num<N: FromFixed>(self) -> N {
         self.number.to_num()
     }
@@ -204,7 +203,7 @@ impl<D, F> Trace for Quantity<D, F> {
     }
 }
 
-// By hand: what is derived would ask the same of the dimension.
+// By hand: derives would demand the same traits of the dimension.
 impl<D, F> Clone for Quantity<D, F> {
     fn clone(&self) -> Self {
         *self

@@ -1,21 +1,21 @@
-//! Division of 64 bits.
+//! 64-bit division.
 
-/// The lower 32 bits of [`divide`].
+/// Returns the low 32 bits of [`divide`].
 pub fn quotient(numerator: u64, divisor: u32) -> u32 {
     divide(numerator, divisor) as u32
 }
 
-/// `numerator / divisor`; the divisor is not 0.
+/// Returns `numerator / divisor`; the divisor must not be 0.
 ///
-/// A Cortex-M4 divides 32 bits. For 64 the compiler takes a routine of 1 KB that is made to be fast;
-/// this one takes a tenth of it, and about 300 instructions for each quotient.
+/// A Cortex-M4 divides 32 bits. The compiler's 64-bit routine takes 1 KB to be fast; this one takes a tenth of that,
+/// and about 300 instructions per quotient.
 #[inline(never)] // many call it
 pub fn divide(numerator: u64, divisor: u32) -> u64 {
     let high = (numerator >> 32) as u32;
     let mut rest = high % divisor;
     let mut quotient = numerator as u32;
     for _ in 0..u32::BITS {
-        // The numerator leaves the quotient's word at one end as the quotient enters it at the other.
+        // The numerator shifts out of the quotient's word at one end as the quotient shifts in at the other.
         let carry = rest >> 31 != 0;
         rest = rest << 1 | quotient >> 31;
         quotient <<= 1;

@@ -1,17 +1,17 @@
-//! Fixed point from and to floating point.
+//! Conversion between fixed and floating point.
 
 use fixed::types::extra::Unsigned;
 use fixed::{FixedI64, FixedU32};
 
 use super::Number;
 
-/// Conversions as the [`fixed`] crate's `saturating_from_num` and `to_num`, but with NaN as 0 and no
-/// panic, in a tenth of the chip's flash: single precision alone, and once for all types.
+/// Converts like the [`fixed`] crate's `saturating_from_num` and `to_num`, but NaN becomes 0 and nothing panics. It
+/// takes a tenth of the flash: single precision only, and one copy for all types.
 pub trait Real {
-    /// The nearest number, of two the even one, held at the ends of the type.
+    /// Rounds to the nearest number, ties to even; saturates.
     fn from_f32(value: f32) -> Self;
 
-    /// The nearest float.
+    /// Returns the nearest float.
     fn to_f32(self) -> f32;
 }
 
@@ -45,21 +45,21 @@ impl<F: Unsigned> Real for FixedI64<F> {
     }
 }
 
-/// The bits of a number with so many binary places. Never inlined: each coefficient has one.
+/// Returns the bits of a number with this many binary places. Never inlined: every coefficient calls it.
 #[inline(never)]
 pub(crate) fn whole(value: f32, places: i32) -> i32 {
     libm::rintf(value * power_of_two(places)) as i32
 }
 
-/// As [`whole`], without a sign.
+/// Like [`whole`], unsigned.
 #[inline(never)]
 fn whole_unsigned(value: f32, places: i32) -> u32 {
-    // What a float has beside 32 bits are zeros.
+    // A float's digits beyond 32 bits are zeros.
     libm::rintf(value * power_of_two(places)) as u32
 }
 
-/// As [`whole`], of 64 bits: by halves, since the chip's unit converts 32 bits, and the compiler's function for
-/// 64 is as long again.
+/// Like [`whole`], for 64 bits. In halves, since the FPU converts 32 bits and the compiler's 64-bit function is twice
+/// as long.
 #[inline(never)]
 fn whole_long(value: f32, places: i32) -> i64 {
     let magnitude = value.abs();
@@ -77,12 +77,12 @@ fn whole_long(value: f32, places: i32) -> i64 {
     }
 }
 
-/// The nearest whole number, of two the even one.
+/// Rounds to the nearest whole number, ties to even.
 pub fn round(value: f32) -> f32 {
     libm::rintf(value)
 }
 
-/// 2 to the power of at most the bits of a type: products with it are exact.
+/// Returns 2^`power`, `power` being at most the bits of a type: products with it are exact.
 const fn power_of_two(power: i32) -> f32 {
     f32::from_bits(((127 + power) << 23) as u32)
 }

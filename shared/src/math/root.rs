@@ -2,24 +2,24 @@
 
 use super::Number;
 
-/// 1/√m at the middle of each section of m in 1/4..1, less one, 8 fraction bits: right to 0.9 %.
+/// 1/√m − 1 at the middle of each section of m in 1/4..1, with 8 fraction bits: accurate to 0.9 %.
 static RECIPROCAL_ROOT: [u8; 96] = reciprocal_root_table();
 
-/// √(x² + y²), held at the type's end.
+/// Returns √(x² + y²), saturated.
 ///
-/// The error is at most 2^-25 of the value and one bit.
+/// The error is at most 2^-25 of the value plus one bit.
 pub fn magnitude<T: Number>(x: T, y: T) -> T {
     T::from_bits(hypotenuse(x.to_bits(), y.to_bits()))
 }
 
-/// The other leg of a right triangle, √(c² − a²), or 0 if the leg `a` is the longer.
+/// Returns the other leg of a right triangle, √(c² − a²), or 0 if the leg `a` is longer than `c`.
 ///
-/// The error is as that of [`magnitude`].
+/// The error is that of [`magnitude`].
 pub fn other_leg<T: Number>(c: T, a: T) -> T {
     T::from_bits(leg(c.to_bits(), a.to_bits()))
 }
 
-/// Once for all types, as [`leg`].
+/// Shared by all types, like [`leg`].
 #[inline(never)]
 fn hypotenuse(x: i32, y: i32) -> i32 {
     let length = root(square(x) + square(y));
@@ -37,9 +37,9 @@ fn square(x: i32) -> u64 {
     x * x
 }
 
-/// √x, rounded down to within 2^-25 of its value and one bit.
+/// Returns √x, rounded down; the error is at most 2^-25 of the value plus one bit.
 ///
-/// The reciprocal root comes from a table and two Newton steps, which take products only.
+/// The reciprocal root comes from a table and two Newton steps, which need only products.
 fn root(x: u64) -> u32 {
     if x == 0 {
         return 0;
@@ -48,11 +48,11 @@ fn root(x: u64) -> u32 {
     let m = ((x << even) >> 32) as u32;
     let mut y = (1 << 30) + (u32::from(RECIPROCAL_ROOT[(m >> 25) as usize - 32]) << 22);
     for _ in 0..2 {
-        // y·(3 − m·y²)/2, where y has 30 fraction bits and m 32.
+        // y·(3 − m·y²)/2, with 30 fraction bits in y and 32 in m.
         let m_y2 = top(top(y, y), m);
         y = top(y, (3 << 28) - m_y2) << 3;
     }
-    // √m = m/√m with 30 fraction bits, 32 wanted before the shift is undone.
+    // √m = m·(1/√m) with 30 fraction bits; 32 are wanted before undoing the shift.
     ((u64::from(top(m, y)) << 2) >> (even / 2)) as u32
 }
 

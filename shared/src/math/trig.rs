@@ -1,4 +1,4 @@
-//! Sine and cosine by table and one rotation; the angle of a vector.
+//! Sine and cosine from a table and one rotation; the angle of a vector.
 
 use fixed::FixedI32;
 use fixed::types::I1F31;
@@ -11,23 +11,22 @@ use crate::trace::traced;
 #[derive(Clone, Copy, Debug)]
 pub enum Turn {}
 
-/// An angle in turns, an electrical one unless it is said otherwise; it wraps.
+/// An angle in turns, electrical unless stated otherwise; it wraps.
 pub type Angle = Quantity<Turn, U32>;
 
 traced! {
-    /// Cosine and sine of one angle.
+    /// Cosine and sine of an angle.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SinCos {
         /// Cosine, −1 to 1 − 2^-31.
         pub cos: I1F31,
-        /// Sine, likewise.
+        /// Sine, same range.
         pub sin: I1F31,
     }
 }
 
 impl SinCos {
-    /// Those of an angle in turns: [`sin_cos`] where it is called and not inlined, for what is not in
-    /// the way of the default drive.
+    /// Returns [`sin_cos`] of an angle in turns, out of line: for code off the default drive's hot path.
     #[inline(never)]
     pub fn of(angle: Angle) -> Self {
         sin_cos(angle)
@@ -41,26 +40,24 @@ const LENGTH: f64 = 1.0 - 7.6e-5;
 /// A quarter of a turn.
 const QUARTER: usize = TABLE_SIZE / 4;
 
-/// Sines at the table's angles of a turn: a cosine is the sine a quarter further. What
-/// remains to be rotated is at most ±π/256. That rotation lengthens by up to 7.6e-5; the entries are
-/// shorter by as much, so that no sum leaves ±1.
+/// Sines at the table's angles; a cosine is the sine a quarter turn on. The remaining rotation is at most ±π/256 and
+/// lengthens by up to 7.6e-5, so the entries are shorter by as much to keep every sum within ±1.
 static TABLE: [I1F31; TABLE_SIZE] = table();
 
-/// 2π/8: the remainder's factor from turns to radians, an eighth of it so that it stays below 1.
+/// 2π/8: converts the remainder from turns to radians, scaled by an eighth to stay below 1.
 const EIGHTH_TURN: I1F31 = I1F31::from_bits(1_686_629_713);
 
-/// Cosine and sine of an angle in turns.
+/// Returns the cosine and sine of an angle in turns.
 ///
-/// The error is at most 0.0001° in direction; the length is 1 − 8e-5 to 1.
+/// The direction is accurate to 0.0001°; the length is 1 − 8e-5 to 1.
 #[inline(always)] // in each period
 pub fn sin_cos(angle: Angle) -> SinCos {
     let bits = angle.to_bits() as u32;
     let half_section = 1 << (31 - TABLE_BITS);
     let near = (bits.wrapping_add(half_section) >> (32 - TABLE_BITS)) as usize;
     let (cos, sin) = (TABLE[(near + QUARTER) % TABLE_SIZE], TABLE[near]);
-    // From the nearest angle of the table, with 8 bits more than an angle. Times 2π/8 that is the
-    // angle in radians with 36 fraction bits, and its product with a cosine has 35, four more than
-    // it needs.
+    // Offset from the nearest table angle, with 8 bits more than an angle. Times 2π/8 it is in radians with 36 fraction
+    // bits, and its product with a cosine has 35, four more than needed.
     let remainder = FixedI32::<U31>::from_bits((bits << TABLE_BITS) as i32);
     let delta = remainder.top(EIGHTH_TURN);
     let cos_step = delta.top(cos).to_bits() >> 4;
@@ -71,16 +68,16 @@ pub fn sin_cos(angle: Angle) -> SinCos {
     }
 }
 
-/// The angle of the vector (`x`, `y`) in turns, −0.5 to 0.5; 0 for the zero vector.
+/// Returns the angle of the vector (`x`, `y`) in turns, −0.5 to 0.5; 0 for the zero vector.
 ///
-/// A polynomial over one octant with an error below 0.02°. It divides, so it is for the events of
-/// a start, not for each period.
+/// A polynomial over one octant, accurate to 0.02°. It divides, so it is for the events of a start, not for each
+/// period.
 #[inline(always)] // in each period
 pub fn atan2_turns<T: Number>(y: T, x: T) -> Angle {
     Angle::from_bits(direction(y.to_bits(), x.to_bits()))
 }
 
-/// Once for all types.
+/// Shared by all types.
 fn direction(y: i32, x: i32) -> i32 {
     let (ax, ay) = (x.unsigned_abs(), y.unsigned_abs());
     if ax == 0 && ay == 0 {
@@ -88,12 +85,12 @@ fn direction(y: i32, x: i32) -> i32 {
     }
     let steep = ay > ax;
     let (small, large) = if steep { (ax, ay) } else { (ay, ax) };
-    // q = small/large with 30 fraction bits, of which 15 are right, 0.002°: more would be a division
-    // of 64 bits, which the chip has not. The polynomial is arctan(q)/2π with 32.
+    // q = small/large with 30 fraction bits, 15 of them good (0.002°): more would take a 64-bit division, which the
+    // chip lacks. The polynomial is arctan(q)/2π with 32.
     let zeros = large.leading_zeros();
     let q = i64::from((small << zeros) / ((large << zeros) >> 15)) << 15;
     let q2 = (q * q) >> 30;
-    // Abramowitz and Stegun 4.4.49, each coefficient divided by 2π and times 2^32.
+    // Abramowitz and Stegun 4.4.49, each coefficient times 2^32/2π.
     let mut sum = 14_241_949_i64;
     for coefficient in [-58_193_354, 123_143_239, -225_778_694, 683_476_103] {
         sum = coefficient + ((sum * q2) >> 30);
@@ -106,7 +103,7 @@ fn direction(y: i32, x: i32) -> i32 {
         quadrant
     };
     let turns = if y.is_negative() { -half } else { half };
-    // Half a turn wraps to minus half a turn: the same angle.
+    // Half a turn wraps to minus half a turn, the same angle.
     turns as i32
 }
 
@@ -121,15 +118,15 @@ const fn table() -> [I1F31; TABLE_SIZE] {
     table
 }
 
-/// Rounds to the nearest.
+/// Rounds to nearest.
 const fn to_fixed(x: f64) -> I1F31 {
     let scaled = x * 2_147_483_648.0;
     let half = if scaled < 0.0 { -0.5 } else { 0.5 };
     I1F31::from_bits((scaled + half) as i32)
 }
 
-/// The Taylor series about the nearest multiple of π: the compiler evaluates it, so that the
-/// table does not depend on any machine's library.
+/// Taylor series about the nearest multiple of π, evaluated by the compiler so that the table does not depend on any
+/// machine's library.
 const fn sine(radians: f64) -> f64 {
     use core::f64::consts::PI;
     let half_turns = (radians / PI + 0.5) as i64;

@@ -1,7 +1,7 @@
-//! The dimensions of the control's quantities, by their units in SI, and every product of two that
-//! has a meaning.
+//! The dimensions of the control's quantities, named by SI unit, and every product of two that has
+//! a meaning.
 //!
-//! Each conversion is inlined: it is no instruction at all, but for one with a factor.
+//! Each conversion is inlined and costs no instruction, except one with a factor.
 
 use fixed::FixedI32;
 use fixed::types::I36F28;
@@ -19,31 +19,31 @@ macro_rules! dimensions {
 }
 
 dimensions! {
-    /// Of a current.
+    /// Current.
     Ampere,
-    /// Of a current that turns: what ω·i is.
+    /// Rotating current, ω·i.
     AmperePerPeriod,
-    /// Of a voltage.
+    /// Voltage.
     Volt,
-    /// Of one over a voltage.
+    /// Inverse voltage.
     PerVolt,
-    /// Of a power.
+    /// Power.
     Watt,
-    /// Of the square of a voltage.
+    /// Voltage squared.
     VoltSquare,
-    /// Of a flux linkage.
+    /// Flux linkage.
     Weber,
-    /// Of an inverse flux.
+    /// Inverse flux.
     PerWeber,
-    /// Of a torque.
+    /// Torque.
     NewtonMetre,
-    /// Of a speed.
+    /// Speed.
     TurnPerPeriod,
-    /// Of the square of a speed.
+    /// Speed squared.
     TurnPerPeriodSquare,
 }
 
-/// Declares what two dimensions make, in either order.
+/// Declares the product of two dimensions, in either order.
 macro_rules! products {
     ($($(#[$attribute:meta])* $one:ty, $other:ty => $product:ident;)*) => {$(
         $(#[$attribute])*
@@ -64,15 +64,15 @@ products! {
     TurnPerPeriod, Weber => Volt;
     /// A power.
     Volt, Ampere => Watt;
-    /// The current that a power takes from a supply.
+    /// The current that a power draws from a supply.
     Watt, PerVolt => Ampere;
-    /// The speed that a back-EMF tells, ω = ξ·|h|.
+    /// The speed that a back-EMF shows, ω = ξ·|h|.
     PerWeber, Volt => TurnPerPeriod;
-    /// The rate of a current in a frame that turns, ω·i.
+    /// The rate of a current in a rotating frame, ω·i.
     TurnPerPeriod, Ampere => AmperePerPeriod;
 }
 
-/// The share of a voltage in another.
+/// The ratio of two voltages.
 impl Times<PerVolt> for Volt {
     type Product<F: Unsigned> = FixedI32<F>;
 }
@@ -82,7 +82,7 @@ impl Times<Self> for Volt {
 }
 
 impl<F> Quantity<Volt, F> {
-    /// The flux linkage that the voltage adds in a period.
+    /// Returns the flux linkage that the voltage adds in a period.
     pub const fn over_period(self) -> Quantity<Weber, F> {
         Quantity::from_bits(self.to_bits())
     }
@@ -92,47 +92,48 @@ impl Times<Self> for TurnPerPeriod {
     type Product<F: Unsigned> = Quantity<TurnPerPeriodSquare, F>;
 }
 
-/// A current over a time, in units of current times periods.
+/// A current over time, in units of current times periods.
 pub type Charge = I36F28;
 
 impl Quantity<Ampere, U28> {
-    /// The charge of so many periods.
+    /// Returns the charge over this many periods.
     pub fn over_periods(self, periods: u32) -> Charge {
         Charge::from_bits(i64::from(self.to_bits())) * i64::from(periods)
     }
 }
 
 impl<F> Quantity<TurnPerPeriod, F> {
-    /// ω·T_s in turns, a plain number.
+    /// Returns ω·T_s in turns, a plain number.
     pub const fn turns(self) -> FixedI32<F> {
         FixedI32::from_bits(self.to_bits())
     }
 
-    /// The angle that the rotor turns by in a period.
+    /// Returns the angle that the rotor turns in a period.
     pub const fn over_period(self) -> Quantity<Turn, F> {
         Quantity::from_bits(self.to_bits())
     }
 
-    /// The angle of half a period.
+    /// Returns the angle turned in half a period.
     pub const fn over_half_period(self) -> Quantity<Turn, F> {
         Quantity::from_bits(self.to_bits() >> 1)
     }
 
-    /// The angle of so many periods; it wraps.
+    /// Returns the angle turned in this many periods; it wraps.
     pub const fn over_periods(self, periods: i32) -> Quantity<Turn, F> {
         Quantity::from_bits(self.to_bits().wrapping_mul(periods))
     }
 }
 
 impl<F> Quantity<Turn, F> {
-    /// The speed that turns by the angle in a period.
+    /// Returns the speed that turns this angle in a period.
     pub const fn per_period(self) -> Quantity<TurnPerPeriod, F> {
         Quantity::from_bits(self.to_bits())
     }
 }
 
 impl<F> Quantity<TurnPerPeriodSquare, F> {
-    /// The change of a speed in a period: of ω²·T_s one turn is a number, as a radian is.
+    /// Returns the change of speed in a period: in ω²·T_s one of the turns counts as a plain
+    /// number, as a radian does.
     pub const fn over_period(self) -> Quantity<TurnPerPeriod, F> {
         Quantity::from_bits(self.to_bits())
     }

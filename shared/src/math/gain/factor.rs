@@ -1,14 +1,14 @@
-//! The factor of a gain as each machine multiplies by it: the same bits on both.
+//! The factor of a gain, in the form each machine multiplies by: both give the same bits.
 //!
-//! Both are `mantissa·2^shift/2^32`, where the shift is at most 30. The product with the mantissa
-//! keeps its top half, so that what is left after the shift ends in as many zeros.
+//! Both are `mantissa·2^shift/2^32` with a shift of at most 30. The product with the mantissa keeps
+//! its top half, so the shifted result ends in `shift` zeros.
 
 #[cfg(target_pointer_width = "64")]
 pub(super) use Long as Factor;
 #[cfg(not(target_pointer_width = "64"))]
 pub(super) use Short as Factor;
 
-/// For registers of 32 bits: an SMMUL and two shifts on a Cortex-M4.
+/// For 32-bit registers: an SMMUL and two shifts on a Cortex-M4.
 #[cfg(any(test, not(target_pointer_width = "64")))]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Short {
@@ -22,14 +22,14 @@ impl Short {
         Self { mantissa, shift }
     }
 
-    /// The product, wrapped.
+    /// Returns the product, wrapped.
     #[inline(always)] // in each period
     pub(super) fn wrapping(self, x: i32) -> i32 {
-        // Masked, a shift cannot be out of range.
+        // The mask tells the compiler that the shift is in range.
         self.top(x) << (self.shift & 31)
     }
 
-    /// The product, held at the ends of the type.
+    /// Returns the product, saturated.
     #[inline(always)] // in each period
     pub(super) fn saturating(self, x: i32) -> i32 {
         let top = self.top(x);
@@ -48,7 +48,7 @@ impl Short {
     }
 }
 
-/// For registers of 64 bits: one product, and a bit mask for what the other form leaves out.
+/// For 64-bit registers: one product, and a mask for the bits that the other form drops.
 #[cfg(target_pointer_width = "64")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Long {
@@ -65,13 +65,13 @@ impl Long {
         }
     }
 
-    /// The product, wrapped.
+    /// Returns the product, wrapped.
     #[inline(always)] // in each period
     pub(super) fn wrapping(self, x: i32) -> i32 {
         self.left(self.whole.wrapping_mul(i64::from(x)))
     }
 
-    /// The product, held at the ends of the type: it leaves 64 bits where the other form leaves 32.
+    /// Returns the product, saturated: it overflows 64 bits where the other form overflows 32.
     #[inline(always)] // in each period
     pub(super) fn saturating(self, x: i32) -> i32 {
         match self.whole.checked_mul(i64::from(x)) {
@@ -86,7 +86,8 @@ impl Long {
     }
 }
 
-/// The last product on the side of `top`. Not inlined: it would be worked out for every product.
+/// Returns the last product on the side of `top`. Out of line: inlined, it would be computed for
+/// every product.
 #[cfg(any(test, not(target_pointer_width = "64")))]
 #[cold]
 #[inline(never)]
@@ -94,7 +95,7 @@ fn beyond(top: i32, shift: u32) -> i32 {
     end(top.is_negative(), -1 << (shift & 31))
 }
 
-/// The last product on a side of zero.
+/// Returns the last product on one side of zero.
 #[inline(always)] // in each period
 fn end(negative: bool, mask: i32) -> i32 {
     if negative { i32::MIN } else { i32::MAX & mask }
