@@ -1,7 +1,7 @@
-//! The motor that is assumed where the parameters do not tell it.
+//! The motor assumed where the parameters do not describe it.
 //!
-//! It is one whose full speed at `LIM_BUS_V_MAX` is the fastest that the six-step drive follows at this PWM: so
-//! every unit and coefficient fits the supply, the PWM and the limit, whatever motor there is.
+//! Its full speed at `LIM_BUS_V_MAX` is the fastest that six-step follows at this PWM frequency, so every unit and
+//! coefficient fits the supply, the PWM and the limit, whatever the motor.
 
 use core::f32::consts::TAU;
 
@@ -10,34 +10,34 @@ use super::table::{Choice, ParamId};
 use super::values::Params;
 use crate::math::SQRT_3;
 
-/// Pole pairs of most small motors: 12 slots and 14 magnets.
+/// Pole pairs of most small motors: 12 slots, 14 magnets.
 pub(crate) const POLE_PAIRS: f32 = 7.0;
 
-/// Periods of the PWM in an electrical turn at full speed: hardly more than four in each sextant, which the
-/// six-step drive needs.
+/// PWM periods per electrical turn at full speed: just over the four per sextant that six-step needs.
 const TURN_PERIODS: f32 = 25.0;
 
-/// Drop of `LIM_PHASE_A` across R, of the supply: of motors that a limit suits, 0.05 to 0.15.
+/// Drop of `LIM_PHASE_A` across R as a share of the supply: 0.05 to 0.15 for motors that the limit suits.
 const DROP_SHARE: f32 = 0.1;
 
-/// L/R, s: of motors of all sizes, 0.15 to 0.8 ms.
+/// L/R, s: 0.15 to 0.8 ms for motors of all sizes.
 const WINDING_S: f32 = 0.35e-3;
 
-/// Time in which `LIM_PHASE_A` takes motor and load to full speed without drag, s. From the library's 3-inch
-/// motor to the first paper's with its propeller it is 0.04 to 0.34 s.
+/// Time in which `LIM_PHASE_A` takes motor and load to full speed without drag, s: 0.04 to 0.34 s from the library's
+/// 3-inch motor to the first paper's with its propeller.
 const RUN_UP_S: f32 = 0.12;
 
 impl Params {
-    /// The first of R, L and flux that is not known: without one of them there is no field-oriented drive.
+    /// Returns the first of R, L and flux that is not known: field-oriented control needs all three.
     pub fn unknown(&self) -> Option<ParamId> {
         let needed = [ParamId::MotRMohm, ParamId::MotLUh, ParamId::MotFluxMwb];
         needed.into_iter().find(|id| self.get(*id) == 0.0)
     }
 
-    /// As a drive is made of them: `CTL_DRIVE` is decided, and what is not known of the motor is assumed.
+    /// Returns the parameters that a drive is built from: `CTL_DRIVE` is decided, and what is unknown of the motor is
+    /// assumed.
     ///
-    /// Where `CTL_DRIVE` 2 finds R, L or flux unknown, throttle is a share of the supply and `CTL_RPM_MAX` binds
-    /// nothing.
+    /// If `CTL_DRIVE` is 2 and R, L or flux is unknown, throttle is a share of the supply and `CTL_RPM_MAX` does not
+    /// bind.
     pub fn in_force(&self) -> Self {
         let mut made = self.clone();
         let unknown = self.unknown().is_some();
@@ -63,7 +63,7 @@ impl Params {
         }
         if made.get(ParamId::MotJGcm2) == 0.0 {
             let linkage_wb = 1e-3 * pole_pairs * made.get(ParamId::MotFluxMwb);
-            // Torque and time over the speed at which the back-EMF is the supply.
+            // J = torque times time over the speed at which the back-EMF equals the supply.
             let torque_nm = 1.5 * linkage_wb * limit_a;
             let fastest_rad_s = supply_v / (SQRT_3 * linkage_wb);
             let inertia_kgm2 = RUN_UP_S * torque_nm / fastest_rad_s;
@@ -149,7 +149,7 @@ mod tests {
             let automatic = with(&[(missing, 0.0), CtlDrive::Automatic.setting()]);
             let config = build(&automatic, &Board::BENCH).expect("it makes a drive");
             assert!(config.six_step.is_some());
-            // What is known of how it turns stays.
+            // What is known of the motor stays.
             assert_eq!(config.scale.pole_pairs, 12.0);
             let asked = with(&[(missing, 0.0), CtlDrive::FieldOriented.setting()]);
             let error = build(&asked, &Board::BENCH).expect_err("not known");

@@ -1,50 +1,48 @@
-//! The properties of the board that the configuration needs.
+//! The board's properties that the configuration needs.
 
 use crate::control::delay::Delay;
 use crate::control::sensing::Shunts;
 use crate::image::Image;
 
-/// The properties of the board that the control must know.
+/// The board's properties that the control must know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Board {
-    /// The program's name and version.
+    /// The firmware's name and version.
     pub image: Image,
-    /// Amperes of one count of the current converter.
+    /// Amperes per count of the current converter.
     pub current_a_per_count: f32,
-    /// Volts of one count of the supply's converter.
+    /// Volts per count of the supply's converter.
     pub bus_v_per_count: f32,
-    /// Greatest phase current that the converter can show, peak amperes.
+    /// Greatest phase current that the converter can read, peak amperes.
     pub current_range_a: f32,
-    /// Volts of one count of the terminals' converter, of 4096.
+    /// Volts per count of the terminals' converter, of 4096 counts.
     pub terminal_v_per_count: f32,
-    /// The phases that have a current shunt.
+    /// Which phases have a current shunt.
     pub shunts: Shunts,
-    /// Control periods from the sample to the voltage.
+    /// Control periods from sample to voltage.
     pub delay: Delay,
-    /// Least time for which a low side must be on, half of it before the sample, for its current to
-    /// be read, s. Dead times are not part of it.
+    /// Least on-time of a low side for its current to be read, s, half of it before the sample.
+    /// Excludes dead times.
     pub low_side_on_s: f32,
-    /// Least time for which a low side must be on in each period so that its high side's driver
-    /// stays supplied, s.
+    /// Least on-time of a low side in each period that keeps its high side's driver supplied, s.
     pub refresh_s: f32,
-    /// Time for which the low sides must be on in all before the high sides' drivers are supplied
-    /// after a time off, s.
+    /// Total on-time of the low sides that charges the high sides' drivers after a time off, s.
     pub charge_s: f32,
-    /// `PWM_DEADTIME_NS` at least, which is also its default if the table's is shorter.
+    /// Lower bound of `PWM_DEADTIME_NS`, and its default where the table's is shorter.
     pub least_dead_time: LeastDeadTime,
 }
 
-/// The shortest dead time that the drivers and transistors of a board take.
+/// The shortest dead time that a board's drivers and transistors tolerate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeastDeadTime {
     /// In ns.
     pub ns: f32,
-    /// The reason why a shorter one is refused, with its number.
+    /// Why a shorter one is refused, with its number.
     pub refusal: &'static str,
 }
 
 impl LeastDeadTime {
-    /// Any will do, and none.
+    /// Any dead time will do, even none.
     pub const NONE: Self = Self {
         ns: 0.0,
         refusal: "",

@@ -1,8 +1,7 @@
-//! The settings that follow from the motor, and from what: each parameter of [`Kind::FromMotor`] does where it
-//! is 0.
+//! The settings that follow from the motor: those of [`Kind::FromMotor`], wherever they are 0.
 //!
-//! Each share below, but the alignment's and the slew's, is one that two benches set by hand have in common: a 5-inch
-//! racing motor's, and that of the first paper's motor with its propeller.
+//! Each share below, except the alignment's and the slew's, is common to two hand-tuned benches: a 5-inch racing motor,
+//! and the first paper's motor with its propeller.
 
 use core::f32::consts::{PI, TAU};
 
@@ -14,48 +13,47 @@ use super::values::Params;
 /// Ramp current of an open-loop start over `LIM_PHASE_A`.
 const RAMP_SHARE: f32 = 0.2;
 
-/// Time for which the whole ramp current aligns the rotor, s. With a quarter of it one motor in fourteen swings
-/// still when the ramp begins, at some angles that it may start from. The start makes it longer for one that
-/// swings slowly.
+/// Time for which the full ramp current aligns the rotor, s. With a quarter of it one motor in fourteen still swings
+/// when the ramp begins, from some initial angles. The start lengthens it for a rotor that swings slowly.
 const PARK_S: f32 = 0.4;
 
-/// Back-EMF over the ramp current's drop across R, at the least speed. To take over from the ramp, the observer
-/// needs the dead time's voltage on top; at less it stays in lock, since the bias of i_d tells the sign of each
-/// current, and a part of that voltage does.
+/// Back-EMF at the least speed over the ramp current's drop across R. To take over from the ramp, the observer needs
+/// the dead time's voltage on top; a part of that keeps it in lock, since the i_d bias makes the sign of each current
+/// known.
 const EMF_SHARE: f32 = 1.5;
 const LEAST_DEAD_SHARE: f32 = 0.25;
 
 /// Least speed over `CTL_RPM_MAX`.
 pub(super) const LEAST_SHARE: f32 = 0.05;
 
-/// Least electrical frequency, Hz: the speed loop is a part of it.
+/// Least electrical frequency, Hz: the speed loop's bandwidth is a share of it.
 const LEAST_HZ: f32 = 30.0;
 
-/// Electrical turns of the ramp: the observer needs some of them to settle.
+/// Electrical turns of the ramp: the observer needs several to settle.
 const RAMP_TURNS: f32 = 12.0;
 
-/// Acceleration of the ramp over what its current can do without a load.
+/// Acceleration of the ramp over what its current achieves without load.
 const RAMP_TORQUE_SHARE: f32 = 0.2;
 
-/// Periods of the PWM in one of the current loop's bandwidth. Less than 20 are refused.
+/// PWM periods per period of the current loop's bandwidth. Fewer than 20 are refused.
 const CURRENT_PERIODS: f32 = 48.0;
 
-/// Error of the speed, over `CTL_RPM_MAX`, for which the loop asks for `LIM_PHASE_A`.
+/// Speed error over `CTL_RPM_MAX` at which the loop demands `LIM_PHASE_A`.
 const SPEED_ERROR_SHARE: f32 = 0.05;
 
-/// Speed loop's bandwidth over the current loop's, at most, and over the electrical frequency at which the
-/// observer takes over: it knows the speed no sooner.
+/// Greatest speed bandwidth over the current loop's, and over the electrical frequency at which the observer takes
+/// over: it knows the speed no sooner.
 const SPEED_SHARE: f32 = 0.05;
 const SPEED_RUN_SHARE: f32 = 0.12;
 
-/// k_p of the speed loop over inertia and bandwidth, by its two equal poles (`control::speed`).
+/// k_p of the speed loop over inertia and bandwidth, from its two equal poles (`control::speed`).
 const SPEED_GAIN: f32 = 1.6;
 
-/// Slew over what `LIM_PHASE_A` can do without a load. With half of it thrust comes in twice the least time; with half
-/// as much again the whoop's angle is off by 21° where it brakes.
+/// Slew over what `LIM_PHASE_A` achieves without load. At half of it thrust takes twice the least time; at one and a
+/// half times it the whoop's angle is off by 21° while braking.
 const SLEW_SHARE: f32 = 1.0;
 
-/// The settings in force: each that was chosen, and for each that is 0, what follows.
+/// The settings in force: those chosen, and for each that is 0, what follows from the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FromMotor {
     /// `CTL_RPM_MIN`.
@@ -79,8 +77,8 @@ pub struct FromMotor {
 }
 
 impl FromMotor {
-    /// The settings of these parameters, which are those [in force](Params::in_force).
-    #[inline(never)] // the throttle's mapping and the coefficients ask for it
+    /// Derives the settings from parameters that are [in force](Params::in_force).
+    #[inline(never)] // the throttle mapping and the coefficients call it
     pub fn new(params: &Params) -> Self {
         let motor = Motor::new(params);
         let in_force = |id, value| in_force(params, id, value);
@@ -109,7 +107,7 @@ impl FromMotor {
         }
     }
 
-    /// Each setting in the order of the table, with what it follows from where it was not chosen.
+    /// Returns each setting in the table's order, with what it follows from, or that it was chosen.
     pub fn reasons(&self, params: &Params) -> [(ParamId, f32, &'static str); 8] {
         let motor = Motor::new(params);
         let run = motor.rpm(self.ramp_a, self.dead_v);
@@ -181,7 +179,7 @@ struct Motor {
     resistance_ohm: f32,
     flux_wb: f32,
     pole_pairs: f32,
-    /// What an ampere can do without a load.
+    /// Acceleration per ampere without load.
     rpm_s_per_a: f32,
     limit_a: f32,
     max_rpm: f32,
@@ -205,7 +203,7 @@ impl Motor {
         }
     }
 
-    /// Bounds of a speed that the observer can know: the greatest, but no more than full throttle.
+    /// Returns the bounds of a speed that the observer can know: the greatest holds, capped at full throttle.
     fn rpm(&self, ramp_a: f32, dead_v: f32) -> [f32; 3] {
         let emf_v = EMF_SHARE * self.resistance_ohm * ramp_a + dead_v;
         let by_emf = emf_v / (self.flux_wb * self.pole_pairs) * (60.0 / TAU);
@@ -217,7 +215,7 @@ impl Motor {
         ]
     }
 
-    /// The ramp's acceleration: the least.
+    /// Returns the bounds of the ramp's acceleration: the least holds.
     fn ramp_rpm_s(&self, ramp_a: f32, run_rpm: f32) -> [f32; 2] {
         [
             RAMP_TORQUE_SHARE * self.rpm_s_per_a * ramp_a,
@@ -225,7 +223,7 @@ impl Motor {
         ]
     }
 
-    /// The speed loop's bandwidth: the least.
+    /// Returns the bounds of the speed loop's bandwidth: the least holds.
     fn speed_hz(&self, current_hz: f32, run_rpm: f32) -> [f32; 3] {
         let error_rpm = SPEED_ERROR_SHARE * self.max_rpm;
         [
@@ -236,8 +234,8 @@ impl Motor {
     }
 }
 
-/// What was chosen, or what follows, within the range.
-#[inline(never)] // eight times
+/// Returns the chosen value, or what follows, within the parameter's range.
+#[inline(never)] // eight callers
 fn in_force(params: &Params, id: ParamId, follows: f32) -> f32 {
     let chosen = params.get(id);
     if chosen == 0.0 {
@@ -255,7 +253,7 @@ fn most<const N: usize>(bounds: [f32; N]) -> f32 {
     bounds.into_iter().fold(0.0, f32::max)
 }
 
-/// The text of the bound that is in force.
+/// Returns the text of the bound in force.
 fn text<const N: usize>(bounds: [f32; N], in_force: f32, texts: [&'static str; N]) -> &'static str {
     let at = bounds.iter().position(|bound| *bound == in_force);
     texts[at.unwrap_or_default()]
@@ -278,7 +276,7 @@ pub(super) mod tests {
         FromMotor::new(&params(values))
     }
 
-    /// R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs, 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. All else follows.
+    /// R 33 mΩ, L 12 µH, 0.3215 mWb, 7 pole pairs, 63 g·cm²; 40 A, 20 V, 48 kHz, 200 ns. The rest follows.
     pub(in crate::params) const RACING: [(ParamId, f32); 11] = [
         (ParamId::CtlRpmMin, 0.0),
         (ParamId::MotPolePairs, 7.0),
@@ -293,8 +291,8 @@ pub(super) mod tests {
         (ParamId::LimBusVMax, 20.0),
     ];
 
-    /// By hand: 1.5·33 mΩ·8 A is 0.396 V, 4/π·200 ns·48 kHz·20 V is 0.2445 V; 0.6405 V are 284.6 rad/s, 2718 rpm,
-    /// of 7 pole pairs of 0.3215 mWb.
+    /// By hand: 1.5·33 mΩ·8 A is 0.396 V, 4/π·200 ns·48 kHz·20 V is 0.2445 V; with 7 pole pairs of 0.3215 mWb, 0.6405 V
+    /// is 284.6 rad/s, 2718 rpm.
     #[test]
     fn a_racing_motor_s_settings_are_those_of_the_formulas() {
         let made = made(&RACING);
@@ -302,14 +300,14 @@ pub(super) mod tests {
             (made.ramp_a, 8.0),
             (made.park_as, 3.2),
             (made.run_rpm, 2718.0),
-            // 0.396 V and a quarter of 0.2445 V.
+            // 0.396 V plus a quarter of 0.2445 V.
             (made.least_rpm, 1939.7),
             (made.current_hz, 1000.0),
-            // 0.2·3.376 mNm/A·8 A/6.3 µkgm² are 857.4 rad/s².
+            // 0.2·3.376 mNm/A·8 A/6.3 µkgm² is 857.4 rad/s².
             (made.ramp_rpm_s, 8188.0),
-            // 40 A·3.376 mNm/A over 1.6·6.3 µkgm²·104.7 rad/s are 127.9 1/s.
+            // 40 A·3.376 mNm/A over 1.6·6.3 µkgm²·104.7 rad/s is 127.9 1/s.
             (made.speed_hz, 20.36),
-            // 40 A·3.376 mNm/A/6.3 µkgm² are 21 434 rad/s².
+            // 40 A·3.376 mNm/A/6.3 µkgm² is 21 434 rad/s².
             (made.slew_rpm_s, 204_680.0),
         ] {
             assert!((value / wanted - 1.0).abs() < 1e-3, "{made:?}: {wanted}");

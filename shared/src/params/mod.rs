@@ -1,4 +1,4 @@
-//! Parameters: the table, the values, and the configuration that they make.
+//! Parameters: the table, the values, and the configuration built from them.
 
 mod assumed;
 mod board;

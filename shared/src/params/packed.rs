@@ -1,16 +1,16 @@
-//! The table of parameters as a chip holds it, in two thirds of the flash: each number once, the names without
-//! their places, and rows of bytes.
+//! The parameter table as stored on a chip, in two thirds of the flash: each number once, the names end to end, and
+//! rows of bytes.
 
 use super::table::{Kind, ParamId, Parameter, TABLE};
 
 /// A row of [`TABLE`].
 struct Row {
-    /// Where its name ends in [`NAMES`]; it begins where the one before ends.
+    /// End of its name in [`NAMES`]; it begins where the previous one ends.
     name_end: u16,
     key: u8,
     kind: Kind,
     live: bool,
-    /// Places in [`NUMBERS`].
+    /// Indices into [`NUMBERS`].
     min: u8,
     max: u8,
     default: u8,
@@ -18,7 +18,8 @@ struct Row {
 
 static ROWS: [Row; TABLE.len()] = rows();
 
-/// The bits of every number of the table, once: to copy them, the chip saves no floating-point registers.
+/// The bits of every distinct number in the table; as integers, they are copied without saving floating-point
+/// registers.
 static NUMBERS: [u32; DISTINCT.1] = {
     let mut numbers = [0; DISTINCT.1];
     let mut i = 0;
@@ -29,7 +30,7 @@ static NUMBERS: [u32; DISTINCT.1] = {
     numbers
 };
 
-/// All names in a row.
+/// All names, end to end.
 static NAMES: &str = {
     const LENGTH: usize = names_before(TABLE.len());
     const BYTES: [u8; LENGTH] = {
@@ -53,8 +54,8 @@ static NAMES: &str = {
 };
 
 impl ParamId {
-    /// This parameter's row of the table.
-    #[inline(never)] // it is unpacked for each of many callers
+    /// Returns this parameter's row of the table.
+    #[inline(never)] // unpacking is long, and many call it
     pub fn entry(self) -> Parameter {
         let at = self as usize;
         let row = &ROWS[at];
@@ -74,22 +75,22 @@ impl ParamId {
         }
     }
 
-    /// The value, held in the table's range.
+    /// Clamps the value to the table's range.
     pub(super) fn held(self, value: f32) -> f32 {
         let row = &ROWS[self as usize];
         value.max(number(row.min)).min(number(row.max))
     }
 
-    /// The table's default.
+    /// Returns the table's default.
     pub(super) fn default_value(self) -> f32 {
         number(ROWS[self as usize].default)
     }
 }
 
-/// Inlined: a look-up is no more than a call.
+/// Inlined: a look-up is no longer than a call.
 #[inline(always)]
 fn number(place: u8) -> f32 {
-    // There is no other place, so that 0 is never taken.
+    // Every index is valid, so the 0 is never used.
     f32::from_bits(NUMBERS.get(usize::from(place)).copied().unwrap_or(0))
 }
 
@@ -123,7 +124,7 @@ const fn rows() -> [Row; TABLE.len()] {
     rows
 }
 
-/// Letters in the names of the first rows.
+/// Returns the total length of the names of the first `rows` rows.
 const fn names_before(rows: usize) -> usize {
     let (mut letters, mut i) = (0, 0);
     while i < rows {
@@ -133,7 +134,7 @@ const fn names_before(rows: usize) -> usize {
     letters
 }
 
-/// The table's numbers, each once, and how many there are.
+/// The table's distinct numbers, and their count.
 const DISTINCT: ([f32; 3 * TABLE.len()], usize) = {
     let mut numbers = [0.0; 3 * TABLE.len()];
     let (mut count, mut i) = (0, 0);
@@ -150,7 +151,7 @@ const DISTINCT: ([f32; 3 * TABLE.len()], usize) = {
     (numbers, count)
 };
 
-/// The place of a value among the first `count` numbers, or `count`.
+/// Returns the index of a value among the first `count` numbers, or `count`.
 const fn find(numbers: &[f32], count: usize, value: f32) -> usize {
     let mut i = 0;
     while i < count && numbers[i].to_bits() != value.to_bits() {

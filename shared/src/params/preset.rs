@@ -3,7 +3,7 @@
 use super::ParamId;
 use super::choice::{CtlObsCure, CtlObserver, CtlRegulator, CtlSpeed};
 
-/// Parameters that belong together.
+/// A named set of parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preset {
     /// Name.
@@ -29,8 +29,8 @@ const MOTOR: [(ParamId, f32); 5] = [
     (ParamId::MotJGcm2, 1430.0),
 ];
 
-/// The first paper's drive: pole placement with 1/ε = R/(1.5·L) and a speed loop of k_pω/J then gives
-/// the gains of its Table III, on the motor of its Table I at 15 kHz.
+/// The first paper's drive: pole placement with 1/ε = R/(1.5·L) and a speed loop of k_pω/J reproduces the gains of its
+/// Table III, for the motor of its Table I at 15 kHz.
 pub const BOSSO_TABLE_III: Preset = Preset {
     name: "bosso-table-iii",
     description: "the first paper's motor and drive as published, with the gains of its Table III",
@@ -57,8 +57,8 @@ pub const BOSSO_TABLE_III: Preset = Preset {
     ],
 };
 
-/// What the first paper's bench is driven with here. Chosen by hand, and what every figure of that bench stands
-/// on; with [`BOSSO_MOTOR`] alone they follow from the motor.
+/// The settings that drive the first paper's bench here. Chosen by hand, and the basis of every figure of that bench;
+/// with [`BOSSO_MOTOR`] alone they follow from the motor.
 pub const BOSSO_BENCH: Preset = Preset {
     name: "bosso-bench",
     description: "the first paper's motor, and settings of start and control loops for its bench, chosen by hand",

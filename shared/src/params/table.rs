@@ -1,8 +1,8 @@
-//! The one table of parameters.
+//! The table of parameters.
 
 use core::fmt;
 
-/// The kind of a parameter: fractions, whole numbers, following from the motor, or computed from others.
+/// The kind of a parameter: its values, and where they come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Any value in range.
@@ -11,11 +11,11 @@ pub enum Kind {
     Whole,
     /// Any value in range, or 0 for the one that [follows from the motor](super::FromMotor).
     FromMotor,
-    /// Any value in range, or 0 where it is not known.
+    /// Any value in range, or 0 if not known.
     OfMotor,
-    /// Computed from other parameters; it cannot be set and is not stored.
+    /// Computed from other parameters; cannot be set and is not stored.
     Derived,
-    /// Whole numbers in range, each of which has something done by being written: it is 0 again when that is over, and
+    /// Whole numbers in range, each of which triggers an action when written. It reads 0 again when that is over, and
     /// is not stored.
     Order,
 }
@@ -23,20 +23,20 @@ pub enum Kind {
 /// One parameter's entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// Number under which the value is stored; never given to another parameter.
+    /// Key under which the value is stored; never reused for another parameter.
     pub key: u16,
     /// Name on MAVLink, at most 16 characters.
     pub name: &'static str,
-    /// Fractions, whole numbers or derived.
+    /// Kind of its values.
     pub kind: Kind,
-    /// Least value that is accepted, beside a 0 that has a [meaning](Kind::zero).
+    /// Least accepted value, besides a 0 that has a [meaning](Kind::zero).
     pub min: f32,
-    /// Greatest value that is accepted.
+    /// Greatest accepted value.
     pub max: f32,
-    /// Value from the factory: no motor is known, and limits are those of the first paper's bench at 24 V.
+    /// Factory value: the motor is unknown, and limits are those of the first paper's bench at 24 V.
     pub default: f32,
-    /// True if it may change while the motor turns. All others describe the motor, the bridge, the wire
-    /// or the way it is driven, and wait until it stands.
+    /// True if it may change while the motor turns. All others describe the motor, the bridge, the wire or the way it
+    /// is driven, and wait for standstill.
     pub live: bool,
 }
 
@@ -46,7 +46,7 @@ impl Kind {
         !matches!(self, Self::Derived | Self::Order)
     }
 
-    /// What 0 means, where it is taken outside the range too.
+    /// Returns what 0 means, where it is accepted outside the range.
     pub fn zero(self) -> Option<&'static str> {
         match self {
             Self::FromMotor => Some("from the motor"),
@@ -62,7 +62,7 @@ impl Parameter {
         (self.min..=self.max).contains(&value) || (self.kind.zero().is_some() && value == 0.0)
     }
 
-    /// The range in words, without its unit.
+    /// Returns the range in words, without its unit.
     pub fn range(&self) -> impl fmt::Display + '_ {
         fmt::from_fn(|f| {
             if let Some(meaning) = self.kind.zero() {
@@ -73,29 +73,29 @@ impl Parameter {
     }
 }
 
-/// A parameter's words for a person. They are apart from the table so that a chip, which serves them in
-/// a compressed file that `build.rs` makes, need not hold them.
+/// A parameter's texts for people. Kept out of the table so that a chip need not hold them: it serves them in a
+/// compressed file that `build.rs` makes.
 #[derive(Clone, Copy, Debug)]
 pub struct Text {
     /// Unit, empty for a number or a choice.
     pub unit: &'static str,
     /// One sentence for a ground station.
     pub description: &'static str,
-    /// The values that it can take and their meanings, for a choice.
+    /// For a choice, its values and their meanings.
     pub choices: &'static [(u8, &'static str)],
-    /// True if a change applies at the next start.
+    /// True if a change takes effect at the next start.
     pub restart: bool,
 }
 
-/// A parameter that is a choice of few.
+/// A parameter that is one of a few choices.
 pub trait Choice: Copy {
     /// The parameter.
     const PARAM: ParamId;
 
-    /// The choice of this number; the table's range holds no other.
+    /// Returns the choice with this number; the table's range holds no other.
     fn of(number: u8) -> Self;
 
-    /// Its number.
+    /// Returns its number.
     fn number(self) -> u8;
 }
 

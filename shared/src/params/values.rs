@@ -1,18 +1,18 @@
-//! The values, and why one is not taken.
+//! The values of the parameters, and why one is rejected.
 
 use super::board::Board;
 use super::preset::Preset;
 use super::table::{Choice, Kind, ParamId, TABLE};
 use crate::math::{SQRT_3, round};
 
-/// The reason why a value was not taken.
+/// Why a value was rejected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetError {
     /// NaN or infinite.
     NotFinite,
     /// Outside `min..=max` of the table.
     OutOfRange,
-    /// A fraction for a whole number.
+    /// Has a fraction where a whole number is needed.
     NotWhole,
     /// The parameter is derived.
     ReadOnly,
@@ -35,18 +35,18 @@ impl Default for Params {
 }
 
 impl ParamId {
-    /// The parameter of this MAVLink name.
+    /// Finds a parameter by its MAVLink name.
     pub fn find(name: &str) -> Option<Self> {
         Self::find_bytes(name.as_bytes())
     }
 
-    /// The parameter of this MAVLink name, which need not be text.
+    /// Finds a parameter by its MAVLink name, which need not be text.
     pub(crate) fn find_bytes(name: &[u8]) -> Option<Self> {
         let mut all = Self::ALL.iter().copied();
         all.find(|id| id.entry().name.as_bytes() == name)
     }
 
-    /// The value from the factory on this board.
+    /// Returns the factory value on this board.
     pub fn factory(self, board: &Board) -> f32 {
         let default = self.default_value();
         match self {
@@ -57,7 +57,7 @@ impl ParamId {
 }
 
 impl Params {
-    /// A named set over the defaults.
+    /// Applies a preset over the defaults.
     pub fn of(preset: &Preset) -> Self {
         let mut params = Self::default();
         for (id, value) in preset.settings {
@@ -67,28 +67,28 @@ impl Params {
         params
     }
 
-    /// The value of one parameter, in the unit of its entry.
+    /// Returns the value of a parameter, in its entry's unit.
     pub fn get(&self, id: ParamId) -> f32 {
         self.values[id as usize]
     }
 
-    /// The value of a parameter that is a choice of few, which its type names.
+    /// Returns the value of a parameter that is a choice, as its type.
     pub fn choice<C: Choice>(&self) -> C {
         C::of(self.number(C::PARAM))
     }
 
-    /// Returns true if a parameter that is a choice has this value.
+    /// Returns true if a parameter has this choice.
     pub fn chosen<C: Choice>(&self, choice: C) -> bool {
         self.number(C::PARAM) == choice.number()
     }
 
-    /// A small whole number. Never inlined: the conversion would be at every choice.
+    /// Returns a small whole number. Never inlined: the conversion would be repeated at every choice.
     #[inline(never)]
     pub(super) fn number(&self, id: ParamId) -> u8 {
         self.get(id) as u8
     }
 
-    /// Takes a value, or says why not and changes nothing.
+    /// Sets a value, or says why not and changes nothing.
     ///
     /// # Errors
     /// Any [`SetError`].
@@ -116,8 +116,8 @@ impl Params {
         self.get(id) == id.default_value()
     }
 
-    /// Raises values that are below the board's least, as the table's default may be. Returns true if one was
-    /// not the default, but chosen by somebody.
+    /// Raises values below the board's least, which the table's default may be. Returns true if one of them was chosen,
+    /// not the default.
     pub fn fit(&mut self, board: &Board) -> bool {
         let id = ParamId::PwmDeadtimeNs;
         if self.get(id) >= board.least_dead_time.ns {
@@ -128,7 +128,7 @@ impl Params {
         chosen
     }
 
-    /// Puts a value in place that need not be in the table's range; nothing is derived of it.
+    /// Sets a value that may be outside the table's range; nothing is derived from it.
     pub(super) fn assume(&mut self, id: ParamId, value: f32) {
         self.values[id as usize] = value;
     }

@@ -1,4 +1,4 @@
-//! The quantities that several blocks need, of which their formulas are made.
+//! The quantities shared by several blocks, from which their formulas are made.
 
 use core::f32::consts::TAU;
 
@@ -10,10 +10,10 @@ use crate::params::choice::CtlObserver;
 use crate::params::from_motor::FromMotor;
 use crate::params::table::ParamId;
 
-/// Drop of the two body diodes that carry a phase's current in a period's dead times, V.
+/// Drop of the two body diodes that carry a phase's current during a period's dead times, V.
 const DIODES_V: f32 = 1.4;
 
-/// The quantities that parameters give, in the unit of the parameter's times a factor.
+/// The quantities taken straight from parameters, with the factor that converts each to SI.
 const GIVEN: &[(Quantity, ParamId, f32)] = &[
     (Quantity::PwmHz, ParamId::PwmFreqHz, 1.0),
     (Quantity::DeadTime, ParamId::PwmDeadtimeNs, 1e-9),
@@ -32,8 +32,8 @@ const GIVEN: &[(Quantity, ParamId, f32)] = &[
 ];
 
 impl Si<'_> {
-    /// Gives the quantities that several blocks need their values. Apart from [`Si::new`], since the chip would
-    /// copy them all to where they are kept.
+    /// Sets the quantities shared by several blocks. Separate from [`Si::new`], where the chip would copy them all into
+    /// place.
     pub(super) fn prepare(&self) {
         for (quantity, param, factor) in GIVEN {
             self.set(*quantity, self.params.get(*param) * factor);
@@ -56,7 +56,7 @@ impl Si<'_> {
         self.set(Quantity::UnitA, self.scale.current_a);
         self.set(Quantity::UnitV, self.scale.voltage_v);
         self.set(Quantity::PolePairs, self.scale.pole_pairs);
-        // The crossings of the flux at 100 rpm are lost if no part of the dead time's loss is left to damp the current.
+        // At 100 rpm the flux crossings are lost unless part of the dead time's loss remains to damp the current.
         let follows_flux = self.chosen(CtlObserver::Compensated);
         self.set(Quantity::DiodesV, if follows_flux { DIODES_V } else { 0.0 });
         define!(self, {
@@ -83,8 +83,8 @@ impl Si<'_> {
             SlowestRpm(RunRpm min LeastRpm),
             SlowRpm([SLOW_SHARE] * SlowestRpm),
             StartA(RampA min LimitA),
-            // In the dead time a phase is by a diode's drop beyond the supply's poles, at both ends. Of the highest
-            // supply that is the least share: what is compensated by too much is not stable around zero current.
+            // During the dead time a phase sits a diode drop beyond the rails, at both ends. The share is taken at the
+            // highest supply, where it is least: overcompensation is unstable around zero current.
             DeadShare(DiodesV / SupplyMaxV + [1.0] * DeadTime / T),
         });
     }

@@ -1,4 +1,4 @@
-//! Coefficients against figures that are worked out by hand, of a 5-inch racing motor.
+//! Coefficients checked against figures worked out by hand for a 5-inch racing motor.
 //!
 //! By [`FromMotor`](crate::params::FromMotor)'s formulas it starts with 8 A, which drop 0.264 V; the dead time takes
 //! 4/π·200 ns·48 kHz·20 V, 0.2445 V; at the least speed the back-EMF is 1.5·0.264 V and a quarter of that, 0.4571 V.
@@ -14,7 +14,7 @@ use crate::params::from_motor::tests::RACING;
 use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
 use crate::units::{Current, Speed};
 
-/// What a block makes of that motor with these changes.
+/// Returns what a block makes of that motor with these changes.
 fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
     let mut params = Params::of(&BOSSO_MOTOR);
     for (id, value) in RACING.iter().chain(changes) {
@@ -33,7 +33,7 @@ fn near(what: &str, got: f32, wanted: f32) {
     );
 }
 
-/// i_d at standstill, A.
+/// Returns i_d at standstill, A.
 fn bias_a(changes: &[(ParamId, f32)]) -> f32 {
     made(changes, |p| {
         let full = Bounds {
@@ -47,20 +47,20 @@ fn bias_a(changes: &[(ParamId, f32)]) -> f32 {
 
 #[test]
 fn the_bias_along_d_is_the_greatest_of_three() {
-    // 0.3 of 8 A. The ripple is 0.4571 V over 48 kHz·12 µH, 0.79 A, and the back-EMF more than the dead time takes.
+    // 0.3 of 8 A. The ripple is 0.4571 V over 48 kHz·12 µH, 0.79 A, and the back-EMF exceeds the dead time's voltage.
     near("share", bias_a(&[]), 2.4);
     // A ripple of 0.4571 V over 48 kHz·3 µH.
     near("ripple", bias_a(&[(ParamId::MotLUh, 3.0)]), 3.174);
-    // A dead time of 1 µs takes 1.2223 V, and the back-EMF is 0.396 V and a quarter of that, 0.7016 V: what is left
-    // of the one, over 33 mΩ, and 0.3 of it.
+    // A dead time of 1 µs takes 1.2223 V, and the back-EMF is 0.396 V and a quarter of that, 0.7016 V: 0.3 of the
+    // difference over 33 mΩ.
     near("hidden", bias_a(&[(ParamId::PwmDeadtimeNs, 1000.0)]), 4.734);
-    // And none is more than the start's current: 0.4571 V over 48 kHz·1 µH are 9.5 A.
+    // Never more than the start's current: 0.4571 V over 48 kHz·1 µH is 9.5 A.
     near("start", bias_a(&[(ParamId::MotLUh, 1.0)]), 8.0);
 }
 
 #[test]
 fn the_compensation_is_the_dead_time_s_share_and_the_diodes() {
-    // 200 ns of 48 kHz, 0.0096, and 1.4 V of 20 V more of it.
+    // 200 ns of 48 kHz, 0.0096, plus 1.4 V in 20 V of that.
     let duty = made(&[], |p| {
         let mut place = dead_time::Config::default();
         sensing::dead_time(p, &mut place);
@@ -69,7 +69,7 @@ fn the_compensation_is_the_dead_time_s_share_and_the_diodes() {
     near("duty", duty, 0.0096 * 1.07);
 }
 
-/// The observer's ω_n that follows `LIM_PHASE_A` and the greatest, 1/s.
+/// Returns the observer's ω_n that follows `LIM_PHASE_A`, and its greatest, 1/s.
 fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
     made(changes, |p| {
         let mut place = observers::Config::default();
@@ -90,8 +90,8 @@ fn omega_n(changes: &[(ParamId, f32)]) -> [f32; 2] {
 
 #[test]
 fn the_observer_s_loop_is_as_fast_as_the_rotor_asks() {
-    // An ampere makes 1.5·7²·0.3215 mWb over 6.3 µkg·m², 3751 rad/s²; times 2² that is 15 004, and with 1/0.35 of
-    // φ/R, 9.742 ms, it asks for 417.6 1/s.
+    // An ampere gives 1.5·7²·0.3215 mWb over 6.3 µkg·m², 3751 rad/s²; times 2² is 15 004, and times 1/0.35 of φ/R,
+    // 9.742 ms, 417.6 1/s.
     let [following, most] = omega_n(&[]);
     near("following", following, 417.6);
     near("most", most, 1000.0);
@@ -99,7 +99,7 @@ fn the_observer_s_loop_is_as_fast_as_the_rotor_asks() {
     let [following, most] = omega_n(&[(ParamId::MotJGcm2, 10.0)]);
     near("light", following, 1944.0);
     near("most", most, 1944.0);
-    // Of 5 g·cm² that root is 2750 1/s; a twentieth of 48 kHz is less.
+    // At 5 g·cm² that root is 2750 1/s; a twentieth of 48 kHz is less.
     let [following, most] = omega_n(&[(ParamId::MotJGcm2, 5.0)]);
     near("lighter", following, 2400.0);
     near("most", most, 2400.0);
@@ -107,7 +107,7 @@ fn the_observer_s_loop_is_as_fast_as_the_rotor_asks() {
 
 #[test]
 fn the_compensation_is_whole_from_a_current_that_the_supply_makes_in_a_dead_time() {
-    // 0.6 of 20 V·200 ns over 12 µH are 0.2 A; without a dead time it is a count of the converter.
+    // 0.6 of 20 V·200 ns over 12 µH is 0.2 A; without a dead time it is one count of the converter.
     let certain_a = |changes: &[(ParamId, f32)]| {
         made(changes, |p| {
             let mut place = dead_time::Config::default();

@@ -1,4 +1,4 @@
-//! The coefficients of the second paper's position estimation.
+//! Coefficients of the second paper's position estimation.
 
 use core::cell::Cell;
 use core::f32::consts::TAU;
@@ -17,42 +17,42 @@ use crate::params::from_motor::LEAST_SHARE;
 use crate::params::{Board, ParamId, Params};
 use crate::units::Angle;
 
-/// τ_int·ω where Run ends with the defaults, at half of `STA_RUN_RPM`: there the first-order integrator
-/// leads by 10° (2.2.2).
+/// τ_int·ω at half of `STA_RUN_RPM`, where Run ends with the defaults: there the first-order integrator leads by 10°
+/// (2.2.2).
 ///
-/// Neither a `CTL_RPM_MIN` below `STA_RUN_RPM` lengthens it, nor a `STA_RUN_RPM` below the least that
-/// follows from the motor. What a start leaves in the integrals, and what one period of them winds up
-/// behind an angle that is wrong, must be forgotten before the drive has accelerated far beyond it, or
-/// neither goes for seconds: with one and a half times the time constant the bench swings about 640 rpm
-/// whatever is asked for. The greater lead at low speeds is known, and taken off.
+/// A `CTL_RPM_MIN` below `STA_RUN_RPM` does not lengthen it, nor does a `STA_RUN_RPM` below the least that follows from
+/// the motor. What a start leaves in the integrals, and what one period of integration winds up behind a wrong angle,
+/// must decay before the drive has accelerated far beyond it, or neither does for seconds: with one and a half times
+/// the time constant the bench swings about 640 rpm whatever the command. The larger lead at low speed is known and
+/// subtracted.
 const TAU_INT: f32 = 5.671;
 
-/// τ_HPFS over τ_int, much above 1 (figure 21): to a lead of 10° it adds 1°.
+/// τ_HPFS over τ_int, much above 1 (figure 21): it adds 1° to a lead of 10°.
 const HIGH_PASS_SHARE: f32 = 10.0;
 
-/// Half the deadband of the flux, as a share of its amplitude: 3° of the rotor (2.3.2).
+/// Half the flux deadband over the flux amplitude: 3° of the rotor (2.3.2).
 const DEADBAND: f32 = 0.05;
 
-/// Hold-off, as a share of the sixth of a turn between crossings (2.3.2).
+/// Hold-off over the sixth of a turn between crossings (2.3.2).
 const HOLD_OFF: f32 = 0.05;
 
 /// Time for which the next edge may be missing, in sixths of a turn at the least speed.
 const PATIENCE: f32 = 2.0;
 
-/// Time for which all Hall sensors may be alike, s: far longer than their edges differ.
+/// Time for which all Hall sensors may read alike, s: far longer than their edges differ.
 const HALL_PATIENCE_S: f32 = 1e-3;
 
-/// The position error that an acceleration of `CTL_SLEW_RPM_S` may make, turns: 10°.
+/// Position error allowed at an acceleration of `CTL_SLEW_RPM_S`, turns: 10°.
 const ERROR_TURNS: f32 = 10.0 / 360.0;
 
-/// A, the angle of extrapolation: 60°.
+/// A, the extrapolated angle: 60°.
 const A_TURNS: f32 = 1.0 / 6.0;
 
-/// Greatest K of appendix A for that error while braking, 1/√(1 − K) − 1 of A; accelerating, where
-/// the paper has 0.44 for it, it is smaller.
+/// Greatest K of appendix A for that error while braking, 1/√(1 − K) − 1 of A. Accelerating, where the paper has K =
+/// 0.44, the error is smaller.
 const K_MAX: f32 = 0.265;
 
-/// The second paper's time constants and filters from the parameters: the input of its Table 1
+/// The second paper's time constants and filters, from the parameters: the input of its Table 1
 /// ([`limits`](crate::control::observer::limits)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxSettings {
@@ -64,19 +64,19 @@ pub struct FluxSettings {
     pub hold_off_turns: f32,
     /// N, electrical turns over which the speed is measured (2.4.1).
     pub turns: f32,
-    /// Electrical speed below which it is measured from edge to edge, turns/s: N is 1/6 there.
+    /// Electrical speed below which N is 1/6, turns/s: the speed is then measured from edge to edge.
     pub whole_turns_above_hz: f32,
     /// A_e, the share of the extrapolated angle that a crossing leaves (2.4.2).
     pub a_e: f32,
-    /// Electrical speed above which A_e counts, turns/s.
+    /// Electrical speed above which A_e applies, turns/s.
     pub filter_above_hz: f32,
 }
 
 impl FluxSettings {
-    /// Those of a drive with these parameters.
+    /// Creates the settings of a drive with these parameters.
     ///
-    /// The speeds from which whole turns and the filter are used follow from the errors that the paper
-    /// gives for the greatest acceleration that the drive asks for.
+    /// The speeds above which whole turns and the filter are used follow from the paper's errors at the greatest
+    /// acceleration that the drive commands.
     pub fn new(params: &Params) -> Self {
         let (quantities, refused) = (Si::quantities(), Cell::new(None));
         // They are the same on any board.
@@ -92,8 +92,8 @@ impl FluxSettings {
             define SlowRadS([LEAST_SHARE] * FastestRpm max RunRpm * [SLOW_SHARE] * PolePairs * Tau / [60.0]),
             define TauInt([TAU_INT] / SlowRadS),
             define Acceleration(SlewRpmS * PolePairs / [60.0]),
-            // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², as every edge measures again, and
-            // θ_ef = (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
+            // In turns and seconds, K = 2·(3N + 0.5)·α·A/ω², since every edge measures anew, and θ_ef =
+            // (α·A/ω²)·(A_e/(1 − A_e))·6N·A.
             define Edges([6.0] * Turns + [1.0]),
             value whole_turns_above(Edges * Acceleration * [A_TURNS] / [K_MAX]),
             define Known([1.0] - Ae),
@@ -170,7 +170,7 @@ fn integrators(p: &Si, settings: &FluxSettings, place: &mut flux_linkage::Config
     );
 }
 
-/// A filter of some time constant: the share of its way that it goes in a period, and 2π times that time.
+/// Defines a filter by its time constant: its share of a step per period, and 2π times that constant.
 fn define_filter(p: &Si, tau_s: f32) {
     p.set(Quantity::Share, settled(p.scale.period_s / tau_s));
     p.set(Quantity::CornerS, TAU * tau_s);

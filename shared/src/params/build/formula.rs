@@ -1,8 +1,8 @@
-//! Formulas of quantities, a byte an operand.
+//! Formulas of quantities, at one byte per operand.
 //!
-//! There are some two hundred on the way to the coefficients. As machine code an operand takes the chip's flash
-//! eight bytes or more, to load it and to multiply. Here the compiler writes the formulas of a block down as
-//! bytes, and one loop works them out, one after another: each from the left, as a pocket calculator does.
+//! The coefficients take some two hundred formulas. As machine code an operand costs eight bytes of flash or more, to
+//! load it and to multiply. Here the compiler encodes a block's formulas as bytes, and one loop evaluates them in
+//! order, each from left to right like a pocket calculator.
 
 use core::cell::Cell;
 
@@ -14,7 +14,7 @@ use crate::math::{Gain, Multiplier, Number, Real, gain_parts, whole};
 use crate::params::table::ParamId;
 use crate::units::Charge;
 
-/// Fills the fields of a place with what formulas give, in their order:
+/// Fills the fields of a place with the values of formulas, in order:
 ///
 /// ```text
 /// fill!(p, place, {
@@ -24,10 +24,9 @@ use crate::units::Charge;
 /// });
 /// ```
 ///
-/// A quantity stands by its name, a number in brackets; the operators are `*`, `/`, `-`, `max` and `min`,
-/// and `+` in front of a number.
-/// `define` keeps the value as a quantity. `gain` and `factor` name the parameter that is refused where the
-/// coefficient leaves its range; `number` makes one of fixed point, `count` a whole one.
+/// A quantity is written by name, a number in brackets; the operators are `*`, `/`, `-`, `max`, `min`, and `+` in front
+/// of a number. `define` stores the value as a quantity. `gain` and `factor` name the parameter that is refused if the
+/// coefficient leaves its range; `number` makes a fixed-point number, `count` a whole one.
 macro_rules! fill {
     ($si:expr, $place:expr, { $($kind:ident $name:ident($($formula:tt)*)),* $(,)? }) => {{
         let formulas = $crate::params::build::formula::formulas!(
@@ -37,7 +36,7 @@ macro_rules! fill {
     }};
 }
 
-/// The formulas of [`fill!`], for what is no field: who reads them keeps to their order.
+/// The formulas of [`fill!`] for values that are no fields: the caller reads them in order.
 macro_rules! formulas {
     ($si:expr, { $($kind:ident $name:ident($($formula:tt)*)),* $(,)? }) => {{
         const ENTRIES: &[$crate::params::build::formula::Entry] =
@@ -55,14 +54,14 @@ macro_rules! define {
     };
 }
 
-/// The value of a formula.
+/// Evaluates one formula.
 macro_rules! value {
     ($si:expr, $($formula:tt)*) => {
         $crate::params::build::formula::formulas!($si, { value it($($formula)*) }).value()
     };
 }
 
-/// Refuses each parameter of which the formula is below zero, with the reason behind it; the first counts.
+/// Refuses each parameter whose formula is below zero, with the reason after it; the first one counts.
 macro_rules! refuse {
     ($si:expr, { $($param:ident($($formula:tt)*) $reason:expr),* $(,)? }) => {
         $crate::params::build::formula::formulas!($si, {
@@ -188,32 +187,32 @@ pub(super) const DEFINE: u8 = 0x80;
 /// Set in an operand that divides.
 const OVER: u8 = 0x80;
 
-/// In front of an operand that is not multiplied with.
+/// Precedes an operand that is not multiplied.
 const LESS: u8 = 0x7a;
 const MAX: u8 = 0x7b;
 const MIN: u8 = 0x7c;
 
-/// In place of a quantity: the number of the next four bytes.
+/// Stands in for a quantity: the number in the next four bytes.
 const NUMBER: u8 = 0x7d;
 
-/// Behind the last operand.
+/// Follows the last operand.
 pub(super) const END: u8 = 0x7e;
 
 const _: () = assert!(Quantity::COUNT <= LESS as usize && ParamId::ALL.len() <= END as usize);
 
-/// Bytes of formulas.
+/// Returns the number of bytes of the formulas.
 pub(super) const fn length(entries: &[Entry]) -> usize {
     write(entries, &mut [])
 }
 
-/// The bytes of formulas.
+/// Returns the bytes of the formulas.
 pub(super) const fn bytes<const LENGTH: usize>(entries: &[Entry]) -> [u8; LENGTH] {
     let mut bytes = [0; LENGTH];
     write(entries, &mut bytes);
     bytes
 }
 
-/// Writes as many of the bytes as there is room for; gives how many there are.
+/// Writes as many bytes as fit; returns how many there are.
 const fn write(entries: &[Entry], bytes: &mut [u8]) -> usize {
     let (mut at, mut i) = (0, 0);
     while i < entries.len() {
@@ -259,36 +258,37 @@ const fn put(bytes: &mut [u8], at: usize, byte: u8) -> usize {
 }
 
 impl Si<'_> {
-    /// The formulas that are worked out from now on.
+    /// Starts the evaluation of these formulas.
     #[inline(never)] // the chip stores two words at each of many
     pub(super) fn begin(&self, formulas: &'static [u8]) -> &Self {
         self.formulas.set(formulas);
         self
     }
 
-    /// The gain of the next value; if there is none, its parameter is refused.
+    /// Returns the next value as a gain; if it has none, its parameter is refused.
     pub(super) fn gain<A: Number, B: Number>(&self) -> Gain<A, B> {
         let (mantissa, shift) = self.parts(B::Frac::I32 - A::Frac::I32 + LEAST);
         Gain::from_parts(mantissa, shift)
     }
 
-    /// The factor of the next value; if it leaves its type's range, its parameter is refused.
+    /// Returns the next value as a factor; if it is out of range, its parameter is refused.
     pub(super) fn factor<A: Number, B: Number>(&self) -> Multiplier<A, B> {
         Multiplier::from_bits(self.bits(B::Frac::I32 - A::Frac::I32 + LEAST))
     }
 
-    /// The next value in fixed point, held at the ends of its type.
+    /// Returns the next value in fixed point, saturated.
     pub(super) fn number<N: Number>(&self) -> N {
         N::from_bits(self.whole(N::Frac::I32))
     }
 
-    /// The next value without its fraction. Never inlined, nor are the next: each coefficient has one of them.
+    /// Returns the next value without its fraction. Never inlined, nor are the next: each coefficient calls one of
+    /// them.
     #[inline(never)]
     pub(super) fn count(&self) -> u32 {
         self.value() as u32
     }
 
-    /// The next value as a charge.
+    /// Returns the next value as a charge.
     pub(super) fn charge(&self) -> Charge {
         Charge::from_f32(self.value())
     }
@@ -314,7 +314,7 @@ impl Si<'_> {
         parts.unwrap_or_default()
     }
 
-    /// Refuses the parameter of each of the next values that is below zero.
+    /// Refuses the parameter of each following value that is below zero.
     pub(super) fn refuse(&self, reasons: &[&'static str]) {
         for reason in reasons {
             let (head, value) = self.next();
@@ -322,24 +322,24 @@ impl Si<'_> {
         }
     }
 
-    /// Refuses the parameter of a head in some case.
+    /// Refuses the parameter in `head` if `refused`.
     fn refuse_head(&self, refused: bool, head: u8, reason: &'static str) {
         if let Some(param) = ParamId::ALL.get(usize::from(head)) {
             self.refuse_if(refused, *param, reason);
         }
     }
 
-    /// The next value.
+    /// Returns the next value.
     pub(super) fn value(&self) -> f32 {
         self.next().1
     }
 
-    /// Works out what is left and defines quantities.
+    /// Evaluates the remaining formulas, all of which define quantities.
     pub(super) fn define(&self) {
         self.next();
     }
 
-    /// Defines quantities up to the next formula for something else: its head and value.
+    /// Defines quantities up to the next formula of another kind; returns its head and value.
     fn next(&self) -> (u8, f32) {
         loop {
             let (head, value) = (self.byte(), self.formula());
@@ -377,12 +377,12 @@ impl Si<'_> {
         }
     }
 
-    /// The quantity of an operand or a head; none is in place of a number.
+    /// Returns the quantity of an operand or a head, or `None` where a number follows.
     fn quantity(&self, byte: u8) -> Option<&Cell<f32>> {
         self.quantities.get(usize::from(byte & !OVER))
     }
 
-    /// The next byte; behind the last one, [`END`].
+    /// Returns the next byte; after the last one, [`END`].
     #[inline(never)] // as above
     fn byte(&self) -> u8 {
         let Some((byte, rest)) = self.formulas.get().split_first() else {
@@ -393,7 +393,7 @@ impl Si<'_> {
     }
 }
 
-/// Taken off an exponent: the chip passes small numbers above zero in less code.
+/// Subtracted from exponents: the chip loads small positive numbers in less code.
 const LEAST: i32 = 64;
 
 #[cfg(test)]
@@ -411,7 +411,7 @@ mod tests {
 
     use fixed::types::I16F16;
 
-    /// What formulas make of a motor of 18 mΩ; and the parameter that they refuse.
+    /// Returns the parameter that a test's formulas refuse on a motor of 18 mΩ.
     fn made(test: impl FnOnce(&Si)) -> Option<ParamId> {
         let (params, quantities) = (Params::of(&BOSSO_BENCH), Si::quantities());
         let refused = Cell::new(None);

@@ -1,4 +1,4 @@
-//! The coefficients of the inductance's adaptation.
+//! Coefficients of the inductance adaptation.
 
 use super::formula::fill;
 use super::si::Si;
@@ -11,10 +11,10 @@ const AMPLITUDE_SHARE: f32 = 0.05;
 /// Half a wave, s: 50 Hz.
 const HALF_S: f32 = 0.01;
 
-/// Share of the error shown that one half wave corrects.
+/// Share of the observed error that one half wave corrects.
 const STEP: f32 = 0.1;
 
-/// The adaptation, if `CTL_ADAPT_L` asks for it.
+/// Sets up the adaptation if `CTL_ADAPT_L` asks for it.
 pub(super) fn inductance(p: &Si, place: &mut Option<Config>) {
     *place = None;
     if p.chosen(CtlAdaptL::Off) {

@@ -1,4 +1,4 @@
-//! The settings of the throttle wire from the parameters.
+//! Settings of the throttle wire, from the parameters.
 
 use crate::input::Settings;
 use crate::input::authority::Timing;
@@ -8,7 +8,7 @@ use crate::input::signal::Signal;
 use crate::params::choice::Inp3d;
 use crate::params::{ParamId, Params};
 
-/// The way the throttle wire is read.
+/// Returns how the throttle wire is read.
 pub fn input(params: &Params) -> Settings {
     let time_us = |id| u64::from((params.get(id) * 1000.0) as u32);
     let width_us = |id| params.get(id) as u16;

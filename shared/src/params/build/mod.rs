@@ -1,4 +1,4 @@
-//! The configuration that the parameters make: SI values become the control's coefficients, once.
+//! Builds the configuration from the parameters: SI values become the control's coefficients, once.
 
 mod base;
 #[cfg(test)]
@@ -41,97 +41,93 @@ use crate::protection;
 use crate::units::{Current, Scale, Voltage, stated_emf};
 use core::cell::Cell;
 
-/// Fastest rotor, turns a period, that is followed by six edges a turn: two periods for each.
+/// Fastest rotor that six edges per turn can follow, turns per period: two periods per edge.
 const EDGES_TURNS: f32 = 1.0 / 12.0;
 
-/// The supply may be at most this many units of voltage, of the eight that the type holds.
+/// Highest supply in units of voltage; the type holds eight.
 const BUS_UNITS_MAX: f32 = 6.0;
 
-/// The supply must be at least so many units, where the modulator's reciprocal of it ends.
+/// Lowest supply in units of voltage, where the range of the modulator's reciprocal ends.
 const BUS_UNITS_MIN: f32 = 0.125;
 
-/// Time for which ξ̂ may be at the end of its range, s: far longer than any transient that the
-/// observer recovers from.
+/// Time for which ξ̂ may stay at the end of its range, s: far longer than any transient that the observer recovers
+/// from.
 const LOST_S: f32 = 0.1;
 
-/// Time for which zero throttle must hold before a fault ends, s.
+/// Time for which zero throttle must hold before a fault clears, s.
 const CLEAR_S: f32 = 0.3;
 
-/// Time without its cause after which a fault ends for the first retry, s: the tasks have seen it by then, and the
-/// terminals have told how the shaft turns.
+/// Time without its cause after which a fault clears for the first retry, s: by then the tasks have seen it, and the
+/// terminals have shown how the shaft turns.
 const RETRY_S: f32 = 0.02;
 
-/// Time for which a motor whose sensors know its position may be slow before it counts as stuck, s.
+/// Time for which a motor with position sensors may be slow before it counts as stuck, s.
 const SENSED_S: f32 = 0.8;
 
-/// Time for which the observer must have led before a start counts as done, s.
+/// Time for which the observer must lead before a start counts as done, s.
 const PROVEN_S: f32 = 0.3;
 
-/// i_d at standstill over `STA_RAMP_A`, and its resistive drop over what the dead time takes beyond the back-EMF at
-/// the least speed.
+/// i_d at standstill over `STA_RAMP_A`, and its resistive drop over what the dead time takes beyond the back-EMF at the
+/// least speed.
 const BIAS_SHARE: f32 = 0.3;
 
-/// Back-EMF over the resistive drop of i_d at standstill, at the speed at which i_d ends: 2000 rad/s
-/// on the bench.
+/// Back-EMF over the resistive drop of i_d at standstill, at the speed where i_d ends: 2000 rad/s on the bench.
 const BIAS_END: f32 = 16.0;
 
-/// The same over the dead time's voltage, at least: 1937 rad/s on the bench.
+/// Least back-EMF there over the dead time's voltage: 1937 rad/s on the bench.
 const BIAS_DEAD_END: f32 = 5.5;
 
 /// Least bound of i_q over `STA_RAMP_A`.
 const TORQUE_LEAST_SHARE: f32 = 0.5;
 
-/// Greatest resistive drop of i_q as a share of the back-EMF: with R stated 30 % too high, three times that leaves no
-/// estimate.
+/// Greatest resistive drop of i_q over the back-EMF: with R stated 30 % too high, three times that leaves no estimate.
 const TORQUE_DROP_SHARE: f32 = 1.0;
 
-/// Time constant with which the reported speed falls while the bridge is off, s. The bench's
-/// propeller takes 1.1 s.
+/// Time constant with which the reported speed decays while the bridge is off, s. The bench's propeller takes 1.1 s.
 const COAST_S: f32 = 2.0;
 
-/// Greatest current bandwidth of the PWM frequency: the observer's poles at (−1 ± i) times it are
-/// stepped by Euler's rule, and there is a period of delay in the loop.
+/// Greatest current bandwidth over the PWM frequency: the observer's poles at (−1 ± i) times it are stepped by Euler's
+/// rule, and the loop has a period of delay.
 const BANDWIDTH_SHARE: f32 = 0.05;
 
-/// Greatest speed bandwidth of the current bandwidth: nested loops need that distance.
+/// Greatest speed bandwidth over the current bandwidth: nested loops need that separation.
 const SPEED_SHARE: f32 = 0.2;
 
 /// Software trip over `LIM_PHASE_A`.
 pub(crate) const TRIP_SHARE: f32 = 1.4;
 
-/// Share of the converter's range that a trip may take: offsets and the uneven ends of the range stay
-/// below the rest.
+/// Greatest trip over the converter's range; the rest is for offsets and the uneven ends of the range.
 const SHOWN_SHARE: f32 = 0.97;
 
-/// Volts below `LIM_BUS_V_MAX` from which on less is returned.
+/// Volts below `LIM_BUS_V_MAX` at which the returned current starts to be reduced.
 const RETURN_BAND_V: f32 = 1.0;
 
-/// Volts over which the returned current is brought to zero: what is measured of it, and the voltage, need the rest.
+/// Volts over which the returned current is reduced to zero; measuring it and the voltage takes the rest of the band.
 const RETURN_V: f32 = 0.5;
 
-/// i_d at `LIM_BUS_V_MAX` over `LIM_PHASE_A`: 4 W on the bench, where an i_q of zero returns 1 W.
+/// i_d at `LIM_BUS_V_MAX` over `LIM_PHASE_A`: 4 W on the bench, where zero i_q returns 1 W.
 const BURN_SHARE: f32 = 0.25;
 
 /// Rate at which the bounds of i_q follow the bus current, 1/s.
 const BOUND_RATE: f32 = 600.0;
 
-/// The reason to refuse a speed.
+/// The reason for refusing a speed.
 const ABOVE_FASTEST: &str = "above CTL_RPM_MAX";
 
 /// Computes the drive's coefficients from SI values.
 ///
 /// # Errors
-/// A [`BuildError`] names the parameter that makes a coefficient leave its range.
+/// A [`BuildError`] names the parameter that takes a coefficient out of its range.
 pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
     let mut config = Config::default();
     build_in(params, board, &mut config)?;
     Ok(config)
 }
 
-/// As [`build`], in a place that the caller has for it: on the chip a copy takes 0.9 KB of stack.
+/// Like [`build`], but in the caller's place: on the chip a copy takes 0.9 KB of stack.
 ///
 /// # Errors
-/// As [`build`]; what is in its place then is no configuration.
+/// As [`build`]; the place then holds no valid configuration.
 pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<(), BuildError> {
     let refused = Cell::new(None);
     let made = params.in_force();
@@ -174,7 +170,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     place.low_speed = low_speed(&p);
     start::attempts(&p, &mut place.start);
     if !p.chosen(CtlDrive::FieldOriented) {
-        // What the six-step drive never runs with need not fit: its motor may be any.
+        // Six-step never uses the coefficients above, so they need not fit: its motor may be any.
         refused.set(None);
     }
     place.test_current = test_current(params, &p.scale);
@@ -190,7 +186,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
         modulation,
         duty_max,
         match board.shunts {
-            // The dead time's compensation comes on top of what the vector makes.
+            // The dead-time compensation adds to what the vector takes.
             Shunts::Three => window - p.of(Quantity::DeadShare),
             Shunts::Two => 0.0,
         },
@@ -203,7 +199,7 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     tone::tone(&p, &mut place.tone);
     match p.choice() {
         CtlDrive::FieldOriented => place.six_step = None,
-        // What is in force is never automatic.
+        // Parameters in force are never automatic.
         CtlDrive::SixStep | CtlDrive::Automatic => {
             six_step::six_step(&p, duty_max, place.six_step.insert(Default::default()));
         }
@@ -221,12 +217,12 @@ pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<()
     p.verdict()
 }
 
-/// Greatest current of a test of the motor.
+/// Returns the greatest current of a motor test.
 pub(crate) fn test_current(params: &Params, scale: &Scale) -> Current {
     scale.current_from_a(TEST_SHARE * params.get(ParamId::LimPhaseA))
 }
 
-/// Where limits bind.
+/// Returns the thresholds at which limits bind.
 pub(crate) fn thresholds(params: &Params, scale: &Scale) -> Thresholds {
     let return_v = params.get(ParamId::LimBusVMax) - RETURN_BAND_V;
     Thresholds {
@@ -235,12 +231,12 @@ pub(crate) fn thresholds(params: &Params, scale: &Scale) -> Thresholds {
     }
 }
 
-/// Periods in a row for which the observer's state may be out of its range.
+/// Returns the number of consecutive periods for which the observer's state may be out of range.
 pub(crate) fn lost_periods(scale: &Scale) -> u32 {
     (LOST_S / scale.period_s) as u32
 }
 
-/// Refuses values that are wrong whatever the coefficients are.
+/// Refuses values that are wrong whatever the coefficients.
 fn refuse_contradictions(p: &Si) {
     p.refuse_if(
         p.of(Quantity::SupplyMinV) >= p.of(Quantity::SupplyMaxV),
@@ -277,14 +273,14 @@ fn refuse_contradictions(p: &Si) {
     );
 }
 
-/// True for an observer that is helped where there is little back-EMF. The first paper's is as published, and
+/// Returns true if the observer is helped where there is little back-EMF. The first paper's stays as published, and
 /// sensors give the position at any speed.
 fn is_helped(p: &Si) -> bool {
     let published = p.chosen(CtlObserver::BackEmf) && p.chosen(CtlObsCure::Published);
     !published && !p.chosen(CtlObserver::Hall)
 }
 
-/// Least voltage along q in voltage mode.
+/// Returns the least voltage along q in voltage mode.
 fn least_u_q(p: &Si) -> Voltage {
     if is_helped(p) {
         stated_emf(p.scale.speed_from_rpm(p.of(Quantity::LeastRpm)))
@@ -293,16 +289,16 @@ fn least_u_q(p: &Si) -> Voltage {
     }
 }
 
-/// Keeps an observer that lives by the back-EMF in lock where there is little of it.
+/// Keeps a back-EMF-based observer in lock where there is little back-EMF.
 fn low_speed(p: &Si) -> low_speed::Config {
     let formulas = formulas!(p, {
         number limit(LimitA / UnitA),
-        // A current whose flux is above the rotor's takes more voltage than the rotor makes: the supply cannot
-        // hold it in braking, and an L that is wrong by 30 % turns the flux by more than 17°.
+        // A current whose flux exceeds the rotor's takes more voltage than the rotor induces: the supply cannot hold it
+        // in braking, and a 30 % error of L turns the flux by more than 17°.
         define BoundA(Flux / L min LimitA),
         number phase(BoundA / UnitA),
-        // At the least speed each phase's current keeps its sign but for short: it is above the PWM's ripple, and
-        // the more the dead time is worth the shorter it is without a sign.
+        // At the least speed each phase current has a clear sign except briefly: it exceeds the PWM ripple, and the
+        // more the dead time costs, the shorter it is without one.
         define SlowV(LeastRpm * PolePairs * Tau / [60.0] * Flux),
         define RippleA(SlowV * T / L),
         define HiddenA(DeadV - SlowV / R * [BIAS_SHARE]),
@@ -425,14 +421,14 @@ mod tests {
         params.set(ParamId::PwmDeadtimeNs, 0.0).expect("in range");
         build(&params, &Board::BENCH).expect("an ideal inverter");
 
-        // A value that was chosen is named; the table's default, which nobody chose, is not.
+        // A chosen value is reported; the table's default, which nobody chose, is not.
         assert!(params.fit(&board));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
         let mut params = Params::of(&BOSSO_MOTOR);
         assert!(!params.fit(&board));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 750.0);
         build(&params, &board).expect("the board's default");
-        // What is long enough stays.
+        // A value that is long enough stays.
         params.set(ParamId::PwmDeadtimeNs, 900.0).expect("in range");
         assert!(!params.fit(&board));
         assert_eq!(params.get(ParamId::PwmDeadtimeNs), 900.0);

@@ -13,8 +13,7 @@ use crate::params::ParamId;
 use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::units::{INVERSE_FLUX_NOMINAL, InverseFlux};
 
-/// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against
-/// 2357 1/s.
+/// Poles of the attitude observer (22) over the current bandwidth: Table III has 425.6 against 2357 1/s.
 const ATTITUDE_SHARE: f32 = 0.1806;
 
 /// k_f over the current bandwidth: 500 against 2357 1/s (section V).
@@ -23,36 +22,35 @@ const FILTER_SHARE: f32 = 0.2121;
 /// ω_n of the loop that cures the published observer, 1/s.
 const CURE_RAD_S: f32 = 400.0;
 
-/// ω⁺ at the least, 1/s.
+/// Least ω⁺, 1/s.
 const OMEGA_MIN_RAD_S: f32 = 60.0;
 
-/// Least and greatest ω_n of the loop, 1/s, where what follows the current is less.
+/// Least and greatest ω_n of the loop, 1/s, unless the current asks for more.
 const OMEGA_N_RAD_S: [f32; 2] = [150.0, 1000.0];
 
-/// ω_n over the root of what `LIM_PHASE_A` accelerates the rotor by, rad/s²: the loop then lags by 1/2² of a radian,
-/// 14°. Slower, a rotor that is light for its speed would leave it behind.
+/// ω_n over the square root of the acceleration that `LIM_PHASE_A` gives the rotor, rad/s²: the loop then lags by 1/2²
+/// rad, 14°. If slower, it would lose a rotor that is light for its speed.
 const FOLLOWING: f32 = 2.0;
 
-/// The current that asks for all of that, of `LIM_PHASE_A`; of less, ω_n is in proportion, and the loop lags by no
-/// more down to a 25th of the limit.
+/// Share of `LIM_PHASE_A` from which that ω_n applies; below it, ω_n is proportional to the current, and the loop lags
+/// no more down to a 25th of the limit.
 const FOLLOWING_SHARE: f32 = 0.2;
 
-/// Up to `LIM_PHASE_A` the current's bound rises with the speed (`TORQUE_DROP_SHARE`), and ω_n with it
-/// (`compensated::OMEGA_N_SHARE`): where it has caught up with what such a current needs, no more is needed.
+/// Up to `LIM_PHASE_A` the current's bound rises with speed (`TORQUE_DROP_SHARE`), and so does ω_n
+/// (`compensated::OMEGA_N_SHARE`): once that matches what such a current needs, more is not needed.
 const CAUGHT_UP: f32 = TORQUE_DROP_SHARE / 0.35;
 
-/// ω_n over the PWM's frequency, at most: the loop goes in steps.
+/// Greatest ω_n over the PWM frequency: the loop is discrete.
 const OMEGA_N_SHARE_MAX: f32 = 0.05;
 
-/// Corner of the speed's part above the loop's integrator, 1/s.
+/// Corner of the speed's smoothing above the loop's integrator, 1/s.
 const SMOOTHING_RAD_S: f32 = 300.0;
 
-/// Flux of a unit of current, in units of flux: with up to a unit and a half of current the stator's
-/// flux stays within the eight units of its type. That is L·i of 9.4 times the stated flux at the end
-/// of the converter's range.
+/// Flux of a unit of current, in units of flux: at up to a unit and a half of current the stator's flux stays within
+/// the eight units of its type. That is an L·i of 9.4 times the stated flux at the end of the converter's range.
 const INDUCTANCE_MAX: f32 = 4.0;
 
-/// The observer that `CTL_OBSERVER` names.
+/// Sets up the observer that `CTL_OBSERVER` selects.
 pub(super) fn observer(p: &Si, place: &mut observer::Config) {
     match p.choice() {
         CtlObserver::BackEmf => *place = observer::Config::BackEmf(back_emf::Config::default()),
@@ -75,7 +73,7 @@ pub(super) fn observer(p: &Si, place: &mut observer::Config) {
 fn compensated(p: &Si, place: &mut compensated::Config) {
     let formulas = formulas!(p, {
         value own_flux(L * FluxPerCurrent),
-        // The square of ω_n over the current.
+        // ω_n squared over the current.
         define Following([1.5 * FOLLOWING * FOLLOWING] * PolePairs * PolePairs * Flux / J),
         value following(Following * LimitA),
     });
@@ -85,7 +83,7 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
         "too high for this flux and the board's range",
     );
     p.set(Quantity::OmegaN, square_root(formulas.value()));
-    // Under a voltage that changes in the middle of the period β is half, the other way.
+    // If the voltage changes in the middle of the period, β is half, with the opposite sign.
     let share = match p.board.delay {
         Delay::None | Delay::One => 1.0,
         Delay::Half => -0.5,
@@ -94,7 +92,7 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
     fill!(p, place, {
         factor half_resistance(MotRMohm, [0.5] * R * T * FluxPerCurrent),
         factor inductance(MotLUh, L * FluxPerCurrent),
-        // β = R·T_s²/(12·L). The square of the speed is in turns a period.
+        // β = R·T_s²/(12·L); the speed squared is in turns per period.
         gain bias(MotLUh, R * T / L * Tau * Tau / [12.0] * Share),
         number omega_min([OMEGA_MIN_RAD_S] * T / Tau),
         define OmegaN(Following * Flux / R * [CAUGHT_UP] min OmegaN * T min [OMEGA_N_SHARE_MAX] / Tau),

@@ -1,4 +1,4 @@
-//! The outer loop's coefficients.
+//! Coefficients of the outer loop.
 
 use super::formula::fill;
 use super::quantity::Quantity;
@@ -15,22 +15,22 @@ const SPEED_CORNER_SHARE: f32 = 0.1183;
 /// Both poles of the default speed loop over the bandwidth.
 const POLE_SHARE: f32 = 0.8;
 
-/// λ of the trajectory's landing over the bandwidth: slower than the poles, so that what an inertia
-/// that is wrong by 30 % leaves behind has decayed before the landing has, and nothing overshoots.
+/// λ of the trajectory's landing over the bandwidth: slower than the poles, so that the effect of a
+/// 30 % error in the inertia decays before the landing does, and nothing overshoots.
 const LANDING_SHARE: f32 = 0.6;
 
-/// Back-EMF over the drop of the ramp's current across R, at the speed from which the speed's error
-/// is acted on in full: 400 rpm on the bench.
+/// Back-EMF over the ramp current's drop across R, at the speed above which speed errors are
+/// corrected in full: 400 rpm on the bench.
 const TRUST_EMF: f32 = 1.5;
 
-/// Time in which ω̇* goes from rest to the slew, s: a few times that of the current loop's answer.
+/// Time in which ω̇* rises from zero to the slew, s: a few times the current loop's response.
 const JERK_S: f32 = 0.005;
 
-/// Time in which i_q* may go from zero to `LIM_PHASE_A`, s.
+/// Least time in which i_q* goes from zero to `LIM_PHASE_A`, s.
 const TORQUE_S: f32 = 0.003;
 
-/// Both times for the modified regulator, over those for the others: it decouples nothing, and at
-/// 6000 rpm on the bench its slow pair of poles is at 870 1/s where theirs are at 2357.
+/// Both times of the modified regulator over the others': it does not decouple, and at 6000 rpm on
+/// the bench its slow pole pair is at 870 1/s where theirs are at 2357.
 const MODIFIED_SLOWER: f32 = 4.0;
 
 /// Torque and voltage mode.
@@ -42,7 +42,7 @@ pub(super) fn torque(p: &Si, place: &mut torque::Config) {
     });
 }
 
-/// The factor of both times.
+/// Defines the factor of both times.
 fn define_slower(p: &Si) {
     let slower = if p.chosen(CtlRegulator::Modified) {
         MODIFIED_SLOWER
@@ -52,7 +52,7 @@ fn define_slower(p: &Si) {
     p.set(Quantity::Slower, slower);
 }
 
-/// The speed regulator that `CTL_SPEED` names, and its planner.
+/// Sets up the speed regulator that `CTL_SPEED` selects, and its planner.
 pub(super) fn speed(p: &Si, place: &mut Config) {
     planner(p, Quantity::OuterT, &mut place.planner);
     let law = p.choice();
@@ -67,11 +67,11 @@ pub(super) fn speed(p: &Si, place: &mut Config) {
     }
 }
 
-/// The planner of a speed regulator that acts once in a time.
+/// Sets up the planner of a speed regulator that runs once per `period`.
 pub(super) fn planner(p: &Si, period: Quantity, place: &mut planner::Config) {
     p.set(Quantity::PlannerT, p.of(period));
     fill!(p, place, { number slew(SlewRpmS * PlannerT * TurnsPerRpm) });
-    // How ω* begins and ends to move: softly, or by the slew alone as in the papers.
+    // How ω* starts and stops moving: softly, or limited by the slew alone as in the papers.
     match p.choice() {
         CtlSpeed::Inertia => {
             define_slower(p);
@@ -97,7 +97,7 @@ fn published(p: &Si, place: &mut nested::Config) {
             CtlBwSpdHz,
             J * SpeedRadS * [SPEED_CORNER_SHARE] * SpeedRadS * OuterT * TorquePerSpeed
         ),
-        // In full from a ten-thousandth of a turn a period.
+        // In full from a ten-thousandth of a turn per period.
         gain trust(CtlBwSpdHz, [5_000.0]),
     });
     place.with_step = reads_step(p);
@@ -114,7 +114,7 @@ fn with_inertia(p: &Si, place: &mut nested::Config) {
         gain inertia_inverse(MotJGcm2, [1.0] / Inertia),
     });
     if p.chosen(CtlObserver::Hall) {
-        // Sensors know R as little as they need to.
+        // Sensors do not depend on R.
         fill!(p, place, { gain trust(CtlBwSpdHz, [5_000.0]) });
     } else {
         fill!(p, place, {
@@ -125,7 +125,7 @@ fn with_inertia(p: &Si, place: &mut nested::Config) {
     place.with_step = reads_step(p);
 }
 
-/// Only the observer-based regulator reads p_q*.
+/// Returns true for the observer-based regulator, the only one that reads p_q*.
 fn reads_step(p: &Si) -> bool {
     p.chosen(CtlRegulator::ObserverBased)
 }

@@ -1,10 +1,11 @@
 //! The quantities that formulas are made of.
 
-/// A quantity that formulas are made of, in SI units unless its name has another.
+/// A quantity used in formulas, in SI units unless its name states another.
 #[derive(Clone, Copy)]
 pub(super) struct Quantity(pub(super) u8);
 
-/// Names the quantities: those that stay, and those of blocks, which take each other's places.
+/// Names the quantities: those that persist, and those of the blocks, which share one set of
+/// places.
 macro_rules! quantities {
     (
         stay { $($(#[$attribute:meta])* $name:ident,)* }
@@ -40,11 +41,11 @@ macro_rules! quantities {
     };
 }
 
-/// Most quantities that a block has for itself.
+/// Most quantities that a block has of its own.
 const OWN: usize = 14;
 
 impl Quantity {
-    /// Places that they take.
+    /// The number of places they take.
     pub(super) const COUNT: usize = STAY + OWN;
 }
 
@@ -52,7 +53,7 @@ quantities! {
     stay {
         /// A whole turn, 2π.
         Tau,
-        // Of the parameters.
+        // From the parameters.
         PwmHz,
         DeadTime,
         PolePairs,
@@ -69,7 +70,7 @@ quantities! {
         FastestRpm,
         PropellerA,
         ToneA,
-        // Of those that follow from the motor.
+        // Derived from the motor.
         LeastRpm,
         SlewRpmS,
         CurrentHz,
@@ -80,10 +81,10 @@ quantities! {
         RunRpm,
         /// What the dead time takes of a phase's voltage.
         DeadV,
-        /// And of its duty, with what the diodes take.
+        /// And of its duty, including the diodes.
         DeadShare,
         DiodesV,
-        // Of the board.
+        // From the board.
         APerCount,
         BusVPerCount,
         TerminalVPerCount,
@@ -103,12 +104,12 @@ quantities! {
         CurrentPerVoltage,
         FluxPerCurrent,
         TorquePerSpeed,
-        /// The period over which the shaft turns by what the field turns by in one.
+        /// The period in which the shaft turns as far as the field does in one control period.
         MechanicalT,
-        /// Of the mechanical speed.
+        /// Unit of mechanical speed.
         UnitRadS,
         // Of the motor and its loops.
-        /// A period of the outer loops.
+        /// Period of the outer loops.
         OuterT,
         ROverL,
         /// Bandwidth of the current loop, 1/s: 1/ε of (20), (21).
@@ -119,14 +120,14 @@ quantities! {
         LinearisedRadS,
         /// The electrical speed at `CTL_RPM_MAX`.
         FastestRadS,
-        /// The same in turns a period.
+        /// The same in turns per period.
         FastestTurns,
         SlowestRpm,
-        /// Below this speed Run ends, and the flux is not followed.
+        /// Speed below which Run ends and the flux is not followed.
         SlowRpm,
         /// The start's current, within `LIM_PHASE_A`.
         StartA,
-        // On the way to the coefficients of more than one block.
+        // Intermediates shared by several blocks.
         KP,
         PoleRadS,
         Share,

@@ -1,14 +1,15 @@
-//! The current regulators' coefficients.
+//! Coefficients of the current regulators.
 
 use super::formula::{define, fill};
 use super::si::Si;
 use crate::control::regulator::{Config, modified, observer_based, synchronous};
 use crate::params::choice::CtlRegulator;
 
-/// Poles of the current regulator (21): Table III has −2357 and −2142, the second at 0.909.
+/// Second pole of the current regulator over the first (21): Table III has −2357 and −2142, a ratio
+/// of 0.909.
 const SECOND_POLE_SHARE: f32 = 0.909;
 
-/// The regulator that `CTL_REGULATOR` names.
+/// Sets up the regulator that `CTL_REGULATOR` selects.
 pub(super) fn regulator(p: &Si, place: &mut Config) {
     match p.choice() {
         CtlRegulator::ObserverBased => {
@@ -44,7 +45,7 @@ fn observer_based(p: &Si, place: &mut observer_based::Config) {
     });
 }
 
-/// Second paper, figure 10: the PI's zero on the winding's pole.
+/// Second paper, figure 10: the PI's zero cancels the winding's pole.
 fn synchronous(p: &Si, place: &mut synchronous::Config) {
     define_pi(p);
     fill!(p, place, {
@@ -56,11 +57,12 @@ fn synchronous(p: &Si, place: &mut synchronous::Config) {
     });
 }
 
-/// Second paper, figure 11: the same PI for the length, and for the phase over the greatest length.
+/// Second paper, figure 11: the same PI for the magnitude, and for the phase divided by the
+/// greatest magnitude.
 fn modified(p: &Si, place: &mut modified::Config) {
     define_pi(p);
     fill!(p, place, {
-        // One over the back-EMF in the control's unit, in turns.
+        // One over the back-EMF, in the control's unit, in turns.
         define EmfTurns(FastestRadS * Flux * Tau),
         define TurnsPerVoltage(UnitV / EmfTurns),
         gain k_p(CtlBwCurHz, KP),
@@ -71,7 +73,7 @@ fn modified(p: &Si, place: &mut modified::Config) {
     });
 }
 
-/// A PI controller's gains, current to voltage: k_p = bandwidth·L, k_i = bandwidth·R.
+/// Defines a PI controller's gains, current to voltage: k_p = bandwidth·L, k_i = bandwidth·R.
 fn define_pi(p: &Si) {
     define!(p, {
         KP(CurrentRadS * L * VoltagePerCurrent),

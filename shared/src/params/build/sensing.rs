@@ -1,4 +1,4 @@
-//! Coefficients of the sensing, of the dead time and of the bridge's preparation.
+//! Coefficients of the sensing, the dead time and the bridge's charging.
 
 use core::f32::consts::SQRT_2;
 
@@ -13,70 +13,70 @@ use crate::math::{Real, SQRT_3};
 use crate::params::{Board, ParamId};
 use crate::units::{AdcCounts, Duty};
 
-/// Time for which the offsets are measured, s; rounded to a power of two of periods. 5 ms leave a
-/// tenth of one reading's noise.
+/// Time over which the offsets are measured, s, rounded to a power of two of periods. 5 ms leave a tenth of one
+/// reading's noise.
 const ZERO_S: f32 = 0.005;
 
-/// Greatest offset of a sound sensor, of the converter's range: 1 % resistors and an amplifier's 3 mV
-/// times 16 make up to 8 %.
+/// Greatest offset of a sound sensor over the converter's range: 1 % resistors and an amplifier's 3 mV times 16 make up
+/// to 8 %.
 const OFFSET_SHARE: f32 = 0.1;
 
-/// The phase current from which its sign is certain, over what the highest supply changes it by in a dead time; below,
-/// the dead time is compensated in proportion. 0.3 A on the bench.
+/// The phase current above which its sign is certain, over the change that the highest supply makes in a dead time;
+/// below, the dead time is compensated in proportion. 0.3 A on the bench.
 const SIGN_CERTAIN_SHARE: f32 = 0.6;
 
-/// Time for which a turning rotor may be unseen, s: a propeller at full speed is 2° behind by then, where
-/// it would be tens of degrees behind after a long charge. The bridge supplies the drivers as it switches.
+/// Time for which a turning rotor may go unobserved, s: by then a propeller at full speed has fallen 2° behind, against
+/// tens of degrees after a long charge. Switching keeps the drivers supplied.
 const UNSEEN_S: f32 = 0.002;
 
-/// Most that one charging pulse may add to the current of a rotor at `CTL_RPM_MAX`, of `LIM_PHASE_A`:
-/// the low sides short its back-EMF, and a few pulses may add up.
+/// Most that one charging pulse may add to the current of a rotor at `CTL_RPM_MAX`, over `LIM_PHASE_A`: the low sides
+/// short its back-EMF, and a few pulses may add up.
 const CHARGE_CURRENT_SHARE: f32 = 0.125;
 
 /// Drop of a low side's body diode at the milliamperes that the dividers draw, V.
 const DIODE_V: f32 = 0.7;
 
-/// Noise of the mean of four readings of a terminal, counts rms, as `catch` reckons with.
+/// Noise of the mean of four terminal readings that `catch` assumes, counts rms.
 const TERMINAL_NOISE_COUNTS: f32 = 1.0;
 
-/// Mean of the highest of three readings that noise alone does not reach: 1.9 counts for 2 rms.
+/// Mean of the highest of three readings that noise alone does not reach: it makes 1.9 counts at 2 rms.
 const TERMINAL_FLOOR_COUNTS: f32 = 4.5;
 
-/// Speed below which a rotor need not be caught, of `STA_RUN_RPM`.
+/// Speed over `STA_RUN_RPM` below which a rotor need not be caught.
 const STANDING_SHARE: f32 = 0.15;
 
-/// Mean of the highest of three half-waves, of their amplitude: 3·√3/2π.
+/// Mean of the highest of three half-waves over their amplitude: 3·√3/2π.
 const HIGHEST_SHARE: f32 = 0.827;
 
-/// Time constant of that mean, s: a resting rotor is known after one to two of them.
+/// Time constant of that mean, s: a resting rotor is recognised after one to two of them.
 const LEVEL_S: f32 = 0.004;
 
 /// Longest memory of the observation of a coasting rotor, s.
 const MEMORY_S: f32 = 0.05;
 
-/// Time for which all must fit before a coasting rotor is known, s.
+/// Time for which everything must fit before a coasting rotor counts as known, s.
 const SURE_S: f32 = 0.001;
 
-/// Time for which it may not fit before the observation starts over, s.
+/// Time for which it may fail to fit before the observation restarts, s.
 const UNFIT_S: f32 = 0.004;
 
-/// What the sum of the currents of sound sensors may be off by on average, of the converter's range: half of what a zero
-/// may. That has been measured before the start, and moves by less.
+/// Greatest mean error of the current sum of sound sensors over the converter's range: half of a zero's greatest
+/// offset. The zeros are measured before the start and drift by less.
 const UNBALANCE_SHARE: f32 = 0.5 * OFFSET_SHARE;
 
-/// Greatest duty that lets every phase that must be read be read, and keeps the drivers of the high
-/// sides supplied; and the greatest duty of a phase that is read.
+/// Returns the greatest duty at which every phase that must be read can be, and the high sides' drivers stay supplied;
+/// and the greatest duty of a phase that is read.
 pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
     let (period_s, dead_time_s) = (p.scale.period_s, p.of(Quantity::DeadTime));
     let with_low_side_on = |s: f32| 1.0 - (s + 2.0 * dead_time_s) / period_s;
     let window = with_low_side_on(p.board.low_side_on_s);
     let supplied = with_low_side_on(p.board.refresh_s);
     let read = match p.board.shunts {
-        // One number for all phases: where c is the highest more would not lengthen the vector that
-        // a and b allow a sixth of a turn later.
+        // One limit for all phases: more where c is highest would not lengthen the vector that a and b allow a sixth of
+        // a turn later.
         Shunts::Two => window,
-        // Only the highest phase may be left out, so the second must fit: with the longest vector
-        // it comes to this share of the greatest duty, and the dead time's compensation on top.
+        // Only the highest phase may go unread, so the second must fit: with the longest vector it reaches this share
+        // of the greatest duty, plus the dead-time compensation.
         Shunts::Three => {
             let second = match modulation {
                 Modulation::SpaceVector => 0.5 + SQRT_3 / 4.0,
@@ -95,9 +95,9 @@ pub(super) fn duty_max(p: &Si, modulation: Modulation) -> (f32, f32) {
     (duty_max, window)
 }
 
-/// The currents' offsets and reconstruction.
+/// Sets up the currents' offsets and reconstruction.
 pub(super) fn sensing(p: &Si, window: f32, place: &mut sensing::Config) {
-    // To the nearest power on a scale of logarithms: down from √2 times as many.
+    // Nearest power of two on a log scale: √2 times as many, rounded down.
     let readings = p.periods(SQRT_2 * ZERO_S);
     place.shunts = p.board.shunts;
     place.window = Duty::from_f32(window);
@@ -106,12 +106,12 @@ pub(super) fn sensing(p: &Si, window: f32, place: &mut sensing::Config) {
     fill!(p, place, { number offset_max([OFFSET_SHARE] * RangeA / APerCount) });
 }
 
-/// What the sum of the currents may be off by on average.
+/// Returns the greatest mean error of the current sum.
 pub(crate) fn unbalance_max(board: &Board) -> AdcCounts {
     AdcCounts::from_f32(UNBALANCE_SHARE * board.current_range_a / board.current_a_per_count)
 }
 
-/// The observation of the terminals while the bridge is off.
+/// Sets up the observation of the terminals while the bridge is off.
 pub(super) fn catch(p: &Si, place: &mut catch::Config) {
     let standing = p
         .scale
@@ -135,10 +135,10 @@ pub(super) fn catch(p: &Si, place: &mut catch::Config) {
     });
 }
 
-/// The dead time's compensation.
+/// Sets up the dead-time compensation.
 pub(super) fn dead_time(p: &Si, place: &mut dead_time::Config) {
     fill!(p, place, {
-        // A count of the converter at the least: there may be no dead time.
+        // At least one count of the converter: there may be no dead time.
         define CertainA([SIGN_CERTAIN_SHARE] * SupplyMaxV * DeadTime / L max APerCount),
         gain certainty(PwmDeadtimeNs, UnitA / CertainA),
         number duty(DeadShare),
@@ -146,8 +146,8 @@ pub(super) fn dead_time(p: &Si, place: &mut dead_time::Config) {
     });
 }
 
-/// The low sides' pulses before a switch-on: as wide as the back-EMF of the fastest rotor allows,
-/// but wide enough to be read and at most half a period, and as many as the board's time takes.
+/// Returns the low sides' pulses before a switch-on: as wide as the back-EMF of the fastest rotor allows, but wide
+/// enough to be read and at most half a period, and as many as the board's charging time takes.
 pub(super) fn charge(p: &Si) -> Charge {
     let period_s = p.scale.period_s;
     define!(p, { RiseAS(FastestRadS * Flux / L) });
@@ -187,7 +187,7 @@ mod tests {
         assert!((1e-3..1.02e-3).contains(&charged(all)), "{}", charged(all));
         let turning_s = (all - config.charge.spared_periods) as f32 * period_s;
         assert!((1.9e-3..=2.0e-3).contains(&turning_s), "{turning_s}");
-        // If little is to be charged, all of it is.
+        // A short charge is done in full.
         let config = build(&params, &Board::BENCH).expect("it makes a drive");
         assert_eq!(
             (config.charge.periods, config.charge.spared_periods),
@@ -195,7 +195,7 @@ mod tests {
         );
     }
 
-    /// A board on which the windows decide, not the drivers' supply.
+    /// A board limited by its sampling windows, not by the drivers' supply.
     const SLOW_AMPLIFIERS: Board = Board {
         low_side_on_s: 4e-6,
         refresh_s: 0.5e-6,
@@ -210,8 +210,8 @@ mod tests {
         build(&params, board).expect("it fits")
     }
 
-    /// Greatest duty of the highest and of the second phase, over a turn of the longest vector
-    /// with the whole compensation for its signs.
+    /// Returns the greatest duty of the highest and of the second phase, over a turn of the longest vector with the
+    /// full compensation for its signs.
     fn highest_and_second(config: &Config) -> (f32, f32) {
         let supply = Supply::new(&config.modulator, Voltage::ONE, Voltage::ZERO);
         let length = supply.longest.length().to_num::<f32>();
@@ -223,7 +223,7 @@ mod tests {
                 beta: TurnedVoltage::from_num(length * sin),
             };
             for sixth in 0..6 {
-                // A current with the six signs that three phases can have.
+                // A current with the six sign patterns of three phases.
                 let (sin, cos) = libm::sincosf(sixth as f32 * TAU / 6.0);
                 let certainty = AlphaBeta {
                     alpha: I8F24::from_num(20.0 * cos),

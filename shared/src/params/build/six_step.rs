@@ -1,4 +1,4 @@
-//! The six-step drive's coefficients: of the board, the limits and the start, not of the motor.
+//! Coefficients of the six-step drive: from the board, the limits and the start, not from the motor.
 
 use core::f32::consts::TAU;
 
@@ -13,39 +13,39 @@ use crate::drive::config::six_step::Config;
 use crate::math::Real;
 use crate::params::ParamId;
 
-/// Back-EMF on the floating terminal that is taken for one, V, and the same in counts: noise and
-/// the difference between the switches that are on.
+/// Least voltage on the floating terminal that counts as back-EMF, V, and the same in counts: above noise and the
+/// difference between the conducting switches.
 const LEAST_V: f32 = 0.02;
 const LEAST_COUNTS: f32 = 1.5;
 
-/// Counts at which the terminals' converter is near its end.
+/// Counts at which the terminals' converter is near full scale.
 const GREATEST_COUNTS: f32 = 0.97 * 4096.0;
 
-/// Least periods a sextant at `CTL_RPM_MAX`.
+/// Least periods per sextant at `CTL_RPM_MAX`.
 const LEAST_PERIODS: f32 = 4.0;
 
-/// Duty over an error of `CTL_RPM_MAX`.
+/// Duty per error of `CTL_RPM_MAX`.
 const PROPORTIONAL: f32 = 1.0;
 
-/// k_i over k_p, of the bandwidth that the speed loop is to have: with 7.9 Hz 20 1/s, where the
-/// bench's shaft has a time constant of 46 ms under a constant duty.
+/// k_i over k_p as a share of the speed loop's bandwidth: 20 1/s at 7.9 Hz, where the bench's shaft has a time constant
+/// of 46 ms under constant duty.
 const CORNER_SHARE: f32 = 0.4;
 
-/// Rate of the duty while the current has all of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], left, 1/s.
+/// Rate of the duty while the whole of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], is left, 1/s.
 const BOUND_RATE: f32 = 320.0;
 
-/// The least bound, A, that the loop's gain grows for: a lower one makes a motor's current answer no
-/// slower. On the bench, at 5 A the loop would ring by half of it.
+/// The least bound, A, for which the loop's gain still grows: a lower one makes a motor's current respond no slower. On
+/// the bench at 5 A the loop would ring by half of it.
 const BOUND_LEAST_A: f32 = 20.0;
 
-/// Time for which a start waits for a crossing, s: under its ramp's current a rotor with ten times the
-/// bench's inertia takes 0.08 s.
+/// Time for which a start waits for a crossing, s: under its ramp's current a rotor with ten times the bench's inertia
+/// takes 0.08 s.
 const PATIENCE_S: f32 = 0.2;
 
-/// Time for which a start may go on without a turn of crossings in a row, s.
+/// Time for which a start may go on without a full turn of consecutive crossings, s.
 const ASTRAY_S: f32 = 0.9;
 
-/// Greatest current against the rotation, of `LIM_PHASE_A`.
+/// Greatest current against the rotation over `LIM_PHASE_A`.
 const BRAKING_SHARE: f32 = 0.25;
 
 pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {

@@ -1,4 +1,4 @@
-//! The coefficients of the start.
+//! Coefficients of the start.
 
 use core::f32::consts::TAU;
 
@@ -10,34 +10,33 @@ use crate::drive::ATTEMPTS;
 use crate::math::square_root;
 use crate::units::INVERSE_FLUX_NOMINAL;
 
-/// Damping ζ of the rotor's swing about the current's vector in Park and Ramp.
+/// Damping ζ of the rotor's swing about the current vector in Park and Ramp.
 const SWING_DAMPING: f32 = 0.5;
 
-/// Rate at which the frame yields, over the swing's ω_n: fast against it, slow against noise.
+/// Rate at which the frame yields over the swing's ω_n: fast for the swing, slow for noise.
 const YIELD_RATE_SHARE: f32 = 5.0;
 
-/// Greatest rate a period: all that is missing in the two periods until the next look.
+/// Greatest rate per period: all that is missing in the two periods until the next look.
 const YIELD_RATE_MAX: f32 = 0.5;
 
-/// Share of the torque of its current that the ramp uses: the rest is for the load and for a rotor that
-/// swings.
+/// Share of its current's torque that the ramp uses; the rest is for the load and a swinging rotor.
 const TORQUE_SHARE: f32 = 0.3;
 
-/// Current of an attempt over that of the one before.
+/// Current of an attempt over the previous one's.
 const CURRENT_GROWTH: f32 = 1.5;
 
-/// Inertia that each attempt assumes, over the stated one.
+/// Inertia that each attempt assumes over the stated one.
 const INERTIA: [f32; ATTEMPTS] = [1.0, 10.0, 20.0, 40.0];
 
-/// Least length of Park in periods of the rotor's swing: half of it sweeps, and in the other half a
-/// swing that is damped by ζ = 0.5 dies down to 3 %.
+/// Least length of Park in periods of the rotor's swing: the first half sweeps, and in the second a swing damped by ζ =
+/// 0.5 decays to 3 %.
 const PARK_SWINGS: f32 = 3.0;
 
 /// Time for which a rotor may turn too slowly in Ramp, in periods of its swing.
 const ASTRAY_SWINGS: f32 = 1.0;
 
-/// Puts the attempts of a start (section 3.2 of the second paper) into their places: each with more
-/// current, up to `LIM_PHASE_A`, and slower than the one before.
+/// Fills in the attempts of a start (section 3.2 of the second paper): each has more current, up to `LIM_PHASE_A`, and
+/// is slower than the one before.
 pub(super) fn attempts(p: &Si, places: &mut [start::Config; ATTEMPTS]) {
     let mut current_a = p.of(Quantity::RampA);
     for (place, inertia) in places.iter_mut().zip(INERTIA) {
@@ -51,13 +50,13 @@ pub(super) fn attempts(p: &Si, places: &mut [start::Config; ATTEMPTS]) {
 fn attempt(p: &Si, place: &mut start::Config) {
     define!(p, {
         AttemptA(AttemptA min LimitA),
-        // What the current can accelerate, in electrical rad/s²: p·1.5·p·φ·I/J.
+        // Greatest acceleration from the current, in electrical rad/s²: p·1.5·p·φ·I/J.
         TorqueNm([1.5] * PolePairs * Flux * AttemptA),
         PossibleRadS2([TORQUE_SHARE] * PolePairs * TorqueNm / AttemptJ),
         RampRadS2(RampRpmS * PolePairs * Tau / [60.0] min PossibleRadS2),
     });
-    // The rotor about the current's vector is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by
-    // 2ζ/ω_n a unit of speed damps it by ζ.
+    // About the current vector the rotor is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by 2ζ/ω_n per unit of speed
+    // damps it by ζ.
     let swing_rad_s = square_root(value!(p, PolePairs * TorqueNm / AttemptJ));
     p.set(Quantity::SwingRadS, swing_rad_s);
     fill!(p, place, {
@@ -68,7 +67,7 @@ fn attempt(p: &Si, place: &mut start::Config) {
         define ParkCharge(ParkAs max SwingAs / UnitAs),
         charge park_charge(ParkCharge),
         define HalfCharge([0.5] * ParkCharge),
-        // A third of a turn, from one phase's axis to the next one's, in the first half.
+        // A third of a turn, from one phase's axis to the next, in the first half.
         gain sweep(StaParkAs, [1.0 / 3.0] / HalfCharge),
         gain k_s(StaRampRpmS, RampRadS2 / Tau * T * T * UnitA / AttemptA),
         define SwingTurns(SwingRadS * T),
@@ -94,7 +93,7 @@ mod tests {
         build(&params, &Board::BENCH).expect("it makes a drive")
     }
 
-    /// Amperes, rpm/s and seconds of Park, of each attempt.
+    /// Returns amperes, rpm/s and seconds of Park for each attempt.
     fn courses(changes: &[(ParamId, f32)]) -> std::vec::Vec<[f32; 3]> {
         let config = config(changes);
         let scale = config.scale;
@@ -119,7 +118,7 @@ mod tests {
         config.start.iter().map(course).collect()
     }
 
-    /// rad/s² of the electrical angle that a current makes at most: p·1.5·p·φ·I/J.
+    /// Returns the greatest electrical acceleration from a current, rad/s²: p·1.5·p·φ·I/J.
     fn possible(current_a: f32, inertia: f32) -> f32 {
         12.0 * 1.5 * 12.0 * 1.3e-3 * current_a / (inertia * 1.43e-4)
     }
