@@ -1,12 +1,10 @@
 //! The seeds of the messages' checksums.
 //!
-//! The checksum of each message has a seed of its own. A receiver must know those of the whole dialect,
-//! and not only of the messages that an ESC obeys: otherwise frames inside the payload of another
-//! message (a file, a tunnel) would be found. The dialect's own look-up takes 2.7 KB of the chip's
-//! flash, these tables a quarter of it; a test compares the two.
+//! Each message's checksum has its own seed. A receiver must know those of the whole dialect, not only of the messages
+//! that an ESC obeys: otherwise it would find frames inside another message's payload (a file, a tunnel). The dialect's
+//! own look-up takes 2.7 KB of flash, these tables a quarter of that; a test compares the two.
 
-/// The first message of each span, and the `CRC_EXTRA` of it and of those that follow; 0 where there
-/// is no message.
+/// The first message of each span, and the `CRC_EXTRA` of it and those that follow; 0 where there is no message.
 const SPANS: &[(u32, &[u8])] = &[
     (
         0,
@@ -56,8 +54,8 @@ const SPANS: &[(u32, &[u8])] = &[
     (52_000, &[13, 239]),
 ];
 
-/// The check of a frame's bytes behind the first (CRC-16/MCRF4XX), with its message's seed. The usual
-/// table of it takes half a kilobyte of the chip's flash.
+/// Computes the checksum of a frame's bytes after the first (CRC-16/MCRF4XX), with its message's seed. The usual table
+/// would take half a kilobyte of flash.
 pub(super) fn of(bytes: &[u8], extra_crc: u8) -> u16 {
     bytes.iter().chain([&extra_crc]).fold(0xFFFF, |crc, byte| {
         (0..8).fold(crc ^ u16::from(*byte), |crc, _| {
@@ -66,7 +64,7 @@ pub(super) fn of(bytes: &[u8], extra_crc: u8) -> u16 {
     })
 }
 
-/// The seed of a message; 0 if the dialect does not have it.
+/// Returns the seed of a message; 0 if the dialect lacks it.
 pub(super) fn extra_crc(message: u32) -> u8 {
     let seed = |(first, seeds): &(u32, &'static [u8])| {
         let index = usize::try_from(message.checked_sub(*first)?).ok()?;

@@ -1,4 +1,4 @@
-//! Commands. Each that is addressed to this ESC gets a COMMAND_ACK.
+//! Commands. Each one addressed to this ESC gets a COMMAND_ACK.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -43,39 +43,38 @@ const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;
 const TEMPORARILY_REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 const UNSUPPORTED: MavResult = MavResult::MAV_RESULT_UNSUPPORTED;
 
-/// Ids of messages have 24 bits.
+/// Message ids have 24 bits.
 const MESSAGE_MAX: f32 = 16_777_215.0;
-/// The slowest interval on request, 2^31 - 128 µs: MESSAGE_INTERVAL is an i32, and this is the
-/// greatest f32 below its end.
+/// The slowest interval on request, 2^31 - 128 µs: MESSAGE_INTERVAL is an i32, and this is the greatest f32 below its
+/// end.
 const INTERVAL_MAX_US: f32 = 2_147_483_520.0;
 
-/// Why a restart is refused, or given up.
+/// Why a restart is refused, or abandoned.
 pub(crate) const NO_REBOOT_ARMED: &str = "No reboot: armed";
 
-/// Time within which a repeated command is the same one; clients give up after 3 s or less.
+/// Time within which a repeated command counts as the same one; clients give up after 3 s or less.
 const REPEAT_US: u64 = 5_000_000;
-/// That time for COMMAND_INT, which has no number of its transmission: as long as a client waits for an
-/// ACK, and hardly as long as a person takes to ask for the same again.
+/// The same for COMMAND_INT, which has no transmission number: as long as a client waits for an ACK, and hardly as long
+/// as a person takes to ask for the same again.
 const REPEAT_INT_US: u64 = 1_000_000;
 
-/// A command as COMMAND_LONG and COMMAND_INT carry it. The number is read as it is: it may be one
-/// that the dialect does not have.
+/// A command, as carried by COMMAND_LONG and COMMAND_INT. The number is raw: the dialect may not have it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Command {
     from: Address,
     trust: Trust,
     signed: bool,
     at_us: u64,
-    /// True if it names exactly this component of this system.
+    /// True if it addresses exactly this component of this system.
     exact: bool,
     number: u16,
-    /// Number of the transmission, which COMMAND_INT does not have.
+    /// The transmission number, which COMMAND_INT lacks.
     confirmation: Option<u8>,
     params: [f32; 7],
 }
 
 impl Command {
-    /// The two messages differ only in parameters 5 and 6 and after the target.
+    /// Reads either message; they differ only in parameters 5 and 6 and after the target.
     pub(super) fn read(now_us: u64, frame: &Frame, trust: Trust, exact: bool) -> Self {
         let mut params = [0.0; 7];
         for (i, param) in params.iter_mut().enumerate() {
@@ -85,7 +84,7 @@ impl Command {
         if frame.id == COMMAND_INT_DATA::ID {
             params[4] = frame.i32(16) as f32;
             params[5] = frame.i32(20) as f32;
-            // That byte is the frame of the coordinates here.
+            // In COMMAND_INT that byte is the coordinate frame.
             confirmation = None;
         }
         Self {
@@ -100,7 +99,7 @@ impl Command {
         }
     }
 
-    /// MOT_IDENTIFY is written: the command of the same number.
+    /// Makes a write of MOT_IDENTIFY the command with the same number.
     pub(super) fn identify(now_us: u64, frame: &Frame) -> Self {
         let mut params = [0.0; 7];
         params[0] = frame.f32(0);
@@ -116,7 +115,7 @@ impl Command {
         }
     }
 
-    /// A parameter that is a whole number from -1 on, or none of these.
+    /// Returns a parameter if it is a whole number from -1 up.
     fn choice(&self, parameter: usize) -> Option<i32> {
         let value = self.params[parameter];
         let whole = value as i32;
@@ -132,14 +131,14 @@ impl Command {
         matches!(self.number, REQUEST_MESSAGE | GET_MESSAGE_INTERVAL)
     }
 
-    /// Returns true if something must be kept once it is obeyed: an interval, and the time of a
-    /// signature, so that what was obeyed is not obeyed again after a reset.
+    /// Returns true if obeying it leaves something to store: an interval, or the time of a signature, so that an obeyed
+    /// command is not obeyed again after a reset.
     fn leaves(&self) -> bool {
         self.number == SET_MESSAGE_INTERVAL || (self.signed && !self.asks())
     }
 
-    /// Returns true if this is the same command sent again because its ACK did not arrive. Values are
-    /// compared by their bits: NaN is a value here.
+    /// Returns true if this is the same command, resent because its ACK was lost. Values are compared by their bits:
+    /// NaN is a valid value.
     fn repeats(&self, earlier: &Self) -> bool {
         let most_us = if self.confirmation.is_some() {
             REPEAT_US
@@ -149,8 +148,8 @@ impl Command {
         self.at_us.saturating_sub(earlier.at_us) <= most_us && self.is_again(earlier)
     }
 
-    /// Returns true if this is the same command, sent again at any time: of one that is under way it asks how far
-    /// it is.
+    /// Returns true if this is the same command, resent at any time: while one is under way, that asks for its
+    /// progress.
     fn is_again(&self, earlier: &Self) -> bool {
         let transmitted_later = match (self.confirmation, earlier.confirmation) {
             (Some(now), Some(then)) => now > then,
@@ -169,9 +168,9 @@ pub(super) struct Commands {
     role: Role,
     /// `ACTUATOR_OUTPUT_FUNCTION` of the motor.
     function: f32,
-    /// The command whose work is done when the parameters have been stored, loaded or erased.
+    /// The command that finishes when the parameters have been stored, loaded or erased.
     storage: Option<Command>,
-    /// The calibration or the self-test that is under way.
+    /// The calibration or self-test under way.
     under_way: Option<Command>,
     /// The last command that must not be obeyed twice, and its result.
     last: Option<(Command, MavResult)>,
@@ -179,7 +178,7 @@ pub(super) struct Commands {
     params_changed: bool,
     request: Option<Request>,
     reboot: bool,
-    /// True if a command has left something to be kept.
+    /// True if a command has left something to store.
     left: bool,
 }
 
@@ -208,7 +207,7 @@ impl Commands {
         replies: &mut Replies,
     ) {
         if !command.is_allowed() {
-            // Others may have been asked as well.
+            // Others may have been addressed as well.
             if command.exact || self.role == Role::Standalone {
                 replies.ack(command.from, command.number, DENIED);
             }
@@ -217,7 +216,7 @@ impl Commands {
         let earlier = self
             .last
             .filter(|(last, _)| command.repeats(last) && is_known(command, context));
-        // One of the two at a time.
+        // Only one of the two at a time.
         let pending = self.storage.as_ref().or(self.under_way.as_ref());
         let result = match (pending, earlier) {
             (Some(pending), _) if command.is_again(pending) => Some(IN_PROGRESS),
@@ -238,7 +237,7 @@ impl Commands {
         }
     }
 
-    /// The result, or none when it comes later or not at all.
+    /// Returns the result, or `None` if it comes later or not at all.
     fn obey(
         &mut self,
         command: &Command,
@@ -275,26 +274,26 @@ impl Commands {
                 Some(id) if u16::try_from(id).is_ok() => ACCEPTED,
                 _ => DENIED,
             },
-            // A command to all is for those who know it: an autopilot answers it, and its ESCs
-            // would only add refusals.
+            // A broadcast command is for those who know it: an autopilot answers it, and its ESCs would only add
+            // refusals.
             _ if command.exact || self.role == Role::Standalone => UNSUPPORTED,
             _ => return None,
         })
     }
 
-    /// Returns true if something is under way that another command must not come between.
+    /// Returns true if something under way must not be interrupted by another command.
     fn is_busy(&self) -> bool {
         self.storage.is_some() || self.under_way.is_some() || self.reboot
     }
 
-    /// Returns true if a command means the motor of this ESC by this number. No number in particular
-    /// means this one only if nobody else was asked.
+    /// Returns true if a command means this ESC's motor by this number. No number in particular means it only if nobody
+    /// else was addressed.
     fn is_own(&self, function: f32, command: &Command) -> bool {
         function == self.function || (function == 0.0 && command.exact)
     }
 
-    /// Reading and writing the flash stalls the processor, and reading changes what the motor is
-    /// driven with: both only at rest. The ACK follows when it is done.
+    /// Stores, loads or resets the parameters, at rest only: flash access stalls the processor, and loading changes
+    /// what drives the motor. The ACK follows on completion.
     fn storage(&mut self, command: &Command, drive: DriveStatus) -> Option<MavResult> {
         let request = match command.choice(0) {
             Some(-1) => return Some(ACCEPTED),
@@ -311,13 +310,13 @@ impl Commands {
         None
     }
 
-    /// Returns true if the storage command that waits asks for nothing else.
+    /// Returns true if the pending storage command asks for nothing else.
     pub(super) fn stores_all(&self) -> bool {
         let command = self.storage.as_ref();
         command.is_some_and(|command| command.number == PREFLIGHT_STORAGE)
     }
 
-    /// The storage command that waits is done.
+    /// Completes the pending storage command.
     pub(super) fn storage_done(
         &mut self,
         result: Result<(), &'static str>,
@@ -333,7 +332,7 @@ impl Commands {
             let text = [reason, ""];
             replies.push(Reply::Text(MavSeverity::MAV_SEVERITY_ERROR, text));
         }
-        // A reset and a load change every value: clients should see the new ones.
+        // A reset or a load changes every value: clients should see the new ones.
         code == ACCEPTED && command.number == PREFLIGHT_STORAGE && command.choice(0) != Some(1)
     }
 
@@ -365,7 +364,7 @@ impl Commands {
         ACCEPTED
     }
 
-    /// Ends what was under way by this command with a result, if anything was.
+    /// Ends the given command with a result, if it is under way.
     fn end(&mut self, number: u16, result: MavResult, replies: &mut Replies) {
         if let Some(command) = self.under_way.take_if(|command| command.number == number) {
             self.last = Some((command, result));
@@ -373,17 +372,17 @@ impl Commands {
         }
     }
 
-    /// The next thing for the ESC to do.
+    /// Returns the next thing for the ESC to do.
     pub(super) fn take_act(&mut self) -> Option<Act> {
         self.act.take()
     }
 
-    /// Returns true if a command has left something to be kept since the last call.
+    /// Returns true if a command has left something to store since the last call.
     pub(super) fn take_left(&mut self) -> bool {
         core::mem::take(&mut self.left)
     }
 
-    /// `replies_sent`: true if nothing waits to be sent. A reboot waits for its ACK.
+    /// Returns the next request. A reboot waits for its ACK: `replies_sent` is true if no reply is pending.
     pub(super) fn take_request(&mut self, replies_sent: bool) -> Option<Request> {
         if core::mem::take(&mut self.params_changed) {
             return Some(Request::ParamsChanged);
@@ -399,8 +398,8 @@ impl Commands {
     }
 }
 
-/// Returns true if a command that looks like an earlier one is that one: by the number of the
-/// transmission, or without one if the test that it asked for still runs.
+/// Returns true if a command that looks like an earlier one is the same: by its transmission number, or if it has none,
+/// because the test that it asked for still runs.
 fn is_known(command: &Command, context: &mut Context) -> bool {
     let tests = matches!(context.authority.command(), authority::Command::Test(_));
     let is_test = matches!(command.number, DO_MOTOR_TEST | ACTUATOR_TEST);

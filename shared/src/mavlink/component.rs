@@ -43,9 +43,9 @@ pub struct Component {
     /// True if it has announced itself.
     started: bool,
     params_changed: bool,
-    /// True if something that is kept has changed.
+    /// True if something stored has changed.
     keep: bool,
-    /// True if the key is to go once the replies have left.
+    /// True if the key is to go once the replies have been sent.
     unsign: bool,
     announcer: Announcer,
     /// As of the last poll.
@@ -59,17 +59,17 @@ pub struct Component {
 }
 
 impl Component {
-    /// A component whose identity is in `params`; a change of it applies at the next start.
+    /// Creates a component with the identity in `params`; a change of it applies at the next start.
     ///
-    /// `link_bytes_per_s` is the rate of the slowest link (11520 at 115200 baud). Lists of
-    /// parameters take at most half of it, and streams the other half; replies are never held up.
+    /// `link_bytes_per_s` is the rate of the slowest link (11520 at 115200 baud). Parameter lists
+    /// take at most half of it, and streams the other half; replies are never delayed.
     ///
     /// Never inlined: a copy of it takes 1.7 KB of stack.
     #[inline(never)]
     pub fn new(params: &Params, image: &Image, link_bytes_per_s: u32) -> Self {
         let identity = Identity::new(params);
         Self {
-            // Constants are made in their places, where copies would take 1.6 KB of stack.
+            // Constants are built in place; copies would take 1.6 KB of stack.
             writer: const { Writer::new() },
             replies: const { Replies::new() },
             list: List::default(),
@@ -93,9 +93,9 @@ impl Component {
     }
 
     /// Obeys a frame. Replies leave at the next [`Component::poll`]; up to 40 wait, and a text
-    /// tells of any that found no room.
+    /// reports any that found no room.
     ///
-    /// Never inlined, as [`Component::poll`]: an image report shows its size.
+    /// Never inlined, like [`Component::poll`]: an image report shows its size.
     #[inline(never)]
     pub fn handle(&mut self, frame: &Frame, context: &mut Context) {
         if frame.from == self.identity.address {
@@ -118,7 +118,7 @@ impl Component {
         if trust == Trust::None {
             return;
         }
-        // If nobody else has been asked, an unknown name is an error.
+        // If nobody else was addressed, an unknown name is an error.
         let alone = target.component != 0 || self.identity.role == Role::Standalone;
         let drive = context.drive();
         let mut command = None;
@@ -202,37 +202,37 @@ impl Component {
         self.replies.push(Reply::Text(severity, [text, ""]));
     }
 
-    /// The key and the time of signatures, as kept from before the start.
+    /// Restores the key and the signature time stored before the start.
     pub fn keep_signing(&mut self, kept: Option<Kept>) {
         self.writer.sender.signing = Signing::new(kept);
     }
 
-    /// The key and the time of signatures, to be kept over a loss of power.
+    /// Returns the key and the signature time, to be stored.
     pub fn kept_signing(&self) -> Option<Kept> {
         self.writer.sender.signing.kept().filter(|_| !self.unsign)
     }
 
-    /// Forgets the key, once the replies that wait have been signed with it.
+    /// Forgets the key, once the pending replies have been signed with it.
     pub fn forget_signing(&mut self) {
         self.unsign = true;
     }
 
-    /// Sets the intervals of messages to those kept from before.
+    /// Restores the stored message intervals.
     pub fn keep_intervals(&mut self, intervals: &Intervals) {
         self.schedule.keep(intervals);
     }
 
-    /// The intervals of messages, to be kept over a loss of power.
+    /// Returns the message intervals, to be stored.
     pub fn kept_intervals(&self) -> Intervals {
         self.schedule.intervals()
     }
 
-    /// Returns true if something that is kept has changed since the last call.
+    /// Returns true if something stored has changed since the last call.
     pub fn take_changed(&mut self) -> bool {
         core::mem::take(&mut self.keep) | self.commands.take_left()
     }
 
-    /// The next thing for the caller to do; to be asked after each poll until there is none.
+    /// Returns the next thing for the caller to do; ask after each poll until there is none.
     pub fn take_request(&mut self) -> Option<Request> {
         if core::mem::take(&mut self.params_changed) {
             return Some(Request::ParamsChanged);
@@ -240,17 +240,17 @@ impl Component {
         self.commands.take_request(self.replies.is_empty())
     }
 
-    /// The next thing for the ESC to do, likewise.
+    /// Returns the next thing for the ESC to do, likewise.
     pub fn take_act(&mut self) -> Option<Act> {
         self.commands.take_act()
     }
 
-    /// Returns true if the command that waits for storage asks for nothing else.
+    /// Returns true if the command waiting for storage asks for nothing else.
     pub fn stores_all(&self) -> bool {
         self.commands.stores_all()
     }
 
-    /// The number of its motor in the vehicle, from 0, if its component id numbers it.
+    /// Returns the number of its motor in the vehicle, from 0, if its component id numbers it.
     #[cfg(feature = "group")]
     pub fn number(&self) -> Option<u8> {
         self.identity.number()
@@ -268,16 +268,16 @@ impl Component {
         self.schedule.follows()
     }
 
-    /// A request for storage is done: `Ok` if the values would survive a loss of power now, or
-    /// a few words on why not. The command is acknowledged with this.
+    /// Completes a storage request: `Ok` if the values now survive a loss of power, or a few words
+    /// on why not. The command is acknowledged with this.
     pub fn storage_done(&mut self, result: Result<(), &'static str>) {
         if self.commands.storage_done(result, &mut self.replies) {
             self.list.start();
         }
     }
 
-    /// Values that something else than MAVLink has changed in the context's parameters: clients are
-    /// told, and [`Request::ParamsChanged`] follows.
+    /// Reports parameters that something other than MAVLink has changed: clients are told, and
+    /// [`Request::ParamsChanged`] follows.
     pub fn changed(&mut self, ids: &[ParamId]) {
         for id in ids {
             self.replies.value(*id);
@@ -285,7 +285,7 @@ impl Component {
         self.params_changed = true;
     }
 
-    /// As [`Component::changed`], of a value from which no configuration follows.
+    /// Like [`Component::changed`], for a value that does not affect the configuration.
     pub fn tell_value(&mut self, id: ParamId) {
         self.replies.value(id);
     }
@@ -300,30 +300,30 @@ impl Component {
         }
     }
 
-    /// A self-test is so far, percent.
+    /// Reports a self-test's progress, percent.
     pub fn tell_progress(&mut self, percent: u8) {
         self.commands.check_progress(percent, &mut self.replies);
     }
 
-    /// An identification has come to this step.
+    /// Reports that an identification has reached this step.
     pub fn tell_step(&mut self, step: &'static str) {
         let text = ["Identification: ", step];
         self.replies
             .push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
     }
 
-    /// A self-test has ended, and the command for it, if there was one, is acknowledged.
+    /// Reports the end of a self-test, and acknowledges the command for it, if any.
     pub fn check_done(&mut self, passed: bool) {
         let result = if passed { ACCEPTED } else { FAILED };
         self.commands.end_check(result, &mut self.replies);
     }
 
-    /// Warns a person at the next poll. Two wait; of more, the first are kept.
+    /// Warns the user at the next poll. Two can wait; of more, the first are kept.
     pub fn warn(&mut self, warning: Warning) {
         self.warnings.push(warning);
     }
 
-    /// Tells how a request for storage ended that did not come by MAVLink.
+    /// Reports the outcome of a storage request that did not come by MAVLink.
     pub fn tell_stored(&mut self, result: Result<(), &'static str>) {
         let (severity, text) = match result {
             Ok(()) => (MavSeverity::MAV_SEVERITY_INFO, "Parameters stored"),
@@ -335,7 +335,7 @@ impl Component {
     }
 }
 
-/// Whom a frame is for, by the place of the target in each message that is obeyed.
+/// Returns the target of a frame, by its place in each message that is obeyed.
 fn target(frame: &Frame) -> Option<Address> {
     let offset = match frame.id {
         PARAM_REQUEST_LIST_DATA::ID | MISSION_REQUEST_LIST_DATA::ID => 0,

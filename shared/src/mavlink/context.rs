@@ -1,4 +1,4 @@
-//! The interface of the component to its caller.
+//! The interface between the component and its caller.
 
 use super::group::Four;
 use crate::check;
@@ -11,26 +11,26 @@ use crate::telemetry::Telemetry;
 
 /// The component's surroundings: what it reads and may change.
 pub struct Context<'a> {
-    /// Time since the start, µs; it does not run backwards.
+    /// Time since the start, µs; monotonic.
     pub now_us: u64,
     /// The values in force; PARAM_SET changes them and asks for [`Request::ParamsChanged`].
     pub params: &'a mut Params,
-    /// The board, which has other values from the factory than the table's.
+    /// The board, whose factory values differ from the table's.
     pub board: &'a Board,
     /// The state of the ESC.
     pub telemetry: &'a Telemetry,
-    /// The ESCs of which its messages tell besides; they are one program's, and not the chip's.
+    /// The other ESCs that its messages cover, which run in the same program, not on the chip.
     #[cfg(feature = "group")]
     pub four: Option<&'a Four>,
     /// The result of the last self-test.
     pub check: &'a check::Report,
     /// The result of the last identification.
     pub identification: &'a identify::Report,
-    /// The fault record, where there is one.
+    /// The fault record, if there is one.
     pub record: Option<&'a Record>,
     /// Decides whether the motor may turn.
     pub authority: &'a mut dyn Access,
-    /// Checks that values make a drive; a value that breaks it is refused with the reason.
+    /// Checks that values make a drive; a value that does not is refused with the reason.
     pub validate: &'a dyn Fn(&Params) -> Result<(), BuildError>,
 }
 
@@ -51,36 +51,36 @@ impl<'a> Context<'a> {
 /// A request that only the caller can carry out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Put the parameters in force: rebuild the drive's configuration.
+    /// Apply the parameters: rebuild the drive's configuration.
     ParamsChanged,
-    /// Write what is kept to flash, then call [`Component::storage_done`](super::Component::storage_done).
+    /// Write what is stored to flash, then call [`Component::storage_done`](super::Component::storage_done).
     Save,
     /// Save without being asked.
     Keep,
-    /// Read the parameters and intervals from flash and put them in force, then call
+    /// Read the parameters and intervals from flash and apply them, then call
     /// [`Component::storage_done`](super::Component::storage_done).
     Load,
-    /// Erase all but the statistics and put the defaults in force, then call
+    /// Erase all but the statistics and apply the defaults, then call
     /// [`Component::storage_done`](super::Component::storage_done).
     FactoryReset,
-    /// Start again; the ACK has been sent.
+    /// Restart; the ACK has been sent.
     Reboot,
 }
 
-/// An act that the ESC does at once. It reports progress if the act takes longer.
+/// An action that the ESC takes at once. It reports progress if that takes longer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
     /// Sound a beacon.
     Beep,
-    /// Begin a calibration by stick; [`Component::tell`](super::Component::tell) reports its steps.
+    /// Begin a stick calibration; [`Component::tell`](super::Component::tell) reports its steps.
     Calibrate,
     /// End it.
     EndCalibration,
-    /// Begin an identification of the motor; its progress and end are told as those of a self-test are.
+    /// Begin an identification of the motor; its progress and end are reported like a self-test's.
     Identify,
     /// End it, if there is one.
     EndIdentification,
-    /// Keep what it has found; [`Component::check_done`](super::Component::check_done) reports it.
+    /// Keep its results; [`Component::check_done`](super::Component::check_done) reports it.
     KeepIdentified,
     /// Begin a self-test; [`Component::tell_progress`](super::Component::tell_progress) and [`Component::check_done`](super::Component::check_done) report it.
     Check,

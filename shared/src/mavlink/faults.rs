@@ -1,9 +1,9 @@
-//! The faults that have been reported in words, and the times.
+//! The faults reported in words, and when.
 
 use crate::drive::{Fault, Faults};
 
-/// Least time between two texts of a fault's beginning, and between two of its end: a fault that
-/// comes and goes each millisecond must not fill the link.
+/// Least time between two texts about a fault's beginning, and between two about its end: a fault that comes and goes
+/// every millisecond must not fill the link.
 const APART_US: u64 = 1_000_000;
 
 /// A fault that has begun or ended.
@@ -13,11 +13,11 @@ pub(super) enum FaultEvent {
     Ended(Fault),
 }
 
-/// The state of each fault as reported last.
+/// The last reported state of each fault.
 #[derive(Clone, Debug)]
 pub(super) struct Announcer {
     told: Faults,
-    /// When its end, and when its beginning, may be told again, µs.
+    /// When the end, and when the beginning, may next be reported, µs.
     due_us: [[u64; Fault::ALL.len()]; 2],
 }
 
@@ -29,8 +29,8 @@ impl Announcer {
         }
     }
 
-    /// The next fault whose state differs from the one reported and may be reported now. What has to wait
-    /// is reported later if it still differs then.
+    /// Returns the next fault whose state differs from the reported one and may be reported now. One that has to wait
+    /// is reported later if it still differs.
     pub(super) fn next(&mut self, now_us: u64, faults: Faults) -> Option<FaultEvent> {
         let began = faults.without(self.told);
         let ended = self.told.without(faults);

@@ -1,4 +1,4 @@
-//! A frame, and who sends it.
+//! A frame and its sender.
 
 use mavlink::MAV_STX_V2;
 
@@ -10,16 +10,16 @@ pub(super) const SIGNED: u8 = 0x01;
 pub struct Frame<'a> {
     /// Its sender.
     pub from: Address,
-    /// Number of the message.
+    /// Message id.
     pub id: u32,
-    /// As received: MAVLink 2 leaves trailing zeros out.
+    /// As received: MAVLink 2 omits trailing zeros.
     pub payload: &'a [u8],
     /// The whole frame, for its signature or a log.
     pub raw: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// `N` bytes of the payload; those that were left out are zero.
+    /// Returns `N` bytes of the payload; omitted ones are zero.
     pub(super) fn bytes<const N: usize>(&self, offset: usize) -> [u8; N] {
         let mut bytes = [0; N];
         for (byte, sent) in bytes.iter_mut().zip(self.payload.iter().skip(offset)) {
@@ -28,7 +28,7 @@ impl Frame<'_> {
         bytes
     }
 
-    /// Never inlined: every field that is read goes through it.
+    /// Never inlined: every field is read through it.
     #[inline(never)]
     pub(super) fn u32(&self, offset: usize) -> u32 {
         u32::from_le_bytes(self.bytes(offset))
@@ -58,7 +58,7 @@ impl Frame<'_> {
         f32::from_bits(self.u32(offset))
     }
 
-    /// The address of two bytes, system first, that a message is for.
+    /// Returns the target address in two bytes, system first.
     pub(super) fn address(&self, offset: usize) -> Address {
         Address {
             system: self.u8(offset),
@@ -67,12 +67,12 @@ impl Frame<'_> {
     }
 }
 
-/// Returns true if a frame whose header is complete has a signature.
+/// Returns true if a frame whose header is complete is signed.
 pub(super) fn is_signed(bytes: &[u8]) -> bool {
     matches!(*bytes, [MAV_STX_V2, _, flags, ..] if flags & SIGNED != 0)
 }
 
-/// A component of a system; as a target 0 means all.
+/// A component of a system; as a target, 0 means all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Address {
     /// System, 1 to 255.
@@ -81,5 +81,5 @@ pub struct Address {
     pub component: u8,
 }
 
-/// Link, timestamp and hash, after the checksum of a frame.
+/// Link, timestamp and hash, after a frame's checksum.
 pub(super) const SIGNATURE_LEN: usize = 13;

@@ -1,4 +1,4 @@
-//! ESCs of one program, of which the first of each four tells of all four.
+//! ESCs of one program, where the first of each four reports for all of them.
 
 use super::payload::Payload;
 use super::place::{Place, SLOTS};
@@ -7,13 +7,13 @@ use crate::telemetry::Telemetry;
 /// The ESCs of a message for four.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Four {
-    /// By their slots.
+    /// By slot.
     pub escs: [Option<Telemetry>; SLOTS],
     /// ESCs in the vehicle.
     pub count: u8,
 }
 
-/// The ESCs that a message tells of.
+/// The ESCs that a message reports.
 pub(super) struct Escs<'a> {
     pub(super) place: Place,
     pub(super) own: &'a Telemetry,
@@ -21,12 +21,12 @@ pub(super) struct Escs<'a> {
 }
 
 impl<'a> Escs<'a> {
-    /// The ESC at this place, and those that it tells of besides.
+    /// The ESC at this place, and the others that it reports.
     pub(super) fn of(place: Place, own: &'a Telemetry, four: Option<&'a Four>) -> Self {
         Self { place, own, four }
     }
 
-    /// Those in the slots beside its own.
+    /// Returns those in the other slots.
     fn others(&self) -> impl Iterator<Item = (usize, &Telemetry)> {
         let slots = self
             .four
@@ -36,9 +36,9 @@ impl<'a> Escs<'a> {
         slots.filter(|(slot, _)| *slot != self.place.slot())
     }
 
-    /// Puts a value for each slot, of which `len` bytes count: of the ESC there, or another where there is none.
+    /// Writes a value for each slot, `len` bytes each: that of the ESC there, or `none`.
     ///
-    /// Inlined: where nobody else is told of, one call is left of it.
+    /// Inlined: if no others are reported, it reduces to one call.
     #[inline(always)]
     pub(super) fn put(
         &self,
@@ -61,13 +61,13 @@ impl<'a> Escs<'a> {
         }
     }
 
-    /// ESCs in the vehicle: of one that is alone the least number that there are. It is not known here; readers
-    /// ignore what is above it.
+    /// Returns the number of ESCs in the vehicle. A single ESC does not know it and gives the least there can be;
+    /// readers ignore what is above it.
     pub(super) fn count(&self) -> u8 {
         self.four.map_or(self.place.count(), |four| four.count)
     }
 
-    /// `ESC_INFO.info`: their bits. The field has none for a ninth ESC and those after it.
+    /// Returns `ESC_INFO.info`: the ESCs' bits. The field has none for the ninth ESC and those after it.
     pub(super) fn online(&self) -> u8 {
         let own = self.place.online();
         self.others().fold(own, |bits, (slot, _)| {
@@ -77,7 +77,7 @@ impl<'a> Escs<'a> {
 }
 
 impl Payload {
-    /// An array with a value in one slot, and another in the rest.
+    /// Writes an array with a value in one slot, and another in the rest.
     ///
     /// Never inlined: each message calls it for each array.
     #[inline(never)]
@@ -87,7 +87,7 @@ impl Payload {
         }
     }
 
-    /// The lowest `len` bytes.
+    /// Writes the lowest `len` bytes.
     fn value(&mut self, len: usize, value: u32) {
         self.put(value.to_le_bytes().get(..len).unwrap_or_default());
     }

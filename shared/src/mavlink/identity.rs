@@ -8,7 +8,7 @@ use super::place::Place;
 use crate::params::choice::MavRole;
 use crate::params::{ParamId, Params};
 
-/// The ESC's role to a ground station (`MAV_ROLE`).
+/// The ESC's role for a ground station (`MAV_ROLE`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
     /// A vehicle of its own, component 1: ground stations show nothing else.
@@ -17,7 +17,7 @@ pub(super) enum Role {
     Peripheral,
 }
 
-/// The ESC's address and role; parameters apply at the start.
+/// The ESC's address and role; its parameters apply at the start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Identity {
     pub(super) role: Role,
@@ -51,22 +51,22 @@ impl Identity {
         }
     }
 
-    /// The number of its motor, from 0, if its component id numbers it.
+    /// Returns the number of its motor, from 0, if its component id numbers it.
     #[cfg(feature = "group")]
     pub(super) fn number(&self) -> Option<u8> {
         Place::number_of_component(self.address.component)
     }
 
-    /// Returns true if something for this target is for this ESC.
+    /// Returns true if this target includes this ESC.
     pub(super) fn is_for(&self, target: Address) -> bool {
         (target.system == 0 || target.system == self.address.system)
             && (target.component == 0 || target.component == self.address.component)
     }
 
-    /// Returns true for what a peripheral waits for: the first sign of an autopilot.
+    /// Returns true for the first sign of an autopilot, which a peripheral waits for.
     pub(super) fn awaits(&self, frame: &Frame) -> bool {
-        // Offset 5 is the autopilot: of a ground station and of other peripherals it is INVALID. System 0
-        // stands for all, and is nobody's.
+        // Offset 5 is the autopilot, INVALID for ground stations and other peripherals. System 0 means all, and is no
+        // sender.
         let from_autopilot = frame.id == HEARTBEAT_DATA::ID
             && frame.from.system != 0
             && frame.from.component == 1
@@ -74,7 +74,7 @@ impl Identity {
         self.role == Role::Peripheral && from_autopilot && !self.autopilot_heard
     }
 
-    /// A peripheral belongs to the first autopilot that it hears, whatever its system id.
+    /// Joins the system of the first autopilot heard, whatever its id: a peripheral belongs to it.
     pub(super) fn belong_to(&mut self, autopilot: Address) {
         self.autopilot_heard = true;
         self.address.system = autopilot.system;

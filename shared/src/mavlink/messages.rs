@@ -14,7 +14,7 @@ use crate::math::{quotient, round};
 use crate::params::{ParamId, Params, TABLE};
 use crate::telemetry::Telemetry;
 
-/// `ESC_INFO.temperature` of a slot without an ESC, or of one that does not know it.
+/// `ESC_INFO.temperature` of a slot without an ESC, or whose ESC does not know it.
 const NO_TEMPERATURE: i16 = i16::MAX;
 
 pub(super) fn heartbeat(
@@ -37,8 +37,8 @@ pub(super) fn heartbeat(
     } else {
         MavState::MAV_STATE_STANDBY
     };
-    // The custom mode comes first: the conditions, each a bit at its number. MAVLink's version is 3 in all of
-    // its second one.
+    // The custom mode comes first: the conditions, each a bit at its number. MAVLink's version is 3 throughout MAVLink
+    // 2.
     payload.u32(telemetry.faults.custom_mode() | telemetry.limits.custom_mode());
     payload.put(&[
         mavtype as u8,
@@ -49,7 +49,7 @@ pub(super) fn heartbeat(
     ]);
 }
 
-/// `counter` is the number of this message.
+/// Writes ESC_INFO; `counter` is the number of this message.
 pub(super) fn esc_info(payload: &mut Payload, now_us: u64, escs: &Escs, counter: u16) {
     payload.u64(now_us);
     let errors = |esc: &Telemetry| esc.fault_count.saturating_add(esc.bad_frames);
@@ -65,7 +65,7 @@ pub(super) fn esc_info(payload: &mut Payload, now_us: u64, escs: &Escs, counter:
     ]);
 }
 
-/// Temperature as `ESC_INFO` has it: an i16 in the lower half.
+/// Returns the temperature as `ESC_INFO` has it: an i16 in the lower half.
 fn temperature_cdegc(esc: &Telemetry) -> u32 {
     let cdegc = if esc.temperature_c.is_nan() {
         NO_TEMPERATURE
@@ -75,7 +75,7 @@ fn temperature_cdegc(esc: &Telemetry) -> u32 {
     cdegc as u32
 }
 
-/// DShot, as long as nothing else is known.
+/// Returns the connection type: DShot until known otherwise.
 fn connection_type(signal: Option<Signal>) -> EscConnectionType {
     match signal {
         None | Some(Signal::Dshot { .. }) => EscConnectionType::ESC_CONNECTION_TYPE_DSHOT,
@@ -84,7 +84,7 @@ fn connection_type(signal: Option<Signal>) -> EscConnectionType {
     }
 }
 
-/// A value by a name of at most 10 characters.
+/// Writes a value with a name of at most 10 characters.
 pub(super) fn named_value(payload: &mut Payload, now_us: u64, name: &str, value: f32) {
     // The field wraps after 49 days.
     payload.u32(quotient(now_us, 1000));
@@ -100,8 +100,8 @@ pub(super) fn esc_status(payload: &mut Payload, now_us: u64, escs: &Escs) {
     payload.put(&[escs.place.index()]);
 }
 
-/// The message has no signs: speed is its magnitude, and a current into the supply is 0. Those for
-/// later ESCs are laid out alike ([`Place::telemetry`](super::place::Place::telemetry)).
+/// Writes ESC_TELEMETRY. It has no signs: speed is its magnitude, and a current into the supply is 0. Those for later
+/// ESCs have the same layout ([`Place::telemetry`](super::place::Place::telemetry)).
 pub(super) fn esc_telemetry(payload: &mut Payload, escs: &Escs, count: u16) {
     let u16 = |value: f32| u32::from(round(value) as u16);
     escs.put(payload, 2, 0, |esc| u16(esc.bus_v * 100.0));
@@ -122,8 +122,7 @@ pub(super) fn autopilot_version(payload: &mut Payload, image: &Image) {
         | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP;
     payload.u64(capabilities.bits());
     payload.u64(uid(&image.serial));
-    // The versions of the middleware and of the operating system are 0, and there are no numbers of a
-    // vendor and a product.
+    // The versions of middleware and operating system are 0, and there are no vendor and product numbers.
     for word in [version(), 0, 0, image.board_number.into(), 0] {
         payload.u32(word);
     }
@@ -138,7 +137,7 @@ pub(super) fn param_value(payload: &mut Payload, params: &Params, id: ParamId) {
     payload.put(&[MavParamType::MAV_PARAM_TYPE_REAL32 as u8]);
 }
 
-/// Its name, without a final zero if it has 16 characters.
+/// Returns its name, without a final zero if it has 16 characters.
 pub(super) fn name_bytes(id: ParamId) -> [u8; 16] {
     let mut bytes = [0; 16];
     for (to, byte) in bytes.iter_mut().zip(id.entry().name.bytes()) {
@@ -154,14 +153,14 @@ fn failure_flags(faults: Faults) -> u16 {
         .fold(0, |flags, fault| flags | fault.failure_flag())
 }
 
-/// Major, minor, patch and release type of the version, a byte each.
+/// Returns major, minor, patch and release type of the version, a byte each.
 fn version() -> u32 {
     const OFFICIAL: u8 = 255;
     let [major, minor, patch] = VERSION;
     u32::from_be_bytes([major, minor, patch, OFFICIAL])
 }
 
-/// The chip's serial number, folded to the bits that there are.
+/// Folds the chip's serial number into 64 bits.
 fn uid(serial: &[u8; 12]) -> u64 {
     let word = |at: usize| {
         u32::from_le_bytes([serial[at], serial[at + 1], serial[at + 2], serial[at + 3]])
@@ -181,7 +180,7 @@ mod tests {
     use crate::mavlink::place::Place;
     use crate::mavlink::tests::TELEMETRY;
 
-    /// The message that the dialect reads in a payload.
+    /// Reads a payload as the dialect's message.
     fn read<D: MessageData>(write: impl FnOnce(&mut Payload)) -> D {
         let mut payload = Payload::new();
         write(&mut payload);
@@ -249,7 +248,7 @@ mod tests {
 
     #[test]
     fn each_fault_has_a_flag() {
-        // The numbers of the protocol; faults that it does not name are GENERIC.
+        // The protocol's numbers; faults that it does not name are GENERIC.
         let flags = [1, 2, 64, 4, 64, 32, 64];
         let mut all = Faults::NONE;
         for (fault, flag) in Fault::ALL.into_iter().zip(flags) {

@@ -1,9 +1,9 @@
 //! The ESC as a MAVLink component: bytes in, bytes out, no socket and no clock of its own.
 //!
-//! [`Receiver`] makes frames of a link's bytes; [`Component`] answers them and sends telemetry. Frames
-//! that the ESC sends carry `mavlink`'s generated payloads. Frames that arrive are read by offset,
-//! because the generated readers refuse unknown command numbers and types, and an ESC must answer
-//! those. The enum of all messages is never built or read: it alone takes 98 KB of flash.
+//! [`Receiver`] turns a link's bytes into frames; [`Component`] answers them and sends telemetry. Frames that the ESC
+//! sends carry `mavlink`'s generated payloads. Incoming frames are read by offset, because the generated readers refuse
+//! unknown command numbers and types, which an ESC must answer. The enum of all messages is never built or read: it
+//! alone takes 98 KB of flash.
 
 mod check;
 mod command;

@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::MavSeverity;
 use crate::input::News;
 use crate::input::calibration::Step;
 
-/// Severity and text of news, in two pieces; `None` for news that only a tune tells.
+/// Returns severity and text of news, in two pieces; `None` for news that only a tune announces.
 pub(super) fn words(news: News) -> Option<(MavSeverity, [&'static str; 2])> {
     Some(match news {
         News::Identified(signal) => (

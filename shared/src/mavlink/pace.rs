@@ -1,21 +1,21 @@
-//! Shares of a link.
+//! Shares of a link's rate.
 
-/// A share of a link's bytes, so that messages that can wait do not hold up the others.
+/// A share of a link's bytes, so that messages that can wait do not delay the others.
 #[derive(Clone, Debug)]
 pub(super) struct Pace {
     bytes_per_s: u32,
-    /// Time at which all bytes taken so far will have left.
+    /// Time at which all bytes taken so far will have been sent.
     free_us: u64,
 }
 
-/// Bytes that may always leave at once: the longest frame, or all signals of the control, signed.
+/// Bytes that may always leave at once: the longest frame, or all of the control's signals, signed.
 const AT_ONCE_MAX: usize = 400;
 
-/// Bytes that may leave at once otherwise, as time of the share.
+/// Bytes that may otherwise leave at once, as time of the share.
 const BURST_US: u64 = 20_000;
 
 impl Pace {
-    /// A share of `bytes_per_s`, of which nothing has been taken.
+    /// Creates a share of `bytes_per_s`, none of it taken.
     pub(super) fn new(bytes_per_s: u32) -> Self {
         Self {
             bytes_per_s: bytes_per_s.max(1),
@@ -27,7 +27,7 @@ impl Pace {
         (len as u32 * 1_000_000).div_ceil(self.bytes_per_s).into()
     }
 
-    /// Takes at most [`AT_ONCE_MAX`] bytes if they may leave now.
+    /// Takes at most [`AT_ONCE_MAX`] bytes, if they may leave now.
     pub(super) fn take(&mut self, now_us: u64, len: usize) -> bool {
         let free_us = self.free_us.max(now_us).saturating_add(self.time_us(len));
         let may = free_us - now_us <= self.time_us(AT_ONCE_MAX).max(BURST_US);

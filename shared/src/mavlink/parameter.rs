@@ -11,7 +11,7 @@ use crate::params::{ParamId, TABLE};
 /// `PARAM_REQUEST_READ.param_index` when the name counts.
 pub(super) const BY_NAME: i16 = -1;
 
-/// The parameters that are still to be broadcast for PARAM_REQUEST_LIST.
+/// The parameters still to be broadcast for PARAM_REQUEST_LIST.
 #[derive(Clone, Debug, Default)]
 pub(super) struct List {
     next: usize,
@@ -19,8 +19,8 @@ pub(super) struct List {
 }
 
 impl List {
-    /// All parameters from here on. A request while a list is under way lengthens it to a whole
-    /// round: whoever asked gets every index, and asking again and again cannot hold it up.
+    /// Starts a list of all parameters. A request during a list extends it to a whole round: the client gets every
+    /// index, and repeated requests cannot hold it up.
     pub(super) fn start(&mut self) {
         self.left = TABLE.len();
     }
@@ -37,7 +37,7 @@ impl List {
     }
 }
 
-/// PARAM_REQUEST_READ. `alone` when nobody else was asked: only then is an unknown name an error.
+/// Handles PARAM_REQUEST_READ. `alone` if nobody else was addressed: only then is an unknown name an error.
 pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
     let index = frame.i16(0);
     let name = frame.bytes(4);
@@ -55,11 +55,10 @@ pub(super) fn read(frame: &Frame, alone: bool, replies: &mut Replies) {
     }
 }
 
-/// PARAM_SET. Returns the parameter if the value was taken; the value in force is broadcast either way.
+/// Handles PARAM_SET. Returns the parameter if the value was taken; the value in force is broadcast either way.
 ///
-/// The type that the sender names is not looked at: those that keep integers in floats mean the
-/// same number. Those that put an integer's bytes into the float give a subnormal, which no
-/// parameter means.
+/// The sender's type is ignored: clients that keep integers in floats mean the same number. Those that put an integer's
+/// bytes into the float produce a subnormal, which no parameter means.
 pub(super) fn set(
     frame: &Frame,
     trust: Trust,
@@ -101,7 +100,7 @@ fn take(id: ParamId, value: f32, stopped: bool, context: &mut Context) -> Result
     change(id, value, context)
 }
 
-/// Changes a value if it is in its range and makes a drive.
+/// Changes a value if it is in range and makes a drive.
 ///
 /// Never inlined: a command calls it too.
 #[inline(never)]
@@ -116,7 +115,7 @@ pub(super) fn change(id: ParamId, value: f32, context: &mut Context) -> Result<(
     Ok(())
 }
 
-/// A name of 16 characters has no zero at its end.
+/// Finds a parameter by name; one of 16 characters has no terminating zero.
 fn find(name: &[u8; 16]) -> Option<ParamId> {
     let name = name.split(|byte| *byte == 0).next()?;
     ParamId::find_bytes(name)

@@ -1,19 +1,19 @@
-//! Payloads field by field, in the order of the wire, with larger fields before smaller ones.
+//! Payloads field by field, in wire order: larger fields before smaller ones.
 //!
-//! The dialect's own serialisers are a copy of code for each message, which is 1 KB of the chip's flash.
-//! Tests read with the dialect's types what is written here.
+//! The dialect's own serialisers duplicate code for each message, 1 KB of flash. Tests read what is written here with
+//! the dialect's types.
 
 use mavlink::MessageData;
 
 /// The longest payload.
 pub(super) const PAYLOAD_MAX: usize = 255;
 
-/// Id and CRC seed of a message.
+/// Returns the id and CRC seed of a message.
 pub(super) const fn id_of<D: MessageData>() -> (u32, u8) {
     (D::ID, D::EXTRA_CRC)
 }
 
-/// A payload that is being written; what is not written is zero.
+/// A payload being written; what is not written is zero.
 pub(super) struct Payload {
     bytes: [u8; PAYLOAD_MAX],
     len: usize,
@@ -27,12 +27,12 @@ impl Payload {
         }
     }
 
-    /// All of it: a frame leaves zeros at the end out.
+    /// Returns all of it: a frame omits zeros at the end.
     pub(super) fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// The next field, the least byte first.
+    /// Appends a field, least significant byte first.
     ///
     /// Never inlined, nor are longer numbers: each message calls it for each field.
     #[inline(never)]

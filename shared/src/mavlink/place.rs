@@ -1,4 +1,4 @@
-//! The ESC's number in its vehicle, and its place in messages for four ESCs.
+//! The ESC's number in its vehicle, and its slot in messages for four ESCs.
 
 use mavlink::dialects::ardupilotmega::{
     ESC_TELEMETRY_1_TO_4_DATA, ESC_TELEMETRY_5_TO_8_DATA, ESC_TELEMETRY_9_TO_12_DATA,
@@ -22,7 +22,7 @@ impl Place {
     /// The only ESC, or one that its component id does not number.
     pub(super) const FIRST: Self = Self(0);
 
-    /// The place of a peripheral: component 140 is the first.
+    /// Returns the place of a peripheral: component 140 is the first.
     pub(super) const fn of_component(component: u8) -> Self {
         match Self::number_of_component(component) {
             Some(number) => Self(number),
@@ -30,7 +30,7 @@ impl Place {
         }
     }
 
-    /// The number of an ESC whose component id gives it one.
+    /// Returns the number of an ESC if its component id gives it one.
     pub(super) const fn number_of_component(component: u8) -> Option<u8> {
         match component {
             FIRST_COMPONENT..=LAST_COMPONENT => Some(component - FIRST_COMPONENT),
@@ -38,37 +38,38 @@ impl Place {
         }
     }
 
-    /// `index` of `ESC_INFO` and `ESC_STATUS`: the number of the ESC in their first slot.
+    /// Returns `index` of `ESC_INFO` and `ESC_STATUS`: the number of the ESC in their first slot.
     pub(super) const fn index(self) -> u8 {
         self.0 - self.0 % SLOTS as u8
     }
 
-    /// The least number of ESCs that there are.
+    /// Returns the least number of ESCs that there can be.
     pub(super) const fn count(self) -> u8 {
         self.0 + 1
     }
 
-    /// Its bit in `ESC_INFO.info`.
+    /// Returns its bit in `ESC_INFO.info`.
     pub(super) const fn online(self) -> u8 {
         if self.0 < 8 { 1 << self.0 } else { 0 }
     }
 
-    /// `ACTUATOR_OUTPUT_FUNCTION` of its motor.
+    /// Returns the `ACTUATOR_OUTPUT_FUNCTION` of its motor.
     pub(super) fn motor_function(self) -> f32 {
         f32::from(self.0 + 1)
     }
 
-    /// The place of another slot of the same four.
+    /// Returns the place of another slot of the same four.
     pub(super) const fn beside(self, slot: usize) -> Self {
         Self(self.index() + slot as u8)
     }
 
-    /// Its slot in an array of [`SLOTS`].
+    /// Returns its slot in an array of [`SLOTS`].
     pub(super) fn slot(self) -> usize {
         usize::from(self.0) % SLOTS
     }
 
-    /// Id and CRC seed of the message `ESC_TELEMETRY_*` with its slot; they are laid out alike.
+    /// Returns id and CRC seed of the `ESC_TELEMETRY_*` message with its slot; all have the same
+    /// layout.
     pub(super) const fn telemetry(self) -> (u32, u8) {
         match self.index() {
             0 => id_of::<ESC_TELEMETRY_1_TO_4_DATA>(),

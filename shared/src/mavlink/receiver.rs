@@ -1,37 +1,37 @@
-//! Bytes to frames.
+//! Finds frames in bytes.
 
 use mavlink::{MAV_STX, MAV_STX_V2};
 
 use super::check;
 use super::frame::{Address, Frame, SIGNATURE_LEN, SIGNED, is_signed};
 
-/// The greatest frame: MAVLink 2, 255 bytes of payload, signed.
+/// The longest frame: MAVLink 2, 255 bytes of payload, signed.
 const FRAME_MAX: usize = 10 + 255 + 2 + SIGNATURE_LEN;
 /// Silence after which an incomplete frame is given up. A false start byte can claim 267 bytes and
-/// would hold back the frames after it for as long as nobody sends more. Links that stall within
-/// a frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
+/// would hold back the frames after it for as long as nobody sends more. Links that stall within a
+/// frame (radios) do so for some tens of milliseconds; clients ask again after 200 ms or more.
 const IDLE_US: u64 = 100_000;
 
-/// Counts since the start; each counter stops at its greatest value.
+/// Counts since the start, saturating.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames handed on.
     pub frames: u32,
-    /// Frames whose check failed; a start byte within noise counts too.
+    /// Frames whose check failed, including start bytes in noise.
     pub bad_checks: u32,
-    /// Sound frames with an incompatibility flag that is not known; they are not obeyed.
+    /// Sound frames with an unknown incompatibility flag; they are not obeyed.
     pub incompatible: u32,
-    /// Frames of a message that the dialect does not have, so that their check is not known. What
-    /// follows the start byte is searched: noise with such a number must not hide a frame.
+    /// Frames of a message that the dialect lacks, so that their check is unknown. What follows the
+    /// start byte is searched: noise with such a number must not hide a frame.
     pub unknown: u32,
-    /// Of the frames handed on, those with a signature. Whether it fits is not known here.
+    /// Frames handed on that are signed. Whether the signature fits is not known here.
     pub signed: u32,
     /// Incomplete frames given up after silence.
     pub incomplete: u32,
 }
 
 impl Counters {
-    /// Frames that were not handed on.
+    /// Returns the number of frames not handed on.
     pub fn rejected(&self) -> u64 {
         [
             self.bad_checks,
@@ -45,9 +45,9 @@ impl Counters {
     }
 }
 
-/// The front of the bytes that wait.
+/// What the waiting bytes begin with.
 enum Front {
-    /// Nothing that could be a frame yet, or not all of it.
+    /// Nothing that could be a frame yet, or an incomplete one.
     Wait,
     /// No frame starts here.
     Reject,
@@ -64,7 +64,7 @@ enum Front {
 /// Finds the frames in the bytes of one link; MAVLink 1 and 2.
 ///
 /// A candidate that fails is searched again from its second byte, so that a start byte in noise
-/// costs no frame after it.
+/// costs no later frame.
 #[derive(Clone, Debug)]
 pub struct Receiver {
     buffer: [u8; FRAME_MAX],
@@ -81,7 +81,7 @@ impl Default for Receiver {
 }
 
 impl Receiver {
-    /// A receiver for one link.
+    /// Creates a receiver for one link.
     pub const fn new() -> Self {
         Self {
             buffer: [0; FRAME_MAX],
@@ -99,15 +99,15 @@ impl Receiver {
         }
     }
 
-    /// The counts since the start.
+    /// Returns the counts since the start.
     pub const fn counters(&self) -> Counters {
         self.counters
     }
 
     /// Takes bytes as they come and calls `on_frame` for each frame that they complete.
     ///
-    /// Call it without bytes now and then (every few milliseconds): after 100 ms of silence an
-    /// incomplete frame is given up and what it held back is searched for frames.
+    /// Call it without bytes every few milliseconds: after 100 ms of silence an incomplete frame is
+    /// given up, and what it held back is searched for frames.
     pub fn push(&mut self, now_us: u64, mut bytes: &[u8], mut on_frame: impl FnMut(&Frame)) {
         if now_us.saturating_sub(self.last_us) >= IDLE_US {
             while self.start < self.end {
@@ -132,7 +132,7 @@ impl Receiver {
 
     /// Moves the waiting bytes to the front of the buffer.
     fn compact(&mut self) {
-        // Byte by byte: a general move of memory takes 1.5 KB of the chip's flash.
+        // Byte by byte: a general memmove takes 1.5 KB of flash.
         for (to, from) in (self.start..self.end).enumerate() {
             self.buffer[to] = self.buffer[from];
         }
@@ -140,7 +140,7 @@ impl Receiver {
         self.start = 0;
     }
 
-    /// Hands on every complete frame; an incomplete one or nothing is left.
+    /// Hands on every complete frame; what remains is incomplete or empty.
     fn search(&mut self, on_frame: &mut impl FnMut(&Frame)) {
         while self.start < self.end {
             match self.front() {
@@ -180,7 +180,7 @@ impl Receiver {
         }
         let (_, _, id) = sender_and_message(bytes);
         let extra_crc = check::extra_crc(id);
-        // The dialect answers 0 for an unknown message; HEARTBEAT's is 50, and no message that
+        // The dialect returns 0 for an unknown message; HEARTBEAT's seed is 50, and no message that
         // an ESC obeys has 0.
         if extra_crc == 0 {
             count(&mut self.counters.unknown);
@@ -199,8 +199,8 @@ impl Receiver {
             count(&mut self.counters.bad_checks);
             return Front::Reject;
         }
-        // What an unknown flag changes is not known, but the check has found where the frame ends:
-        // a frame within its payload is not searched for.
+        // What an unknown flag changes is unknown, but the check has found where the frame ends:
+        // its payload is not searched for frames.
         if flags & !SIGNED != 0 {
             count(&mut self.counters.incompatible);
             return Front::Skip(len);
@@ -216,7 +216,7 @@ impl Receiver {
     }
 }
 
-/// System, component and message of a frame whose header is complete.
+/// Returns system, component and message of a frame whose header is complete.
 fn sender_and_message(bytes: &[u8]) -> (u8, u8, u32) {
     match *bytes {
         [MAV_STX_V2, _, _, _, _, system, component, a, b, c, ..] => {

@@ -1,4 +1,4 @@
-//! Why a value of a parameter was not taken.
+//! Why a parameter's value is rejected.
 
 use mavlink::dialects::ardupilotmega::MavParamError;
 
@@ -9,14 +9,14 @@ pub(super) const NOT_PERMITTED: MavParamError = MavParamError::MAV_PARAM_ERROR_P
 pub(super) const READ_ONLY: MavParamError = MavParamError::MAV_PARAM_ERROR_READ_ONLY;
 pub(super) const WRONG_TYPE: MavParamError = MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH;
 
-/// The reason why a value was not taken.
+/// Why a value was rejected.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refusal {
-    /// For the sender of the request.
+    /// For the requesting client.
     pub(super) error: MavParamError,
-    /// The parameter that conflicts with it, if that is another.
+    /// The conflicting parameter, if it is another.
     pub(super) because: Option<ParamId>,
-    /// For a person.
+    /// For the user.
     pub(super) reason: &'static str,
 }
 

@@ -14,19 +14,19 @@ use super::refusal::Refusal;
 use super::sender::Sender;
 use crate::params::{ParamId, TABLE};
 
-/// Replies that can wait. A poll empties them, so it is the most that may arrive between two:
-/// 1 ms of a serial link holds at most one frame, a datagram of 1500 bytes 35 commands.
+/// Replies that can wait. A poll empties the queue, so it holds the most that may arrive between
+/// two: 1 ms of a serial link carries at most one frame, a datagram of 1500 bytes 35 commands.
 const WAITING: usize = 40;
 const CHUNK_LEN: usize = 50;
 /// The longest text: a parameter's refusal with another's name and the reason.
 const TEXT_MAX: usize = 200;
-/// `COMMAND_ACK.progress` when it is not known.
+/// `COMMAND_ACK.progress` if unknown.
 const PROGRESS_UNKNOWN: u8 = u8::MAX;
 
-/// Message id and CRC seed of PING. The dialect marks the message as superseded, which would be a
-/// warning at each use, but clients still send it.
+/// Message id and CRC seed of PING. The dialect marks the message as superseded, which would warn
+/// at each use, but clients still send it.
 pub(super) const PING: (u32, u8) = (4, 237);
-/// Bytes of a PING that come back: time and sequence.
+/// Bytes of a PING that are returned: time and sequence.
 pub(super) const PING_LEN: usize = 12;
 
 /// Something to send once.
@@ -39,16 +39,16 @@ pub(super) enum Reply {
         /// Percent, or [`PROGRESS_UNKNOWN`].
         progress: u8,
     },
-    /// One of the messages that can be asked for; the id is known to be one of them.
+    /// A message on request; the id is known to be valid.
     Message(u32),
     /// MESSAGE_INTERVAL of this message.
     Interval(u16),
-    /// Time and sequence as they came: bytes, which take no more room here than another reply.
+    /// Time and sequence as received; as bytes they take no more room than another reply.
     Pong {
         to: Address,
         asked: [u8; PING_LEN],
     },
-    /// No missions of this type.
+    /// There are no missions of this type.
     MissionCount {
         to: Address,
         mission_type: u8,
@@ -58,7 +58,7 @@ pub(super) enum Reply {
         name: [u8; 16],
         index: i16,
     },
-    /// A value was not taken.
+    /// A value was rejected.
     Refused {
         to: Address,
         id: ParamId,
@@ -72,8 +72,8 @@ pub(super) enum Reply {
     },
 }
 
-/// The replies that wait. Parameters' values are broadcast, so that one waiting is enough for any
-/// number of requests.
+/// The pending replies. Parameter values are broadcast, so one pending is enough for any number of
+/// requests.
 #[derive(Clone, Debug)]
 pub(super) struct Replies {
     queue: Deque<Reply, WAITING>,
@@ -90,7 +90,7 @@ impl Replies {
         }
     }
 
-    /// Queues a reply. One too many is dropped, and the next poll says so.
+    /// Queues a reply. If the queue is full it is dropped, and the next poll reports that.
     ///
     /// Never inlined, nor is the ACK: a dozen places call it.
     #[inline(never)]
@@ -115,7 +115,7 @@ impl Replies {
         });
     }
 
-    /// A command goes on, and so many percent of it are done.
+    /// Reports a command's progress, percent.
     pub(super) fn progress(&mut self, to: Address, command: u16, percent: u8) {
         self.push(Reply::Ack {
             to,
@@ -149,7 +149,7 @@ impl Replies {
     }
 }
 
-/// Encodes replies that do not depend on the state of the ESC.
+/// Encodes replies that do not depend on the ESC's state.
 #[derive(Clone, Debug)]
 pub(super) struct Writer {
     pub(super) sender: Sender,
@@ -164,7 +164,7 @@ impl Writer {
         }
     }
 
-    /// COMMAND_ACK, by bytes because the command may be one that the dialect does not know.
+    /// Sends COMMAND_ACK, as bytes because the dialect may not know the command.
     pub(super) fn ack(
         &mut self,
         identity: &Identity,
@@ -191,7 +191,7 @@ impl Writer {
             .send_payload(identity.address, message, &payload, out);
     }
 
-    /// STATUSTEXT, in chunks of 50 bytes if it is longer.
+    /// Sends STATUSTEXT, in chunks of 50 bytes if it is longer.
     pub(super) fn text(
         &mut self,
         identity: &Identity,
@@ -203,7 +203,7 @@ impl Writer {
         let mut text = [0; TEXT_MAX + CHUNK_LEN];
         let mut len = 0;
         let bytes = pieces.iter().flat_map(|piece| piece.bytes());
-        // A longer text ends here.
+        // Longer text is cut off.
         for (to, byte) in text.iter_mut().take(TEXT_MAX).zip(bytes) {
             *to = byte;
             len += 1;
@@ -213,7 +213,7 @@ impl Writer {
         if len > CHUNK_LEN {
             self.text_id = self.text_id.checked_add(1).unwrap_or(1);
             id = self.text_id;
-            // The last chunk is known by a zero in it, so it must not be full.
+            // A zero marks the last chunk, so it must not be full.
             chunks = len / CHUNK_LEN + 1;
         }
         let [id_low, id_high] = id.to_le_bytes();

@@ -1,4 +1,4 @@
-//! The schedule of messages that are sent without a request.
+//! The schedule of messages sent without a request.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -12,16 +12,16 @@ use crate::params::{ParamId, Params};
 
 const SECOND_US: u64 = 1_000_000;
 
-/// A message that is sent again and again. Their order is that in which intervals are stored.
+/// A message sent periodically. The order is that of the stored intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stream {
     Heartbeat,
     EscInfo,
     EscStatus,
     EscTelemetry,
-    /// NAMED_VALUE_FLOAT of the throttle wire: the one that intervals and requests of this message mean.
+    /// NAMED_VALUE_FLOAT of the throttle wire: the one meant by intervals and requests of this message.
     BadFrames,
-    /// NAMED_VALUE_FLOAT of the control's signals, all of one moment.
+    /// NAMED_VALUE_FLOAT of the control's signals, all of one instant.
     Signals,
 }
 
@@ -45,7 +45,7 @@ impl Stream {
         }
     }
 
-    /// The most bytes that its frames take, each with its overhead.
+    /// Returns the most bytes that its frames take, including overhead.
     fn frames_len(self, params: &Params, overhead_len: usize) -> usize {
         let (frames, len) = match self {
             Self::Heartbeat => (1, HEARTBEAT_DATA::ENCODED_LEN),
@@ -61,7 +61,7 @@ impl Stream {
         frames as usize * (overhead_len + len)
     }
 
-    /// None when it is off.
+    /// Returns the default interval; `None` if the stream is off.
     fn default_interval_us(self, params: &Params) -> Option<u64> {
         let rate = match self {
             Self::Heartbeat | Self::EscInfo | Self::BadFrames => return Some(SECOND_US),
@@ -73,7 +73,7 @@ impl Stream {
     }
 }
 
-/// The signals that are streamed, a bit for each.
+/// Returns the streamed signals, a bit for each.
 pub(super) fn signals(params: &Params) -> u32 {
     params.get(ParamId::TelSignals) as u32
 }
@@ -81,16 +81,16 @@ pub(super) fn signals(params: &Params) -> u32 {
 /// The interval of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Interval {
-    /// As the parameters say.
+    /// As set by the parameters.
     Default,
     /// Never.
     Off,
-    /// This many microseconds apart, above 0.
+    /// Microseconds between two, above 0.
     Us(u32),
 }
 
 impl Interval {
-    /// As it is stored.
+    /// Returns its stored form.
     fn bits(self) -> u32 {
         match self {
             Self::Default => 0,
@@ -109,20 +109,20 @@ impl Interval {
     }
 }
 
-/// Intervals of messages that take the place of those from the parameters.
+/// Message intervals that override those from the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Intervals([u32; Stream::ALL.len()]);
 
 impl Intervals {
-    /// Words under which they are stored.
+    /// The number of words that store them.
     pub(crate) const WORDS: usize = Stream::ALL.len();
 
-    /// One of the words; zero is as the parameters say.
+    /// Returns one of the words; zero means as the parameters say.
     pub(crate) fn word(&self, word: usize) -> u32 {
         self.0[word]
     }
 
-    /// Takes a stored word. Returns true if it can be one.
+    /// Sets a word from storage. Returns true if it is valid.
     pub(crate) fn set_word(&mut self, word: usize, bits: u32) -> bool {
         let fits = Interval::from_bits(bits).is_some();
         if fits {
@@ -146,7 +146,7 @@ pub(super) struct Schedule {
     place: Place,
     /// Another ESC sends the messages for four.
     led: bool,
-    /// The stream that is looked at first, so that on a link too slow for all each gets its turn.
+    /// The stream checked first, so that on a link too slow for all each gets its turn.
     first: usize,
 }
 
@@ -164,7 +164,7 @@ impl Schedule {
         }
     }
 
-    /// The stream of this message, the first if several have it.
+    /// Returns the stream of this message; the first, if several have it.
     pub(super) fn find(&self, message: u32) -> Option<Stream> {
         Stream::ALL
             .into_iter()
@@ -196,8 +196,8 @@ impl Schedule {
         self.timers[stream as usize].due_us = 0;
     }
 
-    /// Changes how often a stream is sent. False for the heartbeat: without it the ESC is gone for
-    /// every ground station.
+    /// Changes how often a stream is sent. Returns false for the heartbeat: without it the ESC is gone for every ground
+    /// station.
     pub(super) fn set(&mut self, stream: Stream, interval: Interval) -> bool {
         if stream == Stream::Heartbeat && interval != Interval::Default {
             return false;
@@ -206,7 +206,7 @@ impl Schedule {
         true
     }
 
-    /// The intervals to keep over a loss of power.
+    /// Returns the intervals, to be stored.
     pub(super) fn intervals(&self) -> Intervals {
         Intervals(self.timers.map(|timer| timer.interval.bits()))
     }
@@ -215,12 +215,12 @@ impl Schedule {
     pub(super) fn keep(&mut self, intervals: &Intervals) {
         for (stream, bits) in Stream::ALL.into_iter().zip(intervals.0) {
             let interval = Interval::from_bits(bits).unwrap_or(Interval::Default);
-            // The heartbeat's stays as it is.
+            // The heartbeat's remains unchanged.
             self.set(stream, interval);
         }
     }
 
-    /// Microseconds between two, none when it is off.
+    /// Returns the microseconds between two; `None` if the stream is off.
     pub(super) fn interval_us(&self, stream: Stream, params: &Params) -> Option<u64> {
         if !self.sends(stream) {
             return None;
@@ -232,8 +232,8 @@ impl Schedule {
         }
     }
 
-    /// The next stream that is due now; each is due at most once at one `now_us`. `overhead_len` is
-    /// what a frame has beside its payload.
+    /// Returns the next stream that is due; each is due at most once per `now_us`. `overhead_len` is the length of a
+    /// frame without payload.
     pub(super) fn next_due(
         &mut self,
         now_us: u64,
@@ -249,13 +249,13 @@ impl Schedule {
             };
             let timer = &mut self.timers[index];
             let next_us = now_us.saturating_add(interval_us);
-            // A faster rate applies now, not after the slower one's time.
+            // A faster rate applies at once, not after the slower one's interval.
             timer.due_us = timer.due_us.min(next_us);
             if timer.due_us > now_us {
                 continue;
             }
-            // Who finds too little of the share left holds up those behind it: shorter messages
-            // would otherwise take it all. Only the heartbeat passes.
+            // A stream that finds too little of the share left blocks those after it: otherwise shorter messages would
+            // take it all. Only the heartbeat passes.
             blocked = blocked
                 || !self
                     .pace

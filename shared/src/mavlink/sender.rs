@@ -1,4 +1,4 @@
-//! Payloads to frames.
+//! Turns payloads into frames.
 
 use mavlink::MAV_STX_V2;
 
@@ -13,7 +13,7 @@ use super::signing::Signing;
 const OVERHEAD_LEN: usize = 12;
 const HEADER_LEN: usize = 10;
 
-/// Numbers the frames that leave. Always MAVLink 2: an ESC's messages have ids above 255.
+/// Numbers outgoing frames. Always MAVLink 2: an ESC's messages have ids above 255.
 #[derive(Clone, Debug)]
 pub(super) struct Sender {
     sequence: u8,
@@ -28,7 +28,7 @@ impl Sender {
         }
     }
 
-    /// The bytes of a frame beside its payload.
+    /// Returns the length of a frame without payload.
     pub(super) fn overhead_len(&self) -> usize {
         OVERHEAD_LEN
             + if self.signing.signs() {
@@ -46,7 +46,7 @@ impl Sender {
         payload: &[u8],
         out: &mut dyn FnMut(&[u8]),
     ) {
-        // MAVLink 2 leaves trailing zeros out, but for the first byte.
+        // MAVLink 2 omits trailing zeros, except the first byte.
         let len = payload
             .iter()
             .rposition(|byte| *byte != 0)

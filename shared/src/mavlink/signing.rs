@@ -1,18 +1,16 @@
-//! Message signing of MAVLink 2: once there is a key, only its owners may change anything.
+//! MAVLink 2 message signing: once there is a key, only its owners may change anything.
 //!
-//! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a
-//! component and a link), whatever key signs it. It may be at most a minute older than the newest
-//! timestamp received or sent, and not older than its key. The newest timestamp is stored with the key,
-//! so that a recording cannot be replayed after a loss of power. It is stored together with the
-//! settings, so three things can be replayed if power fails: frames of the last two seconds (of three
-//! minutes where a hundred saves have gone before), frames since the motor began to turn, and frames
+//! A timestamp counts 10 µs since 2015. It must grow within each stream of frames (a system, a component and a link),
+//! whatever key signs it. It may be at most a minute older than the newest timestamp received or sent, and not older
+//! than its key. The newest timestamp is stored with the key, so that a recording cannot be replayed after a loss of
+//! power. It is stored along with the settings, so three things can be replayed if power fails: frames of the last two
+//! seconds (of three minutes where a hundred saves have gone before), frames since the motor began to turn, and frames
 //! refused since the last save.
 //!
-//! The ESC has no clock: it takes the time from SETUP_SIGNING and from each newer frame. A frame may be
-//! dated at most a minute ahead. The first frame after a start, and the next one after a minute without
-//! any, may be further ahead, since the time that has passed is unknown or may be wrong; it sets the
-//! time then, but by no more than five years at once. A wrong clock that is further off locks nobody
-//! out.
+//! The ESC has no clock: it takes the time from SETUP_SIGNING and from each newer frame. A frame may be dated at most a
+//! minute ahead. The first frame after a start, and the next one after a minute without any, may be further ahead,
+//! since the elapsed time is unknown or may be wrong; it then sets the time, but by no more than five years at once. A
+//! clock that is further off locks nobody out.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::SETUP_SIGNING_DATA;
@@ -27,26 +25,26 @@ const HASH_LEN: usize = 6;
 /// The link that this ESC signs for: it sends the same frames on all of them.
 const LINK: u8 = 0;
 
-/// The most that a stream may begin behind the newest timestamp, and be ahead of it: a minute.
+/// The most that a stream may start behind the newest timestamp, and be ahead of it: a minute.
 const MINUTE_TICKS: u64 = 6_000_000;
 const TICK_US: u32 = 10;
 const MINUTE_US: u64 = MINUTE_TICKS * TICK_US as u64;
 const YEAR_TICKS: u64 = 36_525 * 864 * 1_000_000 / TICK_US as u64;
-/// The most that a frame may be ahead of the newest known timestamp while the time is unknown: an ESC
-/// may have lain without power for so long.
+/// The most that a frame may be ahead of the newest known timestamp while the time is unknown: an ESC may have been
+/// without power for so long.
 const FIRST_TICKS: u64 = 5 * YEAR_TICKS;
-/// The least time of a clock that is right: 2026, in which this was written.
+/// The least time of a correct clock: 2026, when this was written.
 const PAST: u64 = 11 * YEAR_TICKS;
 /// The greatest timestamp of a SETUP_SIGNING, in 2099: others must be able to follow in 48 bits.
 const SET_UP_MOST: u64 = (1 << 48) - 1 - FIRST_TICKS;
 
-/// Streams that are followed: ground stations, companions and an autopilot, each over two links.
+/// Streams tracked: ground stations, companions and an autopilot, each over two links.
 const STREAMS: usize = 8;
 
-/// Places of a timestamp that are not kept over a loss of power: 0.66 s.
+/// Low bits of a timestamp that are not stored: 0.66 s.
 const KEPT_SHIFT: u32 = 16;
 
-/// The secret that two sides share. It is never sent or printed.
+/// The secret shared by two sides. It is never sent or printed.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Key(pub(crate) [u8; 32]);
 
@@ -61,7 +59,7 @@ impl core::fmt::Debug for Key {
 pub struct Kept {
     /// The key.
     pub key: Key,
-    /// The newest timestamp, in 0.66 s.
+    /// The newest timestamp, in units of 0.66 s.
     pub newest: u32,
 }
 
@@ -70,9 +68,9 @@ pub struct Kept {
 pub(super) enum Trust {
     /// Everything.
     Full,
-    /// Ask, and change nothing.
+    /// May ask, and change nothing.
     Read,
-    /// Nothing: the signature does not fit, is old, or cannot be verified.
+    /// None: the signature does not fit, is old, or cannot be verified.
     None,
 }
 
@@ -88,16 +86,16 @@ struct Stream {
 #[derive(Clone, Debug)]
 pub(super) struct Signing {
     key: Option<Key>,
-    /// The newest timestamp received, and when that was.
+    /// The newest timestamp received, and when.
     newest: u64,
     newest_us: u64,
-    /// The last timestamp that was sent.
+    /// The last timestamp sent.
     sent: u64,
-    /// Time of the last signed frame taken, or of a SETUP_SIGNING that sets the time.
+    /// Time of the last signed frame accepted, or of a SETUP_SIGNING that sets the time.
     told_us: Option<u64>,
-    /// Up to here, everything may have been received before the start or before the key.
+    /// Everything up to here may have been received before the start or before the key.
     floor: u64,
-    /// Kept from key to key, so that a key that comes back finds its earlier streams.
+    /// Kept across keys, so that a key that comes back finds its earlier streams.
     streams: [Option<Stream>; STREAMS],
     now_us: u64,
 }
@@ -115,7 +113,7 @@ impl Signing {
         now_us: 0,
     };
 
-    /// With the values stored before the start; without a key nothing is signed.
+    /// Starts with the stored values; without a key nothing is signed.
     pub(super) fn new(kept: Option<Kept>) -> Self {
         let floor = kept.map_or(0, |kept| ((u64::from(kept.newest) + 1) << KEPT_SHIFT) - 1);
         Self {
@@ -130,15 +128,15 @@ impl Signing {
         }
     }
 
-    /// The part to be kept.
+    /// Returns the part to be stored.
     pub(super) fn kept(&self) -> Option<Kept> {
         let newest = u32::try_from(self.clock() >> KEPT_SHIFT).unwrap_or(u32::MAX);
         self.key.map(|key| Kept { key, newest })
     }
 
-    /// SETUP_SIGNING: a key from now on, or with a key of zeros none. False if its time is impossible.
+    /// Handles SETUP_SIGNING: sets a key, or removes it if all zeros. Returns false if its time is impossible.
     ///
-    /// From key to key time does not run backwards, and a frame that was received is not taken again.
+    /// Across keys time does not run backwards, and a frame already received is not accepted again.
     ///
     /// Never inlined: its stack is free for all other messages.
     #[inline(never)]
@@ -162,24 +160,24 @@ impl Signing {
         true
     }
 
-    /// Time since the start, which does not run backwards.
+    /// Sets the time since the start, which is monotonic.
     pub(super) fn advance(&mut self, now_us: u64) {
         self.now_us = now_us;
     }
 
-    /// Returns true if frames that leave are signed.
+    /// Returns true if outgoing frames are signed.
     pub(super) fn signs(&self) -> bool {
         self.key.is_some()
     }
 
     /// Judges the rights of this frame's sender.
     ///
-    /// Never inlined: within the component's own code it takes 80 bytes more.
+    /// Never inlined: inside the component's own code it takes 80 bytes more.
     #[inline(never)]
     pub(super) fn judge(&mut self, frame: &Frame) -> Trust {
         match (self.key, signature(frame.raw)) {
             (None, None) => Trust::Full,
-            // A client that signs from its first try on may have to try again.
+            // A client that signs from its first attempt on may have to try again.
             (None, Some(_)) if frame.id == SETUP_SIGNING_DATA::ID => Trust::Full,
             (None, Some(_)) => Trust::None,
             (Some(_), None) => Trust::Read,
@@ -193,14 +191,14 @@ impl Signing {
         }
     }
 
-    /// Returns true if a frame whose hash fits is younger than all of its stream, and takes note of it.
+    /// Returns true if a frame whose hash fits is newer than all of its stream, and records it.
     fn is_new(&mut self, from: Address, signed: &[u8]) -> bool {
         let [.., link, a, b, c, d, e, f] = *signed else {
             return false;
         };
         let timestamp = u64::from_le_bytes([a, b, c, d, e, f, 0, 0]);
         let oldest = self.floor.max(self.clock().saturating_sub(MINUTE_TICKS));
-        // A recording that is played slowly falls behind, and does not keep the time for long.
+        // A recording played back slowly falls behind, and does not hold the time back for long.
         if timestamp <= oldest || timestamp > self.latest() {
             return false;
         }
@@ -211,7 +209,7 @@ impl Signing {
             Some(place) => Some(place).filter(|place| {
                 self.streams[*place].is_none_or(|stream| timestamp > stream.timestamp)
             }),
-            // A stream is forgotten when its frames are too old to begin one.
+            // A stream is forgotten once its frames are too old to begin one.
             None => self
                 .streams
                 .iter()
@@ -233,13 +231,13 @@ impl Signing {
         true
     }
 
-    /// The time now, as far as it is known here.
+    /// Returns the current time, as far as it is known.
     fn clock(&self) -> u64 {
         let passed = divide(self.now_us.saturating_sub(self.newest_us), TICK_US);
         self.sent.max(self.newest + passed)
     }
 
-    /// The latest time at which somebody else may believe to be.
+    /// Returns the latest time that another clock may show.
     fn latest(&self) -> u64 {
         let known = |told_us| self.now_us.saturating_sub(told_us) < MINUTE_US;
         if self.told_us.is_some_and(known) {
@@ -249,8 +247,8 @@ impl Signing {
         }
     }
 
-    /// Signs a frame: from its start to its check, with the flag set and the check over it. The
-    /// signature follows it; nothing without a key.
+    /// Signs a frame, from its start to its check, with the flag set and covered by the check. Returns the signature
+    /// that follows it; `None` without a key.
     pub(super) fn sign(&mut self, frame: &[u8]) -> Option<[u8; SIGNATURE_LEN]> {
         let key = self.key?;
         let timestamp = self.clock().max(self.sent + 1);
@@ -264,7 +262,7 @@ impl Signing {
     }
 }
 
-/// The bytes that a signed frame's hash is over beside the key, and that hash.
+/// Returns the bytes of a signed frame that its hash covers besides the key, and that hash.
 fn signature(raw: &[u8]) -> Option<(&[u8], &[u8; HASH_LEN])> {
     is_signed(raw)
         .then(|| raw.split_last_chunk::<HASH_LEN>())
@@ -272,7 +270,7 @@ fn signature(raw: &[u8]) -> Option<(&[u8], &[u8; HASH_LEN])> {
 }
 
 fn fits(key: &Key, signed: &[u8], hash: &[u8; HASH_LEN]) -> bool {
-    // All bytes are compared, whatever the first ones are: the time says nothing of them.
+    // Compares all bytes in constant time, so that timing reveals nothing about them.
     let wrong = digest(key, &[signed])
         .iter()
         .zip(hash)

@@ -54,19 +54,19 @@ const ESC: Address = Address {
     component: 1,
 };
 
-/// A frame that left the ESC.
+/// A frame sent by the ESC.
 #[derive(Clone, Debug)]
 struct Sent {
     at_us: u64,
     sequence: u8,
     from: Address,
     message: MavMessage,
-    /// With the zeros that were left out, for what the generated types do not have.
+    /// Including omitted zeros, for what the generated types lack.
     payload: [u8; 255],
     len: usize,
 }
 
-/// An ESC with all that surrounds it.
+/// An ESC and its surroundings.
 struct Bench {
     now_us: u64,
     params: Params,
@@ -137,7 +137,7 @@ impl Bench {
         sent.collect()
     }
 
-    /// Collects the frames that leave at this poll.
+    /// Collects the frames sent at this poll.
     fn poll_bytes(&mut self, frames: &mut Vec<Vec<u8>>) {
         let check = Report::new(40.0, 0.02);
         let mut context = Context {
@@ -158,8 +158,8 @@ impl Bench {
         });
     }
 
-    /// Sends a message to the ESC and returns what it answers at the next poll, without what it
-    /// sends by itself.
+    /// Sends a message to the ESC and returns its answers at the next poll, without what it sends
+    /// by itself.
     fn ask<D: MessageData>(&mut self, data: &D) -> Vec<Sent> {
         self.receive(&encode(STATION, data, &[]));
         self.answers()
@@ -171,7 +171,7 @@ impl Bench {
         sent
     }
 
-    /// Polls each millisecond for a time.
+    /// Polls every millisecond for a time.
     fn run_ms(&mut self, ms: u64) -> Vec<Sent> {
         let mut sent = Vec::new();
         for _ in 0..ms {
@@ -183,7 +183,7 @@ impl Bench {
     }
 }
 
-/// A check as `build` makes it: one parameter stands against another.
+/// A check like `build`'s: one parameter conflicts with another.
 fn refuse_slow_pwm(params: &Params) -> Result<(), BuildError> {
     let slow = params.get(ParamId::PwmFreqHz) < 10_000.0;
     if slow && params.get(ParamId::CtlBwCurHz) > 300.0 {
@@ -231,7 +231,7 @@ fn frame(from: Address, (id, extra_crc): (u32, u8), flags: u8, payload: &[u8]) -
     bytes
 }
 
-/// Reads a frame with nothing of the code under test.
+/// Parses a frame without the code under test.
 fn parse(at_us: u64, bytes: &[u8]) -> Sent {
     let mut raw = MAVLinkV2MessageRaw::new();
     raw.as_mut_slice()[..bytes.len()].copy_from_slice(bytes);
@@ -239,7 +239,7 @@ fn parse(at_us: u64, bytes: &[u8]) -> Sent {
     assert!(raw.has_valid_crc::<MavMessage>());
     let mut typed = raw.payload().to_vec();
     if raw.message_id() == COMMAND_ACK_DATA::ID {
-        // The generated type takes no command that it does not know; tests read the bytes.
+        // The generated type rejects commands that it does not know; tests read the bytes.
         typed[0..2].fill(0);
         typed[0] = 176;
     }
@@ -279,7 +279,7 @@ fn texts(sent: &[Sent]) -> Vec<&str> {
         .collect()
 }
 
-/// Index and value of each PARAM_VALUE.
+/// Returns index and value of each PARAM_VALUE.
 fn values(sent: &[Sent]) -> Vec<(u16, f32)> {
     sent.iter()
         .filter_map(|sent| match &sent.message {

@@ -1,18 +1,18 @@
-//! Warnings for a person.
+//! Warnings for the user.
 
 use heapless::String;
 
-/// A text that is made up at run time; STATUSTEXT has room for 50 letters.
+/// A text composed at run time; STATUSTEXT has room for 50 letters.
 pub type Warning = String<50>;
 
-/// The warnings that wait to be sent, two at most, and the last one for later readers.
+/// The pending warnings, at most two, and the last one for later readers.
 #[derive(Clone, Debug)]
 pub(super) struct Warnings {
     texts: [Warning; 2],
-    /// Number of warnings that have come since all had been sent, and number of those sent.
+    /// Warnings received since all had been sent, and how many of those are sent.
     come: usize,
     sent: usize,
-    /// The place of the last one.
+    /// The index of the last one.
     last: usize,
 }
 
@@ -26,7 +26,7 @@ impl Warnings {
         }
     }
 
-    /// Of more than two at once, the first are kept.
+    /// Queues a warning; of more than two at once, the first are kept.
     pub(super) fn push(&mut self, warning: Warning) {
         if let Some(place) = self.texts.get_mut(self.come) {
             *place = warning;
@@ -35,7 +35,7 @@ impl Warnings {
         }
     }
 
-    /// The next to be sent.
+    /// Returns the next one to send.
     pub(super) fn next(&mut self) -> Option<Warning> {
         if self.sent == self.come {
             self.come = 0;
@@ -47,7 +47,7 @@ impl Warnings {
         next
     }
 
-    /// The last one that has come, sent or not; empty if there was none.
+    /// Returns the last one received, sent or not; empty if there was none.
     pub(super) fn last(&self) -> &str {
         self.texts.get(self.last).map_or("", String::as_str)
     }

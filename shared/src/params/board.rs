@@ -7,7 +7,7 @@ use crate::image::Image;
 /// The board's properties that the control must know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Board {
-    /// The firmware's name and version.
+    /// The program's name and version.
     pub image: Image,
     /// Amperes per count of the current converter.
     pub current_a_per_count: f32,

@@ -1,5 +1,5 @@
-//! PREFLIGHT_CALIBRATION: of all that it names, an ESC has the end points of its throttle, which the
-//! stick teaches. It takes as long as the stick does, so it is acknowledged step by step.
+//! PREFLIGHT_CALIBRATION: of all it covers, an ESC has the throttle end points, taught by stick. It
+//! takes as long as the user does, so it is acknowledged step by step.
 
 use mavlink::dialects::ardupilotmega::MavResult;
 
@@ -14,7 +14,7 @@ use crate::input::signal::Signal;
 const ESC: f32 = 1.0;
 
 impl Commands {
-    /// All zeros end the one that is under way.
+    /// Begins a calibration; all zeros end the one under way.
     pub(super) fn calibrate(
         &mut self,
         command: &Command,
@@ -31,7 +31,7 @@ impl Commands {
             }
             return ACCEPTED;
         }
-        // DShot's throttle has no ends to be taught.
+        // DShot's throttle has no ends to teach.
         let digital = matches!(context.telemetry.signal, Some(Signal::Dshot { .. }));
         if others || esc != ESC || digital {
             return DENIED;
@@ -44,7 +44,7 @@ impl Commands {
         IN_PROGRESS
     }
 
-    /// The stick has come a step further. The end points are stored before the end is reported.
+    /// Reports the stick's next step. The end points are stored before the end is reported.
     pub(in super::super) fn follow_stick(&mut self, step: Step, replies: &mut Replies) {
         match (step, self.calibrates()) {
             (Step::Full, Some(command)) => replies.ack(command.from, command.number, IN_PROGRESS),
@@ -53,7 +53,7 @@ impl Commands {
         }
     }
 
-    /// The calibration has this result, if there is one under way.
+    /// Ends the calibration under way, if any, with this result.
     pub(in super::super) fn end_calibration(&mut self, result: MavResult, replies: &mut Replies) {
         self.end(PREFLIGHT_CALIBRATION, result, replies);
     }

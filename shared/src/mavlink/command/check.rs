@@ -1,6 +1,6 @@
-//! RUN_PREARM_CHECKS: the self-test. It takes most of a second, and is acknowledged step by step. USER_1: the
-//! identification of the motor, which takes some ten seconds; parameter 1 is 1 to begin it, 0 to end it, and 2 to
-//! keep what it has found. A write of MOT_IDENTIFY is the same.
+//! RUN_PREARM_CHECKS: the self-test. It takes most of a second and is acknowledged step by step. USER_1: the
+//! identification of the motor, which takes some ten seconds; parameter 1 is 1 to begin it, 0 to end it, and 2 to keep
+//! its results. A write of MOT_IDENTIFY does the same.
 
 use mavlink::dialects::ardupilotmega::{MavResult, MavSeverity};
 
@@ -10,7 +10,7 @@ use super::{
 };
 
 impl Commands {
-    /// Of an identification, the one or the other.
+    /// Begins or ends an identification, or keeps its results.
     pub(super) fn identify(
         &mut self,
         command: &Command,
@@ -44,7 +44,7 @@ impl Commands {
         result
     }
 
-    /// The bridge is used for it: under the rule of what may turn a motor.
+    /// Begins what uses the bridge, under the rule of what may turn a motor.
     pub(super) fn measure(
         &mut self,
         command: &Command,
@@ -60,19 +60,19 @@ impl Commands {
         IN_PROGRESS
     }
 
-    /// The self-test is so far, percent.
+    /// Reports the self-test's progress, percent.
     pub(in super::super) fn check_progress(&self, percent: u8, replies: &mut Replies) {
         if let Some(command) = self.under_way.as_ref().filter(|command| measures(command)) {
             replies.progress(command.from, command.number, percent);
         }
     }
 
-    /// Returns true if a self-test was asked for, and goes on.
+    /// Returns true if a requested self-test is running.
     pub(super) fn checks(&self) -> bool {
         self.under_way.as_ref().is_some_and(measures)
     }
 
-    /// The self-test has this result, if one was asked for.
+    /// Ends the requested self-test, if any, with this result.
     pub(in super::super) fn end_check(&mut self, result: MavResult, replies: &mut Replies) {
         for number in [RUN_PREARM_CHECKS, IDENTIFY] {
             self.end(number, result, replies);

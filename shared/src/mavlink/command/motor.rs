@@ -1,4 +1,4 @@
-//! Commands that turn the motor for a moment, sound it, or say how it turns.
+//! Commands that turn the motor briefly, make it sound, or set its direction.
 
 use mavlink::dialects::ardupilotmega::{ActuatorConfiguration, MavResult, MotorTestThrottleType};
 
@@ -22,7 +22,7 @@ const SPIN_1: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION
 const SPIN_2: i32 = ActuatorConfiguration::ACTUATOR_CONFIGURATION_SPIN_DIRECTION2 as i32;
 
 impl Commands {
-    /// ACTUATOR_TEST and DO_MOTOR_TEST: the authority decides, but not during a self-test.
+    /// ACTUATOR_TEST and DO_MOTOR_TEST: the authority decides, but never during a self-test.
     pub(super) fn test(
         &self,
         command: &Command,
@@ -51,8 +51,8 @@ impl Commands {
         }
     }
 
-    /// CONFIGURE_ACTUATOR: does and stores the same as DShot's commands. The ACK follows when
-    /// it has been stored.
+    /// CONFIGURE_ACTUATOR: does and stores the same as DShot's commands. The ACK follows once
+    /// stored.
     pub(super) fn configure(
         &mut self,
         command: &Command,
@@ -90,9 +90,9 @@ impl Commands {
     }
 }
 
-/// The value and the time of DO_MOTOR_TEST as ACTUATOR_TEST has them: a share of full throttle, or a
-/// pulse between the ends that the wire has. Nothing for a kind of throttle that is not served, and
-/// for several motors.
+/// Converts DO_MOTOR_TEST's value and time to ACTUATOR_TEST's: a share of full throttle, or a pulse
+/// between the wire's end points. Returns `None` for an unsupported kind of throttle, and for
+/// several motors.
 fn motor_test(command: &Command, params: &Params) -> Option<(f32, f32)> {
     let [_, _, throttle, duration_s, motors, ..] = command.params;
     let value = match command.choice(1) {
@@ -111,7 +111,7 @@ fn motor_test(command: &Command, params: &Params) -> Option<(f32, f32)> {
     if value.is_nan() || motors > 1.0 {
         return None;
     }
-    // Ground stations end a test by one of no throttle or no time; ACTUATOR_TEST does by NaN.
+    // Ground stations end a test by one with no throttle or no time; ACTUATOR_TEST does by NaN.
     let ends = value == 0.0 || duration_s == 0.0;
     Some((if ends { f32::NAN } else { value }, duration_s))
 }

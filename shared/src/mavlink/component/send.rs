@@ -1,5 +1,4 @@
-//! Sends what leaves the component, in this order: faults, answers, warnings, streams, and at last the
-//! rest.
+//! Sends what leaves the component, in this order: faults, answers, warnings, streams, the rest.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -23,8 +22,7 @@ use crate::telemetry::SIGNALS;
 const FILE: (u32, u8) = id_of::<FILE_TRANSFER_PROTOCOL_DATA>();
 
 impl Component {
-    /// Sends all that waits or is due, each frame by one call of `send`. To be called every
-    /// millisecond or so.
+    /// Sends all that is pending or due, one call of `send` per frame. Call it every millisecond or so.
     ///
     /// Never inlined: its stack is free for what the caller does next.
     #[inline(never)]
@@ -74,7 +72,7 @@ impl Component {
         self.send_burst(context, send);
     }
 
-    /// In words, and by ESC_INFO at once: its flags would be up to a second late.
+    /// Reports faults in words, and by an immediate ESC_INFO, whose flags would be up to a second late.
     fn tell_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
         let faults = context.telemetry.faults;
         if core::mem::replace(&mut self.faults, faults) != faults {
@@ -198,7 +196,7 @@ impl Component {
         sender.send_payload(self.identity.address, message, payload.bytes(), send);
     }
 
-    /// MESSAGE_INTERVAL: -1 when it is off, 0 when there is no such stream.
+    /// Sends MESSAGE_INTERVAL: -1 if the stream is off, 0 if there is none.
     fn send_interval(&mut self, message: u16, params: &Params, send: &mut dyn FnMut(&[u8])) {
         let interval_us = match self.schedule.find(u32::from(message)) {
             Some(stream) => self
@@ -213,8 +211,8 @@ impl Component {
         self.send_payload(id_of::<MESSAGE_INTERVAL_DATA>(), &payload, send);
     }
 
-    /// Sends as much of the file that someone reads as the link has room for. Never inlined, nor are
-    /// those below: their stack is free for the rest of what is sent.
+    /// Sends as much of the file being read as the link has room for. Never inlined, nor are those below: their stack
+    /// is free for the rest of what is sent.
     #[inline(never)]
     fn send_burst(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
         let overhead_len = self.writer.sender.overhead_len();

@@ -1,6 +1,6 @@
 //! Why a request is refused.
 
-/// The reason why a request is refused, by the protocol's numbers.
+/// Why a request is refused, by the protocol's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Error {

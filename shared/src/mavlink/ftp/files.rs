@@ -12,7 +12,7 @@ use crate::record::{self, Record};
 static GENERAL: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/general.json.xz"));
 static PARAMETER: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/parameter.json.xz"));
 
-/// The metadata of all parameters as ground stations read it, JSON, for programs that have the table at hand. No
+/// The metadata of all parameters as ground stations read it, as JSON, for programs that have the table at hand. No
 /// image holds it: what is served is compressed.
 pub const PARAMETER_METADATA: &str = include_str!(concat!(env!("OUT_DIR"), "/parameter.json"));
 
@@ -28,7 +28,7 @@ enum Content {
     Folder,
     /// A file whose bytes are in the image.
     Fixed(&'static [u8]),
-    /// The parameters, of which a path can choose.
+    /// The parameters; a path can select some.
     Parameters,
     /// Present faults, in words.
     Faults,
@@ -45,7 +45,7 @@ enum Content {
 /// An entry of a folder.
 #[derive(Debug)]
 pub(super) struct Entry {
-    /// The folder, as it stands before the name in a path.
+    /// The folder, as it precedes the name in a path.
     folder: &'static str,
     name: &'static str,
     content: Content,
@@ -99,19 +99,19 @@ static ENTRIES: [Entry; 9] = [
     },
 ];
 
-/// The fault record: an entry of its own, so that a program without one has none of it.
+/// The fault record: separate, so that a program without one has none of it.
 static RECORD: Entry = Entry {
     folder: "@SYS/",
     name: "faults.bin",
     content: Content::Record,
 };
 
-/// Those that this program has.
+/// Returns the entries of this program.
 fn entries() -> impl Iterator<Item = &'static Entry> {
     ENTRIES.iter().chain(record::KEPT.then_some(&RECORD))
 }
 
-/// The fault record, where this program keeps one.
+/// Returns the fault record, if this program keeps one.
 fn record<'a>(view: &View<'a>) -> Option<&'a Record> {
     view.record.filter(|_| record::KEPT)
 }
@@ -124,7 +124,7 @@ pub(super) struct File {
 }
 
 impl File {
-    /// The file of a path, with the root's slash or without it.
+    /// Finds the file of a path, with or without the root's slash.
     pub(super) fn find(path: &[u8]) -> Option<Self> {
         let path = trim(path);
         let query_at = path.iter().position(|byte| *byte == b'?');
@@ -163,14 +163,14 @@ impl File {
         }
     }
 
-    /// It has been read to its end.
+    /// Notes that it has been read to the end.
     pub(super) fn read(&self, view: &View) {
         if let (Content::Record, Some(record)) = (&self.entry.content, record(view)) {
             record.taken();
         }
     }
 
-    /// Its length and its checksum.
+    /// Returns its length and checksum.
     pub(super) fn measure(&self, view: &View) -> Measure {
         let mut sink = Sink::default();
         self.write(view, &mut sink);
@@ -181,15 +181,15 @@ impl File {
     }
 }
 
-/// What a file's whole content comes to.
+/// Size and checksum of a file's whole content.
 pub(super) struct Measure {
-    /// Its bytes.
+    /// Its length in bytes.
     pub(super) len: u32,
     pub(super) checksum: u32,
 }
 
 impl Entry {
-    /// The entry with this number in a path's folder, with the root's slash or without it.
+    /// Returns the entry with this number in a path's folder, with or without the root's slash.
     pub(super) fn find(path: &[u8], number: u32) -> Result<&'static Self, Error> {
         let path = trim(path);
         let mut before = 0;
@@ -206,8 +206,7 @@ impl Entry {
         Err(error)
     }
 
-    /// The entries of its folder from itself on, each as what it is, its name, for a file its length,
-    /// and a zero.
+    /// Writes the entries of its folder from itself on: type, name, for a file its length, and a zero.
     pub(super) fn write_rest(&'static self, view: &View, sink: &mut Sink) {
         let mut begun = false;
         for entry in entries() {
@@ -228,7 +227,7 @@ impl Entry {
     }
 }
 
-/// A path without the slashes around it, and without a zero that ends it.
+/// Strips the slashes around a path and a terminating zero.
 fn trim(mut path: &[u8]) -> &[u8] {
     while let [b'/', rest @ ..] | [rest @ .., b'/' | 0] = path {
         path = rest;

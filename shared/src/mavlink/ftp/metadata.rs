@@ -1,4 +1,4 @@
-//! The messages that say where a component's metadata are.
+//! The messages that say where a component's metadata is.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::COMPONENT_METADATA_DATA;
@@ -7,20 +7,20 @@ use super::files::GENERAL_CHECKSUM;
 use super::sink::Sink;
 use crate::math::quotient;
 
-/// COMPONENT_INFORMATION, which COMPONENT_METADATA has superseded; older ground stations ask for it.
+/// COMPONENT_INFORMATION, superseded by COMPONENT_METADATA; older ground stations ask for it.
 const COMPONENT_INFORMATION_ID: u32 = 395;
 
-/// Without a component: it is the one that tells it.
+/// Without a component it means the sender itself.
 const GENERAL_URI: &str = "mftp:///general.json.xz";
 /// The URI and the fields before it in the longer message; only zeros follow.
 const PAYLOAD_LEN: usize = 12 + GENERAL_URI.len();
 
-/// Returns true if [`metadata`] makes the message of this id.
+/// Returns true if [`metadata`] makes the message with this id.
 pub(in crate::mavlink) const fn is_metadata(id: u32) -> bool {
     matches!(id, COMPONENT_METADATA_DATA::ID | COMPONENT_INFORMATION_ID)
 }
 
-/// The payload of one of these messages.
+/// Returns the payload of one of these messages.
 pub(in crate::mavlink) fn metadata(id: u32, now_us: u64) -> [u8; PAYLOAD_LEN] {
     let mut payload = [0; PAYLOAD_LEN];
     let mut sink = Sink::new(0, &mut payload);
@@ -28,7 +28,7 @@ pub(in crate::mavlink) fn metadata(id: u32, now_us: u64) -> [u8; PAYLOAD_LEN] {
     sink.put(&quotient(now_us, 1000).to_le_bytes());
     sink.put(&GENERAL_CHECKSUM.to_le_bytes());
     if id == COMPONENT_INFORMATION_ID {
-        // The checksum of the metadata of peripherals, of which there are none.
+        // The checksum of the peripherals' metadata, of which there is none.
         sink.put(&[0; 4]);
     }
     sink.put(GENERAL_URI.as_bytes());

@@ -9,11 +9,10 @@
 //! | `general.json.xz` | the place of the next one ([`metadata()`] has that of this one) |
 //! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
 //!
-//! The last two are made from the table of parameters when the crate is built (`build.rs`). The others
-//! are written again for each answer, of which only the part asked for is kept: no file is ever in
-//! memory. One reader at a time has a session, which nobody else can end. It reads a file of one
-//! moment: once the contents have changed, reads fail. Bursts leave with the lists of parameters, in
-//! their half of the link, and only a few requests of a flood are answered.
+//! The last two are made from the parameter table when the crate is built (`build.rs`). The others are rewritten for
+//! each answer, of which only the requested part is kept: no file is ever in memory. One reader at a time has a
+//! session, which nobody else can end. It reads a snapshot: once the contents have changed, reads fail. Bursts share
+//! half of the link with the parameter lists, and only a few requests of a flood are answered.
 
 mod answer;
 mod error;

@@ -1,11 +1,11 @@
 //! `@PARAM/param.pck`: every parameter in one file, in ArduPilot's format.
 //!
-//! A header of three little-endian `u16`: 0x671B, or 0x671C with defaults; the parameters that follow;
-//! all that there are. For each parameter a byte of type (4: float) and above it the flag 1 if its
-//! default follows its value; a byte of how many letters the name has in common with the one before
-//! and above it how many differ, less 1; those letters; the value; the default if it is another.
-//! (ArduPilot, `AP_Filesystem_Param.cpp`.) It pads with zeros so that no value crosses the end of a
-//! read; that is not needed here, since a file that changes can no longer be read.
+//! A header of three little-endian `u16`: 0x671B, or 0x671C with defaults; the number of parameters that follow; the
+//! number of all. Each parameter has a byte with its type (4: float) and above it the flag 1 if its default follows its
+//! value; a byte with the number of letters its name shares with the previous one, and above it the number of differing
+//! letters less 1; those letters; the value; and the default if it differs. (ArduPilot, `AP_Filesystem_Param.cpp`.)
+//! ArduPilot pads with zeros so that no value straddles two reads; that is unnecessary here, since a file that changes
+//! can no longer be read.
 
 use super::sink::Sink;
 use crate::params::Board;
@@ -15,10 +15,10 @@ const MAGIC: u16 = 0x671B;
 const MAGIC_WITH_DEFAULTS: u16 = 0x671C;
 const FLOAT: u8 = 4;
 const WITH_DEFAULT: u8 = 1 << 4;
-/// `ParamId` is a byte: no more parameters can be asked for.
+/// `ParamId` is a byte: no more parameters can be requested.
 const ALL: u8 = ParamId::ALL.len() as u8;
 
-/// The parameters asked for; with their defaults if that is set.
+/// The requested parameters, with their defaults if that is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Selection {
     first: u8,
@@ -33,8 +33,8 @@ impl Selection {
         defaults: false,
     };
 
-    /// Reads `start=N&count=N&withdefaults=1`, in any order; a count of 0 is all of them. None when
-    /// it is something else, or there are no such parameters.
+    /// Parses `start=N&count=N&withdefaults=1`, in any order; a count of 0 means all. Returns `None` for anything else,
+    /// or if there are no such parameters.
     pub(super) fn parse(query: &[u8]) -> Option<Self> {
         let mut selection = Self::ALL;
         for part in query.split(|byte| *byte == b'&') {
@@ -70,7 +70,7 @@ impl Selection {
         let chosen = ParamId::ALL.iter().skip(self.first.into());
         for id in chosen.take(self.count.into()) {
             let name = id.entry().name.as_bytes();
-            // At least one letter is written; a name has 16 at the most.
+            // At least one letter is written; a name has at most 16.
             let mut alike = 0;
             while alike + 1 < name.len() && name.get(alike) == before.get(alike) {
                 alike += 1;
@@ -93,7 +93,7 @@ impl Selection {
     }
 }
 
-/// A decimal number; one beyond all parameters is as good as any other.
+/// Parses a decimal number; anything above the number of parameters is equivalent.
 fn number(digits: &[u8]) -> Option<u8> {
     let mut number: u8 = 0;
     for digit in digits {

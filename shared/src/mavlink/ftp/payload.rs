@@ -1,4 +1,4 @@
-//! The payload of an answer, with what the session's file has.
+//! The payload of an answer, with the contents of the session's file.
 
 use super::answer::{ACK, Answer, Content, DATA_AT, NAK, PAYLOAD_MAX};
 use super::server::Server;

@@ -1,4 +1,4 @@
-//! The reader's session: there is one.
+//! The reader's session, of which there is one.
 
 use super::answer::{Answer, Content, DATA_MAX};
 use super::error::Error;
@@ -8,16 +8,16 @@ use super::view::View;
 use crate::mavlink::frame::Address;
 use crate::mavlink::frame::{Frame, is_signed};
 
-/// A session without a request for so long is over, µs: a client that is gone must not keep the next
-/// one out, and one that lives asks again within seconds.
+/// Time after which an idle session ends, µs: a client that is gone must not lock out the next one, and a live one asks
+/// again within seconds.
 const SESSION_US: u64 = 10_000_000;
 
-/// Most that requests may cost between two polls. A client that waits for each answer asks once, since
-/// answers leave at a poll; of more, those that find nothing left are as if they had been lost. Who leaves
-/// nothing and asks for more has nothing until the poll after the next: meanwhile others have theirs.
+/// Most that requests may cost between two polls. A client that waits for each answer asks once, since answers leave at
+/// a poll; requests beyond the budget are dropped as if lost. A client that uses up the budget and asks for more gets
+/// nothing until the poll after the next, so that others get their turn.
 const COST_MOST: u8 = 5;
 
-/// Offsets in the message; before these stand the network and the target.
+/// Offsets in the message; network and target come first.
 const SEQUENCE: usize = 3;
 const SESSION: usize = 5;
 const REQUEST: usize = 6;
@@ -25,7 +25,7 @@ const SIZE: usize = 7;
 const OFFSET: usize = 11;
 const PATH: usize = 15;
 
-/// Numbers of the requests.
+/// Request numbers.
 mod request {
     pub(super) const NONE: u8 = 0;
     pub(super) const TERMINATE_SESSION: u8 = 1;
@@ -41,13 +41,13 @@ mod request {
     pub(super) const ACK: u8 = 128;
 }
 
-/// A file that someone reads.
+/// A file being read.
 #[derive(Clone, Debug)]
 struct Session {
     reader: Address,
-    /// True if the reader has opened it by a signed frame; nobody else can have.
+    /// True if the reader opened it by a signed frame; nobody else can have.
     signed: bool,
-    /// As the reader has numbered it.
+    /// As numbered by the reader.
     number: u8,
     file: File,
     /// As they were when it was opened.
@@ -57,7 +57,7 @@ struct Session {
     burst: Option<Burst>,
 }
 
-/// The rest of the file, which is sent without being asked for.
+/// The rest of the file, sent without further requests.
 #[derive(Clone, Debug)]
 struct Burst {
     sequence: u16,
@@ -66,13 +66,12 @@ struct Burst {
 }
 
 impl Session {
-    /// Returns true if this frame is the reader's: anybody may send what is not signed under his
-    /// address.
+    /// Returns true if this frame is the reader's: anybody may send unsigned frames under its address.
     fn is_of(&self, frame: &Frame) -> bool {
         self.reader == frame.from && (!self.signed || is_signed(frame.raw))
     }
 
-    /// Reads at an offset; the rest of the file if that is less than `size`.
+    /// Reads `size` bytes at an offset, or the rest of the file if that is less.
     fn read(&self, offset: u32, size: u8) -> Result<Content, Error> {
         let left = self.len.saturating_sub(offset);
         if left == 0 {
@@ -88,30 +87,29 @@ impl Session {
 
 /// Serves files to one reader at a time.
 ///
-/// Every request can be obeyed twice, so that one that is sent again gets the same answer and none has
-/// to be kept: opening a file again begins the same session, and to end one where there is none is no
-/// error.
+/// Every request is idempotent, so a resent one gets the same answer and none has to be kept: reopening a file begins
+/// the same session, and ending a session that does not exist is no error.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mavlink) struct Server {
     session: Option<Session>,
     /// Cost of the requests since the last poll.
     cost: u8,
-    /// Whose the last of these was.
+    /// The sender of the last of these.
     spender: Option<Address>,
-    /// Who has spent all and asked for more, since the last poll and before it.
+    /// Who has used up the budget and asked for more, since the last poll and before it.
     greedy: Option<Address>,
     waits: Option<Address>,
 }
 
 impl Server {
-    /// A poll: requests may cost something again.
+    /// Renews the budget of requests, at a poll.
     pub(in crate::mavlink) fn rest(&mut self) {
         self.cost = 0;
         self.spender = None;
         self.waits = self.greedy.take();
     }
 
-    /// Obeys a request. None when the frame is an answer itself, or the answer comes in a burst.
+    /// Obeys a request. Returns `None` if the frame is an answer itself, or the answer comes in a burst.
     ///
     /// Never inlined: its stack is free for what else the component does.
     #[inline(never)]
@@ -143,7 +141,7 @@ impl Server {
         })
     }
 
-    /// Takes the cost of a request; whether there is so much left for this one.
+    /// Charges the cost of a request; returns true if the budget covers it.
     fn affords(&mut self, from: Address, cost: u8) -> bool {
         if cost == 0 {
             return true;
@@ -232,7 +230,7 @@ impl Server {
         }))
     }
 
-    /// The session that this frame is of.
+    /// Returns the session that this frame belongs to.
     fn session_of(&mut self, frame: &Frame) -> Result<&mut Session, Error> {
         self.session_if(|session| session.is_of(frame) && session.number == frame.u8(SESSION))
     }
@@ -244,13 +242,13 @@ impl Server {
             .ok_or(Error::InvalidSession)
     }
 
-    /// Bytes of payload of the next frame of a burst, at the most; none when there is none.
+    /// Returns the greatest payload of a burst's next frame, bytes; `None` if there is no burst.
     pub(in crate::mavlink) fn burst_payload_len(&self) -> Option<usize> {
         let burst = self.session.as_ref()?.burst.as_ref()?;
         Some(PATH + usize::from(burst.size))
     }
 
-    /// The next answer of a burst, and for whom it is.
+    /// Returns the next answer of a burst and its recipient.
     pub(in crate::mavlink) fn next_of_burst(&mut self, now_us: u64) -> Option<(Address, Answer)> {
         let session = self.session.as_mut()?;
         let Burst {
@@ -278,8 +276,8 @@ impl Server {
         Some((session.reader, answer))
     }
 
-    /// The bytes of a file that an answer asks for. Those of a file that has changed since it was
-    /// opened are refused and its session is over, so that a file that was read is of one moment.
+    /// Reads the bytes of a file that an answer asks for. If the file has changed since it was opened, the read is
+    /// refused and the session ends, so that a file that was read is consistent.
     pub(super) fn read(
         &mut self,
         (reader, number): (Address, u8),
@@ -303,8 +301,7 @@ impl Server {
     }
 }
 
-/// The cost of a request: a file is made and summed up as a whole to be opened, and again for each
-/// answer.
+/// Returns the cost of a request: opening a file means producing and summing all of it, and so does each answer.
 fn cost(request: u8) -> u8 {
     match request {
         request::LIST_DIRECTORY | request::OPEN_FILE_RO | request::CALC_FILE_CRC32 => COST_MOST,

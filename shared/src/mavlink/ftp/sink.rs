@@ -1,4 +1,4 @@
-//! Takes the bytes of a file while it is written.
+//! Receives the bytes of a file as it is written.
 
 use crate::checksum::checksum;
 
@@ -7,14 +7,14 @@ use crate::checksum::checksum;
 pub(super) struct Sink<'a> {
     skip: usize,
     room: &'a mut [u8],
-    /// Of all that has been put in, bytes.
+    /// Total bytes received.
     pub(super) len: usize,
-    /// Its checksum so far.
+    /// Checksum so far.
     pub(super) checksum: u32,
 }
 
 impl<'a> Sink<'a> {
-    /// `room` for the bytes from `skip` on.
+    /// Creates a sink that keeps the bytes from `skip` on in `room`.
     pub(super) fn new(skip: usize, room: &'a mut [u8]) -> Self {
         Self {
             skip,

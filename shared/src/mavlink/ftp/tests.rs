@@ -1,4 +1,4 @@
-//! The bytes of the files, at every place of them.
+//! The bytes of the files, at every offset.
 
 use std::format;
 use std::string::String;
@@ -49,7 +49,7 @@ fn whole(path: &str, params: &Params) -> Option<Vec<u8>> {
     Some(whole)
 }
 
-/// `param.pck` by its description, with nothing of the code under test.
+/// Builds `param.pck` from its description, without the code under test.
 fn packed(params: &Params, chosen: &[ParamId], defaults: bool) -> Vec<u8> {
     let mut file = Vec::new();
     let magic = if defaults { 0x671C_u16 } else { 0x671B };
@@ -90,7 +90,7 @@ fn a_motor_s_figures_are_lines_of_name_value_unit_and_spread() {
 
 #[test]
 fn the_checksum_is_that_of_nuttx() {
-    // By Python: zlib.crc32(b"123456789", 0xFFFFFFFF) ^ 0xFFFFFFFF.
+    // From Python: zlib.crc32(b"123456789", 0xFFFFFFFF) ^ 0xFFFFFFFF.
     assert_eq!(checksum(0, b"123456789"), 0x2DFD_2D88);
     assert_eq!(checksum(checksum(0, b"1234"), b"56789"), 0x2DFD_2D88);
     assert_eq!(checksum(0, b""), 0);
@@ -141,7 +141,7 @@ fn the_default_of_a_dead_time_is_the_boards() {
         file.write(&view, &mut Sink::new(0, &mut whole));
         whole
     };
-    // No default of its own follows the value.
+    // No separate default follows the value.
     assert!(read(&params).ends_with(&750.0_f32.to_le_bytes()));
     assert_eq!(read(&params)[6], 0x04);
     params.set(id, 900.0).expect("in range");
@@ -212,7 +212,7 @@ fn folders_list_what_is_in_them() {
             entry.write_rest(&view(&params), &mut sink);
         }
         let len = sink.len;
-        // Or its end would be cut off.
+        // Else its end would be cut off.
         assert!(len <= 239);
         String::from_utf8(room[..len].to_vec()).expect("ASCII")
     };

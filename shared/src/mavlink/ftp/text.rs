@@ -1,4 +1,4 @@
-//! Texts in words, and numbers in decimal.
+//! Texts, and numbers in decimal.
 
 use super::sink::Sink;
 use super::view::View;
@@ -23,7 +23,7 @@ pub(super) fn faults(view: &View, sink: &mut Sink) {
     sink.put(b"\n");
 }
 
-/// `@SYS/statistics.txt`: one answer holds it as long as few kinds of faults have been.
+/// `@SYS/statistics.txt`: fits one answer as long as few kinds of faults have occurred.
 pub(super) fn statistics(view: &View, sink: &mut Sink) {
     let statistics = &view.telemetry.statistics;
     row("Run time", statistics.run_s, " s\n", sink);
@@ -40,7 +40,7 @@ pub(super) fn statistics(view: &View, sink: &mut Sink) {
     }
 }
 
-// Out of line: there are five.
+// Out of line: there are five calls.
 #[inline(never)]
 fn row(name: &str, number: u32, unit: &str, sink: &mut Sink) {
     sink.put(name.as_bytes());
@@ -49,8 +49,8 @@ fn row(name: &str, number: u32, unit: &str, sink: &mut Sink) {
     sink.put(unit.as_bytes());
 }
 
-/// `@SYS/check.txt`: a line for each item that was measured, with its name, value, unit, bounds and
-/// whether it is within them; `-` is a value that a sensor does not give.
+/// `@SYS/check.txt`: a line for each measured item, with its name, value, unit, bounds and whether
+/// it is within them; `-` is a value that a sensor does not provide.
 pub(super) fn check(view: &View, sink: &mut Sink) {
     view.check.tell(view.params, |line| {
         for piece in [line.name[0], line.name[1], " "] {
@@ -78,7 +78,7 @@ pub(super) fn identification(view: &View, sink: &mut Sink) {
     });
 }
 
-/// A number with three decimals, and a space.
+/// Writes a number with three decimals, and a space.
 fn thousandths(number: f32, sink: &mut Sink) {
     let thousandths = (number.abs() * 1000.0 + 0.5) as u32;
     if !number.is_finite() {
@@ -89,7 +89,7 @@ fn thousandths(number: f32, sink: &mut Sink) {
     }
     decimal(thousandths / 1000, sink);
     sink.put(b".");
-    // Behind a digit that is left out, so that zeros stand.
+    // Keeps leading zeros: the digit in front is dropped.
     let mut digits = [0; 4];
     let mut place = Sink::new(0, &mut digits);
     decimal(1000 + thousandths % 1000, &mut place);
@@ -98,7 +98,7 @@ fn thousandths(number: f32, sink: &mut Sink) {
     sink.put(&digits);
 }
 
-/// A number in decimal. The formatting of the core library would take 3 KB of a chip's image.
+/// Writes a number in decimal. The core library's formatting would take 3 KB of the image.
 pub(super) fn decimal(number: u32, sink: &mut Sink) {
     let mut worth = 1_000_000_000;
     while worth > 0 {

@@ -6,7 +6,7 @@ use crate::params::{Board, Params};
 use crate::record::Record;
 use crate::telemetry::Telemetry;
 
-/// The sources of those files that are made when they are read.
+/// The sources of the files that are produced when read.
 #[derive(Clone, Copy)]
 pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) params: &'a Params,
@@ -16,8 +16,8 @@ pub(in crate::mavlink) struct View<'a> {
     pub(in crate::mavlink) check: &'a check::Report,
     /// The result of the last identification.
     pub(in crate::mavlink) identification: &'a identify::Report,
-    /// The fault record, where there is one.
+    /// The fault record, if there is one.
     pub(in crate::mavlink) record: Option<&'a Record>,
-    /// The last that a person was warned of; empty if there was none.
+    /// The last warning; empty if there was none.
     pub(in crate::mavlink) warning: &'a str,
 }

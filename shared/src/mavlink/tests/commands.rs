@@ -18,7 +18,7 @@ const FAILED: MavResult = MavResult::MAV_RESULT_FAILED;
 const REJECTED: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
 const UNSUPPORTED: MavResult = MavResult::MAV_RESULT_UNSUPPORTED;
 
-/// A COMMAND_LONG by bytes, so that the command can be any number.
+/// Encodes a COMMAND_LONG as bytes, so that the command can be any number.
 fn long(to: Address, command: u16, params: &[f32], confirmation: u8) -> Vec<u8> {
     let mut payload = Vec::new();
     for i in 0..7 {
@@ -30,8 +30,8 @@ fn long(to: Address, command: u16, params: &[f32], confirmation: u8) -> Vec<u8> 
     frame(STATION, LONG, 0, &payload)
 }
 
-/// Command and result of each COMMAND_ACK. Its other fields are checked here: the generated type
-/// does not have them, and a command that the dialect does not know cannot be read with it.
+/// Returns command and result of each COMMAND_ACK. Its other fields are checked here: the generated
+/// type lacks them, and cannot represent a command that the dialect does not know.
 fn acks(sent: &[Sent]) -> Vec<(u16, u8)> {
     sent.iter()
         .filter(|sent| sent.message.message_id() == COMMAND_ACK_DATA::ID)
@@ -60,7 +60,7 @@ impl Bench {
         matches!(self.authority.command(), Command::Test(_))
     }
 
-    /// The result of a command that is answered with one ACK.
+    /// Returns the result of a command that is answered with one ACK.
     fn result(&mut self, command: u16, params: &[f32]) -> u8 {
         let sent = self.command(command, params);
         let acks = acks(&sent);
@@ -85,7 +85,7 @@ fn an_unknown_command_is_unsupported_and_one_for_others_ignored() {
             "{system}/{component}"
         );
     }
-    // What it has sent itself comes back on some links.
+    // Its own frames come back on some links.
     let mut own = long(ESC, 64_999, &[], 0);
     let end = own.len() - 2;
     own[5..7].copy_from_slice(&[1, 1]);
@@ -124,7 +124,7 @@ fn a_peripheral_is_silent_to_what_all_are_asked_and_it_does_not_know() {
             "{system}/{component}"
         );
     }
-    // What it knows it does for anyone.
+    // It obeys known commands from anyone.
     bench.receive(&long(
         Address {
             component: 0,
@@ -207,7 +207,7 @@ fn a_message_is_sent_on_request() {
         .collect();
     let expected = parts.iter().fold(0, |all, part| all << 8 | part) << 8 | 255;
     assert_eq!(version.flight_sw_version, expected);
-    // COMMAND_INT, a float as the value itself, MAVLink 2: what other tests have served.
+    // COMMAND_INT, floats as the value itself, MAVLink 2: what other tests use.
     let served = MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
         | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
         | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
@@ -323,7 +323,7 @@ fn arming_needs_the_wire_and_disarming_nothing() {
     assert!(!bench.authority.armed());
 }
 
-/// A COMMAND_INT.
+/// Encodes a COMMAND_INT.
 fn int(command: u16, [p1, p2]: [f32; 2], p5: i32) -> Vec<u8> {
     let mut payload = [0; 35];
     payload[0..4].copy_from_slice(&p1.to_le_bytes());
@@ -346,7 +346,7 @@ fn a_command_with_integers_is_obeyed_too() {
 fn a_test_by_integers_sent_again_is_the_same_test() {
     let mut bench = Bench::new();
     let at_rest = bench.telemetry;
-    // When it is sent again during a test of 2 s, and the result of that.
+    // When it is resent during a test of 2 s, and the result.
     for (wait_ms, second) in [
         (500, ACCEPTED),
         (1000, ACCEPTED),
@@ -408,7 +408,7 @@ fn one_request_too_many_is_told() {
     let sent = bench.answers();
     assert_eq!(acks(&sent).len(), 40);
     assert_eq!(texts(&sent), ["MAVLink: too many requests at once"]);
-    // 1500 bytes hold 33 commands of 45 bytes: none is lost from one datagram.
+    // 1500 bytes hold 33 commands of 45 bytes: one datagram loses none.
     let datagram: Vec<u8> = (0..33).flat_map(|_| long(ESC, 22, &[], 0)).collect();
     bench.receive(&datagram);
     let sent = bench.answers();

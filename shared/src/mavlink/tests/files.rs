@@ -1,4 +1,4 @@
-//! A client that reads files, by the protocol's description.
+//! A client that reads files, written from the protocol's description.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, FILE_TRANSFER_PROTOCOL_DATA};
 
@@ -29,7 +29,7 @@ const UNKNOWN_COMMAND: u8 = 7;
 const FILE_PROTECTED: u8 = 9;
 const FILE_NOT_FOUND: u8 = 10;
 
-/// A request, from a station of which there are two.
+/// A request from one of two stations.
 #[derive(Clone, Copy)]
 struct Ask<'a> {
     from: Address,
@@ -89,7 +89,7 @@ fn read(code: u8, offset: u32, size: u8) -> Ask<'static> {
     }
 }
 
-/// Who sends a request, and its message.
+/// Returns a request's sender and its message.
 fn message(ask: Ask) -> (Address, FILE_TRANSFER_PROTOCOL_DATA) {
     let mut message = FILE_TRANSFER_PROTOCOL_DATA {
         target_system: 1,
@@ -132,7 +132,7 @@ fn told(sent: &[Sent]) -> Vec<Told> {
         .collect()
 }
 
-/// The one answer to a request.
+/// Returns the one answer to a request.
 fn ask(bench: &mut Bench, ask: Ask) -> Told {
     send(bench, ask);
     let mut told = told(&bench.answers());
@@ -150,7 +150,7 @@ fn refused(bench: &mut Bench, request: Ask, error: u8) {
     );
 }
 
-/// Reads a file that is open, by requests of this size.
+/// Reads an open file, by requests of this size.
 fn rest(bench: &mut Bench, size: u8) -> Vec<u8> {
     let mut file = Vec::new();
     loop {
@@ -174,7 +174,7 @@ fn fetch(bench: &mut Bench, name: &str, size: u8) -> Vec<u8> {
     file
 }
 
-/// By the table of the polynomial, unlike the code under test.
+/// By the polynomial's table, unlike the code under test.
 fn crc32(bytes: &[u8]) -> u32 {
     let row = |index: u32| {
         (0..8).fold(index, |c, _| {
@@ -242,7 +242,7 @@ fn a_request_that_is_sent_again_gets_the_same_answer() {
         assert_eq!(ask(&mut bench, request), first);
         assert_eq!(ask(&mut bench, request), first);
     }
-    // The lost answer was that to opening it, and the client has not begun to read.
+    // The lost answer was the one to opening it, and the client has not begun to read.
     let opened = ask(&mut bench, path(OPEN, PACK));
     assert_eq!(ask(&mut bench, path(OPEN, PACK)), opened);
     assert_eq!(rest(&mut bench, 239).len(), opened.number() as usize);
@@ -315,7 +315,7 @@ fn a_burst_takes_half_of_the_link_and_holds_up_no_answer() {
         };
         assert_eq!(count(&bench.ask(&command), 77), 1);
     }
-    // 0.4 s of 5760 bytes/s, and what could leave at once.
+    // 0.4 s of 5760 bytes/s, plus what could leave at once.
     assert!((2304 - 266..=2304 + 400).contains(&bytes), "{bytes}");
 }
 
@@ -355,8 +355,7 @@ fn one_reads_at_a_time_and_the_next_waits_until_he_is_silent() {
     refused(&mut bench, read(READ, 0, 80), INVALID_SESSION);
     assert_eq!(ask(&mut bench, other(path(OPEN, PACK))).code, ACK);
     refused(&mut bench, path(OPEN, PACK), NO_SESSIONS_AVAILABLE);
-    // A reset ends the sessions of the one who sends it, and whoever has one may open another file in its
-    // place.
+    // A reset ends only its sender's sessions, and whoever has one may open another file instead.
     assert_eq!(ask(&mut bench, read(RESET, 0, 0)).code, ACK);
     refused(&mut bench, path(OPEN, PACK), NO_SESSIONS_AVAILABLE);
     assert_eq!(ask(&mut bench, other(read(READ, 0, 80))).code, ACK);
@@ -366,7 +365,7 @@ fn one_reads_at_a_time_and_the_next_waits_until_he_is_silent() {
     assert_eq!(rest(&mut bench, 239).len(), faults as usize);
 }
 
-/// Of a station that signs, another that takes its address and has no key ends nothing.
+/// A station that takes a signing station's address without the key cannot end its session.
 #[test]
 fn a_session_of_one_who_signs_is_not_for_who_does_not() {
     let mut bench = signing::keyed();
@@ -455,7 +454,7 @@ fn what_cannot_be_done_is_refused_with_the_reason() {
             refused(&mut bench, read(code, 0, size), INVALID_DATA_SIZE);
         }
     }
-    // A path is not longer than the frame, whatever it says.
+    // A path is no longer than the frame, whatever it claims.
     refused(
         &mut bench,
         Ask {

@@ -1,4 +1,4 @@
-//! Ten million bytes that are no frames for this ESC: chance, and frames that were whole once.
+//! Ten million bytes that are no frames for this ESC: random ones, and damaged frames.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_REQUEST_LIST_DATA};
 
@@ -7,7 +7,7 @@ use super::signing::{KEY, SECOND, TODAY, keyed, setup, signed};
 use super::*;
 use crate::input::authority::Command;
 
-/// Bytes of each kind of link.
+/// Bytes on each kind of link.
 const BYTES: usize = 5_000_000;
 
 /// SplitMix64: the same bytes on every machine and in every run.
@@ -30,8 +30,8 @@ impl Chance {
         (0..self.below(most)).map(|_| self.next() as u8).collect()
     }
 
-    /// Some bits are turned, the rest is lost, or a byte is put in or left out. Not of the last two:
-    /// what follows could make them whole.
+    /// Flips some bits, drops the rest, or inserts or removes a byte. Spares the last two: what
+    /// follows could make the frame whole.
     fn mutate(&mut self, frame: &mut Vec<u8>) {
         let at = self.below(frame.len() - 2);
         match self.below(6) {
@@ -67,7 +67,7 @@ fn list() -> PARAM_REQUEST_LIST_DATA {
     }
 }
 
-/// Nothing has been changed, turned or asked for.
+/// Nothing has been changed, turned or requested.
 fn check(bench: &mut Bench, before: &Params) {
     assert_eq!(&bench.params, before);
     assert_eq!(bench.authority.command(), Command::Stop);
@@ -75,8 +75,8 @@ fn check(bench: &mut Bench, before: &Params) {
     assert_eq!(bench.component.take_act(), None);
 }
 
-/// Receives what holds no frame. One in 65536 that begin like one has a right check by chance and is
-/// one: such are counted, and not obeyed.
+/// Receives bytes that hold no frame. One candidate in 65536 has a valid check by chance and is
+/// one: those are counted, and not obeyed.
 fn receive_but_chance(bench: &mut Bench, bytes: &[u8]) -> usize {
     let mut found = 0;
     let mut ahead = bench.receiver.clone();
@@ -89,7 +89,7 @@ fn receive_but_chance(bench: &mut Bench, bytes: &[u8]) -> usize {
     found
 }
 
-/// After a silence a request is answered when its last byte has come, and not before.
+/// After a silence a request is answered on its last byte, and not before.
 fn answers(bench: &mut Bench, request: &[u8]) {
     bench.run_ms(200);
     let (last, first) = request.split_last().expect("a frame");
@@ -127,7 +127,7 @@ fn five_million_bytes_of_noise_and_broken_frames_change_nothing() {
         for _ in 0..200 {
             let bytes = match chance.below(4) {
                 0 => chance.bytes(600),
-                // Start bytes are more frequent than chance has it.
+                // Start bytes are more frequent than in random data.
                 1 => {
                     let pick = |byte: u8| [0xfd, 0xfe, 0, byte][usize::from(byte & 3)];
                     chance.bytes(600).into_iter().map(pick).collect()
@@ -156,13 +156,13 @@ fn five_million_bytes_of_noise_and_broken_frames_change_nothing() {
         answers(&mut bench, &request);
     }
     assert!(bench.component.kept_signing().is_none());
-    // Of 600 000 that begin like one.
+    // Of 600 000 candidates.
     let began = bench.receiver.counters().bad_checks;
     assert!(began > 500_000 && by_chance < 30, "{by_chance} of {began}");
 }
 
-/// Here the checks of half the frames are right: only the signature can tell. The rest is noise,
-/// frames that are not signed, and such as were obeyed before.
+/// Half of these frames have a valid check: only the signature can tell. The rest is noise,
+/// unsigned frames, and replays.
 #[test]
 fn five_million_bytes_without_the_key_change_nothing() {
     let mut bench = keyed();
@@ -200,7 +200,7 @@ fn five_million_bytes_without_the_key_change_nothing() {
                 kind => {
                     let mut frame = frames[chance.below(frames.len())].clone();
                     let len = frame.len();
-                    // Behind the start, the length and the flags.
+                    // After the start, the length and the flags.
                     for _ in 0..=chance.below(3) {
                         let bit = 32 + chance.below((len - 4) * 8);
                         frame[bit / 8] ^= 1 << (bit % 8);
@@ -234,7 +234,7 @@ fn five_million_bytes_without_the_key_change_nothing() {
         bench.component.kept_signing().map(|kept| kept.key.0),
         Some(KEY)
     );
-    // The key opens what these could not.
+    // The key permits what these could not do.
     bench.receive(&signed(
         STATION,
         &set("MOT_POLE_PAIRS", 7.0),

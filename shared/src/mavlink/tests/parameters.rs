@@ -31,7 +31,7 @@ pub(super) fn read(text: &str, index: i16) -> PARAM_REQUEST_READ_DATA {
     }
 }
 
-/// Why the value of this parameter was refused, as the one who asked is told.
+/// Returns why this parameter's value was refused, as reported to the requester.
 pub(super) fn refusal(sent: &[Sent], id: ParamId) -> MavParamError {
     let errors: Vec<_> = sent
         .iter()
@@ -111,7 +111,7 @@ fn a_value_is_read_by_name_and_by_index() {
     assert_eq!(values(&bench.ask(&read("MOT_FLUX_MWB", -1))), expected);
     let index = ParamId::MotFluxMwb as i16;
     assert_eq!(values(&bench.ask(&read("", index))), expected);
-    // The name does not count beside an index.
+    // With an index the name does not count.
     assert_eq!(values(&bench.ask(&read("NO_SUCH", index))), expected);
 }
 
@@ -122,8 +122,8 @@ fn every_name_is_found_whatever_its_length() {
         let got = values(&bench.ask(&read(id.entry().name, -1)));
         assert_eq!(got, [(id as u16, bench.params.get(id))]);
     }
-    // 16 characters and no zero: nothing of the next field is taken for the name, and no name that
-    // it begins with is found.
+    // 16 characters without a zero: nothing of the next field is taken for the name, and no name
+    // that it begins with is found.
     for sixteen in ["ABCDEFGHIJKLMNOP", "MOT_POLE_PAIRS__"] {
         for sent in [bench.ask(&read(sixteen, -1)), bench.ask(&set(sixteen, 7.0))] {
             let MavMessage::PARAM_ERROR(error) = &sent[0].message else {
@@ -179,7 +179,7 @@ fn a_refused_value_is_answered_with_the_old_one_and_the_reason() {
     let cases = [
         ("MOT_POLE_PAIRS", 6.5, "whole", out_of_range),
         ("LIM_PHASE_A", 1e9, "out of range", out_of_range),
-        // The least above its range: nothing is clamped.
+        // The least value above its range: nothing is clamped.
         (
             "LIM_PHASE_A",
             200.0_f32.next_up(),

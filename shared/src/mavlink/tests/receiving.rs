@@ -6,7 +6,7 @@ use proptest::test_runner::RngSeed;
 
 use super::*;
 
-/// Asks for the first parameter.
+/// Requests the first parameter.
 fn request() -> PARAM_REQUEST_READ_DATA {
     PARAM_REQUEST_READ_DATA {
         param_index: 0,
@@ -135,7 +135,7 @@ fn unknown_flags_and_signatures_are_not_obeyed() {
 #[test]
 fn a_frame_within_a_frame_is_data() {
     let mut bench = Bench::new();
-    // ENCAPSULATED_DATA, which an ESC does not obey: what it carries must not be either.
+    // ENCAPSULATED_DATA, which an ESC does not obey: nor must it obey the contents.
     let mut payload = Vec::from([0, 0]);
     payload.extend(set_bytes());
     bench.receive(&frame(STATION, (131, 223), 0, &payload));
@@ -160,7 +160,7 @@ fn a_frame_within_one_with_unknown_flags_is_data() {
         let counters = bench.receiver.counters();
         assert_eq!((counters.incompatible, counters.frames), (1, 1));
 
-        // With a wrong check it may be a start byte in noise: what it seems to hold is found.
+        // With a bad check it may be a start byte in noise: what it seems to hold is found.
         let mut bench = Bench::new();
         bytes[10] ^= 1;
         bench.receive(&bytes);
@@ -180,7 +180,7 @@ fn one_wrong_bit_anywhere_is_noticed() {
         bytes[bit / 8] ^= 1 << (bit % 8);
         bench.receive(&bytes);
         bench.run_ms(110);
-        // The sequence number and the two flags that mean nothing are checked too.
+        // The sequence number and the two unused flags are checked too.
         assert_eq!(bench.params, before, "bit {bit}");
         bench.receive(&request_bytes());
         assert!(is_answered(&mut bench), "bit {bit}");
@@ -188,8 +188,8 @@ fn one_wrong_bit_anywhere_is_noticed() {
 }
 
 proptest! {
-    // One in 65536 frames that are wrong in many places passes its check by chance: the cases are
-    // always the same ones, of which none does.
+    // One in 65536 heavily damaged frames passes its check by chance: the cases are always the same
+    // ones, of which none does.
     #![proptest_config(ProptestConfig {
         cases: 1000,
         rng_seed: RngSeed::Fixed(1),
@@ -201,7 +201,7 @@ proptest! {
         pieces in prop::collection::vec(
             prop_oneof![
                 prop::collection::vec(any::<u8>(), 0..400),
-                // Start bytes are more frequent than chance has it.
+                // Start bytes are more frequent than in random data.
                 prop::collection::vec(prop_oneof![Just(0xfd_u8), Just(0xfe), Just(0), any::<u8>()], 0..400),
             ],
             0..6,
@@ -217,7 +217,7 @@ proptest! {
         bench.receive(&request_bytes());
         let mut answers = values(&bench.run_ms(110)).len();
         if answers == 0 && bench.receiver.counters().frames > by_chance {
-            // Noise whose 16 bits of check fit by chance has claimed the request's first bytes.
+            // Noise whose 16-bit check fits by chance has claimed the request's first bytes.
             bench.receive(&request_bytes());
             answers = values(&bench.run_ms(110)).len();
         }

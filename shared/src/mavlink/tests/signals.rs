@@ -8,7 +8,7 @@ use super::parameters::set;
 use super::streams::{ESC_INFO, ESC_STATUS, HEARTBEAT};
 use super::*;
 
-/// Names, values and times of the signals among what was sent.
+/// Returns names, values and times of the signals among what was sent.
 fn signals(sent: &[Sent]) -> Vec<(String, f32, u32)> {
     let named = sent.iter().filter_map(|sent| match &sent.message {
         MavMessage::NAMED_VALUE_FLOAT(value) => {
@@ -47,7 +47,7 @@ fn signals_are_streamed_by_choice_and_those_of_one_moment_together() {
     bench.ask(&set("TEL_SIG_HZ", 200.0));
     let told = signals(&bench.run_ms(1000)).len();
     assert!(told.abs_diff(200 * 9) <= 9, "{told}");
-    // The interval of this message is that of the wire's: the parameters are the signals'.
+    // This message's interval is the wire's; parameters set that of the signals.
     bench.receive(&encode(STATION, &interval(251, -1.0), &[]));
     assert!(signals(&bench.run_ms(1000)).len() > 1700);
     bench.ask(&set("TEL_SIGNALS", 0.0));
@@ -79,8 +79,8 @@ fn names_of_signals_fit_their_message() {
     }
 }
 
-/// All signals at the greatest rate are 23 times what the link's half carries, signed 34 times. Names
-/// shorter than the longest leave some of their share.
+/// All signals at the highest rate are 23 times what half the link carries, signed 34 times. Names shorter than the
+/// longest leave some of their share unused.
 #[test]
 fn signals_take_their_turn_on_a_slow_link() {
     for key in [None, Some(Key([7; 32]))] {
@@ -110,7 +110,7 @@ fn signals_take_their_turn_on_a_slow_link() {
         };
         assert_eq!(count(HEARTBEAT), 10);
         assert!((9..=10).contains(&count(ESC_INFO)), "{}", count(ESC_INFO));
-        // Each stream has as many turns as another that is always due.
+        // Each stream gets as many turns as another that is always due.
         assert!(count(ESC_STATUS) > 60, "{}", count(ESC_STATUS));
         assert!(count(251) > 9 * 100, "{}", count(251));
     }

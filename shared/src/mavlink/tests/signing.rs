@@ -34,7 +34,7 @@ pub(super) fn setup(key: [u8; 32], timestamp: u64) -> SETUP_SIGNING_DATA {
     }
 }
 
-/// A frame that was heard or sent at this time, with a hash of its own making.
+/// Returns a frame sent at this time, with its hash computed independently.
 pub(super) fn signed<D: MessageData>(
     from: Address,
     data: &D,
@@ -64,7 +64,7 @@ fn command(number: MavCmd, param1: f32) -> COMMAND_LONG_DATA {
     }
 }
 
-/// With a key as of today.
+/// Returns a bench with a key as of today.
 pub(super) fn keyed() -> Bench {
     let mut bench = Bench::new();
     bench.receive(&encode(STATION, &setup(KEY, TODAY), &[]));
@@ -74,7 +74,7 @@ pub(super) fn keyed() -> Bench {
     bench
 }
 
-/// Sends a value of CTL_BW_SPD_HZ that is signed like this; whether it was taken.
+/// Sends a value of CTL_BW_SPD_HZ signed like this; returns true if it was taken.
 fn takes(bench: &mut Bench, value: f32, from: Address, link: u8, timestamp: u64) -> bool {
     bench.receive(&signed(
         from,
@@ -131,7 +131,7 @@ fn without_a_signature_one_may_ask_and_change_nothing() {
         assert_eq!(bench.component.take_request(), None, "{number:?}");
         assert_eq!(bench.component.take_act(), None, "{number:?}");
     }
-    // Nor may one take the key away, or bring another.
+    // Nor may such a frame remove the key, or set another.
     bench.receive(&encode(STATION, &setup([0; 32], TODAY), &[]));
     bench.receive(&encode(STATION, &setup([9; 32], TODAY), &[]));
     assert_eq!(bench.answers().len(), 0);
@@ -175,7 +175,7 @@ fn a_frame_is_obeyed_once_and_in_its_order() {
         !takes(&mut bench, 4.0, STATION, 1, TODAY + 3 * SECOND),
         "as old"
     );
-    // Another link has an order of its own, within a minute.
+    // Another link has its own order, within a minute.
     assert!(takes(&mut bench, 7.0, STATION, 2, TODAY + SECOND));
     let later = TODAY + 100 * SECOND;
     bench.now_us += 97_000_000;
@@ -206,7 +206,7 @@ fn more_streams_than_can_be_followed_push_out_none_that_could_be_played_again() 
         ));
     }
     assert!(!takes(&mut bench, 20.0, STATION, 8, TODAY + 2 * SECOND));
-    // A minute later they are too old to begin anew, and make room.
+    // A minute later they are too old to start again, and make room.
     let later = TODAY + 62 * SECOND;
     bench.now_us += 61_000_000;
     assert!(takes(&mut bench, 20.0, STATION, 7, later));
@@ -293,7 +293,7 @@ fn a_key_does_not_print() {
     assert!(text.contains("Key(..)") && !text.contains("30"), "{text}");
 }
 
-/// So that what was recorded cannot be played again after a restart.
+/// So that a recording cannot be replayed after a restart.
 #[test]
 fn whatever_would_change_something_leaves_its_time_to_be_kept() {
     let mut bench = keyed();
@@ -319,7 +319,7 @@ fn whatever_would_change_something_leaves_its_time_to_be_kept() {
     assert_eq!(keeps(MAV_CMD_COMPONENT_ARM_DISARM, 0.0, true), (true, true));
     assert_eq!(keeps(MAV_CMD_PREFLIGHT_STORAGE, 0.0, true), (true, true));
     assert!(!keeps(MAV_CMD_REQUEST_MESSAGE, 0.0, true).0);
-    // What is refused wears the flash no more than what is not signed.
+    // Refused commands wear the flash no more than unsigned ones.
     assert_eq!(
         keeps(MAV_CMD_COMPONENT_ARM_DISARM, 2.0, true),
         (false, true)
@@ -390,7 +390,7 @@ fn a_key_may_be_set_by_a_frame_that_it_signs() {
 const YEAR: u64 = 365 * 86_400 * SECOND;
 const LAST: u64 = (1 << 48) - 1;
 
-/// Gives another key, or none, by a frame that the one before signs.
+/// Sets another key, or none, by a frame signed with the previous one.
 fn give(bench: &mut Bench, key: [u8; 32], by: &[u8], timestamp: u64) {
     let message = setup(key, timestamp);
     if by == [0; 32] {
@@ -406,7 +406,7 @@ fn give(bench: &mut Bench, key: [u8; 32], by: &[u8], timestamp: u64) {
 #[test]
 fn a_key_that_comes_back_opens_nothing_that_was_heard() {
     for other in [[7; 32], [0; 32]] {
-        // Those who set it say what time it is, or that they do not know.
+        // Whoever sets it states the time, or that it is unknown.
         for returns in [TODAY + 12 * SECOND, TODAY] {
             let mut bench = keyed();
             for (value, link, after) in [(5.0, 1, 5), (6.0, 2, 6), (7.0, 1, 7)] {
@@ -433,7 +433,7 @@ fn a_key_that_comes_back_opens_nothing_that_was_heard() {
     }
 }
 
-/// Also over a loss of power in which there was none.
+/// Even across a loss of power without a key.
 #[test]
 fn what_was_signed_before_a_key_was_set_is_not_obeyed() {
     let mut bench = Bench::new();

@@ -43,7 +43,7 @@ fn each_message_has_its_rate_and_frames_are_numbered() {
         .set(ParamId::TelRateHz, 50.0)
         .expect("in range");
     let sent = bench.run_ms(2000);
-    // The new interval runs from the change on, 1 ms after the start here.
+    // The new interval counts from the change, 1 ms after the start here.
     assert_eq!(count(&sent, ESC_STATUS), 99);
     assert_eq!(count(&sent, HEARTBEAT), 2);
 }
@@ -57,7 +57,7 @@ fn a_slow_link_is_shared_and_the_heartbeat_stays() {
     let bytes: usize = sent.iter().map(|sent| sent.len).sum();
     assert!(bytes <= 25_000 + 400 + 21 * 10, "{bytes} bytes in 10 s");
     assert_eq!(count(&sent, HEARTBEAT), 10);
-    // It takes its turn, some milliseconds late: the tenth may be past the end.
+    // It takes its turn, some milliseconds late: the tenth may fall outside.
     assert!((9..=10).contains(&count(&sent, ESC_INFO)));
     let (status, telemetry) = (count(&sent, ESC_STATUS), count(&sent, ESC_TELEMETRY));
     assert!(
@@ -224,7 +224,7 @@ fn a_peripheral_does_not_join_system_0_which_stands_for_all() {
     assert_eq!(system_of(&mut bench), 3);
 }
 
-/// A heartbeat of this system's autopilot.
+/// Returns a heartbeat of this system's autopilot.
 fn autopilot(system: u8) -> Vec<u8> {
     let from = Address {
         system,
@@ -238,7 +238,7 @@ fn autopilot(system: u8) -> Vec<u8> {
     encode(from, &data, &[])
 }
 
-/// The system that a peripheral with component 142 says it belongs to.
+/// Returns the system that a peripheral with component 142 claims.
 fn system_of(bench: &mut Bench) -> u8 {
     let from = bench.run_ms(100)[0].from;
     assert_eq!(from.component, 142);
@@ -325,7 +325,7 @@ fn a_change_of_faults_is_in_esc_info_at_once() {
         });
         assert_eq!(flags.map(|flags| flags != 0), Some(present));
     }
-    // And then each second as before.
+    // And then every second as before.
     assert_eq!(count(&bench.run_ms(999), ESC_INFO), 0);
     assert_eq!(count(&bench.run_ms(1), ESC_INFO), 1);
 }
@@ -349,7 +349,7 @@ fn a_fault_that_comes_and_goes_is_told_once_a_second() {
     let expected = [0, 1, 1000, 1001, 2000, 2001];
     let lengths = [began, ended].repeat(3);
     assert_eq!(told, expected.into_iter().zip(lengths).collect::<Vec<_>>());
-    // The last state is told, however soon it came.
+    // The last state is reported, however soon it came.
     bench.telemetry.faults.insert(Fault::OverCurrent);
     assert_eq!(texts(&bench.run_ms(1)).len(), 1);
     bench.telemetry.faults = Faults::NONE;
@@ -379,7 +379,7 @@ fn only_a_vehicle_has_missions_and_it_has_none() {
         ),
         (0, 255, 190)
     );
-    // The type that was asked for: rally points.
+    // The requested type: rally points.
     assert_eq!(sent[0].payload[4], 2);
 
     let mut bench = Bench::with(peripheral(), 100_000);

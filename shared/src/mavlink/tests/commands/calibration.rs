@@ -1,4 +1,4 @@
-//! PREFLIGHT_CALIBRATION: the end points of the throttle, by stick.
+//! PREFLIGHT_CALIBRATION: the throttle end points, by stick.
 
 use super::*;
 use crate::input::News;
@@ -13,7 +13,7 @@ const IN_PROGRESS: MavResult = MavResult::MAV_RESULT_IN_PROGRESS;
 const BEGIN: [f32; 7] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 const END: [f32; 7] = [0.0; 7];
 
-/// One that is under way.
+/// Returns a bench with a calibration under way.
 fn begun() -> Bench {
     let mut bench = Bench::new();
     bench.telemetry.signal = Some(Signal::Pulse(Pulse::Servo));
@@ -33,7 +33,7 @@ impl Bench {
 fn a_calibration_is_acknowledged_step_by_step_and_when_it_is_stored() {
     for (stored, result) in [(Ok(()), ACCEPTED), (Err("storage: worn out"), FAILED)] {
         let mut bench = begun();
-        // Sent again, and whatever else takes long.
+        // Resent, and other long commands.
         bench.receive(&long(ESC, 241, &BEGIN, 1));
         assert_eq!(acks(&bench.answers()), [(241, IN_PROGRESS as u8)]);
         assert_eq!(bench.component.take_act(), None);
@@ -54,7 +54,7 @@ fn a_calibration_is_acknowledged_step_by_step_and_when_it_is_stored() {
         bench.receive(&long(ESC, 241, &BEGIN, 2));
         assert_eq!(acks(&bench.answers()), [(241, result as u8)]);
         assert_eq!(bench.component.take_act(), None);
-        // Another is another.
+        // Another one is new.
         assert_eq!(bench.result(241, &BEGIN), IN_PROGRESS as u8);
     }
 }
@@ -101,7 +101,7 @@ fn what_an_esc_has_not_is_not_calibrated() {
     let mut params = BEGIN;
     params[0] = 1.0;
     assert_eq!(Bench::new().result(241, &params), DENIED as u8);
-    // DShot's throttle has no ends, and a motor that turns has a throttle.
+    // DShot's throttle has no ends, and a turning motor has a throttle.
     let mut bench = Bench::new();
     bench.telemetry.signal = Signal::from_number(12);
     assert_eq!(bench.result(241, &BEGIN), DENIED as u8);

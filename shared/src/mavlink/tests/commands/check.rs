@@ -5,7 +5,7 @@ use super::*;
 const IN_PROGRESS: u8 = MavResult::MAV_RESULT_IN_PROGRESS as u8;
 const RUN: u16 = 401;
 
-/// Result and progress of the one ACK.
+/// Returns result and progress of the one ACK.
 fn ack(sent: &[Sent]) -> (u8, u8) {
     let [ack] = sent else { panic!("one answer") };
     (ack.payload[2], ack.payload[3])
@@ -19,7 +19,7 @@ fn a_self_test_is_acknowledged_step_by_step() {
         assert_eq!(bench.component.take_act(), Some(Act::Check));
         bench.component.tell_progress(40);
         assert_eq!(ack(&bench.answers()), (IN_PROGRESS, 40));
-        // Sent again, and what must not come between; the stick's calibration is another matter.
+        // Resent, and what must not interrupt it; the stick calibration is separate.
         bench.receive(&long(ESC, RUN, &[], 1));
         assert_eq!(ack(&bench.answers()), (IN_PROGRESS, 255));
         assert_eq!(bench.component.take_act(), None);
@@ -35,7 +35,7 @@ fn a_self_test_is_acknowledged_step_by_step() {
         bench.receive(&long(ESC, RUN, &[], 2));
         assert_eq!(ack(&bench.answers()), (result as u8, 0));
         assert_eq!(bench.component.take_act(), None);
-        // Those that nobody asked for are not told.
+        // Self-tests that nobody requested are not reported.
         bench.component.check_done(passed);
         bench.component.tell_progress(50);
         assert_eq!(bench.answers().len(), 0);

@@ -1,4 +1,4 @@
-//! Commands that turn the motor for a moment, sound it, or say how it turns.
+//! Commands that turn the motor briefly, make it sound, or set its direction.
 
 use super::*;
 use crate::drive::Fault;
@@ -11,7 +11,7 @@ const PERCENT: f32 = 0.0;
 const PWM: f32 = 1.0;
 
 impl Bench {
-    /// The throttle of the test that turns the motor, if any.
+    /// Returns the throttle of the test that turns the motor, if any.
     fn tested(&self) -> Option<f32> {
         match self.authority.command() {
             Command::Test(share) => Some(share.to_num()),
@@ -23,7 +23,7 @@ impl Bench {
         self.params.set(id, value).expect("in range");
     }
 
-    /// Each acts on a bench of its own.
+    /// Runs each on a bench of its own.
     fn motor_test(params: &[f32]) -> (u8, Option<f32>) {
         let mut bench = Self::new();
         let result = bench.result(209, params);
@@ -47,7 +47,7 @@ fn a_motor_test_is_a_share_of_full_throttle_or_a_pulse() {
             "{kind} {throttle}: {tested}"
         );
     }
-    // Between other ends, and with two directions.
+    // With other end points, and with two directions.
     let mut bench = Bench::new();
     bench.set(ParamId::InpPulseMinUs, 1100.0);
     bench.set(ParamId::InpPulseMaxUs, 1900.0);
@@ -66,11 +66,11 @@ fn a_motor_test_is_a_share_of_full_throttle_or_a_pulse() {
 #[test]
 fn a_motor_test_that_cannot_be_is_refused() {
     for params in [
-        // Another motor, none at all, and several.
+        // Another motor, none, and several.
         [2.0, PERCENT, 10.0, 1.0, 1.0],
         [f32::NAN, PERCENT, 10.0, 1.0, 1.0],
         [1.0, PERCENT, 10.0, 1.0, 2.0],
-        // By the pilot's stick, for the compass, and of no kind.
+        // By the pilot's stick, for the compass, and an invalid kind.
         [1.0, 2.0, 10.0, 1.0, 1.0],
         [1.0, 3.0, 10.0, 1.0, 1.0],
         [1.0, f32::NAN, 10.0, 1.0, 1.0],
@@ -152,7 +152,7 @@ fn what_is_configured_is_stored_before_it_is_acknowledged() {
         assert_eq!(bench.component.take_request(), Some(Request::ParamsChanged));
         assert_eq!(bench.component.take_request(), Some(Request::Save));
         assert_eq!(bench.component.take_request(), None);
-        // The same again is under way, and another has to wait.
+        // A repeat is under way, and another one has to wait.
         bench.receive(&long(ESC, 311, &params, 1));
         assert_eq!(acks(&bench.answers()), [(311, IN_PROGRESS as u8)]);
         assert_eq!(bench.result(311, &[1.0]), REJECTED as u8);
@@ -219,7 +219,7 @@ fn nothing_is_configured_that_is_not_known_not_this_motor_or_turns() {
     assert_eq!(bench.component.take_act(), None);
     assert_eq!(bench.component.take_request(), None);
 
-    // What makes no drive: these parameters stand against each other whatever is set beside them.
+    // Makes no drive: these parameters conflict whatever else is set.
     bench.set(ParamId::PwmFreqHz, 9000.0);
     assert_eq!(bench.result(311, &[2.0]), DENIED as u8);
     assert_eq!(bench.params.get(ParamId::Inp3d), 0.0);

@@ -1,4 +1,4 @@
-//! Commands about the stored parameters and the restart.
+//! Commands about stored parameters and the restart.
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn a_save_is_acknowledged_when_it_is_done() {
     assert_eq!(bench.command(245, &[1.0]).len(), 0);
     assert_eq!(bench.component.take_request(), Some(Request::Save));
     assert_eq!(bench.component.take_request(), None);
-    // Another one has to wait; the same one, sent again, is under way.
+    // Another one has to wait; the same one, resent, is under way.
     assert_eq!(bench.result(245, &[2.0]), REJECTED as u8);
     assert_eq!(bench.result(246, &[1.0]), REJECTED as u8);
     bench.receive(&long(ESC, 245, &[1.0], 1));
@@ -24,7 +24,7 @@ fn a_save_is_acknowledged_when_it_is_done() {
     bench.receive(&long(ESC, 245, &[1.0], 2));
     assert_eq!(acks(&bench.answers()), [(245, ACCEPTED as u8)]);
     assert_eq!(bench.component.take_request(), None);
-    // Not the same any more: once more, and it fails.
+    // No longer a repeat: stores again, and fails.
     assert_eq!(bench.command(245, &[1.0]).len(), 0);
     assert_eq!(bench.component.take_request(), Some(Request::Save));
     bench
@@ -33,7 +33,7 @@ fn a_save_is_acknowledged_when_it_is_done() {
     let sent = bench.answers();
     assert_eq!(acks(&sent), [(245, FAILED as u8)]);
     assert_eq!(texts(&sent), ["storage: the flash failed"]);
-    // Nothing was asked for.
+    // Nothing was requested.
     bench.component.storage_done(Ok(()));
     assert_eq!(bench.answers().len(), 0);
 }

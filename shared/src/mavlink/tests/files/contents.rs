@@ -48,7 +48,7 @@ fn faults_are_told_in_words() {
 fn the_metadata_can_be_found() {
     let mut bench = Bench::new();
     let general = fetch(&mut bench, "general.json.xz", 239);
-    // COMPONENT_METADATA, and COMPONENT_INFORMATION, which was before it.
+    // COMPONENT_METADATA, and its predecessor COMPONENT_INFORMATION.
     for (message, uri_at) in [(397, 8), (395, 12)] {
         let command = COMMAND_LONG_DATA {
             target_system: 1,

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Each makes a whole file: what comes between two polls must not hold up the next.
+/// Each produces a whole file: what arrives between two polls must not delay the next.
 #[test]
 fn of_a_flood_of_requests_few_are_answered_at_a_poll() {
     let mut bench = Bench::new();
@@ -33,7 +33,7 @@ fn a_flood_of_one_does_not_keep_out_another() {
     };
     for flood in [path(CRC, "parameter.json.xz"), read(READ, 0, 80)] {
         let mut polls = 0;
-        // Behind the flood of each poll, as its answers come.
+        // Behind each poll's flood, as its answers come.
         let mut requests = [path(OPEN, PACK), read(READ, 0, 80), read(TERMINATE, 0, 0)].into_iter();
         let mut request = requests.next();
         while let Some(wanted) = request {

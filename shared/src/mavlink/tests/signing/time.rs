@@ -1,4 +1,4 @@
-//! The time of signatures: who tells it, and how far ahead it may be.
+//! The time of signatures: who sets it, and how far ahead it may be.
 
 use super::*;
 
@@ -12,7 +12,7 @@ fn a_time_ahead_locks_nobody_out() {
         );
         let off = setup([0; 32], TODAY + ahead);
         bench.receive(&signed(STATION, &off, &KEY, 1, TODAY + ahead));
-        // By a frame that is taken.
+        // By a frame that is accepted.
         let far = setup(KEY, TODAY + ahead);
         bench.receive(&signed(STATION, &far, &KEY, 9, TODAY + ahead / YEAR));
         let refused = bench.answers();
@@ -47,7 +47,7 @@ fn the_first_frame_after_a_start_tells_the_time_within_five_years() {
     assert!(takes(&mut bench, 5.0, STATION, 1, TODAY + 4 * YEAR));
 }
 
-/// A frame from a recording that was never heard may come first, and a machine may sleep.
+/// A frame from a recording never heard before may come first, and a machine may sleep.
 #[test]
 fn a_minute_without_a_frame_lets_one_tell_the_time_again() {
     let mut bench = keyed();
@@ -60,8 +60,8 @@ fn a_minute_without_a_frame_lets_one_tell_the_time_again() {
     assert!(takes(&mut bench, 5.0, STATION, 1, hour));
 }
 
-/// An hour that was never heard, one frame a second, from a day before: while it is played nobody who is
-/// right is heard, and no longer.
+/// An unheard hour from the day before, one frame a second: correct clocks are locked out while it plays, and no
+/// longer.
 #[test]
 fn a_recording_that_is_played_slowly_locks_out_for_its_own_length_at_most() {
     let mut bench = keyed();
