@@ -1,7 +1,7 @@
-//! Tunes that the motor plays: which notes each has, and which note is due.
+//! Tunes that the motor plays: the notes of each, and which is due.
 //!
-//! A tune tells a user what the ESC has found, so no two sound alike. The drive plays a
-//! note without turning the motor; see [`Setpoint::Tone`](crate::drive::Setpoint::Tone).
+//! A tune tells the user what the ESC has found, so no two sound alike. The drive plays a note
+//! without turning the motor; see [`Setpoint::Tone`](crate::drive::Setpoint::Tone).
 
 /// The tunes of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,13 +12,13 @@ pub enum Tune {
     Armed,
     /// An armed wire has lost its signal: three low pulses.
     Lost,
-    /// The throttle was not at zero when the signal came: two notes that fall, twice.
+    /// The throttle was not at zero when the signal came: two falling notes, twice.
     OpenThrottle,
     /// The high end of the stick's range is taken: two short notes.
     Calibrating,
     /// The stick's range is stored: two short notes and a high one.
     Calibrated,
-    /// A flight controller looks for its aircraft: one note.
+    /// A flight controller searches for its aircraft: one note.
     Beacon(Beacon),
 }
 
@@ -49,7 +49,7 @@ pub enum Note {
     },
 }
 
-/// A note and for how long it sounds, ms.
+/// A note and its duration, ms.
 type Timed = (Note, u16);
 
 const fn note(hz: u16, for_ms: u16) -> Timed {
@@ -71,12 +71,11 @@ const G6: u16 = 1568;
 const B6: u16 = 1976;
 const C7: u16 = 2093;
 
-/// The end of every tune: a pause, in which the low sides brake the movement that the last note has
-/// left.
+/// The end of every tune: a pause in which the low sides brake the movement left by the last note.
 const END: Timed = rest(20);
 
 impl Tune {
-    /// Its notes, in order, but for the [`END`].
+    /// Returns its notes in order, without the [`END`].
     const fn notes(self) -> &'static [Timed] {
         const START: &[Timed] = &[note(C6, 80), rest(15), note(E6, 80), rest(15), note(G6, 80)];
         const ARMED: &[Timed] = &[note(C7, 150)];
@@ -102,7 +101,7 @@ impl Tune {
             rest(60),
             note(C7, 200),
         ];
-        // With their ends 250 ms: flight controllers wait 260 ms for one.
+        // 250 ms with the end: flight controllers wait 260 ms for one.
         const BEACONS: [&[Timed]; 5] = [
             &[note(G5, 230)],
             &[note(B5, 230)],
@@ -122,7 +121,7 @@ impl Tune {
     }
 }
 
-/// Plays one tune at a time. Times are in µs since any start, and do not run backwards.
+/// Plays one tune at a time. Times are in µs from any origin, and monotonic.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Player {
     playing: Option<Playing>,
@@ -135,8 +134,8 @@ struct Playing {
 }
 
 impl Player {
-    /// Begins a tune, in place of one that plays. One that plays already goes on: what asks for it
-    /// may ask several times.
+    /// Begins a tune in place of the one playing. If it already plays it goes on: callers may ask
+    /// repeatedly.
     pub fn play(&mut self, now_us: u64, tune: Tune) {
         let goes_on = self.playing.is_some_and(|playing| playing.tune == tune);
         if !goes_on || self.note(now_us).is_none() {
@@ -147,7 +146,7 @@ impl Player {
         }
     }
 
-    /// The motor cannot be heard now: the tune starts over now.
+    /// Restarts the tune now, since the motor cannot be heard yet.
     pub fn wait(&mut self, now_us: u64) {
         if self.note(now_us).is_some()
             && let Some(playing) = &mut self.playing
@@ -161,7 +160,7 @@ impl Player {
         self.playing = None;
     }
 
-    /// The note that is due; `None` when no tune plays.
+    /// Returns the note that is due; `None` if no tune plays.
     pub fn note(&self, now_us: u64) -> Option<Note> {
         let playing = self.playing?;
         let mut left_us = now_us.saturating_sub(playing.since_us);
@@ -202,7 +201,7 @@ mod tests {
         named.into_iter().chain(beacons).collect()
     }
 
-    /// Each note with the time for which it is heard, ms, as a caller that looks every ms finds it.
+    /// Returns each note with the time it is heard, ms, for a caller that looks every ms.
     fn heard(tune: Tune) -> Vec<(Note, u32)> {
         let mut player = Player::default();
         player.play(5_000_000, tune);
@@ -244,7 +243,7 @@ mod tests {
 
     #[test]
     fn tunes_are_as_long_as_their_users_wait() {
-        // Arming takes 300 ms, a flight controller waits 260 ms for a beacon.
+        // Arming takes 300 ms, and a flight controller waits 260 ms for a beacon.
         assert!(length_ms(Tune::Start) < 300);
         assert!(length_ms(Tune::Armed) <= 200);
         for beacon in BEACONS {

@@ -1,4 +1,4 @@
-//! Means of what the drive shows at many looks.
+//! Averages what the drive shows over many looks.
 
 use core::f32::consts::TAU;
 
@@ -6,22 +6,22 @@ use crate::drive::Snapshot;
 use crate::math::Real;
 use crate::units::Scale;
 
-/// Looks that make a mean of an excitation.
+/// Looks averaged for an excitation.
 pub(super) const EXCITED_LOOKS: u16 = 150;
 
-/// Looks that make a mean of a rotor that turns.
+/// Looks averaged for a turning rotor.
 pub(super) const SPUN_LOOKS: u16 = 200;
 
-/// The time from then to now, s: less than an hour, so the lower words tell it.
+/// Returns the time elapsed, s: less than an hour, so the low words suffice.
 pub(super) fn seconds(now_us: u64, then_us: u64) -> f32 {
     1e-6 * (now_us as u32).wrapping_sub(then_us as u32) as f32
 }
 
 /// What the drive shows, or its mean: currents along d and q, A, voltages along d and q, V, and the electrical speed,
-/// rad/s. Of an excitation those along q are amplitudes of the square wave.
+/// rad/s. During an excitation those along q are amplitudes of the square wave.
 pub(super) type Seen = [f32; 5];
 
-// Out of line: two steps need it.
+// Out of line: two steps call it.
 #[inline(never)]
 pub(super) fn seen(snapshot: &Snapshot, scale: &Scale) -> Seen {
     let (i, u) = (snapshot.i, snapshot.u);

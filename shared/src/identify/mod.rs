@@ -1,19 +1,19 @@
-//! Identification: R, L, flux and inertia of a motor that nobody measured, in some ten seconds.
+//! Identification: measures R, L, flux and inertia of an unknown motor in some ten seconds.
 //!
-//! Nothing is taken as known of the motor but its pole pairs, which only the inertia needs. The drive is made anew
-//! as the figures come in, and as it was at the end: they stand in a [`Report`], and change no parameter until
-//! somebody has them kept. It turns the motor, up to four tenths of the speed that the supply can give it, so it is
-//! begun under the rule of what may turn one, and any throttle, fault or failed start ends it.
+//! It assumes nothing about the motor but its pole pairs, which only the inertia needs. The drive is rebuilt as the
+//! figures come in, and at the end as it was before: they stand in a [`Report`] and change no parameter until someone
+//! has them kept. It turns the motor, up to four tenths of the speed that the supply allows, so it begins under the
+//! rule of what may turn a motor, and any throttle, fault or failed start ends it.
 //!
 //! | step | the drive | what follows |
 //! |---|---|---|
-//! | each phase is excited by two currents | [`Setpoint::Excite`]: the rotor stands aligned | R from the difference of the voltages, and from the rest what the dead time takes |
-//! | and by a square wave along the current and across it | likewise | L on both axes |
-//! | spin | six-step, by a share of the supply | about the flux |
-//! | up and down | field-oriented, by a torque each way | the flux, from the voltage that the current does not take; the inertia, from the currents of both runs and what they gain in speed |
+//! | each phase is excited by two currents | [`Setpoint::Excite`]: the rotor stands aligned | R from the difference of the voltages, and what the dead time takes from the rest |
+//! | then by a square wave, along the current and across it | likewise | L on both axes |
+//! | spin | six-step, with a share of the supply | a rough flux |
+//! | up and down | field-oriented, with a torque each way | the flux, from the voltage that the current does not account for; the inertia, from both runs' currents and changes of speed |
 //!
-//! A current of either sign, two levels of it and a run each way: an error of the dead time, of a sensor's gain or of
-//! a drag that grows with the speed's square stands in both measurements, and their difference is without it.
+//! Both signs of a current, two levels of it, a run each way: an error of the dead time, of a sensor's gain, or of drag
+//! that grows with speed squared is common to both measurements and cancels in their difference.
 
 mod means;
 mod report;
@@ -33,7 +33,7 @@ use report::Motor;
 use shaft::Shaft;
 use winding::Winding;
 
-/// The excitations of a phase: the current, of the greatest one, and the square wave.
+/// The excitations of a phase: the share of the greatest current, and the square wave.
 const EXCITATIONS: [(f32, Ripple); 4] = [
     (0.5, Ripple::None),
     (1.0, Ripple::None),
@@ -41,35 +41,35 @@ const EXCITATIONS: [(f32, Ripple); 4] = [
     (1.0, Ripple::Across),
 ];
 
-/// The excitations of all phases.
+/// The number of excitations over all phases.
 const EXCITED: u8 = 12;
 
-/// The greatest current of an excitation, and that of a run, of `LIM_PHASE_A`.
+/// The greatest current of an excitation, and that of a run, over `LIM_PHASE_A`.
 const EXCITED_SHARE: f32 = 0.5;
 const RUN_SHARE: f32 = 0.4;
 
-/// Share of the supply with which the motor is spun.
+/// Share of the supply that spins the motor.
 const SPIN_SHARE: I1F31 = I1F31::lit("0.25");
 
-/// Time in which the torque of a run rises to its greatest, s: a light rotor has its speed before that.
+/// Time in which a run's torque rises to its greatest, s: a light rotor gets to speed sooner.
 const RISE_S: f32 = 1.0;
-/// How far it has risen when a run begins, s: with less a rotor that is caught would slow down and be lost.
+/// How far it has risen when a run begins, s: with less, a caught rotor would slow down and be lost.
 const BEGUN_S: f32 = 0.15;
-/// The torque against the rotation, of that with which the run up has ended.
+/// The torque against the rotation over the torque at the end of the run up.
 const AGAINST: f32 = 0.5;
 /// Time between two looks, s.
 const LOOK_S: f32 = 1e-3;
 
-/// Time until the drive has been made anew, s.
+/// Time until the drive has been rebuilt, s.
 const ADOPTED_S: f32 = 0.02;
-/// Time until a rotor has swung to another phase's axis, and until a current has come to another level, s.
+/// Time until a rotor has swung to another phase's axis, and until a current has reached another level, s.
 const ALIGNED_S: f32 = 0.4;
 const SETTLED_S: f32 = 0.1;
-/// The means of an excitation are those of 512 periods.
+/// The means of an excitation span 512 periods.
 const SETTLED_PERIODS: f32 = 4096.0;
-/// What the voltage takes at most to come to the end of its range.
+/// The longest that the voltage takes to reach the end of its range.
 const RISEN_PERIODS: f32 = 20_000.0;
-/// The longest that a step may take, s.
+/// The longest time for a step, s.
 const LONGEST_S: f32 = 8.0;
 
 /// The step of an identification.
@@ -79,17 +79,17 @@ enum Step {
     Over,
     /// The drive forgets the motor.
     Forget,
-    /// An excitation, by its number: four of each phase.
+    /// An excitation, by number: four of each phase.
     Excite(u8),
     /// Six-step.
     Spin,
-    /// The bridge goes off.
+    /// The bridge turns off.
     Release,
-    /// The drive learns what has been found.
+    /// The drive is rebuilt with the results so far.
     Learn,
     /// A torque along the rotation.
     Up,
-    /// One against it.
+    /// A torque against it.
     Down,
     /// The same until the rotor is slow: a light one would coast for a minute.
     Halt,
@@ -98,11 +98,11 @@ enum Step {
 /// The outcome of a look.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// It goes on, so many percent being done.
+    /// It goes on; percent done.
     Progress(u8),
-    /// The drive shall be made for the motor as far as it is known by now.
+    /// Build the drive for the motor as far as it is known by now.
     Assume,
-    /// It has ended: well, or for this reason. The drive shall be made for the motor of the parameters.
+    /// It has ended, with success or for this reason. Build the drive from the parameters.
     Done(Result<(), &'static str>),
 }
 
@@ -136,12 +136,12 @@ pub struct Identify {
     means: Means,
     winding: Winding,
     shaft: Shaft,
-    /// The motor as far as it is known, and the greatest speed that the drive must know, rpm.
+    /// The motor as far as it is known, and the greatest speed to build the drive for, rpm.
     motor: Motor,
     rpm_max: f32,
     /// How long the torque has risen, s.
     risen_s: f32,
-    /// The speed with which the means of the spin began.
+    /// The speed at which the means of the spin began.
     speed: Speed,
     /// The results.
     pub report: Report,
@@ -166,14 +166,14 @@ impl Default for Identify {
 }
 
 impl Identify {
-    /// Begins one.
+    /// Begins an identification.
     pub fn begin(&mut self, now_us: u64) -> Outcome {
         *self = Self::default();
         self.go(now_us, Step::Forget, Setpoint::Stop);
         Outcome::Assume
     }
 
-    /// Ends it, for this reason, if one is under way.
+    /// Ends the one under way, if any, for this reason.
     pub fn end(&mut self, reason: &'static str) -> Option<Outcome> {
         let ended = self.is_under_way();
         self.step = Step::Over;
@@ -185,12 +185,12 @@ impl Identify {
         self.step != Step::Over
     }
 
-    /// What is asked of the drive, while one is under way.
+    /// Returns the drive's set-point while one is under way.
     pub fn setpoint(&self) -> Option<Setpoint> {
         self.is_under_way().then_some(self.setpoint)
     }
 
-    /// Goes on, about each millisecond.
+    /// Advances it; call it about every millisecond.
     // Out of line: its stack is free for what the caller does next.
     #[inline(never)]
     pub fn look(&mut self, sight: &Sight) -> Option<Outcome> {
@@ -246,7 +246,7 @@ impl Identify {
         Outcome::Progress(5 * number)
     }
 
-    /// A look at the windings.
+    /// Looks at the windings.
     fn excited(
         &mut self,
         sight: &Sight,
@@ -263,7 +263,7 @@ impl Identify {
             let settled_s = if step == 0 { ALIGNED_S } else { SETTLED_S };
             let settled = passed_s > settled_s + SETTLED_PERIODS * period_s;
             let reached = (snapshot.i.d - asked).abs() < asked >> 5;
-            // Where the supply is too weak for the current, what flows is as good.
+            // If the supply is too weak for the current, what flows is as good.
             let risen = reached || passed_s > RISEN_PERIODS * period_s;
             if snapshot.phase != Phase::Tone || !settled || !risen {
                 return Ok(None);
@@ -284,13 +284,13 @@ impl Identify {
         Ok(Some(Outcome::Progress(60)))
     }
 
-    /// A look at a rotor that turns by six-step.
+    /// Looks at a rotor turned by six-step.
     fn spun(&mut self, sight: &Sight) -> Option<Outcome> {
         let snapshot = sight.snapshot;
         if snapshot.phase != Phase::Run {
             return None;
         }
-        // Anew until the speed stays.
+        // Restarts until the speed is steady.
         if (snapshot.speed - self.speed).abs() > self.speed >> 5 {
             self.speed = snapshot.speed;
             self.means = Means::default();
@@ -305,7 +305,7 @@ impl Identify {
         Some(Outcome::Progress(70))
     }
 
-    /// A look whether the bridge is off: only then can the drive be made anew.
+    /// Waits until the bridge is off: only then can the drive be rebuilt.
     fn released(&mut self, sight: &Sight, passed_s: f32) -> Option<Outcome> {
         if sight.snapshot.phase != Phase::Idle || passed_s < ADOPTED_S {
             return None;
@@ -315,7 +315,7 @@ impl Identify {
         Some(Outcome::Assume)
     }
 
-    /// A look at a run.
+    /// Looks at a run.
     fn runs(&mut self, sight: &Sight) -> Result<Option<Outcome>, &'static str> {
         if sight.snapshot.phase != Phase::Run {
             return Ok(None);
@@ -338,15 +338,15 @@ impl Identify {
         Ok(None)
     }
 
-    /// The torque that there is by now, this way.
-    // As above, three times.
+    /// Returns the torque reached by now, in this direction.
+    // Out of line: three calls.
     #[inline(never)]
     fn torque(&self, sight: &Sight, way: f32) -> Setpoint {
         let current_a = way * RUN_SHARE * self.risen_s / RISE_S * sight.limit_a;
         Setpoint::Torque(sight.scale.current_from_a(current_a))
     }
 
-    /// Puts the motor as far as it is known, and what follows from it, in the place of that of the parameters.
+    /// Replaces the parameters' motor by the one known so far, and what follows from it.
     pub(crate) fn assume(&self, params: &mut Params) {
         for id in ParamId::ALL {
             if id.entry().kind == Kind::FromMotor {
@@ -358,12 +358,12 @@ impl Identify {
             (ParamId::MotLUh, 1e6 * self.motor.l_h),
             (ParamId::MotFluxMwb, 1e3 * self.motor.flux_wb),
             (ParamId::MotJGcm2, 0.0),
-            // Braked by the low sides alone a motor could drive more than the limit.
+            // Braked by the low sides alone, a motor could drive more than the limit.
             (ParamId::MotStop, 0.0),
             (CtlDrive::PARAM, f32::from(CtlDrive::Automatic.number())),
             (ParamId::CtlRpmMax, self.rpm_max),
         ] {
-            // A figure out of range is left out, and the check of what this makes tells of it.
+            // A figure out of range is left out; the check of the resulting drive reports it.
             let _ = params.set(id, value);
         }
     }

@@ -1,4 +1,4 @@
-//! The figures that an identification has found.
+//! The results of an identification.
 
 use crate::params::ParamId;
 
@@ -13,17 +13,17 @@ pub(super) struct Motor {
     pub(super) flux_wb: f32,
 }
 
-/// A figure: the mean of some measurements.
+/// A figure: the mean of several measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figure {
     /// The mean.
     pub value: f32,
-    /// By how much a measurement differs from it at most, as a share of it.
+    /// The greatest deviation of a measurement from it, as a share of it.
     pub spread: f32,
 }
 
 impl Figure {
-    // Out of line: there are seven.
+    // Out of line: seven calls.
     #[inline(never)]
     pub(super) fn of(values: &[f32], factor: f32) -> Self {
         let mean = values.iter().sum::<f32>() / values.len() as f32;
@@ -46,7 +46,7 @@ pub struct Line {
     pub figure: Figure,
 }
 
-/// The figures' names and units: those of the parameters that they are for, and three that are for a person.
+/// The figures' names and units: four parameters, and three for the user alone.
 const ROWS: [(&str, &str); 7] = [
     ("MOT_R_MOHM", "mOhm"),
     ("MOT_L_UH", "uH"),
@@ -66,16 +66,16 @@ pub struct Report {
     pub l_uh: Figure,
     /// Flux linkage, mWb.
     pub flux_mwb: Figure,
-    /// Inertia with what is on the shaft, g·cm²; of the pole pairs that are told.
+    /// Inertia including what is on the shaft, g·cm²; scaled by the stated pole pairs.
     pub j_gcm2: Figure,
-    /// L along the rotor's flux, and across it, µH.
+    /// L along the rotor's flux and across it, µH.
     pub l_axes_uh: [Figure; 2],
     /// The dead time of the bridge, ns.
     pub dead_time_ns: Figure,
 }
 
 impl Report {
-    /// The lines, none before an identification has come to its end.
+    /// Passes each line to `tell`; none before an identification has completed.
     pub fn tell(&self, mut tell: impl FnMut(&Line)) {
         if self.settings().is_none() {
             return;
@@ -95,7 +95,7 @@ impl Report {
         }
     }
 
-    /// The parameters that it is for, of one that has come to its end.
+    /// Returns the parameters found by a completed identification.
     pub fn settings(&self) -> Option<[(ParamId, f32); 4]> {
         (self.j_gcm2.value > 0.0).then_some([
             (ParamId::MotRMohm, self.r_mohm.value),

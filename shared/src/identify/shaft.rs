@@ -1,4 +1,4 @@
-//! Flux and inertia from a rotor that turns.
+//! Flux and inertia from a turning rotor.
 
 use core::f32::consts::TAU;
 
@@ -7,23 +7,23 @@ use super::report::{Figure, Motor, Report};
 use crate::math::{SQRT_3, square_root};
 use crate::units::Scale;
 
-/// The speed of the runs: of what the supply can turn the motor with, and of a turn a period.
+/// The speed of the runs: over what the supply can reach, and in turns per period.
 const RUN_SHARE: f32 = 0.4;
 const RUN_TURNS: f32 = 1.0 / 30.0;
 
 /// The share of that speed at which a run down ends.
 const SLOW_SHARE: f32 = 0.45;
 
-/// The greatest speed of the drive, of that of the runs.
+/// The drive's greatest speed over that of the runs.
 const RESERVE: f32 = 1.5;
 
 /// Mean of the back-EMF between two commutations over its peak: 3/π.
 const SIX_STEP_SHARE: f32 = 0.955;
 
-/// Most by which the flux of a run may differ from the mean of both.
+/// Greatest deviation of a run's flux from the mean of both.
 const FLUX_SPREAD: f32 = 0.1;
 
-/// What the runs have told.
+/// The measurements of the runs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Shaft {
     fast_rad_s: f32,
@@ -61,7 +61,7 @@ impl Run {
     }
 }
 
-/// The length of the voltage that the current does not take: whatever the angle of the frame.
+/// Returns the magnitude of the voltage that the current does not account for, whatever the angle of the frame.
 fn emf([i_d, i_q, u_d, u_q, omega]: Seen, motor: &Motor) -> f32 {
     let reactance_ohm = omega * motor.l_h;
     let e_d = u_d - motor.r_ohm * i_d + reactance_ohm * i_q;
@@ -74,21 +74,21 @@ fn length(x: f32, y: f32) -> f32 {
 }
 
 impl Shaft {
-    /// About the flux, Wb, of what the six-step drive shows. Of its two legs one switches: the dead time takes √3/4
-    /// of what it takes along a phase.
+    /// Returns a rough flux, Wb, from what six-step shows. One of its two legs switches: the dead time takes √3/4 of
+    /// what it takes along a phase.
     pub(super) fn about([i_d, i_q, u_d, u_q, omega]: Seen, motor: &Motor, dead_v: f32) -> f32 {
         let dropped_v = motor.r_ohm * length(i_d, i_q) + SQRT_3 / 4.0 * dead_v;
         (length(u_d, u_q) - dropped_v) / (SIX_STEP_SHARE * omega)
     }
 
-    /// Chooses the speed of the runs. Returns the greatest speed that the drive must know, rpm.
+    /// Chooses the speed of the runs. Returns the greatest speed to build the drive for, rpm.
     pub(super) fn choose(&mut self, bus_v: f32, motor: &Motor, scale: &Scale) -> f32 {
         let by_supply = RUN_SHARE * bus_v / (SQRT_3 * motor.flux_wb);
         self.fast_rad_s = by_supply.min(RUN_TURNS * TAU / scale.period_s);
         RESERVE * self.fast_rad_s * 60.0 / (TAU * scale.pole_pairs)
     }
 
-    /// A look at a run up or down. True when it has come to its end.
+    /// Looks at a run up or down. Returns true at its end.
     pub(super) fn look(&mut self, now_us: u64, seen: Seen, down: bool, motor: &Motor) -> bool {
         let slow = SLOW_SHARE * self.fast_rad_s;
         let [.., omega] = seen;
@@ -102,7 +102,7 @@ impl Shaft {
         }
     }
 
-    /// The figures of the runs, or why there are none.
+    /// Computes the runs' figures, or says why there are none.
     pub(super) fn judge(&self, report: &mut Report, pole_pairs: f32) -> Result<(), &'static str> {
         let [up, down] = &self.runs;
         let flux_wb = self.runs.map(|run| run.flux_wb / run.looks);

@@ -4,23 +4,23 @@ use super::means::Seen;
 use super::report::{Figure, Motor, Report};
 use crate::units::Scale;
 
-/// Most by which R of a phase may differ from the mean, and L likewise: of a salient rotor the axes do.
+/// Greatest deviation of a phase's R from the mean, and of L likewise: a salient rotor's axes differ.
 const R_SPREAD: f32 = 0.1;
 const L_SPREAD: f32 = 0.5;
 
-/// What the excitations of the three phases have told.
+/// The measurements from the excitations of the three phases.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Winding {
-    /// Voltage and current of the lower of two currents.
+    /// Voltage and current at the lower of two currents.
     lower: (f32, f32),
     r_ohm: [f32; 3],
     dead_v: [f32; 3],
-    /// L along the axis and across it, of each phase.
+    /// L along each phase's axis and across it.
     l_h: [[f32; 3]; 2],
 }
 
 impl Winding {
-    /// Takes the means of an excitation of a phase, by the number of its step.
+    /// Takes the means of a phase's excitation, by its step number.
     pub(super) fn take(&mut self, phase: usize, step: u8, seen: Seen, period_s: f32) {
         let [i_a, ripple_a, u_v, ripple_v, _] = seen;
         match step {
@@ -37,12 +37,12 @@ impl Winding {
         }
     }
 
-    /// Voltage that the dead time takes along a phase's axis, V.
+    /// Returns the voltage that the dead time takes along a phase's axis, V.
     pub(super) fn dead_v(&self) -> f32 {
         Figure::of(&self.dead_v, 1.0).value
     }
 
-    /// The winding's figures, or why there are none.
+    /// Computes the winding's figures, or says why there are none.
     pub(super) fn judge(
         &self,
         report: &mut Report,
@@ -52,11 +52,11 @@ impl Winding {
         report.r_mohm = Figure::of(&self.r_ohm, 1e3);
         report.l_uh = Figure::of(self.l_h.as_flattened(), 1e6);
         report.l_axes_uh = self.l_h.map(|l_h| Figure::of(&l_h, 1e6));
-        // Along a phase's axis the dead time takes 4/3 of what it takes of a phase.
+        // Along a phase's axis the dead time takes 4/3 of what it takes from a phase.
         report.dead_time_ns = Figure::of(&self.dead_v, 0.75e9 * scale.period_s / bus_v);
         motor.r_ohm = 1e-3 * report.r_mohm.value;
         motor.l_h = 1e-6 * report.l_uh.value;
-        // What is no number is no less than anything either.
+        // The comparisons also reject NaN.
         if motor.r_ohm > 0.0 && report.r_mohm.spread < R_SPREAD {
             if motor.l_h > 0.0 && report.l_uh.spread < L_SPREAD {
                 return Ok(());
@@ -67,12 +67,12 @@ impl Winding {
     }
 }
 
-/// L by the current that a square wave of voltage, up for two periods and down for two, has driven. Within
-/// two periods the current goes from one peak to the other: i = u/R·tanh(R·T_s/L).
+/// Returns L from the current that a square wave of voltage, two periods up and two down, has driven. Within two
+/// periods the current goes from one peak to the other: i = u/R·tanh(R·T_s/L).
 fn inductance(r_ohm: f32, period_s: f32, u_v: f32, i_a: f32) -> f32 {
     let z = r_ohm * i_a / u_v;
     let square = z * z;
-    // z/artanh(z), right to 1 % up to 0.7.
+    // z/artanh(z), accurate to 1 % up to 0.7.
     let ratio = 1.0 - square * (1.0 / 3.0 + square * (4.0 / 45.0 + square * (44.0 / 945.0)));
     period_s * u_v / i_a * ratio
 }
@@ -82,7 +82,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// The current of a winding, period by period.
+    /// Simulates a winding's current, period by period.
     #[test]
     fn an_inductance_is_found_whatever_the_resistance() {
         let (period_s, u_v) = (1.0 / 24_000.0, 0.5);

@@ -1,4 +1,4 @@
-//! The record as a file: written by the ESC, read by a person's tools.
+//! The record as a file: written by the ESC, read by a user's tools.
 
 use core::sync::atomic::Ordering::Relaxed;
 
@@ -12,7 +12,7 @@ use crate::params::{Board, POLE_PAIRS};
 const HEAD: usize = 3;
 
 impl Record {
-    /// The file: amperes and volts a count of the converters, pole pairs, and the words of the record; those of the
+    /// Writes the file: amperes and volts per count of the converters, pole pairs, and the words of the record; the
     /// periods only while they are held.
     pub(crate) fn tell(&self, board: &Board, pole_pairs: f32, put: &mut dyn FnMut(u32)) {
         for number in [board.current_a_per_count, board.bus_v_per_count, pole_pairs] {
@@ -28,55 +28,55 @@ impl Record {
     }
 }
 
-/// A fault of the record.
+/// A fault in the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FaultSeen {
-    /// From 1 on, since power-up.
+    /// From 1, since power-up.
     pub number: u32,
-    /// What it was.
+    /// Which fault.
     pub fault: Fault,
     /// What the drive was doing.
     pub phase: Phase,
-    /// Starts of the ESC between it and now: 0 is the present one.
+    /// Restarts of the ESC since then; 0 is the current run.
     pub starts_ago: u32,
-    /// Time since its start, s.
+    /// Time from the ESC's start to the fault, s.
     pub time_s: f32,
-    /// Mechanical speed, the way the motor turned, rpm.
+    /// Mechanical speed in the motor's direction, rpm.
     pub rpm: f32,
     /// Supply, V.
     pub bus_v: f32,
 }
 
-/// A control period of the record.
+/// A control period in the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeriodSeen {
-    /// Before the end of the last one, s: below 0.
+    /// Relative to the end of the last one, s: negative.
     pub time_s: f32,
-    /// Currents as the converters read them, without their zeros taken out, A.
+    /// Currents as read by the converters, zeros not subtracted, A.
     pub currents_a: [f32; 3],
     /// Supply, V.
     pub bus_v: f32,
-    /// Electrical angle as estimated, degrees, 0 to 360.
+    /// Estimated electrical angle, degrees, 0 to 360.
     pub angle_deg: f32,
-    /// Mechanical speed as estimated, the way the motor turned, rpm.
+    /// Estimated mechanical speed in the motor's direction, rpm.
     pub rpm: f32,
-    /// The share for which each high side was to be on in the next period; nothing where both switches are off.
+    /// Commanded on-time share of each high side in the next period; `None` if both switches are off.
     pub duties: [Option<f32>; 3],
 }
 
-/// The record as a tool has read it.
+/// The record as a tool reads it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recorded {
     /// The last faults, oldest first.
     pub faults: Vec<FaultSeen, FAULTS>,
     /// The number of the fault that the periods led to.
     pub holder: Option<u32>,
-    /// Those before it, oldest first; in the last one the bridge was turned off.
+    /// The periods before it, oldest first; in the last one the bridge was turned off.
     pub periods: Vec<PeriodSeen, PERIODS>,
 }
 
 impl Recorded {
-    /// Reads the file; `None` if it is none.
+    /// Reads the file; returns `None` if it is not one.
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let word = |at: usize| {
             let bytes = bytes.get(4 * at..)?.first_chunk()?;
@@ -128,7 +128,7 @@ impl Recorded {
                 |duty: u32, one: u32| (duty < 2 * one - 1).then(|| duty as f32 / one as f32);
             let currents = [lower(of_b_a), upper(of_b_a), lower(of_bus_c)];
             let seen = PeriodSeen {
-                // The difference first: a float has no room for days of periods.
+                // Difference first: a float cannot resolve days of periods.
                 time_s: -((end - number) as f32) * period_s,
                 currents_a: currents.map(|counts| counts * a_per_count),
                 bus_v: upper(of_bus_c) * v_per_count,

@@ -1,12 +1,12 @@
-//! The fault record: the last faults, and the control periods before a trip, in memory that a reset leaves alone.
+//! The fault record: the last faults, and the control periods before a trip, in memory that survives a reset.
 //!
-//! The interrupt writes it, outside [`step`](crate::drive::step); tasks read it whenever they like. All is words,
-//! each written at once, so neither waits for the other.
+//! The interrupt writes it, outside [`step`](crate::drive::step); tasks read it at any time. It consists of words, each
+//! written atomically, so neither waits for the other.
 //!
-//! Only periods in which the bridge drives are noted: those before a trip stay, however long the drive rests after
-//! it. The first trip holds them, and later faults are noted without: the first is the cause more often than what
-//! follows it. They are held until somebody has read them ([`Record::taken`]) and the motor turns again, or the
-//! supply is gone.
+//! Only periods in which the bridge drives are recorded, so those before a trip remain however long the drive then
+//! rests. The first trip holds them, and later faults are recorded without periods: the first is the cause more often
+//! than what follows. They are held until someone has read them ([`Record::taken`]) and the motor turns again, or power
+//! is lost.
 
 mod file;
 
@@ -17,47 +17,47 @@ pub use file::{FaultSeen, PeriodSeen, Recorded};
 use crate::drive::{Bridge, Config, Sample, State};
 use crate::units::{AdcCounts, Duty};
 
-/// Whether this program keeps a record: the feature `record`.
+/// True if this program keeps a record: the feature `record`.
 pub const KEPT: bool = cfg!(feature = "record");
 
-/// Control periods that are kept.
+/// Control periods kept.
 pub const PERIODS: usize = 64;
 
-/// Faults that are kept.
+/// Faults kept.
 pub const FAULTS: usize = 8;
 
-/// What memory after power-up does not hold by chance, together with its inverse.
+/// A mark that memory after power-up does not hold by chance, together with its inverse.
 const MAGIC: u32 = 0x5369_4661;
 
-/// Places of words. All up to [`WRITTEN`] change at a start and at a fault only.
+/// Places of words. Those before [`WRITTEN`] change only at a start and at a fault.
 mod place {
-    /// [`MAGIC`](super::MAGIC), and behind it its inverse.
+    /// [`MAGIC`](super::MAGIC), followed by its inverse.
     pub(super) const MAGIC: usize = 0;
     /// Starts since power-up.
     pub(super) const STARTS: usize = 2;
     /// Faults since power-up.
     pub(super) const NOTED: usize = 3;
-    /// Which of them has held the periods last, from 1 on.
+    /// The number, from 1, of the fault that last held the periods.
     pub(super) const HOLDER: usize = 4;
-    /// Length of the periods that it holds, s, as a float's bits.
+    /// Length of the held periods, s, as a float's bits.
     pub(super) const PERIOD_S: usize = 5;
-    /// The ring of the faults.
+    /// The ring of faults.
     pub(super) const FAULTS: usize = 6;
-    /// Periods that have been written, and [`HELD`](super::HELD).
+    /// Number of periods written, with [`HELD`](super::HELD).
     pub(super) const WRITTEN: usize = FAULTS + super::ROW * super::FAULTS;
-    /// The ring of the periods, which has an array of its own: its rows are found without a look at the bounds.
+    /// The ring of periods, which has its own array: its rows need no bounds check.
     pub(super) const PERIODS: usize = WRITTEN + 1;
 }
 
 type Row = [AtomicU32; ROW];
 
-/// Words of a fault, and of a period.
+/// Words per fault, and per period.
 const ROW: usize = 4;
 
-/// In the count of the periods: a trip holds them.
+/// Flag in the count of periods: a trip holds them.
 const HELD: u32 = 1 << 31;
 
-/// A leg whose switches are both off: its duty in full is not as long.
+/// Marks a leg with both switches off: above any actual duty.
 const NO_DUTY: u32 = u32::MAX;
 
 /// The record.
@@ -65,16 +65,16 @@ const NO_DUTY: u32 = u32::MAX;
 pub struct Record {
     words: [AtomicU32; place::PERIODS],
     periods: [Row; PERIODS],
-    /// Periods that had been written when the bridge was last off.
+    /// Number of periods written when the bridge was last off.
     rested: AtomicU32,
-    /// Faults that the drive has counted since this start.
+    /// Faults counted by the drive since this start.
     counted: AtomicU32,
-    /// Not 0 once somebody has read the periods that are held.
+    /// Nonzero once someone has read the held periods.
     taken: AtomicU32,
 }
 
 impl Record {
-    /// An empty one, which is to be opened.
+    /// Creates an empty record, to be opened.
     pub const fn new() -> Self {
         Self {
             words: [const { AtomicU32::new(0) }; place::PERIODS],
@@ -85,8 +85,8 @@ impl Record {
         }
     }
 
-    /// Begins a start, before the interrupt does: what was left over a reset stays, what memory holds after
-    /// power-up does not.
+    /// Opens the record at a start, before the interrupt runs: contents that survived a reset stay, random contents
+    /// after power-up are cleared.
     pub fn open(&self) {
         if self.get(place::MAGIC) != MAGIC || self.get(place::MAGIC + 1) != !MAGIC {
             for word in &self.words {
@@ -100,8 +100,8 @@ impl Record {
         self.rested.store(self.get(place::WRITTEN), Relaxed);
     }
 
-    /// Notes a period: what `step` was given, its state after that, and what it said; to be called in each.
-    #[inline(always)] // in the interrupt: of a period that is driven only what is here
+    /// Records a period: the input of `step`, its state afterwards and its output; call it in every period.
+    #[inline(always)] // in the interrupt: a driven period takes only this code
     pub fn note(&self, config: &Config, state: &State, io: (&Sample, &Bridge), period: u32) {
         let written = self.get(place::WRITTEN);
         match io.1 {
@@ -114,9 +114,9 @@ impl Record {
         }
     }
 
-    /// A period's row: the readings of b and a; of the supply and c; speed and angle, the upper half of each; the
-    /// upper 11, 11 and 10 bits of the duties.
-    // Word by word: a loop over them stays one, where the code is made small.
+    /// Writes a period's row: the readings of b and a; of the supply and c; speed and angle, the upper half of each;
+    /// the upper 11, 11 and 10 bits of the duties.
+    // Word by word: optimised for size, a loop over them is not unrolled.
     #[inline(always)] // in each period
     fn write(&self, written: u32, state: &State, sample: &Sample, duties: [u32; 3]) {
         let [a, b, c] = sample.currents;
@@ -131,7 +131,7 @@ impl Record {
         row[3].store(duties, Relaxed);
     }
 
-    /// Any other period.
+    /// Records any other period.
     #[cold]
     #[inline(never)]
     fn note_rest(&self, config: &Config, state: &State, io: (&Sample, &Bridge), period: u32) {
@@ -171,7 +171,7 @@ impl Record {
                 return;
             }
         } else if !free {
-            // A tune at the next start, or a shaft that is held, takes nobody's place.
+            // A tune at the next start, or a blocked shaft, overwrites nothing.
             if self.taken.load(Relaxed) != 0 && state.drives() {
                 self.taken.store(0, Relaxed);
                 self.put(place::WRITTEN, 0);
@@ -185,7 +185,7 @@ impl Record {
         );
     }
 
-    /// Somebody has read the periods that are held: the next that are driven may take their place.
+    /// Notes that someone has read the held periods: the next driven ones may replace them.
     pub fn taken(&self) {
         self.taken.store(1, Relaxed);
     }
@@ -207,19 +207,19 @@ impl Default for Record {
     }
 }
 
-/// The count after this one. After 2^31 periods, a day of them, it begins anew, and so do the rows.
+/// Returns the next count. After 2^31 periods, a day of them, it restarts, and so do the rows.
 #[inline(always)] // in each period
 fn next(written: u32) -> u32 {
     (written + 1) & !HELD
 }
 
-/// The upper half of both: one instruction.
+/// Packs the upper halves of both: one instruction.
 #[inline(always)] // in each period
 fn halves(upper: u32, lower: u32) -> u32 {
     (upper & 0xffff_0000) | lower >> 16
 }
 
-/// Whole counts stand in the upper half.
+/// Returns a reading's bits; whole counts are in the upper half.
 #[inline(always)] // in each period
 fn counts(reading: AdcCounts) -> u32 {
     reading.to_bits() as u32

@@ -1,4 +1,4 @@
-//! What is noted, what holds it, and what a reader makes of it.
+//! What is recorded, what holds it, and what a reader makes of it.
 
 use std::vec::Vec;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::drive::{Fault, Phase, Setpoint, step};
 use crate::params::{BOSSO_BENCH, Board, Params, build};
 
-/// A drive at rest whose interrupt notes what the tests say of its bridge.
+/// A drive at rest whose interrupt records what the tests say of its bridge.
 struct Bench {
     config: Config,
     state: State,
@@ -38,7 +38,7 @@ impl Bench {
         }
     }
 
-    /// So many periods with this bridge; the readings count on.
+    /// Runs this many periods with this bridge; the readings count on.
     fn run(&mut self, periods: u32, bridge: Bridge) {
         for _ in 0..periods {
             self.period += 1;
@@ -53,7 +53,7 @@ impl Bench {
         self.run(periods, Bridge::Duty(duties));
     }
 
-    /// A start, as far as it goes without a motor.
+    /// Starts, as far as that goes without a motor.
     fn turn(&mut self) {
         let speed = self.config.scale.speed_from_rpm(3000.0);
         let nothing = Sample {
@@ -99,7 +99,7 @@ impl Bench {
         let mut file = Vec::new();
         let put = &mut |word: u32| file.extend(word.to_le_bytes());
         self.record.tell(&Board::BENCH, 7.0, put);
-        // What is cut short is refused, or has less; it is never misread with a panic.
+        // A truncated file is refused or yields less; it never panics.
         for end in (0..file.len()).step_by(7) {
             let cut = Recorded::read(&file[..end]);
             assert!(cut.is_none() || end >= 4 * 7, "{end}");
@@ -167,7 +167,7 @@ fn the_first_trip_holds_its_periods_until_they_are_read_and_the_bridge_drives() 
     assert_eq!(bench.read().holder, None);
     bench.trip(Fault::Stuck);
     let read = bench.read();
-    // The first that was driven freed them.
+    // The first driven period freed them.
     assert_eq!((read.holder, read.periods.len()), (Some(3), 20));
 }
 
