@@ -1,4 +1,4 @@
-//! What can stand on the bench: motors, loads and supplies by name, from a file or written out.
+//! What can be put on the bench: motors, loads and supplies by name, from a file or inline.
 
 mod choice;
 mod error;

@@ -1,4 +1,4 @@
-//! One emulated ESC: its tasks' side, its drive on a bench, its throttle wire and its flash.
+//! One emulated ESC: its tasks, its drive on a bench, its throttle wire and its flash.
 
 mod answer;
 mod capture;
@@ -33,7 +33,7 @@ use reply::Driven;
 
 pub use crate::machine::Onlooker;
 
-/// Where in the flash the parameters are: all of it.
+/// The parameters' place in the flash: all of it.
 const STORE: Range<u32> = 0..FLASH_BYTES as u32;
 
 /// Time between two calls of the tasks.
@@ -66,25 +66,24 @@ impl From<BuildError> for StartError {
 
 /// What an ESC starts with.
 pub struct Start {
-    /// What stands on the bench.
+    /// The bench.
     pub bench: Bench,
     /// The throttle wire.
     pub wire: Wire,
-    /// Where the parameters are kept.
+    /// Storage of the parameters.
     pub flash: FileFlash,
-    /// Parameters that are set over the stored ones and not stored themselves.
+    /// Parameters that override the stored ones and are not stored themselves.
     pub overrides: Vec<(ParamId, f32)>,
-    /// Parameters that are set in place of the factory's values and not stored: what else is stored goes
-    /// before them.
+    /// Parameters that replace the factory values and are not stored; stored values take precedence.
     pub defaults: Vec<(ParamId, f32)>,
-    /// What goes wrong.
+    /// The faults.
     pub faults: Vec<Fault>,
-    /// What the slowest MAVLink link carries.
+    /// Rate of the slowest MAVLink link.
     pub link_bytes_per_s: u32,
 }
 
-/// Nothing but the default bench, whose motor is known: a wire that nobody drives, nothing stored, set or broken,
-/// and a serial link of 115 200 baud.
+/// The default bench, whose motor is known: an undriven wire, nothing stored, set or broken, and a serial link of 115
+/// 200 baud.
 impl Default for Start {
     fn default() -> Self {
         Self {
@@ -106,14 +105,14 @@ pub struct Device {
     rig: Rig,
     wire: Wire,
     driven: Driven,
-    /// What the converters have last read; nothing before the first period.
+    /// The converters' latest readings; `None` before the first period.
     latest: Option<Sample>,
     flash: FileFlash,
     overrides: Vec<Override>,
     board: Board,
     link_bytes_per_s: u32,
     receivers: BTreeMap<LinkId, Receiver>,
-    /// Frames that receivers of streams which have ended refused.
+    /// Frames refused by receivers of streams that have ended.
     rejected_frames: u64,
     clock: Clock,
     task_due_ns: u64,
@@ -125,18 +124,17 @@ pub struct Device {
 struct Override {
     id: ParamId,
     value: f32,
-    /// True if it only takes the place of the factory's value.
+    /// True if it only replaces the factory value.
     is_default: bool,
-    /// What is stored, and stays so.
+    /// The stored value, which stays.
     stored: f32,
 }
 
-/// The simulated chip for the self-test: it has converters, of which this is the latest sample, and neither
-/// comparators nor clocks.
+/// The simulated chip for the self-test: its converters' latest sample; it has neither comparators nor clocks.
 pub struct Latest(pub Sample);
 
 impl Latest {
-    /// Without a supply, for an ESC that stands alone.
+    /// Returns a sample without a supply, for an ESC on its own.
     pub const fn at_rest() -> Self {
         Self(Sample {
             currents: [AdcCounts::ZERO; 3],
@@ -169,7 +167,7 @@ impl Clock {
         self.now() as u64
     }
 
-    /// The same to its fraction.
+    /// Returns the same with its fraction.
     fn now(&self) -> f64 {
         self.origin_ns + self.periods as f64 * self.period_ns
     }
@@ -178,7 +176,7 @@ impl Clock {
 impl Device {
     /// Powers the ESC up.
     ///
-    /// Returns it with a warning where what was stored is not whole.
+    /// Returns it with a warning if the stored data is not intact.
     pub fn start(start: Start) -> Result<(Self, Option<&'static str>), StartError> {
         let Start {
             bench,
@@ -209,7 +207,7 @@ impl Device {
         let board = bench.sensing.board(bench.delay);
         let (mut esc, throttle) = Esc::new(params.clone(), board, CAPTURE_HZ, link_bytes_per_s)?;
         esc.recall(&loaded);
-        // Memory of the chip, which is there before the program and after it: 1.2 KB that are never given back.
+        // The chip's memory, which outlives the program: 1.2 KB, never freed.
         let record = &*Box::leak(Box::<Record>::default());
         record.open();
         esc.serve(record);
@@ -241,55 +239,55 @@ impl Device {
         Ok((device, loaded.trouble()))
     }
 
-    /// Simulated time since the start, ns.
+    /// Returns the simulated time since the start, ns.
     pub fn now_ns(&self) -> u64 {
         self.clock.now_ns()
     }
 
-    /// When the period that comes begins, s.
+    /// Returns the start of the next period, s.
     pub fn begins_s(&self) -> f64 {
         self.clock.now() * 1e-9
     }
 
-    /// Whether a period is left until this time, to the nearest one: a period's length is no whole
-    /// number of nanoseconds.
+    /// Returns true if a period remains until this time, to the nearest one: a period is not a whole number of
+    /// nanoseconds.
     pub fn is_before(&self, until_ns: u64) -> bool {
         self.now_ns()
             .saturating_add(self.clock.period_ns as u64 / 2)
             < until_ns
     }
 
-    /// The tasks' side.
+    /// Returns the tasks' side.
     pub fn esc(&self) -> &Esc {
         &self.esc
     }
 
-    /// The drive on its bench.
+    /// Returns the drive on its bench.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// The throttle wire, to be polled or played.
+    /// Returns the throttle wire, to be polled or played.
     pub fn wire(&mut self) -> &mut Wire {
         &mut self.wire
     }
 
-    /// What stands around it, to be changed.
+    /// Returns its surroundings, for changes.
     pub fn around_mut(&mut self) -> &mut Surroundings {
         self.rig.around_mut()
     }
 
-    /// The tasks' side, to tell it of other ESCs.
+    /// Returns the tasks' side, to tell it of other ESCs.
     pub fn esc_mut(&mut self) -> &mut Esc {
         &mut self.esc
     }
 
-    /// Whether the tasks' side is called in the period that comes.
+    /// Returns true if the tasks run in the next period.
     pub fn task_is_due(&self) -> bool {
         self.now_ns() >= self.task_due_ns
     }
 
-    /// Bytes that came in on a MAVLink stream; a chip in reset hears none.
+    /// Takes bytes received on a MAVLink stream; a chip in reset ignores them.
     pub fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
         if self.rig.is_held() {
             return;
@@ -304,24 +302,24 @@ impl Device {
         });
     }
 
-    /// A MAVLink stream that has ended.
+    /// Forgets a MAVLink stream that has ended.
     pub fn forget(&mut self, stream: LinkId) {
         if let Some(receiver) = self.receivers.remove(&stream) {
             self.rejected_frames += receiver.counters().rejected();
         }
     }
 
-    /// Lets a fault act from its time on, in place of one of its kind.
+    /// Injects a fault that acts from its time on, replacing one of its kind.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.inject(self.t_s(), fault);
     }
 
-    /// The faults that act, have acted or are to come, without those that were mended.
+    /// Returns the faults that act, have acted or are pending, except mended ones.
     pub fn faults(&self) -> &[Fault] {
         self.faults.faults()
     }
 
-    /// Makes whole again all that faults have broken by now.
+    /// Repairs everything that faults have broken so far.
     pub fn mend(&mut self) {
         self.faults.mend(self.t_s());
     }
@@ -330,7 +328,7 @@ impl Device {
         self.now_ns() as f64 * 1e-9
     }
 
-    /// What came in since the start and was refused.
+    /// Returns what was received since the start and refused.
     pub fn rejected(&self) -> Rejected {
         let wire = self.wire.counts();
         let receivers = self.receivers.values();
@@ -343,7 +341,7 @@ impl Device {
         }
     }
 
-    /// Lets the faults of this time act.
+    /// Applies the faults of this time.
     #[cold]
     fn disturb(&mut self, t_s: f64) {
         let before = self.faults.look(t_s);
@@ -351,18 +349,18 @@ impl Device {
         self.rig.disturb(&before, &now);
         self.wire.disturb(now.wire);
         self.flash.fail(now.flash_fails);
-        // A bus that a fault has drained is watched until it is up again.
+        // A bus drained by a fault is watched until it is up again.
         let starved = now.bus_weakened && self.rig.bus_v() < CHIP_V;
         let held = now.held || starved;
         if held != self.rig.is_held() || now.resets > before.resets {
-            // Into reset and out of it: nothing of what was known is left.
+            // Entering and leaving reset: all state is lost.
             self.reboot();
         }
         self.rig.hold(held);
     }
 
     fn tasks(&mut self, now_ns: u64, onlooker: &mut impl Onlooker, send: &mut dyn FnMut(&[u8])) {
-        // No bytes tell a receiver that time has passed: what a false start held back is searched.
+        // Receivers learn the time only from bytes: this searches what a false start held back.
         let now_us = now_ns / 1000;
         for receiver in self.receivers.values_mut() {
             receiver.push(now_us, &[], |frame| {
@@ -395,7 +393,7 @@ impl Device {
         }
     }
 
-    /// Does what a request for storage asks for; what the command line set stays unstored.
+    /// Carries out a storage request; values from the command line remain unstored.
     fn store(&mut self, request: Request) -> Result<(), &'static str> {
         self.flash.check().map_err(|error| reason(&error))?;
         let mut kept = self.esc.kept();
@@ -428,18 +426,18 @@ impl Device {
     }
 
     fn configure(&mut self) {
-        // Always, since what is in force has been built before.
+        // Always succeeds, since what is in force has been built before.
         if let Ok(config) = self.esc.config() {
             self.rig.configure(config);
         }
     }
 
-    /// Starts the ESC again; the shaft, the supply and the wire go on as they are.
+    /// Restarts the ESC; shaft, supply and wire go on as they are.
     fn reboot(&mut self) {
         let mut loaded = store::load(&mut self.flash, STORE);
         let params = &mut loaded.kept.params;
         apply(&mut self.overrides, params);
-        // What cannot be built now was never in force: the old values go on.
+        // What cannot be built now was never in force: the old values stay.
         let Ok((mut esc, throttle)) = Esc::new(
             params.clone(),
             self.board,
@@ -466,7 +464,7 @@ impl Device {
     }
 }
 
-/// Why nothing is stored, for a person behind MAVLink.
+/// Returns why nothing is stored, for a user behind MAVLink.
 fn reason(error: &FlashError) -> &'static str {
     match error {
         FlashError::Gone => "storage: the file was removed or cut",
@@ -474,7 +472,7 @@ fn reason(error: &FlashError) -> &'static str {
     }
 }
 
-/// Puts what the command line and the bench set over what was stored. Each value was accepted before.
+/// Applies what the command line and the bench set over the stored values. Each value was accepted before.
 fn apply(overrides: &mut [Override], params: &mut Params) {
     for given in &mut *overrides {
         given.stored = params.get(given.id);

@@ -1,7 +1,7 @@
-//! The flash in which the parameters are kept, as a file or in memory only.
+//! The flash that holds the parameters, backed by a file or by memory alone.
 //!
-//! It has the geometry and the manners of the STM32G4's flash, so that the storage code meets on a PC what it meets on
-//! the chip (RM0440, 3.3): pages of 2 KiB erase to ones, and a double word is written once after an erase.
+//! It has the geometry and behaviour of the STM32G4's flash, so that the storage code sees the same on a PC as on the
+//! chip (RM0440, 3.3): pages of 2 KiB erase to ones, and a double word is written once after an erase.
 
 mod each;
 
@@ -14,20 +14,19 @@ use embedded_storage::nor_flash::{
 };
 use thiserror::Error;
 
-/// Bytes of a page, which is erased as one.
+/// Bytes of a page, which is erased as a whole.
 pub const PAGE_BYTES: usize = 2048;
 
 /// Bytes of the flash: two pages.
 pub const FLASH_BYTES: usize = 2 * PAGE_BYTES;
 
-/// Bytes of a double word, which is written as one.
+/// Bytes of a double word, which is written as a whole.
 pub const WORD_BYTES: usize = 8;
 
 const ERASED: u8 = 0xFF;
 
-/// Flash behind which a file stands, which nobody else may read: a key of signatures is in it. What has
-/// been written or erased is in the file when the call returns: it survives a kill of the program, and
-/// after [`FileFlash::sync`] a loss of power.
+/// Flash backed by a file, which nobody else may read: it holds a signing key. Writes and erases are in the file when
+/// the call returns, so they survive a kill of the program, and after [`FileFlash::sync`] a loss of power.
 #[derive(Debug)]
 pub struct FileFlash {
     content: Box<[u8; FLASH_BYTES]>,
@@ -35,7 +34,7 @@ pub struct FileFlash {
     fails: bool,
 }
 
-/// A file, and where it stands unless somebody has moved it.
+/// A file, and its path unless someone has moved it.
 #[derive(Debug)]
 struct Backing {
     file: File,
@@ -57,7 +56,7 @@ pub enum StorageError {
         /// Its length.
         bytes: u64,
     },
-    /// There is a folder or a device.
+    /// The path is a folder or a device.
     #[error("--storage {}: it is not a file; give another path or none", .0.display())]
     NotAFile(PathBuf),
     /// Another emulator has it open.
@@ -75,21 +74,21 @@ pub enum StorageError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// What the system reported.
         source: io::Error,
     },
 }
 
-/// Why an operation on the flash fails. It has then changed nothing.
+/// Why a flash operation fails. Nothing has changed then.
 #[derive(Debug, Error)]
 pub enum FlashError {
     /// The range is not whole words or pages.
     #[error("the range is not aligned")]
     NotAligned,
-    /// The range leaves the flash.
+    /// The range exceeds the flash.
     #[error("the range leaves the flash")]
     OutOfBounds,
-    /// A word that is to be written is not erased (PROGERR of the chip).
+    /// A word to be written is not erased (PROGERR of the chip).
     #[error("the word at {0:#06x} is not erased")]
     NotErased(u32),
     /// The flash is worn out or protected (PGSERR, WRPERR of the chip).
@@ -98,13 +97,13 @@ pub enum FlashError {
     /// The file cannot be written.
     #[error("the storage file cannot be written ({0}); free some room")]
     Io(#[from] io::Error),
-    /// Somebody has removed the file, put another in its place or changed its length.
+    /// Someone has removed or replaced the file, or changed its length.
     #[error("the storage file was removed or cut; start again")]
     Gone,
 }
 
 impl FileFlash {
-    /// Flash that is forgotten at the end.
+    /// Creates flash that is forgotten at the end.
     pub fn in_memory() -> Self {
         Self {
             content: Box::new([ERASED; FLASH_BYTES]),
@@ -113,12 +112,12 @@ impl FileFlash {
         }
     }
 
-    /// Lets every write and erase fail from now on, or no more.
+    /// Makes every write and erase fail from now on, or no longer.
     pub fn fail(&mut self, fails: bool) {
         self.fails = fails;
     }
 
-    /// Flash in the file at `path`, which is made, erased, with its folders if there is none.
+    /// Opens flash in the file at `path`; creates it, erased, and its folders if it does not exist.
     pub fn open(path: &Path) -> Result<Self, StorageError> {
         let failed = |source| StorageError::Io {
             path: path.to_owned(),
@@ -158,15 +157,15 @@ impl FileFlash {
         })
     }
 
-    /// Whether what is written outlives the program.
+    /// Returns true if what is written outlives the program.
     pub fn is_persistent(&self) -> bool {
         self.backing.is_some()
     }
 
-    /// Looks whether what was written will be found at the next start.
+    /// Checks that what was written will be found at the next start.
     ///
     /// # Errors
-    /// [`FlashError::Gone`] where somebody has removed the file or changed its length.
+    /// [`FlashError::Gone`] if someone has removed the file or changed its length.
     pub fn check(&self) -> Result<(), FlashError> {
         let stands = self.backing.as_ref().is_none_or(Backing::stands);
         if stands {
@@ -176,10 +175,10 @@ impl FileFlash {
         }
     }
 
-    /// Waits until all that was written is on the disk.
+    /// Waits until everything written is on the disk.
     ///
     /// # Errors
-    /// As of [`FileFlash::check`], and where the system refuses it.
+    /// As for [`FileFlash::check`], and if the system refuses.
     pub fn sync(&self) -> Result<(), FlashError> {
         self.check()?;
         if let Some(backing) = &self.backing {
@@ -188,7 +187,7 @@ impl FileFlash {
         Ok(())
     }
 
-    /// Puts `bytes` into the file, then into memory: if the file refuses, nothing has changed.
+    /// Writes `bytes` to the file, then to memory: if the file refuses, nothing has changed.
     fn store(&mut self, offset: usize, bytes: &[u8]) -> Result<(), FlashError> {
         if self.fails {
             return Err(FlashError::Refused);
@@ -203,7 +202,7 @@ impl FileFlash {
 }
 
 impl Backing {
-    /// Whether the file is still what its path leads to, and whole.
+    /// Returns true if the path still leads to the file, and it is whole.
     fn stands(&self) -> bool {
         let (Ok(there), Ok(own)) = (fs::metadata(&self.path), self.file.metadata()) else {
             return false;
@@ -218,13 +217,13 @@ fn is_same(a: &fs::Metadata, b: &fs::Metadata) -> bool {
     (a.dev(), a.ino()) == (b.dev(), b.ino())
 }
 
-/// Files have no numbers here that the standard library tells; an open one cannot be removed.
+/// The standard library has no file numbers here; an open file cannot be removed.
 #[cfg(not(unix))]
 fn is_same(_a: &fs::Metadata, _b: &fs::Metadata) -> bool {
     true
 }
 
-/// Takes from others what right they have to the file.
+/// Removes other users' rights to the file.
 #[cfg(unix)]
 fn keep_private(file: &File) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
@@ -233,20 +232,20 @@ fn keep_private(file: &File) -> io::Result<()> {
         return Ok(());
     }
     match file.set_permissions(fs::Permissions::from_mode(mode & 0o700)) {
-        // Another's file, or a file system without rights: whoever has put it there knows.
+        // Owned by someone else, or a file system without rights: whoever put it there knows.
         Err(error) if error.kind() == io::ErrorKind::PermissionDenied => Ok(()),
         tightened => tightened,
     }
 }
 
-/// A folder of the user's is private here.
+/// A user's folder is private here.
 #[cfg(not(unix))]
 fn keep_private(_file: &File) -> io::Result<()> {
     Ok(())
 }
 
-/// Makes an erased file whole: one that a kill cut short would be found corrupt at the next start. Of two
-/// that start at once both find the file of the first.
+/// Creates an erased file atomically: one cut short by a kill would be found corrupt at the next start. Of two that
+/// start at once, both find the first one's file.
 fn create(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
@@ -265,12 +264,12 @@ fn create(path: &Path) -> io::Result<()> {
             Err(_) => fs::rename(&new, path),
             Ok(()) => Ok(()),
         });
-    // The error that counts is the one that brought us here, and what was renamed is gone.
+    // The error that counts is the one that led here, and a renamed file is gone.
     let _ = fs::remove_file(&new);
     made
 }
 
-/// Keeps other emulators from the file until it is closed. False when one has it already.
+/// Locks the file against other emulators until it is closed. Returns false if one already has it.
 #[cfg(unix)]
 fn lock(file: &File) -> io::Result<bool> {
     use rustix::fs::{FlockOperation, flock};
@@ -284,13 +283,13 @@ fn lock(file: &File) -> io::Result<bool> {
     }
 }
 
-/// File locks of the standard library are younger than the oldest compiler that builds this.
+/// The standard library's file locks are newer than the oldest compiler that builds this.
 #[cfg(not(unix))]
 fn lock(_file: &File) -> io::Result<bool> {
     Ok(true)
 }
 
-/// A range of the flash whose ends are multiples of `unit`.
+/// Returns a range of the flash whose ends are multiples of `unit`.
 fn range(from: u32, to: usize, unit: usize) -> Result<std::ops::Range<usize>, FlashError> {
     let from = from as usize;
     if from > to || to > FLASH_BYTES {
@@ -374,7 +373,7 @@ mod tests {
         flash.write(2048, &word).unwrap();
         assert_eq!(read(&mut flash, 2041, 14), b"iskin 1siskin ");
 
-        // A word is written once, even with bits that could still be cleared.
+        // A word is written once, even if bits could still be cleared.
         let again = flash.write(2032, &[0; 16]).unwrap_err();
         assert!(matches!(again, FlashError::NotErased(2040)), "{again}");
         assert_eq!(read(&mut flash, 2032, 8), [0xFF; 8], "nothing has changed");
@@ -420,7 +419,7 @@ mod tests {
         let mut flash = FileFlash::open(&path).unwrap();
         assert!(flash.is_persistent());
         flash.write(2048, &[7; 24]).unwrap();
-        // What another process would find, had this one been killed here.
+        // What another process would find if this one were killed here.
         let mut wanted = vec![0xFF; FLASH_BYTES];
         wanted[2048..2072].fill(7);
         assert_eq!(fs::read(&path).unwrap(), wanted);

@@ -7,19 +7,18 @@ use std::sync::{Arc, LazyLock};
 use std::thread;
 use std::time::Duration;
 
-/// Time for which output may be held up before an interrupt ends the program without it: a reader that
-/// reads takes all of it in less.
+/// Time for which output may block before an interrupt ends the program without it: an active reader takes all of it in
+/// less.
 const STUCK: Duration = Duration::from_secs(1);
 
-/// 128 and the number of SIGINT, as a shell tells it.
+/// 128 plus the number of SIGINT, as a shell reports it.
 const STATUS: i32 = 130;
 
-/// True while output is held up.
+/// True while output is blocked.
 static IS_STUCK: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
-/// A flag that an interrupt or a request to end raises. Each is only that, however many come: whoever has
-/// asked for the flag ends soon, and what it has to tell is not cut short by a second one. Output that
-/// nobody takes is no end: see [`writing`].
+/// Returns a flag raised by an interrupt or a request to end. Repeated ones do nothing more: whoever asked for the flag
+/// ends soon, and a second one does not cut its output short. Blocked output does not end: see [`writing`].
 ///
 /// # Errors
 /// The system's signals cannot be caught.
@@ -32,8 +31,8 @@ pub fn flag() -> io::Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// Writes output. If it takes longer than a second, as into a pipe whose reader has stopped, an
-/// interrupt or a request to end ends the program at once, with status 130.
+/// Writes output. If it takes longer than a second, as into a pipe whose reader has stopped, an interrupt or a request
+/// to end terminates the program at once, with status 130.
 pub fn writing<T>(write: impl FnOnce() -> T) -> T {
     let (written, wait) = mpsc::channel::<()>();
     let result = thread::scope(|scope| {

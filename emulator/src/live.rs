@@ -1,7 +1,7 @@
-//! ESCs in real time, on their MAVLink links and their throttle wires.
+//! ESCs in real time, on their MAVLink links and throttle wires.
 //!
-//! One thread: it wakes each millisecond, takes in what has come on the sockets, simulates up to
-//! the present and sends. An answer leaves within two milliseconds.
+//! A single thread wakes every millisecond, reads the sockets, simulates up to the present and sends. An answer leaves
+//! within two milliseconds.
 
 mod keeping;
 mod pace;
@@ -33,7 +33,7 @@ use pace::Pacer;
 
 /// What to run.
 pub struct Session {
-    /// What stands on the bench.
+    /// The bench.
     pub bench: Bench,
     /// MAVLink endpoints.
     pub mavlink: Vec<Endpoint>,
@@ -41,17 +41,17 @@ pub struct Session {
     pub signal: SignalAddress,
     /// How fast.
     pub pace: Pace,
-    /// For how long, simulated.
+    /// Duration in simulated time.
     pub duration: Option<Duration>,
-    /// Where the parameters of each ESC are kept: there are as many ESCs.
+    /// Storage of each ESC's parameters: there are as many ESCs.
     pub flash: Vec<FileFlash>,
     /// Parameters over the stored ones.
     pub params: Vec<(ParamId, f32)>,
     /// Parameters in place of the factory's values.
     pub defaults: Vec<(ParamId, f32)>,
-    /// What goes wrong.
+    /// The faults.
     pub faults: Vec<Fault>,
-    /// Where each period is written; each of several ESCs has its number before the extension.
+    /// Where each period is recorded; of several ESCs, each has its number before the extension.
     pub record: Option<PathBuf>,
     /// Where the page is served.
     pub web: WebAddress,
@@ -83,15 +83,15 @@ pub enum LiveError {
     Interrupt(std::io::Error),
 }
 
-/// What a person should know of a session that has begun.
+/// What the user should know about a session that has begun.
 pub struct Opened {
     /// A line on each MAVLink link.
     pub links: Vec<String>,
-    /// The MAVLink endpoints as they came to be.
+    /// The actual MAVLink endpoints.
     pub endpoints: Vec<Endpoint>,
     /// Where the throttle wire of each ESC listens.
     pub signals: Vec<SocketAddr>,
-    /// Where the page is served, and what a person opens.
+    /// Where the page is served, and what the user opens.
     pub page: Option<(SocketAddr, String)>,
 }
 
@@ -99,7 +99,7 @@ pub struct Opened {
 pub(crate) struct Open {
     pub(crate) links: Links,
     pub(crate) watches: Watches,
-    /// An interrupt has come.
+    /// Set by an interrupt.
     pub(crate) stop: Arc<AtomicBool>,
     pub(crate) end_ns: u64,
     pub(crate) about: Opened,
@@ -107,7 +107,7 @@ pub(crate) struct Open {
 }
 
 impl Session {
-    /// Where each ESC is recorded, if it is.
+    /// Returns where each ESC is recorded, if at all.
     fn recordings(&self) -> Vec<PathBuf> {
         let escs = self.flash.len();
         match &self.record {
@@ -116,7 +116,7 @@ impl Session {
         }
     }
 
-    /// Opens what it needs; gives it with what the ESCs start with.
+    /// Opens what it needs; returns it with what the ESCs start with.
     ///
     /// # Errors
     /// The session cannot begin.
@@ -164,12 +164,12 @@ impl Session {
 }
 
 impl Open {
-    /// Whether the session goes on.
+    /// Returns true while the session goes on.
     pub(crate) fn goes_on(&self) -> bool {
         !self.stop.load(Ordering::Relaxed) && !self.watches.failed()
     }
 
-    /// Hands what has come by MAVLink to a machine.
+    /// Passes received MAVLink data to a machine.
     pub(crate) fn receive(&mut self, machine: &mut impl Machine) {
         let watches = &mut self.watches;
         self.links
@@ -179,7 +179,7 @@ impl Open {
             });
     }
 
-    /// The figures at the end.
+    /// Computes the final figures.
     pub(crate) fn finish(self, machine: &impl Machine) -> Result<Report, WatchError> {
         let rejected: Vec<_> = (0..machine.escs())
             .map(|esc| machine.rejected(esc))
@@ -192,15 +192,15 @@ impl Open {
     }
 }
 
-/// The recording of one ESC of several: its number before the extension, which says the format.
+/// Returns the recording of one of several ESCs: its number before the extension, which sets the format.
 fn numbered(path: &Path, esc: usize) -> PathBuf {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     path.with_extension(format!("{esc}.{extension}"))
 }
 
-/// Runs a session until its duration or an interrupt: on what `start` makes, with a warning where what
-/// was stored is not whole. Tells `opened` once all is open, and `warn` in a line what a person should know
-/// then or later; gives back what it was at the end.
+/// Runs a session until its duration or an interrupt, on what `start` makes, which comes with a warning if stored data
+/// is not intact. Calls `opened` once everything is open, and `warn` with a line that the user should know then or
+/// later; returns the machine's final state.
 ///
 /// # Errors
 /// The session cannot begin or go on.
@@ -245,7 +245,7 @@ pub fn run<M: Machine>(
             web.send(&to_pages);
         }
         if let Err(stopped) = advanced {
-            // The recording of what led there is worth having.
+            // A recording of what led there is worth having.
             open.watches.finish(0.0, 0.0)?;
             return Err(stopped.into());
         }

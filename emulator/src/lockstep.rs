@@ -13,12 +13,12 @@ use crate::summary::Report;
 use clock::Clock;
 use request::is_request;
 
-/// For how long a client is waited for at once: interrupts and new MAVLink streams are looked at in between.
+/// How long to wait for a client at a time; interrupts and new MAVLink streams are checked in between.
 const WAIT: Duration = Duration::from_millis(10);
 
-/// Runs a session whose clock a client on the first throttle wire has, until its duration or an interrupt: it ends
-/// with the advance that reaches its end. Tells `opened` once all is open, and `warn` in a line what a person
-/// should know.
+/// Runs a session clocked by a client on the first throttle wire, until its duration or an interrupt: it ends with the
+/// advance that reaches its end. Calls `opened` once everything is open, and `warn` with a line that the user should
+/// know.
 ///
 /// # Errors
 /// The session cannot begin or go on.

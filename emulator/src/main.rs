@@ -23,7 +23,7 @@ use siskin_emulator::web::WebAddress;
 
 use cli::{BenchArgs, Cli, Command, MatrixArgs, Paper, PlotArgs, ReproduceArgs};
 
-/// How far a sweep has come, and how long it still takes.
+/// Progress of a sweep and the time it still takes.
 const PROGRESS: &str = "{wide_bar} {pos} of {len} runs, {eta} to go";
 
 fn main() -> ExitCode {
@@ -91,7 +91,7 @@ fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
         None => Ok(()),
     };
     if args.seeds.is_some() || plan.runs() > 1 {
-        // On standard error, and nothing where that is no terminal.
+        // On standard error, and hidden if that is no terminal.
         let style = ProgressStyle::with_template(PROGRESS).map_err(|error| error.to_string())?;
         let bar = ProgressBar::new(plan.runs() as u64).with_style(style);
         let mut rows = Vec::new();
@@ -128,7 +128,7 @@ fn scenario(args: &ScenarioArgs) -> Result<ExitCode, String> {
 fn reproduce(args: &ReproduceArgs) -> Result<ExitCode, String> {
     let line = |error: plot::PlotError| error.to_string();
     if let Some(folder) = &args.output {
-        // It takes long enough not to find out at its end.
+        // It takes too long to find out only at the end.
         plot::chart::prepare(folder).map_err(line)?;
     }
     let reproduction = match args.paper {

@@ -1,4 +1,4 @@
-//! A part of the bench as it is chosen: by a name, a path, or written out.
+//! A part of the bench as chosen: by name, by path, or inline.
 
 use std::fmt;
 use std::path::Path;
@@ -61,7 +61,7 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Choice<T> {
                 Ok(Choice::Named(name.to_owned()))
             }
 
-            // A number is the shortest text of it: volts.
+            // A number stands for its shortest text: volts.
             fn visit_f64<E>(self, number: f64) -> Result<Self::Value, E> {
                 Ok(Choice::Named(number.to_string()))
             }

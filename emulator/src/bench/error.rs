@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// Why something cannot stand on the bench; one line.
+/// Why something cannot be put on the bench; one line.
 #[derive(Debug, Error)]
 pub enum BenchError {
     /// Neither a built-in name nor a file.
@@ -49,13 +49,13 @@ pub enum BenchError {
         "bus {0}: give volts above 0 and up to 70, a pack from 1s to 14s, as 24 or 6s, or a file"
     )]
     Bus(String),
-    /// A table of a supply that is none or two.
+    /// A supply table that gives none of the sources, or both.
     #[error("bus: give volts or cells; sinks goes with volts, capacity_ah and charge with cells")]
     Source,
 }
 
 impl BenchError {
-    /// The dotted key of a scenario that it is about.
+    /// Returns the dotted key of the scenario that it is about.
     pub fn key(&self) -> String {
         match self {
             Self::Unknown { kind: "bench", .. } | Self::File { kind: "bench", .. } => {
@@ -69,7 +69,7 @@ impl BenchError {
     }
 }
 
-/// A quantity within its range, both ends included.
+/// Checks that a quantity is in range, both ends included.
 pub(super) fn range(
     kind: &'static str,
     key: &'static str,

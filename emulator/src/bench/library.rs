@@ -1,7 +1,7 @@
-//! Whole benches: those in the binary, and files like them.
+//! Whole benches: the built-in ones, and files like them.
 //!
-//! A bench is the `[bench]` and `[params]` of a scenario: what stands there, and what the ESC must
-//! know of it. Motors and loads in it that have a `name` are known by it.
+//! A bench is the `[bench]` and `[params]` of a scenario: the hardware, and what the ESC must know of it. Motors and
+//! loads in it that have a `name` are known by that name.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -13,7 +13,7 @@ use super::error::BenchError;
 use super::text::toml_reason;
 use super::word::word;
 
-/// The files in the binary; the first is the default.
+/// The built-in files; the first is the default.
 const FILES: [(&str, &str); 16] = [
     ("bosso", include_str!("../../library/bosso.toml")),
     ("bosso-real", include_str!("../../library/bosso-real.toml")),
@@ -51,7 +51,7 @@ const FILES: [(&str, &str); 16] = [
     ("scooter", include_str!("../../library/scooter.toml")),
 ];
 
-/// The bench that stands where none is named.
+/// The bench used if none is named.
 pub const DEFAULT: &str = FILES[0].0;
 
 static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| {
@@ -59,26 +59,26 @@ static TABLES: LazyLock<Vec<Table>> = LazyLock::new(|| {
     FILES.iter().map(table).collect()
 });
 
-/// The names of the built-in benches.
+/// Returns the names of the built-in benches.
 pub fn names() -> impl Iterator<Item = &'static str> {
     FILES.iter().map(|(name, _)| *name)
 }
 
-/// Says what is wrong with a bench's file by itself, from its text and the tables in it.
+/// Says what is wrong with a bench file on its own, from its text and its tables.
 pub type Check<'a> = &'a dyn Fn(&str, &Table) -> Result<(), String>;
 
-/// Puts what stands on the bench that `bench.base` names under what `root`, a scenario's tables, says
-/// itself: tables are merged key by key, everything else of `root` stays. Where it names none, the default
-/// bench's `[params]` alone: what stands there is the default already. Paths begin at `folder`.
+/// Puts the bench named by `bench.base` under `root`, a scenario's tables: tables are merged key by key, everything
+/// else in `root` stays. If none is named, only the default bench's `[params]` are added: its hardware is the default
+/// already. Paths are relative to `folder`.
 ///
 /// # Errors
-/// A base that is neither built in nor a file, or no bench.
+/// A base that is neither built in nor a file, or is no bench.
 pub fn complete(root: &mut Table, folder: &Path, check: Check) -> Result<(), BenchError> {
     begin_at(folder, root);
     let mut bench = root.get_mut("bench").and_then(Value::as_table_mut);
     let under = match bench.as_ref().and_then(|bench| bench.get("base")) {
         Some(Value::String(name)) => find(name, check)?,
-        // What is no text is left to be refused with the rest.
+        // If it is no text it is left to be refused with the rest.
         Some(_) => return Ok(()),
         None => {
             let mut default = TABLES[0].clone();
@@ -93,7 +93,7 @@ pub fn complete(root: &mut Table, folder: &Path, check: Check) -> Result<(), Ben
     Ok(())
 }
 
-/// Lets the paths in `[bench]` begin at a folder, where there is such a file.
+/// Makes the paths in `[bench]` relative to a folder, if the file exists there.
 fn begin_at(folder: &Path, root: &mut Table) {
     let Some(Value::Table(bench)) = root.get_mut("bench") else {
         return;
@@ -118,7 +118,7 @@ fn begin_at(folder: &Path, root: &mut Table) {
     }
 }
 
-/// The tables of a bench by name or path.
+/// Finds the tables of a bench by name or path.
 fn find(name: &str, check: Check) -> Result<Table, BenchError> {
     if let Some(index) = names().position(|known| known == name) {
         return Ok(TABLES[index].clone());
@@ -164,7 +164,7 @@ fn find(name: &str, check: Check) -> Result<Table, BenchError> {
     Ok(table)
 }
 
-/// Puts keys under those that are there.
+/// Adds missing keys.
 fn merge(over: &mut Table, under: &Table) {
     for (key, value) in under {
         match (over.get_mut(key), value) {
@@ -177,7 +177,7 @@ fn merge(over: &mut Table, under: &Table) {
     }
 }
 
-/// The motor or load of this name in the library.
+/// Returns the motor or load of this name in the library.
 pub(super) fn part<T: for<'de> Deserialize<'de>>(kind: &str, name: &str) -> Option<T> {
     T::deserialize(part_named(kind, name)?.clone()).ok()
 }
@@ -187,7 +187,7 @@ fn part_named(kind: &str, name: &str) -> Option<&'static Value> {
     parts.find(|part| part_name(part) == Some(name))
 }
 
-/// The names of all motors or loads in the library.
+/// Returns the names of all motors or loads in the library.
 pub(super) fn known(kind: &str) -> String {
     let parts = TABLES.iter().filter_map(|table| part_of(table, kind));
     let mut names: Vec<_> = parts.filter_map(part_name).collect();
@@ -226,7 +226,7 @@ mod tests {
         assert!(bench.get("base").is_none());
         assert_eq!(root["params"]["MOT_R_MOHM"].as_integer(), Some(200));
         assert_eq!(root["params"]["MOT_POLE_PAIRS"].as_integer(), Some(7));
-        // A name takes the place of the base's whole motor.
+        // A name replaces the base's whole motor.
         let root = completed("[bench]\nbase = 'scooter'\nmotor = 'x'").unwrap();
         assert_eq!(root["bench"]["motor"].as_str(), Some("x"));
     }

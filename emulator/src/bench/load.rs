@@ -1,4 +1,4 @@
-//! A load as a file or a table gives it.
+//! A load as given by a file or a table.
 
 use serde::Deserialize;
 
@@ -10,7 +10,7 @@ use crate::plant::Load;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LoadTable {
-    /// What it is known by in the library.
+    /// Its name in the library.
     #[serde(rename = "name")]
     _name: Option<String>,
     #[serde(default)]
@@ -25,13 +25,13 @@ pub struct LoadTable {
 }
 
 impl Choice<LoadTable> {
-    /// The load that was chosen.
+    /// Returns the chosen load.
     ///
     /// # Errors
     /// One line that names the load or its key.
     pub fn load(&self) -> Result<Load, BenchError> {
         let table = self.find("load")?;
-        // What such an ESC turns, up to a vehicle's wheel: numbers in other units are beyond.
+        // What such an ESC turns, up to a vehicle's wheel; numbers in wrong units are beyond.
         let check = |key, value, most, unit| range("load", key, value, [0.0, most], unit);
         Ok(Load {
             c1: check("c1", table.c1, 1.0, "Nms")?,

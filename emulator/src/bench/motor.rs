@@ -1,4 +1,4 @@
-//! A motor as a file or a table gives it.
+//! A motor as given by a file or a table.
 
 use serde::Deserialize;
 
@@ -6,30 +6,30 @@ use super::choice::Choice;
 use super::error::{BenchError, range};
 use crate::plant::{Cogging, Drag, Extras, Harmonic, Motor, Winding};
 
-/// Resistance of one phase, Ω. Ranges are those of motors that an ESC of 1 to 200 A turns, so that a number
-/// in a unit with another prefix is beyond: 33 for 33 mΩ.
+/// Resistance of one phase, Ω. Ranges suit motors for ESCs of 1 to 200 A, so that a number with the wrong unit prefix
+/// is out of range: 33 for 33 mΩ.
 const R_OHM: [f64; 2] = [1e-3, 10.0];
 
 /// Inductance of one phase, H.
 const L_H: [f64; 2] = [5e-7, 1e-2];
 
-/// Peak flux linkage of one phase, Wb: a seventh of it is a hub motor's of 10 rpm/V and 15 pole pairs.
+/// Peak flux linkage of one phase, Wb: a hub motor of 10 rpm/V and 15 pole pairs has a seventh of the maximum.
 const FLUX_WB: [f64; 2] = [1e-5, 0.2];
 
 /// Inertia of the rotor, kg·m².
 const J_KGM2: [f64; 2] = [0.0, 1.0];
 
-/// What friction, iron and detents take, Nm.
+/// Torque taken by friction, iron and detents, Nm.
 const TORQUE_MAX_NM: f64 = 10.0;
 
-/// The same for each rad/s, Nms.
+/// The same per rad/s, Nms.
 const VISCOUS_MAX_NMS: f64 = 1.0;
 
 /// A motor in SI units.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MotorTable {
-    /// What it is known by in the library.
+    /// Its name in the library.
     #[serde(rename = "name")]
     _name: Option<String>,
     /// Phase resistance at 25 °C, Ω.
@@ -42,7 +42,7 @@ pub struct MotorTable {
     l_d: Option<f64>,
     #[serde(rename = "L_q")]
     l_q: Option<f64>,
-    /// Current along q at which the inductance has fallen to half, A.
+    /// Current along q at which the inductance has halved, A.
     saturation_a: Option<f64>,
     /// Peak phase flux linkage, Wb.
     flux: f64,
@@ -55,7 +55,7 @@ pub struct MotorTable {
     harmonics: Vec<HarmonicTable>,
     #[serde(default)]
     cogging_nm: f64,
-    /// Detents in a mechanical turn.
+    /// Detents per mechanical turn.
     #[serde(default)]
     cogging_order: u32,
     #[serde(default)]
@@ -66,7 +66,7 @@ pub struct MotorTable {
     hysteresis_nm: f64,
     #[serde(default)]
     eddy_nms: f64,
-    /// How the winding warms up.
+    /// How the winding heats up.
     winding: Option<WindingTable>,
 }
 
@@ -75,7 +75,7 @@ pub struct MotorTable {
 #[serde(deny_unknown_fields)]
 struct HarmonicTable {
     order: u32,
-    /// Of the fundamental.
+    /// Relative to the fundamental.
     share: f64,
     #[serde(default)]
     phase_deg: f64,
@@ -90,7 +90,7 @@ struct WindingTable {
 }
 
 impl Choice<MotorTable> {
-    /// The motor that was chosen, and what it has beyond the ideal one.
+    /// Returns the chosen motor, and its deviations from the ideal one.
     ///
     /// # Errors
     /// One line that names the motor or its key.

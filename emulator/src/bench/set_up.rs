@@ -1,4 +1,4 @@
-//! What stands on a bench.
+//! The contents of a bench.
 
 use siskin_control::control::delay::Delay;
 use siskin_control::drive::Config;
@@ -14,7 +14,7 @@ pub const DEFAULT_MOTOR: &str = "antigravity-4006-kv380";
 /// The load of the default bench.
 pub const DEFAULT_LOAD: &str = "cfprop-13x4.4";
 
-/// Where the control has the rotor's position from.
+/// Where the control gets the rotor's position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Position {
@@ -25,30 +25,30 @@ pub enum Position {
     Ideal,
 }
 
-/// What stands on the bench.
+/// The contents of a bench.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bench {
     /// The motor.
     pub motor: Motor,
-    /// What it has beyond the ideal motor.
+    /// Its deviations from the ideal motor.
     pub extras: Extras,
-    /// What it turns.
+    /// What it drives.
     pub load: Load,
     /// What feeds it.
     pub supply: Supply,
     /// How the inverter is simulated.
     pub plant: Fidelity,
-    /// Where the control has the rotor's position from.
+    /// Where the control gets the rotor's position.
     pub position: Position,
     /// Sensors and converter.
     pub sensing: Sensing,
     /// Control periods from the sample to the voltage.
     pub delay: Delay,
-    /// Dead time of the inverter, s; `None` is what the parameters set the timer to.
+    /// Dead time of the inverter, s; `None` for the timer's, as set by the parameters.
     pub dead_time_s: Option<f64>,
     /// Thermal resistance from the board to the air, K/W.
     pub board_k_per_w: f64,
-    /// Speed that the shaft is held at, rad/s.
+    /// Speed at which the shaft is held, rad/s.
     pub imposed_rad_s: Option<f64>,
     /// Speed at the start, rad/s.
     pub initial_rad_s: f64,
@@ -59,9 +59,9 @@ pub struct Bench {
 }
 
 impl Default for Bench {
-    /// The bench of the first paper's section V with the sensors of a board: an Antigravity 4006
-    /// KV380 with a 13×4.4 propeller at 24 V; 12 bits over ±40 A, 0.05 A of noise, one period of
-    /// delay and the dead time of the parameters.
+    /// Creates the bench of the first paper's section V with the sensors of a board: an Antigravity
+    /// 4006 KV380 with a 13×4.4 propeller at 24 V; 12 bits over ±40 A, 0.05 A of noise, one period
+    /// of delay and the dead time of the parameters.
     fn default() -> Self {
         let built_in = "the built-in benches are tested";
         let motor = Choice::<MotorTable>::Named(DEFAULT_MOTOR.to_owned());
@@ -87,7 +87,7 @@ impl Default for Bench {
 }
 
 impl Bench {
-    /// The control's configuration with this bench's source of the rotor's position.
+    /// Returns the control's configuration with this bench's source of the rotor's position.
     pub(crate) fn observed(&self, config: Config) -> Config {
         match self.position {
             Position::Observer => config,

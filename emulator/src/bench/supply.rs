@@ -1,4 +1,4 @@
-//! A supply as a word, a file or a table gives it.
+//! A supply as given by a word, a file or a table.
 
 use serde::Deserialize;
 
@@ -7,27 +7,27 @@ use super::error::{BenchError, range};
 use super::word::{CELLS_MAX, word};
 use crate::plant::{CAPACITANCE_F, CAPACITY_C, CELL_OHM, Source, Supply};
 
-/// A supply: `volts` or `cells`, and what else it has.
+/// A supply: `volts` or `cells`, and its other properties.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupplyTable {
-    /// A source of one voltage, V.
+    /// A constant voltage source, V.
     volts: Option<f64>,
-    /// Whether it takes current back; it does where left out.
+    /// Whether it sinks current; default true.
     sinks: Option<bool>,
-    /// A lithium-polymer pack of so many cells in series.
+    /// A lithium-polymer pack of this many cells in series.
     cells: Option<u32>,
     capacity_ah: Option<f64>,
-    /// Share of the capacity that is left, 0..1.
+    /// Remaining share of the capacity, 0..1.
     charge: Option<f64>,
-    /// Of the whole source; 4 a cell, or none.
+    /// Resistance of the whole source; default 4 per cell, or none.
     resistance_mohm: Option<f64>,
-    /// Of the bus; 470.
+    /// Capacitance of the bus; default 470.
     capacitance_uf: Option<f64>,
 }
 
 impl Choice<SupplyTable> {
-    /// The supply that was chosen: volts, a pack as `6s`, a file or a table.
+    /// Returns the chosen supply: volts, a pack as `6s`, a file or a table.
     ///
     /// # Errors
     /// One line that names what was given or its key.

@@ -1,6 +1,6 @@
-//! Where in a file's text something is wrong.
+//! Where a file's text has an error.
 
-/// A TOML error in one line, with the line of the text that it is about.
+/// Formats a TOML error in one line, with its line number.
 pub(super) fn toml_reason(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().replace('\n', " ");
     match error.span() {
@@ -9,7 +9,7 @@ pub(super) fn toml_reason(text: &str, error: &toml::de::Error) -> String {
     }
 }
 
-/// The line, from 1, of a byte of a text.
+/// Returns the line, from 1, of a byte of a text.
 pub fn line_of_byte(text: &str, at: usize) -> usize {
     let before = &text.as_bytes()[..at.min(text.len())];
     before.iter().filter(|byte| **byte == b'\n').count() + 1

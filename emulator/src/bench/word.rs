@@ -5,7 +5,7 @@ use crate::plant::Supply;
 /// The most cells of a pack: the voltage dividers end at 70 V.
 pub(super) const CELLS_MAX: u32 = 14;
 
-/// `24`, `24.0` or `6s`.
+/// Parses `24`, `24.0` or `6s`.
 pub(super) fn word(text: &str) -> Option<Supply> {
     if let Some(cells) = text.strip_suffix(['s', 'S']) {
         let cells = cells.parse().ok()?;

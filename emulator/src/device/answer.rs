@@ -1,4 +1,4 @@
-//! What the ESC sends back to who asked: its reply on the throttle wire, and datagrams.
+//! What the ESC sends back to the requester: its reply on the throttle wire, and datagrams.
 
 use siskin_control::answer::{Answer, Ask};
 use siskin_control::input::signal::Signal;
@@ -6,12 +6,12 @@ use siskin_control::input::signal::Signal;
 use super::capture::time_ns;
 use super::{Device, Onlooker};
 
-/// Byte 0 of a datagram with KISS telemetry, and of one with the ESC's information.
+/// Byte 0 of a KISS telemetry datagram, and of one with the ESC's information.
 const KISS: u8 = 30;
 const INFO: u8 = 31;
 
 impl Device {
-    /// Sends what was asked for at about `now_ns`.
+    /// Sends what was requested at about `now_ns`.
     pub(super) fn answer(&mut self, now_ns: u64, ask: Ask, onlooker: &mut impl Onlooker) {
         let Answer { reply, kiss, info } = self.throttle.answer(ask, &self.rig.snapshot());
         let asked_ns = time_ns(ask.first_edge_ticks, now_ns);

@@ -1,18 +1,18 @@
-//! The timer that captures the throttle wire's edges: its counts as times.
+//! The timer that captures the throttle wire's edges: conversion of its counts.
 
 /// Rate of the timer that captures the wire's edges: that of the STM32G431.
 pub(super) const CAPTURE_HZ: u32 = 170_000_000;
 
-/// The greatest rate of which both the timer's and that of nanoseconds are multiples.
+/// The greatest rate that divides both the timer's and that of nanoseconds.
 const STEP_HZ: u32 = 10_000_000;
 
-/// The capturing timer's count at a time.
+/// Returns the capture timer's count at a time.
 pub(super) fn ticks(time_ns: u64) -> u32 {
-    // Each control period asks: a product that 34 years fill is divided in a fifth of the time of a wider one.
+    // Called in each control period: a 64-bit product, which lasts 34 years, takes a fifth of the time of a wider one.
     (time_ns * u64::from(CAPTURE_HZ / STEP_HZ) / u64::from(1_000_000_000 / STEP_HZ)) as u32
 }
 
-/// When the capturing timer shows a count: the time nearest to `near_ns`, to the next nanosecond.
+/// Returns when the capture timer shows a count: the time nearest to `near_ns`, rounded up to a nanosecond.
 pub(super) fn time_ns(at_ticks: u32, near_ns: u64) -> u64 {
     let since = at_ticks.wrapping_sub(ticks(near_ns)) as i32;
     let near = u128::from(near_ns) * u128::from(CAPTURE_HZ) / 1_000_000_000;
@@ -26,7 +26,7 @@ mod tests {
 
     #[test]
     fn a_count_is_the_time_at_which_it_begins() {
-        // Ticks of 5.88 ns; the timer wraps each 25.26 s.
+        // Ticks of 5.88 ns; the timer wraps every 25.26 s.
         for near_ns in [0, 1_000, 30_000_000_123, 90_000_000_000_000] {
             for ahead_ns in [0, 1, 5, 6, 56_667, 1_000_000] {
                 let then_ns = near_ns + ahead_ns;

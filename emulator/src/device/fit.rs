@@ -1,4 +1,4 @@
-//! Another motor for an ESC that runs.
+//! Another motor for a running ESC.
 
 use siskin_control::drive::Phase;
 
@@ -6,11 +6,11 @@ use super::Device;
 use crate::fault::InForce;
 use crate::rig::Bench;
 
-/// Below this the shaft counts as at rest, rad/s: 10 rpm, at which a hand could hold it.
+/// Speed below which the shaft counts as at rest, rad/s: 10 rpm, at which a hand could hold it.
 const AT_REST_RAD_S: f64 = 1.0;
 
 impl Device {
-    /// Puts the motor of a bench and its load in place of those that stand there. What is broken stays so.
+    /// Replaces the motor and load with those of a bench. What is broken stays broken.
     ///
     /// # Errors
     /// The motor turns, or something turns it.
@@ -23,7 +23,7 @@ impl Device {
         }
         self.rig.around_mut().fit(bench);
         let now = self.faults.now;
-        // What has kicked the shaft before is over.
+        // Earlier kicks of the shaft are over.
         let whole = InForce {
             kicked_rad_s: now.kicked_rad_s,
             ..InForce::default()

@@ -1,4 +1,4 @@
-//! The emulated ESC as a machine that runs: what the wire asks for counts.
+//! The emulated ESC as a machine, driven by its throttle wire.
 
 use super::Device;
 use crate::fault::Fault;

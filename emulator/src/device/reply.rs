@@ -10,15 +10,16 @@ use crate::machine::Onlooker;
 /// The replies that the ESC puts on the wire.
 #[derive(Debug, Default)]
 pub(super) struct Driven {
-    /// Edges that are yet to come.
+    /// Edges still to come.
     edges: VecDeque<(u64, bool)>,
     /// When the pin is an output for the latest reply.
     span_ns: Range<u64>,
 }
 
 impl Driven {
-    /// Puts a reply on the wire from `at_ns` on. The line rests high before and after it. There is
-    /// none while another waits or is sent, for a sender that does not leave it its time.
+    /// Puts a reply on the wire from `at_ns` on. The line idles high before and after. Returns
+    /// false while another is pending or being sent, for a sender that does not leave it enough
+    /// time.
     pub(super) fn drive(&mut self, now_ns: u64, reply: &Reply, at_ns: u64) -> bool {
         if now_ns < self.span_ns.end {
             return false;
@@ -40,12 +41,12 @@ impl Driven {
         true
     }
 
-    /// Whether the pin is an output at this time, so that nothing is captured.
+    /// Returns true if the pin is an output at this time, so that nothing is captured.
     pub(super) fn is_output(&self, time_ns: u64) -> bool {
         self.span_ns.contains(&time_ns)
     }
 
-    /// Shows the edges before this time.
+    /// Reports the edges before this time.
     pub(super) fn show(&mut self, before_ns: u64, onlooker: &mut impl Onlooker) {
         let due = self.edges.partition_point(|edge| edge.0 < before_ns);
         for (time_ns, level) in self.edges.drain(..due) {

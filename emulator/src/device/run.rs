@@ -1,4 +1,4 @@
-//! The ESC in time: a control period after the other, with what the wire brings in between.
+//! The ESC in time: one control period after another, with the wire's events in between.
 
 use siskin_control::drive::Setpoint;
 
@@ -8,8 +8,8 @@ use crate::rig::Rig;
 use crate::surroundings::Motion;
 
 impl Device {
-    /// Runs control periods until `until_ns`. `imposed` replaces what the wire asks for; `send`
-    /// gets every MAVLink frame.
+    /// Runs control periods until `until_ns`. `imposed` overrides the wire's set-point; `send`
+    /// receives every MAVLink frame.
     pub fn advance(
         &mut self,
         until_ns: u64,
@@ -22,7 +22,7 @@ impl Device {
         }
     }
 
-    /// Runs the control period that comes; what the motor did in it.
+    /// Runs the next control period; returns what the motor did in it.
     #[inline(always)] // in each period
     pub fn step(
         &mut self,
@@ -42,7 +42,7 @@ impl Device {
                 self.tasks(now_ns, onlooker, send);
             }
         }
-        // Past the wire or not, a task that has found a fault is heard.
+        // A fault found by a task takes precedence, even over an imposed set-point.
         let setpoint = match (self.throttle.setpoint(), imposed(t_s, &self.rig)) {
             (fault @ Setpoint::Fault(_), _) => fault,
             (setpoint, imposed) => imposed.unwrap_or(setpoint),
@@ -77,7 +77,7 @@ impl Device {
         self.settle(now_ns, onlooker);
     }
 
-    /// Tells the ESC the time, and shows what it has put on the wire before.
+    /// Tells the ESC the time, and reports what it has put on the wire before.
     fn settle(&mut self, now_ns: u64, onlooker: &mut impl Onlooker) {
         if !self.rig.is_held()
             && let Some(ask) = self.throttle.settle(now_ns / 1000, ticks(now_ns))

@@ -1,4 +1,4 @@
-//! What faults do to the chip and its flash, and to whom it answers.
+//! What faults do to the chip and its flash, and whom it answers.
 
 use std::net::UdpSocket;
 use std::path::Path;
@@ -20,7 +20,7 @@ fn device(flash: FileFlash, faults: Vec<Fault>) -> Device {
     started.unwrap().0
 }
 
-/// Runs up to a time with zero throttle each millisecond; gives how many MAVLink frames were sent.
+/// Runs up to a time with zero throttle every millisecond; returns the number of MAVLink frames sent.
 fn run(device: &mut Device, until_ms: u64) -> u32 {
     let mut frames = 0;
     while device.is_before(until_ms * MS_NS) {
@@ -71,7 +71,7 @@ fn a_flash_that_refuses_keeps_what_was_stored() {
     assert_eq!(limit(&device), 12.0);
 }
 
-/// A device on a stored file, with parameters over the stored ones and in place of the factory's.
+/// Creates a device on a stored file, with parameters over the stored ones and in place of the factory values.
 fn given(path: &Path, overrides: Vec<(ParamId, f32)>, defaults: Vec<(ParamId, f32)>) -> Device {
     let started = Device::start(Start {
         flash: FileFlash::open(path).unwrap(),
@@ -82,7 +82,7 @@ fn given(path: &Path, overrides: Vec<(ParamId, f32)>, defaults: Vec<(ParamId, f3
     started.unwrap().0
 }
 
-/// Nor by a reset to the factory's settings, after which it is still in force.
+/// Nor by a reset to the factory settings, after which it is still in force.
 #[test]
 fn what_the_command_line_set_is_not_stored() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,8 +115,8 @@ fn what_the_command_line_set_is_not_stored() {
     }
 }
 
-/// Unlike what the command line sets, it gives way to what is stored: before a restart, after it, and after a
-/// load. What the command line sets goes before it.
+/// Unlike what the command line sets, it yields to what is stored: before a restart, after it, and after a load. What
+/// the command line sets overrides it.
 #[test]
 fn what_takes_the_place_of_the_factorys_value_gives_way_to_a_stored_one() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,7 +193,7 @@ fn whatever_drains_the_bus_resets_the_chip() {
         let mut device = device(FileFlash::in_memory(), vec![fault]);
         run(&mut device, 1_001);
         let silent = run(&mut device, 1_499) == 0;
-        // 24 V less 20 V are below 4.5 V. Nothing discharges the capacitor of a motor at rest.
+        // 24 V less 20 V is below 4.5 V. Nothing discharges the capacitor of a motor at rest.
         assert_eq!(silent, kind == Kind::BusSag(20.0), "{kind:?}");
         assert!(run(&mut device, 2_000) > 0, "{kind:?}");
     }
@@ -215,8 +215,8 @@ fn a_brown_out_resets_the_chip() {
     }
 }
 
-/// Two flight controllers take turns, at times that are no ticks of the ESC's timer, on a wire that
-/// is exact and on one that is not.
+/// Two flight controllers take turns, at times that are not ticks of the ESC's timer, on an exact wire and on an
+/// imperfect one.
 #[test]
 fn an_answer_goes_to_who_has_asked() {
     for jitter_ns in [0.0, 60.0] {

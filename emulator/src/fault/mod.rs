@@ -4,7 +4,7 @@ mod timeline;
 
 pub use timeline::{InForce, Timeline};
 
-/// Which of a leg's switches.
+/// Which switch of a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
@@ -21,27 +21,27 @@ pub enum Kind {
     RotorBlocked,
     /// The wire to a phase is open.
     PhaseOpen(usize),
-    /// A switch never turns on; its body diode is sound.
+    /// A switch never turns on; its body diode still works.
     MosfetOpen(usize, Side),
     /// A switch is always on.
     MosfetShort(usize, Side),
-    /// A current sensor shows this, A.
+    /// A current sensor reads this, A.
     SensorStuck(usize, f64),
     /// A current sensor's zero moves by this, A: linearly over the fault's time, and stays.
     OffsetDrift(usize, f64),
     /// More noise on all currents, A rms.
     Noise(f64),
-    /// A Hall sensor shows this level.
+    /// A Hall sensor reads this level.
     HallStuck(usize, bool),
-    /// The supply gives so many volts less.
+    /// The supply gives this many volts less.
     BusSag(f64),
-    /// The supply is gone; the bus has its capacitor.
+    /// The supply is gone; the bus has only its capacitor.
     BusDisconnect,
     /// The supply gives no more than this, V.
     BrownOut(f64),
     /// The shaft turns faster by this, rad/s: at once, or linearly over the fault's time.
     RotorKick(f64),
-    /// The air moves as fast as the propeller does at this speed, rad/s.
+    /// The air moves as fast as the propeller would at this speed, rad/s.
     Gust(f64),
     /// A torque on the shaft, Nm; positive turns it forward.
     Strike(f64),
@@ -51,14 +51,14 @@ pub enum Kind {
     BitErrors(f64),
     /// Each edge on the wire is displaced, ns rms.
     Jitter(f64),
-    /// The chip starts anew; it is held in reset for the fault's time, if that is given.
+    /// The chip restarts; it is held in reset for the fault's time, if given.
     Reset,
-    /// The flash refuses to be written and erased.
+    /// The flash refuses to be written or erased.
     FlashFail,
 }
 
 impl Kind {
-    /// Whether it is the same but for a value.
+    /// Returns true if both are the same except for a value.
     fn is_like(&self, other: &Self) -> bool {
         let place = |kind: &Self| match *kind {
             Self::PhaseOpen(phase)
@@ -73,7 +73,7 @@ impl Kind {
         std::mem::discriminant(self) == std::mem::discriminant(other) && place(self) == place(other)
     }
 
-    /// Whether the bus may fall so low by it that the chip is in reset.
+    /// Returns true if it may lower the bus so far that the chip resets.
     const fn weakens_bus(&self) -> bool {
         matches!(
             self,
@@ -82,16 +82,16 @@ impl Kind {
     }
 }
 
-/// Bus below which a chip is held in reset once a fault has weakened it, V: 3.3 V and what its
-/// regulator drops.
+/// Bus voltage below which a chip is held in reset once a fault has weakened it, V: 3.3 V plus the
+/// drop of its regulator.
 pub const CHIP_V: f64 = 4.5;
 
-/// One entry of the time line.
+/// An entry of the time line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
     /// When it begins, s: at the first control period from then on.
     pub at_s: f64,
-    /// For how long it acts, s; until the end if not given.
+    /// How long it acts, s; until the end if not given.
     pub for_s: Option<f64>,
     /// What is wrong.
     pub kind: Kind,
@@ -106,7 +106,7 @@ impl Fault {
         t_s >= self.at_s
     }
 
-    /// Whether it acts no more.
+    /// Returns true if it no longer acts.
     pub fn is_over(&self, t_s: f64) -> bool {
         t_s >= self.end_s()
     }
@@ -115,7 +115,7 @@ impl Fault {
         self.has_begun(t_s) && !self.is_over(t_s)
     }
 
-    /// How far it has grown, 0..1, where it grows linearly over its time and stays.
+    /// Returns how far it has grown, 0..1, if it grows linearly over its time and stays.
     fn share(&self, t_s: f64) -> f64 {
         match self.for_s {
             _ if !self.has_begun(t_s) => 0.0,
@@ -124,10 +124,11 @@ impl Fault {
         }
     }
 
-    /// Whether what it does changes from period to period.
+    /// Returns true if its effect changes from period to period.
     fn moves(&self, t_s: f64) -> bool {
         let grows = matches!(self.kind, Kind::OffsetDrift(..) | Kind::RotorKick(_));
-        // The chip resets and comes back as the bus falls and rises, which goes on after the fault.
+        // The chip resets and comes back as the bus falls and rises, which continues after the
+        // fault.
         let follows = self.kind.weakens_bus() && self.has_begun(t_s);
         follows || grows && self.for_s.is_some() && self.acts(t_s)
     }

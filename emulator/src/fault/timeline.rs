@@ -9,15 +9,15 @@ use crate::wire::WireErrors;
 pub struct InForce {
     /// Broken wires and switches.
     pub breaks: Breaks,
-    /// What stuck current sensors show, A.
+    /// What stuck current sensors read, A.
     pub stuck_a: [Option<f64>; 3],
-    /// By how much the current sensors' zeros have moved, A.
+    /// How far the current sensors' zeros have moved, A.
     pub drift_a: [f64; 3],
-    /// Noise on the currents beside their own, A rms.
+    /// Extra noise on the currents, A rms.
     pub noise_a: f64,
-    /// What stuck Hall sensors show.
+    /// What stuck Hall sensors read.
     pub hall: [Option<bool>; 3],
-    /// Volts that the supply lacks.
+    /// Voltage that the supply lacks, V.
     pub sag_v: f64,
     /// The supply is disconnected.
     pub disconnected: bool,
@@ -35,7 +35,7 @@ pub struct InForce {
     pub torque_nm: f64,
     /// What is wrong with the throttle wire.
     pub wire: WireErrors,
-    /// Resets that have begun.
+    /// Number of resets that have begun.
     pub resets: usize,
     /// The chip is held in reset.
     pub held: bool,
@@ -43,7 +43,7 @@ pub struct InForce {
     pub flash_fails: bool,
 }
 
-/// Faults over time.
+/// The faults over time.
 #[derive(Clone, Debug)]
 pub struct Timeline {
     faults: Vec<Fault>,
@@ -51,12 +51,12 @@ pub struct Timeline {
     pub due_s: f64,
     /// What was in force at the last look.
     pub now: InForce,
-    /// What faults have left that are not in the list any more.
+    /// Lasting effects of faults that are no longer in the list.
     past: InForce,
 }
 
 impl Timeline {
-    /// Nothing is in force before the first look.
+    /// Creates a time line; nothing is in force before the first look.
     pub fn new(faults: Vec<Fault>) -> Self {
         let due_s = faults.iter().map(|fault| fault.at_s);
         Self {
@@ -67,25 +67,25 @@ impl Timeline {
         }
     }
 
-    /// Adds a fault at a time, in place of one of its kind, phase and switch that has begun.
+    /// Adds a fault at a time, replacing one of its kind, phase and switch that has begun.
     pub fn inject(&mut self, t_s: f64, fault: Fault) {
         self.forget(t_s, |old| old.kind.is_like(&fault.kind));
         self.faults.push(fault);
         self.due_s = t_s;
     }
 
-    /// The faults that have not been mended.
+    /// Returns the faults that have not been mended.
     pub fn faults(&self) -> &[Fault] {
         &self.faults
     }
 
-    /// Ends at a time all that has begun. What it has done to the shaft stays.
+    /// Ends everything that has begun. Its effect on the shaft stays.
     pub fn mend(&mut self, t_s: f64) {
         self.forget(t_s, |_| true);
         self.due_s = t_s;
     }
 
-    /// Takes off faults that have begun.
+    /// Removes faults that have begun.
     fn forget(&mut self, t_s: f64, which: impl Fn(&Fault) -> bool) {
         for fault in self
             .faults
@@ -98,15 +98,15 @@ impl Timeline {
         self.past.held = false;
     }
 
-    /// Looks at `t_s`, which does not go back: gives what was in force before.
+    /// Looks at `t_s`, which does not decrease; returns what was in force before.
     pub fn look(&mut self, t_s: f64) -> InForce {
         self.due_s = self.next_s(t_s);
         let now = self.at(t_s);
         std::mem::replace(&mut self.now, now)
     }
 
-    /// What is in force at a time. Of two faults of a kind and phase that give a value the later entry
-    /// counts; what adds up is added.
+    /// Returns what is in force at a time. Of two faults of a kind and phase that set a value the later entry counts;
+    /// what adds up is added.
     fn at(&self, t_s: f64) -> InForce {
         let mut now = self.past;
         for fault in self.faults.iter().filter(|fault| fault.has_begun(t_s)) {
@@ -118,9 +118,9 @@ impl Timeline {
         now
     }
 
-    /// When something changes after `t_s`: `t_s` itself where it does in every period.
+    /// Returns when something changes after `t_s`: `t_s` itself if it does in every period.
     fn next_s(&self, t_s: f64) -> f64 {
-        // A bus that was weakened comes back after its fault.
+        // A weakened bus recovers after its fault.
         if self.past.bus_weakened || self.faults.iter().any(|fault| fault.moves(t_s)) {
             return t_s;
         }
@@ -133,7 +133,7 @@ impl Timeline {
 }
 
 impl InForce {
-    /// Adds what has come of a fault, whether it still acts or not.
+    /// Adds the lasting effect of a fault, whether it still acts or not.
     fn grow(&mut self, fault: &Fault, t_s: f64) {
         self.bus_weakened |= fault.kind.weakens_bus();
         match fault.kind {
@@ -147,7 +147,7 @@ impl InForce {
         }
     }
 
-    /// Adds what acts.
+    /// Adds a fault that acts.
     fn add(&mut self, kind: Kind) {
         match kind {
             Kind::RotorBlocked => self.blocked = true,
@@ -171,7 +171,7 @@ impl InForce {
     }
 }
 
-/// A switch's place in [`crate::plant::LegBreaks`].
+/// Returns a switch's index in [`crate::plant::LegBreaks`].
 fn index(side: Side) -> usize {
     match side {
         Side::Low => 0,

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{FileFlash, StorageError};
 
 impl FileFlash {
-    /// The flash of so many ESCs: one alone is in the file at `path`, of several each has its number behind that.
+    /// Opens the flash of each ESC: a single one in the file at `path`; of several, each with its number appended.
     ///
     /// # Errors
     /// As [`FileFlash::open`].

@@ -1,4 +1,4 @@
-//! Looks on at the ESCs of a laboratory.
+//! Observes the ESCs of a laboratory.
 
 use std::mem;
 
@@ -11,9 +11,9 @@ use crate::watch::Void;
 /// What is kept of each ESC's periods.
 pub(super) struct Look {
     esc: usize,
-    /// Why it cannot go on, from the first reason on.
+    /// Why it cannot go on: the first reason.
     failed: Option<Void>,
-    /// Packed rows of each ESC, if they are wanted.
+    /// Packed rows of each ESC, if wanted.
     rows: Option<Vec<Vec<u8>>>,
     /// A summary of each ESC without windows, if its hash is wanted.
     summaries: Option<Vec<Summary>>,
@@ -29,17 +29,17 @@ impl Look {
         }
     }
 
-    /// Why the laboratory cannot go on, if it cannot.
+    /// Returns why the laboratory cannot go on, if it cannot.
     pub(super) fn failed(&self) -> Option<Void> {
         self.failed
     }
 
-    /// The rows of an ESC since they were last taken.
+    /// Returns the rows of an ESC since the last call.
     pub(super) fn take_recorded(&mut self, esc: usize) -> Option<Vec<u8>> {
         Some(mem::take(&mut self.rows.as_mut()?[esc]))
     }
 
-    /// The hash of an ESC so far.
+    /// Returns the hash of an ESC so far.
     pub(super) fn trace_hash(&self, esc: usize) -> Option<String> {
         let summary = &self.summaries.as_ref()?[esc];
         Some(summary.report(0.0, 0.0).trace_hash)

@@ -1,9 +1,9 @@
-//! ESCs in the hand of a program in this process, such as the Python module: no socket, and simulated time goes on
-//! by calls.
+//! ESCs controlled by a program in this process, such as the Python module: no socket, and simulated time advances by
+//! calls.
 //!
-//! Each ESC is sent its throttle as a flight controller sends it: a frame on its wire, at the same simulated times
-//! however time is cut into calls. So what comes out depends on what is asked for and when in simulated time, bit for
-//! bit, and is that of [`lockstep`](crate::lockstep) over UDP.
+//! Each ESC gets its throttle as from a flight controller: a frame on its wire, at the same simulated times however the
+//! calls divide time. So the result depends only on what is requested and when in simulated time, bit for bit, and
+//! equals that of [`lockstep`](crate::lockstep) over UDP.
 
 mod look;
 mod outbox;
@@ -29,19 +29,19 @@ use outbox::Outbox;
 
 pub use parameter::Refused;
 
-/// What stands in a laboratory.
+/// The contents of a laboratory.
 pub struct Setup {
-    /// The bench of each ESC; the supply is one.
+    /// The bench of each ESC; they share one supply.
     pub bench: Bench,
     /// How many ESCs: 1 to [`ESCS_MAX`](crate::rack::ESCS_MAX).
     pub escs: usize,
     /// How throttle is sent.
     pub signal: ThrottleSignal,
-    /// Parameters over the stored ones, which are not stored themselves.
+    /// Parameters that override the stored ones and are not stored themselves.
     pub params: Vec<(ParamId, f32)>,
-    /// The file behind the flash, with the ESC's number behind it where there are several; none keeps nothing.
+    /// The file behind the flash, with the ESC's number appended if there are several; `None` stores nothing.
     pub storage: Option<PathBuf>,
-    /// Whether each control period is kept until it is taken.
+    /// Whether each control period is kept until taken.
     pub records: bool,
     /// Whether the control's state is hashed.
     pub traces: bool,
@@ -62,7 +62,7 @@ pub enum SetupError {
 pub struct Laboratory {
     rack: Rack,
     signal: ThrottleSignal,
-    /// Throttle of each ESC, 0 to 1; its wire is silent where there is none.
+    /// Throttle of each ESC, 0 to 1; `None` for a silent wire.
     throttles: Vec<Option<f64>>,
     /// When the next frames are due, ns.
     frames_due_ns: u64,
@@ -71,16 +71,16 @@ pub struct Laboratory {
     streams: Ids,
     /// The program's own stream.
     stream: LinkId,
-    /// What was injected into each ESC, as it was given.
+    /// What was injected into each ESC, as given.
     faults: Vec<Vec<(Fault, String)>>,
 }
 
 impl Laboratory {
-    /// Powers the ESCs up, with zero throttle on their wires. Gives a warning for each whose stored parameters are not
-    /// whole.
+    /// Powers the ESCs up, with zero throttle on their wires. Returns a warning for each whose stored parameters are
+    /// not intact.
     ///
     /// # Errors
-    /// The storage cannot serve, or an ESC does not start.
+    /// The storage is unusable, or an ESC does not start.
     pub fn set_up(setup: Setup) -> Result<(Self, Vec<&'static str>), SetupError> {
         let Setup {
             bench,
@@ -120,20 +120,20 @@ impl Laboratory {
         Ok((laboratory, warnings))
     }
 
-    /// The ESCs, with their states and their answers.
+    /// Returns the ESCs, with their states and answers.
     pub fn rack(&self) -> &Rack {
         &self.rack
     }
 
-    /// Begins an advance: answers and means are of what [`Laboratory::go_on_to`] runs from here on.
+    /// Begins an advance: answers and means cover what [`Laboratory::go_on_to`] runs from here on.
     pub fn begin(&mut self) {
         self.rack.begin();
     }
 
-    /// Runs all control periods that begin before `until_ns`, with the frames that are due.
+    /// Runs all control periods that begin before `until_ns`, with the frames due.
     ///
     /// # Errors
-    /// The simulated motor has left all bounds, or both switches of a leg may have been on.
+    /// The simulated motor has diverged, or both switches of a leg may have been on.
     pub fn go_on_to(&mut self, until_ns: u64) -> Result<(), Void> {
         let outbox = &mut self.outbox;
         while self.rack.now_ns() < until_ns {
@@ -144,7 +144,7 @@ impl Laboratory {
                     if let Some(throttle) = throttle {
                         let params = self.rack.escs()[esc].esc().params();
                         let datagram = self.signal.datagram(*throttle, params);
-                        // One that finds no room behind what the program has sent is counted by its wire.
+                        // If it finds no room after what the program has sent, its wire counts it.
                         let _ = self.rack.play(esc, now_ns, &datagram);
                     }
                 }
@@ -159,20 +159,20 @@ impl Laboratory {
         Ok(())
     }
 
-    /// Throttle of each ESC, 0 to 1; none where its wire is silent.
+    /// Returns the throttle of each ESC, 0 to 1; `None` for a silent wire.
     pub fn throttles(&self) -> &[Option<f64>] {
         &self.throttles
     }
 
-    /// Throttle of an ESC from the next frame on, 0 to 1, or a silent wire.
+    /// Sets an ESC's throttle from the next frame on, 0 to 1, or silences its wire.
     pub fn set_throttle(&mut self, esc: usize, throttle: Option<f64>) {
         self.throttles[esc] = throttle;
     }
 
-    /// Plays a datagram of the throttle wire for an ESC, `after_ns` from now or after what still plays.
+    /// Plays a throttle-wire datagram for an ESC, `after_ns` from now or after what still plays.
     ///
     /// # Errors
-    /// It is malformed, or too much waits.
+    /// It is malformed, or too much is pending.
     pub fn send(
         &mut self,
         esc: usize,
@@ -183,39 +183,39 @@ impl Laboratory {
         self.rack.play(esc, start_ns, datagram)
     }
 
-    /// Changes what is around the ESCs, from their next control periods on.
+    /// Changes the ESCs' surroundings, from their next control periods on.
     ///
     /// # Errors
-    /// A quantity is out of its range; nothing has changed then.
+    /// A quantity is out of range; nothing has changed then.
     pub fn surround(&mut self, change: &Environment) -> Result<(), OutOfRange> {
         change.check()?;
         self.rack.surround(change);
         Ok(())
     }
 
-    /// Bytes of MAVLink for all ESCs.
+    /// Sends MAVLink bytes to all ESCs.
     pub fn receive(&mut self, bytes: &[u8]) {
         self.rack.receive(self.stream, bytes, &mut self.look);
     }
 
-    /// Takes bytes of MAVLink that the ESCs have sent, at most so many. The latest 64 KB are kept, in whole frames.
+    /// Takes at most this many MAVLink bytes that the ESCs have sent. The latest 64 KB are kept, in whole frames.
     pub fn take_sent(&mut self, most: usize) -> Vec<u8> {
         self.outbox.take(most)
     }
 
-    /// Lets a fault act on an ESC from its time on, in place of one of its kind; `text` is how it is listed.
+    /// Injects a fault into an ESC that acts from its time on, replacing one of its kind; `text` is how it is listed.
     pub fn inject(&mut self, esc: usize, fault: Fault, text: String) {
         // The rack's ESCs can be broken.
         let _ = self.rack.inject(esc, fault);
         self.faults[esc].push((fault, text));
     }
 
-    /// Makes whole again all that faults have broken of an ESC by now.
+    /// Repairs everything that faults have broken in an ESC so far.
     pub fn mend(&mut self, esc: usize) {
         let _ = self.rack.mend(esc);
     }
 
-    /// The faults of an ESC that act or are to come, as they were given.
+    /// Returns the faults of an ESC that act or are pending, as given.
     pub fn faults(&mut self, esc: usize) -> Vec<String> {
         let device = &self.rack.escs()[esc];
         let given = &mut self.faults[esc];
@@ -225,17 +225,17 @@ impl Laboratory {
         left.map(|(_, text)| text.clone()).collect()
     }
 
-    /// Takes what has been recorded of an ESC: [packed rows](crate::record::Row::pack), a control period each.
+    /// Takes what has been recorded of an ESC: [packed rows](crate::record::Row::pack), one per control period.
     pub fn take_recorded(&mut self, esc: usize) -> Option<Vec<u8>> {
         self.look.take_recorded(esc)
     }
 
-    /// Hash over an ESC's control state in every step so far, as a scenario's `trace_hash`.
+    /// Returns the hash over an ESC's control state in every step so far, as a scenario's `trace_hash`.
     pub fn trace_hash(&self, esc: usize) -> Option<String> {
         self.look.trace_hash(esc)
     }
 
-    /// A number for another stream of MAVLink.
+    /// Returns an id for another MAVLink stream.
     fn new_stream(&mut self) -> LinkId {
         self.streams.give()
     }

@@ -2,17 +2,16 @@
 
 use std::collections::VecDeque;
 
-/// Bytes that are kept: at the default rates, what four ESCs send in some 20 s.
+/// Bytes kept: at the default rates, what four ESCs send in some 20 s.
 const KEPT_BYTES: usize = 65_536;
 
-/// Frames in the order in which they were sent. What nobody takes goes, the oldest first: telemetry is worth having
-/// while it is new.
+/// Frames in sending order. Untaken ones are dropped, oldest first: telemetry is only worth having while it is new.
 #[derive(Debug, Default)]
 pub(super) struct Outbox {
     bytes: VecDeque<u8>,
-    /// The length of each frame, of the first what is left of it.
+    /// The length of each frame; of the first, what is left of it.
     lengths: VecDeque<usize>,
-    /// A part of the first has been taken: without the rest of it, the reader would lose the next one too.
+    /// A part of the first has been taken: without the rest, the reader would lose the next one too.
     is_cut: bool,
 }
 
@@ -33,7 +32,7 @@ impl Outbox {
         }
     }
 
-    /// Takes the oldest bytes, at most so many.
+    /// Takes the oldest bytes, at most this many.
     pub(super) fn take(&mut self, most: usize) -> Vec<u8> {
         let count = most.min(self.bytes.len());
         let mut left = count;
@@ -67,7 +66,7 @@ mod tests {
         }
         let left = outbox.take(usize::MAX);
         assert!(left.len() <= KEPT_BYTES && left.len() > KEPT_BYTES - 280);
-        // The rest of the frame that was begun, and then the latest.
+        // The rest of the frame begun, then the latest.
         assert_eq!(left[..60], [255; 60]);
         let (frames, rest) = left[60..].as_chunks::<280>();
         assert!(rest.is_empty() && frames.iter().all(|frame| *frame == [frame[0]; 280]));

@@ -1,4 +1,4 @@
-//! A parameter that a program sets as a ground station does, by PARAM_SET.
+//! A parameter set by a program as a ground station does, by PARAM_SET.
 
 use siskin_control::esc;
 use siskin_control::params::ParamId;
@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::Laboratory;
 use crate::parameter::set_frame;
 
-/// Why a value is not taken; one line.
+/// Why a value is rejected; one line.
 #[derive(Debug, Error)]
 #[error("{name} = {value} is refused: {reason}")]
 pub struct Refused {
@@ -17,7 +17,7 @@ pub struct Refused {
 }
 
 impl Laboratory {
-    /// The value of an ESC's parameter that is in force.
+    /// Returns the value of an ESC's parameter in force.
     pub fn param(&self, esc: usize, id: ParamId) -> f32 {
         self.esc(esc).esc().params().get(id)
     }
@@ -25,11 +25,11 @@ impl Laboratory {
     /// Sets an ESC's parameter to a value in its range. The drive has it within a millisecond.
     ///
     /// # Errors
-    /// The ESC refuses it: the motor turns, say, or the drive cannot be built so.
+    /// The ESC refuses it, for instance because the motor turns or the drive cannot be built so.
     pub fn set_param(&mut self, esc: usize, id: ParamId, value: f32) -> Result<(), Refused> {
         let name = id.entry().name;
         let frame = set_frame(id, value);
-        // Beside what the program itself sends, of which a frame may be half there.
+        // Separate from the program's own stream, which may be in the middle of a frame.
         let stream = self.new_stream();
         self.rack
             .receive_for(esc, stream, frame.raw_bytes(), &mut self.look);
@@ -40,7 +40,7 @@ impl Laboratory {
         let device = self.esc(esc);
         let bench = device.rig().around().bench();
         let mut wanted = device.esc().params().clone();
-        // It is in its range.
+        // It is in range.
         let _ = wanted.set(id, value);
         let reason = if device.rig().is_held() {
             "the chip is in reset"

@@ -25,7 +25,7 @@ fn laboratory(escs: usize) -> Laboratory {
     Laboratory::set_up(setup(escs)).unwrap().0
 }
 
-/// Arms, and turns at half throttle for a while.
+/// Arms, and runs at half throttle for a while.
 fn run_up(laboratory: &mut Laboratory) {
     laboratory.go_on_to(400 * MS).unwrap();
     for esc in 0..laboratory.rack().escs().len() {
@@ -96,7 +96,7 @@ fn a_parameter_is_set_as_by_a_ground_station() {
     laboratory.set_param(1, ParamId::CtlRpmMax, 5000.0).unwrap();
     assert_eq!(laboratory.param(1, ParamId::CtlRpmMax), 5000.0);
     assert_ne!(laboratory.param(0, ParamId::CtlRpmMax), 5000.0);
-    // No drive of so little inductance fits the board.
+    // No drive with so little inductance fits the board.
     let error = laboratory.set_param(0, ParamId::MotLUh, 0.1).unwrap_err();
     assert!(
         error.to_string().starts_with("MOT_L_UH = 0.1 is refused: "),
@@ -169,7 +169,7 @@ fn mavlink_waits_to_be_taken_and_records_too() {
     let bytes = laboratory.take_recorded(0).unwrap();
     let (rows, rest) = bytes.as_chunks::<{ Row::PACKED_BYTES }>();
     assert!(rest.is_empty() && rows.len() > 10_000);
-    // Time, and at its place 24 V.
+    // Time, and 24 V at its place.
     assert_eq!(rows[0][..8], [0; 8]);
     assert_eq!(rows[0][74..78], 24.0_f32.to_le_bytes());
     assert_eq!(laboratory.take_recorded(0), Some(Vec::new()));

@@ -8,10 +8,10 @@ use thiserror::Error;
 
 use siskin_scope::{AddressError, HostPort};
 
-/// Baud of a `pty` endpoint that names none: what telemetry radios and boards start with.
+/// Baud rate of a `pty` endpoint that names none: the initial rate of telemetry radios and boards.
 pub const DEFAULT_BAUD: u32 = 115_200;
 
-/// The slowest and the fastest rate that is taken: from the oldest radios to USB bridges.
+/// The slowest and fastest accepted rate: from the oldest radios to USB bridges.
 const BAUD: std::ops::RangeInclusive<u32> = 300..=12_000_000;
 
 /// One place to which MAVLink goes and from which it comes.
@@ -27,14 +27,14 @@ pub enum Endpoint {
     Serial {
         /// The device.
         path: PathBuf,
-        /// Bits a second.
+        /// Bits per second.
         baud: u32,
     },
     /// A pseudo-terminal, which another program opens like a serial port.
     Pty {
-        /// A symbolic link to make to it.
+        /// A symbolic link to create to it.
         link: Option<PathBuf>,
-        /// Bits a second at which bytes pass.
+        /// Rate at which bytes pass, bits per second.
         baud: u32,
     },
     /// No MAVLink at all.
@@ -63,7 +63,7 @@ pub enum EndpointReason {
     /// The address is wrong.
     #[error(transparent)]
     Address(#[from] AddressError),
-    /// Port 0 means nothing where datagrams are sent to.
+    /// Datagrams cannot be sent to port 0.
     #[error("datagrams cannot be sent to port 0")]
     PortZero,
     /// The device or the rate is missing.
@@ -72,14 +72,14 @@ pub enum EndpointReason {
     /// The rate is not a number or out of range.
     #[error("the rate '{0}' is not a number from 300 to 12000000")]
     Baud(String),
-    /// Something follows a word that stands alone.
+    /// Something follows a word that must be alone.
     #[error("nothing follows 'none'")]
     None,
 }
 
 impl Endpoint {
-    /// Where MAVLink goes when nothing was asked for: to a ground station's usual port and to a
-    /// server for scripts, both on this machine only.
+    /// Returns the default endpoints: a ground station's usual port and a server for scripts, both
+    /// on this machine only.
     pub fn defaults() -> Vec<Self> {
         let local = |port| HostPort {
             host: "127.0.0.1".to_owned(),
@@ -88,9 +88,10 @@ impl Endpoint {
         vec![Self::UdpOut(local(14550)), Self::TcpIn(local(5760))]
     }
 
-    /// What `siskin --connect` takes to reach it; nothing for a port whose other end is elsewhere.
+    /// Returns what `siskin --connect` takes to reach it; `None` for a port whose other end is
+    /// elsewhere.
     pub fn opposite(&self) -> Option<String> {
-        // What listens on every interface is reached on this machine too.
+        // What listens on every interface is reachable on this machine too.
         let here = |address: &HostPort| match address.host.as_str() {
             "0.0.0.0" | "::" => format!("127.0.0.1:{}", address.port),
             _ => address.to_string(),

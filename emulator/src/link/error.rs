@@ -1,4 +1,4 @@
-//! Why a link cannot be opened: one line a person can act on.
+//! Why a link cannot be opened: one actionable line.
 
 use std::io;
 use std::path::PathBuf;
@@ -51,7 +51,7 @@ pub enum LinkError {
         /// What the system said.
         source: io::Error,
     },
-    /// There is no pseudo-terminal to be had.
+    /// No pseudo-terminal is available.
     #[error("--mavlink {endpoint}: no pseudo-terminal ({source}); use udpout or tcpin instead")]
     Pty {
         /// What was asked for.
@@ -72,7 +72,7 @@ pub enum LinkError {
         /// What the system said.
         source: io::Error,
     },
-    /// What stands at the link's path is not a link; it is left alone.
+    /// The link's path exists and is not a link; it is left alone.
     #[error(
         "--mavlink {endpoint}: {} exists and is not a symbolic link; remove it or give another \
          path",

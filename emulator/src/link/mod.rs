@@ -1,7 +1,7 @@
 //! MAVLink's byte streams: UDP, TCP, serial ports and pseudo-terminals.
 //!
-//! Nothing here blocks or reads a clock: the emulator's one loop calls [`Links::receive`] at least
-//! once a millisecond and says what time it is, and [`Links::send`] whenever there is a frame.
+//! Nothing here blocks or reads a clock: the emulator's single loop calls [`Links::receive`] with
+//! the time at least once a millisecond, and [`Links::send`] whenever there is a frame.
 
 mod endpoint;
 mod error;
@@ -26,10 +26,10 @@ use std::time::Duration;
 
 use stream::{Inbox, Link};
 
-/// Most bytes that one read takes: the longest datagram.
+/// Most bytes per read: the longest datagram.
 const READ_BYTES: usize = 65_535;
 
-/// What a loopback socket takes without loss, by far.
+/// What a loopback socket easily takes without loss.
 pub const SOCKET_BYTES_PER_S: u32 = 1_000_000;
 
 /// Every open MAVLink link.
@@ -56,8 +56,8 @@ impl Links {
         })
     }
 
-    /// Hands what is pending to `handle`, at most some 16 MB a second on each stream. Serial lines
-    /// also go on sending here. `now` is wall time since any fixed moment.
+    /// Passes pending data to `handle`, at most some 16 MB a second per stream. Serial lines also
+    /// continue sending here. `now` is wall time since any fixed moment.
     pub fn receive(&mut self, now: Duration, mut handle: impl FnMut(LinkId, Event<'_>)) {
         let mut inbox = Inbox {
             now,
@@ -70,19 +70,19 @@ impl Links {
         }
     }
 
-    /// Sends a frame to every peer of every link; never waits. Returns for how many peers there
-    /// was no room, each of which has lost the whole frame.
+    /// Sends a frame to every peer of every link; never waits. Returns the number of peers without
+    /// room, each of which has lost the whole frame.
     pub fn send(&mut self, frame: &[u8]) -> u64 {
         self.links.iter_mut().map(|link| link.send(frame)).sum()
     }
 
-    /// A number for a stream that another part of the program carries.
+    /// Returns an id for a stream carried by another part of the program.
     pub fn stream(&mut self) -> LinkId {
         self.ids.give()
     }
 
-    /// What the slowest link carries, bytes/s: a terminal's rate, or what a loopback socket takes
-    /// without loss where there is none.
+    /// Returns the rate of the slowest link, bytes/s: a terminal's, or if there is none, what a
+    /// loopback socket takes without loss.
     pub fn slowest_bytes_per_s(&self) -> u32 {
         let bauds = self.links.iter().filter_map(|link| match link.endpoint() {
             Endpoint::Serial { baud, .. } | Endpoint::Pty { baud, .. } => Some(baud),
@@ -91,12 +91,12 @@ impl Links {
         bauds.min().map_or(SOCKET_BYTES_PER_S, |baud| baud / 10)
     }
 
-    /// The endpoints as they came to be: a port of 0 is replaced by the one that was given.
+    /// Returns the actual endpoints: a port of 0 is replaced by the assigned one.
     pub fn endpoints(&self) -> Vec<Endpoint> {
         self.links.iter().map(|link| link.endpoint()).collect()
     }
 
-    /// A line for a person on each link, in the order of opening.
+    /// Describes each link in a line for the user, in the order of opening.
     pub fn describe(&self) -> Vec<String> {
         self.links.iter().map(|link| link.describe()).collect()
     }

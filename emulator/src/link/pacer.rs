@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-/// Bits that a byte takes on the line: start, eight, stop.
+/// Bits per byte on the line: start, eight, stop.
 const BITS_PER_BYTE: u128 = 10;
 
-/// How many bytes a line of some rate has carried since it was last idle.
+/// The number of bytes that a line has carried since it was last idle.
 #[derive(Debug)]
 pub(super) struct Pacer {
     baud: u32,
@@ -22,7 +22,7 @@ impl Pacer {
         }
     }
 
-    /// Bytes that may pass at `now`, the line having been busy since it was last idle.
+    /// Returns how many bytes may pass at `now`, for a line busy since it was last idle.
     pub(super) fn budget(&mut self, now: Duration) -> usize {
         let since = *self.busy_since.get_or_insert(now);
         let bits = now.saturating_sub(since).as_nanos() * u128::from(self.baud) / 1_000_000_000;
@@ -30,12 +30,12 @@ impl Pacer {
         usize::try_from(budget).unwrap_or(usize::MAX)
     }
 
-    /// Bytes have passed.
+    /// Counts bytes that have passed.
     pub(super) fn pass(&mut self, bytes: usize) {
         self.passed += bytes as u128;
     }
 
-    /// The line is idle: time that passes unused is not made up for.
+    /// Marks the line idle: unused time is not made up for.
     pub(super) fn idle(&mut self, now: Duration) {
         self.busy_since = Some(now);
         self.passed = 0;
@@ -67,7 +67,7 @@ mod tests {
         pacer.idle(Duration::from_secs(6));
         assert_eq!(pacer.budget(Duration::from_secs(6)), 0);
         assert_eq!(pacer.budget(Duration::from_millis(6010)), 9);
-        // A clock that steps back gives nothing.
+        // A clock that steps back allows nothing.
         assert_eq!(pacer.budget(Duration::from_secs(1)), 0);
     }
 }

@@ -15,8 +15,8 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use super::tty::Port;
 use super::{Endpoint, LinkError};
 
-/// Our end of the pair. The other end is opened by whoever wants to; while nobody has it open,
-/// reading fails with EIO, which is how a reader that went away is noticed.
+/// Our end of the pair. Anyone may open the other end; while nobody has it open, reading fails with
+/// EIO, which is how a departed reader is noticed.
 pub(super) struct Pty {
     master: File,
     path: PathBuf,
@@ -56,8 +56,8 @@ fn pair() -> io::Result<(File, PathBuf)> {
         ptsname(&master, Vec::new())?.into_bytes(),
     ));
     // Raw from the start, for readers that set nothing: otherwise the terminal echoes, translates
-    // line ends and takes 0x03 for an interrupt. The settings live as long as our end. Closing
-    // the other end again makes reading fail until someone opens it.
+    // line ends and takes 0x03 for an interrupt. The settings live as long as our end. Closing the
+    // other end again makes reading fail until someone opens it.
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let other = rustix::fs::open(&path, flags, Mode::empty())?;
     let mut settings = tcgetattr(&other)?;
@@ -76,7 +76,7 @@ impl Port for Pty {
     }
 
     fn revive(&mut self, _now: Duration) {
-        // The terminal stays; whoever opens it is there again.
+        // The terminal remains; whoever opens it is back.
     }
 
     fn endpoint(&self) -> Endpoint {
@@ -99,7 +99,7 @@ impl Port for Pty {
     }
 }
 
-/// A symbolic link to the terminal, which goes when the program ends.
+/// A symbolic link to the terminal, removed when the program ends.
 struct Symlink {
     path: PathBuf,
     target: PathBuf,
@@ -134,9 +134,9 @@ impl Symlink {
 
 impl Drop for Symlink {
     fn drop(&mut self) {
-        // Another run may have put its own in place since.
+        // Another run may have put its own there since.
         if fs::read_link(&self.path).is_ok_and(|target| target == self.target) {
-            // There is nobody left to tell that it could not be removed.
+            // Nobody is left to report a failure to.
             let _ = fs::remove_file(&self.path);
         }
     }

@@ -9,10 +9,10 @@ use serial2::SerialPort;
 use super::Endpoint;
 use super::tty::Port;
 
-/// Time between attempts to open a port that has gone, as a USB bridge does when it is unplugged.
+/// Time between attempts to reopen a port that has gone, such as an unplugged USB bridge.
 const RETRY: Duration = Duration::from_secs(1);
 
-/// A port that is opened again when it comes back.
+/// A port that is reopened when it comes back.
 pub(super) struct Serial {
     port: Option<SerialPort>,
     tried: Duration,
@@ -37,7 +37,7 @@ impl Serial {
     }
 }
 
-/// A bare rate means raw, 8N1 and no flow control to this library.
+/// To this library a bare rate means raw, 8N1 and no flow control.
 fn open(path: &Path, baud: u32) -> io::Result<SerialPort> {
     let mut port = SerialPort::open(path, baud)?;
     port.set_read_timeout(Duration::ZERO)?;

@@ -7,7 +7,7 @@ use super::endpoint::Endpoint;
 use super::error::LinkError;
 use siskin_scope::HostPort;
 
-/// What refuses a socket: a port that is taken has another remedy than an address that is wrong.
+/// Returns the error of a refused socket: a port in use has another remedy than a wrong address.
 pub(super) fn socket_error(endpoint: &Endpoint, source: io::Error) -> LinkError {
     let endpoint = endpoint.clone();
     match source.kind() {

@@ -1,30 +1,30 @@
-//! What every kind of link does, and what it is handed to do it.
+//! The interface of every kind of link.
 
 use std::io;
 use std::time::Duration;
 
 use super::endpoint::Endpoint;
 
-/// One byte stream: a TCP client, a UDP peer, a serial line while someone is there. A number is
-/// never used again, so a peer that comes back gets another.
+/// One byte stream: a TCP client, a UDP peer, a serial line while someone is there. Ids are never
+/// reused, so a returning peer gets another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct LinkId(u64);
 
 /// What happened on a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event<'a> {
-    /// Bytes came in. From UDP it is one whole datagram.
+    /// Bytes were received. From UDP it is one whole datagram.
     Bytes(&'a [u8]),
-    /// The stream is gone, and with it what its receiver remembers.
+    /// The stream is gone, and so is its receiver's state.
     Ended,
 }
 
-/// Gives each stream its number.
+/// Assigns ids to streams.
 #[derive(Clone, Debug, Default)]
 pub struct Ids(u64);
 
 impl Ids {
-    /// A number that no stream has had.
+    /// Returns an id that no stream has had.
     pub fn give(&mut self) -> LinkId {
         self.0 += 1;
         LinkId(self.0)
@@ -39,19 +39,19 @@ pub(super) struct Inbox<'a> {
     pub(super) handle: &'a mut dyn FnMut(LinkId, Event<'_>),
 }
 
-/// One endpoint that is open.
+/// An open endpoint.
 pub(super) trait Link {
-    /// Takes in what is pending, a bounded amount, and goes on with what is being sent.
+    /// Takes in a bounded amount of pending data, and continues sending.
     fn receive(&mut self, inbox: &mut Inbox<'_>);
-    /// Sends a frame to each peer, whole or not at all. Returns to how many it was lost.
+    /// Sends a frame to each peer, whole or not at all. Returns how many lost it.
     fn send(&mut self, frame: &[u8]) -> u64;
-    /// The endpoint as it came to be: with the port that the system chose.
+    /// Returns the actual endpoint, with the port that the system chose.
     fn endpoint(&self) -> Endpoint;
-    /// A line for a person.
+    /// Describes it in a line for the user.
     fn describe(&self) -> String;
 }
 
-/// Whether an operation has only to be tried again later.
+/// Returns true if an operation only has to be retried later.
 pub(super) fn is_pending(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), WouldBlock | TimedOut | Interrupted)

@@ -11,20 +11,20 @@ use super::socket::{resolve, socket_error};
 use super::stream::{Event, Inbox, Link, LinkId, is_pending};
 use super::{Endpoint, LinkError};
 
-/// Clients at once. One more takes the place of the one that has been silent for longest, if any is, and
-/// is turned away otherwise.
+/// Most clients at once. A further one replaces the client that has been silent longest, if any is, and is otherwise
+/// turned away.
 const MAX_CLIENTS: usize = 32;
 
-/// Silence after which a client makes room for another: stations send a heartbeat each second.
+/// Silence after which a client makes room for another: stations send a heartbeat every second.
 const SILENT: Duration = Duration::from_secs(5);
 
-/// Bytes that wait for a slow client, a minute of telemetry; one that lets more pile up is dropped.
+/// Most bytes pending for a slow client, a minute of telemetry; a client that exceeds it is dropped.
 const MAX_PENDING_BYTES: usize = 256 * 1024;
 
-/// Bytes taken from a client in one call, 16 MB a second with one call a millisecond.
+/// Bytes read from a client per call, 16 MB a second with one call a millisecond.
 const READ_BYTES: usize = 16 * 1024;
 
-/// The port and those connected to it.
+/// The port and its clients.
 pub(super) struct TcpServer {
     listener: TcpListener,
     clients: Vec<Client>,
@@ -36,9 +36,9 @@ struct Client {
     stream: TcpStream,
     id: LinkId,
     pending: VecDeque<u8>,
-    /// When it has connected, or bytes came from it.
+    /// When it connected, or bytes last came from it.
     heard: Duration,
-    /// True once bytes have come from it.
+    /// True once it has sent bytes.
     begun: bool,
 }
 
@@ -61,12 +61,12 @@ impl TcpServer {
     }
 
     fn accept(&mut self, inbox: &mut Inbox<'_>) {
-        // The bound is for a flood of connections; each one over the limit is closed at once.
+        // The bound is for a flood of connections; those over the limit are closed at once.
         for _ in 0..MAX_CLIENTS {
             let stream = match self.listener.accept() {
                 Ok((stream, _)) => stream,
-                // A connection that broke before it was accepted, or no descriptor left: the
-                // port stays open and the next call tries again.
+                // A connection broke before it was accepted, or no descriptor is left: the port stays open and the next
+                // call tries again.
                 Err(_) => break,
             };
             // Telemetry is small frames that should not wait for each other's acknowledgement.
@@ -85,7 +85,7 @@ impl TcpServer {
         }
     }
 
-    /// Whether there is room for one client more, which is made where one is silent.
+    /// Returns true if there is room for another client, dropping a silent one if necessary.
     fn has_room(&mut self, now: Duration) -> bool {
         if self.clients.len() < MAX_CLIENTS {
             return true;
@@ -116,8 +116,8 @@ impl TcpServer {
 }
 
 impl Client {
-    /// Reads once. An error or the end of the stream is an error, and so is a request of HTTP: any page of a browser on
-    /// this machine could hide frames in one.
+    /// Reads once. The end of the stream is an error, and so is an HTTP request: any page in a browser on this machine
+    /// could hide frames in one.
     fn receive(&mut self, inbox: &mut Inbox<'_>) -> io::Result<()> {
         match self.stream.read(&mut inbox.buffer[..READ_BYTES]) {
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
@@ -155,7 +155,7 @@ impl Client {
     }
 }
 
-/// Whether the first bytes of a client are what a browser sends, or a part of it.
+/// Returns true if a client's first bytes are what a browser sends, or part of it.
 fn is_http(first: &[u8]) -> bool {
     let methods: [&[u8]; 4] = [b"GET ", b"HEAD ", b"OPTIONS ", b"POST "];
     methods

@@ -1,4 +1,4 @@
-//! Real sockets on loopback and real terminals; the time that the links see is an argument.
+//! Real sockets on loopback and real terminals; the links' time is an argument.
 
 #[cfg(unix)]
 mod terminals;
@@ -14,7 +14,7 @@ use super::*;
 
 const MS: Duration = Duration::from_millis(1);
 
-/// Open links, what came in on each stream that lives, and what has ended.
+/// Open links, what each live stream received, and which streams have ended.
 struct Bench {
     links: Links,
     now: Duration,
@@ -43,7 +43,7 @@ impl Bench {
         });
     }
 
-    /// Receives until it is so. The kernel takes what time it needs; the links see `step` a turn.
+    /// Receives until `done`. The kernel takes its time; the links see `step` per turn.
     fn until(&mut self, step: Duration, mut done: impl FnMut(&mut Self) -> bool) {
         for _ in 0..5000 {
             self.now += step;
@@ -60,7 +60,7 @@ impl Bench {
         self.streams.values().any(|bytes| bytes == text)
     }
 
-    /// Where the link of this index listens.
+    /// Returns where the link of this index listens.
     fn address(&self, index: usize) -> SocketAddress {
         match &self.links.endpoints()[index] {
             Endpoint::UdpIn(address) | Endpoint::TcpIn(address) => {
@@ -78,7 +78,7 @@ impl Bench {
         client
     }
 
-    /// Two clients, of which each has been heard.
+    /// Connects two clients, each of which has been heard.
     fn connect_two(&mut self) -> [TcpStream; 2] {
         let mut clients = [self.connect(0), self.connect(0)];
         for (client, name) in clients.iter_mut().zip([b"one", b"two"]) {
@@ -112,7 +112,7 @@ fn read(stream: &mut impl Read, length: usize) -> Vec<u8> {
     bytes
 }
 
-/// Whether the bytes are 0 to 249 over and over, none missing.
+/// Returns true if the bytes are 0 to 249 repeated, none missing.
 fn is_counted(bytes: &[u8]) -> bool {
     bytes
         .iter()
@@ -194,7 +194,7 @@ fn udpin_sends_to_all_that_have_sent_in_the_last_minute() {
     second.set_nonblocking(true).unwrap();
     assert!(second.recv(&mut [0; 64]).is_err());
 
-    // It comes back as another stream, so that no half frame of before is continued.
+    // It returns as another stream, so that no half frame is continued.
     second.send_to(b"back", &to).unwrap();
     bench.until(MS, |b| b.heard(b"back"));
     assert!(!bench.streams.contains_key(&bench.ended[0]));
@@ -273,9 +273,9 @@ fn a_client_that_does_not_read_is_dropped_and_the_others_get_every_byte() {
     assert_eq!(bench.ended.len(), 1);
     assert!(bench.heard(b"two") && !bench.heard(b"one"));
 
-    // What the slow one finds when it reads at last is whole and in order, then cut off.
+    // What the slow client finally reads is whole and in order, then cut off.
     let mut found = Vec::new();
-    // A connection closed with something unread may end as a reset.
+    // A connection closed with unread data may end as a reset.
     let _ = slow.read_to_end(&mut found);
     assert!(is_counted(&found));
 }

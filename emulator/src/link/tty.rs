@@ -1,4 +1,4 @@
-//! MAVLink over a serial line, real or not, at the pace of its rate.
+//! MAVLink over a serial line, real or not, at its rate.
 
 use std::collections::VecDeque;
 use std::io;
@@ -8,25 +8,26 @@ use super::Endpoint;
 use super::pacer::Pacer;
 use super::stream::{Event, Inbox, Link, LinkId, is_pending};
 
-/// Bytes taken in one call, whatever the rate: a kernel terminal holds as many.
+/// Bytes read per call, whatever the rate: a kernel terminal holds as many.
 const READ_BYTES: usize = 4096;
 
-/// The device under a [`Tty`]. Reading and writing never wait.
+/// The device under a [`Tty`]. Reading and writing never block.
 pub(super) trait Port {
-    /// An error other than "not now", or a length of 0, says that nobody is at the other end.
+    /// Reads. An error other than "not now", or a length of 0, means that nobody is at the other
+    /// end.
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
-    /// Writes what there is room for.
+    /// Writes as much as there is room for.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
-    /// Nobody is at the other end: tries to get it back.
+    /// Tries to get the other end back.
     fn revive(&mut self, now: Duration);
-    /// The endpoint as it came to be.
+    /// Returns the actual endpoint.
     fn endpoint(&self) -> Endpoint;
-    /// A line for a person.
+    /// Describes it in a line for the user.
     fn describe(&self) -> String;
 }
 
-/// A serial line that is carried at its rate in both directions. Like a real line it goes on
-/// when nobody listens: what is sent then is gone.
+/// A serial line, paced at its rate in both directions. Like a real line it works without a
+/// listener: what is sent then is lost.
 pub(super) struct Tty<P> {
     port: P,
     attached: bool,
@@ -39,8 +40,8 @@ pub(super) struct Tty<P> {
 
 impl<P: Port> Tty<P> {
     pub(super) fn new(port: P, baud: u32) -> Self {
-        // Half a second of the line, so that an answer does not wait for longer behind telemetry
-        // that the line is too slow for; at least two frames of the longest kind (280 bytes).
+        // Half a second of the line, so that an answer does not wait longer behind telemetry that
+        // is too much for the line; at least two frames of the longest kind (280 bytes).
         let max_pending = (baud as usize / 20).clamp(2 * 280, 64 * 1024);
         Self {
             port,

@@ -1,4 +1,4 @@
-//! MAVLink over UDP, outward to an address and inward from whoever sends.
+//! MAVLink over UDP, outward to an address and inward from any sender.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -10,17 +10,17 @@ use super::socket::{resolve, socket_error};
 use super::stream::{Event, Inbox, Link, LinkId, is_pending};
 use super::{Endpoint, LinkError};
 
-/// Datagrams taken in one call: more than a ground station sends in the millisecond between two.
+/// Datagrams taken per call: more than a ground station sends in the millisecond between two.
 const DATAGRAMS_PER_CALL: usize = 64;
 
-/// Peers that are remembered; the one silent for longest makes room for another.
+/// Peers remembered; the one silent longest makes room for another.
 const MAX_PEERS: usize = 16;
 
-/// A peer that has been silent for this long is forgotten. Every MAVLink system sends a heartbeat
-/// each second; a script that only listens has a minute between two requests.
+/// A peer silent for this long is forgotten. Every MAVLink system sends a heartbeat each second; a
+/// listening script has a minute between two requests.
 const PEER_SILENCE: Duration = Duration::from_secs(60);
 
-/// A socket, the address it always sends to if there is one, and those that it has heard.
+/// A socket, its fixed target if any, and the peers that it has heard.
 pub(super) struct Udp {
     socket: UdpSocket,
     target: Option<SocketAddr>,
@@ -35,10 +35,10 @@ struct Peer {
 }
 
 impl Udp {
-    /// Sends to `address` whether anyone listens there or not.
+    /// Opens a link that sends to `address` whether anyone listens there or not.
     pub(super) fn outward(endpoint: &Endpoint, address: &HostPort) -> Result<Self, LinkError> {
         let target = resolve(endpoint, address)?;
-        // What goes to this machine only is not to be reached from another either.
+        // Traffic for this machine only must not be reachable from another one either.
         let local: IpAddr = match (target.ip(), target.ip().is_loopback()) {
             (ip, true) => ip,
             (IpAddr::V4(_), false) => Ipv4Addr::UNSPECIFIED.into(),
@@ -49,7 +49,7 @@ impl Udp {
         Ok(link)
     }
 
-    /// Sends to those that have sent to `address`.
+    /// Opens a link that sends to those that have sent to `address`.
     pub(super) fn inward(endpoint: &Endpoint, address: &HostPort) -> Result<Self, LinkError> {
         let local = resolve(endpoint, address)?;
         let mut link = Self::bind(endpoint, local)?;
@@ -63,7 +63,7 @@ impl Udp {
         let open = || -> io::Result<UdpSocket> {
             let socket = UdpSocket::bind(local)?;
             socket.set_nonblocking(true)?;
-            // An address given may be a network's broadcast address.
+            // The given address may be a network's broadcast address.
             socket.set_broadcast(true)?;
             Ok(socket)
         };
@@ -75,7 +75,7 @@ impl Udp {
         })
     }
 
-    /// The stream of the peer at `address`, which has just been heard.
+    /// Returns the stream of the peer at `address`, which has just been heard.
     fn hear(&mut self, address: SocketAddr, inbox: &mut Inbox<'_>) -> LinkId {
         if let Some(peer) = self.peers.iter_mut().find(|p| p.address == address) {
             peer.heard = inbox.now;
@@ -107,7 +107,7 @@ impl Link for Udp {
                     (inbox.handle)(id, Event::Bytes(&inbox.buffer[..length]));
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                // Some systems report here that nobody listened to an earlier datagram.
+                // Some systems report here that nobody received an earlier datagram.
                 Err(_) => {}
             }
         }
@@ -127,8 +127,8 @@ impl Link for Udp {
         let all = target
             .into_iter()
             .chain(heard.filter(|a| Some(*a) != target));
-        // Only a full queue loses a frame of a peer that is there: that nobody listens, or that
-        // the network is down for now, is normal for datagrams.
+        // Only a full queue loses a present peer's frame: that nobody listens, or that the network
+        // is down for now, is normal for datagrams.
         all.filter(|address| {
             let sent = self.socket.send_to(frame, address);
             sent.is_err_and(|error| is_pending(&error))

@@ -1,23 +1,23 @@
-//! How simulated time keeps up with the wall's, for those who send in the wall's: a second is looked at
-//! once it is over.
+//! Checks that simulated time keeps up with wall time, for senders that run on wall time: each second is checked once
+//! over.
 
 use std::time::Duration;
 
 use super::pace::Pace;
 
-/// What is looked at together.
+/// The span of one check.
 const LOOK: Duration = Duration::from_secs(1);
 
-/// The same is said again no sooner.
+/// The same message is repeated no sooner.
 const AGAIN: Duration = Duration::from_secs(60);
 
-/// Share of the speed asked for below which simulated time has fallen behind.
+/// Share of the requested speed below which simulated time has fallen behind.
 const BEHIND: f64 = 0.95;
 
-/// Simulated time between two frames which no throttle signal leaves, s: servo pulses come at 50 Hz.
+/// Interval between two frames that no throttle signal exceeds, in simulated s: servo pulses come at 50 Hz.
 const APART_S: f64 = 0.025;
 
-/// Looks at both clocks and the wire.
+/// Watches both clocks and the wire.
 pub(super) struct Keeping {
     pace: Pace,
     /// At the latest look: wall time, simulated ns, and datagrams played.
@@ -34,7 +34,7 @@ impl Keeping {
         }
     }
 
-    /// Looks, if it is time; a line where a sender will not get what it expects.
+    /// Looks, if it is time; returns a line if a sender will not get what it expects.
     pub(super) fn look(&mut self, wall: Duration, now_ns: u64, played: u64) -> Option<String> {
         let (since, since_ns, played_before) = self.last;
         let took = wall.checked_sub(since).filter(|took| *took >= LOOK)?;

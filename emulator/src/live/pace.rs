@@ -1,26 +1,26 @@
-//! Simulated time in step with the wall's.
+//! Simulated time in step with wall time.
 
 use std::time::{Duration, Instant};
 
-/// Wall time between two looks at the sockets.
+/// Wall time between two reads of the sockets.
 const SLICE: Duration = Duration::from_millis(1);
 
-/// Lag behind the wall clock that is given up rather than caught up with: the machine slept.
+/// Lag behind the wall clock that is dropped rather than caught up: the machine slept.
 const GIVEN_UP: Duration = Duration::from_millis(500);
 
-/// A control period at the lowest PWM frequency, 8 kHz, and some more, ns.
+/// A control period at the lowest PWM frequency, 8 kHz, plus a margin, ns.
 const LONGEST_PERIOD_NS: u64 = 130_000;
 
 /// How fast simulated time passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// So many simulated seconds a second.
+    /// This many simulated seconds per second.
     Times(f64),
     /// As fast as the machine can.
     Max,
 }
 
-/// Keeps simulated time in step with the wall's.
+/// Keeps simulated time in step with wall time.
 pub(super) struct Pacer {
     pace: Pace,
     pub(super) began: Instant,
@@ -37,10 +37,10 @@ impl Pacer {
         }
     }
 
-    /// How far to simulate now, in slices that take a millisecond of the wall's time.
+    /// Returns how far to simulate now, in slices of a millisecond of wall time.
     pub(super) fn until_ns(&mut self, now_ns: u64) -> u64 {
         let Pace::Times(times) = self.pace else {
-            // The sockets are looked at once in 20 ms of simulation, which take less than one.
+            // The sockets are read once per 20 ms of simulation, which takes less than one.
             return now_ns + 20_000_000;
         };
         let wall = self.began.elapsed();
@@ -62,7 +62,8 @@ impl Pacer {
     }
 }
 
-/// What is simulated in a millisecond of the wall's time; in slow motion at least a control period.
+/// Returns what is simulated in a millisecond of wall time; in slow motion at least a control
+/// period.
 fn slice_ns(times: f64) -> u64 {
     ((SLICE.as_nanos() as f64 * times) as u64).max(LONGEST_PERIOD_NS)
 }

@@ -1,21 +1,21 @@
-//! The rack's clock in a client's hand: each request in its turn, and the state as the answer.
+//! The rack's clock under a client's control: each request in its turn, answered by the state.
 
 use super::request::{Malformed, Request, Turn, parse};
 use super::state::{self, Head};
 use crate::machine::Onlooker;
 use crate::rack::Rack;
 
-/// Where a client stands.
+/// A client's position in the sequence.
 #[derive(Default)]
 pub(super) struct Clock {
     head: Head,
-    /// The answer to the latest request that was obeyed.
+    /// The answer to the latest request obeyed.
     state: Vec<u8>,
 }
 
 impl Clock {
-    /// Obeys a request if it is its turn, and says what was wrong with one that is malformed. Either way
-    /// [`Clock::answer`] then goes to who asked.
+    /// Obeys a request if it is its turn, and says what is wrong with a malformed one. Either way [`Clock::answer`]
+    /// then goes to the sender.
     pub(super) fn obey(
         &mut self,
         request: &[u8],
@@ -33,7 +33,7 @@ impl Clock {
                         let now_ns = rack.now_ns();
                         for frame in frames {
                             let start_ns = now_ns + u64::from(frame.offset_ns);
-                            // One that finds no room is counted by its wire, as any is.
+                            // If it finds no room, its wire counts it, as any.
                             let _ = rack.play(frame.esc, start_ns, frame.datagram);
                         }
                         rack.advance_to(now_ns + u64::from(time_ns), onlooker, send);
@@ -53,19 +53,19 @@ impl Clock {
         Ok(())
     }
 
-    /// The state: of a request that came before, if it is written already.
+    /// Writes the state, unless it is written already, for a repeated request.
     fn told(&mut self, rack: &Rack) {
         if self.state.is_empty() {
             state::write(&mut self.state, &mut self.head, rack);
         }
     }
 
-    /// The state after the latest request that was obeyed.
+    /// Returns the state after the latest request obeyed.
     pub(super) fn answer(&self) -> &[u8] {
         &self.state
     }
 
-    /// Requests that were malformed.
+    /// Returns the number of malformed requests.
     pub(super) fn refused(&self) -> u32 {
         self.head.refused
     }

@@ -1,4 +1,4 @@
-//! What a client asks for: the datagrams of `LOCKSTEP.md`, read.
+//! A client's requests: the datagrams of `LOCKSTEP.md`, parsed.
 
 use thiserror::Error;
 
@@ -12,27 +12,27 @@ const ADVANCE: u8 = 41;
 const ENVIRONMENT: u8 = 42;
 const ASK: u8 = 43;
 
-/// The longest advance, ns: MAVLink is looked at once in each.
+/// The longest advance, ns: MAVLink is checked once in each.
 const TIME_MAX_NS: u32 = 1_000_000_000;
 
-/// The most frames in an advance: their answers have room in a datagram.
+/// Most frames in an advance: their answers fit a datagram.
 const FRAMES_MAX: usize = 1024;
 
-/// What a client asks for.
+/// A client's request.
 #[derive(Debug, PartialEq)]
 pub(super) enum Request<'a> {
-    /// How things are.
+    /// Asks for the state.
     Ask,
-    /// What acts only in its turn.
+    /// Acts, in its turn only.
     Turn(u32, Turn<'a>),
 }
 
-/// What acts.
+/// A request that acts.
 #[derive(Debug, PartialEq)]
 pub(super) enum Turn<'a> {
-    /// Time goes on by so many ns, with these frames.
+    /// Advances time by this many ns, with these frames.
     Advance(u32, Vec<Timed<'a>>),
-    /// Something changes around the ESCs.
+    /// Changes the ESCs' surroundings.
     Change(Environment),
 }
 
@@ -40,9 +40,9 @@ pub(super) enum Turn<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Timed<'a> {
     pub(super) esc: usize,
-    /// From the beginning of the advance, ns.
+    /// Relative to the start of the advance, ns.
     pub(super) offset_ns: u32,
-    /// A datagram of the throttle wire.
+    /// A throttle-wire datagram.
     pub(super) datagram: &'a [u8],
 }
 
@@ -73,12 +73,12 @@ pub(super) enum Malformed {
     Range(#[from] OutOfRange),
 }
 
-/// Whether a datagram on the throttle wire is a request.
+/// Returns true if a datagram on the throttle wire is a request.
 pub(super) fn is_request(datagram: &[u8]) -> bool {
     matches!(datagram.first(), Some(&(ADVANCE | ENVIRONMENT | ASK)))
 }
 
-/// Reads a request to so many ESCs.
+/// Parses a request to this many ESCs.
 pub(super) fn parse(datagram: &[u8], escs: usize) -> Result<Request<'_>, Malformed> {
     let mut fields = Fields(datagram);
     let [kind, version] = fields.take()?;
@@ -162,7 +162,7 @@ fn environment<'a>(fields: &mut Fields<'a>, escs: usize) -> Result<Request<'a>, 
     Ok(Request::Turn(sequence, Turn::Change(change)))
 }
 
-/// The fields that are left of a datagram.
+/// The remaining fields of a datagram.
 struct Fields<'a>(&'a [u8]);
 
 impl<'a> Fields<'a> {
@@ -178,7 +178,7 @@ impl<'a> Fields<'a> {
         Ok(bytes)
     }
 
-    /// A value that NaN leaves as it is.
+    /// Reads a value; NaN means unchanged.
     fn value(&mut self) -> Result<Option<f64>, Malformed> {
         let value = f64::from_le_bytes(self.take()?);
         Ok((!value.is_nan()).then_some(value))

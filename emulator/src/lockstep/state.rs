@@ -1,4 +1,4 @@
-//! What a client is answered: the state of `LOCKSTEP.md`, written.
+//! The answer to a client: the state of `LOCKSTEP.md`, encoded.
 
 use super::request::VERSION;
 use crate::rack::{Answer, EscState, Rack};
@@ -8,18 +8,18 @@ const STATE: u8 = 40;
 /// The longest datagram over UDP.
 const BYTES_MAX: usize = 65_507;
 
-/// What stands before the ESCs beside the rack's own.
+/// What precedes the ESCs besides the rack's own state.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Head {
-    /// Of the latest request that was obeyed.
+    /// Of the latest request obeyed.
     pub(super) sequence: u32,
-    /// Requests that were malformed.
+    /// Number of malformed requests.
     pub(super) refused: u32,
     /// Answers that found no room.
     pub(super) left_out: u32,
 }
 
-/// Writes the state, and counts the answers for which it has no room.
+/// Writes the state, and counts the answers for which there is no room.
 pub(super) fn write(out: &mut Vec<u8>, head: &mut Head, rack: &Rack) {
     let escs = rack.escs().len();
     let mut answers = vec![Vec::new(); escs];

@@ -1,4 +1,4 @@
-//! What a cell must keep within, and what it misses.
+//! What a cell must keep within, and what it exceeds.
 
 use serde::Serialize;
 
@@ -13,12 +13,12 @@ const SUPPLY_V: f64 = 30.0;
 const WINDING_C: f64 = 155.0;
 const STAGE_C: f64 = 100.0;
 
-/// What is measured must stay below these.
+/// Upper limits of what is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bounds {
     /// Phase current from 200 µs after the fault on, A: 1.2 times its limit. What the rotor drives through the diodes
     /// is not the ESC's to bound: through a shorted switch at most twice the current of a short circuit of all phases
-    /// at its speed, into a supply that is below its own voltage less than that current.
+    /// at its speed, into a supply below its own voltage less than that current.
     pub current_a: f64,
     /// Supply, V: its maximum.
     pub bus_v: f64,
@@ -26,9 +26,9 @@ pub struct Bounds {
     pub winding_c: f64,
     /// Stage, °C.
     pub stage_c: f64,
-    /// From the fault to what is first done or named, ms, where anything must be.
+    /// From the fault to the first reaction or name, ms, where there must be one.
     pub within_ms: Option<f64>,
-    /// From a current beyond the comparators' level to gates that are off, µs, where they must act.
+    /// From a current beyond the comparators' level to gates off, µs, where they must act.
     pub trip_us: Option<f64>,
 }
 

@@ -8,7 +8,7 @@ use tempfile::tempdir;
 
 use super::*;
 
-/// A program that opens the terminal and sets nothing.
+/// Opens the terminal as a program that sets nothing.
 fn open(path: &Path) -> fs::File {
     let flags = (rustix::fs::OFlags::NONBLOCK | rustix::fs::OFlags::NOCTTY).bits();
     let mut options = OpenOptions::new();
@@ -63,7 +63,7 @@ fn a_terminal_passes_every_byte_both_ways() {
 
 #[test]
 fn bytes_pass_at_the_rate() {
-    // 9600 baud: 960 bytes a second, 480 of them waiting at most (at least two frames: 560).
+    // 9600 baud: 960 bytes a second, at most 480 of them pending (at least two frames: 560).
     let mut bench = Bench::open(&["pty::9600"]);
     let mut reader = open(&path(&bench));
     settle(&mut bench);
@@ -72,8 +72,8 @@ fn bytes_pass_at_the_rate() {
     assert_eq!(bench.links.send(&[3; 1]), 1, "there is no room for a third");
     let start = bench.now;
     let mut found = Vec::new();
-    // A poll each ms is 0.96 bytes: after t ms at most 0.96·t bytes have come, and no less
-    // than one fewer once the kernel has passed them on.
+    // A poll each ms is 0.96 bytes: after t ms at most 0.96·t bytes have arrived, and at most one
+    // fewer once the kernel has passed them on.
     for ms in 1..=600_u32 {
         bench.now = start + ms * MS;
         bench.receive();
@@ -89,7 +89,7 @@ fn bytes_pass_at_the_rate() {
     }
     assert_eq!(found, [[1; 280], [2; 280]].concat());
 
-    // The other way: 2000 bytes wait in the kernel and come at the same pace.
+    // The other direction: 2000 bytes wait in the kernel and arrive at the same pace.
     settle(&mut bench);
     reader.write_all(&[4; 2000]).unwrap();
     let mut came = 0;
@@ -108,7 +108,7 @@ fn bytes_pass_at_the_rate() {
 fn a_reader_goes_away_and_comes_back() {
     let mut bench = Bench::open(&["pty"]);
     let path = path(&bench);
-    // Nobody is there: the frame is gone, as on a line without a listener.
+    // Nobody is there: the frame is lost, as on a line without a listener.
     settle(&mut bench);
     assert_eq!(bench.links.send(b"unheard"), 0);
     settle(&mut bench);
@@ -116,7 +116,7 @@ fn a_reader_goes_away_and_comes_back() {
     let mut reader = open(&path);
     reader.write_all(b"here").unwrap();
     bench.until(MS, |b| b.heard(b"here"));
-    // What still waits when the reader leaves is gone with it.
+    // What is pending when the reader leaves is lost with it.
     assert_eq!(bench.links.send(&[9; 280]), 0);
     drop(reader);
     bench.until(MS, |b| b.ended.len() == 1);
@@ -165,7 +165,7 @@ fn the_link_is_made_and_removed() {
     let folder = tempdir().unwrap();
     let link = folder.path().join("esc");
     let text = format!("pty:{}:57600", link.display());
-    // One left by a run that was killed is replaced.
+    // One left by a killed run is replaced.
     symlink("/dev/pts/left-over", &link).unwrap();
     let bench = Bench::open(&[&text]);
     let target = fs::read_link(&link).unwrap();
@@ -210,14 +210,14 @@ fn a_link_that_another_run_has_taken_over_stays() {
 
 #[test]
 fn a_serial_port_works_and_is_found_again() {
-    // The other end of a pseudo-terminal of our own is the device.
+    // The other end of our own pseudo-terminal is the device.
     let folder = tempdir().unwrap();
     let device = folder.path().join("ttyUSB0");
     let pty = format!("pty:{}", device.display());
     let mut far = Bench::open(&[&pty]);
     let mut near = Bench::open(&[&format!("serial:{}:115200", device.display())]);
     let exchange = |far: &mut Bench, near: &mut Bench, text: &[u8]| {
-        // The near end may have to open the device before the far end sees someone there.
+        // The near end may have to open the device before the far end sees anyone there.
         settle(near);
         settle(far);
         near.links.send(text);
@@ -232,7 +232,7 @@ fn a_serial_port_works_and_is_found_again() {
     };
     exchange(&mut far, &mut near, b"\x03\r\n\x11 first");
 
-    // Unplugged: the device is gone, then comes back as another under the same name.
+    // Unplugged: the device is gone, then returns as another one under the same name.
     drop(far);
     near.until(MS, |near| near.ended.len() == 1);
     let mut far = Bench::open(&[&pty]);
