@@ -1,8 +1,9 @@
-//! How fast the emulator is on this machine: simulated seconds in a second of one thread, as a ratio
-//! to the [`yardstick`], and which part of it takes how long.
+//! Measures the emulator's speed on this machine: simulated seconds per second of one thread, as a
+//! ratio to the [`yardstick`], and how the time divides among its parts.
 //!
-//! What is measured is the default bench at 15 kHz with all of the control, the sensors' noise and
-//! their quantisation, its shaft settled at 4500 rpm. Control and plant are then timed apart on what
+//! The workload is the default bench at 15 kHz with all of the control, the sensors' noise and
+//! quantisation, its shaft settled at 4500 rpm. Control and plant are then timed separately on the
+//! data they exchanged in that run, so that each repeats the same work.
 //! passed between them in that run, so that each does the same work again.
 
 use std::fmt;
@@ -23,23 +24,23 @@ use crate::yardstick::{self, Yardstick};
 /// Periods until the shaft has settled: 4 s.
 const SETTLING: usize = 60_000;
 
-/// Periods of one measurement: 60 electrical turns, and less than a millisecond of time, so that
-/// most pass between two turns of the scheduler and the median is of undisturbed ones.
+/// Periods per measurement: 60 electrical turns, and less than a millisecond, so that most fit
+/// between two scheduler ticks and the median is of undisturbed ones.
 const MEASURED: usize = 1_000;
 
-/// Measurements of each kind, in turns, so that a processor's changing clock falls on all alike.
+/// Measurements of each kind, interleaved, so that a changing clock rate affects all alike.
 const ROUNDS: usize = 1_001;
 
 /// The figures; each is the median of several runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
-    /// Simulated seconds in a second, with the averaged plant.
+    /// Simulated seconds per second with the averaged plant.
     pub averaged_sim_per_wall: f64,
     /// The same with the switching plant.
     pub switching_sim_per_wall: f64,
-    /// The same of the yardstick.
+    /// The same for the yardstick.
     pub yardstick_sim_per_wall: f64,
-    /// With the averaged plant, as a share of the yardstick's.
+    /// With the averaged plant, relative to the yardstick.
     pub averaged_ratio: f64,
     /// The same with the switching plant.
     pub switching_ratio: f64,
@@ -65,7 +66,7 @@ pub struct Figures {
 /// Measures for some seconds, on one thread.
 ///
 /// # Errors
-/// Where the control cannot be configured.
+/// The control cannot be configured.
 pub fn measure() -> Result<Figures, BuildError> {
     let averaged = Run::settled(Fidelity::Averaged)?;
     let switching = Run::settled(Fidelity::Switching)?;
@@ -143,7 +144,7 @@ impl fmt::Display for Figures {
     }
 }
 
-/// What each part took in one round, ns a period.
+/// What each part took in one round, ns per period.
 struct Round {
     yardstick_ns: f64,
     averaged_ns: f64,
@@ -153,12 +154,12 @@ struct Round {
     plant_switching_ns: f64,
 }
 
-/// A run of the emulator that has settled, and what passed between its parts from there on.
+/// A settled run of the emulator, and the data exchanged between its parts from there on.
 struct Run {
     rig: Rig,
     setpoint: Setpoint,
     samples: Vec<Sample>,
-    /// In force from each sample to the next: with a period of delay, the command of the one before.
+    /// In force from each sample to the next: with a period of delay, the previous command.
     commands: Vec<Bridge>,
 }
 
@@ -170,7 +171,7 @@ impl Run {
             ..Bench::default()
         };
         let mut params = Params::of(&BOSSO_BENCH);
-        // The table's range has it.
+        // It is in the table's range.
         let _ = params.set(ParamId::PwmFreqHz, (1.0 / yardstick::PERIOD_S) as f32);
         let config = build(&params, &bench.sensing.board(bench.delay))?;
         let setpoint = Setpoint::Speed(config.scale.speed_from_rpm(yardstick::RPM as f32));
@@ -194,19 +195,19 @@ impl Run {
         })
     }
 
-    /// A period of all together, ns.
+    /// Returns the time of a whole period, ns.
     fn whole_ns(&self) -> f64 {
         time_ns(self.rig.clone(), |rig, _| rig.period(self.setpoint))
     }
 
-    /// A step of the control, ns.
+    /// Returns the time of a control step, ns.
     fn step_ns(&self) -> f64 {
         time_ns(self.rig.state().clone(), |state, k| {
             drive::step(self.rig.config(), state, self.samples[k], self.setpoint)
         })
     }
 
-    /// A period of the plant, ns.
+    /// Returns the time of a plant period, ns.
     fn plant_ns(&self) -> f64 {
         let rig = &self.rig;
         let (period_s, dead_time_s) = (rig.period_s(), rig.dead_time_s());
@@ -217,7 +218,7 @@ impl Run {
     }
 }
 
-/// What a period of some work takes, ns.
+/// Returns the time that some work takes per period, ns.
 fn time_ns<S, T>(mut state: S, mut period: impl FnMut(&mut S, usize) -> T) -> f64 {
     let began = Instant::now();
     for k in 0..MEASURED {
@@ -233,7 +234,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// The processor's name, where the system tells it.
+/// Returns the processor's name, if the system tells it.
 fn cpu() -> String {
     let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = text.lines().find_map(|line| {
@@ -247,7 +248,7 @@ fn cpu() -> String {
 mod tests {
     use super::*;
 
-    /// Control and plant apart do what they do together.
+    /// Control and plant do the same apart as together.
     #[test]
     fn the_parts_are_those_of_the_whole() {
         for fidelity in [Fidelity::Averaged, Fidelity::Switching] {

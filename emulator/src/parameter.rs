@@ -4,10 +4,10 @@ use mavlink::dialects::ardupilotmega::{MavParamType, PARAM_SET_DATA};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader};
 use siskin_control::params::{PRESETS, ParamId, Params, Preset, SetError};
 
-/// A parameter by name, its value checked against the table.
+/// Finds a parameter by name and checks the value against the table.
 ///
 /// # Errors
-/// One line that names the parameter and what would do.
+/// One line that names the parameter and what would be accepted.
 pub fn parameter(name: &str, value: f32) -> Result<(ParamId, f32), String> {
     let id = ParamId::find(name).ok_or_else(|| format!("there is no parameter {name}"))?;
     let entry = id.entry();
@@ -25,10 +25,10 @@ pub fn parameter(name: &str, value: f32) -> Result<(ParamId, f32), String> {
     }
 }
 
-/// `NAME=VALUE`, as on the command line.
+/// Parses `NAME=VALUE`, as on the command line.
 ///
 /// # Errors
-/// One line that names what was given and what would do.
+/// One line that names what was given and what would be accepted.
 pub fn assignment(text: &str) -> Result<(ParamId, f32), String> {
     let (name, value) = text
         .split_once('=')
@@ -40,10 +40,10 @@ pub fn assignment(text: &str) -> Result<(ParamId, f32), String> {
     )
 }
 
-/// A named set of parameters.
+/// Finds a named set of parameters.
 ///
 /// # Errors
-/// One line that names those that there are.
+/// One line that lists the existing ones.
 pub fn preset(name: &str) -> Result<&'static Preset, String> {
     PRESETS
         .iter()
@@ -54,14 +54,14 @@ pub fn preset(name: &str) -> Result<&'static Preset, String> {
         })
 }
 
-/// As a ground station.
+/// A ground station's address.
 const OWN: MavHeader = MavHeader {
     system_id: 255,
     component_id: 190,
     sequence: 0,
 };
 
-/// The frame by which a ground station sets a parameter.
+/// Returns the frame by which a ground station sets a parameter.
 pub fn set_frame(id: ParamId, value: f32) -> MAVLinkV2MessageRaw {
     let mut frame = MAVLinkV2MessageRaw::new();
     let set = PARAM_SET_DATA {

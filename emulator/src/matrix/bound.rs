@@ -32,7 +32,7 @@ pub struct Bounds {
     pub trip_us: Option<f64>,
 }
 
-/// What a cell misses.
+/// What a cell violates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Miss {
@@ -44,15 +44,15 @@ pub enum Miss {
     Winding,
     /// Temperature of the stage.
     Stage,
-    /// Something is named that is not so, or what is so is not named.
+    /// Something false is named, or something true is not.
     Cause,
-    /// What is made of it.
+    /// The reaction.
     Reaction,
-    /// The time that it took, or that of the comparators.
+    /// The reaction time, or that of the comparators.
     Time,
     /// A leg had less than the dead time between its switches.
     Gates,
-    /// After the throttle was closed, with the fault mended, it does not turn.
+    /// With the throttle closed and the fault mended, it does not turn again.
     Again,
 }
 
@@ -105,12 +105,12 @@ impl Bounds {
     }
 }
 
-/// Whether something that must come within a time has not.
+/// Returns true if something required within a time has not happened.
 fn is_late(after: Option<f64>, within: Option<f64>) -> bool {
     within.is_some_and(|within| after.is_none_or(|after| after > within))
 }
 
-/// Amplitude of the phase currents with all phases shorted, A.
+/// Returns the amplitude of the phase currents with all phases shorted, A.
 fn short_circuit_a(speed_rad_s: f64) -> f64 {
     let motor = Bench::default().motor;
     let omega = speed_rad_s * f64::from(motor.pole_pairs);

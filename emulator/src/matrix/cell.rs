@@ -1,4 +1,4 @@
-//! One cell: an ESC flies, a fault comes, and what came of it is noted.
+//! One cell: an ESC flies, a fault occurs, and the outcome is noted.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -19,31 +19,31 @@ use crate::plant::{Extras, Fidelity, Winding};
 use crate::rig::{Bench, Period, Rig};
 use crate::scenario::dshot_bits;
 
-/// For how long the throttle stays as it was after a fault has come, s.
+/// Time for which the throttle stays unchanged after a fault, s.
 const WATCHED_S: f64 = 2.0;
-/// Then it is closed for as long, s: faults end, and a chip that has started anew is armed.
+/// Then it is closed for this long, s: faults end, and a restarted chip is armed.
 const CLOSED_S: f64 = 1.5;
-/// And then open for as long, s.
+/// And then opened for this long, s.
 const AGAIN_S: f64 = 2.2;
 /// The throttle of that flight.
 const AGAIN: f64 = 0.5;
-/// Over the last so many seconds of a stretch it is looked at how the motor turns.
+/// The motor's speed is judged over the last this many seconds of a stretch.
 const LOOKED_S: f64 = 0.1;
-/// How near a speed must be to the one that is asked for.
+/// Allowed deviation of a speed from the commanded one, as a share of it.
 const NEAR: f64 = 0.05;
 
-/// When the greatest current is looked for, s after a fault: what a fault does in the control periods until it can
-/// be known is its own.
+/// When the search for the greatest current starts, s after a fault: the control periods until a fault can be detected
+/// do not count.
 const SETTLED_S: f64 = 200e-6;
 
-/// A frame each millisecond, as DShot600.
+/// A DShot600 frame every millisecond.
 const FRAME_NS: u64 = 1_000_000;
 const DSHOT600: u8 = 12;
 
-/// Texts on the throttle, which follow from what has been named, and on what has ended.
+/// Throttle texts that follow from what has been named, and texts about what has ended.
 const FOLLOWS: [&str; 3] = ["Throttle: DShot", "Throttle is open", "Fault ended: "];
 
-/// What is set while the flash fails, and to what: it acts at once, in flight too.
+/// What is set while the flash fails, and its value: it acts at once, in flight too.
 const CHANGED: (ParamId, f32) = (ParamId::TelRateHz, 20.0);
 
 /// `CTL_OBSERVER` of a motor with Hall sensors.
@@ -55,26 +55,26 @@ const WINDING: Winding = Winding {
     capacity_j_per_k: 20.0,
 };
 
-/// What came of a fault.
+/// The outcome of a fault.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cell {
     /// The fault.
     pub fault: Row,
-    /// When it came.
+    /// When it occurred.
     pub moment: Moment,
     /// How the motor was driven.
     pub drive: Drive,
-    /// What was made of it.
+    /// The ESC's reaction.
     pub reaction: Reaction,
-    /// What was named in texts since, and as a fault that holds the bridge off.
+    /// What has been named since, in texts and as a latched fault.
     pub named: BTreeSet<String>,
     /// Limits that have bound since, and not before.
     pub limits: BTreeSet<&'static str>,
-    /// From the fault to what was first done or named, ms.
+    /// From the fault to the first reaction or name, ms.
     pub after_ms: Option<f64>,
-    /// From a current beyond the comparators' level to gates that were off, µs, if they have acted since the fault.
+    /// From a current beyond the comparators' level to gates off, µs, if they have acted since the fault.
     pub trip_us: Option<f64>,
-    /// Greatest magnitude of a phase current from 200 µs after the fault on, A, at each edge of the switches.
+    /// Greatest phase current from 200 µs after the fault on, A, at each edge of the switches.
     pub current_a: f64,
     /// Greatest voltage of the supply since the fault, V.
     pub bus_v: f64,
@@ -82,16 +82,16 @@ pub struct Cell {
     pub winding_c: f64,
     /// Warmest sensor of the stage, °C.
     pub stage_c: f64,
-    /// Whether the motor was flown again after the throttle had been closed, with the fault mended.
+    /// Whether the motor flew again after the throttle was closed and the fault mended.
     pub again: bool,
     /// Whether a leg ever had less than the dead time between its switches.
     pub crossed: bool,
-    /// Speed when the fault came, rad/s.
+    /// Speed at the fault, rad/s.
     pub speed_rad_s: f64,
 }
 
 impl Cell {
-    /// What its fault is expected to come to.
+    /// Returns what is expected of its fault.
     pub(super) fn expected(&self) -> Expected {
         let pole_pairs = f64::from(Bench::default().motor.pole_pairs);
         let turns_per_s = self.speed_rad_s * pole_pairs / TAU;
@@ -101,9 +101,9 @@ impl Cell {
 
 /// What is noted from the fault on.
 struct Notes {
-    /// From when on, s.
+    /// The start, s.
     from_s: f64,
-    /// Whether currents, voltages and what is named are those that the fault is to be blamed for.
+    /// Whether currents, voltages and names are attributed to the fault.
     watched: bool,
     limits_before: BTreeSet<&'static str>,
     limits: BTreeSet<&'static str>,
@@ -119,7 +119,7 @@ struct Notes {
     speed_rad_s: f64,
     driven: bool,
     phase: Phase,
-    /// Speeds of the stretch that is looked at, rad/s.
+    /// Range of speeds in the observed stretch, rad/s.
     least_rad_s: f64,
     most_rad_s: f64,
 }
@@ -150,7 +150,7 @@ impl Onlooker for Notes {
             .winding_c
             .max(rig.plant().winding_c().unwrap_or_default());
         self.stage_c = self.stage_c.max(rig.around().sensor_c());
-        // The six-step drive begins a start anew without a period of rest.
+        // The six-step drive restarts without a period of rest.
         let retried =
             snapshot.phase == Phase::Park && self.phase.drives() && self.phase != Phase::Park;
         self.phase = snapshot.phase;
@@ -195,7 +195,7 @@ impl Notes {
         (self.least_rad_s, self.most_rad_s) = (f64::INFINITY, f64::NEG_INFINITY);
     }
 
-    /// Whether the speeds since [`Self::look`] were all near this one.
+    /// Returns true if all speeds since [`Self::look`] were near this one.
     fn near(&self, rad_s: f64) -> bool {
         let within = NEAR * rad_s;
         (self.least_rad_s - rad_s).abs() < within && (self.most_rad_s - rad_s).abs() < within
@@ -213,7 +213,7 @@ impl Notes {
     }
 }
 
-/// The bench of the first paper with every switch edge, and a winding that warms up.
+/// Returns the first paper's bench with every switch edge, and a winding that heats up.
 fn bench(seed: u64) -> Bench {
     Bench {
         plant: Fidelity::Switching,
@@ -226,7 +226,7 @@ fn bench(seed: u64) -> Bench {
     }
 }
 
-/// The parameters of a drive.
+/// Returns the parameters of a drive.
 fn params(drive: Drive, row: Row) -> Vec<(ParamId, f32)> {
     let mut params = BOSSO_BENCH.settings.to_vec();
     params.extend(match drive {
@@ -271,9 +271,9 @@ impl Flight {
     }
 }
 
-/// The text of a STATUSTEXT.
+/// Returns the text of a STATUSTEXT.
 fn text(frame: &[u8]) -> Option<String> {
-    // Start, length, two flags, sequence, system, component, and three bytes of the message's number; then severity.
+    // Start, length, two flags, sequence, system, component, three bytes of message id; then the severity.
     const STATUSTEXT: [u8; 3] = [253, 0, 0];
     let is_text = frame.get(7..10)? == STATUSTEXT;
     let end = 10 + usize::from(*frame.get(1)?);
@@ -283,7 +283,7 @@ fn text(frame: &[u8]) -> Option<String> {
     is_text.then(|| String::from_utf8_lossy(letters).into_owned())
 }
 
-/// Speed that a throttle asks for, rad/s, by the factory's `CTL_RPM_MIN` and `CTL_RPM_MAX`.
+/// Returns the speed that a throttle commands, rad/s, with the factory's `CTL_RPM_MIN` and `CTL_RPM_MAX`.
 fn asked_rad_s(device: &Device, throttle: f64) -> f64 {
     let params = device.esc().params();
     let [least, most] =
@@ -340,7 +340,7 @@ pub(super) fn play(row: Row, moment: Moment, drive: Drive) -> Result<Cell, Start
     if row.outlasts_flight() {
         flight.fly(0.0, closed_s);
     }
-    // What stays of a fault is mended, and what is told from here on is of no interest.
+    // Lasting faults are mended; texts from here on do not count.
     flight.notes.watched = false;
     flight.device.mend();
     let mut named: BTreeSet<String> = snapshot
@@ -383,7 +383,7 @@ pub(super) fn play(row: Row, moment: Moment, drive: Drive) -> Result<Cell, Start
     })
 }
 
-/// What the texts since a time have named: not what comes of it that the wire is silent, or heard anew.
+/// Returns what the texts since a time have named, except what follows from a silent wire, or one heard anew.
 fn told(texts: &[(f64, String)], from_s: f64) -> impl Iterator<Item = String> {
     let since = texts.iter().filter(move |(t_s, _)| *t_s > from_s);
     since.filter_map(|(_, text)| {
@@ -400,7 +400,7 @@ fn reaction(
     named: &BTreeSet<String>,
 ) -> Reaction {
     let latched = !snapshot.faults.is_empty();
-    // A motor that is slowed down is not driven.
+    // A motor being slowed down is not driven.
     let driven = snapshot.phase.drives() && snapshot.phase != Phase::Stopping;
     match (moment.drives(), turns, broken_off) {
         (false, ..) if driven => Reaction::Fails,

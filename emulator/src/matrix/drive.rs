@@ -16,7 +16,7 @@ impl Drive {
     /// Both.
     pub const ALL: [Self; 2] = [Self::FieldOriented, Self::SixStep];
 
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::FieldOriented => "field-oriented",

@@ -1,8 +1,8 @@
-//! The fault matrix: every fault of the laboratory at every moment of a flight, with either drive, and what the ESC
-//! makes of it.
+//! The fault matrix: every fault of the laboratory at every moment of a flight, with either drive, and the ESC's
+//! reaction.
 //!
-//! The bench is the first paper's with every switch edge and a winding that warms up; the ESC has the parameters of
-//! that bench. What is expected of a cell follows from what the fault is ([`Row`]).
+//! The bench is the first paper's, with every switch edge and a winding that heats up; the ESC has that bench's
+//! parameters. What is expected of a cell follows from the nature of the fault ([`Row`]).
 
 mod bound;
 mod cell;
@@ -24,15 +24,15 @@ pub use row::{Reaction, Row};
 
 use crate::device::StartError;
 
-/// A cell with what it misses of what is expected.
+/// A cell, with what it violates of its expectations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Judged {
-    /// What came of the fault.
+    /// The outcome of the fault.
     #[serde(flatten)]
     pub cell: Cell,
-    /// What it was to keep within.
+    /// The bounds it had to keep.
     pub bounds: Bounds,
-    /// What it did not.
+    /// Those it violated.
     pub misses: Vec<Miss>,
 }
 
@@ -44,10 +44,10 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// Plays those cells that are wanted, on all processors.
+    /// Plays the selected cells on all processors.
     ///
     /// # Errors
-    /// A bench that does not fit its parameters.
+    /// The bench does not fit its parameters.
     pub fn play(wanted: impl Fn(Row, Moment, Drive) -> bool) -> Result<Self, StartError> {
         let mut places = Vec::new();
         for drive in Drive::ALL {
@@ -72,7 +72,7 @@ impl Matrix {
         Ok(Self { cells })
     }
 
-    /// Cells that miss something.
+    /// Returns the cells that violate something.
     pub fn failed(&self) -> impl Iterator<Item = &Judged> {
         self.cells.iter().filter(|judged| !judged.misses.is_empty())
     }

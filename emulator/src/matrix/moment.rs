@@ -1,16 +1,16 @@
-//! When a fault comes: what the throttle asks for until then, and what the motor does there.
+//! When a fault occurs: the throttle until then, and what the motor does.
 
 use serde::Serialize;
 
-/// What the motor does when the fault comes.
+/// What the motor does when the fault occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {
-    /// It stands after a flight, its low sides on.
+    /// It stands after a flight, with the low sides on.
     Standstill,
-    /// It is ramped up from standstill.
+    /// It is being ramped up from standstill.
     Start,
-    /// The throttle is at its least.
+    /// At idle throttle.
     Idle,
     /// At half throttle.
     Half,
@@ -20,14 +20,14 @@ pub enum Moment {
     Braking,
 }
 
-/// The throttle that turns the motor as slowly as it can be asked to; flight controllers idle there.
+/// The throttle at which the motor turns as slowly as it can be asked to; flight controllers idle there.
 const IDLE: f64 = 0.055;
 
-/// When the throttle first opens, s: armed takes 0.3.
+/// When the throttle first opens, s: arming takes 0.3.
 pub(super) const OPENS_S: f64 = 0.4;
 
 impl Moment {
-    /// All, from rest to full speed and back.
+    /// All moments, from rest to full speed and back.
     pub const ALL: [Self; 6] = [
         Self::Standstill,
         Self::Start,
@@ -37,7 +37,7 @@ impl Moment {
         Self::Braking,
     ];
 
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Standstill => "standstill",
@@ -49,7 +49,7 @@ impl Moment {
         }
     }
 
-    /// Throttle at first, and from a later time on, s.
+    /// Returns the initial throttle, and the one from a later time on, s.
     pub(super) fn throttle(self) -> (f64, Option<(f64, f64)>) {
         match self {
             Self::Standstill => (0.5, Some((1.6, 0.0))),
@@ -60,18 +60,18 @@ impl Moment {
         }
     }
 
-    /// Whether the motor is to turn when the fault comes and behind it.
+    /// Returns true if the motor is to turn when the fault occurs and afterwards.
     pub fn drives(self) -> bool {
         !matches!(self, Self::Standstill | Self::Braking)
     }
 
-    /// Whether the rotor's voltage between the lines, 17.8 V, is above `LIM_BUS_V_MIN`, 9 V.
+    /// Returns true if the rotor's line-to-line voltage, 17.8 V, exceeds `LIM_BUS_V_MIN`, 9 V.
     pub(super) fn is_fast(self) -> bool {
         matches!(self, Self::Full | Self::Braking)
     }
 
-    /// When the fault comes, s: the start's ramp by either drive; speeds that are settled; the motor braked to a
-    /// stand; 20 ms of braking, a twentieth of all.
+    /// Returns when the fault occurs, s: during the start's ramp with either drive; at settled speeds; with the motor
+    /// braked to standstill; 20 ms into braking, a twentieth of it.
     pub(super) fn fault_s(self) -> f64 {
         match self {
             Self::Standstill => 2.6,

@@ -9,7 +9,7 @@ use super::row::{Reaction, Row};
 use super::{Judged, Matrix};
 use crate::plot::grid::{Grid, Place};
 
-// Light enough for the text on them, and told apart by the colour-blind.
+// Light enough for text on them, and distinguishable by the colour-blind.
 const GOES_ON: RGBColor = RGBColor(0xd5, 0xec, 0xe4);
 const RECOVERS: RGBColor = RGBColor(0xd9, 0xea, 0xf7);
 const RESTS: RGBColor = RGBColor(0xf0, 0xf0, 0xf0);
@@ -29,7 +29,7 @@ impl Reaction {
 }
 
 impl Matrix {
-    /// Faults by moments, drive beside drive; a cell that was not played is left out.
+    /// Faults by moments, drive beside drive; cells not played are left out.
     pub fn grid(&self) -> Grid {
         let columns = || Moment::ALL.map(|moment| moment.name().to_owned()).to_vec();
         let rows = Row::ALL.map(|row| {

@@ -1,4 +1,4 @@
-//! The faults of the matrix, and what each is by its nature: what may be named for it, and what may come of it.
+//! The faults of the matrix, with the names and the reactions that each may have by its nature.
 
 use serde::Serialize;
 
@@ -6,32 +6,32 @@ use super::drive::Drive;
 use super::moment::Moment;
 use crate::fault::{Kind, Side};
 
-/// For how long a fault acts that has no time of its own, s.
+/// Duration of a fault that has none of its own, s.
 const FAULT_S: f64 = 0.5;
 
-/// Within which what ends a drive must have ended it, s: two samples, or the chip's own reset.
+/// Time within which what ends a drive must have ended it, s: two samples, or the chip's own reset.
 const AT_ONCE_S: f64 = 200e-6;
-/// Within which a supply that has gone must be known, s: its reading is smoothed over eight periods.
+/// Time within which a lost supply must be detected, s: its reading is smoothed over eight periods.
 const SMOOTHED_S: f64 = 2e-3;
-/// Within which a rotor that is lost must be known, s, or electrical turns, whichever takes longer.
+/// Time within which a lost rotor must be detected, s, or electrical turns, whichever is longer.
 const LOST_S: f64 = 5e-3;
 const LOST_TURNS: f64 = 3.0;
-/// Within which a pilot must be told of what the motor goes on with, s.
+/// Time within which a pilot must be told of a fault that the motor flies on with, s.
 const TOLD_S: f64 = 0.2;
-/// `INP_LOSS_MS`, with a frame and a round of the tasks, s.
+/// `INP_LOSS_MS`, plus a frame and a round of the tasks, s.
 const SIGNAL_S: f64 = 0.105;
-/// Within which comparators must have turned a short off, from when the current passed their level, s.
+/// Time within which comparators must have cut off a short once the current has exceeded their level, s.
 const TRIP_S: f64 = 3e-6;
 
 /// A fault of the matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Row {
-    /// Nothing, to see that nothing is named.
+    /// None, to check that nothing is named.
     Nothing,
     /// The shaft is held.
     RotorBlocked,
-    /// Nine tenths of the speed go within 10 ms.
+    /// It loses nine tenths of its speed within 10 ms.
     Strike,
     /// 0.3 Nm against the rotation for 20 ms: four times the load at half throttle.
     StrikeTorque,
@@ -47,47 +47,47 @@ pub enum Row {
     HighShort,
     /// A low side is always on.
     LowShort,
-    /// A current sensor that shows nothing.
+    /// A current sensor reads zero.
     SensorZero,
-    /// A current sensor at its full scale.
+    /// A current sensor reads full scale.
     SensorFull,
     /// A current sensor's zero moves by 5 A within 0.1 s.
     Drift,
     /// 1 A rms on the currents.
     Noise,
-    /// A Hall sensor always shows the same, with `CTL_OBSERVER` 2.
+    /// A Hall sensor always reads the same, with `CTL_OBSERVER` 2.
     HallStuck,
     /// 4 V less.
     Sag,
     /// 16 V less: below `LIM_BUS_V_MIN`.
     DeepSag,
-    /// The supply is gone; the capacitor is left.
+    /// The supply is gone; only the capacitor is left.
     Disconnect,
     /// 3 V for 0.1 s.
     BrownOut,
-    /// The chip starts anew.
+    /// The chip restarts.
     Reset,
     /// The flash refuses to change, and a parameter has just been set.
     FlashFail,
     /// Nothing comes over the throttle wire.
     SignalLoss,
-    /// A bit of a hundred.
+    /// One bit in a hundred is wrong.
     BitErrors,
     /// 100 ns rms on each edge.
     Jitter,
 }
 
-/// What came of a fault.
+/// The outcome of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reaction {
-    /// The motor has turned on as it is asked to.
+    /// The motor keeps turning as commanded.
     GoesOn,
-    /// It turns again as it is asked to, after the bridge was off or a start was begun.
+    /// It turns again as commanded, after the bridge was off or a start had begun.
     Recovers,
-    /// It is at rest, or on its way there, as it is asked to be.
+    /// It is at rest, or coming to rest, as commanded.
     Rests,
-    /// The bridge is off until the throttle is closed, and it is said why.
+    /// The bridge is off until the throttle is closed, and the reason is given.
     Stops,
     /// It is driven where it must not be, still tries at the end, or is off without a word.
     Fails,
@@ -106,7 +106,7 @@ const SENSOR_DRIFTS: &str = "current sensor drifts";
 const HALL: &str = "position sensor";
 const FAILED_START: &str = "Start failed: the motor is tried again";
 const FLASH: &str = "storage";
-/// A chip that starts anew says its name.
+/// A restarting chip announces its name.
 const RESTART: &str = "Siskin ESC";
 const SIGNAL_LOST: &str = "Throttle: signal lost while armed";
 
@@ -116,16 +116,16 @@ pub(super) struct Expected {
     pub(super) causes: &'static [&'static str],
     /// Whether one of them must be named.
     pub(super) named: bool,
-    /// What may come of it.
+    /// The permitted reactions.
     pub(super) reactions: &'static [Reaction],
-    /// Within which the first of that must have been done or said, s.
+    /// Time within which the first of them must occur, s.
     pub(super) within_s: Option<f64>,
-    /// Within which comparators must have acted, s, from when the current passed their level.
+    /// Time within which comparators must have acted, s, once the current has exceeded their level.
     pub(super) trip_s: Option<f64>,
 }
 
 impl Row {
-    /// All, in the order of the table.
+    /// All rows, in the order of the table.
     pub const ALL: [Self; 24] = [
         Self::Nothing,
         Self::RotorBlocked,
@@ -153,7 +153,7 @@ impl Row {
         Self::Jitter,
     ];
 
-    /// Its name in the table.
+    /// Returns its name in the table.
     pub fn name(self) -> &'static str {
         match self {
             Self::Nothing => "nothing",
@@ -183,7 +183,7 @@ impl Row {
         }
     }
 
-    /// What is wrong, and for how long, s, at a shaft that turns at this speed, rad/s.
+    /// Returns what is wrong, and for how long, s, with a shaft that turns at this speed, rad/s.
     pub(super) fn kind(self, speed_rad_s: f64) -> Option<(Kind, f64)> {
         let rpm = std::f64::consts::TAU / 60.0;
         let lasting = |kind| Some((kind, FAULT_S));
@@ -215,31 +215,31 @@ impl Row {
         }
     }
 
-    /// Whether it lasts until the motor has been stopped and has rested: only then is it met with.
+    /// Returns true if it lasts until the motor has stopped and rested: only then does it show.
     pub(super) fn outlasts_flight(self) -> bool {
         self == Self::FlashFail
     }
 
-    /// Whether nothing shows of it.
+    /// Returns true if it has no visible effect.
     fn is_hidden(self, moment: Moment, drive: Drive) -> bool {
         match self {
-            // Half an ampere turns the motor, a quarter of what a sensor's zero may be off by before it is told.
+            // Half an ampere turns the motor, a quarter of the offset at which a sensor is reported.
             Self::PhaseOpen | Self::HighOpen | Self::LowOpen | Self::SensorZero => {
                 (moment, drive) == (Moment::Idle, Drive::SixStep)
             }
-            // It goes by the crossings, whatever the observer.
+            // It follows the crossings, whatever the observer.
             Self::HallStuck => drive == Drive::SixStep,
             _ => false,
         }
     }
 
-    /// Within which something must have been done or said, s, if anything must, at a shaft that turned so many
-    /// electrical turns a second.
+    /// Returns the time within which there must be a reaction or a text, s, if any, with a shaft that turned at this
+    /// many electrical turns a second.
     fn within_s(self, moment: Moment, drive: Drive, turns_per_s: f64) -> Option<f64> {
         let drives = moment.drives();
         match self {
             _ if self.is_hidden(moment, drive) => None,
-            // A start has its time to fail.
+            // A start is given time to fail.
             Self::RotorBlocked if moment == Moment::Start => Some(FAULT_S),
             Self::RotorBlocked if drives => Some(LOST_S.max(LOST_TURNS / turns_per_s)),
             Self::PhaseOpen | Self::HighOpen | Self::LowOpen | Self::HallStuck if drives => {
@@ -255,8 +255,8 @@ impl Row {
         }
     }
 
-    /// What is expected of it at a moment with a drive, from what it is, at a shaft that turned so many electrical
-    /// turns a second.
+    /// Returns what its nature makes expected at a moment with a drive, with a shaft that turned at this many
+    /// electrical turns a second.
     pub(super) fn expected(self, moment: Moment, drive: Drive, turns_per_s: f64) -> Expected {
         let drives = moment.drives();
         let shows = drives && !self.is_hidden(moment, drive);
@@ -267,13 +267,13 @@ impl Row {
         let expected = |causes, named, reactions| Expected {
             causes,
             named,
-            // At rest, or on the way there, a fault ends with its cause: the throttle is closed.
+            // At rest, or coming to rest, a fault ends with its cause: the throttle is closed.
             reactions: if drives { reactions } else { &[Rests, Stops] },
             within_s: self.within_s(moment, drive, turns_per_s),
             trip_s: shorted.then_some(TRIP_S),
         };
         match self {
-            // What the drive can hold it holds; limits say where it binds.
+            // The drive withstands these; limits say where it binds.
             Self::Nothing
             | Self::Gust
             | Self::StrikeTorque
@@ -283,30 +283,31 @@ impl Row {
             | Self::Sag => expected(&[], false, &[GoesOn]),
             // What was set in flight is written at rest.
             Self::FlashFail => expected(&[FLASH], true, &[GoesOn]),
-            // Faster than the currents follow: a back-EMF that is gone within a period drives 14 A in the next
-            // at full speed.
+            // Faster than the currents follow: a back-EMF that vanishes within a period drives 14 A in the next at full
+            // speed.
             Self::RotorBlocked if moment.is_fast() => expected(
                 &[STUCK, LOST, FAILED_START, OVER_CURRENT],
                 drives,
                 &[Recovers],
             ),
             Self::RotorBlocked => expected(&[STUCK, LOST, FAILED_START], drives, &[Recovers]),
-            // Where the rotor is lost, it is caught.
+            // A lost rotor is caught.
             Self::Strike => expected(&[LOST, FAILED_START], false, &[GoesOn, Recovers]),
-            // Without current nothing shows. A motor that turns on with two phases is better than none, if it is told.
+            // Without current nothing shows. A motor that flies on with two phases is better than none, if it is
+            // reported.
             Self::PhaseOpen | Self::HighOpen | Self::LowOpen => expected(
                 &[PHASE_OPEN, LOST, STUCK, FAILED_START],
                 shows,
                 &[GoesOn, Recovers, Stops],
             ),
-            // With the low sides on one more that is on is nothing; the high one shoots through.
+            // With the low sides on, one more makes no difference; the high one shoots through.
             Self::LowShort if moment == Moment::Standstill => expected(&[], false, &[]),
-            // A retry behind its end turns the motor on.
+            // A retry after its end turns the motor on.
             Self::HighShort => expected(&[OVER_CURRENT], true, &[Recovers, Stops]),
             // What the rotor drives through it between two retries is measured as a sensor's zero.
             Self::LowShort if drives => expected(&[OVER_CURRENT, SENSOR], true, &[Recovers, Stops]),
             Self::LowShort => expected(&[OVER_CURRENT], true, &[Stops]),
-            // Slow, a motor takes less current than its sensor is off by, and is lost and started again.
+            // A slow motor takes less current than its sensor is off by, and is lost and restarted.
             Self::SensorZero | Self::Drift => expected(
                 &[SENSOR_DRIFTS, SENSOR, OVER_CURRENT, FAILED_START],
                 shows,
@@ -314,23 +315,23 @@ impl Row {
             ),
             Self::SensorFull => expected(&[SENSOR, OVER_CURRENT], true, &[Recovers, Stops]),
             Self::HallStuck => expected(&[HALL], shows, &[GoesOn, Recovers, Stops]),
-            // The rotor's own voltage between the lines is above what is left: it feeds the supply by the diodes, more
-            // than the trip allows. Once the supply is back the rotor is caught; the six-step drive cannot.
+            // The rotor's own line-to-line voltage exceeds what is left: it feeds the supply through the diodes with
+            // more than the trip allows. Once the supply is back the rotor is caught; the six-step drive cannot.
             Self::DeepSag if moment.is_fast() => {
                 expected(&[UNDER_VOLTAGE, OVER_CURRENT], true, &[Recovers, Stops])
             }
             Self::DeepSag => expected(&[UNDER_VOLTAGE], true, &[Recovers, Stops]),
-            // Braking holds the supply up, and when the motor stands it empties.
+            // Braking holds the supply up; once the motor stands it runs down.
             Self::Disconnect if moment == Moment::Braking => {
                 expected(&[OVER_VOLTAGE, UNDER_VOLTAGE], false, &[])
             }
-            // A retry that has the capacitor alone charges it from the rotor.
+            // A retry on the capacitor alone charges it from the rotor.
             Self::Disconnect if moment.is_fast() => expected(
                 &[UNDER_VOLTAGE, OVER_CURRENT, OVER_VOLTAGE],
                 drives,
                 &[Recovers, Stops],
             ),
-            // At rest the capacitor keeps the chip for as long as it takes to empty it.
+            // At rest the capacitor keeps the chip running until it is empty.
             Self::Disconnect => expected(&[UNDER_VOLTAGE], drives, &[Recovers, Stops]),
             Self::BrownOut => expected(&[RESTART, UNDER_VOLTAGE], true, &[Stops]),
             Self::Reset => expected(&[RESTART], true, &[Stops]),

@@ -1,4 +1,4 @@
-//! The matrix as a table for a person.
+//! The matrix as a readable table.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use super::row::Reaction;
 use super::{Cell, Judged, Matrix, Miss};
 
 impl Reaction {
-    /// A word.
+    /// Returns a word for it.
     pub fn name(self) -> &'static str {
         match self {
             Self::GoesOn => "goes on",
@@ -19,7 +19,7 @@ impl Reaction {
 }
 
 impl Miss {
-    /// A word.
+    /// Returns a word for it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Current => "current",
@@ -36,7 +36,7 @@ impl Miss {
 }
 
 impl Cell {
-    /// What was named, or else the limits that bound.
+    /// Returns what was named, or else the limits that bound.
     pub(super) fn words(&self) -> String {
         let named: Vec<&str> = self.named.iter().map(String::as_str).collect();
         let limits: Vec<&str> = self.limits.iter().copied().collect();

@@ -1,19 +1,19 @@
-//! What is around an ESC and its propeller.
+//! The surroundings of an ESC and its propeller.
 
 use super::thermal::AMBIENT_C;
 
-/// What acts on one ESC and its motor from outside.
+/// External influences on one ESC and its motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
-    /// Torque on the shaft beside that of its load, Nm; positive turns it with the phases in the order a, b, c.
+    /// Torque on the shaft besides its load's, Nm; positive turns it with the phases in the order a, b, c.
     pub torque_nm: f64,
-    /// Wind, as the speed at which it would turn the propeller by itself, rad/s.
+    /// Wind, as the speed at which it would turn a free propeller, rad/s.
     pub wind_rad_s: f64,
     /// Temperature, °C.
     pub ambient_c: f64,
 }
 
-/// Still air of 25 °C.
+/// Still air at 25 °C.
 impl Default for Air {
     fn default() -> Self {
         Self {

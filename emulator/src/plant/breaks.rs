@@ -1,4 +1,4 @@
-//! What can be broken in the power stage.
+//! What can break in the power stage.
 
 /// What is broken in a leg; switches are low and high.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

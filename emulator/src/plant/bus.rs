@@ -1,7 +1,7 @@
 //! The bus: a capacitor between the supply and the bridge.
 //!
-//! Its voltage stands still within a control period; at the end the period's mean current moves it,
-//! in closed form. What the edges of the PWM do to it within a period is left out.
+//! Its voltage is constant within a control period; at the end the period's mean current moves it,
+//! in closed form. The ripple from the PWM edges is left out.
 
 use super::Supply;
 
@@ -12,17 +12,17 @@ pub struct Bus {
     volts: f64,
     /// Charge drawn from the source since the start, C.
     drawn_c: f64,
-    /// By how much the source is weaker than it should be, V.
+    /// Voltage that the source lacks, V.
     sag_v: f64,
     /// The most that the source gives, V.
     limit_v: f64,
     connected: bool,
-    /// Another bus feeds it, which stands for the source and the capacitor.
+    /// Another bus feeds it, in place of the source and the capacitor.
     fed: bool,
 }
 
 impl Bus {
-    /// A supply without load.
+    /// Creates a supply without load.
     pub fn new(supply: Supply) -> Self {
         Self {
             volts: supply.open_v(0.0),
@@ -35,7 +35,8 @@ impl Bus {
         }
     }
 
-    /// Takes its voltage from another bus, V, as far as its own source would be connected and sound.
+    /// Takes its voltage from another bus, V, as far as its own source would be connected and
+    /// sound.
     pub fn feed(&mut self, volts: f64) {
         self.fed = true;
         if self.connected {
@@ -43,38 +44,38 @@ impl Bus {
         }
     }
 
-    /// Whether what the bridge takes comes from the source.
+    /// Returns true if the bridge draws its current from the source.
     pub fn is_connected(&self) -> bool {
         self.connected
     }
 
-    /// The supply as it is now.
+    /// Returns the supply as it is now.
     pub fn supply(&self) -> Supply {
         self.supply
     }
 
-    /// Puts another supply in its place; the capacitor keeps its voltage until time goes on.
+    /// Replaces the supply; the capacitor keeps its voltage until time advances.
     pub fn set_supply(&mut self, supply: Supply) {
         self.supply = supply;
     }
 
-    /// Voltage of the bus in the period that begins, V.
+    /// Returns the bus voltage in the period that begins, V.
     pub fn volts(&self) -> f64 {
         self.volts
     }
 
-    /// Charge drawn from the source since the start, C.
+    /// Returns the charge drawn from the source since the start, C.
     #[cfg(test)]
     fn drawn_c(&self) -> f64 {
         self.drawn_c
     }
 
-    /// Weakens the source by this many volts; 0 mends it.
+    /// Lowers the source by this many volts; 0 mends it.
     pub fn sag(&mut self, volts: f64) {
         self.sag_v = volts;
     }
 
-    /// Bounds what the source gives, V, as in a brown-out; `None` mends it.
+    /// Limits the source's voltage, V, as in a brown-out; `None` mends it.
     pub fn limit(&mut self, volts: Option<f64>) {
         self.limit_v = volts.unwrap_or(f64::INFINITY);
     }
@@ -84,7 +85,7 @@ impl Bus {
         self.connected = connected;
     }
 
-    /// Ends a period in which the bridge took this mean current, A; negative is given back.
+    /// Ends a period in which the bridge took this mean current, A; negative is returned.
     #[inline]
     pub fn advance(&mut self, time_s: f64, current_a: f64) {
         if self.fed && self.connected {
@@ -112,7 +113,7 @@ impl Bus {
         }
     }
 
-    /// The bus voltage after a time with a source that gives current and takes none, V.
+    /// Returns the bus voltage after a time with a source that gives current and takes none, V.
     fn charged_one_way(&self, time_s: f64, current_a: f64, open_v: f64) -> f64 {
         let capacitance_f = self.supply.capacitance_f;
         let resistance_ohm = self.supply.resistance_ohm;
@@ -120,7 +121,7 @@ impl Bus {
         let mut volts = self.volts;
         let mut left_s = time_s;
         if volts > open_v {
-            // The capacitor alone, until it is down at the source's voltage.
+            // The capacitor alone, until it is down to the source's voltage.
             let until_s = if rate < 0.0 {
                 (open_v - volts) / rate
             } else {
@@ -136,7 +137,7 @@ impl Bus {
         if current_a >= 0.0 {
             return settled_v + (volts - settled_v) * decay(left_s, time_constant_s);
         }
-        // Current comes back: the source charges along until the voltage is up at its own.
+        // Current returns: the source keeps charging until the voltage has reached its own.
         let until_s = if volts < open_v && time_constant_s > 0.0 {
             time_constant_s * libm::log((settled_v - volts) / (settled_v - open_v))
         } else {
@@ -150,7 +151,7 @@ impl Bus {
     }
 }
 
-/// What is left of a transient.
+/// Returns the remaining share of a transient.
 fn decay(time_s: f64, time_constant_s: f64) -> f64 {
     if time_constant_s > 0.0 {
         libm::exp(-time_s / time_constant_s)
@@ -219,7 +220,7 @@ mod tests {
         );
     }
 
-    /// The energy that comes back and that the source does not take stands in the capacitor.
+    /// Returned energy that the source does not take stays in the capacitor.
     #[test]
     fn braking_charges_the_capacitor_of_a_supply_that_takes_nothing() {
         for resistance_ohm in [0.0, 0.05] {
@@ -243,7 +244,7 @@ mod tests {
         }
     }
 
-    /// In steps of any length the bus comes to the same.
+    /// The bus reaches the same state in steps of any length.
     #[test]
     fn the_bus_is_solved_whatever_the_step() {
         for (from_a, then_a) in [(8.0, -9.0), (-4.0, 20.0)] {

@@ -1,10 +1,10 @@
-//! The stator's circuit while the speed stands still.
+//! The stator's circuit at constant speed.
 //!
 //! Between two changes of the inverter the currents obey a linear equation with a constant and a
-//! rotating input, L·di/dt = u − R·i − jωφ·e^(jθ) (1), (2), in the stator's frame, which has a
-//! closed solution: i − s decays with R/L towards u/R, where s = −jωφ·e^(jθ)/(R + jωL) turns with
-//! the rotor. With one phase open the current keeps to the line across that phase's axis, and as
-//! every coefficient is a plain number, its solution is the projection of the same one on that line.
+//! rotating input, L·di/dt = u − R·i − jωφ·e^(jθ) (1), (2), in the stator's frame. It has a closed
+//! solution: i − s decays with R/L towards u/R, where s = −jωφ·e^(jθ)/(R + jωL) turns with the
+//! rotor. With one phase open the current stays on the line perpendicular to that phase's axis, and
+//! as every coefficient is scalar, its solution is the projection of the full one on that line.
 
 mod mean;
 mod sweep;
@@ -20,36 +20,36 @@ use super::vector::{AXES, back, dot, largest, turn};
 pub(super) enum Way {
     /// All.
     Star,
-    /// Not that of this phase.
+    /// All but this phase's.
     Without(usize),
     /// None.
     Nowhere,
 }
 
-/// What the inverter does to the motor until its next change.
+/// What the inverter applies to the motor until its next change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Drive {
     /// Voltage vector in the stator's frame, V.
     pub(super) u: [f64; 2],
-    /// What the currents' vector is multiplied with to give the current from the supply.
+    /// The current vector times this gives the supply current.
     pub(super) to_bus: [f64; 2],
     /// Which currents flow.
     pub(super) way: Way,
 }
 
-/// A stretch of time within a period.
+/// An interval within a period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stretch {
     /// Its length, s.
     pub(super) time_s: f64,
-    /// Cosine and sine of the angle by which the rotor turns.
+    /// Cosine and sine of the angle that the rotor turns.
     rotation: [f64; 2],
-    /// What is left of a transient.
+    /// The remaining share of a transient.
     decay: f64,
 }
 
 impl Stretch {
-    /// One that is twice as long.
+    /// Returns one twice as long.
     #[inline(always)]
     pub(super) fn twice(&self) -> Self {
         Self {
@@ -70,19 +70,19 @@ pub(super) struct Moment {
 }
 
 impl Moment {
-    /// The current vector in the stator's frame, A.
+    /// Returns the current vector in the stator's frame, A.
     #[inline(always)]
     pub(super) fn stator_a(&self) -> [f64; 2] {
         turn(self.i, self.direction)
     }
 }
 
-/// What a stretch comes to.
+/// The result of a stretch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solution {
     /// Its end.
     pub(super) end: Moment,
-    /// u/R seen from the rotor at its start and end, A.
+    /// u/R in the rotor's frame at its start and end, A.
     settled: [[f64; 2]; 2],
 }
 
@@ -99,27 +99,27 @@ pub(super) struct Sums {
     pub(super) charge: f64,
 }
 
-/// Where the circuit has come to in a period.
+/// The circuit's progress in a period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Course {
     /// The currents and the rotor now.
     pub(super) now: Moment,
-    /// What has flowed.
+    /// Integrals so far.
     pub(super) sums: Sums,
     /// Greatest magnitude of a phase current so far, A.
     pub(super) most_a: f64,
 }
 
 impl Course {
-    /// Goes on to a stretch's end.
+    /// Advances to a stretch's end.
     #[inline(always)]
     pub(super) fn go(&mut self, to: Moment) {
         self.now = to;
         self.reach(largest(to.stator_a()));
     }
 
-    /// A phase current came to this, A.
-    // By comparison: `max` looks for what is no number.
+    /// Records a phase current, A.
+    // By comparison: `max` checks for NaN.
     #[inline(always)]
     pub(super) fn reach(&mut self, current_a: f64) {
         if current_a > self.most_a {
@@ -128,12 +128,12 @@ impl Course {
     }
 }
 
-/// The circuit at one speed, and in a form that needs no division.
+/// The circuit at one speed, in a form that needs no division.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Circuit {
     /// Electrical speed ω, rad/s.
     pub(super) omega: f64,
-    /// Amplitude of the voltage that the rotor induces in a phase, with the sign of ω, V.
+    /// Amplitude of the back-EMF in a phase, with the sign of ω, V.
     pub(super) emf_v: f64,
     /// The current that turns with the rotor, in the rotor's frame, A.
     turning: [f64; 2],
@@ -148,12 +148,12 @@ pub(super) struct Circuit {
     inverse_z_square: f64,
     /// R/L, 1/s.
     rate: f64,
-    /// Whether the series of decay and of rotation reach half a period.
+    /// Whether the series of decay and of rotation are valid for half a period.
     short: [bool; 2],
 }
 
 impl Circuit {
-    /// Of a motor at rest.
+    /// Creates the circuit of a motor at rest.
     pub(super) fn new(motor: &Motor) -> Self {
         let (r, l) = (motor.resistance_ohm, motor.inductance_h);
         Self {
@@ -171,12 +171,12 @@ impl Circuit {
         }
     }
 
-    /// Phase resistance, Ω.
+    /// Returns the phase resistance, Ω.
     pub(super) fn resistance_ohm(&self) -> f64 {
         self.resistance_ohm
     }
 
-    /// Turns to an electrical speed, for stretches of at most `longest_s`.
+    /// Sets the electrical speed, for stretches of at most `longest_s`.
     pub(super) fn turn_at(&mut self, omega: f64, longest_s: f64) {
         let (r, x) = (self.resistance_ohm, omega * self.inductance_h);
         self.omega = omega;
@@ -190,7 +190,7 @@ impl Circuit {
         ];
     }
 
-    /// A stretch of at most half a period.
+    /// Prepares a stretch of at most half a period.
     #[inline(always)]
     pub(super) fn stretch(&self, time_s: f64) -> Stretch {
         let (angle, fall) = (self.omega * time_s, self.rate * time_s);
@@ -205,7 +205,7 @@ impl Circuit {
         }
     }
 
-    /// What is left of a transient after a fall.
+    /// Returns the remaining share of a transient.
     #[inline(always)]
     fn decay(&self, fall: f64) -> f64 {
         if self.short[0] {
@@ -215,7 +215,7 @@ impl Circuit {
         }
     }
 
-    /// The closed solution over a stretch.
+    /// Returns the closed solution over a stretch.
     #[inline(always)]
     pub(super) fn solve(&self, now: &Moment, drive: &Drive, stretch: &Stretch) -> Solution {
         let direction = turn(now.direction, stretch.rotation);
@@ -240,18 +240,18 @@ impl Circuit {
         }
     }
 
-    /// Takes the currents and the rotor on.
+    /// Advances the currents and the rotor.
     #[inline(always)]
     pub(super) fn conduct(&self, course: &mut Course, drive: &Drive, stretch: &Stretch) {
         let solution = self.solve(&course.now, drive, stretch);
         self.follow(course, drive, stretch, &solution);
     }
 
-    /// Takes the currents and the rotor on to a solution's end, and adds up what flows.
+    /// Advances the currents and the rotor to a solution's end, and integrates.
     ///
-    /// The integrals of i_q and of the squares are by the values and the derivatives at both ends
-    /// (Euler and Maclaurin's trapezoid): its error is h⁵/720 of the fourth derivative, 1e-6 of the
-    /// current where the rotor turns by 0.1. That of the current itself, and so of charge and
+    /// The integrals of i_q and of the squares use the values and derivatives at both ends (Euler
+    /// and Maclaurin's trapezoid): the error is h⁵/720 of the fourth derivative, 1e-6 of the
+    /// current if the rotor turns by 0.1. The integral of the current itself, and so charge and
     /// energy, is exact: the flux linkage L·i + φ·e^(jθ) grows by u·h − R·∫i.
     #[inline(always)]
     pub(super) fn follow(
@@ -292,26 +292,26 @@ impl Circuit {
         sums.charge += dot(drive.to_bus, lost);
     }
 
-    /// The slope that a voltage along it gives a current, A/s.
+    /// Returns the slope that a voltage along it gives a current, A/s.
     #[inline(always)]
     pub(super) fn slope_of(&self, volts: f64) -> f64 {
         volts * self.inverse_r * self.rate
     }
 
-    /// The slope of the currents in the stator's frame without voltage, A/s.
+    /// Returns the slope of the currents in the stator's frame without voltage, A/s.
     #[inline(always)]
     pub(super) fn free_slope(&self, now: &Moment) -> [f64; 2] {
         turn(self.slope([0.0; 2], now.i), now.direction)
     }
 
-    /// u/R with what an open phase shows along its axis: what the rotor induces.
+    /// Returns u/R including the voltage of an open phase along its axis: what the rotor induces.
     fn held_open(&self, settled: [f64; 2], phase: usize, at: &Moment) -> [f64; 2] {
         let axis = back(AXES[phase], at.direction);
         let own = axis[1] * self.emf_v * self.inverse_r - dot(axis, settled);
         [settled[0] + own * axis[0], settled[1] + own * axis[1]]
     }
 
-    /// Derivatives of i_d and i_q: (u − R·i)/L − jω·(i + φ/L).
+    /// Returns the derivatives of i_d and i_q: (u − R·i)/L − jω·(i + φ/L).
     #[inline(always)]
     fn slope(&self, settled: [f64; 2], [d, q]: [f64; 2]) -> [f64; 2] {
         [
@@ -320,7 +320,7 @@ impl Circuit {
         ]
     }
 
-    /// The flux linkage L·i + φ·e^(jθ) in the stator's frame, Vs.
+    /// Returns the flux linkage L·i + φ·e^(jθ) in the stator's frame, Vs.
     #[inline(always)]
     fn linkage(&self, at: &Moment) -> [f64; 2] {
         let l = self.inductance_h;
@@ -328,7 +328,7 @@ impl Circuit {
     }
 }
 
-/// The part of a current vector that can flow.
+/// Returns the part of a current vector that can flow.
 #[inline(always)]
 pub(super) fn confine(i: [f64; 2], way: Way) -> [f64; 2] {
     match way {

@@ -1,37 +1,37 @@
-//! The currents of a motor that has no closed solution: harmonics, saliency, saturation.
+//! The currents of a motor without a closed solution: harmonics, saliency, saturation.
 //!
-//! Runge and Kutta's classical method on the currents' flux in the stator's frame,
-//! dX/dt = u − R·i − ω·g with ω·g what the rotor induces, between two changes of the inverter. The
-//! integrals that the period needs are integrated along.
+//! Classical Runge-Kutta on the currents' flux in the stator's frame, dX/dt = u − R·i − ω·g with
+//! ω·g the back-EMF, between two changes of the inverter. The integrals that the period needs are
+//! integrated along with it.
 
 use super::circuit::{Circuit, Course, Drive, Moment, Way, confine};
 use super::magnetics::Magnetics;
 use super::series::rotation;
 use super::vector::{AXES, back, dot, turn};
 
-/// Angle of the fastest harmonic in a step, rad: its error is 0.2⁵/120, 3e-6 of the harmonic.
+/// Angle of the fastest harmonic per step, rad: the error is 0.2⁵/120, 3e-6 of the harmonic.
 const STEP_RAD: f64 = 0.2;
 
-/// Decay of the currents in a step: its error is 0.1⁵/120, 1e-7.
+/// Decay of the currents per step: the error is 0.1⁵/120, 1e-7.
 const STEP_DECAY: f64 = 0.1;
 
-/// Change of the flux in a step against that which halves the inductance.
+/// Change of the flux per step relative to that which halves the inductance.
 const STEP_BEND: f64 = 0.1;
 
-/// The most steps in a stretch: a motor that would need more has no sense, and its errors show in
-/// the currents rather than in the time that a run takes.
+/// Most steps in a stretch: a motor that would need more makes no sense, and its errors show in the
+/// currents rather than in run time.
 const STEPS_MAX: f64 = 1e4;
 
 /// Flux X, and the integrals since the start.
 type State = [f64; 7];
 
-/// A motor's magnetics with its speed and resistance for now.
+/// A motor's magnetics with its present speed and resistance.
 pub(super) struct Conduction<'a> {
     pub(super) magnetics: &'a Magnetics,
     pub(super) circuit: &'a Circuit,
 }
 
-/// What flows over a stretch.
+/// Integrals over a stretch.
 #[derive(Clone, Copy, Debug)]
 struct Flowed {
     /// Integral of the current in the stator's frame, As.
@@ -43,16 +43,16 @@ struct Flowed {
 }
 
 impl Conduction<'_> {
-    /// The currents and the rotor after a time.
+    /// Returns the currents and the rotor after a time.
     pub(super) fn at(&self, now: &Moment, drive: &Drive, time_s: f64) -> Moment {
         self.integrate(now, drive, time_s).0
     }
 
-    /// Takes the currents and the rotor on, and adds up what flows.
+    /// Advances the currents and the rotor, and integrates.
     ///
-    /// The period's end takes the torque from i_q, its square from that of i_q, and the copper's
-    /// loss from both squares: here i_q stands for the torque over φ, and the other square for what
-    /// is left.
+    /// The period's end takes the torque from i_q, its square from i_q squared, and the copper loss
+    /// from both squares: here i_q stands for the torque over φ, and the other square for the
+    /// remainder.
     pub(super) fn conduct(&self, course: &mut Course, drive: &Drive, time_s: f64, flux_wb: f64) {
         let (now, flowed) = self.integrate(&course.now, drive, time_s);
         course.go(now);
@@ -110,7 +110,7 @@ impl Conduction<'_> {
         (Moment { i, direction }, flowed)
     }
 
-    /// Into how many steps a time is cut.
+    /// Returns the number of steps for a time.
     fn steps(&self, now: &Moment, flux: [f64; 2], drive: &Drive, time_s: f64) -> f64 {
         let (magnetics, r) = (self.magnetics, self.circuit.resistance_ohm());
         let length = |[a, b]: [f64; 2]| a.abs() + b.abs();

@@ -1,27 +1,27 @@
-//! What a real motor has beyond the ideal one.
+//! How a real motor departs from the ideal one.
 
 /// Departures from a sinusoidal, round, unsaturated, frictionless and cool motor; none by default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extras {
-    /// Harmonics of the voltage that the rotor induces.
+    /// Harmonics of the back-EMF.
     pub harmonics: Vec<Harmonic>,
     /// L_q/L_d; their mean is the motor's inductance. 1 is a round rotor.
     pub saliency: f64,
-    /// Current along q at which the inductance has fallen to half, A; infinite is no saturation.
+    /// Current along q at which the inductance has halved, A; infinite means no saturation.
     pub saturation_a: f64,
     /// What brakes the shaft.
     pub drag: Drag,
-    /// What holds it in detents.
+    /// Its detents.
     pub cogging: Cogging,
-    /// How the winding warms up, if it does.
+    /// How the winding heats up, if it does.
     pub winding: Option<Winding>,
 }
 
-/// A harmonic of the induced voltage: with the fundamental −ωφ·sin θ, phase a gets
-/// −share·ωφ·sin(order·θ + phase).
+/// A harmonic of the back-EMF: with the fundamental −ωφ·sin θ, phase a gets −share·ωφ·sin(order·θ +
+/// phase).
 ///
-/// Order 5 turns against the rotor and 7 with it. The third's multiples are the same in all three
-/// phases: they move the star point, which is not connected, and show at no terminal.
+/// Order 5 turns against the rotor and 7 with it. Multiples of three are the same in all phases:
+/// they move the star point, which is not connected, and show at no terminal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonic {
     /// Order, 2 and above.
@@ -32,16 +32,16 @@ pub struct Harmonic {
     pub phase_rad: f64,
 }
 
-/// Torque against the rotation that is lost in the motor.
+/// Torque against the rotation that the motor itself loses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drag {
     /// Dry friction of the bearings, Nm.
     pub friction_nm: f64,
     /// Viscous friction, Nm·s/rad.
     pub viscous_nms: f64,
-    /// The iron's hysteresis, whose loss grows with the speed, Nm.
+    /// Hysteresis of the iron, whose loss grows with speed, Nm.
     pub hysteresis_nm: f64,
-    /// The iron's eddy currents, whose loss grows with its square, Nm·s/rad.
+    /// Eddy currents of the iron, whose loss grows with speed squared, Nm·s/rad.
     pub eddy_nms: f64,
 }
 
@@ -50,11 +50,11 @@ pub struct Drag {
 pub struct Cogging {
     /// Amplitude, Nm.
     pub torque_nm: f64,
-    /// Detents in a mechanical turn: mostly the least common multiple of poles and slots.
+    /// Detents per mechanical turn: usually the least common multiple of poles and slots.
     pub order: u32,
 }
 
-/// The winding as one thermal mass that copper loss heats.
+/// The winding as one thermal mass heated by copper loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Winding {
     /// To the surroundings, K/W.
@@ -77,12 +77,12 @@ impl Default for Extras {
 }
 
 impl Extras {
-    /// Whether the currents obey the ideal motor's linear equation.
+    /// Returns true if the currents obey the ideal motor's linear equation.
     pub fn is_linear(&self) -> bool {
         self.harmonics.is_empty() && self.saliency == 1.0 && self.saturation_a == f64::INFINITY
     }
 
-    /// Whether nothing but currents and load moves the shaft.
+    /// Returns true if only currents and load move the shaft.
     pub(super) fn runs_freely(&self) -> bool {
         self.drag == Drag::default() && self.cogging == Cogging::default()
     }

@@ -1,20 +1,20 @@
-//! The gates' signals of a control period, edge by edge with the dead times, for a recording.
+//! The gate signals of a control period, edge by edge with the dead times, for a recording.
 //!
-//! They are what the switching plant plays, whichever plant is simulated. The comparators' trip
-//! shows when the drive has answered it.
+//! They are what the switching plant plays, whichever plant is simulated. A comparator trip shows
+//! once the drive has responded to it.
 
 use siskin_control::drive::Bridge;
 
 use super::rail::Rail;
 use super::timing::{Half, Timer, first_half, second_half};
 
-/// The timer's outputs behind the dead time.
+/// The timer's outputs after the dead-time insertion.
 #[derive(Clone, Debug, Default)]
 pub struct Gates {
     timers: [Timer; 3],
 }
 
-/// Which gate of a leg is on.
+/// Which gates of a leg are on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gate {
     /// That of the high side.
@@ -24,8 +24,8 @@ pub struct Gate {
 }
 
 impl Gates {
-    /// Plays a period with a command for each half, and tells of each leg's changes in order of
-    /// time: seconds from the period's start, the leg and its gates.
+    /// Plays a period with a command for each half, and reports each leg's changes in time order:
+    /// seconds from the period's start, the leg and its gates.
     pub fn period(
         &mut self,
         halves: [Bridge; 2],
@@ -85,12 +85,12 @@ impl Gate {
         }
     }
 
-    /// Whether both are on.
+    /// Returns true if both are on.
     pub fn shoots(self) -> bool {
         self.high && self.low
     }
 
-    /// The one that is on, if only one is.
+    /// Returns the one that is on, if only one is.
     pub(super) fn on(self) -> Option<Rail> {
         match (self.low, self.high) {
             (true, false) => Some(Rail::Low),

@@ -1,11 +1,10 @@
-//! The inverter's timing: what a command makes of the legs in each half of a control period.
+//! The inverter's timing: how a command moves the legs in each half of a control period.
 //!
-//! The timer's counter runs down from its top to the middle of the period and up again, and its
-//! outputs change where it passes the duties: the high sides are on around the middle. Turning a
-//! switch off is immediate, turning one on waits for the dead time. The sample is taken in the
-//! middle of the low sides' on-time, half a dead time after the top: at the top itself, where a
-//! current falls by e/L while the low sides are on, its mean would be missed by 0.06 A at 4500 rpm
-//! and 0.5 µs. The period runs from sample to sample.
+//! The timer's counter runs down from its top to the middle of the period and up again, and its outputs change where it
+//! passes the duties: the high sides are on around the middle. Turning a switch off is immediate, turning one on waits
+//! for the dead time. The sample is taken in the middle of the low sides' on-time, half a dead time after the top: at
+//! the top itself, where a current falls by e/L while the low sides are on, its mean would be missed by 0.06 A at 4500
+//! rpm and 0.5 µs. The period runs from sample to sample.
 
 mod comparators;
 mod edges;
@@ -31,7 +30,7 @@ pub enum Fidelity {
     Switching,
 }
 
-/// The phase current below which a dead time's loss is in proportion to the current, A.
+/// The phase current below which a dead time's loss is proportional to the current, A.
 const SIGN_CERTAIN_A: f64 = 0.1;
 
 /// Motor, load and inverter.
@@ -43,13 +42,12 @@ pub struct Plant {
     comparators: Comparators,
     /// Where all legs are, with none waiting.
     settled: Option<Rail>,
-    /// The longest stretch that the circuit's solution is prepared for between a period's own edges, s.
+    /// The longest stretch between a period's own edges that the circuit's solution is prepared for, s.
     longest_s: f64,
 }
 
 impl Plant {
-    /// A motor and its load at a mechanical speed and an electrical angle in turns, all switches
-    /// off.
+    /// Creates a motor and its load at a mechanical speed and an electrical angle in turns, all switches off.
     pub fn new(
         fidelity: Fidelity,
         motor: Motor,
@@ -69,47 +67,46 @@ impl Plant {
 
     /// Breaks parts of the stage and mends all others.
     ///
-    /// While something is broken every switch edge is simulated, and a comparator at each low side's
-    /// shunt turns all switches off where it sees more than its level: with a sound stage the drive's own
-    /// trip at the samples comes first.
+    /// While something is broken every switch edge is simulated, and a comparator at each low side's shunt turns all
+    /// switches off if it sees more than its level: with a sound stage the drive's own trip at the samples comes first.
     pub fn break_legs(&mut self, breaks: &Breaks) {
         let on = [0, 1, 2].map(|leg| self.timers[leg].on());
         self.stage.break_legs(breaks, on);
     }
 
-    /// Sets the comparators' level, A; it is infinite at the start.
+    /// Sets the comparators' level, A; initially infinite.
     pub fn set_comparator_a(&mut self, level_a: f64) {
         self.comparators.level_a = level_a;
     }
 
-    /// Whether the comparators hold all switches off, until the drive turns them off as well.
+    /// Returns true if the comparators hold all switches off, until the drive turns them off as well.
     pub fn tripped(&self) -> bool {
         self.comparators.tripped
     }
 
-    /// From a current beyond the comparators' level to switches that were off, s, the last time that they acted.
+    /// Returns the time from a current beyond the comparators' level to switches off, s, at their last act.
     pub fn trip_answer_s(&self) -> Option<f64> {
         self.comparators.answer_s()
     }
 
-    /// A leg that has had less than the dead time between its switches in the last period: real ones might both have
-    /// been on. Means have no edges.
+    /// Returns a leg that had less than the dead time between its switches in the last period, where real ones might
+    /// both have been on. Mean voltages have no edges.
     #[inline(always)] // in each period
     pub fn crossed(&self) -> Option<usize> {
         self.stage.crossed()
     }
 
-    /// Gives the motor at rest what a real one has beyond the ideal.
+    /// Gives the motor, at rest, the deviations of a real one.
     pub fn fit(&mut self, extras: &Extras) {
         self.stage.machine.fit(extras);
     }
 
-    /// Phase resistance now, Ω.
+    /// Returns the present phase resistance, Ω.
     pub fn resistance_ohm(&self) -> f64 {
         self.stage.machine.resistance_ohm()
     }
 
-    /// Temperature of the winding, °C, if it is simulated.
+    /// Returns the winding's temperature, °C, if simulated.
     pub fn winding_c(&self) -> Option<f64> {
         self.stage.machine.winding_c()
     }
@@ -119,71 +116,70 @@ impl Plant {
         self.stage.machine.impose(speed_rad_s);
     }
 
-    /// Blocks the shaft, whatever the torque, or lets it go.
+    /// Blocks the shaft, whatever the torque, or releases it.
     pub fn block(&mut self, blocked: bool) {
         self.stage.machine.block(blocked);
     }
 
-    /// Adds to the shaft's speed at once, rad/s; not where it is held.
+    /// Adds to the shaft's speed at once, rad/s, unless it is held.
     pub fn kick(&mut self, speed_rad_s: f64) {
         self.stage.machine.kick(speed_rad_s);
     }
 
-    /// The speed at which the wind would turn the propeller by itself, rad/s; 0 is still air.
+    /// Sets the speed at which the wind would turn a free propeller, rad/s; 0 is still air.
     pub fn set_wind_rad_s(&mut self, speed_rad_s: f64) {
         self.stage.machine.shaft_mut().wind_rad_s = speed_rad_s;
     }
 
-    /// A torque on the shaft beside all others, Nm; positive turns it forward.
+    /// Sets a torque on the shaft besides all others, Nm; positive turns it forward.
     pub fn set_extra_torque_nm(&mut self, torque_nm: f64) {
         self.stage.machine.shaft_mut().torque_nm = torque_nm;
     }
 
-    /// The temperature of the surroundings, °C.
+    /// Sets the ambient temperature, °C.
     pub fn set_ambient_c(&mut self, ambient_c: f64) {
         self.stage.machine.set_ambient_c(ambient_c);
     }
 
-    /// Energy stored in motor and shaft, J.
+    /// Returns the energy stored in motor and shaft, J.
     #[cfg(test)]
     pub(super) fn stored_j(&self) -> f64 {
         self.stage.machine.stored_j()
     }
 
-    /// Electrical angle in turns, 0..1.
+    /// Returns the electrical angle in turns, 0..1.
     pub fn angle_turns(&self) -> f64 {
         self.stage.machine.angle_turns()
     }
 
-    /// Cosine and sine of the electrical angle.
+    /// Returns the cosine and sine of the electrical angle.
     pub fn direction(&self) -> [f64; 2] {
         self.stage.machine.now().direction
     }
 
-    /// Mechanical speed, rad/s.
+    /// Returns the mechanical speed, rad/s.
     pub fn speed_rad_s(&self) -> f64 {
         self.stage.machine.speed_rad_s()
     }
 
-    /// Currents into the phases, A.
+    /// Returns the currents into the phases, A.
     pub fn currents_a(&self) -> [f64; 3] {
         self.stage.machine.currents_a()
     }
 
-    /// Voltages of the terminals against the negative pole, V: with all legs off and no current,
-    /// three equal dividers hold the star at ground, unless a low diode holds a terminal.
+    /// Returns the terminals' voltages against the negative pole, V: with all legs off and no current, three equal
+    /// dividers hold the star at ground, unless a low diode holds a terminal.
     pub fn terminals_v(&self) -> [f64; 3] {
         self.stage.terminals_v()
     }
 
-    /// For how long each phase's current has been flowing through its low side, s; `None` where it
-    /// does not.
+    /// Returns how long each phase's current has been flowing through its low side, s; `None` if it does not.
     pub fn low_s(&self) -> [Option<f64>; 3] {
         self.stage.low_s()
     }
 
-    /// Currents that the low sides' shunts carry into the phases, A, of the phases' `currents_a`:
-    /// the same where the stage is sound.
+    /// Returns the currents of the low sides' shunts into the phases, A, from the phases' `currents_a`: the same if the
+    /// stage is sound.
     pub fn shunts_a(&self, currents_a: [f64; 3]) -> [f64; 3] {
         if self.stage.is_sound() {
             currents_a
@@ -192,7 +188,7 @@ impl Plant {
         }
     }
 
-    /// Takes the plant on by a period from sample to sample, with a command for each half.
+    /// Advances the plant by a period from sample to sample, with a command for each half.
     pub fn period(
         &mut self,
         halves: [Bridge; 2],
@@ -225,7 +221,7 @@ impl Plant {
         flow
     }
 
-    /// What the comparators let through of a command.
+    /// Returns what the comparators let through of a command.
     fn gated(&self, bridge: Bridge) -> Bridge {
         if self.comparators.tripped {
             Bridge::Off
@@ -234,8 +230,8 @@ impl Plant {
         }
     }
 
-    /// Takes the plant on by a stretch of any length with each leg at a rail, or with both switches
-    /// off: for commands that no period of the control makes, without dead time.
+    /// Advances the plant by a stretch of any length with each leg at a rail, or with both switches off: for commands
+    /// that no control period makes, without dead time.
     ///
     /// The means are over the stretch; the shaft takes its torque at the end.
     pub fn legs(&mut self, legs: [Option<Rail>; 3], bus_v: f64, time_s: f64) -> Flow {
@@ -255,7 +251,7 @@ impl Plant {
         self.stage.machine.finish(time_s)
     }
 
-    /// The duties whose mean voltages stand for the switches.
+    /// Returns the duties whose mean voltages replace the switches.
     fn means(&self, bridge: Bridge) -> Option<[f64; 3]> {
         match self.fidelity {
             Fidelity::Averaged if self.stage.is_sound() => duties(bridge),
@@ -263,7 +259,7 @@ impl Plant {
         }
     }
 
-    /// Means stand for legs that are low at the samples.
+    /// Puts all legs low, as mean voltages assume at the samples.
     #[cold]
     fn close_low(&mut self) {
         self.timers = [Timer {
@@ -274,8 +270,8 @@ impl Plant {
         self.settled = Some(Rail::Low);
     }
 
-    /// Some time by the mean voltages, less what the dead time, a share of the period, takes by the
-    /// sign of each current: the supply's voltage once and a diode's twice a period.
+    /// Runs some time on the mean voltages, less the dead time's loss, a share of the period, by the sign of each
+    /// current: once the supply's voltage and twice a diode's per period.
     #[inline(always)]
     fn mean(&mut self, duties: [f64; 3], dead_share: f64, time_s: f64) {
         if self.settled != Some(Rail::Low) {
@@ -295,7 +291,7 @@ impl Plant {
         self.stage.run_averaged(terminals_v, time_s);
     }
 
-    /// Half a period edge by edge, in which the legs that switch come to a rail.
+    /// Plays half a period edge by edge, after which the switching legs are at a rail.
     fn switch(&mut self, bridge: Bridge, to: Rail, half_s: f64, dead_time_s: f64) {
         if let Some(edges_s) = self.plain(bridge, to, half_s, dead_time_s)
             && self.stage.sweep(to, edges_s, dead_time_s, half_s)
@@ -372,12 +368,12 @@ impl Plant {
         }
     }
 
-    /// Whether a switch that is on may make a short with one that is always on.
+    /// Returns true if a switch that is on may short through one that is always on.
     fn may_short(&self) -> bool {
         self.stage.is_shorted() && self.timers.iter().any(|timer| timer.output.is_some())
     }
 
-    /// The comparators turn all switches off for the rest of a half.
+    /// Turns all switches off by the comparators for the rest of a half.
     #[cold]
     fn trip(&mut self, left_s: f64) {
         self.timers = Default::default();
@@ -387,8 +383,8 @@ impl Plant {
         self.stage.run(left_s);
     }
 
-    /// The legs' edges, where solutions add up, each leg has one from the other rail, and there is time
-    /// for its dead time: nearly always, in drive.
+    /// Returns the legs' edges if solutions superpose, each leg has one from the other rail, and its dead time fits:
+    /// nearly always, in drive.
     fn plain(&self, bridge: Bridge, to: Rail, half_s: f64, dead_time_s: f64) -> Option<[f64; 3]> {
         let Bridge::Duty(duties) = bridge else {
             return None;
@@ -406,7 +402,7 @@ impl Plant {
                 Rail::Low => high_s,
             }
         });
-        // An edge at an end is none.
+        // An edge at either end does not count.
         let [first_s, last_s] = [
             at_s[0].min(at_s[1]).min(at_s[2]),
             at_s[0].max(at_s[1]).max(at_s[2]),
@@ -430,7 +426,7 @@ mod tests {
         plant
     }
 
-    /// A leg with both switches off has each edge played; with three legs that switch, all follow from one solution.
+    /// With one leg off each edge is played; with three switching legs, all follow from one solution.
     fn commands() -> [Bridge; 2] {
         let [low, high] = [0.2, 0.8].map(Duty::from_num::<f64>);
         [
@@ -439,7 +435,7 @@ mod tests {
         ]
     }
 
-    /// Whoever asks for no dead time has none.
+    /// Asking for no dead time gives none.
     #[test]
     fn there_is_a_dead_time_between_the_switches() {
         for bridge in commands() {
@@ -453,7 +449,7 @@ mod tests {
         }
     }
 
-    /// A timer that forgets a tenth of its dead time is found in the half period in which it does.
+    /// A timer that drops a tenth of its dead time is found in that half period.
     #[test]
     fn a_dead_time_that_is_too_short_is_found() {
         const HALF_S: f64 = 20e-6;
@@ -481,7 +477,7 @@ mod tests {
         }
     }
 
-    /// A leg that has been off waits for no dead time: it must have been for as long.
+    /// A leg that has been off waits for no dead time: it must have been off for as long.
     #[test]
     fn a_leg_that_was_off_too_shortly_is_found() {
         let mut plant = plant();

@@ -1,7 +1,7 @@
 //! The motor on its shaft: the circuit within a period, and the speed from period to period.
 //!
-//! The speed stands still within a period, at what the last period's torque lets expect of its
-//! middle; at the end the period's mean torque moves it (3).
+//! The speed is constant within a period, at the mid-period value expected from the last period's torque; at the end
+//! the period's mean torque moves it (3).
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ use super::{Cogging, Drag, Extras, Load, Motor};
 pub struct Flow {
     /// Electromagnetic torque, Nm.
     pub torque_nm: f64,
-    /// Square of it.
+    /// Its square.
     pub torque_square: f64,
     /// Electrical power into the motor, W.
     pub motor_w: f64,
@@ -27,10 +27,9 @@ pub struct Flow {
     pub copper_w: f64,
     /// Current from the supply, A.
     pub bus_a: f64,
-    /// Greatest magnitude of a phase current among those that were worked out: with the switches, at each of their
-    /// edges, A.
+    /// Greatest phase current among those computed: with the switches, at each of their edges, A.
     pub most_a: f64,
-    /// Power lost to the motor's friction and in its iron while the shaft is free, W.
+    /// Power lost to the motor's friction and iron while the shaft is free, W.
     pub drag_w: f64,
 }
 
@@ -40,15 +39,15 @@ pub(super) struct Machine {
     motor: Motor,
     load: Load,
     inertia_kgm2: f64,
-    /// Speed that the shaft is held at while nothing blocks it, rad/s.
+    /// Speed at which the shaft is held while nothing blocks it, rad/s.
     imposed_rad_s: Option<f64>,
-    /// Speed that it is held at whatever the torque, rad/s.
+    /// Speed at which it is held whatever the torque, rad/s.
     held_rad_s: Option<f64>,
-    /// Flux against current, where it is not the ideal motor's.
+    /// Flux against current, if not the ideal motor's.
     magnetics: Option<Box<Magnetics>>,
-    /// What warms the winding, if anything does.
+    /// What heats the winding, if anything.
     warming: Option<Warming>,
-    /// What else acts on the shaft, if anything does.
+    /// What else acts on the shaft, if anything.
     shaft: Option<Box<Shaft>>,
     /// Electrical angle at the start of the period in turns, 0..1.
     angle_turns: f64,
@@ -58,12 +57,12 @@ pub(super) struct Machine {
     acceleration: f64,
     /// The circuit in this period.
     pub(super) circuit: Circuit,
-    /// Where it has come to.
+    /// Its progress.
     pub(super) course: Course,
 }
 
 impl Machine {
-    /// A motor and its load without current, at a mechanical speed and an electrical angle in turns.
+    /// Creates a motor and its load without current, at a mechanical speed and an electrical angle in turns.
     pub(super) fn new(motor: Motor, load: Load, speed_rad_s: f64, angle_turns: f64) -> Self {
         let angle_turns = fraction(angle_turns);
         let (sin, cos) = libm::sincos(TAU * angle_turns);
@@ -91,7 +90,7 @@ impl Machine {
         }
     }
 
-    /// Gives an ideal motor at rest what a real one has beyond that.
+    /// Gives an ideal motor, at rest, the deviations of a real one.
     pub(super) fn fit(&mut self, extras: &Extras) {
         self.magnetics = Magnetics::new(&self.motor, extras).map(Box::new);
         let cold_ohm = self.motor.resistance_ohm;
@@ -105,19 +104,19 @@ impl Machine {
         }
     }
 
-    /// Whether the currents have a closed solution between two changes of the inverter, and
-    /// solutions add up.
+    /// Returns true if the currents have a closed solution between two changes of the inverter, and solutions
+    /// superpose.
     #[inline(always)]
     pub(super) fn is_linear(&self) -> bool {
         self.magnetics.is_none()
     }
 
-    /// Phase resistance now, Ω.
+    /// Returns the present phase resistance, Ω.
     pub(super) fn resistance_ohm(&self) -> f64 {
         self.motor.resistance_ohm
     }
 
-    /// Temperature of the winding, °C, if it is simulated.
+    /// Returns the winding's temperature, °C, if simulated.
     pub(super) fn winding_c(&self) -> Option<f64> {
         self.warming.as_ref().map(Warming::temperature_c)
     }
@@ -128,7 +127,7 @@ impl Machine {
         self.hold(self.imposed_rad_s);
     }
 
-    /// Blocks the shaft, or lets it go.
+    /// Blocks the shaft, or releases it.
     pub(super) fn block(&mut self, blocked: bool) {
         self.hold(if blocked {
             Some(0.0)
@@ -152,43 +151,43 @@ impl Machine {
         }
     }
 
-    /// What else acts on the shaft.
+    /// Returns what else acts on the shaft.
     pub(super) fn shaft_mut(&mut self) -> &mut Shaft {
         let pole_pairs = self.motor.pole_pairs;
         let free = || Box::new(Shaft::new(pole_pairs, Drag::default(), Cogging::default()));
         self.shaft.get_or_insert_with(free)
     }
 
-    /// Changes the temperature of the surroundings, °C.
+    /// Changes the ambient temperature, °C.
     pub(super) fn set_ambient_c(&mut self, ambient_c: f64) {
         if let Some(warming) = &mut self.warming {
             warming.set_ambient_c(ambient_c);
         }
     }
 
-    /// Electrical angle at the start of the period in turns, 0..1.
+    /// Returns the electrical angle at the start of the period in turns, 0..1.
     pub(super) fn angle_turns(&self) -> f64 {
         self.angle_turns
     }
 
-    /// Mechanical speed at the start of the period, rad/s.
+    /// Returns the mechanical speed at the start of the period, rad/s.
     pub(super) fn speed_rad_s(&self) -> f64 {
         self.speed_rad_s
     }
 
-    /// The currents and the rotor's direction now.
+    /// Returns the present currents and rotor direction.
     pub(super) fn now(&self) -> &Moment {
         &self.course.now
     }
 
-    /// Currents into the phases, A.
+    /// Returns the currents into the phases, A.
     #[inline(always)]
     pub(super) fn currents_a(&self) -> [f64; 3] {
         phases(self.now().stator_a())
     }
 
-    /// Voltages against the star that phases show which carry no current, V: what the rotor induces,
-    /// and in a motor that is not round what the other phases couple into an open one.
+    /// Returns the voltages of currentless phases against the star, V: the back-EMF, and in a motor that is not round
+    /// what the other phases couple into an open one.
     pub(super) fn emf_v(&self, at: &Moment, drive: &Drive) -> [f64; 3] {
         if let Some(magnetics) = &self.magnetics {
             let open = match drive.way {
@@ -201,19 +200,19 @@ impl Machine {
         phases([-peak * at.direction[1], peak * at.direction[0]])
     }
 
-    /// The greatest voltage that the rotor induces between two phases, V.
+    /// Returns the greatest voltage that the rotor induces between two phases, V.
     pub(super) fn line_v(&self) -> f64 {
         let peak = self.magnetics.as_ref().map_or(1.0, |m| m.peak());
         3.0_f64.sqrt() * self.circuit.emf_v.abs() * peak
     }
 
-    /// Angular speed of the fastest wave that the rotor induces, rad/s.
+    /// Returns the angular speed of the fastest wave that the rotor induces, rad/s.
     pub(super) fn fastest_rad_s(&self) -> f64 {
         let order = self.magnetics.as_ref().map_or(1.0, |m| m.order());
         self.circuit.omega.abs() * order
     }
 
-    /// A current that has come to zero with its phase open stays there.
+    /// Keeps a current that has reached zero with its phase open at zero.
     pub(super) fn open(&mut self, way: Way) {
         let now = &mut self.course.now;
         now.i = back(confine(now.stator_a(), way), now.direction);
@@ -231,12 +230,12 @@ impl Machine {
         self.course.most_a = largest(self.now().stator_a());
     }
 
-    /// Speed to expect at the middle of the period, rad/s.
+    /// Returns the expected mid-period speed, rad/s.
     fn middle_rad_s(&self, period_s: f64) -> f64 {
         self.speed_rad_s + 0.5 * period_s * self.acceleration
     }
 
-    /// Takes the currents and the rotor on.
+    /// Advances the currents and the rotor.
     #[inline(always)]
     pub(super) fn conduct(&mut self, drive: &Drive, stretch: &Stretch) {
         if let Some(magnetics) = &self.magnetics {
@@ -251,8 +250,7 @@ impl Machine {
         }
     }
 
-    /// Takes the currents and the rotor on at a mean voltage, of which as much power comes from the
-    /// supply as goes into the motor.
+    /// Advances the currents and the rotor at a mean voltage; the supply provides the power that goes into the motor.
     #[inline(always)]
     pub(super) fn conduct_mean(&mut self, u: [f64; 2], bus_v: f64, time_s: f64) {
         if self.is_linear() {
@@ -269,15 +267,15 @@ impl Machine {
         self.conduct(&drive, &self.circuit.stretch(time_s));
     }
 
-    /// The phase currents to expect in the middle of a stretch, A: i_d and i_q stand still, and the
-    /// rotor's turn is taken for a straight line, 2 % too long where it is 0.2 rad.
+    /// Returns the phase currents expected in the middle of a stretch, A: i_d and i_q held constant, and the rotor's
+    /// turn taken as a straight line, 2 % too long at 0.2 rad.
     #[inline(always)]
     pub(super) fn middle_a(&self, time_s: f64) -> [f64; 3] {
         let turned = 0.5 * self.circuit.omega * time_s;
         phases(turn(self.now().stator_a(), [1.0, turned]))
     }
 
-    /// The currents and the rotor after a time of at most half a period.
+    /// Returns the currents and the rotor after a time of at most half a period.
     pub(super) fn after(&self, drive: &Drive, time_s: f64) -> Moment {
         match &self.magnetics {
             Some(magnetics) => Conduction {
@@ -292,7 +290,7 @@ impl Machine {
         }
     }
 
-    /// Energy in the currents' flux, in the shaft's motion and in its detents, J.
+    /// Returns the energy in the currents' flux, the shaft's motion and its detents, J.
     #[cfg(test)]
     pub(super) fn stored_j(&self) -> f64 {
         let [d, q] = self.now().i;
@@ -314,7 +312,7 @@ impl Machine {
         let middle_rad_s = self.middle_rad_s(period_s);
         let Course { now, sums, most_a } = &mut self.course;
         let [cos, sin] = now.direction;
-        // One Newton step towards length 1 keeps the rounding from adding up.
+        // One Newton step towards length 1 keeps rounding from accumulating.
         let correction = 1.5 - 0.5 * (cos * cos + sin * sin);
         now.direction = [cos * correction, sin * correction];
         now.i = now.i.map(settle);
@@ -334,7 +332,7 @@ impl Machine {
                 self.speed_rad_s = settle(self.speed_rad_s + period_s * self.acceleration);
             }
         } else if self.held_rad_s.is_none() {
-            // The load by the trapezoidal rule, which is stable however stiff the load.
+            // The load by the trapezoidal rule, stable however stiff the load.
             let damping = self.load.damping_at(middle_rad_s);
             let inertia = self.inertia_kgm2 + 0.5 * period_s * damping;
             let torque = torque_nm - damping * self.speed_rad_s;

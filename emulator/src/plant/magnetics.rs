@@ -1,10 +1,9 @@
-//! A motor's magnetic energy: what flux its currents link, and what the turning rotor induces.
+//! A motor's magnetic energy: the flux that its currents link, and the back-EMF.
 //!
-//! The energy of the currents' own flux X in the rotor's frame is 3/2·(w/2 + β·w²/4) with
-//! w = X_d²/L_d + X_q²/L_q. Its derivatives are the currents, i = X/L·(1 + β·w): a power series of
-//! the flux, as is usual for saturation, with the coupling of both axes that one energy function asks
-//! for. The voltages and the torque follow from the same function, so that no energy is lost between
-//! them. X of no current is none: what the magnets do to the iron by themselves is in φ and L.
+//! The energy of the currents' own flux X in the rotor's frame is 3/2·(w/2 + β·w²/4) with w = X_d²/L_d + X_q²/L_q. Its
+//! derivatives are the currents, i = X/L·(1 + β·w): a power series of the flux, as is usual for saturation, with the
+//! cross-coupling of the axes that one energy function demands. Voltages and torque follow from the same function, so
+//! that no energy is lost between them. Without current X is zero: the magnets' own effect on the iron is in φ and L.
 
 use super::circuit::Circuit;
 use super::vector::{AXES, back, dot, phases, turn};
@@ -21,7 +20,7 @@ pub(super) struct Magnetics {
     waves: Vec<Wave>,
     /// The highest order of anything that turns with the rotor.
     order: f64,
-    /// The greatest voltage that a phase can show, against the fundamental's.
+    /// The greatest phase voltage relative to the fundamental's.
     peak: f64,
 }
 
@@ -29,16 +28,16 @@ pub(super) struct Magnetics {
 #[derive(Clone, Copy, Debug)]
 struct Wave {
     order: u32,
-    /// Its derivative's amplitude, Wb.
+    /// Amplitude of its derivative, Wb.
     flux_wb: f64,
     /// Cosine and sine of its phase.
     phase: [f64; 2],
-    /// 1 where it turns with the rotor, −1 against it.
+    /// 1 if it turns with the rotor, −1 against it.
     sense: f64,
 }
 
 impl Magnetics {
-    /// Those of a motor, where they are not those of the ideal one.
+    /// Creates those of a motor, unless they are the ideal one's.
     pub(super) fn new(motor: &Motor, extras: &Extras) -> Option<Self> {
         if extras.is_linear() {
             return None;
@@ -46,9 +45,9 @@ impl Magnetics {
         let ratio = extras.saliency;
         let d_h = 2.0 * motor.inductance_h / (1.0 + ratio);
         let q_h = ratio * d_h;
-        // Along q the flux has half its inductance where β·w = 1.
+        // Along q the flux has half its inductance at β·w = 1.
         let half_flux = 0.5 * q_h * extras.saturation_a;
-        // The third's multiples are common to the phases.
+        // Multiples of three are common to the phases.
         let felt = extras.harmonics.iter().filter(|h| h.order % 3 != 0);
         let waves: Vec<_> = felt
             .map(|harmonic| {
@@ -83,8 +82,7 @@ impl Magnetics {
         self.peak
     }
 
-    /// What the rotor induces over ω, in the stator's frame: the derivative of the magnets' flux by
-    /// the angle, Wb.
+    /// Returns the back-EMF over ω, in the stator's frame: the derivative of the magnets' flux by the angle, Wb.
     pub(super) fn induced(&self, direction: [f64; 2]) -> [f64; 2] {
         let [cos, sin] = direction;
         let mut sum = [-self.flux_wb * sin, self.flux_wb * cos];
@@ -96,21 +94,21 @@ impl Magnetics {
         sum
     }
 
-    /// 1 + β·w at a flux: by what the currents exceed those of the unsaturated motor.
+    /// Returns 1 + β·w at a flux: how much the currents exceed those of the unsaturated motor.
     fn excess(&self, [d, q]: [f64; 2]) -> f64 {
         1.0 + self.bend * (d * d * self.inverse_l[0] + q * q * self.inverse_l[1])
     }
 
-    /// The currents of a flux, in the rotor's frame, A.
+    /// Returns the currents of a flux, in the rotor's frame, A.
     pub(super) fn current_a(&self, flux: [f64; 2]) -> [f64; 2] {
         let excess = self.excess(flux);
         [0, 1].map(|axis| flux[axis] * self.inverse_l[axis] * excess)
     }
 
-    /// The flux of currents, in the rotor's frame, Wb.
+    /// Returns the flux of currents, in the rotor's frame, Wb.
     ///
-    /// With m = 1 + β·w and w₀ = Σ L·i² it is L·i/m where m³ − m² = β·w₀. Newton's method comes down
-    /// from above, where the cubic is convex, without passing the root.
+    /// With m = 1 + β·w and w₀ = Σ L·i² it is L·i/m where m³ − m² = β·w₀. Newton's method descends from above, where
+    /// the cubic is convex, without passing the root.
     pub(super) fn flux_wb(&self, [d, q]: [f64; 2]) -> [f64; 2] {
         let w = d * d / self.inverse_l[0] + q * q / self.inverse_l[1];
         let target = self.bend * w;
@@ -125,21 +123,20 @@ impl Magnetics {
         [d / (self.inverse_l[0] * m), q / (self.inverse_l[1] * m)]
     }
 
-    /// How fast currents decay at most at a flux of this length, 1/s: with R over the least
-    /// differential inductance.
+    /// Returns the fastest decay of currents at a flux of this length, 1/s: R over the least differential inductance.
     pub(super) fn rate(&self, resistance_ohm: f64, flux_wb: f64) -> f64 {
         let bent = self.bent(flux_wb);
         let steepest = self.inverse_l[0].max(self.inverse_l[1]);
         resistance_ohm * steepest * (1.0 + 3.0 * bent * bent)
     }
 
-    /// A flux against the least that halves the inductance.
+    /// Returns a flux relative to the least that halves the inductance.
     pub(super) fn bent(&self, flux_wb: f64) -> f64 {
         flux_wb * (self.bend * self.inverse_l[0].max(self.inverse_l[1])).sqrt()
     }
 
-    /// The voltage that an open phase adds along its axis so that its current stays none, V, where
-    /// `slope` is what the flux would change by without it in the stator's frame, V.
+    /// Returns the voltage that an open phase adds along its axis to keep its current at zero, V, where `slope` is the
+    /// flux's rate of change without it in the stator's frame, V.
     pub(super) fn held_v(
         &self,
         axis: [f64; 2],
@@ -158,7 +155,7 @@ impl Magnetics {
         -dot(axis, drift) / dot(axis, self.differential(flux, axis))
     }
 
-    /// What a change of flux changes the currents by, in the rotor's frame, A.
+    /// Returns the change of the currents from a change of flux, in the rotor's frame, A.
     fn differential(&self, flux: [f64; 2], change: [f64; 2]) -> [f64; 2] {
         let excess = self.excess(flux);
         let linear = [0, 1].map(|axis| flux[axis] * self.inverse_l[axis]);
@@ -166,8 +163,8 @@ impl Magnetics {
         [0, 1].map(|axis| change[axis] * self.inverse_l[axis] * excess + along * linear[axis])
     }
 
-    /// What each phase shows against the star under the voltage vector `u`, V; of an open one among
-    /// conducting ones with what their changing currents couple into it.
+    /// Returns each phase's voltage against the star under the voltage vector `u`, V; for an open one among conducting
+    /// ones, including what their changing currents couple into it.
     pub(super) fn phases_v(
         &self,
         circuit: &Circuit,
@@ -187,7 +184,7 @@ impl Magnetics {
         shown
     }
 
-    /// Energy in the currents' flux, J.
+    /// Returns the energy in the currents' flux, J.
     #[cfg(test)]
     pub(super) fn stored_j(&self, i: [f64; 2]) -> f64 {
         let flux = self.flux_wb(i);
@@ -198,7 +195,7 @@ impl Magnetics {
     }
 }
 
-/// A unit vector's power: that of its angle times `order`.
+/// Returns a unit vector's power: its angle times `order`.
 fn power(direction: [f64; 2], order: u32) -> [f64; 2] {
     let mut result = [1.0, 0.0];
     let (mut square, mut left) = (direction, order);
@@ -268,8 +265,7 @@ mod tests {
         }
     }
 
-    /// The currents are the derivatives of the energy, which makes the coupling of the axes equal
-    /// both ways.
+    /// The currents are the derivatives of the energy, which makes the coupling of the axes symmetric.
     #[test]
     fn the_currents_are_the_energy_s_slopes() {
         let magnetics = salient();
@@ -286,7 +282,7 @@ mod tests {
         assert!((change_q / (next_q - q) - 1.0).abs() < 1e-4);
     }
 
-    /// Each phase has the same wave a third of a turn later, but for what all have in common.
+    /// Each phase has the same wave a third of a turn later, apart from what all have in common.
     #[test]
     fn harmonics_are_the_same_wave_in_every_phase() {
         let harmonic = |order, share, phase_rad| Harmonic {

@@ -1,4 +1,4 @@
-//! What is outside the chip: motor, inverter, load, supply, sensors.
+//! Everything outside the chip: motor, inverter, load, supply, sensors.
 //!
 //! Double precision, `libm`'s functions and a fixed order of operations: equal inputs give equal
 //! bits on every machine.

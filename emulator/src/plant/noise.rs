@@ -7,21 +7,22 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 #[derive(Clone, Debug)]
 pub struct Noise(Xoshiro256PlusPlus);
 
-/// Every other one of four 16-bit numbers.
+/// Every other of four 16-bit numbers.
 const PAIRS: u64 = 0x0000_ffff_0000_ffff;
 
 impl Noise {
-    /// The source of a seed.
+    /// Creates the source of a seed.
     pub fn new(seed: u64) -> Self {
         Self(Xoshiro256PlusPlus::seed_from_u64(seed))
     }
 
-    /// True with this probability.
+    /// Returns true with this probability.
     pub fn chance(&mut self, probability: f64) -> bool {
         share_of(self.0.next_u64()) < probability
     }
 
-    /// A number of mean 0 and standard deviation 1, bounded by ±3.5: the sum of four uniform ones.
+    /// Returns a number of mean 0 and standard deviation 1, bounded by ±3.5: the sum of four
+    /// uniform ones.
     pub fn gaussian(&mut self) -> f64 {
         // Two sums at once, then their sum.
         let bits = self.0.next_u64();
@@ -32,7 +33,7 @@ impl Noise {
     }
 }
 
-/// An even number of 0..1 from random bits, as fine as a double holds.
+/// Returns a uniform number in 0..1 from random bits, as fine as a double holds.
 pub fn share_of(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1_u64 << 53) as f64
 }

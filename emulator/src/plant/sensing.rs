@@ -1,4 +1,4 @@
-//! From the plant's quantities to the converter's counts.
+//! Converts the plant's quantities to ADC counts.
 
 use siskin_control::control::delay::Delay;
 use siskin_control::control::sensing::Shunts;
@@ -13,13 +13,13 @@ use super::vector::{AXES, dot, phases, turn};
 /// Counts from zero to full scale of the control's converter, whatever the simulated resolution.
 const FULL_SCALE_COUNTS: f64 = 2048.0;
 
-/// Bits of a count's fraction.
+/// Fraction bits of a count.
 const COUNT_BITS: u32 = AdcCounts::FRAC_NBITS;
 
 /// Full scale of the supply's and of the terminals' dividers, V.
 const VOLTAGE_RANGE_V: f64 = 70.0;
 
-/// Counts of a voltage's reading at full scale.
+/// Counts at full scale of a voltage reading.
 const VOLTAGE_COUNTS: f64 = 4096.0;
 
 /// The sensors and their converter.
@@ -31,22 +31,22 @@ pub struct Sensing {
     pub bits: u32,
     /// Noise, A rms.
     pub noise_a: f64,
-    /// Error of each phase's zero, A.
+    /// Zero error of each phase, A.
     pub offset_a: [f64; 3],
-    /// What each phase's current is multiplied with.
+    /// Gain of each phase's current.
     pub gain: [f64; 3],
-    /// Time constant with which the shunts' amplifiers follow, s.
+    /// Time constant of the shunt amplifiers, s.
     pub settling_s: f64,
-    /// By how much of an electrical turn each Hall sensor changes late in forward rotation, degrees.
+    /// Electrical degrees by which each Hall sensor switches late in forward rotation.
     pub hall_error_deg: [f64; 3],
 }
 
-/// What there is to be sensed at a sample.
+/// What there is to sense at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
     /// Currents into the phases, A.
     pub currents_a: [f64; 3],
-    /// For how long each has been flowing through its low side, s; `None` where it does not.
+    /// How long each has been flowing through its low side, s; `None` if it does not.
     pub low_s: [Option<f64>; 3],
     /// Voltages of the terminals, V.
     pub terminals_v: [f64; 3],
@@ -65,9 +65,8 @@ impl Default for Sensing {
             noise_a: 0.05,
             offset_a: [0.0; 3],
             gain: [1.0; 3],
-            // An amplifier of 1.6 MHz: after the half microsecond that the board leaves at the
-            // greatest duty it is right to 1 %. Written as a scenario's nanoseconds are converted, for
-            // equal bits.
+            // An amplifier of 1.6 MHz: after the half microsecond that the board leaves at the greatest duty it has
+            // settled to 1 %. Written as a scenario's nanoseconds are converted, for equal bits.
             settling_s: 100.0 * 1e-9,
             hall_error_deg: [0.0; 3],
         }
@@ -75,7 +74,7 @@ impl Default for Sensing {
 }
 
 impl Sensing {
-    /// The board that these sensors make, for [`siskin_control::params::build`].
+    /// Returns the board that these sensors make, for [`siskin_control::params::build`].
     pub fn board(&self, delay: Delay) -> Board {
         Board {
             image: Image::EMULATOR,
@@ -92,7 +91,7 @@ impl Sensing {
         }
     }
 
-    /// One sample of everything.
+    /// Takes one sample of everything.
     #[inline]
     pub fn sample(&self, truth: &Truth, noise: &mut Noise) -> Sample {
         let per_a = 1.0 / self.range_a;
@@ -108,7 +107,7 @@ impl Sensing {
         }
     }
 
-    /// What a phase's sensor shows before it is converted, A.
+    /// Returns a phase sensor's output before conversion, A.
     #[inline]
     pub fn shown_a(&self, truth: &Truth, phase: usize, noise: &mut Noise) -> f64 {
         let current_a = self.shunt_a(truth, phase) + self.offset_a[phase];
@@ -119,19 +118,18 @@ impl Sensing {
         }
     }
 
-    /// What a sensor shows that is stuck at a current, A.
+    /// Returns the reading of a sensor stuck at a current, A.
     pub fn stuck(&self, current_a: f64) -> AdcCounts {
         self.quantised(current_a / self.range_a)
     }
 
-    /// What a low side's amplifier shows, A: it sets out from zero when the current enters the
-    /// shunt.
+    /// Returns a low side amplifier's output, A: it starts from zero when the current enters the shunt.
     fn shunt_a(&self, truth: &Truth, phase: usize) -> f64 {
         let Some(on_s) = truth.low_s[phase] else {
             return 0.0;
         };
         let settled_a = truth.currents_a[phase] * self.gain[phase];
-        // Nothing is left of the approach after 40 time constants.
+        // Fully settled after 40 time constants.
         if on_s >= 40.0 * self.settling_s {
             settled_a
         } else {
@@ -139,9 +137,9 @@ impl Sensing {
         }
     }
 
-    /// A divider's reading of a voltage, held at its ends.
+    /// Returns a divider's reading of a voltage, saturated.
     fn voltage(&self, volts: f64) -> AdcCounts {
-        // As the low sides' terminals are.
+        // The case of the low sides' terminals.
         if volts == 0.0 {
             return AdcCounts::ZERO;
         }
@@ -153,7 +151,7 @@ impl Sensing {
         }
     }
 
-    /// The Hall sensors' bits.
+    /// Returns the Hall sensors' bits.
     #[inline(always)]
     pub fn hall(&self, direction: [f64; 2]) -> u8 {
         let mut through = phases(direction);
@@ -168,7 +166,7 @@ impl Sensing {
         a | b << 1 | c << 2
     }
 
-    /// A share of full scale in counts, rounded to the resolution and held at its ends.
+    /// Converts a share of full scale to counts, rounded to the resolution and saturated.
     fn quantised(&self, share: f64) -> AdcCounts {
         if self.bits == 0 {
             let highest = 1.0 - 1.0 / FULL_SCALE_COUNTS;
@@ -185,8 +183,8 @@ fn fixed(counts: f64) -> AdcCounts {
     AdcCounts::from_bits(nearest(counts * f64::from(1 << COUNT_BITS)))
 }
 
-/// The nearest whole number, halves to even: beside 1.5·2^52 a double has no bits for more, and the
-/// number stands in its lowest ones. Several times faster than a conversion, of any size and NaN.
+/// Rounds to the nearest whole number, ties to even: next to 1.5·2^52 a double has no bits for more, and the number is
+/// in its lowest ones. Several times faster than a conversion, for any size and NaN.
 #[inline(always)]
 fn nearest(x: f64) -> i32 {
     (x + 6_755_399_441_055_744.0).to_bits() as i32

@@ -1,9 +1,9 @@
-//! Functions by their series, for the small arguments of a fraction of a control period: several
-//! times faster than the library's, and the same bits on every machine.
+//! Functions by series, for the small arguments of a fraction of a control period: several times faster than the
+//! library's, and the same bits on every machine.
 
 use std::ops::{Add, Mul};
 
-/// What a series can be of: a number, or several side by side.
+/// The argument of a series: a number, or several side by side.
 pub(super) trait Number:
     Copy + Add<Output = Self> + Mul<Output = Self> + Add<f64, Output = Self> + Mul<f64, Output = Self>
 {
@@ -12,7 +12,7 @@ pub(super) trait Number:
 impl Number for f64 {}
 impl Number for wide::f64x4 {}
 
-/// Cosine and sine to 1e-15 by their series up to x¹¹, for up to [`ROTATION_MAX`] radians.
+/// Returns cosine and sine to 1e-15 by their series up to x¹¹, for up to [`ROTATION_MAX`] radians.
 #[inline(always)]
 pub(super) fn small_rotation<T: Number>(radians: T) -> [T; 2] {
     let cos = polynomial(
@@ -29,7 +29,7 @@ pub(super) fn small_rotation<T: Number>(radians: T) -> [T; 2] {
     [cos, radians * small_sinc(radians)]
 }
 
-/// sin(x)/x to 1e-15, for up to [`ROTATION_MAX`] radians.
+/// Returns sin(x)/x to 1e-15, for up to [`ROTATION_MAX`] radians.
 #[inline(always)]
 pub(super) fn small_sinc<T: Number>(radians: T) -> T {
     polynomial(
@@ -45,8 +45,8 @@ pub(super) fn small_sinc<T: Number>(radians: T) -> T {
     )
 }
 
-/// A polynomial of six coefficients, the constant one first, in pairs (Estrin): what follows waits for
-/// it half as long as for Horner's rule.
+/// Evaluates a polynomial of six coefficients, the constant one first, in pairs (Estrin): half the latency of Horner's
+/// rule.
 #[inline(always)]
 fn polynomial<T: Number>(x: T, c: [f64; 6]) -> T {
     let square = x * x;
@@ -56,13 +56,13 @@ fn polynomial<T: Number>(x: T, c: [f64; 6]) -> T {
 /// See [`small_rotation`].
 pub(super) const ROTATION_MAX: f64 = 0.3;
 
-/// Cosine and sine.
+/// Returns cosine and sine.
 pub(super) fn rotation(radians: f64) -> [f64; 2] {
     let (sin, cos) = libm::sincos(radians);
     [cos, sin]
 }
 
-/// e^(−x) to 2e-15 by its series up to x⁹, for 0 to [`DECAY_MAX`].
+/// Returns e^(−x) to 2e-15 by its series up to x⁹, for 0 to [`DECAY_MAX`].
 #[inline(always)]
 pub(super) fn small_decay<T: Number>(x: T) -> T {
     let square = x * x;
@@ -78,21 +78,21 @@ pub(super) fn small_decay<T: Number>(x: T) -> T {
 /// See [`small_decay`].
 pub(super) const DECAY_MAX: f64 = 0.15;
 
-/// What is left of turns without whole ones, 0..1.
+/// Returns the fraction of a number of turns, 0..1.
 pub(super) fn fraction(turns: f64) -> f64 {
     let rest = turns - (turns as i64) as f64;
     if rest < 0.0 { rest + 1.0 } else { rest }
 }
 
-/// Zero for what has decayed to nothing: arithmetic with subnormal numbers is many times slower.
+/// Returns zero for what has decayed to nothing: subnormal arithmetic is many times slower.
 pub(super) fn settle(x: f64) -> f64 {
     if x.abs() < 1e-15 { 0.0 } else { x }
 }
 
-/// Where `f` is zero between 0 and `end`, to `tolerance` of f; of opposite signs at the ends.
+/// Finds the zero of `f` between 0 and `end`, to `tolerance` of f; the signs at the ends differ.
 ///
-/// The secant with the stale end's weight halved (the Illinois rule), which cannot leave the
-/// bracket; 60 steps bound it, six are usual.
+/// Uses the secant with the stale end's weight halved (the Illinois rule), which cannot leave the bracket; 60 steps
+/// bound it, six are usual.
 pub(super) fn root(
     f: impl Fn(f64) -> f64,
     at_0: f64,

@@ -1,27 +1,27 @@
-//! What acts on the shaft beside the currents and the load in still air: wind, a blow, and the
-//! motor's own drag and cogging.
+//! What acts on the shaft besides the currents and the load in still air: wind, a blow, and the motor's own drag and
+//! cogging.
 
 use std::f64::consts::TAU;
 
 use super::{Cogging, Drag, Load};
 
-/// What disturbs a shaft.
+/// Disturbances of a shaft.
 #[derive(Clone, Debug)]
 pub(super) struct Shaft {
-    /// Speed at which the wind would turn the propeller by itself, rad/s.
+    /// Speed at which the wind would turn a free propeller, rad/s.
     pub(super) wind_rad_s: f64,
-    /// Torque beside all others, Nm.
+    /// Torque besides all others, Nm.
     pub(super) torque_nm: f64,
     drag: Drag,
     cogging: Cogging,
     pole_pairs: u32,
-    /// Electrical turns since the start, of those in a mechanical one.
+    /// Electrical turns since the start, modulo those in a mechanical turn.
     pole: u32,
     /// Mean cogging torque over the latest period, Nm.
     cogging_nm: f64,
 }
 
-/// What a period did to the shaft.
+/// The effect of a period on the shaft.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Push {
     /// Acceleration, rad/s².
@@ -43,7 +43,7 @@ impl Shaft {
         }
     }
 
-    /// Turns the rotor from an electrical angle, in turns, by as much.
+    /// Turns the rotor from an electrical angle by `turns`, in turns.
     pub(super) fn turn(&mut self, angle_turns: f64, turns: f64) {
         if self.cogging.torque_nm > 0.0 {
             self.cogging_nm = self.mean_cogging_nm(angle_turns, turns);
@@ -53,8 +53,8 @@ impl Shaft {
         self.pole = pole.rem_euclid(i64::from(self.pole_pairs)) as u32;
     }
 
-    /// The mean of the cogging torque over the way, Nm: what its potential falls by over the way's
-    /// length. Steps of half a wave cost less than 0.1 mW of 5 mNm.
+    /// Returns the mean cogging torque over the path, Nm: the fall of its potential over the path's length. Steps of
+    /// half a wave cost less than 0.1 mW of 5 mNm.
     fn mean_cogging_nm(&self, angle_turns: f64, turns: f64) -> f64 {
         let (middle, half) = (
             self.cogging_rad(angle_turns + 0.5 * turns),
@@ -68,16 +68,16 @@ impl Shaft {
         -self.cogging.torque_nm * libm::sin(middle) * share
     }
 
-    /// The angle of the cogging's wave at an electrical angle of this turn.
+    /// Returns the angle of the cogging wave at an electrical angle of this turn.
     fn cogging_rad(&self, angle_turns: f64) -> f64 {
         let mechanical = (f64::from(self.pole) + angle_turns) / f64::from(self.pole_pairs);
         TAU * f64::from(self.cogging.order) * mechanical
     }
 
-    /// What a period does to a free shaft at `speed` under a mean electromagnetic torque; `middle` is
-    /// the speed to expect in its middle, rad/s.
+    /// Computes the effect of a period on a free shaft at `speed` under a mean electromagnetic torque; `middle` is the
+    /// expected mid-period speed, rad/s.
     ///
-    /// The load by the trapezoidal rule, dry friction so that it stops the shaft and never turns it.
+    /// The load by the trapezoidal rule; dry friction stops the shaft and never turns it.
     pub(super) fn push(
         &self,
         load: &Load,
@@ -88,7 +88,7 @@ impl Shaft {
     ) -> Push {
         let (c2, wind) = (load.c2, self.wind_rad_s);
         let own = self.drag.viscous_nms + self.drag.eddy_nms;
-        // The propeller feels the difference to the wind, the rest the speed.
+        // The propeller feels the difference to the wind, everything else the speed.
         let aerodynamic = c2 * ((middle - wind).abs() - middle.abs());
         let damping = load.damping_at(middle) + aerodynamic + own;
         let blown = c2 * (middle - wind).abs() * wind;
@@ -102,7 +102,7 @@ impl Shaft {
             free - dry.copysign(free)
         };
         let acceleration = (stopped - speed) / period_s;
-        // What is missing of the balance at the mean speed is what the drag took.
+        // What is missing from the balance at the mean speed is what the drag took.
         let mean = 0.5 * (speed + stopped);
         let lost_nm = driving - (damping - own) * mean - inertia_kgm2 * acceleration;
         Push {
@@ -111,7 +111,7 @@ impl Shaft {
         }
     }
 
-    /// Energy in the cogging's field at an electrical angle, J.
+    /// Returns the energy in the cogging field at an electrical angle, J.
     #[cfg(test)]
     pub(super) fn stored_j(&self, angle_turns: f64) -> f64 {
         let order = f64::from(self.cogging.order).max(1.0);
@@ -133,7 +133,7 @@ mod tests {
 
     const PERIOD_S: f64 = 50e-6;
 
-    /// Speeds of a shaft that only its surroundings move.
+    /// Returns the speeds of a shaft moved only by its surroundings.
     fn turned(mut shaft: Shaft, load: &Load, mut speed: f64, periods: u32) -> Vec<f64> {
         let (mut angle, mut acceleration) = (0.1, 0.0);
         (0..periods)
@@ -170,7 +170,7 @@ mod tests {
         }
     }
 
-    /// c2·(ω − ω_w)² of a wind along the blades' way, c2·(ω + ω_w)² of one against it.
+    /// c2·(ω − ω_w)² for a wind along the blades' motion, c2·(ω + ω_w)² for one against it.
     #[test]
     fn wind_changes_the_load_at_a_speed() {
         for (wind_rad_s, seen) in [(0.0, 400.0), (150.0, 250.0), (-150.0, 550.0)] {
@@ -192,7 +192,7 @@ mod tests {
             ..Drag::default()
         };
         let bare = Load::default();
-        // 3 mNm on 10 µkg·m² take 100 rad/s in a third of a second.
+        // 3 mNm on 10 µkg·m² takes 100 rad/s in a third of a second.
         let speeds = turned(plain(drag), &bare, 100.0, 8_000);
         let stops = speeds.iter().position(|speed| *speed == 0.0);
         let stops_s = stops.map(|periods| periods as f64 * PERIOD_S);
@@ -208,7 +208,7 @@ mod tests {
             turned(shaft, &bare, 0.0, 1_000)[999]
         };
         assert_eq!(held(2.9e-3), 0.0);
-        // A tenth of a millinewton metre is left of it, for 50 ms.
+        // A tenth of a millinewton metre remains, for 50 ms.
         assert!((held(-3.1e-3) + 0.5).abs() < 1e-9);
     }
 
@@ -229,7 +229,7 @@ mod tests {
         );
     }
 
-    /// It takes and gives: over turns no energy is lost, slow or fast against the steps.
+    /// It takes and gives: over full turns no energy is lost, whether slow or fast relative to the steps.
     #[test]
     fn cogging_only_stores() {
         let cogging = Cogging {
@@ -243,7 +243,7 @@ mod tests {
                 let of = |f: fn(f64, f64) -> f64| speeds.iter().copied().fold(speeds[0], f);
                 [of(f64::min), of(f64::max)]
             };
-            // The potential's whole height is 2·T/N, 0.12 mJ.
+            // The potential's full height is 2·T/N, 0.12 mJ.
             let swing = 2.0 * 5e-3 / 84.0 / 1e-5 / speed;
             let [[least, most], [_, late]] = [&speeds[..10_000], &speeds[90_000..]].map(ends);
             assert!(
@@ -253,7 +253,7 @@ mod tests {
             let shown_w = 1e-5 * speed * (late - most).abs() / (90_000.0 * PERIOD_S);
             assert!(shown_w < lost_w, "{shown_w}");
         }
-        // A rotor that is too slow to leave its detent stays in it.
+        // A rotor too slow to leave its detent stays in it.
         let shaft = Shaft::new(7, Drag::default(), cogging);
         let speeds = turned(shaft, &Load::default(), 1.0, 20_000);
         assert!(speeds.iter().any(|speed| *speed < -0.5));

@@ -1,7 +1,7 @@
 //! The power stage: three legs of switches and diodes between the supply and the motor.
 //!
-//! With all switches on or a dead time's diode certain, stretches of the closed solution follow
-//! each other; everything else is left to the [`diodes`].
+//! With all switches on, or a dead time's diode certain, stretches of the closed solution follow one another;
+//! everything else is left to the [`diodes`].
 
 mod broken;
 mod diodes;
@@ -15,11 +15,11 @@ use super::rail::Rail;
 use super::vector::{AXES, along_axes, dot};
 use guard::Guard;
 
-/// Forward voltage of the switches' body diodes, V: silicon at some amperes. The switches' own
-/// resistance counts as part of the motor's.
+/// Forward voltage of the switches' body diodes, V: silicon at some amperes. The switches' own resistance counts as
+/// part of the motor's.
 pub const DIODE_V: f64 = 0.7;
 
-/// Phase current that is none, A.
+/// Phase current that counts as zero, A.
 const ZERO_A: f64 = 1e-10;
 
 /// What connects a leg's terminal.
@@ -30,12 +30,12 @@ enum Path {
     Floating,
     /// Both switches: a shoot-through.
     Both,
-    /// No path: its wire is open.
+    /// No path: the wire is open.
     Cut,
 }
 
 impl Path {
-    /// Whether a current flows through the low side, and its shunt.
+    /// Returns true if a current flows through the low side and its shunt.
     fn is_low(self) -> bool {
         matches!(
             self,
@@ -43,7 +43,7 @@ impl Path {
         )
     }
 
-    /// Whether no current can flow.
+    /// Returns true if no current can flow.
     fn is_open(self) -> bool {
         matches!(self, Self::Floating | Self::Cut)
     }
@@ -55,9 +55,9 @@ pub(super) struct Stage {
     pub(super) machine: Machine,
     bus_v: f64,
     paths: [Path; 3],
-    /// 1 where a terminal is connected to the positive pole.
+    /// 1 if a terminal is connected to the positive pole.
     high: [f64; 3],
-    /// Diodes' share of a terminal's voltage, V.
+    /// The diodes' share of a terminal's voltage, V.
     drop_v: [f64; 3],
     /// Legs with both switches off.
     legs_off: u32,
@@ -65,16 +65,16 @@ pub(super) struct Stage {
     now_s: f64,
     /// Since when a leg's current has been flowing through its low side, s.
     low_from_s: [f64; 3],
-    /// Whether nothing is broken.
+    /// True if nothing is broken.
     sound: bool,
     breaks: Breaks,
-    /// Charge that has flowed from pole to pole in this period, As.
+    /// Shoot-through charge in this period, As.
     shot_as: f64,
     guard: Guard,
 }
 
 impl Stage {
-    /// All switches off.
+    /// Creates a stage with all switches off.
     pub(super) fn new(machine: Machine) -> Self {
         Self {
             machine,
@@ -92,7 +92,7 @@ impl Stage {
         }
     }
 
-    /// Begins a period at a supply's voltage, in which there must be `dead_s` between the switches of a leg.
+    /// Begins a period at a supply voltage, in which there must be `dead_s` between the switches of a leg.
     #[inline(always)]
     pub(super) fn begin(&mut self, bus_v: f64, period_s: f64, dead_s: f64) {
         self.bus_v = bus_v;
@@ -105,12 +105,12 @@ impl Stage {
         self.machine.begin(period_s);
     }
 
-    /// The supply's voltage in this period, V.
+    /// Returns the supply's voltage in this period, V.
     pub(super) fn bus_v(&self) -> f64 {
         self.bus_v
     }
 
-    /// A leg that has had less than the dead time between its switches in this period.
+    /// Returns a leg that had less than the dead time between its switches in this period.
     pub(super) fn crossed(&self) -> Option<usize> {
         self.guard.crossed()
     }
@@ -122,7 +122,7 @@ impl Stage {
         self.switch(leg, on);
     }
 
-    /// The legs have been at a rail for long.
+    /// Puts the legs at a rail, as if for long.
     #[cold]
     pub(super) fn hold(&mut self, rail: Rail) {
         self.guard.hold(rail);
@@ -150,7 +150,7 @@ impl Stage {
         }
     }
 
-    /// What carries a leg's current on with both switches off.
+    /// Returns what carries a leg's current with both switches off.
     #[inline(always)]
     fn diode(&self, leg: usize) -> Path {
         let current_a = dot(AXES[leg], self.machine.now().stator_a());
@@ -163,7 +163,7 @@ impl Stage {
         }
     }
 
-    /// Lets the stage be for a while.
+    /// Runs the stage unchanged for a time.
     pub(super) fn run(&mut self, time_s: f64) {
         if !self.sound {
             self.shoot(time_s);
@@ -178,7 +178,7 @@ impl Stage {
         }
     }
 
-    /// Mean voltages of the three terminals in place of switches, V.
+    /// Runs on mean voltages of the three terminals in place of switches, V.
     #[inline(always)]
     pub(super) fn run_averaged(&mut self, terminals_v: [f64; 3], time_s: f64) {
         let [alpha, beta] = along_axes(terminals_v);
@@ -187,8 +187,7 @@ impl Stage {
         self.now_s += time_s;
     }
 
-    /// For how long each leg's current has been flowing through its low side, s; `None` where it
-    /// does not.
+    /// Returns how long each leg's current has been flowing through its low side, s; `None` if it does not.
     #[inline(always)]
     pub(super) fn low_s(&self) -> [Option<f64>; 3] {
         [0, 1, 2].map(|leg| match self.paths[leg] {
@@ -197,7 +196,7 @@ impl Stage {
         })
     }
 
-    /// Voltages of the terminals against the negative pole, V.
+    /// Returns the terminals' voltages against the negative pole, V.
     #[inline(always)]
     pub(super) fn terminals_v(&self) -> [f64; 3] {
         if self.legs_off == 0 {
@@ -206,7 +205,7 @@ impl Stage {
         self.open_terminals_v()
     }
 
-    /// The same with a leg off.
+    /// Returns the same with a leg off.
     fn open_terminals_v(&self) -> [f64; 3] {
         let drive = self.confined();
         let emf = self.machine.emf_v(self.machine.now(), &drive);
@@ -227,7 +226,7 @@ impl Stage {
         })
     }
 
-    /// The lowest of the voltages that are induced in phases with a wire, V.
+    /// Returns the lowest of the voltages induced in phases with a wire, V.
     fn lowest_v(&self, emf_v: [f64; 3]) -> f64 {
         let legs = (0..3).filter(|leg| self.paths[*leg] != Path::Cut);
         legs.fold(f64::INFINITY, |lowest, leg| lowest.min(emf_v[leg]))
@@ -251,12 +250,12 @@ impl Stage {
         self.bus_v * self.high[leg] + self.drop_v[leg]
     }
 
-    /// Sum of the connected terminals' voltages, V.
+    /// Returns the sum of the connected terminals' voltages, V.
     fn sum_v(&self) -> f64 {
         self.leg_v(0) + self.leg_v(1) + self.leg_v(2)
     }
 
-    /// The one leg that is connected.
+    /// Returns the only connected leg.
     fn only(&self) -> Option<usize> {
         (0..3).find(|leg| !self.paths[*leg].is_open())
     }
@@ -271,7 +270,7 @@ impl Stage {
         }
     }
 
-    /// What the legs do to the motor, with the way that they leave to its currents.
+    /// Returns what the legs apply to the motor, and which currents they let flow.
     fn confined(&self) -> Drive {
         Drive {
             way: self.way(),
@@ -279,14 +278,14 @@ impl Stage {
         }
     }
 
-    /// What three connected legs do to the motor.
+    /// Returns what three connected legs apply to the motor.
     fn drive(&self) -> Drive {
         star(self.bus_v, along_axes(self.high), along_axes(self.drop_v))
     }
 }
 
-/// All phases conduct: by the sum of the axes of those at the positive pole, and the diodes' share
-/// of the voltages as such a sum.
+/// Returns the drive of all phases conducting, from the sum of the axes of those at the positive pole, and the diodes'
+/// share of the voltages as such a sum.
 #[inline(always)]
 fn star(bus_v: f64, high: [f64; 2], drop_v: [f64; 2]) -> Drive {
     Drive {

@@ -1,25 +1,25 @@
-//! Where the power comes from.
+//! The power source.
 
 /// A source with its resistance, and the capacitor of the bus that it feeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Supply {
-    /// What stands behind the resistance.
+    /// The source behind the resistance.
     pub source: Source,
     /// Internal resistance, Ω.
     pub resistance_ohm: f64,
-    /// The bus capacitor, F, above 0. A source without resistance that takes current back holds the
-    /// bus without it; it counts once the source is disconnected.
+    /// The bus capacitor, F, above 0. A source without resistance that sinks current holds the bus
+    /// without it; it counts once the source is disconnected.
     pub capacitance_f: f64,
 }
 
 /// A voltage source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Source {
-    /// One voltage, V.
+    /// A constant voltage, V.
     Fixed {
         /// Volts.
         volts: f64,
-        /// Whether it takes current back. Most bench supplies do not: braking charges the capacitor.
+        /// Whether it sinks current. Most bench supplies do not: braking charges the capacitor.
         sinks: bool,
     },
     /// Lithium-polymer cells in series.
@@ -28,7 +28,7 @@ pub enum Source {
         cells: u32,
         /// Capacity, C (3600 to the Ah).
         capacity_c: f64,
-        /// Share of the capacity that is left, 0..1.
+        /// Remaining share of the capacity, 0..1.
         charge: f64,
     },
 }
@@ -36,21 +36,21 @@ pub enum Source {
 /// The capacitor of a small ESC's board, F.
 pub const CAPACITANCE_F: f64 = 470e-6;
 
-/// Capacity where only the number of cells is given, C: 2 Ah.
+/// Capacity if only the number of cells is given, C: 2 Ah.
 pub const CAPACITY_C: f64 = 2.0 * 3600.0;
 
 /// Resistance of a cell of some 2 Ah, Ω.
 pub const CELL_OHM: f64 = 4e-3;
 
-/// Volts of a lithium-polymer cell at rest, from empty to full in steps of 5 %: the shape of the
-/// discharge tables that are published for such packs.
+/// Open-circuit volts of a lithium-polymer cell, from empty to full in steps of 5 %: the shape of
+/// the published discharge tables of such packs.
 const CELL_V: [f64; 21] = [
     3.27, 3.61, 3.69, 3.71, 3.73, 3.75, 3.77, 3.79, 3.80, 3.82, 3.84, 3.85, 3.87, 3.91, 3.95, 3.98,
     4.02, 4.08, 4.11, 4.15, 4.20,
 ];
 
 impl Supply {
-    /// A bench supply whose voltage does not depend on the current, in either direction.
+    /// Creates a bench supply whose voltage does not depend on the current, in either direction.
     pub const fn stiff(volts: f64) -> Self {
         Self {
             source: Source::Fixed { volts, sinks: true },
@@ -59,7 +59,7 @@ impl Supply {
         }
     }
 
-    /// A charged lithium-polymer pack: 2 Ah, 4.2 V and 4 mΩ a cell.
+    /// Creates a charged lithium-polymer pack: 2 Ah, 4.2 V and 4 mΩ per cell.
     pub fn battery(cells: u32) -> Self {
         Self {
             source: Source::Pack {
@@ -72,7 +72,7 @@ impl Supply {
         }
     }
 
-    /// Voltage without load once `drawn_c` coulombs have been drawn, V.
+    /// Returns the voltage without load once `drawn_c` coulombs have been drawn, V.
     pub fn open_v(&self, drawn_c: f64) -> f64 {
         match self.source {
             Source::Fixed { volts, .. } => volts,
@@ -84,7 +84,7 @@ impl Supply {
         }
     }
 
-    /// Whether current flows back into the source.
+    /// Returns true if current flows back into the source.
     pub fn sinks(&self) -> bool {
         match self.source {
             Source::Fixed { sinks, .. } => sinks,
@@ -93,8 +93,8 @@ impl Supply {
     }
 }
 
-/// Voltage of a cell at rest by what is left of its charge, V: straight between the curve's points,
-/// and on along its ends beyond empty and full.
+/// Returns a cell's open-circuit voltage by its remaining charge, V: linear between the curve's
+/// points, and extrapolated beyond empty and full.
 fn cell_v(charge: f64) -> f64 {
     let last = CELL_V.len() - 1;
     let place = charge * last as f64;
@@ -121,7 +121,7 @@ mod tests {
         assert!((pack(0.0).open_v(0.0) - 13.08).abs() < 1e-12);
         // Half an ampere-hour of one.
         assert!((pack(1.0).open_v(1800.0) - 4.0 * 3.84).abs() < 1e-9);
-        // Between two points, and over the ends.
+        // Between two points, and beyond the ends.
         assert!((cell_v(0.525) - 3.845).abs() < 1e-9);
         assert!(cell_v(-0.05) < 3.0 && cell_v(-9.0) == 0.0 && cell_v(1.02) > 4.2);
     }

@@ -1,4 +1,4 @@
-//! The plant against its equations stepped by brute force, and against what must hold in any case.
+//! The plant against its equations stepped by brute force, and against invariants.
 
 mod breaks;
 mod brute_force;
@@ -30,7 +30,7 @@ fn held(fidelity: Fidelity, rpm: f64, angle_turns: f64) -> Plant {
     plant
 }
 
-/// A duty whose edges are at the brute force's steps.
+/// Returns a duty whose edges are at the brute force's steps.
 fn duty(share: f64) -> Duty {
     let steps = 0.5 * PERIOD_S / brute_force::STEP_S;
     Duty::from_num((share * steps).round() / steps)
@@ -44,7 +44,7 @@ fn legs(legs: [Option<f64>; 3]) -> Bridge {
     Bridge::Legs(legs.map(|leg| leg.map(duty)))
 }
 
-/// Duties that hold about `amps` of i_q at a speed, from a rotor angle.
+/// Returns duties that hold about `amps` of i_q at a speed, from a rotor angle.
 fn field_oriented(plant: &Plant, amps: f64, bus_v: f64) -> Bridge {
     let omega = plant.speed_rad_s() * f64::from(MOTOR.pole_pairs);
     let q_v = omega * MOTOR.flux_wb + MOTOR.resistance_ohm * amps;
@@ -57,7 +57,7 @@ fn field_oriented(plant: &Plant, amps: f64, bus_v: f64) -> Bridge {
     }))
 }
 
-/// Runs both from the same start under commands that `command` makes, and compares all there is.
+/// Runs both from the same start under the commands of `command`, and compares everything.
 fn compare(plant: Plant, bus_v: f64, periods: u32, command: impl Fn(u32, &Plant) -> [Bridge; 2]) {
     compare_with(&[], plant, bus_v, periods, command);
 }
@@ -109,7 +109,7 @@ fn compare_brute(
     }
     assert!(peak_a > 0.1, "nothing flows");
     assert!(worst_a < 1e-6 * peak_a, "{worst_a} A of {peak_a} A");
-    // A sweep has the currents at the steps of voltage without what a dead time's diode adds.
+    // A sweep has the currents at the voltage steps without what a dead time's diode adds.
     assert!(
         most_apart_a < 0.01 * peak_a,
         "{most_apart_a} A of {peak_a} A"
@@ -132,7 +132,7 @@ fn loaded_field_oriented_drive_is_as_by_brute_force() {
     });
 }
 
-/// Half an ampere: the ripple crosses zero in many dead times, and currents stand at zero there.
+/// Half an ampere: the ripple crosses zero in many dead times, where currents stay at zero.
 #[test]
 fn zero_crossings_in_the_dead_time_are_as_by_brute_force() {
     let plant = held(Fidelity::Switching, 3000.0, 0.37);

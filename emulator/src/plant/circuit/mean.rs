@@ -5,12 +5,12 @@ use super::super::vector::{back, dot, turn};
 use super::{Circuit, Course, Drive, Way};
 
 impl Circuit {
-    /// As [`Self::conduct`] over up to a period, for a mean voltage of which as much power comes from a
-    /// supply of `bus_v` as goes into the motor.
+    /// Like [`Self::conduct`] over up to a period, for a mean voltage; a supply of `bus_v` provides the power that goes
+    /// into the motor.
     ///
-    /// The means of i_d and i_q are exact, by their equation's: (R + jωL) times the mean is that of
-    /// the voltage, which turns against the rotor, less what the flux linkage takes. Of their squares
-    /// the variance is a parabola's.
+    /// The means of i_d and i_q are exact, by their equation's: (R + jωL) times the mean is the mean of the voltage,
+    /// which turns against the rotor, less the growth of the flux linkage. For their squares the variance is a
+    /// parabola's.
     #[inline(always)]
     pub(in super::super) fn conduct_mean(
         &self,
@@ -58,7 +58,7 @@ impl Circuit {
         sums.q += flowed[1];
         sums.squares[0] += square(0);
         sums.squares[1] += square(1);
-        // u·(u·h − the growth of L·i + φ·e^(jθ)), seen from the rotor at either end.
+        // u·(u·h − the growth of L·i + φ·e^(jθ)), in the rotor's frame at either end.
         let [from, to] = solution.settled;
         let m = self.magnet_a;
         let along = |settled: [f64; 2], [d, q]: [f64; 2]| dot(settled, [d + m, q]);

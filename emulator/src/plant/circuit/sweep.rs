@@ -1,12 +1,11 @@
 //! Half a period of drive: three legs step from one rail to the other, one after the other.
 //!
-//! In the stator's frame the voltage stands still between two steps, and so does, but for its decay,
-//! what the currents are apart from u/R and from what the rotor induces. So the currents at all steps
-//! follow at once, and the four stretches between them are worked out side by side.
+//! In the stator's frame the voltage is constant between two steps, and so, but for its decay, is what the currents are
+//! apart from u/R and from what the rotor induces. So the currents at all steps follow at once, and the four stretches
+//! between them are computed side by side.
 //!
-//! In a dead time the diode of one of the rails carries the current on, and all that is special is
-//! its voltage. The circuit is linear: what that does to the currents is added to the solution
-//! without it, at the dead time's end or start, as a kick.
+//! In a dead time the diode of one of the rails carries the current, and only its voltage is special. The circuit is
+//! linear: its effect on the currents is added to the solution without it, at the dead time's end or start, as a kick.
 
 use std::array;
 
@@ -16,8 +15,8 @@ use super::super::series::{rotation, small_decay, small_rotation};
 use super::super::vector::{AXES, ROOT_3, back, turn};
 use super::{Circuit, Course, Moment};
 
-/// By how much of itself a current's change in a dead time may differ from a straight line's: R/L
-/// and ω times a dead time are some 0.01.
+/// Allowed deviation of a current's change in a dead time from a straight line, relative to the change: R/L and ω times
+/// a dead time are some 0.01.
 const BEND: f64 = 0.05;
 
 /// What the legs do.
@@ -26,14 +25,14 @@ pub(in super::super) struct Sweep {
     pub(in super::super) order: [usize; 3],
     /// When each leg's voltage changes, s.
     pub(in super::super) at_s: [f64; 3],
-    /// Whether that is at its dead time's end, its current's diode being at the rail that it comes
-    /// from; else it is at the start.
+    /// Whether that is at the end of its dead time, because its current's diode is at the rail that it leaves; else it
+    /// is at the start.
     pub(in super::super) stays: [bool; 3],
     /// Whether they go from the negative pole to the positive one, or back.
     pub(in super::super) rises: bool,
     /// The length of the voltage vector with one or two legs high, V.
     pub(in super::super) volts: f64,
-    /// What of it is a diode's own.
+    /// The part of it that is a diode's own.
     pub(in super::super) diode_v: f64,
     pub(in super::super) dead_s: f64,
     /// Whether dead times overlap.
@@ -82,7 +81,7 @@ impl Vectors {
         }
     }
 
-    /// The product of each with a vector as complex numbers.
+    /// Multiplies each by a vector, as complex numbers.
     #[inline(always)]
     fn turned(self, [cos, sin]: [f64; 2]) -> Self {
         Self {
@@ -101,7 +100,7 @@ impl Vectors {
         self.x * other.y - self.y * other.x
     }
 
-    /// Those at the stretches' starts, of those at their ends and the first.
+    /// Returns those at the stretches' starts, from those at their ends and the first.
     #[inline(always)]
     fn before(self, first: [f64; 2]) -> Self {
         let ([a, b, c, _], [d, e, f, _]) = (self.x.to_array(), self.y.to_array());
@@ -117,7 +116,7 @@ impl Vectors {
     }
 }
 
-/// In this order on every machine.
+/// Sums in this order on every machine.
 #[inline(always)]
 fn sum(parts: f64x4) -> f64 {
     let [a, b, c, d] = parts.to_array();
@@ -125,13 +124,12 @@ fn sum(parts: f64x4) -> f64 {
 }
 
 impl Circuit {
-    /// Takes the currents and the rotor through a sweep, and adds up what flows. Returns false, with
-    /// nothing done, where a current comes too close to zero in its dead time for its diode to be
-    /// certain.
+    /// Advances the currents and the rotor through a sweep, and integrates. Returns false, having done nothing, if a
+    /// current comes too close to zero in its dead time for its diode to be certain.
     ///
-    /// In each stretch i_q is taken for a parabola by its values and derivatives at both ends: the
-    /// mean is right to the fourth order, and the square's is the mean's square and the variance. The
-    /// current's square is by the trapezoid, and the charge exact, as in [`Circuit::follow`].
+    /// In each stretch i_q is taken as a parabola through its values and derivatives at both ends: the mean is accurate
+    /// to fourth order, and the mean of the square is the mean's square plus the variance. The current's square is by
+    /// the trapezoid, and the charge exact, as in [`Circuit::follow`].
     #[inline(always)]
     pub(in super::super) fn sweep(&self, course: &mut Course, sweep: &Sweep) -> bool {
         let Sweep { volts, dead_s, .. } = *sweep;
@@ -148,8 +146,7 @@ impl Circuit {
         let axes = [AXES[a], AXES[b], AXES[c], [0.0; 2]];
         let stays = [sweep.stays[a], sweep.stays[b], sweep.stays[c]];
         let at_s = [sweep.at_s[a], sweep.at_s[b], sweep.at_s[c]];
-        // Sum of the axes of the legs that are high; two of them are as long as one, and the third
-        // adds nothing to none.
+        // Sum of the axes of the legs that are high; two of them sum to the length of one, and three to zero.
         let high = [
             [0.0; 2],
             axes[0].map(|x| step * x),
@@ -160,7 +157,7 @@ impl Circuit {
         let length = f64x4::from([0.0, 1.0, 1.0, 0.0]);
         let settled = high.times(settled_a);
 
-        // What each leg's diode adds, and in what direction of time its dead time lies.
+        // What each leg's diode adds, and on which side in time its dead time lies.
         let [last_a, first_a] = self.kick_a(sweep.diode_v, dead_s);
         let either = |stayed: f64, moved: f64| {
             let [a, b, c] = stays.map(|stays| if stays { stayed } else { moved });
@@ -169,7 +166,7 @@ impl Circuit {
         let kick_a = either(-step * last_a, step * first_a);
         let dead = either(-dead_s, dead_s);
         let sign = either(step, -step);
-        // Whether the kick is in the current at its step already.
+        // Whether the kick is already in the current at its step.
         let own = either(0.0, 1.0);
         // The voltage along the leg's own axis in its dead time, over `volts`.
         let during = (f64x4::from([0.0, -0.5, -1.0, 0.0]) + own) * step;
@@ -181,7 +178,7 @@ impl Circuit {
         let to = self.rotations(end_s).turned(now.direction);
         let from = to.before(now.direction);
         let turning = to.turned(self.turning);
-        // What is left of the rest, and what the steps add to it.
+        // The remaining transient, and what the steps add to it.
         let decay = self.decays(h).to_array();
         let jump_a = (kick_a - step * settled_a).to_array();
         let start_a = now.stator_a();
@@ -221,7 +218,7 @@ impl Circuit {
         let (q0, q1) = (from.cross(start), to.cross(end));
         let (square0, square1) = (start.dot(start), end.dot(end));
         let grown = q1 - q0;
-        // By how much the derivatives fall from end to end.
+        // Fall of the derivatives from end to end.
         let fall_q =
             (grown - swung.cross(settled)) * rate + (to.dot(end) - from.dot(start)) * omega;
         let fall_square = (square1 - square0 - moved.dot(settled)) * rate + grown * induced;
@@ -234,14 +231,14 @@ impl Circuit {
         let linked = moved.times(l).plus(swung.times(self.flux_wb));
         let charge = h * length * volts - high.dot(linked);
 
-        // What of a kick's integrals is missing or too much: it grew in a straight line before its
-        // step, or is yet to grow after it.
+        // What of a kick's integrals is missing or too much: it grew linearly before its step, or is yet to grow after
+        // it.
         let kick_q = kick_a * across;
         let missing = dead * kick_a * -0.5;
         let missing_q = missing * across;
         let missing_square = missing * (along + own * kick_a) * 2.0;
         let missing_q_square = missing_q * (q1 + own * kick_q) * 2.0;
-        // What it puts into the inductance, and what goes into shaft and copper meanwhile.
+        // What it stores in the inductance, and what shaft and copper take meanwhile.
         let stored = kick_a * (along + kick_a * 0.5) * l;
         let spent = missing_q * self.emf_v + missing_square * r;
 
@@ -252,7 +249,7 @@ impl Circuit {
         sums.squares[1] += q_square;
         sums.energy += sum(charge * volts + (stored + spent) * r);
         sums.charge += sum(charge + missing * during * r);
-        // The largest phase current of each vector, as `largest` has it.
+        // The largest phase current of each vector, as in `largest`.
         let (x, y) = (end.x.abs(), end.y.abs());
         let largest = x.fast_max((x + y * ROOT_3) * 0.5).to_array();
         for current_a in largest {
@@ -266,7 +263,7 @@ impl Circuit {
         true
     }
 
-    /// Cosines and sines of the angles by which the rotor turns in times of at most half a period.
+    /// Returns cosines and sines of the rotor's angle over times of at most half a period.
     #[inline(always)]
     fn rotations(&self, times_s: f64x4) -> Vectors {
         let angles = times_s * self.omega;
@@ -279,7 +276,7 @@ impl Circuit {
         }
     }
 
-    /// What is left of a transient after times of at most half a period.
+    /// Returns the remaining share of a transient after times of at most half a period.
     #[inline(always)]
     fn decays(&self, times_s: f64x4) -> f64x4 {
         let falls = times_s * self.rate;
@@ -290,8 +287,8 @@ impl Circuit {
         }
     }
 
-    /// What a short pulse of voltage does to a current along it, A: as it is at the pulse's end, and
-    /// what would have to be there at its start to decay to that.
+    /// Returns the effect of a short voltage pulse on a current along it, A: at the pulse's end, and what would have to
+    /// be there at its start to decay to that.
     fn kick_a(&self, voltage_v: f64, time_s: f64) -> [f64; 2] {
         let decay = self.decay(self.rate * time_s);
         let last_a = voltage_v * self.inverse_r * (1.0 - decay);

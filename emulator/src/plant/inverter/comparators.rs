@@ -1,13 +1,13 @@
 //! The comparators at the low sides' shunts, which turn all switches off without the control's help.
 
-/// Time from a current beyond their level to switches that are off, s: their filter and the gates' drivers.
+/// Time from a current beyond their level to switches off, s: their filter and the gate drivers.
 const ACT_S: f64 = 1e-6;
 
-/// Time from one look at the currents of a short to the next, s: real ones look all the time. Any others are looked at
-/// at the switches' edges.
+/// Interval at which the currents of a short are checked, s: real comparators check continuously. All others are
+/// checked at the switches' edges.
 const LOOK_S: f64 = 0.25e-6;
 
-/// What rounding may leave of a time, s.
+/// Rounding error of a time, s.
 const ROUNDING_S: f64 = 1e-15;
 
 /// The comparators of all legs.
@@ -15,18 +15,18 @@ const ROUNDING_S: f64 = 1e-15;
 pub(super) struct Comparators {
     /// Current through a low side at which they act, A.
     pub(super) level_a: f64,
-    /// Whether they have, and the drive has not yet.
+    /// Whether they have acted, and the drive has not yet.
     pub(super) tripped: bool,
-    /// When they will, s from now; never is infinite.
+    /// When they will act, s from now; infinite for never.
     act_s: f64,
-    /// For how long there may have been more than their level, s.
+    /// For how long the current may have been beyond their level, s.
     beyond_s: f64,
     /// That time at their last act, s.
     answer_s: Option<f64>,
 }
 
 impl Comparators {
-    /// Without a level.
+    /// Creates comparators without a level.
     pub(super) fn new() -> Self {
         Self {
             level_a: f64::INFINITY,
@@ -37,14 +37,14 @@ impl Comparators {
         }
     }
 
-    /// Nothing of what they have seen counts any more.
+    /// Discards what they have seen.
     pub(super) fn rest(&mut self) {
         self.act_s = f64::INFINITY;
         self.beyond_s = 0.0;
     }
 
-    /// They see these currents of the shunts now, which may be those of a short. Gives the time until they must look
-    /// again, or act, s.
+    /// Shows them the shunts' currents, which may be those of a short. Returns the time until they must look again, or
+    /// act, s.
     pub(super) fn look(&mut self, shunts_a: [f64; 3], shorts: bool) -> f64 {
         if self.act_s < f64::INFINITY {
             return self.act_s;
@@ -57,7 +57,7 @@ impl Comparators {
         if shorts { LOOK_S } else { f64::INFINITY }
     }
 
-    /// Time passes; true where they act at its end.
+    /// Advances time; returns true if they act at its end.
     pub(super) fn pass(&mut self, time_s: f64) -> bool {
         self.act_s -= time_s;
         self.beyond_s += time_s;
@@ -70,7 +70,7 @@ impl Comparators {
         acts
     }
 
-    /// From a current beyond their level to switches that were off, s, the last time that they acted.
+    /// Returns the time from a current beyond their level to switches off, s, at their last act.
     pub(super) fn answer_s(&self) -> Option<f64> {
         self.answer_s
     }
@@ -80,7 +80,7 @@ impl Comparators {
 mod tests {
     use super::*;
 
-    /// The current may have come to its level just behind the look before.
+    /// The current may have reached its level just after the previous look.
     #[test]
     fn they_act_a_microsecond_after_they_have_seen_it() {
         let mut comparators = Comparators::new();
@@ -91,7 +91,7 @@ mod tests {
         }
         assert_eq!(comparators.look([0.0, -30.1, 0.0], true), ACT_S);
         assert!(!comparators.pass(0.6e-6) && !comparators.tripped);
-        // What it is meanwhile does not matter.
+        // The current meanwhile does not matter.
         assert!(comparators.look([0.0; 3], true) < 0.5e-6);
         assert!(comparators.pass(0.4e-6) && comparators.tripped);
         let answer_s = comparators.answer_s().expect("they have acted");

@@ -1,12 +1,12 @@
-//! A stage with something broken in it: wires, and switches that no longer do what the timer wants.
+//! A stage with something broken in it: wires, and switches that no longer follow the timer.
 //!
-//! - An open wire takes its phase's current to zero at once, as an arc would within microseconds;
-//!   no diode carries it on, and the board's end of it reads as ground. What its leg's switches then
-//!   do shows nowhere: a shoot-through in that leg is left out.
+//! - An open wire takes its phase's current to zero at once, as an arc would within microseconds; no diode carries it
+//!   on, and the board's end of it reads as ground. What its leg's switches then do shows nowhere: a shoot-through in
+//!   that leg is left out.
 //! - An open switch never turns on; its body diode is sound.
-//! - A shorted switch is always on. With the other one on as well, the leg is a divider of two equal
-//!   resistances: half the supply's voltage for the motor and, through both switches and the shunt,
-//!   V/(2·R_on) besides what the motor takes.
+//! - A shorted switch is always on. With the other one on as well, the leg is a divider of two equal resistances: half
+//!   the supply's voltage for the motor and, through both switches and the shunt, V/(2·R_on) besides what the motor
+//!   takes.
 
 use super::super::breaks::Breaks;
 use super::super::gates::Gate;
@@ -14,18 +14,18 @@ use super::super::rail::Rail;
 use super::super::vector::{AXES, dot};
 use super::{Path, Stage};
 
-/// Resistance of one switch with its half of the leg's copper and shunt, Ω: 2 mΩ of silicon, 3 mΩ
-/// of shunt and some copper share the leg.
+/// Resistance of one switch with its half of the leg's copper and shunt, Ω: 2 mΩ of silicon, 3 mΩ of shunt and some
+/// copper share the leg.
 const ON_OHM: f64 = 3e-3;
 
 impl Stage {
-    /// Whether nothing is broken.
+    /// Returns true if nothing is broken.
     #[inline(always)]
     pub(in super::super) fn is_sound(&self) -> bool {
         self.sound
     }
 
-    /// Whether a switch is always on.
+    /// Returns true if a switch is always on.
     pub(in super::super) fn is_shorted(&self) -> bool {
         self.breaks.0.iter().any(|leg| leg.shorted.contains(&true))
     }
@@ -45,13 +45,13 @@ impl Stage {
         }
     }
 
-    /// What [`Stage::set`] does where something is broken, or has just been mended.
+    /// Does what [`Stage::set`] does when something is broken, or has just been mended.
     #[cold]
     pub(super) fn set_broken(&mut self, leg: usize, on: Option<Rail>) {
         self.connect_broken(leg, [Rail::Low, Rail::High].map(|rail| on == Some(rail)));
     }
 
-    /// Connects a leg whose gates, low and high, are on or off.
+    /// Connects a leg from the state of its gates, low and high.
     fn connect_broken(&mut self, leg: usize, on: [bool; 2]) {
         let breaks = self.breaks.0[leg];
         let closed = |rail: Rail| {
@@ -68,7 +68,7 @@ impl Stage {
         self.rewire(leg, path);
     }
 
-    /// Turns a leg's gates on or off, both on being a shoot-through.
+    /// Turns a leg's gates on or off; both on is a shoot-through.
     #[inline(always)]
     pub(in super::super) fn set_gates(&mut self, leg: usize, gate: Gate) {
         if self.sound && !gate.shoots() {
@@ -92,24 +92,24 @@ impl Stage {
         self.connect(leg, path);
     }
 
-    /// Lets shoot-throughs flow for a while.
+    /// Lets shoot-throughs flow for a time.
     #[cold]
     pub(super) fn shoot(&mut self, time_s: f64) {
         let legs = self.paths.iter().filter(|path| **path == Path::Both);
         self.shot_as += legs.count() as f64 * time_s * self.shoot_a();
     }
 
-    /// Charge that has flowed from pole to pole past the motor in this period, As.
+    /// Returns the charge that has bypassed the motor from pole to pole in this period, As.
     pub(in super::super) fn shot_as(&self) -> f64 {
         self.shot_as
     }
 
-    /// The current from pole to pole through a leg with both switches on, A.
+    /// Returns the current from pole to pole through a leg with both switches on, A.
     fn shoot_a(&self) -> f64 {
         self.bus_v / (2.0 * ON_OHM)
     }
 
-    /// Currents through the low sides' shunts into the phases, A, of those that flow there.
+    /// Returns the currents of the low sides' shunts into the phases, A.
     pub(in super::super) fn shunts_a(&self) -> [f64; 3] {
         let stator_a = self.machine.now().stator_a();
         [0, 1, 2].map(|leg| {

@@ -1,33 +1,31 @@
 //! Legs whose switches are both off.
 //!
-//! Such a leg conducts through the diode that its current's sign wants, until the current is zero;
-//! then it floats until the voltage at its terminal would forward-bias a diode. The instants at
-//! which that happens are found on the closed solution.
+//! Such a leg conducts through the diode set by its current's sign until the current is zero; then it floats until the
+//! voltage at its terminal would forward-bias a diode. The instants of these events are found on the closed solution.
 
 use super::super::circuit::{Drive, Moment, Way};
 use super::super::series::root;
 use super::super::vector::phases;
 use super::{DIODE_V, Path, Rail, Stage, ZERO_A};
 
-/// Forward bias from which a floating leg's diode takes over, V: far above rounding and far below
-/// what moves a current.
+/// Forward bias above which a floating leg's diode conducts, V: far above rounding and far below what moves a current.
 const ONSET_V: f64 = 1e-6;
 
-/// How closely the zero of a voltage is found, V; that of a current to [`ZERO_A`].
+/// Accuracy of a voltage's zero, V; that of a current's is [`ZERO_A`].
 const ZERO_V: f64 = 0.5e-6;
 
-/// Electrical angle within which a current or a voltage is taken to cross its limit at most once,
-/// rad: an excursion between two looks stays below ωφ/8·0.05² of voltage, 3 mV at 6000 rpm.
+/// Electrical angle within which a current or voltage is assumed to cross its limit at most once, rad: an excursion
+/// between two looks stays below ωφ/8·0.05² of voltage, 3 mV at 6000 rpm.
 const LOOK_RAD: f64 = 0.05;
 
-/// Two zero-crossings closer than this are one, s: then the current does not come back.
+/// Two zero-crossings closer than this count as one, s: the current then does not return.
 const INSTANT_S: f64 = 1e-12;
 
-/// The leg that wants to conduct most.
+/// The leg closest to conducting.
 struct Onset {
-    /// Voltage beyond its diode's own, V.
+    /// Voltage beyond that of its diode, V.
     excess_v: f64,
-    /// Legs that begin to conduct, and to where; both the same where there is one.
+    /// Legs that begin to conduct, and to which rail; both the same if there is only one.
     legs: [(usize, Rail); 2],
 }
 
@@ -62,12 +60,12 @@ impl Stage {
         }
     }
 
-    /// Whether the rotor is too slow to conduct by itself, with all legs off.
+    /// Returns true if the rotor is too slow to conduct by itself, with all legs off.
     fn idle(&self) -> bool {
         self.only().is_none() && self.machine.line_v() < self.bus_v + 2.0 * DIODE_V
     }
 
-    /// The first event within a time, or its end, and the leg whose current comes to zero there.
+    /// Returns the first event within a time, or its end, and the leg whose current reaches zero there.
     fn next_event(&self, drive: &Drive, step_s: f64) -> (f64, Option<usize>) {
         let machine = &self.machine;
         let at = |t| machine.after(drive, t);
@@ -110,7 +108,7 @@ impl Stage {
         (at_s, stopped)
     }
 
-    /// Lets floating legs conduct whose diodes are forward-biased.
+    /// Lets floating legs conduct if their diodes are forward-biased.
     fn resolve(&mut self) {
         for _ in 0..3 {
             let drive = self.confined();
@@ -127,8 +125,8 @@ impl Stage {
         }
     }
 
-    /// With fewer than two legs connected no current flows, and no diode is left conducting; nor is one
-    /// of two legs that have come to zero with the third.
+    /// Stops currents: with fewer than two legs connected none flows, and no diode stays conducting; nor does one of
+    /// two legs that have reached zero together with the third.
     fn still(&mut self) {
         self.machine.open(self.way());
         let currents_a = phases(self.machine.now().stator_a());
@@ -142,7 +140,7 @@ impl Stage {
         self.machine.open(self.way());
     }
 
-    /// The legs in which the highest and the lowest voltage are induced.
+    /// Returns the legs with the highest and the lowest induced voltage.
     fn extremes(&self, emf_v: [f64; 3]) -> (usize, usize) {
         let wired = |leg: usize| self.paths[leg] != Path::Cut;
         let better = |leg, best, than: fn(&f64, &f64) -> bool| {
@@ -160,7 +158,7 @@ impl Stage {
         (highest, lowest)
     }
 
-    /// How far the floating legs' voltages are beyond the diodes' at some time.
+    /// Returns how far the floating legs' voltages are beyond the diodes' at some time.
     fn onset(&self, at: &Moment, drive: &Drive) -> Onset {
         let emf = self.machine.emf_v(at, drive);
         let high_v = self.bus_v + DIODE_V;

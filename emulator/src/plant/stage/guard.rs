@@ -1,31 +1,30 @@
-//! Watches over the legs' switches: none is turned on before the other one of its leg has been off for the dead
-//! time.
+//! Checks the legs' switches: none may turn on before the other one of its leg has been off for the dead time.
 //!
-//! It is told of each edge as the stage is, and when it is by the stage's own clock. So it knows nothing of the
-//! timers whose work it checks; nor of what is broken: a shorted switch is on, but nobody has turned it on.
+//! It sees each edge when the stage does, timed by the stage's own clock. So it knows nothing of the timers that it
+//! checks; nor of what is broken: a shorted switch is on, but nobody has turned it on.
 
 use super::super::rail::Rail;
 
-/// What rounding may take of a dead time, s.
+/// Rounding error of a dead time, s.
 const ROUNDING_S: f64 = 1e-12;
 
-/// What is known of the legs' switches.
+/// The state of the legs' switches.
 #[derive(Clone, Debug)]
 pub(super) struct Guard {
-    /// What must pass between the switches of a leg, s.
+    /// Time required between the switches of a leg, s.
     dead_s: f64,
     /// The switch of each leg that is on.
     on: [Option<Rail>; 3],
-    /// The last one that was turned off.
+    /// The last one turned off.
     last: [Rail; 3],
-    /// When that was in the period, s.
+    /// When, within the period, s.
     off_s: [f64; 3],
-    /// A leg that has had less in this period.
+    /// A leg that had less in this period.
     crossed: Option<usize>,
 }
 
 impl Guard {
-    /// All switches have been off for long.
+    /// Creates a guard with all switches off for long.
     pub(super) fn new() -> Self {
         Self {
             dead_s: 0.0,
@@ -46,12 +45,12 @@ impl Guard {
         }
     }
 
-    /// A leg that has had less than the dead time between its switches in this period.
+    /// Returns a leg that had less than the dead time between its switches in this period.
     pub(super) fn crossed(&self) -> Option<usize> {
         self.crossed
     }
 
-    /// One of a leg's switches is on from now on, or none.
+    /// Turns on one of a leg's switches, or none.
     #[inline(always)] // at each edge
     pub(super) fn turn(&mut self, leg: usize, on: Option<Rail>, now_s: f64) {
         let before = std::mem::replace(&mut self.on[leg], on);
@@ -70,7 +69,7 @@ impl Guard {
         }
     }
 
-    /// Each leg goes over to a rail, with so much time between its switches.
+    /// Moves each leg to a rail, with this much time between its switches.
     #[inline(always)] // in each half of a period
     pub(super) fn sweep(&mut self, to: Rail, dead_s: f64) {
         if dead_s < self.dead_s - ROUNDING_S {
@@ -79,7 +78,7 @@ impl Guard {
         self.on = [Some(to); 3];
     }
 
-    /// The legs have been at a rail for long, without an edge that anybody has made.
+    /// Puts the legs at a rail, as if for long, without an edge.
     pub(super) fn hold(&mut self, rail: Rail) {
         self.on = [Some(rail); 3];
     }

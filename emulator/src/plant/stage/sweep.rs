@@ -5,8 +5,8 @@ use super::super::vector::phases;
 use super::{DIODE_V, Path, Rail, Stage};
 
 impl Stage {
-    /// Half a period in which each leg has an edge at this time, with time for its dead time. Returns
-    /// false, with nothing done, where a current comes too close to zero in it.
+    /// Runs half a period in which each leg has an edge at its given time, leaving room for the dead time. Returns
+    /// false, having done nothing, if a current comes too close to zero in it.
     #[inline(never)]
     pub(in super::super) fn sweep(
         &mut self,
@@ -39,14 +39,14 @@ impl Stage {
         self.guard.sweep(to, dead_s);
         self.paths = [Path::Switch(to); 3];
         self.high = [if rises { 1.0 } else { 0.0 }; 3];
-        // A leg that goes low conducts there from its step on; after the other one nobody asks.
+        // A leg that goes low conducts there from its step on; for a high one nobody asks.
         self.low_from_s = at_s.map(|at_s| self.now_s + at_s);
         self.now_s += half_s;
         true
     }
 
-    /// Whether each leg's current is to be expected to flow into the motor at its edge: by its slope
-    /// without voltage, and what the legs before it take from it.
+    /// Returns whether each leg's current is expected to flow into the motor at its edge, from its slope without
+    /// voltage and what the legs before it take from it.
     #[inline(always)]
     fn inward(&self, edges_s: [f64; 3], rises: bool) -> [bool; 3] {
         let [a, b, c] = edges_s;
@@ -65,7 +65,7 @@ impl Stage {
     }
 }
 
-/// The legs in order of these times.
+/// Returns the legs in order of these times.
 #[inline(always)]
 fn order([a, b, c]: [f64; 3]) -> [usize; 3] {
     let (first, last) = if a <= b { (0, 1) } else { (1, 0) };
