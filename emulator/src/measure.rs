@@ -4,7 +4,6 @@
 //! The workload is the default bench at 15 kHz with all of the control, the sensors' noise and
 //! quantisation, its shaft settled at 4500 rpm. Control and plant are then timed separately on the
 //! data they exchanged in that run, so that each repeats the same work.
-//! passed between them in that run, so that each does the same work again.
 
 use std::fmt;
 use std::fs;

@@ -1,8 +1,8 @@
-//! Several ESCs on one clock, one supply and one MAVLink link, taken on by calls.
+//! Several ESCs on one clock, one supply and one MAVLink link, advanced by calls.
 //!
-//! No socket and no wall clock: the program and other languages' modules run this. The ESCs go on a control period
-//! at a time, the one furthest behind first, each at the voltage to which all have brought their supply. Each is what
-//! it would be alone, bit for bit, where the supply does not give way.
+//! No socket and no wall clock: the program and other languages' modules run this. The ESCs advance one control period
+//! at a time, the one furthest behind first, each at the voltage to which all have brought their supply. Each behaves
+//! as it would alone, bit for bit, if the supply is stiff.
 
 mod environment;
 mod group;
@@ -29,10 +29,10 @@ pub use environment::{Environment, OutOfRange, Shaft};
 pub use heard::Answer;
 pub use state::{EscState, Reported};
 
-/// The most ESCs: `ESC_INFO` has a bit for so many.
+/// Most ESCs: the number of bits in `ESC_INFO`.
 pub const ESCS_MAX: usize = 8;
 
-/// The component id of the first of several ESCs, where none is given.
+/// The component id of the first of several ESCs, if none is given.
 const FIRST_COMPONENT: f32 = 140.0;
 
 /// The highest component id that `MAV_COMP_ID` takes.
@@ -41,24 +41,24 @@ const LAST_COMPONENT: f32 = 250.0;
 /// ESCs that run together.
 pub struct Rack {
     escs: Vec<Device>,
-    /// What they share; one alone has its own supply.
+    /// What they share; a single one has its own supply.
     pack: Option<Pack>,
     parts: Vec<Part>,
     means: Vec<Means>,
     answers: Vec<Answer>,
-    /// Nothing has run in the latest advance: the means are of the one before.
+    /// True if nothing has run in the latest advance: the means are of the one before.
     means_are_old: bool,
     now_ns: u64,
 }
 
 impl Rack {
-    /// Powers the ESCs up. Of several, each is a peripheral on MAVLink, with component ids that count from the
-    /// first one's `MAV_COMP_ID`, or from 140; and the supply is the first one's.
+    /// Powers the ESCs up. Several are peripherals on MAVLink, with component ids that count from the first one's
+    /// `MAV_COMP_ID`, or from 140; the supply is the first one's.
     ///
-    /// Returns them with a warning for each whose stored parameters are not whole.
+    /// Returns them with a warning for each whose stored parameters are not intact.
     ///
     /// # Errors
-    /// As [`Device::start`].
+    /// As for [`Device::start`].
     pub fn start(mut starts: Vec<Start>) -> Result<(Self, Vec<&'static str>), StartError> {
         let several = starts.len() > 1;
         if several {
@@ -86,20 +86,20 @@ impl Rack {
         Ok((rack, warnings.into_iter().flatten().collect()))
     }
 
-    /// The ESCs.
+    /// Returns the ESCs.
     pub fn escs(&self) -> &[Device] {
         &self.escs
     }
 
-    /// Up to where [`Rack::advance_to`] has gone on, ns.
+    /// Returns how far [`Rack::advance_to`] has advanced, ns.
     pub fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
-    /// Plays a datagram of the throttle wire on an ESC's wire, from `start_ns` on or after what still plays.
+    /// Plays a throttle-wire datagram on an ESC's wire, from `start_ns` on or after what still plays.
     ///
     /// # Errors
-    /// It is malformed, or too much waits.
+    /// It is malformed, or too much is pending.
     pub fn play(
         &mut self,
         esc: usize,
@@ -109,7 +109,7 @@ impl Rack {
         self.escs[esc].wire().play(start_ns, datagram)
     }
 
-    /// Changes what is around the ESCs, from their next control periods on.
+    /// Changes the ESCs' surroundings, from their next control periods on.
     pub fn surround(&mut self, change: &Environment) {
         let pack = self.pack.as_mut().map(Pack::bus_mut);
         let own = self.escs.first_mut().map(|esc| esc.around_mut().bus_mut());
@@ -134,8 +134,8 @@ impl Rack {
         }
     }
 
-    /// Runs all control periods that begin before `until_ns`: what comes of it does not depend on how a time is
-    /// divided into calls. `send` gets every MAVLink frame.
+    /// Runs all control periods that begin before `until_ns`; the result does not depend on how a time is divided into
+    /// calls. `send` receives every MAVLink frame.
     pub fn advance_to(
         &mut self,
         until_ns: u64,
@@ -146,13 +146,13 @@ impl Rack {
         self.go_on_to(until_ns, onlooker, send);
     }
 
-    /// Begins an advance that [`Rack::go_on_to`] takes in several strides: answers and means are of all of them.
+    /// Begins an advance that [`Rack::go_on_to`] makes in several strides: answers and means cover all of them.
     pub fn begin(&mut self) {
         self.answers.clear();
         self.means_are_old = true;
     }
 
-    /// Goes on with an advance, as [`Rack::advance_to`] does.
+    /// Continues an advance, as [`Rack::advance_to`] does.
     pub fn go_on_to(
         &mut self,
         until_ns: u64,
@@ -163,25 +163,25 @@ impl Rack {
         self.now_ns = self.now_ns.max(until_ns);
     }
 
-    /// What the ESCs have answered in the latest advance, in the order in which they did.
+    /// Returns the ESCs' answers in the latest advance, in order.
     pub fn answers(&self) -> &[Answer] {
         &self.answers
     }
 
-    /// The ESCs and their motors as they are now.
+    /// Returns the present state of the ESCs and their motors.
     pub fn states(&self) -> impl Iterator<Item = EscState> {
         let escs = self.escs.iter().zip(&self.means);
         escs.map(|(esc, means)| state::state(esc, means))
     }
 
-    /// Bytes that came in on a MAVLink stream, for all of them.
+    /// Passes bytes received on a MAVLink stream to all of them.
     pub fn receive(&mut self, stream: LinkId, bytes: &[u8], onlooker: &mut impl Onlooker) {
         for esc in 0..self.escs.len() {
             self.receive_for(esc, stream, bytes, onlooker);
         }
     }
 
-    /// The same for one of them.
+    /// Passes them to one ESC.
     pub fn receive_for(
         &mut self,
         esc: usize,
@@ -193,7 +193,7 @@ impl Rack {
         self.escs[esc].receive(stream, bytes, onlooker);
     }
 
-    /// A MAVLink stream that has ended.
+    /// Forgets a MAVLink stream that has ended.
     pub fn forget(&mut self, stream: LinkId) {
         self.escs.iter_mut().for_each(|esc| esc.forget(stream));
     }
@@ -253,7 +253,7 @@ impl Rack {
     }
 }
 
-/// Whose period begins first, of those that begin at all.
+/// Returns the ESC whose period begins first, if any begins.
 fn first(begin_s: &[f64]) -> Option<usize> {
     let (mut first, mut first_s) = (None, f64::INFINITY);
     for (esc, begins_s) in begin_s.iter().enumerate() {

@@ -1,4 +1,5 @@
-//! The reference in `README.md` against the code: every key that a file can have, and no other.
+//! Checks the reference in `README.md` against the code: every key that a file can have, and no
+//! other.
 
 use serde::de::value::Error;
 use serde::de::{Deserialize, Deserializer, Error as _, Visitor};
@@ -6,7 +7,7 @@ use serde::forward_to_deserialize_any;
 
 const README: &str = include_str!("../README.md");
 
-/// Takes the names of a struct's fields, or of an enum's variants, from what serde derived for it.
+/// Collects the names of a struct's fields, or an enum's variants, from what serde derived for it.
 struct Names<'a>(&'a mut Vec<&'static str>);
 
 impl<'de> Deserializer<'de> for Names<'_> {
@@ -42,7 +43,7 @@ impl<'de> Deserializer<'de> for Names<'_> {
     }
 }
 
-/// The rows of the table under a heading of the README, cell by cell.
+/// Returns the rows of the table under a README heading, cell by cell.
 pub(crate) fn rows(heading: &str) -> Vec<Vec<String>> {
     let (_, section) = README
         .split_once(&format!("\n### {heading}\n"))
@@ -57,12 +58,12 @@ pub(crate) fn rows(heading: &str) -> Vec<Vec<String>> {
     .collect()
 }
 
-/// What stands between a cell's backquotes, if that is all.
+/// Returns the text between a cell's backquotes, if that is all.
 pub(crate) fn code(cell: &str) -> Option<&str> {
     cell.strip_prefix('`')?.strip_suffix('`')
 }
 
-/// Compares the first column of a table with these names, which come in the same order.
+/// Compares the first column of a table with these names, in order.
 pub(crate) fn assert_lists(heading: &str, names: &[&str]) {
     let rows = rows(heading);
     let listed: Vec<_> = rows.iter().filter_map(|row| code(&row[0])).collect();

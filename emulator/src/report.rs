@@ -1,5 +1,5 @@
-//! What is printed: the first screen, figures, verdicts. All goes to standard output at once, so
-//! that a closed pipe is one clean error.
+//! What is printed: the first screen, figures, verdicts. Each goes to standard output in one write, so that a closed
+//! pipe is one clean error.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -30,24 +30,24 @@ pub fn print(text: &str) -> Result<(), String> {
     }
 }
 
-/// One JSON object on a line.
+/// Formats a value as one JSON object on a line.
 ///
 /// # Errors
-/// What cannot be spelt so.
+/// The value cannot be represented.
 pub fn json(value: &impl Serialize) -> Result<String, String> {
     let text = serde_json::to_string(value).map_err(|error| error.to_string())?;
     Ok(text + "\n")
 }
 
-/// What is printed once a session is open: the first screen, or one JSON object with every port. Where nobody reads
-/// it, the ESC runs all the same.
+/// Prints the first screen of an open session, or one JSON object with every port. The ESC runs even if nobody reads
+/// it.
 pub fn opened(what: &str, args: &RunArgs, standing: &Standing, opened: &Opened, params: &Params) {
     let text = if !args.common.json {
         greeting(what, args, standing, opened, params)
     } else if !opened.endpoints.is_empty() || args.speed == Speed::Lockstep {
         json(&Ready::of(opened)).unwrap_or_default()
     } else {
-        // Who asked for no link reads the summary alone.
+        // If no link was asked for, only the summary is read.
         return;
     };
     let _ = print(&text);
@@ -59,7 +59,7 @@ struct Ready {
     ready: Ports,
 }
 
-/// Where all is reached.
+/// Where everything is reached.
 #[derive(Serialize)]
 struct Ports {
     /// MAVLink, as `--mavlink` has it.
@@ -68,7 +68,7 @@ struct Ports {
     signal: Option<String>,
     /// The page, as `--web` has it.
     web: Option<String>,
-    /// Of several ESCs, each.
+    /// One per ESC, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     escs: Vec<Port>,
 }
@@ -100,7 +100,7 @@ impl Ready {
     }
 }
 
-/// The first screen: `what` runs, where it is reached, what to type next. `params` are in force.
+/// Returns the first screen: `what` runs, where it is reached, what to type next. `params` are in force.
 fn greeting(
     what: &str,
     args: &RunArgs,
@@ -159,8 +159,8 @@ fn greeting(
     lines.join("\n") + "\n"
 }
 
-/// The option with which `siskin` reaches one of these, a server before others; empty for the one that it
-/// looks for by itself.
+/// Returns the option with which `siskin` reaches one of these, servers first; empty for the one that it finds by
+/// itself.
 fn connect(endpoints: &[Endpoint]) -> Option<String> {
     let usual = Endpoint::defaults();
     let is_server = |endpoint: &&Endpoint| matches!(endpoint, Endpoint::TcpIn(_));
@@ -173,7 +173,7 @@ fn connect(endpoints: &[Endpoint]) -> Option<String> {
     Some(format!(" --connect {other}"))
 }
 
-/// The figures of a run.
+/// Formats the figures of a run.
 pub fn figures(report: &Report) -> String {
     let pace = report.sim_per_wall.unwrap_or_default();
     let mut text = format!(
@@ -220,7 +220,7 @@ pub fn figures(report: &Report) -> String {
     text
 }
 
-/// Whether a scenario's expectations held.
+/// Formats whether a scenario's expectations held.
 pub fn verdicts(outcome: &Outcome) -> String {
     let mut text = String::new();
     if outcome.interrupted {
@@ -247,7 +247,7 @@ pub fn verdicts(outcome: &Outcome) -> String {
     text
 }
 
-/// What many runs came to.
+/// Formats the results of many runs.
 pub fn survey(survey: &Survey) -> String {
     let pace = survey.sim_per_wall.unwrap_or_default();
     let mut text = format!(
@@ -313,6 +313,6 @@ fn number(value: Option<f64>) -> String {
 }
 
 fn line(text: &mut String, arguments: std::fmt::Arguments) {
-    // A String takes all that is written to it.
+    // Writing to a String cannot fail.
     let _ = writeln!(text, "{arguments}");
 }

@@ -11,14 +11,14 @@ use crate::fault::InForce;
 use crate::plant::Plant;
 use crate::surroundings::{Motion, Surroundings};
 
-/// What was read and done at a sample, and what came of it until the next.
+/// What was read and done at a sample, and its effect until the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Period {
     /// What the converter read.
     pub sample: Sample,
-    /// What the drive was asked for.
+    /// The drive's set-point.
     pub setpoint: Setpoint,
-    /// What the bridge was told.
+    /// The bridge's command.
     pub bridge: Bridge,
     /// What the bridge did in each half, after the delay.
     pub halves: [Bridge; 2],
@@ -39,7 +39,7 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// The bench at its start, with the control at power-up.
+    /// Starts the bench, with the control at power-up.
     pub fn new(bench: Bench, config: Config) -> Self {
         let config = bench.observed(config);
         Self {
@@ -51,16 +51,16 @@ impl Rig {
         }
     }
 
-    /// Swaps the control's configuration, as the tasks do between two periods.
+    /// Replaces the control's configuration, as the tasks do between two periods.
     ///
-    /// The period's length stays that of the start.
+    /// The period's length remains as at the start.
     pub fn configure(&mut self, config: Config) {
         let config = self.around.bench().observed(config);
         self.state.adopt(&self.config, &config);
         self.config = config;
     }
 
-    /// Starts the control anew, as after a reset of the chip; the plant goes on.
+    /// Restarts the control, as after a reset of the chip; the plant goes on.
     pub fn restart(&mut self, config: Config) {
         let config = self.around.bench().observed(config);
         self.state = State::new(&config);
@@ -68,14 +68,13 @@ impl Rig {
         self.applied = Bridge::Off;
     }
 
-    /// Lets other faults act than before.
+    /// Replaces the faults that act.
     pub fn disturb(&mut self, before: &InForce, now: &InForce) {
         self.around.disturb(before, now);
     }
 
-    /// Where a board's comparators turn the bridge off: 1.6 times `LIM_PHASE_A` where the drive's own
-    /// trip is at 1.4, and never above what the board can measure, A. They go up with the limit, and
-    /// down with the drive's trip.
+    /// Returns where a board's comparators turn the bridge off: 1.6 times `LIM_PHASE_A`, with the drive's own trip at
+    /// 1.4, and never above what the board can measure, A. They rise with the limit, and fall with the drive's trip.
     fn comparator_a(&self) -> f64 {
         let trip = self.config.protection.trip.max(self.state.trip_level());
         let trip_counts: f64 = trip.to_num();
@@ -84,81 +83,81 @@ impl Rig {
         (trip_counts * per_count_a * (1.6 / 1.4)).min(sensing.range_a)
     }
 
-    /// Holds the chip in reset, with the bridge off, or lets it run.
+    /// Holds the chip in reset, with the bridge off, or releases it.
     pub fn hold(&mut self, held: bool) {
         self.held = held;
     }
 
-    /// Whether the chip is held in reset.
+    /// Returns true if the chip is held in reset.
     pub fn is_held(&self) -> bool {
         self.held
     }
 
-    /// Voltage of the bus, V.
+    /// Returns the bus voltage, V.
     pub fn bus_v(&self) -> f64 {
         self.around.bus_v()
     }
 
-    /// What stands there outside the chip.
+    /// Returns everything outside the chip.
     pub fn around(&self) -> &Surroundings {
         &self.around
     }
 
-    /// What stands there outside the chip, to be changed.
+    /// Returns everything outside the chip, for changes.
     pub fn around_mut(&mut self) -> &mut Surroundings {
         &mut self.around
     }
 
-    /// Motor, load and inverter.
+    /// Returns motor, load and inverter.
     pub fn plant(&self) -> &Plant {
         self.around.plant()
     }
 
-    /// The control's configuration.
+    /// Returns the control's configuration.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// What the tasks may know of the control.
+    /// Returns what the tasks may know of the control.
     pub fn snapshot(&self) -> Snapshot {
         self.state.snapshot()
     }
 
-    /// λ̂ of the phases in the order of the configured direction, Wb, where the control observes flux
-    /// crossings; else zero.
+    /// Returns λ̂ of the phases in the order of the configured direction, Wb, if the control observes flux crossings;
+    /// else zero.
     pub fn flux_linkages_wb(&self) -> [f64; 3] {
         let flux_wb = f64::from(self.config.scale.flux_wb());
         let lambda = self.state.flux_linkages();
         lambda.map(|flux| flux.to_num::<f64>() * flux_wb)
     }
 
-    /// The adapted inductance over the one that the parameters state.
+    /// Returns the adapted inductance over the stated one.
     pub fn inductance(&self) -> f64 {
         self.state.inductance().get().to_num()
     }
 
-    /// Every word of the control state.
+    /// Passes every word of the control state to `out`.
     #[inline(always)]
     pub fn trace(&self, out: &mut impl FnMut(u32)) {
         self.state.trace(&self.config, out);
     }
 
-    /// Temperature of the board as its thermistor shows it, °C.
+    /// Returns the board's temperature by its thermistor, °C.
     pub fn temperature_c(&self) -> f32 {
         self.around.temperature_c()
     }
 
-    /// Length of a control period, s.
+    /// Returns the length of a control period, s.
     pub fn period_s(&self) -> f64 {
         f64::from(self.config.scale.period_s)
     }
 
-    /// The control's state.
+    /// Returns the control's state.
     pub(crate) fn state(&self) -> &State {
         &self.state
     }
 
-    /// Dead time of the inverter, s.
+    /// Returns the inverter's dead time, s.
     pub(crate) fn dead_time_s(&self) -> f64 {
         self.around.bench().dead_time_s.unwrap_or_else(|| {
             let share: f64 = self.config.dead_time.share.to_num();
@@ -179,7 +178,7 @@ impl Rig {
         self.state.place(theta, omega);
     }
 
-    /// The next control period.
+    /// Runs the next control period.
     pub fn period(&mut self, setpoint: Setpoint) -> Period {
         let setpoint = if self.around.plant().tripped() {
             Setpoint::Fault(Fault::OverCurrent)
@@ -223,12 +222,12 @@ impl Rig {
 }
 
 impl Period {
-    /// Estimated less true electrical angle at the sample, degrees, ±180.
+    /// Returns the estimated less true electrical angle at the sample, degrees, ±180.
     pub fn angle_error_deg(&self, snapshot: &Snapshot) -> f64 {
         self.motion.angle_error_deg(snapshot)
     }
 
-    /// Mechanical speed, rpm.
+    /// Returns the mechanical speed, rpm.
     pub fn rpm(&self) -> f64 {
         self.motion.rpm()
     }

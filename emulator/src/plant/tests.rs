@@ -215,7 +215,8 @@ fn currents_die_against_the_supply_when_all_is_off() {
     assert!((amps - 0.05 * 24.0 * 2.0 / 3.0 / 0.108).abs() < 1e-3);
     let flow = plant.period([Bridge::Off; 2], 24.0, PERIOD_S, 0.0);
     assert_eq!(plant.currents_a(), [0.0; 3]);
-    // What the inductance held, 3/4·L·i² less the copper's and the diodes', goes into the supply.
+    // The inductance's energy, 3/4·L·i² less the copper's and the diodes' loss, goes into the
+    // supply.
     let stored_j = 0.75 * MOTOR.inductance_h * amps * amps;
     let back_j = -flow.bus_a * 24.0 * PERIOD_S;
     assert!(
@@ -224,8 +225,8 @@ fn currents_die_against_the_supply_when_all_is_off() {
     );
 }
 
-/// What catching a turning rotor builds on: with the low sides on, each current grows with the
-/// voltage that the rotor induces, e/L; between two phases of opposite e that is e_ll/(2L).
+/// Catching a turning rotor relies on this: with the low sides on, each current grows with the
+/// back-EMF, e/L; between two phases of opposite e that is e_ll/(2L).
 #[test]
 fn short_circuit_pulses_show_the_induced_voltage() {
     let half_s = 0.5 * PERIOD_S;
@@ -234,7 +235,8 @@ fn short_circuit_pulses_show_the_induced_voltage() {
     let rpm = 6000.0;
     let omega = rpm * TAU / 60.0 * f64::from(MOTOR.pole_pairs);
     for fidelity in [Fidelity::Averaged, Fidelity::Switching] {
-        // In the middle of the pulse phase c's axis is along the flux, so that it induces nothing.
+        // In the middle of the pulse phase c's axis is along the flux, so that it induces nothing
+        // there.
         let turns_to_pulse = omega * (PERIOD_S - 0.5e-6) / TAU;
         let mut plant = held(fidelity, rpm, 2.0 / 3.0 - turns_to_pulse);
         plant.period([Bridge::Off, charge], 24.0, PERIOD_S, DEAD_TIME_S);
@@ -243,7 +245,7 @@ fn short_circuit_pulses_show_the_induced_voltage() {
         let wanted = line_v * 1e-6 / (2.0 * MOTOR.inductance_h);
         assert!((a.abs() - wanted).abs() < 0.005 * wanted, "{a} {wanted}");
         assert!((a + b).abs() < 0.01 * wanted && c.abs() < 0.01 * wanted);
-        // The low sides carry it: the shunts show it for as long as they have.
+        // The low sides carry it: the shunts show it for as long as they do.
         for on_s in plant.low_s() {
             assert!((on_s.unwrap_or(0.0) - 1e-6).abs() < 1e-12);
         }
@@ -296,24 +298,24 @@ fn floating_terminals_show_what_the_rotor_induces() {
         // Slow: the dividers' star is at ground.
         let plant = after(300.0, Bridge::Off);
         close(&plant, emf(&plant));
-        // Faster: the lowest hangs on its diode.
+        // Faster: the lowest terminal hangs on its diode.
         let plant = after(3000.0, Bridge::Off);
         let e = emf(&plant);
         let lowest = e[0].min(e[1]).min(e[2]);
         close(&plant, e.map(|e| e - lowest - DIODE_V));
-        // One low side holds its terminal, the others' show the difference: slow enough for no
-        // diode.
+        // One low side holds its terminal, and the others show the difference: too slow for a diode
+        // to conduct.
         let plant = after(200.0, legs([Some(0.0), None, None]));
         let e = emf(&plant);
         close(&plant, [0.0, e[1] - e[0], e[2] - e[0]]);
-        // Two legs hold the star between them but for the third's half.
+        // Two legs hold the star between them, except for the third's half.
         let plant = after(200.0, legs([Some(0.3), None, Some(0.3)]));
         let e = emf(&plant);
         close(&plant, [0.0, 1.5 * e[1], 0.0]);
         // All low sides on.
         let plant = after(3000.0, duties([0.2, 0.6, 0.4]));
         close(&plant, [0.0; 3]);
-        // A high side all the period long.
+        // A high side on for the whole period.
         let mut plant = held(Fidelity::Switching, 3000.0, angle_turns);
         plant.period([duties([1.0, 0.2, 0.3]); 2], 24.0, PERIOD_S, DEAD_TIME_S);
         close(&plant, [24.0, 0.0, 0.0]);
@@ -341,7 +343,7 @@ fn rig(plant: Fidelity) -> Rig {
     rig_with(plant, Extras::default())
 }
 
-/// The same with a motor that is not ideal.
+/// The same with a non-ideal motor.
 fn rig_with(plant: Fidelity, extras: Extras) -> Rig {
     let bench = Bench {
         plant,
@@ -352,8 +354,9 @@ fn rig_with(plant: Fidelity, extras: Extras) -> Rig {
     Rig::new(bench, config)
 }
 
-/// From standing through the start to 4500 rpm, held there, and braked from there: the greatest
-/// difference between what came in and what went out or is stored, of what came in.
+/// From standstill through the start to 4500 rpm, held there, and braked from there: returns the
+/// greatest difference between what came in and what went out or is stored, relative to what came
+/// in.
 fn imbalance(mut rig: Rig) -> f64 {
     let load = Bench::default().load;
     let speed = |rig: &Rig, rpm| Setpoint::Speed(rig.config().scale.speed_from_rpm(rpm));
@@ -367,7 +370,7 @@ fn imbalance(mut rig: Rig) -> f64 {
         let before = rig.plant().speed_rad_s();
         let flow = rig.period(setpoint).motion.flow;
         let after = rig.plant().speed_rad_s();
-        // The load's by the trapezoidal rule between samples.
+        // The load by the trapezoidal rule between samples.
         let load_w = |w: f64| load.damping_at(w) * w * w;
         let lost_w = flow.copper_w + flow.drag_w + 0.5 * (load_w(before) + load_w(after));
         input += period_s * flow.motor_w;
@@ -403,8 +406,8 @@ fn both_fidelities_make_the_same_torque() {
         "{averaged} {switching}"
     );
 
-    // Without regulation, and so without dead time: what it takes is not the mean of what the
-    // ripple lets it take, and the current follows every 0.01 V.
+    // Without regulation, and so without dead time: its loss is not the mean of the loss over the
+    // ripple, and the current follows every 0.01 V.
     let open_loop = |fidelity| {
         let mut plant = held(fidelity, 4500.0, 0.1);
         let flows = (0..600).map(|_| {
@@ -450,8 +453,7 @@ fn any_bridge() -> impl Strategy<Value = Bridge> {
 }
 
 proptest! {
-    /// Whatever is commanded: no energy comes from nowhere, and no current from a phase that
-    /// nothing connects.
+    /// Under any commands energy is conserved, and no current flows from an unconnected phase.
     #[test]
     fn energy_is_conserved_through_any_commands(
         commands in prop::collection::vec(any_bridge(), 1..40),
@@ -474,12 +476,12 @@ proptest! {
             let grown = stored(&plant) - before;
             balance += 50e-6 * (flow.motor_w - flow.copper_w - shaft_w) - grown;
             gross += 50e-6 * (flow.motor_w.abs() + flow.copper_w + shaft_w.abs());
-            // Diodes only take.
+            // Diodes only dissipate.
             prop_assert!(bus_v * flow.bus_a >= flow.motor_w - 1e-6);
             let [a, b, c] = plant.currents_a();
             prop_assert!((a + b + c).abs() < 1e-9 && a.abs() < 1e4);
         }
-        // The integral of a square is off by 0.06·(R/L·h)² where a current grows from zero: here by
+        // The integral of a square is off by 0.06·(R/L·h)² if a current grows from zero: here by
         // 5e-4 over a whole half period.
         prop_assert!(balance.abs() < 5e-4 * gross, "{balance} of {gross}");
     }

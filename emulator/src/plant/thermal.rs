@@ -1,17 +1,17 @@
-//! How warm things get.
+//! Temperatures.
 
 use siskin_control::protection::Ntc;
 use siskin_control::units::AdcCounts;
 
 use super::Winding;
 
-/// Of everything at the start, and of the surroundings, °C.
+/// Initial temperature of everything, and that of the surroundings, °C.
 pub(super) const AMBIENT_C: f64 = 25.0;
 
-/// What copper's resistance grows by, 1/K.
+/// Temperature coefficient of copper's resistance, 1/K.
 const COPPER_PER_K: f64 = 3.93e-3;
 
-/// Two transistors and their shunts carry each phase's current in turn: about 6 mΩ.
+/// Resistance of a phase's current path, through one of two transistors and their shunt: about 6 mΩ.
 const PATH_OHM: f64 = 6e-3;
 
 /// Thermal resistance of a small board to moving air, K/W.
@@ -20,13 +20,13 @@ pub const BOARD_K_PER_W: f64 = 6.0;
 /// Its time constant, s.
 const BOARD_S: f64 = 20.0;
 
-/// The sensor lies beside the transistors and follows the board, s.
+/// Time constant of the sensor, which lies beside the transistors and follows the board, s.
 const SENSOR_S: f64 = 2.0;
 
 /// The sensor of the simulated board.
 const NTC: Ntc = Ntc::VESC;
 
-/// Board, with its transistors on it, and the sensor beside them.
+/// The board with its transistors, and the sensor beside them.
 #[derive(Clone, Copy, Debug)]
 pub struct Thermal {
     /// From the board to the air, K/W.
@@ -35,12 +35,12 @@ pub struct Thermal {
     board_c: f64,
     /// Temperature of the sensor, °C.
     sensor_c: f64,
-    /// Temperature of the surroundings, °C.
+    /// Ambient temperature, °C.
     ambient_c: f64,
 }
 
 impl Thermal {
-    /// At the temperature of the surroundings, with this thermal resistance from the board to the air, K/W.
+    /// Starts at ambient temperature, with this thermal resistance from the board to the air, K/W.
     pub const fn new(k_per_w: f64) -> Self {
         Self {
             k_per_w,
@@ -50,13 +50,12 @@ impl Thermal {
         }
     }
 
-    /// Changes the temperature of the surroundings, °C.
+    /// Changes the ambient temperature, °C.
     pub fn set_ambient_c(&mut self, ambient_c: f64) {
         self.ambient_c = ambient_c;
     }
 
-    /// Takes the temperatures on by `time_s`, short against 2 s, at the mean square of a current
-    /// vector, A².
+    /// Advances the temperatures by `time_s`, short against 2 s, at the mean square of a current vector, A².
     pub fn advance(&mut self, time_s: f64, current_square: f64) {
         let heat_w = 1.5 * PATH_OHM * current_square;
         let settled_c = self.ambient_c + self.k_per_w * heat_w;
@@ -64,12 +63,12 @@ impl Thermal {
         self.sensor_c += (self.board_c - self.sensor_c) * (time_s * (1.0 / SENSOR_S));
     }
 
-    /// Temperature of the sensor, °C.
+    /// Returns the sensor's temperature, °C.
     pub fn sensor_c(&self) -> f64 {
         self.sensor_c
     }
 
-    /// What the converter reads of the sensor's divider: 12 bits.
+    /// Returns the converter's reading of the sensor's divider: 12 bits.
     fn counts(&self) -> AdcCounts {
         let per_k = 1.0 / (self.sensor_c + 273.15) - 1.0 / 298.15;
         let thermistor = libm::exp(f64::from(NTC.beta_k) * per_k);
@@ -78,7 +77,7 @@ impl Thermal {
         AdcCounts::from_num(libm::round(4096.0 * share).min(4095.0))
     }
 
-    /// What the control takes the board's temperature for, °C.
+    /// Returns the board's temperature as the control measures it, °C.
     pub fn measured_c(&self) -> f32 {
         NTC.celsius(self.counts())
     }
@@ -90,13 +89,13 @@ impl Default for Thermal {
     }
 }
 
-/// A winding that copper loss heats and whose resistance grows with it.
+/// A winding heated by copper loss, whose resistance grows with it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Warming {
     winding: Winding,
     /// Resistance at 25 °C, Ω.
     cold_ohm: f64,
-    /// Above 25 °C: of the surroundings, and by its own heat above them, K.
+    /// Above 25 °C: of the surroundings, and its own above them, K.
     ambient_k: f64,
     excess_k: f64,
 }
@@ -111,21 +110,21 @@ impl Warming {
         }
     }
 
-    /// Changes the temperature of the surroundings, °C. The winding is as warm as before.
+    /// Changes the ambient temperature, °C. The winding's own does not change.
     pub(super) fn set_ambient_c(&mut self, ambient_c: f64) {
         let ambient_k = ambient_c - AMBIENT_C;
         self.excess_k += self.ambient_k - ambient_k;
         self.ambient_k = ambient_k;
     }
 
-    /// Heats the winding for a time that is short against its time constant; its resistance then, Ω.
+    /// Heats the winding for a time short against its time constant; returns its resistance then, Ω.
     pub(super) fn advance(&mut self, time_s: f64, copper_w: f64) -> f64 {
         let heat_w = copper_w - self.excess_k / self.winding.resistance_k_per_w;
         self.excess_k += heat_w * time_s / self.winding.capacity_j_per_k;
         self.cold_ohm * (1.0 + COPPER_PER_K * (self.ambient_k + self.excess_k))
     }
 
-    /// Temperature, °C.
+    /// Returns the temperature, °C.
     pub(super) fn temperature_c(&self) -> f64 {
         AMBIENT_C + self.ambient_k + self.excess_k
     }
@@ -144,10 +143,10 @@ mod tests {
             }
             (thermal.board_c, thermal.sensor_c)
         };
-        // 30 A are 8.1 W.
+        // 30 A is 8.1 W.
         let (board_c, sensor_c) = advance(1.0, 30.0);
         assert!(board_c > sensor_c && sensor_c > 25.0 && board_c < 28.0);
-        // In the end the board is up by 48.6 K, and the sensor with it.
+        // In the end the board is 48.6 K warmer, and so is the sensor.
         let (board_c, sensor_c) = advance(200.0, 30.0);
         assert!((board_c - 73.6).abs() < 0.1 && (sensor_c - 73.6).abs() < 0.1);
     }

@@ -8,16 +8,16 @@ use super::rail::Rail;
 /// One bit of a duty.
 const DUTY_BIT: f64 = 1.0 / 2_147_483_648.0;
 
-/// One leg's output of the timer.
+/// One leg's timer output.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Timer {
-    /// The switch that is, or after the dead time will be, on.
+    /// The switch that is on, or will be after the dead time.
     pub(super) output: Option<Rail>,
-    /// What is left of the dead time, s.
+    /// Remaining dead time, s.
     pub(super) waiting_s: f64,
 }
 
-/// A leg's part in half a period: one output, then another.
+/// A leg's part of half a period: one output, then another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Half {
     pub(super) first: Option<Rail>,
@@ -27,9 +27,9 @@ pub(super) struct Half {
 }
 
 impl Half {
-    /// The half as it is played: the edge at its time, or at infinity where there is none.
+    /// Returns the half as played: the edge at its time, or at infinity if there is none.
     pub(super) fn timed(mut self, half_s: f64, dead_time_s: f64) -> Self {
-        // An edge at an end is none.
+        // An edge at either end does not count.
         if self.edge_s <= 0.0 {
             self.first = self.second;
         }
@@ -45,8 +45,8 @@ impl Half {
     }
 }
 
-/// With each turning on late by the dead time, the middle of the low side's on-time, which is when
-/// the sample is taken, is half of it behind the counter's top.
+/// Delays an edge: with each turn-on late by the dead time, the middle of the low side's on-time,
+/// which is when the sample is taken, is half a dead time behind the counter's top.
 #[inline]
 pub(super) fn delayed(edge_s: f64, dead_time_s: f64) -> f64 {
     (edge_s - 0.5 * dead_time_s).max(0.0)
@@ -68,7 +68,7 @@ impl Timer {
         }
     }
 
-    /// When the dead time ends.
+    /// Returns when the dead time ends.
     pub(super) fn next_s(&self, now_s: f64) -> f64 {
         if self.waiting_s > 0.0 {
             now_s + self.waiting_s
@@ -78,7 +78,7 @@ impl Timer {
     }
 }
 
-/// The duties of a command with which all legs switch, 0..1.
+/// Returns the duties of a command under which all legs switch, 0..1.
 #[inline]
 pub(super) fn duties(bridge: Bridge) -> Option<[f64; 3]> {
     match bridge {
@@ -89,13 +89,13 @@ pub(super) fn duties(bridge: Bridge) -> Option<[f64; 3]> {
     }
 }
 
-/// A duty, 0..1.
+/// Converts a duty to 0..1.
 #[inline]
 pub(super) fn share(duty: Duty) -> f64 {
     (f64::from(duty.to_bits()) * DUTY_BIT).min(1.0)
 }
 
-/// What a command makes of each leg in the half after a sample.
+/// Returns each leg's part in the half after a sample.
 pub(super) fn first_half(bridge: Bridge, half_s: f64) -> [Half; 3] {
     second_half(bridge, half_s).map(|half| Half {
         first: half.second,
@@ -104,7 +104,7 @@ pub(super) fn first_half(bridge: Bridge, half_s: f64) -> [Half; 3] {
     })
 }
 
-/// The same in the half before a sample: the first in the mirror.
+/// Returns the same for the half before a sample, the mirror image of the first.
 pub(super) fn second_half(bridge: Bridge, half_s: f64) -> [Half; 3] {
     let off = Half {
         first: None,

@@ -6,13 +6,13 @@ const HALF_ROOT_3: f64 = 0.5 * ROOT_3;
 /// The phases' axes in the stator's frame.
 pub(super) const AXES: [[f64; 2]; 3] = [[1.0, 0.0], [-0.5, HALF_ROOT_3], [-0.5, -HALF_ROOT_3]];
 
-/// The sum over the axes, each with its weight: 3/2 of Clarke's transform of the weights.
+/// Returns the weighted sum of the axes: 3/2 of the weights' Clarke transform.
 #[inline(always)]
 pub(super) fn along_axes([a, b, c]: [f64; 3]) -> [f64; 2] {
     [a - 0.5 * (b + c), HALF_ROOT_3 * (b - c)]
 }
 
-/// The three phases of a vector.
+/// Returns the three phases of a vector.
 #[inline(always)]
 pub(super) fn phases([alpha, beta]: [f64; 2]) -> [f64; 3] {
     let half_root_3_beta = HALF_ROOT_3 * beta;
@@ -23,27 +23,27 @@ pub(super) fn phases([alpha, beta]: [f64; 2]) -> [f64; 3] {
     ]
 }
 
-/// The greatest magnitude of a vector's three phases.
+/// Returns the greatest magnitude of a vector's three phases.
 #[inline(always)]
 pub(super) fn largest([alpha, beta]: [f64; 2]) -> f64 {
     let (alpha, beta) = (alpha.abs(), beta.abs());
-    // Of b and c, the one in which both parts have one sign.
+    // Of b and c, the one whose parts have the same sign.
     alpha.max(HALF_ROOT_3 * beta + 0.5 * alpha)
 }
 
-/// The product of two vectors as complex numbers.
+/// Returns the product of two vectors as complex numbers.
 #[inline(always)]
 pub(super) fn turn([a, b]: [f64; 2], [cos, sin]: [f64; 2]) -> [f64; 2] {
     [a * cos - b * sin, a * sin + b * cos]
 }
 
-/// The product with the conjugate: the vector `a` seen from a direction.
+/// Returns the product with the conjugate: the vector `a` seen from a direction.
 #[inline(always)]
 pub(super) fn back([a, b]: [f64; 2], [cos, sin]: [f64; 2]) -> [f64; 2] {
     [a * cos + b * sin, b * cos - a * sin]
 }
 
-/// Their scalar product.
+/// Returns their scalar product.
 #[inline(always)]
 pub(super) fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]

@@ -1,4 +1,4 @@
-//! From a picture to the bytes of its file.
+//! Renders a picture to the bytes of its file.
 
 use std::path::Path;
 
@@ -13,16 +13,16 @@ use super::style;
 pub(super) type Area<B> = DrawingArea<B, Shift>;
 pub(super) type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
-/// What can be drawn, in pixels of the PNG.
+/// Something to draw, in pixels of the PNG.
 pub(super) trait Picture {
-    /// Width and height.
+    /// Returns width and height.
     fn size(&self) -> (u32, u32);
 
     /// Draws it on an area of that size.
     fn draw<B: DrawingBackend>(&self, root: &Area<B>) -> Drawn<B>;
 }
 
-/// A format of a file.
+/// A file format.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Format {
     Svg,
@@ -30,7 +30,7 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// The one that the path's extension names.
+    /// Returns the format named by the path's extension.
     pub(super) fn of(path: &Path) -> Result<Self, PlotError> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("svg") => Ok(Self::Svg),
@@ -60,7 +60,7 @@ fn svg(picture: &impl Picture) -> Result<Vec<u8>, PlotError> {
         picture,
         SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(),
     )?;
-    // The library draws on whole pixels. Shown at half its size, the figure has half pixels.
+    // The library draws on whole pixels. Shown at half size, the figure has half pixels.
     let drawn = format!(r#"width="{width}" height="{height}""#);
     let shown = format!(r#"width="{}" height="{}""#, width / 2, height / 2);
     Ok(text.replacen(&drawn, &shown, 1).into_bytes())
@@ -90,7 +90,7 @@ fn draw<B: DrawingBackend>(picture: &impl Picture, root: Area<B>) -> Result<(), 
         .map_err(|error| PlotError::Draw(error.to_string()))
 }
 
-/// Takes a font that is the same on every machine; a viewer of the SVG takes its own.
+/// Registers a font that is the same on every machine; a viewer of the SVG uses its own.
 fn register_fonts() -> Result<(), PlotError> {
     for (style, font) in [
         (FontStyle::Normal, dejavu::sans::regular()),

@@ -1,4 +1,4 @@
-//! Pictures that are not recordings: curves and maps over any quantities, several to a sheet.
+//! Pictures other than recordings: curves and maps of any quantities, several to a sheet.
 
 mod curve;
 mod map;
@@ -15,20 +15,20 @@ use plotters::style::RGBColor;
 use super::canvas::Format;
 use super::error::PlotError;
 
-/// Size of a panel where nothing else is wanted.
+/// Default size of a panel.
 pub const PANEL: (u32, u32) = (1200, 900);
 
-/// Width of a line where nothing else is wanted.
+/// Default line width.
 const LINE: u32 = 5;
 
-/// A picture: panels side by side and below each other, under a title.
+/// A picture: panels in rows and columns, under a title.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Stem of the file's name, as `bosso-3`.
+    /// Stem of the file name, as `bosso-3`.
     pub name: String,
-    /// What it shows, and where the paper does.
+    /// What it shows, and where in the paper.
     pub title: String,
-    /// Panels a row; the rows follow from the number of panels.
+    /// Panels per row; the rows follow from their number.
     pub columns: usize,
     /// Size of a panel, pixels of the PNG.
     pub panel: (u32, u32),
@@ -41,24 +41,24 @@ pub struct Figure {
 pub struct Panel {
     /// What it shows.
     pub title: String,
-    /// The quantity to the right.
+    /// The horizontal quantity.
     pub x: Axis,
-    /// The quantity upwards.
+    /// The vertical quantity.
     pub y: Axis,
-    /// Colours below the curves, where there is a third quantity.
+    /// Colours behind the curves, for a third quantity.
     pub map: Option<Map>,
     /// The curves, each with its entry in the legend.
     pub curves: Vec<Curve>,
-    /// Stretches of the x axis that are told apart behind the curves.
+    /// Stretches of the x axis marked behind the curves.
     pub stretches: Vec<Stretch>,
-    /// Places on the x axis at which something goes wrong.
+    /// Positions on the x axis where something goes wrong.
     pub faults: Vec<f64>,
 }
 
 /// A stretch of the x axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
-    /// Its name, above the axes; none where it is empty.
+    /// Its name, above the axes; none if empty.
     pub name: &'static str,
     /// Its ends.
     pub ends: (f64, f64),
@@ -69,9 +69,9 @@ pub struct Stretch {
 /// An axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// The quantity with its unit, as `speed (rpm)`; an x axis without is that of the panel below.
+    /// The quantity with its unit, as `speed (rpm)`; an x axis without one shares that of the panel below.
     pub label: String,
-    /// Ends; `None` is what the curves span.
+    /// Ends; `None` for the range of the curves.
     pub range: Option<(f64, f64)>,
     /// Whether equal lengths are equal ratios.
     pub logarithmic: bool,
@@ -82,13 +82,13 @@ pub struct Axis {
 pub struct Curve {
     /// Its entry in the legend.
     pub name: String,
-    /// The points; one that is not finite is a gap.
+    /// The points; a non-finite one is a gap.
     pub points: Vec<(f64, f64)>,
-    /// What the samples about each point span; empty where they are the points.
+    /// The range of the samples about each point; empty if they are the points.
     pub spread: Vec<(f64, f64)>,
     /// How it is drawn.
     pub look: CurveLook,
-    /// Its colour, where it is not the next of the palette.
+    /// Its colour, if not the next of the palette.
     pub colour: Option<RGBColor>,
     /// Width of a line.
     pub width: u32,
@@ -104,7 +104,7 @@ pub enum CurveLook {
     Dashed,
     /// A dot at each point: samples, or the paper's printed values.
     Dots,
-    /// What the samples span, without a line.
+    /// The range of the samples, without a line.
     Band,
 }
 
@@ -113,18 +113,18 @@ pub enum CurveLook {
 pub struct Map {
     /// The quantity with its unit.
     pub label: String,
-    /// Places of the columns on the x axis, rising.
+    /// Positions of the columns on the x axis, rising.
     pub x: Vec<f64>,
-    /// Places of the rows on the y axis, rising.
+    /// Positions of the rows on the y axis, rising.
     pub y: Vec<f64>,
-    /// Rows of values from the lowest y, in each from the lowest x; what is not finite is left blank.
+    /// Rows of values from the lowest y, each from the lowest x; non-finite values are left blank.
     pub rows: Vec<Vec<f64>>,
-    /// What the colours span; `None` is what the values do.
+    /// The range of the colours; `None` for that of the values.
     pub range: Option<(f64, f64)>,
 }
 
 impl Map {
-    /// Two maps to be compared, in the colours of one scale.
+    /// Gives two maps to be compared the same colour scale.
     pub fn alike(mut self, mut other: Self) -> [Self; 2] {
         let values = self.rows.iter().chain(&other.rows).flatten();
         let finite = values.filter(|value| value.is_finite());
@@ -137,7 +137,7 @@ impl Map {
 }
 
 impl Panel {
-    /// Curves over an axis each way.
+    /// Creates a panel of curves over two axes.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, curves: Vec<Curve>) -> Self {
         Self {
             title: title.into(),
@@ -152,17 +152,17 @@ impl Panel {
 }
 
 impl Curve {
-    /// What was measured.
+    /// Creates a curve of measurements.
     pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(name, CurveLook::Line, points)
     }
 
-    /// A bound, a formula or a reference.
+    /// Creates a bound, a formula or a reference.
     pub fn dashed(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(name, CurveLook::Dashed, points)
     }
 
-    /// Single values: samples, or the paper's.
+    /// Creates single values: samples, or the paper's.
     pub fn dots(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(name, CurveLook::Dots, points)
     }
@@ -184,7 +184,7 @@ impl Curve {
 }
 
 impl Axis {
-    /// A linear axis over what the curves span.
+    /// Creates a linear axis over the range of the curves.
     pub fn new(label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -194,10 +194,10 @@ impl Axis {
     }
 }
 
-/// Makes a folder for pictures where there is none, and tries whether it takes a file.
+/// Creates a folder for pictures if there is none, and checks that a file can be written there.
 ///
 /// # Errors
-/// A folder that cannot be made or written to.
+/// The folder cannot be created or written to.
 pub fn prepare(folder: &Path) -> Result<(), PlotError> {
     let probe = folder.join(".probe");
     std::fs::create_dir_all(folder)
@@ -212,7 +212,7 @@ pub fn prepare(folder: &Path) -> Result<(), PlotError> {
 /// Draws figures into a folder, see [`prepare`], each as SVG and PNG.
 ///
 /// # Errors
-/// A picture that cannot be written.
+/// A picture cannot be written.
 pub fn draw(figures: &[Figure], folder: &Path) -> Result<(), PlotError> {
     for figure in figures {
         for (format, extension) in [(Format::Svg, "svg"), (Format::Png, "png")] {

@@ -23,7 +23,7 @@ pub enum PlotError {
     Content {
         /// The file.
         path: PathBuf,
-        /// What is amiss.
+        /// What is wrong.
         reason: String,
     },
     /// The drawing failed.

@@ -1,4 +1,4 @@
-//! The figure of a recording: four panels over a common time.
+//! The figure of a recording: four panels over a common time axis.
 
 use plotters::style::{RGBColor, WHITE};
 use siskin_control::drive::Fault;
@@ -9,15 +9,15 @@ use super::read::Recording;
 use super::reduce::{Cell, Trace};
 use super::style::{BLUE, GREEN, GREY, ORANGE, VERMILION, number};
 
-/// Columns that a recording is reduced to: one for about two and a half pixels, so that the SVG of
-/// a long recording stays below 300 kB.
+/// Columns that a recording is reduced to: one per some two and a half pixels, so that the SVG of a long recording
+/// stays below 300 kB.
 pub(super) const COLUMNS: usize = 900;
 
 /// Size of a panel.
 const PANEL: (u32, u32) = (2400, 530);
 
-/// Quantities of a recording on a panel: the least height of its axes, in the unit, since less is noise that
-/// would fill the panel, and the share of the columns at either end that may reach beyond them.
+/// Quantities of a recording on a panel: the least height of its axes, in the unit, since less is noise that would fill
+/// the panel, and the share of the columns at either end that may exceed them.
 struct Shown<'a> {
     title: &'a str,
     axis: &'a str,
@@ -79,7 +79,7 @@ pub(super) fn figure(recording: &Recording) -> Figure {
             axis: "error (el. °)",
             curves: vec![spread("angle error", &r.angle_error_deg, GREEN)],
             least_span: 1.0,
-            // The first periods of the observer may be far off, and would flatten the rest.
+            // The observer's first periods may be far off, and would flatten the rest.
             outliers: 0.005,
         },
     ];
@@ -119,7 +119,7 @@ impl Shown<'_> {
         }
     }
 
-    /// What the axis of values spans: all curves, with some room.
+    /// Returns the range of the value axis: all curves, with some room.
     fn range(&self) -> (f64, f64) {
         let ranges = self.curves.iter().filter_map(|(curve, trace)| {
             if curve.spread.is_empty() {
@@ -137,7 +137,7 @@ impl Shown<'_> {
     }
 }
 
-/// A line through the means of a trace.
+/// Returns a line through the means of a trace.
 fn means(recording: &Recording, name: &str, trace: &Trace, colour: RGBColor, width: u32) -> Curve {
     let cells = trace.cells().iter().enumerate();
     let points = cells.map(|(column, cell)| {
@@ -151,7 +151,7 @@ fn means(recording: &Recording, name: &str, trace: &Trace, colour: RGBColor, wid
     }
 }
 
-/// What the columns of a trace span.
+/// Returns the ranges of a trace's columns.
 fn spread(trace: &Trace) -> Vec<(f64, f64)> {
     let nothing = (f64::NAN, f64::NAN);
     let cells = trace.cells().iter();
@@ -160,7 +160,7 @@ fn spread(trace: &Trace) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// What was recorded, and the faults in it.
+/// Describes what was recorded, and its faults.
 fn title(recording: &Recording) -> String {
     let length_s = recording.t1_s - recording.t0_s;
     let rate_khz = recording.periods as f64 / length_s / 1e3;

@@ -11,20 +11,20 @@ use super::canvas::{Area, Drawn, Format, Picture};
 use super::error::PlotError;
 use super::style::{FAULT, GRID, INK, heading, length, text};
 
-/// Width of the rows' names, and of a column, pixels.
+/// Width of the row names, and of a column, pixels.
 const NAMES: i32 = 330;
 const COLUMN: i32 = 196;
 /// Height of a row, and of a line in it.
 const ROW: i32 = 100;
 const LINE: i32 = 29;
-/// Height of the title, of the groups' and columns' names, and of the key.
+/// Height of the title, of the group and column names, and of the key.
 const TITLE: i32 = 76;
 const HEAD: i32 = 88;
 const KEY: i32 = 70;
-/// Space about everything, and between two groups of columns.
+/// Space around everything, and between two groups of columns.
 const EDGE: i32 = 24;
 const GAP: i32 = 14;
-/// Size of the letters in a cell.
+/// Font size in a cell.
 const LETTERS: f64 = 22.0;
 
 /// A table.
@@ -32,7 +32,7 @@ const LETTERS: f64 = 22.0;
 pub struct Grid {
     /// What it shows.
     pub title: String,
-    /// Groups of columns with the columns' names.
+    /// Groups of columns with the column names.
     pub groups: Vec<(String, Vec<String>)>,
     /// Rows with their names; a row has a cell for each column.
     pub rows: Vec<(String, Vec<Place>)>,
@@ -43,11 +43,11 @@ pub struct Grid {
 /// A cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Place {
-    /// What it is filled with.
+    /// Its fill.
     pub tint: RGBColor,
     /// Lines of text, three at most.
     pub lines: Vec<String>,
-    /// Whether the last line is one of warning, and the cell has a frame.
+    /// Whether the last line is a warning, and the cell has a frame.
     pub warns: bool,
 }
 
@@ -55,12 +55,12 @@ impl Grid {
     /// Draws it to an `.svg` or a `.png`.
     ///
     /// # Errors
-    /// An extension without a format, or a picture that cannot be written.
+    /// The extension has no format, or the picture cannot be written.
     pub fn draw_to(&self, picture: &Path) -> Result<(), PlotError> {
         Format::of(picture)?.write(self, picture)
     }
 
-    /// Left end of a column in a group.
+    /// Returns the left end of a column in a group.
     fn left(&self, group: usize, column: usize) -> i32 {
         let before: usize = self.groups[..group]
             .iter()
@@ -69,7 +69,7 @@ impl Grid {
         EDGE + NAMES + GAP * group as i32 + COLUMN * (before + column) as i32
     }
 
-    /// Where the columns are, in their order.
+    /// Returns the left ends of the columns, in order.
     fn lefts(&self) -> Vec<i32> {
         let groups = self.groups.iter().enumerate();
         let lefts = groups
@@ -148,7 +148,7 @@ impl Place {
     }
 }
 
-/// Text about its position.
+/// Returns a style centred on its position.
 fn centred(size: f64) -> TextStyle<'static> {
     text(size).pos(Pos::new(HPos::Center, VPos::Center))
 }

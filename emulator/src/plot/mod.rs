@@ -20,11 +20,10 @@ use figure::{COLUMNS, figure};
 use read::Recording;
 
 /// Draws the recording at `record` to `picture`, an `.svg` or a `.png`: speeds, currents, voltages
-/// and the angle error over the time, with the phases of the drive behind them.
+/// and the angle error over time, with the drive's phases behind them.
 ///
 /// # Errors
-/// An extension without a format, a recording that cannot be read, a picture that cannot be
-/// written.
+/// The extension has no format, the recording cannot be read, or the picture cannot be written.
 pub fn plot(record: &Path, picture: &Path) -> Result<(), PlotError> {
     let format = Format::of(picture)?;
     format.write(&figure(&Recording::read(record, COLUMNS)?), picture)

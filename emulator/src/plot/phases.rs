@@ -1,4 +1,4 @@
-//! What the drive did in a recording: its phases one after the other, and its faults.
+//! The drive's activity in a recording: its successive phases, and its faults.
 
 use plotters::style::RGBColor;
 use siskin_control::drive::Phase;
@@ -12,7 +12,7 @@ pub(super) struct Span {
     pub(super) t1_s: f64,
 }
 
-/// The stretches of the drive's phases.
+/// Returns the stretches of the drive's phases.
 pub(super) fn spans(recording: &Recording) -> Vec<Span> {
     let mut column = 0;
     let chunks = recording.phases.chunk_by(|a, b| a == b);
@@ -28,7 +28,7 @@ pub(super) fn spans(recording: &Recording) -> Vec<Span> {
     spans.collect()
 }
 
-/// Where a fault begins, s.
+/// Returns when faults begin, s.
 pub(super) fn fault_times(recording: &Recording) -> Vec<f64> {
     let mut before = 0;
     let columns = recording.faults.iter().enumerate();
@@ -40,7 +40,7 @@ pub(super) fn fault_times(recording: &Recording) -> Vec<f64> {
     begins.collect()
 }
 
-/// The background of a phase; none where nothing happens.
+/// Returns the background of a phase; `None` if nothing happens.
 pub(super) fn tint(phase: Phase) -> Option<RGBColor> {
     match phase {
         Phase::Idle => None,

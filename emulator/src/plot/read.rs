@@ -10,7 +10,7 @@ use super::error::PlotError;
 use super::reduce::Trace;
 use crate::record::{Row, trip};
 
-/// A recording as a picture shows it.
+/// A recording as shown in a picture.
 #[derive(Clone, Debug)]
 pub(super) struct Recording {
     /// The file's name.
@@ -21,9 +21,9 @@ pub(super) struct Recording {
     pub(super) t0_s: f64,
     /// End of the last period, s.
     pub(super) t1_s: f64,
-    /// What the drive did at the end of each column, where there was a period.
+    /// The drive's phase at the end of each column, if it has a period.
     pub(super) phases: Vec<Option<Phase>>,
-    /// The faults that were set within each column, one bit each.
+    /// The faults set within each column, one bit each.
     pub(super) faults: Vec<u8>,
     pub(super) rpm: Trace,
     pub(super) rpm_est: Trace,
@@ -35,11 +35,11 @@ pub(super) struct Recording {
     pub(super) u_q_v: Trace,
     /// Greatest phase voltage of an undistorted sine, bus/√3.
     pub(super) u_max_v: Trace,
-    /// Only while the observer leads: before that the estimate means nothing.
+    /// Only while the observer leads: before that the estimate is meaningless.
     pub(super) angle_error_deg: Trace,
 }
 
-/// No time of a recording is beyond, s: 30 years, of which a double still tells 0.1 µs.
+/// Latest time in a recording, s: 30 years, at which a double still resolves 0.1 µs.
 const LATEST_S: f64 = 1e9;
 
 /// The extent of a recording.
@@ -50,8 +50,8 @@ struct Extent {
 }
 
 impl Recording {
-    /// Reads the recording at `path` into at most `columns` columns. It is read twice, so that
-    /// its length does not matter: first for its extent.
+    /// Reads the recording at `path` into at most `columns` columns. It is read twice, first for
+    /// its extent, so that its length does not matter.
     pub(super) fn read(path: &Path, columns: usize) -> Result<Self, PlotError> {
         let extent = extent(path)?;
         let count = columns.min(usize::try_from(extent.periods).unwrap_or(columns));
@@ -84,7 +84,7 @@ impl Recording {
     fn add(&mut self, row: &Row) {
         let columns = self.phases.len();
         let share = (row.t_s - self.t0_s) / (self.t1_s - self.t0_s);
-        // A half of a period keeps rounding from moving a sample across the edge of its column.
+        // Half a period keeps rounding from moving a sample across the edge of its column.
         let middle = share + 0.5 / self.periods as f64;
         let column = ((middle * columns as f64) as usize).min(columns - 1);
         self.phases[column] = row.phase;
@@ -111,12 +111,12 @@ impl Recording {
         }
     }
 
-    /// The middle of a column, s.
+    /// Returns the middle of a column, s.
     pub(super) fn time_s(&self, column: usize) -> f64 {
         self.edge_s(column as f64 + 0.5)
     }
 
-    /// The time that is so many columns from the start, s.
+    /// Returns the time this many columns from the start, s.
     pub(super) fn edge_s(&self, columns: f64) -> f64 {
         self.t0_s + (self.t1_s - self.t0_s) * columns / self.phases.len() as f64
     }
@@ -125,7 +125,7 @@ impl Recording {
 /// The rows of a recording, each with its place in the file.
 type Rows = Box<dyn Iterator<Item = Result<(String, Row), PlotError>>>;
 
-/// Opens a recording in the format that its extension names; any other is taken for CSV.
+/// Opens a recording in the format that its extension names; any other is read as CSV.
 fn rows(path: &Path) -> Result<Rows, PlotError> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("parquet") => packed_rows(path),
@@ -161,7 +161,7 @@ fn packed_rows(path: &Path) -> Result<Rows, PlotError> {
     })))
 }
 
-/// The fault record of an ESC.
+/// Reads the fault record of an ESC.
 fn rows_of_record(path: &Path) -> Result<Rows, PlotError> {
     let bytes = std::fs::read(path).map_err(|source| PlotError::Read {
         path: path.to_owned(),
@@ -239,7 +239,7 @@ fn content(path: &Path, reason: String) -> PlotError {
     }
 }
 
-/// What the file holds instead, in one line.
+/// Says what the file holds instead, in one line.
 fn not_a_recording(path: &Path, error: csv::Error) -> PlotError {
     let path = path.to_owned();
     let line = error.position().map_or(0, csv::Position::line);

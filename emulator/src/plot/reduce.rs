@@ -1,6 +1,6 @@
-//! Fewer points than periods: each column of the picture keeps what its periods spanned.
+//! Fewer points than periods: each column of the picture keeps the range of its periods.
 
-/// What the samples within a column of the picture came to.
+/// The samples within a column of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cell {
     pub(super) min: f64,
@@ -28,7 +28,7 @@ impl Trace {
         }
     }
 
-    /// Takes in a sample; what is not finite has no place in a picture.
+    /// Adds a sample; non-finite ones cannot be drawn.
     pub(super) fn add(&mut self, column: usize, value: f32) {
         let value = f64::from(value);
         if !value.is_finite() {
@@ -46,7 +46,8 @@ impl Trace {
         cell.count += 1;
     }
 
-    /// Least `low` and greatest `high` of the columns, but for this share of them at either end.
+    /// Returns the least `low` and greatest `high` of the columns, except for this share of them at
+    /// either end.
     pub(super) fn range(
         &self,
         outliers: f64,
@@ -63,7 +64,7 @@ impl Trace {
         Some((*lows.get(cut)?, *highs.iter().rev().nth(cut)?))
     }
 
-    /// The columns.
+    /// Returns the columns.
     pub(super) fn cells(&self) -> &[Option<Cell>] {
         &self.cells
     }

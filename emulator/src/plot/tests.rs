@@ -5,7 +5,8 @@ use super::plot;
 use super::reduce::{Cell, Trace};
 use crate::record::Row;
 
-/// A recording at 24 kHz that parks, runs, loses the rotor and stops. `noise` spreads its values.
+/// Writes a recording at 24 kHz that parks, runs, loses the rotor and stops. `noise` spreads its
+/// values.
 fn recording(path: &Path, periods: u32, noise: f64) {
     let mut text = Row::COLUMNS.join(",") + "\n";
     for k in 0..periods {
@@ -34,7 +35,7 @@ fn recording(path: &Path, periods: u32, noise: f64) {
     std::fs::write(path, text).unwrap();
 }
 
-/// The texts of the SVG that a recording gives, and the SVG's length.
+/// Returns the texts of a recording's SVG, and the SVG's length.
 fn svg(name: &str, periods: u32, noise: f64) -> (Vec<String>, usize) {
     let folder = tempfile::tempdir().unwrap();
     let (record, picture) = (folder.path().join(name), folder.path().join("picture.svg"));

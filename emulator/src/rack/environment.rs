@@ -1,33 +1,33 @@
-//! What changes around a rack's ESCs.
+//! Changes around a rack's ESCs.
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
-/// What changes around the ESCs; `None` leaves it as it is.
+/// Changes around the ESCs; `None` leaves a quantity unchanged.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Environment {
-    /// Voltage of the supply without load, V, 0 to 100: in place of a battery's, which then is never empty.
+    /// Open-circuit voltage of the supply, V, 0 to 100: it replaces a battery's, which then never runs empty.
     pub supply_v: Option<f64>,
     /// Resistance of the supply, Ω, 0 to 100.
     pub supply_ohm: Option<f64>,
     /// Temperature of the air, °C, -60 to 150.
     pub ambient_c: Option<f64>,
-    /// For each ESC in turn, from the first on.
+    /// One per ESC, in order from the first.
     pub shafts: Vec<Shaft>,
 }
 
-/// What acts on one ESC's shaft beside its load; `None` leaves it as it is.
+/// What acts on one ESC's shaft besides its load; `None` leaves it unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shaft {
     /// Torque, Nm, ±100; positive turns it with the phases in the order a, b, c.
     pub torque_nm: Option<f64>,
-    /// Air speed, as the speed at which it would turn the propeller by itself, rpm, ±100 000.
+    /// Air speed, as the speed at which it would turn a free propeller, rpm, ±100 000.
     pub wind_rpm: Option<f64>,
 }
 
-/// A quantity that nothing can be given.
+/// A quantity out of range.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{what} = {value} is out of range; give {} to {}", range.start(), range.end())]
 pub struct OutOfRange {
@@ -37,7 +37,7 @@ pub struct OutOfRange {
 }
 
 impl Environment {
-    /// Whether everything in it is in its range.
+    /// Checks that everything in it is in range.
     ///
     /// # Errors
     /// The first quantity that is not.
@@ -53,7 +53,7 @@ impl Environment {
 }
 
 impl Shaft {
-    /// The air speed, rad/s.
+    /// Returns the air speed, rad/s.
     pub(super) fn wind_rad_s(&self) -> Option<f64> {
         self.wind_rpm.map(|rpm| rpm * TAU / 60.0)
     }

@@ -1,4 +1,4 @@
-//! Which ESC of a rack tells of which by MAVLink.
+//! Which ESC of a rack reports which others by MAVLink.
 
 use siskin_control::mavlink::Four;
 
@@ -7,15 +7,15 @@ use crate::device::Device;
 /// An ESC's part in the messages for four.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Part {
-    /// It tells of itself.
+    /// It reports itself.
     Alone,
-    /// Another tells of it.
+    /// Another reports it.
     Follows,
-    /// It tells of those in these slots, of so many ESCs in the vehicle.
+    /// It reports those in these slots, and the number of ESCs in the vehicle.
     Leads([Option<usize>; 4], u8),
 }
 
-/// The parts of all: of those whose component ids number them, the lowest of each group of four leads.
+/// Returns the parts of all: of those numbered by their component ids, the lowest of each group of four leads.
 pub(super) fn parts(escs: &[Device]) -> Vec<Part> {
     if escs.len() < 2 {
         return vec![Part::Alone; escs.len()];
@@ -39,7 +39,7 @@ pub(super) fn parts(escs: &[Device]) -> Vec<Part> {
     numbers.iter().map(part).collect()
 }
 
-/// What one that leads tells, with its ESCs as they are now.
+/// Returns what a leading ESC reports, with the present state of its ESCs.
 pub(super) fn four(escs: &[Device], slots: [Option<usize>; 4], count: u8) -> Four {
     Four {
         escs: slots.map(|esc| esc.map(|esc| *escs[esc].esc().telemetry())),

@@ -1,4 +1,4 @@
-//! The answers of a rack's ESCs, kept as they pass an onlooker.
+//! Keeps the answers of a rack's ESCs as they pass to an onlooker.
 
 use siskin_control::drive::Limits;
 
@@ -7,18 +7,18 @@ use crate::plant::Gate;
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
 
-/// What an ESC has put on its throttle wire or its serial line.
+/// What an ESC has sent on its throttle wire or its serial line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// The ESC, from 0.
     pub esc: usize,
-    /// When the frame began that is answered, ns, by the ESC's timer.
+    /// When the answered frame began, ns, by the ESC's timer.
     pub asked_ns: u64,
-    /// A datagram of the throttle wire.
+    /// A throttle-wire datagram.
     pub datagram: Vec<u8>,
 }
 
-/// An onlooker beside which an ESC's answers are kept.
+/// Wraps an onlooker and keeps an ESC's answers.
 pub(super) struct Heard<'a, O> {
     pub(super) onlooker: &'a mut O,
     pub(super) answers: &'a mut Vec<Answer>,

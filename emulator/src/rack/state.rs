@@ -1,4 +1,4 @@
-//! What is told of an ESC of a rack to a simulator around it.
+//! The state of a rack's ESC, for a simulator around it.
 
 use std::f64::consts::TAU;
 
@@ -7,30 +7,30 @@ use siskin_control::drive::{Faults, Phase};
 use crate::device::Device;
 use crate::surroundings::Motion;
 
-/// An ESC and its motor as they are at the beginning of its next control period.
+/// An ESC and its motor at the start of its next control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EscState {
     /// Speed of the shaft, rpm; positive with the phases in the order a, b, c.
     pub rpm: f64,
     /// Electrical angle of the rotor, turns, 0..1.
     pub angle_turns: f64,
-    /// Electromagnetic torque over the latest advance, Nm, mean.
+    /// Mean electromagnetic torque over the latest advance, Nm.
     pub torque_nm: f64,
     /// Currents into the phases, A.
     pub currents_a: [f64; 3],
-    /// Current from the supply over the latest advance, A, mean.
+    /// Mean current from the supply over the latest advance, A.
     pub bus_a: f64,
     /// Voltage of the supply, V.
     pub bus_v: f64,
     /// Temperature of the board, °C.
     pub board_c: f64,
-    /// What the ESC itself takes these for.
+    /// The ESC's own values for these.
     pub reported: Reported,
     /// Faults that hold the bridge off.
     pub faults: Faults,
     /// Whether throttle may turn the motor.
     pub armed: bool,
-    /// What the drive does.
+    /// The drive's phase.
     pub phase: Phase,
 }
 
@@ -72,7 +72,7 @@ impl Means {
     }
 }
 
-/// The state of an ESC.
+/// Returns the state of an ESC.
 pub(super) fn state(esc: &Device, means: &Means) -> EscState {
     let (rig, telemetry) = (esc.rig(), esc.esc().telemetry());
     let (plant, snapshot) = (rig.plant(), rig.snapshot());

@@ -1,4 +1,4 @@
-//! Text, one line a control period.
+//! Text, one line per control period.
 
 use std::fs::File;
 use std::io;

@@ -1,7 +1,7 @@
 //! Recordings of a run, for other programs.
 //!
 //! The extension of the path selects the format: `.csv` and `.parquet` hold the columns of [`Row`],
-//! one line a control period; `.vcd` the wires of the bridge, of the throttle and of the Hall
+//! one line per control period; `.vcd` the wires of the bridge, of the throttle and of the Hall
 //! sensors with every edge; `.tlog` the MAVLink frames of both directions.
 
 mod csv;
@@ -31,8 +31,8 @@ use sink::Sink;
 
 pub use row::Row;
 
-/// When an offline run begins by the clock of its log: 2020-01-01 00:00 UTC, so that equal runs
-/// give equal files.
+/// Start of an offline run by the clock of its log: 2020-01-01 00:00 UTC, so that equal runs give
+/// equal files.
 const OFFLINE_START: Duration = Duration::from_secs(1_577_836_800);
 
 /// Why there is no recording.
@@ -43,7 +43,7 @@ pub enum RecordError {
         "cannot record to {}: the name must end in .csv, .parquet, .vcd or .tlog", .0.display()
     )]
     Extension(PathBuf),
-    /// No format of a table has it.
+    /// No table format has this extension.
     #[error("--table {}: the name must end in .csv or .parquet", .0.display())]
     Table(PathBuf),
     /// The format is not in this build.
@@ -59,7 +59,7 @@ pub enum RecordError {
     },
 }
 
-/// What to do where a build cannot write or read Parquet.
+/// What to do if a build cannot write or read Parquet.
 pub(crate) const NO_PARQUET: &str = "this build has no Parquet; build it with --features parquet";
 
 /// Writes a recording.
@@ -69,15 +69,15 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A new recording at `path` of a run offline; what stood there is lost.
+    /// Creates a recording of an offline run at `path`, overwriting what is there.
     ///
     /// # Errors
-    /// An extension without a format, or a file that cannot be written.
+    /// The extension has no format, or the file cannot be written.
     pub fn create(path: &Path) -> Result<Self, RecordError> {
         Self::from(path, OFFLINE_START)
     }
 
-    /// The same of a run that begins now.
+    /// Creates one of a run that begins now.
     ///
     /// # Errors
     /// Likewise.
@@ -87,7 +87,7 @@ impl Recorder {
         Self::from(path, now.unwrap_or(OFFLINE_START))
     }
 
-    /// A recording of a run that begins so long after 1970.
+    /// Creates a recording of a run that begins at `start` after 1970.
     fn from(path: &Path, start: Duration) -> Result<Self, RecordError> {
         let error = |source| RecordError::Write {
             path: path.to_owned(),
@@ -117,7 +117,7 @@ impl Recorder {
         })
     }
 
-    /// Takes in the control period that began at `t_s`, and what the control made of it.
+    /// Records the control period that began at `t_s`, and the control's response.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -126,16 +126,16 @@ impl Recorder {
         written.map_err(|source| self.error(source))
     }
 
-    /// Takes in the period of the PWM that began at `t_s`, of a machine whose control nobody sees.
+    /// Records the PWM period that began at `t_s`, of a machine whose control is not visible.
     ///
     /// # Errors
-    /// The file cannot be written, or wants the control.
+    /// The file cannot be written, or needs the control.
     pub fn passage(&mut self, t_s: f64, passage: &Passage) -> Result<(), RecordError> {
         let written = self.sink.passage(t_s, passage);
         written.map_err(|source| self.error(source))
     }
 
-    /// Takes in a change of a leg's gates, later than the start of the next such period to be told.
+    /// Records a change of a leg's gates, after the start of the next such period reported.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -144,7 +144,7 @@ impl Recorder {
         written.map_err(|source| self.error(source))
     }
 
-    /// Takes in a change of the throttle wire, earlier than the next period.
+    /// Records a change of the throttle wire, before the next period.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -153,7 +153,7 @@ impl Recorder {
         written.map_err(|source| self.error(source))
     }
 
-    /// Takes in a whole MAVLink frame, sent or received.
+    /// Records a whole MAVLink frame, sent or received.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -1,5 +1,5 @@
-//! Apache Parquet: the columns of the CSV, packed, for pandas, Polars and DuckDB. The unit of each
-//! column stands in the file's metadata as `unit.COLUMN`.
+//! Apache Parquet: the columns of the CSV, packed, for pandas, Polars and DuckDB. Each column's
+//! unit is in the file's metadata as `unit.COLUMN`.
 
 use std::fs::File;
 use std::io;
@@ -25,7 +25,7 @@ use super::sink::Sink;
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
 
-/// Rows that are kept in memory and written together: less than 10 MB.
+/// Rows buffered and written together: less than 10 MB.
 const GROUP_ROWS: usize = 65_536;
 
 /// How a column is stored, and where its values are in a row.
@@ -35,13 +35,13 @@ enum Column {
     Phase,
     Faults,
     Single(fn(&Row) -> f32),
-    /// Of the control, which every recording in this format has.
+    /// From the control, which every recording in this format has.
     Inside(fn(&Row) -> Option<f32>),
     Optional(fn(&Row) -> Option<f32>),
 }
 use Column::{Double, Inside, Optional, Single};
 
-/// The columns of [`Row`] in their order, each with its unit.
+/// The columns of [`Row`] in order, each with its unit.
 const COLUMNS: [(&str, &str, Column); Row::COLUMNS.len()] = [
     ("t_s", "s", Double(|row| row.t_s)),
     ("phase", "", Column::Phase),
@@ -194,10 +194,10 @@ fn schema() -> String {
     format!("message siskin {{ {} }}", columns.join(" "))
 }
 
-/// The rows of the recording at `path`. What is wrong with one is a reason in one line.
+/// Reads the rows of the recording at `path`. An error of a row is a reason in one line.
 ///
 /// # Errors
-/// A file that cannot be read, is no Parquet or lacks a column.
+/// The file cannot be read, is not Parquet or lacks a column.
 pub(crate) fn read(
     path: &Path,
 ) -> Result<impl Iterator<Item = Result<Row, String>> + use<>, ReadError> {
@@ -220,7 +220,7 @@ pub(crate) fn read(
 pub(crate) enum ReadError {
     /// The file itself.
     Io(io::Error),
-    /// What is in it, in one line.
+    /// Its contents; the reason in one line.
     Content(String),
 }
 

@@ -9,14 +9,13 @@ use crate::rig::{Period, Rig};
 use crate::shaft::Units;
 use crate::surroundings::Motion;
 
-/// One control period. The fields are the columns, in this order, with the unit as the last part
-/// of the name. Single precision holds more than any sensor, and halves the file. What is of the control
-/// is empty where nobody sees it.
+/// One control period. The fields are the columns, in this order, with the unit as the last part of the name. Single
+/// precision exceeds any sensor's, and halves the file. Columns from the control are empty if it is not visible.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Start of the period, s, to the nanosecond.
     pub t_s: f64,
-    /// What the drive is doing, in small letters.
+    /// What the drive is doing, in lower case.
     #[serde(with = "spelt")]
     pub phase: Option<Phase>,
     /// Faults that hold the bridge off, one bit each.
@@ -39,30 +38,30 @@ pub struct Row {
     pub i_b_a: f32,
     /// True current into phase c.
     pub i_c_a: f32,
-    /// Measured current along the estimated rotor's axis.
+    /// Measured current along the estimated rotor axis.
     pub i_d_a: Option<f32>,
-    /// Measured current across it.
+    /// Measured current a quarter turn ahead of it.
     pub i_q_a: Option<f32>,
-    /// Commanded voltage along the estimated rotor's axis.
+    /// Commanded voltage along the estimated rotor axis.
     pub u_d_v: Option<f32>,
-    /// Commanded voltage across it.
+    /// Commanded voltage a quarter turn ahead of it.
     pub u_q_v: Option<f32>,
-    /// Share of the period for which phase a is high; empty while all switches are off, and while
-    /// the low sides only charge the drivers.
+    /// Share of the period for which phase a is high; empty while all switches are off, and while the low sides only
+    /// charge the drivers.
     pub duty_a: Option<f32>,
-    /// Likewise of phase b.
+    /// Likewise for phase b.
     pub duty_b: Option<f32>,
-    /// Likewise of phase c.
+    /// Likewise for phase c.
     pub duty_c: Option<f32>,
-    /// True voltage of the supply.
+    /// True supply voltage.
     pub bus_v: f32,
     /// True current from the supply.
     pub bus_a: f32,
-    /// Electromagnetic torque, the mean over the period.
+    /// Electromagnetic torque, mean over the period.
     pub torque_nm: f32,
 }
 
-/// [`Phase`] as a recording spells it.
+/// [`Phase`] as spelt in a recording.
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Phase", rename_all = "lowercase")]
 enum PhaseName {
@@ -125,14 +124,14 @@ impl Row {
         "torque_nm",
     ];
 
-    /// The phase as a recording spells it.
+    /// Returns the phase as spelt in a recording.
     #[cfg(feature = "parquet")]
     pub(super) fn phase_name(&self) -> Option<String> {
         let phase = self.phase?;
         Some(format!("{phase:?}").to_lowercase())
     }
 
-    /// The phase that a recording spells so.
+    /// Returns the phase with this spelling.
     #[cfg(feature = "parquet")]
     pub(super) fn phase_named<'a, D: Deserializer<'a>>(name: D) -> Result<Phase, D::Error> {
         PhaseName::deserialize(name)
@@ -141,8 +140,8 @@ impl Row {
     /// Bytes of a packed row.
     pub const PACKED_BYTES: usize = 8 + 1 + 1 + 4 * (Self::COLUMNS.len() - 3);
 
-    /// Adds the row's bytes: its columns in their order, little-endian without gaps, as f64, phase and faults as one
-    /// byte each, and the others as f32. The phase is the number of [`Phase`], and 255 is for nothing, as NaN is.
+    /// Appends the row's bytes: its columns in order, little-endian without gaps, time as f64, phase and faults as one
+    /// byte each, and the others as f32. The phase is the number of [`Phase`]; 255 means none, as does NaN.
     pub fn pack(&self, out: &mut Vec<u8>) {
         out.extend(self.t_s.to_le_bytes());
         out.extend([
@@ -175,13 +174,13 @@ impl Row {
         }
     }
 
-    /// The period that began at `t_s`, and what the control of the rig made of it.
+    /// Returns the row of the period that began at `t_s`, and the control's response in the rig.
     pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Self {
         let (snapshot, units) = (&rig.snapshot(), Units::of(rig.config()));
         Self::seen(t_s, (period.bridge, &period.motion), (snapshot, units))
     }
 
-    /// The same of what was kept of it.
+    /// Returns the same from what was kept of it.
     pub fn seen(
         t_s: f64,
         (bridge, motion): (Bridge, &Motion),
@@ -213,7 +212,7 @@ impl Row {
         }
     }
 
-    /// The period that began at `t_s`, of a machine whose control nobody sees.
+    /// Returns the row of the period that began at `t_s`, of a machine whose control is not visible.
     pub fn outside(t_s: f64, motion: &Motion) -> Self {
         let [i_a_a, i_b_a, i_c_a] = motion.currents_a.map(|current_a| current_a as f32);
         Self {

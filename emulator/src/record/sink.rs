@@ -1,4 +1,4 @@
-//! What a format of recordings is handed.
+//! The interface of a recording format.
 
 use std::io;
 
@@ -6,7 +6,7 @@ use crate::plant::Gate;
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
 
-/// A format: it takes what it has a place for.
+/// A format: it takes what it can represent.
 pub(super) trait Sink {
     fn period(&mut self, _t_s: f64, _period: &Period, _rig: &Rig) -> io::Result<()> {
         Ok(())

@@ -26,7 +26,7 @@ fn rig() -> Rig {
     Rig::new(bench, config)
 }
 
-/// Plays a start, with `also` before each period's recording, and gives what was recorded.
+/// Plays a start, calling `also` before each period is recorded, and returns what was recorded.
 fn play(
     recorder: &mut Recorder,
     periods: u32,
@@ -122,7 +122,7 @@ fn a_parquet_gives_back_each_period_with_its_units() {
     let names: Vec<_> = columns.iter().map(|column| column.name()).collect();
     assert_eq!(names, Row::COLUMNS);
     for pair in metadata.key_value_metadata().unwrap() {
-        // A name ends with its unit, but for the phase's letter of a duty.
+        // A name ends with its unit, except for the phase's letter of a duty.
         let Some(name) = pair.key.strip_prefix("unit.") else {
             continue;
         };
@@ -166,7 +166,7 @@ fn both_tables_give_the_same_picture() {
     );
 }
 
-/// Each wire's changes with their times, ns.
+/// Returns each wire's changes with their times, ns.
 fn wires(path: &Path) -> BTreeMap<String, Vec<(u64, u8)>> {
     let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
     let mut parser = vcd::Parser::new(file);
@@ -205,13 +205,13 @@ fn wires(path: &Path) -> BTreeMap<String, Vec<(u64, u8)>> {
     wires
 }
 
-/// A wire's value at a time.
+/// Returns a wire's value at a time.
 fn at(changes: &[(u64, u8)], time_ns: u64) -> u8 {
     let next = changes.partition_point(|(change_ns, _)| *change_ns <= time_ns);
     changes[next - 1].1
 }
 
-/// How long a wire is high from one time to another, ns.
+/// Returns how long a wire is high from one time to another, ns.
 fn high_ns(changes: &[(u64, u8)], from_ns: u64, to_ns: u64) -> u64 {
     let within = changes.iter().map(|change| change.0);
     let within = within.filter(|change_ns| (from_ns..to_ns).contains(change_ns));
@@ -229,7 +229,7 @@ fn a_dump_has_the_bridge_and_the_throttle_to_the_nanosecond() {
     let mut recorder = Recorder::create(&path).unwrap();
     let mut sent = vec![(0, 0)];
     let written = play(&mut recorder, 6000, |recorder, now_ns| {
-        // As the device does: the edges since the period before.
+        // As the device does: the edges since the previous period.
         for back_ns in [20_011, 7_002] {
             if now_ns > 40_000 {
                 let level = 1 - sent[sent.len() - 1].1;
@@ -301,7 +301,7 @@ fn a_log_has_each_frame_after_its_time() {
     recorder.frame(2_000_000_000, b"second").unwrap();
     recorder.finish().unwrap();
     let mut expected = Vec::new();
-    // Microseconds since 1970 without the two bits of the link, from 2020 on.
+    // Microseconds since 1970 without the two link bits, from 2020 on.
     for (time_us, frame) in [
         (1_577_836_801_234_564_u64, &b"first"[..]),
         (1_577_836_802_000_000, b"second"),
@@ -312,7 +312,7 @@ fn a_log_has_each_frame_after_its_time() {
     assert_eq!(std::fs::read(&path).unwrap(), expected);
 }
 
-/// A log is handed on to others.
+/// Logs are passed on to others.
 #[test]
 fn a_log_has_no_key_of_signatures() {
     let folder = tempfile::tempdir().unwrap();
@@ -347,8 +347,8 @@ fn what_cannot_be_recorded_is_one_line_with_the_path() {
     assert!(error("run.parquet").contains("--features parquet"));
 }
 
-/// A machine whose control nobody sees leaves the control's columns empty and its wires unknown, and the
-/// figures of the motor are there all the same.
+/// A machine whose control is not visible leaves the control's columns empty and its wires unknown, but has the figures
+/// of the motor.
 #[test]
 fn without_the_control_the_motor_is_recorded() {
     let mut around = Surroundings::new(Bench {

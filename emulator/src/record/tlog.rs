@@ -1,5 +1,5 @@
-//! MAVLink frames as MAVProxy and Mission Planner keep them: before each the microseconds since
-//! 1970, eight bytes, the most significant first.
+//! MAVLink frames as MAVProxy and Mission Planner store them, each preceded by the microseconds since 1970 in eight
+//! bytes, most significant first.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -7,14 +7,14 @@ use std::time::Duration;
 
 use super::sink::Sink;
 
-/// The lowest bits of a time are the link's number to the readers; all frames here are of link 0.
+/// To readers the lowest bits of a time are the link number; all frames here are of link 0.
 const LINK_BITS: u64 = 3;
 
-/// Start and message of SETUP_SIGNING, 256, in the first ten bytes of a frame: MAVLink 1 does not have it.
+/// Start and message id, 256, of SETUP_SIGNING in the first ten bytes of a frame: MAVLink 1 lacks it.
 const STX: u8 = 0xFD;
 const SETUP_SIGNING: [u8; 3] = [0x00, 0x01, 0x00];
 
-/// A tlog file. The frames that carry a key of signatures are left out: logs are handed on.
+/// A tlog file. Frames that carry a signing key are left out: logs are passed on.
 pub(super) struct Tlog {
     file: BufWriter<File>,
     /// Start of the run since 1970; simulated time counts from there.

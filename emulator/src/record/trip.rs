@@ -1,7 +1,7 @@
-//! The control periods of a fault record as a recording's rows.
+//! The control periods of a fault record as rows of a recording.
 //!
-//! They are what the ESC saw: currents and voltages in the rotor's frame are worked out from the readings and the
-//! duties by its own estimate of the angle, and its speed stands for the true one.
+//! They show what the ESC saw: currents and voltages in the rotor's frame are computed from readings and duties with
+//! its own angle estimate, and its speed stands for the true one.
 
 use std::f64::consts::TAU;
 
@@ -10,10 +10,10 @@ use siskin_control::record::{PeriodSeen, Recorded};
 
 use super::Row;
 
-/// The rows of a record; none where no trip holds any periods.
+/// Returns the rows of a record; none if no trip holds any periods.
 pub(crate) fn rows(recorded: &Recorded) -> Vec<Row> {
     let of = |holder| recorded.faults.iter().find(|seen| seen.number == holder);
-    // The fault itself may have made room for later ones.
+    // The fault itself may have been overwritten by later ones.
     let seen = recorded.holder.and_then(of);
     let phase = seen.map(|seen| seen.phase);
     let mut faults = Faults::NONE;
@@ -62,7 +62,7 @@ fn row(seen: &PeriodSeen, phase: Option<Phase>) -> Row {
     }
 }
 
-/// Along and across an axis at this angle from that of phase a, with the amplitude of the phases.
+/// Returns the components along and across an axis at this angle from phase a's, with the phases' amplitude.
 fn dq([a, b, c]: [f32; 3], angle: f64) -> [f32; 2] {
     let alpha = f64::from(2.0 * a - b - c) / 3.0;
     let beta = f64::from(b - c) / 3.0_f64.sqrt();

@@ -1,7 +1,7 @@
-//! The wires as a logic analyser shows them: a value change dump with a resolution of 1 ns.
+//! The wires as on a logic analyser: a value change dump with a resolution of 1 ns.
 //!
-//! GTKWave and PulseView read it. PulseView samples at the resolution: for more than some tenths of
-//! a second, open it with a downsample factor of 10 or 100.
+//! GTKWave and PulseView read it. PulseView samples at that resolution: for more than some tenths
+//! of a second, open it with a downsample factor of 10 or 100.
 
 use std::fs::File;
 use std::io::{self, BufWriter};
@@ -14,15 +14,15 @@ use crate::plant::{Gate, Gates};
 use crate::rig::{Period, Rig};
 use crate::surroundings::Passage;
 
-// The places of the wires.
+// Indices of the wires.
 const BRIDGE: usize = 0;
 const SIGNAL: usize = 6;
 const HALL: usize = 7;
 const PHASE: usize = 10;
 const FAULT: usize = PHASE + Phase::ALL.len();
 
-/// The scopes with their wires, in the order of their places. Each phase and each fault has a wire:
-/// older PulseViews leave out what has several bits, and none shows text.
+/// Returns the scopes with their wires, in index order. Each phase and each fault has a wire: older
+/// PulseViews drop multi-bit signals, and none shows text.
 fn wires() -> [(&'static str, Vec<String>); 5] {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
     let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
@@ -51,7 +51,7 @@ pub(super) struct Vcd {
     codes: Vec<IdCode>,
     levels: Vec<Option<bool>>,
     gates: Gates,
-    /// Not written yet: the throttle wire's edges come later than those of the bridge about them.
+    /// Not written yet: the throttle wire's edges arrive later than the bridge's around them.
     waiting: Vec<Change>,
     written_ns: Option<u64>,
     end_ns: u64,
@@ -96,7 +96,7 @@ impl Vcd {
         let known = self
             .waiting
             .partition_point(|change| change.time_ns < end_ns);
-        // Of changes at one time the last counts: a half that ends with a switch off and the next
+        // Of simultaneous changes the last counts: a half that ends with a switch off and the next
         // that begins with it on is no change.
         let mut changes = self.waiting.drain(..known).peekable();
         while let Some(change) = changes.next() {

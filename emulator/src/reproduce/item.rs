@@ -1,4 +1,4 @@
-//! A paper's figures, each beside what was measured, and how they are printed.
+//! A paper's figures, each with what was measured, and how they are printed.
 
 use std::fmt;
 
@@ -7,10 +7,10 @@ use serde::Serialize;
 use super::verdict::{Comparison, Verdict};
 use crate::plot::chart::Figure;
 
-/// A paper's figures beside those measured here.
+/// A paper's figures and those measured here.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reproduction {
-    /// In the order of the paper.
+    /// In the paper's order.
     pub items: Vec<Item>,
     /// The paper's pictures, drawn from the same measurements.
     #[serde(skip)]
@@ -20,9 +20,9 @@ pub struct Reproduction {
 /// One figure.
 #[derive(Clone, Debug, Serialize)]
 pub struct Item {
-    /// What it is called.
+    /// Its name.
     pub name: String,
-    /// What the paper says or its formula gives.
+    /// The paper's value, or that of its formula.
     pub paper: Option<f64>,
     /// What was measured.
     pub measured: Option<f64>,
@@ -30,12 +30,13 @@ pub struct Item {
     pub unit: &'static str,
     /// What they are, in a line.
     pub note: String,
-    /// Whether that is the same, within which bound and why.
+    /// Whether they agree, within which bound and why.
     #[serde(flatten)]
     pub comparison: Comparison,
 }
 
-/// What the paper says or its formula gives, beside what was measured; what is not finite was not.
+/// Creates an item from the paper's value, or its formula's, and the measurement; a non-finite
+/// value counts as not measured.
 pub(super) fn item(
     name: impl Into<String>,
     paper: Option<f64>,
@@ -91,7 +92,8 @@ impl fmt::Display for Reproduction {
 }
 
 impl Reproduction {
-    /// Why each bound is as it is where an item does not keep it: items of one kind have one reason.
+    /// Prints the reason for the bound of each item that misses it: items of one kind share a
+    /// reason.
     fn differences(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let differs = |item: &&Item| item.comparison.verdict == Verdict::Differs;
         let differing: Vec<&Item> = self.items.iter().filter(differs).collect();

@@ -1,46 +1,46 @@
-//! Whether what was measured is what the paper has: within which bound, and why that one.
+//! Judges whether a measurement agrees with the paper: within which bound, and why.
 //!
-//! A bound follows from how the paper comes to its figure, not from what came out here.
+//! A bound follows from how the paper derives its figure, not from the result here.
 
 use serde::Serialize;
 
-/// What a comparison comes to.
+/// The outcome of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// It is within its bound.
     Agrees,
-    /// It is not.
+    /// It is outside.
     Differs,
-    /// The paper has nothing to compare it with, or nothing was measured.
+    /// The paper has nothing to compare with, or nothing was measured.
     Open,
 }
 
 /// A comparison with the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What it comes to.
+    /// Its outcome.
     pub verdict: Verdict,
-    /// Between which values, both included, what is measured agrees, in the item's unit.
+    /// Range of agreement, both ends included, in the item's unit.
     pub bound: Option<[f64; 2]>,
-    /// Why these, and what is known of a difference.
+    /// Why this range, and what is known of a difference.
     pub reason: &'static str,
 }
 
-/// How far from the paper's figure is near enough.
+/// How close to the paper's figure is close enough.
 #[derive(Clone, Copy, Debug)]
 enum Bound {
-    /// So much of it to either side.
+    /// This share of it to either side.
     Share(f64),
-    /// So much to either side, in the item's unit.
+    /// This much to either side, in the item's unit.
     Within(f64),
-    /// From zero up to it: it is a limit itself.
+    /// From zero up to it: it is itself a limit.
     AtMost,
 }
 
 use Bound::{AtMost, Share, Within};
 
-/// What the items' names begin with, the first that fits.
+/// What the items' names begin with; the first match counts.
 const RULES: &[(&str, Bound, &str)] = &[
     (
         "copper_loss_ratio",

@@ -1,9 +1,9 @@
-//! A course of values over time, from a CSV file.
+//! Values over time, from a CSV file.
 
-/// The greatest magnitude of a number: what is computed from two of them stays finite.
+/// The greatest magnitude of a number: anything computed from two of them stays finite.
 pub(super) const NUMBER_MAX: f64 = 1e9;
 
-/// Values at rising times, joined by straight lines. The first holds before, the last after.
+/// Values at rising times, interpolated linearly. The first holds before, the last after.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Course {
     /// Times, s, and the values at them.
@@ -11,7 +11,7 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// The course in a CSV text: seconds and a value on each line, below a header or none.
+    /// Parses a CSV text: seconds and a value on each line, with or without a header.
     pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
@@ -45,7 +45,7 @@ impl Course {
         Ok(Self { points })
     }
 
-    /// The value at a time, s.
+    /// Returns the value at a time, s.
     pub(super) fn at(&self, t_s: f64) -> f64 {
         let next = self.points.partition_point(|point| point.0 <= t_s);
         match (
@@ -61,7 +61,7 @@ impl Course {
     }
 }
 
-/// A cell that is a number of which a scenario can have use.
+/// Parses a cell as a number that a scenario can use.
 fn number(cell: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(cell).ok()?;
     let number = text.parse().ok();

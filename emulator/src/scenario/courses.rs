@@ -1,4 +1,4 @@
-//! The files of courses that a scenario's signals name.
+//! The course files that a scenario's signals name.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,16 +8,16 @@ use super::course::Course;
 use super::error::ScenarioError;
 use super::file::Scenario;
 
-/// Courses that have been read, each once for all runs.
+/// Courses already read, each once for all runs.
 #[derive(Debug)]
 pub(super) struct Courses {
-    /// The scenario's folder, where relative paths begin.
+    /// The scenario's folder, to which paths are relative.
     folder: PathBuf,
     read: Mutex<BTreeMap<PathBuf, Arc<Course>>>,
 }
 
 impl Courses {
-    /// Courses of a scenario in this folder.
+    /// Creates the courses of a scenario in this folder.
     pub(super) fn in_folder(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -25,7 +25,7 @@ impl Courses {
         }
     }
 
-    /// Gives each signal that names a file what is in it.
+    /// Gives each signal that names a file its contents.
     pub(super) fn fill(&self, scenario: &mut Scenario) -> Result<(), ScenarioError> {
         for (index, signal) in scenario.signal.iter_mut().enumerate() {
             if let Some(path) = &signal.path {

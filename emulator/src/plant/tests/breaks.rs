@@ -5,7 +5,7 @@ use super::*;
 const LOW: usize = 0;
 const HIGH: usize = 1;
 
-/// Phase b's leg with this broken.
+/// Returns breaks of phase b's leg.
 fn broken(leg: LegBreaks) -> Breaks {
     Breaks([LegBreaks::default(), leg, LegBreaks::default()])
 }
@@ -29,7 +29,7 @@ fn shorted(switch: usize) -> Breaks {
     broken(leg)
 }
 
-/// Drive with what is broken, without comparators.
+/// Drives with broken parts, without comparators.
 fn compare_broken(
     fidelity: Fidelity,
     rpm: f64,
@@ -94,7 +94,7 @@ fn a_divider_of_two_switches_is_as_by_brute_force() {
         for (a, b) in plant.currents_a().into_iter().zip(brute.currents_a()) {
             assert!((a - b).abs() < 1e-3, "{a} A for {b} A");
         }
-        // 24 V over two switches of 3 mΩ for 0.3 of the period, less a dead time, goes past the motor.
+        // 24 V over two switches of 3 mΩ for 0.3 of the period, less a dead time, bypasses the motor.
         let past_a = 4000.0 * (0.3 - DEAD_TIME_S / PERIOD_S);
         let bus_a = ours.bus_a - past_a;
         assert!(
@@ -147,7 +147,7 @@ fn a_shoot_through_trips_the_comparator() {
         plant.period([Bridge::Off; 2], 24.0, PERIOD_S, DEAD_TIME_S);
         assert!(!plant.tripped());
 
-        // Without a comparator a shunt shows it where the low sides are on at the sample.
+        // Without a comparator a shunt shows it if the low sides are on at the sample.
         plant.set_comparator_a(f64::INFINITY);
         plant.break_legs(&shorted(switch));
         plant.period(command, 24.0, PERIOD_S, DEAD_TIME_S);

@@ -33,7 +33,7 @@ enum On {
     At(f64),
 }
 
-/// What the timer wants of a leg, and for how many steps it has.
+/// What the timer wants of a leg, and for how many steps it has wanted it.
 #[derive(Clone, Copy)]
 struct Leg {
     wanted: Option<bool>,
@@ -69,7 +69,7 @@ impl BruteForce {
         self.i
     }
 
-    /// A period, and its means by the rectangular rule about the middle of each step.
+    /// Runs a period; returns its means by the midpoint rule.
     pub(super) fn period(&mut self, halves: [Bridge; 2], bus_v: f64, period_s: f64) -> Flow {
         let steps = (period_s / STEP_S).round() as i64;
         let mut sum = Flow::default();
@@ -77,7 +77,7 @@ impl BruteForce {
             sum.most_a = self.i.iter().fold(sum.most_a, |most, i| most.max(i.abs()));
             let share = (step as f64 + 0.5) / steps as f64;
             let bridge = halves[usize::from(share > 0.5)];
-            // 0 at the samples, 1 in the middle of the period; the counter is half a dead time ahead.
+            // 0 at the samples, 1 in the middle of the period; the counter leads by half a dead time.
             let height = |share: f64| 1.0 - (2.0 * share - 1.0).abs();
             let ahead = 0.5 * self.dead_steps as f64 / steps as f64;
             let heights = (height(share), height(share + ahead));
@@ -103,7 +103,7 @@ impl BruteForce {
         }
     }
 
-    /// The switch that is on: as wanted, once it has been so for the dead time.
+    /// Returns the switch that is on: the wanted one, once wanted for the dead time.
     fn gate(&mut self, leg: usize, wanted: Option<bool>) -> Option<bool> {
         let state = &mut self.legs[leg];
         if state.wanted != wanted {
@@ -116,7 +116,7 @@ impl BruteForce {
         if dead { None } else { wanted }
     }
 
-    /// What becomes of a gate's wish.
+    /// Returns the effect of a gate's state.
     fn switches(&self, leg: usize, gate: Option<bool>) -> On {
         let breaks = self.breaks.0[leg];
         let [low, high] = [false, true].map(|high| {
@@ -135,7 +135,7 @@ impl BruteForce {
             .map(|wave| self.omega * self.motor.flux_wb * wave)
     }
 
-    /// The voltages that the rotor induces, over ωφ.
+    /// Returns the back-EMFs over ωφ.
     fn waves(&self, angle: f64) -> [f64; 3] {
         [0.0, 1.0, 2.0].map(|phase| {
             let angle = angle - phase * TAU / 3.0;
@@ -146,7 +146,7 @@ impl BruteForce {
         })
     }
 
-    /// Voltages of the connected terminals.
+    /// Returns the voltages of the connected terminals.
     fn terminals(&self, on: [On; 3], bus_v: f64) -> [Option<f64>; 3] {
         let emf = self.emf(self.angle);
         let mut v = [0, 1, 2].map(|leg| match on[leg] {
@@ -156,12 +156,12 @@ impl BruteForce {
             On::None | On::Cut => None,
         });
         let wired = || (0..3).filter(|leg| on[*leg] != On::Cut);
-        // Every star voltage at which a floating leg conducts is found by trying.
+        // Finds every star voltage at which a floating leg conducts by trying.
         for _ in 0..3 {
             let known: Vec<usize> = (0..3).filter(|leg| v[*leg].is_some()).collect();
             let star = match known.as_slice() {
                 [] => {
-                    // The pair with the greatest difference, if it beats the supply.
+                    // The pair with the greatest difference, if it exceeds the supply.
                     let at = |leg: &usize, other: &usize| emf[*leg].total_cmp(&emf[*other]);
                     let top = wired().max_by(at).unwrap_or(0);
                     let bottom = wired().min_by(at).unwrap_or(0);
@@ -195,7 +195,7 @@ impl BruteForce {
         v
     }
 
-    /// A step, or the part of it until a diode's current is zero; returns its length.
+    /// Runs a step, or its part until a diode's current is zero; returns its length.
     fn step(
         &mut self,
         on: [On; 3],
@@ -220,7 +220,7 @@ impl BruteForce {
                 }
             }
         }
-        // A diode stops its current at zero, in a straight line from where it was.
+        // A diode stops its current at zero, interpolated linearly.
         let zero = |leg: usize| before[leg] / (before[leg] - after[leg]);
         let stops = (0..3).filter(|leg| on[*leg] == On::None && before[*leg] * after[*leg] < 0.0);
         let first = stops.min_by(|a, b| zero(*a).total_cmp(&zero(*b)));
@@ -230,7 +230,7 @@ impl BruteForce {
         }
         if let Some(leg) = first {
             self.i[leg] = 0.0;
-            // Alone, none flows.
+            // A single one cannot flow.
             if (0..3).filter(|leg| self.i[*leg].abs() > 1e-9).count() < 2 {
                 self.i = [0.0; 3];
             }
@@ -258,8 +258,7 @@ impl BruteForce {
     }
 }
 
-/// The output that the timer gives a leg at these heights: of the time from the samples, and of its
-/// counter.
+/// Returns the timer's output for a leg at these heights: of the time from the samples, and of its counter.
 fn wanted(bridge: Bridge, leg: usize, (time, counter): (f64, f64)) -> Option<bool> {
     let above = |duty: Duty| duty >= Duty::ONE || counter > 1.0 - duty.to_num::<f64>();
     match bridge {

@@ -1,4 +1,4 @@
-//! What a real motor has beyond the ideal one.
+//! How a real motor departs from the ideal one.
 
 use super::*;
 
@@ -36,7 +36,7 @@ fn with_harmonics() -> Extras {
     }
 }
 
-/// An ideal motor that is solved numerically all the same: with a harmonic of no amplitude.
+/// An ideal motor solved numerically nonetheless: with a harmonic of zero amplitude.
 fn unheard() -> Extras {
     Extras {
         harmonics: vec![Harmonic {
@@ -93,7 +93,7 @@ fn the_numeric_solution_of_an_ideal_motor_is_the_closed_one() {
         let [ours, theirs] =
             flows.map(|f| [f.torque_nm, f.torque_square, f.motor_w, f.copper_w, f.bus_a]);
         for (ours, theirs) in ours.into_iter().zip(theirs) {
-            // The closed solution's own integrals of squares are good to 1e-4.
+            // The closed solution's own integrals of squares are accurate to 1e-4.
             assert!(
                 (ours - theirs).abs() < 1e-3 * theirs.abs() + 1e-4,
                 "{k}: {ours} {theirs}"
@@ -105,7 +105,7 @@ fn the_numeric_solution_of_an_ideal_motor_is_the_closed_one() {
     }
 }
 
-/// The torque of a whole period at once is that of its numeric solution's small steps.
+/// The torque of a whole period at once equals that of the numeric solution's small steps.
 #[test]
 fn a_mean_over_a_whole_period_makes_its_torque() {
     for rpm in [600.0, 4500.0, 7500.0, 12_000.0] {
@@ -143,8 +143,8 @@ fn energy_is_conserved_with_harmonics_drag_and_detents() {
     assert!(apart < 1e-6, "{apart}");
 }
 
-/// The numeric solution's error per step is 1e-7 of what decays in it and 3e-6 of a harmonic; the
-/// integrals' is of the same order, and their sum over a run averages out.
+/// The numeric solution's error per step is 1e-7 of what decays in it and 3e-6 of a harmonic; that of the integrals is
+/// of the same order, and averages out over a run.
 #[test]
 fn energy_is_conserved_in_a_salient_and_saturated_motor() {
     let extras = Extras {
@@ -219,7 +219,7 @@ fn a_hot_winding_takes_less_current() {
     for _ in 0..20_000 {
         flow = plant.period([step; 2], 24.0, PERIOD_S, 0.0);
     }
-    // At rest in the balance of heat: R·(1 + α·5 K/W·P) with P = 3/2·u²/R.
+    // At rest in thermal balance: R·(1 + α·5 K/W·P) with P = 3/2·u²/R.
     let excess_k = 5.0 * flow.copper_w;
     let winding_c = plant.winding_c().unwrap();
     assert!(
@@ -267,8 +267,8 @@ fn a_blocked_shaft_stands_until_it_is_let_go() {
 }
 
 proptest! {
-    /// As for the ideal motor, and with more of what flows than the period's means show: what a pulse
-    /// puts into the currents, and the diodes give back by the period's end.
+    /// As for the ideal motor, and with more of the flows than the period's means show: what a pulse puts into the
+    /// currents and the diodes return by the period's end.
     #[test]
     fn energy_is_conserved_through_any_commands_in_a_real_motor(
         commands in prop::collection::vec(any_bridge(), 1..20),
@@ -296,8 +296,8 @@ proptest! {
             let [a, b, c] = plant.currents_a();
             prop_assert!((a + b + c).abs() < 1e-9 && a.abs() < 1e4);
         }
-        // In one step of Runge and Kutta's from no current the balance is off by 0.04·(R/L·h)³ of what
-        // flows, and a step is at most a tenth of L/R.
+        // In one Runge-Kutta step from zero current the balance is off by 0.04·(R/L·h)³ of the flows, and a step is at
+        // most a tenth of L/R.
         prop_assert!(balance.abs() < 4e-5 * gross, "{balance} of {gross}");
     }
 }

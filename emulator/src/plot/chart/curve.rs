@@ -9,25 +9,25 @@ use super::{Curve, CurveLook};
 use crate::plot::canvas::{Area, Drawn};
 use crate::plot::style::{BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION};
 
-/// Length of a dash, and of the space after it.
+/// Length of a dash, and of the gap after it.
 pub(super) const DASH: (i32, i32) = (20, 14);
 /// Radius of a dot.
 pub(super) const DOT: i32 = 7;
 /// Width of the white rim that sets a curve off from a map.
 const RIM: u32 = 3;
-/// Width of the columns to which a dense line is reduced.
+/// Columns to which a dense line is reduced are this wide.
 const COLUMN: f64 = 3.0;
-/// Points for each column from which a line is dense.
+/// Points per column above which a line is dense.
 const DENSE: usize = 4;
-/// Dots that one curve shows at most, where they lie close.
+/// Most dots that one curve shows where they are close together.
 const DOTS: usize = 1200;
 
 const COLOURS: [RGBColor; 7] = [BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK];
 
 type Point = (f64, f64);
 
-/// The colours of a panel's curves. Where there is one dashed curve, or one of dots, for each
-/// line, they are pairs in the lines' order, and the second is a darker shade of the first.
+/// Assigns the colours of a panel's curves. If there is one dashed curve, or one of dots, per line,
+/// they pair up in the lines' order, and the second is a darker shade of the first.
 pub(super) fn colours(curves: &[Curve]) -> Vec<RGBColor> {
     let count = |look| curves.iter().filter(|curve| curve.look == look).count();
     let mut free = COLOURS.iter().cycle();
@@ -127,7 +127,8 @@ impl Curve {
                 } else if self.spread.is_empty() {
                     path(area, &line, style)?;
                 } else {
-                    // A noisy line in pieces would make a long recording's file half as large again.
+                    // A noisy line in pieces would make a long recording's file half as large
+                    // again.
                     area.draw(&PathElement::new(line, style))?;
                 }
             }
@@ -136,7 +137,7 @@ impl Curve {
     }
 }
 
-/// A piece of a line: its mean, with the span of the heights about it.
+/// A piece of a line: its mean, and the range of heights about it.
 #[derive(Clone, Copy)]
 struct Column {
     mean: Point,
@@ -144,7 +145,7 @@ struct Column {
     high: f64,
 }
 
-/// A line that goes to the right and is dense, reduced to columns of pixels.
+/// Reduces a dense line that runs to the right to columns of pixels.
 fn reduced(line: &[Column]) -> Option<Vec<Column>> {
     let column = |piece: &Column| (piece.mean.0 / COLUMN).floor();
     let span = column(line.last()?) - column(line.first()?) + 1.0;
@@ -181,7 +182,7 @@ fn path<B: DrawingBackend>(area: &Area<B>, line: &[(i32, i32)], style: ShapeStyl
     area.draw(&PathElement::new(&line[from..], style))
 }
 
-/// The parts of a line within the area, on whole pixels, each of two points or more.
+/// Returns the parts of a line within the area, on whole pixels, each of two points or more.
 fn clip(points: &[Point], size: Point) -> Vec<Vec<(i32, i32)>> {
     let mut lines: Vec<Vec<(i32, i32)>> = Vec::new();
     let mut leaves = true;
@@ -208,8 +209,8 @@ fn clip(points: &[Point], size: Point) -> Vec<Vec<(i32, i32)>> {
     lines
 }
 
-/// The shares of the way between two points at which it enters and leaves the area (Liang and
-/// Barsky's clipping).
+/// Returns where between two points the line enters and leaves the area, as shares of the way
+/// (Liang-Barsky clipping).
 fn inside(from: Point, to: Point, size: Point) -> Option<(f64, f64)> {
     let (mut enter, mut exit) = (0.0_f64, 1.0_f64);
     for (start, way, end) in [
@@ -229,7 +230,7 @@ fn inside(from: Point, to: Point, size: Point) -> Option<(f64, f64)> {
     (enter <= exit).then_some((enter, exit))
 }
 
-/// The dots within the area; of those that lie close, one.
+/// Returns the dots within the area; only one of those close together.
 fn dots(points: impl Iterator<Item = Point>, size: Point) -> Vec<(i32, i32)> {
     let within =
         |point: &Point| (0.0..=size.0).contains(&point.0) && (0.0..=size.1).contains(&point.1);

@@ -1,4 +1,4 @@
-//! A third quantity as colours, and the scale that tells what they stand for.
+//! A third quantity as colours, and the scale that explains them.
 
 use plotters::backend::DrawingBackend;
 use plotters::element::{PathElement, Rectangle};
@@ -11,7 +11,8 @@ use super::{Axis, Map};
 use crate::plot::canvas::{Area, Drawn};
 use crate::plot::style::{AXIS, text};
 
-/// Colours of the scale. Steps read like contours, and neighbours of one colour are one shape.
+/// Number of colours of the scale. Steps read like contours, and neighbours of one colour are one
+/// shape.
 const STEPS: usize = 24;
 /// Right of the axes: the space, the bar, its numbers and its name.
 pub(super) const WIDTH: u32 = 210;
@@ -21,7 +22,8 @@ const BAR: i32 = 34;
 const NUMBER: f64 = 48.0;
 
 impl Map {
-    /// The edges of the cells: half way between the places, and as far beyond the outer ones.
+    /// Returns the edges of the cells: half way between the places, and as far beyond the outer
+    /// ones.
     pub(super) fn edges(places: &[f64], scale: &Scale) -> Vec<f64> {
         let places: Vec<_> = places.iter().filter_map(|at| scale.place(*at)).collect();
         let (Some(first), Some(last)) = (places.first(), places.last()) else {
@@ -38,7 +40,7 @@ impl Map {
         edges
     }
 
-    /// The values that the colours span.
+    /// Returns the values that the colours span.
     pub(super) fn scale(&self) -> Scale {
         let values = self.rows.iter().flatten().copied();
         let axis = Axis {
@@ -81,8 +83,8 @@ impl Map {
         Ok(())
     }
 
-    /// Draws the scale of the colours at the right of the axes, which end at `left` and reach from
-    /// `top` to `bottom`.
+    /// Draws the colour scale to the right of the axes, which end at `left` and reach from `top` to
+    /// `bottom`.
     pub(super) fn key<B: DrawingBackend>(
         &self,
         area: &Area<B>,
@@ -117,7 +119,7 @@ impl Map {
     }
 }
 
-/// Whether numbers below each other on an axis of this height leave space between them.
+/// Returns true if stacked numbers on an axis of this height do not touch.
 pub(super) fn apart(numbers: &[(f64, String)], scale: &Scale, height: f64) -> bool {
     let shares = |pair: &[(f64, String)]| scale.share(pair[1].0) - scale.share(pair[0].0);
     numbers
@@ -125,13 +127,13 @@ pub(super) fn apart(numbers: &[(f64, String)], scale: &Scale, height: f64) -> bo
         .all(|pair| shares(pair) * height >= NUMBER)
 }
 
-/// Which of the colours stands for a value.
+/// Returns the index of a value's colour.
 fn step(value: f64, scale: &Scale) -> Option<usize> {
     let share = scale.share(scale.place(value)?);
     Some(((share * STEPS as f64) as usize).min(STEPS - 1))
 }
 
-/// Viridis, which is read alike by the colour-blind and in grey.
+/// Returns a colour of Viridis, which works for the colour-blind and in grey.
 fn colour(step: usize) -> RGBColor {
     ViridisRGB.get_color((step as f64 + 0.5) / STEPS as f64)
 }

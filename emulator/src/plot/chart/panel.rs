@@ -25,15 +25,15 @@ const RIGHT: u32 = 60;
 const FOOT: u32 = 20;
 /// Least distance between the numbers of the x axis.
 const NUMBER: f64 = 28.0;
-/// Share of the y axis, and of the x axis, that the curves leave free at either end.
+/// Share of the y axis, and of the x axis, left free by the curves at either end.
 const FREE: (f64, f64) = (0.05, 0.02);
 
-/// A line of the panel's title, and one of its legend.
+/// Height of a line of the panel's title, and of the legend.
 const TITLE: u32 = 44;
 const ENTRIES: u32 = 40;
-/// The names of the stretches.
+/// Height of the stretches' names.
 const STRIP: u32 = 44;
-/// The sample of a curve in the legend, the space before its name, and the one after it.
+/// The curve sample in the legend, the space before its name, and the one after it.
 const SAMPLE: i32 = 54;
 const NAME: i32 = 14;
 const AFTER: i32 = 44;
@@ -54,7 +54,7 @@ impl Header<'_> {
 }
 
 impl Panel {
-    /// Lays out what is above the axes on a panel of this width.
+    /// Lays out what is above the axes of a panel of this width.
     pub(super) fn header(&self, width: u32) -> Header<'_> {
         let left = (EDGE + LEFT) as i32;
         let room = width as i32 - left - RIGHT as i32;
@@ -83,7 +83,7 @@ impl Panel {
         }
     }
 
-    /// Draws the panel, whose axes begin below the highest header of its row.
+    /// Draws the panel, whose axes begin below the tallest header of its row.
     pub(super) fn draw<B: DrawingBackend>(
         &self,
         area: &Area<B>,
@@ -133,7 +133,7 @@ impl Panel {
         let (x_pixels, y_pixels) = within.get_pixel_range();
         let (panel_x, panel_y) = area.get_pixel_range();
         let left = x_pixels.start - panel_x.start;
-        // What the axis has no place for is where it begins.
+        // A value that the axis cannot place goes to its start.
         let along = |at| (x.share(x.place(at).unwrap_or(x.low)) * axes_width) as i32;
         for stretch in &self.stretches {
             let ends = (along(stretch.ends.0), along(stretch.ends.1));
@@ -193,7 +193,7 @@ impl Panel {
 }
 
 impl Stretch {
-    /// Its name above the axes, if there is room between its ends.
+    /// Draws its name above the axes, if it fits between its ends.
     fn label<B: DrawingBackend>(&self, area: &Area<B>, ends: (i32, i32), top: u32) -> Drawn<B> {
         let (top, bottom) = ((top - STRIP) as i32, top as i32);
         let corners = [(ends.0, top), (ends.1, bottom)];
@@ -212,7 +212,7 @@ impl Stretch {
     }
 }
 
-/// The axis of a map: all of its cells.
+/// Returns the axis of a map: all of its cells.
 fn map_scale(axis: &super::Axis, places: &[f64]) -> Scale {
     let mut scale = Scale::new(axis, places.iter().copied(), 0.0);
     let edges = Map::edges(places, &scale);
@@ -238,7 +238,7 @@ fn draw_header<B: DrawingBackend>(area: &Area<B>, header: &Header<'_>) -> Drawn<
     Ok(())
 }
 
-/// How a curve looks, beside its name.
+/// Draws a sample of a curve beside its name.
 fn sample<B: DrawingBackend>(
     area: &Area<B>,
     curve: &Curve,

@@ -1,4 +1,4 @@
-//! Where an axis begins and ends, and the ticks on it.
+//! The ends of an axis, and its ticks.
 
 use std::ops::Range;
 
@@ -9,10 +9,10 @@ use crate::plot::style::rounded;
 
 /// Most ticks with a number.
 const TICKS: usize = 10;
-/// Decades up to which a logarithmic axis has lines between its ticks.
+/// Most decades for which a logarithmic axis has lines between its ticks.
 const LIGHT_DECADES: f64 = 6.0;
 
-/// An axis in the coordinate that is proportional to length: the value, or its decimal logarithm.
+/// An axis in the coordinate proportional to length: the value, or its decimal logarithm.
 #[derive(Clone, Debug)]
 pub(super) struct Scale {
     pub(super) low: f64,
@@ -20,7 +20,7 @@ pub(super) struct Scale {
     logarithmic: bool,
 }
 
-/// The places of numbers on an axis.
+/// The positions of numbers on an axis.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ticks {
     /// Coordinate and number.
@@ -65,8 +65,8 @@ impl ValueFormatter<f64> for Laid<'_> {
 }
 
 impl Scale {
-    /// The axis over these values, with this share of its length left free at either end; the
-    /// axis' own range goes before.
+    /// Creates the axis over these values, with this share of its length left free at either end;
+    /// the axis' own range takes precedence.
     pub(super) fn new(axis: &Axis, values: impl Iterator<Item = f64>, free: f64) -> Self {
         let mut scale = Self {
             low: f64::INFINITY,
@@ -100,7 +100,7 @@ impl Scale {
         scale
     }
 
-    /// The coordinate of a value; none where the axis has no place for it.
+    /// Returns the coordinate of a value; `None` if the axis has no place for it.
     pub(super) fn place(&self, value: f64) -> Option<f64> {
         let place = if self.logarithmic {
             value.log10()
@@ -110,12 +110,12 @@ impl Scale {
         place.is_finite().then_some(place)
     }
 
-    /// How far along the axis a coordinate lies, 0 to 1 between the ends.
+    /// Returns the position of a coordinate along the axis, 0 to 1 between the ends.
     pub(super) fn share(&self, place: f64) -> f64 {
         (place - self.low) / (self.high - self.low)
     }
 
-    /// As many round numbers as `fit` beside each other.
+    /// Returns as many round numbers as `fit` accepts side by side.
     pub(super) fn ticks(&self, fit: impl Fn(&[(f64, String)]) -> bool) -> Ticks {
         let fits = |numbers: &Vec<_>| numbers.len() <= TICKS && fit(numbers);
         let two = |numbers: &Vec<_>| numbers.len() >= 2;
@@ -139,7 +139,7 @@ impl Scale {
         }
     }
 
-    /// Round numbers of equal ratio, from close to wide.
+    /// Returns round numbers of equal ratio, from close to wide.
     fn ratios(&self) -> Vec<Vec<(f64, String)>> {
         let mantissas: [&[i32]; 4] = [&[1, 2, 3, 4, 5, 6, 7, 8, 9], &[1, 2, 5], &[1, 3], &[1]];
         let within = mantissas.map(|mantissas| self.multiples(1, mantissas));
@@ -147,7 +147,7 @@ impl Scale {
         within.into_iter().chain(decades).collect()
     }
 
-    /// These multiples of every so many powers of ten.
+    /// Returns these multiples of every `decades`-th power of ten.
     fn multiples(&self, decades: i32, mantissas: &[i32]) -> Vec<(f64, String)> {
         let (first, last) = (self.low.floor() as i32, self.high.ceil() as i32);
         let powers = (first..=last).filter(|power| power % decades == 0);
@@ -164,7 +164,7 @@ impl Scale {
             .collect()
     }
 
-    /// Round numbers of equal difference, from close to wide.
+    /// Returns round numbers of equal difference, from close to wide.
     fn steps(&self) -> impl Iterator<Item = Vec<(f64, String)>> {
         let (low, high) = if self.logarithmic {
             (10_f64.powf(self.low), 10_f64.powf(self.high))
@@ -195,7 +195,7 @@ impl Scale {
     }
 }
 
-/// A number to the place of `unit`, a power of ten; `greatest` is the greatest beside it.
+/// Formats a number to the place of `unit`, a power of ten; `greatest` is the greatest beside it.
 fn tick(value: f64, unit: f64, greatest: f64) -> String {
     let place = unit.log10().round() as i32;
     let value = rounded(value, place);

@@ -132,7 +132,7 @@ fn figure(name: &str, columns: usize, panels: Vec<Panel>) -> Figure {
     }
 }
 
-/// The text of a figure's SVG and the pixels of its PNG.
+/// Returns the text of a figure's SVG and the pixels of its PNG.
 fn drawn(figure: Figure) -> (String, Vec<[u8; 3]>) {
     let folder = tempfile::tempdir().unwrap();
     let made = folder.path().join("made");

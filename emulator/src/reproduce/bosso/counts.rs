@@ -1,10 +1,9 @@
 //! Table II: the operations of a control period.
 //!
-//! The paper counts the right-hand sides of its equations. Here they are counted in the functions that
-//! run, by reading them: each sum or difference, product and comparison of the path that a period of
-//! Run takes with nothing limited, with Euler's sums, whose products with T_s are within the gains.
-//! Shifts, negations and the saturation of sums are not counted, nor what is inside a root, a sine or
-//! a cosine. The inductance's factor in ω·L·i, for its adaptation, is.
+//! The paper counts the right-hand sides of its equations. Here they are counted in the functions that run, by reading
+//! them: each sum or difference, product and comparison on the path of an unlimited period of Run, with Euler's sums,
+//! whose products with T_s are within the gains. Shifts, negations and the saturation of sums are not counted, nor what
+//! is inside a root, a sine or a cosine. The adaptation's inductance factor in ω·L·i is.
 
 use crate::reproduce::item::{Item, item};
 
@@ -105,7 +104,7 @@ pub(super) fn items() -> Vec<Item> {
     rows.collect()
 }
 
-/// Counts the operators in the text of the functions, so that none of them changes without its row.
+/// Counts the operators in the functions' text, so that none of them changes without its row.
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,7 +124,7 @@ mod tests {
         (".minus_top(", 1),
         (" + ", 1),
         (" - ", 1),
-        // Doubling is a shift, and no sum.
+        // Doubling is a shift, not a sum.
         ("x.plus(x)", -1),
     ];
     const PRODUCTS: &[(&str, i32)] = &[
@@ -138,7 +137,7 @@ mod tests {
         (".plus_top(", 1),
         (".minus_top(", 1),
         (" * ", 1),
-        // Doubling is a shift, and no product.
+        // Doubling is a shift, not a product.
         ("2 * ", -1),
     ];
     const COMPARISONS: &[(&str, i32)] = &[
@@ -150,7 +149,7 @@ mod tests {
         (".hold(", 2),
     ];
 
-    /// The text from an opening bracket to the one that closes it, without them.
+    /// Returns the text from an opening bracket to the closing one, without them.
     fn within(text: &str, [open, close]: [char; 2]) -> &str {
         let begin = text.find(open).expect("an opening bracket") + 1;
         let mut depth = 1;
@@ -161,7 +160,7 @@ mod tests {
         &text[begin..begin + end.expect("a closing bracket")]
     }
 
-    /// The statements of a function, without its comments and the blocks after these words.
+    /// Returns the statements of a function, without its comments and the blocks after these words.
     fn statements(source: &str, name: &str, left_out: &[&str]) -> Vec<String> {
         let lines = source.lines().map(|line| {
             let code = line.split("//").next();
@@ -202,7 +201,7 @@ mod tests {
         counted.collect()
     }
 
-    /// The statements that begin with one of these, and the others.
+    /// Splits statements into those that begin with one of these, and the others.
     fn parted(statements: Vec<String>, begins: &[&str]) -> [Vec<String>; 2] {
         for begin in begins {
             assert!(
@@ -232,7 +231,7 @@ mod tests {
         let estimate = all(BACK_EMF, "estimate");
         let [filter, adaptive] = parted(estimate, &["let omega_bar_step =", "state.omega_f ="]);
         let [theta, high_gain] = parted(all(BACK_EMF, "advance"), &["state.theta ="]);
-        // The path that a period takes with nothing limited.
+        // The path of a period with nothing limited.
         let current = statements(NESTED, "current", &["if half_trust <", "if bounded !="]);
         let [reference, speed] = parted(current, &["let i_q =", "Reference {"]);
         let counted = [

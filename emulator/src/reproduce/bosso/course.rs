@@ -1,4 +1,4 @@
-//! A motor at a constant speed, taken on by the legs' states from edge to edge.
+//! A motor at constant speed, advanced by the legs' states from edge to edge.
 
 use std::f64::consts::TAU;
 
@@ -9,22 +9,22 @@ use crate::plant::{Fidelity, Load, Plant, Rail};
 /// Longest piece of a waveform, s: 1/67 of a PWM period.
 const PIECE_S: f64 = 1e-6;
 
-/// A switch that is on, or neither, for each leg.
+/// The switch that is on for each leg, or none.
 pub(super) type Legs = [Option<Rail>; 3];
 
-/// The motor, what has been measured of it, and its torque's waveform where that is wanted.
+/// The motor, its measurements, and its torque's waveform if wanted.
 pub(super) struct Course {
     plant: Plant,
-    /// What the run came to since [`Course::measure`].
+    /// The measurements since [`Course::measure`].
     pub(super) means: Means,
-    /// Torque at the middle of each piece of the last part, s since its begin and Nm.
+    /// Torque at the middle of each piece of the last part: s since its start, and Nm.
     pub(super) waveform: Vec<(f64, f64)>,
     since_s: f64,
     draws: bool,
 }
 
 impl Course {
-    /// The paper's motor held at a speed, from an electrical angle.
+    /// Creates the paper's motor held at a speed, from an electrical angle.
     pub(super) fn new(rpm: f64, angle_turns: f64) -> Self {
         let mut plant = Plant::new(
             Fidelity::Switching,
@@ -43,17 +43,17 @@ impl Course {
         }
     }
 
-    /// What follows is measured, what was before is not.
+    /// Starts measuring; discards what was before.
     pub(super) fn measure(&mut self) {
         self.means = Means::default();
     }
 
-    /// What follows is drawn.
+    /// Starts drawing.
     pub(super) fn draw(&mut self) {
         (self.draws, self.since_s) = (true, 0.0);
     }
 
-    /// The legs stay for a while as they are told.
+    /// Runs with these leg states for a time.
     pub(super) fn run(&mut self, legs: Legs, time_s: f64) {
         if time_s <= 0.0 {
             return;

@@ -11,13 +11,13 @@ use super::sensorless::{Drive, Realism};
 use crate::plot::chart::{Axis, Curve, Figure, PANEL, Panel};
 use crate::reproduce::item::{Item, item};
 
-/// From the catch to the begin of what is shown, s.
+/// Time from the catch to the start of what is shown, s.
 const SETTLE_S: f64 = 1.0;
 
-/// Time between two of a curve's points, in control periods: 1 ms.
+/// Control periods between two points of a curve: 1 ms.
 const EVERY: usize = 15;
 
-/// When the stairs' first and last step come, s.
+/// When the first and last step of the stairs occur, s.
 const FIRST_STEP_S: f64 = 0.1;
 const LAST_STEP_S: f64 = 0.8;
 
@@ -100,8 +100,8 @@ fn rms(seen: &[Seen], value: fn(&Seen) -> f64) -> f64 {
     libm::sqrt(squares / seen.len() as f64)
 }
 
-/// By how much the last step's end was passed, rpm, and how long after that step the speed last was
-/// more than 1 % off it, s: none where it still is.
+/// Returns the overshoot of the last step, rpm, and how long after it the speed was last more than 1 % off its end, s:
+/// `None` if it still is.
 fn landing(seen: &[Seen], upwards: bool) -> (f64, Option<f64>) {
     let end = seen[seen.len() - 1].command;
     let passed = seen.iter().map(|seen| {
@@ -128,7 +128,7 @@ fn estimation_error(seen: &Seen) -> f64 {
     seen.estimate - seen.speed
 }
 
-/// Figures 8 and 9 and their figures.
+/// Measures and draws figures 8 and 9.
 pub(super) fn figures_8_and_9() -> (Vec<Item>, [Figure; 2]) {
     let up = || run(1.5, stairs([3000.0, 4500.0, 6000.0]));
     let down = || run(1.5, stairs([6000.0, 4500.0, 3000.0]));

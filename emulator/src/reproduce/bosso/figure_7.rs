@@ -15,13 +15,13 @@ const SPEEDS_RPM: [f64; 8] = [
     2500.0, 3000.0, 3500.0, 4000.0, 4500.0, 5000.0, 5500.0, 6000.0,
 ];
 
-/// Improvements of the motor's efficiency that the paper prints, points.
+/// Improvements of the motor's efficiency printed in the paper, points.
 const PRINTED: [(f64, f64); 3] = [(3000.0, 0.4), (4500.0, 0.77), (6000.0, 0.98)];
 
 /// What the paper's motor took beyond its simulation, W.
 const OFFSET_W: f64 = 2.8;
 
-/// Where the real motor's iron loss is taken from that figure, rpm.
+/// Speed at which the real motor's iron loss is fitted to that figure, rpm.
 const IRON_LOSS_RPM: f64 = 4500.0;
 
 /// Both drives at a speed, and the ideal ones of section III at the same torque.
@@ -31,7 +31,7 @@ struct Point {
     /// Mean angle error with a real and with an ideal board, degrees.
     error_deg: [f64; 2],
     six_step: Means,
-    /// Both with the real motor, where the paper prints something.
+    /// Both with the real motor, if the paper prints something.
     real: Option<[Means; 2]>,
     ideal_foc: Means,
     ideal_six_step: Means,
@@ -61,35 +61,35 @@ impl Point {
         }
     }
 
-    /// Offset of the real motor's power, W.
+    /// Returns the offset of the real motor's power, W.
     fn offset_w(&self) -> f64 {
         self.real_w() - self.published.motor_w()
     }
 
-    /// Power of the published drive with the real motor, W; not a number where it was not measured.
+    /// Returns the power of the published drive with the real motor, W; NaN if not measured.
     fn real_w(&self) -> f64 {
         self.real.map_or(f64::NAN, |[foc, _]| foc.motor_w())
     }
 
-    /// By how much the published drive is more efficient with the real motor, points.
+    /// Returns the efficiency gain of the published drive with the real motor, points.
     fn real_better(&self) -> f64 {
         self.real
             .map_or(f64::NAN, |[foc, six_step]| better(&foc, &six_step))
     }
 }
 
-/// By how much the first is more efficient than the second, points.
+/// Returns the efficiency gain of the first over the second, points.
 fn better(first: &Means, second: &Means) -> f64 {
     first.efficiency_pct() - second.efficiency_pct()
 }
 
-/// What the paper prints at this speed.
+/// Returns what the paper prints at this speed.
 fn printed(rpm: f64) -> Option<f64> {
     let at = PRINTED.iter().find(|(printed_rpm, _)| *printed_rpm == rpm);
     at.map(|(_, points)| *points)
 }
 
-/// The figure and what the paper prints of it.
+/// Measures the figure and what the paper prints of it.
 pub(super) fn figure_7() -> (Vec<Item>, Figure) {
     let points: Vec<Point> = SPEEDS_RPM.into_par_iter().map(Point::measure).collect();
     let of_printed: Vec<&Point> = points.iter().filter(|p| printed(p.rpm).is_some()).collect();
@@ -117,7 +117,7 @@ pub(super) fn figure_7() -> (Vec<Item>, Figure) {
     let offsets = of_printed.iter().map(|point| {
         item(
             format!("fig7_power_offset_{:.0}", point.rpm),
-            // At this speed the real motor's iron loss is the paper's offset: no result.
+            // At this speed the real motor's iron loss is the paper's offset, hence no result.
             Some(OFFSET_W).filter(|_| point.rpm != IRON_LOSS_RPM),
             point.offset_w(),
             "W",

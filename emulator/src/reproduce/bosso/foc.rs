@@ -1,5 +1,5 @@
-//! The paper's field-oriented control of section III: the drive's own control, told the true angle,
-//! holds a constant torque at a constant speed.
+//! The paper's field-oriented control of section III: the drive's own control, given the true angle, holds a constant
+//! torque at a constant speed.
 
 use std::f64::consts::TAU;
 
@@ -13,13 +13,13 @@ use super::setting::{BUS_V, CARRIER_HZ, MOTOR, PHASES, exact_sensing};
 use crate::plant::{Fidelity, Load, Rail, Supply};
 use crate::rig::{Bench, Position, Rig};
 
-/// The current has settled after this time of Run: 47 time constants of its loop, s.
+/// Time of Run after which the current has settled: 47 time constants of its loop, s.
 const SETTLE_S: f64 = 0.02;
 
 /// Longest time until Run, s.
 const START_S: f64 = 0.2;
 
-/// How the phases' common voltage is chosen, as `CTL_MODULATION` counts.
+/// How the common-mode voltage is chosen, numbered like `CTL_MODULATION`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Modulation {
     SpaceVector,
@@ -35,21 +35,21 @@ pub(super) struct Foc {
     pub(super) torque_nm: f64,
     /// The modulation.
     pub(super) modulation: Modulation,
-    /// Dead time of the inverter, which the control compensates as always, s.
+    /// Dead time of the inverter, compensated by the control as usual, s.
     pub(super) dead_time_s: f64,
 }
 
 impl Foc {
-    /// T* at which the mean torque is as wanted: the control holds the current at the samples, which
-    /// is not its mean.
+    /// Finds the T* that gives the wanted mean torque: the control holds the current at the samples, which is not its
+    /// mean.
     pub(super) fn at_torque(self, wanted_nm: f64, time_s: f64) -> Self {
         let with = |torque_nm| Self { torque_nm, ..self };
         let torque = |torque_nm| with(torque_nm).measure(time_s).torque_nm();
         with(seek(wanted_nm, [wanted_nm, 1.02 * wanted_nm], torque))
     }
 
-    /// Measures for a time in all, from several angles of the rotor at the start; nothing where the
-    /// drive does not run all the time.
+    /// Measures for a total time, from several initial rotor angles; returns nothing if the drive does not run
+    /// throughout.
     pub(super) fn measure(&self, time_s: f64) -> Means {
         let mut all = Means::default();
         for part in 0..PHASES {
@@ -71,8 +71,8 @@ impl Foc {
         all
     }
 
-    /// The torque over some time, s since its begin and Nm: the bridge's commands of a run from the
-    /// start on, edge by edge. Nothing where the drive does not run.
+    /// Returns the torque over a time, as s since its start and Nm, from the bridge's commands of a run from the start
+    /// on, edge by edge. Empty if the drive does not run.
     pub(super) fn waveform(&self, time_s: f64) -> Vec<(f64, f64)> {
         let mut bridges = vec![Bridge::Off];
         let Some(mut rig) = self.settled(0.0, |bridge| bridges.push(bridge)) else {
@@ -98,8 +98,8 @@ impl Foc {
         course.waveform
     }
 
-    /// A rig that has held the torque for long enough; `each` hears every command until then. None
-    /// where the drive is not in Run in time, or falls out of it.
+    /// Returns a rig that has held the torque for long enough; `each` sees every command until then. `None` if the
+    /// drive does not reach Run in time, or leaves it.
     fn settled(&self, angle_turns: f64, mut each: impl FnMut(Bridge)) -> Option<Rig> {
         let bench = Bench {
             load: Load::default(),
@@ -122,11 +122,11 @@ impl Foc {
             (ParamId::PwmFreqHz, CARRIER_HZ as f32),
             (ParamId::PwmDeadtimeNs, (self.dead_time_s * 1e9) as f32),
             (ParamId::CtlModulation, modulation),
-            // A PI an axis with back-EMF compensation.
+            // One PI per axis, with back-EMF compensation.
             (ParamId::CtlRegulator, 1.0),
             (ParamId::LimPhaseA, 25.0),
         ] {
-            // Each is within the table's range.
+            // Each is in the table's range.
             let _ = params.set(id, value);
         }
         let config = build(&params, &bench.sensing.board(bench.delay))
@@ -160,11 +160,11 @@ fn periods(time_s: f64) -> u32 {
     libm::round(time_s * CARRIER_HZ) as u32
 }
 
-/// A period of a command without dead time, from sample to sample: each leg is high about the middle.
+/// Returns the edges of a command's period without dead time, from sample to sample: each leg is high about the middle.
 fn edges(bridge: Bridge) -> Vec<(Legs, f64)> {
     let period_s = 1.0 / CARRIER_HZ;
     let Bridge::Duty(duties) = bridge else {
-        // The drive does not run yet. What charges its drivers leaves no current that lasts.
+        // The drive does not run yet. Charging its drivers leaves no lasting current.
         return vec![([None; 3], period_s)];
     };
     let rises = duties.map(|duty| 0.5 * (1.0 - duty.to_num::<f64>().min(1.0)));
@@ -202,7 +202,7 @@ mod tests {
         assert!((got - 0.0972).abs() < 1e-5, "{got}");
     }
 
-    /// At 20,000 rpm the back-EMF is three times what 24 V can meet.
+    /// At 20,000 rpm the back-EMF is three times what 24 V can overcome.
     #[test]
     fn a_drive_that_does_not_run_measures_nothing() {
         let drive = Foc {

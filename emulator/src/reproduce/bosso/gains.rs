@@ -1,5 +1,5 @@
-//! Table III: the gains that the drive computes, and the roots of the polynomials (20) and (21) and of
-//! the matrices (22) and (23) that they make.
+//! Table III: the gains that the drive computes, and the resulting roots of the polynomials (20) and (21) and
+//! eigenvalues of the matrices (22) and (23).
 
 use std::f64::consts::TAU;
 
@@ -47,7 +47,7 @@ const PRINTED: Gains = Gains {
     k_i_omega: 41.7e-3,
 };
 
-/// The printed eigenvalues: pairs of real and imaginary part, or of two real roots.
+/// The printed eigenvalues: real and imaginary part of a pair, or two real roots.
 const PRINTED_ROOTS: [[f64; 2]; 4] = [
     [-2360.0, 2360.0],
     [-2357.0, -2142.0],
@@ -55,7 +55,7 @@ const PRINTED_ROOTS: [[f64; 2]; 4] = [
     [-46.6, -6.3],
 ];
 
-/// A gain's value from one unit to the other, by what it does.
+/// Returns a gain's value between the two units, from its effect.
 fn value<A: Number, B: Number>(gain: Gain<A, B>) -> f64 {
     let x = A::from_bits(1 << 22);
     let y = gain.apply(x);
@@ -64,7 +64,7 @@ fn value<A: Number, B: Number>(gain: Gain<A, B>) -> f64 {
 }
 
 impl Gains {
-    /// What the drive computes for its control period, in the paper's units.
+    /// Returns what the drive computes for its control period, in the paper's units.
     fn computed() -> Self {
         let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in BOSSO_TABLE_III.settings {
@@ -106,7 +106,7 @@ impl Gains {
         }
     }
 
-    /// In the order of Table III, with their names and units.
+    /// Returns them in the order of Table III, with names and units.
     fn named(&self) -> [(&'static str, f64, &'static str); 8] {
         [
             ("k_p", self.k_p, "1/s"),
@@ -120,7 +120,7 @@ impl Gains {
         ]
     }
 
-    /// The four pairs of roots: of (20), (21), (22), (23).
+    /// Returns the four pairs of roots: of (20), (21), (22), (23).
     fn roots(&self) -> [Roots; 4] {
         let (r, l) = (MOTOR.resistance_ohm, MOTOR.inductance_h);
         let chi = f64::from(MOTOR.pole_pairs) * OMEGA_M * MOTOR.flux_wb;

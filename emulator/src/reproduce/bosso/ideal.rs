@@ -1,5 +1,5 @@
-//! Section III along the propeller's load curve: efficiencies, losses and ripple of both drives with
-//! the exact angle, and the ratio (4) of their losses with stepwise currents.
+//! Section III along the propeller's load curve: efficiencies, losses and ripple of both drives
+//! with the exact angle, and the ratio (4) of their losses with stepwise currents.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,17 +11,17 @@ use super::setting::load_nm;
 use super::six_step::SixStep;
 use crate::reproduce::item::{Item, item};
 
-/// Speeds at which the paper prints figures, and its differences of the efficiencies, points.
+/// Speeds with printed figures, and the printed differences of the efficiencies, points.
 const PRINTED: [(f64, f64); 3] = [(3000.0, 3.65), (4500.0, 1.49), (6000.0, 0.54)];
 
-/// Dead time with which all is measured once more, s.
+/// Dead time of the second round of measurements, s.
 const DEAD_TIME_S: f64 = 500e-9;
 
-/// Time over which a setting is sought, and over which it is measured, s.
+/// Time over which a setting is searched, and over which it is measured, s.
 const SEEK_S: f64 = 0.2;
 const MEASURE_S: f64 = 1.0;
 
-/// What fills the paper's silence.
+/// Assumptions where the paper is silent.
 const SILENCE: &str = "24 V, torque 0.0972 Nm·(n/4500 rpm)², no dead time; six-step: the upper leg \
                        switches with both switches in turn, the lower is held low";
 
@@ -55,20 +55,20 @@ impl Point {
         }
     }
 
-    /// By how much the field-oriented drive is the better one, points.
+    /// Returns the efficiency gain of the field-oriented drive, points.
     fn better(&self, foc: &Means) -> f64 {
         foc.efficiency_pct() - self.six_step.efficiency_pct()
     }
 }
 
-/// The copper losses of stepwise currents between two phases over those of sinusoidal ones, for the
-/// same mean torque (4): sums over a turn.
+/// Returns the copper losses of stepwise currents between two phases over those of sinusoidal ones
+/// for the same mean torque (4): sums over a turn.
 fn copper_loss_ratio() -> f64 {
     const STEPS: u32 = 36_000;
     let (mut torque, mut square) = ([0.0; 2], [0.0; 2]);
     for step in 0..STEPS {
         let turns = (f64::from(step) + 0.5) / f64::from(STEPS);
-        // What each phase's ampere gives of torque, over p·φ.
+        // Torque per ampere of each phase, over p·φ.
         let per_a = [0.0, 1.0, 2.0].map(|phase: f64| -libm::sin(TAU * (turns - phase / 3.0)));
         let (mut highest, mut lowest) = (0, 0);
         for phase in 1..3 {
@@ -93,7 +93,7 @@ fn copper_loss_ratio() -> f64 {
     loss(0) / loss(1)
 }
 
-/// The figures along the load curve.
+/// Measures the figures along the load curve.
 pub(super) fn items() -> Vec<Item> {
     let settings: Vec<_> = [0.0, DEAD_TIME_S]
         .into_iter()

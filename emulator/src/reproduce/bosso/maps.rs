@@ -8,14 +8,14 @@ use super::setting::load_nm;
 use super::six_step::SixStep;
 use crate::plot::chart::{Axis, Curve, Figure, Map, PANEL, Panel};
 
-/// Time over which each setting of the grids is measured, s.
+/// Time over which each grid setting is measured, s.
 const MEASURE_S: f64 = 0.1;
 
-/// Settings of a grid a speed.
+/// Grid settings per speed.
 const SIX_STEP_SETTINGS: u32 = 16;
 const FOC_SETTINGS: u32 = 10;
 
-/// Least and greatest torque that is asked for, Nm.
+/// Least and greatest commanded torque, Nm.
 const TORQUE_NM: [f64; 2] = [0.01, 0.22];
 
 /// An electrical turn at 4500 rpm, s.
@@ -24,7 +24,7 @@ const WAVEFORM_S: f64 = 1.0 / 900.0;
 /// Range of both waveforms, Nm.
 const WAVEFORM_NM: (f64, f64) = (-0.05, 0.25);
 
-/// What a drive does at a mean torque.
+/// A drive's performance at a mean torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Reading {
     motor_w: f64,
@@ -55,7 +55,7 @@ fn six_step(rpm: f64) -> Vec<Means> {
     let settings = 0..SIX_STEP_SETTINGS;
     let means = settings.map(|n| {
         let share = f64::from(n) / f64::from(SIX_STEP_SETTINGS - 1);
-        // What commutation takes of the voltage at 6500 rpm is more than the resistance takes.
+        // At 6500 rpm commutation takes more voltage than the resistance does.
         let drive = SixStep::near(rpm, 2.5 * TORQUE_NM[1] * share);
         drive.measure(MEASURE_S)
     });
@@ -78,7 +78,8 @@ fn foc(rpm: f64) -> Vec<Means> {
 }
 
 impl Grid {
-    /// Measures a drive over its own settings at each speed, and reads it at the pictures' torques.
+    /// Measures a drive over its own settings at each speed, and interpolates it at the pictures'
+    /// torques.
     fn measure(drive: impl Fn(f64) -> Vec<Means> + Sync) -> Self {
         let columns: Vec<Vec<Option<Reading>>> = speeds_rpm()
             .into_par_iter()
@@ -102,7 +103,7 @@ impl Grid {
         })
     }
 
-    /// What becomes of both drives' readings.
+    /// Maps a function of both drives' readings.
     fn against(&self, label: &str, other: &Self, value: impl Fn(&Reading, &Reading) -> f64) -> Map {
         map(label, |row, column| {
             let both = self.rows[row][column].zip(other.rows[row][column]);
@@ -129,10 +130,10 @@ fn map(label: &str, value: impl Fn(usize, usize) -> Option<f64>) -> Map {
     }
 }
 
-/// What a drive does at a torque, by the parabola through the three measurements about it: power is
-/// linear in the torque and the loss a square.
+/// Interpolates a drive's performance at a torque, by the parabola through the three measurements
+/// around it: power is linear in torque and the loss quadratic.
 fn read(measured: &[Means], torque_nm: f64) -> Option<Reading> {
-    // Where the supply is at its end the torque no longer rises.
+    // Once the supply is exhausted the torque no longer rises.
     let rising = measured
         .windows(2)
         .take_while(|pair| pair[1].torque_nm() > pair[0].torque_nm() + 1e-3);
@@ -154,7 +155,7 @@ fn read(measured: &[Means], torque_nm: f64) -> Option<Reading> {
         let terms = three.iter().zip(weights);
         terms.map(|(means, weight)| weight * of(means)).sum::<f64>()
     };
-    // The ripple itself grows without bound towards no torque; times the torque it does not.
+    // The ripple itself diverges towards zero torque; times the torque it does not.
     let ripple_nm = sum(|means| means.ripple_pct() * means.torque_nm());
     Some(Reading {
         motor_w: sum(Means::motor_w),
@@ -163,7 +164,7 @@ fn read(measured: &[Means], torque_nm: f64) -> Option<Reading> {
     })
 }
 
-/// The propeller's curve as far as the maps reach.
+/// Returns the propeller's curve within the maps.
 fn load_curve() -> Curve {
     let speeds = (50..=130).map(|n| 50.0 * f64::from(n));
     let points = speeds.map(|rpm| (rpm, load_nm(rpm)));
@@ -179,7 +180,7 @@ fn over_speed(title: &str, map: Map) -> Panel {
     }
 }
 
-/// Figures 3 and 4.
+/// Measures and draws figures 3 and 4.
 pub(super) fn figures() -> Vec<Figure> {
     let (bldc, foc) = rayon::join(|| Grid::measure(six_step), || Grid::measure(foc));
     vec![efficiency(&bldc, &foc), ripple(&bldc, &foc)]
@@ -274,7 +275,7 @@ mod tests {
     use super::*;
     use crate::plant::Flow;
 
-    /// A drive that takes 500 W/Nm, loses 300 W/Nm² and has a ripple of 0.03 Nm.
+    /// Returns a drive that takes 500 W/Nm, loses 300 W/Nm² and has a ripple of 0.03 Nm.
     fn means(torque_nm: f64) -> Means {
         let flow = Flow {
             torque_nm,

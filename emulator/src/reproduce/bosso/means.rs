@@ -11,7 +11,7 @@ pub(super) struct Means {
 }
 
 impl Means {
-    /// A stretch of this length.
+    /// Adds a stretch of this length.
     pub(super) fn add(&mut self, flow: &Flow, time_s: f64) {
         self.time_s += time_s;
         let parts = [
@@ -25,7 +25,7 @@ impl Means {
         }
     }
 
-    /// Another run's stretches.
+    /// Adds another run's stretches.
     pub(super) fn join(mut self, other: &Self) -> Self {
         self.time_s += other.time_s;
         for (sum, part) in self.sums.iter_mut().zip(other.sums) {
@@ -34,29 +34,29 @@ impl Means {
         self
     }
 
-    /// T_avg, Nm.
+    /// Returns T_avg, Nm.
     pub(super) fn torque_nm(&self) -> f64 {
         self.sums[0] / self.time_s
     }
 
-    /// 100·√(T_rms² − T_avg²)/T_avg; the paper's text has the division under the root.
+    /// Returns 100·√(T_rms² − T_avg²)/T_avg; the paper's text has the division under the root.
     pub(super) fn ripple_pct(&self) -> f64 {
         let mean = self.torque_nm();
         let square = self.sums[1] / self.time_s;
         100.0 * (square - mean * mean).max(0.0).sqrt() / mean
     }
 
-    /// Electrical power into the motor, W.
+    /// Returns the electrical power into the motor, W.
     pub(super) fn motor_w(&self) -> f64 {
         self.sums[2] / self.time_s
     }
 
-    /// Power lost in the windings, W.
+    /// Returns the power lost in the windings, W.
     pub(super) fn copper_w(&self) -> f64 {
         self.sums[3] / self.time_s
     }
 
-    /// 1 − p_copper/p_motor, %.
+    /// Returns 1 − p_copper/p_motor, %.
     pub(super) fn efficiency_pct(&self) -> f64 {
         100.0 * (1.0 - self.sums[3] / self.sums[2])
     }
@@ -65,7 +65,7 @@ impl Means {
 /// Steps of [`seek`]: each leaves a hundredth of the error or less.
 const STEPS: u32 = 3;
 
-/// The setting at which a mean torque is as wanted, by the secant from two settings near it.
+/// Finds the setting that gives a mean torque, by the secant from two settings near it.
 pub(super) fn seek(wanted_nm: f64, near: [f64; 2], torque_nm: impl Fn(f64) -> f64) -> f64 {
     let [mut before, mut setting] = near;
     let mut error_before = torque_nm(before) - wanted_nm;

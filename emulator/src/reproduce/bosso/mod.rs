@@ -1,9 +1,8 @@
-//! The first paper's figures: section III with the exact angle, Tables II and III, and section V
-//! without a position sensor.
+//! The first paper's figures: section III with the exact angle, Tables II and III, and section V without a position
+//! sensor.
 //!
-//! Nothing is fitted to what the paper prints but the real motor's iron loss, which is that of figure
-//! 7(d) at 4500 rpm: its offset there is no result. Where the paper is silent a choice stands beside
-//! the result.
+//! Nothing is fitted to the paper's figures but the real motor's iron loss, which is that of figure 7(d) at 4500 rpm:
+//! its offset there is no result. Where the paper is silent the assumption is given with the result.
 
 mod counts;
 mod course;
@@ -20,7 +19,7 @@ mod six_step;
 
 use super::item::Reproduction;
 
-/// The first paper's figures.
+/// Measures the first paper's figures.
 pub fn bosso() -> Reproduction {
     let ((ideal, maps), (figure_7, figures_8_and_9)) = rayon::join(
         || rayon::join(ideal::items, maps::figures),

@@ -17,7 +17,7 @@ const REAL_MOTOR: &str = "antigravity-4006-kv380-real";
 /// Inertia of motor and propeller (section V), kg·m².
 const INERTIA_KGM2: f64 = 1.43e-4;
 
-/// Time for which a steady speed is measured, s.
+/// Time over which a steady speed is measured, s.
 const MEASURE_S: f64 = 0.4;
 
 /// How close to a real bench the simulation is.
@@ -27,7 +27,7 @@ pub(super) enum Realism {
     Ideal,
     /// That motor; 12 bits, 0.05 A of noise and 500 ns of dead time, which the control compensates.
     Board,
-    /// The same board; a motor with harmonics, iron loss, detents and a winding that warms up.
+    /// The same board; a motor with harmonics, iron loss, detents and a winding that heats up.
     Motor,
 }
 
@@ -48,7 +48,7 @@ impl Drive {
         }
     }
 
-    /// It with the propeller at a speed.
+    /// Creates its rig with the propeller at a speed.
     pub(super) fn rig(self, initial_rpm: f64, realism: Realism) -> Rig {
         let (sensing, dead_time_ns) = match realism {
             Realism::Board | Realism::Motor => (Sensing::default(), 500.0),
@@ -79,7 +79,7 @@ impl Drive {
         let mut params = Params::of(&BOSSO_BENCH);
         let dead_time = (ParamId::PwmDeadtimeNs, dead_time_ns);
         for (id, value) in self.params().iter().chain(&[dead_time]) {
-            // Each is within the table's range.
+            // Each is in the table's range.
             let _ = params.set(*id, *value);
         }
         let config = build(&params, &bench.sensing.board(bench.delay))
@@ -87,8 +87,8 @@ impl Drive {
         Rig::new(bench, config)
     }
 
-    /// Settles at a speed and measures: figures of power, and the mean angle error in degrees; nothing
-    /// where the drive falls out of Run.
+    /// Settles at a speed and measures: power figures, and the mean angle error in degrees; nothing if the drive leaves
+    /// Run.
     pub(super) fn at(self, rpm: f64, realism: Realism) -> (Means, f64) {
         // One is caught in flight, the other starts from standstill.
         let (initial_rpm, settle_s) = match self {

@@ -1,4 +1,4 @@
-//! What the first paper measures on: its motor and load, the supply and the carrier.
+//! The first paper's setup: its motor and load, the supply and the carrier.
 
 use std::sync::LazyLock;
 
@@ -8,21 +8,21 @@ use crate::rig::Bench;
 /// Table I.
 pub(super) static MOTOR: LazyLock<Motor> = LazyLock::new(|| Bench::default().motor);
 
-/// The supply, V. The paper does not say; 6000 rpm with sine modulation take 21.8 V.
+/// The supply, V. The paper does not say; 6000 rpm with sine modulation takes 21.8 V.
 pub(super) const BUS_V: f64 = 24.0;
 
 /// PWM and sampling, Hz (section III.C).
 pub(super) const CARRIER_HZ: f64 = 15_000.0;
 
-/// Phases of the carrier against the rotor over which a measurement is shared out.
+/// Phases of the carrier against the rotor among which a measurement is divided.
 pub(super) const PHASES: u32 = 4;
 
-/// Electrical frequency, Hz.
+/// Returns the electrical frequency, Hz.
 pub(super) fn electrical_hz(rpm: f64) -> f64 {
     rpm * f64::from(MOTOR.pole_pairs) / 60.0
 }
 
-/// Currents as they are: no steps, no noise.
+/// Returns sensing of exact currents: no steps, no noise.
 pub(super) fn exact_sensing() -> Sensing {
     Sensing {
         bits: 0,
@@ -31,7 +31,7 @@ pub(super) fn exact_sensing() -> Sensing {
     }
 }
 
-/// The propeller's torque: quadratic through the one point that the paper prints, Nm.
+/// Returns the propeller's torque: quadratic through the one point printed in the paper, Nm.
 pub(super) fn load_nm(rpm: f64) -> f64 {
     0.0972 * (rpm / 4500.0) * (rpm / 4500.0)
 }

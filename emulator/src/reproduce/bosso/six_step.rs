@@ -1,6 +1,6 @@
-//! The paper's BLDC control of section III: in each sextant one leg switches at a constant duty, one
-//! is held low and one is off (footnote 1). It commutates at the exact angle, wherever in a PWM
-//! period that is; there is no current loop.
+//! The paper's BLDC control of section III: in each sextant one leg switches at a constant duty,
+//! one is held low and one is off (footnote 1). It commutates at the exact angle, wherever in a PWM
+//! period that falls; there is no current loop.
 
 use siskin_control::control::six_step::commutation::{Legs as Roles, Sector};
 
@@ -9,7 +9,7 @@ use super::means::{Means, seek};
 use super::setting::{BUS_V, CARRIER_HZ, MOTOR, PHASES, electrical_hz};
 use crate::plant::Rail;
 
-/// Electrical transients are over after this time, 70 times L/R, s.
+/// Time after which electrical transients are over, 70 times L/R, s.
 const SETTLE_S: f64 = 0.02;
 
 /// Angle at which the first sextant begins, turns.
@@ -23,15 +23,15 @@ const BETWEEN_PHASES: f64 = 1.653_986_686_265_375_8;
 pub(super) struct SixStep {
     /// Mechanical speed, rpm.
     pub(super) rpm: f64,
-    /// Share of the carrier's period for which the switching leg is high.
+    /// Share of the carrier period for which the switching leg is high.
     pub(super) duty: f64,
     /// Time for which both of a leg's switches are off between its states, s.
     pub(super) dead_time_s: f64,
 }
 
 impl SixStep {
-    /// The duty that the back-EMF leaves a current through two phases for this torque, if there were
-    /// no commutation: a first guess.
+    /// Returns a first guess: the duty at which the back-EMF leaves a current through two phases
+    /// for this torque, without commutation.
     pub(super) fn near(rpm: f64, torque_nm: f64) -> Self {
         let emf_v = std::f64::consts::TAU * electrical_hz(rpm) * MOTOR.flux_wb;
         // The power into a constant current between two phases: T·ω_m is e·i.
@@ -44,7 +44,7 @@ impl SixStep {
         }
     }
 
-    /// The duty at which the mean torque is as wanted, by the secant from [`Self::near`].
+    /// Finds the duty that gives the wanted mean torque, by the secant from [`Self::near`].
     pub(super) fn at_torque(rpm: f64, torque_nm: f64, dead_time_s: f64, time_s: f64) -> Self {
         let with = |duty: f64| Self {
             rpm,
@@ -56,8 +56,8 @@ impl SixStep {
         with(seek(torque_nm, [near, near + 0.01], torque).clamp(0.0, 1.0))
     }
 
-    /// Measures for a time in all, in equal parts from several phases of the carrier against the
-    /// rotor: where their frequencies are in a ratio of small numbers the phase stays as it is.
+    /// Measures for a total time, in equal parts from several phases of the carrier against the
+    /// rotor: if their frequencies are in a ratio of small integers the phase does not drift.
     pub(super) fn measure(&self, time_s: f64) -> Means {
         let part_s = time_s / f64::from(PHASES);
         let parts = (0..PHASES).map(|part| {
@@ -70,7 +70,7 @@ impl SixStep {
         parts.fold(Means::default(), |all, part| all.join(&part))
     }
 
-    /// The torque over some time, s since its begin and Nm.
+    /// Returns the torque over a time, as s since its start and Nm.
     pub(super) fn waveform(&self, time_s: f64) -> Vec<(f64, f64)> {
         let mut drive = Drive::new(self, 0.0);
         drive.run_until(SETTLE_S);
@@ -80,26 +80,26 @@ impl SixStep {
     }
 }
 
-/// The drive on its way.
+/// A run of the drive.
 struct Drive<'a> {
     setting: &'a SixStep,
     course: Course,
     now_s: f64,
-    /// Where the carrier's period is at time 0, as a share of it.
+    /// Phase of the carrier at time 0, as a share of its period.
     carrier: f64,
     /// Edges of the switching leg so far: every other one rises.
     edges: u32,
     /// Commutations so far.
     commutations: u32,
     sector: Sector,
-    /// Where the legs are to be.
+    /// The wanted leg states.
     wanted: Legs,
-    /// When each may be there, s.
+    /// When each leg may change, s.
     on_from_s: [f64; 3],
 }
 
 impl<'a> Drive<'a> {
-    /// At the beginning of the first sextant, without current.
+    /// Starts at the beginning of the first sextant, without current.
     fn new(setting: &'a SixStep, carrier: f64) -> Self {
         let mut drive = Self {
             setting,
@@ -119,7 +119,8 @@ impl<'a> Drive<'a> {
         drive
     }
 
-    /// When the switching leg changes next: it is high about the middle of the carrier's period.
+    /// Returns when the switching leg changes next: it is high about the middle of the carrier
+    /// period.
     fn edge_s(&self) -> f64 {
         let period = f64::from(self.edges / 2) + 0.5 - self.carrier;
         let half_duty = 0.5 * self.setting.duty;
@@ -128,7 +129,7 @@ impl<'a> Drive<'a> {
         periods / CARRIER_HZ
     }
 
-    /// When the sextant ends.
+    /// Returns when the sextant ends.
     fn commutation_s(&self) -> f64 {
         f64::from(self.commutations + 1) / (6.0 * electrical_hz(self.setting.rpm))
     }
@@ -159,7 +160,7 @@ impl<'a> Drive<'a> {
         }
     }
 
-    /// Takes note of where the legs are to be now. One that changes rails waits for the dead time.
+    /// Notes the wanted leg states. A leg that changes rails waits for the dead time.
     fn want(&mut self) {
         let high = !self.edges.is_multiple_of(2);
         let wanted = self.sector.phases(Roles {
@@ -181,8 +182,8 @@ impl<'a> Drive<'a> {
 mod tests {
     use super::*;
 
-    /// So slow that a sextant is many time constants, the current is V·d − e over 2R for nearly all
-    /// of it.
+    /// So slow that a sextant is many time constants, and the current is V·d − e over 2R for nearly
+    /// all of it.
     #[test]
     fn a_slow_motor_takes_what_the_two_phases_leave() {
         let torque_nm = 0.1;
@@ -196,7 +197,8 @@ mod tests {
         for dead_time_s in [0.0, 500e-9] {
             let drive = SixStep::at_torque(4500.0, 0.0972, dead_time_s, 0.02);
             let got = drive.measure(0.02).torque_nm();
-            // With a dead time the current's zero crossings leave steps in the torque over the duty.
+            // With a dead time the current's zero crossings put steps into the torque over the
+            // duty.
             assert!((got - 0.0972).abs() < 1e-4, "{got}");
         }
     }

@@ -1,9 +1,9 @@
-//! Figures 27, 28, 30 and 54 of the second paper: the error of the position estimator while a motor
-//! accelerates, beside the bounds that the paper gives in closed form.
+//! Figures 27, 28, 30 and 54 of the second paper: the position estimator's error while a motor
+//! accelerates, and the bounds that the paper gives in closed form.
 //!
-//! The paper measures the speed once in N turns and bounds the error of the last interval before the
-//! next measurement. The estimator measures at every edge, and stays well below that bound where the
-//! acceleration counts.
+//! The paper measures the speed once in N turns and bounds the error of the last interval before
+//! the next measurement. The estimator measures at every edge, and stays well below that bound
+//! where acceleration dominates.
 
 use std::ops::RangeInclusive;
 
@@ -20,15 +20,15 @@ pub(super) const RPM_S: f64 = 10_000.0;
 pub(super) const RPM_END: f64 = 10_000.0;
 /// A_e of figure 30.
 pub(super) const A_E: f64 = 0.9;
-/// Angles at which the rotor starts; a sixth of a turn later all repeats but for the phase.
+/// Initial rotor angles; a sixth of a turn later everything repeats but for the phase.
 const STARTS: u32 = 60;
 
-/// K with which the error is 10° (appendix A).
+/// K at which the error is 10° (appendix A).
 const K_PRINTED: f64 = 0.44;
 /// Steps of a picture.
 const STEPS: usize = 200;
 
-/// Speeds of the tables' rows, mechanical rpm, each standing for what is within 5 % of it.
+/// Speeds of the tables' rows, mechanical rpm, each covering 5 % to either side.
 const ROWS: [f64; 9] = [
     250.0, 500.0, 750.0, 1000.0, 2000.0, 3400.0, 5000.0, 7300.0, 9500.0,
 ];
@@ -42,16 +42,16 @@ pub(super) struct Seen {
     pub(super) estimated_rpm: f64,
     /// Magnitude of estimated less true angle, electrical degrees.
     pub(super) error_deg: f64,
-    /// What the paper bounds it by.
+    /// The paper's bound on it.
     bound_deg: f64,
 }
 
-/// What is switched in a run.
+/// What varies between runs.
 #[derive(Clone, Copy)]
 pub(super) struct Setting {
     a_e: f64,
-    /// Whether the time from a crossing to its sample is taken into account, which leaves what
-    /// acceleration alone does.
+    /// Whether the time from a crossing to its sample is compensated, which leaves the effect of
+    /// acceleration alone.
     compensates: bool,
 }
 
@@ -88,7 +88,7 @@ impl Setting {
         limits::extrapolation(k) + filter + sampling
     }
 
-    /// Every sample from standstill to the end, for each starting angle.
+    /// Returns every sample from standstill to the end, for each starting angle.
     fn run(&self) -> Vec<Seen> {
         let config = config(self.a_e, self.compensates);
         let samples = (RPM_END / RPM_S * SAMPLE_HZ) as u32;
@@ -110,7 +110,7 @@ impl Setting {
     }
 }
 
-/// The runs of the figures and of Table 1; their samples stand for the same moments.
+/// The runs of the figures and of Table 1; their samples are simultaneous.
 pub(super) struct Runs {
     pub(super) accelerating: Vec<Seen>,
     pub(super) smoothed: Vec<Seen>,
@@ -140,7 +140,7 @@ pub(super) fn greatest(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.reduce(f64::max)
 }
 
-/// The greatest of a quantity about each of these places, within this share of it.
+/// Returns the greatest of a quantity around each of these places, within this share of it.
 pub(super) fn envelope(
     points: &[(f64, f64)],
     places: impl Iterator<Item = f64>,
@@ -155,7 +155,7 @@ pub(super) fn envelope(
     places.filter_map(greatest_about).collect()
 }
 
-/// A table: per row the greatest bound and the greatest error about the speed.
+/// Tabulates the greatest bound and the greatest error around each row's speed.
 fn rows(
     name: &str,
     seen: &[Seen],
@@ -179,7 +179,7 @@ fn rows(
     .collect()
 }
 
-/// How much of its bound the error takes, at most.
+/// Returns the greatest share of its bound that the error takes.
 fn of_bound(name: &str, seen: &[Seen], from_rpm: f64, note: &str) -> Item {
     let shares = seen
         .iter()
@@ -198,7 +198,7 @@ fn limit(name: &str, seen: &[Seen], paper: f64, (from_rpm, to_rpm): (f64, f64)) 
     item(name, Some(paper), error, "deg", note)
 }
 
-/// The greatest error and the greatest bound over the speed, of all starts.
+/// Draws the greatest error and the greatest bound over the speed, of all starts.
 fn picture(name: &str, title: &str, seen: &[Seen], speed: fn(&Seen) -> f64, x: Axis) -> Figure {
     let (from, to) = x.range.unwrap_or((0.0, RPM_END));
     let step = (to - from) / STEPS as f64;
@@ -234,7 +234,7 @@ pub(super) fn over_speed(runs: &Runs) -> Reproduction {
         ..
     } = runs;
     // The figure's own axis is the estimated speed. Above, less than half a degree is left of the
-    // bound, and a fifth of one comes from the line through the two samples about a crossing.
+    // bound, and a fifth of one comes from the line through the two samples around a crossing.
     let mut items = rows(
         "fig27",
         accelerating,

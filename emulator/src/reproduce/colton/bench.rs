@@ -1,4 +1,4 @@
-//! The second paper's machines on the bench, from the library, under its observer.
+//! The second paper's machines from the library, on the bench under its observer.
 
 use siskin_control::drive::Setpoint;
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
@@ -17,11 +17,12 @@ pub(super) struct Drive {
     time_s: f64,
 }
 
-/// The scooter of section 4.1, which its rider pushes to 150 rpm. The flux is followed down to 100.
+/// Returns the scooter of section 4.1, which its rider pushes to 150 rpm. The flux is followed down
+/// to 100.
 ///
-/// The paper does not tell its poles. Here they are 30 instead of the library's 14, for the same
-/// speed by the same voltage: the supply must be above an eighth of the control's unit of voltage,
-/// π·φ/(2·T_s), which at 15.625 kHz is 11 mWb for 35 V.
+/// The paper does not give its poles. Here they are 30 instead of the library's 14, for the same
+/// speed at the same voltage: the supply must exceed an eighth of the control's unit of voltage,
+/// π·φ/(2·T_s), which at 15.625 kHz means 11 mWb for 35 V.
 pub(super) fn scooter() -> Drive {
     drive(
         "scooter",
@@ -38,13 +39,13 @@ pub(super) fn scooter() -> Drive {
     )
 }
 
-/// The quadrotor of section 4.2 at the sampling frequency of the paper's drives.
+/// Returns the quadrotor of section 4.2 at the sampling frequency of the paper's drives.
 pub(super) fn quadrotor(others: &[(ParamId, f64)]) -> Drive {
     let own = [(ParamId::PwmFreqHz, super::estimator::SAMPLE_HZ)];
     drive("quad-10-inch", "", &[&own, others].concat())
 }
 
-/// A bench of the library with these keys and parameters over its own.
+/// Returns a library bench with these keys and parameters overriding its own.
 fn drive(base: &str, keys: &str, others: &[(ParamId, f64)]) -> Drive {
     let keys = keys.parse().expect("written here");
     let stands = stand(base, keys).expect("the built-in benches are tested");
@@ -73,22 +74,22 @@ impl Drive {
         }
     }
 
-    /// What the control's numbers are worth.
+    /// Returns the units of the control's numbers.
     pub(super) fn scale(&self) -> Scale {
         self.rig.config().scale
     }
 
-    /// The set-point of a speed, rpm.
+    /// Returns the set-point of a speed, rpm.
     pub(super) fn at_rpm(&self, rpm: f64) -> Setpoint {
         Setpoint::Speed(self.scale().speed_from_rpm(rpm as f32))
     }
 
-    /// Torque of a current, Nm/A.
+    /// Returns the torque per current, Nm/A.
     pub(super) fn torque_nm_per_a(&self) -> f64 {
         1.5 * f64::from(self.motor.pole_pairs) * self.motor.flux_wb
     }
 
-    /// Runs for so long; `each` sees every period with its start, s.
+    /// Runs for this long; `each` sees every period with its start, s.
     pub(super) fn run(
         &mut self,
         setpoint: Setpoint,

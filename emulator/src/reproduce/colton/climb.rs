@@ -1,5 +1,4 @@
-//! Figures 50 and 52 of the second paper: a quadrotor's drive that climbs, and its observed flux over
-//! its speeds.
+//! Figures 50 and 52 of the second paper: a climbing quadrotor's drive, and its observed flux over speed.
 
 use std::f64::consts::TAU;
 
@@ -13,20 +12,20 @@ use crate::plot::chart::{Axis, Curve, Map, Panel};
 use crate::reproduce::item::{Item, Reproduction, item};
 use crate::shaft::Units;
 
-/// Hovering, and climbing, rpm.
+/// Hover and climb speeds, rpm.
 const HOVER_RPM: f64 = 4000.0;
 const CLIMB_RPM: f64 = 6000.0;
-/// The slew limit, with which the paper counts in 2.4, rpm/s.
+/// The slew limit that the paper assumes in 2.4, rpm/s.
 const SLEW_RPM_S: f64 = 10_000.0;
-/// The start is over by then, and the picture begins, s.
+/// When the start is over and the picture begins, s.
 const BEGIN_S: f64 = 2.0;
-/// When the climb begins, and how long the picture is, s.
+/// When the climb begins, and the picture's length, s.
 const CLIMB_S: f64 = 0.1;
 const LENGTH_S: f64 = 0.8;
-/// Length over which the picture's currents and speeds are averaged, as telemetry does, s.
+/// Averaging window of the picture's currents and speeds, as in telemetry, s.
 const MEAN_S: f64 = 1e-3;
 
-/// The speeds of figure 52, rpm, and how fast they are gone through, rpm/s.
+/// Speed range of figure 52, rpm, and its sweep rate, rpm/s.
 const SPEEDS_RPM: [f64; 2] = [1500.0, 6000.0];
 const SWEEP_RPM_S: f64 = 1500.0;
 /// Columns and rows of the map.
@@ -43,8 +42,8 @@ struct Seen {
     i_d_a: f64,
 }
 
-/// Figure 50: closed-loop speed control through a climb, by the loop of figure 47 and the modified
-/// synchronous regulator.
+/// Figure 50: closed-loop speed control through a climb, with the loop of figure 47 and the modified synchronous
+/// regulator.
 pub(super) fn climb() -> Reproduction {
     let bench = quadrotor(&[]);
     let (inertia, per_a) = (
@@ -146,7 +145,7 @@ pub(super) fn climb() -> Reproduction {
     }
 }
 
-/// The mean of some samples.
+/// Returns the mean of some samples.
 fn mean(seen: &[Seen]) -> Seen {
     let of = |value: fn(&Seen) -> f64| seen.iter().map(value).sum::<f64>() / seen.len() as f64;
     Seen {
@@ -222,7 +221,7 @@ pub(super) fn flux_map() -> Reproduction {
     }
 }
 
-/// Cosine and sine part of a row of the map.
+/// Returns the cosine and sine parts of a row of the map.
 fn fundamental(row: &[f64]) -> (f64, f64) {
     let angles = evenly(0.5, COLUMNS as f64 - 0.5, COLUMNS as u32);
     let parts = row.iter().zip(angles).map(|(value, at)| {
@@ -233,8 +232,7 @@ fn fundamental(row: &[f64]) -> (f64, f64) {
     (2.0 * cos / COLUMNS as f64, 2.0 * sin / COLUMNS as f64)
 }
 
-/// The amplitude at a speed beside what the high-passes leave of the motor's: the cosine of each
-/// one's lead.
+/// Compares the amplitude at a speed with what the high-passes leave of the motor's: the cosine of each one's lead.
 fn amplitude(
     row: &[f64],
     (rpm, omega_rad_s): (f64, f64),
@@ -257,7 +255,7 @@ fn amplitude(
     )
 }
 
-/// Rms of what is not the fundamental, of the fundamental's, %.
+/// Returns the rms of everything but the fundamental over the fundamental's, %.
 fn distortion(row: &[f64]) -> f64 {
     let (cos, sin) = fundamental(row);
     let power = row.iter().map(|value| value * value).sum::<f64>() / COLUMNS as f64;

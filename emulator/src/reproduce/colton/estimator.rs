@@ -1,5 +1,5 @@
-//! The running estimator, fed with the voltages of an ideal motor without resistance and inductance:
-//! all that is wrong with its angle it has done itself.
+//! The running estimator, fed with the voltages of an ideal motor without resistance and
+//! inductance: every error of its angle is its own.
 
 use std::f64::consts::TAU;
 
@@ -19,33 +19,32 @@ use crate::rig::Bench;
 pub(super) const POLE_PAIRS: f64 = 7.0;
 /// Sampling frequency, Hz.
 pub(super) const SAMPLE_HZ: f64 = 15_625.0;
-/// N, electrical turns a measurement of the speed.
+/// N, electrical turns per measurement of the speed.
 pub(super) const N: f64 = 1.0;
 
-/// Electrical rad/s of this motor's rpm; and likewise of accelerations.
+/// Converts this motor's rpm to electrical rad/s; likewise accelerations.
 pub(super) fn rad_s(rpm: f64) -> f64 {
     hz(rpm) * TAU
 }
 
-/// Electrical turns a second of this motor's rpm.
+/// Converts this motor's rpm to electrical turns per second.
 pub(super) fn hz(rpm: f64) -> f64 {
     rpm / 60.0 * POLE_PAIRS
 }
 
-/// The fluxes of the phases at an angle in turns, in the control's units.
+/// Returns the phases' fluxes at an angle in turns, in the control's units.
 pub(super) fn fluxes(turns: f64) -> [f64; 3] {
     let flux = FLUX_NOMINAL.to_num::<f64>();
     [0.0, -1.0, 1.0].map(|third| flux * libm::cos(TAU * (turns + third / 3.0)))
 }
 
-/// The voltages of a period in which the fluxes change so, in the control's units: those of the
-/// change.
+/// Returns the voltages of a period with this change of flux, in the control's units.
 pub(super) fn voltages(before: [f64; 3], now: [f64; 3]) -> [Voltage; 3] {
     [0, 1, 2].map(|phase| Voltage::from_num(now[phase] - before[phase]))
 }
 
-/// The estimator of the paper: what the drive does beyond it is turned off. Its integrators forget
-/// nothing. `compensates` is whether the time from a crossing to its sample is taken into account.
+/// Configures the paper's estimator: what the drive adds is turned off, and the integrators forget
+/// nothing. `compensates` is whether the time from a crossing to its sample is compensated.
 pub(super) fn config(a_e: f64, compensates: bool) -> edges::Config {
     let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in [
@@ -86,7 +85,7 @@ pub(super) fn config(a_e: f64, compensates: bool) -> edges::Config {
     }
 }
 
-/// Flux integrators with these time constants in place of those that forget nothing.
+/// Configures flux integrators with these time constants in place of those that forget nothing.
 pub(super) fn integrator(tau_int_s: f64, tau_hpfs_s: Option<f64>) -> flux_linkage::Config {
     let share = |tau_s: f64| {
         let share = -libm::expm1(-1.0 / (SAMPLE_HZ * tau_s));
@@ -104,7 +103,7 @@ pub(super) fn integrator(tau_int_s: f64, tau_hpfs_s: Option<f64>) -> flux_linkag
     }
 }
 
-/// What the estimator says at a sample.
+/// The estimator's output at a sample.
 pub(super) struct Said {
     /// Time since the start, s.
     pub(super) time_s: f64,
@@ -114,7 +113,7 @@ pub(super) struct Said {
     pub(super) omega_hz: f64,
 }
 
-/// Follows a rotor for so many samples from what the estimator's state knows. `angle` is the rotor's
+/// Follows a rotor for a number of samples from the estimator's given state. `angle` is the rotor's
 /// in turns after a time in s.
 pub(super) fn follow(
     config: &edges::Config,
@@ -139,7 +138,7 @@ pub(super) fn follow(
     })
 }
 
-/// The state of an estimator that knows where the rotor is, in turns, and how fast it turns, in
+/// Returns the state of an estimator that knows the rotor's position, in turns, and speed, in
 /// electrical turns/s.
 pub(super) fn begun(config: &edges::Config, turns: f64, omega_hz: f64) -> edges::State {
     let mut state = edges::State::default();

@@ -1,5 +1,5 @@
-//! Figures 19, 20 and 21 of the second paper: what the flux integrator does that an integrator does
-//! not, on the running one.
+//! Figures 19, 20 and 21 of the second paper: how the running flux integrator departs from an ideal
+//! integrator.
 
 use std::f64::consts::TAU;
 
@@ -14,21 +14,21 @@ use crate::reproduce::item::{Item, Reproduction, item};
 
 /// The paper's allowed lead, degrees.
 const LEAD_DEG: f64 = 10.0;
-/// The speed from which the filters of figures 20 and 21 lead by less, rpm. The paper does not print
-/// its own.
+/// The speed above which the filters of figures 20 and 21 lead by less, rpm. The paper does not
+/// print its own.
 const LEAST_RPM: f64 = 500.0;
 /// τ_HPFS over τ_int, "much above 1": the drive's.
 const SHARE: f64 = 10.0;
 
-/// What an integrator of flux makes of a turning rotor's voltages.
+/// A flux integrator's response to a turning rotor's voltages.
 struct Response {
-    /// Its amplitude over that of an integrator.
+    /// Its amplitude over an integrator's.
     gain: f64,
-    /// By how much it leads one, degrees.
+    /// Its lead over an integrator, degrees.
     lead_deg: f64,
 }
 
-/// Turns the rotor at ω for a turn, and measures over the next two.
+/// Turns the rotor at ω for one turn, and measures over the next two.
 fn respond(tau_int_s: f64, tau_hpfs_s: Option<f64>, omega_rad_s: f64) -> Response {
     let config = integrator(tau_int_s, tau_hpfs_s);
     let step = omega_rad_s / TAU / SAMPLE_HZ;
@@ -96,7 +96,7 @@ fn time_constants() -> (Vec<Item>, Figure) {
     (items.to_vec(), figure)
 }
 
-/// The time constant with which the running integrator leads by 10° at this speed.
+/// Finds the time constant at which the running integrator leads by 10° at this speed.
 fn least_tau_s(omega_rad_s: f64) -> f64 {
     let (mut short, mut long) = (1.0 / omega_rad_s, 50.0 / omega_rad_s);
     for _ in 0..20 {
@@ -143,7 +143,7 @@ impl Form {
         }
     }
 
-    /// Amplitude over that of an integrator: a high-pass's for each time constant.
+    /// Returns the amplitude over an integrator's: a high-pass's for each time constant.
     fn gain(&self, omega_rad_s: f64) -> f64 {
         let high_pass = |tau_s: f64| {
             let x = tau_s * omega_rad_s;
@@ -157,7 +157,7 @@ fn decibel(gain: f64) -> f64 {
     20.0 * libm::log10(gain)
 }
 
-/// Figure 20: magnitude and phase over the frequency.
+/// Figure 20: magnitude and phase over frequency.
 fn bode() -> (Vec<Item>, Figure) {
     let (from, to) = (0.1, 1000.0);
     let rad_s = |hertz: f64| TAU * hertz;
@@ -226,7 +226,7 @@ fn bode() -> (Vec<Item>, Figure) {
     (items, figure)
 }
 
-/// Figure 21: the lead of both forms over the speed.
+/// Figure 21: the lead of both forms over speed.
 fn leads() -> (Vec<Item>, Figure) {
     let mut items = Vec::new();
     let mut curves = Vec::new();

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::item::Reproduction;
 
-/// The second paper's figures and Table 1, in its order.
+/// Measures the second paper's figures and Table 1, in its order.
 pub fn colton() -> Reproduction {
     let by_drive: [fn() -> Reproduction; 4] = [
         filters::filters,

@@ -1,5 +1,5 @@
-//! Table 1 of the second paper: each of its sources of error alone, on the running estimator, beside
-//! its formula.
+//! Table 1 of the second paper: each of its sources of error alone, on the running estimator,
+//! against its formula.
 
 use siskin_control::control::observer::{crossing, edges, flux_linkage, limits};
 use siskin_control::units::{Angle, FLUX_NOMINAL, Flux, Speed};
@@ -10,14 +10,14 @@ use super::sheet::{between, figure, over, ratios, spread};
 use crate::plot::chart::{Curve, Panel};
 use crate::reproduce::item::{Reproduction, item};
 
-/// The integrator of the table: 10° of lead at this speed, rpm.
+/// The table's integrator leads by 10° at this speed, rpm.
 const LEAST_RPM: f64 = 500.0;
 /// T_h, s.
 const HOLD_OFF_S: f64 = 50e-6;
-/// Rate at which the comparator is looked at for the hold-off, Hz: what it does between two samples
-/// is the digital delay's row.
+/// Rate at which the comparator is read for the hold-off, Hz: what happens between two samples is
+/// the digital delay's row.
 const FINE_HZ: f64 = 1e6;
-/// Angles in a sixth of a turn at which the rotor starts.
+/// Initial rotor angles in a sixth of a turn.
 const STARTS: u32 = 16;
 
 /// A row: the formula and the measurement, both over rpm in degrees.
@@ -25,7 +25,7 @@ struct Row {
     name: &'static str,
     formula: fn(f64) -> f64,
     measured: Vec<(f64, f64)>,
-    /// Where the item is taken, rpm.
+    /// Speed at which the item is taken, rpm.
     at_rpm: f64,
     note: &'static str,
 }
@@ -34,7 +34,7 @@ fn tau_int_s() -> f64 {
     limits::tau_int_s(10.0, rad_s(LEAST_RPM))
 }
 
-/// Errors at a constant speed, of several starts, after two turns.
+/// Returns errors at a constant speed, of several starts, after two turns.
 fn steady(rpm: f64, config: &edges::Config, begins: &edges::Config) -> Vec<f64> {
     let omega = hz(rpm);
     let samples = (12.0 * SAMPLE_HZ / omega) as u32;
@@ -47,7 +47,7 @@ fn steady(rpm: f64, config: &edges::Config, begins: &edges::Config) -> Vec<f64> 
     settled.map(|said| said.error_deg).collect()
 }
 
-/// The mean lead with an integrator whose own lead is not taken off.
+/// Returns the mean lead of an integrator whose own lead is not subtracted.
 fn low_pass(rpm: f64) -> Option<f64> {
     let paper = config(0.0, true);
     let known = edges::Config {
@@ -66,15 +66,15 @@ fn low_pass(rpm: f64) -> Option<f64> {
     (count > 0.0).then(|| errors.iter().sum::<f64>() / count)
 }
 
-/// The greatest error where the time from a crossing to its sample is not taken off.
+/// Returns the greatest error without compensation of the time from a crossing to its sample.
 fn digital_delay(rpm: f64) -> Option<f64> {
     let config = config(0.0, false);
     let errors = steady(rpm, &config, &config);
     greatest(errors.into_iter().map(f64::abs))
 }
 
-/// How far the rotor is beyond phase a's crossing when it is taken, because that of phase b, which a
-/// disturbance has kept back until then, came at the same moment.
+/// Returns how far the rotor is beyond phase a's crossing when it is accepted, because that of
+/// phase b, held back until then by a disturbance, came at the same moment.
 fn hold_off(rpm: f64) -> Option<f64> {
     let omega = hz(rpm);
     let config = crossing::Config {
@@ -84,7 +84,7 @@ fn hold_off(rpm: f64) -> Option<f64> {
     let speed = Speed::from_num(omega / FINE_HZ);
     let mut state = crossing::State::default();
     crossing::begin(&mut state, Angle::ZERO);
-    // From 0° on, b rises at 30° and a falls at 90°.
+    // From 0°, b rises at 30° and a falls at 90°.
     let falls = 0.25;
     let mut before = fluxes(0.0).map(Flux::from_num);
     let samples = (0.5 / omega * FINE_HZ) as u32;
@@ -108,14 +108,14 @@ fn at_speeds(from: f64, to: f64, measure: fn(f64) -> Option<f64>) -> Vec<(f64, f
         .collect()
 }
 
-/// The greatest about each speed of what a run shows.
+/// Returns the greatest error of a run around each speed.
 fn in_run(error: impl Iterator<Item = (f64, f64)>, from: f64) -> Vec<(f64, f64)> {
     let points: Vec<_> = error.collect();
     envelope(&points, spread(from, 9500.0, 20), 0.05)
 }
 
 fn rows(runs: &Runs) -> [Row; 5] {
-    // K is one of the estimated speed.
+    // K is a function of the estimated speed.
     let alone = |seen: &Seen| (seen.estimated_rpm, seen.error_deg);
     let added =
         |(smoothed, alone): (&Seen, &Seen)| (alone.rpm, smoothed.error_deg - alone.error_deg);
@@ -160,7 +160,7 @@ fn rows(runs: &Runs) -> [Row; 5] {
     ]
 }
 
-/// The value between two measured ones about this speed.
+/// Interpolates between two measured values around this speed.
 fn at(points: &[(f64, f64)], rpm: f64) -> Option<f64> {
     let next = points.iter().position(|(x, _)| *x >= rpm)?;
     let (to, above) = points[next];

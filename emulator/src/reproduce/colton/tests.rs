@@ -1,4 +1,4 @@
-//! The paper's limits and formulas, kept by the running control.
+//! The running control obeys the paper's limits and formulas.
 
 use std::sync::LazyLock;
 
@@ -18,7 +18,7 @@ fn both(name: &str) -> (f64, f64) {
     (paper, item.measured.expect("it was measured"))
 }
 
-/// Every item of this prefix is within `within` of what its formula gives.
+/// Checks that every item with this prefix is within `within` of its formula.
 #[track_caller]
 fn assert_close(prefix: &str, count: usize, within: f64) {
     let names = COLTON.items.iter().map(|item| item.name.as_str());
@@ -61,7 +61,7 @@ fn the_errors_are_within_the_papers_bounds_and_limits() {
 
 #[test]
 fn the_running_integrators_are_the_papers() {
-    // A filter in samples knows the time to half a sampling period, 32 µs.
+    // A sampled filter resolves time to half a sampling period, 32 µs.
     assert_close("fig19_tau_int", 7, 0.032);
     assert_close("fig20_gain", 2, 0.05);
     assert_close("fig20_phase", 2, 0.5);
@@ -86,7 +86,7 @@ fn each_source_of_error_is_as_large_as_its_formula_or_taken_care_of() {
 
 #[test]
 fn the_scooters_flux_leads_and_its_current_leads_the_flux_as_the_paper_says() {
-    // Noise, dead time and 12 bits in it.
+    // With noise, dead time and 12 bits.
     assert_close("fig42_lead", 5, 1.0);
     let (motor, flux) = both("fig43_flux");
     assert!((flux / motor - 1.0).abs() < 0.05, "{flux} of {motor}");
@@ -96,7 +96,7 @@ fn the_scooters_flux_leads_and_its_current_leads_the_flux_as_the_paper_says() {
 #[test]
 fn the_quadrotor_climbs_on_its_transient_current() {
     let (predicted, peak) = both("fig50_peak_i_q");
-    // The paper: hardware must bear two to three times what is predicted.
+    // The paper: hardware must bear two to three times the predicted peak.
     assert!(
         peak > 0.9 * predicted && peak < 2.0 * predicted,
         "{peak} of {predicted}"

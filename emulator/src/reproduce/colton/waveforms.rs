@@ -1,5 +1,5 @@
-//! Figures 42 and 43 of the second paper: the scooter's flux observer against the rotor's true angle,
-//! in a drive that takes over at a push and accelerates by a constant current.
+//! Figures 42 and 43 of the second paper: the scooter's flux observer against the rotor's true angle, in a drive that
+//! takes over from a push and accelerates with a constant current.
 
 use std::f64::consts::TAU;
 
@@ -14,11 +14,11 @@ use crate::reproduce::item::{Item, Reproduction, item};
 
 /// Torque current, A.
 const CURRENT_A: f32 = 20.0;
-/// Length of the run, s: to some 600 rpm.
+/// Length of the run, s: up to some 600 rpm.
 const RUN_S: f64 = 8.0;
-/// Width of the steps over which the lead is averaged, rpm.
+/// Width of the speed steps over which the lead is averaged, rpm.
 const STEP_RPM: f64 = 20.0;
-/// Where the waveforms are taken, rpm, and over how many turns.
+/// Speed at which the waveforms are taken, rpm, and their number of turns.
 const WAVES_RPM: f64 = 400.0;
 const WAVES_TURNS: f64 = 6.0;
 
@@ -35,7 +35,7 @@ struct Seen {
     error_deg: f64,
 }
 
-/// The push and the acceleration.
+/// Runs the push and the acceleration.
 fn ride() -> (Vec<Seen>, Drive) {
     let mut drive = scooter();
     let scale = drive.scale();
@@ -60,8 +60,7 @@ fn ride() -> (Vec<Seen>, Drive) {
     (seen, drive)
 }
 
-/// The phasor of a three-phase quantity in the frame of the rotor, averaged: along the rotor's flux
-/// and across it.
+/// Returns the phasor of a three-phase quantity in the rotor's frame, averaged: along the rotor's flux and across it.
 fn phasor<'a>(seen: impl Iterator<Item = &'a Seen>, of: fn(&Seen) -> [f64; 3]) -> (f64, f64) {
     let (mut along, mut across, mut count) = (0.0, 0.0, 0.0);
     for seen in seen {
@@ -79,7 +78,7 @@ fn degrees((along, across): (f64, f64)) -> f64 {
     libm::atan2(across, along) * 360.0 / TAU
 }
 
-/// The lead of the drive's flux integrators by their time constants, degrees.
+/// Returns the lead of the drive's flux integrators by their time constants, degrees.
 fn lead_deg(drive: &Drive, rpm: f64) -> f64 {
     let settings = FluxSettings::new(&drive.params);
     let omega_rad_s = rpm * f64::from(drive.motor.pole_pairs) * TAU / 60.0;
@@ -90,7 +89,7 @@ fn lead_deg(drive: &Drive, rpm: f64) -> f64 {
     }
 }
 
-/// Figure 42: the lead of the observed flux over the speed.
+/// Figure 42: the lead of the observed flux over speed.
 fn lead(seen: &[Seen], drive: &Drive) -> (Vec<Item>, Figure) {
     let formula = |rpm: f64| lead_deg(drive, rpm);
     let about = |rpm: f64| {
