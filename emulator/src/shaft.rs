@@ -1,20 +1,20 @@
-//! The control's numbers as the shaft's, whatever the configured direction.
+//! Converts the control's numbers to the shaft's, whatever the configured direction.
 
 use siskin_control::drive::{Config, Direction};
 use siskin_control::units::{Scale, Speed};
 
-/// What the control's numbers are worth on the bench, where a positive speed has the phases in the
+/// The units of the control's numbers on the bench, where a positive speed has the phases in the
 /// order a, b, c.
 #[derive(Clone, Copy, Debug)]
 pub struct Units<'a> {
-    /// What they are worth along the configured direction.
+    /// The units along the configured direction.
     pub scale: &'a Scale,
     /// The configured direction.
     pub direction: Direction,
 }
 
 impl<'a> Units<'a> {
-    /// Those of a configuration.
+    /// Returns those of a configuration.
     pub const fn of(config: &'a Config) -> Self {
         Self {
             scale: &config.scale,
@@ -22,7 +22,7 @@ impl<'a> Units<'a> {
         }
     }
 
-    /// 1, or −1 where the configured direction has the phases in the order a, c, b.
+    /// Returns 1, or −1 if the configured direction has the phases in the order a, c, b.
     pub const fn sign(&self) -> f64 {
         match self.direction {
             Direction::Normal => 1.0,
@@ -30,7 +30,7 @@ impl<'a> Units<'a> {
         }
     }
 
-    /// The shaft's mechanical speed for one along the configured direction, rpm.
+    /// Converts a speed along the configured direction to the shaft's mechanical speed, rpm.
     pub fn rpm(&self, speed: Speed) -> f64 {
         self.sign() * f64::from(self.scale.rpm(speed))
     }

@@ -1,4 +1,4 @@
-//! What a run comes to: figures over measuring windows, and a hash of the control state.
+//! The results of a run: figures over measuring windows, and a hash of the control state.
 
 mod since;
 mod trace;
@@ -17,16 +17,16 @@ use trace::Trace;
 pub use window::Figures;
 use window::{Control, Look, Window};
 
-/// Watches a run.
+/// Observes a run.
 pub struct Summary {
     trace: Trace,
     steps: u64,
-    /// Whether nobody sees the control.
+    /// Whether the control is not visible.
     blind: bool,
     faults: Faults,
-    /// What the motor has gone on with.
+    /// What the motor has flown on with.
     warnings: Limits,
-    /// What the drive did in the period before.
+    /// The drive's phase in the previous period.
     phase: Phase,
     windows: Vec<Window>,
 }
@@ -40,28 +40,28 @@ pub struct Report {
     pub wall_s: f64,
     /// Simulated seconds per wall second.
     pub sim_per_wall: Option<f64>,
-    /// Control periods, or those of the PWM where nobody sees the control.
+    /// Control periods, or PWM periods if the control is not visible.
     pub steps: u64,
     /// Hash over the control state of every step: 16 hexadecimal digits, equal for equal seed and
-    /// inputs on any machine. Where nobody sees the control, over the motor's.
+    /// inputs on any machine. If the control is not visible, over the motor's state.
     pub trace_hash: String,
-    /// Faults that have turned the bridge off; `None` where nobody sees the control.
+    /// Faults that have turned the bridge off; `None` if the control is not visible.
     pub faults: Option<Vec<&'static str>>,
-    /// What was wrong while the motor went on, if anything was.
+    /// What was wrong while the motor went on, if anything.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<&'static str>,
-    /// What came in from outside and was refused; not for a scenario, where nothing does.
+    /// Refused input from outside; `None` for a scenario, which has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rejected: Option<Rejected>,
-    /// The measuring windows; none of several ESCs together.
+    /// The measuring windows; none for several ESCs together.
     pub windows: Vec<Figures>,
-    /// Of several ESCs, each.
+    /// One per ESC, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub escs: Vec<Report>,
 }
 
 impl Report {
-    /// Several ESCs together: what they add up to, and a hash over their hashes in their order.
+    /// Sums up several ESCs, with a hash over their hashes in order.
     fn over(escs: Vec<Self>, sim_s: f64, wall_s: f64) -> Self {
         let mut hash = Xxh3::new();
         let mut faults = Vec::new();
@@ -89,7 +89,7 @@ impl Report {
         }
     }
 
-    /// The only ESC, or several together.
+    /// Reports the only ESC, or several together.
     pub fn of(mut escs: Vec<Self>, sim_s: f64, wall_s: f64) -> Self {
         match escs.pop() {
             Some(only) if escs.is_empty() => only,
@@ -97,7 +97,7 @@ impl Report {
         }
     }
 
-    /// With what each ESC has refused.
+    /// Adds what each ESC has refused.
     pub fn with_rejected(mut self, rejected: &[Rejected]) -> Self {
         self.rejected = Some(rejected.iter().fold(Rejected::default(), Rejected::and));
         for (esc, rejected) in self.escs.iter_mut().zip(rejected) {
@@ -107,22 +107,22 @@ impl Report {
     }
 }
 
-/// What came in and was refused.
+/// Refused input.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Rejected {
-    /// Datagrams on the throttle wire that were malformed or found no room.
+    /// Throttle-wire datagrams that were malformed or found no room.
     pub wire_datagrams: u64,
     /// Runs of edges that were no frame, or failed its check.
     pub wire_frames: u32,
     /// MAVLink frames that failed their check, are unknown, or cannot be trusted.
     pub mavlink_frames: u64,
-    /// Requests of a client in lockstep that were malformed.
+    /// Malformed requests of a client in lockstep.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lockstep_requests: Option<u32>,
 }
 
 impl Rejected {
-    /// Its sum with that of another ESC.
+    /// Adds another ESC's.
     fn and(self, other: &Self) -> Self {
         Self {
             wire_datagrams: self.wire_datagrams + other.wire_datagrams,
@@ -134,7 +134,7 @@ impl Rejected {
 }
 
 impl Summary {
-    /// Watches with these measuring windows: name, start and end, s.
+    /// Creates a summary with these measuring windows: name, start and end, s.
     pub fn new(windows: impl IntoIterator<Item = (String, f64, f64)>) -> Self {
         let windows = windows.into_iter();
         Self {
@@ -150,7 +150,7 @@ impl Summary {
         }
     }
 
-    /// Takes in a period that began at `t_s`.
+    /// Adds a period that began at `t_s`.
     #[inline]
     pub fn add(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.steps += 1;
@@ -177,14 +177,14 @@ impl Summary {
         }
     }
 
-    /// Takes in the limits that bind, of which some are warnings.
+    /// Adds the limits that bind, some of which are warnings.
     pub fn limited(&mut self, limits: Limits) {
         for warning in limits.iter().filter(|limit| limit.warns()) {
             self.warnings.insert(warning);
         }
     }
 
-    /// Takes in a period that began at `t_s` of a machine whose control nobody sees.
+    /// Adds a period that began at `t_s` of a machine whose control is not visible.
     pub fn pass(&mut self, t_s: f64, passage: &Passage) {
         self.steps += 1;
         self.blind = true;
@@ -200,7 +200,7 @@ impl Summary {
         }
     }
 
-    /// The figures, after `sim_s` simulated and `wall_s` real seconds.
+    /// Returns the figures, after `sim_s` simulated and `wall_s` real seconds.
     pub fn report(&self, sim_s: f64, wall_s: f64) -> Report {
         Report {
             sim_s,

@@ -1,8 +1,8 @@
-//! What stands on the bench outside the chip, as it runs: motor and inverter, bus, heat and sensors.
+//! The running bench outside the chip: motor and inverter, bus, heat and sensors.
 //!
-//! The control's periods come whole ([`Surroundings::period`]), with the emulator's converter at their
-//! start. Whoever has the edges themselves takes it on stretch by stretch, asks for what a pin shows at
-//! any instant, and ends each period of the PWM.
+//! The control's periods come whole ([`Surroundings::period`]), with the emulator's converter sampling at their start.
+//! A caller that has the edges itself advances it stretch by stretch, reads a pin at any instant, and ends each PWM
+//! period.
 
 mod fit;
 
@@ -14,10 +14,10 @@ use crate::bench::Bench;
 use crate::fault::InForce;
 use crate::plant::{Air, Bus, Flow, Gate, Noise, Plant, Sensing, Thermal, Truth};
 
-/// The first period's length to expect, s, before there was one.
+/// Expected length of the first period, s.
 const USUAL_S: f64 = 1.0 / 24_000.0;
 
-/// The shortest and the longest period to expect, s: the bus and the shaft's speed stand still in one.
+/// Shortest and longest expected period, s: bus voltage and shaft speed are constant within one.
 const EXPECTED_S: [f64; 2] = [10e-6, 1e-3];
 
 /// The motor and its supply at the start of a period, and what flowed in it.
@@ -37,7 +37,7 @@ pub struct Motion {
     pub flow: Flow,
 }
 
-/// A period as it looks from outside the chip.
+/// A period as seen from outside the chip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passage {
     /// Its length, s.
@@ -61,18 +61,18 @@ pub struct Surroundings {
     struck: [f64; 2],
     /// The sensors as they are now.
     sensing: Sensing,
-    /// What stuck current sensors show, A.
+    /// What stuck current sensors read, A.
     stuck_a: [Option<f64>; 3],
-    /// What stuck Hall sensors show.
+    /// What stuck Hall sensors read.
     hall_stuck: [Option<bool>; 3],
-    /// The period that goes on stretch by stretch, as it began and of its length so far.
+    /// The period in progress, from its start and with its length so far.
     begun: Option<Passage>,
-    /// Length of the latest such period, s, as far as one is to be expected.
+    /// Length of the latest such period, s, within the expected range.
     latest_s: f64,
 }
 
 impl Surroundings {
-    /// The bench at its start.
+    /// Creates the bench at its start.
     pub fn new(bench: Bench) -> Self {
         let mut plant = Plant::new(
             bench.plant,
@@ -101,32 +101,32 @@ impl Surroundings {
         }
     }
 
-    /// What stands there.
+    /// Returns the bench.
     pub fn bench(&self) -> &Bench {
         &self.bench
     }
 
-    /// Motor, load and inverter.
+    /// Returns motor, load and inverter.
     pub fn plant(&self) -> &Plant {
         &self.plant
     }
 
-    /// Voltage of the bus, V.
+    /// Returns the bus voltage, V.
     pub fn bus_v(&self) -> f64 {
         self.bus.volts()
     }
 
-    /// The bus, to be fed by another or to be given another supply.
+    /// Returns the bus, to be fed by another or given another supply.
     pub fn bus_mut(&mut self) -> &mut Bus {
         &mut self.bus
     }
 
-    /// What acts from outside now.
+    /// Returns what acts from outside now.
     pub fn air(&self) -> Air {
         self.air
     }
 
-    /// What acts from outside from now on.
+    /// Sets what acts from outside from now on.
     pub fn surround(&mut self, air: Air) {
         let before = std::mem::replace(&mut self.air, air);
         if [air.torque_nm, air.wind_rad_s] != [before.torque_nm, before.wind_rad_s] {
@@ -136,7 +136,7 @@ impl Surroundings {
         self.thermal.set_ambient_c(air.ambient_c);
     }
 
-    /// Lets air and faults act on the shaft.
+    /// Applies air and faults to the shaft.
     fn push(&mut self) {
         let [torque_nm, wind_rad_s] = self.struck;
         self.plant.set_wind_rad_s(self.air.wind_rad_s + wind_rad_s);
@@ -144,24 +144,24 @@ impl Surroundings {
             .set_extra_torque_nm(self.air.torque_nm + torque_nm);
     }
 
-    /// Temperature of the board as the emulator's thermistor and converter show it, °C.
+    /// Returns the board's temperature as measured by the emulator's thermistor and converter, °C.
     pub fn temperature_c(&self) -> f32 {
         self.thermal.measured_c()
     }
 
-    /// Temperature of the sensor on the board, °C.
+    /// Returns the temperature of the sensor on the board, °C.
     pub fn sensor_c(&self) -> f64 {
         self.thermal.sensor_c()
     }
 
-    /// Electrical angle now, turns, 0..1.
+    /// Returns the present electrical angle, turns, 0..1.
     pub fn angle_turns(&self) -> f64 {
         let [cos, sin] = self.plant.direction();
         let turns = libm::atan2(sin, cos) / TAU;
         if turns < 0.0 { turns + 1.0 } else { turns }
     }
 
-    /// What there is to be sensed now.
+    /// Returns what there is to sense now.
     #[inline(always)]
     pub fn truth(&self) -> Truth {
         Truth {
@@ -173,7 +173,7 @@ impl Surroundings {
         }
     }
 
-    /// What the emulator's converter reads of everything.
+    /// Returns the readings of the emulator's converter.
     #[inline(always)]
     pub fn sample(&mut self) -> Sample {
         let mut sample = self.sensing.sample(&self.truth(), &mut self.noise);
@@ -186,7 +186,7 @@ impl Surroundings {
         sample
     }
 
-    /// What the amplifier of a phase's shunt shows now, A, with its errors and its noise.
+    /// Returns the present output of a phase's shunt amplifier, A, with its errors and noise.
     pub fn shown_a(&mut self, phase: usize) -> f64 {
         match self.stuck_a[phase] {
             Some(stuck_a) => stuck_a,
@@ -197,12 +197,12 @@ impl Surroundings {
         }
     }
 
-    /// The Hall sensors' bits now.
+    /// Returns the Hall sensors' present bits.
     pub fn hall(&self) -> u8 {
         self.seen(self.sensing.hall(self.plant.direction()))
     }
 
-    /// What stuck Hall sensors leave of their bits.
+    /// Applies stuck Hall sensors to their bits.
     #[inline(always)]
     fn seen(&self, mut hall: u8) -> u8 {
         for (phase, stuck) in self.hall_stuck.into_iter().enumerate() {
@@ -213,7 +213,7 @@ impl Surroundings {
         hall
     }
 
-    /// A whole period of the control with a command for each half.
+    /// Runs a whole control period with a command for each half.
     #[inline(always)]
     pub fn period(&mut self, halves: [Bridge; 2], period_s: f64, dead_time_s: f64) -> Motion {
         let start = self.start();
@@ -222,7 +222,7 @@ impl Surroundings {
         self.follow(start, flow, period_s)
     }
 
-    /// Goes on by `time_s` with each leg's gates, if that is any time.
+    /// Advances by `time_s`, if positive, with each leg's gates.
     pub fn stretch(&mut self, gates: [Gate; 3], time_s: f64) {
         if time_s <= 0.0 {
             return;
@@ -241,8 +241,8 @@ impl Surroundings {
         }
     }
 
-    /// Ends a period of the PWM, if there was a stretch of one: what passed in it. Without PWM, there
-    /// must be an end each millisecond too: the supply and the speed stand still until then.
+    /// Ends a PWM period, if it had a stretch, and returns what passed in it. Without PWM, call it each millisecond
+    /// too: supply and speed are constant until then.
     pub fn end_period(&mut self) -> Option<Passage> {
         let begun = self.begun.take()?;
         let length_s = begun.length_s;
@@ -254,7 +254,7 @@ impl Surroundings {
         })
     }
 
-    /// The motor and its supply now.
+    /// Returns the present state of the motor and its supply.
     #[inline(always)]
     fn start(&self) -> Motion {
         Motion {
@@ -267,7 +267,7 @@ impl Surroundings {
         }
     }
 
-    /// Bus and board after a period.
+    /// Advances bus and board after a period.
     #[inline(always)]
     fn follow(&mut self, start: Motion, flow: Flow, time_s: f64) -> Motion {
         self.bus.advance(time_s, flow.bus_a);
@@ -280,12 +280,12 @@ impl Surroundings {
         }
     }
 
-    /// Sets the level, A, at which comparators turn the bridge off in whole periods of the control.
+    /// Sets the level, A, at which comparators turn the bridge off in whole control periods.
     pub fn set_comparator_a(&mut self, level_a: f64) {
         self.plant.set_comparator_a(level_a);
     }
 
-    /// Lets other faults act than before.
+    /// Replaces the faults that act.
     pub fn disturb(&mut self, before: &InForce, now: &InForce) {
         if now.breaks != before.breaks {
             self.plant.break_legs(&now.breaks);
@@ -315,18 +315,18 @@ impl Surroundings {
 }
 
 impl Motion {
-    /// Whether the plant's numbers have become none.
+    /// Returns true if the plant's numbers are no longer finite.
     pub fn diverged(&self) -> bool {
         !(self.speed_rad_s.is_finite() && self.flow.torque_nm.is_finite())
     }
 
-    /// Estimated less true electrical angle, degrees, ±180.
+    /// Returns the estimated less true electrical angle, degrees, ±180.
     pub fn angle_error_deg(&self, snapshot: &Snapshot) -> f64 {
         let turns = snapshot.angle.to_num::<f64>() - self.angle_turns;
         (turns - libm::round(turns)) * 360.0
     }
 
-    /// Mechanical speed, rpm.
+    /// Returns the mechanical speed, rpm.
     pub fn rpm(&self) -> f64 {
         self.speed_rad_s * 60.0 / TAU
     }
@@ -367,7 +367,7 @@ mod tests {
             }
         }
 
-        /// A period, cut so many times where nothing changes besides.
+        /// Plays a period, cut into `cuts` pieces besides its edges.
         fn period(&mut self, bridge: Bridge, cuts: u32) -> Motion {
             let mut edges = Vec::new();
             let halves = [bridge; 2];
@@ -394,9 +394,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
 
-        /// However a period is cut, it is the same, and the switching plant's: that has the diodes of a
-        /// dead time in its sweep as kicks. When a diode begins to conduct is looked for by the ends of a
-        /// stretch, 3 mV and so some mA too late at most, and the copper's loss is by a series of each.
+        /// However a period is cut, the result is the same, and equals the switching plant's, whose sweep has the
+        /// diodes of a dead time as kicks. A diode's onset is searched from the ends of a stretch, at most 3 mV and so
+        /// some mA too late, and the copper's loss is by a different series in each.
         #[test]
         fn stretches_make_the_period(
             rpm in -5000.0..5000.0,
@@ -431,8 +431,8 @@ mod tests {
         }
     }
 
-    /// The winding's time constant is 0.4 ms: in 5 µs a current rises by V/L·t, through the low side's
-    /// shunt only while that is on.
+    /// The winding's time constant is 0.4 ms: in 5 µs a current rises by V/L·t, and through the low side's shunt only
+    /// while that is on.
     #[test]
     fn a_shunt_shows_its_current_while_its_low_side_is_on() {
         let mut around = Surroundings::new(Bench {
@@ -460,7 +460,7 @@ mod tests {
         assert_eq!(around.shown_a(1), 3.0);
     }
 
-    /// 24 V over twice 3 mΩ, as if a switch were shorted; and it ends with the gates' overlap.
+    /// 24 V over twice 3 mΩ, as with a shorted switch; it ends with the gates' overlap.
     #[test]
     fn both_gates_of_a_leg_shoot_through() {
         let mut around = around(0.0);

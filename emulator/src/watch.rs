@@ -1,4 +1,4 @@
-//! Looks on at a run: figures of it, and a recording where one is wanted.
+//! Observes a run: its figures, and a recording if wanted.
 
 use siskin_control::drive::Limits;
 use thiserror::Error;
@@ -24,7 +24,7 @@ pub enum WatchError {
 /// Why what is simulated is void; one line.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum Void {
-    /// The simulated motor has left all bounds.
+    /// The simulated motor has diverged.
     #[error(
         "the simulated motor diverged: its inertia is too small for its load and the PWM frequency"
     )]
@@ -36,13 +36,13 @@ pub enum Void {
     Both {
         /// The phase, from 0.
         phase: usize,
-        /// When, s: the period's start where only that is known.
+        /// When, s: the period's start if only that is known.
         t_s: f64,
     },
 }
 
 impl Void {
-    /// Whether a period is a reason.
+    /// Returns why a period makes the run void, if it does.
     pub fn of(t_s: f64, period: &Period, rig: &Rig) -> Option<Self> {
         if period.motion.diverged() {
             return Some(Self::Diverged);
@@ -60,7 +60,8 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Takes figures in these windows (name, start and end, s), and records what it sees.
+    /// Creates a watch with figures in these windows (name, start and end, s) that records what it
+    /// sees.
     pub fn new(
         windows: impl IntoIterator<Item = (String, f64, f64)>,
         recorder: Option<Recorder>,
@@ -72,12 +73,13 @@ impl Watch {
         }
     }
 
-    /// Whether the run cannot go on.
+    /// Returns true if the run cannot go on.
     pub fn failed(&self) -> bool {
         self.failed.is_some()
     }
 
-    /// Ends the recording and gives the figures, after `sim_s` simulated and `wall_s` real seconds.
+    /// Ends the recording and returns the figures, after `sim_s` simulated and `wall_s` real
+    /// seconds.
     pub fn finish(self, sim_s: f64, wall_s: f64) -> Result<Report, WatchError> {
         if let Some(error) = self.failed {
             return Err(error);
@@ -89,24 +91,25 @@ impl Watch {
     }
 }
 
-/// The onlookers of several ESCs, each of its own.
+/// The onlookers of several ESCs, one each.
 pub struct Watches {
     each: Vec<Watch>,
     esc: usize,
 }
 
 impl Watches {
-    /// One for each ESC.
+    /// Creates them from one per ESC.
     pub fn new(each: Vec<Watch>) -> Self {
         Self { each, esc: 0 }
     }
 
-    /// Whether the run cannot go on.
+    /// Returns true if the run cannot go on.
     pub fn failed(&self) -> bool {
         self.each.iter().any(Watch::failed)
     }
 
-    /// Ends the recordings and gives the figures, after `sim_s` simulated and `wall_s` real seconds.
+    /// Ends the recordings and returns the figures, after `sim_s` simulated and `wall_s` real
+    /// seconds.
     pub fn finish(self, sim_s: f64, wall_s: f64) -> Result<Report, WatchError> {
         let reports = self.each.into_iter();
         let reports = reports.map(|watch| watch.finish(sim_s, wall_s));

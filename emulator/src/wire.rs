@@ -1,7 +1,7 @@
 //! The throttle wire: datagrams in, edges on the simulation's time axis out.
 //!
-//! A datagram is one frame as a flight controller's timer would put it on the wire, or any run of
-//! levels. Nothing here decodes: the edges go to the same capture decoder as on the chip.
+//! A datagram is one frame as a flight controller's timer would put it on the wire, or any run of levels. Nothing is
+//! decoded here: the edges go to the same capture decoder as on the chip.
 
 mod frame;
 mod rejected;
@@ -20,32 +20,32 @@ use crate::plant::Noise;
 use frame::Frame;
 pub use rejected::Rejected;
 
-/// What may wait to be played, ns; a datagram that would have to wait longer is dropped.
+/// Longest backlog to be played, ns; a datagram that would have to wait longer is dropped.
 pub const MAX_BACKLOG_NS: u64 = 100_000_000;
 
-/// Edges that may wait: more than 100 ms of DShot1200 (193 thousand), so that only raw edges far
-/// beyond any protocol's rate reach it.
+/// Most pending edges: more than 100 ms of DShot1200 (193 thousand), so that only raw edges far beyond any protocol's
+/// rate reach it.
 const MAX_EDGES: usize = 1 << 18;
 
-/// Datagrams taken in one call; at DShot1200's 75 frames in a millisecond, three times as many.
+/// Datagrams taken per call: three times DShot1200's 75 frames per millisecond.
 const DATAGRAMS_PER_CALL: usize = 256;
 
-/// By how much the ESC may take a frame's first edge for earlier than it was sent, ns: a tick of its
-/// timer, and what the edge strays. Half of what the shortest frames are apart, 16.7 µs.
+/// How much earlier than sent the ESC may time a frame's first edge, ns: a tick of its timer, plus the edge's jitter.
+/// Half the spacing of the shortest frames, 16.7 µs.
 const EARLY_NS: u64 = 8_000;
 
-/// What began so long ago is not answered any more, ns. The ESC answers within a frame, 107 µs at
-/// most, and two control periods, 125 µs each.
+/// Age beyond which a frame is no longer answered, ns. The ESC answers within a frame, 107 µs at most, and two control
+/// periods, 125 µs each.
 const ANSWERED_NS: u64 = 1_000_000;
 
 /// The longest datagram.
 const READ_BYTES: usize = 65_535;
 
-/// Where the wire listens: the argument of `--signal`.
+/// The wire's address: the argument of `--signal`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SignalAddress(HostPort);
 
-/// Why a text is not the address of a wire.
+/// Why a text is not a wire's address.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "'{text}' is not a throttle wire: {reason}; use udp:HOST:PORT, such as udp:127.0.0.1:14600"
@@ -57,7 +57,7 @@ pub struct SignalError {
     pub reason: SignalReason,
 }
 
-/// What is wrong with the address of a wire.
+/// What is wrong with a wire's address.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SignalReason {
     /// It is not UDP.
@@ -96,56 +96,56 @@ pub fn check(datagram: &[u8]) -> Result<(), Rejected> {
     Frame::parse(datagram).map(|_| ())
 }
 
-/// What became of the datagrams so far.
+/// Counts of the datagrams so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WireCounts {
     /// Turned into edges.
     pub played: u64,
     /// Malformed.
     pub rejected: u64,
-    /// Dropped, since too much waited already.
+    /// Dropped, because too much was pending.
     pub dropped: u64,
 }
 
 /// What is wrong with a wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireErrors {
-    /// Nothing that is sent comes through.
+    /// Nothing sent comes through.
     pub lost: bool,
-    /// Probability of each bit of a DShot frame to be the other one.
+    /// Probability that a bit of a DShot frame is inverted.
     pub bit_error_rate: f64,
-    /// By how much edges are displaced, ns rms; they stay in order.
+    /// Jitter of edges, ns rms; they stay in order.
     pub jitter_ns: f64,
 }
 
-/// One ESC's throttle wire. Its line is low at the start.
+/// One ESC's throttle wire. Its line is initially low.
 ///
-/// Time is the simulation's, in ns. Times given to it do not go back.
+/// Time is the simulation's, in ns, and does not decrease from call to call.
 pub struct Wire {
     socket: Option<UdpSocket>,
     /// Whether the socket waits for datagrams.
     waits: bool,
     buffer: Vec<u8>,
-    /// Who sends, and from which time on: to whom answers go. None is who plays without a socket.
+    /// Who sends, and from when on: the recipients of answers. `None` is a player without a socket.
     senders: VecDeque<(u64, Option<SocketAddr>)>,
     counts: WireCounts,
     edges: VecDeque<(u64, bool)>,
-    /// The level after all that waits.
+    /// The level after everything pending.
     level: bool,
-    /// Up to here edges have been handed out; nothing is added before it.
+    /// Edges have been handed out up to here; nothing is added before it.
     taken_ns: u64,
-    /// The end of the last frame and the rest that it needs after it.
+    /// The end of the last frame and the rest required after it.
     last: Option<(u64, u64)>,
     errors: WireErrors,
     noise: Noise,
-    /// When the socket has last given a frame.
+    /// When the socket last delivered a frame.
     heard_ns: Option<u64>,
-    /// What the latest frame asks for, 0 to 1.
+    /// The latest frame's throttle, 0 to 1.
     throttle: f64,
 }
 
 impl Wire {
-    /// A wire without a socket: only [`Wire::play`] feeds it.
+    /// Creates a wire without a socket: only [`Wire::play`] feeds it.
     pub fn detached() -> Self {
         Self {
             socket: None,
@@ -164,19 +164,19 @@ impl Wire {
         }
     }
 
-    /// What its errors are drawn from.
+    /// Seeds its errors.
     pub fn sow(&mut self, seed: u64) {
-        // Another sequence than the sensors' noise of the same seed.
+        // A different sequence from the sensors' noise with the same seed.
         self.noise = Noise::new(!seed);
     }
 
-    /// What is wrong with it from now on.
+    /// Sets what is wrong with it from now on.
     pub fn disturb(&mut self, errors: WireErrors) {
         self.errors = errors;
     }
 
-    /// Opens the wire of ESC `index`: `address` with its port raised by `index`. Each gets a free
-    /// port of its own when the port is 0.
+    /// Opens the wire of ESC `index`: `address` with its port raised by `index`. With port 0 each gets a free port of
+    /// its own.
     pub fn open(address: &SignalAddress, index: u16) -> Result<Self, WireError> {
         let no_port = || WireError::NoPort(address.clone(), index);
         let HostPort { host, port } = &address.0;
@@ -203,29 +203,28 @@ impl Wire {
         })
     }
 
-    /// Where it listens, with the port that the system chose if that was left to it. None without
-    /// a socket.
+    /// Returns where it listens, with the actual port if the system chose it. `None` without a socket.
     pub fn local_address(&self) -> Option<SocketAddr> {
         self.socket.as_ref()?.local_addr().ok()
     }
 
-    /// What became of the datagrams so far.
+    /// Returns the counts of the datagrams so far.
     pub fn counts(&self) -> WireCounts {
         self.counts
     }
 
-    /// When the socket has last given a frame that was played, ns.
+    /// Returns when the socket last delivered a frame that was played, ns.
     pub fn heard_ns(&self) -> Option<u64> {
         self.heard_ns
     }
 
-    /// What the latest frame asks for, 0 to 1 of its range, for a person to see; 0 before there was one, and of
-    /// raw edges.
+    /// Returns the latest frame's throttle, 0 to 1 of its range, for display; 0 before the first one, and for raw
+    /// edges.
     pub fn throttle(&self) -> f64 {
         self.throttle
     }
 
-    /// Plays the datagrams that have come in, the first from `now_ns` on. Never waits.
+    /// Plays the received datagrams, the first from `now_ns` on. Never waits.
     pub fn poll(&mut self, now_ns: u64) {
         // Taken out for the loop, since playing borrows the whole wire.
         let (Some(socket), mut buffer) = (self.socket.take(), std::mem::take(&mut self.buffer))
@@ -241,7 +240,7 @@ impl Wire {
                     }
                 }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                // Some systems report here that an earlier answer found nobody.
+                // Some systems report here that an earlier answer reached nobody.
                 Err(_) => {}
             }
         }
@@ -249,8 +248,8 @@ impl Wire {
         self.buffer = buffer;
     }
 
-    /// Waits for a datagram, for `time` at most, and plays it; but one that `is_request` is put into `request`, and who
-    /// sent it is given back.
+    /// Waits for a datagram, for at most `time`, and plays it; one that `is_request` is put into `request` instead, and
+    /// its sender is returned.
     pub fn wait(
         &mut self,
         now_ns: u64,
@@ -264,7 +263,7 @@ impl Wire {
             socket.set_read_timeout(Some(time)).ok()?;
             self.waits = true;
         }
-        // Some systems report here that an earlier answer found nobody.
+        // Some systems report here that an earlier answer reached nobody.
         let (length, sender) = socket.recv_from(&mut self.buffer).ok()?;
         let buffer = std::mem::take(&mut self.buffer);
         let datagram = &buffer[..length];
@@ -279,7 +278,7 @@ impl Wire {
         asks.then_some(sender)
     }
 
-    /// Sends a datagram to who asked for it; one who does not take it loses it.
+    /// Sends a datagram to its requester; one who does not take it loses it.
     pub fn send_to(&self, peer: SocketAddr, datagram: &[u8]) {
         if let Some(socket) = &self.socket {
             let _ = socket.send_to(datagram, peer);
@@ -297,8 +296,8 @@ impl Wire {
         Ok(())
     }
 
-    /// Sends an answer to who sent what was played at `asked_ns`, if that is known. A sender that
-    /// does not take it loses it, as on a wire that nobody listens to.
+    /// Sends an answer to the sender of what was played at `asked_ns`, if known. A sender that does not take it loses
+    /// it, as on a wire that nobody listens to.
     pub fn send(&mut self, asked_ns: u64, datagram: &[u8]) {
         self.forget_senders(asked_ns.saturating_add(EARLY_NS));
         if let (Some(socket), Some((_, Some(sender)))) = (&self.socket, self.senders.front()) {
@@ -315,14 +314,14 @@ impl Wire {
         }
     }
 
-    /// Forgets who sent before the one whose turn it is at this time.
+    /// Forgets the senders before the one at this time.
     fn forget_senders(&mut self, at_ns: u64) {
         while self.senders.get(1).is_some_and(|next| next.0 <= at_ns) {
             self.senders.pop_front();
         }
     }
 
-    /// Plays a datagram as [`Wire::play`] says; when its first level begins, if it comes through.
+    /// Plays a datagram as [`Wire::play`] does; returns when its first level begins, if it comes through.
     fn take(&mut self, now_ns: u64, datagram: &[u8]) -> Result<Option<u64>, Rejected> {
         let frame = Frame::parse(datagram);
         let result = frame.and_then(|frame| {
@@ -341,9 +340,8 @@ impl Wire {
         result
     }
 
-    /// The next edge that is earlier than `before_ns`: its time and the level after it. Edges come
-    /// in order, each at a later time and of another level than the one before. What is played
-    /// from now on comes at `before_ns` or later.
+    /// Returns the next edge before `before_ns`: its time and the level after it. Edges come in order, each later than
+    /// the one before and of another level. What is played from now on comes at `before_ns` or later.
     pub fn next_edge(&mut self, before_ns: u64) -> Option<(u64, bool)> {
         self.taken_ns = self.taken_ns.max(before_ns);
         let (time_ns, _) = self.edges.front()?;
@@ -354,7 +352,7 @@ impl Wire {
         }
     }
 
-    /// A frame with the bit errors of the wire.
+    /// Applies the wire's bit errors to a frame.
     fn flipped<'a>(&mut self, mut frame: Frame<'a>) -> Frame<'a> {
         let rate = self.errors.bit_error_rate;
         if let Frame::DShot { bits, .. } = &mut frame
@@ -367,7 +365,7 @@ impl Wire {
         frame
     }
 
-    /// When an edge comes that is sent at a time, ns: behind the one before.
+    /// Returns when an edge sent at a time arrives, ns: after the one before.
     fn displaced(&mut self, time_ns: u64) -> u64 {
         let jitter_ns = self.errors.jitter_ns * self.noise.gaussian();
         let earliest_ns = self.edges.back().map_or(0, |(last_ns, _)| last_ns + 1);
@@ -380,7 +378,7 @@ impl Wire {
     fn append(&mut self, now_ns: u64, frame: &Frame<'_>) -> Result<u64, Rejected> {
         let now_ns = now_ns.max(self.taken_ns);
         let mut start_ns = match self.last {
-            // The longer rest counts where frames of different rates follow each other.
+            // Between frames of different rates the longer rest counts.
             Some((end_ns, rest_ns)) => {
                 now_ns.max(end_ns.saturating_add(rest_ns.max(frame.rest_before_ns())))
             }
@@ -391,7 +389,7 @@ impl Wire {
             return Err(Rejected::Backlog);
         }
         if frame.idle_level().is_some_and(|idle| idle != self.level) {
-            // The line comes to rest on the frame's level first, or its first edge would be none.
+            // The line first rests on the frame's level, or its first edge would be none.
             self.set_level(start_ns, !self.level);
             start_ns = start_ns.saturating_add(frame.rest_before_ns());
         }
@@ -409,13 +407,13 @@ impl Wire {
         let time_ns = if self.errors.jitter_ns > 0.0 {
             self.displaced(time_ns)
         } else {
-            // An edge that waits may have been displaced beyond it.
+            // A pending edge may have been displaced beyond it.
             match self.edges.back() {
                 Some((last_ns, _)) if *last_ns > time_ns => last_ns + 1,
                 _ => time_ns,
             }
         };
-        // A level that was held for 0 ns was none.
+        // A level held for 0 ns does not count.
         if self
             .edges
             .back()

@@ -1,13 +1,12 @@
-//! A fixed program that the emulator's speed is stated against: a machine's name and clock say
+//! A fixed program against which the emulator's speed is stated: a machine's name and clock say
 //! little, the ratio to this does.
 //!
 //! It is what a competent engineer writes straight from the textbook, neither slowed down nor
 //! tuned: the motor in double precision, its circuit by the exact matrix exponential over each
-//! period, and a sensorless field-oriented drive in single precision. A sine and its cosine are
-//! taken together, and what is constant is computed once. Both stand on the default bench (24 V,
-//! 15 kHz, Antigravity 4006 KV380 with its propeller) at 4500 rpm. There is no noise, no dead time
-//! and no converter. It stays as it is: a change, of the `libm` crate too, makes earlier ratios
-//! worthless.
+//! period, and a sensorless field-oriented drive in single precision. Sine and cosine are computed
+//! together, and constants once. Both run on the default bench (24 V, 15 kHz, Antigravity 4006
+//! KV380 with its propeller) at 4500 rpm. There is no noise, no dead time and no converter. It must
+//! not change: a change, even of the `libm` crate, makes earlier ratios worthless.
 
 mod control;
 mod plant;
@@ -29,7 +28,7 @@ pub struct Yardstick {
 }
 
 impl Yardstick {
-    /// The motor turns at [`RPM`] without current, and the drive has its angle.
+    /// Starts with the motor turning at [`RPM`] without current, and the drive knowing its angle.
     pub fn new() -> Self {
         Self {
             control: Control::new(),
@@ -38,7 +37,7 @@ impl Yardstick {
         }
     }
 
-    /// The next period: currents, control, and the motor under the period before's duties.
+    /// Runs the next period: currents, control, and the motor under the previous period's duties.
     pub fn period(&mut self) {
         let currents_a = self.plant.currents_a().map(|current_a| current_a as f32);
         let duties = self.control.step(currents_a, BUS_V as f32);
@@ -46,12 +45,12 @@ impl Yardstick {
         self.plant.period(applied.map(f64::from));
     }
 
-    /// Mechanical speed, rpm.
+    /// Returns the mechanical speed, rpm.
     pub fn rpm(&self) -> f64 {
         self.plant.rpm()
     }
 
-    /// Estimated less true electrical angle, degrees, ±180.
+    /// Returns the estimated less true electrical angle, degrees, ±180.
     pub fn angle_error_deg(&self) -> f64 {
         let error = self.control.angle_rad() - self.plant.angle_rad();
         let turns = error / std::f64::consts::TAU;

@@ -38,7 +38,7 @@ impl Courses {
     }
 
     fn get(&self, path: &Path) -> Result<Arc<Course>, String> {
-        // A reader that has failed left the courses before whole.
+        // A reader that failed left the earlier courses intact.
         let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(course) = read.get(path) {
             return Ok(Arc::clone(course));

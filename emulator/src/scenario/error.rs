@@ -18,7 +18,7 @@ pub enum ScenarioError {
     /// It is not a scenario.
     #[error("{0}")]
     Syntax(String),
-    /// Something that cannot stand on the bench.
+    /// Something that cannot be put on the bench.
     #[error("{key}: {0}", key = .0.key())]
     Bench(#[from] BenchError),
     /// A quantity out of range.
@@ -36,7 +36,7 @@ pub enum ScenarioError {
     /// A delay that no board has.
     #[error("bench.delay_periods = {0}; give 0, 0.5 or 1")]
     Delay(f64),
-    /// An expectation of no window, of no figure, or of nothing.
+    /// An expectation of an unknown window, of an unknown figure, or of nothing.
     #[error("the expectation of {window}.{key} {problem}")]
     Expectation {
         /// The window's name.
@@ -78,7 +78,7 @@ pub enum ScenarioError {
     Case {
         /// What is wrong.
         error: Box<ScenarioError>,
-        /// The options that make this run.
+        /// The options that reproduce this run.
         place: String,
     },
     /// The ESC does not start.
@@ -93,7 +93,7 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
-    /// A key whose value makes no sense.
+    /// Creates the error of a key whose value makes no sense.
     pub(super) fn of_key(key: impl Into<String>, problem: impl Into<String>) -> Self {
         Self::Key {
             key: key.into(),
@@ -101,8 +101,8 @@ impl ScenarioError {
         }
     }
 
-    /// The same with the line of its key in the file, where the value is from the file and not
-    /// from the keys that the command line sets.
+    /// Adds the line of its key in the file, if the value is from the file and not from keys set on
+    /// the command line.
     pub(super) fn in_file(self, text: &str, set: &[(String, Value)]) -> Self {
         let line = self.key().and_then(|key| line_of(text, &key, set));
         match line {
@@ -114,11 +114,11 @@ impl ScenarioError {
         }
     }
 
-    /// The dotted key that it is about.
+    /// Returns the dotted key that it is about.
     fn key(&self) -> Option<String> {
         match self {
             Self::Bench(error) => Some(error.key()),
-            // What motor and load come to together begins at the motor.
+            // What motor and load give together is attributed to the motor.
             Self::Range { key, .. } if !key.starts_with("bench.") => Some("bench.motor".to_owned()),
             Self::Range { key, .. } => Some((*key).to_owned()),
             Self::Delay(_) => Some("bench.delay_periods".to_owned()),

@@ -1,4 +1,4 @@
-//! A fault as a scenario gives it.
+//! A fault as given by a scenario.
 //!
 //! The kinds and their keys are in the reference of `emulator/README.md`.
 
@@ -8,10 +8,10 @@ use serde::Deserialize;
 
 use crate::fault::{CHIP_V, Fault, Kind, Side};
 
-/// The key that is wrong, and what it needs.
+/// The wrong key, and what it needs.
 type Problem = (&'static str, String);
 
-/// One entry of the time line.
+/// An entry of the time line.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FaultTable {
@@ -48,7 +48,7 @@ enum Name {
     Jitter,
 }
 
-/// A fault as it stands in a command line: its keys and values, at the start where it says no other time.
+/// Parses a fault from a command line: its keys and values, acting from the start unless it states a time.
 pub fn from_text(text: &str) -> Result<Fault, String> {
     let how = |reason: &str| format!("{reason}; give a fault as kind = \"mosfet_open\", phase = 1");
     let wrong = |error: toml::de::Error| how(error.message());
@@ -63,7 +63,7 @@ pub fn from_text(text: &str) -> Result<Fault, String> {
 }
 
 impl FaultTable {
-    /// What it means.
+    /// Returns the fault that it describes.
     pub(super) fn fault(&self) -> Result<Fault, Problem> {
         if !(0.0..=1e5).contains(&self.at_s) {
             return Err(("at_s", "give 0 to 100000".to_owned()));
@@ -107,7 +107,7 @@ impl FaultTable {
         })
     }
 
-    /// A key that would do nothing is a slip of the pen.
+    /// A key without effect is a mistake.
     fn takes_no_other_keys(&self) -> Result<(), Problem> {
         let switch = matches!(self.kind, Name::MosfetOpen | Name::MosfetShort);
         let sensor = matches!(

@@ -1,4 +1,4 @@
-//! A scenario as its file gives it.
+//! A scenario as given by its file.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,29 +21,29 @@ use crate::parameter::parameter;
 use crate::plant::{BOARD_K_PER_W, Fidelity, Sensing};
 use crate::rig::{Bench, Position};
 
-/// The fastest decay of currents that are taken on step by step, 1/s: 500 steps in a period of 50 µs.
+/// The fastest decay of currents integrated in steps, 1/s: 500 steps in a period of 50 µs.
 const DECAY_MAX_PER_S: f64 = 1e6;
 
 /// The whole file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Scenario {
-    /// What stands on the bench: the truth.
+    /// The bench: the truth.
     #[serde(default)]
     pub(super) bench: BenchTable,
     /// What the control believes.
     #[serde(default)]
     pub(super) params: BTreeMap<String, f32>,
-    /// What is asked of the drive, in order.
+    /// What the drive is commanded, in order.
     #[serde(default)]
     pub(super) signal: Vec<Signal>,
-    /// What goes wrong.
+    /// The faults.
     #[serde(default)]
     pub(super) fault: Vec<FaultTable>,
-    /// Where figures are taken.
+    /// The measuring windows.
     #[serde(default)]
     pub(super) window: Vec<WindowTable>,
-    /// What they must be.
+    /// The figures' required values.
     #[serde(default)]
     pub(super) expect: Vec<Expectation>,
     /// Keys of this file with the values that each takes in turn.
@@ -62,9 +62,9 @@ pub(super) struct Scenario {
     expecting = "give [least, greatest] as numbers, or { of = [...] }"
 )]
 pub(super) enum Draw {
-    /// Evenly from whole numbers.
+    /// Uniformly from whole numbers.
     Whole([i64; 2]),
-    /// Evenly from a range.
+    /// Uniformly from a range.
     Real([f64; 2]),
     /// One of these.
     OneOf {
@@ -73,11 +73,11 @@ pub(super) enum Draw {
     },
 }
 
-/// The bench; each key left out takes that of its base, or else of the Bosso bench.
+/// The bench; omitted keys take the value of its base, or else of the Bosso bench.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct BenchTable {
-    /// The bench that this one is built on, by name or path; see [`crate::bench::library`].
+    /// The bench that this one extends, by name or path; see [`crate::bench::library`].
     pub(super) base: Option<String>,
     /// A built-in name, a file or a table.
     pub(super) motor: Choice<MotorTable>,
@@ -87,9 +87,9 @@ pub(super) struct BenchTable {
     pub(super) bus: Choice<SupplyTable>,
     /// How the inverter is simulated.
     pub(super) plant: Fidelity,
-    /// Where the control has the rotor's position from.
+    /// Where the control gets the rotor's position.
     pub(super) position: Position,
-    /// Speed that the shaft is held at.
+    /// Speed at which the shaft is held.
     pub(super) imposed_rpm: Option<f64>,
     /// Seed of all randomness.
     pub(super) seed: u64,
@@ -97,31 +97,31 @@ pub(super) struct BenchTable {
     pub(super) duration_s: f64,
     /// How throttle is sent.
     pub(super) wire: Wire,
-    /// Resolution of the currents, 0 is exact.
+    /// Resolution of the currents; 0 is exact.
     pub(super) adc_bits: u32,
-    /// From the sample to the voltage: 0, 0.5 or 1.
+    /// Periods from sample to voltage: 0, 0.5 or 1.
     pub(super) delay_periods: f64,
-    /// The truth against the named motor and load.
+    /// The truth relative to the named motor and load.
     pub(super) scale: Factors,
     /// Full scale of the currents.
     pub(super) adc_range_a: f64,
     /// Noise of the currents, rms.
     pub(super) noise_a: f64,
-    /// Error of each current's zero.
+    /// Zero error of each current.
     pub(super) offset_a: [f64; 3],
-    /// What each current is multiplied with.
+    /// Gain of each current.
     pub(super) gain: [f64; 3],
-    /// Time constant of the currents' amplifiers.
+    /// Time constant of the current amplifiers.
     pub(super) settling_ns: f64,
-    /// By how much each Hall sensor changes late, electrical degrees.
+    /// Electrical degrees by which each Hall sensor switches late.
     pub(super) hall_error_deg: [f64; 3],
     /// Dead time of the inverter.
     pub(super) dead_time_ns: f64,
-    /// How warm the board gets.
+    /// Thermal resistance of the board.
     pub(super) board_k_per_w: f64,
-    /// Speed at the start.
+    /// Initial speed.
     pub(super) initial_rpm: f64,
-    /// Electrical angle at the start.
+    /// Initial electrical angle.
     pub(super) initial_angle_deg: f64,
 }
 
@@ -155,7 +155,7 @@ impl Default for BenchTable {
     }
 }
 
-/// The truth against the named motor and load.
+/// The truth relative to the named motor and load.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Factors {
@@ -193,10 +193,10 @@ pub(super) struct WindowTable {
     pub(super) t1_s: f64,
 }
 
-/// The window that an expectation names for the whole run.
+/// The window by which an expectation names the whole run.
 pub(super) const RUN: &str = "run";
 
-/// What a figure must be.
+/// The required value of a figure.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Expectation {
@@ -208,14 +208,14 @@ pub(super) struct Expectation {
     pub(super) below: Option<f64>,
     /// It must be more.
     pub(super) above: Option<f64>,
-    /// It must be this, give or take `within`, which is 0 where left out.
+    /// It must be this, give or take `within`, which defaults to 0.
     pub(super) equals: Option<f64>,
     /// See `equals`.
     pub(super) within: Option<f64>,
 }
 
 impl BenchTable {
-    /// What stands on the bench.
+    /// Returns the bench.
     pub(super) fn bench(&self) -> Result<Bench, ScenarioError> {
         let range = |key, value: f64, least: f64, most: f64| {
             if (least..=most).contains(&value) {
@@ -312,13 +312,12 @@ impl BenchTable {
 }
 
 impl Scenario {
-    /// The scenario that the tables of a file in this folder make, on the bench that they name as
-    /// their base.
+    /// Reads the scenario from the tables of a file in this folder, on the bench that they name as their base.
     pub(super) fn read(root: Table, folder: &Path) -> Result<Self, ScenarioError> {
         Self::understand(Self::complete(root, folder)?)
     }
 
-    /// The tables with those of the bench that they name as their base.
+    /// Completes the tables with those of the bench that they name as their base.
     pub(super) fn complete(mut root: Table, folder: &Path) -> Result<Table, ScenarioError> {
         library::complete(&mut root, folder, &|text, table| {
             let alone = Self::alone(text, table);
@@ -327,7 +326,7 @@ impl Scenario {
         Ok(root)
     }
 
-    /// Whether the file of a bench makes sense by itself; `table` is its text's.
+    /// Checks that a bench's file makes sense by itself; `table` is its parsed text.
     fn alone(text: &str, table: &Table) -> Result<(), ScenarioError> {
         toml::from_str::<Self>(text)
             .map_err(|error| ScenarioError::Syntax(reason(text, &error)))?;
@@ -337,7 +336,7 @@ impl Scenario {
         Ok(())
     }
 
-    /// The scenario that complete tables make.
+    /// Reads the scenario from complete tables.
     pub(super) fn understand(root: Table) -> Result<Self, ScenarioError> {
         Self::deserialize(root).map_err(|error| {
             let message = error.message().replace('\n', " ");
@@ -345,7 +344,7 @@ impl Scenario {
         })
     }
 
-    /// What goes wrong.
+    /// Returns the faults.
     pub(super) fn faults(&self) -> Result<Vec<Fault>, ScenarioError> {
         let faults = self.fault.iter().enumerate();
         faults
@@ -358,7 +357,7 @@ impl Scenario {
             .collect()
     }
 
-    /// The parameters that the file sets.
+    /// Returns the parameters that the file sets.
     pub(super) fn params(&self) -> Result<Vec<(ParamId, f32)>, ScenarioError> {
         self.params
             .iter()

@@ -1,4 +1,4 @@
-//! Whether the figures of a run are what the scenario expects.
+//! Judges whether the figures of a run are what the scenario expects.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -7,33 +7,33 @@ use super::error::ScenarioError;
 use super::file::{Expectation, RUN};
 use crate::summary::{Figures, Report};
 
-/// Whether an expectation held.
+/// The result of an expectation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
     /// The window's name.
     pub window: String,
     /// The figure's key.
     pub key: String,
-    /// The figure; a true boolean counts as 1, a list as its length.
+    /// The figure; true counts as 1, a list as its length.
     pub value: Option<f64>,
     /// What it must be.
     pub wanted: String,
-    /// Whether it is; `None` of the control's inside where nobody sees that, as on a machine that is asked
-    /// over its wire only.
+    /// Whether it is; `None` for a figure of the control if that is not visible, as on a machine that is driven only
+    /// over its wire.
     pub held: Option<bool>,
-    /// By how much it could be worse; −∞ without a figure, ∞ of one that nobody sees.
+    /// Margin to failure; −∞ without a figure, ∞ for one that is not visible.
     #[serde(skip)]
     pub(super) slack: f64,
 }
 
 impl Verdict {
-    /// Whether the figure is another than it must be.
+    /// Returns true if the figure is not what it must be.
     pub fn failed(&self) -> bool {
         self.held == Some(false)
     }
 }
 
-/// Compares a figure with what is expected of it.
+/// Compares a figure with its expectation.
 pub(super) fn judge(expected: &Expectation, report: &Report) -> Result<Verdict, ScenarioError> {
     let wrong = |problem| ScenarioError::Expectation {
         window: expected.window.clone(),

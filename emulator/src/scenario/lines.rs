@@ -1,4 +1,4 @@
-//! Where a key stands in a scenario's file.
+//! Finds keys in a scenario's file.
 
 use std::ops::Range;
 
@@ -7,8 +7,9 @@ use toml::{Spanned, Value};
 
 use crate::bench::line_of_byte;
 
-/// The line on which a dotted key gets its value: where it is swept or drawn, or else its own, or
-/// that of what should hold it. None where the command line sets it, or nothing of it is there.
+/// Returns the line on which a dotted key gets its value: where it is swept or drawn, or else its
+/// own, or that of its would-be parent. `None` if the command line sets it, or no part of it
+/// exists.
 pub(super) fn line_of(text: &str, key: &str, set: &[(String, Value)]) -> Option<usize> {
     if set.iter().any(|(other, _)| other == key) {
         return None;
@@ -24,13 +25,13 @@ pub(super) fn line_of(text: &str, key: &str, set: &[(String, Value)]) -> Option<
     Some(line_of_byte(text, span.start))
 }
 
-/// The dotted key whose entry holds this byte of the text.
+/// Returns the dotted key whose entry holds this byte of the text.
 fn key_at(text: &str, at: usize) -> Option<String> {
     let root = DeTable::parse(text).ok()?;
     holder(&DeValue::Table(root.into_inner()), at)
 }
 
-/// What is wrong with a text that is no scenario, with the line and the key.
+/// Says what is wrong with a text that is no scenario, with line and key.
 pub(super) fn reason(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().replace('\n', " ");
     let Some(span) = error.span() else {
@@ -52,8 +53,7 @@ fn entry<'a, 'i>(
     Some((key.span(), value))
 }
 
-/// Where the longest part of a dotted key that there is stands; the entries of an array count
-/// from 0.
+/// Returns the place of the longest existing part of a dotted key; array entries count from 0.
 fn own(root: &DeTable<'_>, key: &str) -> Option<Range<usize>> {
     let mut parts = key.split('.');
     let (mut span, mut place) = entry(root, parts.next()?)?;
@@ -127,7 +127,7 @@ rpm = 2.0
         assert_eq!(line("bench.offset_a.2"), Some(5));
         assert_eq!(line("signal.0.rpm"), Some(9));
         assert_eq!(line("signal.1.at_s"), Some(12));
-        // What is not there has the line of what should hold it.
+        // A missing key has the line of its would-be parent.
         assert_eq!(line("bench.scale.J"), Some(2));
         assert_eq!(line("signal.1.throttle"), Some(11));
         // Where a key gets its value.

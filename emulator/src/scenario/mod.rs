@@ -1,8 +1,8 @@
 //! Runs from a file, offline: a bench, signals, measuring windows and expectations.
 //!
-//! With a table of swept keys, or several seeds, a file stands for many runs: every combination for
-//! every seed. They go in parallel and come to one [`Survey`]. Keys are dotted, the entries of an
-//! array count from 0, and what is drawn depends on the seed and the key alone:
+//! With a table of swept keys, or several seeds, a file stands for many runs: every combination for every seed. They
+//! run in parallel and are summed up in one [`Survey`]. Keys are dotted, array entries count from 0, and a drawn value
+//! depends on seed and key alone:
 //!
 //! ```toml
 //! [sweep]
@@ -14,12 +14,11 @@
 //! "bench.delay_periods" = { of = [0.0, 0.5, 1.0] }
 //! ```
 //!
-//! `base` in `[bench]` names a bench of the library or a file like its: its `[bench]` and `[params]`
-//! hold where the scenario says nothing. A path in a file begins at the file's folder, or else, that of
-//! a bench, motor, load or supply, at the working directory.
+//! `base` in `[bench]` names a bench of the library or a similar file: its `[bench]` and `[params]` apply where the
+//! scenario says nothing. Paths in a file are relative to the file's folder, or else, those of a bench, motor, load or
+//! supply, to the working directory.
 //!
-//! An expectation of the window `run` is one of the whole run; its `faults` is the number of
-//! different faults.
+//! An expectation of the window `run` covers the whole run; its `faults` is the number of different faults.
 
 mod course;
 mod courses;
@@ -66,22 +65,21 @@ use vary::{Case, Variations};
 pub use wire::Wire as ThrottleSignal;
 pub(crate) use wire::bits as dshot_bits;
 
-/// The longest file, bytes: one of a hundred times the usual length. An entry takes a few KB while it is
-/// understood.
+/// The longest file, bytes: a hundred times the usual length. An entry takes a few KB while it is parsed.
 const TEXT_MAX: u64 = 1_000_000;
 
-/// What the command line changes in a scenario.
+/// Changes to a scenario from the command line.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Other seeds than the file's.
+    /// Seeds that replace the file's.
     pub seeds: Option<RangeInclusive<u64>>,
-    /// Keys of the file with the one value that each takes, in place of what sweeps or draws it.
+    /// Keys of the file with a fixed value, in place of what sweeps or draws it.
     pub set: Vec<(String, toml::Value)>,
-    /// Where each period of the only run is written.
+    /// Where each period of the only run is recorded.
     pub record: Option<PathBuf>,
 }
 
-/// A scenario that has been read and found to make sense.
+/// A scenario that has been read and checked.
 pub struct Plan {
     variations: Variations,
     courses: Courses,
@@ -92,7 +90,7 @@ impl Plan {
     /// Reads the scenario in the file at `path`.
     ///
     /// # Errors
-    /// Any [`ScenarioError`] that shows before a run; that of the first run that has one.
+    /// Any [`ScenarioError`] that shows before a run; that of the first run to have one.
     pub fn read(path: &Path, options: &Options) -> Result<Self, ScenarioError> {
         let text = text(path).map_err(ScenarioError::Read)?;
         let in_file = |error: ScenarioError| error.in_file(&text, &options.set);
@@ -113,13 +111,13 @@ impl Plan {
         }
     }
 
-    /// How many runs it stands for.
+    /// Returns the number of runs that it stands for.
     pub fn runs(&self) -> usize {
         self.variations.runs()
     }
 
-    /// Plays the only run, or the first of several, to its end or until `stop` is set: what was played
-    /// until then is kept.
+    /// Plays the only run, or the first of several, to its end or until `stop` is set; what was played until then is
+    /// kept.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in the run.
@@ -128,11 +126,11 @@ impl Plan {
         Ok(Outcome::new(played, place))
     }
 
-    /// Plays the only run, or the first of several, on another machine, which `start` makes and `ended`
-    /// gets at the end or once `stop` is set.
+    /// Plays the only run, or the first of several, on another machine, made by `start` and passed to `ended` at the
+    /// end or once `stop` is set.
     ///
     /// # Errors
-    /// Any [`ScenarioError`] that shows in the run, and a signal that goes past the wire.
+    /// Any [`ScenarioError`] that shows in the run, and a signal that bypasses the wire.
     pub fn play_on<M: Machine>(
         &self,
         stop: &AtomicBool,
@@ -146,9 +144,8 @@ impl Plan {
         }
     }
 
-    /// Plays all runs on all processors; `each` is called after each of them, and `row` at the end for each in the
-    /// order of the runs. Once `stop` is set none
-    /// begins or goes on: the survey is of those that have been played to their end.
+    /// Plays all runs on all processors; calls `each` after each of them, and at the end `row` for each in run order.
+    /// Once `stop` is set no run begins or continues: the survey covers those played to their end.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in a run.
@@ -167,8 +164,8 @@ impl Plan {
         Ok(Survey::of(played, left_out, began.elapsed().as_secs_f64()))
     }
 
-    /// Plays some of the runs on all processors, and gives a row for each, in their order: those of a survey. Once
-    /// `stop` is set none begins or goes on, and theirs are left out.
+    /// Plays some of the runs on all processors and returns a survey's row for each, in order. Once `stop` is set no
+    /// run begins or continues, and theirs are left out.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows in a run.
@@ -220,7 +217,7 @@ impl Plan {
     }
 }
 
-/// The text of a scenario's file.
+/// Reads the text of a scenario's file.
 fn text(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     let length = File::open(path)?

@@ -1,4 +1,4 @@
-//! What one run of a scenario comes to for who asked for it.
+//! The result of one run of a scenario.
 
 use serde::Serialize;
 
@@ -7,15 +7,15 @@ use super::place::{self, Place};
 use super::play::Played;
 use crate::summary::Report;
 
-/// The summary of a scenario that is one run.
+/// The summary of a scenario with a single run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
     /// The figures.
     #[serde(flatten)]
     pub report: Report,
-    /// What was expected of them.
+    /// The results of the expectations.
     pub expectations: Vec<Verdict>,
-    /// Whether an interrupt has ended the run before its time.
+    /// Whether an interrupt ended the run early.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub interrupted: bool,
     /// What the seed drew, if anything.
@@ -42,19 +42,19 @@ impl Outcome {
         }
     }
 
-    /// Whether no expectation failed.
+    /// Returns true if no expectation failed.
     pub fn held(&self) -> bool {
         !self.expectations.iter().any(Verdict::failed)
     }
 
-    /// What a program that played it ends with: 0, 1 where an expectation failed, 130 where it was
-    /// interrupted.
+    /// Returns the exit status of a program that played it: 0, 1 if an expectation failed, 130 if
+    /// it was interrupted.
     pub fn exit_status(&self) -> u8 {
         exit_status(self.interrupted, self.held())
     }
 }
 
-/// As shells have it.
+/// Follows the conventions of shells.
 pub(super) fn exit_status(interrupted: bool, held: bool) -> u8 {
     match (interrupted, held) {
         (true, _) => 130,

@@ -1,4 +1,4 @@
-//! What makes a run one of several, so that it can be made again alone.
+//! Identifies one of several runs, so that it can be repeated alone.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use toml::Value;
 
 use super::error::ScenarioError;
 
-/// One of several runs. As text it is the options that make it.
+/// One of several runs. As text, the options that reproduce it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Place {
     /// The seed of noise and draws.
@@ -21,7 +21,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// An error with the run that has it, where that differs from the file.
+    /// Adds to an error the run that has it, if that differs from the file.
     pub(super) fn blame(&self, error: ScenarioError) -> ScenarioError {
         if self.set.is_empty() && self.drawn.is_empty() {
             return error;
@@ -38,7 +38,7 @@ impl fmt::Display for Place {
         write!(f, "--seed {}", self.seed)?;
         for (key, value) in &self.set {
             let text = format!("{key}={value}");
-            // What a shell would take apart.
+            // What a shell would split or expand.
             if text.contains([' ', '[', '{', '"', '\'']) {
                 write!(f, " --set '{}'", text.replace('\'', "'\\''"))?;
             } else {
@@ -49,7 +49,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// Pairs as a JSON object, in their order.
+/// Serialises pairs as a JSON object, in order.
 pub(super) fn map<S: Serializer>(
     pairs: &[(String, Value)],
     serializer: S,

@@ -20,14 +20,13 @@ use crate::rig::Rig;
 use crate::summary::{Report, Summary};
 use crate::watch::{Watch, WatchError};
 
-/// Most entries of one kind: signals, faults, windows or expectations. Some of what looks through them takes
-/// the square of their number.
+/// Most entries of one kind: signals, faults, windows or expectations. Some searches through them take quadratic time.
 const ENTRIES_MAX: usize = 10_000;
 
-/// What a run came to.
+/// The result of a run.
 pub(super) struct Played {
     pub(super) report: Report,
-    /// Whether that was expected.
+    /// The results of the expectations.
     pub(super) verdicts: Vec<Verdict>,
     /// It was stopped before its end.
     pub(super) interrupted: bool,
@@ -50,7 +49,7 @@ pub(super) fn play(
     played.map(|(played, _)| played)
 }
 
-/// Plays a scenario on another machine, which is asked over its wire only, as [`play`] does.
+/// Plays a scenario on another machine, driven only over its wire, as [`play`] does.
 pub(super) fn play_on<M: Machine>(
     scenario: &Scenario,
     record: Option<&Path>,
@@ -96,7 +95,7 @@ fn run<M: Machine>(
     let (mut machine, _) = start(Start {
         bench: scenario.bench.bench()?,
         overrides,
-        // What is known of the motor is the scenario's to say.
+        // What is known of the motor is up to the scenario.
         defaults: Vec::new(),
         faults: scenario.faults()?,
         ..Start::default()
@@ -124,7 +123,7 @@ fn run<M: Machine>(
     let verdicts = expectations.map(|expected| judge(expected, &report));
     let mut verdicts = verdicts.collect::<Result<Vec<_>, _>>()?;
     if interrupted {
-        // Nobody has seen all of a window that goes on.
+        // A window still open has not been seen in full.
         let whole = |name: &str| {
             let mut windows = scenario.window.iter();
             windows.any(|window| window.name == name && window.t1_s <= sim_s)
@@ -140,8 +139,7 @@ fn run<M: Machine>(
     Ok((played, machine))
 }
 
-/// Finds what is wrong with a scenario before it is played, so that a slip of the pen does not cost
-/// its time.
+/// Finds errors in a scenario before it is played, so that a mistake does not cost its run time.
 pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
     for (key, entries) in [
         ("signal", scenario.signal.len()),
@@ -196,7 +194,7 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
         if window.t0_s.partial_cmp(&window.t1_s) != Some(std::cmp::Ordering::Less) {
             return Err(wrong("t1_s", "has no time between t0_s and t1_s"));
         }
-        // What it is to show would be that of a part of it, or of nothing.
+        // Its figures would cover a part of it, or nothing.
         if window.t1_s > end_s {
             return Err(wrong("t1_s", &after("ends")));
         }
@@ -211,7 +209,7 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), ScenarioError> {
     Ok(())
 }
 
-/// The measuring windows: those of the file, and the whole run where a figure of it is expected.
+/// Returns the measuring windows: those of the file, and the whole run if an expectation names it.
 fn windows(scenario: &Scenario) -> impl Iterator<Item = (String, f64, f64)> {
     let tables = scenario.window.iter();
     let tables = tables.map(|window| (window.name.clone(), window.t0_s, window.t1_s));
@@ -220,8 +218,8 @@ fn windows(scenario: &Scenario) -> impl Iterator<Item = (String, f64, f64)> {
     tables.chain(whole.then(|| (RUN.to_owned(), 0.0, f64::INFINITY)))
 }
 
-/// What is asked of the drive past the wire. `last` is what that was before: a demand is worth more
-/// than a comparison to convert, and few periods bring another.
+/// Returns the drive's command that bypasses the wire. `last` is the previous one: converting a demand costs more than
+/// a comparison, and few periods bring a new one.
 fn past_the_wire(
     signals: &[Signal],
     t_s: f64,

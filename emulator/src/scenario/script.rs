@@ -1,7 +1,7 @@
-//! A scenario's throttle and faults, for what runs already.
+//! A scenario's throttle and faults, played on what is already running.
 //!
-//! What stands there and what the ESC knows stays as it is: `[bench]` and `[params]` are for a run of its own, and so
-//! are windows and expectations.
+//! The bench and the ESC's knowledge stay as they are: `[bench]` and `[params]` are for a separate run, and so are
+//! windows and expectations.
 
 use std::path::Path;
 
@@ -13,13 +13,13 @@ use super::lines::reason;
 use super::signal::{Demand, Signal, demand};
 use crate::fault::Fault;
 
-/// What of a file is played; of the bench its duration.
+/// The parts of a file that are played; of the bench only its duration.
 const KEPT: [&str; 3] = ["bench", "signal", "fault"];
 
 /// What is played.
 pub struct Script {
     signals: Vec<Signal>,
-    /// By the time at which they begin.
+    /// By start time.
     faults: Vec<Fault>,
     duration_s: f64,
 }
@@ -31,7 +31,7 @@ impl Script {
     /// A line on what is wrong with it, or why it cannot be played here.
     pub fn read(text: &str) -> Result<Self, String> {
         let here = Path::new("");
-        // Whole as it is it must make sense, and what is wrong stands on a line of it.
+        // As it stands it must make sense, and errors have a line in it.
         toml::from_str::<Scenario>(text).map_err(|error| reason(text, &error))?;
         let mut root: toml::Table = text.parse().map_err(|error| reason(text, &error))?;
         if root.contains_key("sweep") || root.contains_key("random") {
@@ -46,7 +46,7 @@ impl Script {
         let scenario = Scenario::understand(root).map_err(line)?;
         super::play::check(&scenario).map_err(line)?;
         if scenario.signal.iter().any(|signal| signal.path.is_some()) {
-            // A page gives a text, and no right to this machine's files.
+            // A page provides text, and has no right to this machine's files.
             return Err("a course in a file of its own is not played here".to_owned());
         }
         let past = scenario.signal.iter().position(|signal| {
@@ -74,7 +74,7 @@ impl Script {
         })
     }
 
-    /// The throttle so long after its start, 0 to 1; nothing once it is over.
+    /// Returns the throttle at a time after its start, 0 to 1; `None` once it is over.
     pub fn throttle(&self, t_s: f64) -> Option<f64> {
         if t_s >= self.duration_s {
             return None;
@@ -85,7 +85,7 @@ impl Script {
         }
     }
 
-    /// The faults, by the time after its start at which they begin.
+    /// Returns the faults, by start time relative to its start.
     pub fn faults(&self) -> &[Fault] {
         &self.faults
     }

@@ -1,4 +1,4 @@
-//! What is asked of the drive over time.
+//! The commands to the drive over time.
 
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
@@ -11,19 +11,19 @@ use super::course::{Course, NUMBER_MAX};
 /// The shortest duration of a shape, s: far below a control period.
 const FOR_LEAST_S: f64 = 1e-6;
 
-/// One entry of the time line; it is in force until the next.
+/// An entry of the time line; it applies until the next.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Signal {
-    /// From when.
+    /// Start time.
     pub(super) at_s: f64,
     /// Throttle on the wire, 0 to 1; 0 is motor stop.
     pub(super) throttle: Option<f64>,
-    /// Speed, past the wire; negative is the other way.
+    /// Speed, bypassing the wire; negative is reverse.
     pub(super) rpm: Option<f64>,
-    /// Torque current, past the wire.
+    /// Torque current, bypassing the wire.
     pub(super) amps: Option<f64>,
-    /// How the value comes about.
+    /// How the value evolves.
     #[serde(default)]
     pub(super) shape: Shape,
     /// Duration of a ramp, of a modulated sine or of a chirp.
@@ -39,43 +39,43 @@ pub(super) struct Signal {
     /// Whether a sine's amplitude swells and fades once over `for_s`.
     #[serde(default)]
     pub(super) am: bool,
-    /// File of a course; beside the scenario where it is relative.
+    /// File of a course; a relative path is beside the scenario.
     pub(super) path: Option<PathBuf>,
-    /// What that file says.
+    /// The contents of that file.
     #[serde(skip)]
     pub(super) course: Option<Arc<Course>>,
 }
 
-/// How a value comes about.
+/// How a value evolves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Shape {
     /// At once.
     #[default]
     Step,
-    /// From the value before, linearly over `for_s`.
+    /// From the previous value, linearly over `for_s`.
     Ramp,
     /// Value + amplitude·sin(2π·freq_hz·t), times sin²(π·t/for_s) with `am`.
     Sine,
-    /// Likewise, the frequency rising linearly to `freq_to_hz` over `for_s`.
+    /// Likewise, with the frequency rising linearly to `freq_to_hz` over `for_s`.
     Chirp,
-    /// Value + what a file says for the time since `at_s`.
+    /// Value + the file's at the time since `at_s`.
     File,
 }
 
-/// What is asked for at one moment.
+/// The command at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Demand {
     /// Throttle on the wire.
     Throttle(f64),
-    /// Mechanical speed, rpm; negative is the other way.
+    /// Mechanical speed, rpm; negative is reverse.
     Rpm(f64),
     /// Torque current, A.
     Amps(f64),
 }
 
 impl Signal {
-    /// What is wrong with it, if anything, and the key that it is about.
+    /// Returns what is wrong with it, if anything, and the key that it is about.
     pub(super) fn problem(&self) -> Option<(&'static str, &'static str)> {
         let given = [
             ("throttle", self.throttle),
@@ -119,7 +119,8 @@ impl Signal {
         }
     }
 
-    /// The value at `t_s` after the start of the scenario, where `before` was in force.
+    /// Returns the value at `t_s` after the start of the scenario, with `before` previously in
+    /// force.
     fn demand(&self, t_s: f64, before: Option<f64>) -> Demand {
         let t = t_s - self.at_s;
         let length = self.for_s.unwrap_or(f64::INFINITY);
@@ -154,7 +155,7 @@ impl Signal {
         }
     }
 
-    /// The value that a ramp after this one starts from.
+    /// Returns the value from which a following ramp starts.
     fn end(&self) -> Option<f64> {
         let base = self.throttle.or(self.rpm).or(self.amps)?;
         let course = self.course.as_ref();
@@ -162,7 +163,7 @@ impl Signal {
     }
 }
 
-/// What is asked for at `t_s`, or `None` before the first entry. The entries are in order.
+/// Returns the command at `t_s`, or `None` before the first entry. The entries are in order.
 pub(super) fn demand(signals: &[Signal], t_s: f64) -> Option<Demand> {
     let next = signals.partition_point(|signal| signal.at_s <= t_s);
     let current = signals.get(next.checked_sub(1)?)?;

@@ -9,19 +9,19 @@ use super::ScenarioError;
 use super::file::Scenario;
 use crate::rig::Bench;
 
-/// What stands on a bench by its name, and what the ESC must know of it.
+/// A bench by name, and what the ESC must know of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Standing {
-    /// What stands there.
+    /// The bench.
     pub bench: Bench,
-    /// Parameters to be set before the start.
+    /// Parameters to set before the start.
     pub params: Vec<(ParamId, f32)>,
-    /// What motor and load are called.
+    /// The names of motor and load.
     pub names: [String; 2],
 }
 
-/// The bench `base`, by name or path, with the keys of `given`, those of a scenario's `[bench]`, in
-/// place of its own.
+/// Builds the bench `base`, by name or path, with the keys of `given`, those of a scenario's
+/// `[bench]`, overriding its own.
 ///
 /// # Errors
 /// Any [`ScenarioError`] that a scenario on this bench would show before it is played.
@@ -37,7 +37,7 @@ pub fn stand(base: &str, given: Table) -> Result<Standing, ScenarioError> {
         name.map_or_else(|| format!("that of {base}"), str::to_owned)
     };
     let names = [name("motor"), name("load")];
-    // Where the bench says nothing, the inverter waits as long as the parameters have it.
+    // If the bench sets none, the inverter's dead time is that of the parameters.
     let waits = root
         .get("bench")
         .is_some_and(|bench| bench.get("dead_time_ns").is_some());
@@ -82,7 +82,7 @@ mod tests {
             let board = bench.sensing.board(bench.delay);
             let built = build(&believed, &board);
             assert!(built.is_ok(), "{name}: {:?}", built.err());
-            // What the ESC believes is what stands there.
+            // The ESC's knowledge matches the bench.
             let believes = |id, truth: f64, name: &str| {
                 let value = f64::from(believed.get(id));
                 assert!(

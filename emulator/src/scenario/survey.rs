@@ -1,4 +1,4 @@
-//! What many runs come to: what held in all of them, and the worst run of each expectation.
+//! The results of many runs: what held in all of them, and the worst run of each expectation.
 
 use std::collections::BTreeMap;
 
@@ -11,22 +11,22 @@ use super::place::Place;
 use super::play::Played;
 use crate::summary::Report;
 
-/// Failed runs that are listed one by one.
+/// Number of failed runs listed individually.
 const LISTED: usize = 20;
 
 /// The summary of several runs.
 #[derive(Clone, Debug, Serialize)]
 pub struct Survey {
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// Runs that an interrupt has left out.
+    /// Runs left out after an interrupt.
     #[serde(skip_serializing_if = "is_zero")]
     pub left_out: usize,
     /// Runs in which an expectation failed.
     pub failed: usize,
-    /// Faults that turned the bridge off, each with the number of runs.
+    /// Faults that turned the bridge off, each with its number of runs.
     pub faults: BTreeMap<&'static str, usize>,
-    /// What was wrong while the motor went on, each with the number of runs.
+    /// What was wrong while the motor went on, each with its number of runs.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub warnings: BTreeMap<&'static str, usize>,
     /// Simulated time of all runs, s.
@@ -37,9 +37,9 @@ pub struct Survey {
     pub sim_per_wall: Option<f64>,
     /// Control periods of all runs.
     pub steps: u64,
-    /// Hash over the trace hashes of all runs in their order, whatever ran beside what.
+    /// Hash over the trace hashes of all runs in order, however they ran in parallel.
     pub trace_hash: String,
-    /// What was expected of each run.
+    /// The expectations of each run.
     pub expectations: Vec<Expected>,
     /// The first runs that failed.
     pub failures: Vec<Failure>,
@@ -52,16 +52,16 @@ pub struct Expected {
     pub window: String,
     /// The figure's key.
     pub key: String,
-    /// What it must be.
+    /// Its required value.
     pub wanted: String,
-    /// Runs in which it was not.
+    /// Runs that missed it.
     pub failed: usize,
-    /// The worst figure: of the first run that comes nearest to failing, or fails by the most.
+    /// The worst figure: of the first run that comes closest to failing, or fails by the most.
     pub worst: Option<f64>,
     /// The run with the worst figure.
     #[serde(rename = "where")]
     pub place: Place,
-    /// The options that make this run alone.
+    /// The options that reproduce this run alone.
     pub options: String,
     #[serde(skip)]
     slack: f64,
@@ -70,19 +70,19 @@ pub struct Expected {
 /// A run that failed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {
-    /// Which it was.
+    /// Which run.
     #[serde(rename = "where")]
     pub place: Place,
-    /// The options that make this run alone.
+    /// The options that reproduce this run alone.
     pub options: String,
     /// Faults that turned the bridge off.
     pub faults: Vec<&'static str>,
-    /// What was not as expected.
+    /// The expectations that failed.
     pub expectations: Vec<Verdict>,
 }
 
 impl Survey {
-    /// The summary of these runs, in their order.
+    /// Sums up these runs, in order.
     pub(super) fn of(
         runs: impl IntoIterator<Item = (Place, Played)>,
         left_out: usize,
@@ -112,12 +112,12 @@ impl Survey {
         survey
     }
 
-    /// Whether every expectation held in every run.
+    /// Returns true if every expectation held in every run.
     pub fn held(&self) -> bool {
         self.failed == 0
     }
 
-    /// As [`Outcome::exit_status`](super::Outcome::exit_status).
+    /// Like [`Outcome::exit_status`](super::Outcome::exit_status).
     pub fn exit_status(&self) -> u8 {
         exit_status(self.left_out > 0, self.held())
     }

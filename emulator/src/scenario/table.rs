@@ -1,6 +1,6 @@
-//! Runs as a table, a row each, for pandas, Polars, DuckDB or a spreadsheet.
+//! Runs as a table, one row each, for pandas, Polars, DuckDB or a spreadsheet.
 //!
-//! The rows stand in the order of the runs, whatever ran beside what, and nothing in them depends on the machine: equal
+//! The rows are in run order, however the runs were parallelised, and nothing in them depends on the machine: equal
 //! files give equal tables.
 
 mod csv;
@@ -17,7 +17,7 @@ use row::columns;
 
 pub use row::{Cell, Row};
 
-/// A table whose file is open.
+/// A table with an open file.
 pub struct Table {
     path: PathBuf,
     file: File,
@@ -25,10 +25,10 @@ pub struct Table {
 }
 
 impl Table {
-    /// A new table at `path`; what stood there is lost.
+    /// Creates a table at `path`, overwriting what is there.
     ///
     /// # Errors
-    /// An extension without a format, or a file that cannot be written.
+    /// The extension has no format, or the file cannot be written.
     pub fn create(path: &Path) -> Result<Self, RecordError> {
         let extension = path.extension().and_then(|extension| extension.to_str());
         let write = match extension {

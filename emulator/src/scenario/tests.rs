@@ -5,7 +5,7 @@ use super::*;
 
 mod reference;
 
-/// A fifth of a second of the start, where half of the combinations are asked for too much.
+/// A fifth of a second of the start, in which half of the combinations demand too much.
 const FILE: &str = r#"
     [bench]
     duration_s = 0.2
@@ -31,7 +31,7 @@ const FILE: &str = r#"
     "bench.initial_angle_deg" = [-180.0, 180.0]
 "#;
 
-/// Nobody interrupts.
+/// Never interrupted.
 static ON: AtomicBool = AtomicBool::new(false);
 
 fn plan(text: &str, options: &Options) -> Result<Plan, ScenarioError> {
@@ -102,14 +102,14 @@ fn an_interrupt_keeps_what_has_been_played() {
         |_, _, _| (),
     );
     let survey = survey.unwrap();
-    // Runs beside the first are cut short, unless they have ended too.
+    // Runs in parallel with the first are cut short, unless they have ended too.
     assert_eq!(survey.runs, played.into_inner());
     assert_eq!(survey.runs + survey.left_out, 12);
     assert!((1..12).contains(&survey.runs), "{} runs", survey.runs);
     assert_eq!(survey.expectations.len(), 2);
 }
 
-/// With what was played until then, and no verdict on what was not.
+/// It has what was played until then, and no verdict on what was not.
 #[test]
 fn an_interrupted_run_keeps_what_has_been_played() {
     let text = FILE.split("[sweep]").next().unwrap();
@@ -228,7 +228,7 @@ fn a_negative_speed_is_asked_for_as_such() {
         key = "reached_s"
         below = 0.001
     "#;
-    // The shaft is held at the speed: it counts as reached only if it is that one.
+    // The shaft is held at the speed: it counts as reached only if it is the commanded one.
     for (imposed, held) in [("-1000.0", true), ("1000.0", false)] {
         let text = text.replace(
             "duration_s",
@@ -239,8 +239,8 @@ fn a_negative_speed_is_asked_for_as_such() {
     }
 }
 
-/// The emulator's own ESC, as if it were a machine that only its wire reaches, does the same; and what goes
-/// past the wire is refused.
+/// The emulator's own ESC, treated as a machine reachable only over its wire, does the same; what bypasses the wire is
+/// refused.
 #[test]
 fn another_machine_plays_what_goes_over_the_wire() {
     let text = r#"

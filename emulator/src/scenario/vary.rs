@@ -1,8 +1,8 @@
 //! The runs that a scenario with `[sweep]` and `[random]` stands for: every combination of the
 //! swept values, each for every seed.
 //!
-//! Values are put into the file's tables before these are understood, so that any key of the file
-//! can be named. A draw depends on the seed and on its key alone: what else is swept, drawn or set
+//! Values are put into the file's tables before these are parsed, so that any key of the file can
+//! be varied. A draw depends on the seed and on its key alone: what else is swept, drawn or set
 //! does not change it.
 
 use std::ops::RangeInclusive;
@@ -19,7 +19,7 @@ use super::lines::reason;
 use super::place::Place;
 use crate::plant::share_of;
 
-/// Runs that are made at once: at a second of simulation each, some ten minutes.
+/// Most runs at once: at a second of simulation each, some ten minutes.
 const RUNS_MAX: u128 = 100_000;
 
 /// The file with what varies.
@@ -27,27 +27,27 @@ const RUNS_MAX: u128 = 100_000;
 pub(super) struct Variations {
     /// The file's tables without what varies.
     base: Table,
-    /// Swept keys; those that the command line sets stand last, with one value.
+    /// Swept keys; those set on the command line come last, with one value.
     swept: Vec<(String, Vec<Value>)>,
     drawn: Vec<(String, Draw)>,
     /// The command line's seeds.
     seeds: Option<RangeInclusive<u64>>,
     runs: usize,
-    /// Where the paths that it names begin.
+    /// The folder to which its paths are relative.
     folder: PathBuf,
 }
 
 /// One run.
 #[derive(Debug)]
 pub(super) struct Case {
-    /// What makes it this one.
+    /// What identifies it.
     pub(super) place: Place,
     /// What is played.
     pub(super) scenario: Scenario,
 }
 
 impl Variations {
-    /// Reads a scenario of this folder; `set` are keys that the command line gives one value.
+    /// Reads a scenario of this folder; `set` are keys given one value on the command line.
     pub(super) fn read(
         text: &str,
         set: &[(String, Value)],
@@ -58,7 +58,7 @@ impl Variations {
         let mut base = toml::from_str::<Table>(text).map_err(|error| syntax(&error))?;
         let scenario = match toml::from_str::<Scenario>(text) {
             Ok(scenario) => scenario,
-            // What a table leaves out may be in the base's. What is wrong with both has a line.
+            // What a table omits may be in the base's. An error that both have has a line.
             Err(error) => {
                 let message = error.message().replace('\n', " ");
                 let whole = Scenario::read(base.clone(), folder);
@@ -120,12 +120,13 @@ impl Variations {
         Ok(variations)
     }
 
-    /// How many runs there are.
+    /// Returns the number of runs.
     pub(super) fn runs(&self) -> usize {
         self.runs
     }
 
-    /// The run of an index below [`Self::runs`]: the seeds change fastest, then the last swept key.
+    /// Returns the run of an index below [`Self::runs`]: the seeds change fastest, then the last
+    /// swept key.
     pub(super) fn case(&self, index: usize) -> Result<Case, ScenarioError> {
         let mut rest = index as u64;
         let seed_of_line = self.seeds.as_ref().map(|seeds| {
@@ -160,12 +161,12 @@ impl Variations {
         Ok(Case { place, scenario })
     }
 
-    /// The scenario in a root that [`put`] has left a table.
+    /// Reads the scenario from a root that is still a table after [`put`].
     fn understand(&self, root: Value) -> Result<Scenario, ScenarioError> {
         Scenario::read(Table::try_from(root).unwrap_or_default(), &self.folder)
     }
 
-    /// Puts every value in alone, so that one that does not fit is named with its key.
+    /// Puts every value in alone, so that an error names the key of the value that does not fit.
     fn check_keys(&self) -> Result<(), ScenarioError> {
         let swept = self.swept.iter();
         let swept = swept.flat_map(|(key, values)| values.iter().map(move |value| (key, value)));
@@ -207,11 +208,11 @@ impl Draw {
         }
     }
 
-    /// The value of a key for a seed.
+    /// Returns the value of a key for a seed.
     fn value(&self, key: &str, seed: u64) -> Value {
         let seed = xxh3_64_with_seed(key.as_bytes(), seed);
         let bits = Xoshiro256PlusPlus::seed_from_u64(seed).next_u64();
-        // The product's upper half is even over 0..count as far as 64 bits can be.
+        // The product's upper half is uniform over 0..count to the precision of 64 bits.
         let below = |count: u128| (u128::from(bits).saturating_mul(count)) >> 64;
         match self {
             Self::Whole([least, greatest]) => {
@@ -226,7 +227,7 @@ impl Draw {
     }
 }
 
-/// Puts a value where a dotted key points; the number of an array's entry counts from 0.
+/// Puts a value where a dotted key points; array entries count from 0.
 fn put(root: &mut Value, key: &str, value: Value) -> Result<(), ScenarioError> {
     let mut place = root;
     for part in key.split('.') {
@@ -257,7 +258,7 @@ fn put(root: &mut Value, key: &str, value: Value) -> Result<(), ScenarioError> {
     Ok(())
 }
 
-/// The seed of the file.
+/// Returns the seed of the file.
 fn seed(root: &Value) -> Option<u64> {
     root.get("bench")?
         .get("seed")?

@@ -7,7 +7,7 @@ use siskin_control::input::signal::{Pulse, Signal};
 use siskin_control::params::choice::Inp3d;
 use siskin_control::params::{ParamId, Params};
 
-/// Share of a pulse's range that is zero throttle.
+/// Share of a pulse's range that counts as zero throttle.
 const ZERO_SHARE: f64 = 1.0 / ZERO_DIVISOR as f64;
 
 /// The signal on the wire.
@@ -24,7 +24,7 @@ impl Default for Wire {
     }
 }
 
-/// The name of a signal in a file.
+/// Returns the name of a signal in a file.
 fn name(signal: Signal) -> String {
     signal.name().to_lowercase().replace(' ', "-")
 }
@@ -42,8 +42,8 @@ impl TryFrom<String> for Wire {
 }
 
 impl Wire {
-    /// From the start of one frame to that of the next, ns: what a flight controller's loop of
-    /// 1 kHz sends, and 400 Hz for servo pulses, which take up to 2 ms.
+    /// Returns the interval between frame starts, ns: that of a flight controller's 1 kHz loop, and
+    /// 400 Hz for servo pulses, which take up to 2 ms.
     pub fn interval_ns(self) -> u64 {
         match self.0 {
             Signal::Pulse(Pulse::Servo) => 2_500_000,
@@ -51,9 +51,8 @@ impl Wire {
         }
     }
 
-    /// The datagram of a throttle, 0 to 1. 0 is motor stop or the pulse that stands for it; above,
-    /// the throttle's steps are gone through from the first to the last, with `INP_3D` those of
-    /// both directions.
+    /// Returns the datagram of a throttle, 0 to 1. 0 is motor stop or its pulse; above it the
+    /// throttle's steps are used from first to last, with `INP_3D` those of both directions.
     pub fn datagram(self, throttle: f64, params: &Params) -> Vec<u8> {
         match self.0 {
             Signal::Dshot { bidirectional, .. } => {
@@ -71,7 +70,7 @@ impl Wire {
     }
 }
 
-/// The 16 bits of a DShot frame of a throttle, 0 to 1.
+/// Returns the 16 bits of a DShot frame for a throttle, 0 to 1.
 pub(crate) fn bits(throttle: f64, bidirectional: bool) -> u16 {
     let value = if throttle > 0.0 {
         48 + libm::round(throttle * 1999.0) as u16
@@ -85,7 +84,7 @@ pub(crate) fn bits(throttle: f64, bidirectional: bool) -> u16 {
     frame.to_bits() ^ dshot::check_mask(bidirectional)
 }
 
-/// The servo pulse of a throttle, µs.
+/// Returns the servo pulse for a throttle, µs.
 fn servo_us(throttle: f64, params: &Params) -> f64 {
     let get = |id| f64::from(params.get(id));
     let (min_us, max_us) = (get(ParamId::InpPulseMinUs), get(ParamId::InpPulseMaxUs));

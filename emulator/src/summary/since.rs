@@ -1,6 +1,6 @@
-//! What reached, settled and locked have in common: since when they hold.
+//! What reached, settled and locked have in common: how long they have held.
 
-/// Since when something has held without a break, s.
+/// Time since which something has held without interruption, s.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Since(pub(super) Option<f64>);
 

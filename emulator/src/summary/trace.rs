@@ -5,18 +5,18 @@ use xxhash_rust::xxh3::Xxh3;
 use crate::rig::Rig;
 use crate::surroundings::{Motion, Passage};
 
-/// Bytes that wait to be hashed at once, at most: the hash's set-up costs more than a period's words.
+/// Most bytes buffered for one hash update, whose set-up costs more than a period's words.
 const BYTES: usize = 16_384;
 
-/// Bytes of one period's words, at most: there are some 200 of four.
+/// Most bytes of one period's words: there are some 200 of four.
 const PERIOD_BYTES: usize = 4_096;
 
 /// Hashes the words of the control state.
 pub(super) struct Trace {
     hash: Xxh3,
-    /// Words, little-endian, with room for a period's behind them.
+    /// Words, little-endian, with room for another period's.
     bytes: Box<[u8; BYTES + PERIOD_BYTES]>,
-    /// How many of them have not been hashed yet.
+    /// Number of bytes not hashed yet.
     waiting: usize,
 }
 
@@ -29,7 +29,7 @@ impl Trace {
         }
     }
 
-    /// Takes in the state after a period.
+    /// Adds the state after a period.
     #[inline]
     pub(super) fn take(&mut self, rig: &Rig) {
         let Some(room) = self.room() else { return };
@@ -41,7 +41,7 @@ impl Trace {
         self.waiting += len;
     }
 
-    /// Takes in what the motor did in a period.
+    /// Adds what the motor did in a period.
     pub(super) fn pass(&mut self, passage: &Passage) {
         let Motion {
             angle_turns,
@@ -62,7 +62,7 @@ impl Trace {
         self.waiting += len;
     }
 
-    /// Room for a period behind what waits, where each word has a fixed place: nothing is checked word by word.
+    /// Returns room for a period after what is buffered, where each word has a fixed place: no per-word checks.
     #[inline]
     fn room(&mut self) -> Option<&mut [u8; PERIOD_BYTES]> {
         if self.waiting > BYTES {
@@ -72,7 +72,7 @@ impl Trace {
         self.bytes[self.waiting..].first_chunk_mut()
     }
 
-    /// The hash so far.
+    /// Returns the hash so far.
     pub(super) fn digest(&self) -> u64 {
         let mut hash = self.hash.clone();
         hash.update(&self.bytes[..self.waiting]);

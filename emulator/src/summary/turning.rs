@@ -1,4 +1,4 @@
-//! How the shaft turns against what is asked of it: turning back, reaching and settling.
+//! The shaft's motion against its command: turning back, reaching and settling.
 
 use siskin_control::drive::Setpoint;
 use siskin_control::units::{Current, Speed};
@@ -6,24 +6,24 @@ use siskin_control::units::{Current, Speed};
 use super::since::Since;
 use crate::shaft::Units;
 
-/// The shaft has reached a speed from this share of it on.
+/// Share of a speed from which the shaft has reached it.
 const REACHED: f64 = 0.95;
 
-/// It has settled within this share of it.
+/// Share of a speed within which it has settled.
 const SETTLED: f64 = 0.01;
 
 /// Sums over the periods of a window.
 #[derive(Clone, Debug)]
 pub(super) struct Turning {
-    /// What is asked for.
+    /// The command.
     setpoint: Setpoint,
-    /// The speed of it, rpm; 0 is none.
+    /// Its speed, rpm; 0 if none.
     command_rpm: f64,
     reached: Since,
     settled: Since,
-    /// 1 or −1: which way the shaft is asked to turn.
+    /// 1 or −1: the commanded direction.
     forward: f64,
-    /// Turned forward since the direction was given, degrees.
+    /// Forward rotation since the direction was commanded, degrees.
     angle_deg: f64,
     furthest_deg: f64,
     turned_back_deg: f64,
@@ -43,7 +43,7 @@ impl Turning {
         }
     }
 
-    /// Takes in a period that began at `t_s` with the shaft at `rpm`.
+    /// Adds a period that began at `t_s` with the shaft at `rpm`.
     pub(super) fn add(&mut self, t_s: f64, rpm: f64, setpoint: Setpoint, units: Units) {
         if setpoint != self.setpoint {
             self.change(setpoint, units);
@@ -60,7 +60,7 @@ impl Turning {
         self.angle_deg += self.forward * rpm * (360.0 / 60.0) * f64::from(units.scale.period_s);
     }
 
-    /// Something else is asked for.
+    /// Changes the command.
     fn change(&mut self, setpoint: Setpoint, units: Units) {
         self.setpoint = setpoint;
         self.command_rpm = match setpoint {
@@ -77,23 +77,23 @@ impl Turning {
         }
     }
 
-    /// When the shaft reached 95 % of what is asked for, to hold it, s.
+    /// Returns when the shaft reached 95 % of the command for good, s.
     pub(super) fn reached_at_s(&self) -> Option<f64> {
         self.reached.0
     }
 
-    /// When it came within 1 % of the last speed that was asked for, to stay there, s.
+    /// Returns when it came within 1 % of the last commanded speed for good, s.
     pub(super) fn settled_at_s(&self) -> Option<f64> {
         self.settled.0
     }
 
-    /// The most by which it stood behind the furthest point that it had reached, degrees.
+    /// Returns the most by which it fell behind the furthest point reached, degrees.
     pub(super) fn turned_back_deg(&self) -> f64 {
         self.turned_back_deg
     }
 }
 
-/// 1 or −1 as a set-point turns the motor along the configured direction or against it, if at all.
+/// Returns 1 or −1 if a set-point turns the motor along or against the configured direction.
 fn forward(setpoint: Setpoint) -> Option<f64> {
     let backward = match setpoint {
         Setpoint::Speed(speed) if speed != Speed::ZERO => speed < Speed::ZERO,
@@ -151,7 +151,7 @@ mod tests {
         let at = |stretches: &[_]| turning(stretches).reached_at_s();
         let held = [(0.1, 1000.0, 0.0), (0.1, 1000.0, 960.0)];
         assert!((at(&held).unwrap() - 0.1).abs() < 1e-9);
-        // The first time was not for good, and more than asked for is enough.
+        // The first time was not for good, and more than commanded is enough.
         let again = [
             (0.1, 1000.0, 960.0),
             (0.1, 1000.0, 940.0),
@@ -174,7 +174,7 @@ mod tests {
             (0.1, 2000.0, 1985.0),
         ];
         assert!((at(&step).unwrap() - 0.3).abs() < 1e-9);
-        // Where the shaft stood at the new speed before it was asked for, it counts from then.
+        // If the shaft was at the new speed before the command, it counts from the command.
         let early = [(0.1, 1000.0, 2000.0), (0.1, 2000.0, 2000.0)];
         assert!((at(&early).unwrap() - 0.1).abs() < 1e-9);
         assert_eq!(at(&[(0.1, 1000.0, 1020.0)]), None);
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn turning_back_is_measured_from_the_furthest_point() {
         let back = |stretches: &[_]| turning(stretches).turned_back_deg();
-        // 60 rpm is a degree in 2.78 ms: 0.25 s are 90 degrees.
+        // 60 rpm is a degree in 2.78 ms: 0.25 s is 90 degrees.
         let swing = [
             (0.1, 1000.0, -60.0),
             (0.25, 1000.0, 60.0),
@@ -192,7 +192,7 @@ mod tests {
         ];
         assert!((back(&swing) - 72.0).abs() < 0.5, "{}", back(&swing));
         assert!(back(&[(0.25, 1000.0, 60.0)]) < 1e-9);
-        // Asked to turn the other way, that is forward.
+        // Commanded the other way, that is forward.
         assert!(back(&[(0.25, -1000.0, -60.0)]) < 1e-9);
         let reversed = [(0.25, 1000.0, 60.0), (0.25, -1000.0, -60.0)];
         assert!(back(&reversed) < 1e-9);

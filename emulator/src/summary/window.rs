@@ -9,22 +9,20 @@ use crate::rig::Period;
 use crate::shaft::Units;
 use crate::surroundings::Motion;
 
-/// Angle error within which the observer has locked: it costs 3.4 % of the torque.
+/// Angle error within which the observer is locked: it costs 3.4 % of the torque.
 const LOCKED_DEG: f64 = 15.0;
 
-/// The figures of one measuring window; none is `None` but for lack of data, as of the control where
-/// nobody sees it.
+/// The figures of one measuring window; one is `None` only for lack of data, such as of a control that is not visible.
 ///
-/// Speed and torque are those of the shaft, positive with the phases in the order a, b, c: with
-/// `MOT_DIR` 1 a motor that runs forward has a negative speed here, and so have the reference and the
-/// estimate that it is compared with.
+/// Speed and torque are the shaft's, positive with the phases in the order a, b, c: with `MOT_DIR` 1 a motor that runs
+/// forward has a negative speed here, and so have the reference and the estimate that it is compared with.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figures {
     /// Name.
     pub name: String,
     /// Start, s.
     pub t0_s: f64,
-    /// End, s; that of the run where it ended before.
+    /// End, s; that of the run if it ended earlier.
     pub t1_s: f64,
     /// Mean mechanical speed, rpm.
     pub rpm_mean: Option<f64>,
@@ -32,34 +30,34 @@ pub struct Figures {
     pub rpm_min: Option<f64>,
     /// Greatest mechanical speed, rpm.
     pub rpm_max: Option<f64>,
-    /// Mean reference of the speed, rpm, while there is one.
+    /// Mean speed reference, rpm, while there is one.
     pub rpm_ref_mean: Option<f64>,
     /// Root mean square of speed less reference, rpm.
     pub speed_error_rms_rpm: Option<f64>,
-    /// Greatest magnitude of it.
+    /// Its greatest magnitude.
     pub speed_error_max_rpm: Option<f64>,
     /// Root mean square of estimated less true speed, rpm, while the observer leads.
     pub speed_estimate_error_rms_rpm: Option<f64>,
     /// Mean of estimated less true electrical angle, degrees, while the observer leads.
     pub angle_error_mean_deg: Option<f64>,
-    /// Root mean square of it.
+    /// Its root mean square.
     pub angle_error_rms_deg: Option<f64>,
-    /// Standard deviation of it.
+    /// Its standard deviation.
     pub angle_error_std_deg: Option<f64>,
-    /// Greatest magnitude of it.
+    /// Its greatest magnitude.
     pub angle_error_max_deg: Option<f64>,
-    /// Time from when the observer took the lead until that error stayed within 15°, s; `None` where
-    /// it did not at the end.
+    /// Time from when the observer took the lead until that error stayed within 15°, s; `None` if it was not within at
+    /// the end.
     pub lock_s: Option<f64>,
     /// Mean electromagnetic torque, Nm.
     pub torque_mean_nm: Option<f64>,
-    /// Torque ripple: 100·√(T_rms² − T_avg²)/|T_avg|, where the drive has turned the motor.
+    /// Torque ripple: 100·√(T_rms² − T_avg²)/|T_avg|, if the drive has turned the motor.
     pub torque_ripple_pct: Option<f64>,
     /// Mean electrical power into the phases, W.
     pub p_motor_w: Option<f64>,
     /// Mean power lost in the windings, W.
     pub p_copper_w: Option<f64>,
-    /// 1 − p_copper/p_motor, for a motor that takes power to turn: a tone's is no work.
+    /// 1 − p_copper/p_motor, for a motor that takes power to turn: a tone does no work.
     pub efficiency: Option<f64>,
     /// Mean measured i_q, A.
     pub i_q_mean_a: Option<f64>,
@@ -71,23 +69,22 @@ pub struct Figures {
     pub bus_v_mean: Option<f64>,
     /// Mean current from the supply, A.
     pub bus_a_mean: Option<f64>,
-    /// The most by which the shaft stood behind the furthest point that it had reached in the
-    /// direction asked for, mechanical degrees.
+    /// The most by which the shaft fell behind the furthest point reached in the commanded direction, mechanical
+    /// degrees.
     pub turned_back_deg: Option<f64>,
-    /// Time from the start after which the shaft held 95 % of the speed asked for, s; `None`
-    /// where it did not at the end.
+    /// Time from the start after which the shaft held 95 % of the commanded speed, s; `None` if it did not at the end.
     pub reached_s: Option<f64>,
-    /// Time from the start after which the shaft stayed within 1 % of the speed that was asked for
-    /// last, s; `None` where it did not at the end.
+    /// Time from the start after which the shaft stayed within 1 % of the last commanded speed, s; `None` if it did not
+    /// at the end.
     pub settled_s: Option<f64>,
-    /// Times that the drive began a start (Park).
+    /// Number of starts that the drive began (Park).
     pub starts: Option<u64>,
-    /// Whether the angle error was 90° or more.
+    /// Whether the angle error reached 90°.
     pub lock_lost: Option<bool>,
 }
 
 impl Figures {
-    /// The keys of those that are of the control, or need to know what it did.
+    /// The keys of figures that are the control's, or need to know what it did.
     pub const OF_CONTROL: [&str; 18] = [
         "rpm_ref_mean",
         "speed_error_rms_rpm",
@@ -110,24 +107,24 @@ impl Figures {
     ];
 }
 
-/// A period as the windows see it.
+/// A period as seen by the windows.
 pub(super) struct Look<'a> {
     /// Its start, s.
     pub(super) t_s: f64,
     /// The truth.
     pub(super) motion: &'a Motion,
-    /// The control, where it is seen.
+    /// The control, if visible.
     pub(super) control: Option<Control<'a>>,
 }
 
 /// The control in a period.
 #[derive(Clone, Copy)]
 pub(super) struct Control<'a> {
-    /// What it was asked for, and the truth against its own.
+    /// Its command, and the truth.
     pub(super) period: &'a Period,
-    /// What the control made of it.
+    /// The control's response.
     pub(super) snapshot: &'a Snapshot,
-    /// What the control's numbers are worth.
+    /// The units of the control's numbers.
     pub(super) units: Units<'a>,
     /// Whether the drive began a start.
     pub(super) started: bool,
@@ -149,13 +146,13 @@ pub(super) struct Window {
     current_max_a: f64,
     speed_error_max_rpm: f64,
     angle_error_max_deg: f64,
-    /// The observer leads.
+    /// Since when the observer leads.
     led: Since,
-    /// It leads, and its angle is near.
+    /// Since when it leads with a small angle error.
     locked: Since,
     turning: Turning,
     starts: u64,
-    /// The drive has turned the motor.
+    /// Whether the drive has turned the motor.
     drove: bool,
 }
 
@@ -185,7 +182,7 @@ impl<const N: usize> Mean<N> {
         self.any(self.sums[index] / self.count as f64)
     }
 
-    /// A figure of these samples, if there are any.
+    /// Returns a figure of these samples, if there are any.
     fn any(&self, figure: f64) -> Option<f64> {
         (self.count > 0).then_some(figure)
     }
@@ -214,7 +211,7 @@ impl Window {
         }
     }
 
-    /// Whether a period that begins at `t_s` is within.
+    /// Returns true if a period that begins at `t_s` is within.
     pub(super) fn covers(&self, t_s: f64) -> bool {
         t_s >= self.t0_s && t_s < self.t1_s
     }

@@ -1,11 +1,11 @@
-//! Another motor in place of the one that stands there.
+//! Replacing the motor.
 
 use super::Surroundings;
 use crate::bench::Bench;
 use crate::plant::Plant;
 
 impl Surroundings {
-    /// Puts the motor of a bench and its load, at rest, in place of those that stand there.
+    /// Replaces the motor and load, at rest, with those of a bench.
     pub fn fit(&mut self, bench: &Bench) {
         self.bench.motor = bench.motor;
         self.bench.load = bench.load;

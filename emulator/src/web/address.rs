@@ -9,7 +9,7 @@ use crate::link::{AddressError, HostPort};
 /// The argument of `--web`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum WebAddress {
-    /// Nobody has said: at [`WebAddress::usual`], or nowhere if that is taken.
+    /// Not given: at [`WebAddress::usual`], or nowhere if that is taken.
     #[default]
     Usual,
     /// There, or it is an error.
@@ -18,7 +18,7 @@ pub enum WebAddress {
     None,
 }
 
-/// Why a text is not the address of a page.
+/// Why a text is not a page's address.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "'{text}' is no address for the page: {reason}; use HOST:PORT, such as 127.0.0.1:8080, or none"
@@ -31,7 +31,7 @@ pub struct WebAddressError {
 }
 
 impl WebAddress {
-    /// Where the page is if nobody has said otherwise.
+    /// Returns the default address of the page.
     pub fn usual() -> HostPort {
         HostPort {
             host: "127.0.0.1".to_owned(),

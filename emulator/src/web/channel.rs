@@ -1,4 +1,4 @@
-//! What is traced.
+//! The traced channels.
 
 use siskin_control::drive::{Bridge, Direction, Snapshot};
 use siskin_control::units::{Flux, Scale};
@@ -7,20 +7,20 @@ use crate::record::Row;
 use crate::shaft::Units;
 use crate::surroundings::Motion;
 
-/// How many channels there are.
+/// Number of channels.
 pub(super) const COUNT: usize = 25;
 
-/// A control period as the simulation leaves it. What it comes to is computed where it is looked at: taking it off
-/// must cost next to nothing.
+/// A control period as left by the simulation. Its values are computed when viewed: recording it must cost next to
+/// nothing.
 #[derive(Clone, Copy)]
 pub(super) struct Point {
-    /// Its beginning, s.
+    /// Its start, s.
     pub(super) t_s: f64,
     /// The motor.
     pub(super) motion: Motion,
-    /// On the wire, 0 to 1.
+    /// Throttle on the wire, 0 to 1.
     pub(super) throttle: f32,
-    /// The control, where it is at hand.
+    /// The control, if accessible.
     pub(super) control: Option<Control>,
 }
 
@@ -35,13 +35,14 @@ pub(super) struct Control {
     pub(super) flux: [Flux; 3],
 }
 
-/// The channels' names, with the unit as the last part: those of a recording after its time, and what it has not.
+/// Returns the channels' names, with the unit as the last part: those of a recording except time, and some that it
+/// lacks.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
     let of_row = Row::COLUMNS[1..].iter().copied();
     of_row.chain(["throttle", "flux_a_wb", "flux_b_wb", "flux_c_wb"])
 }
 
-/// Their values in a control period; what is not known is not a number.
+/// Returns their values in a control period; unknown ones are NaN.
 #[rustfmt::skip]
 pub(super) fn values(point: &Point) -> [f32; COUNT] {
     let (row, flux_wb) = match &point.control {

@@ -1,7 +1,7 @@
-//! The scope: a page in the browser that shows a running ESC and lets a person play with it.
+//! The scope: a browser page that shows a running ESC and lets the user play with it.
 //!
-//! The page and its server are those of every ESC ([`siskin_scope`]), by MAVLink. Beside that there is what only a
-//! simulation has: traces at the control's rate, a throttle wire, and faults.
+//! The page and its server are those of every ESC ([`siskin_scope`]), by MAVLink. In addition there is what only a
+//! simulation has: traces at the control rate, a throttle wire, and faults.
 
 mod address;
 mod channel;
@@ -40,23 +40,23 @@ use throttle::Throttle;
 
 pub use siskin_scope::SiteError as WebError;
 
-/// The page's side of a running simulation.
+/// The page's interface to a running simulation.
 pub struct Web {
     site: Site<Rings>,
     links: BTreeMap<ViewerId, LinkId>,
     taps: Taps,
-    /// One for each ESC.
+    /// One per ESC.
     throttles: Vec<Throttle>,
-    /// Likewise: what is played on it.
+    /// One per ESC: what is played on it.
     playing: Vec<Option<Playing>>,
 }
 
 impl Web {
-    /// Serves the page of so many ESCs where it is wanted, with what is recorded of each, if anything is; with a line
-    /// for a person where the usual port is taken.
+    /// Serves the page of this many ESCs if wanted, with each one's recording, if any; returns a line for the user if
+    /// the usual port is taken.
     ///
     /// # Errors
-    /// It cannot be served where a person wants it.
+    /// It cannot be served where the user wants it.
     pub fn open(
         address: &WebAddress,
         escs: usize,
@@ -88,19 +88,19 @@ impl Web {
         })
     }
 
-    /// Where it is served, and what a person opens.
+    /// Returns where it is served, and what the user opens.
     pub fn place(&self) -> (SocketAddr, String) {
         (self.site.local(), self.site.url().to_owned())
     }
 
-    /// Does what the pages ask for, and drives the throttle wire for who holds it. Never waits.
+    /// Carries out the pages' requests, and drives the throttle wire for its holder. Never waits.
     pub fn receive<M: Machine>(
         &mut self,
         links: &mut Links,
         machine: &mut M,
         onlooker: &mut impl Onlooker,
     ) {
-        // No more than the queue has held: pages that go on sending hold nothing up.
+        // No more than the queue has held, so that pages that keep sending delay nothing.
         for _ in 0..ORDERS {
             let Some(Order { viewer, came, what }) = self.site.order() else {
                 break;
@@ -141,13 +141,13 @@ impl Web {
         }
     }
 
-    /// A viewer wants no throttle any more, or is gone.
+    /// Releases the throttle of a viewer that wants none any more, or is gone.
     fn release(&mut self, esc: usize, (viewer, came): (ViewerId, Instant)) {
         self.playing[esc].take_if(|playing| playing.viewer() == viewer);
         self.throttles[esc].release(viewer, came);
     }
 
-    /// Goes on with what is played.
+    /// Advances what is being played.
     fn go_on(&mut self, now: Instant, machine: &mut impl Machine) {
         for (esc, place) in self.playing.iter_mut().enumerate() {
             let Some(playing) = place else { continue };
@@ -176,7 +176,7 @@ impl Web {
         | FromPage::Fault { esc, .. }
         | FromPage::Mend { esc }) = asked
         else {
-            // A viewer sees to its views itself.
+            // A viewer's own views are handled there.
             return Ok(());
         };
         let throttle = self.throttles.get_mut(esc);
@@ -220,7 +220,7 @@ impl Web {
         self.site.send(frames);
     }
 
-    /// An onlooker that takes off the traces beside `onlooker`, where there is a page.
+    /// Returns an onlooker that records the traces beside `onlooker`, if there is a page.
     pub fn tapped<'a, O>(web: Option<&'a mut Self>, onlooker: &'a mut O) -> Tapped<'a, O> {
         Tapped {
             onlooker,
@@ -229,7 +229,7 @@ impl Web {
     }
 }
 
-/// Puts a bench of the library there: what a page is told of it, with what the ESC would have to know.
+/// Fits a bench of the library; returns what the page is told of it, including what the ESC would have to know.
 fn fit(esc: usize, bench: &str, machine: &mut impl Machine) -> Result<String, String> {
     if !library::names().any(|known| known == bench) {
         // A page has no right to this machine's files.
@@ -245,7 +245,7 @@ fn fit(esc: usize, bench: &str, machine: &mut impl Machine) -> Result<String, St
     Ok(serde_json::json!({ "fitted": fitted }).to_string())
 }
 
-/// What a page is told first: what there is.
+/// Returns a page's greeting: what is available.
 fn greeting(escs: usize, recordings: &[PathBuf]) -> String {
     let phases = Phase::ALL.map(|phase| format!("{phase:?}").to_lowercase());
     let channels: Vec<_> = channel::names().collect();
@@ -257,7 +257,7 @@ fn greeting(escs: usize, recordings: &[PathBuf]) -> String {
         "benches".into(),
         library::names().collect::<Vec<_>>().into(),
     );
-    // What is no file before its end is none to be fetched.
+    // A file that is incomplete until its end cannot be fetched.
     let names = recordings.iter().map(|path| match path.extension() {
         Some(extension) if extension == "parquet" => None,
         _ => path.file_name().map(|name| name.to_string_lossy()),

@@ -1,6 +1,6 @@
-//! A scenario that is played on an ESC which runs: its throttle on the wire, its faults as they begin.
+//! A scenario played on a running ESC: its throttle on the wire, its faults as they begin.
 //!
-//! A page has begun it, and holds the throttle for it: it ends with the page, and where anybody else has the wire.
+//! A page has begun it, and holds the throttle for it: it ends with the page, and when anyone else takes the wire.
 
 use std::time::Instant;
 
@@ -13,22 +13,22 @@ use crate::scenario::Script;
 /// `INP_PROTO` of any signal.
 const ANY_SIGNAL: u8 = 0;
 
-/// A scenario that goes on.
+/// A scenario in progress.
 pub(super) struct Playing {
     viewer: ViewerId,
     script: Script,
     begun_ns: u64,
-    /// Faults that have begun.
+    /// Number of faults that have begun.
     begun: usize,
 }
 
-/// How far it is.
+/// Its progress.
 pub(super) enum Stage {
     /// It goes on.
     GoesOn,
     /// It has been played to its end.
     Over,
-    /// It cannot go on: a line.
+    /// It cannot go on; why, in a line.
     Refused(String),
 }
 
@@ -43,7 +43,7 @@ impl Playing {
         }
     }
 
-    /// Who has begun it.
+    /// Returns who has begun it.
     pub(super) fn viewer(&self) -> ViewerId {
         self.viewer
     }

@@ -1,20 +1,20 @@
 //! The latest ten seconds of one ESC at its control rate.
 //!
-//! The simulation fills a chunk and hands it over whole; from then on it does not change, so that who looks at it
-//! holds up nobody. Columns are made when somebody first looks, and lie together, since a page looks at few of them.
+//! The simulation fills a chunk and hands it over whole; it does not change afterwards, so that viewers delay nobody.
+//! Columns are computed when first viewed, and are stored together, since a page views few of them.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, OnceLock};
 
 use super::channel::{self, COUNT, Point};
 
-/// Control periods in a chunk: 11 ms at 24 kHz, which is how old the latest point of a trace is at most.
+/// Control periods in a chunk: 11 ms at 24 kHz, the greatest age of a trace's latest point.
 pub(super) const CHUNK: usize = 256;
 
 /// Chunks in a ring: 10.7 s at 24 kHz, in some 90 MB.
 const CHUNKS: usize = 1000;
 
-/// Some control periods that follow each other.
+/// Consecutive control periods.
 pub(super) struct Chunk {
     points: Vec<Point>,
     columns: OnceLock<Columns>,
@@ -23,7 +23,7 @@ pub(super) struct Chunk {
 /// A chunk by channel.
 struct Columns {
     values: Vec<[f32; CHUNK]>,
-    /// The least and the greatest of each.
+    /// The least and greatest value of each.
     bounds: Vec<[f32; 2]>,
 }
 
@@ -49,22 +49,22 @@ impl Chunk {
         self.points.len() == CHUNK
     }
 
-    /// The beginning of a control period, s.
+    /// Returns the start of a control period, s.
     pub(super) fn t_s(&self, place: usize) -> f64 {
         self.points[place].t_s
     }
 
-    /// The first place whose time is this or later.
+    /// Returns the first index whose time is this or later.
     pub(super) fn at(&self, t_s: f64) -> usize {
         self.points.partition_point(|point| point.t_s < t_s)
     }
 
-    /// The values of a channel.
+    /// Returns the values of a channel.
     pub(super) fn values(&self, channel: usize) -> &[f32; CHUNK] {
         &self.columns().values[channel]
     }
 
-    /// The least and the greatest of a channel; not numbers if there are none.
+    /// Returns the least and greatest value of a channel; NaN if there are none.
     pub(super) fn bounds(&self, channel: usize) -> [f32; 2] {
         self.columns().bounds[channel]
     }
@@ -83,7 +83,7 @@ impl Chunk {
     }
 }
 
-/// The least and the greatest of some values; not numbers if there are none.
+/// Returns the least and greatest of some values; NaN if there are none.
 pub(super) fn bounds(values: &[f32]) -> [f32; 2] {
     values
         .iter()
@@ -92,13 +92,13 @@ pub(super) fn bounds(values: &[f32]) -> [f32; 2] {
         })
 }
 
-/// The chunks, the oldest first.
+/// The chunks, oldest first.
 #[derive(Default)]
 pub(super) struct Ring(VecDeque<Arc<Chunk>>);
 
 impl Ring {
-    /// Takes in a full chunk, and gives an empty one: the oldest, unless somebody still looks at that. Memory that
-    /// the program has already costs nothing, where the system would have to clear what is new.
+    /// Adds a full chunk and returns an empty one: the oldest, unless it is still viewed. Memory that the program
+    /// already has is free, where the system would have to clear new memory.
     pub(super) fn push(&mut self, chunk: Chunk) -> Chunk {
         let is_full = self.0.len() == CHUNKS;
         let oldest = if is_full { self.0.pop_front() } else { None };
@@ -107,12 +107,12 @@ impl Ring {
         unseen.map_or_else(Chunk::new, Chunk::emptied)
     }
 
-    /// Forgets all.
+    /// Forgets everything.
     pub(super) fn clear(&mut self) {
         self.0.clear();
     }
 
-    /// All that there is.
+    /// Returns all chunks.
     pub(super) fn chunks(&self) -> Vec<Arc<Chunk>> {
         self.0.iter().cloned().collect()
     }

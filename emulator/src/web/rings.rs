@@ -1,4 +1,4 @@
-//! The traces of all ESCs, as the simulation and the viewers share them.
+//! The traces of all ESCs, shared by the simulation and the viewers.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,7 +16,7 @@ pub(super) struct Rings {
 }
 
 impl Rings {
-    /// For so many ESCs.
+    /// Creates rings for this many ESCs.
     pub(super) fn new(escs: usize) -> Self {
         Self {
             each: (0..escs).map(|_| Mutex::default()).collect(),
@@ -24,19 +24,19 @@ impl Rings {
         }
     }
 
-    /// Whether somebody views.
+    /// Returns true if anyone is viewing.
     pub(super) fn is_viewed(&self) -> bool {
         self.viewed.load(Ordering::Relaxed)
     }
 
-    /// Takes in a full chunk of an ESC, and gives one to fill.
+    /// Adds a full chunk of an ESC, and returns one to fill.
     pub(super) fn push(&self, esc: usize, chunk: Chunk) -> Option<Chunk> {
         Some(self.ring(esc)?.push(chunk))
     }
 
     fn ring(&self, esc: usize) -> Option<MutexGuard<'_, Ring>> {
         let ring = self.each.get(esc)?;
-        // Nothing in it is left half done where a thread has died.
+        // Nothing in it is left half done if a thread has died.
         Some(ring.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -57,7 +57,7 @@ impl Show for Rings {
         Ok(answer)
     }
 
-    /// The first viewer finds no old traces, and the last takes them along.
+    /// The first viewer finds no old traces, and the last clears them.
     fn viewed(&self, is_viewed: bool) {
         for esc in 0..self.each.len() {
             if let Some(mut ring) = self.ring(esc) {

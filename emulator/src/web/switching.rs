@@ -1,7 +1,7 @@
-//! One period of the PWM edge by edge: the six switches, the terminals' voltages and the phases' currents.
+//! One PWM period edge by edge: the six switches, the terminal voltages and the phase currents.
 //!
-//! A period that has passed tells its commands, and what stood on the bench before it is played through it anew,
-//! stretch by stretch. That costs the simulation a copy, and only where somebody asks.
+//! A past period's commands are replayed, stretch by stretch, on the bench as it was before. That costs the simulation
+//! a copy, and only on request.
 
 use serde::Serialize;
 use siskin_scope::ViewerId;
@@ -10,10 +10,10 @@ use crate::plant::{Fidelity, Gate, Gates};
 use crate::rig::{Period, Rig};
 use crate::surroundings::Surroundings;
 
-/// Stretches between which the currents are told, beside those that the edges make.
+/// Stretches into which the period is cut, besides its edges, for the currents.
 const STRETCHES: u32 = 200;
 
-/// Microseconds, to the picosecond: an edge stands at any time.
+/// Converts to microseconds, rounded to the picosecond: an edge can be at any time.
 fn microseconds(seconds: f64) -> f64 {
     (seconds * 1e12).round() * 1e-6
 }
@@ -21,7 +21,7 @@ fn microseconds(seconds: f64) -> f64 {
 /// A period.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Switching {
-    /// When it began, s.
+    /// Its start, s.
     pub(super) t_s: f64,
     /// Its length, µs.
     pub(super) length_us: f64,
@@ -31,27 +31,27 @@ pub(super) struct Switching {
     pub(super) edges: Vec<(f64, usize, bool, bool)>,
     /// The ends of the stretches, µs.
     pub(super) t_us: Vec<f64>,
-    /// In each stretch whether the high side and the low side of each leg are on, a bit each.
+    /// For each stretch, whether each leg's high and low sides are on, one bit each.
     pub(super) gates: Vec<u8>,
-    /// At its end the terminals' voltages, V.
+    /// The terminal voltages at its end, V.
     pub(super) terminals_v: [Vec<f32>; 3],
     /// And the currents into the phases, A.
     pub(super) currents_a: [Vec<f32>; 3],
 }
 
-/// Looks at periods where somebody asks.
+/// Captures periods on request.
 #[derive(Default)]
 pub(super) enum Look {
-    /// Nobody asks.
+    /// No request.
     #[default]
     Nowhere,
-    /// Who asks.
+    /// Requested, by these viewers.
     Asked(Vec<ViewerId>),
-    /// And what there was before the period that comes.
+    /// Requested, with the state before the next period.
     Before(Vec<ViewerId>, Box<Before>),
 }
 
-/// What there is before a period.
+/// The state before a period.
 pub(super) struct Before {
     around: Surroundings,
     gates: Gates,
@@ -59,7 +59,7 @@ pub(super) struct Before {
 }
 
 impl Look {
-    /// Somebody asks.
+    /// Adds a request.
     pub(super) fn ask(&mut self, viewer: ViewerId) {
         match self {
             Self::Nowhere => *self = Self::Asked(vec![viewer]),
@@ -67,12 +67,12 @@ impl Look {
         }
     }
 
-    /// Whether somebody asks.
+    /// Returns true if there is a request.
     pub(super) fn is_asked(&self) -> bool {
         !matches!(self, Self::Nowhere)
     }
 
-    /// A period has passed: who asked for one, and that.
+    /// Handles a period that has passed: returns its requesters and the period itself, if requested.
     pub(super) fn period(
         &mut self,
         t_s: f64,
@@ -89,7 +89,7 @@ impl Look {
         }
     }
 
-    /// A period of which nobody knows the commands: who asked.
+    /// Handles a period whose commands are unknown: returns its requesters.
     pub(super) fn unknown(&mut self) -> Option<Vec<ViewerId>> {
         match std::mem::take(self) {
             Self::Nowhere => None,
@@ -99,7 +99,7 @@ impl Look {
 }
 
 impl Before {
-    /// What there is after a period, and so before the next one.
+    /// Captures the state after a period, which is that before the next.
     fn after(period: &Period, rig: &Rig) -> Self {
         let mut before = Self {
             around: rig.around().clone(),
@@ -132,7 +132,7 @@ impl Before {
             });
         let part_s = period_s / f64::from(STRETCHES);
         changes.extend((1..=STRETCHES).map(|part| (f64::from(part) * part_s, None)));
-        // Of one time, edges stand in the order in which they come.
+        // Simultaneous edges stay in order of occurrence.
         changes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut now_s = 0.0;
         seen.tell(now_s, self.on, &self.around);
@@ -177,7 +177,8 @@ mod tests {
     use super::*;
     use crate::rig::Bench;
 
-    /// A period of a motor at speed as it is seen, what it really was, s, and the phases' currents after it, A.
+    /// Returns a period of a motor at speed as captured, the actual one, its length, s, and the phase currents after
+    /// it, A.
     fn seen(plant: Fidelity) -> (Switching, Period, f64, [f64; 3]) {
         let mut params = Params::of(&BOSSO_BENCH);
         params.set(ParamId::PwmDeadtimeNs, 500.0).expect("in range");
@@ -215,7 +216,7 @@ mod tests {
             let edges: Vec<_> = seen.edges.iter().filter(|edge| edge.1 == leg).collect();
             assert_eq!(edges.len(), 4, "{edges:?}");
             assert!(edges.iter().all(|edge| !(edge.2 && edge.3)));
-            // Low off, high on, high off, low on: between off and on lies the dead time.
+            // Low off, high on, high off, low on: the dead time is between off and on.
             let dead = [edges[1].0 - edges[0].0, edges[3].0 - edges[2].0];
             assert!(dead.iter().all(|us| (us - 0.5).abs() < 1e-3), "{dead:?}");
         }
@@ -225,10 +226,10 @@ mod tests {
         let traces = seen.currents_a.iter().zip(&seen.terminals_v);
         for ((current, volts), (begin_a, after_a)) in traces.zip(ends_a) {
             assert!((f64::from(current[0]) - begin_a).abs() < 1e-5);
-            // Played stretch by stretch it is what the plant has made of it: `Surroundings` has the tolerance.
+            // Replayed stretch by stretch it equals the plant's result: `Surroundings` has the tolerance.
             let apart = f64::from(current[current.len() - 1]) - after_a;
             assert!(apart.abs() < 5e-3 * (1.0 + after_a.abs()), "{apart}");
-            // A terminal is at either rail, but for the drop of a diode or a switch.
+            // A terminal is at either rail, except for the drop of a diode or switch.
             let rail = |volts: &f32| volts.abs() < 1.5 || (volts - bus_v).abs() < 1.5;
             assert!(volts.iter().all(rail), "{volts:?}");
         }

@@ -1,4 +1,4 @@
-//! Takes the traces off a running simulation while somebody views them.
+//! Records the traces of a running simulation while someone views them.
 
 use std::sync::Arc;
 
@@ -18,11 +18,11 @@ use crate::surroundings::{Motion, Passage};
 pub(super) struct Tap {
     rings: Arc<Rings>,
     esc: usize,
-    /// Nothing while nobody views.
+    /// `None` while nobody views.
     chunk: Option<Chunk>,
     throttle: f32,
     look: Look,
-    /// Periods that were asked for, by whom; none where it cannot be known.
+    /// The requested periods, with their requesters; `None` if unknown.
     seen: Vec<(Vec<ViewerId>, Option<Switching>)>,
 }
 
@@ -38,7 +38,7 @@ impl Tap {
         }
     }
 
-    /// Looks whether somebody views; `throttle` is on the wire.
+    /// Checks whether anyone views; `throttle` is on the wire.
     pub(super) fn look(&mut self, throttle: f64) {
         self.throttle = throttle as f32;
         match (self.rings.is_viewed(), &self.chunk) {
@@ -63,7 +63,7 @@ impl Tap {
         }
     }
 
-    /// Looks at a period edge by edge.
+    /// Captures a period edge by edge.
     #[cold]
     fn see(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         if let Some((viewers, seen)) = self.look.period(t_s, period, rig) {
@@ -99,12 +99,12 @@ impl Tap {
 /// The taps of all ESCs.
 pub(super) struct Taps {
     each: Vec<Tap>,
-    /// Whose periods are told.
+    /// The ESC whose periods follow.
     esc: usize,
 }
 
 impl Taps {
-    /// One for each of so many ESCs.
+    /// Creates one for each of this many ESCs.
     pub(super) fn new(rings: &Arc<Rings>, escs: usize) -> Self {
         let each = (0..escs).map(|esc| Tap::new(Arc::clone(rings), esc));
         Self {
@@ -113,23 +113,23 @@ impl Taps {
         }
     }
 
-    /// As [`Tap::look`] of one.
+    /// Calls [`Tap::look`] of one.
     pub(super) fn look(&mut self, esc: usize, throttle: f64) {
         self.each[esc].look(throttle);
     }
 
-    /// A viewer asks for a period of an ESC's PWM.
+    /// Requests a PWM period of an ESC for a viewer.
     pub(super) fn ask(&mut self, esc: usize, viewer: ViewerId) {
         self.each[esc].look.ask(viewer);
     }
 
-    /// The periods that have been asked for, and by whom.
+    /// Takes the requested periods, with their requesters.
     pub(super) fn seen(&mut self, esc: usize) -> Vec<(Vec<ViewerId>, Option<Switching>)> {
         std::mem::take(&mut self.each[esc].seen)
     }
 }
 
-/// An onlooker and the taps, where there are any.
+/// An onlooker and the taps, if there are any.
 pub struct Tapped<'a, O> {
     pub(super) onlooker: &'a mut O,
     pub(super) taps: Option<&'a mut Taps>,

@@ -9,7 +9,7 @@ use super::*;
 use crate::device::{Device, Start};
 use crate::rig::{Period, Rig};
 
-/// An ESC with its page, in real time enough: a millisecond of it a turn.
+/// An ESC with its page, roughly in real time: a millisecond per turn.
 struct Desk {
     web: Web,
     links: Links,
@@ -30,7 +30,7 @@ impl Desk {
         }
     }
 
-    /// Runs for so many milliseconds of both times.
+    /// Runs for this many milliseconds of both times.
     fn run(&mut self, ms: u64) {
         for _ in 0..ms {
             let turn = Instant::now();
@@ -48,7 +48,7 @@ impl Desk {
         }
     }
 
-    /// A page's socket.
+    /// Opens a page's socket.
     fn page(&self) -> WebSocket<TcpStream> {
         let at = self.web.place().0;
         let request = ClientRequestBuilder::new(format!("ws://{at}/socket").parse().unwrap())
@@ -60,7 +60,7 @@ impl Desk {
         tungstenite::client(request, stream).unwrap().0
     }
 
-    /// Runs until the page is told something under this key: an order may come in later than any one run.
+    /// Runs until the page receives something under this key: a request may arrive after any one run.
     fn answer(&mut self, page: &mut WebSocket<TcpStream>, key: &str) -> Value {
         page.get_ref()
             .set_read_timeout(Some(Duration::from_millis(10)))
@@ -76,7 +76,7 @@ impl Desk {
         }
     }
 
-    /// The status line and all else of an answer.
+    /// Returns the status line and the rest of an answer.
     fn get(&self, path: &str, lines: &str) -> String {
         let mut stream = TcpStream::connect(self.web.place().0).unwrap();
         write!(stream, "GET {path} HTTP/1.1\r\n{lines}\r\n").unwrap();
@@ -269,7 +269,7 @@ fn a_motor_is_one_of_the_library_and_no_file() {
     let mut desk = Desk::new();
     let mut page = desk.page();
     page.read().unwrap();
-    // The board tests itself, and sounds.
+    // The board tests itself, and plays its tune.
     desk.run(1500);
     for (bench, key) in [("/etc/hostname", "refused"), ("bare", "fitted")] {
         ask(&mut page, &json!({ "fit": { "esc": 0, "bench": bench } }));

@@ -1,4 +1,4 @@
-//! Throttle from the page, by a dead man's handle: frames on the wire, as a flight controller sends them.
+//! Throttle from the page, with a dead man's switch: frames on the wire, as a flight controller sends them.
 
 use std::time::{Duration, Instant};
 
@@ -8,13 +8,13 @@ use crate::scenario::dshot_bits;
 use crate::wire::Wire;
 use siskin_scope::ViewerId;
 
-/// A page that has been silent for so long has let go.
+/// Silence after which a page has let go.
 const SILENT: Duration = Duration::from_millis(200);
 
-/// So long zero throttle is sent for a page that is gone, before the wire falls silent.
+/// Time for which zero throttle is sent for a departed page before the wire falls silent.
 const AFTER: Duration = Duration::from_millis(500);
 
-/// From one frame to the next, simulated ns: a flight controller's loop of 1 kHz.
+/// Interval between frames, simulated ns: that of a flight controller's 1 kHz loop.
 const INTERVAL_NS: u64 = 1_000_000;
 
 /// Simulated time for which another sender's frame keeps the page off the wire, ns.
@@ -26,16 +26,16 @@ const USUAL: u8 = 12;
 /// Why the page's throttle does not reach the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Refused {
-    /// A client of the wire's socket sends.
+    /// A client of the wire's socket is sending.
     Wire,
-    /// Another page does.
+    /// Another page is.
     Page,
-    /// The page has been silent, and has not asked for zero since.
+    /// The page has been silent, and has not commanded zero since.
     LetGo,
 }
 
 impl Refused {
-    /// A line for a person.
+    /// Returns a line for the user.
     pub(super) fn line(self) -> &'static str {
         match self {
             Self::Wire => "another sender is on the throttle wire",
@@ -45,13 +45,13 @@ impl Refused {
     }
 }
 
-/// The one who holds the throttle.
+/// The holder of the throttle.
 struct Holder {
     viewer: ViewerId,
     heard: Instant,
     value: f64,
     signal: u8,
-    /// True after a silence, until zero has been asked for.
+    /// True after a silence, until zero has been commanded.
     let_go: bool,
 }
 
@@ -63,7 +63,7 @@ pub(super) struct Throttle {
 }
 
 impl Throttle {
-    /// A viewer asks for throttle, 0 to 1, in a signal as `INP_PROTO` counts them.
+    /// Commands a throttle for a viewer, 0 to 1, in a signal numbered as in `INP_PROTO`.
     ///
     /// # Errors
     /// Another has the wire, or the page has let go.
@@ -90,7 +90,7 @@ impl Throttle {
         } else {
             0.0
         };
-        // Whoever takes the wire begins at zero too: the ESC may still be armed.
+        // Whoever takes the wire starts at zero too: the ESC may still be armed.
         let was_let_go =
             held.is_none_or(|held| held.viewer != viewer || held.let_go || silence > SILENT);
         self.holder = Some(Holder {
@@ -106,7 +106,7 @@ impl Throttle {
         Ok(())
     }
 
-    /// The viewer wants no signal any more, or is gone: it has been silent from now on.
+    /// Releases the signal of a viewer that wants none any more, or is gone: it counts as silent from now on.
     pub(super) fn release(&mut self, viewer: ViewerId, now: Instant) {
         if let Some(held) = self.holder.as_mut().filter(|held| held.viewer == viewer) {
             held.value = 0.0;
@@ -128,18 +128,18 @@ impl Throttle {
         }
         self.due_ns = now_ns + INTERVAL_NS;
         let value = if held.let_go { 0.0 } else { held.value };
-        // What does not find room, finds it in a millisecond.
+        // If there is no room now, there will be in a millisecond.
         let _ = wire.play(now_ns, &datagram(held.signal, value));
     }
 }
 
-/// Whether a client of the socket has the wire.
+/// Returns true if a client of the socket has the wire.
 fn others_send(wire: &Wire, now_ns: u64) -> bool {
     let heard = wire.heard_ns();
     heard.is_some_and(|heard_ns| now_ns.saturating_sub(heard_ns) < OTHERS_NS)
 }
 
-/// A frame for the wire: a DShot's, or the usual one's where the number is another's.
+/// Returns a frame for the wire: a DShot's, or the usual one's for any other number.
 fn datagram(number: u8, value: f64) -> [u8; 3] {
     let (number, bidirectional) = match Signal::from_number(number) {
         Some(Signal::Dshot { bidirectional, .. }) => (number, bidirectional),
@@ -183,7 +183,7 @@ mod tests {
                 .ask((viewer, now), (value, 0), &self.wire, now_ns)
         }
 
-        /// After so many milliseconds: the throttle that is on the wire, if there is any.
+        /// Advances by this many milliseconds; returns the throttle on the wire, if any.
         fn after(&mut self, ms: u64) -> Option<f64> {
             for _ in 0..ms {
                 self.now_ms += 1;

@@ -1,5 +1,5 @@
-//! A piece of the traces for the eye: exact where there is a column for each control period, else the least and the
-//! greatest value of each column, so that no peak is lost.
+//! A piece of the traces for display: exact if there is a column per control period, else the least and greatest value
+//! of each column, so that no peak is lost.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -8,14 +8,14 @@ use super::channel::COUNT;
 use super::message::{TRACE, Trigger, View};
 use super::ring::{CHUNK, Chunk, bounds};
 
-/// The most columns of a view: a wide screen's.
+/// Most columns of a view: those of a wide screen.
 const MAX_COLUMNS: usize = 4096;
 
-/// A place among chunks, control periods from the oldest on.
+/// Indices into chunks, control periods counted from the oldest.
 struct Places<'a>(&'a [Arc<Chunk>]);
 
 impl Places<'_> {
-    /// How many there are: all chunks are full.
+    /// Returns their number: all chunks are full.
     fn count(&self) -> usize {
         self.0.len() * CHUNK
     }
@@ -24,14 +24,14 @@ impl Places<'_> {
         self.0[place / CHUNK].t_s(place % CHUNK)
     }
 
-    /// The first place whose time is this or later.
+    /// Returns the first index whose time is this or later.
     fn at(&self, t_s: f64) -> usize {
         let chunk = self.0.partition_point(|chunk| chunk.t_s(CHUNK - 1) < t_s);
         let within = self.0.get(chunk);
         chunk * CHUNK + within.map_or(0, |chunk| chunk.at(t_s))
     }
 
-    /// The bounds of a channel over some places.
+    /// Returns the bounds of a channel over a range.
     fn bounds(&self, channel: usize, places: &Range<usize>) -> [f32; 2] {
         let mut at = places.start;
         let mut least_greatest = [f32::NAN; 2];
@@ -52,7 +52,7 @@ impl Places<'_> {
         least_greatest
     }
 
-    /// The latest place before `end` where a channel crosses a level, if that is after a time.
+    /// Returns the latest index before `end` where a channel crosses a level, if that is after a time.
     fn crossing(&self, trigger: &Trigger, end: usize) -> Option<usize> {
         let Trigger {
             channel,
@@ -91,9 +91,9 @@ impl Places<'_> {
     }
 }
 
-/// The answer to a view: [`TRACE`], whether a trigger was found, two bytes of nothing, and as u32 the id, the ESC,
-/// the number of points and that of channels; then as f64 the time of the crossing, the time of each point, and as
-/// f32 each channel's values. All is little-endian, and what is not known is not a number.
+/// Encodes the answer to a view: [`TRACE`], whether a trigger was found, two zero bytes, and as u32 the id, the ESC,
+/// the number of points and that of channels; then as f64 the time of the crossing, the time of each point, and as f32
+/// each channel's values. All is little-endian; unknown values are NaN.
 pub(super) fn answer(view: &View, chunks: &[Arc<Chunk>]) -> Vec<u8> {
     let places = Places(chunks);
     let channels: Vec<_> = view
@@ -187,8 +187,8 @@ mod tests {
         place as f64 * 1e-3
     }
 
-    /// Phase current a counts the periods, of a millisecond each, b is 1 in period 700 alone, and of the
-    /// control's phase nothing is known.
+    /// Phase current a counts the periods, of a millisecond each, b is 1 in period 700 alone, and the control's phase
+    /// is unknown.
     const CHANNELS: [usize; 3] = [8, 9, 0];
 
     fn chunks() -> Vec<Arc<Chunk>> {
@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    /// Crossing, times and channels of an answer.
+    /// Returns crossing, times and channels of an answer.
     fn read(bytes: &[u8]) -> (Option<f64>, Vec<f64>, Vec<Vec<f32>>) {
         let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
         assert_eq!((bytes[0], number(4), number(16)), (TRACE, 7, 3));
@@ -265,7 +265,7 @@ mod tests {
         let peaks = values[1].iter().filter(|value| **value == 1.0).count();
         assert_eq!(peaks, 1);
         assert!(values[2].iter().all(|value| value.is_nan()));
-        // Columns of more than a chunk.
+        // Columns longer than a chunk.
         let (_, _, values) = read(&answer(&view(10.0, 4), &chunks));
         assert_eq!(
             values[0],
@@ -300,7 +300,7 @@ mod tests {
         assert_eq!((crossing, values[1][100]), (Some(t_s(700)), 1.0));
         assert!((times[0] - 0.6).abs() < 1e-9 && (times[400] - 1.0).abs() < 1e-9);
         assert_eq!(seen(trigger(1, 0.5, false, 0.0)).0, Some(t_s(701)));
-        // On the way from one chunk into the next, and at the end of what could follow.
+        // Across a chunk boundary, and at the end of what could follow.
         assert_eq!(seen(trigger(0, 511.5, true, 0.0)).0, Some(t_s(512)));
         for never in [
             trigger(1, 0.5, true, 0.7005),

@@ -1,4 +1,4 @@
-//! One datagram of the throttle wire as levels over time.
+//! One throttle-wire datagram as levels over time.
 
 use siskin_control::answer::{REPLY_DELAY_NS, gcr, reply_bit_hz};
 use siskin_control::input::dshot::{Rate, edges};
@@ -6,20 +6,20 @@ use siskin_control::input::signal::Signal;
 
 use super::rejected::Rejected;
 
-/// The longest run of levels that is played, ns. It is far above any frame's, and bounds for how
-/// long one datagram can hold the wire.
+/// The longest run of levels, ns. It far exceeds any frame's, and bounds how long one datagram can
+/// hold the wire.
 const MAX_DURATION_NS: u64 = 10_000_000_000;
 
-/// The low level that keeps the shortest pulses apart, ns; longer ones get 1/16 of their width,
-/// which leaves a 2 ms pulse its 450 Hz.
+/// The low level that separates the shortest pulses, ns; longer ones get 1/16 of their width, which
+/// allows a 2 ms pulse its 450 Hz.
 const MIN_PULSE_REST_NS: u64 = 2_000;
 
-/// The least time from a pulse to the next, ns: Multishot's 32 kHz. A decoder takes pulses that
-/// follow each other like DShot's bits for no pulses.
+/// Least period of pulses, ns: Multishot's 32 kHz. A decoder does not take pulses spaced like
+/// DShot's bits for pulses.
 const MIN_PULSE_PERIOD_NS: u64 = 31_250;
 
-/// Eighths of a bit of rest between two DShot frames. A decoder knows a frame's end by a level that
-/// lasts longer than a bit; four bits leave no doubt and cost a fifth of the highest frame rate.
+/// Rest between two DShot frames, in eighths of a bit. A decoder recognises a frame's end by a
+/// level longer than a bit; four bits leave no doubt and cost a fifth of the highest frame rate.
 const DSHOT_REST_EIGHTHS: u32 = 4 * 8;
 
 /// What a datagram puts on the line.
@@ -27,13 +27,13 @@ const DSHOT_REST_EIGHTHS: u32 = 4 * 8;
 pub(super) enum Frame<'a> {
     /// High for a while.
     Pulse { width_ns: u64 },
-    /// 16 bits, from the highest on.
+    /// 16 bits, most significant first.
     DShot {
         rate: Rate,
         bidirectional: bool,
         bits: u16,
     },
-    /// Levels that alternate; four bytes say how long each lasts.
+    /// Alternating levels; four bytes give each one's duration.
     Raw {
         first: bool,
         durations: &'a [[u8; 4]],
@@ -41,7 +41,7 @@ pub(super) enum Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    /// Byte 0 is the protocol, then its payload, little-endian.
+    /// Parses a datagram: byte 0 is the protocol, followed by its payload, little-endian.
     pub(super) fn parse(datagram: &'a [u8]) -> Result<Self, Rejected> {
         let (protocol, payload) = datagram.split_first().ok_or(Rejected::Empty)?;
         let wrong_length = || Rejected::Length {
@@ -69,7 +69,8 @@ impl<'a> Frame<'a> {
                 Self::Raw { first, durations }
             }
             number => {
-                // Frames have the numbers of `INP_PROTO`; pulses count from 0 here and from 1 there.
+                // Frames have the numbers of `INP_PROTO`; pulses count from 0 here and from 1
+                // there.
                 let Some(Signal::Dshot {
                     rate,
                     bidirectional,
@@ -92,13 +93,13 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// What it asks for, 0 to 1 of its range; 0 of raw levels.
+    /// Returns its throttle, 0 to 1 of its range; 0 for raw levels.
     pub(super) fn throttle(&self) -> f64 {
         let share = |value: f64, from: f64, to: f64| ((value - from) / (to - from)).clamp(0.0, 1.0);
         match *self {
             Self::DShot { bits, .. } => share(f64::from(bits >> 5), 47.0, 2047.0),
             Self::Pulse { width_ns } => {
-                // Servo, OneShot125, OneShot42, Multishot: no two of them have a width in common.
+                // Servo, OneShot125, OneShot42, Multishot: their widths do not overlap.
                 let ranges = [(1000.0, 2000.0), (125.0, 250.0), (42.0, 84.0), (5.0, 25.0)];
                 let width_us = width_ns as f64 * 1e-3;
                 let found = ranges.iter().find(|(from, _)| width_us > 0.7 * from);
@@ -133,7 +134,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// From the first edge to the end, ns: 16 bit times for DShot.
+    /// Returns the time from the first edge to the end, ns: 16 bit times for DShot.
     pub(super) fn duration_ns(&self) -> u64 {
         match *self {
             Self::Pulse { width_ns } => width_ns,
@@ -145,7 +146,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Most edges that it can make, one that first brings the line to rest included.
+    /// Returns the most edges that it can make, including one that first brings the line to rest.
     pub(super) fn max_edges(&self) -> usize {
         match self {
             Self::Pulse { .. } => 3,
@@ -154,7 +155,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The level at which the line rests around it. Raw levels follow whatever there is.
+    /// Returns the level at which the line rests around it. Raw levels follow any level.
     pub(super) fn idle_level(&self) -> Option<bool> {
         match self {
             Self::Pulse { .. } => Some(false),
@@ -163,8 +164,8 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The rest that keeps it apart from what was before it, ns. Raw levels follow each other
-    /// without any, so that a long capture can come in several datagrams.
+    /// Returns the rest that separates it from what came before, ns. Raw levels need none, so that
+    /// a long capture can come in several datagrams.
     pub(super) fn rest_before_ns(&self) -> u64 {
         match *self {
             Self::Pulse { width_ns } => MIN_PULSE_REST_NS.max(width_ns / 16),
@@ -173,8 +174,8 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The rest that it needs after it, ns: after a bidirectional frame the time of its answer too,
-    /// and after a short pulse what is left of its period.
+    /// Returns the rest required after it, ns: after a bidirectional frame also the time of its
+    /// answer, and after a short pulse the remainder of its period.
     pub(super) fn rest_after_ns(&self) -> u64 {
         let rest_ns = self.rest_before_ns();
         match *self {

@@ -1,11 +1,11 @@
-//! What a sender has done wrong, or the wire has no room for.
+//! A sender's mistakes, and lack of room on the wire.
 
 use thiserror::Error;
 
 /// Why a datagram is not played.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Rejected {
-    /// There is not even a protocol in it.
+    /// It lacks even a protocol.
     #[error("an empty datagram")]
     Empty,
     /// The first byte is no protocol.
@@ -19,7 +19,7 @@ pub enum Rejected {
         /// Bytes of the datagram.
         length: usize,
     },
-    /// A pulse of no width.
+    /// A pulse of zero width.
     #[error("a pulse of 0 ns")]
     NoPulse,
     /// The first raw level is neither 0 nor 1.
@@ -28,7 +28,7 @@ pub enum Rejected {
     /// It would hold the wire for more than 10 s.
     #[error("{0} ns are more than 10 s")]
     TooLong(u64),
-    /// Too much waits already. This one counts as dropped, the others as rejected.
+    /// Too much is pending. This one counts as dropped, the others as rejected.
     #[error("more than 100 ms wait to be played")]
     Backlog,
 }

@@ -11,7 +11,7 @@ fn edges(wire: &mut Wire) -> Vec<(u64, bool)> {
     std::iter::from_fn(|| wire.next_edge(u64::MAX / 2)).collect()
 }
 
-/// The edges of one datagram on a wire that has been silent, from 1000 ns on.
+/// Returns the edges of one datagram on a wire that has been silent, from 1000 ns on.
 fn alone(datagram: &[u8]) -> Vec<(u64, bool)> {
     let mut wire = Wire::detached();
     wire.play(1000, datagram).unwrap();
@@ -70,7 +70,7 @@ fn dshot_has_its_nominal_times() {
             assert_eq!(*level, i % 2 == 0);
         }
 
-        // The other polarity rests high: the line gets there four bits before.
+        // The other polarity rests high: the line gets there four bits earlier.
         let inverted = alone(&dshot(20 + rate, 0x8001));
         assert_eq!(inverted[0], (1000, true));
         let rest = inverted[1].0 - 1000;
@@ -96,7 +96,7 @@ fn frames_that_come_too_early_wait_their_turn() {
     // 16 bits of the frame and 4 of rest: the second starts 20 bit times after the first.
     assert_eq!(found[32], (26_667 + 6667, true));
 
-    // The longer rest counts, whichever frame it belongs to.
+    // The longer rest counts, whichever frame requires it.
     for (first, second, end_ns) in [(10, 12, 106_667), (12, 10, 26_667)] {
         let mut wire = Wire::detached();
         wire.play(0, &dshot(first, 0)).unwrap();
@@ -104,7 +104,7 @@ fn frames_that_come_too_early_wait_their_turn() {
         assert_eq!(edges(&mut wire)[32], (end_ns + 26_667, true));
     }
 
-    // After the rest a frame starts when it comes.
+    // After the rest a frame starts on arrival.
     wire.play(90_000, &dshot(12, 0)).unwrap();
     assert_eq!(wire.next_edge(u64::MAX).map(|edge| edge.1), Some(true));
 }
@@ -134,7 +134,7 @@ fn a_pulse_rests_for_a_sixteenth_of_it() {
     assert_eq!(starts, [0, 2_125_000, 2_156_250]);
 }
 
-/// However many come at once, each is a pulse for the ESC: 5 to 25 µs, at 32 kHz at most.
+/// However many come at once, the ESC sees each as a pulse: 5 to 25 µs, at 32 kHz at most.
 #[test]
 fn queued_multishot_pulses_are_decoded() {
     const TICK_HZ: u64 = 170_000_000;
@@ -168,14 +168,14 @@ fn raw_levels_join_and_the_last_one_stays() {
     wire.play(0, &raw(0, &[25, 10])).unwrap();
     assert_eq!(edges(&mut wire), [(0, true), (100, false), (175, true)]);
 
-    // High until something comes: more of it is no edge.
+    // High until something comes: more of it makes no edge.
     wire = Wire::detached();
     wire.play(0, &raw(1, &[10])).unwrap();
     wire.play(1_000_000, &raw(1, &[10])).unwrap();
     wire.play(2_000_000, &raw(0, &[10])).unwrap();
     assert_eq!(edges(&mut wire), [(0, true), (2_000_000, false)]);
 
-    // A level of 0 ns is none, be it between two or at the end of a datagram.
+    // A level of 0 ns does not count, whether between two or at the end of a datagram.
     assert_eq!(
         alone(&raw(1, &[10, 0, 10, 5])),
         [(1000, true), (1020, false)]
@@ -235,7 +235,7 @@ fn edges_come_before_the_time_asked_for() {
     assert_eq!(wire.next_edge(5), None);
     assert_eq!(wire.next_edge(6), Some((5, true)));
     assert_eq!(wire.next_edge(15), None);
-    // The slice up to 40 000 is over: what comes late is played from there.
+    // The slice up to 40 000 is over: a late arrival is played from there.
     assert_eq!(wire.next_edge(40_000), Some((15, false)));
     assert_eq!(wire.next_edge(40_000), None);
     wire.play(39_900, &pulse(0, 10)).unwrap();
@@ -271,7 +271,7 @@ fn malformed_datagrams_are_counted() {
     assert_eq!(edges(&mut wire), []);
 }
 
-/// Until so many datagrams have been played, or it has taken too long.
+/// Polls until this many datagrams have been played, or it has taken too long.
 fn poll(wire: &mut Wire, now_ns: u64, played: u64) {
     for _ in 0..5000 {
         wire.poll(now_ns);
@@ -282,7 +282,7 @@ fn poll(wire: &mut Wire, now_ns: u64, played: u64) {
     }
 }
 
-/// A socket whose silence fails a test.
+/// Opens a socket whose silence fails a test.
 fn sender() -> UdpSocket {
     let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
     let patience = Duration::from_secs(5);
@@ -302,7 +302,7 @@ fn datagrams_come_in_by_udp() {
     wire.send(0, &[1]);
     sender.send_to(&[99], to).unwrap();
     sender.send_to(&dshot(12, 0x1234), to).unwrap();
-    // Longer than any frame, and as long as a datagram gets.
+    // Longer than any frame, and as long as a datagram can be.
     sender.send_to(&raw(1, &[1000; 16_000]), to).unwrap();
     poll(&mut wire, 777, 2);
     let counts = WireCounts {
@@ -335,7 +335,7 @@ fn an_answer_goes_to_who_has_asked() {
         sender.send_to(&dshot(22, 0), to).unwrap();
         poll(&mut wire, 0, place as u64 + 1);
     }
-    // Both wait in the queue; the second one begins when the first has been answered.
+    // Both wait in the queue; the second begins when the first has been answered.
     let edges = edges(&mut wire);
     let begins_ns = [edges[1].0, edges[33].0];
     for (sender, asked_ns) in senders.iter().zip(begins_ns) {
@@ -346,7 +346,7 @@ fn an_answer_goes_to_who_has_asked() {
     }
 }
 
-/// Frames that nobody answers leave no trace, however often the sender changes.
+/// Unanswered frames leave no trace, however often the sender changes.
 #[test]
 fn senders_are_forgotten() {
     let mut wire = Wire::open(&"udp:127.0.0.1:0".parse().unwrap(), 0).unwrap();

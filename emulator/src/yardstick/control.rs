@@ -12,11 +12,11 @@ const L: f32 = INDUCTANCE_H as f32;
 const INVERSE_ROOT_3: f32 = 0.577_350_27;
 const HALF_ROOT_3: f32 = 0.866_025_4;
 
-/// Bandwidths of the current and of the speed loop, rad/s.
+/// Bandwidths of the current and speed loops, rad/s.
 const CURRENT_BANDWIDTH: f32 = 2.0 * PI * 600.0;
 const SPEED_BANDWIDTH: f32 = 2.0 * PI * 5.0;
 
-/// Current for a change of the electrical speed, A·s/rad: p²·φ·1.5/J is an ampere's acceleration.
+/// Current per electrical speed error, A·s/rad: an ampere accelerates by p²·φ·1.5/J.
 const SPEED_KP: f32 = SPEED_BANDWIDTH * INERTIA_KGM2 as f32
     / (1.5 * FLUX_WB as f32 * (POLE_PAIRS * POLE_PAIRS) as f32);
 const SPEED_KI: f32 = 0.25 * SPEED_KP * SPEED_BANDWIDTH;
@@ -24,13 +24,13 @@ const SPEED_KI: f32 = 0.25 * SPEED_KP * SPEED_BANDWIDTH;
 /// Greatest torque current, A.
 const CURRENT_LIMIT: f32 = 30.0;
 
-/// Share of the back-EMF's error that the observer takes up in a period.
+/// Share of the back-EMF error that the observer corrects per period.
 const OBSERVER_GAIN: f32 = 0.2;
 
 /// The phase-locked loop's natural frequency, rad/s, critically damped.
 const PLL_BANDWIDTH: f32 = 2.0 * PI * 40.0;
 
-/// From the sample to the middle of the period in which the voltage is in force, periods.
+/// Delay from the sample to the middle of the period in which the voltage applies, periods.
 const DELAY: f32 = 1.5;
 
 #[derive(Clone, Debug)]
@@ -41,12 +41,12 @@ pub(super) struct Control {
     speed: f32,
     /// Estimated back-EMF in rotor coordinates, V.
     emf: [f32; 2],
-    /// Currents of the sample before, A.
+    /// Currents of the previous sample, A.
     current: [f32; 2],
     /// Integral parts of the current loop, V, and of the speed loop, A.
     voltage_integral: [f32; 2],
     current_integral: f32,
-    /// The last command, which is in force until the next sample, and the one before, V.
+    /// The last command, which applies until the next sample, and the one before, V.
     voltage: [[f32; 2]; 2],
 }
 
@@ -64,7 +64,7 @@ impl Control {
         }
     }
 
-    /// From the phase currents, A, and the supply's voltage to the legs' duties, 0..1.
+    /// Computes the legs' duties, 0..1, from the phase currents, A, and the supply's voltage.
     pub(super) fn step(&mut self, [a, b, c]: [f32; 3], bus_v: f32) -> [f32; 3] {
         // Clarke and Park.
         let alpha = (2.0 * a - b - c) / 3.0;
@@ -86,7 +86,7 @@ impl Control {
         duties
     }
 
-    /// The back-EMF is what moved the currents and neither voltage nor impedance explains.
+    /// Attributes to the back-EMF what moved the currents beyond voltage and impedance.
     fn observe(&mut self, current: [f32; 2]) {
         let [d, q] = self.current;
         let [u_d, u_q] = self.voltage[1];
@@ -101,7 +101,7 @@ impl Control {
         self.current = current;
     }
 
-    /// The phase-locked loop: a rotor ahead of its estimate shows a negative e_d.
+    /// Runs the phase-locked loop: a rotor ahead of its estimate shows a negative e_d.
     fn turn(&mut self) {
         let [d, q] = self.emf;
         let error = -d / (d * d + q * q).sqrt().max(0.1);
@@ -115,7 +115,7 @@ impl Control {
         }
     }
 
-    /// The torque current for the speed.
+    /// Returns the torque current for the speed.
     fn speed_loop(&mut self) -> f32 {
         let error = RPM as f32 / 60.0 * TAU * POLE_PAIRS as f32 - self.speed;
         let integral = self.current_integral + SPEED_KI * PERIOD * error;
@@ -123,7 +123,7 @@ impl Control {
         (SPEED_KP * error + self.current_integral).clamp(-CURRENT_LIMIT, CURRENT_LIMIT)
     }
 
-    /// The voltages for the currents, with the axes decoupled, within the hexagon's circle.
+    /// Returns the voltages for the currents, with decoupled axes, within the hexagon's circle.
     fn current_loop(&mut self, [d, q]: [f32; 2], reference: f32, bus_v: f32) -> [f32; 2] {
         let error = [-d, reference - q];
         let kp = L * CURRENT_BANDWIDTH;
@@ -153,7 +153,7 @@ impl Control {
     }
 }
 
-/// Space-vector modulation: the three phases centred between the supply's poles.
+/// Space-vector modulation: centres the three phases between the supply's poles.
 fn modulate([alpha, beta]: [f32; 2], bus_v: f32) -> [f32; 3] {
     let phases = [
         alpha,

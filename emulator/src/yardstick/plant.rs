@@ -1,5 +1,5 @@
 //! The motor in rotor coordinates (1)-(3), its circuit by the exact matrix exponential at the
-//! period's speed, for the voltage that the rotor sees in the period's middle.
+//! period's speed, for the voltage in the rotor's frame at the middle of the period.
 
 use std::f64::consts::TAU;
 
@@ -20,7 +20,7 @@ pub(super) struct Plant {
     angle_rad: f64,
     /// Mechanical speed.
     speed_rad_s: f64,
-    /// What a period leaves of a transient current, e^(−R·T/L).
+    /// Remaining share of a transient current after a period, e^(−R·T/L).
     decay: f64,
 }
 
@@ -34,7 +34,7 @@ impl Plant {
         }
     }
 
-    /// Currents into the phases, A.
+    /// Returns the currents into the phases, A.
     pub(super) fn currents_a(&self) -> [f64; 3] {
         let (sin, cos) = libm::sincos(self.angle_rad);
         let [d, q] = self.i;
@@ -46,12 +46,12 @@ impl Plant {
         ]
     }
 
-    /// Takes the motor on by a period with these duties of the three legs.
+    /// Advances the motor by a period with these duties of the three legs.
     pub(super) fn period(&mut self, [a, b, c]: [f64; 3]) {
         let omega = POLE_PAIRS * self.speed_rad_s;
         let alpha = BUS_V * (2.0 * a - b - c) / 3.0;
         let beta = BUS_V * (b - c) / (2.0 * HALF_ROOT_3);
-        // The voltage as the rotor sees it in the middle of the period.
+        // The voltage in the rotor's frame at the middle of the period.
         let middle_rad = self.angle_rad + 0.5 * omega * PERIOD_S;
         let (sin, cos) = libm::sincos(middle_rad);
         let u_d = alpha * cos + beta * sin;

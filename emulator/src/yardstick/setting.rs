@@ -1,4 +1,4 @@
-//! The bench that the drive and the motor stand on, known to both.
+//! The bench shared by the drive and the motor.
 
 /// Control and PWM period, s.
 pub const PERIOD_S: f64 = 1.0 / 15_000.0;

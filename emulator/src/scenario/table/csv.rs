@@ -5,7 +5,7 @@ use std::io;
 
 use super::row::{Cell, Row};
 
-/// Numbers as the shortest text that is the same double.
+/// Writes numbers as the shortest text that parses to the same double.
 pub(super) fn write(file: File, columns: &[String], rows: &[Row]) -> io::Result<()> {
     let mut writer = ::csv::Writer::from_writer(file);
     writer.write_record(columns)?;

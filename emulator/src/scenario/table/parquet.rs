@@ -1,4 +1,4 @@
-//! The table as Apache Parquet: each column of the kind of its first value, and text where they differ.
+//! The table as Apache Parquet: each column has the kind of its values, or is text if they differ.
 
 use std::fs::File;
 use std::io;
@@ -70,7 +70,7 @@ fn write_table(file: File, columns: &[String], rows: &[Row]) -> Result<(), Parqu
     Ok(())
 }
 
-/// The kind of a column's values.
+/// Returns the kind of a column's values.
 fn kind(column: &str, rows: &[Row]) -> Kind {
     let kinds = rows.iter().filter_map(|row| match row.cell(column) {
         Cell::Nothing => None,

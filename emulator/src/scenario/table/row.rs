@@ -21,12 +21,12 @@ pub enum Cell {
     Text(String),
 }
 
-/// A run: its seed, the keys that were swept, set or drawn, its figures, and whether they were as expected.
+/// A run: its seed, the keys that were swept, set or drawn, its figures, and the results of its expectations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row(pub(super) Vec<(String, Cell)>);
 
 impl Row {
-    /// The row of a run.
+    /// Creates the row of a run.
     pub fn of(place: &Place, report: &Report, verdicts: &[Verdict]) -> Self {
         let mut cells = vec![("seed".to_owned(), Cell::Whole(place.seed))];
         let keys = place.set.iter().chain(&place.drawn);
@@ -43,7 +43,7 @@ impl Row {
             ("faults".to_owned(), Cell::Text(faults.join(", "))),
         ]);
         for window in &report.windows {
-            // A window's figures are numbers and flags, so that there is nothing that cannot be told.
+            // A window's figures are numbers and flags, so this cannot fail.
             let figures = serde_json::to_value(window).unwrap_or_default();
             let figures = figures.as_object().into_iter().flatten();
             let figures = figures.filter(|(key, _)| *key != "name");
@@ -68,12 +68,12 @@ impl Row {
         Self(cells)
     }
 
-    /// A row of cells that another has been told, as in another process.
+    /// Creates a row from cells received from elsewhere, such as another process.
     pub fn of_cells(cells: Vec<(String, Cell)>) -> Self {
         Self(cells)
     }
 
-    /// Its cells with the names of their columns.
+    /// Returns its cells with the names of their columns.
     pub fn cells(&self) -> &[(String, Cell)] {
         &self.0
     }
@@ -104,7 +104,7 @@ impl Cell {
     }
 }
 
-/// The names of all cells, in the order in which they come.
+/// Returns the names of all cells, in order of appearance.
 pub(super) fn columns(rows: &[Row]) -> Vec<String> {
     let mut columns: Vec<String> = Vec::new();
     for (name, _) in rows.iter().flat_map(|row| &row.0) {

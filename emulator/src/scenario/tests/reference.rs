@@ -15,7 +15,7 @@ fn the_reference_has_every_key() {
     assert_has_all::<Expectation>("`[[expect]]`");
 }
 
-/// The keys of a table with their defaults, as a file gives them.
+/// Returns the keys of a table with their defaults, as in a file.
 fn defaults(heading: &str) -> String {
     let rows = rows(heading);
     let given = rows.iter().filter_map(|row| {
@@ -28,7 +28,7 @@ fn defaults(heading: &str) -> String {
 #[test]
 fn the_defaults_of_the_bench_are_those_in_force() {
     let listed: BenchTable = toml::from_str(&defaults("`[bench]`")).unwrap();
-    // A supply of one voltage is the same as a number and as its text.
+    // A constant supply is the same as a number and as its text.
     let bench = |table: &BenchTable| table.bench().unwrap();
     assert_eq!(bench(&listed), bench(&BenchTable::default()));
     assert_eq!(listed.wire, BenchTable::default().wire);

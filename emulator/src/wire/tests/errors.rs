@@ -1,4 +1,4 @@
-//! A wire with something wrong.
+//! A faulty wire.
 
 use super::*;
 
@@ -9,7 +9,7 @@ fn wrong(errors: WireErrors) -> Wire {
     wire
 }
 
-/// The bits of a frame by the widths of its pulses: a one is active for 5/8 of a bit or more.
+/// Returns the bits of a frame by its pulse widths: a one is active for 5/8 of a bit or more.
 fn bits(edges: &[(u64, bool)]) -> u16 {
     let pulses = edges.chunks(2);
     pulses.fold(0, |bits, pulse| {
@@ -56,7 +56,7 @@ fn bits_are_wrong_at_their_rate() {
     assert_eq!(flipped, 80_000);
 }
 
-/// An edge that was displaced beyond what is sent next goes before it all the same.
+/// An edge displaced beyond what is sent next still comes before it.
 #[test]
 fn edges_do_not_go_back_when_the_jitter_ends() {
     for seed in 0..200 {
@@ -75,7 +75,7 @@ fn edges_do_not_go_back_when_the_jitter_ends() {
     }
 }
 
-/// Edges stray by what was asked for, and stay in order however much that is.
+/// Edges are displaced by the requested jitter, and stay in order however large it is.
 #[test]
 fn jitter_displaces_edges_and_keeps_their_order() {
     let stray = |jitter_ns: f64| {
