@@ -29,7 +29,7 @@ pub const FAULTS: usize = 8;
 /// A mark that memory after power-up does not hold by chance, together with its inverse.
 const MAGIC: u32 = 0x5369_4661;
 
-/// Places of words. Those before [`WRITTEN`] change only at a start and at a fault.
+/// Places of words. Those before [`WRITTEN`](place::WRITTEN) change only at a start and at a fault.
 mod place {
     /// [`MAGIC`](super::MAGIC), followed by its inverse.
     pub(super) const MAGIC: usize = 0;
