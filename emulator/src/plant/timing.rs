@@ -45,8 +45,9 @@ impl Half {
     }
 }
 
-/// Delays an edge: with each turn-on late by the dead time, the middle of the low side's on-time,
-/// which is when the sample is taken, is half a dead time behind the counter's top.
+/// Converts an edge's time from the counter's top to the sample. With each turn-on late by the dead
+/// time, the middle of the low side's on-time, which is when the sample is taken, is half a dead
+/// time behind the top.
 #[inline]
 pub(super) fn delayed(edge_s: f64, dead_time_s: f64) -> f64 {
     (edge_s - 0.5 * dead_time_s).max(0.0)

@@ -42,7 +42,7 @@ pub(super) struct Means {
 }
 
 impl Means {
-    // As above.
+    // Out of line, like `seen`.
     #[inline(never)]
     pub(super) fn add(&mut self, snapshot: &Snapshot, scale: &Scale) {
         self.looks += 1;

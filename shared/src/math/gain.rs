@@ -1,4 +1,4 @@
-//! A constant factor with a range of its own.
+//! A constant factor that carries its own range.
 
 mod factor;
 

@@ -82,7 +82,7 @@ impl Bench {
         Self::with(Params::of(&BOSSO_BENCH), 1_000_000)
     }
 
-    /// The start text has been sent.
+    /// Creates a bench whose start text has been sent.
     fn with(params: Params, link_bytes_per_s: u32) -> Self {
         let mut bench = Self {
             now_us: 1_000_000,

@@ -171,7 +171,7 @@ impl Record {
                 return;
             }
         } else if !free {
-            // A tune at the next start, or a blocked shaft, overwrites nothing.
+            // A tune at the next start, or a held shaft, overwrites nothing.
             if self.taken.load(Relaxed) != 0 && state.drives() {
                 self.taken.store(0, Relaxed);
                 self.put(place::WRITTEN, 0);

@@ -39,7 +39,7 @@ impl Stage {
         self.guard.sweep(to, dead_s);
         self.paths = [Path::Switch(to); 3];
         self.high = [if rises { 1.0 } else { 0.0 }; 3];
-        // A leg that goes low conducts there from its step on; for a high one nobody asks.
+        // A leg that goes low conducts there from its step on; after a sweep to high nobody asks.
         self.low_from_s = at_s.map(|at_s| self.now_s + at_s);
         self.now_s += half_s;
         true

@@ -72,7 +72,7 @@ impl Component {
         self.send_burst(context, send);
     }
 
-    /// Reports faults in words, and by an immediate ESC_INFO, whose flags would be up to a second late.
+    /// Reports faults in words, and by an immediate ESC_INFO, whose flags would otherwise be up to a second late.
     fn tell_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
         let faults = context.telemetry.faults;
         if core::mem::replace(&mut self.faults, faults) != faults {

@@ -120,7 +120,7 @@ impl FluxSettings {
     }
 }
 
-/// Sections 2.2 to 2.4.
+/// Sets up the edge-based position estimation: sections 2.2 to 2.4.
 pub(super) fn edges(p: &Si, place: &mut Config) {
     let settings = FluxSettings::of(p);
     place.sensors = match (p.choice(), p.choice()) {
@@ -145,7 +145,7 @@ pub(super) fn edges(p: &Si, place: &mut Config) {
     });
 }
 
-/// Sections 2.2 and 2.3.
+/// Sets up the flux integrators: sections 2.2 and 2.3.
 fn integrators(p: &Si, settings: &FluxSettings, place: &mut flux_linkage::Config) {
     define_filter(p, settings.tau_int_s);
     fill!(p, place, {
@@ -176,7 +176,7 @@ fn define_filter(p: &Si, tau_s: f32) {
     p.set(Quantity::CornerS, TAU * tau_s);
 }
 
-/// Section 2.4.
+/// Sets up the position estimator: section 2.4.
 fn estimator(p: &Si, settings: &FluxSettings, place: &mut position::Config) {
     place.turns = p.params.number(ParamId::CtlPosN);
     p.set(Quantity::WholeTurnsHz, settings.whole_turns_above_hz);

@@ -1,4 +1,4 @@
-//! The observers' coefficients.
+//! Coefficients of the observers.
 
 use super::TORQUE_DROP_SHARE;
 use super::flux;
@@ -69,7 +69,7 @@ pub(super) fn observer(p: &Si, place: &mut observer::Config) {
     }
 }
 
-/// The compensated flux observer.
+/// Sets up the compensated flux observer.
 fn compensated(p: &Si, place: &mut compensated::Config) {
     let formulas = formulas!(p, {
         value own_flux(L * FluxPerCurrent),
@@ -107,7 +107,7 @@ fn compensated(p: &Si, place: &mut compensated::Config) {
     place.quarter_per_flux = Multiplier::from_bits(EIGHTH_PI.to_bits());
 }
 
-/// The adaptive back-EMF observer (6), (7), (20), (22), (28).
+/// Sets up the adaptive back-EMF observer: (6), (7), (20), (22), (28).
 fn back_emf(p: &Si, place: &mut back_emf::Config) {
     p.set(Quantity::Decay, settled(value!(p, ROverL * T)));
     place.delay = p.board.delay;

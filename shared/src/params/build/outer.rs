@@ -33,7 +33,7 @@ const TORQUE_S: f32 = 0.003;
 /// the bench its slow pole pair is at 870 1/s where theirs are at 2357.
 const MODIFIED_SLOWER: f32 = 4.0;
 
-/// Torque and voltage mode.
+/// Sets up torque and voltage mode.
 pub(super) fn torque(p: &Si, place: &mut torque::Config) {
     define_slower(p);
     fill!(p, place, {
@@ -89,7 +89,7 @@ pub(super) fn planner(p: &Si, period: Quantity, place: &mut planner::Config) {
     }
 }
 
-/// (8) with gains in the ratio of Table III.
+/// Sets up (8) with gains in the ratio of Table III.
 fn published(p: &Si, place: &mut nested::Config) {
     fill!(p, place, {
         gain k_p(CtlBwSpdHz, J * SpeedRadS * TorquePerSpeed),
@@ -103,7 +103,7 @@ fn published(p: &Si, place: &mut nested::Config) {
     place.with_step = reads_step(p);
 }
 
-/// (8) with both poles faster than the trajectory's landing: J·s² + k_pω·s + k_iω.
+/// Sets up (8) with both poles faster than the trajectory's landing: J·s² + k_pω·s + k_iω.
 fn with_inertia(p: &Si, place: &mut nested::Config) {
     fill!(p, place, {
         define PoleRadS([POLE_SHARE] * SpeedRadS),
@@ -130,7 +130,7 @@ fn reads_step(p: &Si) -> bool {
     p.chosen(CtlRegulator::ObserverBased)
 }
 
-/// Second paper, figure 47.
+/// Sets up the feed-forward loop of the second paper's figure 47.
 fn feed_forward(p: &Si, place: &mut feed_forward::Config) {
     let fastest = p.scale.speed_from_rpm(p.of(Quantity::FastestRpm));
     p.set(Quantity::Fastest, fastest.to_f32());

@@ -25,7 +25,7 @@ pub(super) fn regulator(p: &Si, place: &mut Config) {
     }
 }
 
-/// (10), (21).
+/// Sets up the observer-based regulator: (10), (21).
 fn observer_based(p: &Si, place: &mut observer_based::Config) {
     const BOTH_POLES: f32 = 1.0 + SECOND_POLE_SHARE;
     fill!(p, place, {
@@ -45,7 +45,8 @@ fn observer_based(p: &Si, place: &mut observer_based::Config) {
     });
 }
 
-/// Second paper, figure 10: the PI's zero cancels the winding's pole.
+/// Sets up the synchronous regulator of the second paper's figure 10: the PI's zero cancels the
+/// winding's pole.
 fn synchronous(p: &Si, place: &mut synchronous::Config) {
     define_pi(p);
     fill!(p, place, {
@@ -57,8 +58,8 @@ fn synchronous(p: &Si, place: &mut synchronous::Config) {
     });
 }
 
-/// Second paper, figure 11: the same PI for the magnitude, and for the phase divided by the
-/// greatest magnitude.
+/// Sets up the modified regulator of the second paper's figure 11: the same PI for the magnitude,
+/// and for the phase divided by the greatest magnitude.
 fn modified(p: &Si, place: &mut modified::Config) {
     define_pi(p);
     fill!(p, place, {
