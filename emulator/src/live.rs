@@ -45,9 +45,9 @@ pub struct Session {
     pub duration: Option<Duration>,
     /// Storage of each ESC's parameters: there are as many ESCs.
     pub flash: Vec<FileFlash>,
-    /// Parameters over the stored ones.
+    /// Parameters that override the stored ones.
     pub params: Vec<(ParamId, f32)>,
-    /// Parameters in place of the factory's values.
+    /// Parameters that replace the factory values.
     pub defaults: Vec<(ParamId, f32)>,
     /// The faults.
     pub faults: Vec<Fault>,

@@ -1,4 +1,4 @@
-//! The options of a run in real time and of a scenario, for every program that has one.
+//! The options of a real-time run and of a scenario, for every program that has one.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -26,12 +26,12 @@ use crate::wire::SignalAddress;
 const MAVLINK_HELP: &str = "MAVLink endpoint: udpout:H:P, udpin:H:P, tcpin:H:P, serial:PATH:BAUD, \
     pty[:LINK[:BAUD]] or none; repeatable [default: udpout:127.0.0.1:14550 and tcpin:127.0.0.1:5760]";
 
-/// How simulated time passes.
+/// How simulated time advances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Speed {
-    /// By the wall's clock, or as fast as the machine can.
+    /// By wall time, or as fast as the machine can.
     Paced(Pace),
-    /// As a client says ([`lockstep`](crate::lockstep)).
+    /// Under a client's control ([`lockstep`](crate::lockstep)).
     Lockstep,
 }
 
@@ -129,7 +129,7 @@ pub struct CommonArgs {
 }
 
 impl ScenarioArgs {
-    /// The plan of the file with these options.
+    /// Reads the plan of the file with these options.
     ///
     /// # Errors
     /// Any [`ScenarioError`] that shows before it is played.
@@ -143,10 +143,10 @@ impl ScenarioArgs {
         Plan::read(&self.file, &options)
     }
 
-    /// The keys that are set, parameters among them: what repeats a run is then one list.
+    /// Returns the keys that are set, including parameters: what reproduces a run is then one list.
     fn keys(&self) -> Vec<(String, toml::Value)> {
         let of_param = |(id, value): (ParamId, f32)| {
-            // By way of its shortest text: 75.6 stays 75.6 as a double.
+            // Via its shortest text: 75.6 stays 75.6 as a double.
             let value = value.to_string().parse().unwrap_or(f64::from(value));
             let key = format!("params.{}", id.entry().name);
             (key, toml::Value::Float(value))
@@ -157,10 +157,10 @@ impl ScenarioArgs {
 }
 
 impl RunArgs {
-    /// What stands on the bench.
+    /// Returns the bench.
     ///
     /// # Errors
-    /// What is named is not there, or makes no bench.
+    /// What is named does not exist, or makes no bench.
     pub fn standing(&self) -> Result<Standing, ScenarioError> {
         let given = [
             ("motor", &self.motor),
@@ -185,15 +185,14 @@ impl RunArgs {
 }
 
 impl RunArgs {
-    /// The session on what stands there, with a warning where settings do not outlive it and nobody has
-    /// asked for that.
+    /// Creates the session on this bench, with a warning if settings do not outlive it and nobody has asked for that.
     ///
     /// # Errors
-    /// The file behind `--storage` cannot serve.
+    /// The file behind `--storage` is unusable.
     pub fn session(&self, standing: &Standing) -> Result<(Session, Option<String>), StorageError> {
         let (flash, warning) = storage(self.storage.as_deref(), self.escs)?;
         let of_bench = standing.params.clone();
-        // The default bench is there unasked, and lasts from run to run: what was stored on it is found again.
+        // The default bench needs no request, and lasts from run to run: what was stored on it is found again.
         let (defaults, mut params) = match self.bench {
             None => (of_bench, Vec::new()),
             Some(_) => (Vec::new(), of_bench),
@@ -224,19 +223,19 @@ impl RunArgs {
 }
 
 impl CommonArgs {
-    /// The preset's parameters, and those given one by one over them.
+    /// Returns the preset's parameters, followed by those given individually, which override them.
     pub fn params(&self) -> Vec<(ParamId, f32)> {
         let preset = self.preset.map_or(&[][..], |preset| preset.settings);
         preset.iter().chain(&self.param).copied().collect()
     }
 }
 
-/// The flash behind `--storage`, by default in the user's state folder.
+/// Opens the flash behind `--storage`, by default in the user's state folder.
 ///
-/// Returns it with a warning where settings do not outlive the run and nobody has asked for that.
+/// Returns it with a warning if settings do not outlive the run and nobody has asked for that.
 ///
 /// # Errors
-/// The file that was given cannot serve.
+/// The given file is unusable.
 fn storage(
     given: Option<&Path>,
     escs: usize,
@@ -257,7 +256,7 @@ fn storage(
     }
 }
 
-/// Where settings stay between runs: the state folder of the XDG base directories.
+/// Returns where settings persist between runs: the state folder of the XDG base directories.
 fn state_file() -> Option<PathBuf> {
     let absolute = |name| {
         let path = PathBuf::from(std::env::var_os(name)?);
@@ -268,11 +267,11 @@ fn state_file() -> Option<PathBuf> {
     Some(folder?.join("siskin/esc.flash"))
 }
 
-/// What comes of a command line that clap does not take, or that asks for help or the version: these as
-/// clap prints them, what is wrong in one line.
+/// Handles a command line that clap rejects, or that asks for help or the version: these as clap prints them, an error
+/// in one line.
 pub fn usage(program: &str, error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
-        // Nobody to tell where standard output is closed.
+        // Nobody is left to tell if standard output is closed.
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
@@ -281,7 +280,7 @@ pub fn usage(program: &str, error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// The argument parser's complaint and its hint on one line, without the usage that follows.
+/// Returns the argument parser's complaint and its hint on one line, without the usage that follows.
 fn one_line(message: &str) -> String {
     let lines = message.lines().map(str::trim);
     let said = lines.take_while(|line| !line.starts_with("Usage:"));
@@ -330,7 +329,7 @@ fn seeds(text: &str) -> Result<RangeInclusive<u64>, String> {
     }
 }
 
-/// A value is TOML, or else text: quotes are for what would be a number.
+/// Parses a value as TOML, or else as text: quotes are for what would be a number.
 fn key(text: &str) -> Result<(String, toml::Value), String> {
     let (key, value) = text
         .split_once('=')

@@ -305,7 +305,7 @@ impl Wire {
         }
     }
 
-    /// Notes who sends from this time on.
+    /// Records who sends from this time on.
     fn sends(&mut self, start_ns: u64, sender: Option<SocketAddr>) {
         // Most signals are not answered.
         self.forget_senders(self.taken_ns.saturating_sub(ANSWERED_NS));

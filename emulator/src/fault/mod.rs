@@ -29,7 +29,7 @@ pub enum Kind {
     SensorStuck(usize, f64),
     /// A current sensor's zero moves by this, A: linearly over the fault's time, and stays.
     OffsetDrift(usize, f64),
-    /// More noise on all currents, A rms.
+    /// Extra noise on all currents, A rms.
     Noise(f64),
     /// A Hall sensor reads this level.
     HallStuck(usize, bool),

@@ -57,23 +57,23 @@ const ROWS: [Row; 8] = [
     Row {
         name: "current_controller",
         printed: [9, 9, 0, 0, 2],
-        // Two errors, three and five of the voltages, σ in both, a sum an axis to integrate; ω·i and its
-        // factor an axis, three and four gains, k_ie an axis.
+        // Two errors, three and five of the voltages, σ in both, one sum per axis to integrate; ω·i and its factor per
+        // axis, three and four gains, k_ie per axis.
         counted: [14, 13, 0, 0, 2],
         functions: "observer_based::Config::voltage, integrate (10)",
     },
     Row {
         name: "high_gain_observer",
         printed: [10, 10, 0, 0, 4],
-        // Two errors, five sums an axis and one for ĥ; ω·i, its factor, four gains and k_i an axis.
+        // Two errors, five sums per axis and one for ĥ; ω·i, its factor, four gains and k_i per axis.
         counted: [14, 14, 0, 0, 4],
         functions: "back_emf::advance (6)",
     },
     Row {
         name: "inverse_park_clarke",
         printed: [4, 4, 0, 2, 0],
-        // Four of the rotation by the angle ahead, whose sine is taken now and then; four of that into the
-        // stator's frame, by the sine of clarke_park; and √3/2.
+        // Four of the rotation by the angle ahead, whose sine is taken now and then; four of that into the stator's
+        // frame, with the sine from clarke_park; and √3/2.
         counted: [6, 9, 0, 0, 0],
         functions: "transform::rotate, inverse_park, phases_in (11)",
     },

@@ -1,13 +1,13 @@
 //! Files that can be read over MAVLink: <https://mavlink.io/en/services/ftp.html>.
 //!
-//! | file | what it shows |
+//! | file | contents |
 //! |---|---|
 //! | `@PARAM/param.pck` | every parameter, as ArduPilot packs them: 3 frames where the list takes 50; with `?withdefaults=1` or `?start=N&count=N` |
 //! | `@SYS/faults.txt` | faults and the last warning, in words |
-//! | `@SYS/faults.bin` | the [fault record](crate::record), while the motor is at rest or a trip holds it; where the program [keeps](crate::record::KEPT) one |
-//! | `@SYS/statistics.txt` | what has happened in the life of the ESC, in words |
+//! | `@SYS/faults.bin` | the [fault record](crate::record), while the motor is at rest or a trip holds it; if the program [keeps](crate::record::KEPT) one |
+//! | `@SYS/statistics.txt` | statistics over the life of the ESC, in words |
 //! | `general.json.xz` | the place of the next one ([`metadata()`] has that of this one) |
-//! | `parameter.json.xz` | units, ranges, choices and what a parameter is, for a ground station to show |
+//! | `parameter.json.xz` | units, ranges, choices and descriptions of the parameters, for a ground station to show |
 //!
 //! The last two are made from the parameter table when the crate is built (`build.rs`). The others are rewritten for
 //! each answer, of which only the requested part is kept: no file is ever in memory. One reader at a time has a
