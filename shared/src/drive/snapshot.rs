@@ -24,6 +24,8 @@ pub struct Snapshot {
     pub speed_reference: Speed,
     /// Measured current in the estimated rotor's frame.
     pub i: Dq<Current>,
+    /// i_q*; with the six-step drive, which regulates no current, zero.
+    pub i_q_reference: Current,
     /// Voltage that was commanded.
     pub u: Dq<Voltage>,
     /// Readings of the three phases' currents, in an order that stays while the motor turns: of the last sample, with

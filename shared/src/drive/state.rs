@@ -254,6 +254,7 @@ impl State {
             speed: signed(seen.speed),
             speed_reference: signed(self.speed_reference()),
             i: seen.i,
+            i_q_reference: self.foc.loops.reference.i.q,
             u: seen.u,
             currents: shared.shown,
             bus: shared.protection.bus,

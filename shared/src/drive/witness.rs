@@ -12,6 +12,7 @@
 //!   rotor was, means an open wire or a switch that does not turn on.
 
 use super::snapshot::Snapshot;
+use crate::math::Held;
 use crate::protection::{Limit, Limits};
 use crate::units::{AdcCounts, Angle, Current};
 
@@ -32,8 +33,8 @@ const ALL_DIRECTIONS: Directions = 0b11_1111;
 /// Rounds since all directions were last seen to conduct.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Rounds {
-    /// Rounds of steady torque.
-    steady: u32,
+    /// Rounds in which the regulator failed to make the current.
+    suspect: u32,
     /// Directions that have conducted in any round.
     conducted: Directions,
     round: Round,
@@ -50,13 +51,14 @@ struct Round {
     sextants: u32,
     /// The greatest current of each direction.
     peaks: [AdcCounts; 6],
-    /// Looks with a torque forwards, and backwards.
-    torques: [u32; 2],
+    /// The greatest current along q, and the greatest error of it.
+    i_q: Current,
+    error: Current,
 }
 
 const ALL_SEXTANTS: u32 = 0b11_1111;
 
-/// Rounds of steady torque after which a direction that has not conducted is open.
+/// Suspect rounds after which a direction that has not conducted is open.
 const OPEN_ROUNDS: u32 = 8;
 
 /// A quarter of a turn.
@@ -135,18 +137,17 @@ impl Rounds {
             }
             direction <<= 1;
         }
-        // A torque that swings in step with the turns may keep a sound phase's current to one direction. That of two
-        // phases alone is against the rest for at most a sixth of a turn.
-        let [forwards, backwards] = round.torques;
-        if forwards.min(backwards) <= (forwards + backwards) / 4 {
-            self.steady += 1;
+        // A torque that swings in step with the turns asks a sound phase for current in one direction only, and gets it.
+        // An open phase leaves an error.
+        if round.error > round.i_q / 4 {
+            self.suspect += 1;
         }
         *round = Round::default();
         // Without any current the rotor may have gone anywhere.
         if self.conducted == ALL_DIRECTIONS || greatest <= none {
             *self = Self::default();
         }
-        self.steady >= OPEN_ROUNDS
+        self.suspect >= OPEN_ROUNDS
     }
 }
 
@@ -158,7 +159,9 @@ impl Round {
             self.peaks[forth] = self.peaks[forth].max(*current);
             self.peaks[back] = self.peaks[back].max(current.wrapping_neg());
         }
-        self.torques[usize::from(snapshot.i.q < Current::ZERO)] += 1;
+        let error = snapshot.i.q.minus(snapshot.i_q_reference);
+        self.i_q = self.i_q.max(snapshot.i.q.saturating_abs());
+        self.error = self.error.max(error.saturating_abs());
         // The top of the product with six counts the sextants.
         self.sextants |= 1 << ((u64::from(snapshot.angle.to_bits() as u32) * 6) >> 32) as u32;
         let missing = ALL_SEXTANTS ^ self.sextants;
@@ -190,28 +193,28 @@ mod tests {
         shown: impl Fn([f64; 3]) -> [f64; 3],
     ) -> Vec<Limit> {
         let turns = |look| 0.013 + step * f64::from(look);
-        found_at(turns, looks, currents, shown)
+        found_at(turns, looks, currents, shown, None)
     }
 
-    /// The same with the rotor at so many turns at each look.
+    /// The same with the rotor at so many turns at each look, and with the current along q that is asked for: without
+    /// it the one that flows.
     fn found_at(
         turns: impl Fn(u32) -> f64,
         looks: u32,
         currents: impl Fn(u32, f64) -> [f64; 3],
         shown: impl Fn([f64; 3]) -> [f64; 3],
+        asked: Option<f64>,
     ) -> Vec<Limit> {
         let mut witness = Witness::default();
         let mut snapshot = snapshot();
         for look in 0..looks {
             let turns = turns(look);
-            let read = shown(currents(look, turns));
-            snapshot.currents = read.map(|part| MOST * AdcCounts::from_num(part));
-            let torque: f64 = read
-                .iter()
-                .zip(unit(turns))
-                .map(|(i, along)| i * along)
-                .sum();
-            snapshot.i.q = Current::from_num(torque.signum());
+            let currents = currents(look, turns);
+            let along_q: f64 = currents.iter().zip(unit(turns)).map(|(i, q)| i * q).sum();
+            let i_q = 2.0 / 3.0 * along_q;
+            snapshot.currents = shown(currents).map(|part| MOST * AdcCounts::from_num(part));
+            snapshot.i.q = Current::from_num(i_q / 16.0);
+            snapshot.i_q_reference = Current::from_num(asked.unwrap_or(i_q) / 16.0);
             snapshot.angle = Angle::wrapping_from_num(turns);
             witness.look(&snapshot, MOST);
         }
@@ -278,7 +281,7 @@ mod tests {
                             let swung = swing * f64::from(look).sin();
                             f64::from(begin) / 24.0 + step * f64::from(look) + swung
                         };
-                        let found = found_at(at, 1000, late, as_is);
+                        let found = found_at(at, 1000, late, as_is, None);
                         assert_eq!(found, vec![], "{step} {lag} {swing} {begin}");
                     }
                 }
@@ -324,8 +327,10 @@ mod tests {
         };
         for step in STEPS {
             let open = vec![Limit::PhaseOpen];
-            assert_eq!(found(step, 600, wire, as_is), open, "{step}");
-            assert_eq!(found(step, 600, switch, as_is), open, "{step}");
+            let turns = |look| 0.013 + step * f64::from(look);
+            let asked = Some(4.0);
+            assert_eq!(found_at(turns, 600, wire, as_is, asked), open, "{step}");
+            assert_eq!(found_at(turns, 600, switch, as_is, asked), open, "{step}");
         }
     }
 
