@@ -1,9 +1,9 @@
-//! Compensation of the dead time by the sign of each phase's current.
+//! Dead-time compensation by the sign of each phase's current.
 //!
-//! While both switches of a phase are off its current flows through a diode: through the low side's
-//! when it flows into the motor, so the phase is low for the dead time of each period in which it
-//! should be high, and the other way round. The duty that this takes is the dead time over the
-//! period, and a little more for the diode's own drop, with the current's sign.
+//! While both switches of a leg are off, the phase's current flows through a diode. Current into the motor
+//! takes the low side's, so the phase is low for the dead time of every period in which it should be high;
+//! negative current does the opposite. The lost duty is the dead time over the period, plus a little for the
+//! diode's forward drop, with the current's sign.
 
 use fixed::FixedI32;
 use fixed::types::extra::{U22, U25};
@@ -13,31 +13,32 @@ use super::transform::{Dq, rotate};
 use crate::math::{Gain, SinCos, TopSum};
 use crate::units::Current;
 
-/// A share of the supply.
+/// A share of the supply voltage.
 pub type Share = FixedI32<U22>;
 
-/// The compensation's coefficients.
+/// Coefficients of the compensation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Phase current over the least whose sign is certain.
+    /// Phase current over the smallest current whose sign is certain.
     pub certainty: Gain<Current, I12F20>,
-    /// The whole compensation: dead time over period, and the diodes' part.
+    /// The full compensation: dead time over period, plus the diodes' part.
     pub duty: I2F30,
-    /// Dead time over period, as the bridge has it.
+    /// The bridge's dead time over the period.
     pub share: I2F30,
 }
 
-/// A current over the least whose sign is certain, in the rotor's frame and as seen from where that
-/// frame will be in the middle of the voltage.
+/// A current over the smallest one whose sign is certain, in the rotor's frame, rotated to where that frame
+/// will be in the middle of the voltage.
 pub type Certainty = Dq<FixedI32<U25>>;
 
-/// The certainty of the current's reference: it has no noise, and what it lags or leads by is below
-/// the width around zero in which the compensation is in proportion, because there a ripple crosses
-/// zero within the period. Taken every few periods, with the frame's turn until the voltage acts.
+/// Returns the certainty of the reference current, which carries no noise. The error by which it lags or leads
+/// is smaller than the proportional zone around zero, where the ripple crosses zero within a period. Called
+/// every few periods; `ahead` is the frame's rotation until the voltage acts.
 pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certainty {
     let d = config.certainty.saturating_apply(wanted.d).to_bits();
     let q = config.certainty.saturating_apply(wanted.q).to_bits();
-    // By less where it is too long for its type, 32: beyond that the width is wider in proportion.
+    // Shifts less where the result would exceed its type, ±32; beyond that the proportional zone widens in
+    // proportion.
     let room = (magnitude(d) | magnitude(q)).leading_zeros() - 1;
     let shift = room.min(MORE_BITS);
     let scaled = Dq {
@@ -47,10 +48,10 @@ pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certain
     rotate(scaled, ahead)
 }
 
-/// The fraction bits by which a certainty's type is finer than its gain's.
+/// Extra fraction bits of a certainty over its gain's output.
 const MORE_BITS: u32 = 6;
 
-/// The value, or for a negative one a bit less: what counts is its leading zeros.
+/// The magnitude, one less for a negative value: only its leading zeros matter.
 #[inline(always)] // in each period
 fn magnitude(bits: i32) -> u32 {
     (bits ^ (bits >> 31)) as u32
@@ -64,7 +65,7 @@ impl Config {
         share: I2F30::ZERO,
     };
 
-    /// A phase's share of the supply and what the dead time takes away of it, for the certainty of its
+    /// Returns a phase's share of the supply plus what the dead time takes from it, for this certainty of its
     /// current's sign.
     #[inline(always)] // in each period
     pub fn compensated(&self, share: Share, certainty: I8F24) -> Share {
@@ -84,7 +85,7 @@ mod tests {
     use crate::units::Angle;
     use core::f64::consts::TAU;
 
-    /// 0.5 µs of 66.7 µs, in full from 0.3 of the unit of current on.
+    /// 0.5 µs of 66.7 µs, in full from 0.3 units of current up.
     fn config() -> Config {
         Config {
             certainty: Gain::new(1.0 / 0.3).expect("in range"),
@@ -93,7 +94,7 @@ mod tests {
         }
     }
 
-    /// The voltage to add to each phase.
+    /// Returns the voltage to add to each phase.
     fn made(config: &Config, certainty: AlphaBeta<I8F24>) -> [f64; 3] {
         phases(certainty).map(|x| config.compensated(Share::ZERO, x).to_num())
     }
@@ -118,7 +119,7 @@ mod tests {
                     let angle = f64::from(degrees) / 360.0 - phase as f64 / 3.0;
                     let current = length * (TAU * angle).cos();
                     let wanted = 0.0075 * (current / 0.3).clamp(-1.0, 1.0);
-                    // Each of two sines is up to 8e-5 short.
+                    // Each of the two sines is up to 8e-5 short.
                     assert!((made - wanted).abs() < 1.3e-6, "{made} for {wanted}");
                 }
             }

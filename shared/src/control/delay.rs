@@ -1,22 +1,22 @@
-//! From the sample to the voltage that it leads to.
+//! The delay from a sample to the voltage computed from it.
 
 use crate::units::{Angle, Speed, Voltage};
 
-/// Periods between the sample and the voltage that it leads to.
+/// Control periods from a sample to the voltage computed from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Delay {
-    /// At once.
+    /// No delay.
     #[default]
     None,
-    /// Half a period later.
+    /// Half a period.
     Half,
-    /// A period later: one duty update a period, preloaded.
+    /// One period: one preloaded duty update per period.
     One,
 }
 
 impl Delay {
-    /// Delay compensation: the angle by which the rotor's frame turns from the sample to the middle
-    /// of the voltage, (0.5 + delay) periods at this speed.
+    /// Delay compensation: returns the angle by which the rotor's frame turns from the sample to
+    /// the middle of the voltage, (0.5 + delay) periods at this speed.
     pub fn advance(self, speed: Speed) -> Angle {
         let half = speed.over_half_period();
         match self {
@@ -26,7 +26,8 @@ impl Delay {
         }
     }
 
-    /// The voltage between this sample and the next, of what is commanded now and what was before.
+    /// Returns the mean voltage between this sample and the next, from the current and the previous
+    /// command.
     pub fn applied(self, now: Voltage, before: Voltage) -> Voltage {
         match self {
             Self::None => now,

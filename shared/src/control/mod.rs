@@ -1,8 +1,8 @@
-//! The control law, one block of the papers a file.
+//! The control law: one block of the papers per file.
 //!
-//! Each block is a pair of an immutable configuration, computed when the parameters change, and a
-//! state. Nothing here knows of parameters, of the throttle or of time: a call is a period, or one
-//! of the longer ones of the outer loops.
+//! Each block pairs an immutable configuration, computed when the parameters change, with a state.
+//! Nothing here knows of parameters, throttle or time: one call is one control period, or one of
+//! the outer loops' longer periods.
 
 pub mod catch;
 pub mod dead_time;
@@ -21,7 +21,7 @@ pub mod torque;
 pub mod transform;
 pub mod voltage;
 
-/// Control periods in one of the outer loops: speed, torque and voltage.
+/// Control periods per period of the outer loops: speed, torque and voltage.
 pub const PERIODS: u32 = 8;
 
 #[cfg(test)]

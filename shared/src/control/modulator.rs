@@ -1,5 +1,5 @@
-//! From a voltage vector to three duties: space-vector or sine modulation with a minimum low-side
-//! on-time, and the compensation of the dead time.
+//! Modulation: from a voltage vector to three duties by space vector or sine, with a minimum low-side on-time
+//! and dead-time compensation.
 
 use crate::control::dead_time::Share;
 use fixed::types::extra::U20;
@@ -15,35 +15,34 @@ use crate::units::{
     wide,
 };
 
-/// The choice of the phases' common voltage.
+/// The choice of common-mode voltage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Modulation {
-    /// In the middle between the highest and the lowest phase: full line-to-line voltage.
+    /// Midway between the highest and the lowest phase: full line-to-line voltage.
     SpaceVector,
-    /// Half the supply: 15 % less voltage and less harmonic content of the common mode.
+    /// Half the supply: 15 % less voltage, and less harmonic content in the common mode.
     Sine,
 }
 
 /// The modulator's limits.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// All ones where the common voltage follows the phases, else zero.
+    /// All ones where the common mode follows the phases, else zero.
     centred: I1F31,
-    /// Greatest duty: what is left is the time for which the low sides must be on, so that their
-    /// shunts can be read.
+    /// Largest duty; the remainder is the low-side on-time that reading the shunts takes.
     pub duty_max: I1F31,
-    /// Greatest length of the voltage vector as a share of the supply.
+    /// Largest length of the voltage vector, as a share of the supply.
     pub vector_max: I1F31,
-    /// The length up to which every phase can be read, likewise; negative where none is.
+    /// Length up to which every phase can be read, as a share of the supply; negative if there is none.
     pub readable: I1F31,
 }
 
 impl Config {
-    /// The modulator of this kind with a greatest duty. Phases can be read up to the duty `window`,
-    /// all of them in a vector that is not too long for it.
+    /// Creates the modulator with a largest duty. A phase can be read up to the duty `window`, all of them
+    /// while the vector is short enough.
     pub fn new(modulation: Modulation, duty_max: f32, window: f32) -> Self {
         let (longest, readable, centred) = match modulation {
-            // The highest phase has half the greatest duty, and √3/2 of the vector at most.
+            // The highest phase sits half the largest duty, plus at most √3/2 of the vector, above zero.
             Modulation::SpaceVector => (1.0 / SQRT_3, (2.0 * window - duty_max) / SQRT_3, -1),
             Modulation::Sine => (0.5, window - 0.5 * duty_max, 0),
         };
@@ -55,7 +54,7 @@ impl Config {
         }
     }
 
-    /// The duty of a phase.
+    /// Returns a phase's duty.
     #[inline(always)] // in each period
     fn duty(&self, common: I1F31, share: Share) -> Duty {
         let duty = common.wrapping_add(whole(share)).max(I1F31::ZERO);
@@ -64,14 +63,14 @@ impl Config {
 }
 
 traced! {
-    /// The supply and its reciprocal, taken every few periods.
+    /// The supply and its reciprocal, updated every few periods.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Supply {
-        /// Voltage.
+        /// Supply voltage.
         pub bus: Voltage,
-        /// 1/V with 28 fraction bits, held at 8.
+        /// 1/V with 28 fraction bits, saturating at 8.
         pub reciprocal: InverseVoltage,
-        /// Longest voltage vector that can be had.
+        /// Longest available voltage vector.
         pub longest: Longest,
         /// Square of the length up to which every phase can be read.
         pub readable: WideVoltageSquare,
@@ -79,22 +78,22 @@ traced! {
 }
 
 traced! {
-    /// The longest voltage vector that can be had, and its part along q near some part along d.
+    /// The longest available voltage vector, and its q component linearized around a d component.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Longest {
         length: Voltage,
         square: WideVoltageSquare,
-        /// Square of that part along d.
+        /// Square of that d component.
         d_square: VoltageSquare,
-        /// The greatest part along q beside it.
+        /// Largest q component beside it.
         q: WideVoltage,
-        /// The share of the square's change that q loses, 1/(2·q).
+        /// Loss of q per change of d's square, 1/(2·q).
         slope: Multiplier<VoltageSquare, Quantity<Volt, U20>>,
     }
 }
 
 impl Longest {
-    /// None at all.
+    /// No vector at all.
     const NONE: Self = Self {
         length: Voltage::ZERO,
         square: WideVoltageSquare::ZERO,
@@ -103,11 +102,11 @@ impl Longest {
         slope: Multiplier::from_bits(0),
     };
 
-    /// Of this length, where the part along d will be near this one.
+    /// Creates one of this length, linearized around this d component.
     pub fn new(length: Voltage, d: Voltage) -> Self {
         let d = d.min(length).max(-length);
         let q = other_leg(length, d);
-        // 2^55 over q's bits; the floor is a sixteenth, below which little is left to lose.
+        // 2^55 over q's bits; the floor is a sixteenth, below which there is little left to lose.
         let q_upper = (q.to_bits() >> 16).max(257) as u32;
         Self {
             length,
@@ -118,22 +117,22 @@ impl Longest {
         }
     }
 
-    /// Its length.
+    /// Returns the length.
     pub fn length(self) -> Voltage {
         self.length
     }
 
-    /// The most along q beside this part along d.
+    /// Returns the largest q component beside this d component.
     #[inline(always)] // in each period
     fn beside(&self, d: Voltage) -> WideVoltage {
-        // Both squares are below 12, and the slope is below 8.
+        // Both squares are below 12, the slope below 8.
         let less = self.slope.of(d.top(d) - self.d_square).scaled();
         (self.q - less).max(WideVoltage::ZERO)
     }
 }
 
 impl Supply {
-    /// The supply of this voltage, while the part along d of what is commanded is near this one.
+    /// Creates the supply at this voltage, for commands with a d component near `d`.
     pub fn new(config: &Config, bus: Voltage, d: Voltage) -> Self {
         let mut supply = Self {
             bus,
@@ -146,11 +145,11 @@ impl Supply {
         supply
     }
 
-    /// Takes another voltage; [`reach`](Self::reach) takes what it is enough for.
+    /// Updates the voltage; [`reach`](Self::reach) updates the lengths it allows.
     #[inline(never)] // only some periods
     pub fn follow(&mut self, bus: Voltage) {
-        // 2^56/bus: a division of 32 bits by the voltage's upper bits, right to 2^-11 at the worst, and one step of
-        // Newton's method. A bus below 1/8 of a unit counts as 1/8, which bounds the reciprocal.
+        // 2^56/bus: a 32-bit division by the voltage's upper bits, accurate to 2^-11 at worst, and one Newton
+        // step. A bus below 1/8 unit counts as 1/8, which bounds the reciprocal.
         let bits = bus.to_bits().max(1 << 25);
         let rough = ((u32::MAX / (bits >> 10) as u32) << 14).min(i32::MAX as u32);
         let rough = InverseVoltage::from_bits(rough as i32);
@@ -160,7 +159,7 @@ impl Supply {
         self.reciprocal = rough.plus(rough.top(error));
     }
 
-    /// Takes the lengths that a vector can have, while its part along d is near this one.
+    /// Updates the lengths a vector may have, for commands with a d component near `d`.
     #[inline(never)] // only some periods
     pub fn reach(&mut self, config: &Config, d: Voltage) {
         let length = config.vector_max.top(self.bus).scaled();
@@ -173,17 +172,17 @@ impl Supply {
     }
 }
 
-/// The part along d leaves this shift's share of the length.
+/// The d component leaves 2^-this of the length.
 const D_RESERVE: u32 = 3;
 
-/// The square of a limited vector may be longer by this shift's share: 0.05 % of its length.
+/// A limited vector's square may exceed the limit by 2^-this: 0.05 % of its length.
 const TOO_LONG: u32 = 10;
 
-/// Shortens a voltage vector to what the supply can give, keeping the part along d, which cancels
-/// what the current and the speed induce, up to seven eighths of the length. With all of it i_q has no
-/// regulator left, and stays where it is beyond its bound: ω·L·i_q is then what the part along d cancels.
+/// Shortens a voltage vector to what the supply allows. Keeps the d component, which cancels what current and
+/// speed induce, up to seven eighths of the length. With all of the length in d, nothing regulates i_q, and it
+/// stays beyond its bound: ω·L·i_q is what the d component cancels.
 ///
-/// Returns the vector and what was cut off, if it was shortened.
+/// Returns the vector, and the part cut off if it was shortened.
 #[inline(always)] // in each period
 pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<WideVoltage>>) {
     if square_of(u) <= longest.square {
@@ -193,7 +192,7 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
     let d = u.d.min(most).max(-most);
     let short_d = d.scaled();
     let mut q_max = longest.beside(short_d);
-    // The slope is too generous far from where it was taken, and never too strict.
+    // Far from its operating point the linearization is too generous, never too strict.
     if square_of(Dq { d, q: q_max }) > longest.square + (longest.square >> TOO_LONG) {
         q_max = wide(other_leg(longest.length, short_d));
     }
@@ -205,7 +204,7 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
     (short(Dq { d, q }), Some(cut))
 }
 
-/// The square of a vector's length. No component is above 128: the sum is below 2^15.
+/// Returns the square of a vector's length. No component exceeds 128, so the sum is below 2^15.
 #[inline(always)] // in each period
 pub fn square_of(u: Dq<WideVoltage>) -> WideVoltageSquare {
     square(u.d).plus_top(u.q, u.q)
@@ -216,7 +215,7 @@ fn square(u: WideVoltage) -> WideVoltageSquare {
     u.top(u)
 }
 
-/// A vector that is known to be within ±8.
+/// Narrows a vector that is known to be within ±8.
 #[inline(always)] // in each period
 pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
     Dq {
@@ -225,10 +224,10 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
     }
 }
 
-/// The three duties of a voltage vector that [`limit`] has passed.
+/// Returns the three duties of a voltage vector that [`limit`] has passed.
 ///
-/// The dead time takes away from each phase's duty what `dead_time` makes of the certainty of its
-/// current's sign, which is added.
+/// Adds to each duty what the dead time takes away: `dead_time` times the certainty of the phase current's
+/// sign.
 #[inline(always)] // in each period
 pub fn duties(
     config: &Config,
@@ -241,14 +240,13 @@ pub fn duties(
         beta: v.beta.top(supply.reciprocal),
     };
     let [a, b, c] = phases_in(order, share);
-    // Without the common voltage the phases' sum is zero: what lies between the highest and the
-    // lowest is minus the phase in the middle.
+    // Without the common mode the phases sum to zero, so highest plus lowest is minus the middle phase.
     let (low, high) = if a < b { (a, b) } else { (b, a) };
     let middle = c.max(low).min(high);
     let half: I1F31 = whole(middle) >> 1;
     let common: I1F31 = (config.duty_max >> 1) + (half & config.centred);
     let [ca, cb, cc] = phases_in(order, certainty);
-    // Not by `map` or a closure: where size counts they become a loop or calls.
+    // Not by `map` or a closure, which become a loop or calls in a build optimized for size.
     [
         config.duty(common, dead_time.compensated(a, ca)),
         config.duty(common, dead_time.compensated(b, cb)),
@@ -256,7 +254,7 @@ pub fn duties(
     ]
 }
 
-/// The share as a duty: a vector is at most 1/√3 long.
+/// Converts the share to a duty: a vector is at most 1/√3 long.
 #[inline(always)] // in each period
 fn whole(share: Share) -> I1F31 {
     I1F31::from_bits(share.to_bits() << 9)
@@ -273,7 +271,7 @@ mod tests {
         Config::new(modulation, duty_max as f32, duty_max as f32)
     }
 
-    /// The vector that duties make of the supply: without its common part.
+    /// The vector that the duties produce, without the common mode.
     fn vector(duties: [Duty; 3], bus: f64) -> (f64, f64) {
         let [a, b, c] = duties.map(|d| d.to_num::<f64>() * bus);
         ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt())
@@ -299,7 +297,7 @@ mod tests {
             let (u, _) = limit(asked, &supply.longest);
             let [u_d, u_q] = [u.d, u.q].map(Voltage::to_num::<f64>);
             prop_assert!(u_d.hypot(u_q) < length * 1.001, "{u_d} {u_q} for {length}");
-            // And no duty wraps: what they make is the vector.
+            // No duty wraps: together they produce the vector.
             let (sin, cos) = (turns * TAU).sin_cos();
             let (alpha, beta) = (u_d * cos - u_q * sin, u_d * sin + u_q * cos);
             let v = AlphaBeta {
@@ -394,7 +392,7 @@ mod tests {
             duty: I2F30::from_num(0.01),
             ..dead_time::Config::NONE
         };
-        // The signs of a current along phase b against a, and none in c.
+        // The signs of a current along phase b minus a, and none in c.
         let certainty = AlphaBeta {
             alpha: I8F24::from_num(20),
             beta: I8F24::from_num(-20.0 / 3.0_f64.sqrt()),

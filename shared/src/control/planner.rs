@@ -1,9 +1,9 @@
-//! The trajectory planner: from a speed command Ω* to ω* and its derivative.
+//! Trajectory planner: from a speed command Ω* to ω* and its derivative.
 //!
-//! A command that jumps is followed at the greatest slew and then, over the last slew/λ,
-//! exponentially: where the reference lands softly the drive does not overshoot it, though the
-//! inertia be wrong. A command that moves within the slew is followed without a lag. The slew is
-//! reached in some milliseconds: the torque that it takes is no jump for the current loop.
+//! The reference follows a step in the command at full slew, and over the last slew/λ
+//! exponentially: with this soft landing the drive does not overshoot even with a wrong inertia. It
+//! follows a command that moves within the slew without lag. The slew builds up over some
+//! milliseconds, so its torque is no step for the current loop.
 
 use crate::math::{Gain, Held};
 use crate::trace::traced;
@@ -12,29 +12,29 @@ use crate::units::Speed;
 /// Limits of the trajectory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Greatest change of ω* in a period.
+    /// Largest change of ω* per period.
     pub slew: Speed,
-    /// Greatest change of that from period to period.
+    /// Largest change of that change from period to period.
     pub jerk: Speed,
-    /// λ·T_s, the share of what is left that a period takes at the end; one lands at full slew.
+    /// λ·T_s, the share of the remainder that a period covers at the end; 1 lands at full slew.
     pub approach: Gain<Speed, Speed>,
 }
 
 traced! {
-    /// State of the trajectory.
+    /// The trajectory's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// ω*.
         pub reference: Speed,
-        /// Ω* of the last period.
+        /// Ω* of the previous period.
         command: Speed,
-        /// ω*'s last step.
+        /// The last step of ω*.
         step: Speed,
     }
 }
 
 impl State {
-    /// A trajectory that begins at this speed.
+    /// Starts a trajectory at this speed.
     pub fn begin(reference: Speed) -> Self {
         Self {
             reference,
@@ -43,14 +43,14 @@ impl State {
         }
     }
 
-    /// The step that ω* may take in this period, ω̇*·T_s. The drive says by
-    /// [`State::advance`] which it takes.
+    /// Returns the step that ω* may take this period, ω̇*·T_s. The drive reports the step it takes
+    /// to [`State::advance`].
     #[inline(always)] // in the longest period
     pub fn plan(&mut self, config: &Config, command: Speed) -> Speed {
         let moved = command.minus(self.command);
         let left = self.command.minus(self.reference);
         self.command = command;
-        // Rounded away from zero, so that the command is reached.
+        // Rounded away from zero, so that the reference reaches the command.
         let share = if left.is_negative() {
             config.approach.apply(left).max(left)
         } else {
@@ -64,7 +64,7 @@ impl State {
             .max(self.step.minus(config.jerk))
     }
 
-    /// Takes ω* on by a step.
+    /// Advances ω* by a step.
     #[inline(always)] // in the longest period
     pub fn advance(&mut self, step: Speed) {
         self.reference = self.reference.plus(step);
@@ -84,7 +84,7 @@ mod tests {
         }
     }
 
-    /// The steps to a command at once, until none is left.
+    /// Steps towards a command until none is left; returns the steps.
     fn run(config: &Config, state: &mut State, command: Speed) -> std::vec::Vec<Speed> {
         let mut steps = std::vec::Vec::new();
         loop {
@@ -116,7 +116,7 @@ mod tests {
             let mut state = State::default();
             let steps = run(&config, &mut state, command);
             assert_eq!(state.reference, command);
-            // Full slew until slew/λ is left: 0.01 of 0.03, 20 periods and the one that it began in.
+            // Full slew until slew/λ is left: 0.01 of 0.03, 20 periods plus the one it starts in.
             let full = steps.iter().filter(|s| s.abs() == config.slew).count();
             assert!((20..=21).contains(&full), "{full}");
             let at_end = steps[full + 1].abs() < config.slew * 9 / 10;

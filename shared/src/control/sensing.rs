@@ -1,11 +1,10 @@
-//! From the current converters' readings to three phase currents: offsets that are measured before
-//! every start, and the phase that the shunts do not show.
+//! Current sensing: from the ADC readings to three phase currents, with offsets measured before every start,
+//! and the phase that the shunts do not show reconstructed.
 //!
-//! A shunt in the low side carries its phase's current only while the low side is on. The sample is
-//! at the counter's top, in the middle of the low sides' on-time and between two periods: the half
-//! of that time before the sample is of the duty of the period that has elapsed, the half after it
-//! of the period that comes. An amplifier must have settled when it is sampled, and the sampling
-//! itself is short, so what counts is the half before: the duties of the elapsed period.
+//! A low-side shunt carries its phase's current only while the low side is on. The ADC samples at the counter's
+//! top, in the middle of the low-side on-time and between two periods: the half before the sample follows from
+//! the elapsed period's duty, the half after it from the next one's. The amplifier must have settled by then,
+//! and sampling itself is short, so the half before counts: the elapsed period's duties.
 
 use fixed::types::I16F16;
 
@@ -16,16 +15,15 @@ use crate::units::{AdcCounts, Duty};
 /// Which phases have a shunt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shunts {
-    /// All three: the phase with the highest duty may be left out.
+    /// All three phases; the one with the highest duty may go unread.
     #[default]
     Three,
-    /// Phases a and b: both must be read in every period, so no duty may exceed
-    /// [`Config::window`].
+    /// Phases a and b: both must be read every period, so no duty may exceed [`Config::window`].
     Two,
 }
 
 impl Shunts {
-    /// Phases that have one, from the first.
+    /// Returns the number of phases with a shunt, counted from a.
     pub const fn count(self) -> usize {
         match self {
             Self::Three => 3,
@@ -39,53 +37,52 @@ impl Shunts {
 pub struct Config {
     /// Which phases have a shunt.
     pub shunts: Shunts,
-    /// Greatest duty that leaves the low side on for long enough to be read.
+    /// Largest duty that leaves the low side on long enough to read.
     pub window: Duty,
-    /// Readings that make an offset, as a power of two; about 5 ms.
+    /// log2 of the readings averaged for an offset; about 5 ms.
     pub zero_readings_log2: u32,
-    /// Greatest offset that a sound sensor has.
+    /// Largest offset of a sound sensor.
     pub offset_max: AdcCounts,
 }
 
 traced! {
-    /// The offsets, and what is known of the next ones.
+    /// The offsets, and progress towards the next ones.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Readings without current, subtracted from all later ones.
         pub offsets: [AdcCounts; 3],
-        /// Mean of the readings so far, as if those to come were zero.
+        /// Sum of the readings so far over the total count: the mean once all are in.
         pub partial: [AdcCounts; 3],
-        /// Readings so far.
+        /// Number of readings so far.
         pub readings: u32,
     }
 }
 
-/// Progress of the measurement of the offsets.
+/// Progress of the offset measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Zeroing {
     /// More readings are needed.
     Measuring,
-    /// The offsets are new; the next reading begins another measurement.
+    /// The offsets are new; the next reading starts another measurement.
     Done,
-    /// A sensor's offset is beyond what a sound one has: the former offsets stay.
+    /// An offset exceeds that of a sound sensor; the previous offsets stay.
     Defect,
 }
 
 impl State {
-    /// Begins a measurement anew; the offsets stay.
+    /// Restarts the measurement; the offsets stay.
     pub fn restart(&mut self) {
         self.partial = [AdcCounts::ZERO; 3];
         self.readings = 0;
     }
 }
 
-/// Takes one reading into the offsets, or, in the period after the last one, judges them. The bridge
-/// must have been off for long enough that no current flows; a rotor may turn as long as its back-EMF
-/// is below the supply.
+/// Adds one reading to the offsets; in the period after the last one, judges them. The bridge must have been
+/// off long enough for the current to decay. The rotor may turn as long as its back-EMF is below the supply.
 pub fn zero(config: &Config, state: &mut State, raw: [AdcCounts; 3]) -> Zeroing {
     if state.readings < 1 << config.zero_readings_log2 {
         for (partial, reading) in state.partial.iter_mut().zip(raw) {
-            // What the shift drops is below 2^-16 counts a reading.
+            // The shift drops less than 2^-16 counts per reading.
             *partial += reading >> config.zero_readings_log2;
         }
         state.readings += 1;
@@ -95,12 +92,12 @@ pub fn zero(config: &Config, state: &mut State, raw: [AdcCounts; 3]) -> Zeroing 
     }
 }
 
-/// The offsets, if the sensors are sound.
+/// Takes over the offsets if the sensors are sound.
 #[cold]
 fn judge(config: &Config, state: &mut State) -> Zeroing {
     let mut measured = state.partial;
     if config.shunts == Shunts::Two {
-        // Nothing stands behind the third reading.
+        // The third channel has no sensor.
         measured[2] = AdcCounts::ZERO;
     }
     state.partial = [AdcCounts::ZERO; 3];
@@ -113,19 +110,19 @@ fn judge(config: &Config, state: &mut State) -> Zeroing {
     Zeroing::Done
 }
 
-/// The readings of a sample less their offsets.
+/// Returns a sample's readings minus their offsets.
 pub fn read(state: &State, raw: [AdcCounts; 3]) -> [AdcCounts; 3] {
     let [a, b, c] = raw;
     let [offset_a, offset_b, offset_c] = state.offsets;
     [a.minus(offset_a), b.minus(offset_b), c.minus(offset_c)]
 }
 
-/// The phase currents of a sample.
+/// Returns a sample's phase currents.
 ///
-/// `applied` are the duties of the elapsed period, 0 for a phase whose high side did not switch.
-/// With three shunts the phase with the highest duty is minus the sum of the others where its
-/// window is too short. Where a second window is too short as well, which the modulator's limit
-/// prevents, the two longest windows are still what is used: their readings may not have settled.
+/// `applied` are the elapsed period's duties, 0 for a phase whose high side did not switch. With three shunts,
+/// the phase with the highest duty is minus the sum of the others where its window is too short. Where a second
+/// window is too short as well, which the modulator's limit prevents, the two longest windows still serve,
+/// though their readings may not have settled.
 pub fn currents(
     config: &Config,
     state: &State,

@@ -1,4 +1,4 @@
-//! Clarke's and Park's transforms, preserving the amplitude (11), (12).
+//! Clarke's and Park's transforms, amplitude-invariant (11), (12).
 
 use fixed::types::{I0F32, I1F31};
 
@@ -10,35 +10,35 @@ traced! {
     /// A vector in the stator's frame.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct AlphaBeta<T> {
-        /// Along the axis of phase a.
+        /// Along phase a.
         pub alpha: T,
-        /// A quarter of a turn ahead of it.
+        /// A quarter turn ahead of phase a.
         pub beta: T,
     }
 }
 
 traced! {
-    /// A vector in the frame of the (estimated) rotor.
+    /// A vector in the (estimated) rotor's frame.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Dq<T> {
         /// Along the rotor's flux.
         pub d: T,
-        /// A quarter of a turn ahead of it.
+        /// A quarter turn ahead of it.
         pub q: T,
     }
 }
 
-/// The order in which three phases follow one another.
+/// The order of the three phases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseOrder {
-    /// ±√3/4: what fits a factor below a half.
+    /// ±√3/4, within the range of a factor below a half.
     root_3_quarter: I0F32,
     /// ±1.
     sign: i32,
 }
 
 impl Trace for PhaseOrder {
-    /// One word: 1 if the phases b and c have changed places.
+    /// One word: 1 if phases b and c are swapped.
     fn trace(&self, out: &mut impl FnMut(u32)) {
         (*self == Self::SWAPPED).trace(out);
     }
@@ -51,28 +51,28 @@ impl PhaseOrder {
         sign: 1,
     };
 
-    /// a, c, b: what a motor that turns the other way makes of them.
+    /// a, c, b: for a motor that turns the other way.
     pub const SWAPPED: Self = Self {
         root_3_quarter: I0F32::from_bits(-1_859_775_393),
         sign: -1,
     };
 
-    /// An angle of the frame of the phases in this order, with the phases in the order a, b, c.
+    /// Converts an angle in this phase order's frame to one in the order a, b, c.
     #[inline(always)] // in each period
     pub fn angle(self, theta: Angle) -> Angle {
         theta.wrapping_mul_int(self.sign)
     }
 }
 
-/// Clarke's transform of three readings (12): one unit of current is 4096/3 counts, so that two
-/// integer products are enough.
+/// Clarke's transform of three readings (12). One unit of current is 4096/3 counts, so two integer products
+/// suffice.
 ///
-/// Readings are within ±2048 counts, which makes each component at most 2 of ±8.
+/// Readings are within ±2048 counts, so each component is at most 2 of ±8.
 pub fn clarke(readings: [AdcCounts; 3]) -> AlphaBeta<Current> {
     clarke_in(PhaseOrder::NORMAL, readings)
 }
 
-/// Clarke's transform of phases in this order.
+/// Clarke's transform in this phase order.
 #[inline(always)] // in each period
 pub fn clarke_in(order: PhaseOrder, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Current> {
     let (a, b, c) = (a.to_bits(), b.to_bits(), c.to_bits());
@@ -86,7 +86,7 @@ pub fn clarke_in(order: PhaseOrder, [a, b, c]: [AdcCounts; 3]) -> AlphaBeta<Curr
     }
 }
 
-/// The voltages of a vector that is turned twice, as the control's voltages: it is within ±8.
+/// Converts a twice-rotated vector to the control's voltages; it is within ±8.
 #[inline(always)] // in each period
 pub fn voltages(v: AlphaBeta<TurnedVoltage>) -> AlphaBeta<Voltage> {
     AlphaBeta {
@@ -95,14 +95,13 @@ pub fn voltages(v: AlphaBeta<TurnedVoltage>) -> AlphaBeta<Voltage> {
     }
 }
 
-/// Park's transform (12): the stator's vector as the rotor sees it. Components are held at the ends of
-/// their type.
+/// Park's transform (12): rotates a stator vector into the rotor's frame. Components saturate.
 #[inline(always)] // in each period
 pub fn park<T>(v: AlphaBeta<T>, SinCos { cos, sin }: SinCos) -> Dq<T>
 where
     T: Number + TopProduct<I1F31, Output: Number>,
 {
-    // The sine takes a fraction bit.
+    // The sine uses one fraction bit.
     let double = |x: T::Output| T::from_bits(x.plus(x).to_bits());
     Dq {
         d: double(v.alpha.top(cos).plus_top(v.beta, sin)),
@@ -110,7 +109,7 @@ where
     }
 }
 
-/// The inverse of Park's transform (11); the sine takes a fraction bit.
+/// Inverse Park transform (11); the sine uses one fraction bit.
 #[inline(always)] // in each period
 pub fn inverse_park<T>(v: Dq<T>, SinCos { cos, sin }: SinCos) -> AlphaBeta<T::Output>
 where
@@ -122,7 +121,7 @@ where
     }
 }
 
-/// Turns a vector of the rotor's frame ahead by an angle; the sine takes a fraction bit.
+/// Rotates a rotor-frame vector ahead by an angle; the sine uses one fraction bit.
 #[inline(always)] // in each period
 pub fn rotate<T>(v: Dq<T>, ahead: SinCos) -> Dq<T::Output>
 where
@@ -132,17 +131,17 @@ where
     Dq { d: alpha, q: beta }
 }
 
-/// The three phases' values of a vector (11).
+/// Returns a vector's three phase values (11).
 #[inline(always)] // in each period
 pub fn phases<T: Number>(v: AlphaBeta<T>) -> [T; 3] {
     phases_in(PhaseOrder::NORMAL, v)
 }
 
-/// The three phases' values of a vector (11), in this order.
+/// Returns a vector's three phase values (11) in this phase order.
 #[inline(always)] // in each period
 pub fn phases_in<T: Number>(order: PhaseOrder, v: AlphaBeta<T>) -> [T; 3] {
     let alpha = v.alpha.to_bits();
-    // √3/2 = 2·√3/4, and the product keeps the top half.
+    // √3/2 = 2·√3/4; the product keeps the top half.
     let product = i64::from(v.beta.to_bits()) * i64::from(order.root_3_quarter.to_bits());
     let beta = ((product >> 32) as i32) << 1;
     let half = alpha >> 1;
@@ -153,8 +152,7 @@ pub fn phases_in<T: Number>(order: PhaseOrder, v: AlphaBeta<T>) -> [T; 3] {
     ]
 }
 
-/// Turns a rotor-frame vector against the frame: the vector as a frame sees it that leads by the
-/// angle. Components are held at the ends of their type.
+/// Returns the vector as seen from a frame that leads by the angle. Components saturate.
 pub fn rotate_frame<T>(v: Dq<T>, ahead: SinCos) -> Dq<T>
 where
     T: Number + TopProduct<I1F31, Output: Number>,
@@ -175,7 +173,7 @@ mod tests {
     use crate::units::Angle;
     use core::f64::consts::TAU;
 
-    /// A balanced vector of the given counts and angle as three readings.
+    /// Three readings of a balanced vector of this amplitude and angle.
     fn readings(counts: f64, turns: f64) -> [AdcCounts; 3] {
         [0.0, -1.0 / 3.0, 1.0 / 3.0]
             .map(|shift| AdcCounts::from_num(counts * (TAU * (turns + shift)).cos()))
@@ -187,7 +185,7 @@ mod tests {
             let turns = f64::from(degrees) / 360.0;
             let sc = sin_cos(Angle::from_bits((turns * 4_294_967_296.0) as i64 as i32));
             let v = park(clarke(readings(1365.0, turns)), sc);
-            // 1365 counts of 4096/3 a unit; the table is up to 8e-5 short.
+            // 1365 counts at 4096/3 per unit; the table is up to 8e-5 short.
             assert!((v.d.to_num::<f64>() - 0.99976).abs() < 9e-5, "{v:?}");
             assert!(v.q.to_num::<f64>().abs() < 3e-6, "{v:?}");
         }

@@ -1,8 +1,9 @@
-//! Voltage mode: a share of the full modulation along q, as a flight controller's throttle.
+//! Voltage mode: a share of the full modulation along q, as a flight controller's throttle commands
+//! it.
 //!
-//! The regulator stays in charge, with the i_q* at which it gives that voltage. So i_d is held at
-//! its reference, and where [`torque::follow`](super::torque::follow) bounds i_q*, the bound takes
-//! over from the command, in braking as well.
+//! The current regulator stays in charge, with the i_q* at which it outputs that voltage. So i_d
+//! stays at its reference, and where [`torque::follow`](super::torque::follow) bounds i_q*, the
+//! bound overrides the command, in braking too.
 
 use fixed::types::I1F31;
 
@@ -11,12 +12,12 @@ use super::transform::Dq;
 use crate::math::TopProduct;
 use crate::units::{Current, Voltage};
 
-/// The voltage of a share, −1 to 1, of the longest vector that the supply can give.
+/// Returns the voltage for a share, −1 to 1, of the longest vector the supply allows.
 pub fn of_share(share: I1F31, vector_max: Voltage) -> Voltage {
     vector_max.top(share).scaled()
 }
 
-/// The current at which the regulator gives `u_q`, whatever it is.
+/// Returns the reference, i_q included, at which the regulator outputs `u_q`.
 pub fn reference(
     config: &regulator::Config,
     state: &regulator::State,

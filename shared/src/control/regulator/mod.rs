@@ -1,8 +1,8 @@
-//! Current regulators: from the current that is wanted to the voltage.
+//! Current regulators: from the reference current to the voltage.
 //!
-//! All three take the same [`Reference`] and [`Feedback`], and each holds two integrators. A period
-//! is [`Config::voltage`], [`Config::integrate`], and where the modulator's limit cuts something off
-//! [`Config::give_way`].
+//! All three take the same [`Reference`] and [`Feedback`], and each holds two integrators. A period is
+//! [`Config::voltage`], [`Config::integrate`], and [`Config::give_way`] where the modulator's limit cuts
+//! something off.
 
 pub mod modified;
 pub mod observer_based;
@@ -33,7 +33,7 @@ impl Default for Config {
 }
 
 traced! {
-    /// The integrators of all regulators; those of the others rest.
+    /// The integrators of all regulators; only the selected one's are in use.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         observer_based: observer_based::State,
@@ -43,7 +43,7 @@ traced! {
 }
 
 impl Config {
-    /// The voltage that brings the currents to their references, before any limit.
+    /// Returns the voltage that drives the currents to their references, before any limit.
     #[inline(always)] // in each period
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let u = match self {
@@ -57,11 +57,11 @@ impl Config {
         }
     }
 
-    /// The current i_q* for which [`Config::voltage`] is `u_q` along q (the length of the voltage
-    /// for the modified regulator), whatever i_q* is wanted.
+    /// Returns the i_q* at which [`Config::voltage`] gives `u_q` along q (for the modified regulator, the
+    /// voltage's length), whatever i_q* `wanted` has.
     ///
-    /// Regulated so, the current goes where the voltage takes it, and a bound of i_q* is a bound of
-    /// the current, reached with the regulator's own dynamics.
+    /// Regulated this way, the current goes where the voltage takes it, and a bound on i_q* bounds the current,
+    /// which reaches it with the regulator's own dynamics.
     #[inline(always)] // in each period
     pub fn current_at(
         &self,
@@ -77,7 +77,7 @@ impl Config {
         }
     }
 
-    /// Takes the integrators on by a period.
+    /// Advances the integrators by one period.
     #[inline(always)] // in each period
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         match self {
@@ -87,9 +87,9 @@ impl Config {
         }
     }
 
-    /// Corrects [`Config::integrate`] for what the limit has cut off the voltage: the integrators go on
-    /// as if only the current had been wanted that the rest can bring, so that they are ready the
-    /// moment that less is wanted.
+    /// Anti-windup: corrects [`Config::integrate`] for the voltage that the limit cut off. The integrators
+    /// continue as if only the current within reach of the remaining voltage had been wanted, so they respond
+    /// at once when the demand falls.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         match self {
             Self::ObserverBased(c) => c.give_way(&mut state.observer_based, cut),
@@ -98,10 +98,10 @@ impl Config {
         }
     }
 
-    /// Sets the integrators so that [`Config::voltage`] is `u`: the regulator takes over from what
-    /// has applied that voltage, without a jump.
+    /// Presets the integrators so that [`Config::voltage`] is `u`: a bumpless takeover from whatever applied
+    /// that voltage.
     ///
-    /// The modified regulator takes over within a quarter of a turn of the q axis, with either sign.
+    /// The modified regulator takes over within a quarter turn of the q axis, with either sign.
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
         match self {
             Self::ObserverBased(c) => c.begin(&mut state.observer_based, u, wanted, fb),
@@ -110,7 +110,7 @@ impl Config {
         }
     }
 
-    /// Update of the coefficients that follow the speed, every few periods.
+    /// Updates the speed-dependent coefficients, every few periods.
     pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
         if let Self::Synchronous(c) = self {
             c.pace(&mut state.synchronous, omega, inductance);
@@ -118,15 +118,15 @@ impl Config {
     }
 }
 
-/// A current regulator in a control period: the one in use of all, or one that is known beforehand.
+/// A current regulator in a control period: the selected one, or one known at compile time.
 pub trait Regulator {
-    /// The voltage that brings the currents to their references, before any limit.
+    /// Returns the voltage that drives the currents to their references, before any limit.
     fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage>;
 
-    /// Takes the integrators on by a period; see [`Config::integrate`].
+    /// Advances the integrators by one period; see [`Config::integrate`].
     fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback);
 
-    /// Corrects that for what the limit has cut off; see [`Config::give_way`].
+    /// Corrects the integrators for what the limit cut off; see [`Config::give_way`].
     fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>);
 }
 

@@ -1,10 +1,9 @@
-//! The modified synchronous current regulator of the second paper, section 1.2.5 and figure 11:
-//! the controller of the q axis sets the voltage's length V, that of the d axis its phase δ ahead
-//! of the q axis.
+//! The modified synchronous current regulator of the second paper, section 1.2.5 and figure 11: the q-axis
+//! controller sets the voltage's length V, the d-axis controller its phase δ ahead of the q axis.
 //!
-//! It needs neither speed, inductance nor back-EMF. A phase moves the voltage along d by V·δ, so
-//! the d axis has the bandwidth that is asked for at the greatest speed, where V is greatest, and
-//! less of it below, where there is less to decouple.
+//! It needs neither speed, inductance nor back-EMF. The phase changes the d voltage by V·δ, so the d axis has
+//! its nominal bandwidth at the highest speed, where V is largest, and less below, where there is less to
+//! decouple.
 
 use fixed::types::extra::U28;
 
@@ -23,7 +22,7 @@ pub struct Config {
     pub k_i: Gain<Current, Voltage>,
     /// k_p of the phase, bandwidth·L over the back-EMF at `CTL_RPM_MAX`.
     pub phase_k_p: Gain<Current, Angle>,
-    /// k_i·T_s of the phase, bandwidth·R·T_s over the same.
+    /// k_i·T_s of the phase, bandwidth·R·T_s over the same back-EMF.
     pub phase_k_i: Gain<Current, Angle>,
     /// 1/k_p of the length.
     pub admittance: Gain<Voltage, Current>,
@@ -33,9 +32,9 @@ traced! {
     /// The integrators.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// Of the length V, which is negative against a back-EMF that is.
+        /// For the length V, which is negative against a negative back-EMF.
         pub length: Voltage,
-        /// Of the phase δ, within a quarter of a turn.
+        /// For the phase δ, within a quarter turn.
         pub phase: Angle,
     }
 }
@@ -43,13 +42,13 @@ traced! {
 const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
 
 impl Config {
-    /// The voltage of length V at the phase δ ahead of q, before any limit: (−V·sin δ, V·cos δ).
+    /// Returns the voltage of length V at phase δ ahead of q, before any limit: (−V·sin δ, V·cos δ).
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let length = self.length(state, wanted, fb);
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
         let phase = bounded(state.phase.plus(self.phase_k_p.held(e_d)));
         let SinCos { cos, sin } = SinCos::of(phase);
-        // 28 + 31 − 32 fraction bits; the length bounds both.
+        // 28 + 31 − 32 fraction bits; both components are within the length.
         Dq {
             d: -length.top(sin).scaled::<U28>(),
             q: length.top(cos).scaled(),
@@ -60,11 +59,11 @@ impl Config {
     fn length(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Voltage {
         let e_q = wanted.i.q.minus(fb.i.q);
         let length = state.length.plus(self.k_p.held(e_q)).plus(wanted.u_q);
-        // Twice the lowest product would not fit.
+        // Twice the product at the type's minimum would overflow.
         length.max(-Voltage::MAX)
     }
 
-    /// The current i_q* for which the voltage has the length `u_q`; the one that is wanted does not matter.
+    /// Returns the i_q* at which the voltage has the length `u_q`, whatever i_q* `wanted` has.
     pub fn current_at(
         &self,
         state: &State,
@@ -77,10 +76,10 @@ impl Config {
         self.admittance.held(u_q.minus(without))
     }
 
-    /// Takes the integrators on by a period.
+    /// Advances the integrators by one period.
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let step = self.k_i.held(wanted.i.q.minus(fb.i.q));
-        // The limit keeps the part along d: while it cuts, the phase alone holds i_d.
+        // The limit keeps the d component: while it cuts, the phase alone regulates i_d.
         let length = self.length(state, wanted, fb);
         let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
         let turn = self.phase_k_i.held(e_d);
@@ -88,14 +87,14 @@ impl Config {
         state.phase = bounded(state.phase.plus(turn));
     }
 
-    /// Takes back what the length has gone on by for the voltage that is cut off.
+    /// Takes back what the length integrated for the voltage that was cut off.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let beyond = beyond(self.admittance, cut);
         state.length = state.length.minus(self.k_i.held(beyond.q));
     }
 
-    /// Sets the integrators so that the voltage is `u`, where that lies within a quarter of a turn
-    /// of the q axis with either sign: everywhere.
+    /// Presets the integrators so that the voltage is `u`, which always lies within a quarter turn of the q
+    /// axis with one sign or the other.
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
         state.set(u);
         let length = state.length;
@@ -110,7 +109,7 @@ impl Config {
 }
 
 impl State {
-    /// Length and phase of a voltage; behind the d axis the length is negative.
+    /// Sets length and phase from a voltage; with a negative q component the length is negative.
     fn set(&mut self, u: Dq<Voltage>) {
         let length = magnitude(u.d, u.q);
         let behind = u.q.is_negative();
@@ -122,7 +121,7 @@ impl State {
     }
 }
 
-/// i_d's error as the phase sees it: with a negative length the other way.
+/// i_d's error as the phase sees it: a negative length flips its sign.
 fn leads_with(length: Voltage, error: Current) -> Current {
     if length.is_negative() {
         error.saturating_neg()

@@ -13,7 +13,7 @@ pub struct Config {
     pub resistance: Gain<Current, Voltage>,
     /// L, for speed times current.
     pub reactance: Gain<CurrentRate, Voltage>,
-    /// L/T_s, for a current's step in a period.
+    /// L/T_s, for a current step in one period.
     pub inductance: Gain<Current, Voltage>,
     /// L·k_pe.
     pub k_pe: Gain<Current, Voltage>,
@@ -33,7 +33,7 @@ traced! {
 }
 
 impl Config {
-    /// The voltage that brings the estimated currents to (i_d*, i_q*), before any limit (10).
+    /// Returns the voltage that drives the estimated currents to (i_d*, i_q*), before any limit (10).
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let u = self.forced(wanted, fb);
         Dq {
@@ -42,7 +42,7 @@ impl Config {
         }
     }
 
-    /// The current i_q* for which the voltage along q is `u_q`; the one that is wanted does not matter.
+    /// Returns the i_q* at which the q voltage is `u_q`, whatever i_q* `wanted` has.
     pub fn current_at(
         &self,
         state: &State,
@@ -55,7 +55,7 @@ impl Config {
         self.admittance.held(u_q.minus(without))
     }
 
-    /// (10) without the integrators. Once for all that asks for it.
+    /// (10) without the integrators. Not inlined: all callers share one copy.
     #[inline(never)]
     fn forced(&self, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
         let e = error(wanted, fb);
@@ -78,7 +78,7 @@ impl Config {
         Dq { d, q }
     }
 
-    /// Takes the integrators on by a period.
+    /// Advances the integrators by one period.
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
         let sigma = &mut state.sigma;
@@ -86,7 +86,7 @@ impl Config {
         sigma.q = sigma.q.minus(self.k_ie.held(e.q));
     }
 
-    /// Takes back what the integrators have gone on by for the voltage that is cut off.
+    /// Takes back what the integrators gained for the voltage that was cut off.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let beyond = beyond(self.admittance, cut);
         let sigma = &mut state.sigma;
@@ -94,7 +94,7 @@ impl Config {
         sigma.q = sigma.q.minus(self.k_ie.held(beyond.q));
     }
 
-    /// Sets the integrators so that the voltage is `u`.
+    /// Presets the integrators so that the voltage is `u`.
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
         let forced = self.forced(wanted, fb);
         state.sigma = Dq {
@@ -104,7 +104,7 @@ impl Config {
     }
 }
 
-/// e_d and e_q: the estimated currents against their references.
+/// e_d and e_q: estimated currents minus references.
 fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
         d: fb.i_hat.d.minus(wanted.i.d),

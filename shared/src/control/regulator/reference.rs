@@ -1,4 +1,5 @@
-//! What every current regulator is given: reference and feedback, and how it takes back what the limit cut off.
+//! Input common to all current regulators, reference and feedback, and the current behind a voltage that was
+//! cut off.
 
 use crate::control::inductance::Factor;
 use crate::control::transform::Dq;
@@ -7,20 +8,20 @@ use crate::trace::traced;
 use crate::units::{Current, Speed, Voltage, WideVoltage, narrow};
 
 traced! {
-    /// The current that is wanted.
+    /// The reference current.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Reference {
         /// i_d* and i_q*.
         pub i: Dq<Current>,
-        /// p_q*, its change in a period.
+        /// p_q*, its change per period.
         pub i_q_step: Current,
-        /// Voltage along q that the speed's reference alone asks for (second paper, figure 47).
+        /// Voltage along q fed forward from the speed reference (second paper, figure 47).
         pub u_q: Voltage,
     }
 }
 
 impl Reference {
-    /// A current along q that does not change.
+    /// Creates a constant current along q.
     pub fn steady(i_q: Current) -> Self {
         Self {
             i: Dq {
@@ -31,7 +32,7 @@ impl Reference {
         }
     }
 
-    /// This reference with another current along d.
+    /// Returns this reference with another current along d.
     #[must_use]
     pub fn with_i_d(self, i_d: Current) -> Self {
         Self {
@@ -43,7 +44,7 @@ impl Reference {
         }
     }
 
-    /// This reference with another current along q.
+    /// Returns this reference with another current along q.
     #[must_use]
     pub fn with_i_q(self, i_q: Current) -> Self {
         Self {
@@ -63,15 +64,15 @@ pub struct Feedback {
     pub omega: Speed,
     /// Measured currents.
     pub i: Dq<Current>,
-    /// Estimated currents; the measured ones where the observer estimates none.
+    /// Estimated currents, or the measured ones if the observer estimates none.
     pub i_hat: Dq<Current>,
-    /// Estimated back-EMF; (0, −ω̂·φ̂) where the observer estimates a flux.
+    /// Estimated back-EMF; (0, −ω̂·φ̂) if the observer estimates a flux.
     pub h_hat: Dq<WideVoltage>,
-    /// L over the inductance that the parameters state.
+    /// L over the stated inductance.
     pub inductance: Factor,
 }
 
-/// The current that the voltage that is cut off would have brought, by the loop's first order.
+/// Returns the current that the cut-off voltage would have produced in the first-order loop.
 #[inline(always)] // in the longest period
 pub(super) fn beyond(admittance: Gain<Voltage, Current>, cut: Dq<WideVoltage>) -> Dq<Current> {
     Dq {

@@ -1,8 +1,8 @@
-//! The synchronous current regulator of the second paper, section 1.2.5 and figure 10: a PI
-//! controller an axis on the measured currents, with the feed-forward that decouples the axes.
+//! The synchronous current regulator of the second paper, section 1.2.5 and figure 10: one PI controller per
+//! axis on the measured currents, with decoupling feed-forward.
 //!
-//! With the zero of each PI on the winding's pole (k_i/k_p = R/L) the loop is of first order, at
-//! the bandwidth that k_p = bandwidth·L sets.
+//! With each PI's zero on the winding's pole (k_i/k_p = R/L) the loop is first-order, at the bandwidth set by
+//! k_p = bandwidth·L.
 
 use super::reference::{Feedback, Reference};
 use crate::control::inductance::Factor;
@@ -18,7 +18,7 @@ pub struct Config {
     pub k_p: Multiplier<Current, WideVoltage>,
     /// k_i·T_s, bandwidth·R·T_s.
     pub k_i: Multiplier<Current, WideVoltage>,
-    /// L, speed to voltage over current.
+    /// L: from speed to voltage over current.
     pub reactance: Gain<Speed, Voltage>,
     /// Bandwidth·T_s.
     pub rate: Multiplier<Current, Current>,
@@ -30,10 +30,11 @@ traced! {
     /// The integrators.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// Of the voltage along d and q.
+        /// The voltage integrators of d and q.
         pub sigma: Dq<WideVoltage>,
-        /// The currents that the references bring, at the loop's first order: what is decoupled. They
-        /// have no noise, and the references themselves would cross the axes at a step.
+        /// The currents that the references produce in the first-order loop, used for decoupling. Unlike
+        /// measured currents they are free of noise; the references themselves would couple a step into the
+        /// other axis.
         pub model: Dq<Current>,
         /// ω̂·L.
         pub cross: Multiplier<Current, WideVoltage>,
@@ -41,18 +42,18 @@ traced! {
 }
 
 impl Config {
-    /// V_d and V_q of figure 10, before any limit:
+    /// Returns V_d and V_q of figure 10, before any limit:
     ///
     /// V_d = k_p·(i_d* − i_d) + σ_d − ω̂·L·i_q,
     /// V_q = k_p·(i_q* − i_q) + σ_q + ω̂·L·i_d + ω̂·φ̂ + u_q*,
     ///
-    /// where the last i_d and i_q are those of the model, and u_q* is the voltage that the reference brings: none but in
-    /// voltage mode.
+    /// where the last i_d and i_q are the model's, and u_q* is the reference's voltage, zero except in voltage
+    /// mode.
     #[inline(always)] // in each period
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let e = error(wanted, fb);
         let model = &state.model;
-        // Currents are within four units and k_p is below eight: no sum comes near 128.
+        // Currents are within four units and k_p is below eight: no sum gets near 128.
         let d = self.k_p.added(state.sigma.d, e.d);
         let q = self.k_p.added(state.sigma.q, e.q);
         let forward = wide(wanted.u_q).wrapping_sub(fb.h_hat.q);
@@ -62,7 +63,7 @@ impl Config {
         }
     }
 
-    /// The current i_q* for which V_q is `u_q`; the one that is wanted does not matter.
+    /// Returns the i_q* at which V_q is `u_q`, whatever i_q* `wanted` has.
     pub fn current_at(
         &self,
         state: &State,
@@ -75,7 +76,7 @@ impl Config {
         self.admittance.saturating_apply(wide(u_q).minus(without))
     }
 
-    /// Takes the integrators on by a period.
+    /// Advances the integrators by one period.
     #[inline(always)] // in each period
     pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
         let e = error(wanted, fb);
@@ -87,8 +88,8 @@ impl Config {
         model.q = self.rate.added(model.q, wanted.i.q.minus(model.q));
     }
 
-    /// Takes back what the integrators have gone on by for the current that the voltage that is cut
-    /// off would have brought, by the loop's first order.
+    /// Takes back what the integrators and the model gained for the current that the cut-off voltage would have
+    /// produced in the first-order loop.
     pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
         let beyond = Dq {
             d: self.admittance.saturating_apply(cut.d),
@@ -101,14 +102,14 @@ impl Config {
         model.q = self.rate.taken(model.q, beyond.q);
     }
 
-    /// Takes ω̂·L, every few periods.
+    /// Updates ω̂·L, every few periods.
     pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
-        // The range of the factor's type is that of a number with 28 fraction bits.
+        // The gain's output type has 28 fraction bits, as the multiplier has.
         let product = inductance.of(self.reactance.saturating_apply(omega));
         state.cross = Multiplier::from_bits(product.to_bits());
     }
 
-    /// Sets the integrators so that the voltage is `u`.
+    /// Presets the integrators so that the voltage is `u`.
     pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
         self.pace(state, fb.omega, fb.inductance);
         state.model = fb.i;
@@ -121,7 +122,7 @@ impl Config {
     }
 }
 
-/// The references against the measured currents.
+/// References minus measured currents.
 #[inline(always)] // in each period
 fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {

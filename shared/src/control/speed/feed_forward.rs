@@ -1,6 +1,6 @@
-//! The speed regulator of the second paper, figure 47: PI on the speed, a current in proportion to
-//! the square of the commanded speed, which is what a propeller takes, and a voltage in proportion
-//! to it, past the current regulator.
+//! The speed regulator of the second paper, figure 47: PI on the speed, plus two feed-forwards: a current
+//! proportional to the square of the commanded speed, the load of a propeller, and a voltage proportional to
+//! that speed, which bypasses the current regulator.
 
 use super::Input;
 use crate::control::regulator::Reference;
@@ -9,19 +9,19 @@ use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
 use crate::units::{Current, Speed, SpeedSquare, Voltage};
 
-/// Coefficients for one period of the outer loops, here T_s.
+/// Coefficients for one outer-loop period, here T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Proportional gain, speed to current.
     pub k_p: Gain<Speed, Current>,
     /// Integral gain times T_s.
     pub k_i: Gain<Speed, Current>,
-    /// K_FFi, the square of the speed to current.
+    /// K_FFi, square of the speed to current.
     pub k_ffi: Gain<SpeedSquare, Current>,
     /// K_FFv, speed to voltage: the flux.
     pub k_ffv: Gain<Speed, Voltage>,
-    /// The part of K_FFv times the measured speed that the current regulator's own feed-forward brings
-    /// already; zero for the modified one, which has none.
+    /// The part of K_FFv times the measured speed that the current regulator's own feed-forward already
+    /// supplies; zero for the modified one, which has none.
     pub own: Gain<Speed, Voltage>,
 }
 
@@ -29,14 +29,14 @@ traced! {
     /// The integrator.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// Of the current.
+        /// The integrator's share of the current.
         pub sigma: Current,
     }
 }
 
 impl Config {
-    /// I_qr and the voltage that is fed forward, for the commanded speed ω_r behind its slew limit.
-    /// The integrator stands still where the current is at a bound and the error pushes it further.
+    /// Returns I_qr and the feed-forward voltage for the commanded speed ω_r after its slew limit. The
+    /// integrator holds while the current is at a bound and the error pushes further.
     #[inline(always)] // in the longest period
     pub(super) fn current(&self, state: &mut State, omega_r: Speed, input: &Input) -> Reference {
         let omega = input.speed;
@@ -64,12 +64,12 @@ impl Config {
         }
     }
 
-    /// The integrator's part of a current at this speed.
+    /// Returns the integrator's share of a current at this speed.
     pub(super) fn remainder(&self, omega: Speed, i_q: Current) -> Current {
         i_q.minus(self.propeller(omega))
     }
 
-    /// K_FFi·ω_r², against the rotation.
+    /// K_FFi·ω_r² with the speed's sign: the propeller's load.
     #[inline(always)] // in the longest period
     fn propeller(&self, omega_r: Speed) -> Current {
         let square = omega_r.top(omega_r.saturating_abs());

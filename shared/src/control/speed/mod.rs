@@ -1,4 +1,4 @@
-//! Speed regulators: from a speed command to the current that is wanted (`CTL_SPEED`).
+//! Speed regulators: from a speed command to the reference current (`CTL_SPEED`).
 
 pub mod feed_forward;
 mod input;
@@ -19,7 +19,7 @@ pub struct Config {
     pub law: Law,
 }
 
-/// The regulators and their coefficients.
+/// A regulator and its coefficients.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// First paper, (8) and (9).
@@ -45,7 +45,8 @@ traced! {
 }
 
 impl Config {
-    /// One of the outer loops' periods: ω* moves towards the command, and the current takes the speed to ω*.
+    /// Runs one outer-loop period: moves ω* towards the command and returns the current that takes the speed to
+    /// ω*.
     pub fn current(&self, state: &mut State, input: &Input) -> Reference {
         let step = state.planner.plan(&self.planner, input.command);
         match &self.law {
@@ -63,7 +64,7 @@ impl Config {
         }
     }
 
-    /// Begins, or goes on, at this speed with this current, without a jump.
+    /// Starts or resumes at this speed with this current, bumplessly.
     pub fn begin(&self, state: &mut State, speed: Speed, i_q: Current) {
         state.planner = planner::State::begin(speed);
         match &self.law {

@@ -1,8 +1,8 @@
 //! The speed regulator (8) and the current reference (9) of the first paper.
 //!
-//! To (8), which has no feed-forward "for simplicity", the torque that ω̇* takes is added, and ω* is
-//! conditioned: where the current is at a bound or the voltage is, ω* moves only as fast as the
-//! torque that is left lets it, so that nothing winds up. Without inertia it is (8) as published.
+//! (8) leaves out feed-forward "for simplicity"; here the torque of ω̇* is added and ω* is
+//! conditioned: where the current or the voltage is at its limit, ω* moves only as fast as the
+//! remaining torque allows, so nothing winds up. Without inertia this is (8) as published.
 
 use fixed::types::I0F32;
 
@@ -14,25 +14,25 @@ use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
 use crate::units::{Current, Speed, Torque, Voltage, stated_torque};
 
-/// From here on the error is acted on in full.
+/// Above this the error acts in full.
 const ALMOST_HALF: I0F32 = I0F32::from_bits(i32::MAX - (1 << 26));
 
-/// Coefficients for one period of the outer loops, here T_s.
+/// Coefficients for one outer-loop period, here T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// k_pω.
     pub k_p: Gain<Speed, Torque>,
     /// k_iω·T_s.
     pub k_i: Gain<Speed, Torque>,
-    /// J/T_s: ω*'s step to torque.
+    /// J/T_s: from a step of ω* to torque.
     pub inertia: Gain<Speed, Torque>,
-    /// T_s/J; zero without conditioning.
+    /// T_s/J; zero disables conditioning.
     pub inertia_inverse: Gain<Torque, Speed>,
-    /// Speed to half of the share of the error that is acted on, where that is below one. At low
-    /// speed an R stated too high closes a loop through the estimate, and its gain is that of the
-    /// regulator.
+    /// Speed to half the share of the error that is acted on, where that share is below one. At low
+    /// speed an R stated too high closes a loop through the estimate, whose gain is the
+    /// regulator's.
     pub trust: Gain<Speed, I0F32>,
-    /// True if the current regulator reads p_q*, the change of i_q*.
+    /// The current regulator uses p_q*, the change of i_q*.
     pub with_step: bool,
 }
 
@@ -46,9 +46,9 @@ traced! {
 }
 
 impl Config {
-    /// The current that takes the speed to its reference (8), (9), within the bounds.
+    /// Returns the current that takes the speed to its reference (8), (9), within the bounds.
     ///
-    /// `step` is what the planner wants ω* to do in this period, and `slew` the most that it may.
+    /// `step` is the planner's step of ω* for this period, and `slew` its limit.
     #[inline(always)] // in the longest period
     pub(super) fn current(
         &self,
@@ -84,7 +84,7 @@ impl Config {
         if !self.with_step {
             return Reference::steady(i_q);
         }
-        // ω̈* is left out: at the trajectory's corners it would be a pulse of voltage.
+        // ω̈* is left out: at the trajectory's corners it would be a voltage pulse.
         let periods = PERIODS as i32;
         let torque_step = self
             .k_p
@@ -100,9 +100,9 @@ impl Config {
         }
     }
 
-    /// The step of ω* that the torque that is left can follow, where the current `over` cannot be
-    /// had. The error then goes on as if nothing were limited, and so may the integrator, unless
-    /// that step is beyond the slew.
+    /// Returns the step of ω* that the remaining torque can follow when the current `over` is
+    /// unavailable. The error then continues as if nothing were limited, and so may the integrator,
+    /// unless that step exceeds the slew.
     #[cold]
     fn conditioned(
         &self,
