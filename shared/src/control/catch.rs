@@ -1,29 +1,27 @@
-//! The rotor's angle and speed from the voltages of the motor's terminals while the bridge is off
-//! (second paper, 2.2.1: without current the terminal's voltage is the back-EMF).
+//! Flying start: the rotor's angle and speed from the terminal voltages while the bridge is off (second paper,
+//! 2.2.1: without current the terminal voltage is the back-EMF).
 //!
-//! The readings are not the back-EMF itself. Dividers hold the terminals about ground, where a
-//! converter reads nothing negative, so a small back-EMF shows its positive half-waves only. A
-//! larger one turns on the low side's diode of the lowest phase, and all readings stand on that
-//! phase's diode drop: `e_x − e_min − V_d`. A large one may be above the converter's range.
+//! The readings are not the back-EMF itself. Dividers hold the terminals around ground, where the ADC reads nothing
+//! negative, so a small back-EMF shows only its positive half-waves. A larger one turns on the low-side diode of
+//! the lowest phase, and all readings sit on that diode's drop: `e_x − e_min − V_d`. A large one may exceed the
+//! ADC's range.
 //!
-//! The observer therefore predicts readings, through the same clamps, from an angle θ_e, a speed ω
-//! and an amplitude E, and corrects by what differs:
+//! The observer therefore predicts readings, through the same clamps, from an angle θ_e, a speed ω and an
+//! amplitude E, and corrects by the differences:
 //!
-//! - A phase that stands at a clamp in prediction and reading says nothing.
-//! - Of the others, the derivatives by θ_e and by E give the correction of each (Gauss-Newton):
-//!   `compare.rs`.
-//! - θ_e and ω are the line that fits all innovations so far best, by recursive least squares: of
-//!   the weights w = Σ(∂r/∂θ_e)²/E² and their ages, S_0 = Σw, S_1 = Σw·age, S_2 = Σw·age² say
-//!   how much of an innovation is the angle's and how much the speed's. So the gains fall as
-//!   knowledge grows, rise again over a gap (in a sixth of a turn only one half-wave shows, near its
-//!   top, and the angle is hardly seen), and the sums say how certain the speed is: `learn.rs`.
-//! - The sums forget with a time constant of one electrical turn, so that a rotor that slows down is
-//!   followed: a propeller coasts with a time constant of a second.
+//! - A phase at a clamp in both prediction and reading carries no information.
+//! - For the others, the derivatives by θ_e and by E give each correction (Gauss-Newton): `compare.rs`.
+//! - θ_e and ω are the line that best fits all innovations so far, by recursive least squares. Of the weights
+//!   w = Σ(∂r/∂θ_e)²/E² and their ages, S_0 = Σw, S_1 = Σw·age and S_2 = Σw·age² split an innovation between angle
+//!   and speed. So the gains fall as knowledge grows, and rise again over a gap (for a sixth of a turn only one
+//!   half-wave shows, near its peak, where the angle is hardly visible), and the sums tell the speed's uncertainty:
+//!   `learn.rs`.
+//! - The sums forget with a time constant of one electrical turn, so that the observer follows a decelerating
+//!   rotor: a propeller coasts with a time constant of a second.
 //!
-//! A period with the bridge off is to be no longer than one that drives, so the work is done in
-//! four periods, a stage in each (`Stage`). A slow rotor, whose readings are small in their noise, is
-//! compared with the mean of four readings. Ages are in such looks, and so are all times of the
-//! configuration.
+//! A bridge-off period must take no longer than a driving one, so the work is spread over four periods, one stage
+//! each (`Stage`). For a slow rotor, whose readings are small against the noise, the mean of four readings is
+//! compared. Ages, and all times in the configuration, count such looks.
 
 mod compare;
 mod learn;
@@ -38,18 +36,17 @@ use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Speed};
 use compare::Difference;
 
-/// Highest reading from which an observation may begin, three times the noise.
+/// Least highest reading at which an observation may begin: three times the noise.
 const BEGIN: I17F15 = I17F15::lit("6");
 
 /// The result of observing the rotor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rotor {
-    /// Not enough, yet.
+    /// Not enough known yet.
     Unknown,
-    /// It stands, or turns too slowly to be seen.
+    /// At rest, or too slow to see.
     Standing,
-    /// It turns: the electrical angle of its flux at this sample and its speed, negative where it
-    /// turns backwards.
+    /// Turning: electrical angle of the flux at this sample and speed, negative when backwards.
     Turning {
         /// Angle of the flux.
         theta: Angle,
@@ -59,7 +56,7 @@ pub enum Rotor {
 }
 
 impl Trace for Rotor {
-    /// As many words whatever is known, so that a word's place tells what it is.
+    /// A constant number of words whatever is known, so that a word's position identifies it.
     fn trace(&self, out: &mut impl FnMut(u32)) {
         let (kind, theta, omega) = match *self {
             Self::Unknown => (0, Angle::ZERO, Speed::ZERO),
@@ -72,11 +69,11 @@ impl Trace for Rotor {
     }
 }
 
-/// Takes one sample of the terminals a, b, c with the bridge off and says what is known by now.
+/// Processes one sample of terminals a, b, c with the bridge off; returns what is known so far.
 #[inline(never)] // only some periods
 pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) -> Rotor {
     state.theta = state.theta.wrapping_add(state.omega.over_period());
-    // 12 bits and their fraction, whatever is above.
+    // 12 bits plus fraction, whatever lies above.
     let held = |v: AdcCounts| I17F15::from_bits(v.to_bits() >> 1 & ((1 << 27) - 1));
     let [a, b, c] = terminals;
     let readings @ [a, b, c] = [held(a), held(b), held(c)];
@@ -105,7 +102,7 @@ pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) ->
     }
 }
 
-/// A look at the terminals.
+/// Runs the look stage on the terminals.
 fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let [a, b, c] = readings;
     let highest = I16F16::from_bits(a.max(b).max(c).to_bits() << 1);
@@ -119,7 +116,7 @@ fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     }
 }
 
-/// One look of a beginning: two of them, a period apart, where the back-EMF is large.
+/// Runs one look of a beginning: two looks, a period apart, where the back-EMF is large.
 #[cold]
 #[inline(never)] // only some periods
 fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
@@ -135,7 +132,7 @@ fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
         begin(config, state);
     } else {
         state.omega = theta.wrapping_sub(before).per_period();
-        // Two looks of weight 1.5 each, a quarter of the usual time apart.
+        // Two looks of weight 1.5 each, a quarter of the usual interval apart.
         state.weight = const { I20F12::lit("3") };
         state.ages = [3 << (SUM_FRACTION - 3), 3 << (SUM_FRACTION - 5)];
         state.amplitude_weight = state.weight;
@@ -148,21 +145,21 @@ fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     }
 }
 
-/// Angle and amplitude of the vector that three readings make, or `None` where they do not: two of
-/// them must be clearly above the clamp, the lower one at three tenths of the higher or more.
+/// Returns angle and amplitude of the vector formed by three readings. `None` unless two are clearly above the
+/// clamp, the lower of them at least three tenths of the higher.
 fn vector(config: &Config, [a, b, c]: [I17F15; 3]) -> Option<(Angle, AdcCounts)> {
     let highest = a.max(b).max(c);
     let lowest = a.min(b).min(c);
     let middle = a + b + c - highest - lowest;
-    // 39/128 of it.
+    // Actually 39/128.
     let three_tenths = (highest >> 2) + (highest >> 4) - (highest >> 7);
     if highest < BEGIN || middle < three_tenths {
         return None;
     }
-    // Without the diode the phases' sum is zero; with it the lowest stands at its drop, and the
-    // others' sum is above that.
+    // Without the diode the phases sum to zero; with it the lowest sits at the diode's drop, and the other two sum
+    // to more than that.
     let below = (highest + middle).min(I17F15::from_bits(config.diode.to_bits() >> 1));
-    // Of equal lowest readings one is enough.
+    // If several readings tie for the lowest, one suffices.
     let (a, b, c) = if a == lowest {
         (-below, b, c)
     } else if b == lowest {
@@ -170,7 +167,7 @@ fn vector(config: &Config, [a, b, c]: [I17F15; 3]) -> Option<(Angle, AdcCounts)>
     } else {
         (a, b, -below)
     };
-    // 3/2 of the components, and of beta half of that: to the angle only their ratio matters.
+    // 3/2 of the components, half of that for beta: the angle needs only their ratio.
     let alpha: I17F15 = a - ((b + c) >> 1);
     let beta: I17F15 = (b - c).top(HALF_ROOT_3);
     let theta = atan2_turns(
@@ -180,15 +177,15 @@ fn vector(config: &Config, [a, b, c]: [I17F15; 3]) -> Option<(Angle, AdcCounts)>
     let along = SinCos::of(theta);
     let length = alpha.top(along.cos) + (beta + beta).top(along.sin);
     let third = length.top(THIRD);
-    // Of 14 fraction bits; two thirds of 16.
+    // From 14 to 16 fraction bits, times two: two thirds.
     Some((theta, AdcCounts::from_bits(third.to_bits() << 3)))
 }
 
-/// A speed about zero, as uncertain as this amplitude lets it be.
+/// Begins with a speed of zero, as uncertain as this amplitude allows.
 fn begin(config: &Config, state: &mut State) {
     state.omega = Speed::ZERO;
-    // (σ/E)² over the speed's variance, which with |ω| of E is (σ·(E/|ω|)/E²)²: the root with 8
-    // fraction bits. E is at least 4 counts, of which 4 fraction bits are kept.
+    // (σ/E)² over the speed's variance, which for |ω| as of E is (σ·(E/|ω|)/E²)²: the root with 8 fraction bits. E
+    // is at least 4 counts, of which 4 fraction bits are kept.
     let divisor = (state.amplitude.to_bits() >> 12) as u32;
     let root = (((config.prior << 12) / divisor) << 4) / divisor;
     let root = u64::from(root.min(1 << 22));
@@ -197,7 +194,7 @@ fn begin(config: &Config, state: &mut State) {
     state.amplitude_weight = I20F12::ZERO;
 }
 
-/// Every later look.
+/// Runs every later look.
 fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let (theta, readings) = if state.is_slow() {
         let [before_a, before_b, before_c] = state.readings;
@@ -207,7 +204,7 @@ fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
             (before_b + b) >> LOOK_SHIFT,
             (before_c + c) >> LOOK_SHIFT,
         ];
-        // Between the second and the third of them.
+        // Midway between the second and the third reading.
         let back = state.omega.wrapping_add(state.omega >> 1);
         (state.theta.wrapping_sub(back.over_period()), mean)
     } else {
@@ -219,7 +216,7 @@ fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     state.stage = Stage::Weigh;
 }
 
-/// √3/4, which with a sum of its product makes √3/2.
+/// √3/4; adding the product to itself gives √3/2.
 const HALF_ROOT_3: I0F32 = I0F32::lit("0.4330127018922");
 
 /// A third.

@@ -1,4 +1,4 @@
-//! Comparison of a look with its prediction.
+//! Compares a look with its prediction.
 
 use fixed::types::{I2F30, I4F28, I17F15, I19F13};
 
@@ -7,14 +7,14 @@ use crate::math::{SinCos, TopProduct};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle};
 
-/// The highest reading of the converter's 12 bits: it may be a clamp.
+/// Highest unambiguous reading of the 12-bit ADC; from here on it may be clamped.
 const CLAMP: I17F15 = I17F15::lit("4094");
 
 traced! {
-    /// The readings against the prediction, in terms of what would correct it.
+    /// The difference between readings and prediction, as the corrections it calls for.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub(super) struct Difference {
-        /// Sum of the errors, in counts, each times its derivative by the angle over E.
+        /// Sum of the errors, in counts, each times its derivative by the angle, over E.
         pub(super) by_angle: I19F13,
         /// Sum of the squares of these derivatives.
         pub(super) angle_weight: I4F28,
@@ -27,11 +27,12 @@ traced! {
     }
 }
 
-/// A phase: what it sees of a vector of length one, how that changes with the vector's angle, and
-/// what its terminal shows.
+/// A phase: its component of a unit vector, that component's derivative by the vector's angle, and
+/// its terminal's reading.
 type Phase = (I2F30, I2F30, I17F15);
 
-/// Compares readings with what a vector at `theta` of this amplitude makes the terminals show.
+/// Compares readings with the terminal voltages that a vector of this amplitude at `theta`
+/// produces.
 pub(super) fn compare(
     diode: AdcCounts,
     theta: Angle,
@@ -61,7 +62,7 @@ pub(super) fn compare(
     let (low_seen, low_turned, low_reading) = lowest;
     // 16 + 30 − 32 fraction bits.
     let counts = |seen: I2F30| I17F15::from_bits(amplitude.top(seen).to_bits() << 1);
-    // The readings stand on the diode's drop of the lowest phase, if it conducts.
+    // The readings sit on the lowest phase's diode drop, if that diode conducts.
     let lift = counts(-low_seen) - I17F15::from_bits(diode.to_bits() >> 1);
     let (lift, base_seen, base_turned) = if lift > I17F15::ZERO {
         (lift, low_seen, low_turned)
@@ -81,7 +82,7 @@ pub(super) fn compare(
         }
         let error = reading - predicted.max(I17F15::ZERO).min(CLAMP);
         sum.misfit += error.abs();
-        // A little above zero where nothing is predicted is noise; half the amplitude is not.
+        // Slightly above zero where nothing is predicted is noise; half the amplitude is not.
         if predicted > I17F15::ZERO || reading >= half_amplitude {
             // At most √3.
             let (by_amplitude, by_angle) = (seen - base_seen, turned - base_turned);

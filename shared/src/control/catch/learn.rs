@@ -1,4 +1,4 @@
-//! The estimate of the rotor from the looks so far, by recursive least squares, and the quality of its fit.
+//! The rotor estimate from the looks so far, by recursive least squares, and the quality of its fit.
 
 use fixed::types::{I0F32, I16F16, I17F15, I20F12};
 
@@ -6,14 +6,14 @@ use super::{Config, LOOK_SHIFT, SUM_FRACTION, Stage, State};
 use crate::math::TopProduct;
 use crate::units::{Angle, Speed};
 
-/// Speed of the fastest forgetting, a sixteenth of a turn a period with 32 fraction bits.
+/// Speed of the fastest forgetting, a sixteenth of a turn per period with 32 fraction bits.
 const FORGET_MAX: i32 = 1 << 28;
 
-/// Least S_0 with which the angle is corrected, a sixteenth of one good look's weight: below,
-/// nothing is known of it.
+/// Smallest S_0 at which the angle is corrected, a sixteenth of one good look's weight; below it the angle is
+/// unknown.
 const WEIGHT_MIN: I20F12 = I20F12::lit("0.0625");
 
-/// Least sum of the weights of E with which it is corrected.
+/// Smallest sum of E's weights at which E is corrected.
 const AMPLITUDE_WEIGHT_MIN: I20F12 = I20F12::lit("0.25");
 
 /// Bounds of E, counts.
@@ -25,17 +25,17 @@ const FAR: u64 = 1_846_835_937;
 /// 1/2π with 32 fraction bits.
 const TURNS_PER_RADIAN: i32 = 683_565_276;
 
-/// (σ/(2π·0.01))², counts², for a speed that is known to 1 % with the readings' noise σ of 2 counts.
+/// (σ/(2π·0.01))², counts², for a speed known to 1 % with a reading noise σ of 2 counts.
 const WANTED: u64 = 1012;
 
-/// Share of the newest look in the residual's mean, as a shift.
+/// Weight of the newest look in the residual's mean, as a right shift.
 const RESIDUAL_SHIFT: u32 = 3;
 
-/// Residual that noise alone leaves at most: three magnitudes are 0.8·σ each in the mean, 4.8 counts,
-/// and their mean over eight looks strays by 0.5.
+/// Largest residual that noise alone leaves: three magnitudes average 0.8·σ each, 4.8 counts in all, and their mean
+/// over eight looks scatters by 0.5.
 const QUIET: I17F15 = I17F15::lit("7");
 
-/// A period after a look.
+/// Runs the stage of a period after a look.
 #[inline(never)] // only some periods
 pub(super) fn learn(config: &Config, state: &mut State) {
     match state.stage {
@@ -55,14 +55,14 @@ pub(super) fn learn(config: &Config, state: &mut State) {
     }
 }
 
-/// Makes the sums a look older, forgets a share of them, and adds the last look's weights: what that
-/// says of the speed.
+/// Ages the sums by one look, forgets a share of them and adds the last look's weights; derives the gains and the
+/// spread of the ages.
 fn weigh(config: &Config, state: &mut State) {
     let omega = state.omega.to_bits().saturating_abs().min(FORGET_MAX);
     // A turn is 1/(4·ω) looks.
     let share = (omega << LOOK_SHIFT).max(config.forget_min.to_bits());
     let share = I0F32::from_bits(share);
-    // Sixteen fraction bits of it: S_2 has up to 47 bits.
+    // Sixteen fraction bits of the share: S_2 has up to 47 bits.
     let of_ages = (share.to_bits() >> 16) as u32;
     let keep = |sum: i64| sum - ((sum as u64 * u64::from(of_ages)) >> 16) as i64;
     let [s_1, s_2] = state.ages;
@@ -82,7 +82,7 @@ fn weigh(config: &Config, state: &mut State) {
     let mean_age = quotient((s_1 >> 6) as i32, weight, 18);
     let moment = (s_1 as u64 * mean_age as u64) >> SUM_FRACTION;
     let spread = (s_2 - moment as i64).max(0) as u64;
-    // At most 1 with 30 fraction bits. A large spread needs no fraction of its own.
+    // At most 1 with 30 fraction bits. A large spread needs no fraction.
     (state.spread, state.speed_gain) = if spread >> 32 != 0 {
         let whole = (spread >> 16) as u32;
         (whole.min(u32::MAX >> 4) << 4, quotient(mean_age, whole, 14))
@@ -93,20 +93,20 @@ fn weigh(config: &Config, state: &mut State) {
     state.mean_age = mean_age;
 }
 
-/// Corrects the vector by what the last look has difference.
+/// Corrects angle, speed and amplitude by the last look's difference.
 fn correct(state: &mut State) {
     let amplitude = state.amplitude.to_bits();
     if state.weight >= WEIGHT_MIN {
-        // The innovation, of 13 and 16 fraction bits: 24 bits, at most 4 radians; as turns 28.
+        // The innovation, from operands with 13 and 16 fraction bits: 24 bits, at most 4 radians; in turns 28.
         let most = amplitude >> 1;
         let by_angle = state.difference.by_angle.to_bits().max(-most).min(most);
         let radians = quotient(by_angle, amplitude as u32, 27);
         let turns = ((i64::from(radians << 4) * i64::from(TURNS_PER_RADIAN)) >> 32) as i32;
-        // 30 + 28 fraction bits: a look's 32, and a quarter of that a period.
+        // 30 + 28 fraction bits to 32 per look; per period a quarter of that.
         let faster = (i64::from(state.speed_gain) * i64::from(turns)) >> 26;
         let omega = Speed::from_bits((faster >> LOOK_SHIFT) as i32);
-        // k_θ = 1/S_0 + mean age·k_ω; the speed's correction acts since the look, two periods ago,
-        // or since the middle of four readings.
+        // k_θ = 1/S_0 + mean age·k_ω. The speed correction counts from the look, two periods ago, or from the
+        // middle of four readings.
         let older = (faster * i64::from(state.mean_age)) >> SUM_FRACTION;
         let ahead = quotient(turns, state.weight.to_bits() as u32, 16).wrapping_add(older as i32);
         let since = if state.is_slow() { 7 } else { 4 };
@@ -123,31 +123,31 @@ fn correct(state: &mut State) {
     }
 }
 
-/// Sees whether the speed is known to 1 % by what has been seen, over nearly half a turn, and
-/// amplitude, speed and residual fit each other.
+/// Judges whether the readings pin the speed to 1 %, over nearly half a turn, and whether amplitude, speed and
+/// residual agree.
 fn judge(config: &Config, state: &mut State) {
     state.residual += (state.difference.misfit - state.residual) >> RESIDUAL_SHIFT;
     let omega = state.omega.magnitude_bits();
     let a_look = omega.min(u32::MAX >> LOOK_SHIFT) << LOOK_SHIFT;
     let amplitude = state.amplitude.to_bits() as u32;
-    // The speed's standard deviation is σ/(E·√spread) radians a look: (E·ω)² > WANTED/spread with ω in turns a look, four times that a period. 16 fraction bits, and at most 64 counts: with as
-    // many a spread of one is enough. Eight fraction bits of the square are left out.
+    // The speed's standard deviation is σ/(E·√spread) radians per look: (E·ω)² > WANTED/spread with ω in turns per
+    // look, four times that per period. 16 fraction bits, and at most 64 counts, at which a spread of one suffices.
+    // Drops eight fraction bits of the square.
     let slope = ((u64::from(amplitude) * u64::from(a_look)) >> 32).min(1 << 22);
     let wanted = WANTED << (32 - 8);
-    // A mean of four readings has half of their noise.
+    // The mean of four readings has half the noise.
     let wanted = wanted >> if state.is_slow() { 2 } else { 0 };
-    // Over a gap in the half-waves a known speed fades: half of that is enough.
+    // Over a gap between half-waves a known speed fades: half of that suffices.
     let wanted = wanted >> u32::from(state.fitting > 0);
     let precise = ((slope * slope) >> 8) * u64::from(state.spread.min(1 << 24)) > wanted;
-    // 0.43 turns since the observation has begun.
+    // 0.43 turns since the observation began.
     let far = u64::from(a_look) * u64::from(state.looks) > FAR;
     let known = precise && far;
     // A flux between half and twice the stated one.
     let expected = ((u64::from(config.emf) * u64::from(omega)) >> 32) as u32;
     let made = amplitude >> 8;
     let fits = 2 * made > expected && made < 2 * expected;
-    // And three sixteenths of the amplitude for what the model leaves out: the diode's drop depends
-    // on its current.
+    // Plus three sixteenths of the amplitude for unmodelled effects: the diode drop depends on its current.
     let left_out = I17F15::from_bits((amplitude >> 4) as i32 + (amplitude >> 5) as i32);
     let quiet = state.residual < QUIET + left_out;
     if known && fits && quiet {
@@ -162,10 +162,10 @@ fn judge(config: &Config, state: &mut State) {
     }
 }
 
-/// `a·2^fraction/by`, within 2^-15 of its value, of which the lower 32 bits are kept; `by` is not 0
-/// and `fraction` at most 33.
+/// Returns the lower 32 bits of `a·2^fraction/by`, within 2^-15 of its value. `by` must not be 0, and `fraction` at
+/// most 33.
 ///
-/// One division of 32 bits by 16: of 64 bits the chip has none.
+/// Uses one 32-by-16-bit division: the chip has no 64-bit one.
 #[inline(never)] // only some periods
 fn quotient(a: i32, by: u32, fraction: u32) -> i32 {
     let zeros = by.leading_zeros();

@@ -1,4 +1,4 @@
-//! The configuration and the state of the observation.
+//! Configuration and state of the observation.
 
 use fixed::types::{I0F32, I17F15, I20F12};
 
@@ -14,55 +14,53 @@ pub(super) const LOOK_SHIFT: u32 = 2;
 /// The observer's coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Back-EMF's amplitude that the stated flux gives, in counts of the terminals with 8 fraction
-    /// bits, over the speed in turns a period.
+    /// Amplitude of the back-EMF for the stated flux, in terminal counts with 8 fraction bits, over the speed in
+    /// turns per period.
     pub emf: u32,
-    /// A diode's drop.
+    /// Forward drop of a diode.
     pub diode: AdcCounts,
-    /// Noise times the amplitude a radian per look, counts²: (E/|ω|)·σ, which makes the first
-    /// guess of the speed's uncertainty.
+    /// Noise times the amplitude per radian per look, counts²: (E/|ω|)·σ, for the initial uncertainty of the speed.
     pub prior: u32,
-    /// Slowest forgetting, a share a look.
+    /// Slowest forgetting, a share per look.
     pub forget_min: I0F32,
-    /// Mean of the highest reading below which the rotor stands, or turns so slowly that it can be
-    /// aligned.
+    /// Mean highest reading below which the rotor stands, or turns slowly enough to align.
     pub standing: AdcCounts,
-    /// Share of a new look in that mean.
+    /// Weight of a new look in that mean.
     pub level_share: I0F32,
-    /// Looks in a row for which all must fit before the rotor is known.
+    /// Consecutive looks that must fit before the rotor counts as known.
     pub sure_looks: u32,
-    /// Looks for which something may not fit before the observation begins anew.
+    /// Looks that may fail to fit before the observation restarts.
     pub lost_looks: u32,
 }
 
 traced! {
-    /// A period's part in a look.
+    /// The part of a look that runs in a period.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub(super) enum Stage {
-        /// It compares the readings with the prediction.
+        /// Compares the readings with the prediction.
         Look,
-        /// It finds by how much angle and speed are to be corrected for what differs.
+        /// Computes the gains of the angle and speed corrections.
         Weigh,
-        /// It corrects them, and the amplitude.
+        /// Corrects angle, speed and amplitude.
         Correct,
-        /// It sees whether all fits.
+        /// Judges whether everything fits.
         Judge,
     }
 }
 
 traced! {
-    /// The state from sample to sample.
+    /// State from sample to sample.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// Mean of the highest reading.
         pub(super) level: AdcCounts,
-        /// This period's part.
+        /// This period's stage.
         pub(super) stage: Stage,
-        /// Sum of the readings after the last look.
+        /// Sum of the readings since the last look.
         pub(super) readings: [I17F15; 3],
         /// Looks of this observation; 0 while there is none.
         pub(super) looks: u32,
-        /// θ_e, the angle of the back-EMF's vector at this sample.
+        /// θ_e, the angle of the back-EMF vector at this sample.
         pub(super) theta: Angle,
         /// ω.
         pub(super) omega: Speed,
@@ -76,26 +74,26 @@ traced! {
         pub(super) amplitude_weight: I20F12,
         /// Sum of the squared ages about their mean, looks².
         pub(super) spread: u32,
-        /// Mean of the errors' magnitudes, summed over the phases.
+        /// Mean of the error magnitudes, summed over the phases.
         pub(super) residual: I17F15,
-        /// The result of the last look.
+        /// Result of the last look.
         pub(super) difference: Difference,
         /// k_ω, 30 fraction bits.
         pub(super) speed_gain: i32,
         /// S_1/S_0, looks with 12 fraction bits.
         pub(super) mean_age: i32,
-        /// Looks in a row for which all fitted.
+        /// Consecutive looks that fitted.
         pub(super) fitting: u32,
-        /// Looks for which something did not.
+        /// Looks that did not.
         pub(super) unfitting: u32,
     }
 }
 
 impl State {
-    /// Nothing known.
+    /// Creates the state in which nothing is known.
     pub fn new(config: &Config) -> Self {
         Self {
-            // Twice the threshold: a resting rotor is told from one that has not been seen.
+            // Twice the threshold, which tells a resting rotor from one not yet seen.
             level: config.standing.saturating_mul_int(2),
             stage: Stage::Look,
             readings: [I17F15::ZERO; 3],
@@ -116,7 +114,7 @@ impl State {
         }
     }
 
-    /// Begins anew, but for the mean that tells a resting rotor.
+    /// Restarts the observation; keeps the mean that tells a resting rotor.
     pub fn restart(&mut self) {
         self.stage = Stage::Look;
         self.looks = 0;
@@ -128,20 +126,20 @@ impl State {
 }
 
 impl State {
-    /// Returns true if the next sample is compared with what is expected of a rotor that is followed. The one after
-    /// it is not.
+    /// Returns true if the next sample will be compared with the prediction for a tracked rotor. The one after it
+    /// will not.
     pub fn is_looking(&self) -> bool {
         self.stage == Stage::Look && self.looks >= 2
     }
 
-    /// Returns true if looks are at the mean of four readings.
+    /// Returns true if looks use the mean of four readings.
     pub(super) fn is_slow(&self) -> bool {
         self.omega.saturating_abs() < SLOW
     }
 
-    /// Returns true if there is no vector yet, or a large one and no speed: of a large back-EMF the
-    /// difference of two vectors is the speed, since the prediction of a rotor at rest may be too far
-    /// off. A small one is of a slow rotor, and too noisy for that.
+    /// Returns true if there is no vector yet, or a large one without a speed. For a large back-EMF the difference
+    /// of two vectors gives the speed, because a prediction from standstill may be too far off; a small one means a
+    /// slow rotor and is too noisy for that.
     pub(super) fn seeks(&self, config: &Config) -> bool {
         self.looks == 0 || self.looks == 1 && self.amplitude >> 1 > config.diode
     }
@@ -150,5 +148,5 @@ impl State {
 /// Fraction bits of the sums.
 pub(super) const SUM_FRACTION: u32 = 12;
 
-/// Speed below which the mean of four readings is as good as one: 3° a period.
+/// Speed below which the mean of four readings is as good as one: 3° per period.
 const SLOW: Speed = Speed::lit("0.0078125");

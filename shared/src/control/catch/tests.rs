@@ -7,7 +7,7 @@ use crate::params::{BOSSO_BENCH, Board, ParamId, Params, build};
 const POLE_PAIRS: f64 = 12.0;
 const FLUX_WB: f64 = 1.3e-3;
 
-/// The converter of the terminals.
+/// The terminals' dividers and ADC.
 #[derive(Clone, Copy)]
 struct Dividers {
     v_per_count: f64,
@@ -22,13 +22,13 @@ const BENCH: Dividers = Dividers {
     diode_v: 0.7,
 };
 
-/// 2.2 kΩ of 12.2 kΩ on 3.3 V: they end at 18.3 V.
+/// 2.2 kΩ of 12.2 kΩ on 3.3 V: full scale is 18.3 V.
 const B_G431B: Dividers = Dividers {
     v_per_count: 3.3 / 4096.0 * 12.2 / 2.2,
     ..BENCH
 };
 
-/// A motor whose terminals float.
+/// A motor with floating terminals.
 struct Coasting {
     dividers: Dividers,
     period_s: f64,
@@ -50,7 +50,7 @@ impl Coasting {
         motor
     }
 
-    /// 0 to 1, by a xorshift generator.
+    /// Returns 0 to 1, by a xorshift generator.
     fn uniform(&mut self) -> f64 {
         for _ in 0..4 {
             self.random ^= self.random << 13;
@@ -60,12 +60,12 @@ impl Coasting {
         (self.random >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Of unit variance: the sum of twelve uniform numbers.
+    /// Returns unit variance: the sum of twelve uniform numbers.
     fn gaussian(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 
-    /// The converter's readings at this sample.
+    /// Returns the ADC's readings at this sample.
     fn read(&mut self) -> [AdcCounts; 3] {
         let Dividers {
             v_per_count,
@@ -86,7 +86,7 @@ impl Coasting {
         self.theta += self.omega_rad_s * self.period_s;
     }
 
-    /// Electrical degrees from the truth, and the relative error of the speed.
+    /// Returns the electrical degrees from the truth, and the speed's relative error.
     fn errors(&self, theta: Angle, omega: Speed) -> (f64, f64) {
         let angle = theta.to_num::<f64>() - self.theta / TAU;
         let speed = omega.to_num::<f64>() * TAU / (self.omega_rad_s * self.period_s) - 1.0;
@@ -111,17 +111,17 @@ fn config(dividers: Dividers, pwm_hz: f64, flux_share: f64) -> Config {
     build(&params, &board).expect("it fits the bench").catch
 }
 
-/// Results of observing.
+/// Results of an observation.
 #[derive(Default)]
 struct Seen {
-    /// When the rotor was known first, s.
+    /// When the rotor was first known, s.
     known_s: Option<f64>,
-    /// Worst errors while it was known: electrical degrees, share of the speed.
+    /// Worst errors while known: electrical degrees, share of the speed.
     angle_deg: f64,
     speed: f64,
-    /// Worst share of the speed from 8 ms on.
+    /// Worst share of the speed after 8 ms.
     speed_after_8_ms: f64,
-    /// Samples at which it was known no more.
+    /// Samples at which a known rotor was lost again.
     lapses: u32,
 }
 
@@ -172,13 +172,13 @@ fn a_turning_rotor_is_known_within_a_turn() {
                     let seen = watch(&config, &mut motor, 0.06, |_| {});
                     let case = std::format!("{signed} rpm, {pwm_hz} Hz, seed {seed}");
                     let known_s = seen.known_s.expect(&case);
-                    // And the millisecond for which all must fit.
+                    // Plus the millisecond in which all must fit.
                     assert!(
                         known_s < electrical_turn_s(rpm) + 0.001,
                         "{case}: {known_s}"
                     );
                     assert!(seen.angle_deg < 10.0, "{case}: {} deg", seen.angle_deg);
-                    // It is known when its standard deviation is 1 %; later it must be better.
+                    // Known means a standard deviation of 1 %; later it must be better.
                     assert!(seen.speed < 0.04, "{case}: {}", seen.speed);
                     if rpm > 300.0 {
                         assert!(
@@ -196,7 +196,7 @@ fn a_turning_rotor_is_known_within_a_turn() {
 
 #[test]
 fn a_slow_rotor_takes_longer() {
-    // At 100 rpm the bench's converter sees 9.6 counts in 2 of noise.
+    // At 100 rpm the bench's ADC sees 9.6 counts in 2 of noise.
     for (dividers, rpm, turns, speed) in [
         (B_G431B, 100.0, 1.0, 0.04),
         (BENCH, 150.0, 2.0, 0.06),
@@ -243,7 +243,7 @@ fn a_wrong_flux_and_another_diode_do_not_matter() {
 
 #[test]
 fn what_is_beyond_the_dividers_range_is_left_out() {
-    // 8000 rpm make 13 V a phase and 22 V between the lowest and the highest.
+    // 8000 rpm give 13 V per phase, 22 V from lowest to highest.
     for pwm_hz in [15_000.0, 24_000.0] {
         let config = config(B_G431B, pwm_hz, 1.0);
         for seed in 0..40 {
@@ -294,7 +294,7 @@ fn a_coasting_propeller_is_followed_until_it_stands() {
                     let (angle_deg, speed) = motor.errors(theta, omega);
                     let case = std::format!("{rpm} rpm, seed {seed}");
                     assert!(rpm < 300.0 || angle_deg < 10.0, "{case}: {angle_deg} deg");
-                    // A memory of a turn lags by up to twice that.
+                    // A memory of one turn lags by up to twice that.
                     let lag = 2.0 * electrical_turn_s(rpm) / 1.1;
                     assert!(rpm < 150.0 || speed < 0.02 + lag, "{case}: {speed}");
                 } else {
@@ -304,7 +304,7 @@ fn a_coasting_propeller_is_followed_until_it_stands() {
                     );
                 }
                 motor.turn();
-                // The bench's time constant of 1.1 s all the way down: a propeller's grows.
+                // The bench's time constant of 1.1 s all the way down; a propeller's grows.
                 motor.omega_rad_s *= 1.0 - motor.period_s / 1.1;
             }
             assert!(stands, "seed {seed}");

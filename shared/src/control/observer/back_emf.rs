@@ -1,6 +1,7 @@
 //! The adaptive back-EMF observer of the first paper: (6), (7), wrap (25) and filter (28).
 //!
-//! Forward Euler, and the matrix exponential for the estimated currents, as its section V says.
+//! Forward Euler, with the matrix exponential for the estimated currents, as the paper's section V
+//! has it.
 
 use fixed::types::I4F28;
 use fixed::types::extra::U28;
@@ -14,13 +15,13 @@ use crate::trace::traced;
 use crate::units::dimension::TurnPerPeriod;
 use crate::units::{Angle, Current, CurrentRate, Flux, InverseFlux, Speed, Voltage, stated_emf};
 
-/// Half a turn a period, where a speed ends.
+/// Half a turn per period, the maximum of a speed.
 const FASTEST: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(i32::MAX >> 4);
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Voltage commanded to voltage applied.
+    /// Delay from the commanded voltage to the applied one.
     pub delay: Delay,
     /// 1 − e^(−R·T_s/L).
     pub decay: Gain<Current, Current>,
@@ -38,21 +39,21 @@ pub struct Config {
     pub gamma: Gain<Voltage, InverseFlux>,
     /// k_f.
     pub k_f: Gain<Speed, Speed>,
-    /// Inverse of the flux that the parameters state.
+    /// Inverse of the stated flux.
     pub xi_nominal: InverseFlux,
-    /// Least ξ̂: a flux twice the stated one.
+    /// Smallest ξ̂: twice the stated flux.
     pub xi_min: InverseFlux,
-    /// Greatest ξ̂: half the stated flux.
+    /// Largest ξ̂: half the stated flux.
     pub xi_max: InverseFlux,
-    /// Another way to the speed than (7); `None` is the observer as published.
+    /// An alternative to (7) for the speed; `None` is the observer as published.
     pub cure: Option<Cure>,
 }
 
-/// A phase-locked loop on the direction of ĥ in place of (7), coefficients for one period.
+/// A phase-locked loop on the direction of ĥ in place of (7); coefficients for one period.
 ///
-/// In (7) the speed is ξ̂·|ĥ|, and what R and L that are stated too high put into ĥ comes back
-/// through the speed: lock is lost at 6000 rpm with L 5 % or R 15 % too high on the bench. With |ĥ|
-/// out of the speed and a constant ξ in (9) it holds with both 30 % off.
+/// In (7) the speed is ξ̂·|ĥ|, and what R and L stated too high add to ĥ feeds back through the
+/// speed: on the bench it loses lock at 6000 rpm with L 5 % or R 15 % too high. With |ĥ| removed
+/// from the speed and a constant ξ in (9) it holds with both 30 % off.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cure {
     /// 2·ω_n.
@@ -65,9 +66,9 @@ traced! {
     /// The observer's state from period to period.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// θ̂ at this sample; the type wraps it (25).
+        /// θ̂ at this sample; its type does the wrap (25).
         pub theta: Angle,
-        /// î at this sample, as the last period predicted it.
+        /// î at this sample, predicted in the last period.
         pub i: Dq<Current>,
         /// ĥ at this sample.
         pub h: Dq<Voltage>,
@@ -75,14 +76,14 @@ traced! {
         pub xi: InverseFlux,
         /// ω̂_f of the filter (28).
         pub omega_f: Speed,
-        /// Integrator of the loop that is the cure.
+        /// Integrator of the cure's loop.
         pub omega_i: Speed,
-        /// Voltage that was commanded in the last period.
+        /// Voltage commanded in the last period.
         pub u_before: Dq<Voltage>,
     }
 }
 
-/// The observer in a moment in which the frame's angle and speed are known, or imposed.
+/// Returns the observer's state for a known, or imposed, angle and speed of the frame.
 pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
     let length = stated_emf(omega);
     State {
@@ -94,7 +95,7 @@ pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
         xi: config.xi_nominal,
         omega_f: omega,
         omega_i: omega,
-        // Without a current the terminals show the back-EMF, as if it had been commanded.
+        // Without current the terminals show the back-EMF, as if it had been commanded.
         u_before: Dq {
             d: Voltage::ZERO,
             q: length,
@@ -103,10 +104,10 @@ pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
     }
 }
 
-/// The speed at a sample, of (7) and (28), and ξ̂ taken on by a period.
+/// Returns the speed at a sample by (7) and (28), and advances ξ̂ by one period.
 ///
-/// With an `imposed` speed the frame does not follow the rotor: nothing is adapted. `planned` is
-/// the change of the speed's reference in a period; only the cure uses it.
+/// With an `imposed` speed the frame does not follow the rotor, so nothing adapts. `planned` is the
+/// change of the speed reference per period; only the cure uses it.
 pub fn estimate(
     config: &Config,
     state: &mut State,
@@ -119,8 +120,8 @@ pub fn estimate(
     if let Some(cure) = &config.cure {
         return cured(config, cure, state, (theta, frame), length, planned);
     }
-    // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4 turns
-    // a period; above half a turn, where a speed ends, the rotor is lost anyway.
+    // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4
+    // turns per period; above half a turn, the maximum of a speed, the rotor is lost anyway.
     let omega_bar = state.xi.top(length).min(FASTEST).scaled();
     let omega = omega_bar.plus(config.k_eta.held(state.h.d));
     let omega_bar_step = config.k_f.apply(omega_bar.minus(state.omega_f));
@@ -152,7 +153,7 @@ fn cured(
     length: Voltage,
     planned: Speed,
 ) -> (Estimate, SlowEstimate) {
-    // Twelve bits of the quotient are enough for a direction: 0.01°.
+    // Twelve bits of the quotient suffice for a direction: 0.01°.
     let quotient = (state.h.d.to_bits() >> 2) / (length.to_bits() >> 14).max(1);
     let epsilon = I4F28::from_bits(quotient.clamp(-1 << 12, 1 << 12) << 16);
     let before = state.omega_i;
@@ -170,24 +171,24 @@ fn cured(
         omega_bar_step: state.omega_i.minus(before),
         xi: config.xi_nominal,
         xi_step: InverseFlux::ZERO,
-        // ĥ opposite to what the frame expects, or nearly none.
+        // ĥ opposes what the frame expects, or is nearly zero.
         lost: !state.h.q.is_negative(),
     };
     (estimate, slow)
 }
 
-/// Takes ξ̂ on by a period, within the range in which the stated flux can be wrong. True if it
-/// stands at an end of that range.
+/// Advances ξ̂ by one period, within the range in which the stated flux may be wrong. Returns true
+/// if it is at an end of that range.
 fn adapt(config: &Config, state: &mut State, xi_step: InverseFlux) -> bool {
     let xi = state.xi.plus(xi_step);
     state.xi = xi.max(config.xi_min).min(config.xi_max);
     state.xi != xi
 }
 
-/// Takes θ̂, î and ĥ on by a period (6).
+/// Advances θ̂, î and ĥ by one period (6).
 ///
-/// The feedback's speed is that of the frame: ω̂ when the observer leads, an imposed one during
-/// start-up. `u` is the voltage that this period commands.
+/// The feedback's speed is the frame's: ω̂ when the observer leads, an imposed one during start-up.
+/// `u` is the voltage commanded in this period.
 pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
     let Feedback {
         omega,
@@ -222,15 +223,15 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
     state.theta = state.theta.wrapping_add(omega.over_period());
 }
 
-/// φ̂ = 1/ξ̂, with a division.
+/// Returns φ̂ = 1/ξ̂, with a division.
 pub fn flux(state: &State) -> Flux {
     // 2^64/(2π) over ξ̂ in 2^-32: sixteen times 28 fraction bits.
     let quotient = divide(0x28BE_60DB_9391_0544, state.xi.to_bits().max(1) as u32);
     Flux::from_bits((quotient >> 4).min(i32::MAX as u64) as i32)
 }
 
-/// Turns the frame from where an open-loop start held it to where the rotor is, by what the
-/// back-EMF tells. Returns by how much; `None` where the rotor has not followed.
+/// Turns the frame from where an open-loop start held it to the rotor, by the back-EMF. Returns the
+/// angle; `None` if the rotor has not followed.
 pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<Angle> {
     let lead = rotor_lead(state.h, omega_s, config.xi_nominal)?;
     let ahead = SinCos::of(lead);
@@ -248,10 +249,10 @@ pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<A
 
 impl State {}
 
-/// The rotor's angle from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
+/// Returns the rotor's angle from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
 ///
-/// `None` where the back-EMF is not between half and twice of what the stated flux gives at the
-/// frame's speed: the rotor has not followed, or there is none and the voltage met no current.
+/// `None` if the back-EMF is not between half and twice what the stated flux gives at the frame's
+/// speed: the rotor has not followed, or there is none and no current answered the voltage.
 fn rotor_lead(h: Dq<Voltage>, omega_s: Speed, xi_nominal: InverseFlux) -> Option<Angle> {
     // A speed has 32 fraction bits, ξ·|h| 28.
     let expected = omega_s.to_bits() >> 4;

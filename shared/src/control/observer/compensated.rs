@@ -1,11 +1,11 @@
 //! The compensated flux observer with a phase-locked loop: the default.
 //!
-//! A voltage model of the stator's flux in the stator's frame, held against drift by the flux that
-//! the loop expects at its own angle. That leak turns with the estimate, so it displaces nothing in
-//! steady state, and the speed comes from the loop alone: neither R nor L stands in its gain, as
-//! they do in ω̂ = ξ̂·|ĥ| of the first paper (7), which loses its lock where they are wrong.
+//! A voltage model of the stator flux in the stator's frame, held against drift by the flux that the loop expects
+//! at its own angle. This leak rotates with the estimate, so it causes no steady-state error, and the speed comes
+//! from the loop alone: neither R nor L enters its gain, as they do in ω̂ = ξ̂·|ĥ| of the first paper (7), which
+//! loses lock when they are wrong.
 //!
-//! In the control's units a voltage for one period is a flux, and the stated flux φ is 2/π.
+//! In the control's units a voltage applied for one period is a flux, and the stated flux φ is 2/π.
 #![doc = include_str!("compensated/derivation.md")]
 
 use fixed::types::extra::{U27, U29};
@@ -24,34 +24,34 @@ use crate::units::{
     WideVoltage,
 };
 
-/// A flux along an axis of the estimated frame: the sine takes a fraction bit.
+/// A flux along an axis of the estimated frame; the sine uses one fraction bit.
 type Component = Quantity<Weber, U27>;
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// R·T_s/2, current to flux.
+    /// R·T_s/2, from current to flux.
     pub half_resistance: Multiplier<Current, Flux>,
-    /// L, current to flux.
+    /// L, from current to flux.
     pub inductance: Multiplier<Current, WideFlux>,
-    /// β·ω²·T_s over the speed's square. The mean of a period's current is not the mean of its two
-    /// ends: without β that is 0.56° at 6000 rpm on the bench.
+    /// β·ω²·T_s over the square of the speed. A period's mean current is not the mean of its end points: without β
+    /// the error is 0.56° at 6000 rpm on the bench.
     pub bias: Gain<SpeedSquare, I0F32>,
-    /// Least ω⁺, the leak's corner towards standstill.
+    /// Smallest ω⁺, the leak's corner towards standstill.
     pub omega_min: Speed,
-    /// Least ω_n of the loop, in turns a period.
+    /// Smallest ω_n of the loop, in turns per period.
     pub omega_n_min: Speed,
-    /// Least ω_n over the current along q, which accelerates the rotor.
+    /// Smallest ω_n per current along q, which accelerates the rotor.
     pub omega_n_per_current: Gain<Current, Speed>,
-    /// The most that this makes of it.
+    /// Largest value this current-dependent floor reaches.
     pub omega_n_following: Speed,
-    /// Greatest ω_n.
+    /// Largest ω_n.
     pub omega_n_max: Speed,
-    /// Share of a new sample in what ω̂ has above ω̂_i.
+    /// Weight of a new sample in the smoothed ω̂ − ω̂_i.
     pub smoothing: Multiplier<Speed, Speed>,
     /// ξ of the stated flux.
     pub xi_nominal: InverseFlux,
-    /// A quarter over the stated flux: along q to ε.
+    /// A quarter over the stated flux, from the q component to ε.
     pub quarter_per_flux: Multiplier<Component, I5F27>,
 }
 
@@ -59,13 +59,13 @@ traced! {
     /// State of the observer.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
-        /// θ̂ at the coming sample.
+        /// θ̂ at the next sample.
         pub theta: Angle,
         /// ω̂_i, the loop's integrator.
         pub omega_i: Speed,
         /// φ̂.
         pub phi: Flux,
-        /// ψ, the stator's flux.
+        /// ψ, the stator flux.
         psi: AlphaBeta<Flux>,
         /// ω̂ − ω̂_i, smoothed.
         smooth: Speed,
@@ -77,10 +77,10 @@ traced! {
 }
 
 traced! {
-    /// Coefficients that follow the speed, and the inductance: taken anew by [`pace`] every few periods.
+    /// Coefficients that follow the speed and the inductance; [`pace`] updates them every few periods.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     struct Pace {
-        /// L, with what is known of it.
+        /// L, including its adaptation.
         inductance: Multiplier<Current, WideFlux>,
         /// 0.5·ω⁺·T_s.
         leak: I0F32,
@@ -92,9 +92,9 @@ traced! {
         integral: Speed,
         /// 1.8·ω_n, for half of ε.
         proportional: Speed,
-        /// φ̂, speed to back-EMF.
+        /// φ̂, from speed to back-EMF.
         emf: Multiplier<Speed, WideVoltage>,
-        /// ω̄̂ when these were taken.
+        /// ω̄̂ at the last update.
         omega_bar: Speed,
     }
 }
@@ -116,32 +116,32 @@ impl Default for State {
 /// ω_n of the loop over ω̂.
 const OMEGA_N_SHARE: I0F32 = I0F32::lit("0.35");
 
-/// Rate of φ̂ over ω⁺, 0.15 a radian and half of that a half turn: 0.15·2π/2.
+/// Rate of φ̂ over ω⁺: 0.15 per radian, per half turn half of that: 0.15·2π/2.
 const PHI_RATE_HALF: I0F32 = I0F32::lit("0.471");
 
-/// 1.8·2/8: twice the damping, for half of ε, an eighth of it.
+/// 1.8·2/8: twice the damping ratio, for half of ε, scaled by an eighth.
 const DAMPING: I0F32 = I0F32::lit("0.45");
 
 /// The fastest leak.
 const EIGHTH_TURN: Speed = Speed::from_bits(1 << 29);
 
-/// Least and greatest φ̂ over the stated flux: 0.3 and 2.
+/// Smallest and largest φ̂ over the stated flux: 0.3 and 2.
 const PHI_MIN: Flux = Flux::from_bits(51_267_396);
 const PHI_MAX: Flux = Flux::from_bits(341_782_638);
 
-/// φ̂ below which the rotor is lost, over the stated flux: 0.4. One that has been stopped leaves what the drop of its
-/// current over a stated R that is off looks like, and φ̂ near its least, z_d now above and now below it.
+/// φ̂ over the stated flux below which the rotor counts as lost: 0.4. A stopped rotor leaves only the error of R
+/// times its current, which keeps φ̂ near its minimum, with z_d alternating above and below it.
 const PHI_LOST: Flux = Flux::from_bits(68_356_528);
 
-/// The observer where the rotor's speed is known, and its angle at the coming sample. The coefficients stay as they are:
-/// Park has taken those of a rotor at rest, and those of one that was caught are taken by [`pace`] after this.
+/// Begins with a known rotor speed, and its angle at the next sample. Keeps the coefficients: Park has set those of
+/// a rotor at rest, and for a caught one [`pace`] sets them afterwards.
 pub fn begin(
     config: &Config,
     state: &mut State,
     (theta, omega): (Angle, Speed),
     i: AlphaBeta<Current>,
 ) {
-    // ψ is that of the sample before: the voltage since then is still to be added.
+    // ψ belongs to the previous sample: the voltage since then is still to be added.
     let rotor = rotor_flux(
         FLUX_NOMINAL,
         sin_cos(theta.wrapping_sub(omega.over_period())),
@@ -160,19 +160,19 @@ pub fn begin(
     };
 }
 
-/// Takes the coefficients that follow the speed and the current that is asked for along q, every few periods.
+/// Updates the coefficients that follow the speed and the requested q current, every few periods.
 pub fn pace(config: &Config, state: &mut State, inductance: Factor, i_q: Current) {
     state.phi = state.phi.max(PHI_MIN).min(PHI_MAX);
     let omega = state.omega_i;
-    // An eighth of a turn a period bounds the leak below one.
+    // An eighth of a turn per period keeps the leak below one.
     let omega_plus = omega
         .saturating_abs()
         .max(config.omega_min)
         .min(EIGHTH_TURN);
     // Half of ω⁺·T_s is π times its turns.
     let leak = omega_plus.turns().top(EIGHTH_PI) << 3;
-    // Fast where the rotor may be accelerated. At idle, where the back-EMF tells little of it, a loop that is faster
-    // than the rotor turns would swing by what the dead times' signs make of its angle.
+    // Fast where the rotor may accelerate. At idle the back-EMF tells little about the rotor, and a loop faster
+    // than its rotation would oscillate on the angle error from the dead times' signs.
     let following = config
         .omega_n_per_current
         .held(i_q.abs())
@@ -190,16 +190,15 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor, i_q: Current
         phi: omega_plus.turns().top(PHI_RATE_HALF) << 1,
         integral: four_pi_omega_n.top(omega_n).over_period(),
         proportional: omega_n.top(DAMPING) << 3,
-        // A speed in turns takes 2π: 16·π/8, and a voltage with 24 fraction bits has a sixteenth.
+        // A speed in turns takes 2π: 16·π/8, and a voltage with 24 fraction bits accounts for a sixteenth.
         emf: Multiplier::from_bits(state.phi.top(EIGHTH_PI).to_bits()),
         omega_bar: state.omega_bar(),
     };
 }
 
-/// Takes the observer from the last sample to this one.
+/// Advances the observer from the last sample to this one.
 ///
-/// `imposed` is the speed that an open-loop start gives the rotor: the loop then follows its phase
-/// only.
+/// `imposed` is the speed that an open-loop start imposes on the rotor: the loop then tracks only the phase.
 #[inline(always)] // in each period
 pub fn estimate(
     config: &Config,
@@ -242,7 +241,7 @@ pub fn estimate(
     };
     let z_d = Flux::from_bits(z.d.plus(z.d).to_bits());
 
-    // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})). The leak is below a half: a bit is free.
+    // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})). The leak is below a half, which frees one bit.
     let led: Quantity<Weber, U29> = state.phi.top(pace.leak).scaled();
     state.psi = AlphaBeta {
         alpha: psi
@@ -266,8 +265,8 @@ pub fn estimate(
     }
     let proportional = pace.proportional.top(epsilon_half);
     let omega = state.omega_i.plus(proportional);
-    // Under acceleration ω̂_i lags by 1.8·ω̇/ω_n and ω̂ does not, but ω̂ passes the noise: what it has
-    // above ω̂_i is added smoothly.
+    // Under acceleration ω̂_i lags by 1.8·ω̇/ω_n. ω̂ does not, but passes the noise, so its excess over ω̂_i is
+    // added smoothed.
     state.smooth = config
         .smoothing
         .added(state.smooth, proportional.minus(state.smooth));
@@ -281,7 +280,7 @@ pub fn estimate(
     }
 }
 
-/// The slower part of the estimate, `periods` after [`pace`].
+/// Returns the slow part of the estimate, `periods` after [`pace`].
 pub fn slow_estimate(config: &Config, state: &State, periods: u32) -> SlowEstimate {
     let change = state.omega_bar().minus(state.pace.omega_bar);
     SlowEstimate {
@@ -292,7 +291,7 @@ pub fn slow_estimate(config: &Config, state: &State, periods: u32) -> SlowEstima
     }
 }
 
-/// L·i.
+/// Returns L·i.
 #[inline(always)] // in each period
 fn stator_flux(
     inductance: Multiplier<Current, WideFlux>,
@@ -305,17 +304,17 @@ fn stator_flux(
     }
 }
 
-/// φ·e^{jθ}.
+/// Returns φ·e^{jθ}.
 #[inline(always)] // in each period
 fn rotor_flux(phi: Flux, frame: SinCos) -> AlphaBeta<Flux> {
-    // φ̂ is at most twice the stated flux: a bit is free.
+    // φ̂ is at most twice the stated flux, which frees one bit.
     AlphaBeta {
         alpha: phi.top(frame.cos).scaled(),
         beta: phi.top(frame.sin).scaled(),
     }
 }
 
-/// ε/2: z_q over the stated flux, held at ±1, and all of that where the rotor points backwards.
+/// Returns ε/2: z_q over the stated flux, clamped to ±1, and ±1 in full where the rotor points backwards.
 #[inline(always)] // in each period
 fn half_epsilon(config: &Config, z: Dq<Component>) -> I0F32 {
     let quarter = config.quarter_per_flux.of(z.q).to_bits();
@@ -327,7 +326,7 @@ fn half_epsilon(config: &Config, z: Dq<Component>) -> I0F32 {
     I0F32::from_bits(held << 6)
 }
 
-/// All of it, with the sign.
+/// Returns full scale with this sign.
 #[cold]
 #[inline(never)] // seldom
 fn whole(quarter: i32) -> i32 {
@@ -337,20 +336,20 @@ fn whole(quarter: i32) -> i32 {
 /// A quarter with 27 fraction bits.
 const ONE_QUARTER: i32 = 1 << 25;
 
-/// The rotor's angle at the coming sample, if its flux is near the stated one.
+/// Returns the rotor's angle at the next sample, if its flux is near the stated one.
 pub fn found(state: &State) -> Option<Angle> {
     let near = state.phi > FLUX_NOMINAL / 2 && state.phi < FLUX_NOMINAL * 2 - FLUX_NOMINAL / 2;
     near.then_some(state.theta)
 }
 
 impl State {
-    /// The back-EMF.
+    /// Returns the back-EMF.
     #[inline(always)] // in each period
     pub(super) fn emf(&self) -> WideVoltage {
         self.pace.emf.of(self.omega_i)
     }
 
-    /// ω̄̂.
+    /// Returns ω̄̂.
     #[inline(always)] // in each period
     fn omega_bar(&self) -> Speed {
         self.omega_i.plus(self.smooth)

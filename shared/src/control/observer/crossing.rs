@@ -1,5 +1,5 @@
-//! The flux comparator (second paper, section 2.3): zero crossings of the three fluxes, with
-//! hysteresis, hold-off and the order of commutation. Forwards only.
+//! The flux comparator (second paper, section 2.3): zero crossings of the three fluxes, with hysteresis, hold-off
+//! and commutation order. Forward rotation only.
 
 use fixed::types::{I0F32, U0F32};
 
@@ -10,17 +10,16 @@ use crate::math::{Held, TopProduct, divide};
 use crate::trace::traced;
 use crate::units::{Angle, Flux, Speed};
 
-/// Limits that keep noise from being taken for a crossing (2.3.2).
+/// Limits that keep noise from passing for a crossing (2.3.2).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Distance beyond zero that a flux must have, as a share of the amplitude: half the deadband, below
-    /// 0.5.
+    /// How far beyond zero a flux must be, as a share of the amplitude: half the deadband, below 0.5.
     pub deadband: I0F32,
-    /// The rotor's angle at which a flux is that far: arcsin of it.
+    /// The rotor angle at which a flux is that far: its arcsine.
     pub deadband_angle: Angle,
     /// Hold-off after each crossing, as an angle at the estimated speed.
     pub hold_off: U0F32,
-    /// Periods without a crossing after which the rotor is lost.
+    /// Periods without a crossing after which the rotor counts as lost.
     pub patience: u32,
 }
 
@@ -28,40 +27,40 @@ traced! {
     /// The comparator's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// The sector that the last crossing has begun.
+        /// The sector that the last crossing began.
         pub sector: Sector,
-        /// Periods since the sample of that crossing.
+        /// Periods since that crossing's sample.
         pub since: u32,
-        /// Trust in the crossings, 0 to 12: a sound one adds one, another takes three.
+        /// Confidence in the crossings, 0 to 12: a sound one adds one, any other takes three.
         pub sound: u8,
-        /// True while they tell where the rotor is.
+        /// The crossings tell where the rotor is.
         pub tracks: bool,
     }
 }
 
-/// A crossing of the one phase and direction that was next.
+/// A crossing of the phase and direction that was due next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// The sector that it begins.
+    /// The sector it begins.
     pub sector: Sector,
-    /// For how long the flux had been beyond the deadband at the sample, at most a period.
+    /// How long before the sample the flux passed the deadband, at most one period.
     pub late: Periods,
     /// Amplitude of the flux.
     pub amplitude: Flux,
 }
 
-/// Most of [`State::sound`].
+/// Maximum of [`State::sound`].
 const SOUND_MAX: u8 = 12;
-/// From here on the crossings are trusted: those of a turn.
+/// From here the crossings are trusted: one turn's worth.
 const SOUND: u8 = 6;
-/// The trust that an impossible crossing takes away.
+/// Confidence lost by an implausible crossing.
 const UNSOUND: u8 = 3;
 
-/// A crossing is no crossing if the rotor has turned less than this since the last one: a third of
-/// the sixth of a turn that it should have. (Later than expected is no sign of noise.)
+/// A crossing is unsound if the rotor has turned less than this since the last: a third of the sixth of a
+/// turn it should have. (Arriving late is no sign of noise.)
 const LEAST_TURNED: u64 = (1 << 32) / 18;
 
-/// Begins in the sector of the flux's angle, trusting the crossings to come.
+/// Begins in the sector of the flux angle, trusting the crossings to come.
 pub fn begin(state: &mut State, lambda_angle: Angle) {
     *state = State {
         sector: Sector::of(lambda_angle),
@@ -71,10 +70,10 @@ pub fn begin(state: &mut State, lambda_angle: Angle) {
     };
 }
 
-/// One period: looks for the next crossing in the fluxes of this sample and of the one before.
+/// Looks for the next crossing in the fluxes of this sample and the previous one.
 ///
-/// Only the flux that is next in the order of commutation is compared, and with a level: a crossing
-/// that was missed is made up for, and from a wrong sector the state comes to the right one.
+/// Compares only the flux that is next in commutation order, by level: it catches up a missed crossing, and from a
+/// wrong sector finds the right one.
 pub fn detect(
     config: &Config,
     state: &mut State,
@@ -106,7 +105,7 @@ pub fn detect(
     None
 }
 
-/// A flux is beyond the deadband: a crossing, but for the hold-off.
+/// Handles a flux beyond the deadband: a crossing, unless held off.
 fn cross(
     config: &Config,
     state: &mut State,
@@ -131,7 +130,7 @@ fn cross(
     state.tracks = state.sound >= SOUND || (state.tracks && state.sound > 0);
     state.sector = sector;
     state.since = 0;
-    // Where it was beyond already, the hold-off has kept the crossing back, or it came out of order.
+    // If it was already beyond, the hold-off delayed the crossing, or it came out of order.
     let late = match before < Flux::ZERO {
         true => ratio(excess, excess.minus(before)),
         false => Periods::ONE,
@@ -143,8 +142,8 @@ fn cross(
     })
 }
 
-/// The share of a period in which a flux has come as far as `part`, of `whole` in a period; at most
-/// a period.
+/// Returns the time, in periods, in which a flux covers `part` when it covers `whole` per period; at most one
+/// period.
 fn ratio(part: Flux, whole: Flux) -> Periods {
     let (part, whole) = (part.to_bits().max(0), whole.to_bits().max(1));
     let share = divide((part as u64) << Periods::FRAC_NBITS, whole as u32);
@@ -228,7 +227,7 @@ mod tests {
             count += 1;
             assert_eq!(found.sector, sector.next());
             sector = found.sector;
-            // The rotor was at the edge and the deadband's angle that long before.
+            // The rotor was at the edge plus the deadband angle that long before.
             let edge = sector.begin().to_num::<f64>() + 0.1_f64.asin() / TAU;
             let error = turns - omega * found.late.to_num::<f64>() - edge;
             let degrees = ((error + 0.5).rem_euclid(1.0) - 0.5) * 360.0;
@@ -256,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_crossing_within_the_hold_off_is_kept_back() {
-        // 5 % of a sixth of a turn are four periods at this speed.
+        // 5 % of a sixth of a turn is four periods at this speed.
         let mut run = Run::new(0.0, 1.0 / 480.0);
         run.state.since = 1000;
         // Phases b and a at once: the first two in order.

@@ -1,7 +1,7 @@
-//! The second paper's position estimation as the drive calls it (figures 16 and 25): flux observers,
-//! their comparator and Hall sensors, each of which gives edges, and the estimator that they trigger.
+//! The second paper's position estimation as the drive calls it (figures 16 and 25): flux observers, their
+//! comparator and Hall sensors, which produce edges, and the estimator that the edges trigger.
 //!
-//! Forwards only: for the other direction the drive exchanges the phases b and c of all that goes in.
+//! Forward rotation only: for the other direction the drive swaps phases b and c in all inputs.
 
 use super::crossing::{self, Crossing};
 use super::flux_linkage;
@@ -13,17 +13,16 @@ use crate::units::{Angle, Current, Speed, Voltage};
 /// The source of the edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sensors {
-    /// Flux crossings; there are no Hall sensors.
+    /// Flux crossings; no Hall sensors.
     #[default]
     None,
-    /// Hall sensors alone; neither voltages nor currents are looked at.
+    /// Hall sensors alone; voltages and currents are ignored.
     Hall,
-    /// Hall sensors at standstill and low speed, flux crossings above; and in place of sensors that
-    /// have failed.
+    /// Hall sensors at standstill and low speed, flux crossings above, which also replace failed sensors.
     Merged,
 }
 
-/// The estimation's coefficients.
+/// Coefficients of the estimation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// The source of the edges.
@@ -36,14 +35,14 @@ pub struct Config {
     pub position: position::Config,
     /// Hall sensors.
     pub hall: hall::Config,
-    /// Speed above which flux crossings take over from Hall sensors.
+    /// Speed above which flux crossings take over from the Hall sensors.
     pub flux_above: Speed,
-    /// Speed below which Hall sensors take over again.
+    /// Speed below which the Hall sensors take over again.
     pub hall_below: Speed,
 }
 
 traced! {
-    /// The present trigger of the position estimator.
+    /// What triggers the position estimator.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     #[repr(u8)]
     pub enum Source {
@@ -56,10 +55,10 @@ traced! {
 }
 
 traced! {
-    /// The estimation's state.
+    /// State of the estimation.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// The trigger of the position estimator.
+        /// The position estimator's trigger.
         pub source: Source,
         /// Flux observers.
         pub flux: flux_linkage::State,
@@ -72,24 +71,24 @@ traced! {
     }
 }
 
-/// The estimate of the rotor at a sample.
+/// The rotor estimate at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
     /// θ̂ at this sample.
     pub theta: Angle,
     /// ω̂.
     pub omega: Speed,
-    /// Its change in a period, by the last measurement.
+    /// Change of ω̂ per period, by the last measurement.
     pub omega_step: Speed,
-    /// True if the position is known; if not, the rest is the last that was.
+    /// The position is known; otherwise the other fields hold the last known one.
     pub known: bool,
-    /// True if a Hall sensor is at fault.
+    /// A Hall sensor has failed.
     pub sensor_fault: bool,
 }
 
-/// One period: the mean phase voltages since the last sample (star, their sum zero), the currents at
-/// this one, and the Hall sensors in bits 0, 1, 2 for the phases a, b, c, high while the rotor's flux
-/// through the phase is positive.
+/// Runs one period on the mean phase voltages since the last sample (star, summing to zero), the currents at this
+/// one, and the Hall sensors in bits 0, 1, 2 for phases a, b, c, high while the rotor's flux through the phase is
+/// positive.
 pub fn estimate(
     config: &Config,
     state: &mut State,
@@ -118,7 +117,7 @@ pub fn estimate(
     position(state)
 }
 
-/// Fluxes and their comparator; crossings that the Hall sensors should have seen.
+/// Runs the flux observers and their comparator; checks crossings against the Hall sensors.
 fn observe(
     config: &Config,
     state: &mut State,
@@ -152,7 +151,7 @@ fn observe(
     Some(found)
 }
 
-/// Chooses the source: by the sensors that there are and, where both are, by the speed.
+/// Selects the source by the available sensors and, with both, by speed.
 fn choose(config: &Config, state: &mut State) {
     let omega = state.position.omega;
     let wanted = match (config.sensors, state.source) {
@@ -174,10 +173,10 @@ fn choose(config: &Config, state: &mut State) {
     }
 }
 
-/// An edge of the flux.
+/// Handles a flux edge.
 fn crossed(config: &Config, state: &mut State, crossing: &Crossing) {
     position::time(&config.position, &mut state.position, crossing.late);
-    // λ̂ leads the rotor's flux, so that it crosses zero early; the deadband is crossed late.
+    // λ̂ leads the rotor's flux and so crosses zero early; the deadband makes it late.
     let lead = flux_linkage::lead(&config.flux, state.position.omega);
     let ahead = config.crossing.deadband_angle.wrapping_sub(lead);
     position::place(
@@ -188,7 +187,7 @@ fn crossed(config: &Config, state: &mut State, crossing: &Crossing) {
     );
 }
 
-/// A change of the Hall sensors' code.
+/// Handles a change of the Hall code.
 fn sensed(config: &Config, state: &mut State, step: Step) {
     let position = &mut state.position;
     match step {
@@ -201,11 +200,11 @@ fn sensed(config: &Config, state: &mut State, step: Step) {
     }
 }
 
-/// Delay until a Hall edge is seen: half a period in the mean, and what its code must last beyond the
-/// first sample.
+/// Delay until a Hall edge is seen: half a period on average, plus the samples beyond the first that its code must
+/// last.
 const HALL_LATE: Periods = Periods::from_bits((2 * hall::SAMPLES - 1) << (Periods::FRAC_NBITS - 1));
 
-/// Without edges for long the rotor stands, somewhere in its sector.
+/// After a long time without edges, sets the rotor to rest somewhere in its sector.
 fn rest(config: &Config, state: &mut State) {
     let position = &mut state.position;
     if position.since >= config.crossing.patience
@@ -230,7 +229,7 @@ fn position(state: &State) -> Position {
     }
 }
 
-/// Begins at this angle and speed with these currents. What is known of the sensors stays.
+/// Begins at this angle and speed with these currents. Keeps what is known of the sensors.
 pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: [Current; 3]) {
     position::begin(&mut state.position, theta, omega);
     flux_linkage::begin(&config.flux, &mut state.flux, theta, omega, i);
@@ -243,7 +242,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
     };
 }
 
-/// The rotor stands in the sector that the Hall sensors show. False where they cannot be believed.
+/// Sets the rotor to rest in the sector that the Hall sensors show. Returns false if they cannot be trusted.
 pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
     if config.sensors == Sensors::None {
         return false;
@@ -255,7 +254,7 @@ pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
     true
 }
 
-/// The rotor's angle at the coming sample, if crossings are followed.
+/// Returns the rotor's angle at the next sample, if crossings are tracked.
 pub fn found(state: &State) -> Option<Angle> {
     let position = &state.position;
     let known = state.crossing.tracks && position.omega.is_positive();

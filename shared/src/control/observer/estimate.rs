@@ -6,24 +6,24 @@ use crate::math::SinCos;
 use crate::trace::traced;
 use crate::units::{Angle, Current, INVERSE_FLUX_NOMINAL, InverseFlux, Speed, Voltage};
 
-/// Input of an observer at a sample.
+/// Input to an observer at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input {
     /// Currents in the stator's frame at this sample.
     pub i: AlphaBeta<Current>,
-    /// Mean voltage in the stator's frame from the last sample to this one.
+    /// Mean voltage in the stator's frame since the last sample.
     pub v: AlphaBeta<Voltage>,
-    /// L over the inductance that the parameters state.
+    /// L over the stated inductance.
     pub inductance: Factor,
-    /// Change of the speed's reference in the last period, ω̇*·T_s.
+    /// Change of the speed reference in the last period, ω̇*·T_s.
     pub planned: Speed,
     /// Hall sensors, see [`Sample`](crate::drive::Sample).
     pub hall: u8,
-    /// True if the phases b and c have changed places in all this.
+    /// Phases b and c are swapped in all of this.
     pub swapped: bool,
 }
 
-/// Estimate of an observer at a sample.
+/// Output of an observer at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     /// θ̂ at this sample.
@@ -32,21 +32,21 @@ pub struct Estimate {
     pub frame: SinCos,
     /// ω̂: the step of θ̂ until the next sample.
     pub omega: Speed,
-    /// ω̄̂: the speed without the term that passes the noise.
+    /// ω̄̂: the speed without the noisy proportional term.
     pub omega_bar: Speed,
 }
 
 traced! {
-    /// The slower part of the estimate, for work that is not done in every period.
+    /// The slow part of the estimate, for work not done every period.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SlowEstimate {
-        /// The change of ω̄̂ in a period.
+        /// Change of ω̄̂ per period.
         pub omega_bar_step: Speed,
-        /// ξ̂, the inverse of the flux.
+        /// ξ̂, the inverse flux.
         pub xi: InverseFlux,
-        /// Change of ξ̂ in a period.
+        /// Change of ξ̂ per period.
         pub xi_step: InverseFlux,
-        /// True if the observer's state is out of its range: the rotor may be elsewhere.
+        /// The observer's state is out of range: the rotor may be elsewhere.
         pub lost: bool,
     }
 }

@@ -1,6 +1,5 @@
-//! The rotor's flux linkage of each phase (second paper, section 2.2, figure 17):
-//! λ = ∫(v − i·R)dt − i·L_s, by a pseudo-integrator that forgets, and limits against what is left of
-//! a bias.
+//! The rotor's flux linkage with each phase (second paper, section 2.2, figure 17): λ = ∫(v −
+//! i·R)dt − i·L_s, by a leaky pseudo-integrator, with limits against residual bias.
 
 use fixed::FixedI32;
 use fixed::types::extra::U32;
@@ -11,27 +10,27 @@ use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage};
 
 use super::sector::Sector;
 
-/// Least amplitude that is believed: 0.3 times the stated flux.
+/// Smallest credible amplitude: 0.3 times the stated flux.
 pub const AMPLITUDE_MIN: Flux = Flux::from_bits(51_267_396);
-/// Greatest amplitude that is believed: twice the stated flux.
+/// Largest credible amplitude: twice the stated flux.
 pub const AMPLITUDE_MAX: Flux = Flux::from_bits(341_782_638);
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// R: current to voltage.
+    /// R, from current to voltage.
     pub resistance: Gain<Current, Voltage>,
-    /// L_s: current to flux.
+    /// L_s, from current to flux.
     pub inductance: Gain<Current, Flux>,
-    /// 1 − e^(−T_s/τ_int): what the integrator forgets in a period.
+    /// 1 − e^(−T_s/τ_int), the integrator's leak per period.
     pub forget: Gain<Flux, Flux>,
-    /// 1/τ_int as a speed: the integrator's corner.
+    /// 1/τ_int as a speed, the integrator's corner.
     pub corner: Speed,
-    /// The further high-pass of the second-order form.
+    /// The additional high-pass of the second-order form.
     pub high_pass: Option<HighPass>,
-    /// i_max·L_s, by which the integrator's limit is above that of the rotor's flux.
+    /// i_max·L_s, by which the integrator's limit exceeds that of the rotor's flux.
     pub stator_max: Flux,
-    /// True if the limits follow the measured amplitude; else they are those of the stated flux.
+    /// The limits follow the measured amplitude; otherwise the stated flux sets them.
     pub adaptive: bool,
 }
 
@@ -45,20 +44,20 @@ pub struct HighPass {
 }
 
 traced! {
-    /// State of the three phases' observers.
+    /// State of the three phases' flux observers.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
         /// Integral of v − i·R.
         pub psi: [Flux; 3],
-        /// Its slow mean, which the high-pass takes away.
+        /// Its slow mean, which the high-pass removes.
         pub mean: [Flux; 3],
         /// λ̂ of the phases at this sample.
         pub lambda: [Flux; 3],
-        /// λ̂ at the sample before.
+        /// λ̂ at the previous sample.
         pub lambda_before: [Flux; 3],
         /// Currents at the last sample.
         pub i_before: [Current; 3],
-        /// Amplitude of λ̂, from which limits and deadband are taken.
+        /// Amplitude of λ̂, which sets limits and deadband.
         pub amplitude: Flux,
     }
 }
@@ -76,13 +75,14 @@ impl Default for State {
     }
 }
 
-/// One period: `v` are the mean phase voltages since the last sample, `i` the currents at this one.
+/// Runs one period: `v` are the mean phase voltages since the last sample, `i` the currents at this
+/// one.
 pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current; 3]) {
     let lambda_max: Flux = state.amplitude + (state.amplitude >> 2);
     let psi_max = lambda_max.plus(config.stator_max);
     state.lambda_before = state.lambda;
     for phase in 0..3 {
-        // The resistance's voltage of a period is that of the mean current.
+        // The resistive drop over a period is that of the mean current.
         let mean_i = (i[phase] >> 1) + (state.i_before[phase] >> 1);
         let drive = v[phase].minus(config.resistance.held(mean_i));
         let psi = state.psi[phase];
@@ -104,8 +104,8 @@ pub fn advance(config: &Config, state: &mut State, v: [Voltage; 3], i: [Current;
     state.i_before = i;
 }
 
-/// The amplitude of the fluxes at the crossing with which a sector begins: the two other phases
-/// stand at ±√3/2 of it. A bias that they have in common drops out.
+/// Returns the flux amplitude at the crossing that begins a sector, where the two other phases are
+/// at ±√3/2 of it. A common bias cancels.
 pub fn measure(lambda: &[Flux; 3], sector: Sector) -> Flux {
     let phase = sector.edge().phase;
     let (one, other) = (lambda[(phase + 1) % 3], lambda[(phase + 2) % 3]);
@@ -118,8 +118,8 @@ pub fn measure(lambda: &[Flux; 3], sector: Sector) -> Flux {
 /// √3/6 with 32 fraction bits.
 const ROOT_3_SIXTH: FixedI32<U32> = FixedI32::from_bits(1_239_850_262);
 
-/// Takes a measured amplitude into the limits, an eighth of it: a bias, which adds at one crossing
-/// and subtracts at that of the other sign, is averaged out.
+/// Updates the limits by an eighth of the difference to a measured amplitude. A bias, which adds at
+/// one crossing and subtracts at the opposite one, averages out.
 pub fn adapt(config: &Config, state: &mut State, measured: Flux) {
     if config.adaptive {
         let step = measured.minus(state.amplitude) >> 3;
@@ -128,15 +128,15 @@ pub fn adapt(config: &Config, state: &mut State, measured: Flux) {
     }
 }
 
-/// By how much λ̂ leads the rotor's flux at this speed: 90° − arctan(τ_int·ω), and as much again for
-/// the high-pass (2.2.2). None without a speed.
+/// Returns by how much λ̂ leads the rotor's flux at this speed: 90° − arctan(τ_int·ω), plus the
+/// same for the high-pass (2.2.2). Zero without a speed.
 pub fn lead(config: &Config, omega: Speed) -> Angle {
     let second = config.high_pass.as_ref().map(|high_pass| high_pass.corner);
     let second = second.map_or(Angle::ZERO, |corner| lead_of(corner, omega));
     lead_of(config.corner, omega) + second
 }
 
-/// arctan(corner/ω): 0 to a quarter of a turn.
+/// Returns arctan(corner/ω), 0 to a quarter turn.
 fn lead_of(corner: Speed, omega: Speed) -> Angle {
     if omega <= Speed::ZERO {
         return Angle::ZERO;
@@ -144,9 +144,9 @@ fn lead_of(corner: Speed, omega: Speed) -> Angle {
     atan2_turns(corner, omega)
 }
 
-/// Begins as if the rotor had turned at `omega` for long and its flux were now at `theta`.
+/// Begins as if the rotor had long turned at `omega` and its flux were now at `theta`.
 pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: [Current; 3]) {
-    // A filter of first order that leads by δ has the gain cos δ.
+    // A first-order filter that leads by δ has the gain cos δ.
     let first = lead_of(config.corner, omega);
     let both = lead(config, omega);
     let length = shortened(FLUX_NOMINAL, first);
@@ -164,7 +164,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
     };
 }
 
-/// The parts along the three phases of a flux of this length and direction.
+/// Returns the three phase components of a flux of this length and direction.
 fn phases(length: Flux, theta: Angle) -> [Flux; 3] {
     let third = Angle::from_bits(THIRD_TURN);
     let around = [Angle::ZERO, third.wrapping_neg(), third];
@@ -174,7 +174,7 @@ fn phases(length: Flux, theta: Angle) -> [Flux; 3] {
 /// 2^32/3.
 const THIRD_TURN: i32 = 1_431_655_765;
 
-/// The flux times the angle's cosine.
+/// Returns the flux times the angle's cosine.
 fn shortened(flux: Flux, angle: Angle) -> Flux {
     // 28 + 31 − 32 fraction bits.
     flux.top(SinCos::of(angle).cos).scaled()

@@ -1,4 +1,4 @@
-//! No observer at all: an encoder, or a simulation that knows the truth, tells where the rotor is.
+//! No observer: an encoder, or a simulation that knows the truth, supplies the rotor's position.
 
 use super::{Estimate, SlowEstimate};
 use crate::math::SinCos;
@@ -6,27 +6,27 @@ use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
 traced! {
-    /// Angle and speed given for the coming sample, with the phases in the order a, b, c.
+    /// Angle and speed given for the next sample, with the phases in the order a, b, c.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Electrical angle.
         pub theta: Angle,
         /// Electrical speed.
         pub omega: Speed,
-        /// Its change since what was told before.
+        /// Change of the speed since the previous report.
         pub omega_step: Speed,
     }
 }
 
 impl State {
-    /// The rotor will be at `theta` and turn at `omega` at the coming sample.
+    /// Sets the rotor's angle and speed at the next sample.
     pub fn place(&mut self, theta: Angle, omega: Speed) {
         self.theta = theta;
         self.omega_step = omega.saturating_sub(self.omega);
         self.omega = omega;
     }
 
-    /// The angle and the speed as the control sees them: with `swapped` phases b and c it turns the
+    /// Returns angle and speed as the control sees them: with phases b and c `swapped` it turns the
     /// other way.
     pub fn seen(&self, swapped: bool) -> (Angle, Speed) {
         if swapped {
@@ -37,7 +37,7 @@ impl State {
     }
 }
 
-/// One period: what was told.
+/// Returns the reported position as this period's estimate.
 pub fn estimate(state: &State, swapped: bool) -> (Estimate, SlowEstimate) {
     let (theta, omega) = state.seen(swapped);
     let estimate = Estimate {

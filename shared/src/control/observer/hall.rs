@@ -1,58 +1,58 @@
-//! Hall sensors (second paper, section 2.3.1, figure 22): the sector by three bits, and whether they
-//! can be believed.
+//! Hall sensors (second paper, section 2.3.1, figure 22): the sector from three bits, and whether they can be
+//! trusted.
 
 use super::sector::Sector;
 use crate::trace::traced;
 
-/// The check of the sensors' codes.
+/// Check of the sensor codes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Periods for which all three may be alike; no rotor makes them so.
+    /// Periods for which all three may be equal, which no rotor position produces.
     pub patience: u32,
 }
 
 traced! {
-    /// The state of the sensors.
+    /// State of the sensors.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// Code of the last sample.
         pub code: u8,
-        /// Code that two samples in a row had.
+        /// Last code seen in two consecutive samples.
         pub held: u8,
         /// Sector of the last valid one.
         pub sector: Option<Sector>,
         /// Periods for which it has been invalid.
         pub invalid: u32,
-        /// The evidence against the sensors.
+        /// Evidence against the sensors.
         pub evidence: u8,
-        /// True once a sensor is at fault; it stays so.
+        /// A sensor has failed; latched.
         pub fault: bool,
     }
 }
 
-/// A change of the sensors' sector.
+/// A change of sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The first valid one.
+    /// The first valid sector.
     Found(Sector),
-    /// The next one: an edge at its beginning.
+    /// The next sector: an edge at its start.
     Forward(Sector),
     /// Back over the edge.
     Back(Sector),
-    /// One that cannot be reached at once.
+    /// A sector that cannot be reached in one step.
     Jump(Sector),
 }
 
-/// Samples that a code must last. One alone may be a spike on the wires.
+/// Samples that a code must last. A single one may be a spike on the wires.
 pub const SAMPLES: u32 = 2;
 
-/// The evidence that one contradiction adds; an edge as it should be takes one away.
+/// Evidence added per contradiction; a regular edge removes one.
 const CONTRADICTION: u8 = 8;
-/// Evidence that is a fault: three contradictions within a turn or two. A sensor that is stuck makes
-/// two or three a turn, a spike on the wires one.
+/// Evidence that makes a fault: three contradictions within a turn or two. A stuck sensor causes two or three a
+/// turn, a spike on the wires one.
 const FAULT: u8 = 20;
 
-/// One period: takes the code of this sample.
+/// Processes this sample's code.
 pub fn read(config: &Config, state: &mut State, code: u8) -> Option<Step> {
     let code = code & 7;
     let lasts = code == state.code;
@@ -70,9 +70,8 @@ pub fn read(config: &Config, state: &mut State, code: u8) -> Option<Step> {
     step
 }
 
-/// The sector of a rotor that nobody has followed since the last drive, by this sample's code, if the
-/// sensors can be believed. What speaks against them stays; wherever the rotor has been turned to
-/// does not.
+/// Returns the sector, from this sample's code, of a rotor not tracked since the last drive, if the sensors can be
+/// trusted. Keeps the evidence against them, but drops the position from before, as the rotor may have been turned.
 pub fn look(state: &mut State, code: u8) -> Option<Sector> {
     let code = code & 7;
     *state = State {
@@ -108,14 +107,14 @@ fn change(state: &mut State, code: u8) -> Option<Step> {
     }
 }
 
-/// Takes note of something that sensors in order would not show.
+/// Records something that working sensors would not show.
 pub fn contradict(state: &mut State) {
     state.evidence = state.evidence.saturating_add(CONTRADICTION);
     state.fault |= state.evidence >= FAULT;
 }
 
 impl State {
-    /// The sector, while the sensors can be believed.
+    /// Returns the sector while the sensors can be trusted.
     pub fn believed(&self) -> Option<Sector> {
         self.sector.filter(|_| !self.fault)
     }
@@ -128,7 +127,7 @@ mod tests {
 
     const CONFIG: Config = Config { patience: 24 };
 
-    /// Ten samples of each code; what the first of them to last makes.
+    /// Shows ten samples of each code; returns the step of the sample that confirms it.
     fn show(state: &mut State, code: u8) -> Option<Step> {
         let steps = [0; 10].map(|_| read(&CONFIG, state, code));
         assert_eq!(
@@ -222,7 +221,7 @@ mod tests {
                 read(&CONFIG, &mut state, code);
                 state.fault
             });
-            // 24 periods, and one until the code has lasted.
+            // 24 periods, plus one to confirm the code.
             assert_eq!(samples, Some(24));
         }
         let mut open = State::default();

@@ -1,23 +1,23 @@
-//! Error of the angle of the flux crossings (second paper, Table 1): by how far each
-//! source of error can put it off, over the speed.
+//! Angle error of the flux crossings (second paper, Table 1): how far each error source can put it
+//! off, by speed.
 //!
-//! Every function gives the magnitude of its error in electrical degrees. ω is the electrical speed
-//! in rad/s, not negative; α the electrical acceleration in rad/s², negative while braking; N the
-//! electrical turns over which the speed is measured.
+//! Each function returns the magnitude of its error in electrical degrees. ω is the electrical
+//! speed in rad/s, not negative; α the electrical acceleration in rad/s², negative while braking; N
+//! the electrical turns over which the speed is measured.
 //!
-//! The running observer takes off what is known of its lead and of the time between a crossing and
-//! its sample, and measures the speed at every edge instead of once in N turns: it stays below.
+//! The running observer stays below these: it compensates its known lead and the time from a
+//! crossing to its sample, and measures the speed at every edge instead of once in N turns.
 
 use core::f64::consts::{FRAC_PI_3, PI};
 
-/// A, the angle over which the position is extrapolated: between two of a turn's six crossings.
+/// A, the extrapolated angle: the distance between two of a turn's six crossings.
 const EXTRAPOLATION_DEG: f64 = 60.0;
 
-/// Above this [`position_filter`] is no longer accurate (2.4.2).
+/// Largest angle up to which [`position_filter`] is accurate (2.4.2).
 pub const POSITION_FILTER_VALID_DEG: f64 = 20.0;
 
-/// By how much the pseudo-integrator λ̂ = τ_int/(τ_int·s + 1)·(v − i·R) leads an integrator:
-/// 90° − arctan(τ_int·ω) (2.2.2). An infinite time constant leads by nothing.
+/// Returns the lead of the pseudo-integrator λ̂ = τ_int/(τ_int·s + 1)·(v − i·R) over an integrator:
+/// 90° − arctan(τ_int·ω) (2.2.2). An infinite time constant has none.
 pub fn low_pass(tau_int_s: f64, omega_rad_s: f64) -> f64 {
     if tau_int_s.is_infinite() {
         return 0.0;
@@ -25,37 +25,38 @@ pub fn low_pass(tau_int_s: f64, omega_rad_s: f64) -> f64 {
     degrees(libm::atan2(1.0, tau_int_s * omega_rad_s))
 }
 
-/// The lead of the second-order form, with a further high-pass of τ_HPFS (2.2.2, figure 21).
+/// Returns the lead of the second-order form, with an additional high-pass of τ_HPFS (2.2.2, figure
+/// 21).
 pub fn second_order(tau_int_s: f64, tau_hpfs_s: f64, omega_rad_s: f64) -> f64 {
     low_pass(tau_int_s, omega_rad_s) + low_pass(tau_hpfs_s, omega_rad_s)
 }
 
-/// The least τ_int, s, with which [`low_pass`] is at most `lead_deg` from this speed on (2.2.2,
-/// figure 19): 5.671/ω for 10°.
+/// Returns the smallest τ_int, s, for which [`low_pass`] is at most `lead_deg` from this speed up
+/// (2.2.2, figure 19): 5.671/ω for 10°.
 pub fn tau_int_s(lead_deg: f64, omega_rad_s: f64) -> f64 {
     1.0 / (libm::tan(lead_deg * (PI / 180.0)) * omega_rad_s)
 }
 
-/// The lag of a crossing that a hold-off of T_h has kept back: T_h·ω (2.3.2).
+/// Returns the lag of a crossing delayed by a hold-off of T_h: T_h·ω (2.3.2).
 pub fn hold_off(hold_off_s: f64, omega_rad_s: f64) -> f64 {
     degrees(hold_off_s * omega_rad_s)
 }
 
-/// K of appendix A, the dimensionless acceleration: (18N − 1)·α·A/ω̂².
+/// Returns K of appendix A, the dimensionless acceleration: (18N − 1)·α·A/ω̂².
 pub fn acceleration(turns: f64, alpha_rad_s2: f64, omega_rad_s: f64) -> f64 {
     (18.0 * turns - 1.0) * per_sixth(alpha_rad_s2, omega_rad_s)
 }
 
-/// K where every edge ends a measurement over the last N turns, as in the running observer: from its
-/// middle to that of the extrapolation are 3N + 1/2 sixths instead of up to 9N − 1/2, which makes
-/// (6N + 1)·α·A/ω̂².
+/// Returns K where every edge ends a measurement over the last N turns, as in the running observer:
+/// the middles of measurement and extrapolation are 3N + 1/2 sixths apart instead of up to 9N −
+/// 1/2, so K is (6N + 1)·α·A/ω̂².
 pub fn acceleration_every_edge(turns: f64, alpha_rad_s2: f64, omega_rad_s: f64) -> f64 {
     (6.0 * turns + 1.0) * per_sixth(alpha_rad_s2, omega_rad_s)
 }
 
-/// θ_ex, the error that K makes by the next measurement of the speed: |1 − 1/√(1 + K)|·A (2.4.1,
-/// appendix A). It lags while accelerating and leads while braking, by more. Infinite where the
-/// rotor would stand before that measurement, K ≤ −1.
+/// Returns θ_ex, the error that K causes by the next speed measurement: |1 − 1/√(1 + K)|·A (2.4.1,
+/// appendix A). It lags while accelerating and leads, by more, while braking. Infinite for K ≤ −1,
+/// where the rotor would stop before that measurement.
 pub fn extrapolation(k: f64) -> f64 {
     if k <= -1.0 {
         return f64::INFINITY;
@@ -63,8 +64,8 @@ pub fn extrapolation(k: f64) -> f64 {
     libm::fabs(1.0 - 1.0 / libm::sqrt(1.0 + k)) * EXTRAPOLATION_DEG
 }
 
-/// θ_ef, what the position filter A_e adds to it, approximately: (α·A/ω̂²)·(A_e/(1 − A_e))·6N·A
-/// (2.4.2). It holds where α·A/ω̂² is much below (1 − A_e)/A_e, which is up to
+/// Returns θ_ef, the approximate contribution of the position filter A_e: (α·A/ω̂²)·(A_e/(1 −
+/// A_e))·6N·A (2.4.2). Valid while α·A/ω̂² is well below (1 − A_e)/A_e, which is up to
 /// [`POSITION_FILTER_VALID_DEG`].
 pub fn position_filter(a_e: f64, turns: f64, alpha_rad_s2: f64, omega_rad_s: f64) -> f64 {
     if a_e == 0.0 {
@@ -74,12 +75,12 @@ pub fn position_filter(a_e: f64, turns: f64, alpha_rad_s2: f64, omega_rad_s: f64
     libm::fabs(per_sixth(alpha_rad_s2, omega_rad_s)) * sixths * EXTRAPOLATION_DEG
 }
 
-/// θ_es, the lag of a crossing that is seen a sampling period T_s late: T_s·ω (2.4.1).
+/// Returns θ_es, the lag of a crossing seen one sampling period T_s late: T_s·ω (2.4.1).
 pub fn digital_delay(period_s: f64, omega_rad_s: f64) -> f64 {
     degrees(period_s * omega_rad_s)
 }
 
-/// α·A/ω²; zero without acceleration, at standstill too.
+/// Returns α·A/ω²; zero without acceleration, even at standstill.
 fn per_sixth(alpha_rad_s2: f64, omega_rad_s: f64) -> f64 {
     if alpha_rad_s2 == 0.0 {
         return 0.0;
@@ -95,7 +96,7 @@ fn degrees(angle_rad: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The motor of figures 27 to 30: 14 poles under 10,000 rpm/s, sampled at 15.625 kHz, N = 1.
+    /// The motor of figures 27 to 30: 14 poles at 10,000 rpm/s, sampled at 15.625 kHz, N = 1.
     const RAD_S_PER_RPM: f64 = 7.0 * PI / 30.0;
     const ALPHA: f64 = 10_000.0 * RAD_S_PER_RPM;
     const PERIOD_S: f64 = 1.0 / 15_625.0;
@@ -138,7 +139,7 @@ mod tests {
         assert!((extrapolation(0.44) - 10.0).abs() < 1e-9);
         // Below 10° above 750 rpm (figure 27).
         assert!(theta_ex(750.0) < 10.0 && theta_ex(735.0) > 10.0);
-        // Without an estimate of the speed it is all of A.
+        // Without a speed estimate it is all of A.
         assert_eq!(theta_ex(0.0), 60.0);
     }
 
@@ -176,7 +177,7 @@ mod tests {
         ] {
             assert!(theta_ex(rpm) + theta_es(rpm) < bound, "{rpm}");
         }
-        // "About": a little beyond, they are left.
+        // "About": slightly beyond, they are exceeded.
         for (rpm, bound) in [(850.0, 10.0), (3740.0, 10.0), (450.0, 20.0), (8030.0, 20.0)] {
             assert!(theta_ex(rpm) + theta_es(rpm) > bound, "{rpm}");
         }
@@ -187,7 +188,7 @@ mod tests {
         let all = |rpm: f64| theta_ex(rpm) + theta_es(rpm) + theta_ef(rpm);
         assert!(all(2000.0) < 20.0, "{}", all(2000.0));
         assert!(all(1850.0) > 20.0, "{}", all(1850.0));
-        // The approximation breaks down below, which is where it leaves its range.
+        // The approximation breaks down below, where it leaves its range.
         assert!(theta_ef(2000.0) < POSITION_FILTER_VALID_DEG);
         assert!(theta_ef(1500.0) > POSITION_FILTER_VALID_DEG);
         assert_eq!(position_filter(0.0, 1.0, ALPHA, 0.0), 0.0);

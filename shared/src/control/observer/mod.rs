@@ -1,6 +1,6 @@
 //! Position observers: from voltages and currents to the rotor's angle and speed.
 //!
-//! All of them are called once a period with the same [`Input`] and say the same [`Estimate`].
+//! Each is called once per period with the same [`Input`] and returns the same [`Estimate`].
 
 pub mod back_emf;
 pub mod compensated;
@@ -22,7 +22,7 @@ use crate::trace::Trace;
 use crate::units::{Angle, Current, FLUX_NOMINAL, Flux, Speed, Voltage, WideVoltage, wide};
 pub use estimate::{Estimate, Input, SlowEstimate};
 
-/// The observer in use (`CTL_OBSERVER`) and its coefficients.
+/// The selected observer (`CTL_OBSERVER`) and its coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Config {
     /// Adaptive back-EMF.
@@ -31,12 +31,12 @@ pub enum Config {
     Edges(edges::Config),
     /// Compensated flux with a phase-locked loop.
     Compensated(compensated::Config),
-    /// None: the drive is told where the rotor is, see [`drive::State::place`](crate::drive::State::place).
+    /// None: the caller supplies the rotor's position, see [`drive::State::place`](crate::drive::State::place).
     #[default]
     Given,
 }
 
-/// The observers' states; only that of the one in use changes.
+/// The observers' states; only the selected one's changes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct State {
     /// Adaptive back-EMF.
@@ -45,32 +45,32 @@ pub struct State {
     pub edges: edges::State,
     /// Compensated flux with a phase-locked loop.
     pub compensated: compensated::State,
-    /// Report to the drive of this period.
+    /// The position reported to the drive for this period.
     pub given: given::State,
-    /// The slower part of the estimate; the compensated flux observer says it by [`pace`].
+    /// The slow part of the estimate; [`pace`] updates it for the compensated flux observer.
     pub slow_estimate: SlowEstimate,
 }
 
-/// An observer in a control period: the one in use of all, or one that is known beforehand.
+/// An observer in a control period: the selected one, or one known at compile time.
 pub trait Observer {
-    /// Takes the observer from the last sample to this one. `imposed` is the speed that an open-loop
-    /// start gives the rotor.
+    /// Advances the observer from the last sample to this one. `imposed` is the speed that an open-loop start
+    /// imposes on the rotor.
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate;
 
-    /// Returns true if what it sees while the rotor is being aligned counts; else [`expect`] begins it anew.
+    /// Returns true if observation during alignment counts; otherwise [`expect`] restarts the observer.
     fn follows_park(&self) -> bool;
 
-    /// The current regulator's feedback: the speed of the control's frame, the measured current in it
-    /// and what the observer makes of it.
+    /// Returns the current regulator's feedback: the speed of the control's frame, the measured current in it, and
+    /// the observer's estimates.
     fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback;
 
-    /// Tells the observer the voltage `u` that a period commands, in the frame of the feedback. Only
-    /// the adaptive back-EMF observer works in that frame.
+    /// Tells the observer the voltage `u` commanded in this period, in the feedback's frame. Only the adaptive
+    /// back-EMF observer works in that frame.
     fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>);
 }
 
 impl Observer for Config {
-    // One copy for whoever calls it.
+    // One copy for all callers.
     #[inline(never)]
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
         estimate(self, state, input, imposed)
@@ -120,15 +120,16 @@ impl Observer for compensated::Config {
 }
 
 impl Config {
-    /// Returns true if [`advance`] is of any use: only the adaptive back-EMF observer works in the control's frame.
+    /// Returns true if [`advance`] has any effect: only the adaptive back-EMF observer works in the control's
+    /// frame.
     pub fn works_in_frame(&self) -> bool {
         matches!(self, Self::BackEmf(_))
     }
 }
 
-/// Takes the observer in use from the last sample to this one.
+/// Advances the selected observer from the last sample to this one.
 ///
-/// `imposed` is the speed that an open-loop start gives the rotor.
+/// `imposed` is the speed that an open-loop start imposes on the rotor.
 #[inline(always)] // in each period
 pub fn estimate(
     config: &Config,
@@ -169,8 +170,8 @@ pub fn estimate(
     }
 }
 
-/// Update of gains, every so many `periods`: coefficients follow the speed and the current `i_q` that is asked for,
-/// and [`State::slow_estimate`] is brought up to date.
+/// Updates the gains every `periods` periods, by the speed and the requested current `i_q`, and refreshes
+/// [`State::slow_estimate`].
 pub fn pace(
     config: &Config,
     state: &mut State,
@@ -183,8 +184,8 @@ pub fn pace(
     }
 }
 
-/// A start begins: the rotor stands where the position sensors of this sample say. False where none
-/// tell: then it must be parked, by the control's frame that is at this angle.
+/// Begins a start: the rotor stands where this sample's position sensors say. Returns false if there are none to
+/// tell; the rotor must then be parked, by the control's frame, which is at angle `frame`.
 pub fn stand(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool {
     state.clear(config);
     match config {
@@ -198,13 +199,13 @@ pub fn stand(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool
     }
 }
 
-/// Returns true if a position sensor is at fault.
+/// Returns true if a position sensor has failed.
 pub fn sensor_fault(state: &State) -> bool {
     state.edges.hall.fault
 }
 
-/// The current regulator's feedback: the speed of the control's frame, the measured current in it
-/// and what the observer makes of it.
+/// Returns the current regulator's feedback: the speed of the control's frame, the measured current in it, and the
+/// observer's estimates.
 #[inline(always)] // in each period
 pub fn feedback(
     config: &Config,
@@ -230,10 +231,10 @@ pub fn feedback(
     }
 }
 
-/// ĥ of a flux along d, ω·φ against q.
+/// Returns ĥ of a flux along d: −ω·φ along q.
 #[inline(always)] // in each period
 fn emf(omega: Speed, flux: Flux) -> Dq<WideVoltage> {
-    // A speed in turns takes 2π: 16·π/8, and the sixteenth is what the fraction bits are apart.
+    // A speed in turns takes 2π: 16·π/8, and the sixteenth is the difference in fraction bits.
     let length = omega.top(flux).top(EIGHTH_PI).to_bits();
     Dq {
         d: WideVoltage::ZERO,
@@ -241,7 +242,7 @@ fn emf(omega: Speed, flux: Flux) -> Dq<WideVoltage> {
     }
 }
 
-/// φ̂, the rotor's flux along d.
+/// Returns φ̂, the rotor's flux along d.
 pub fn flux(config: &Config, state: &State) -> Flux {
     match config {
         Config::BackEmf(_) => back_emf::flux(&state.back_emf),
@@ -251,8 +252,8 @@ pub fn flux(config: &Config, state: &State) -> Flux {
     }
 }
 
-/// Tells the observer the voltage `u` that a period commands, in the frame of the feedback. Only the
-/// adaptive back-EMF observer works in that frame.
+/// Tells the observer the voltage `u` commanded in this period, in the feedback's frame. Only the adaptive back-EMF
+/// observer works in that frame.
 #[inline(always)] // in each period
 pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
     if let Config::BackEmf(config) = config {
@@ -260,8 +261,8 @@ pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>
     }
 }
 
-/// The rotor is known to turn at `omega` and to be at `theta` at the coming sample, under the current
-/// `i`. [`pace`] comes before that.
+/// Begins with a rotor known to turn at `omega` and to be at `theta` at the next sample, with the current `i`. Call
+/// [`pace`] first.
 pub fn begin(
     config: &Config,
     state: &mut State,
@@ -272,7 +273,7 @@ pub fn begin(
     match config {
         Config::BackEmf(config) => state.back_emf = back_emf::begin(config, theta, omega),
         Config::Edges(config) => {
-            // Its state is that of the sample before.
+            // Its state is that of the previous sample.
             let before = theta.wrapping_sub(omega.over_period());
             edges::begin(config, &mut state.edges, before, omega, phases(i));
         }
@@ -283,10 +284,10 @@ pub fn begin(
     }
 }
 
-/// The rotor has been aligned and is expected at `theta` and at rest, under the current `i`.
+/// Expects the aligned rotor at rest at `theta`, with the current `i`.
 pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
     match config {
-        // The one works in the frame that the start imposes, the other needs no start.
+        // The former works in the frame that the start imposes, the latter needs no start.
         Config::BackEmf(_) | Config::Given => {}
         Config::Edges(config) => {
             edges::begin(config, &mut state.edges, theta, Speed::ZERO, phases(i));
@@ -297,8 +298,8 @@ pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Cur
     }
 }
 
-/// The angle by which the rotor leads the control's frame, which has turned at the imposed speed `omega_s` and
-/// stands at `frame`. The observer goes on from there. `None` where the rotor has not followed.
+/// Hands over from the open-loop start, whose frame turns at `omega_s` and is at `frame`: returns the angle by
+/// which the rotor leads that frame, from where the observer continues. `None` if the rotor has not followed.
 pub fn take_over(
     config: &Config,
     state: &mut State,
@@ -311,17 +312,17 @@ pub fn take_over(
         Config::Compensated(_) => {
             compensated::found(&state.compensated).map(|theta| theta.wrapping_sub(frame))
         }
-        // It is never started by an imposed frame.
+        // Never started by an imposed frame.
         Config::Given => None,
     }
 }
 
 impl State {
-    /// The observer in use forgets the rotor, but not what is known of its sensors.
+    /// Resets the selected observer, except for what it knows of its sensors.
     fn clear(&mut self, config: &Config) {
         self.slow_estimate = SlowEstimate::default();
         match config {
-            // A start or a catch gives it all of its state.
+            // A start or a catch sets its whole state.
             Config::BackEmf(_) | Config::Given => {}
             Config::Edges(_) => {
                 let hall = self.edges.hall.clone();
@@ -334,7 +335,7 @@ impl State {
         }
     }
 
-    /// Every word of the state of the observer in use; the others rest.
+    /// Emits every word of the selected observer's state; the others are idle.
     pub fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
         let Self {
             back_emf,

@@ -1,9 +1,9 @@
-//! The position estimator (second paper, section 2.4): linear extrapolation from the last edge, and
-//! the speed from the time between edges. Flux crossings and Hall sensors trigger it alike.
+//! The position estimator (second paper, section 2.4): linear extrapolation from the last edge, with the speed from
+//! the time between edges. Flux crossings and Hall sensors trigger it alike.
 //!
-//! The paper measures the speed over N turns once in N turns. Here every edge ends a measurement over
-//! the last N turns, so that from its middle to that of the extrapolation the rotor turns by
-//! (3N + 0.5)·60° instead of up to (9N − 0.5)·60°, which is what the error of appendix A comes from.
+//! The paper measures the speed over N turns once every N turns. Here every edge ends a measurement over the last N
+//! turns, so the middles of measurement and extrapolation are (3N + 0.5)·60° apart instead of up to (9N − 0.5)·60°,
+//! the source of appendix A's error.
 
 use fixed::types::U20F12;
 
@@ -18,22 +18,22 @@ pub type Periods = U20F12;
 /// Coefficients of the estimator.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// N, the electrical turns over which the speed is taken, 1 to 4.
+    /// N, the electrical turns over which the speed is measured, 1 to 4.
     pub turns: u8,
-    /// Below this speed it is taken from edge to edge (2.5.2, item 3): over whole turns it would lag
-    /// too much. Zero is never.
+    /// Below this speed it is measured from edge to edge (2.5.2, item 3): over whole turns it would lag too much.
+    /// Zero means never.
     pub whole_turns_above: Speed,
-    /// A_e, the share of the extrapolated angle that an edge leaves (2.4.2), 0 to below 1.
+    /// A_e, the share of the extrapolated angle that survives an edge (2.4.2), 0 to below 1.
     pub a_e: Gain<Angle, Angle>,
-    /// The speed above which A_e counts.
+    /// The speed above which A_e applies.
     pub filter_above: Speed,
-    /// True if what is known of an edge's angle and of its time before the sample is taken into
-    /// account. The paper's figures 28 and 30 are without.
+    /// Compensate for an edge's known angle and for its time before the sample. The paper's figures 28 and 30 do
+    /// not.
     pub compensates: bool,
 }
 
 traced! {
-    /// State of the estimator.
+    /// The estimator's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// θ̂ at this sample.
@@ -42,47 +42,47 @@ traced! {
         pub theta_inc: Angle,
         /// ω̂.
         pub omega: Speed,
-        /// Change of ω̂ in a period, between the last two measurements.
+        /// Change of ω̂ per period, between the last two measurements.
         pub omega_step: Speed,
         /// Periods since the sample that saw the last edge.
         pub since: u32,
         /// Time from the edge to that sample.
         pub late: Periods,
-        /// The last intervals between edges, a ring.
+        /// The last intervals between edges, a ring buffer.
         pub intervals: [Periods; EDGES_MAX],
-        /// Place of the next interval.
+        /// Position of the next interval.
         pub next: u8,
         /// Number of intervals, at most those of N turns.
         pub edges: u8,
         /// Their sum.
         pub window: Periods,
-        /// True if the last edge was seen, so that the next interval is one.
+        /// The last edge was seen, so the next interval is valid.
         pub timed: bool,
     }
 }
 
-/// Edges in the greatest N.
+/// Edges in the largest N.
 const EDGES_MAX: usize = 6 * TURNS_MAX as usize;
 
-/// Greatest N.
+/// Largest N.
 pub const TURNS_MAX: u8 = 4;
 
 /// θ_inc ≤ 90° (2.4.1).
 const LIMIT: Angle = Angle::from_bits(1 << 30);
 
-/// After the time in which the estimated speed gives a third of a turn without an edge, the speed
-/// was twice too high: the rotor has turned less than a sixth.
+/// If the estimated speed would have covered a third of a turn without an edge, it was twice too high: the rotor
+/// has turned less than a sixth.
 const THIRD_TURN: u64 = (1 << 32) / 3;
 
-/// Held below a quarter of a turn a period: sectors could no longer be told apart.
+/// Below a quarter of a turn per period; above, sectors could not be told apart.
 const OMEGA_MAX: u64 = (1 << 30) - 1;
 
-/// The angle in turns, 32 fraction bits, of so many periods at this speed.
+/// Returns the angle turned in this many periods, in turns with 32 fraction bits.
 pub(super) fn turned(periods: u32, omega: Speed) -> u64 {
     u64::from(periods) * u64::from(omega.to_bits().max(0) as u32)
 }
 
-/// One period without news: extrapolates (2.4.1).
+/// Extrapolates by one period without news (2.4.1).
 pub fn advance(state: &mut State) {
     let step = state.omega.over_period().min(LIMIT - state.theta_inc);
     state.theta = state.theta.wrapping_add(step);
@@ -100,13 +100,13 @@ fn overdue(state: &mut State) {
     forget(state);
 }
 
-/// Leaves the intervals so far out of the next measurements.
+/// Excludes the intervals so far from the next measurements.
 fn forget(state: &mut State) {
     state.edges = 0;
     state.window = Periods::ZERO;
 }
 
-/// Takes the time of an edge that was `late` before this sample, for the speed.
+/// Uses the time of an edge, `late` before this sample, to measure the speed.
 pub fn time(config: &Config, state: &mut State, late: Periods) {
     let since = Periods::saturating_from_num(state.since);
     let interval = since.saturating_add(state.late).saturating_sub(late);
@@ -119,7 +119,7 @@ pub fn time(config: &Config, state: &mut State, late: Periods) {
     }
     let wanted = 6 * config.turns.clamp(1, TURNS_MAX);
     remember(state, interval, wanted);
-    // 32 + 12 fraction bits: a rotor that is slow turns by less than a sixth in the interval.
+    // 32 + 12 fraction bits. Slow means that speed would have covered more than a sixth in the interval.
     let whole_turns = u64::from(config.whole_turns_above.to_bits().max(0) as u32);
     if u64::from(interval.to_bits()) * whole_turns > (1 << 44) / 6 {
         measure(state, 1, interval);
@@ -128,7 +128,7 @@ pub fn time(config: &Config, state: &mut State, late: Periods) {
     }
 }
 
-/// Takes an interval into the ring, in place of the oldest once there are as many as wanted.
+/// Stores an interval in the ring, replacing the oldest once the wanted number is there.
 fn remember(state: &mut State, interval: Periods, wanted: u8) {
     let size = EDGES_MAX as u8;
     if state.edges >= wanted {
@@ -142,7 +142,7 @@ fn remember(state: &mut State, interval: Periods, wanted: u8) {
     state.window = state.window.saturating_add(interval);
 }
 
-/// ω̂ of so many sixths of a turn in this time.
+/// Sets ω̂ from this many sixths of a turn in this time.
 fn measure(state: &mut State, sixths: u8, time: Periods) {
     // Turns with 44 fraction bits over periods with 12.
     let turns = divide(u64::from(sixths) << 44, 6);
@@ -158,19 +158,19 @@ fn measure(state: &mut State, sixths: u8, time: Periods) {
     state.omega = Speed::from_bits(omega as i32);
 }
 
-/// Takes the place of an edge: the beginning of `sector`, where the rotor was [`State::late`] before
-/// this sample, `ahead` of where it is commonly. Merges it with the extrapolated angle (2.4.2).
+/// Uses the position of an edge: the start of `sector`, where the rotor was [`State::late`] before this sample,
+/// `ahead` of the nominal edge. Merges it with the extrapolated angle (2.4.2).
 pub fn place(config: &Config, state: &mut State, sector: Sector, ahead: Angle) {
     let mut theta = sector.begin();
     if config.compensates {
-        // 32 + 12 − 12 fraction bits; below two periods at below a quarter of a turn.
+        // 32 + 12 − 12 fraction bits; less than two periods at less than a quarter turn each.
         let since = i64::from(state.omega.to_bits()) * i64::from(state.late.to_bits());
         let since = Angle::from_bits((since >> Periods::FRAC_NBITS) as i32);
         theta = theta.wrapping_add(ahead).wrapping_add(since);
     }
     state.theta_inc = Angle::ZERO;
     state.theta = if state.omega == Speed::ZERO {
-        // Nothing will be extrapolated: the middle is never further off than half the sector.
+        // Nothing will be extrapolated: the middle is at most half a sector off.
         sector.middle()
     } else if state.omega >= config.filter_above {
         let extrapolated = state.theta.wrapping_sub(theta);
@@ -180,27 +180,27 @@ pub fn place(config: &Config, state: &mut State, sector: Sector, ahead: Angle) {
     };
 }
 
-/// Puts the rotor where it must be, and measures its speed anew from the next edge on.
+/// Puts the rotor where it must be, and restarts the speed measurement at the next edge.
 pub fn settle(state: &mut State, theta: Angle) {
     state.theta = theta;
     state.theta_inc = Angle::ZERO;
     retime(state);
 }
 
-/// Measures the speed anew: the next edges come from another source.
+/// Restarts the speed measurement: the next edges come from another source.
 pub fn retime(state: &mut State) {
-    // The next edge forgets the intervals so far.
+    // The next edge discards the intervals so far.
     state.timed = false;
     state.omega_step = Speed::ZERO;
 }
 
-/// The rotor stands somewhere in this sector.
+/// Sets the rotor to rest, somewhere in this sector.
 pub fn stand(state: &mut State, sector: Sector) {
     settle(state, sector.middle());
     state.omega = Speed::ZERO;
 }
 
-/// Begins at this angle and speed; a negative speed is none.
+/// Begins at this angle and speed; a negative speed counts as zero.
 pub fn begin(state: &mut State, theta: Angle, omega: Speed) {
     *state = State {
         theta,

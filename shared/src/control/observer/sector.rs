@@ -1,26 +1,26 @@
-//! The sixths of an electrical turn that the signs of three fluxes tell apart (second paper, figures
-//! 22 and 24): what flux crossings and Hall sensors have in common.
+//! The sixths of an electrical turn that the signs of three fluxes distinguish (second paper, figures 22 and 24),
+//! shared by flux crossings and Hall sensors.
 
 use crate::trace::traced;
 use crate::units::Angle;
 
 traced! {
-    /// One of six sectors of 60°, numbered in the positive direction; the first has its middle at 0°,
-    /// where the rotor's flux lies along phase a.
+    /// One of six sectors of 60°, numbered in the positive direction. The middle of the first is at 0°, where the
+    /// rotor's flux lies along phase a.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub struct Sector(u8);
 }
 
-/// The zero crossing with which a sector begins.
+/// The zero crossing at which a sector begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Edge {
-    /// Phase whose flux crosses zero: 0, 1, 2.
+    /// Phase whose flux crosses zero: 0, 1 or 2.
     pub phase: usize,
-    /// True if it becomes positive.
+    /// The flux becomes positive.
     pub rising: bool,
 }
 
-/// Signs of the fluxes in each sector, bits 0, 1, 2 for the phases a, b, c: set while positive.
+/// Signs of the fluxes per sector, bits 0, 1, 2 for phases a, b, c: set while positive.
 const CODES: [u8; 6] = [0b001, 0b011, 0b010, 0b110, 0b100, 0b101];
 
 /// 2^32/6: a sector as an angle.
@@ -30,50 +30,50 @@ const SIXTH_TURN: u32 = 715_827_883;
 const TWELFTH_TURN: u32 = 357_913_941;
 
 impl Sector {
-    /// Half a sector: how far the rotor can be from the middle of its sector.
+    /// Half a sector: the largest distance of the rotor from its sector's middle.
     pub const HALF: Angle = Angle::from_bits(TWELFTH_TURN as i32);
 
-    /// The sector in which an angle lies.
+    /// Returns the sector of an angle.
     pub fn of(theta: Angle) -> Self {
         let from_edge = (theta.to_bits() as u32).wrapping_add(TWELFTH_TURN);
         Self(((u64::from(from_edge) * 6) >> 32) as u8)
     }
 
-    /// The sector with these signs; all equal is none.
+    /// Returns the sector with these signs; `None` if all are equal.
     pub fn of_code(code: u8) -> Option<Self> {
         let index = CODES.iter().position(|known| *known == code)?;
         Some(Self(index as u8))
     }
 
-    /// The signs of the fluxes in it.
+    /// Returns the signs of the sector's fluxes.
     pub fn code(self) -> u8 {
         CODES[usize::from(self.0 % 6)]
     }
 
-    /// The sector that follows in the positive direction.
+    /// Returns the next sector in the positive direction.
     pub fn next(self) -> Self {
         Self(if self.0 >= 5 { 0 } else { self.0 + 1 })
     }
 
-    /// The number of sectors forwards from here to there, 0 to 5.
+    /// Returns the number of forward steps from this sector to `there`, 0 to 5.
     pub fn steps_to(self, there: Self) -> u8 {
         (there.0 + 6 - self.0) % 6
     }
 
-    /// The angle at which it begins.
+    /// Returns the angle at which the sector begins.
     pub fn begin(self) -> Angle {
         self.middle().wrapping_sub(Self::HALF)
     }
 
-    /// The angle of its middle.
+    /// Returns the angle of the sector's middle.
     pub fn middle(self) -> Angle {
         Angle::from_bits(u32::from(self.0).wrapping_mul(SIXTH_TURN) as i32)
     }
 
-    /// The crossing with which it begins.
+    /// Returns the crossing at which the sector begins.
     pub fn edge(self) -> Edge {
         Edge {
-            // c, b, a, c, b, a; every second one rises.
+            // c, b, a, c, b, a; every other one rises.
             phase: usize::from(2 - self.0 % 3),
             rising: self.0 & 1 == 1,
         }

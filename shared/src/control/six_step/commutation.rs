@@ -1,33 +1,33 @@
-//! The six sextants: which leg does what, and where the rotor is meanwhile.
+//! The six sextants: each leg's role, and the rotor's position meanwhile.
 
 use crate::trace::traced;
 use crate::units::Angle;
 
 traced! {
-    /// A sextant, named after the leg that switches and the leg that is held low. The current's vector
-    /// stands at 30°, 90° and so on, a quarter of a turn ahead of the rotor in the sextant's middle.
+    /// A sextant, named after the switching leg and the leg held low. The current vector stands at 30°, 90° and so
+    /// on, a quarter turn ahead of the rotor mid-sextant.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     #[repr(u8)]
     pub enum Sector {
-        /// Current from a to c: the rotor is within 30° of 300°.
+        /// Current from a to c; rotor within 30° of 300°.
         Ac,
-        /// From b to c: about 0°.
+        /// From b to c; around 0°.
         Bc,
-        /// From b to a: about 60°.
+        /// From b to a; around 60°.
         Ba,
-        /// From c to a: about 120°.
+        /// From c to a; around 120°.
         Ca,
-        /// From c to b: about 180°.
+        /// From c to b; around 180°.
         Cb,
-        /// From a to b: about 240°.
+        /// From a to b; around 240°.
         Ab,
     }
 }
 
-/// One thing for each leg, by what the leg does.
+/// One value per leg, by the leg's role.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Legs<T> {
-    /// The leg that switches: both switches in turn, so that the current may flow either way.
+    /// The switching leg: both switches alternate, so the current may flow either way.
     pub switching: T,
     /// The leg whose low side is on.
     pub low: T,
@@ -38,11 +38,11 @@ pub struct Legs<T> {
 /// A sixth of a turn.
 pub const SEXTANT: Angle = Angle::from_bits(715_827_883);
 
-/// From a sextant's middle to its end.
+/// From mid-sextant to its end.
 pub const HALF_SEXTANT: Angle = Angle::from_bits(357_913_941);
 
 impl Sector {
-    /// The one that follows as the rotor turns forwards.
+    /// Returns the next sextant in forward rotation.
     pub const fn next(self) -> Self {
         match self {
             Self::Ac => Self::Bc,
@@ -54,25 +54,24 @@ impl Sector {
         }
     }
 
-    /// Returns true if the floating phase's back-EMF rises through zero; it falls in every other sextant.
+    /// Returns true if the floating phase's back-EMF rises through zero; rising and falling sextants alternate.
     ///
-    /// At the start of a rising sextant the low leg has changed and the switching one goes on, at
-    /// the start of a falling one it is the other way round.
+    /// At the start of a rising sextant the low leg has changed and the switching leg stays; at the start of a
+    /// falling one it is the other way round.
     pub const fn rising(self) -> bool {
         matches!(self, Self::Ac | Self::Ba | Self::Cb)
     }
 
-    /// The rotor's angle at which the floating phase's back-EMF is zero.
+    /// Returns the rotor angle at which the floating phase's back-EMF is zero.
     ///
-    /// Phase a has its greatest flux at 0°, so its back-EMF is −ω·φ·sin θ: it falls through zero at
-    /// 0°, where a floats.
+    /// Phase a's flux peaks at 0°, so its back-EMF is −ω·φ·sin θ: it falls through zero at 0°, where a floats.
     pub const fn middle(self) -> Angle {
         Angle::from_bits((self as i32 - 1).wrapping_mul(SEXTANT.to_bits()))
     }
 
-    /// The sextant in which a rotor at this angle is.
+    /// Returns the sextant of a rotor at this angle.
     pub const fn at(theta: Angle) -> Self {
-        // The first begins at −90°. The top of the product with six counts the sextants.
+        // The first sextant begins at −90°. The top word of six times the angle counts sextants.
         let from_first = (theta.to_bits() as u32).wrapping_add(1 << 30);
         match ((from_first as u64 * 6) >> 32) as u32 {
             0 => Self::Ac,
@@ -84,7 +83,7 @@ impl Sector {
         }
     }
 
-    /// Phases a, b, c by what their legs do.
+    /// Sorts the values of phases a, b, c by their legs' roles.
     pub fn legs<T>(self, [a, b, c]: [T; 3]) -> Legs<T> {
         let (switching, low, floating) = match self {
             Self::Ac => (a, c, b),
@@ -101,7 +100,7 @@ impl Sector {
         }
     }
 
-    /// The state of each leg, as phases a, b, c.
+    /// Returns each leg's value, ordered as phases a, b, c.
     pub fn phases<T>(self, legs: Legs<T>) -> [T; 3] {
         let Legs {
             switching: s,
@@ -133,7 +132,7 @@ mod tests {
         Sector::Ab,
     ];
 
-    /// Back-EMF of the phases over ω·φ.
+    /// Back-EMFs of the phases over ω·φ.
     fn emf(turns: f64) -> [f64; 3] {
         [0.0, 1.0, 2.0].map(|phase| -(TAU * (turns - phase / 3.0)).sin())
     }

@@ -1,16 +1,15 @@
-//! The zero crossing of the floating phase.
+//! Zero-crossing detection on the floating phase.
 //!
-//! The terminals are read in the middle of the low sides' on-time. The two legs that conduct are
-//! both at 0 V then, and what the switches drop cancels in the star point, so that the floating
-//! terminal stands at 1.5 times its back-EMF: the crossing is against ground at any duty and any
-//! supply. The modulator's least low-side on-time keeps the edges of the PWM away from the reading.
-//! Below a diode's drop the terminal is clamped, so that only the positive side has a value, and
-//! the crossing's instant is extrapolated from it.
+//! The terminals are sampled in the middle of the low-side on-time. Both conducting legs are at 0 V then, and their
+//! switches' drops cancel at the star point, so the floating terminal is at 1.5 times its back-EMF: the crossing is
+//! against ground at any duty and supply. The modulator's minimum low-side on-time keeps PWM edges away from the
+//! sample. Below a diode's drop the terminal is clamped, so only the positive side has a value, and the crossing's
+//! instant is extrapolated from it.
 //!
-//! After a commutation the current of the released phase goes on through a diode until it is gone.
-//! Of a leg that was low it takes the terminal to the supply, where no back-EMF is; such a reading
-//! says nothing. Of a leg that switched it takes the terminal to ground, which looks like a
-//! crossing; so a falling phase must have been seen above first.
+//! After a commutation the released phase's current freewheels through a diode until it has decayed. From a leg
+//! that was low it takes the terminal to the supply, above any back-EMF, so such a reading is ignored. From a leg
+//! that switched it takes the terminal to ground, which looks like a crossing, so a falling phase must have been
+//! seen above first.
 
 use fixed::types::I16F16;
 
@@ -21,32 +20,31 @@ use crate::units::Voltage;
 /// Thresholds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Reading above which the back-EMF is positive: beyond the converter's noise.
+    /// Reading above which the back-EMF is positive, beyond ADC noise.
     pub least: Voltage,
-    /// Greatest reading that is certainly one: above it the converter is at its end.
+    /// Largest valid reading; above it the ADC saturates.
     pub greatest: Voltage,
-    /// Samples after a commutation that still show the sextant before.
+    /// Samples after a commutation that still belong to the previous sextant.
     pub delayed: u16,
 }
 
 traced! {
-    /// The readings of the present sextant.
+    /// The present sextant's readings.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// Samples of this sextant.
+        /// Samples in this sextant.
         pub samples: u16,
         /// The last reading was above the threshold.
         pub side: bool,
-        /// Readings in a row on that side.
+        /// Consecutive readings on that side.
         pub run: u16,
-        /// It is certain to have been below the threshold, and the phase is one that rises.
+        /// The phase rises and has certainly been below the threshold.
         pub below: bool,
-        /// The first and the last reading above the threshold.
+        /// The first and last readings above the threshold.
         pub above: Option<Span>,
         /// The crossing has been found.
         pub found: bool,
-        /// Change of the reading in a period near the crossing, of the sextants before; 0 where it
-        /// is not known.
+        /// Change of the reading per period near the crossing, from earlier sextants; 0 while unknown.
         pub slope: Voltage,
     }
 }
@@ -55,21 +53,20 @@ traced! {
     /// Two readings of one sextant.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub struct Span {
-        /// Samples of the sextant until the first, and its value.
+        /// Sample number and value of the first.
         pub first: (u16, Voltage),
-        /// Sample and reading of the last.
+        /// Sample number and value of the last.
         pub last: (u16, Voltage),
     }
 }
 
 impl State {
-    /// Returns true if no reading of this sextant has said anything: the released phase's current has not
-    /// died.
+    /// Returns true if no reading of this sextant was usable: the released phase's current has not decayed.
     pub fn blind(&self) -> bool {
         !self.below && self.above.is_none()
     }
 
-    /// The next sextant begins.
+    /// Begins the next sextant.
     pub fn begin(&mut self, config: &Config) {
         let slope = self.measured_slope(config).unwrap_or(self.slope);
         *self = Self {
@@ -84,7 +81,7 @@ impl State {
         self.above = Some(Span { first, last: now });
     }
 
-    /// The measured slope, where the reading has changed by far more than the converter's steps and noise.
+    /// Returns the measured slope if the reading has changed well beyond ADC steps and noise.
     fn measured_slope(&self, config: &Config) -> Option<Voltage> {
         let Span { first, last } = self.above?;
         let samples = i32::from(last.0 - first.0);
@@ -96,13 +93,12 @@ impl State {
     }
 }
 
-/// Takes in a sample's reading of the floating terminal, for a phase that is `rising` or falling.
+/// Processes a sample of the floating terminal, for a phase that is `rising` or falling.
 ///
-/// Returns for how many periods the crossing has been over, once in a sextant. A side counts from
-/// `certain` readings in a row on. With `strict` a rising phase too must have been seen on the other
-/// side: before the start has found the rotor, one that swings backwards looks like one that is past
-/// its crossing.
-// Inlined, though it is long: the call would be longer than what it saves.
+/// Returns, once per sextant, how many periods ago the crossing was. A side counts after `certain` consecutive
+/// readings. With `strict` a rising phase too must first have been seen on the other side: until the start has
+/// found the rotor, one swinging backwards looks like one past its crossing.
+// Inlined although long: the call would be longer than what it saves.
 #[inline]
 pub fn look(
     config: &Config,
@@ -117,8 +113,8 @@ pub fn look(
     if state.samples <= config.delayed {
         return None;
     }
-    // Line to line, a motor that is driven has less back-EMF than the supply has volts: 1.5 times
-    // a phase's at 30° from its crossing is 0.43 of that, at 60° 0.75.
+    // Line to line, a driven motor's back-EMF is below the supply: 1.5 times a phase's at 30° from its crossing is
+    // 0.43 of that, at 60° 0.75.
     let clamped = (bus >> 2).saturating_mul_int(3).min(config.greatest);
     if terminal >= clamped {
         return None;
@@ -164,7 +160,7 @@ fn rising_above(
         return None;
     }
     state.found = true;
-    // All of the reading has grown since the crossing, and that was in this sextant.
+    // The reading has grown from zero since the crossing, which was within this sextant.
     let grows = periods(terminal, state.slope).max(whole(certain - 1));
     Some(grows.min(whole(state.samples)))
 }
@@ -172,7 +168,8 @@ fn rising_above(
 fn falling_below(state: &mut State) -> Option<I16F16> {
     let (at, reading) = state.above?.last;
     state.found = true;
-    // The last reading had that far to fall; a slow rotor's has some way to go from the threshold.
+    // The crossing came this much later than the last reading; a slow rotor still falls a while below the
+    // threshold.
     let falls = periods(reading, state.slope).min(whole(state.samples / 2));
     Some(whole(state.samples - at).minus(falls))
 }
@@ -181,7 +178,7 @@ fn whole(samples: u16) -> I16F16 {
     I16F16::from_num(samples.min(1 << 14))
 }
 
-/// The time in which a reading grows by this slope; zero if the slope is not known.
+/// Returns the time in which a reading grows by this slope; zero if the slope is unknown.
 fn periods(reading: Voltage, slope: Voltage) -> I16F16 {
     if reading <= Voltage::ZERO || slope <= Voltage::ZERO {
         return I16F16::ZERO;
@@ -207,15 +204,15 @@ mod tests {
         }
     }
 
-    /// The terminal for a back-EMF, clamped by the diodes and in whole counts.
+    /// The terminal voltage for a back-EMF, clamped by the diodes and quantized to counts.
     fn terminal(emf_v: f64) -> Voltage {
         let held_v = (1.5 * emf_v).clamp(0.0, BUS_V + 0.7);
         Voltage::from_num((held_v / COUNT_V).round() * COUNT_V / BASE_V)
     }
 
-    /// A sextant of a motor with this back-EMF, V, and so many periods a sextant, of which the
-    /// first sample comes `offset` periods after its beginning; current of the phase before dies
-    /// for `dies` samples. Returns the error of the crossing's instant, periods.
+    /// Runs one sextant of a motor with this back-EMF, V, and this many periods per sextant, the first sample
+    /// `offset` periods after its start; the previous phase's current decays for `dies` samples. Returns the error
+    /// of the crossing's instant, periods.
     fn sextant(
         state: &mut State,
         rising: bool,
@@ -250,7 +247,7 @@ mod tests {
         }
     }
 
-    /// (V, periods a sextant) of the bench with 12 pole pairs and 1.3 mWb at 40 kHz.
+    /// Returns (V, periods per sextant) of the bench with 12 pole pairs and 1.3 mWb at 40 kHz.
     fn bench(rpm: f64) -> (f64, f64) {
         (
             rpm / 60.0 * 12.0 * TAU * 1.3e-3,
@@ -269,7 +266,7 @@ mod tests {
                 let error = sextant(&mut state, i % 2 == 0, (emf_v, periods, offset), dies);
                 let error_deg = error.expect("it is seen") / periods * 60.0;
                 if i >= 4 {
-                    // Half a count is 0.2° at 1000 rpm; the sine's bend makes up the rest.
+                    // Half a count is 0.2° at 1000 rpm; the sine's curvature makes up the rest.
                     assert!(error_deg.abs() < 1.0, "{rpm} {i}: {error_deg}");
                 }
             }

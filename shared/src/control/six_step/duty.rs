@@ -1,10 +1,8 @@
-//! The outer loop: from the speed, the current or the share of the supply that is wanted to the
-//! duty of the switching leg.
+//! The outer loop: from the wanted speed, current or share of the supply to the duty of the switching leg.
 //!
-//! Between two commutations the duty is the voltage across two phases, and with the phases kept in
-//! line with the back-EMF that is the speed (first paper, section III.B): a PI on the speed gives
-//! the duty itself, and the current is only bounded. Gains are relative to the greatest speed and
-//! to the current's bound, not to the motor.
+//! Between commutations the duty is the voltage across two phases. With commutation in step with the back-EMF that
+//! voltage sets the speed (first paper, section III.B), so a PI on the speed outputs the duty itself, and the
+//! current is only bounded. Gains are relative to the maximum speed and the current bound, not to the motor.
 
 use fixed::types::I1F31;
 
@@ -13,20 +11,20 @@ use crate::math::{Gain, Held};
 use crate::trace::traced;
 use crate::units::{Current, Duty, Speed};
 
-/// Time constant with which the current's peak is forgotten, in periods, as a power of two: longer
-/// than a sextant where its ripple is too fast to be regulated away.
+/// log2 of the time constant, in periods, with which the current's peak decays: longer than a sextant whose ripple
+/// is too fast to regulate away.
 const PEAK_SHIFT: u32 = 6;
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Speed to duty.
+    /// From speed to duty.
     pub k_p: Gain<Speed, I1F31>,
-    /// Speed to duty in a period.
+    /// From speed to duty per period.
     pub k_i: Gain<Speed, I1F31>,
-    /// The current's distance from its bound to the greatest change of the duty in a period.
+    /// From the current's distance to its bound to the largest duty change per period.
     pub k_b: Gain<Current, I1F31>,
-    /// Greatest duty: what is left is the low sides' on-time in which the sample falls.
+    /// Largest duty; the remainder is the low-side on-time in which the sample falls.
     pub duty_max: I1F31,
 }
 
@@ -34,47 +32,46 @@ traced! {
     /// The loop's state.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// The duty of the period before, 0 to `duty_max`.
+        /// The previous period's duty, 0 to `duty_max`.
         pub duty: I1F31,
         /// The speed regulator's integral.
         pub sigma: I1F31,
-        /// The current behind a low-pass filter of eight periods.
+        /// The current after a low-pass of eight periods.
         pub smoothed: Current,
-        /// The greatest magnitude of the current, which is forgotten slowly.
+        /// Peak of the current's magnitude, slowly decaying.
         pub peak: Current,
     }
 }
 
-/// Between what the duty may be in this period.
+/// Limits of the duty in this period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Least duty: below, the current would fall under its bound.
+    /// Smallest duty; below it the current would fall under its bound.
     pub least: I1F31,
-    /// Greatest duty.
+    /// Largest duty.
     pub greatest: I1F31,
 }
 
 impl State {
-    /// By how much the current's peaks exceed its mean: a bound of the phase currents is one of their
-    /// peaks. Between two commutations the back-EMF falls and rises, and with it the current.
+    /// Returns by how much the current's peaks exceed its mean. A bound on phase current applies to the peaks, and
+    /// between commutations the back-EMF, and with it the current, dips and rises.
     pub fn ripple(&self) -> Current {
         self.peak
             .minus(self.smoothed.saturating_abs())
             .max(Current::ZERO)
     }
 
-    /// The duty for the bridge.
+    /// Returns the duty for the bridge.
     pub fn for_bridge(&self) -> Duty {
         Duty::from_bits(self.duty.max(I1F31::ZERO).to_bits() as u32)
     }
 }
 
-/// The range that keeps the current `i` within its bounds: the duty changes the faster the more
-/// the current has left to them, and turns back beyond.
+/// Returns the range that keeps the current `i` within its bounds: the more headroom the current has, the faster
+/// the duty may change; beyond a bound it turns back.
 ///
-/// With `min` = `max` it is one value, the regulator of the current. Three times the current's
-/// difference from its smoothed value looks some 25 periods ahead, which damps motors whose
-/// current answers slowly.
+/// With `min` = `max` the range is a single value: a current regulator. Adding three times the current's deviation
+/// from its smoothed value looks some 25 periods ahead, which damps motors whose current responds slowly.
 pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> Range {
     let change = i.minus(state.smoothed);
     state.smoothed = state.smoothed.plus(change >> 3);
@@ -92,18 +89,18 @@ pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> 
     }
 }
 
-/// Regulates the current, with the range of equal bounds.
+/// Regulates the current, given the range of equal bounds.
 pub fn current(state: &mut State, range: Range) {
     state.duty = range.greatest;
 }
 
-/// Goes to this share of the supply as the range permits.
+/// Moves to this share of the supply as far as the range permits.
 pub fn share(state: &mut State, share: I1F31, range: Range) {
     state.duty = share.min(range.greatest).max(range.least);
 }
 
-/// Regulates the speed: `error` is what is wanted less what there is. The integral stands still
-/// while the duty is held by the range and the error pushes it further.
+/// Regulates the speed; `error` is wanted minus actual. The integral holds while the range limits the duty and the
+/// error pushes further.
 pub fn speed(config: &Config, state: &mut State, error: Speed, range: Range) {
     let wanted = state.sigma.plus(config.k_p.held(error));
     state.duty = wanted.min(range.greatest).max(range.least);
@@ -115,7 +112,7 @@ pub fn speed(config: &Config, state: &mut State, error: Speed, range: Range) {
     }
 }
 
-/// The regulation of speed begins at the duty that there is.
+/// Starts speed regulation bumplessly from the present duty.
 pub fn take_over(state: &mut State) {
     state.sigma = state.duty;
 }
@@ -126,7 +123,7 @@ mod tests {
 
     const LIMIT_A: f64 = 20.0;
 
-    /// Gains for a bound of 20 A at 40 kHz, and a full speed of 0.03 turns a period.
+    /// Gains for a bound of 20 A at 40 kHz and a full speed of 0.03 turns per period.
     fn config() -> Config {
         Config {
             k_p: Gain::new(1.0 / 0.03).expect("in range"),
@@ -148,7 +145,7 @@ mod tests {
         }
     }
 
-    /// Two phases in series behind the bridge, with a period of delay.
+    /// Two phases in series at the bridge, with one period of delay.
     struct Winding {
         supply_v: f64,
         r_ohm: f64,
@@ -168,7 +165,7 @@ mod tests {
 
     #[test]
     fn full_share_from_rest_stays_below_the_trip_for_motors_of_any_kind() {
-        // The bench; a racing motor of a tenth of its resistance at 25 V; a gimbal's.
+        // The bench; a racing motor with a tenth of its resistance at 25 V; a gimbal motor.
         for (r_ohm, l_h) in [(0.216, 61.2e-6), (0.03, 20e-6), (4.0, 2e-3)] {
             let (config, mut state) = (config(), State::default());
             let mut winding = Winding {
@@ -253,7 +250,7 @@ mod tests {
 
     #[test]
     fn the_speed_settles_without_windup() {
-        // The bench's shaft: 24 V are 8880 rpm, 0.0444 turns a period; 46 ms.
+        // The bench's shaft: 24 V give 8880 rpm, 0.0444 turns per period; 46 ms.
         let (config, mut state) = (config(), State::default());
         let (mut speed_now, mut current_a) = (0.0_f64, 0.0_f64);
         let mut most = 0.0_f64;

@@ -1,4 +1,4 @@
-//! From crossing to crossing: the rotor's angle and speed, and when the next commutation is due.
+//! Tracking from crossing to crossing: the rotor's angle and speed, and when the next commutation is due.
 
 use fixed::types::I16F16;
 
@@ -8,40 +8,39 @@ use crate::math::{Held, divide};
 use crate::trace::traced;
 use crate::units::{Angle, Speed};
 
-/// Crossings in a row after which the rotor's motion is known well enough to be smoothed.
+/// Consecutive crossings after which the rotor's motion is known well enough to smooth.
 pub const KNOWN: u8 = 6;
 
 traced! {
-    /// The estimate of the rotor.
+    /// The rotor estimate.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
-        /// Angle past the middle of the present sextant.
+        /// Angle past mid-sextant.
         pub delta: Angle,
-        /// ω: its step a period.
+        /// ω: turns per period.
         pub omega: Speed,
-        /// ω's step a period while the rotor is started; then 0.
+        /// Change of ω per period while starting, then 0.
         pub acceleration: Speed,
-        /// ω̄, smoothed over some four sextants: a commutation falls on a period's boundary, and what
-        /// that does to the crossing after it is not in the rotor's speed.
+        /// ω̄, smoothed over some four sextants. Commutations fall on period boundaries; how that shifts the next
+        /// crossing is not in the rotor's speed.
         pub omega_bar: Speed,
-        /// Periods since the last crossing, or since the rotor stood.
+        /// Periods since the last crossing, or since standstill.
         pub elapsed: I16F16,
         /// Sextants since then.
         pub sextants: u8,
-        /// It has not crossed since it stood.
+        /// No crossing since standstill.
         pub from_rest: bool,
-        /// Crossings in a row, up to [`KNOWN`].
+        /// Consecutive crossings, up to [`KNOWN`].
         pub crossings: u8,
     }
 }
 
-/// At least three periods a sextant: with fewer there is no reading left between the dying current
-/// and the crossing.
+/// At least three periods per sextant: with fewer no reading is left between the decaying current and the crossing.
 pub const FASTEST: Speed = Speed::from_bits(SEXTANT.to_bits() / 3);
 
 impl State {
-    /// A rotor at rest, 60° before the middle of the sextant, and what it will accelerate by in a
-    /// period until its first crossing tells better.
+    /// Creates the state of a rotor at rest, 60° before mid-sextant, with the acceleration per period to assume
+    /// until the first crossing gives a better one.
     pub fn at_rest(acceleration: Speed) -> Self {
         Self {
             delta: -SEXTANT,
@@ -52,21 +51,21 @@ impl State {
         }
     }
 
-    /// A period passes.
+    /// Advances by one period.
     pub fn advance(&mut self) {
         self.omega = self.omega.plus(self.acceleration).min(FASTEST);
         self.delta = self.delta.plus(self.omega.over_period());
         self.elapsed = self.elapsed.plus(I16F16::ONE);
     }
 
-    /// The crossing was found to be `age` periods ago: 60° since the one before.
+    /// Takes a crossing found to be `age` periods old, 60° after the one before.
     pub fn crossed(&mut self, age: I16F16) {
         let interval = self.elapsed.minus(age).max(I16F16::ONE);
         let turned = u64::from(self.sextants.max(1)) * SEXTANT.to_bits() as u64;
         let mean = over(turned, interval);
         let mut overdue = false;
         if self.from_rest {
-            // Under a constant torque twice the mean, after a constant acceleration.
+            // Constant acceleration: the final speed is twice the mean.
             self.omega = mean.plus(mean).min(FASTEST);
             self.acceleration = over(self.omega.to_bits() as u64, interval);
             self.omega_bar = self.omega;
@@ -75,12 +74,12 @@ impl State {
             let half_sextant = i64::from(HALF_SEXTANT.to_bits());
             overdue = off > half_sextant;
             if off.abs() > half_sextant / 2 {
-                // It did not stand where it was taken to, or its load is another.
+                // It was not where it was aligned to, or the load differs.
                 self.omega = mean;
                 self.acceleration = Speed::ZERO;
             } else {
-                // The mean is the speed in the interval's middle. While the rotor is slow a crossing
-                // may be seen some degrees early or late: half of what that tells is taken.
+                // The mean is the speed mid-interval. At low speed a crossing may be seen some degrees early or
+                // late, so only half the correction is applied.
                 let gained = times(self.acceleration, interval) >> 1;
                 let middle = self.omega.minus(bounded(gained).per_period());
                 self.omega += mean.minus(middle) >> 1;
@@ -93,7 +92,7 @@ impl State {
         }
         self.omega = self.omega.max(Speed::ZERO).min(FASTEST);
         self.delta = if overdue {
-            // It may be faster than the long interval tells: rather early than late.
+            // It may be faster than the long interval suggests: better early than late.
             HALF_SEXTANT
         } else {
             bounded(times(self.omega, age))
@@ -104,11 +103,11 @@ impl State {
         self.crossings = (self.crossings + 1).min(KNOWN);
     }
 
-    /// Readings in a row that are to tell on which side of zero the floating phase is: one a 40th
-    /// of a sextant, up to four, since the slower a rotor is, the smaller its back-EMF.
+    /// Returns how many consecutive readings must agree on the floating phase's side of zero: one per 40th of a
+    /// sextant, up to four, because the back-EMF shrinks with the speed.
     pub fn certain(&self) -> u16 {
         match self.omega.to_bits() >> 21 {
-            // Below 2^-11 turns a period, 341 periods a sextant; then 171, and 85.
+            // Below 2^-11 turns per period, 341 periods per sextant; then 171, and 85.
             ..1 => 4,
             1 => 3,
             2..4 => 2,
@@ -116,21 +115,20 @@ impl State {
         }
     }
 
-    /// Returns true if a commutation that is commanded now takes effect nearest to `angle` past the middle
-    /// of the sextant.
+    /// Returns true if a commutation commanded now takes effect closest to `angle` past mid-sextant.
     pub fn reaches(&self, angle: Angle, delay: Delay) -> bool {
-        // Half a period and the delay, which is also the way to the middle of a voltage.
+        // Half a period plus the delay, which is also the advance to the middle of a voltage.
         self.delta.plus(delay.advance(self.omega)) >= angle
     }
 
-    /// The next sextant begins, by the extrapolated angle.
+    /// Begins the next sextant by the extrapolated angle.
     pub fn commutated(&mut self) {
         self.delta = self.delta.minus(SEXTANT);
         self.sextants = self.sextants.saturating_add(1);
     }
 
-    /// The next sextant begins without anything known of the rotor but that it should be there. One
-    /// that has been followed so far is slower than it was taken to be.
+    /// Begins the next sextant without knowing more than that the rotor should be there. A rotor tracked so far is
+    /// slower than assumed.
     pub fn forced(&mut self) {
         self.commutated();
         if self.crossings > 0 {
@@ -142,18 +140,18 @@ impl State {
     }
 }
 
-/// A quantity with 32 fraction bits over a time, at most [`FASTEST`].
+/// Returns a quantity with 32 fraction bits over a time, at most [`FASTEST`].
 fn over(bits: u64, periods: I16F16) -> Speed {
     let quotient = divide(bits << 16, periods.to_bits().unsigned_abs());
     Speed::from_bits(quotient.min(FASTEST.to_bits() as u64) as i32)
 }
 
-/// A step a period times a time, in bits of a turn.
+/// Returns a step per period times a time, in bits of a turn.
 fn times(step: Speed, periods: I16F16) -> i64 {
     (i64::from(step.to_bits()) * i64::from(periods.to_bits())) >> 16
 }
 
-/// At most a sextant either way.
+/// Clamps to one sextant either way.
 fn bounded(turn_bits: i64) -> Angle {
     let sextant = i64::from(SEXTANT.to_bits());
     Angle::from_bits(turn_bits.clamp(-sextant, sextant) as i32)
@@ -163,13 +161,13 @@ fn bounded(turn_bits: i64) -> Angle {
 mod tests {
     use super::*;
 
-    /// Periods between crossings to turns a period.
+    /// Converts periods between crossings to turns per period.
     fn speed(sextant_periods: f64) -> f64 {
         1.0 / 6.0 / sextant_periods
     }
 
-    /// Drives the tracker with crossings of a rotor that is `turned(period)` sextants past the
-    /// first crossing, and returns the angle by which each commutation's effect was late, degrees.
+    /// Runs the tracker on crossings of a rotor `turned(period)` sextants past the first crossing; returns each
+    /// commutation's lateness in degrees.
     fn lateness(turned: impl Fn(f64) -> f64, periods: u32, delay: Delay) -> std::vec::Vec<f64> {
         let lead = match delay {
             Delay::None => 0.0,
@@ -185,7 +183,7 @@ mod tests {
             state.advance();
             if !found && turned(now) >= sextant {
                 found = true;
-                // The crossing's instant, by bisection between the samples.
+                // The crossing's instant, by bisection between samples.
                 let (mut a, mut b) = (now - 1.0, now);
                 for _ in 0..40 {
                     let m = 0.5 * (a + b);
