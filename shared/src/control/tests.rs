@@ -1,7 +1,7 @@
 //! The fixed-point blocks against the papers' equations in double precision and SI units.
 //!
-//! Inputs are the motor's of the first paper at some thousand rpm, disturbed at random; each block
-//! runs from the same state for some periods, and the difference at the end is bounded.
+//! Inputs are those of the first paper's motor at some thousand rpm, randomly perturbed. Both
+//! versions of a block run some periods from the same state; the final difference is bounded.
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -27,7 +27,7 @@ const PHI: f64 = 1.3e-3;
 const P: f64 = 12.0;
 const TS: f64 = 1.0 / 15_000.0;
 
-/// Table III, which the defaults make up to the rounding of the paper's own figures.
+/// Table III, which the defaults reproduce to the rounding of the paper's own figures.
 const K_P: f64 = 1178.0;
 const K_I: f64 = 340.0;
 const K_PE: f64 = 964.0;
@@ -38,7 +38,7 @@ const K_F: f64 = 500.0;
 const K_P_OMEGA: f64 = 7.1e-3;
 const K_I_OMEGA: f64 = 41.7e-3;
 
-/// Distance that the computed gains may have from Table III: its eigenvalues have three digits.
+/// Tolerance of the computed gains against Table III, whose eigenvalues have three digits.
 const TABLE_III: f64 = 0.02;
 
 fn config_with(changes: &[(ParamId, f32)]) -> Config {
@@ -62,7 +62,7 @@ fn published(config: &Config) -> back_emf::Config {
     }
 }
 
-/// That observer's input from a period's feedback.
+/// Returns that observer's input from a period's feedback.
 fn feedback(omega: Speed, i: Dq<Current>) -> Feedback {
     Feedback {
         omega,
@@ -73,7 +73,7 @@ fn feedback(omega: Speed, i: Dq<Current>) -> Feedback {
     }
 }
 
-/// Between SI and the control's units.
+/// Converts between SI and the control's units.
 #[derive(Clone)]
 struct Units(Config);
 
@@ -203,7 +203,7 @@ proptest! {
         let epsilon = h_d / h_d.hypot(h_q);
         let omega_n = 400.0;
         let next = omega_i + TS * (omega_n * omega_n * epsilon + planned);
-        // ε has twelve bits, |ĥ| of 28 the upper fourteen and a magnitude right to 0.1 %.
+        // ε has twelve bits: the upper fourteen of |ĥ|'s 28, and a magnitude accurate to 0.1 %.
         let length = units.voltage(h_d.hypot(h_q)).to_bits();
         let part = 1e-3 + 1.0 / 4096.0 + 1.1 * 16_384.0 / f64::from(length);
         near(units.rad_s(got.omega_bar), next, 0.0, 0.01 + part * TS * omega_n * omega_n)?;
@@ -212,7 +212,7 @@ proptest! {
         near(units.rad_s(state.omega_i), units.rad_s(got.omega_bar), 0.0, 1e-9)?;
         prop_assert_eq!(slow.xi, config.xi_nominal);
         prop_assert_eq!(state.xi, config.xi_nominal);
-        // The rotor cannot be where ĥ is opposite to what the frame expects.
+        // The rotor cannot be where ĥ opposes what the frame expects.
         prop_assert_eq!(slow.lost, !state.h.q.is_negative());
     }
 }

@@ -1,4 +1,4 @@
-//! Charge: the low sides charge the supplies of the high sides' drivers before the phases switch.
+//! Charge: the low sides charge the supplies of the high-side drivers before the phases switch.
 
 use super::config::Config;
 use super::seen::Seen;
@@ -15,7 +15,7 @@ traced! {
 }
 
 impl State {
-    /// Charge begins, for a shorter time where the rotor turns, which it does unseen meanwhile.
+    /// Begins Charge, shortened if the rotor turns, since it goes unobserved meanwhile.
     pub(super) fn begin(&mut self, config: &Config, rotor: Rotor) {
         self.periods = match rotor {
             Rotor::Turning { .. } => config.charge.spared_periods,
@@ -24,7 +24,8 @@ impl State {
     }
 }
 
-/// A period of Charge, in which the rotor turns on. The periods since the drivers are charged, from 1 on.
+/// Runs one period of Charge, in which the rotor keeps turning. Returns the periods since the drivers were charged,
+/// from 1.
 pub(super) fn period(
     config: &Config,
     state: &mut State,

@@ -1,13 +1,13 @@
-//! The windings of a rotor that stands are excited to be measured: a direct current along a phase's axis, and
-//! about it a square wave of voltage with a cycle of four periods.
+//! Excitation of a standing motor's windings for measurement: a direct current along one phase's axis, with a
+//! superimposed square-wave voltage with a cycle of four periods.
 //!
-//! Neither R nor L is known, so nothing is regulated by them. The mean voltage goes up by a small step in each
-//! period in which the current is below what is asked for, and down in each other one; the square wave's
-//! amplitude does likewise, for a current of a quarter of the mean. That settles with any winding, and what it
-//! swings by takes the duty over many counts of the timer, so that the mean of the voltage is finer than one.
+//! Neither R nor L is known, so no regulator can be designed from them. The mean voltage rises by a small step in
+//! each period in which the current is below the request, and falls in every other; the square wave's amplitude
+//! does likewise, for a current of a quarter of the mean. This settles with any winding, and its ripple spreads the
+//! duty over many timer counts, so the mean voltage is finer than one count.
 //!
-//! The voltage of each phase keeps the sign of its current all the while: what the dead time takes is constant,
-//! and the difference of two currents tells R without it.
+//! Throughout, each phase's voltage keeps the sign of its current: the dead time's effect is constant, and the
+//! difference between two currents yields R without it.
 
 use super::config::Config;
 use super::excitation::{Excitation, Ripple};
@@ -22,13 +22,13 @@ use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, clarke};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
 
-/// The share of the supply by which a voltage changes in a period, as a power of two.
+/// log2 of the supply voltage over a voltage's change per period.
 const STEP_SHIFT: u32 = 15;
 
-/// Time constant of the means, periods, as a power of two: 21 ms at 24 kHz.
+/// log2 of the means' time constant in periods: 21 ms at 24 kHz.
 const MEAN_SHIFT: u32 = 9;
 
-/// The square wave's current, of the mean current, as a power of two.
+/// log2 of the mean current over the square wave's current.
 const RIPPLE_SHIFT: u32 = 2;
 
 traced! {
@@ -37,12 +37,12 @@ traced! {
     pub(super) struct State {
         phase: u8,
         ripple: Ripple,
-        /// The period of the square wave's cycle.
+        /// Position in the square wave's cycle, in periods.
         slot: u8,
         /// The mean voltage, and the square wave's amplitude.
         u: Voltage,
         h: Voltage,
-        /// Currents of the last two samples, along the axis and across it.
+        /// Currents of the last two samples, along and across the axis.
         before: [AlphaBeta<Current>; 2],
         /// Means of the current and of the square wave's current.
         i: Current,
@@ -53,8 +53,8 @@ traced! {
     }
 }
 
-/// A period of an excitation. The snapshot's current and voltage along d are the means along the axis, those
-/// along q the amplitudes of the square wave.
+/// Runs one period of an excitation. The snapshot's d current and voltage are the means along the axis, those of q
+/// the square wave's amplitudes.
 #[cold]
 #[inline(never)] // only some periods
 pub(super) fn period(
@@ -79,7 +79,7 @@ pub(super) fn period(
     let at = |behind: usize| (usize::from(phase) + behind) % 3;
     shared.supply.follow(shared.protection.bus);
     shared.supply.reach(&config.modulator, Voltage::ZERO);
-    // In the order from the excited phase on, along whose axis Clarke's first component is.
+    // Ordered from the excited phase on, so that Clarke's first component lies along its axis.
     let now = clarke([0, 1, 2].map(|behind| currents[at(behind)]));
     regulate(config, state, shared.supply.bus, now, excitation.current());
     shared.seen = Seen {
@@ -118,7 +118,7 @@ pub(super) fn period(
     Bridge::Duty(duties)
 }
 
-/// The voltages of the coming period.
+/// Updates the voltages for the next period.
 fn regulate(
     config: &Config,
     state: &mut State,
@@ -127,7 +127,7 @@ fn regulate(
     asked: Current,
 ) {
     let step = bus >> STEP_SHIFT;
-    // The square wave's current two periods ago was the opposite one.
+    // Two periods ago the square wave's current was the opposite.
     let [last, earlier] = state.before;
     state.before = [now, last];
     let i = (now.alpha + earlier.alpha) >> 1;
@@ -135,8 +135,8 @@ fn regulate(
     state.u = toward(state.u, i < asked, step, (bus >> 1) - (bus >> 3));
     state.i += (i - state.i) >> MEAN_SHIFT;
     state.mean_u += (state.u - state.mean_u) >> MEAN_SHIFT;
-    // A voltage of the slots 0 and 1 has raised the current in the sample that follows both, two slots after
-    // its last command, or one without a delay of the voltage.
+    // The voltage of slots 0 and 1 has raised the current in the sample after both, two slots after its last
+    // command, or one if the voltage has no delay.
     let peak = 2 + u8::from(config.delay == Delay::One);
     let difference = match state.ripple {
         Ripple::None => return,
@@ -153,7 +153,7 @@ fn regulate(
     state.mean_h += (state.h - state.mean_h) >> (MEAN_SHIFT - 1);
 }
 
-/// A step up or down between zero and the most.
+/// Returns the voltage one step up or down, between zero and the maximum.
 fn toward(u: Voltage, up: bool, step: Voltage, most: Voltage) -> Voltage {
     if up {
         (u + step).min(most)

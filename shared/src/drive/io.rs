@@ -7,65 +7,65 @@ use super::pull::Pull;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
-/// The converter's readings for one control period.
+/// The ADC readings of one control period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Phase currents a, b, c into the motor, as the converter reads them: with the sensors' offsets
-    /// about a nominal zero, at the middle of the low sides' on-time.
+    /// Currents into the motor of phases a, b, c, as read: with the sensors' offsets around a nominal zero, sampled
+    /// mid low-side on-time.
     pub currents: [AdcCounts; 3],
-    /// The supply's voltage.
+    /// Supply voltage.
     pub bus: AdcCounts,
-    /// Voltages of the motor's terminals a, b, c against the supply's negative pole.
+    /// Voltages of motor terminals a, b, c against the supply's negative pole.
     pub terminals: [AdcCounts; 3],
-    /// Hall sensors a, b, c in bits 0, 1, 2: high while the rotor's flux through the phase is
-    /// positive. Without sensors their pull-ups read 7.
+    /// Hall sensors a, b, c in bits 0, 1, 2: high while the rotor's flux through the phase is positive. Without
+    /// sensors the pull-ups read 7.
     pub hall: u8,
 }
 
-/// The demand on the motor; it comes from something that may turn it.
+/// The demand on the motor, from a source that may turn it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Setpoint {
     /// No drive: coast or brake, as configured.
     Stop,
-    /// No drive, because the throttle is at zero: that also ends a latched fault.
+    /// No drive because the throttle is at zero, which also clears a latched fault.
     Zero,
-    /// No drive, the bridge off, for a reason that something outside the interrupt has found.
+    /// No drive, bridge off, for a reason found outside the interrupt.
     Fault(Fault),
-    /// Turn at this electrical speed; negative ones, here and below, are the other way.
+    /// Turn at this electrical speed; negative, here and below, is the other direction.
     Speed(Speed),
     /// Hold this current i_q.
     Torque(Current),
-    /// Apply this share of the voltage that the supply can give.
+    /// Apply this share of the available voltage.
     Voltage(I1F31),
-    /// Play a tone of this pitch, in cycles a period, without turning the motor: of at most
+    /// Play a tone of this pitch, in cycles per period, without turning the motor. At most
     /// [`PITCH_MAX`](super::config::tone::PITCH_MAX); zero is a pause between two notes.
     Tone(Speed),
-    /// Hold this current i_q for a test; the start uses no more than a test may either.
+    /// Hold this current i_q for a test; the start, too, uses at most a test's current.
     Test(Current),
-    /// Pull half-bridges to the supply's poles without turning the motor, once it is seen to stand.
+    /// Pull half-bridges to the supply rails without turning the motor, once it is seen to stand.
     Pull(Pull),
     /// Excite the windings without turning the motor, once it is seen to stand.
     Excite(Excitation),
 }
 
-/// State of the inverter's switches until the next period.
+/// State of the inverter switches until the next period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bridge {
     /// All switches off.
     Off,
-    /// The low sides on for this share of the period around the sample and all else off: it charges
-    /// the supplies of the high sides' drivers.
+    /// Low sides on for this share of the period around the sample, all else off: charges the supplies of the
+    /// high-side drivers.
     Charge(Duty),
     /// All low sides on.
     Brake,
-    /// Each phase switches; the share of the period for which its high side is on.
+    /// Each phase switches, with its high side on for this share of the period.
     Duty([Duty; 3]),
-    /// As `Duty`, but a phase with `None` has both switches off.
+    /// Like `Duty`, but a phase with `None` has both switches off.
     Legs([Option<Duty>; 3]),
 }
 
 impl Setpoint {
-    /// A number for each kind.
+    /// Returns a number for each kind.
     pub(super) fn kind(self) -> u8 {
         match self {
             Self::Stop => 0,
@@ -81,8 +81,8 @@ impl Setpoint {
         }
     }
 
-    /// Which way it asks the motor to turn. The other way is for who has asked for `both_ways`, or for a test,
-    /// which is of either direction.
+    /// Returns the direction in which it asks the motor to turn. Backward needs `both_ways`, or a test, which may
+    /// go either way.
     pub(super) fn rotation(self, both_ways: bool) -> Rotation {
         let sign = match self {
             Self::Speed(speed) => speed.to_bits(),
@@ -104,7 +104,7 @@ impl Setpoint {
         }
     }
 
-    /// This set-point as seen by a motor that turns the other way.
+    /// Returns this set-point as seen by a motor that turns the other way.
     pub(super) fn mirrored(self) -> Self {
         match self {
             Self::Speed(speed) => Self::Speed(speed.saturating_neg()),
@@ -121,7 +121,7 @@ impl Setpoint {
     }
 }
 
-/// Which way a set-point asks the motor to turn, against the configured direction.
+/// The direction in which a set-point asks the motor to turn, relative to the configured one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rotation {
     /// Not at all.
@@ -132,7 +132,7 @@ pub(super) enum Rotation {
     Backward,
 }
 
-/// The Hall sensors in the order of the control's phases.
+/// Returns the Hall sensors in the control's phase order.
 pub(super) fn hall(sample: &Sample, swapped: bool) -> u8 {
     if swapped {
         sample.hall & 1 | (sample.hall & 2) << 1 | (sample.hall & 4) >> 1
@@ -141,7 +141,7 @@ pub(super) fn hall(sample: &Sample, swapped: bool) -> u8 {
     }
 }
 
-/// Phases b and c change places where the motor turns the other way than a, b, c.
+/// Swaps phases b and c for a motor that turns the other way.
 pub(super) fn in_order<T>(swapped: bool, [a, b, c]: [T; 3]) -> [T; 3] {
     if swapped { [a, c, b] } else { [a, b, c] }
 }

@@ -1,23 +1,24 @@
-//! Which limits bind, as a snapshot shows it. The tasks work this out, not the interrupt.
+//! Which limits are active, from a snapshot. Runs in the tasks, not the interrupt.
 
 use super::snapshot::Snapshot;
 use crate::protection::{Limit, Limits};
 use crate::units::{Current, Voltage};
 
-/// Where limits bind, in the control's units.
+/// Thresholds at which limits count as active, in the control's units.
 #[derive(Clone, Copy, Debug)]
 pub struct Thresholds {
-    /// Bound of the current's vector, `LIM_PHASE_A`.
+    /// Bound on the current vector, `LIM_PHASE_A`.
     pub phase: Current,
-    /// Supply voltage from which less is returned, as [`Config::bus_return_v`](crate::protection::Config::bus_return_v).
+    /// Supply voltage above which less is returned, as
+    /// [`Config::bus_return_v`](crate::protection::Config::bus_return_v).
     pub bus_return_v: Voltage,
 }
 
-/// What is held at a bound lies within a sixteenth of it: the regulator's ripple is less.
+/// A quantity at its bound lies within a sixteenth of it: the regulator's ripple is smaller.
 const NEAR_SHIFT: u32 = 4;
 
 impl Thresholds {
-    /// The limits that bind now.
+    /// Returns the limits that are active now.
     pub fn limits(&self, snapshot: &Snapshot) -> Limits {
         let mut limits = Limits::NONE;
         if !snapshot.phase.drives() {
@@ -37,13 +38,13 @@ impl Thresholds {
             bounds.max < self.phase && i.q >= near(bounds.max),
             Limit::BusCurrent,
         );
-        // Without braking there is a bound as well: it stands ready, far from the current.
+        // There is a bound even without braking, ready but far from the current.
         note(
             i.q.is_negative() && bounds.min > -self.phase && i.q <= near(bounds.min),
             Limit::RegenCurrent,
         );
         note(snapshot.bus > self.bus_return_v, Limit::BusVoltage);
-        // The longest voltage without over-modulation is 1/√3 of the supply's: 1/2 and 1/16 are 3 % less.
+        // The longest voltage without over-modulation is 1/√3 of the supply; 1/2 + 1/16 is 3 % less.
         let bus = snapshot.bus;
         let most = (bus >> 1) + (bus >> NEAR_SHIFT);
         note(
@@ -54,9 +55,9 @@ impl Thresholds {
     }
 }
 
-/// Returns true if a vector is as long as a bound, by squares: no root is needed.
+/// Returns true if a vector reaches a bound, by squares to avoid a root.
 ///
-/// Never inlined: two bounds are asked for.
+/// Never inlined: it has two callers.
 #[inline(never)]
 fn reaches(d: i32, q: i32, bound: i32) -> bool {
     let square = |bits: i32| i64::from(bits) * i64::from(bits);

@@ -1,62 +1,62 @@
-//! One control period: [`step()`] takes a sample and a set-point, and says what the bridge does.
+//! One control period: [`step()`] takes a sample and a set-point, and returns what the bridge does.
 //!
 //! # A period, from top to bottom
-//! `step.rs`: the mode is decided (`mode_change.rs`, and by what the rotor does in each mode's own file) and this
-//! period's slice of the outer loop's work is done (`schedule.rs`, 32 periods), both from what the last period
-//! saw. Then the sample is read and judged (`shared.rs`, [`protection`](crate::protection)), and the mode does
-//! its own work: it says what the bridge does, and perhaps why it ends. The default observer and regulator have
-//! a piece of code of their own, any others share one (`foc/period.rs`).
+//! `step.rs` first decides the mode (by the set-point in `mode_change.rs`, by the rotor in each mode's own file)
+//! and does this period's slice of the outer loop (`schedule.rs`, 32 periods), both from what the last period saw.
+//! Then it reads and checks the sample (`shared.rs`, [`protection`](crate::protection)), and the mode does its own
+//! work: it determines what the bridge does, and possibly why the mode ends. The default observer and regulator
+//! have dedicated code, all others share one path (`foc/period.rs`).
 //!
-//! A set-point of another kind is obeyed in its own period, and so is a fault; in Idle, while a turning rotor is
-//! looked at, in the next. One of the same kind that only
-//! changes its sign is obeyed within a cycle of the schedule, at most 32 periods later.
+//! A set-point of another kind takes effect in its own period, and so does a fault; in Idle, while observing a
+//! turning rotor, in the next. One of the same kind that only changes sign takes effect within one schedule cycle,
+//! at most 32 periods later.
 //!
 //! # From the sample to the duties
-//! In Run, with the files in which to read it:
+//! In Run, with the files that do it:
 //!
 //! | step | file |
 //! |---|---|
-//! | the converters' counts become a [`Sample`] | `firmware/src/interrupt/sample.rs`; emulator: `plant/sensing.rs` |
-//! | less their zeros, and a phase that could not be read from the other two | `shared.rs`, [`control::sensing`](crate::control::sensing) |
-//! | a current or a voltage beyond its trip ends the drive | `step.rs`, [`protection`](crate::protection) |
+//! | the ADC counts become a [`Sample`] | `firmware/src/interrupt/sample.rs`; emulator: `plant/sensing.rs` |
+//! | offsets are subtracted; a phase that could not be read is reconstructed from the other two | `shared.rs`, [`control::sensing`](crate::control::sensing) |
+//! | a current or voltage beyond its trip ends the drive | `step.rs`, [`protection`](crate::protection) |
 //! | Clarke, then the observer's angle and speed, then Park | `foc/period.rs`, `foc/current_loop.rs`, [`control::observer`](crate::control::observer) |
-//! | the current regulator's voltage, with its decoupling; anti-windup where the supply gives less | `foc/current_loop.rs`, [`control::regulator`](crate::control::regulator) |
-//! | turned ahead by the delay, inverse Park, dead time, duties | [`control::delay`](crate::control::delay), [`control::modulator`](crate::control::modulator) |
-//! | the duties reach the timer, in force from the next period on | `firmware/src/interrupt/pwm.rs`; emulator: `plant/inverter.rs` |
+//! | the current regulator's voltage, with decoupling; anti-windup where the supply falls short | `foc/current_loop.rs`, [`control::regulator`](crate::control::regulator) |
+//! | delay compensation, inverse Park, dead time, duties | [`control::delay`](crate::control::delay), [`control::modulator`](crate::control::modulator) |
+//! | the duties reach the timer, effective from the next period | `firmware/src/interrupt/pwm.rs`; emulator: `plant/inverter.rs` |
 //!
-//! The regulator's reference is the outer loop's: speed regulator, limits, delay compensation and dead-time sign
-//! are pieces of `foc/outer_loop.rs`.
+//! The regulator's reference comes from the outer loop: speed regulator, limits, delay compensation and dead-time
+//! sign are parts of `foc/outer_loop.rs`.
 //!
 //! # What ends a drive
 //!
 //! | reason | decided in |
 //! |---|---|
-//! | the set-point asks for rest, or for the other rotation | `mode_change.rs`; six-step: `six_step/period.rs` |
-//! | the set-point is a fault: found outside the drive, or by the hardware | `step.rs` |
+//! | the set-point asks for rest, or for the other direction | `mode_change.rs`; six-step: `six_step/period.rs` |
+//! | the set-point is a fault, found outside the drive or by the hardware | `step.rs` |
 //! | a sample beyond a trip | `step.rs`, by [`protection::check`](crate::protection::check) |
 //! | a stop has come to rest; a start has failed; the rotor is lost, or stuck | `foc/open_loop.rs`; six-step: `six_step/start.rs`, `six_step/period.rs` |
 //! | a current sensor's zero is off | `off.rs` |
 //!
-//! What is wrong with a sensor or a phase of a motor that turns is told, and ends no drive: `witness.rs`.
+//! A defective sensor or phase of a turning motor is reported and ends no drive: `witness.rs`.
 //!
-//! Throttle that is lost, closed or not armed is a set-point of rest by the time that it comes here:
-//! [`Throttle::setpoint`](crate::throttle::Throttle::setpoint) makes it so.
+//! Throttle that is lost, closed or not armed reaches this point as a set-point of rest:
+//! [`Throttle::setpoint`](crate::throttle::Throttle::setpoint) sees to that.
 //!
 //! # The modes
-//! They are the values of [`Phase`].
+//! The modes are the values of [`Phase`].
 //!
 //! | mode | file | what it does and remembers |
 //! |---|---|---|
-//! | Idle, Sense | `off.rs` | the bridge is off: the rotor is watched, the currents' zeros are measured |
-//! | Charge | `charge.rs` | the drivers' supplies are charged, then the drive is made ready (`foc/begin.rs`) |
-//! | Park, Ramp | `foc/open_loop.rs` | the frame is imposed, the rotor follows |
+//! | Idle, Sense | `off.rs` | the bridge is off: watches the rotor, measures the current offsets |
+//! | Charge | `charge.rs` | charges the drivers' supplies, then prepares the drive (`foc/begin.rs`) |
+//! | Park, Ramp | `foc/open_loop.rs` | imposes the frame, the rotor follows |
 //! | Run, Stopping | `foc/` | field-oriented control |
-//! | Brake | `foc/brake.rs` | the low sides are on, the observer goes on |
+//! | Brake | `foc/brake.rs` | the low sides are on, the observer keeps running |
 //! | Park, Ramp, Run, Stopping, Brake with `CTL_DRIVE` 1 | `six_step/` | the same by zero crossings |
-//! | Tone | `tone.rs`, `self_test.rs`, `excite.rs` | the phases switch to be heard, or to be tested or measured: [`Setpoint::Pull`], [`Setpoint::Excite`] |
+//! | Tone | `tone.rs`, `self_test.rs`, `excite.rs` | the phases switch to be heard, tested or measured: [`Setpoint::Pull`], [`Setpoint::Excite`] |
 //!
-//! All changes of mode, each with its reason, are the table in `transitions.rs`; they are made by one
-//! function, `State::change`, but for a restart under other units ([`State::adopt`]):
+//! `transitions.rs` has the table of all mode changes with their reasons. One function makes them, `State::change`,
+//! except for a restart under other units ([`State::adopt`]):
 //!
 //! ```text
 //!        Drive, Tone            Sensed            Stands            Aligned
@@ -78,9 +78,9 @@
 //!  Ramp, Run, Stopping -- Retried, by the six-step drive --> Park        Idle -- Shorted --> Brake
 //! ```
 //!
-//! # The files' order
-//! Each file uses those before it, and none behind it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
-//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
+//! # File order
+//! Each file uses only those before it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`, `schedule`,
+//! `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
 //! `witness`, `state`, `mode_change`, `step`.
 
 mod charge;

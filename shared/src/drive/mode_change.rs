@@ -1,4 +1,4 @@
-//! The mode that a set-point asks for.
+//! The mode change that a set-point asks for.
 
 use super::config::{Config, Stop};
 use super::io::{Rotation, Setpoint};
@@ -10,7 +10,7 @@ use super::transitions::Why;
 use crate::control::catch::Rotor;
 use crate::units::Speed;
 
-/// The reason why the present mode ends, if the set-point asks for another.
+/// Returns the reason why the present mode ends, if the set-point asks for another.
 pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     match (state.phase, &config.six_step) {
         (Phase::Idle | Phase::Sense | Phase::Charge | Phase::Brake | Phase::Tone, _) => {
@@ -21,7 +21,7 @@ pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoin
     }
 }
 
-/// Returns true if a set-point wants the motor to turn the way it does, or is being started.
+/// Returns true if a set-point wants the direction in which the motor turns or is being started.
 fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
         Rotation::Backward
@@ -31,7 +31,7 @@ fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     setpoint.rotation(config.both_ways) == present
 }
 
-/// While field-oriented control drives.
+/// Handles set-points while field-oriented control drives.
 #[inline(always)] // in the longest period
 fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
     let along = is_along(config, shared, setpoint);
@@ -44,12 +44,12 @@ fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoi
         }
         _ => {}
     }
-    // A torque against the rotation slows the motor down within Run, but does not turn it round.
+    // A torque against the rotation slows the motor down within Run but does not reverse it.
     let holds = matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
         && shared.seen.speed >= config.slow;
     let nothing = setpoint.rotation(config.both_ways) == Rotation::Rest;
     if config.stop == Stop::Coast && nothing && !holds {
-        // The bridge is off at once: without current, and the terminals tell how the shaft turns.
+        // Bridge off at once: without current the terminals show how the shaft turns.
         Some(Why::Coasts)
     } else if phase == Phase::Run && !holds {
         Some(Why::Released)
@@ -58,7 +58,7 @@ fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoi
     }
 }
 
-/// While nothing drives.
+/// Handles set-points while nothing drives.
 fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Why> {
     let pulls = matches!(setpoint, Setpoint::Pull(_));
     let wants_tone = match setpoint {
@@ -70,7 +70,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
     let stands = state.off.rotor == Rotor::Standing;
     match state.phase {
         Phase::Tone | Phase::Sense if wants_tone => None,
-        // A test charges what it needs, and is to find a short circuit before all low sides are on.
+        // A test charges what it needs itself, and must find a short before all low sides turn on.
         Phase::Charge if pulls && stands => Some(Why::ToneReady),
         Phase::Charge if wants_tone && stands => None,
         Phase::Idle if wants_tone && stands => Some(Why::Tone),
@@ -78,7 +78,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
         Phase::Tone if drives => Some(Why::Drive),
         Phase::Tone if state.tone.shorted_before => Some(Why::Shorted),
         Phase::Idle if state.tone.shorted_before && !drives && stands => Some(Why::Shorted),
-        // Not the low sides: the rotor may turn, and is looked at until it stands.
+        // Not the low sides: the rotor may turn, and is watched until it stands.
         Phase::Tone | Phase::Sense | Phase::Charge if !drives => Some(Why::Released),
         Phase::Idle | Phase::Brake if !drives => {
             state.shared.failed_starts = 0;
@@ -88,7 +88,7 @@ fn at_rest(config: &Config, state: &mut State, setpoint: &Setpoint) -> Option<Wh
     }
 }
 
-/// While nothing drives and something asks for it.
+/// Handles a request to turn while nothing drives.
 fn start(config: &Config, state: &State, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
     let shared = &state.shared;
     let begins = matches!(phase, Phase::Idle | Phase::Brake).then_some(Why::Drive);

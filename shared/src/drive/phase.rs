@@ -2,32 +2,32 @@
 
 use crate::trace::Trace;
 
-/// Phase of the drive (start-up: second paper, section 3).
+/// A phase of the drive (start-up: second paper, section 3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Phase {
     /// No drive; the bridge is off.
     Idle,
-    /// The bridge is off while the currents' zeros are measured and the rotor is looked for.
+    /// Bridge off while the current offsets are measured and the rotor is searched for.
     Sense,
-    /// The low sides charge the supplies of the high sides' drivers.
+    /// The low sides charge the supplies of the high-side drivers.
     Charge,
     /// The rotor is being aligned.
     Park,
-    /// The current's vector turns faster and faster and the rotor follows.
+    /// The current vector accelerates and the rotor follows.
     Ramp,
     /// The observer knows the rotor's position: field-oriented control.
     Run,
-    /// The shaft coasts without torque or is slowed down to be stopped.
+    /// The shaft coasts without torque or is braked to a stop.
     Stopping,
     /// All low sides are on.
     Brake,
-    /// The phases switch to be heard, or to be tested; the rotor stands.
+    /// The phases switch to be heard or tested; the rotor stands.
     Tone,
 }
 
 impl Phase {
-    /// Every phase, in the order of their numbers.
+    /// Every phase, in numerical order.
     pub const ALL: [Self; 9] = [
         Self::Idle,
         Self::Sense,
@@ -50,7 +50,7 @@ impl Phase {
         matches!(self, Self::Idle | Self::Sense)
     }
 
-    /// Returns true if the motor is turned, or slowed down.
+    /// Returns true if the motor is driven or slowed down.
     pub fn drives(self) -> bool {
         matches!(self, Self::Park | Self::Ramp | Self::Run | Self::Stopping)
     }

@@ -1,32 +1,32 @@
-//! Which half-bridges a self-test pulls.
+//! The half-bridges that a self-test pulls.
 
 use crate::trace::Trace;
 
-/// Which half-bridges a self-test pulls to the supply's poles.
+/// Which half-bridge a self-test pulls to which supply rail.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Pull {
-    /// Nothing: all switches are off.
+    /// None: all switches are off.
     #[default]
     Open = 0,
-    /// Leg a to the supply: its high side on for more and more of the period and at last for all of it, the
-    /// low side for the rest. The others are off.
+    /// Leg a to the supply: its high side is on for a growing share of the period, finally for all of it, and its
+    /// low side for the rest. The other legs are off.
     UpA = 1,
-    /// Leg b, likewise.
+    /// Leg b, in the same way.
     UpB = 2,
-    /// Leg c, likewise.
+    /// Leg c, in the same way.
     UpC = 3,
-    /// Leg a up to a quarter of the period, with the low side of leg b on: a current flows into the motor by
-    /// the one and back by the other.
+    /// Leg a up to a quarter of the period, with the low side of leg b on: current flows into the motor through one
+    /// and back through the other.
     ThroughA = 4,
-    /// Leg b, and c, likewise.
+    /// Legs b and c, in the same way.
     ThroughB = 5,
-    /// Leg c, and a, likewise.
+    /// Legs c and a, in the same way.
     ThroughC = 6,
 }
 
 impl Pull {
-    /// All, in the order of their numbers.
+    /// All of them, in numerical order.
     pub const ALL: [Self; 7] = [
         Self::Open,
         Self::UpA,
@@ -37,9 +37,9 @@ impl Pull {
         Self::ThroughC,
     ];
 
-    /// The one of a number; of any other, the first.
+    /// Returns the one with this number, or the first for any other.
     pub const fn from_number(number: u8) -> Self {
-        // Written out: a look-up would be a table in flash.
+        // Spelled out: a lookup would be a table in flash.
         match number {
             1 => Self::UpA,
             2 => Self::UpB,
@@ -56,7 +56,7 @@ impl Pull {
         self as u8 >= Self::ThroughA as u8
     }
 
-    /// The leg that is pulled, 0, 1, 2 for a, b, c.
+    /// Returns the pulled leg, 0, 1, 2 for a, b, c.
     pub const fn leg(self) -> u8 {
         match self {
             Self::Open | Self::UpA | Self::ThroughA => 0,

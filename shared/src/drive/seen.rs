@@ -1,6 +1,6 @@
-//! What the last period saw and commanded: telemetry shows it, and the next period's decisions read it.
+//! What the last period saw and commanded, for telemetry and for the next period's decisions.
 //!
-//! Its phase is the one that these figures belong to; the drive's own, `State::phase`, may already be the next.
+//! Its phase is the one these values belong to; the drive's own, `State::phase`, may already be the next.
 
 use super::phase::Phase;
 use crate::control::modulator::Supply;
@@ -13,15 +13,15 @@ traced! {
     /// The last period's quantities.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub(super) struct Seen {
-        /// Phase of the drive.
+        /// The drive's phase.
         pub(super) phase: Phase,
-        /// Electrical angle of the control's frame at the sample, with the phases in the order a, b, c.
+        /// Electrical angle of the control's frame at the sample, for the phase order a, b, c.
         pub(super) angle: Angle,
-        /// Electrical speed the way the motor turns.
+        /// Electrical speed in the direction of rotation.
         pub(super) speed: Speed,
         /// Measured current in the frame.
         pub(super) i: Dq<Current>,
-        /// Voltage that was commanded, in the frame.
+        /// Commanded voltage in the frame.
         pub(super) u: Dq<Voltage>,
         /// Current from the supply.
         pub(super) bus_current: Current,
@@ -29,7 +29,7 @@ traced! {
 }
 
 impl Seen {
-    /// A shaft that stands, without current and voltage.
+    /// A standing shaft, without current and voltage.
     pub(super) const NOTHING: Self = Self {
         phase: Phase::Idle,
         angle: Angle::ZERO,
@@ -45,7 +45,7 @@ impl Seen {
         bus_current: Current::ZERO,
     };
 
-    /// The bridge is off, or the low sides are on: nothing flows any more.
+    /// Clears current and voltage: the bridge is off, or the low sides are on.
     pub(super) fn rest(&mut self) {
         self.i = Dq::default();
         self.u = Dq::default();
@@ -53,19 +53,19 @@ impl Seen {
     }
 }
 
-/// A phase's reading as a current: one unit is 4096/3 counts.
+/// Converts a phase reading to a current: one unit is 4096/3 counts.
 pub(super) fn reading(counts: AdcCounts) -> Current {
     Current::from_bits(counts.to_bits().saturating_mul(3))
 }
 
-/// The greatest of three currents' magnitudes.
+/// Returns the largest magnitude of three currents.
 pub(super) fn greatest([a, b, c]: [Current; 3]) -> Current {
     a.saturating_abs()
         .max(b.saturating_abs())
         .max(c.saturating_abs())
 }
 
-/// Current from the supply: 1.5·(v·i)/V_bus.
+/// Returns the current from the supply: 1.5·(v·i)/V_bus.
 pub(super) fn bus_current(u: Dq<Voltage>, i: Dq<Current>, supply: &Supply) -> Current {
     // 24 + 28 − 32 fraction bits; 28 wanted.
     let two_thirds: Current = (u.d.top(i.d) + u.q.top(i.q))

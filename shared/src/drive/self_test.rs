@@ -1,11 +1,11 @@
-//! Half-bridges pulled by a self-test, without turning the motor.
+//! The self-test's pulls on half-bridges, without turning the motor.
 //!
-//! The duty of one leg rises from zero by the same step each period, and all ends as soon as a phase
-//! carries the current of a test: a low side that is shorted shows as a current of a few amperes through
-//! the windings, not as the trip of an over-current. Not so that of the first leg to be pulled: its own
-//! high side works against it, in pulses that end before a sample sees them. The first is no longer than
-//! a step of the duty, and there the hardware's trip ends it: the comparator on that leg's shunt, or the
-//! gate driver. What flowed last stays to be read, at a period's pace or slower.
+//! The duty of one leg rises from zero by a fixed step per period, and everything ends as soon as a phase carries
+//! the test current: a shorted low side shows as a few amperes through the windings instead of an over-current
+//! trip. The exception is a short in the first leg pulled: its own high side works against it, in pulses that end
+//! before a sample sees them. The first is no longer than one duty step, and the hardware trip ends it there: the
+//! comparator on that leg's shunt, or the gate driver. The last current remains readable, at one period's pace or
+//! slower.
 
 use super::config::Config;
 use super::io::Bridge;
@@ -16,14 +16,14 @@ use crate::control::transform::Dq;
 use crate::trace::traced;
 use crate::units::{AdcCounts, Duty};
 
-/// Periods in which the duty comes to the whole.
+/// Periods in which the duty rises to full.
 const RISE_PERIODS: u16 = 256;
 
-/// Periods after which a current through two legs is given up: a quarter of the supply.
+/// Periods after which a current through two legs is given up: at a quarter of the supply.
 const THROUGH_PERIODS: u16 = RISE_PERIODS / 4;
 
 traced! {
-    /// The pull under way.
+    /// The pull in progress.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     pub(super) struct State {
         pull: Pull,
@@ -32,8 +32,7 @@ traced! {
     }
 }
 
-/// A period of a self-test. The snapshot's currents d and q are those into the phases that follow the
-/// pulled one.
+/// Runs one period of a self-test. The snapshot's d and q currents are those into the phases after the pulled one.
 #[cold]
 #[inline(never)] // only some periods
 pub(super) fn period(
@@ -62,7 +61,7 @@ pub(super) fn period(
     if state.over {
         return Bridge::Off;
     }
-    // Above the whole the high side stays on at the counter's top too.
+    // At full duty the high side stays on at the counter's top too.
     let duty = if state.periods == RISE_PERIODS {
         Duty::MAX
     } else {

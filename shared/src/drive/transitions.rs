@@ -1,4 +1,4 @@
-//! Every change of the drive's phase, with its reason: the one table of them.
+//! The single table of the drive's phase changes, with their reasons.
 
 use super::config::Stop;
 use super::phase::Phase;
@@ -7,46 +7,46 @@ use crate::protection::Fault;
 /// Why the phase changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Why {
-    /// Something may turn the motor and asks for it.
+    /// Something that may turn the motor asks for it.
     Drive,
-    /// A tone or a self-test is asked for, of a rotor that stands.
+    /// A tone or a self-test is requested while the rotor stands.
     Tone,
-    /// Nothing is asked for any more, or the other direction is.
+    /// Nothing is requested any more, or the other direction is.
     Released,
-    /// Nothing is asked for any more and the shaft is to coast: without current at once.
+    /// Nothing is requested any more and the shaft shall coast: without current at once.
     Coasts,
-    /// The low sides were on before a tone, and are to be again.
+    /// The low sides were on before a tone, and go on again.
     Shorted,
-    /// The currents' zeros are measured, and what there is to know of the rotor is known.
+    /// The current offsets are measured, and the rotor is known as far as possible.
     Sensed,
-    /// The shaft turns too fast to be parked by the six-step drive, which knows no flying start.
+    /// The shaft turns too fast for the six-step drive, which has no flying start, to park it.
     TooFast,
-    /// The drivers are charged, and the rotor stands somewhere: it is to be aligned.
+    /// The drivers are charged and the rotor stands at an unknown angle: align it.
     Stands,
-    /// The drivers are charged, and the rotor is known: a flying start, or sensors that show where it is.
+    /// The drivers are charged and the rotor is known, by a flying start or position sensors.
     Caught,
-    /// The drivers are charged, and the rotor turns the other way.
+    /// The drivers are charged and the rotor turns the other way.
     CaughtBackwards,
-    /// The drivers are charged as far as a tone or a self-test needs.
+    /// The drivers are charged as far as a tone or self-test needs.
     ToneReady,
     /// The rotor has had its time to align.
     Aligned,
-    /// The observer has the rotor.
+    /// The observer has locked on to the rotor.
     HandedOver,
-    /// The motor is to turn again, and the observer still follows it.
+    /// The motor shall turn again, and the observer still tracks it.
     Resumed,
-    /// There is nothing left to slow down.
+    /// Nothing is left to slow down.
     Stopped,
-    /// Loss of synchronism in a start, or Run has been too slow for too long: to Idle, from which a set-point
-    /// that still asks for it begins another attempt.
+    /// Loss of synchronism in a start, or Run too slow for too long: to Idle, where a set-point that still asks to
+    /// turn begins another attempt.
     Failed,
-    /// The six-step drive's loss of synchronism in a start: it aligns the rotor anew.
+    /// Loss of synchronism in a six-step start: it aligns the rotor again.
     Retried,
-    /// The bridge is off until zero throttle, or a retry.
+    /// Bridge off until zero throttle, or a retry.
     Tripped(Fault),
 }
 
-/// The phase that a change leads to: the table. `None` where a phase has no such reason to end.
+/// Returns the phase that a change leads to; `None` if the phase cannot end for this reason.
 pub(super) const fn next(from: Phase, why: Why, stop: Stop) -> Option<Phase> {
     use Phase::{Brake, Charge, Idle, Park, Ramp, Run, Sense, Stopping, Tone};
     Some(match (from, why) {
@@ -100,7 +100,7 @@ mod tests {
         Why::Tripped(Fault::OverCurrent),
     ];
 
-    /// Phases that the table leads to from here without a fault, for either way to stop.
+    /// Returns the phases that the table reaches from here without a fault, for either stop mode.
     fn led_to(from: Phase) -> Vec<Phase> {
         let stops = [Stop::Coast, Stop::Brake];
         let to = |why| stops.map(|stop| next(from, why, stop));

@@ -1,18 +1,18 @@
-//! Conditions: faults that stop the bridge and limits that bind it, in one space of numbers.
+//! Conditions: faults that stop the bridge and limits that bound it, in one number space.
 //!
-//! The listings below are the one source of numbers, names, flags and of the pilot's page in
-//! `firmware/README.md`: a test compares that with [`Condition`]'s rows.
+//! The listings below are the single source of numbers, names, flags and of the pilot's page in
+//! `firmware/README.md`, which a test compares with [`Condition`]'s rows.
 
 use crate::trace::Trace;
 
-/// What the pilot's page says of a condition.
+/// A condition's entry on the pilot's page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Condition {
-    /// Its number, which is that of its bit in HEARTBEAT's custom mode.
+    /// Its number, also its bit in HEARTBEAT's custom mode.
     pub number: u8,
     /// Its name, in texts and files.
     pub text: &'static str,
-    /// When it is there.
+    /// When it applies.
     pub meaning: &'static str,
     /// What to do about it, or what the ESC does.
     pub remedy: &'static str,
@@ -32,11 +32,11 @@ macro_rules! conditions {
         }
 
         impl $name {
-            /// All, in the order of their numbers.
+            /// All of them, in numerical order.
             pub const ALL: [Self; $count] = [$(Self::$variant),*];
 
-            /// The one with this number.
-            // By comparison: in the interrupt a look-up would be a table in flash.
+            /// Returns the one with this number.
+            // By comparison: a lookup would put a table into the interrupt's flash.
             pub const fn of_number(number: u8) -> Option<Self> {
                 match number {
                     $($number => Some(Self::$variant),)*
@@ -44,7 +44,7 @@ macro_rules! conditions {
                 }
             }
 
-            /// A few words for a person.
+            /// Returns a short text for people.
             pub const fn text(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)*
@@ -58,7 +58,7 @@ macro_rules! conditions {
                 }
             }
 
-            /// The row of the pilot's page.
+            /// Returns its row of the pilot's page.
             pub const fn condition(self) -> Condition {
                 let (meaning, remedy) = match self {
                     $(Self::$variant => ($meaning, $remedy),)*
@@ -72,7 +72,7 @@ macro_rules! conditions {
         pub struct $set(u8);
 
         impl $set {
-            /// None.
+            /// The empty set.
             pub const NONE: Self = Self(0);
 
             /// Adds one.
@@ -80,32 +80,32 @@ macro_rules! conditions {
                 self.0 |= 1 << (one as u8 - $first);
             }
 
-            /// Adds one, or takes it away if it is there.
+            /// Adds one, or removes it if present.
             pub fn toggle(&mut self, one: $name) {
                 self.0 ^= 1 << (one as u8 - $first);
             }
 
-            /// Returns true if it is in the set.
+            /// Returns true if the set contains it.
             pub const fn contains(self, one: $name) -> bool {
                 self.0 & (1 << (one as u8 - $first)) != 0
             }
 
-            /// Returns true if there is none.
+            /// Returns true if the set is empty.
             pub const fn is_empty(self) -> bool {
                 self.0 == 0
             }
 
-            /// Those of both sets.
+            /// Returns the union of both sets.
             pub const fn with(self, other: Self) -> Self {
                 Self(self.0 | other.0)
             }
 
-            /// Those that are not in the other set.
+            /// Returns those not in the other set.
             pub const fn without(self, other: Self) -> Self {
                 Self(self.0 & !other.0)
             }
 
-            /// Those that are in the set, in the order of their numbers.
+            /// Iterates over the set in numerical order.
             pub fn iter(self) -> impl Iterator<Item = $name> {
                 let numbers = $first..$first + $count;
                 numbers.filter_map($name::of_number).filter(move |one| self.contains(*one))
@@ -116,7 +116,7 @@ macro_rules! conditions {
                 self.0
             }
 
-            /// The bits at the conditions' numbers, as HEARTBEAT's custom mode has them.
+            /// Returns the bits at the conditions' numbers, as in HEARTBEAT's custom mode.
             pub const fn custom_mode(self) -> u32 {
                 (self.0 as u32) << $first
             }
@@ -124,21 +124,21 @@ macro_rules! conditions {
     };
 }
 
-/// What a [`Limit`] raises of extended telemetry's status.
+/// The bit of extended telemetry's status that a [`Limit`] raises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Raised {
-    /// There is no more torque.
+    /// No more torque is available.
     Alert,
-    /// Something is broken, and the motor runs on with it.
+    /// Something is broken, and the motor keeps running with it.
     Warning,
 }
 
 conditions! {
-    /// A reason for which the bridge was turned off.
+    /// A reason why the bridge was turned off.
     Fault,
     /// A set of faults.
     Faults of 7 from 0,
-    /// Its flag of `ESC_FAILURE_FLAGS`; of those without one of their own, GENERIC.
+    /// Its flag in `ESC_FAILURE_FLAGS`; GENERIC if it has none of its own.
     failure_flag: u16;
 
     /// A phase current was above 1.4 times `LIM_PHASE_A` for two samples.
@@ -157,37 +157,37 @@ conditions! {
     OverTemperature = 3 "over-temperature" 4,
         "board above `LIM_TEMP_C`"
         "cool it; lower `LIM_PHASE_A`";
-    /// The observer's state left its range: the rotor's position is not known.
+    /// The observer's state left its range: the rotor's position is unknown.
     ObserverLost = 4 "rotor position lost" 64,
         "the observer's angle cannot be trusted any more"
         "check the motor's parameters; a loose phase; a blocked propeller";
-    /// All attempts of a start have failed, or the motor was too slow for too long.
+    /// Every attempt of a start failed, or the motor was too slow for too long.
     Stuck = 5 "motor does not start" 32,
         "every attempt of a start has failed"
         "see below";
-    /// A current sensor's zero is too far off.
+    /// A current sensor's zero error is too large.
     CurrentSensor = 6 "current sensor defect" 64,
         "a current sensor's zero is too far off"
         "its shunt and amplifier: `siskin check`";
 }
 
 conditions! {
-    /// A limit that the drive keeps to, at the cost of what is asked for, or something wrong that it goes on with.
+    /// A limit that the drive respects at the cost of the demand, or a defect that it continues with.
     Limit,
     /// A set of limits.
     Limits of 8 from 16,
-    /// What of extended telemetry's status it raises.
+    /// The bit of extended telemetry's status that it raises.
     raises: Option<Raised>;
 
-    /// The current's vector is at `LIM_PHASE_A`.
+    /// The current vector is at `LIM_PHASE_A`.
     PhaseCurrent = 16 "phase current" Some(Raised::Alert),
         "the current is at `LIM_PHASE_A`"
         "holds the current there: there is no more torque";
-    /// The supply gives `LIM_BUS_A`.
+    /// The supply delivers `LIM_BUS_A`.
     BusCurrent = 17 "supply current" Some(Raised::Alert),
         "the supply gives `LIM_BUS_A`"
         "lowers the phase current: there is no more torque";
-    /// The supply takes `LIM_REGEN_A`.
+    /// The supply sinks `LIM_REGEN_A`.
     RegenCurrent = 18 "returned current" None,
         "braking returns `LIM_REGEN_A`"
         "brakes more slowly";
@@ -195,7 +195,7 @@ conditions! {
     BusVoltage = 19 "supply voltage" None,
         "the supply is within 1 V of `LIM_BUS_V_MAX`"
         "returns less to the supply, and turns more into heat in the motor";
-    /// The motor has all the voltage that the supply gives.
+    /// The motor has all the voltage that the supply can give.
     Duty = 20 "duty" None,
         "the motor has all the voltage that the supply gives"
         "turns no faster";
@@ -203,7 +203,7 @@ conditions! {
     PhaseOpen = 21 "phase open" Some(Raised::Warning),
         "a phase carries no current, or in one direction only: a loose wire, or a switch that does not turn on"
         "turns on, with less torque: land, then `siskin check`";
-    /// The phases' currents do not come to none.
+    /// The phase currents do not sum to zero.
     SensorDrift = 22 "current sensor drifts" Some(Raised::Warning),
         "the phases' currents do not come to none: a current sensor's zero has moved, or it shows nothing"
         "turns on, with a torque that swings: land, then `siskin check`";
@@ -214,12 +214,12 @@ conditions! {
 }
 
 impl Fault {
-    /// Flashes of the light until its pause; one is that all is well.
+    /// Returns the number of flashes between pauses of the light; a single flash means all is well.
     pub const fn flashes(self) -> u8 {
         self as u8 + 2
     }
 
-    /// Returns true if it can pass by itself, so that a drive that has proven itself may be tried again.
+    /// Returns true if it can pass by itself, so that a drive that has proven itself may be retried.
     pub const fn is_retried(self) -> bool {
         match self {
             Self::OverCurrent | Self::OverVoltage | Self::UnderVoltage | Self::ObserverLost => true,
@@ -229,7 +229,7 @@ impl Fault {
 }
 
 impl Limit {
-    /// Returns true if it is a warning: nothing is bounded, but the motor runs on with something broken.
+    /// Returns true if it is a warning: nothing is bounded, but the motor runs with a defect.
     pub const fn warns(self) -> bool {
         matches!(self.raises(), Some(Raised::Warning))
     }
@@ -286,7 +286,7 @@ mod tests {
 
     use super::*;
 
-    /// The rows of the table in the builder's guide that begins with this line.
+    /// Returns the rows of the builder's guide table that begins with this line.
     fn rows(head: &str) -> Vec<&'static str> {
         let guide = include_str!("../../../firmware/README.md");
         let (_, table) = guide.split_once(head).expect("the table is there");

@@ -1,4 +1,4 @@
-//! Turns the bridge off, and bounds the current so that it need not.
+//! Protection: faults that turn the bridge off, and current bounds that make that unnecessary.
 
 mod condition;
 mod ntc;
@@ -12,37 +12,36 @@ use crate::math::{Gain, Held, Multiplier, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Current, Voltage};
 
-/// Periods by which the supply's voltage is looked ahead while the motor brakes: eight that the filter is behind, and
-/// as many as it takes until a bound is looked at again and the current has followed.
+/// Periods by which the supply voltage is extrapolated while braking: eight for the filter's lag, and about as many
+/// again until the bound is updated and the current has followed.
 const AHEAD_PERIODS: i32 = 32;
 
-/// Samples in a row above the trip level that are an over-current, so that one disturbed reading
-/// is not.
+/// Consecutive samples above the trip level that count as over-current; a single disturbed reading does not.
 const OVER_CURRENT_SAMPLES: u8 = 2;
 
 /// Thresholds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Magnitude of a phase's reading that trips: 1.4 times `LIM_PHASE_A`. If that was lowered, the
-    /// trip in force is [`State::trip`].
+    /// Trip level of a phase current reading: 1.4 times `LIM_PHASE_A`. After that limit was lowered,
+    /// [`State::trip`] is the level in force.
     pub trip: AdcCounts,
-    /// Least supply voltage.
+    /// Smallest supply voltage.
     pub bus_min: Voltage,
-    /// Greatest supply voltage.
+    /// Largest supply voltage.
     pub bus_max: Voltage,
-    /// Bound of i_q, `LIM_PHASE_A`.
+    /// Bound on i_q, `LIM_PHASE_A`.
     pub phase: Current,
-    /// Bound of the current from the supply, `LIM_BUS_A`.
+    /// Bound on the current from the supply, `LIM_BUS_A`.
     pub bus_draw: Current,
-    /// Bound of the current to the supply, `LIM_REGEN_A`.
+    /// Bound on the current into the supply, `LIM_REGEN_A`.
     pub bus_return: Current,
-    /// Supply voltage from which less is returned.
+    /// Supply voltage above which less is returned.
     pub bus_return_v: Voltage,
-    /// Volts above that to current.
+    /// From volts above that to the reduction of the returned current.
     pub bus_return_slope: Gain<Voltage, Current>,
-    /// Volts above that to i_d, which turns into heat what would raise them.
+    /// From volts above that to i_d, which burns the power that would raise the voltage.
     pub burn_slope: Gain<Voltage, Current>,
-    /// Bus current's excess to the bound's change in a period.
+    /// From the bus current's excess to the change of the bound per period.
     pub bound_rate: Multiplier<Current, Current>,
 }
 
@@ -50,22 +49,22 @@ traced! {
     /// State from sample to sample.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
-        /// Magnitude of a phase's reading that trips now: [`Config::trip`], or that of the limit before,
-        /// until the current has come down to one that was lowered, or a drive or a tone begins.
+        /// Trip level in force: [`Config::trip`], or that of the previous limit until the current has come down to
+        /// a lowered one, or a drive or a tone begins.
         pub trip: AdcCounts,
-        /// Samples in a row above the trip.
+        /// Consecutive samples above the trip level.
         pub over_current_samples: u8,
-        /// Supply voltage behind a low-pass filter.
+        /// Supply voltage after a low-pass.
         pub bus: Voltage,
-        /// By how much that has risen in the last period.
+        /// Rise of that voltage in the last period.
         pub rise: Voltage,
-        /// Bounds of i_q*, moved by what the supply gives and takes.
+        /// Bounds of i_q*, moved by the supply's current in either direction.
         pub bounds: Bounds,
     }
 }
 
 impl State {
-    /// At power-up: full bounds, and a supply in the middle of its range until there are samples.
+    /// Creates the power-up state: full bounds, and mid-range supply until there are samples.
     pub fn new(config: &Config) -> Self {
         Self {
             trip: config.trip,
@@ -86,9 +85,9 @@ impl Config {
     }
 }
 
-/// Takes a sample's supply voltage into the filter and looks for a reason to turn the bridge off.
+/// Filters a sample's supply voltage and checks for a reason to turn the bridge off.
 ///
-/// `currents` is `None` if the readings are those of no current.
+/// `currents` is `None` if the bridge is off and the readings show no current.
 #[inline(always)] // in each period
 pub fn check(
     config: &Config,
@@ -96,8 +95,8 @@ pub fn check(
     currents: Option<[AdcCounts; 3]>,
     bus: Voltage,
 ) -> Option<Fault> {
-    // An eighth of the difference a period: one reading that is off moves it by little.
-    // Both are from 0 to 8, the type is of ±8: nothing here wraps.
+    // An eighth of the difference per period, so that a single bad reading has little effect.
+    // Both are from 0 to 8 and the type covers ±8: nothing wraps.
     state.rise = bus.wrapping_sub(state.bus) >> 3;
     state.bus = state.bus.wrapping_add(state.rise);
 
@@ -109,7 +108,7 @@ pub fn check(
     } else if state.over_current_samples != 0 {
         state.over_current_samples = 0;
     }
-    // Below the least wraps round to above the greatest: one comparison.
+    // Below the minimum wraps around to above the maximum: one comparison.
     let above = state.bus.wrapping_sub(config.bus_min).to_bits() as u32;
     if above <= config.bus_max.wrapping_sub(config.bus_min).to_bits() as u32 {
         None
@@ -123,15 +122,14 @@ pub fn check(
 /// Returns true if a phase's current is beyond ±`trip`.
 fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     let trip = trip.to_bits();
-    // Below −trip wraps round to above 2·trip: one comparison a phase.
+    // Below −trip wraps around to above 2·trip: one comparison per phase.
     let far = |current: AdcCounts| current.to_bits().wrapping_add(trip) as u32 > 2 * trip as u32;
     let [a, b, c] = currents;
     far(a) || far(b) || far(c)
 }
 
-/// Lets the trip follow `LIM_PHASE_A`: at once if that was raised, and if it was lowered when
-/// the current vector `i` has come down to within a quarter above it. Else to lower a limit would be a
-/// reason to trip.
+/// Makes the trip follow `LIM_PHASE_A`: at once if raised; if lowered, when the current vector `i` is down to
+/// within a quarter above it. Otherwise lowering the limit would itself trip.
 pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {
     if state.trip == config.trip {
         return;
@@ -142,8 +140,8 @@ pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {
     }
 }
 
-/// `i_d`, or what turns more of the supply's power into heat, as its voltage nears the limit: no bound of i_q,
-/// and no current that is measured, is exact enough for a supply that takes nothing at all.
+/// Returns `i_d`, or a larger one that burns more of the supply's power as its voltage nears the limit: no bound on
+/// i_q and no current measurement is exact enough for a supply that sinks no current at all.
 #[inline(always)] // a comparison, in the longest period of the control
 pub fn burn(config: &Config, state: &State, i_d: Current) -> Current {
     if state.bus <= config.bus_return_v {
@@ -154,20 +152,20 @@ pub fn burn(config: &Config, state: &State, i_d: Current) -> Current {
 }
 
 #[cold]
-#[inline(never)] // what is rare is no part of the longest period
+#[inline(never)] // rare, so not part of the longest period
 fn burnt(config: &Config, state: &State) -> Current {
     let above = state.bus.minus(config.bus_return_v);
     config.burn_slope.saturating_apply(above)
 }
 
-/// Moves the bounds of i_q, after so many `periods`, so that the supply gives no more than `bus_draw`
-/// and takes no more than `bus_return`, and less of that as its voltage nears the limit.
+/// Moves the bounds of i_q, every `periods` periods, so that the supply delivers at most `bus_draw` and sinks at
+/// most `bus_return`, less as its voltage nears the limit.
 ///
-/// A supply that takes nothing back any more rises by volts a millisecond: what it comes to if it goes on so counts as its
-/// voltage, and where that is beyond the limit nothing is returned at once.
+/// A supply that no longer sinks current rises by volts per millisecond. The bound therefore uses the extrapolated
+/// voltage; where that exceeds the limit, return stops at once.
 ///
-/// Braking begins at a bound that returns no more than that at any speed; only then is it moved by
-/// what is returned. From the full bound it would return too much for some milliseconds.
+/// Braking begins at a bound that returns no more than allowed at any speed, and only then follows the measured
+/// return. Starting from the full bound would return too much for some milliseconds.
 pub fn bound(
     config: &Config,
     state: &mut State,
@@ -197,7 +195,7 @@ pub fn bound(
         Current::ZERO
     } else if i_q.is_negative() {
         let too_much_returned = bus_current.saturating_neg().minus(may_return);
-        // While the current is on its way to the bound there is nothing to say that more may be had.
+        // Until the current has reached the bound, nothing shows that more is available.
         let arrived = i_q < min - (min >> 3);
         if arrived || too_much_returned.is_positive() {
             min.plus(rate(too_much_returned))
@@ -205,7 +203,7 @@ pub fn bound(
             min
         }
     } else {
-        // The bus current is at most 1.5/√3 of i_q, at full modulation: 1 + 1/8 + 1/32 is 2/√3.
+        // The bus current is at most 1.5/√3 of i_q, at full modulation: 1 + 1/8 + 1/32 approximates 2/√3.
         let most = may_return.max(Current::ZERO);
         most.plus((most >> 3) + (most >> 5)).saturating_neg()
     };

@@ -1,17 +1,17 @@
-//! A thermistor's reading.
+//! Temperature from a thermistor reading.
 
 use crate::math::Real;
 use crate::units::AdcCounts;
 
-/// Readings of a converter of 12 bits.
+/// Counts of a 12-bit ADC.
 const COUNTS: f32 = 4096.0;
 
 /// 0 °C, K.
 const FREEZING_K: f32 = 273.15;
 
-/// A thermistor with a negative temperature coefficient between the converter's reference and its
-/// input, and a resistor from there to ground, by its β: at T kelvins it has
-/// r₂₅·e^(β·(1/T − 1/298.15)), so that a warmer one gives a higher reading.
+/// An NTC thermistor between the ADC's reference and its input, with a resistor from there to
+/// ground, by its β: at T kelvins its resistance is r₂₅·e^(β·(1/T − 1/298.15)), so a warmer one
+/// reads higher.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ntc {
     /// The resistor to ground over the thermistor's resistance at 25 °C.
@@ -21,15 +21,15 @@ pub struct Ntc {
 }
 
 impl Ntc {
-    /// The thermistor of the VESC's transistors: 10 kΩ at 25 °C, β 3434 K, over 10 kΩ.
+    /// The VESC's transistor thermistor: 10 kΩ at 25 °C, β 3434 K, over 10 kΩ.
     pub const VESC: Self = Self {
         pull_down: 1.0,
         beta_k: 3434.0,
     };
 
-    /// Temperature of a reading, °C; not a number if the thermistor is torn off or shorted.
+    /// Returns the temperature of a reading, °C; NaN if the thermistor is open or shorted.
     ///
-    /// For the tasks, about once a millisecond: it takes a logarithm.
+    /// For the tasks, about once per millisecond: it takes a logarithm.
     pub fn celsius(&self, reading: AdcCounts) -> f32 {
         let counts = reading.to_f32();
         if counts <= 1.0 || counts >= COUNTS - 1.0 {

@@ -1,4 +1,4 @@
-//! The inductance's adaptation on a flux estimate as an observer gives it.
+//! Inductance adaptation on a flux estimate like an observer's.
 
 use super::{L, PHI, TS, Units, config_with};
 use crate::control::inductance::{Factor, State, step};
@@ -26,7 +26,7 @@ impl Bench {
         }
     }
 
-    /// Uniform noise of this standard deviation.
+    /// Returns uniform noise of this standard deviation.
     fn noise(&mut self, deviation: f64) -> f64 {
         self.noise = self
             .noise
@@ -35,8 +35,8 @@ impl Bench {
         (f64::from(self.noise >> 8) / f64::from(1 << 24) - 0.5) * 12_f64.sqrt() * deviation
     }
 
-    /// A period on a motor of this L: the current follows in 0.4 ms, and the observer's flux in
-    /// 1.2 ms, as at 4500 rpm. Returns what is added to i_d*, A.
+    /// Runs a period on a motor of this L: the current follows in 0.4 ms, the observer's flux in
+    /// 1.2 ms, as at 4500 rpm. Returns the offset to i_d*, A.
     fn period(&mut self, inductance_h: f64) -> f64 {
         let config = self.units.0.adapt_l.clone().expect("it is on");
         let measured = self.i_d + self.noise(0.05);
@@ -72,7 +72,7 @@ fn the_wave_is_an_ampere_at_fifty_hertz() {
 fn a_stated_inductance_that_is_wrong_by_thirty_percent_is_found_in_three_tenths_of_a_second() {
     for wrong in [0.7, 1.0, 1.3] {
         let mut bench = Bench::new();
-        // The truth over the statement.
+        // Actual over stated.
         let truth = 1.0 / wrong;
         for _ in 0..(0.3 / TS) as usize {
             bench.period(truth * L);

@@ -9,24 +9,24 @@ use crate::control::regulator::{Feedback, Reference, State};
 use crate::control::transform::Dq;
 use crate::units::{Current, Voltage, WideVoltage, narrow};
 
-/// Steps of the model a period.
+/// Model steps per period.
 const PARTS: u32 = 16;
 
-/// A motor with its load. The stator's quantities are complex numbers, (α, β).
+/// A motor with its load. Stator quantities are complex numbers, (α, β).
 #[derive(Clone, Debug)]
 pub(super) struct Motor {
     pub(super) inertia_kgm2: f64,
     /// Load of section V: c1·ω + c2·ω².
     pub(super) c1: f64,
     pub(super) c2: f64,
-    /// True if the shaft is held at its speed.
+    /// The shaft is held at its speed.
     pub(super) held: bool,
     /// Mechanical speed, rad/s.
     pub(super) omega_m: f64,
     /// Electrical angle.
     theta: f64,
     pub(super) i: (f64, f64),
-    /// Command of the last period: it acts in this one.
+    /// Command of the last period, which acts in this one.
     pending: (f64, f64),
 }
 
@@ -45,7 +45,7 @@ impl Motor {
         }
     }
 
-    /// This motor with its shaft held at that speed.
+    /// Returns this motor with its shaft held at that speed.
     pub(super) fn held(rpm: f64) -> Self {
         Self {
             held: true,
@@ -71,7 +71,7 @@ impl Motor {
         1.5 * P * PHI * self.i_dq().1
     }
 
-    /// One period, at whose end the command for the next one stands: d and q of the sample's
+    /// Runs one period, at whose end the command for the next one is ready: d and q in the sample's
     /// frame, aimed at the middle of the period in which it acts.
     pub(super) fn period(&mut self, u_dq: (f64, f64)) {
         let acting = self.pending;
@@ -79,7 +79,7 @@ impl Motor {
         let dt = TS / f64::from(PARTS);
         for _ in 0..PARTS {
             let omega = self.omega();
-            // Midpoint: the back-EMF and the resistance's drop in the middle of the part.
+            // Midpoint rule: back-EMF and resistive drop in the middle of the step.
             let middle = self.theta + 0.5 * omega * dt;
             let e = (-omega * PHI * middle.sin(), omega * PHI * middle.cos());
             let decay = 0.5 * R * dt / L;
@@ -95,19 +95,19 @@ impl Motor {
     }
 }
 
-/// A vector turned ahead by an angle.
+/// Returns a vector turned ahead by an angle.
 fn turned((x, y): (f64, f64), angle: f64) -> (f64, f64) {
     let (sin, cos) = angle.sin_cos();
     (x * cos - y * sin, x * sin + y * cos)
 }
 
-/// A motor, a current regulator that knows the rotor's position, and a limit of the voltage.
+/// A motor, a current regulator that knows the rotor's position, and a voltage limit.
 pub(super) struct Loop {
     pub(super) units: Units,
     pub(super) regulator: State,
     pub(super) motor: Motor,
     pub(super) vector_max: Voltage,
-    /// i_q* less i_q while the voltage is limited.
+    /// i_q* minus i_q while the voltage is limited.
     pub(super) missing: Current,
 }
 
@@ -123,7 +123,7 @@ impl Loop {
         }
     }
 
-    /// Estimate of an observer without errors.
+    /// Returns the estimate of an observer without errors.
     pub(super) fn feedback(&self) -> Feedback {
         let (i_d, i_q) = self.motor.i_dq();
         let i = Dq {
@@ -142,7 +142,7 @@ impl Loop {
         }
     }
 
-    /// One period; the voltage that was commanded, V.
+    /// Runs one period; returns the commanded voltage, V.
     pub(super) fn period(&mut self, wanted: &Reference) -> (f64, f64) {
         let feedback = self.feedback();
         let regulator = &self.units.0.regulator;

@@ -44,13 +44,13 @@ impl Bench {
         }
     }
 
-    /// Returns true if the outer loops act in this period.
+    /// Returns true if the outer loops run in this period.
     fn outer(&mut self) -> bool {
         self.periods += 1;
         self.periods % PERIODS == 1
     }
 
-    /// One period of speed control; the speed after it, rpm.
+    /// Runs one period of speed control; returns the speed after it, rpm.
     fn turn(&mut self, rpm: f64) -> f64 {
         if self.outer() {
             let units = &self.inner.units;
@@ -129,14 +129,14 @@ fn an_amplitude_modulated_sine_is_tracked() {
         let error = bench.turn(command) - command;
         square += error * error / f64::from(periods);
     }
-    // The published loop without feed-forward comes to 163 rpm rms.
+    // The published loop without feed-forward reaches 163 rpm rms.
     assert!(square.sqrt() < 20.0, "{} rpm rms", square.sqrt());
 }
 
 #[test]
 fn the_reference_waits_for_a_drive_that_cannot_follow() {
     for changes in [
-        // Half of the current that the slew takes, and a voltage that ends below the command.
+        // Half of the current that the slew needs, and a voltage that gives out below the command.
         (6.0, 13.4),
         (20.0, 9.0),
     ] {
@@ -155,7 +155,7 @@ fn the_reference_waits_for_a_drive_that_cannot_follow() {
         }
         let top = bench.inner.motor.rpm();
         assert!(top > 4000.0 && top < 5900.0, "{changes:?}: {top}");
-        // It turns round at once, and lands as softly.
+        // It reverses at once, and lands as softly.
         let back = bench.turn_for(1.5, 3000.0);
         assert!(
             back[150] < top - 20.0,
@@ -179,7 +179,7 @@ fn the_second_papers_loop_arrives_without_a_steady_error() {
     }
 }
 
-/// A share of the voltage goes to the motor as it is, while the current is within the bounds.
+/// A share of the voltage reaches the motor unchanged while the current is within bounds.
 #[test]
 fn a_commanded_voltage_is_given_until_a_bound_takes_over() {
     for regulator in [0.0, 1.0, 2.0] {
@@ -220,12 +220,11 @@ fn a_commanded_voltage_is_given_until_a_bound_takes_over() {
             "{regulator}: {:?}",
             motor.i_dq()
         );
-        // R·i + ω·φ, less the 0.5 % by which a voltage that stands for a period is shorter in the
-        // rotor's frame.
+        // R·i + ω·φ, minus the 0.5 % that a voltage held for a period loses in the rotor's frame.
         let left = u.1 - motor.i_dq().1 * R - motor.omega() * PHI;
         assert!(left.abs() < 0.05, "{regulator}: {left} V");
 
-        // Full throttle: without a bound the current would be 43 A.
+        // Full throttle: unbounded, the current would be 43 A.
         let (_, most, motor) = run(0.85, 0.05);
         assert!(most < 27.0, "{regulator}: {most} A");
         let held = motor.i_dq().1;
@@ -242,7 +241,7 @@ fn a_commanded_voltage_is_given_until_a_bound_takes_over() {
     }
 }
 
-/// Torque mode: the current is what is asked for within the bounds, and a negative one brakes.
+/// Torque mode: the current follows the command within the bounds, and a negative one brakes.
 #[test]
 fn a_commanded_current_brakes_within_the_bounds() {
     let mut bench = Bench::new(&[(ParamId::CtlRegulator, 1.0)], Motor::bench(5000.0));
@@ -261,8 +260,8 @@ fn a_commanded_current_brakes_within_the_bounds() {
     assert!(bench.inner.motor.rpm() < before - 1000.0);
 }
 
-/// Braking into a battery: the current returned stays within `LIM_REGEN_A`, and less of it flows as
-/// the voltage nears its limit. The second one, near full and of a quarter of an ohm, would rise to
+/// Braking into a battery: the returned current stays within `LIM_REGEN_A` and decreases as the
+/// voltage nears its limit. The second battery, nearly full and with a quarter ohm, would rise to
 /// 30.5 V.
 #[test]
 fn braking_is_bounded_by_the_supplys_current_and_voltage() {

@@ -1,4 +1,4 @@
-//! The current regulators against their equations, and in a loop with the motor.
+//! The current regulators against their equations, and in closed loop with the motor.
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -16,14 +16,14 @@ const ALL: [f32; 3] = [0.0, 1.0, 2.0];
 const SYNCHRONOUS: f32 = 1.0;
 const MODIFIED: f32 = 2.0;
 
-/// Bandwidth of the defaults, 1/s.
+/// Default bandwidth, 1/s.
 const BANDWIDTH: f64 = TAU * 375.0;
 
 fn units(regulator: f32) -> Units {
     Units(config_with(&[(ParamId::CtlRegulator, regulator)]))
 }
 
-/// Amperes, volts and rad/s for one call.
+/// Amperes, volts and rad/s of one call.
 #[derive(Clone, Copy, Debug)]
 struct Case {
     omega: f64,
@@ -96,8 +96,8 @@ fn voltages(units: &Units, [d, q]: [f64; 2]) -> Dq<Voltage> {
     }
 }
 
-/// The state that gives the integrators these voltages: where nothing flows and nothing is wanted
-/// they are all that is left.
+/// Returns the state in which the integrators hold these voltages: with no current and no reference they are all
+/// that remains.
 fn at(units: &Units, sigma: [f64; 2]) -> State {
     let mut state = State::default();
     let idle = Case {
@@ -119,7 +119,7 @@ fn at(units: &Units, sigma: [f64; 2]) -> State {
     state
 }
 
-/// The voltage now, and after the integrators have gone on by a period.
+/// Returns the voltage now, and after the integrators have advanced by one period.
 fn two_periods(units: &Units, state: &mut State, case: &Case) -> [[f64; 2]; 2] {
     let regulator = &units.0.regulator;
     let (wanted, feedback) = (case.wanted(units), case.feedback(units));
@@ -152,7 +152,7 @@ proptest! {
         }
     }
 
-    /// Figure 10 with its decoupling: it takes over at zero volts and these currents.
+    /// Figure 10 with its decoupling: starts from zero volts and these currents.
     #[test]
     fn the_synchronous_one_is_that_of_the_equations(case in cases(), before in cases()) {
         let units = units(SYNCHRONOUS);
@@ -183,7 +183,7 @@ proptest! {
         }
     }
 
-    /// Figure 11: the q axis's PI is the length, the d axis's the phase.
+    /// Figure 11: the q-axis PI sets the length, the d-axis PI the phase.
     #[test]
     fn the_modified_one_is_that_of_the_figure(
         case in cases(),
@@ -202,7 +202,7 @@ proptest! {
         };
         let wanted = |integrated: f64| {
             let length = length_at(integrated);
-            // The integral was taken with the sign that the length had then.
+            // The integral used the sign the length had then.
             let proportional = L * length.signum();
             let integral = TS * R * integrated * length_at(0.0).signum();
             let phase = phase + BANDWIDTH / top * (proportional + integral) * e[0];
@@ -211,13 +211,13 @@ proptest! {
         };
         for (got, wanted) in [(now, wanted(0.0)), (next, wanted(1.0))] {
             for axis in 0..2 {
-                // The phase comes from an arctangent right to 0.02°, of up to 25 V.
+                // The phase comes from an arctangent accurate to 0.02°, of up to 25 V.
                 near(got[axis], wanted[axis], 1e-3, 0.012)?;
             }
         }
     }
 
-    /// Whatever has applied a voltage before, a regulator goes on with it.
+    /// A regulator continues smoothly from whatever applied the voltage before.
     #[test]
     fn each_takes_over_without_a_jump(case in cases(), u in prop::array::uniform2(-10.0..10.0_f64)) {
         for kind in ALL {
@@ -229,7 +229,7 @@ proptest! {
             let got = regulator.voltage(&state, &wanted, &feedback);
             let settled = kind != MODIFIED || u[1].abs() > 2.0 * u[0].abs() && (case.i[0] - case.i_star[0]).abs() < 10.0;
             if settled {
-                // The modified one's angle is right to 0.02°.
+                // The modified one's angle is accurate to 0.02°.
                 near(units.wide_volts(got.d), u[0], 1e-5, 6e-3)?;
                 near(units.wide_volts(got.q), u[1], 1e-5, 6e-3)?;
             }
@@ -251,7 +251,7 @@ proptest! {
                 MODIFIED => u_q.signum() * units.wide_volts(u.d).hypot(units.wide_volts(u.q)),
                 _ => units.wide_volts(u.q),
             };
-            // Far from any current that flows, i_q* less i_q ends at the type's 213 A.
+            // Far from any actual current, i_q* minus i_q saturates at the type's 213 A.
             if units.amperes(i_q).abs() < 190.0 {
                 near(got, u_q, 1e-4, 5e-3)?;
             }
@@ -260,7 +260,7 @@ proptest! {
 }
 
 impl Loop {
-    /// Periods for these currents, A: i_d and i_q at the begin of each.
+    /// Runs periods with these currents, A; returns i_d and i_q at the start of each.
     fn run(&mut self, seconds: f64, i_star: [f64; 2]) -> std::vec::Vec<(f64, f64)> {
         let wanted = Reference {
             i: currents(&self.units, i_star),
@@ -298,8 +298,8 @@ fn a_step_of_the_synchronous_one_is_of_first_order_and_decoupled() {
         let mut bench = Loop::new(units(SYNCHRONOUS), Motor::held(rpm));
         bench.run(0.05, [0.0, 0.0]);
         let step = bench.run(0.01, [0.0, 10.0]);
-        // With the PI's zero on the winding's pole the current is the integral of its error, and
-        // the error's voltage acts a period later; a tenth of the step is left for the decoupling.
+        // With the PI's zero on the winding's pole the current is the integral of its error, whose voltage acts one
+        // period later; the decoupling leaves a tenth of the step.
         let mut expected = [0.0; 2];
         for (period, i) in step.iter().enumerate() {
             let off = (i.1 - expected[0]).abs();
@@ -317,8 +317,8 @@ fn a_step_of_the_synchronous_one_is_of_first_order_and_decoupled() {
     }
 }
 
-/// Braking at high speed with a current beyond what is wanted: at 6000 rpm −56 A along q induce the 13 V along d
-/// that there are, and without a voltage along q they would stay.
+/// Braking at high speed with a current beyond its reference: at 6000 rpm −56 A along q induce the full 13 V along
+/// d, and with no voltage left along q they would persist.
 #[test]
 fn a_current_beyond_its_bound_comes_back_where_its_drop_takes_the_whole_voltage() {
     for kind in ALL {
@@ -333,13 +333,13 @@ fn a_current_beyond_its_bound_comes_back_where_its_drop_takes_the_whole_voltage(
 #[test]
 fn a_limited_voltage_winds_nothing_up() {
     for kind in ALL {
-        // At 6000 rpm 10 V are too few for 8 A: the back-EMF alone is 9.8 V.
+        // At 6000 rpm 10 V are too little for 8 A: the back-EMF alone is 9.8 V.
         let mut bench = Loop::new(units(kind), Motor::held(6000.0));
         bench.run(0.05, [0.0, 0.0]);
         bench.vector_max = bench.units.voltage(10.0);
         let limited = *bench.run(0.2, [0.0, 8.0]).last().expect("it has run");
         assert!(limited.1 < 6.0, "{kind}: {limited:?}");
-        // The moment that it is asked for less it obeys, as one that was never limited.
+        // When less is requested it obeys at once, like one that was never limited.
         let back = bench.run(0.01, [0.0, 0.0]);
         let least = back.iter().map(|i| i.1).fold(0.0, f64::min);
         assert!(least > -2.0, "{kind}: {least}");

@@ -14,12 +14,12 @@ use crate::units::{Current, Torque};
 const FEED_FORWARD: f32 = 1.0;
 const PUBLISHED: f32 = 2.0;
 
-/// The regulators' period.
+/// The speed regulators' period.
 const T: f64 = TS * PERIODS as f64;
 
 /// J of section V.
 const J: f64 = 1.43e-4;
-/// Nm a peak ampere.
+/// Nm per ampere, peak.
 const TORQUE_CONSTANT: f64 = 1.5 * P * PHI;
 
 fn units(speed: f32) -> Units {
@@ -27,7 +27,7 @@ fn units(speed: f32) -> Units {
     Units(config_with(&[(ParamId::CtlSpeed, speed), observer_based]))
 }
 
-/// Torque of the integrator, Nm, or its current, A: the trace's words after the planner's.
+/// Returns the integrator's torque, Nm, or its current, A: the trace words after the planner's.
 fn sigma(units: &Units, state: &State) -> [f64; 2] {
     let mut words = std::vec::Vec::new();
     state.trace(&mut |word| words.push(word as i32));
@@ -37,7 +37,7 @@ fn sigma(units: &Units, state: &State) -> [f64; 2] {
     ]
 }
 
-/// A period for speeds in mechanical rad/s and currents in A.
+/// A period, in mechanical rad/s and A.
 struct Case {
     omega_m: f64,
     omega_star: f64,
@@ -54,7 +54,7 @@ struct Outcome {
     i_q: f64,
     p_q: f64,
     u_q: f64,
-    /// Of both integrators.
+    /// For both integrators.
     sigma_step: [f64; 2],
     /// Of ω*, mechanical rad/s².
     omega_dot_star: f64,
@@ -99,7 +99,7 @@ impl Case {
 }
 
 proptest! {
-    /// (8) and (9) away from the bounds, and that the bounds hold.
+    /// (8) and (9) away from the bounds, and the bounds.
     #[test]
     fn the_published_one_is_that_of_the_equations(
         omega_m in 100.0..600.0_f64,
@@ -133,7 +133,7 @@ proptest! {
         near(got.omega_dot_star, omega_dot_star, 0.0, 0.1)?;
     }
 
-    /// With the torque that ω̇* takes, and ω* that yields to a current that cannot be had.
+    /// With the torque of ω̇*, and ω* yielding to a current that is unavailable.
     #[test]
     fn the_default_adds_the_inertia_and_conditions_the_reference(
         omega_m in 100.0..600.0_f64,
@@ -189,11 +189,11 @@ proptest! {
             omega_m, omega_star: omega_r, omega_dot_star: 0.0, y_f: 0.0, xi: 1.0 / PHI,
             xi_dot: 0.0, sigma_nm, bound, missing: 0.0,
         }.run(&units);
-        // It begins with the current of `sigma_nm` in all, the propeller's share included.
+        // It begins with `sigma_nm` as the total current, the propeller's share included.
         let i_q = (sigma_nm + K_P_OMEGA * error) / TORQUE_CONSTANT;
         let tolerance = 0.002 + TABLE_III * (K_P_OMEGA * error / TORQUE_CONSTANT).abs();
         near(got.i_q, i_q.clamp(-bound, bound), 1e-3, tolerance)?;
-        // Regulators 0 and 1 bring the back-EMF of the measured speed themselves.
+        // Regulators 0 and 1 supply the back-EMF of the measured speed themselves.
         let own = if regulator == 2 { 0.0 } else { omega_m };
         near(got.u_q, P * PHI * (omega_r - own), 1e-4, 1e-4)?;
         let step = T * K_I_OMEGA * error / TORQUE_CONSTANT;
@@ -242,9 +242,9 @@ fn at_a_bound_the_published_integrator_only_comes_back() {
         assert!(got.p_q.abs() < 1e-9);
         got.sigma_step[0]
     };
-    // Too slow and too much torque asked for already: 1 A is 0.0234 Nm.
+    // Too slow, and too much torque requested already: 1 A is 0.0234 Nm.
     assert!(sigma_step(-50.0, 0.2).abs() < 1e-9);
-    // Too fast while the integrator asks for far too much: it falls.
+    // Too fast while the integrator requests far too much: it falls.
     assert!(sigma_step(1.0, 0.2) < 0.0);
     assert!(sigma_step(50.0, -0.2).abs() < 1e-9);
 }
@@ -292,7 +292,7 @@ fn at_low_speed_a_share_of_the_error_is_acted_on() {
         backwards.iter().all(|got| got.abs() < 1e-4),
         "{backwards:?}"
     );
-    // As published, and with sensors, in full from a ten-thousandth of a turn a period.
+    // As published, and with sensors: in full from a ten-thousandth of a turn per period.
     let sensors = Units(config_with(&[(ParamId::CtlObserver, 2.0)]));
     for (units, full) in [(units(PUBLISHED), None), (sensors, Some(full))] {
         let full = full.unwrap_or_else(|| regulated(&units, 3000.0));

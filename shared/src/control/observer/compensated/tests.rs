@@ -1,5 +1,4 @@
-//! The observer against its equations in double precision and SI units, and on a motor that turns as
-//! it is slow.
+//! The observer against its equations in double precision and SI units, and on a motor at constant speed.
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -49,7 +48,7 @@ fn turned(a: Vector, angle: f64) -> Vector {
     (a.0 * cos - a.1 * sin, a.0 * sin + a.1 * cos)
 }
 
-/// Between SI and the control's units.
+/// Converts between SI and the control's units.
 struct Units(Scale);
 
 impl Units {
@@ -97,7 +96,7 @@ fn rad_s(speed: Speed) -> f64 {
     speed.to_num::<f64>() * TAU / TS
 }
 
-/// Radians within ±π.
+/// Returns radians within ±π.
 fn wrapped(angle: f64) -> f64 {
     (angle / TAU + 0.5).rem_euclid(1.0) * TAU - 0.5 * TAU
 }
@@ -150,7 +149,7 @@ proptest! {
         let z = turned(psi_r, -theta);
         let omega_i = imposed.unwrap_or(omega_i);
         let plus_rad_s = omega_i.abs().max(60.0);
-        // 2, whose φ̂ step 3 sees a period later: it moves by 0.15·ω·T_s, 5 %, at most.
+        // 2. Step 3 sees its φ̂ a period later: it changes by at most 0.15·ω·T_s, 5 %.
         let phi_step = 0.15 * TS * plus_rad_s * (z.0 - phi);
         let moved_phi = phi + phi_step;
         let next_phi = moved_phi.clamp(0.3 * PHI, 2.0 * PHI);
@@ -172,9 +171,9 @@ proptest! {
         // ω̂ where it is smooth.
         let next_smooth = smooth + 300.0 * TS * (over - smooth);
 
-        // Where z crosses the edge at which the sign takes over, a rounding decides.
+        // Where z crosses the edge at which the sign takes over, rounding decides.
         prop_assume!(z.0.abs() > 1e-3 * PHI);
-        // The table of sines is right to 2e-5; a bit of ψ is 5e-12 Wb.
+        // The sine table is accurate to 2e-5; a bit of ψ is 5e-12 Wb.
         let flux = 5e-5 * PHI;
         let slow = slow_estimate(&config, &state, 1);
         // The bounds of φ̂.
@@ -230,8 +229,8 @@ proptest! {
     }
 }
 
-/// A motor at a constant speed with a constant current along q, under voltages that stand for a
-/// period: those for which the current at each sample is the wanted one.
+/// A motor at constant speed with a constant current along q, under voltages held for a period that give the wanted
+/// current at each sample.
 struct Bench {
     config: Config,
     units: Units,
@@ -244,7 +243,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// The observer's parameters differ by `changes`; the motor is the default one.
+    /// The observer's parameters differ by `changes`; the motor is the default.
     fn new(changes: &[(ParamId, f32)], rpm: f64) -> Self {
         let (config, scale) = config(Delay::One, changes);
         Self {
@@ -263,7 +262,7 @@ impl Bench {
         turned((0.0, self.i_q), theta)
     }
 
-    /// The observer knows the rotor but for this error.
+    /// Starts the observer knowing the rotor except for this error.
     fn begin(&mut self, error_deg: f64) {
         let coming = self.theta + self.omega * TS + error_deg.to_radians();
         let i = self.units.current(self.current(self.theta));
@@ -272,7 +271,7 @@ impl Bench {
         pace(&self.config, &mut self.state, Factor::ONE, Current::ZERO);
     }
 
-    /// One period; the error of the angle in degrees.
+    /// Runs one period; returns the angle error in degrees.
     fn step(&mut self) -> f64 {
         // L·di/dt = u − R·i − jω·φ·e^jθ: i' = a·i + (1 − a)/R·u − φ·jω/(R + jωL)·(e^jωT − a)·e^jθ.
         let a = (-R * TS / L).exp();
@@ -292,7 +291,7 @@ impl Bench {
         wrapped(got.theta.to_num::<f64>() * TAU - self.theta).to_degrees()
     }
 
-    /// The greatest error in so many seconds, degrees.
+    /// Returns the largest error over this many seconds, degrees.
     fn worst(&mut self, seconds: f64) -> f64 {
         (0..(seconds / TS) as u32)
             .map(|_| self.step().abs())
@@ -366,7 +365,7 @@ fn a_resistance_that_is_30_percent_wrong_does_not_turn_the_angle() {
             bench.i_q = 8.0;
             bench.begin(0.0);
             bench.worst(0.2);
-            // β is computed from R, too, and takes away all but 0.17° of 0.56° at 6000 rpm.
+            // β is computed from R, too, and compensates all but 0.17° of 0.56° at 6000 rpm.
             let worst = bench.worst(0.1);
             assert!(worst < 0.2, "{rpm}, {share}: {worst}");
         }
@@ -383,7 +382,7 @@ fn a_wrong_inductance_turns_the_angle_by_what_its_flux_does() {
             bench.begin(0.0);
             bench.worst(0.2);
             let got = bench.step();
-            // L̂ too high takes away too much along q.
+            // L̂ too high subtracts too much along q.
             let wanted = -(share * L * bench.i_q / PHI).asin().to_degrees();
             assert!(
                 (got / wanted - 1.0).abs() < 0.1,
@@ -393,8 +392,8 @@ fn a_wrong_inductance_turns_the_angle_by_what_its_flux_does() {
     }
 }
 
-/// By hand: an ampere accelerates the bench's rotor by 1.5·12²·1.3 mWb over 143 µkg·m², 1964 rad/s²; times 2², and
-/// with 1/0.35 of φ/R, 12.04 ms, ω_n is 270 1/s, where without a current it is 150.
+/// Computed by hand: an ampere accelerates the bench's rotor by 1.5·12²·1.3 mWb over 143 µkg·m², 1964 rad/s²; times
+/// 2², and with 1/0.35 of φ/R, 12.04 ms, ω_n is 270 1/s, against 150 without a current.
 #[test]
 fn the_loop_is_faster_where_a_current_accelerates_the_rotor() {
     let (config, scale) = config(Delay::One, &[]);

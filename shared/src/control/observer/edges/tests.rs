@@ -1,4 +1,4 @@
-//! The whole estimation on a motor in double precision that turns as it is told.
+//! The whole estimation on a motor in double precision that turns as commanded.
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -15,7 +15,7 @@ const PHI: f64 = 1.3e-3;
 const P: f64 = 12.0;
 const TS: f64 = 1.0 / 24_000.0;
 
-/// The rotor's flux and the current along q, as seen by three phases, and three sensors.
+/// The rotor's flux and the q current, as seen by three phases, and three sensors.
 struct Bench {
     config: Config,
     scale: Scale,
@@ -30,9 +30,9 @@ struct Bench {
     /// Noise of the current sensors, A rms.
     noise_a: f64,
     random: u64,
-    /// By how much the sensors are ahead of the phases, degrees.
+    /// Lead of the sensors over the phases, degrees.
     hall_deg: f64,
-    /// Their code under a fault.
+    /// Their code when faulty.
     spoil: fn(u8) -> u8,
 }
 
@@ -76,11 +76,11 @@ impl Bench {
         }
     }
 
-    /// A motor that runs and an estimation that knows it.
+    /// Returns a running motor and an estimation that knows it.
     fn running(sensors: Sensors, changes: &[(ParamId, f32)], rpm: f64) -> Self {
         let mut bench = Self::new(sensors, changes);
         bench.rpm = rpm;
-        // A code of the sensors must last.
+        // A sensor code must last.
         bench.step();
         bench.step();
         bench.begin();
@@ -115,7 +115,7 @@ impl Bench {
         estimate(&self.config, &mut self.state, v, i, hall)
     }
 
-    /// Twelve evenly distributed numbers make one that is nearly normal.
+    /// Returns nearly normal noise: the sum of twelve uniform numbers.
     fn noise(&mut self) -> f64 {
         let mut sum = -6.0;
         for _ in 0..12 {
@@ -133,12 +133,12 @@ impl Bench {
         position.theta.wrapping_sub(truth).to_num::<f64>() * 360.0
     }
 
-    /// The greatest angle error in so many seconds, in which the position is known throughout.
+    /// Returns the largest angle error over this many seconds; the position must be known throughout.
     fn run(&mut self, seconds: f64) -> f64 {
         self.ramp(0.0, seconds)
     }
 
-    /// A run while the speed changes by so many rpm a second.
+    /// Runs while the speed changes by this many rpm per second; returns the largest angle error.
     fn ramp(&mut self, rpm_s: f64, seconds: f64) -> f64 {
         let mut worst = 0.0_f64;
         for _ in 0..(seconds / TS).round() as u32 {
@@ -160,7 +160,7 @@ fn at_a_steady_speed_lead_and_delays_are_compensated() {
             bench.begin();
             bench.run(2.0);
             let worst = bench.run(0.2);
-            // Between two samples of a crossing a sine is taken for a line.
+            // A sine between two samples of a crossing is treated as a line.
             assert!(worst < 0.5, "form {form}, {rpm} rpm: {worst}");
         }
     }
@@ -173,8 +173,8 @@ fn current_costs_at_most_what_the_integrators_do_to_its_flux() {
         bench.i_q = 15.0;
         bench.run(2.0);
         let worst = bench.run(0.2);
-        // L·i is 0.35 φ at a right angle; what the filter adds to it, (F − 1)·L·i with |F − 1| =
-        // sin(lead), turns λ̂ by at most the square of that.
+        // L·i is 0.35 φ at a right angle; what the filter adds to it, (F − 1)·L·i with |F − 1| = sin(lead), turns
+        // λ̂ by at most the square of that.
         let lead = 5.5_f64.to_radians() * 300.0 / rpm;
         let bound = 0.5 + (0.36 * lead * lead).to_degrees();
         assert!(worst < bound, "{rpm}: {worst} of {bound}");
@@ -193,7 +193,7 @@ fn a_wrong_inductance_turns_the_angle_by_the_papers_amount_and_a_wrong_resistanc
         bench.error_deg(&position)
     };
     for share in [-0.3, 0.3] {
-        // Δθ = −arctan(I·ΔL/λ) (2.5.1), the current standing at a right angle to the true flux.
+        // Δθ = −arctan(I·ΔL/λ) (2.5.1), the current being at a right angle to the true flux.
         let wanted = -(15.0 * share * L / PHI).atan().to_degrees();
         let got = error(ParamId::MotLUh, (1.0 + share) * L * 1e6, 3000.0);
         assert!((got - wanted).abs() < 0.5, "{got}, {wanted}");
@@ -209,7 +209,7 @@ fn noise_of_the_sensors_moves_the_angle_by_a_degree_or_two() {
         let mut bench = Bench::running(Sensors::None, &[], rpm);
         bench.noise_a = 0.05;
         let worst = bench.run(0.5);
-        // 0.05 A·(R·T_s·√(τ/2T_s) + L) of the flux is 0.2°; five times that at the worst.
+        // 0.05 A·(R·T_s·√(τ/2T_s) + L) of the flux is 0.2°; five times that at worst.
         assert!(worst < 2.0, "{rpm}: {worst}");
     }
 }
@@ -218,7 +218,7 @@ fn noise_of_the_sensors_moves_the_angle_by_a_degree_or_two() {
 fn accelerating_as_hard_as_the_drive_may_keeps_the_error_below_20_degrees() {
     for a_e in [0.0, 0.5, 0.9] {
         let mut bench = Bench::running(Sensors::None, &[(ParamId::CtlAe, a_e)], 300.0);
-        // CTL_SLEW_RPM_S; the extrapolation's part and the filter's are to be 10° each.
+        // CTL_SLEW_RPM_S; extrapolation and filter may contribute 10° each.
         let up = bench.ramp(20_000.0, 5_700.0 / 20_000.0);
         let down = bench.ramp(-20_000.0, 5_400.0 / 20_000.0);
         assert!(up < 20.0 && down < 20.0, "{a_e}: {up}, {down}");
@@ -237,8 +237,8 @@ fn a_rotor_that_stops_is_lost_and_one_that_turns_again_is_found() {
     assert_eq!(known.last(), Some(&false));
     bench.rpm = 1000.0;
     let found = (0..24_000).position(|_| bench.step().known);
-    // A turn takes 120 periods: one until the comparator has found its place, one of sound crossings,
-    // one for what the integrators have made of the standstill.
+    // A turn takes 120 periods: one turn until the comparator has locked, one of sound crossings, one to flush the
+    // standstill from the integrators.
     assert!(found.is_some_and(|periods| periods < 360), "{found:?}");
     bench.run(0.2);
     assert!(bench.run(0.1) < 0.5);
@@ -283,7 +283,7 @@ fn sensors_start_a_motor_and_follow_it_to_its_stop() {
 #[test]
 fn flux_crossings_take_over_above_a_speed_and_sensors_below_another() {
     let mut bench = Bench::new(Sensors::Merged, &[]);
-    // Sensors that are 12° off: what leads is told by the error.
+    // Sensors 12° off: the error tells which source leads.
     bench.hall_deg = 12.0;
     bench.step();
     bench.step();
@@ -352,7 +352,7 @@ fn at_low_speed_too_a_failed_sensor_is_noticed_and_a_start_without_it_works() {
     bench.spoil = |_| 7;
     let last = (0..100).map(|_| bench.step()).last().expect("some");
     assert!(last.sensor_fault && !last.known);
-    // What a ramp without sensors hands over.
+    // The state that a ramp without sensors hands over.
     bench.rpm = 300.0;
     bench.step();
     bench.begin();

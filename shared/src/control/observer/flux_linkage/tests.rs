@@ -12,7 +12,7 @@ const R: f64 = 0.108;
 const L: f64 = 30.6e-6;
 const PHI: f64 = 1.3e-3;
 const TS: f64 = 1.0 / 24_000.0;
-/// 5.671 over the least electrical speed: half of 300 rpm with 12 pole pairs.
+/// 5.671 over the lowest electrical speed: half of 300 rpm with 12 pole pairs.
 const TAU_INT: f64 = 5.671 / (150.0 * 12.0 * TAU / 60.0);
 const TAU_HPFS: f64 = 10.0 * TAU_INT;
 
@@ -48,12 +48,12 @@ fn amperes(scale: &Scale, a: f64) -> Current {
     Current::from_num(a / f64::from(scale.current_a))
 }
 
-/// Three phases of a vector of this length and angle in turns.
+/// Returns the three phases of a vector of this length and angle in turns.
 fn three(length: f64, turns: f64) -> [f64; 3] {
     [0.0, -1.0, 1.0].map(|third| length * (TAU * (turns + third / 3.0)).cos())
 }
 
-/// A motor that turns at a constant speed with a constant current along q.
+/// A motor at constant speed with a constant current along q.
 struct Motor {
     hz: f64,
     flux_wb: f64,
@@ -75,7 +75,7 @@ impl Motor {
         );
         [0, 1, 2].map(|k| rotor[k] + L * i[k])
     }
-    /// The mean of a sine's period, which is the mean of its ends times this.
+    /// Advances one sample; returns the mean phase voltages since the last one and the currents.
     fn step(&mut self) -> ([f64; 3], [f64; 3]) {
         self.sample += 1;
         let (now, before) = (self.linked(self.sample), self.linked(self.sample - 1));
@@ -92,7 +92,7 @@ impl Motor {
     }
 }
 
-/// Length and angle in degrees of three phases.
+/// Returns the length, and the angle in degrees, of three phases.
 fn vector(scale: &Scale, phases: &[Flux; 3]) -> (f64, f64) {
     let [a, b, c] = phases.map(|flux| wb(scale, flux));
     let (alpha, beta) = ((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt());
@@ -103,7 +103,7 @@ fn wrapped(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// Gain over an integrator's and lead over its angle, after `seconds`.
+/// Returns gain and lead relative to an integrator, after `seconds`.
 fn response(form: f32, hz: f64, seconds: f64) -> (f64, f64) {
     let (config, scale) = config(form);
     let mut state = State::default();
@@ -181,7 +181,7 @@ fn the_first_order_leads_by_the_papers_angle() {
         let wanted = 90.0 - product.atan().to_degrees();
         assert!((lead - wanted).abs() < 0.1, "{hz}: {lead}, {wanted}");
     }
-    // The least speed is that of 10° (2.2.2).
+    // The lowest speed is that of 10° (2.2.2).
     let (_, lead) = response(FIRST, 30.0, 0.5);
     assert!((lead - 10.0).abs() < 0.1, "{lead}");
 }
@@ -229,7 +229,7 @@ fn a_bias_is_multiplied_by_the_time_constant_or_taken_away() {
     let wanted = (0.01 - 0.05 * R) * TAU_INT - 0.05 * L;
     let got = settle(FIRST);
     assert!((got / wanted - 1.0).abs() < 0.01, "{got}, {wanted}");
-    // The high-pass leaves what does not pass the integrator: i_DC·L_s.
+    // The high-pass leaves what bypasses the integrator: i_DC·L_s.
     let got = settle(SECOND);
     assert!((got + 0.05 * L).abs() < 1e-7, "{got}");
 }
@@ -247,7 +247,7 @@ fn the_stators_flux_is_taken_away() {
     motor.run(&config, &scale, &mut state, 12_000);
     let (length, degrees) = vector(&scale, &state.lambda);
     assert!((length / PHI - 1.0).abs() < 0.01, "{length}");
-    // The integrator leads by 0.51° also with the stator's flux, at right angles to the rotor's.
+    // The integrator leads by 0.51° for the stator's flux too, at right angles to the rotor's.
     let error = wrapped(degrees - motor.turns(motor.sample) * 360.0 - 0.51);
     assert!(error.abs() < 0.1, "{error}");
 }
@@ -320,7 +320,7 @@ fn it_begins_without_a_transient() {
                 let (_, degrees) = vector(&scale, &state.lambda);
                 let expected = lead(&config, omega).to_num::<f64>() * 360.0;
                 let error = wrapped(degrees - motor.turns(motor.sample) * 360.0 - expected);
-                // What the filters do to the stator's flux, at 30 Hz up to 1.7°, is no transient.
+                // What the filters do to the stator's flux, up to 1.7° at 30 Hz, is no transient.
                 assert!(error.abs() < 2.0, "{form} {hz}: {error}");
             }
         }

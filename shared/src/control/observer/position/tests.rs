@@ -28,7 +28,7 @@ fn edge(config: &Config, state: &mut State, index: u32, late: f64) {
     place(config, state, sector(index), Angle::ZERO);
 }
 
-/// A rotor at constant speed: an edge in the sample after each sixth of a turn.
+/// A rotor at constant speed, with an edge in the sample after each sixth of a turn.
 struct Rotor {
     omega: f64,
     sample: u32,
@@ -44,7 +44,7 @@ impl Rotor {
         }
     }
 
-    /// One sample; the edge's time if there was one.
+    /// Runs one sample; returns the edge's time if there was one.
     fn step(&mut self, config: &Config, state: &mut State) -> Option<f64> {
         self.sample += 1;
         advance(state);
@@ -74,12 +74,12 @@ proptest! {
             rotor.step(&config, &mut state);
             prop_assert_eq!(state.omega, Speed::ZERO);
         }
-        // The first edge begins the measurement, which takes 6N more.
+        // The first edge starts the measurement, which takes 6N more.
         while rotor.edges < 6 * u32::from(turns) + 1 {
             rotor.step(&config, &mut state);
         }
         let found = state.omega.to_num::<f64>();
-        // A time is known to 2^-12 of a period, twice.
+        // Each of two times is known to 2^-12 of a period.
         let bound = omega * (2.0_f64.powi(-11) * omega / f64::from(turns) + 1e-6) + 1e-9;
         prop_assert!((found - omega).abs() <= bound, "{} instead of {}", found, omega);
     }
@@ -163,7 +163,7 @@ fn the_speed_of_a_rotor_that_stops_is_never_above_what_the_missing_edge_allows()
     }
     for _ in 0..10_000 {
         advance(&mut state);
-        // A sixth of a turn, twice as much for the halving.
+        // A sixth of a turn, doubled because of the halving.
         let most = 2.0 / 6.0 / f64::from(state.since);
         assert!(state.omega.to_num::<f64>() <= most.max(1e-7) || state.since < 34);
     }
