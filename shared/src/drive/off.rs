@@ -1,8 +1,8 @@
-//! Idle and Sense: the bridge is off, and the rotor is watched at the open terminals.
+//! Idle and Sense: the bridge is off, and the open terminals show the rotor.
 //!
-//! A start begins with a few milliseconds in which the currents' zeros are measured and the rotor is
-//! looked for. One that turns is caught where it is; one that turns the other way is stopped first; one
-//! that stands is parked.
+//! A start begins with a few milliseconds in which the current offsets are measured and the rotor is searched for.
+//! A turning rotor is caught where it is, one that turns the other way is stopped first, and a standing one is
+//! parked.
 
 use super::config::{Config, Direction};
 use super::io::Sample;
@@ -14,29 +14,29 @@ use crate::protection::Fault;
 use crate::trace::traced;
 use crate::units::Speed;
 
-/// Measurements of the currents' zeros while it is not known whether the rotor turns:
-/// after eight times 5 ms it turns too slowly to matter, or its terminals cannot be read.
+/// Offset measurements without knowing whether the rotor turns: after eight times 5 ms it is too slow to matter, or
+/// its terminals cannot be read.
 const LOOKS: u8 = 8;
 
-/// The sample at which the bridge is turned off, and one for a period of delay.
+/// The sample at which the bridge turns off, and one for a period of delay.
 const SETTLING_PERIODS: u8 = 2;
 
 traced! {
     /// State while the bridge is off.
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct State {
-        /// Samples that may still show a current from before the bridge was off.
+        /// Samples that may still show current from before the bridge was off.
         settling_periods: u8,
-        /// Measurements of the currents' zeros since Sense began.
+        /// Offset measurements since Sense began.
         looks: u8,
-        /// The rotor by the open terminals, with the phases in the order a, b, c.
+        /// The rotor, from the open terminals, for the phase order a, b, c.
         pub(super) rotor: Rotor,
         catch: catch::State,
     }
 }
 
 impl State {
-    /// Nothing known.
+    /// Creates the state in which nothing is known.
     pub(super) fn new(config: &Config) -> Self {
         Self {
             settling_periods: 0,
@@ -46,13 +46,13 @@ impl State {
         }
     }
 
-    /// Nothing has been measured yet.
+    /// Begins Sense: nothing is measured yet.
     pub(super) fn begin(&mut self) {
         self.settling_periods = SETTLING_PERIODS;
         self.looks = 0;
     }
 
-    /// True if this period looks at a rotor that is followed; the next one does not.
+    /// Returns true if this period looks at a tracked rotor; the next one does not.
     pub(super) fn is_looking(&self) -> bool {
         self.catch.is_looking()
     }
@@ -64,8 +64,8 @@ impl State {
     }
 }
 
-/// The rotor is watched at the open terminals. The currents are not looked at: a reading is its offset,
-/// which may not have been measured yet.
+/// Watches the rotor at the open terminals. Ignores the currents: a reading is its offset, which may not be
+/// measured yet.
 #[inline(never)] // only some periods
 pub(super) fn watch(config: &Config, state: &mut State, shared: &mut Shared, sample: &Sample) {
     state.rotor = catch::observe(&config.catch, &mut state.catch, sample.terminals);
@@ -80,7 +80,7 @@ pub(super) fn watch(config: &Config, state: &mut State, shared: &mut Shared, sam
     }
 }
 
-/// Sense: until the currents' zeros and the rotor are known.
+/// Runs Sense until the current offsets and the rotor are known.
 pub(super) fn sense(
     config: &Config,
     state: &mut State,

@@ -13,20 +13,20 @@ use super::{charge, excite, off, self_test, six_step, tone};
 use crate::protection;
 use crate::units::AdcCounts;
 
-/// One control period: from the sample to what the bridge does in the period that follows.
+/// One control period: from the sample to what the bridge does in the next period.
 ///
-/// Pure: no clock, no allocation, no logging, and no result but the state and the returned value.
-/// Called once a PWM period, in the interrupt of the chip and in the emulator's loop.
+/// Pure: no clock, no allocation, no logging, and no effect beyond the state and the returned value. Called once
+/// per PWM period, by the chip's interrupt and the emulator's loop.
 #[inline(never)] // only some periods
 pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoint) -> Bridge {
     // Decide the mode from what the last period saw. While field-oriented control drives, only its schedule does
-    // so: once in a cycle, and in a start where its own pieces are due. This comes before the sample is read, so
+    // so: once per cycle, and in a start also where its own pieces are due. This precedes reading the sample, so
     // that no sample is kept across it.
     let field_oriented = if state.is_decided_for(&setpoint) {
         match schedule::next(&mut state.foc.loops.slot) {
             Work::NOTHING => true,
             Work::REFERENCE => {
-                // A drive's first period is in this slot.
+                // A drive's first period uses this slot.
                 state.shared.seen.phase = state.phase;
                 outer_loop::reference(config, &mut state.foc, &state.shared, &setpoint);
                 true
@@ -37,7 +37,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
         !stays(config, state, &setpoint) && decide(config, state, &setpoint)
     };
 
-    // Sense. The mode's own work: voltage, duties, and what is seen.
+    // Sense. Then the mode's own work: voltage, duties, and what is seen.
     if !field_oriented {
         return other(config, state, &sample, &setpoint);
     }
@@ -51,8 +51,8 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
     }
 }
 
-/// The currents of a sample; `None` where the sample is a fault, which ends the drive.
-// In the period's own code: a call would carry the three currents through memory.
+/// Returns a sample's currents; `None` if the sample is a fault, which ends the drive.
+// Inlined into the period: a call would pass the three currents through memory.
 #[inline(always)]
 fn sense(
     config: &Config,
@@ -71,11 +71,11 @@ fn sense(
     Some(currents)
 }
 
-/// A period of any mode but field-oriented control's, among them all of the six-step drive's.
-// In the period's own code, which has saved the registers already.
+/// Runs a period of any mode except field-oriented control, including every mode of the six-step drive.
+// Inlined into the period, which has already saved the registers.
 #[inline(always)]
 fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
-    // With the bridge off a reading is its offset, which may not have been measured yet.
+    // With the bridge off a reading is its offset, which may not be measured yet.
     let flowing = !state.phase.is_off();
     let currents = sense(config, state, sample, flowing);
     if let Some(bridge) = state.enters_rest() {
@@ -97,9 +97,9 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
 
 /// Returns true if the mode need not be decided in this period:
 ///
-/// - a drive at rest is asked for nothing, which also ends a row of failed starts;
-/// - one in Sense is still asked to turn;
-/// - in Idle a turning rotor is looked at in this period, the longest of four: what is asked for begins in the next.
+/// - A drive at rest is asked for nothing, which also clears the count of failed starts.
+/// - A drive in Sense is still asked to turn.
+/// - In Idle this period looks at a turning rotor, the longest of four; a request begins in the next.
 #[inline(always)] // in each period
 fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
@@ -119,11 +119,11 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     }
 }
 
-/// The mode that the set-point asks for. Whether field-oriented control drives.
+/// Decides the mode from the set-point. Returns whether field-oriented control drives.
 #[inline(never)] // only some periods
 fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
-    // This period's slice of the outer loop is left out, since it comes round again; but not the damping of a
-    // start, in which the observer is told once where the aligned rotor is. No other mode has this schedule.
+    // Skips this period's slice of the outer loop, which comes round again, except the damping of a start, where
+    // the observer is told once where the aligned rotor is. No other mode has this schedule.
     if state.is_decided() && schedule::next(&mut state.foc.loops.slot) == Work::DAMP {
         open_loop::damp(config, &mut state.foc, &state.shared, state.phase);
     }
@@ -140,9 +140,9 @@ fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     state.is_decided()
 }
 
-/// This period's slice of field-oriented control's outer loop, and what it makes of the mode. Whether
-/// that drives on.
-// Cold, so that what it needs is not in the way of the periods without.
+/// Runs this period's slice of field-oriented control's outer loop, with its mode changes. Returns whether
+/// field-oriented control still drives.
+// Cold, to keep its needs out of the periods without it.
 #[cold]
 #[inline(never)]
 fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> bool {
@@ -168,7 +168,7 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> 
     state.is_decided()
 }
 
-/// The pieces that may be due in one period, and what they make of the mode.
+/// Runs the pieces that may share a period; returns the mode change they call for.
 #[inline(always)] // in each period
 fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> Option<Why> {
     let State { foc, shared, .. } = state;
@@ -185,7 +185,7 @@ fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) 
     }
 }
 
-/// A period with the bridge off.
+/// Runs a period with the bridge off.
 #[inline(never)] // only some periods
 fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoint)) -> Bridge {
     let shared = &mut state.shared;
@@ -200,7 +200,7 @@ fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoi
     Bridge::Off
 }
 
-/// A period of Charge, of a tone, or of the six-step drive.
+/// Runs a period of Charge, of a tone, or of the six-step drive.
 #[inline(never)] // only some periods
 fn energised(
     config: &Config,
@@ -228,7 +228,7 @@ fn energised(
             let input = (sample, setpoint);
             six_step::period::period(config, six_step, drive, (phase, position), input, currents)
         }
-        // Off has its own period, and so has what field-oriented control drives.
+        // The bridge-off modes have their own period, and so has field-oriented control.
         _ => return Bridge::Off,
     };
     if let Some(why) = why {
@@ -238,7 +238,7 @@ fn energised(
     state.enters_rest().unwrap_or(bridge)
 }
 
-/// After Charge, in its period `n`, from 1 on: what makes ready for the mode that follows.
+/// Prepares the next mode in period `n`, from 1, after Charge.
 #[cold]
 #[inline(never)] // only some periods
 fn ready(
@@ -249,7 +249,7 @@ fn ready(
 ) -> Option<Why> {
     let (foc, shared) = (&mut state.foc, &mut state.shared);
     if matches!(setpoint, Setpoint::Tone(_) | Setpoint::Excite(_)) {
-        // What the supply gives is all that a tone must know.
+        // A tone needs to know only what the supply allows.
         outer_loop::ready(config, foc, shared, n);
         return (n + 1 >= tone::READY_PERIODS).then_some(Why::ToneReady);
     }
@@ -271,7 +271,7 @@ fn ready(
     }
 }
 
-/// A period of a tone or of a self-test.
+/// Runs a period of a tone or a self-test.
 #[inline(never)] // only some periods
 fn tone_or_test(
     config: &Config,

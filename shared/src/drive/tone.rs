@@ -1,19 +1,18 @@
 //! Tones: the motor as a loudspeaker, without turning it.
 //!
-//! The phases make a sine voltage along the axis of phase a, which pulls a rotor to and fro as often
-//! as the pitch says and, over a cycle, nowhere. The voltage is imposed, not the current: what a rotor
-//! that moves induces drives a current that brakes it. It is played only to a rotor that stands.
+//! The phases form a sine voltage along the axis of phase a, which pulls a rotor back and forth at the pitch and,
+//! over a cycle, nowhere. The voltage is imposed, not the current, so that what a moving rotor induces drives a
+//! braking current. A tone plays only to a standing rotor.
 //!
-//! The voltage's amplitude begins at zero and is led, each half cycle, to where the greatest phase
-//! current is to be: R and L may be stated wrongly, and the dead time eats an unknown part of so
-//! small a voltage, more of one half cycle than of the next. It rises by a quarter of the square of
-//! the share that is missing and falls by half of the share that is too much: so it is soon there,
-//! and the greatest of the half cycles stays near what is wanted. For a sensor that shows nothing,
-//! the amplitude itself is bounded: by what twice the current and the dead time need.
+//! The voltage amplitude starts at zero and is adjusted every half cycle towards the wanted peak phase current: R
+//! and L may be stated wrongly, and the dead time takes an unknown part of so small a voltage, more in one half
+//! cycle than in the next. It rises by a quarter of the square of the missing share and falls by half of the excess
+//! share, so it arrives soon, and the larger half cycle stays near the target. In case a sensor reads nothing, the
+//! amplitude itself is bounded to what twice the current and the dead time need.
 //!
-//! The voltage for that current is not taken from R and L as stated, one of which may be a hundred times
-//! the true one, but learnt: it begins at the lesser of what each alone would take, and is doubled
-//! where twice as much has not brought the current. What both as stated would take is the most.
+//! The voltage for that current is not computed from the stated R and L, one of which may be a hundred times the
+//! true one, but learned: it starts at the lesser of what each alone would need, and doubles where twice as much
+//! has not produced the current. What both as stated would need is the maximum.
 
 use super::config::Config;
 use super::config::tone::{self, PITCH_MAX};
@@ -29,50 +28,50 @@ use crate::math::{Held, SinCos, TopProduct, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
 
-/// The least that a current is taken to need, of what the dead time takes: crossing that in steps of a
-/// quarter of so much takes some 30 half cycles.
+/// The smallest voltage assumed for a current, as a right shift of the dead time's: crossing the latter in steps of
+/// a quarter of the former takes some 30 half cycles.
 const DEAD_SHIFT: u32 = 3;
 
-/// The period after Charge in which a tone begins; those before it look at the supply.
+/// The period after Charge in which a tone begins; the ones before it read the supply.
 pub(super) const READY_PERIODS: u32 = 3;
 
-/// Slot of a cycle in which the supply's voltage is taken.
+/// Slot of the cycle that updates the supply voltage.
 const SUPPLY_SLOT: u8 = 0;
 
-/// Slot in which the longest vector is taken.
+/// Slot that updates the longest vector.
 const LONGEST_SLOT: u8 = 16;
 
 traced! {
-    /// The tone that is being played.
+    /// The tone being played.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub(super) struct State {
-        /// The present slot of the cycle, in one of which the supply is looked at.
+        /// Present slot of the cycle.
         slot: u8,
-        /// Turns a period; zero is a pause.
+        /// Pitch in turns per period; zero is a pause.
         pitch: Speed,
-        /// The sine's angle.
+        /// Angle of the sine.
         angle: Angle,
-        /// The sine's amplitude.
+        /// Amplitude of the sine.
         amplitude: Voltage,
-        /// Greatest phase current since the last half cycle began.
+        /// Largest phase current since the last half cycle began.
         peak: Current,
-        /// Voltage that the peak current needs beside the dead time's, as far as has been learnt.
+        /// Voltage that the peak current needs, without the dead time's, as learned so far.
         needed: Voltage,
-        /// The low sides were on before, and will be again: at once where a tone has been played, else
-        /// when the rotor is seen to stand.
+        /// The low sides were on before and will be again: at once after a played tone, otherwise once the rotor is
+        /// seen to stand.
         pub(super) shorted_before: bool,
     }
 }
 
 impl State {
-    /// No tone, and whether there are low sides to go back to; all else is begun by the next tone.
+    /// Ends the tone and records whether to return to the low sides; the next tone initializes the rest.
     pub(super) fn end(&mut self, shorted_before: bool) {
         self.pitch = Speed::ZERO;
         self.shorted_before = shorted_before;
     }
 }
 
-/// A period of a tone.
+/// Runs a period of a tone.
 #[cold]
 pub(super) fn period(
     config: &Config,
@@ -106,7 +105,7 @@ pub(super) fn period(
         bus_current: bus_current(along, i, &shared.supply),
     };
     if state.pitch == Speed::ZERO {
-        // A pause brakes what a tone has left of a movement, and keeps the drivers charged.
+        // A pause brakes any movement left from a tone and keeps the drivers charged.
         shared.applied.rest();
         return Bridge::Brake;
     }
@@ -117,7 +116,7 @@ pub(super) fn period(
     let v = (v, PhaseOrder::NORMAL);
     let none = (&dead_time::Config::NONE, AlphaBeta::default());
     let duties = modulator::duties(&config.modulator, &shared.supply, v, none);
-    // A tone's voltage may be as long as the supply gives.
+    // A tone's voltage may be as long as the supply allows.
     let wanted = Dq {
         d: wide(u),
         q: WideVoltage::ZERO,
@@ -129,7 +128,7 @@ pub(super) fn period(
     Bridge::Duty(duties)
 }
 
-/// The voltage along the axis of phase a.
+/// Returns the voltage along the axis of phase a.
 fn play(
     tone: &tone::Config,
     playing: &mut State,
@@ -147,7 +146,7 @@ fn play(
         };
     }
     playing.peak = playing.peak.max(greatest);
-    // The work at the end of a half cycle is shared by two periods; a tone's first period has the second half alone.
+    // Two periods share the work at the end of a half cycle; a tone's first period has only the second part.
     let step = pitch.over_period();
     let ends = |angle: Angle| angle.is_negative() != angle.wrapping_sub(step).is_negative();
     if ends(playing.angle) {
@@ -161,13 +160,13 @@ fn play(
     playing.amplitude.top(sine).scaled()
 }
 
-/// The voltage that the dead time takes.
+/// Returns the voltage that the dead time takes.
 #[inline(always)] // one caller
 fn dead(tone: &tone::Config, supply: &Supply) -> Voltage {
     tone.dead.top(supply.bus).scaled()
 }
 
-/// What has been learnt of the voltage that the current needs, as far as it can be true.
+/// Returns the learned voltage for the current, within plausible limits.
 fn needed(tone: &tone::Config, playing: &State, supply: &Supply) -> Voltage {
     let reactive = tone.reactive.held(playing.pitch);
     let stated = magnitude(tone.resistive, reactive);
@@ -178,12 +177,12 @@ fn needed(tone: &tone::Config, playing: &State, supply: &Supply) -> Voltage {
     playing.needed.max(least).min(stated)
 }
 
-/// The amplitude of the coming half cycle.
+/// Sets the amplitude of the next half cycle.
 fn regulate(tone: &tone::Config, playing: &mut State, supply: &Supply) {
     let needed = playing.needed;
     let dead = dead(tone, supply);
     let missing = tone.share.held(tone.peak.minus(playing.peak));
-    // 28 + 31 − 32 fraction bits are half of it with 28.
+    // 28 + 31 − 32 fraction bits: half the product, with 28.
     let half = needed.top(missing);
     let step = Voltage::from_bits(if half.is_negative() {
         half.to_bits()

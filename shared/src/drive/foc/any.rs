@@ -1,4 +1,4 @@
-//! The current loop with any observer and regulator, and in an open-loop start.
+//! The current loop with any observer and regulator, including open-loop starts.
 
 use super::current_loop::{Drive, Frame, current_loop, imposed, observed};
 use crate::control::transform::AlphaBeta;
@@ -8,7 +8,7 @@ use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
 use crate::units::Current;
 
-/// A period with any observer, regulator and delay, and with the adaptation of the inductance if it is asked for.
+/// Runs a period with any observer, regulator and delay, and with inductance adaptation if configured.
 #[inline(never)] // not the default drive
 pub(in crate::drive) fn any(
     config: &Config,
@@ -21,8 +21,9 @@ pub(in crate::drive) fn any(
     current_loop(parts, config, (foc, shared), frame, stator)
 }
 
-/// The frame, imposed by a start or where the observer sees the rotor.
-// A call: inlined, the two ways would meet in values whose width the compiler forgets, and it would multiply 64 bits.
+/// Returns the frame, imposed by a start or from the observer.
+// Not inlined: the two branches would merge values whose width the compiler then forgets, leading to 64-bit
+// multiplications.
 #[inline(never)]
 fn frame(
     config: &Config,
@@ -38,7 +39,7 @@ fn frame(
     observed(parts, (foc, shared), sample, stator)
 }
 
-/// The adaptation of the inductance, where it is asked for: i_d* carries its wave.
+/// Runs the inductance adaptation, if configured: i_d* carries its wave.
 fn adapt(config: &Config, (foc, shared): Drive<'_>) {
     if let Some(adapt) = &config.adapt_l {
         let flux = observer::flux(&config.observer, &foc.observer);

@@ -1,4 +1,4 @@
-//! The begin of a drive, in pieces, behind Charge: a flying start where the rotor turns.
+//! The beginning of a drive after Charge, in pieces: a flying start if the rotor turns.
 
 use super::outer_loop::{self, READY_PIECES};
 use super::state::State;
@@ -14,11 +14,11 @@ use crate::drive::transitions::Why;
 use crate::math::SinCos;
 use crate::units::{Angle, Current, Speed, Voltage, stated_emf};
 
-/// Periods behind Charge in which a drive is made ready, a piece in each.
+/// Periods after Charge that prepare a drive, one piece each.
 pub(in crate::drive) const READY_PERIODS: u32 = 10;
 
-/// Piece `n`, from 1, of what makes a drive ready: the rotor is caught where it turns, started where
-/// its sensors show it, or parked, from the period after the last piece on.
+/// Runs piece `n`, from 1, of the preparation. In the period after the last piece the rotor is
+/// caught if it turns, started from where its sensors show it, or parked.
 #[cold]
 pub(in crate::drive) fn begin(
     config: &Config,
@@ -29,7 +29,7 @@ pub(in crate::drive) fn begin(
     n: u32,
 ) -> Option<Why> {
     let turning = turning(config, shared, rotor);
-    // Until the first period that drives.
+    // Until the first driving period.
     let periods = READY_PERIODS as i32 + 1 - n as i32;
     match (n, turning) {
         (1..=READY_PIECES, _) => outer_loop::ready(config, foc, shared, n),
@@ -53,7 +53,7 @@ pub(in crate::drive) fn begin(
     None
 }
 
-/// The rotor's angle and speed as the control sees them, where it turns fast enough to be caught.
+/// Returns the rotor's angle and speed as the control sees them, if it turns fast enough to catch.
 fn turning(config: &Config, shared: &mut Shared, rotor: Rotor) -> Option<(Angle, Speed)> {
     match rotor {
         Rotor::Turning { theta, omega } if omega.saturating_abs() > config.slow => {
@@ -69,7 +69,7 @@ fn turning(config: &Config, shared: &mut Shared, rotor: Rotor) -> Option<(Angle,
     }
 }
 
-/// The mode in which a drive begins, for a rotor that turns at `omega`, or stands.
+/// Returns the mode in which a drive begins, for a rotor that turns at `omega` or stands.
 fn go(
     config: &Config,
     foc: &mut State,
@@ -78,7 +78,7 @@ fn go(
     omega: Option<Speed>,
 ) -> Why {
     let backward = setpoint.rotation(config.both_ways) == Rotation::Backward;
-    // The first period takes its reference.
+    // The first period computes its reference.
     foc.loops.slot = schedule::LAST;
     if omega.is_none() {
         shared.reversed = backward;
@@ -92,7 +92,7 @@ fn go(
     let speed = &mut foc.loops.speed;
     if let Some(omega) = omega {
         config.speed.begin(speed, omega, Current::ZERO);
-        // One that turns the other way is stopped first.
+        // A rotor that turns the other way is stopped first.
         if shared.reversed == backward {
             Why::Caught
         } else {
@@ -109,14 +109,14 @@ fn go(
     }
 }
 
-/// Drives on from the speed and the current that there are.
+/// Resumes driving from the present speed and current.
 #[cold]
 pub(in crate::drive) fn resume(config: &Config, foc: &mut State, shared: &Shared) {
     let (speed, i_q) = (shared.seen.speed, shared.seen.i.q);
     config.speed.begin(&mut foc.loops.speed, speed, i_q);
 }
 
-/// The back-EMF at this speed.
+/// Returns the back-EMF at this speed.
 fn emf(omega: Speed) -> Dq<Voltage> {
     Dq {
         d: Voltage::ZERO,
@@ -124,7 +124,7 @@ fn emf(omega: Speed) -> Dq<Voltage> {
     }
 }
 
-/// The current regulator at this speed, without current.
+/// Presets the current regulator at this speed, without current.
 fn regulate(config: &Config, foc: &mut State, omega: Speed) {
     let still = Dq::default();
     let loops = &mut foc.loops;
@@ -136,8 +136,8 @@ fn regulate(config: &Config, foc: &mut State, omega: Speed) {
         .begin(&mut loops.regulator, emf(omega), &reference, &fb);
 }
 
-/// The back-EMF has been at the terminals, as if it had been commanded: the last two commands, for a
-/// rotor that is at `theta` at the first period's sample.
+/// Returns the last two commands for a rotor at `theta` at the first period's sample: the back-EMF
+/// was at the terminals, as if commanded.
 fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
     let to_middle = config
         .delay

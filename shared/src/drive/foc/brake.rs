@@ -1,4 +1,4 @@
-//! Brake: all low sides are on, and the observer goes on.
+//! Brake: all low sides are on, and the observer keeps running.
 
 use super::current_loop::input;
 use super::outer_loop::{self, READY_PIECES};
@@ -13,11 +13,11 @@ use crate::drive::seen::Seen;
 use crate::drive::shared::Shared;
 use crate::units::{AdcCounts, Current, Speed};
 
-/// Slots from one piece that makes ready to the next.
+/// Slots between two pieces of preparation.
 const READY_SLOTS: u32 = 4;
 
-/// With the low sides on the voltage is known to be zero: the observer goes on, so that the speed
-/// is reported down to where its back-EMF drowns in noise.
+/// Runs the observer on. With the low sides on the voltage is known to be zero, so the speed can be
+/// reported until the back-EMF drowns in noise.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn watch(
     config: &Config,

@@ -1,4 +1,4 @@
-//! The current loop: from the sample's currents to the phases' duties.
+//! The current loop: from the sampled currents to the phase duties.
 
 use super::state::{Loops, State};
 use crate::control::delay::Delay;
@@ -13,13 +13,13 @@ use crate::drive::shared::Shared;
 use crate::math::{Held, SinCos, sin_cos};
 use crate::units::{Current, Speed, Voltage, WideVoltage};
 
-/// State of field-oriented control, and the state that all modes share.
+/// State of field-oriented control, and the state shared by all modes.
 pub(in crate::drive) type Drive<'a> = (&'a mut State, &'a mut Shared);
 
-/// The control's frame in a period: its cosine and sine, and its speed.
+/// The control's frame in a period: cosine and sine, and speed.
 pub(super) type Frame = (SinCos, Speed);
 
-/// The frame where the observer sees the rotor.
+/// Returns the frame from the observer.
 #[inline(always)] // in each period
 pub(super) fn observed(
     (observer, delay): (&impl Observer, Delay),
@@ -38,7 +38,7 @@ pub(super) fn observed(
     (estimate.frame, estimate.omega)
 }
 
-/// The frame that an open-loop start imposes, while the observer runs along.
+/// Returns the frame that an open-loop start imposes; the observer runs along.
 #[inline(always)] // in each period
 pub(super) fn imposed(
     (observer, delay): (&impl Observer, Delay),
@@ -60,7 +60,7 @@ pub(super) fn imposed(
     (sin_cos(theta), start::advance(&mut loops.start))
 }
 
-/// From the current in a frame to the duties, with this observer and this regulator.
+/// Runs the loop from the current in a frame to the duties, with this observer and regulator.
 #[inline(always)] // in each period
 pub(super) fn current_loop(
     (observer, regulator): (&impl Observer, &impl Regulator),
@@ -76,7 +76,7 @@ pub(super) fn current_loop(
     let i = park(stator, frame);
     shared.seen.i = i;
 
-    // The voltage that brings the current to its reference, as far as the supply gives it.
+    // The voltage that drives the current to its reference, as far as the supply allows.
     let fb = observer.feedback(of, (omega, i), loops.inductance.factor);
     let wanted = regulator.voltage(&loops.regulator, &loops.reference, &fb);
     regulator.integrate(&mut loops.regulator, &loops.reference, &fb);
@@ -88,7 +88,7 @@ pub(super) fn current_loop(
     observer.advance(of, &fb, u);
     shared.seen.u = u;
 
-    // The phases' duties, for where the frame will be when they act.
+    // The duties, for where the frame will be when they act.
     let v = inverse_park(rotate(u, loops.advance), frame);
     loops.commanded = [voltages(v), loops.commanded[0]];
     let dead_time = (&config.dead_time, inverse_park(loops.dead_time_sign, frame));
@@ -102,8 +102,8 @@ pub(super) fn current_loop(
     Bridge::Duty(duties)
 }
 
-/// A voltage vector so long that a phase cannot be read, or than the supply can give. Anti-windup: the
-/// regulator's integrators take back what the limit cuts off, and the speed regulator is told.
+/// Handles a voltage vector too long to read every phase, or for the supply. Anti-windup: the regulator's
+/// integrators take back what the limit cuts off, and the speed regulator is informed.
 #[cold]
 fn limited(
     regulator: &impl Regulator,
@@ -120,7 +120,7 @@ fn limited(
     u
 }
 
-/// The observer's input at this sample.
+/// Returns the observer's input at this sample.
 #[inline(always)] // in each period
 pub(super) fn input(
     loops: &Loops,

@@ -14,10 +14,10 @@ use crate::math::{Held, sin_cos};
 use crate::protection;
 use crate::units::{Current, Speed};
 
-/// Pieces in which a drive is made ready, one a period.
+/// Pieces that prepare a drive, one per period.
 pub(in crate::drive) const READY_PIECES: u32 = 5;
 
-/// Outer-loop work before the first period of a drive, in [`READY_PIECES`].
+/// Runs a piece of the outer-loop work before a drive's first period, one of [`READY_PIECES`].
 pub(in crate::drive) fn ready(config: &Config, foc: &mut State, shared: &mut Shared, piece: u32) {
     match piece {
         1 => {
@@ -34,8 +34,8 @@ pub(in crate::drive) fn ready(config: &Config, foc: &mut State, shared: &mut Sha
     }
 }
 
-/// The pieces that follow what is measured, in any mode, and change none.
-// In the code of its only caller, of whose longest period a call would be 20 instructions.
+/// Runs the pieces that follow measurements, in any mode, without changing the mode.
+// Inlined into its only caller: a call would add 20 instructions to the longest period.
 #[inline(always)]
 pub(in crate::drive) fn work(config: &Config, foc: &mut State, shared: &mut Shared, due: Work) {
     if due.includes(Work::DELAY_COMPENSATION) {
@@ -67,26 +67,26 @@ pub(in crate::drive) fn work(config: &Config, foc: &mut State, shared: &mut Shar
     }
 }
 
-/// The trip follows its limit.
+/// Makes the trip follow its limit.
 #[inline(always)] // in the longest period
 pub(in crate::drive) fn trip_level(config: &Config, shared: &mut Shared) {
     protection::follow_limit(&config.protection, &mut shared.protection, shared.seen.i);
 }
 
-/// The supply's voltage and current.
+/// Updates supply voltage and current.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn supply(shared: &mut Shared) {
     shared.supply.follow(shared.protection.bus);
     shared.seen.bus_current = bus_current(shared.seen.u, shared.seen.i, &shared.supply);
 }
 
-/// The longest vector that the supply gives.
+/// Updates the longest vector that the supply allows.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn longest_vector(config: &Config, shared: &mut Shared) {
     shared.supply.reach(&config.modulator, shared.seen.u.d);
 }
 
-/// Bounds of i_q by the supply's current.
+/// Updates the bounds of i_q from the supply current.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: &mut Shared) {
     let seen = &shared.seen;
@@ -96,13 +96,13 @@ pub(in crate::drive) fn supply_bounds(config: &Config, foc: &mut State, shared: 
         (seen.bus_current, seen.i.q),
         SUPPLY_PERIODS,
     );
-    // The next reference follows from that; a bound that braking has reached does not wait for it:
-    // where the supply takes nothing its voltage rises by volts a millisecond.
+    // The next reference applies them. A bound that braking has reached does not wait for it: a supply that sinks
+    // no current rises by volts per millisecond.
     let i_q = &mut foc.loops.reference.i.q;
     *i_q = (*i_q).max(shared.protection.bounds.min);
 }
 
-/// Bounds of i_q by the speed, and i_d.
+/// Updates the bounds of i_q from the speed, and i_d.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &Shared) {
     let bounds = shared.protection.bounds;
@@ -112,7 +112,7 @@ pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &
     loops.bounds = bounds;
 }
 
-/// Run and Stopping: the current's reference.
+/// Updates the current reference in Run and Stopping.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn reference(
     config: &Config,
@@ -136,7 +136,7 @@ pub(in crate::drive) fn reference(
             let reference = at_voltage(config, foc, shared, share);
             return commanded(config, foc, shared, reference);
         }
-        // Stopping, and turning round, is by regenerative braking.
+        // Stopping, and reversing, brake regeneratively.
         _ => {
             let braking = Bounds {
                 max: Current::ZERO,
@@ -159,8 +159,8 @@ pub(in crate::drive) fn reference(
         torque::grow(&config.torque, &mut loops.torque, reference).with_i_d(loops.i_d);
 }
 
-/// The current at which a share of the voltage is given.
-// Here, and the next one too: a call would make the longest period longer.
+/// Returns the current reference for a share of the voltage.
+// Inlined, as the next one: a call would lengthen the longest period.
 #[inline(always)]
 fn at_voltage(
     config: &Config,
@@ -176,7 +176,7 @@ fn at_voltage(
     voltage::reference(&config.regulator, &foc.loops.regulator, &fb, i_d, u_q)
 }
 
-/// A current that is commanded, while the speed regulator stands by to take over.
+/// Applies a commanded current, while the speed regulator stands by to take over.
 #[inline(always)] // in the longest period
 fn commanded(config: &Config, foc: &mut State, shared: &Shared, reference: Reference) {
     let loops = &mut foc.loops;
@@ -188,16 +188,16 @@ fn commanded(config: &Config, foc: &mut State, shared: &Shared, reference: Refer
     loops.reference = reference.with_i_d(loops.i_d);
 }
 
-/// Delay compensation: the voltage acts from `delay` to `delay + 1` periods after the sample, while the
-/// rotor turns on; it is meant for the middle of that time. Without this the loop is unstable above
-/// 4489 rpm on the bench at 15 kHz.
+/// Delay compensation. The voltage acts from `delay` to `delay + 1` periods after the sample, while the rotor keeps
+/// turning; it is aimed at the middle of that time. Without it the loop is unstable above 4489 rpm on the bench at
+/// 15 kHz.
 #[inline(always)] // in the longest period
 pub(in crate::drive) fn delay_compensation(config: &Config, foc: &mut State, shared: &Shared) {
     foc.loops.advance = sin_cos(config.delay.advance(shared.seen.speed));
 }
 
-/// Which way the phases' currents go, for the dead time: two periods behind each reference. Where
-/// braking begins i_q* passes zero at 3 A/ms on the bench: once a cycle the sign would be wrong for a
+/// Updates the signs of the phase currents for the dead time, two periods after each reference. Where braking
+/// begins, i_q* crosses zero at 3 A/ms on the bench: updated once per cycle, the sign would be wrong for a
 /// millisecond, after which the adaptive back-EMF observer as published swings by 45°.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
@@ -206,14 +206,14 @@ pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
         dead_time::certainty(&config.dead_time, loops.reference.i, loops.advance);
 }
 
-/// Update of the observer's gains, which follow the speed and the torque.
+/// Updates the observer's gains, which follow speed and torque.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn observer_gains(config: &Config, foc: &mut State) {
     let follows = (foc.loops.inductance.factor, foc.loops.reference.i.q);
     observer::pace(&config.observer, &mut foc.observer, follows, CYCLE);
 }
 
-/// Decoupling of the regulator's axes at this speed.
+/// Updates the decoupling of the regulator's axes at this speed.
 #[inline(always)] // in the longest period
 pub(in crate::drive) fn decoupling(config: &Config, foc: &mut State, shared: &Shared) {
     let factor = foc.loops.inductance.factor;

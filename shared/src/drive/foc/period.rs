@@ -1,5 +1,5 @@
-//! The choice of the current loop's parts: the default observer and regulator are compiled as one piece,
-//! any others are chosen by the configuration at each call.
+//! Selects the current loop's parts: the default observer and regulator compile into dedicated code, the
+//! configuration selects any others at each call.
 
 use super::any::any;
 use super::current_loop::{Drive, current_loop, imposed, observed};
@@ -12,8 +12,8 @@ use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
 use crate::units::{AdcCounts, Current};
 
-/// A period of Park, Ramp, Run or Stopping. The default observer and regulator have a piece of
-/// code of their own; any others share one.
+/// Runs a period of Park, Ramp, Run or Stopping. The default observer and regulator have dedicated code; all others
+/// share one path.
 #[inline(always)] // in each period
 pub(in crate::drive) fn period(
     config: &Config,
@@ -37,7 +37,7 @@ pub(in crate::drive) fn period(
     }
 }
 
-/// A period of an open-loop start with the default parts.
+/// Runs a period of an open-loop start with the default parts.
 #[inline(never)] // only a start
 fn start(
     (observer, regulator): (&compensated::Config, &synchronous::Config),

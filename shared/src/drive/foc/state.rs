@@ -19,32 +19,32 @@ pub(in crate::drive) struct State {
 }
 
 traced! {
-    /// All but the observer.
+    /// Everything but the observer.
     #[derive(Clone, Debug, PartialEq)]
     pub(in crate::drive) struct Loops {
-        /// Slot of the last period in the schedule.
+        /// The last period's slot in the schedule.
         pub(in crate::drive) slot: Slot,
-        /// The phases' order as the control sees it.
+        /// The phase order as the control sees it.
         pub(in crate::drive) order: PhaseOrder,
         /// Reference of the current regulator.
         pub(in crate::drive) reference: Reference,
         pub(in crate::drive) regulator: regulator::State,
-        /// Delay compensation: how far the frame turns until the voltage acts.
+        /// Delay compensation: the frame's rotation until the voltage acts.
         pub(in crate::drive) advance: SinCos,
-        /// Dead-time signs: the current's reference as the compensation takes it.
+        /// Dead-time signs: the reference current as the compensation uses it.
         pub(in crate::drive) dead_time_sign: dead_time::Certainty,
-        /// The voltages of the last two commands in the stator's frame, the latest first.
+        /// The last two commanded voltages in the stator's frame, latest first.
         pub(in crate::drive) commanded: [AlphaBeta<Voltage>; 2],
         pub(in crate::drive) inductance: inductance::State,
         pub(in crate::drive) speed: speed::State,
         pub(in crate::drive) torque: torque::State,
         /// Change of ω* in the last period.
         pub(in crate::drive) planned: Speed,
-        /// i_d* at this speed.
+        /// i_d* at the present speed.
         pub(in crate::drive) i_d: Current,
-        /// Bounds of i_q* at this speed.
+        /// Bounds of i_q* at the present speed.
         pub(in crate::drive) bounds: Bounds,
-        /// Anti-windup: i_q* less i_q where the voltage was limited.
+        /// Anti-windup: i_q* minus i_q where the voltage was limited.
         pub(in crate::drive) deficit: Current,
         /// The open-loop start.
         pub(in crate::drive) start: start::State,
@@ -52,7 +52,7 @@ traced! {
 }
 
 impl State {
-    /// At power-up.
+    /// Creates the power-up state.
     pub(in crate::drive) fn new() -> Self {
         Self {
             loops: Loops {
@@ -76,13 +76,13 @@ impl State {
         }
     }
 
-    /// As at power-up.
+    /// Resets to the power-up state.
     #[inline(never)] // seldom
     pub(in crate::drive) fn restart(&mut self) {
         *self = Self::new();
     }
 
-    /// A drive has ended: nothing is held for the next one but the factor of the inductance.
+    /// Ends a drive: the next one inherits only the inductance factor.
     pub(in crate::drive) fn rest(&mut self) {
         let loops = &mut self.loops;
         loops.commanded = [AlphaBeta::default(); 2];
@@ -96,7 +96,7 @@ impl State {
         loops.regulator = regulator::State::default();
     }
 
-    /// Every word; of the observers those of the one in use.
+    /// Emits every word; of the observers, the selected one's.
     #[inline(always)] // as for `State::trace`
     pub(in crate::drive) fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
         self.loops.trace(out);

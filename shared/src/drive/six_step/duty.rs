@@ -1,4 +1,4 @@
-//! The six-step drive's duty: from the speed, the current or the share that is asked for.
+//! The six-step drive's duty, from the demanded speed, current or share.
 
 use fixed::types::I1F31;
 
@@ -14,21 +14,19 @@ use crate::drive::shared::Shared;
 use crate::math::{Held, TopProduct};
 use crate::units::{AdcCounts, Current, Duty, Speed};
 
-/// Readings up to which there is no current: noise, and what is left of an offset. On the bench 0.3 A
-/// are 20 rpm.
+/// Largest reading that counts as no current: noise, and residual offset. On the bench 0.3 A are 20 rpm.
 pub(super) const NO_CURRENT: AdcCounts = AdcCounts::lit("16");
 
-/// Current, at most, of a shaft that is to lose speed: one that is certain to brake.
+/// Upper bound of the current for a shaft that must lose speed: one that certainly brakes.
 const LEAST_BRAKING: Current = Current::from_bits(-3 * NO_CURRENT.to_bits());
 
-/// What a shaft may have too much of while the supply is near its greatest voltage, as a part of what is
-/// wanted.
+/// Excess tolerated while the supply is near its maximum voltage: one part in this many of the demand.
 const EXCESS_PART: i32 = 64;
 
-/// The demand on a motor that turns the way it does.
+/// The demand, relative to the direction of rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Demand {
-    /// Nothing, or the other way: it is to be stopped.
+    /// Nothing, or the other direction: stop.
     Rest,
     /// A speed above zero.
     Speed(Speed),
@@ -38,7 +36,7 @@ enum Demand {
     Share(I1F31),
 }
 
-/// The set-point as seen along the rotation.
+/// Returns the set-point as seen along the rotation.
 fn demand(setpoint: &Setpoint, reversed: bool) -> Demand {
     let along = if reversed {
         setpoint.mirrored()
@@ -53,17 +51,16 @@ fn demand(setpoint: &Setpoint, reversed: bool) -> Demand {
     }
 }
 
-/// Returns true if a motor that turns the way it does is to be stopped.
+/// Returns true if a turning motor must stop.
 pub(super) fn is_to_stop(setpoint: &Setpoint, reversed: bool) -> bool {
     demand(setpoint, reversed) == Demand::Rest
 }
 
-/// The bounds, opened for braking where a speed, or a share of the supply, is above what is wanted of it; both
-/// in bits.
+/// Returns the bounds, opened for braking if a speed, or a share of the supply, exceeds the demand; both in bits.
 ///
-/// A current that reads as none is one of some mA, and a shaft without a load gains speed by it. That is
-/// taken back where the supply may be given nothing, too: some tens of mA while the shaft is fast. A supply
-/// that takes nothing at all is spared as its voltage nears the limit.
+/// A current that reads as zero may be some mA, and an unloaded shaft gains speed from it. Braking takes that back
+/// even where nothing may be returned to the supply: some tens of mA while the shaft is fast. A supply that sinks
+/// no current at all is spared as its voltage nears the limit.
 fn opened(
     config: &config::Config,
     shared: &Shared,
@@ -80,7 +77,7 @@ fn opened(
     Bounds { min, ..bounds }
 }
 
-/// Run and Stopping: the duty.
+/// Computes the duty in Run and Stopping.
 pub(super) fn run(
     config: &config::Config,
     six_step: &Config,
@@ -108,7 +105,7 @@ pub(super) fn run(
         }
         Demand::Current(current) => (only(bounds.hold(current)), 0, 0),
         Demand::Rest => {
-            // The estimate's noise makes it a little slower each time: it comes to rest.
+            // The estimate's noise lowers it a little each time, so it comes to rest.
             slowest = s.planner.reference.min(speed);
             let bounds = match config.stop {
                 Stop::Coast => only(Current::ZERO),
@@ -117,7 +114,7 @@ pub(super) fn run(
             (bounds, speed.to_bits(), slowest.to_bits())
         }
     };
-    // Once for all demands: in each of them it is 112 bytes more on the chip.
+    // Once for all demands: in each of them it would cost 112 bytes more on the chip.
     let bounds = opened(config, shared, bounds, (present, wanted));
     let range = duty::range(&six_step.duty, &mut s.duty, i, bounds);
     match demand {
@@ -134,12 +131,12 @@ pub(super) fn run(
     duty::take_over(&mut s.duty);
 }
 
-/// A share of the supply as a duty.
+/// Returns a share of the supply as a duty.
 fn duty_of(six_step: &Config, share: I1F31) -> I1F31 {
     I1F31::from_bits(share.top(six_step.duty.duty_max).to_bits() << 1)
 }
 
-/// Bounds that leave one current.
+/// Returns bounds that permit only one current.
 fn only(current: Current) -> Bounds {
     Bounds {
         min: current,
@@ -153,13 +150,13 @@ pub(super) fn hold(six_step: &Config, s: &mut State, i: Current, wanted: Current
     duty::current(&mut s.duty, range);
 }
 
-/// Speed is regulated from the speed and the duty that there are.
+/// Starts speed regulation from the present speed and duty.
 pub(super) fn take_over(s: &mut State) {
     s.planner = planner::State::begin(s.tracking.omega_bar);
     duty::take_over(&mut s.duty);
 }
 
-/// The bridge of the present sextant.
+/// Returns the bridge in the present sextant.
 pub(super) fn bridge(s: &State, swapped: bool, floating: Option<Duty>) -> Bridge {
     let phases = s.sector.phases(Legs {
         switching: Some(s.duty.for_bridge()),

@@ -1,5 +1,4 @@
-//! The rotor's position is told: commutation by it from standstill on, without Park, Ramp and
-//! crossings.
+//! Commutation by a given rotor position, from standstill, without Park, Ramp and crossings.
 
 use fixed::types::{I1F31, I2F30};
 
@@ -14,10 +13,10 @@ use crate::drive::shared::Shared;
 use crate::math::TopProduct;
 use crate::units::{Angle, Speed, Voltage, stated_emf};
 
-/// Mean back-EMF between two phases within a sextant over a phase's peak: √3·3/π.
+/// Mean back-EMF between two phases over a sextant, relative to a phase's peak: √3·3/π.
 const BETWEEN_PHASES: I2F30 = I2F30::lit("1.6539867");
 
-/// The rotor's position and speed as the control sees them, where the drive is told.
+/// Returns the rotor's position and speed as the control sees them, if they are given.
 pub(in crate::drive) fn position(
     config: &Config,
     observer: &observer::State,
@@ -27,7 +26,7 @@ pub(in crate::drive) fn position(
         .then(|| observer.given.seen(shared.swapped(config)))
 }
 
-/// Run begins at once, with the duty that the rotor's speed holds up without a current.
+/// Begins Run at once, with the duty that sustains the rotor's speed without current.
 pub(super) fn begin(
     config: &Config,
     six_step: &six_step::Config,
@@ -44,7 +43,8 @@ pub(super) fn begin(
     take_over(s);
 }
 
-/// A period: the sextant in the middle of which the command will act, and the rotor's place in it.
+/// Follows the position: selects the sextant for the middle of the time in which the command acts,
+/// and the rotor's place in it.
 pub(super) fn follow(
     six_step: &six_step::Config,
     (s, shared): (&mut State, &mut Shared),
@@ -59,7 +59,8 @@ pub(super) fn follow(
     s.tracking.omega_bar = omega;
 }
 
-/// Run is too slow: it has just begun, or something holds the rotor. True where that has lasted.
+/// Returns true if Run has been too slow for too long: it has just begun, or something holds the
+/// rotor.
 pub(super) fn is_stuck(config: &Config, shared: &mut Shared) -> bool {
     shared.progress.slow_periods += 1;
     shared.progress.slow_periods > config.slow_periods

@@ -1,12 +1,12 @@
-//! The six-step drive: from the sample to what the bridge does, by zero crossings.
+//! The six-step drive: from the sample to the bridge by zero crossings.
 //!
-//! The phases are those of the field-oriented drive. Park holds the rotor along one phase and then
-//! along another, so that one that stood opposite to the first does not stay there. Ramp begins as
-//! it stands there, or at the forward end of its swing. While nothing can be seen of the rotor it
-//! commutates by a speed that grows by `STA_RAMP_RPM_S`; crossings correct that as soon as there are
-//! some. Run begins when a turn of them has been seen in a row at `STA_RUN_RPM`.
+//! It has the phases of the field-oriented drive. Park holds the rotor along one phase and then
+//! along another, so that a rotor opposite to the first does not stay there. Ramp begins with the
+//! rotor at rest there, or at the forward end of its swing. While the rotor cannot be seen, Ramp
+//! commutates at a speed that grows by `STA_RAMP_RPM_S`; crossings correct it as soon as they
+//! appear. Run begins after a full turn of consecutive crossings at `STA_RUN_RPM`.
 //!
-//! Files, each above those that it uses: `state`, `duty`, `telemetry`, `given`, `start`, `period`.
+//! Files, each after those it uses: `state`, `duty`, `telemetry`, `given`, `start`, `period`.
 
 mod duty;
 pub(super) mod given;

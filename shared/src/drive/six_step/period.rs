@@ -17,17 +17,17 @@ use crate::drive::transitions::Why;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Angle, Speed};
 
-/// Sextants without a crossing for which one counts that Ramp has waited for in vain: three of them
-/// end the start.
+/// Weight, in missed sextants, of a crossing for which Ramp waited in vain: three of them end the
+/// start.
 const IMPATIENCE: u8 = 4;
 
-/// Periods in a row without a current after which the shaft stands.
+/// Consecutive periods without current after which the shaft counts as standing.
 const STILL_PERIODS: u16 = 1000;
 
-/// Position of the rotor, if it is given.
+/// The rotor's position, if given.
 type Position = Option<(Angle, Speed)>;
 
-/// The mode that a set-point asks for while this drive drives.
+/// Returns the mode change that a set-point asks for while this drive drives.
 pub(in crate::drive) fn mode_change(
     config: &config::Config,
     shared: &Shared,
@@ -43,7 +43,7 @@ pub(in crate::drive) fn mode_change(
     }
 }
 
-/// Returns true if the set-point wants the motor to turn the way in which it is being started.
+/// Returns true if the set-point wants the direction in which the motor is being started.
 fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
         Rotation::Backward
@@ -53,7 +53,7 @@ fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bo
     setpoint.rotation(config.both_ways) == present
 }
 
-/// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
+/// Returns true if a shaft turns too fast to park: it must slow down first.
 pub(in crate::drive) fn is_too_fast(
     config: &config::Config,
     six_step: &Config,
@@ -64,7 +64,7 @@ pub(in crate::drive) fn is_too_fast(
     shared.seen.speed > six_step.run_speed && !may_be_caught
 }
 
-/// Run goes on from the speed and the duty that there are.
+/// Resumes Run from the present speed and duty.
 pub(in crate::drive) fn resume(s: &mut State) {
     take_over(s);
 }
@@ -88,8 +88,8 @@ pub(in crate::drive) fn begin(
     }
 }
 
-/// With the low sides on, a shaft that turns drives a current. It has stopped when there has been
-/// none for a while; until then what is reported falls slowly.
+/// Watches for standstill with the low sides on, where a turning shaft drives a current. The shaft
+/// has stopped after a while without current; until then the reported speed decays slowly.
 pub(in crate::drive) fn watch(
     config: &config::Config,
     (s, shared): (&mut State, &mut Shared),
@@ -108,8 +108,8 @@ pub(in crate::drive) fn watch(
     }
 }
 
-/// A period of Park, Ramp, Run or Stopping.
-// Apart from the modes that are chosen with it: it takes many more registers.
+/// Runs a period of Park, Ramp, Run or Stopping.
+// Not inlined among the other modes: it needs many more registers.
 #[inline(never)]
 pub(in crate::drive) fn period(
     config: &config::Config,
@@ -127,8 +127,8 @@ pub(in crate::drive) fn period(
     let terminals = in_order(swapped, sample.terminals);
     let ramping = phase == Phase::Ramp;
     let legs = s.sector.legs(currents);
-    // The leg that was on before the last commutation carries all of the current, the other one
-    // only what the released phase has left.
+    // The leg that was on before the last commutation carries the full current, the other one only
+    // what the released phase has left.
     let i = if s.sector.rising() {
         reading(legs.switching)
     } else {
@@ -171,7 +171,7 @@ pub(in crate::drive) fn period(
     )
 }
 
-/// The end of Run and of Stopping by what the rotor does.
+/// Returns how the rotor ends Run or Stopping.
 fn rotor(
     config: &config::Config,
     six_step: &Config,
@@ -201,7 +201,7 @@ fn rotor(
     }
 }
 
-/// Looks for the crossing and commutates by it. False where the rotor is no longer followed.
+/// Looks for the crossing and commutates by it. Returns false if the rotor is no longer tracked.
 fn crossings(
     six_step: &Config,
     (s, shared): (&mut State, &Shared),
@@ -234,16 +234,16 @@ fn crossings(
     s.missed < LOST_SEXTANTS && s.astray < six_step.astray
 }
 
-/// The next sextant, where it is time.
+/// Commutates if due.
 fn commutate(six_step: &Config, s: &mut State, ramping: bool) {
     let blind = s.crossing.blind();
     let mut sextants = 1;
     let due = if s.crossing.found || blind {
-        // Where nothing has been seen, the released phase's current has hidden the crossing, or the
-        // rotor had been past it: what is known of it tells when the sextant ends.
+        // If nothing was seen, the released phase's current hid the crossing, or the rotor was
+        // already past it: the estimate tells when the sextant ends.
         s.tracking.reaches(HALF_SEXTANT, six_step.delay)
     } else if ramping {
-        // It is certain to be on its way, pulled forwards, unless something holds it.
+        // The rotor is certainly on its way, pulled forwards, unless something holds it.
         sextants = IMPATIENCE;
         s.crossing.samples >= six_step.patience
     } else {

@@ -1,4 +1,4 @@
-//! The start: Park, and another attempt where the rotor has not been followed.
+//! The start: Park, and another attempt if the rotor was not tracked.
 
 use fixed::types::I36F28;
 
@@ -17,17 +17,17 @@ use crate::drive::transitions::Why;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Current, Duty};
 
-/// Starts in a row that may fail.
+/// Consecutive starts that may fail.
 const ATTEMPTS: u8 = 3;
 
-/// Then along phase a, at 0°: one that stood opposite to c has not stayed there.
+/// Then along phase a, at 0°: a rotor opposite to c does not stay there.
 const SECOND_PARK: Sector = Sector::Ac;
 
-/// The ramp's first sextant, whose middle is 60° ahead of the rotor. Its phase rises: a back-EMF
-/// too small to be seen is then a crossing seen late, not one missed.
+/// The ramp's first sextant, whose middle is 60° ahead of the rotor. Its phase rises, so a back-EMF too small to
+/// see makes the crossing late, not missed.
 const FIRST_RAMP: Sector = Sector::Ba;
 
-/// The current of Park and Ramp: half more after each start that has failed, up to the bound.
+/// Returns the current of Park and Ramp: half more after each failed start, up to the bound.
 pub(super) fn current(
     six_step: &Config,
     (s, shared): (&State, &Shared),
@@ -42,9 +42,9 @@ pub(super) fn current(
     }
 }
 
-/// Holds the rotor along the phase of the switching leg. The other two are held low, not one of
-/// them open: what the rotor's swing induces flows between them without any dead time in its way,
-/// damps the swing and shows its direction.
+/// Holds the rotor along the switching leg's phase. The other two legs are both held low instead of one floating:
+/// the current that the rotor's swing induces flows between them without dead time in its way, damps the swing and
+/// shows its direction.
 pub(super) fn park(
     config: &config::Config,
     six_step: &Config,
@@ -60,10 +60,10 @@ pub(super) fn park(
         low,
         floating,
     } = s.sector.legs(currents.map(reading));
-    // A rotor that swings drives a current through the other two, which may be the greatest.
+    // A swinging rotor drives a current through the other two, which may be the largest.
     hold(six_step, s, greatest([switching, low, floating]), wanted);
-    // By the first attempt's current: a greater one does not damp the swing any sooner. After a
-    // start that has failed, twice as long.
+    // Counts at most the first attempt's current: a larger one damps the swing no sooner. Twice as long after a
+    // failed start.
     s.charge += wanted.min(six_step.start_current).over_periods(1);
     let long = six_step.park_charge * (1 + i64::from(s.failed > 0));
     if s.sector == FIRST_PARK {
@@ -72,7 +72,7 @@ pub(super) fn park(
             s.sector = SECOND_PARK;
         }
     } else {
-        // Forwards along phase a, b has a positive back-EMF and c a negative one.
+        // Moving forwards along phase a, b has a positive back-EMF and c a negative one.
         let forwards = low.saturating_sub(floating).saturating_sub(s.swing);
         s.swing += forwards >> 6;
         let certain = wanted / 16;
@@ -96,7 +96,7 @@ pub(super) fn park(
     (bridge(s, swapped, Some(Duty::ZERO)), None)
 }
 
-/// Loss of synchronism: another start, or none. While it is stopped nothing is lost with the rotor: it coasts.
+/// Handles loss of synchronism: another start, or none. A motor that is being stopped loses nothing and coasts.
 #[cold]
 pub(super) fn lost(six_step: &Config, s: &mut State, phase: Phase) -> Why {
     let starting = phase == Phase::Ramp || s.tracking.omega_bar <= six_step.run_speed;

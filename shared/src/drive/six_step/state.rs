@@ -8,7 +8,7 @@ use crate::control::six_step::{crossing, duty, tracking};
 use crate::trace::traced;
 use crate::units::Current;
 
-/// The rotor is first held along phase c, at 240°.
+/// Park first holds the rotor along phase c, at 240°.
 pub(super) const FIRST_PARK: Sector = Sector::Cb;
 
 traced! {
@@ -19,21 +19,21 @@ traced! {
         pub(super) crossing: crossing::State,
         pub(super) tracking: tracking::State,
         pub(super) duty: duty::State,
-        /// ∫i dt since the present angle of Park.
+        /// ∫i dt at the present angle of Park.
         pub(super) charge: I36F28,
-        /// Current that the rotor's swing in Park induces, smoothed; positive forwards.
+        /// Current induced by the rotor's swing in Park, smoothed; positive forwards.
         pub(super) swing: Current,
-        /// It is certain that it swings forwards.
+        /// The rotor certainly swings forwards.
         pub(super) swings_forwards: bool,
-        /// Periods of Ramp since it has last followed the rotor.
+        /// Periods since Ramp last tracked the rotor.
         pub(super) astray: u16,
-        /// Periods in a row without a current while the low sides are on.
+        /// Consecutive periods without current while the low sides are on.
         pub(super) still: u16,
-        /// Sextants in a row without a crossing.
+        /// Consecutive sextants without a crossing.
         pub(super) missed: u8,
-        /// Starts in a row that have failed.
+        /// Consecutive failed starts.
         pub(super) failed: u8,
-        /// ω* and where it goes.
+        /// ω* and its trajectory.
         pub(in crate::drive) planner: planner::State,
     }
 }
@@ -41,9 +41,9 @@ traced! {
 /// Signs of lost synchronism, for telemetry.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::drive) struct Losses {
-    /// Starts in a row that have failed.
+    /// Consecutive failed starts.
     pub(in crate::drive) failed_starts: u8,
-    /// Sextants in a row without a crossing.
+    /// Consecutive sextants without a crossing.
     pub(in crate::drive) missed_sextants: u8,
 }
 
@@ -67,13 +67,13 @@ impl Default for State {
 }
 
 impl State {
-    /// A drive has ended.
+    /// Ends a drive.
     pub(in crate::drive) fn rest(&mut self) {
         self.still = 0;
         self.planner = planner::State::default();
     }
 
-    /// The present signs of lost synchronism.
+    /// Returns the present signs of lost synchronism.
     pub(in crate::drive) fn losses(&self) -> Losses {
         Losses {
             failed_starts: self.failed,

@@ -16,7 +16,7 @@ use crate::units::{AdcCounts, Current, Speed, Voltage};
 /// 1/√3 with 31 fraction bits.
 const RECIPROCAL_ROOT_3: I1F31 = I1F31::from_bits(1_239_850_263);
 
-/// Telemetry of this period, and the bounds by the supply's current.
+/// Updates telemetry, and the bounds from the supply current.
 pub(super) fn update(
     config: &Config,
     (s, shared): (&State, &mut Shared),
@@ -33,7 +33,7 @@ pub(super) fn update(
     );
 
     let parked = phase == Phase::Park;
-    // In Park the rotor is taken to stand along the switching phase.
+    // In Park the rotor is assumed to stand along the switching phase.
     let delta = if parked { SEXTANT } else { s.tracking.delta };
     let angle = s.sector.middle().wrapping_add(delta);
     let from_middle = SinCos::of(delta);
@@ -55,7 +55,7 @@ pub(super) fn update(
         (false, _) => s.tracking.omega_bar,
     };
     if s.tracking.crossings > 0 && s.crossing.samples == 0 && s.missed == 0 {
-        // A sextant has ended in which the released phase's current died, or no crossing would have been found.
+        // The released phase's current died in the sextant that just ended, or no crossing would have been found.
         shared.shown = currents;
     }
     shared.seen = Seen {
