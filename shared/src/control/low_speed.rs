@@ -1,8 +1,8 @@
-//! Support of the observer at low speed: a current along d, and a bound of the one along q; and at any speed the
-//! bound of a winding whose own flux would hide the rotor's.
+//! Support of the observer at low speed: a current along d, and a bound on the current along q; and at any speed
+//! the bound for a winding whose own flux would hide the rotor's.
 //!
-//! There the back-EMF is small against what is not known: the dead time's loss around zero current,
-//! and the drop across a resistance that may be stated wrongly.
+//! At low speed the back-EMF is small against the unknowns: the dead time's loss around zero current, and the drop
+//! across a resistance that may be stated wrongly.
 
 use super::speed::Bounds;
 use crate::math::{Gain, Held};
@@ -13,22 +13,22 @@ use crate::units::{Current, Speed};
 pub struct Config {
     /// i_d* at standstill: a current along d makes no torque, but gives each phase's current a sign.
     i_d: Current,
-    /// Its fall over the speed.
+    /// Its decrease over the speed.
     i_d_slope: Gain<Speed, Current>,
-    /// Bound of i_q at standstill.
+    /// Bound on i_q at standstill.
     i_q: Current,
-    /// Bound of i_q over the speed, where that is more.
+    /// Bound on i_q over the speed, where larger.
     i_q_slope: Gain<Speed, Current>,
     /// What bounds both: `LIM_PHASE_A`, or what the winding's flux allows.
     phase: Current,
-    /// The last speed at which anything is done.
+    /// The highest speed at which this acts.
     end: Speed,
 }
 
 impl Config {
-    /// `i_d` along d at standstill and `i_d_slope` less over the speed; at most `i_q` along q, or
-    /// `i_q_slope` times the speed, where that is more. No slope is negative. The current along q is at most `phase`,
-    /// where the drive itself has it up to `limit`.
+    /// Creates the support: `i_d` along d at standstill, decreasing by `i_d_slope` over the speed; along q at most
+    /// `i_q`, or `i_q_slope` times the speed where that is larger. No slope is negative. The q current is at most
+    /// `phase`; the drive's own bound is `limit`.
     pub fn new(
         (i_d, i_d_slope): (Current, Gain<Speed, Current>),
         (i_q, i_q_slope): (Current, Gain<Speed, Current>),
@@ -46,14 +46,14 @@ impl Config {
         config
     }
 
-    /// Nothing is done at any speed.
+    /// Creates one that never acts.
     pub fn none(phase: Current) -> Self {
         let i_d = (Current::ZERO, Gain::ZERO);
         Self::new(i_d, (Current::MAX, Gain::ZERO), (phase, phase))
     }
 
-    /// The last speed at which anything is done, by bisection: with the speed i_d* only falls and
-    /// the bound of i_q only rises.
+    /// Returns the highest speed at which this acts, by bisection: with rising speed i_d* only falls and the bound
+    /// on i_q only rises.
     fn last(&self, limit: Current) -> Speed {
         let acts = |bits| {
             let speed = Speed::from_bits(bits);
@@ -71,7 +71,7 @@ impl Config {
         Speed::from_bits(last)
     }
 
-    /// i_d*, and what of the bounds of i_q* this and the speed leave.
+    /// Returns i_d*, and the bounds of i_q* that it and the speed leave.
     pub fn bounds(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         if speed > self.end {
             (Current::ZERO, full)
@@ -83,7 +83,7 @@ impl Config {
     #[cold]
     fn slow(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         let i_d = self.i_d_at(speed);
-        // Both together stay below `phase` while i_d is below 0.47 of it. A root would be the longest period's.
+        // Both together stay below `phase` while i_d is below 0.47 of it. A root would lengthen the longest period.
         let most = self.i_q_at(speed).min(self.phase.minus(i_d / 4));
         let bounds = Bounds {
             min: full.min.max(-most),
@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(i_d, Current::from_num(0.2));
         assert_eq!(bounds.max, Current::from_num(0.2));
         assert_eq!(at(-0.1), at(0.0));
-        // i_d* has gone at 0.02, and the bound of i_q is the drive's own at 1.5/40.
+        // i_d* is gone at 0.02, and the bound on i_q reaches the drive's own at 1.5/40.
         let (i_d, bounds) = at(0.03);
         assert_eq!(i_d, Current::ZERO);
         assert!(

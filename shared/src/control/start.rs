@@ -1,8 +1,8 @@
 //! Open-loop start of the second paper, section 3.2: Park aligns the rotor, Ramp turns it.
 //!
-//! The current is held on the q axis of the control's frame, and the frame is turned without
-//! knowledge of the rotor, which follows like a stepper motor's. The observer runs all the while, so
-//! at the hand-over it tells where the rotor really is.
+//! The current is held on the q axis of the control's frame, which turns without knowledge of the
+//! rotor; the rotor follows like a stepper motor's. The observer runs all the while, so at the
+//! hand-over it knows the rotor's actual position.
 
 use fixed::types::extra::U28;
 
@@ -19,16 +19,16 @@ pub struct Config {
     pub current: Current,
     /// Current times periods after which Park ends (A·s of section 3.2.2).
     pub park_charge: Charge,
-    /// Current to the frame's speed in the first half of Park. It turns the current's vector by a
-    /// quarter of a turn, so that a rotor that stood opposite to it does not stay there.
+    /// From current to the frame's speed in the first half of Park, which sweeps the current vector
+    /// by a quarter turn so that a rotor opposite to it does not stay there.
     pub sweep: Gain<Current, Speed>,
-    /// K_s, current to the frame's acceleration in a period: ω_s = K_s·∫I_qr dt (3.2.3).
+    /// K_s, from current to the frame's acceleration per period: ω_s = K_s·∫I_qr dt (3.2.3).
     pub k_s: Gain<Current, Speed>,
-    /// Speed to angle: how far the frame yields to a rotor that swings.
+    /// From speed to angle: how far the frame yields to a swinging rotor.
     pub yielding: Gain<Speed, Angle>,
-    /// Share of that angle that is taken in a period, as speed to speed.
+    /// Share of that angle applied per period, from angle to speed.
     pub yield_rate: Gain<Angle, Speed>,
-    /// Periods in which the rotor has turned too slowly, less those in which it has not, after which
+    /// Periods in which the rotor turned too slowly, minus those in which it did not, after which
     /// it has lost the frame.
     pub astray_periods: u32,
     /// R.
@@ -45,20 +45,20 @@ traced! {
     /// The state of Park and Ramp.
     #[derive(Clone, Debug, PartialEq)]
     pub struct State {
-        /// The frame's angle at the coming sample.
-        /// Current along q of the first frame, a quarter of a turn back, is along phase a.
+        /// The frame's angle at the next sample. In the first frame, a quarter turn back, a current
+        /// along q lies along phase a.
         pub frame: Angle,
         /// ∫I_qr in Park, in periods.
         pub charge: Charge,
-        /// ω_s, the speed of the frame but for its yielding.
+        /// ω_s, the speed of the frame without its yielding.
         pub omega_s: Speed,
-        /// Its change in a period.
+        /// Its change per period.
         pub acceleration: Speed,
         /// Angle by which the frame yields to the rotor's swing.
         pub yielded: Angle,
-        /// Its change in a period.
+        /// Its change per period.
         pub yielding: Speed,
-        /// Periods in which the rotor has turned too slowly, less those in which it has not.
+        /// Periods in which the rotor turned too slowly, minus those in which it did not.
         pub astray: u32,
     }
 }
@@ -77,13 +77,13 @@ impl Default for State {
     }
 }
 
-/// True once the rotor has had its time in Park.
+/// Returns true once the rotor has had its time in Park.
 pub fn aligned(config: &Config, state: &State) -> bool {
     state.charge >= config.park_charge
 }
 
-/// So many `periods` of Park with this current: the frame's speed, and whether the rotor had had its
-/// time before.
+/// Runs `periods` of Park with this current: sets the frame's speed. Returns whether the rotor had
+/// already had its time.
 pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) -> bool {
     let over = aligned(config, state);
     state.charge += current.over_periods(periods);
@@ -96,12 +96,12 @@ pub fn park(config: &Config, state: &mut State, current: Current, periods: u32) 
     over
 }
 
-/// Ramp with this current: the frame's acceleration.
+/// Runs Ramp with this current: sets the frame's acceleration.
 pub fn ramp(config: &Config, state: &mut State, current: Current) {
     state.acceleration = config.k_s.apply(current);
 }
 
-/// Takes the frame on by a period and returns its speed in it.
+/// Advances the frame by one period and returns its speed.
 pub fn advance(state: &mut State) -> Speed {
     state.omega_s = state.omega_s.plus(state.acceleration);
     let omega = state.omega_s.plus(state.yielding);
@@ -109,12 +109,12 @@ pub fn advance(state: &mut State) -> Speed {
     omega
 }
 
-/// Damps the rotor's swing about the current's vector: a pendulum that a constant current does not
-/// damp. The frame yields by an angle in proportion to the rotor's speed against the frame, which
-/// is ξ·h_d, since the rotor's flux stands near the q axis; along d, neither a wrong R nor the dead
-/// time disturbs the back-EMF h_d = R·i_d − ω·L·i_q − u_d (5).
+/// Damps the rotor's swing about the current vector, a pendulum that constant current does not
+/// damp. The frame yields by an angle proportional to the rotor's speed relative to the frame,
+/// which is ξ·h_d, since the rotor's flux is near the q axis; along d neither a wrong R nor the
+/// dead time disturbs the back-EMF h_d = R·i_d − ω·L·i_q − u_d (5).
 ///
-/// Called every so many `periods`, which are few against those of a swing.
+/// Called every `periods` periods, which are few compared with a swing.
 pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage>), periods: u32) {
     state.yielded = state
         .yielded
@@ -131,8 +131,8 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
         .max(-SPEED_END)
         .min(SPEED_END - Quantity::DELTA)
         .scaled();
-    // A rotor that follows turns as fast as the frame in the mean. Below a quarter of the speed at
-    // which Run begins its swing is as fast.
+    // On average a rotor that follows turns as fast as the frame. Below a quarter of the speed at
+    // which Run begins, its swing is as fast.
     if omega_s > config.run_speed / 4 {
         state.astray = if rotor < omega_s / 2 {
             state.astray + periods
@@ -155,10 +155,10 @@ pub fn lost(config: &Config, state: &State) -> bool {
 
 impl State {}
 
-/// The end of the range of speeds, half a turn a period, with 28 fraction bits.
+/// The maximum speed, half a turn per period, with 28 fraction bits.
 const SPEED_END: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(1 << 27);
 
-/// Most by which the frame yields: a sixteenth of a turn.
+/// The most that the frame yields: a sixteenth of a turn.
 const YIELDED_MAX: Angle = Angle::from_bits(1 << 28);
 
 #[cfg(test)]
@@ -171,7 +171,7 @@ mod tests {
         Config {
             current: Current::from_num(0.5),
             park_charge: Charge::from_num(100),
-            // A quarter of a turn in half of the charge.
+            // A quarter turn in half of the charge.
             sweep: Gain::new(0.25 / 50.0).expect("in range"),
             k_s: Gain::new(1e-4).expect("in range"),
             yielding: Gain::new(200.0).expect("in range"),
@@ -213,7 +213,7 @@ mod tests {
                 state.omega_s >= config.run_speed
             })
             .expect("it ends");
-        // 0.01 / (0.5 · 1e-4), and one for the rounding of K_s.
+        // 0.01 / (0.5 · 1e-4), plus one for the rounding of K_s.
         assert!((200..=201).contains(&periods), "{periods}");
     }
 
@@ -237,7 +237,7 @@ mod tests {
             }
             state.yielded.to_num::<f64>()
         };
-        // Rotor at ξ·h_d = 0.00025 turns a period: 200 times that against the swing.
+        // Rotor at ξ·h_d = 0.00025 turns per period: 200 times that against the swing.
         assert!((settle(0.001, 0.0) + 0.05).abs() < 1e-3);
         assert!((settle(-0.001, 0.0) - 0.05).abs() < 1e-3);
         assert!(settle(0.001, 0.00025).abs() < 1e-3);

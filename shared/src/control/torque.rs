@@ -1,8 +1,7 @@
 //! Torque mode: the command is i_q, within the bounds, braking included.
 //!
-//! Also what voltage mode and a test go through. i_q* moves from one end of its range to the other
-//! in a few milliseconds, not at once: at speed the current loop answers a jump with an overshoot
-//! of half of it, and 40 A of jump would end in the over-current trip.
+//! Voltage mode and tests go through it too. i_q* takes a few milliseconds across its range: at speed the current
+//! loop overshoots a step by half, and a 40 A step would end in the over-current trip.
 
 use super::regulator::Reference;
 use super::speed::Bounds;
@@ -13,12 +12,12 @@ use crate::units::Current;
 /// Limit of the change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
-    /// Greatest change of i_q* in a period of the outer loops.
+    /// Largest change of i_q* per outer-loop period.
     pub slew: Current,
 }
 
 traced! {
-    /// The state: i_q* of the last period.
+    /// The state: i_q* of the previous period.
     #[derive(Clone, Debug, Default, PartialEq)]
     pub struct State {
         /// i_q*.
@@ -26,7 +25,7 @@ traced! {
     }
 }
 
-/// `wanted` with its i_q* within the bounds, and not far from the last one.
+/// Returns `wanted` with its i_q* clamped to the bounds and slew-limited.
 pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
     let i_q = bounds
         .hold(wanted.i.q)
@@ -36,9 +35,8 @@ pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bou
     wanted.with_i_q(i_q)
 }
 
-/// `wanted` with an i_q* that has grown by no more than that, for the speed regulator; it may fall at
-/// once. Where L is stated wrongly the rotor seems to turn by asin(ΔL·i_q/φ), and the observer needs
-/// time to follow.
+/// Returns `wanted` with the growth of its i_q* slew-limited, for the speed regulator; it may fall at once. With L
+/// stated wrongly the rotor seems to turn by asin(ΔL·i_q/φ), and the observer needs time to follow.
 pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
     let least = state.i_q.min(Current::ZERO).minus(config.slew);
     let most = state.i_q.max(Current::ZERO).plus(config.slew);
@@ -85,7 +83,7 @@ mod tests {
                 "{}",
                 state.i_q
             );
-            // And one for what the decimal fractions are rounded by.
+            // Plus one for the rounding of the decimal fractions.
             assert!((periods..=periods + 1).contains(&moved), "{moved}");
         }
     }

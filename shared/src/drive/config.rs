@@ -1,4 +1,4 @@
-//! Everything that a control period reads and does not change.
+//! Everything that a control period reads but does not change.
 
 pub mod six_step;
 pub mod tone;
@@ -27,22 +27,22 @@ pub enum Direction {
 /// Way to stop the motor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stop {
-    /// The bridge off: at once by field-oriented control, by the six-step drive when the shaft is slow. On the way to
-    /// the other direction the shaft is braked all the same.
+    /// The bridge turns off: at once in field-oriented control, once the shaft is slow in six-step. To reverse, the
+    /// shaft is braked all the same.
     #[default]
     Coast,
-    /// By regenerative braking, then all low sides on.
+    /// Regenerative braking, then all low sides on.
     Brake,
 }
 
-/// Charging of the supplies of the high sides' drivers before the phases switch.
+/// Charging of the high-side drivers' supplies before the phases switch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Charge {
     /// The low sides' share of each period.
     pub duty: Duty,
-    /// Periods that it takes.
+    /// Number of periods.
     pub periods: u32,
-    /// Of these, how many are left out where the rotor turns, which it does unseen meanwhile.
+    /// Periods skipped if the rotor turns, since it goes unobserved meanwhile.
     pub spared_periods: u32,
 }
 
@@ -54,15 +54,15 @@ pub const ATTEMPTS: usize = 4;
 pub struct Config {
     /// The control's units in SI.
     pub scale: Scale,
-    /// Counts of the supply's converter to voltage.
+    /// From the supply's ADC counts to voltage.
     pub bus: Multiplier<AdcCounts, WideVoltage>,
     /// Direction of rotation.
     pub direction: Direction,
     /// Way to stop the motor.
     pub stop: Stop,
-    /// True if a set-point may turn the motor the other way.
+    /// A set-point may turn the motor the other way.
     pub both_ways: bool,
-    /// Voltage commanded to voltage applied.
+    /// Delay from the commanded voltage to the applied one.
     pub delay: Delay,
     /// Position observer.
     pub observer: observer::Config,
@@ -82,13 +82,13 @@ pub struct Config {
     pub test_current: Current,
     /// Speed below which the observer no longer leads.
     pub slow: Speed,
-    /// Share of the reported speed that a period with the bridge off takes away.
+    /// Share of the reported speed that each bridge-off period takes away.
     pub coast: Gain<Speed, Speed>,
     /// Modulator.
     pub modulator: modulator::Config,
     /// Current sensors.
     pub sensing: sensing::Config,
-    /// Rotor that turns while the bridge is off.
+    /// Observation of a turning rotor while the bridge is off.
     pub catch: catch::Config,
     /// Charging before a switch-on.
     pub charge: Charge,
@@ -98,33 +98,33 @@ pub struct Config {
     pub protection: protection::Config,
     /// Tones, if any are to be heard.
     pub tone: Option<tone::Config>,
-    /// The six-step drive, where it is to drive the motor.
+    /// The six-step drive, if it drives the motor.
     pub six_step: Option<six_step::Config>,
     /// Periods for which Run may be slow before it ends.
     pub slow_periods: u32,
-    /// Periods for which Run must have lasted before a start counts as done.
+    /// Periods of Run after which a start counts as done.
     pub proven_periods: u32,
-    /// Periods at zero throttle after which a fault whose cause is gone has ended.
+    /// Periods of zero throttle after which a fault whose cause is gone ends.
     pub clear_periods: u32,
-    /// Periods without its cause after which a fault ends for the first retry of a drive that has proven itself; 0 if
-    /// there is none.
+    /// Periods without its cause after which a fault ends for the first retry of a proven drive; 0 disables
+    /// retries.
     pub retry_periods: u32,
-    /// Periods in a row for which the observer's state may be out of its range.
+    /// Consecutive periods for which the observer's state may be out of range.
     pub lost_periods: u32,
-    /// Least voltage along q in voltage mode: the back-EMF of the least speed that the observer can know.
+    /// Smallest q voltage in voltage mode: the back-EMF of the lowest speed the observer can track.
     pub least_u_q: Voltage,
 }
 
-/// Makes a default in its place. Never inlined: so it is not copied there from a stack, and the chip has a
-/// configuration's code once.
+/// Writes a default in place. Never inlined, which avoids a copy from the stack and keeps a single copy of a
+/// configuration's code on the chip.
 #[inline(never)]
 pub fn put_default<T: Default>(place: &mut MaybeUninit<T>) -> &mut T {
     place.write(T::default())
 }
 
 impl Config {
-    /// This drive, told where its rotor is by [`State::place`](crate::drive::State::place) in place of
-    /// an observer. It starts from standstill without aligning the rotor.
+    /// Returns this drive with the rotor's position given by [`State::place`](crate::drive::State::place) instead
+    /// of an observer. It starts from standstill without aligning the rotor.
     pub fn with_position_given(self) -> Self {
         Self {
             observer: observer::Config::Given,

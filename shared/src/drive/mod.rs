@@ -79,8 +79,8 @@
 //! ```
 //!
 //! # File order
-//! Each file uses only those before it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`, `schedule`,
-//! `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
+//! Each file uses only those before it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
+//! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
 //! `witness`, `state`, `mode_change`, `step`.
 
 mod charge;

@@ -21,7 +21,7 @@ pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoin
     }
 }
 
-/// Returns true if a set-point wants the direction in which the motor turns or is being started.
+/// Returns true if a set-point wants the motor to turn the way it does, or is being started.
 fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
         Rotation::Backward
@@ -31,7 +31,7 @@ fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     setpoint.rotation(config.both_ways) == present
 }
 
-/// Handles set-points while field-oriented control drives.
+/// While field-oriented control drives.
 #[inline(always)] // in the longest period
 fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
     let along = is_along(config, shared, setpoint);

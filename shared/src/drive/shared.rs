@@ -1,4 +1,4 @@
-//! State that every mode is handed and none owns: protection, the currents' zeros, faults, what was applied.
+//! State that every mode uses and none owns: protection, current offsets, faults, applied duties.
 
 use super::config::{Config, Direction};
 use super::io::{Sample, Setpoint};
@@ -12,24 +12,24 @@ use crate::trace::traced;
 use crate::units::{AdcCounts, Duty, Speed, Voltage};
 
 traced! {
-    /// State that every mode is handed.
+    /// State that every mode uses.
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct Shared {
         pub(super) seen: Seen,
         pub(super) latch: Latch,
-        /// True if the motor turns, or is to turn, against the configured direction.
+        /// The motor turns, or is to turn, against the configured direction.
         pub(super) reversed: bool,
-        /// Attempts of a start that have failed.
+        /// Failed attempts of a start.
         pub(super) failed_starts: u8,
         pub(super) progress: Progress,
         pub(super) protection: protection::State,
-        /// The currents' zeros.
+        /// Current offsets.
         pub(super) zeros: sensing::State,
-        /// The phases' currents for who watches a motor that turns: of the last sample, with the six-step drive of the
-        /// one at the end of the last sextant with a crossing.
+        /// The phase currents for monitoring a turning motor: from the last sample, or with six-step from the end
+        /// of the last sextant with a crossing.
         pub(super) shown: [AdcCounts; 3],
         pub(super) applied: Applied,
-        /// The supply's voltage and the vectors that it gives.
+        /// The supply voltage and the vectors it allows.
         pub(super) supply: Supply,
     }
 }
@@ -39,7 +39,7 @@ traced! {
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct Latch {
         pub(super) faults: Faults,
-        /// Faults that have turned the bridge off.
+        /// Faults that turned the bridge off.
         pub(super) count: u32,
         /// The last of them, and the phase that it ended.
         pub(super) last: (Fault, Phase),
@@ -58,7 +58,7 @@ traced! {
         pub(super) slow_periods: u32,
         /// Periods since Run began, as far as they matter.
         pub(super) run_periods: u32,
-        /// Periods in a row for which the observer's state has been out of its range.
+        /// Consecutive periods with the observer's state out of range.
         pub(super) lost_periods: u32,
     }
 }
@@ -67,25 +67,25 @@ traced! {
     /// Duties of the last commands, and whether all phases can be read.
     #[derive(Clone, Debug, PartialEq)]
     pub(super) struct Applied {
-        /// The last two commands' duties of the phases a, b, c, the latest first. The second is kept up
-        /// only while a phase may be unreadable.
+        /// The last two commands' duties of phases a, b, c, latest first. The second is maintained only while a
+        /// phase may be unreadable.
         duties: [[Duty; 3]; 2],
         /// Samples for which a phase may be unreadable.
         unreadable: u8,
     }
 }
 
-/// Samples after a long voltage vector in which its duties may still count.
+/// Samples after a long voltage vector in which its duties may still matter.
 const UNREADABLE: u8 = 3;
 
-/// A retry's pause over that before.
+/// Ratio of a retry's pause to the previous one.
 const LONGER: u32 = 4;
 
-/// The last retry's pause over the first one's: there are three.
+/// Ratio of the last retry's pause to the first: there are three.
 const LAST_PAUSE: u32 = LONGER * LONGER;
 
 impl Shared {
-    /// At power-up.
+    /// Creates the power-up state.
     pub(super) fn new(config: &Config) -> Self {
         Self {
             seen: Seen::NOTHING,
@@ -110,18 +110,18 @@ impl Shared {
         }
     }
 
-    /// The currents of a sample.
+    /// Returns a sample's currents.
     #[inline(always)] // in each period
     pub(super) fn currents(&mut self, config: &Config, sample: &Sample) -> [AdcCounts; 3] {
         if self.applied.unreadable != 0 {
-            // One by one: what may come in memory as a whole would be there in every period.
+            // One by one: an array that may come in memory would be in memory in every period.
             let [a, b, c] = self.reconstructed(config, sample);
             return [a, b, c];
         }
         sensing::read(&self.zeros, sample.currents)
     }
 
-    /// The currents of a sample at which a phase may be unreadable.
+    /// Returns a sample's currents when a phase may be unreadable.
     #[cold]
     fn reconstructed(&mut self, config: &Config, sample: &Sample) -> [AdcCounts; 3] {
         let Applied { duties, unreadable } = &mut self.applied;
@@ -134,7 +134,7 @@ impl Shared {
         sensing::currents(&config.sensing, &self.zeros, sample.currents, elapsed)
     }
 
-    /// Returns true if phases b and c change places for the control, which always turns one way.
+    /// Returns true if phases b and c are swapped for the control, which always turns one way.
     #[inline(always)] // in each period
     pub(super) fn swapped(&self, config: &Config) -> bool {
         (config.direction == Direction::Reversed) != self.reversed
@@ -150,7 +150,7 @@ impl Shared {
 }
 
 impl Latch {
-    /// Notes a fault in this phase; false where it has been noted, and the bridge is off for it.
+    /// Notes a fault in this phase; returns false if already noted, with the bridge off for it.
     pub(super) fn note(&mut self, fault: Fault, phase: Phase) -> bool {
         self.clear_periods = 0;
         if !fault.is_retried() {
@@ -166,8 +166,8 @@ impl Latch {
     }
 
     /// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
-    /// by then, and a limit that is grazed does not come and go. Under an open throttle it ends for a retry, if
-    /// there is one left: the first comes after a pause, each other one after a longer one.
+    /// by then, and a grazed limit does not come and go. Under open throttle it ends for a retry, if one is left:
+    /// the first comes after a pause, each further one after a longer one.
     pub(super) fn clear(&mut self, config: &Config, setpoint: &Setpoint) {
         if matches!(setpoint, Setpoint::Stop | Setpoint::Zero) {
             self.retry_periods = 0;
@@ -193,26 +193,26 @@ impl Latch {
 }
 
 impl Applied {
-    /// Notes the duties of a command.
+    /// Records the duties of a command.
     #[inline(always)] // in each period
     pub(super) fn command(&mut self, duties: [Duty; 3]) {
         self.duties[0] = duties;
     }
 
-    /// No phase is told to switch.
+    /// Records that no phase switches.
     pub(super) fn rest(&mut self) {
         self.command([Duty::ZERO; 3]);
     }
 
-    /// The bridge has been off for long enough that no duty counts any more.
+    /// Clears the duties: the bridge has been off long enough.
     pub(super) fn forget(&mut self) {
         self.duties = [[Duty::ZERO; 3]; 2];
     }
 
-    /// Notes that the command to come may leave a phase unreadable.
+    /// Notes that the next command may leave a phase unreadable.
     pub(super) fn expect_unreadable(&mut self) {
         if self.unreadable == 0 {
-            // Since then nobody has asked for them.
+            // Nobody has used the second since.
             self.duties[1] = self.duties[0];
         }
         self.unreadable = UNREADABLE;

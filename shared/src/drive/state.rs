@@ -1,4 +1,4 @@
-//! State of the drive from period to period: that of each mode, and that which all share.
+//! The drive's state from period to period: each mode's, and the shared one.
 
 use super::config::Config;
 use super::io::{Bridge, Setpoint};
@@ -15,10 +15,10 @@ use crate::units::{AdcCounts, Angle, Flux, Speed};
 /// No kind of set-point.
 const UNDECIDED: u8 = u8::MAX;
 
-/// The last fault that has turned the bridge off; any before the first.
+/// The last fault that turned the bridge off; an arbitrary one before the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LastFault {
-    /// Faults since the start.
+    /// Faults since power-up.
     pub count: u32,
     /// What it was.
     pub fault: Fault,
@@ -32,7 +32,7 @@ pub struct State {
     pub(super) phase: Phase,
     /// The kind of set-point for which field-oriented control drives, or [`UNDECIDED`].
     decided: u8,
-    /// True if the present phase, one of rest, has just begun.
+    /// The present phase, one of rest, has just begun.
     enters_rest: bool,
     pub(super) shared: Shared,
     pub(super) off: off::State,
@@ -45,7 +45,7 @@ pub struct State {
 }
 
 impl State {
-    /// The state at power-up: idle, without fault.
+    /// Creates the power-up state: idle, without fault.
     pub fn new(config: &Config) -> Self {
         Self {
             phase: Phase::Idle,
@@ -62,22 +62,22 @@ impl State {
         }
     }
 
-    /// Goes on under a new configuration. Where its units differ, all but the faults starts anew:
-    /// the numbers would mean something else. That is for a drive at rest.
+    /// Continues under a new configuration. If its units differ, everything but the faults restarts, because the
+    /// numbers would change their meaning; that is for a drive at rest.
     pub fn adopt(&mut self, before: &Config, now: &Config) {
         self.decided = UNDECIDED;
         if before.scale != now.scale {
             self.restart(now);
         }
-        // A factor that was found for another inductance, or is no longer kept up.
+        // A factor found for another inductance, or no longer maintained.
         let stated = |config: &Config| config.adapt_l.as_ref().map(|adapt| adapt.gain);
         if stated(before) != stated(now) {
             self.foc.loops.inductance = inductance::State::default();
         }
     }
 
-    /// As at power-up, but for the faults. Part by part: a whole state in between would take a KB of
-    /// the interrupt's stack.
+    /// Resets to power-up except for the faults. Part by part: a temporary whole state would take a KB of the
+    /// interrupt's stack.
     fn restart(&mut self, config: &Config) {
         let latch = self.shared.latch.clone();
         self.phase = Phase::Idle;
@@ -93,8 +93,8 @@ impl State {
         self.excite = excite::State::default();
     }
 
-    /// Returns true if field-oriented control drives for this kind of set-point: only its schedule says when
-    /// the mode is looked at again.
+    /// Returns true if field-oriented control drives for this kind of set-point: its schedule alone then decides
+    /// when to check the mode.
     #[inline(always)] // in each period
     pub(super) fn is_decided_for(&self, setpoint: &Setpoint) -> bool {
         self.decided == setpoint.kind()
@@ -106,8 +106,8 @@ impl State {
         self.decided != UNDECIDED
     }
 
-    /// The bridge in the period in which a phase of rest has just begun. Its own work begins in the next period:
-    /// what is at the terminals now has been driven.
+    /// Returns the bridge for the first period of a phase of rest. The phase's own work begins in the next period,
+    /// because the terminals are still driven in this one.
     pub(super) fn enters_rest(&mut self) -> Option<Bridge> {
         core::mem::take(&mut self.enters_rest).then(|| {
             self.shared.applied.rest();
@@ -119,7 +119,7 @@ impl State {
         })
     }
 
-    /// Notes that the phase suits this set-point.
+    /// Records that the phase suits this set-point.
     pub(super) fn set_decided_for(&mut self, config: &Config, setpoint: &Setpoint) {
         self.decided = if self.phase.drives() && config.six_step.is_none() {
             setpoint.kind()
@@ -128,8 +128,8 @@ impl State {
         };
     }
 
-    /// Changes the phase, by the table of [`transitions`](super::transitions): here, and where all begins
-    /// anew under other units, and nowhere else.
+    /// Changes the phase by the table in [`transitions`](super::transitions). Apart from a restart under other
+    /// units, phases change nowhere else.
     #[cold]
     pub(super) fn change(&mut self, config: &Config, why: Why) {
         if let Why::Tripped(fault) = why
@@ -160,8 +160,8 @@ impl State {
         }
     }
 
-    /// Ends any drive: nothing is known of the rotor's position. The speed that is reported stays where
-    /// it was the rotor's: the shaft turns on.
+    /// Ends any drive: the rotor's position is unknown. The reported speed stays if it was the rotor's: the shaft
+    /// keeps turning.
     fn rest(&mut self, from: Phase, why: Why) {
         let shared = &mut self.shared;
         shared.seen.phase = self.phase;
@@ -171,18 +171,18 @@ impl State {
         self.self_test = self_test::State::default();
         self.tone.end(match (from, why) {
             (Phase::Brake, Why::Tone) => true,
-            // On the way to a tone, or back from one that has not come to be played.
+            // On the way to a tone, or back from one that was never played.
             (Phase::Idle, Why::Tone) | (Phase::Sense | Phase::Charge, Why::Released) => {
                 self.tone.shorted_before
             }
             _ => false,
         });
         if from.is_off() && self.phase.is_off() {
-            // All else has been at rest since the bridge was turned off.
+            // Everything else has been at rest since the bridge turned off.
             return;
         }
         if from.is_open_loop() {
-            // That was the frame's speed, which the rotor may not have followed.
+            // It was the frame's speed, which the rotor may not have followed.
             shared.seen.speed = Speed::ZERO;
         }
         if !from.is_off() && from != Phase::Charge {
@@ -196,33 +196,32 @@ impl State {
         self.six_step.rest();
     }
 
-    /// Tells where the rotor will be at the coming sample, as an encoder does: its electrical angle
-    /// and speed with the phases in the order a, b, c. Only
-    /// [`observer::Config::Given`] listens.
+    /// Sets the rotor's position at the next sample, as an encoder does: electrical angle and speed for the phase
+    /// order a, b, c. Only [`observer::Config::Given`] uses it.
     pub fn place(&mut self, theta: Angle, omega: Speed) {
         self.foc.observer.given.place(theta, omega);
     }
 
-    /// Magnitude of a phase's reading that turns the bridge off now.
+    /// Returns the trip level of a phase current reading.
     #[inline(always)] // in each period
     pub fn trip_level(&self) -> AdcCounts {
         self.shared.protection.trip
     }
 
-    /// The rotor as the last period saw it: its electrical angle with the phases in the order a, b, c, and its speed
-    /// the way it turns.
+    /// Returns the rotor as the last period saw it: electrical angle for the phase order a, b, c, and speed in the
+    /// direction of rotation.
     #[inline(always)] // in each period
     pub fn rotor(&self) -> (Angle, Speed) {
         (self.shared.seen.angle, self.shared.seen.speed)
     }
 
-    /// Returns true if the motor is turned, or slowed down.
+    /// Returns true if the motor is driven or slowed down.
     #[inline(always)] // a comparison
     pub fn drives(&self) -> bool {
         self.phase.drives()
     }
 
-    /// The last fault that has turned the bridge off.
+    /// Returns the last fault that turned the bridge off.
     pub fn last_fault(&self) -> LastFault {
         let latch = &self.shared.latch;
         let (fault, phase) = latch.last;
@@ -233,8 +232,8 @@ impl State {
         }
     }
 
-    /// A copy for the tasks.
-    // Made where it is put, not copied there.
+    /// Returns a copy for the tasks.
+    // Built in place, not copied.
     #[inline(always)]
     pub fn snapshot(&self) -> Snapshot {
         let shared = &self.shared;
@@ -243,7 +242,7 @@ impl State {
         let losses = if self.phase.drives() {
             self.six_step.losses()
         } else {
-            // What the six-step drive counts is left where it was when it ended.
+            // The six-step drive's counts stay as they were when it ended.
             six_step::state::Losses::default()
         };
         Snapshot {
@@ -268,28 +267,28 @@ impl State {
         }
     }
 
-    /// The adapted inductance over the one that the parameters state.
+    /// Returns the adapted inductance over the stated one.
     pub fn inductance(&self) -> inductance::Factor {
         self.foc.loops.inductance.factor
     }
 
-    /// λ̂ of the phases in the order of the configured direction, where flux crossings are observed
-    /// (`CTL_OBSERVER` 1 and 2); else zero.
+    /// Returns λ̂ of the phases in the order of the configured direction, if flux crossings are observed
+    /// (`CTL_OBSERVER` 1 and 2), else zero.
     pub fn flux_linkages(&self) -> [Flux; 3] {
         self.foc.observer.edges.flux.lambda
     }
 
-    /// ω* of the drive in use; that of the other rests at zero.
+    /// Returns ω* of the drive in use; the other's rests at zero.
     fn speed_reference(&self) -> Speed {
         let six_step = self.six_step.planner.reference;
         self.foc.loops.speed.reference().max(six_step)
     }
 
-    /// Every word of the control state, one after the other: what two machines must agree on.
-    // One copy where it is called, or the words' place would go through memory.
+    /// Emits every word of the control state in order: what two machines must agree on.
+    // Inlined at its callers; otherwise the words would go through memory.
     #[inline(always)]
     pub fn trace(&self, config: &Config, out: &mut impl FnMut(u32)) {
-        // Taken apart in full, so that a new field is not forgotten here.
+        // Destructured in full, so that a new field cannot be forgotten.
         let Self {
             phase,
             decided,

@@ -1,5 +1,5 @@
-//! The drive's phases and faults, with samples that a test makes up. How it turns a motor is
-//! tested where there is one.
+//! The drive's phases and faults on synthetic samples. Tests with a motor model cover how it turns
+//! one.
 
 use std::f64::consts::TAU;
 use std::vec::Vec;
@@ -36,8 +36,8 @@ fn sample(currents_a: [f64; 3], bus_v: f64) -> Sample {
     }
 }
 
-/// Readings of the open terminals of a rotor that turns: its back-EMF, standing on the drop of the
-/// lowest phase's diode where that conducts.
+/// Returns the open-terminal readings of a turning rotor: its back-EMF, on top of the lowest
+/// phase's diode drop where that diode conducts.
 fn terminals(turns: f64, rpm: f64) -> [AdcCounts; 3] {
     let peak_v = 1.3e-3 * rpm * 12.0 * TAU / 60.0;
     let emf = [0.0, 1.0, 2.0].map(|phase: f64| -peak_v * (TAU * (turns - phase / 3.0)).sin());
@@ -58,7 +58,7 @@ impl Bench {
         Self { config, state }
     }
 
-    /// Periods with no current at 24 V.
+    /// Runs periods without current at 24 V.
     fn quiet(&mut self, periods: u32, setpoint: Setpoint) -> Bridge {
         self.run(periods, sample([0.0; 3], 24.0), setpoint)
     }
@@ -71,7 +71,7 @@ impl Bench {
         bridge
     }
 
-    /// The phases of so many periods with no current, each with its length.
+    /// Returns the phases in this many periods without current, each with its length.
     fn phases(&mut self, periods: u32, setpoint: Setpoint) -> Vec<(Phase, u32)> {
         let mut phases: Vec<(Phase, u32)> = Vec::new();
         for _ in 0..periods {
@@ -85,7 +85,7 @@ impl Bench {
         phases
     }
 
-    /// Periods with no current until a phase begins; how many they were.
+    /// Runs periods without current until a phase begins; returns their number.
     fn until(&mut self, phase: Phase, setpoint: Setpoint) -> u32 {
         for periods in 1..=100_000 {
             self.quiet(1, setpoint);
@@ -108,7 +108,7 @@ impl Bench {
         self.state.snapshot().faults
     }
 
-    /// Back to work at once.
+    /// Clears the faults at once.
     fn clear_faults(&mut self) {
         self.state.shared.latch.faults = Faults::NONE;
         self.state.shared.failed_starts = 0;
@@ -160,7 +160,7 @@ fn the_supply_is_watched_at_both_ends_and_stop_does_not_end_a_fault_that_lasts()
         let mut bench = Bench::new(&[]);
         let turn = bench.turn();
         bench.quiet(100, turn);
-        // The filter takes an eighth a period.
+        // The filter takes an eighth per period.
         assert_eq!(bench.run(60, sample([0.0; 3], bus_v), turn), Bridge::Off);
         assert!(bench.faults().contains(fault), "{fault:?}");
         bench.run(10_000, sample([0.0; 3], bus_v), Setpoint::Zero);

@@ -13,7 +13,7 @@ pub(super) enum Why {
     Tone,
     /// Nothing is requested any more, or the other direction is.
     Released,
-    /// Nothing is requested any more and the shaft shall coast: without current at once.
+    /// Nothing is requested any more and the shaft is to coast: without current at once.
     Coasts,
     /// The low sides were on before a tone, and go on again.
     Shorted,
@@ -33,7 +33,7 @@ pub(super) enum Why {
     Aligned,
     /// The observer has locked on to the rotor.
     HandedOver,
-    /// The motor shall turn again, and the observer still tracks it.
+    /// The motor is to turn again, and the observer still tracks it.
     Resumed,
     /// Nothing is left to slow down.
     Stopped,

@@ -1,4 +1,4 @@
-//! The open-loop start: Park and Ramp, and what the rotor makes of Run.
+//! The open-loop start, Park and Ramp, and mode changes caused by the rotor.
 
 use super::state::State;
 use crate::control::regulator::Reference;
@@ -33,7 +33,7 @@ pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, 
     }
 }
 
-/// The current, and what it makes of the frame's speed.
+/// Sets the start's current, and the frame's speed from it.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn current(
     config: &Config,
@@ -56,7 +56,7 @@ pub(in crate::drive) fn current(
     }
 }
 
-/// The rotor's flux stands along the current, on the frame's q axis.
+/// Expects the rotor's flux along the current, on the frame's q axis.
 fn expect(config: &Config, foc: &mut State, shared: &Shared) {
     let frame = foc.loops.start.frame;
     let rotor = frame.wrapping_add(Angle::from_bits(1 << 30));
@@ -65,8 +65,8 @@ fn expect(config: &Config, foc: &mut State, shared: &Shared) {
     observer::expect(&config.observer, &mut foc.observer, rotor, i);
 }
 
-/// Every [`CYCLE`], what the rotor makes of the phase: another attempt where it has not followed or has
-/// become too slow, the end of a stop, a fault where it is lost.
+/// Every [`CYCLE`], returns the mode change the rotor calls for: another attempt if it has not followed or has
+/// become too slow, the end of a stop, a fault if it is lost.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn rotor(
     config: &Config,
@@ -90,7 +90,7 @@ pub(in crate::drive) fn rotor(
             let astray = start::lost(attempt(config, shared), &foc.loops.start);
             astray.then(|| failed(shared))
         }
-        // Before the speed is looked at: sensors that fail at standstill are lost there.
+        // Before the speed check: sensors that fail at standstill are lost there.
         Phase::Run | Phase::Stopping if progress.lost_periods >= config.lost_periods => {
             Some(if progress.run_periods < config.proven_periods {
                 failed(shared)
@@ -126,18 +126,18 @@ fn failed(shared: &mut Shared) -> Why {
     }
 }
 
-/// The speed regulator is made ready for [`hand_over`], shortly before it.
+/// Prepares the speed regulator for [`hand_over`], shortly before it.
 #[cold]
 pub(in crate::drive) fn stand_by(config: &Config, foc: &mut State) {
     let loops = &mut foc.loops;
-    // What the ramp's current accelerates with is not what the load takes.
+    // The ramp current includes the acceleration, which the load does not take.
     config
         .speed
         .begin(&mut loops.speed, loops.start.omega_s, Current::ZERO);
 }
 
-/// The ramp's end: turns the control's frame from where the ramp held it to where the rotor is, and begins
-/// Run with the torque that there is.
+/// Ends the ramp: turns the control's frame from the ramp's angle to the rotor, and begins Run with the present
+/// torque.
 #[cold]
 #[inline(never)] // only some periods
 pub(in crate::drive) fn hand_over(
@@ -161,7 +161,7 @@ pub(in crate::drive) fn hand_over(
         return Some(failed(shared));
     };
     let lead = SinCos::of(lead);
-    // The voltage goes on as it was, in the new frame.
+    // The voltage continues unchanged, in the new frame.
     let u = rotate_frame(shared.seen.u, lead);
     let i = rotate_frame(shared.seen.i, lead);
     let factor = loops.inductance.factor;

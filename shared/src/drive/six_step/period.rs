@@ -43,7 +43,7 @@ pub(in crate::drive) fn mode_change(
     }
 }
 
-/// Returns true if the set-point wants the direction in which the motor is being started.
+/// Returns true if the set-point wants the motor to turn the way in which it is being started.
 fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bool {
     let present = if shared.reversed {
         Rotation::Backward
@@ -53,7 +53,7 @@ fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bo
     setpoint.rotation(config.both_ways) == present
 }
 
-/// Returns true if a shaft turns too fast to park: it must slow down first.
+/// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
 pub(in crate::drive) fn is_too_fast(
     config: &config::Config,
     six_step: &Config,

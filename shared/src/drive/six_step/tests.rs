@@ -1,5 +1,4 @@
-//! The six-step drive with samples that a test makes up. How it turns a motor is tested where there
-//! is one.
+//! The six-step drive on synthetic samples. Tests with a motor model cover how it turns one.
 
 use fixed::types::I1F31;
 
@@ -20,7 +19,7 @@ fn drive(changes: &[(ParamId, f32)]) -> (Config, State) {
     (config, state)
 }
 
-/// No current and no voltage but the supply's 24 V.
+/// No current, and no voltage except the supply's 24 V.
 fn quiet() -> Sample {
     Sample {
         currents: [AdcCounts::ZERO; 3],
@@ -76,8 +75,7 @@ fn park_holds_two_phases_low_and_ramp_lets_one_float() {
             other => panic!("{other:?}"),
         }
     }
-    // 0.1 s and 0.3 s of Park, then Ramp; before them 256 readings of the currents' zeros and the
-    // charge.
+    // 0.1 s and 0.3 s of Park, then Ramp; 256 offset readings and the charge come first.
     assert!((15_990..=16_010).contains(&parked), "{parked}");
     assert!((3700..=3760).contains(&floating), "{floating}");
 }
@@ -92,7 +90,7 @@ fn a_rotor_whose_position_is_told_is_driven_from_where_it_stands() {
         let command = Setpoint::Speed(config.scale.speed_from_rpm(3000.0) * sign);
         let mut bridge = Bridge::Off;
         for _ in 0..1_000 {
-            // Backwards the control sees the phases b and c exchanged, and the angle turned.
+            // Backwards the control sees phases b and c swapped, and the angle negated.
             let theta = sector.middle();
             let theta = if backwards {
                 theta.wrapping_neg()
@@ -129,7 +127,7 @@ fn stop_ends_a_start_at_once() {
                 step(&config, &mut state, quiet(), turn(&config));
             }
             assert_eq!(state.snapshot().phase, phase);
-            // Before the rotor has been parked it may turn at any speed.
+            // Before Park the rotor may turn at any speed.
             let bridge = if phase == Phase::Sense {
                 Bridge::Off
             } else {
@@ -160,7 +158,7 @@ fn a_start_without_a_rotor_that_follows_fails_within_a_second_and_ends_in_a_faul
         ramps
     };
     assert_eq!(fail(&mut state), 4);
-    // 0.3 s of zero throttle end the fault, and the next start has as many attempts.
+    // 0.3 s of zero throttle end the fault; the next start has as many attempts.
     for _ in 0..12_100 {
         step(&config, &mut state, quiet(), Setpoint::Zero);
     }
@@ -182,7 +180,7 @@ fn fewer_than_four_periods_a_sextant_are_refused() {
 #[test]
 fn no_sample_and_no_set_point_makes_it_overflow() {
     // Overflow panics in this build.
-    // Noise of so many counts, which trips now and then.
+    // Noise of this many counts, which trips now and then.
     for (noise_counts, changes) in [
         (
             1000,

@@ -1,9 +1,9 @@
-//! Whatever comes in.
+//! Arbitrary input.
 
 use super::*;
 use fixed::types::I1F31;
 
-/// Numbers that look random.
+/// Pseudo-random numbers.
 pub(super) struct Noise(pub(super) u32);
 
 impl Noise {
@@ -17,7 +17,7 @@ impl Noise {
     }
 
     pub(super) fn sample(&mut self, period: u32) -> Sample {
-        // Now and then all of the range, else what does not trip; for a while still, too.
+        // Occasionally full range, otherwise below the trip; zero for a while, too.
         let wild = period % 8192 > 8000;
         let (range, bus) = if wild { (4096, 4096) } else { (1000, 300) };
         let still = period / 2048 % 4 == 1;
@@ -55,7 +55,7 @@ fn words(config: &Config, state: &State) -> usize {
     words
 }
 
-/// The phases that are seen in so many periods of anything. Overflow panics in this build.
+/// Returns the phases seen in this many periods of arbitrary input. Overflow panics in this build.
 fn anything(changes: &[(ParamId, f32)], periods: u32, seed: u32) -> Vec<Phase> {
     let mut bench = Bench::new(changes);
     let turn = bench.turn();
@@ -95,12 +95,12 @@ fn no_sample_and_no_set_point_makes_any_drive_overflow() {
                     (ParamId::CtlObserver, observer),
                     (ParamId::CtlRegulator, regulator),
                     (ParamId::CtlDrive, drive),
-                    // Six-step has a period for a quarter of a sextant at least.
+                    // Six-step needs a period per quarter sextant at least.
                     (ParamId::PwmFreqHz, 24_000.0 + 6_000.0 * drive),
                     (ParamId::Inp3d, drive),
                     (ParamId::CtlAdaptL, regulator.min(1.0)),
                     (ParamId::CtlObsCure, drive),
-                    // Short starts, so that more than starts is seen.
+                    // Short starts, so that more than starts is covered.
                     (ParamId::StaParkAs, 0.01),
                     (ParamId::MotJGcm2, 30.0),
                     (ParamId::StaRampRpmS, 20_000.0),

@@ -1,10 +1,10 @@
-//! The bridge is off: what the sensors and the terminals tell before the phases switch.
+//! Bridge off: what sensors and terminals show before the phases switch.
 
 use super::*;
 use crate::control::catch::Rotor;
 use crate::drive::foc::begin::READY_PERIODS;
 
-/// A rotor that turns at a constant speed while no current flows.
+/// A rotor that turns at constant speed without current.
 struct Coasting {
     bench: Bench,
     /// Mechanical, negative against the order a, b, c.
@@ -30,7 +30,7 @@ impl Coasting {
         self.bench.run(1, sample, setpoint)
     }
 
-    /// Periods until a phase begins.
+    /// Runs until a phase begins; returns the number of periods.
     fn until(&mut self, phase: Phase, setpoint: Setpoint) -> u32 {
         for periods in 1..5000 {
             self.step(setpoint);
@@ -70,7 +70,7 @@ fn a_rotor_that_turns_is_caught_into_run() {
                 let case = std::format!("{observer}, {direction}, {rpm}");
                 let turn = motor.bench.turn();
                 let periods = motor.until(Phase::Run, turn);
-                // 128 readings of the currents' zeros, 63 µs of charge, and what makes ready.
+                // 128 offset readings, 63 µs of charge, and the preparation.
                 assert!(periods < 145 + READY_PERIODS, "{case}: {periods}");
                 let error = motor.angle_error_deg();
                 assert!(error.abs() < 5.0, "{case}: {error}");
@@ -182,7 +182,7 @@ fn an_offset_beyond_a_tenth_of_the_range_is_a_fault() {
             assert_eq!(fault, !sound, "{phase}: {amperes} A");
             assert_eq!(matches!(bridge, Bridge::Charge(_)), sound);
             if !sound {
-                // It holds the bridge off until zero throttle has stood for 0.3 s.
+                // It holds the bridge off until zero throttle has lasted 0.3 s.
                 bench.quiet(bench.periods(0.5), turn);
                 assert_eq!(bench.phase(), Phase::Idle);
                 bench.quiet(bench.periods(0.32), Setpoint::Zero);
@@ -197,7 +197,7 @@ fn an_offset_beyond_a_tenth_of_the_range_is_a_fault() {
 fn terminals_that_tell_nothing_delay_a_start_by_40_ms() {
     let mut bench = Bench::new(&[]);
     let turn = bench.turn();
-    // Three alike are no back-EMF, and no resting rotor either.
+    // Three equal readings are no back-EMF, nor a standing rotor.
     let stuck = Sample {
         terminals: [AdcCounts::from_num(800); 3],
         ..sample([0.0; 3], 24.0)
@@ -208,7 +208,7 @@ fn terminals_that_tell_nothing_delay_a_start_by_40_ms() {
         periods += 1;
     }
     assert_eq!(bench.state.off.rotor, Rotor::Unknown);
-    // Two periods in which a current may still die, and eight measurements that end in one that judges.
+    // Two periods for the current to decay, and eight measurements, each judged in a period of its own.
     assert_eq!(periods, 2 + 8 * (128 + 1));
 }
 
@@ -233,7 +233,7 @@ fn the_speed_at_a_fault_is_reported_until_the_terminals_tell_another() {
     let [at_once, soon, _] = tripped([AdcCounts::ZERO; 3]);
     assert!((at_once - 3000.0).abs() < 1.0, "{at_once}");
     assert!(soon.abs() < 1e-3, "{soon}");
-    // They tell nothing: it falls as a large propeller coasts, by e in 2 s.
+    // They show nothing usable: it decays as a large propeller coasts, by e in 2 s.
     let [at_once, _, late] = tripped([AdcCounts::from_num(800); 3]);
     assert!((at_once - 3000.0).abs() < 1.0, "{at_once}");
     assert!((late - 3000.0 / 1.0_f32.exp()).abs() < 20.0, "{late}");

@@ -1,8 +1,8 @@
-//! A fault in each phase of each drive: the bridge is off in the period that sees it.
+//! A fault in each phase of each drive turns the bridge off in the period that sees it.
 
 use super::*;
 
-/// Both drives, at a speed that leaves the six-step drive its periods in a sextant.
+/// Both drives, at a speed that gives six-step enough periods per sextant.
 const DRIVES: [[(ParamId, f32); 2]; 2] = [
     [(ParamId::CtlDrive, 0.0), (ParamId::CtlRpmMax, 4500.0)],
     [(ParamId::CtlDrive, 1.0), (ParamId::CtlRpmMax, 4500.0)],
@@ -11,7 +11,7 @@ const DRIVES: [[(ParamId, f32); 2]; 2] = [
 /// Beyond the trip of 28 A.
 const OVER_CURRENT: [f64; 3] = [-15.0, -15.0, 30.0];
 
-/// What keeps a drive in a phase.
+/// Returns the set-point that keeps a drive in a phase.
 fn asked(bench: &Bench, phase: Phase) -> Setpoint {
     match phase {
         Phase::Brake => Setpoint::Stop,
@@ -20,7 +20,7 @@ fn asked(bench: &Bench, phase: Phase) -> Setpoint {
     }
 }
 
-/// One that is in a phase by now.
+/// Returns a bench that has reached a phase.
 fn within(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     let mut bench = Bench::new(drive);
     let turn = bench.turn();
@@ -31,7 +31,7 @@ fn within(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     bench
 }
 
-/// Periods of this until a fault is seen, in which the bridge must be off already.
+/// Repeats this until a fault is seen, when the bridge must already be off; returns the periods.
 fn periods_to_fault(bench: &mut Bench, sample: Sample, setpoint: Setpoint, fault: Fault) -> u32 {
     for periods in 1..=3 {
         let bridge = bench.run(1, sample, setpoint);
@@ -77,7 +77,8 @@ fn a_supply_beyond_its_limit_turns_the_bridge_off_in_each_phase() {
         for phase in Phase::ALL {
             let mut bench = within(&drive, phase);
             let asked = asked(&bench, phase);
-            // An eighth of what is above 24 V a period: 28.5 V, and 32.4 V where 30 V is the most.
+            // An eighth of the excess over 24 V per period: 28.5 V, and 32.4 V where the maximum is
+            // 30 V.
             let high = sample([0.0; 3], 60.0);
             let periods = periods_to_fault(&mut bench, high, asked, Fault::OverVoltage);
             assert_eq!(periods, 2, "{phase:?}");

@@ -1,10 +1,10 @@
-//! Legs that are pulled for the self-test: what switches, and what ends it.
+//! Legs pulled by the self-test: what switches, and what ends it.
 
 use super::*;
 use crate::drive::Pull;
 use crate::units::Duty;
 
-/// The bridge in so many periods of a pull, at a sample with this current into phase b.
+/// Returns the bridge over this many periods of a pull, with this current into phase b.
 fn pulled(bench: &mut Bench, pull: Pull, periods: usize, b: i32) -> Vec<Bridge> {
     let mut sample = sample([0.0; 3], 24.0);
     sample.currents[1] = AdcCounts::from_num(b);
@@ -26,7 +26,7 @@ fn all_switches_are_off_until_the_shaft_is_seen_to_stand() {
     let mut bridges = (0..2000).map(|_| (bench.quiet(1, pull), bench.phase()));
     let first = bridges.find(|(bridge, _)| *bridge != Bridge::Off);
     assert!(matches!(first, Some((Bridge::Legs(_), Phase::Tone))));
-    // A stop ends it, at once.
+    // A stop ends it at once.
     assert_eq!(bench.quiet(1, Setpoint::Stop), Bridge::Off);
     assert_eq!(bench.phase(), Phase::Idle);
 }
@@ -45,7 +45,7 @@ fn a_leg_comes_up_by_a_step_a_period_and_stays() {
         };
         assert_eq!(bridge, Bridge::Legs([None, None, Some(duty)]), "{n}");
     }
-    // Another begins anew.
+    // Another pull starts over.
     let first = pulled(&mut bench, Pull::UpA, 1, 0);
     let step = Duty::from_num(1.0 / 256.0);
     assert_eq!(first, [Bridge::Legs([Some(step), None, None])]);
@@ -71,7 +71,7 @@ fn a_current_through_two_legs_ends_at_that_of_a_test_or_a_quarter() {
         pulled(&mut bench, Pull::ThroughC, 1, -counts),
         [Bridge::Off]
     );
-    // What flowed stays to be read.
+    // The last current remains readable.
     let bridges = pulled(&mut bench, Pull::ThroughC, 50, 0);
     assert!(bridges.iter().all(|bridge| *bridge == Bridge::Off));
     let told_a = bench.config.scale.amperes(bench.state.snapshot().i.q);

@@ -1,4 +1,4 @@
-//! What a fault makes of a drive that has proven itself, and of one that has not.
+//! Faults of a drive that has proven itself, and of one that has not.
 
 use super::*;
 use crate::units::Angle;
@@ -9,7 +9,7 @@ const OVER_CURRENT: [f64; 3] = [-15.0, -15.0, 30.0];
 /// Far longer than any pause, s.
 const LONG_S: f32 = 3.0;
 
-/// A drive that is told where its rotor is, which turns at 3000 rpm whatever the bridge does, or stands.
+/// A drive with a given rotor position, which turns at 3000 rpm whatever the bridge does, or stands.
 struct Flight {
     bench: Bench,
     theta: Angle,
@@ -28,7 +28,7 @@ impl Flight {
         }
     }
 
-    /// Both drives, at a speed that leaves the six-step drive its periods in a sextant.
+    /// Both drives, at a speed that gives six-step enough periods per sextant.
     fn both(change: (ParamId, f32)) -> [Self; 2] {
         [0.0, 1.0].map(|drive| {
             let slow = (ParamId::CtlRpmMax, 4500.0);
@@ -44,14 +44,14 @@ impl Flight {
         self.bench.run(1, sample, setpoint);
     }
 
-    /// So many seconds with no current.
+    /// Runs for this many seconds without current.
     fn quiet(&mut self, seconds: f32, setpoint: Setpoint) {
         for _ in 0..self.bench.periods(seconds) {
             self.fly(sample([0.0; 3], 24.0), setpoint);
         }
     }
 
-    /// Flies until the drive has proven itself, or for half of that time.
+    /// Flies until the drive has proven itself, or for half that time.
     fn flown(mut self, proven: bool) -> Self {
         let turn = self.bench.turn();
         self.quiet(if proven { 0.4 } else { 0.2 }, turn);
@@ -59,7 +59,7 @@ impl Flight {
         self
     }
 
-    /// An over-current, once the bridge is on.
+    /// Causes an over-current once the bridge is on.
     fn trip(&mut self) {
         let turn = self.bench.turn();
         let before = self.bench.state.snapshot().fault_count;
@@ -73,7 +73,7 @@ impl Flight {
         assert_eq!(self.bench.state.snapshot().fault_count, before + 1);
     }
 
-    /// Seconds under this set-point until the fault has ended, if it does.
+    /// Returns the seconds under this set-point until the fault ends, if it does.
     fn pause_s(&mut self, setpoint: Setpoint) -> Option<f32> {
         let periods = self.bench.periods(LONG_S);
         let ended = (0..periods).find(|_| {
@@ -98,7 +98,7 @@ fn a_proven_drive_is_tried_again_three_times_with_growing_pauses_and_then_held()
         }
         flight.trip();
         assert_eq!(flight.pause_s(turn), None);
-        // Zero throttle ends it, and nothing is left of the flight before.
+        // Zero throttle ends it, and nothing remains of the previous flight.
         assert!(flight.pause_s(Setpoint::Zero).is_some());
         flight.trip();
         assert_eq!(flight.pause_s(turn), None);

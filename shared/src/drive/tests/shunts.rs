@@ -1,10 +1,10 @@
-//! Two shunts: the third phase is the other two.
+//! Two shunts: the third phase follows from the other two.
 
 use super::*;
 use crate::control::sensing::Shunts;
 use crate::params::BOSSO_MOTOR;
 
-/// Readings of phase c that nothing stands behind.
+/// Readings of phase c, which has no sensor.
 const NONSENSE_A: [f64; 4] = [0.0, 39.0, -39.0, 7.3];
 
 fn with_two_shunts() -> Bench {
@@ -17,7 +17,7 @@ fn with_two_shunts() -> Bench {
     Bench { config, state }
 }
 
-/// A current that turns, of some amperes.
+/// A rotating current of some amperes.
 fn turning(period: u32) -> [f64; 3] {
     [0.0, 1.0, 2.0].map(|phase| 4.0 * (TAU * (f64::from(period) / 97.0 - phase / 3.0)).sin())
 }
@@ -30,7 +30,7 @@ fn the_third_phase_is_never_read() {
         let mut bridges = Vec::new();
         let mut driven = 0;
         for _ in 0..8000 {
-            // The zeros are measured without a current.
+            // The offsets are measured without current.
             let [a, b, c] = if bench.phase().drives() {
                 driven += 1;
                 turning(driven)
@@ -42,7 +42,7 @@ fn the_third_phase_is_never_read() {
             let i = bench.state.snapshot().i;
             let [d, q] = [i.d, i.q].map(|i| f64::from(bench.config.scale.amperes(i)));
             let seen_a = d.hypot(q);
-            // A count is 0.02 A, and two make up the third.
+            // A count is 0.02 A, and the third phase combines two.
             assert!(
                 driven < 2 || (seen_a - 4.0).abs() < 0.06,
                 "{driven}: {seen_a} A"

@@ -1,4 +1,4 @@
-//! Starts: their course, their attempts and their directions.
+//! Starts: sequence, attempts and directions.
 
 use super::*;
 use crate::control::observer::sector::Sector;
@@ -27,12 +27,12 @@ fn a_start_senses_charges_parks_and_ramps() {
     else {
         panic!("{phases:?}");
     };
-    // 5 ms are 128 periods, rounded to a power of two; before them a current may still die for two,
-    // and one after them judges what was read.
+    // 5 ms are 128 periods, rounded to a power of two; two before them let the current decay, and
+    // one after them judges the readings.
     assert_eq!(sense, 2 + 128 + 1);
     assert_eq!(charge, pulses + READY_PERIODS);
-    // Three periods of the rotor's swing, which are more than 0.4 As at 4 A, in steps of eight, and
-    // eight for the observer.
+    // Three periods of the rotor's swing, more than 0.4 As at 4 A, in steps of eight, and eight for
+    // the observer.
     let expected = 3.0 * TAU / swing_rad_s * 24_000.0;
     assert!(
         (f64::from(park) - expected - 8.0).abs() < 8.0,
@@ -92,7 +92,7 @@ fn a_start_that_fails_is_tried_again_with_more_current_and_ends_as_stuck() {
         for (current, wanted) in currents.iter().zip([4.0, 6.0, 9.0, 13.5]) {
             assert!((current - wanted).abs() < 1e-3, "{currents:?}");
         }
-        // Zero throttle gives all the attempts anew.
+        // Zero throttle restores all attempts.
         bench.quiet(bench.periods(0.32), Setpoint::Zero);
         assert!(bench.faults().is_empty());
         assert_eq!(bench.state.shared.failed_starts, 0);
@@ -117,7 +117,7 @@ fn stop_ends_a_start_at_once() {
             let mut bench = Bench::new(&[(ParamId::MotStop, stop)]);
             let turn = bench.turn();
             bench.until(phase, turn);
-            // Before the rotor has been parked it may turn at any speed.
+            // Before Park the rotor may turn at any speed.
             let parked = matches!(phase, Phase::Park | Phase::Ramp);
             let bridge = if parked { bridge } else { Bridge::Off };
             assert_eq!(bench.quiet(1, Setpoint::Stop), bridge);
@@ -139,7 +139,7 @@ fn reversed_is_two_phases_swapped() {
         let (Bridge::Duty([a, b, c]), Bridge::Duty(swapped)) = (a, b) else {
             panic!("both switch");
         };
-        // Products round towards minus infinity, a mirrored one the other way.
+        // Products round towards minus infinity, mirrored ones the other way.
         for (duty, swapped) in [a, c, b].into_iter().zip(swapped) {
             let off = duty.to_num::<f64>() - swapped.to_num::<f64>();
             assert!(off.abs() < 2e-6, "{off}");
@@ -157,12 +157,12 @@ fn a_test_starts_with_no_more_than_its_bound() {
     bench.quiet(2, Setpoint::Stop);
     let test = Setpoint::Test(bench.config.scale.current_from_a(0.5));
     bench.until(Phase::Park, test);
-    // At half of the ramp's current Park takes twice its time.
+    // At half the ramp's current Park takes twice as long.
     let half = bench.until(Phase::Ramp, test);
     assert!(half.abs_diff(2 * full) < 20, "{half}, {full}");
 }
 
-/// Set-points of one sign, of each kind that has one.
+/// Returns set-points of one sign, of every kind that has one.
 fn signed(bench: &Bench, sign: f32) -> [Setpoint; 3] {
     [
         Setpoint::Speed(bench.config.scale.speed_from_rpm(sign * 2000.0)),
@@ -208,7 +208,7 @@ fn the_other_direction_ends_a_start() {
     assert!(snapshot.speed <= Speed::ZERO);
 }
 
-/// A rotor that does not move, with Hall sensors.
+/// A blocked rotor with Hall sensors.
 fn blocked(changes: &[(ParamId, f32)], sector_deg: f64) -> (Bench, Sample) {
     let changes: Vec<_> = changes
         .iter()
@@ -259,7 +259,7 @@ fn with_hall_sensors_a_blocked_rotor_is_stuck_after_a_second_an_attempt() {
 
 #[test]
 fn without_hall_sensors_the_merged_observer_starts_as_without_any() {
-    // The pull-ups of sensors that are not connected read 7.
+    // The pull-ups of unconnected sensors read 7.
     let mut bench = Bench::new(&[(ParamId::CtlObserver, 2.0)]);
     let turn = bench.turn();
     let course: Vec<Phase> = bench.phases(8000, turn).iter().map(|p| p.0).collect();
@@ -274,7 +274,7 @@ fn hall_sensors_that_fail_at_standstill_are_done_without_after_a_tenth_of_a_seco
     let turn = bench.turn();
     bench.run(200, sample, turn);
     assert_eq!(bench.phase(), Phase::Run);
-    // 0.1 s until the observer counts as lost, and 5 ms for the next start.
+    // 0.1 s until the observer counts as lost, plus 5 ms for the next start.
     let periods = bench.until(Phase::Park, turn);
     assert!(periods < bench.periods(0.12), "{periods}");
     assert!(bench.state.snapshot().sensor_fault);
@@ -289,7 +289,7 @@ fn a_torque_against_the_rotation_does_not_turn_the_motor_round_within_run() {
         let (forwards, backwards) = (setpoint(current(1.0)), setpoint(current(-1.0)));
         bench.run(200, sample, forwards);
         assert_eq!(bench.phase(), Phase::Run);
-        // A cycle until the set-point is looked at, and one until the rotor is.
+        // One cycle until the set-point is checked, one until the rotor is.
         let bridge = bench.run(2 * CYCLE, sample, backwards);
         assert!(
             !matches!(bridge, Bridge::Duty(_)),
@@ -323,7 +323,7 @@ fn what_flows_as_the_bridge_is_turned_off_is_no_offset() {
     assert_eq!(bench.state.shared.zeros.offsets, [AdcCounts::ZERO; 3]);
 }
 
-/// With the supply in motion, and currents that are no rotor's, so that each start fails.
+/// With a moving supply, and currents of no real rotor, so that every start fails.
 #[test]
 fn the_default_loop_does_what_the_one_of_any_observer_and_regulator_does() {
     let mut bench = Bench::new(&[]);

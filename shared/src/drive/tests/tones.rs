@@ -1,4 +1,4 @@
-//! Tones: when one is played, and what ends it.
+//! Tones: when one plays, and what ends it.
 
 use super::*;
 use crate::drive::config::tone::PITCH_MAX;
@@ -6,12 +6,12 @@ use crate::drive::schedule::CYCLE;
 use crate::drive::transitions::Why;
 use crate::units::Speed;
 
-/// A pitch of 1 kHz.
+/// Returns a pitch of 1 kHz.
 fn tone(bench: &Bench) -> Setpoint {
     Setpoint::Tone(Speed::from_num(1000.0 * bench.config.scale.period_s))
 }
 
-/// One whose rotor is known to stand, with a tone in play.
+/// Returns a bench whose rotor is known to stand, with a tone playing.
 fn playing(changes: &[(ParamId, f32)]) -> Bench {
     let mut bench = Bench::new(changes);
     let tone = tone(&bench);
@@ -19,7 +19,7 @@ fn playing(changes: &[(ParamId, f32)]) -> Bench {
     bench
 }
 
-/// Both, at a speed that leaves the six-step drive its periods in a sextant.
+/// Both drives, at a speed that gives six-step enough periods per sextant.
 const DRIVES: [[(ParamId, f32); 2]; 2] = [
     [(ParamId::CtlDrive, 0.0), (ParamId::CtlRpmMax, 4500.0)],
     [(ParamId::CtlDrive, 1.0), (ParamId::CtlRpmMax, 4500.0)],
@@ -53,7 +53,7 @@ fn a_tone_of_no_current_is_silent() {
         for _ in 0..5000 {
             assert_eq!(bench.quiet(1, tone), Bridge::Off);
         }
-        // Nor does one that is made silent while it plays go on.
+        // Nor does one that is silenced while playing.
         let mut bench = playing(&drive);
         bench.config = config_with(&silent);
         assert_eq!(bench.quiet(1, tone), Bridge::Off);
@@ -139,7 +139,7 @@ fn what_a_tone_found_is_what_it_leaves() {
     }
 }
 
-/// In the brake, and with a tone asked for, until it has come to a phase.
+/// Brakes with a tone requested until it reaches a phase.
 fn braked_until(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     let mut bench = Bench::new(drive);
     bench.state.change(&bench.config, Why::Shorted);
@@ -163,7 +163,7 @@ fn a_tone_that_never_came_to_play_leaves_the_brake_too() {
                 assert_eq!(bench.quiet(2000, setpoint), Bridge::Brake);
             }
         }
-        // Throttle is not held up by it, and what it found is forgotten then.
+        // It does not delay throttle, after which the previous state is forgotten.
         let mut bench = braked_until(&drive, Phase::Sense);
         let turn = bench.turn();
         bench.quiet(10, Setpoint::Stop);
@@ -227,7 +227,7 @@ fn throttle_in_a_tone_starts_the_motor_as_from_rest() {
         let mut bench = playing(&drive);
         let took = bench.until(Phase::Park, turn);
         assert!(took <= usual + 1, "{took} of {usual}");
-        // Before it has begun, too.
+        // Also before it has begun.
         let mut bench = Bench::new(&drive);
         let tone = tone(&bench);
         bench.until(Phase::Sense, tone);
@@ -235,7 +235,7 @@ fn throttle_in_a_tone_starts_the_motor_as_from_rest() {
     }
 }
 
-/// The vector that the duties make along phase a, V, and across it.
+/// Returns the vector of the duties, V: along phase a and across it.
 fn vector(bridge: Bridge) -> (f64, f64) {
     let Bridge::Duty(duties) = bridge else {
         panic!("{bridge:?}");
@@ -279,7 +279,7 @@ fn the_voltage_is_along_one_axis_as_often_one_way_as_the_other_and_bounded() {
             most = most.max(along.abs());
             sum += along;
         }
-        // Twice what 0.75 of the bound needs, and the dead time's 4/3·0.5 µs of 41.7 µs.
+        // Twice what 0.75 of the bound needs, plus the dead time's 4/3·0.5 µs of 41.7 µs.
         let needed = 0.108_f64.hypot(TAU * pitch_hz * 30.6e-6) * 0.75 * f64::from(tone_a);
         let bound = 2.0 * needed + 24.0 * 0.016;
         assert!(most < bound * 1.001 && most > bound * 0.9, "{most} {bound}");
