@@ -36,7 +36,7 @@ use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Speed};
 use compare::Difference;
 
-/// Least highest reading at which an observation may begin: three times the noise.
+/// The highest reading that an observation needs to begin: three times the noise.
 const BEGIN: I17F15 = I17F15::lit("6");
 
 /// The result of observing the rotor.

@@ -42,7 +42,7 @@ impl Config {
     /// while the vector is short enough.
     pub fn new(modulation: Modulation, duty_max: f32, window: f32) -> Self {
         let (longest, readable, centred) = match modulation {
-            // The highest phase sits half the largest duty, plus at most √3/2 of the vector, above zero.
+            // The highest phase is at half the largest duty plus at most √3/2 of the vector.
             Modulation::SpaceVector => (1.0 / SQRT_3, (2.0 * window - duty_max) / SQRT_3, -1),
             Modulation::Sine => (0.5, window - 0.5 * duty_max, 0),
         };

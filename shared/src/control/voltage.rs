@@ -17,7 +17,7 @@ pub fn of_share(share: I1F31, vector_max: Voltage) -> Voltage {
     vector_max.top(share).scaled()
 }
 
-/// Returns the reference, i_q included, at which the regulator outputs `u_q`.
+/// Returns the reference with the i_q at which the regulator outputs `u_q`.
 pub fn reference(
     config: &regulator::Config,
     state: &regulator::State,

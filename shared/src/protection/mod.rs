@@ -12,8 +12,8 @@ use crate::math::{Gain, Held, Multiplier, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Current, Voltage};
 
-/// Periods by which the supply voltage is extrapolated while braking: eight for the filter's lag, and about as many
-/// again until the bound is updated and the current has followed.
+/// Periods by which the supply voltage is extrapolated while braking: eight for the filter's lag, the rest until
+/// the bound is updated and the current has followed.
 const AHEAD_PERIODS: i32 = 32;
 
 /// Consecutive samples above the trip level that count as over-current; a single disturbed reading does not.

@@ -119,7 +119,7 @@ pub fn time(config: &Config, state: &mut State, late: Periods) {
     }
     let wanted = 6 * config.turns.clamp(1, TURNS_MAX);
     remember(state, interval, wanted);
-    // 32 + 12 fraction bits. Slow means that speed would have covered more than a sixth in the interval.
+    // 32 + 12 fraction bits. Slow: at that speed the rotor would have turned more than a sixth in the interval.
     let whole_turns = u64::from(config.whole_turns_above.to_bits().max(0) as u32);
     if u64::from(interval.to_bits()) * whole_turns > (1 << 44) / 6 {
         measure(state, 1, interval);

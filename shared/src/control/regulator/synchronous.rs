@@ -47,8 +47,8 @@ impl Config {
     /// V_d = k_p·(i_d* − i_d) + σ_d − ω̂·L·i_q,
     /// V_q = k_p·(i_q* − i_q) + σ_q + ω̂·L·i_d + ω̂·φ̂ + u_q*,
     ///
-    /// where the last i_d and i_q are the model's, and u_q* is the reference's voltage, zero except in voltage
-    /// mode.
+    /// where the last i_d and i_q are the model's, and u_q* is what the speed regulator of figure 47 feeds forward,
+    /// else zero.
     #[inline(always)] // in each period
     pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let e = error(wanted, fb);
