@@ -1,4 +1,4 @@
-"""The sweep on a Dask cluster: here two processes of this machine, elsewhere whatever its scheduler reaches."""
+"""A sweep on a Dask cluster: here two processes on this machine, elsewhere whatever its scheduler reaches."""
 
 import sys
 
@@ -9,7 +9,7 @@ import siskin
 
 def main(path: str, seeds: str = "12") -> None:
     with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
-        # Client("tcp://head:8786") for a cluster that is there already.
+        # For a cluster that already runs: Client("tcp://head:8786").
         with Client(cluster) as client:
             together = siskin.sweep(path, seeds=range(1, int(seeds) + 1), client=client)
     alone = siskin.sweep(path, seeds=range(1, int(seeds) + 1))

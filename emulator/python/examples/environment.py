@@ -1,4 +1,4 @@
-"""A gust, a weak pack and a hot day: what the ESC and its motor make of them."""
+"""How the ESC and its motor respond to a gust, a weak pack and a hot day."""
 
 import siskin
 

@@ -1,4 +1,4 @@
-"""A propeller that strikes, a wire that breaks, and a motor that goes on once it is whole again."""
+"""A propeller strike, a broken throttle wire, and a motor that runs again once it is mended."""
 
 import siskin
 
@@ -16,7 +16,7 @@ def main() -> None:
     for index, esc in enumerate(emulator.state):
         print(f"ESC {index}: {esc.rpm:.0f} rpm, {esc.phase}, armed: {esc.armed}, faults: {esc.faults}")
 
-    # A signal that comes back with throttle turns nothing: it has to be zero first.
+    # A signal that comes back with open throttle turns nothing: it must be zero first.
     emulator.faults.mend()
     emulator.throttle[1] = 0.0
     emulator.advance(1.5)

@@ -1,4 +1,4 @@
-"""MAVLink without sockets: a ground station's connection of pymavlink's mavutil, in simulated time."""
+"""MAVLink without sockets: a ground station's mavutil connection, in simulated time."""
 
 import siskin
 

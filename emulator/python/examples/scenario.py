@@ -1,4 +1,4 @@
-"""A scenario with its figures, and the same with another motor than the ESC believes in."""
+"""A scenario with its figures, and the same with a motor that differs from what the ESC believes."""
 
 import sys
 

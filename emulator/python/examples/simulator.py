@@ -1,12 +1,12 @@
-"""A flight simulator's loop in steps of 1 ms: a quadrotor that rises on four ESCs and one pack."""
+"""A flight simulator's loop in steps of 1 ms: a quadrotor climbs on four ESCs and one pack."""
 
 import siskin
 
 MASS_KG = 0.5
 GRAVITY_M_S2 = 9.81
-# Of a 5-inch propeller, an estimate: thrust over the square of its speed, N/rpm².
+# Thrust of a 5-inch propeller over the square of its speed, N/rpm²; an estimate.
 THRUST = 1.3e-8
-# Rising, it meets air: the speed at which that would turn it, rpm per m/s (a pitch of 4.5 inches).
+# Inflow when climbing, as the speed at which it would turn the propeller, rpm per m/s (a pitch of 4.5 inches).
 INFLOW_RPM = 60 / 0.1143
 
 
@@ -17,7 +17,7 @@ def main() -> None:
 
     height_m, climb_m_s = 0.0, 0.0
     for step in range(2000):
-        # What a flight controller would work out: a climb of 1 m/s, after the motors have started.
+        # In place of a flight controller: a climb of 1 m/s, once the motors have started.
         wanted = 0.35 if step < 500 else 0.45 + 0.1 * (1.0 - climb_m_s)
         emulator.throttle[:] = min(max(wanted, 0.0), 1.0)
         emulator.environment(wind_rpm=INFLOW_RPM * climb_m_s)

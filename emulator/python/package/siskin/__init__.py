@@ -1,4 +1,4 @@
-"""The Siskin ESC in Python: the ESC's own control code turns simulated motors, in this process and without sockets.
+"""The Siskin brushless ESC in Python: its own control code on simulated motors, in this process and without sockets.
 
 Four ESCs on one pack, armed and at half throttle::
 
@@ -16,22 +16,22 @@ A scenario, and a sweep of one over many seeds on all cores::
     table = siskin.sweep("tests/scenarios/random-drives.toml", seeds=range(1, 61))
     table.to_csv("drives.csv")
 
-What there is:
+Contents:
 
 :class:`Emulator`
-    One to eight ESCs on one clock, one supply and one MAVLink stream. Simulated time goes on only by
+    One to eight ESCs on one clock, one supply and one MAVLink stream. Simulated time advances only by
     :meth:`Emulator.advance`, and equal calls give equal bits, on any machine and at any pace.
 :func:`scenario`
     Plays a scenario, as ``siskin-emulator scenario`` does.
 :func:`sweep`
-    Plays all runs of a scenario on all cores, or on a Dask cluster, and gives a :class:`Table` of them.
+    Plays all runs of a scenario on all cores, or on a Dask cluster, and returns a :class:`Table` of them.
 :exc:`Error`
-    What goes wrong, in one line, with the text that the program prints.
+    Any error, in one line, with the text that the program prints.
 :data:`BENCHES`, :data:`PARAMETERS`
     The names of the built-in benches and of the ESC's parameters.
 
-Units are the last part of a name: ``bus_v`` is in volts, ``torque_nm`` in newton metres. The guide of the emulator
-describes benches, scenarios and faults; the one in ``emulator/python`` has recipes, Dask clusters among them.
+The last part of a name is its unit: ``bus_v`` is in volts, ``torque_nm`` in newton metres. The emulator's guide
+describes benches, scenarios and faults; the guide in ``emulator/python`` has recipes, including Dask clusters.
 """
 
 from ._emulator import Emulator, Throttle

@@ -1,4 +1,4 @@
-"""ESCs that run as a program says."""
+"""ESCs in simulated time, driven by a program."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from ._sweep import sweep
 
 
 class Throttle(Sequence["float | None"]):
-    """The throttle of each ESC, from 0 to 1, as a flight controller sends it: a frame a millisecond.
+    """The throttle of each ESC, from 0 to 1, sent as a flight controller does: one frame per millisecond.
 
-    0 is motor stop, and arms once it has been held for 300 ms. ``None`` is a silent wire, which the ESC takes for a
-    lost signal. ``throttle[i] = 0.5`` is for one ESC, ``throttle[:] = 0.5`` for all, and
-    ``throttle[:] = [0.5, 0.4, 0.5, 0.4]`` for each in turn. A value counts from the next frame on.
+    0 is motor stop, and arms once held for 300 ms. ``None`` silences the wire, which the ESC takes for a lost signal.
+    ``throttle[i] = 0.5`` sets one ESC, ``throttle[:] = 0.5`` all of them, and ``throttle[:] = [0.5, 0.4, 0.5, 0.4]``
+    each in turn. A value takes effect with the next frame.
     """
 
     def __init__(self, laboratory: Laboratory) -> None:
@@ -61,22 +61,22 @@ class Throttle(Sequence["float | None"]):
 class Emulator:
     """One to eight ESCs with their motors, on one clock, one supply and one MAVLink stream.
 
-    Simulated time goes on only by :meth:`advance`. What comes out depends on the calls and the simulated times at
-    which they come, bit for bit, and not on how time is cut into calls. Several threads may use it, one after the
-    other; what takes long lets Python's other threads run.
+    Simulated time advances only by :meth:`advance`. The results depend, bit for bit, on the calls and the simulated
+    times at which they are made, and not on how time is split into calls. Several threads may use it, one after the
+    other; long calls let Python's other threads run.
 
-    :param bench: a built-in bench (:data:`siskin.BENCHES`) or the path of a file like one: motor, load, supply, and the
-        parameters that the ESCs need for them.
-    :param escs: how many, 1 to 8. Of several each is a peripheral on MAVLink, component 140 and on.
-    :param seed: of all randomness.
-    :param params: parameters over the bench's, by name. They are not stored.
-    :param wire: how throttle is sent, as a scenario's ``bench.wire`` has it: ``"dshot600"``, ``"servo"``...
-    :param storage: the file behind the flash, ``PATH.i`` where there are several ESCs; it is this emulator's alone as
-        long as that lives. Without one nothing is kept.
-    :param record: whether each control period is kept for :meth:`record`.
-    :param trace: whether the control's state is hashed for :attr:`trace_hashes`.
-    :param keys: other keys of a scenario's ``[bench]``, as ``bus="6s"``, ``load="none"`` or ``plant="switching"``.
-    :raises siskin.Error: if something cannot stand on the bench, with what would do.
+    :param bench: a built-in bench (:data:`siskin.BENCHES`) or the path of a file in the same format: motor, load,
+        supply, and the parameters that the ESCs need for them.
+    :param escs: number of ESCs, 1 to 8. If there are several, each is a peripheral on MAVLink, component 140 and on.
+    :param seed: seed of all randomness.
+    :param params: parameters that override the bench's, by name. They are not stored.
+    :param wire: throttle protocol, as in a scenario's ``bench.wire``: ``"dshot600"``, ``"servo"``...
+    :param storage: the file behind the flash, ``PATH.i`` if there are several ESCs; this emulator locks it for as long
+        as it lives. Without one nothing is kept.
+    :param record: whether to keep each control period for :meth:`record`.
+    :param trace: whether to hash the control's state for :attr:`trace_hashes`.
+    :param keys: other keys of a scenario's ``[bench]``, such as ``bus="6s"``, ``load="none"`` or ``plant="switching"``.
+    :raises siskin.Error: if a value is not possible; the text says what is.
     """
 
     def __init__(
@@ -103,10 +103,10 @@ class Emulator:
         self._faults = Faults(self._laboratory)
 
     def advance(self, seconds: float) -> None:
-        """Lets simulated time go on.
+        """Advances simulated time.
 
-        :param seconds: for how long, to the nanosecond.
-        :raises siskin.Error: if that is no time, or the simulated motor has left all bounds.
+        :param seconds: how far, to the nanosecond.
+        :raises siskin.Error: if that is not a valid time, or the simulated motor has left all bounds.
         """
         self._laboratory.advance(seconds)
 
@@ -117,12 +117,12 @@ class Emulator:
 
     @property
     def state(self) -> list[EscState]:
-        """Each ESC and its motor as they are now, with what it has answered in the latest advance."""
+        """The current state of each ESC and its motor, with the ESC's answers from the latest advance."""
         return self._laboratory.states()
 
     @property
     def throttle(self) -> Throttle:
-        """The throttle of each ESC, to be read and set."""
+        """The throttle of each ESC, to read and set."""
         return self._throttle
 
     @throttle.setter
@@ -130,11 +130,11 @@ class Emulator:
         self._throttle[:] = throttle
 
     def send(self, esc: int, datagram: bytes, after_s: float = 0.0) -> None:
-        """Plays a frame on an ESC's wire that a program has made itself; set its :attr:`throttle` to ``None`` first.
+        """Plays a frame of your own on an ESC's wire; set its :attr:`throttle` to ``None`` first.
 
         :param datagram: as over UDP, described in the emulator's guide under "The throttle wire over UDP".
-        :param after_s: when its first edge comes, s from now. One that still plays is waited for.
-        :raises siskin.Error: if it is malformed, or more than 100 ms wait.
+        :param after_s: time of its first edge, s from now. A frame that still plays is waited for.
+        :raises siskin.Error: if it is malformed, or more than 100 ms of frames are waiting.
         """
         self._laboratory.send(_index.one(self._laboratory.escs, esc), datagram, after_s)
 
@@ -147,16 +147,16 @@ class Emulator:
         torque_nm: Values = None,
         wind_rpm: Values = None,
     ) -> None:
-        """Changes what is around the ESCs from now on. What is left out, or ``None``, stays as it is.
+        """Changes the ESCs' surroundings from now on. A value that is left out or ``None`` stays unchanged.
 
-        :param supply_v: voltage of the supply without load, V, 0 to 100: in place of a battery's, which then is never
-            empty.
+        :param supply_v: open-circuit voltage of the supply, V, 0 to 100; replaces that of a battery, which then never
+            runs empty.
         :param supply_ohm: resistance of the supply, Ω, 0 to 100.
-        :param ambient_c: temperature of the air, °C, -60 to 150.
-        :param torque_nm: torque on the shaft beside its load's, Nm, ±100, for all ESCs or for each; positive turns it
-            with the phases in the order a, b, c.
+        :param ambient_c: air temperature, °C, -60 to 150.
+        :param torque_nm: torque on the shaft in addition to its load's, Nm, ±100, for all ESCs or for each; positive
+            turns it with the phases in the order a, b, c.
         :param wind_rpm: air speed, as the speed at which it would turn the propeller by itself, rpm, ±100 000, likewise.
-        :raises siskin.Error: if one is out of its range; nothing has changed then.
+        :raises siskin.Error: if a value is out of range; nothing changes then.
         """
         escs = self._laboratory.escs
         torques = _index.each("torque_nm", escs, torque_nm)
@@ -165,24 +165,24 @@ class Emulator:
 
     @property
     def params(self) -> Params:
-        """The parameters of all ESCs, by name, to be read and set."""
+        """The parameters of all ESCs, by name, to read and set."""
         return self._params
 
     @property
     def mavlink(self) -> MavlinkPipe:
-        """The MAVLink stream of all ESCs, as a pipe of bytes."""
+        """The MAVLink stream of all ESCs, as a byte pipe."""
         return self._mavlink
 
     @property
     def faults(self) -> Faults:
-        """What is broken, to be looked at, added to and mended."""
+        """The faults of each ESC, to list, inject and mend."""
         return self._faults
 
     def record(self, esc: int = 0) -> np.ndarray[Any, np.dtype[np.void]]:
-        """Takes what has been recorded of an ESC since the start or the last call: a row for each control period.
+        """Returns what has been recorded of an ESC since the start or the last call: a row for each control period.
 
         The columns are those of the program's recordings: ``record()["rpm"]`` is the true speed. ``phase`` is an index
-        of :data:`siskin.PHASES`; a number that is not there is NaN. A second takes 1.3 MB at 15 kHz.
+        into :data:`siskin.PHASES`; a missing number is NaN. A second takes 1.3 MB at 15 kHz.
 
         :raises siskin.Error: if the emulator was made without ``record=True``.
         """
@@ -190,7 +190,7 @@ class Emulator:
 
     @property
     def trace_hashes(self) -> list[str]:
-        """A hash over the control's state in every step of each ESC, equal for equal inputs on any machine.
+        """A hash over the control's state in every step, for each ESC; equal for equal inputs on any machine.
 
         :raises siskin.Error: if the emulator was made without ``trace=True``.
         """

@@ -1,4 +1,4 @@
-"""What goes wrong with the ESCs."""
+"""Faults of the simulated ESCs."""
 
 from collections.abc import Sequence
 from typing import overload
@@ -8,7 +8,7 @@ from ._siskin import Laboratory
 
 
 class Faults(Sequence[list[str]]):
-    """What is broken of each ESC: ``faults[i]`` lists the faults of ESC i that act or are to come.
+    """The faults of each ESC: ``faults[i]`` lists those of ESC i that act or are to come.
 
     Kinds and values are those of a scenario's ``[[fault]]``, which the emulator's guide lists.
     """
@@ -27,15 +27,15 @@ class Faults(Sequence[list[str]]):
         at_s: float | None = None,
         for_s: float | None = None,
     ) -> None:
-        """Lets a fault act, in place of one of its kind.
+        """Injects a fault, replacing any of the same kind.
 
-        :param kind: as ``"mosfet_open"``, ``"bus_sag"`` or ``"signal_loss"``.
+        :param kind: such as ``"mosfet_open"``, ``"bus_sag"`` or ``"signal_loss"``.
         :param phase: 0 to 2.
         :param side: ``"low"`` or ``"high"``.
         :param value: in the kind's unit.
-        :param at_s: when, in simulated time; now if it is left out.
-        :param for_s: for how long, s; until it is mended if it is left out.
-        :raises siskin.Error: if there is no such fault, with what would do.
+        :param at_s: when it begins, in simulated time; now if left out.
+        :param for_s: how long it lasts, s; until it is mended if left out.
+        :raises siskin.Error: if there is no such fault; the text says what there is.
         """
         at_s = self._laboratory.now_ns / 1e9 if at_s is None else at_s
         given = {"kind": kind, "phase": phase, "side": side, "value": value, "at_s": at_s, "for_s": for_s}
@@ -44,7 +44,7 @@ class Faults(Sequence[list[str]]):
         self._laboratory.inject(_index.one(len(self), esc), ", ".join(words))
 
     def mend(self, esc: int | None = None) -> None:
-        """Makes whole again all that faults have broken by now, of one ESC or of all."""
+        """Mends everything that faults have broken by now, on one ESC or on all."""
         for each in range(len(self)) if esc is None else [_index.one(len(self), esc)]:
             self._laboratory.mend(each)
 
@@ -65,7 +65,7 @@ class Faults(Sequence[list[str]]):
 
 
 def _toml(value: object) -> str:
-    """A value as TOML has it."""
+    """Returns a value in TOML's notation."""
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return f'"{escaped}"'

@@ -1,4 +1,4 @@
-"""Which ESC is meant, and values for each."""
+"""Indices of ESCs, and values for each."""
 
 from collections.abc import Sequence
 from typing import TypeAlias
@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from ._siskin import Error
 
 Values: TypeAlias = float | Sequence[float | None] | NDArray[np.floating] | None
-"""One for all ESCs, or one for each in turn."""
+"""One value for all ESCs, or one for each in turn."""
 
 
 def one(escs: int, esc: int) -> int:
-    """The number of one of so many ESCs; -1 is the last, as of any list."""
+    """Returns the number of one of this many ESCs; -1 is the last, as in any list."""
     try:
         return range(escs)[esc]
     except IndexError:
@@ -21,7 +21,7 @@ def one(escs: int, esc: int) -> int:
 
 
 def each(name: str, escs: int, values: Values) -> list[float | None]:
-    """A value for each of so many ESCs."""
+    """Returns a value for each of this many ESCs."""
     if values is None or isinstance(values, int | float | np.number):
         return [None if values is None else float(values)] * escs
     listed = [None if value is None else float(value) for value in values]

@@ -8,29 +8,29 @@ from ._siskin import Laboratory
 
 
 class MavlinkPipe:
-    """The MAVLink stream of the ESCs: what is written goes to all of them, what they send is read.
+    """The MAVLink stream of the ESCs: a write goes to all of them, a read returns what they send.
 
-    pymavlink's ``MAVLink`` takes it as the file that it sends to; :meth:`connection` is a connection of its
-    ``mavutil``. The ESCs' latest 64 KB wait to be read, in whole frames.
+    pymavlink's ``MAVLink`` accepts it as the file to send to; :meth:`connection` returns a connection of its
+    ``mavutil``. The ESCs' latest 64 KB are kept to be read, in whole frames.
     """
 
     def __init__(self, laboratory: Laboratory) -> None:
         self._laboratory = laboratory
 
     def write(self, data: bytes) -> int:
-        """Sends bytes to the ESCs; gives how many those were."""
+        """Sends bytes to the ESCs; returns their number."""
         self._laboratory.receive(bytes(data))
         return len(data)
 
     def read(self, size: int = -1) -> bytes:
-        """What the ESCs have sent, at most ``size`` bytes; never waits."""
+        """Returns what the ESCs have sent, at most ``size`` bytes; never waits."""
         return self._laboratory.take_sent(size if size >= 0 else 1 << 32)
 
     def connection(self, *, dialect: str = "ardupilotmega", source_system: int = 255, step_s: float = 0.01) -> Any:
-        """A ``mavutil.mavfile`` on this pipe, for whatever is written for pymavlink.
+        """Returns a ``mavutil.mavfile`` on this pipe, for code written for pymavlink.
 
-        Where it waits for a message, simulated time goes on, by ``step_s`` at a time. What has waited to be read
-        until now is left out.
+        While it waits for a message, simulated time advances by ``step_s`` at a time. Bytes not read until now are
+        dropped.
 
         :raises ImportError: without pymavlink: ``pip install pymavlink``.
         """

@@ -7,14 +7,14 @@ from ._siskin import PARAMETERS, Laboratory
 
 
 class Params(MutableMapping[str, float]):
-    """The parameters of the ESCs by name, as in the table of the control's guide.
+    """The parameters of the ESCs by name, as in the parameter table.
 
-    ``params["CTL_MODE"]`` is the value of the first ESC, and ``params["CTL_MODE"] = 2`` sets that of all; ``params.of(2)``
-    has those of ESC 2 alone. A value is taken as from a ground station: it is in force within a millisecond, it stores
-    itself, and most are refused while the motor turns.
+    ``params["CTL_MODE"]`` is the value of the first ESC, and ``params["CTL_MODE"] = 2`` sets it on all; ``params.of(2)``
+    has the parameters of ESC 2 alone. A value is treated like one from a ground station: it is in force within a
+    millisecond, it stores itself, and most are refused while the motor turns.
 
-    :raises KeyError: for a name that no parameter has.
-    :raises siskin.Error: for a value that is out of range or refused, with the reason.
+    :raises KeyError: if no parameter has the name.
+    :raises siskin.Error: if a value is out of range or refused, with the reason.
     """
 
     def __init__(self, laboratory: Laboratory, escs: range | None = None) -> None:

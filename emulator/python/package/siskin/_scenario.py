@@ -11,10 +11,10 @@ from ._siskin import Plan
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a scenario came to."""
+    """The result of a scenario."""
 
     summary: dict[str, Any]
-    """All of it, as the program prints it with ``--json``."""
+    """The whole result, as the program prints it with ``--json``."""
 
     @property
     def held(self) -> bool:
@@ -23,17 +23,17 @@ class Outcome:
 
     @property
     def windows(self) -> dict[str, dict[str, Any]]:
-        """The figures of each measuring window, by its name."""
+        """The figures of each measuring window, by name."""
         return {window["name"]: window for window in self.summary["windows"]}
 
     @property
     def faults(self) -> list[str]:
-        """Faults that have turned the bridge off, as the ESC names them."""
+        """Faults that turned the bridge off, as the ESC names them."""
         return list(self.summary["faults"])
 
     @property
     def warnings(self) -> list[str]:
-        """What the ESC has told while the motor turned on with it: an open phase, a sensor at fault."""
+        """What the ESC reported while the motor kept running, such as an open phase or a faulty sensor."""
         return list(self.summary.get("warnings", []))
 
     @property
@@ -54,11 +54,11 @@ def scenario(
     """Plays the only run of a scenario, or the first, as ``siskin-emulator scenario`` does: equal bits, equal figures.
 
     :param path: the scenario, a TOML file.
-    :param seed: another seed than the file's.
-    :param record: where each control period is written, as ``--record`` has it.
-    :param overrides: keys of the file with the value that each takes, as ``{"params.CTL_RPM_MAX": 5000,
-        "bench.load": "none"}``; the entries of an array count from 0. ``**more`` are others.
-    :raises siskin.Error: if it makes no sense or cannot be played, with the program's text.
+    :param seed: a seed in place of the file's.
+    :param record: file to which each control period is written, as by ``--record``.
+    :param overrides: keys of the file with their values, as ``{"params.CTL_RPM_MAX": 5000, "bench.load": "none"}``;
+        array entries count from 0. ``**more`` are further ones.
+    :raises siskin.Error: if the scenario is invalid or cannot be played, with the program's text.
     """
     seeds = None if seed is None else (seed, seed)
     return Outcome(json.loads(Plan(path, seeds, {**(overrides or {}), **more}, record).play()))

@@ -19,10 +19,10 @@ Cells: TypeAlias = list[tuple[str, Cell]]
 
 
 class Table(Sequence[Mapping[str, Cell]]):
-    """A row for each run: its seed, the keys that were swept or drawn, every figure of every window, and the verdicts.
+    """A row for each run: its seed, the swept or drawn keys, every figure of every window, and the verdicts.
 
-    ``table[0]["held"]`` is whether all expectations of the first run held; ``table["steady.rpm_mean"]`` is a column.
-    ``pandas.DataFrame(list(table))`` makes a frame of it. Two tables are equal if every bit of them is.
+    ``table[0]["held"]`` says whether all expectations of the first run held; ``table["steady.rpm_mean"]`` is a column.
+    ``pandas.DataFrame(list(table))`` makes a data frame of it. Two tables are equal if every bit of them is.
     """
 
     def __init__(self, rows: list[Cells]) -> None:
@@ -50,7 +50,7 @@ class Table(Sequence[Mapping[str, Cell]]):
         return (dict(row) for row in self._rows)
 
     def __eq__(self, other: object) -> bool:
-        # By their texts, which say each double exactly, and are equal for nothing and nothing.
+        # By their texts, which give each double exactly, and are equal for two missing values.
         return isinstance(other, Table) and repr(self._rows) == repr(other._rows)
 
     __hash__ = None  # type: ignore[assignment]
@@ -61,11 +61,11 @@ class Table(Sequence[Mapping[str, Cell]]):
 
     @property
     def columns(self) -> list[str]:
-        """The names of all columns, in the order in which they come."""
+        """The names of all columns, in order."""
         return list(dict.fromkeys(name for row in self._rows for name, _ in row))
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
-        """Writes the table: byte for byte what the program writes with ``--table``.
+        """Writes the table as CSV, byte for byte what the program writes with ``--table``.
 
         :raises siskin.Error: if the path does not end in ``.csv``, or cannot be written.
         """
@@ -83,16 +83,16 @@ def sweep(
     retries: int = 3,
     **more: Any,
 ) -> Table:
-    """Plays all runs that a scenario stands for, on all cores or on a cluster; the table is the same, bit for bit.
+    """Plays all runs of a scenario, on all cores or on a cluster; the table is the same, bit for bit.
 
     :param path: the scenario, a TOML file.
-    :param seeds: plays it for each of these seeds, as ``range(1, 201)``.
-    :param threads: how many at once here; all cores if it is left out.
-    :param client: a ``dask.distributed.Client``: its workers play the runs, of which it takes care. The scenario, and
-        the files that it names, have to be there under the same path.
-    :param retries: how often the cluster tries a part again that has failed.
-    :param overrides: keys of the file with the one value that each takes, as :func:`siskin.scenario` has them.
-    :raises siskin.Error: if it makes no sense or cannot be played, with the program's text.
+    :param seeds: plays it once for each of these seeds, as ``range(1, 201)``.
+    :param threads: number of runs at once on this machine; all cores if left out.
+    :param client: a ``dask.distributed.Client``, whose workers play the runs. They must find the scenario, and the
+        files that it names, under the same path.
+    :param retries: how often the cluster retries a part that has failed.
+    :param overrides: keys of the file with one value each, as for :func:`siskin.scenario`.
+    :raises siskin.Error: if the scenario is invalid or cannot be played, with the program's text.
     """
     ends, given = _ends(seeds), {**(overrides or {}), **more}
     if client is None:
@@ -108,11 +108,11 @@ def _on_cluster(
 ) -> list[Cells]:
     runs = Plan(path, ends, overrides, None).runs
     text = _hash(path)
-    # Small enough for all to end at about the same time, and for little to be lost with a worker.
+    # Parts are small, so that all workers end at about the same time and little is lost with one.
     workers = sum(client.nthreads().values()) or 1
     step = max(1, runs // (16 * workers))
     parts = [(first, min(first + step, runs)) for first in range(0, runs, step)]
-    # `pure` would let an equal sweep of before answer, whatever has become of the files since.
+    # With `pure`, an earlier equal sweep would answer, even if the files have changed since.
     futures = client.map(
         _part, parts, path=path, ends=ends, overrides=overrides, text=text, pure=False, retries=retries
     )
@@ -122,7 +122,7 @@ def _on_cluster(
 def _part(
     part: tuple[int, int], path: Path, ends: tuple[int, int] | None, overrides: dict[str, Any], text: str
 ) -> list[Cells]:
-    """Some of the runs, on a worker: on one thread, since each thread of a worker has a part of its own."""
+    """Plays some of the runs on a worker: on one thread, since each of a worker's threads has a part of its own."""
     if _hash(path) != text:
         raise Error(f"{path}: the file differs between this worker and who has asked it; give both the same")
     return Plan(path, ends, overrides, None).rows(*part, 1)
@@ -144,7 +144,7 @@ def _ends(seeds: range | None) -> tuple[int, int] | None:
 
 
 def _array(values: list[Cell]) -> np.ndarray[Any, np.dtype[Any]]:
-    """A column: numbers as f64 with NaN for nothing, flags as bool, and what else there is as objects."""
+    """Returns a column: numbers as f64 with NaN for missing ones, flags as bool, anything else as objects."""
     if all(isinstance(value, bool) for value in values):
         return np.array(values, dtype=bool)
     if all(value is None or isinstance(value, int | float) and not isinstance(value, bool) for value in values):
