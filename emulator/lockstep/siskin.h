@@ -1,5 +1,5 @@
-/* A client of the Siskin emulator in lockstep, for C99 on POSIX systems: LOCKSTEP.md beside its folder says what the
- * datagrams are. Calls return 0, or -1 where the emulator does not answer or refuses, with errno set. */
+/* A lockstep client for the Siskin emulator, for C99 on POSIX systems; LOCKSTEP.md in the folder above describes the
+ * datagrams. Calls return 0, or -1 with errno set if the emulator does not answer or refuses. */
 #ifndef SISKIN_H
 #define SISKIN_H
 
@@ -18,7 +18,7 @@
 #define SISKIN_DSHOT600 12
 #define SISKIN_BIDIRECTIONAL_DSHOT600 22
 
-/* An ESC and its motor, in the units of LOCKSTEP.md. */
+/* State of an ESC and its motor, in the units of LOCKSTEP.md. */
 struct siskin_esc {
     double rpm, angle_turns, torque_nm, currents_a[3], bus_a, bus_v, board_c;
     float reported_rpm, reported_bus_v, reported_bus_a, reported_c;
@@ -34,10 +34,10 @@ struct siskin {
     uint32_t refused, left_out;
     unsigned escs;
     struct siskin_esc esc[SISKIN_ESCS];
-    /* The latest state as it came, and where the answers begin in it. */
+    /* The latest state as received, and where the answers begin in it. */
     uint8_t state[SISKIN_BYTES];
     size_t state_len, answers_at;
-    /* The request that is being written. */
+    /* The request under construction. */
     uint8_t request[SISKIN_BYTES];
     size_t request_len;
     unsigned frames;
@@ -81,7 +81,7 @@ static inline void siskin_put_f64(uint8_t *to, double value) {
     siskin_put(to, bits, 8);
 }
 
-/* Reads the state that has come. */
+/* Parses the received state. */
 static inline int siskin_read(struct siskin *s) {
     const uint8_t *b = s->state;
     if (s->state_len < 24 || b[0] != 40 || b[1] != SISKIN_VERSION || b[2] > SISKIN_ESCS
@@ -116,7 +116,7 @@ static inline int siskin_read(struct siskin *s) {
     return 0;
 }
 
-/* Sends the request until the state with this sequence number comes; any state will do for `ask`. */
+/* Sends the request until the state with this sequence number arrives; for `ask`, any state will do. */
 static inline int siskin_call(struct siskin *s, uint32_t sequence, int ask) {
     for (int attempt = 0; attempt < 50; attempt++) {
         if (send(s->socket, s->request, s->request_len, 0) < 0 && errno != ECONNREFUSED) return -1;
@@ -164,7 +164,7 @@ static inline void siskin_close(struct siskin *s) {
     close(s->socket);
 }
 
-/* Adds a datagram of the throttle wire to the advance that comes, for an ESC's in order. */
+/* Adds a throttle-wire datagram to the next advance; those of one ESC in order. */
 static inline int siskin_frame(struct siskin *s, unsigned esc, uint32_t offset_ns, const uint8_t *datagram, uint16_t len) {
     uint8_t *at = s->request + s->request_len;
     if (s->frames == SISKIN_FRAMES || s->request_len + 8 + len > sizeof s->request) {
@@ -181,7 +181,7 @@ static inline int siskin_frame(struct siskin *s, unsigned esc, uint32_t offset_n
     return 0;
 }
 
-/* Adds a DShot frame of a protocol of the wire: 0 is motor stop, 48 to 2047 are throttle. */
+/* Adds a DShot frame in one of the wire's protocols: 0 is motor stop, 48 to 2047 are throttle. */
 static inline int siskin_dshot(struct siskin *s, unsigned esc, uint32_t offset_ns, uint8_t protocol, unsigned value) {
     unsigned data = value << 1;
     unsigned check = (data ^ data >> 4 ^ data >> 8) & 0xF;
@@ -190,7 +190,7 @@ static inline int siskin_dshot(struct siskin *s, unsigned esc, uint32_t offset_n
     return siskin_frame(s, esc, offset_ns, datagram, sizeof datagram);
 }
 
-/* Lets time go on, with the frames that have been added. */
+/* Advances time, with the frames added so far. */
 static inline int siskin_advance(struct siskin *s, uint32_t time_ns) {
     uint32_t sequence = s->sequence + 1;
     s->request[0] = 41;
@@ -204,8 +204,8 @@ static inline int siskin_advance(struct siskin *s, uint32_t time_ns) {
     return told;
 }
 
-/* Changes what is around the ESCs; NaN leaves a value as it is. `shafts` has for each ESC its torque, Nm, and air
- * speed, rpm, or is NULL. To be called before the frames of an advance are added. */
+/* Changes the ESCs' surroundings; NaN leaves a value unchanged. `shafts` has each ESC's torque, Nm, and air speed,
+ * rpm, or is NULL. Call it before adding the frames of an advance. */
 static inline int siskin_environment(struct siskin *s, double supply_v, double supply_ohm, double ambient_c, const double (*shafts)[2]) {
     uint32_t sequence = s->sequence + 1;
     unsigned count = shafts ? s->escs : 0;
@@ -228,7 +228,7 @@ static inline int siskin_environment(struct siskin *s, double supply_v, double s
     return told;
 }
 
-/* The next answer of the latest advance, beginning with `*at` and `*nth` of 0; -1 after the last. */
+/* Reads the next answer of the latest advance, starting with `*at` and `*nth` of 0; returns -1 after the last. */
 static inline int siskin_next(const struct siskin *s, size_t *at, unsigned *nth, struct siskin_answer *answer) {
     unsigned before = 0;
     size_t here = s->answers_at + *at;

@@ -1,4 +1,4 @@
-//! Values of Python as those of a scenario's file and of a table, and back.
+//! Converts Python values to those of a scenario file and of a table, and back.
 
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -8,9 +8,9 @@ use toml::{Table, Value};
 
 use crate::Error;
 
-/// A value of a scenario's file.
+/// Converts a value to that of a scenario file.
 pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
-    // A bool is an int in Python, and so comes first.
+    // A bool is also an int in Python, so it comes first.
     if let Ok(flag) = value.cast::<PyBool>() {
         return Ok(Value::Boolean(flag.is_true()));
     }
@@ -27,7 +27,7 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(text) = value.extract::<String>() {
         return Ok(Value::String(text));
     }
-    // Numbers of numpy too.
+    // Includes numpy's numbers.
     if let Ok(number) = value.extract::<f64>() {
         return Ok(Value::Float(number));
     }
@@ -36,14 +36,14 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
     Err(Error::new_err(what))
 }
 
-/// A table of a scenario's file.
+/// Converts a dict to a table of a scenario file.
 pub(crate) fn to_table(table: &Bound<'_, PyDict>) -> PyResult<Table> {
     let entries = table.iter();
     let entries = entries.map(|(key, value)| Ok((key.extract()?, to_toml(&value)?)));
     entries.collect()
 }
 
-/// A run's cells as pairs of a name and None, a bool, an int, a float or a str.
+/// Converts a run's cells to pairs of a name and None, a bool, an int, a float or a str.
 pub(crate) fn cells<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyList>> {
     let cells = row.cells().iter().map(|(name, cell)| {
         let value = match cell {
@@ -58,7 +58,7 @@ pub(crate) fn cells<'py>(py: Python<'py>, row: &Row) -> PyResult<Bound<'py, PyLi
     PyList::new(py, cells.collect::<PyResult<Vec<_>>>()?)
 }
 
-/// The run that such cells are of.
+/// Converts such cells back to a run.
 pub(crate) fn row(cells: Vec<(String, Bound<'_, PyAny>)>) -> PyResult<Row> {
     let cells = cells.into_iter().map(|(name, value)| {
         let cell = if value.is_none() {

@@ -1,4 +1,4 @@
-//! Work that goes on while Python's other threads run, until it is done or Ctrl-C is pressed.
+//! Runs work beside Python's other threads, until it is done or Ctrl-C is pressed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -9,10 +9,10 @@ use pyo3::prelude::*;
 
 use crate::Error;
 
-/// Time between two looks for Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Does some work on a thread of its own, and sets what it is given once Ctrl-C is pressed.
+/// Runs `work` on a thread of its own, and sets the flag that it is given once Ctrl-C is pressed.
 ///
 /// # Errors
 /// What Ctrl-C raises in Python.
@@ -26,7 +26,7 @@ pub(crate) fn run<T: Send>(
         thread::scope(|scope| {
             let worker = scope.spawn(move || {
                 let result = work(stop);
-                // Whoever waits for it is there until it has come.
+                // The receiver outlives the send: it waits for it.
                 let _ = done.send(());
                 result
             });
@@ -45,7 +45,7 @@ pub(crate) fn run<T: Send>(
     })
 }
 
-/// What Ctrl-C raises, if it has been pressed. Python looks for it on its main thread only.
+/// Returns what Ctrl-C raises, if it has been pressed. Python checks for it on its main thread only.
 fn pressed() -> PyResult<()> {
     Python::attach(|py| {
         py.check_signals()?;

@@ -1,4 +1,4 @@
-//! ESCs that run as a Python program says.
+//! ESCs in simulated time, driven by a Python program.
 
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -17,7 +17,7 @@ use crate::Error;
 use crate::convert::to_table;
 use crate::state::{EscState, Reply};
 
-/// Simulated time between two looks for Ctrl-C, ns: some milliseconds of the wall's.
+/// Simulated time between two checks for Ctrl-C, ns: some milliseconds of wall time.
 const LOOK_NS: u64 = 500_000_000;
 
 /// The longest advance, s.
@@ -34,9 +34,9 @@ pub(crate) struct Laboratory {
 }
 
 impl Laboratory {
-    /// Does something with the ESCs, while Python's other threads run: one of them may have hold of them.
+    /// Runs `work` on the ESCs while Python's other threads run, one of which may hold them.
     ///
-    /// After a panic it refuses: what that has left half done is no ESC any more.
+    /// Refuses after a panic, which may have left the ESCs half updated.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
@@ -65,7 +65,7 @@ fn known(name: &str) -> PyResult<ParamId> {
     ParamId::find(name).ok_or_else(|| PyKeyError::new_err(format!("there is no parameter {name}")))
 }
 
-/// Nanoseconds in seconds of a program.
+/// Converts a program's seconds to nanoseconds.
 fn ns(seconds: f64) -> PyResult<u64> {
     if (0.0..=ADVANCE_MAX_S).contains(&seconds) {
         Ok((seconds * 1e9).round() as u64)

@@ -1,7 +1,7 @@
-//! What the Python package `siskin` is made on: the emulator's laboratory and its scenarios, by calls from Python.
+//! Compiled core of the Python package `siskin`: the emulator's laboratory and scenarios, called from Python.
 //!
-//! The package's own files give it the shape that a person uses. Whatever runs for long lets other threads of Python
-//! go on, and ends with Ctrl-C.
+//! The package's Python files give it the interface that users see. Long calls let Python's other threads run, and end
+//! on Ctrl-C.
 #![forbid(unsafe_code)]
 
 mod convert;

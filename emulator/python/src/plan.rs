@@ -1,4 +1,4 @@
-//! Scenarios that a Python program plays.
+//! Scenarios played by a Python program.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -11,7 +11,7 @@ use siskin_emulator::scenario::{self, Options, Row, Table};
 use crate::convert::{cells, row, to_table};
 use crate::{Error, interrupt};
 
-/// A scenario that has been read and found to make sense.
+/// A scenario that has been read and validated.
 #[pyclass(frozen, module = "siskin._siskin")]
 pub(crate) struct Plan {
     plan: scenario::Plan,
@@ -24,7 +24,7 @@ impl Plan {
     }
 }
 
-/// As the program has it.
+/// Makes an error with the text that the program prints.
 fn wrong(path: &std::path::Path, error: impl ToString) -> PyErr {
     Error::new_err(format!("{}: {}", path.display(), error.to_string()))
 }
@@ -57,14 +57,14 @@ impl Plan {
         self.plan.runs()
     }
 
-    /// Plays the only run; the program's summary of it as JSON.
+    /// Plays the only run. Returns the program's summary as JSON.
     fn play(&self, py: Python<'_>) -> PyResult<String> {
         let played = interrupt::run(py, |stop| self.plan.play(stop))?;
         let outcome = played.map_err(|error| self.wrong(error))?;
         serde_json::to_string(&outcome).map_err(|error| self.wrong(error))
     }
 
-    /// Plays some runs, on so many threads or on all processors: the cells of each.
+    /// Plays some runs, on this many threads or on all processors. Returns the cells of each.
     #[pyo3(signature = (first, end, threads))]
     fn rows<'py>(
         &self,

@@ -1,16 +1,16 @@
-//! What is told of an ESC.
+//! The state of an ESC as Python sees it.
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use siskin_control::drive::Fault;
 use siskin_emulator::rack;
 
-/// What the drive does, by the number of its phase.
+/// Names of the drive's phases, by number.
 pub(crate) const PHASES: [&str; 9] = [
     "idle", "sense", "charge", "park", "ramp", "run", "stopping", "brake", "tone",
 ];
 
-/// An ESC and its motor as they are at the beginning of its next control period.
+/// The state of an ESC and its motor at the beginning of its next control period.
 ///
 /// Means are over the latest :meth:`siskin.Emulator.advance`.
 #[pyclass(frozen, eq, module = "siskin")]
@@ -20,16 +20,16 @@ pub(crate) struct EscState {
     pub(crate) replies: Vec<Reply>,
 }
 
-/// What an ESC itself takes its motor and its supply for.
+/// The state of motor and supply as the ESC itself reports it.
 #[pyclass(frozen, eq, module = "siskin")]
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reported(rack::Reported);
 
-/// What an ESC has put on its throttle wire or its serial line: a reply to a bidirectional frame, or telemetry.
+/// An ESC's answer on its throttle wire or serial line: a reply to a bidirectional frame, or telemetry.
 #[pyclass(frozen, eq, module = "siskin")]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Reply {
-    /// When the frame began that is answered, ns of simulated time.
+    /// When the answered frame began, ns of simulated time.
     #[pyo3(get)]
     pub(crate) asked_ns: u64,
     pub(crate) datagram: Vec<u8>,
@@ -37,7 +37,7 @@ pub(crate) struct Reply {
 
 #[pymethods]
 impl EscState {
-    /// Speed of the shaft, rpm; positive with the phases in the order a, b, c.
+    /// Shaft speed, rpm; positive with the phases in the order a, b, c.
     #[getter]
     fn rpm(&self) -> f64 {
         self.state.rpm
@@ -61,25 +61,25 @@ impl EscState {
         self.state.currents_a.into()
     }
 
-    /// Current from the supply, A, mean; negative is given back.
+    /// Supply current, A, mean; negative is returned to the supply.
     #[getter]
     fn bus_a(&self) -> f64 {
         self.state.bus_a
     }
 
-    /// Voltage of the supply, V.
+    /// Supply voltage, V.
     #[getter]
     fn bus_v(&self) -> f64 {
         self.state.bus_v
     }
 
-    /// Temperature of the board, °C.
+    /// Board temperature, °C.
     #[getter]
     fn board_c(&self) -> f64 {
         self.state.board_c
     }
 
-    /// What the ESC itself takes these for.
+    /// These quantities as the ESC itself reports them.
     #[getter]
     fn reported(&self) -> Reported {
         Reported(self.state.reported)
@@ -97,13 +97,13 @@ impl EscState {
         self.state.armed
     }
 
-    /// What the drive does: idle, sense, charge, park, ramp, run, stopping, brake or tone.
+    /// Phase of the drive: idle, sense, charge, park, ramp, run, stopping, brake or tone.
     #[getter]
     fn phase(&self) -> &'static str {
         PHASES[self.state.phase as usize]
     }
 
-    /// What the ESC has answered in the latest advance, in order.
+    /// The ESC's answers during the latest advance, in order.
     #[getter]
     fn replies(&self) -> Vec<Reply> {
         self.replies.clone()
@@ -124,7 +124,7 @@ impl EscState {
 
 #[pymethods]
 impl Reported {
-    /// Mechanical speed, rpm; forward is positive, whichever way ``MOT_DIR`` turns it.
+    /// Mechanical speed, rpm; forward is positive, whichever way ``MOT_DIR`` turns the motor.
     #[getter]
     fn rpm(&self) -> f32 {
         self.0.rpm
@@ -142,7 +142,7 @@ impl Reported {
         self.0.bus_a
     }
 
-    /// Temperature of the board, °C.
+    /// Board temperature, °C.
     #[getter]
     fn temperature_c(&self) -> f32 {
         self.0.temperature_c
