@@ -1,24 +1,24 @@
-//! Table 1 of the second paper, solved for the speed.
+//! Table 1 of the second paper, solved for speed.
 //!
-//! What leads and what lags are counted apart, each at its worst: hold-off and digital delay are
-//! anything from nothing to their amount, so that they cannot be relied on to make up for a lead.
+//! Leading and lagging errors are summed separately, each at its worst: hold-off and digital delay may be
+//! anything from zero to their full amount, so they cannot be relied on to cancel a lead.
 //!
-//! Between the speeds at which N or A_e change, every contribution is a convex function of the
-//! speed: those that an acceleration makes fall like 1/ω², the integrator's like 1/ω, and the rest
-//! grow with ω. So is the greater of their sums, and what it leaves within a bound is one range.
+//! Between the speeds at which N or A_e change, every contribution is a convex function of speed: those due
+//! to acceleration fall like 1/ω², the integrator's like 1/ω, and the rest grow with ω. So is the larger of
+//! the two sums, and the speeds at which it is within a bound form one range.
 
 use siskin_control::control::observer::limits;
 
-/// N where the speed is measured from edge to edge.
+/// N when the speed is measured from edge to edge.
 const EDGE_TO_EDGE: f64 = 1.0 / 6.0;
 
-/// Halvings of an interval: as many as a double has bits.
+/// Bisection steps: as many as a double has bits.
 const HALVINGS: usize = 64;
 
-/// Steps of the search for the least error, each of which leaves two thirds: to 1e-15.
+/// Steps of the search for the minimum error, each of which keeps two thirds: down to 1e-15.
 const THIRDS: usize = 90;
 
-/// For how long crossings are not looked for.
+/// How long crossings are ignored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum HoldOff {
     /// T_h, s.
@@ -27,7 +27,7 @@ pub(crate) enum HoldOff {
     Angle(f64),
 }
 
-/// What the errors come from. Speeds are electrical, rad/s; accelerations rad/s².
+/// What the errors follow from. Speeds are electrical, rad/s; accelerations rad/s².
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Settings {
     /// τ_int, s; may be infinite.
@@ -37,14 +37,14 @@ pub(crate) struct Settings {
     pub(crate) hold_off: HoldOff,
     /// N.
     pub(crate) turns: f64,
-    /// Whether every crossing ends a measurement of the speed, as in the drive; else one in N turns
+    /// Whether every crossing completes a speed measurement, as in the drive; otherwise one in N turns
     /// does, as in the paper.
     pub(crate) every_edge: bool,
-    /// Below this N is 1/6.
+    /// Below this speed N is 1/6.
     pub(crate) whole_turns_above: f64,
     /// A_e.
     pub(crate) a_e: f64,
-    /// Below this A_e is 0.
+    /// Below this speed A_e is 0.
     pub(crate) filter_above: f64,
     /// T_s, s.
     pub(crate) period_s: f64,
@@ -52,14 +52,14 @@ pub(crate) struct Settings {
     pub(crate) braking: f64,
 }
 
-/// A row of Table 1, as it is told.
+/// A row of Table 1, as printed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Contribution {
     pub(crate) source: &'static str,
     pub(crate) deg: f64,
 }
 
-/// The errors of one direction at a speed, those of a kind that is zero left out, the greatest first.
+/// The errors in one direction at a given speed, without those that are zero, largest first.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Errors {
     /// Whether the estimate is ahead of the rotor.
@@ -67,7 +67,7 @@ pub(crate) struct Errors {
     pub(crate) contributions: Vec<Contribution>,
 }
 
-/// A speed at which the bound is reached, and by what.
+/// A speed at which the bound is reached, and what reaches it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct End {
     /// Electrical speed, rad/s.
@@ -76,7 +76,7 @@ pub(crate) struct End {
     pub(crate) errors: Errors,
 }
 
-/// Speeds within the bound; without a lowest one they begin at standstill.
+/// A range of speeds within the bound; without a lowest one it begins at standstill.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Range {
     pub(crate) lowest: Option<End>,
@@ -92,14 +92,14 @@ struct Piece {
 }
 
 impl Errors {
-    /// Their sum.
+    /// Returns their sum.
     pub(crate) fn total_deg(&self) -> f64 {
         self.contributions.iter().map(|row| row.deg).sum()
     }
 }
 
 impl Settings {
-    /// The ranges of the speed in which no error is above the bound, from the lowest.
+    /// Returns the speed ranges in which no error exceeds the bound, lowest first.
     pub(crate) fn ranges(&self, bound_deg: f64) -> Vec<Range> {
         let mut found: Vec<(f64, f64)> = Vec::new();
         let pieces = self.pieces(bound_deg);
@@ -119,7 +119,7 @@ impl Settings {
             })
         };
         let range = |(low, high): (f64, f64)| {
-            // Just beyond an end N and A_e may be others.
+            // Just beyond an end, N and A_e may differ.
             let below = pieces.iter().find(|p| p.from < low && low <= p.to);
             let above = pieces.iter().find(|p| p.from <= high && high < p.to);
             Some(Range {
@@ -130,7 +130,7 @@ impl Settings {
         found.into_iter().filter_map(range).collect()
     }
 
-    /// The speed with the least error up to where the delay alone reaches the bound.
+    /// Returns the speed with the smallest error, up to where the delay alone reaches the bound.
     pub(crate) fn best(&self, bound_deg: f64) -> Option<End> {
         let ends = self.pieces(bound_deg).into_iter().map(|piece| {
             let omega = self.quietest(&piece);
@@ -142,7 +142,7 @@ impl Settings {
         ends.min_by(|one, other| one.errors.total_deg().total_cmp(&other.errors.total_deg()))
     }
 
-    /// N and A_e over the speed, up to where the digital delay alone reaches the bound.
+    /// Returns N and A_e over speed, up to where the digital delay alone reaches the bound.
     fn pieces(&self, bound_deg: f64) -> Vec<Piece> {
         let top = bound_deg.to_radians() / self.period_s;
         let mut ends = [0.0, self.whole_turns_above, self.filter_above, top];
@@ -167,7 +167,7 @@ impl Settings {
             .collect()
     }
 
-    /// The part of a piece that is within the bound.
+    /// Returns the part of a piece that is within the bound.
     fn within(&self, piece: &Piece, bound_deg: f64) -> Option<(f64, f64)> {
         let sound = |omega| self.worst(piece, omega).total_deg() <= bound_deg;
         let middle = self.quietest(piece);
@@ -192,7 +192,7 @@ impl Settings {
         Some((limit(piece.from), limit(piece.to)))
     }
 
-    /// Where in a piece the error is least, which is one place for a convex function.
+    /// Returns where in a piece the error is smallest: a single point, as the function is convex.
     fn quietest(&self, piece: &Piece) -> f64 {
         let total = |omega| self.worst(piece, omega).total_deg();
         let (mut low, mut high) = (piece.from, piece.to);
@@ -213,7 +213,7 @@ impl Settings {
             })
     }
 
-    /// The greater of what leads and what lags.
+    /// Returns the larger of the leading and the lagging errors.
     fn worst(&self, piece: &Piece, omega: f64) -> Errors {
         let by_acceleration = |alpha: f64| {
             let k = if self.every_edge {
@@ -271,10 +271,10 @@ fn errors<const N: usize>(
 mod tests {
     use super::*;
 
-    /// Electrical rad/s of a mechanical rpm, 14 poles.
+    /// Electrical rad/s per mechanical rpm, 14 poles.
     const RAD_S_PER_RPM: f64 = 7.0 * std::f64::consts::TAU / 60.0;
 
-    /// Figure 28: nothing but acceleration and sampling.
+    /// Figure 28: acceleration and sampling only.
     fn figure_28() -> Settings {
         Settings {
             tau_int_s: f64::INFINITY,
@@ -306,7 +306,7 @@ mod tests {
         let [(from, to)] = *found else {
             panic!("{found:?}")
         };
-        // "About 1,000", for what its formula makes 885; the rest is within 5 %.
+        // The paper says "about 1,000" where its formula gives 885; the rest is within 5 %.
         assert!((from / low - 1.0).abs() < 0.15, "{from}");
         assert!((to / high - 1.0).abs() < 0.05, "{to}");
     }
@@ -356,7 +356,7 @@ mod tests {
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((found[0].1 - 1200.0).abs() < 1e-6, "{found:?}");
         assert!(found[1].0 > 1500.0 && found[1].0 < 2000.0, "{found:?}");
-        // What breaks it off is the filter that begins there.
+        // The filter that begins there ends the range.
         let end = &settings.ranges(20.0)[0].highest;
         assert_eq!(end.errors.contributions[0].source, "position filter");
         assert!(end.errors.total_deg() > 20.0);
@@ -382,7 +382,7 @@ mod tests {
             ..figure_28()
         };
         let lowest = |settings: &Settings| rpm(settings, 10.0)[0].0;
-        // √(7/17) of it, where sampling adds nothing.
+        // √(7/17) of it, if sampling added nothing.
         let share = lowest(&settings) / lowest(&figure_28());
         assert!((0.55..0.65).contains(&share), "{share}");
     }
@@ -404,7 +404,7 @@ mod tests {
         assert!(figure_28().ranges(3.0).is_empty());
         let best = figure_28().best(3.0).expect("a speed");
         assert!(best.errors.total_deg() > 3.0);
-        // Nowhere up to there is it less.
+        // The error is nowhere smaller up to there.
         for step in 1..1000 {
             let omega = 3.0_f64.to_radians() * 15_625.0 * f64::from(step) / 1000.0;
             let piece = &figure_28().pieces(3.0)[0];

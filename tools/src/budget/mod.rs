@@ -1,4 +1,4 @@
-//! `siskin budget`: between which speeds the flux crossings hold the rotor's angle.
+//! `siskin budget`: the speeds between which the flux crossings hold the rotor's angle.
 
 mod limits;
 mod motor;
@@ -10,7 +10,7 @@ use crate::cli::BudgetArgs;
 use crate::error::Error;
 use motor::Motor;
 
-/// Computes and prints it. `component` is whose parameters a file of several gives.
+/// Computes and prints the budget. `component` selects whose parameters to take from a file with several.
 ///
 /// # Errors
 /// [`Error::Usage`] or [`Error::File`] for bad input.

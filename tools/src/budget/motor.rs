@@ -1,4 +1,4 @@
-//! The motor and the settings that a budget is made for: from parameters and from the command line.
+//! The motor and settings of a budget, from parameters and the command line.
 
 use std::f64::consts::TAU;
 
@@ -9,14 +9,14 @@ use crate::cli::BudgetArgs;
 use crate::error::Error;
 use crate::given;
 
-/// A motor and what its angle is found with.
+/// A motor and the settings by which its angle is found.
 pub(crate) struct Motor {
     pub(crate) pole_pairs: f64,
     pub(crate) settings: Settings,
 }
 
 impl Motor {
-    /// What the arguments say over what the parameters do.
+    /// Builds it from the parameters, which the arguments override.
     ///
     /// # Errors
     /// [`Error::Usage`] or [`Error::File`].
@@ -40,7 +40,7 @@ impl Motor {
             .acceleration
             .unwrap_or_else(|| f64::from(FromMotor::new(&params).slew_rpm_s));
         let drive = FluxSettings::new(&params);
-        // What is given as in the paper counts at every speed.
+        // Values given as in the paper apply at every speed.
         let from = |given: Option<f64>, above_hz: f32| match given {
             Some(_) => 0.0,
             None => f64::from(above_hz) * TAU,
@@ -70,7 +70,7 @@ impl Motor {
         })
     }
 
-    /// Mechanical speed, rpm, of an electrical one in rad/s; and likewise of accelerations.
+    /// Converts an electrical speed in rad/s to a mechanical one in rpm; accelerations likewise.
     pub(crate) fn rpm(&self, omega: f64) -> f64 {
         omega * 60.0 / (TAU * self.pole_pairs)
     }

@@ -1,4 +1,4 @@
-//! A budget for people and for programs.
+//! Prints a budget for people and for programs.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use siskin_control::control::observer::limits::POSITION_FILTER_VALID_DEG;
 use super::limits::{End, HoldOff, Range};
 use super::motor::Motor;
 
-/// The settings, and each range with what ends it.
+/// Returns the settings, and each range with what limits it.
 pub(crate) fn text(motor: &Motor, bound_deg: f64, ranges: &[Range]) -> String {
     let mut out = head(motor, bound_deg);
     for range in ranges {
@@ -120,12 +120,12 @@ fn limit(out: &mut String, motor: &Motor, side: &str, end: &End) {
 }
 
 fn line(out: &mut String, text: &str) {
-    // The standard library formats into a string without fail.
+    // Formatting into a string cannot fail.
     let _ = writeln!(out, "{text}");
 }
 
-/// The same as one object. An infinite time constant is null, and so is the lowest speed where there
-/// is none.
+/// Returns the same as one JSON object. An infinite time constant is null, and so is a missing lowest
+/// speed.
 pub(crate) fn json(motor: &Motor, bound_deg: f64, ranges: &[Range]) -> Value {
     let settings = &motor.settings;
     let (hold_off_s, hold_off_deg) = match settings.hold_off {
@@ -165,7 +165,7 @@ pub(crate) fn json(motor: &Motor, bound_deg: f64, ranges: &[Range]) -> Value {
     })
 }
 
-/// The parameters are in single precision: beyond this, a value made from them tells nothing.
+/// Rounds away what is beyond the parameters' single precision.
 fn tidy(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

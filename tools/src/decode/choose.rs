@@ -1,14 +1,14 @@
-//! Which channel is the wire.
+//! Selects the channel that is the wire.
 
 use std::io::BufRead;
 
 use super::capture::{Capture, Reason};
 
-/// The place of the channel that is asked for by name or place; without, of the only one that
-/// changes, for which the capture is read whole.
+/// Returns the index of the channel given by name or index; otherwise of the only one that changes, for
+/// which the whole capture is read.
 ///
 /// # Errors
-/// There is no such channel, or several.
+/// There is no such channel, or more than one.
 pub(super) fn choose(
     mut capture: Capture<impl BufRead>,
     wanted: Option<&str>,
@@ -37,8 +37,8 @@ pub(super) fn choose(
     }
 }
 
-/// A channel by its whole name, the last part of its name (`signal` of `siskin.throttle.signal`),
-/// or its place from 0.
+/// Finds a channel by its full name, by the last part of its name (`signal` of `siskin.throttle.signal`),
+/// or by its index from 0.
 fn find(names: &[String], wanted: &str) -> Result<usize, Reason> {
     let by = |fits: &dyn Fn(&str) -> bool| -> Vec<usize> {
         (0..names.len())
@@ -75,7 +75,7 @@ fn find(names: &[String], wanted: &str) -> Result<usize, Reason> {
     })
 }
 
-/// Channels by place and name.
+/// Lists channels by index and name.
 fn list(names: &[String], channels: &[usize]) -> String {
     let names: Vec<_> = channels
         .iter()
@@ -98,7 +98,7 @@ mod tests {
         assert_eq!(find(&emulator, "siskin.throttle.signal"), Ok(1));
         assert_eq!(find(&emulator, "Signal"), Ok(1));
         assert_eq!(find(&emulator, "0"), Ok(0));
-        // A name counts before a place.
+        // A name takes precedence over an index.
         assert_eq!(find(&names(&["1", "0"]), "0"), Ok(1));
     }
 

@@ -1,6 +1,6 @@
-//! The commands of DShot by name.
+//! DShot commands by name.
 
-/// What the command 0 to 47 is called, or nothing where it has no meaning.
+/// Returns the name of a command 0 to 47, or `None` if it has no meaning.
 pub(crate) fn name(command: u16) -> Option<&'static str> {
     Some(match command {
         0 => "motor stop",

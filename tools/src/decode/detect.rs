@@ -1,4 +1,4 @@
-//! Which signal a channel carries.
+//! Detects the signal on a channel.
 
 use std::io::BufRead;
 
@@ -10,14 +10,14 @@ use super::sampling::Sampling;
 use super::wire::{Item, Wire};
 use super::{REST_NS, next_edge};
 
-/// A rate of the analyser at which every signal can be told.
+/// A sample rate at which every signal can be recognised.
 const ENOUGH_HZ: f64 = 24e6;
 
-/// How often a signal must be in a capture that ends before the ESC is sure of it.
+/// How often a signal must occur in a capture that ends before the ESC is sure of it.
 const HITS: u32 = 4;
 
-/// The signal of a channel: what the ESC detects, or where the capture is too short for that, what
-/// most of it is.
+/// Returns a channel's signal: what the ESC detects, or, if the capture is too short for that, what most of
+/// it is.
 ///
 /// # Errors
 /// There is none.
@@ -49,7 +49,7 @@ pub(super) fn detect(mut capture: Capture<impl BufRead>, channel: usize) -> Resu
     })
 }
 
-/// The advice to sample faster, where that may help.
+/// Returns advice to sample faster, if that may help.
 fn faster(sample_hz: Option<f64>) -> String {
     match sample_hz {
         Some(hz) if hz < ENOUGH_HZ => format!(
@@ -81,7 +81,7 @@ impl Tally {
         }
     }
 
-    /// The signal that is most of what has been seen.
+    /// Returns the signal that makes up most of what has been seen.
     fn winner(&self) -> Option<Signal> {
         let all = self.bad + self.seen.iter().map(|(_, times)| times).sum::<u32>();
         let most = self.seen.iter().max_by_key(|(_, times)| *times);

@@ -1,30 +1,30 @@
-//! A DShot frame's edges as the wire had them: what its bits are, and how well they are timed.
+//! A DShot frame's edges as they were on the wire: its bits, and how well they are timed.
 
 use siskin_control::input::dshot::Rate;
 
 use super::Edge;
 
-/// Edges of a frame.
+/// Edges in a frame.
 pub(super) const EDGES: usize = 32;
 
-/// A pulse of at least this share of its bit is a one: the decoder's limit, between 37.5 % and 75 %.
+/// A pulse of at least this share of its bit is a one: the decoder's threshold, between 37.5 % and 75 %.
 const ONE: f64 = 0.55;
 
 /// How a frame was sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Measured {
-    /// Its bits by their shares, check sum included.
+    /// Its bits by their shares, checksum included.
     pub(crate) bits: u16,
     /// The mean time of a bit, ns.
     pub(crate) bit_ns: f64,
-    /// What part of its time each bit is active, the first bit first.
+    /// The active share of each bit, first bit first.
     pub(crate) shares: [f64; 16],
-    /// By how much each bit begins too late or early, ns.
+    /// How late (or, if negative, early) each bit begins, ns.
     pub(crate) strays_ns: [f64; 16],
 }
 
 impl Measured {
-    /// Measures the edges of 16 pulses of this level; nothing where they are no such pulses.
+    /// Measures the edges of 16 pulses of this level; `None` if they are not that.
     pub(super) fn of(edges: &[Edge], active: bool) -> Option<Self> {
         if edges.len() != EDGES || edges[0].level != active {
             return None;
@@ -51,7 +51,7 @@ impl Measured {
     }
 }
 
-/// By how much the rate of bits of this length is above its nominal one, %.
+/// Returns by how much the bit rate at this bit time exceeds the nominal one, %.
 pub(super) fn rate_error_pct(bit_ns: f64, rate: Rate) -> f64 {
     (1e9 / bit_ns / f64::from(rate.bit_hz()) - 1.0) * 100.0
 }

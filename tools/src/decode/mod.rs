@@ -1,8 +1,8 @@
-//! `siskin decode`: what a logic analyser has seen on a throttle wire.
+//! `siskin decode`: shows what a logic analyser has captured on a throttle wire.
 //!
-//! The capture is read from its beginning several times, and never held: once to see which channel
-//! has edges, where that is not told; once to detect the signal; and once to decode it with what has
-//! been detected, so that the first frames are in the table too.
+//! The capture is read from the beginning several times and never held in memory: once to find the channel
+//! with edges, if none is given; once to detect the signal; and once to decode it, so that the first frames
+//! are in the table too.
 
 mod capture;
 mod choose;
@@ -36,32 +36,31 @@ use table::Table;
 use track::{Sighting, Tracker};
 use wire::Wire;
 
-/// Bytes of the file that are held.
+/// Bytes of the file held in memory.
 const BUFFER: usize = 1 << 16;
 
-/// How long the line is taken to rest after a capture, ns: enough for the last frame or reply to be
-/// over, and too short for a reply to be missed.
+/// How long the line is assumed to rest after a capture, ns: long enough to end the last frame or reply,
+/// and too short for a reply to count as missing.
 const REST_NS: i64 = 25_000;
 
-/// An edge of the wire.
+/// An edge on the wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Edge {
     at_ns: i64,
-    /// From then on.
+    /// The level from then on.
     level: bool,
 }
 
 /// How to decode.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Options {
-    /// Channel by name or by place from 0, instead of the only one with edges.
+    /// Channel by name or by index from 0, instead of the only one with edges.
     #[arg(long, value_name = "NAME_OR_PLACE")]
     pub channel: Option<String>,
-    /// The signal by its number in INP_PROTO or its name, for example 12 or DShot600, instead of
-    /// what is detected.
+    /// Signal by its INP_PROTO number or its name, for example 12 or DShot600, instead of detecting it.
     #[arg(long, value_name = "SIGNAL", value_parser = signal)]
     pub protocol: Option<Signal>,
-    /// A line for each frame.
+    /// Print a line for each frame.
     #[arg(long)]
     pub all: bool,
     /// One JSON object a line; the last one is the summary.
@@ -72,7 +71,7 @@ pub struct Options {
 /// Why a capture was not decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
-    /// It is no capture, has no such channel or no signal that is known: what to do.
+    /// Not a capture, no such channel, or no known signal; the message says what to do.
     #[error("{0}")]
     Capture(String),
     /// The table could not be written.
@@ -86,10 +85,10 @@ impl From<Reason> for DecodeError {
     }
 }
 
-/// Decodes the file of this name.
+/// Decodes the file at this path.
 ///
 /// # Errors
-/// A file that is none or is no capture, a channel that is not in it, a signal that is not known.
+/// The file does not exist or is not a capture, lacks the channel, or has no known signal.
 pub(crate) fn run(path: &Path, options: &Options, out: &mut dyn Write) -> Result<(), Error> {
     let done = File::open(path)
         .map_err(|error| DecodeError::Capture(error.to_string()))
@@ -100,10 +99,10 @@ pub(crate) fn run(path: &Path, options: &Options, out: &mut dyn Write) -> Result
     })
 }
 
-/// Prints the table and the summary of a capture, which is read from its beginning.
+/// Prints the table and summary of a capture, read from its beginning.
 ///
 /// # Errors
-/// It is no capture, has no such channel or no signal that is known, or `out` takes no more.
+/// The input is not a capture, lacks the channel or has no known signal, or `out` cannot be written.
 pub fn decode(
     mut input: impl Read + Seek,
     options: &Options,
@@ -136,7 +135,7 @@ pub fn decode(
     Ok(())
 }
 
-/// The signal of an argument.
+/// Parses a signal argument.
 fn signal(text: &str) -> Result<Signal, String> {
     let wanted = text.replace(['-', '_'], " ");
     let named = Signal::all().find(|signal| signal.name().eq_ignore_ascii_case(&wanted));
@@ -173,7 +172,7 @@ fn next_edge(capture: &mut Capture<impl BufRead>, channel: usize) -> Result<Opti
     Ok(None)
 }
 
-/// The capture from its beginning.
+/// Opens the capture at its beginning.
 fn open<R: Read + Seek>(input: &mut R) -> Result<Capture<BufReader<&mut R>>, Reason> {
     input.rewind().map_err(|error| error.to_string())?;
     Capture::open(BufReader::with_capacity(BUFFER, input))

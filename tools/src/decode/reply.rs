@@ -1,4 +1,4 @@
-//! Replies of an ESC on a bidirectional wire: 21 bits after a frame.
+//! ESC replies on a bidirectional wire: 21 bits after a frame.
 
 use siskin_control::answer::extended::Extended;
 use siskin_control::answer::{erpm, gcr};
@@ -6,19 +6,18 @@ use siskin_control::input::dshot::Rate;
 
 use super::Edge;
 
-/// Every bit is a change or none, and the line ends high.
+/// Each bit is a change or none, and the line ends high.
 const MOST_EDGES: usize = gcr::BITS as usize + 1;
 
-/// The latest that a reply may begin after its frame, ns. It should after 30 µs; senders listen
-/// for about twice as long.
+/// The latest that a reply may begin after its frame, ns. Nominal is 30 µs; senders listen for about twice
+/// as long.
 const LATEST_NS: i64 = 100_000;
 
-/// The shortest level of a reply in bits. Each bit of a frame has a part of 0.47 reply bits or less,
-/// so that no frame is taken for a reply.
+/// The shortest level of a reply, in bits. Each bit of a frame has a part of at most 0.47 reply bits, so no
+/// frame is taken for a reply.
 const SHORTEST_BITS: f64 = 0.65;
 
-/// Edges from which a run of levels may be a reply: its code changes once in three bits or more
-/// often.
+/// The fewest edges that may be a reply: its code changes at least once in three bits.
 const FEWEST_EDGES: usize = 5;
 
 /// A reply as it was on the wire.
@@ -26,7 +25,7 @@ const FEWEST_EDGES: usize = 5;
 pub(crate) struct Reply {
     /// 21 levels, the first highest; 1 is high.
     pub(crate) bits: u32,
-    /// The time of one, ns.
+    /// Time per bit, ns.
     pub(crate) bit_ns: f64,
     /// From the frame's nominal end to the first edge, ns.
     pub(crate) delay_ns: i64,
@@ -35,19 +34,19 @@ pub(crate) struct Reply {
 /// What a reply carries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Content {
-    /// Electrical revolutions a minute; 0 where the motor stands still.
+    /// Electrical rpm; 0 at standstill.
     Erpm(u32),
     /// Extended telemetry.
     Extended(Extended),
 }
 
 impl Reply {
-    /// The 12 bits of data, or nothing where the code or the check sum is wrong.
+    /// Returns the 12 data bits, or `None` if the code or the checksum is wrong.
     pub(crate) fn data(&self) -> Option<u16> {
         gcr::decode(self.bits)
     }
 
-    /// What the data means.
+    /// Returns what the data means.
     pub(crate) fn content(&self) -> Option<Content> {
         let data = self.data()?;
         let erpm = || erpm::period_us(data).map_or(0, |period_us| 60_000_000 / period_us);
@@ -63,14 +62,14 @@ pub(super) struct Listener {
     edges: Vec<Edge>,
 }
 
-/// What a listener makes of the edges.
+/// A listener's verdict on its edges.
 #[derive(Debug, PartialEq)]
 pub(super) enum Heard {
-    /// It needs more of them.
+    /// More edges are needed.
     More,
-    /// A reply: its edges are used up.
+    /// A reply: its edges have been consumed.
     Reply(Reply),
-    /// None came. Edges that were something else have yet to be looked at.
+    /// No reply. The edges, if any, were something else and are still to be decoded.
     None(Vec<Edge>),
 }
 
@@ -84,7 +83,7 @@ impl Listener {
         }
     }
 
-    /// Whether edges wait for a verdict.
+    /// Returns whether edges await a verdict.
     pub(super) fn holds_edges(&self) -> bool {
         !self.edges.is_empty()
     }
@@ -94,7 +93,7 @@ impl Listener {
         self.edges.push(edge);
     }
 
-    /// The verdict, when no edge comes before `now_ns`.
+    /// Returns the verdict, given that no edge comes before `now_ns`.
     pub(super) fn verdict(&mut self, now_ns: i64) -> Heard {
         let (Some(first), Some(last)) = (self.edges.first(), self.edges.last()) else {
             let too_late = now_ns - self.end_ns > LATEST_NS;

@@ -11,7 +11,7 @@ use super::reply::{Content, Reply};
 use super::throttle::{self, Share};
 use super::track::{Answer, Sighting, What};
 
-/// The table's head.
+/// The table's header.
 pub(super) const HEAD: &str = "      time s   times  bits    what                            reply";
 
 /// One sighting, or several equal ones in a row.
@@ -20,7 +20,7 @@ pub(crate) struct Row {
     signal: Signal,
     first: Sighting,
     times: u64,
-    /// The least speed of its replies and the greatest, eRPM.
+    /// Lowest and highest speed in its replies, eRPM.
     erpm: Option<(u32, u32)>,
 }
 
@@ -35,7 +35,7 @@ impl Row {
         }
     }
 
-    /// Takes up one that looks the same but for a speed; gives it back if it does not.
+    /// Merges a sighting that looks the same except for a speed; otherwise returns it.
     pub(super) fn join(&mut self, next: Sighting) -> Option<Sighting> {
         if !self.looks_like(&next.what) {
             return Some(next);
@@ -65,7 +65,7 @@ impl Row {
         }
     }
 
-    /// As a line of text.
+    /// Formats it as a line of text.
     pub(super) fn line(&self) -> String {
         let time_s = self.first.at_ns as f64 * 1e-9;
         let bits = match &self.first.what {
@@ -85,7 +85,7 @@ impl Row {
         line.trim_end().to_owned()
     }
 
-    /// As an object.
+    /// Converts it to a JSON object.
     pub(super) fn json(&self) -> Value {
         let (mut bits, mut value, mut telemetry, mut name, mut width_us) =
             (None, None, None, None, None);
@@ -168,7 +168,7 @@ impl Row {
     }
 }
 
-/// What is wrong with it.
+/// Returns what is wrong with the sighting.
 fn error(signal: Signal, what: &What) -> Option<String> {
     let What::Bad { edges, measured } = what else {
         return None;
@@ -204,7 +204,7 @@ fn command_of(kind: Kind) -> Option<u16> {
     }
 }
 
-/// A command's number and name.
+/// Returns a command's number and name.
 pub(super) fn command_text(command: u16) -> String {
     format!(
         "{command} {}",
@@ -213,7 +213,7 @@ pub(super) fn command_text(command: u16) -> String {
 }
 
 impl What {
-    /// The speed of a frame's reply.
+    /// Returns the speed in a frame's reply.
     fn erpm(&self) -> Option<u32> {
         match self {
             Self::Frame {
@@ -231,7 +231,7 @@ impl Answer {
             (Self::Reply(reply), Self::Reply(next)) => {
                 reply.bits == next.bits || reply.erpm().is_some() && next.erpm().is_some()
             }
-            // The capture ended before it could come.
+            // The capture ended before the reply could come.
             (_, Self::Unknown) => true,
             _ => self == next,
         }

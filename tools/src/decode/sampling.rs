@@ -1,29 +1,29 @@
-//! How often the analyser has sampled, where its export does not say.
+//! Estimates the analyser's sample rate if the export does not state it.
 
-/// Rates of analysers, MHz.
+/// Common analyser rates, MHz.
 const RATES_MHZ: [f64; 24] = [
     0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.25, 8.0, 10.0, 12.0, 12.5, 15.0, 16.0, 20.0, 24.0, 25.0,
     30.0, 32.0, 40.0, 48.0, 50.0, 80.0, 100.0,
 ];
 
-/// Times are whole nanoseconds, and so is the one they are counted from.
+/// Times are whole nanoseconds, and so is their origin.
 const ROUNDING_NS: f64 = 1.01;
 
-/// Edges that decide.
+/// Edges that are looked at.
 const EDGES: u32 = 500;
 
-/// The coarsest raster that all edges so far lie on.
+/// The coarsest sampling grid that all edges so far lie on.
 #[derive(Debug)]
 pub(super) struct Sampling {
     told_hz: Option<f64>,
     first_ns: Option<i64>,
     edges: u32,
-    /// The slowest of [`RATES_MHZ`] that may be it.
+    /// Index of the slowest of [`RATES_MHZ`] that is still possible.
     slowest: usize,
 }
 
 impl Sampling {
-    /// What an export told, if it did.
+    /// `told_hz` is what the export states, if anything.
     pub(super) fn new(told_hz: Option<f64>) -> Self {
         Self {
             told_hz,
@@ -43,14 +43,14 @@ impl Sampling {
             let samples = since_ns * mhz * 1e-3;
             (samples - samples.round()).abs() / (mhz * 1e-3) <= ROUNDING_NS
         };
-        // A rate that some edge has ruled out may fit the next one: only the rest is left.
+        // A rate ruled out by an earlier edge may fit the next one: only the rest is searched.
         self.slowest += RATES_MHZ[self.slowest..]
             .iter()
             .take_while(|mhz| !fits(mhz))
             .count();
     }
 
-    /// The analyser's rate, Hz; nothing where it cannot be told, or is above 100 MHz.
+    /// Returns the analyser's rate, Hz; `None` if it cannot be determined or is above 100 MHz.
     pub(super) fn hz(&self) -> Option<f64> {
         self.told_hz.or_else(|| {
             let mhz = RATES_MHZ.get(self.slowest)?;

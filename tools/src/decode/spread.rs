@@ -1,8 +1,8 @@
-//! Least, mean and greatest of many numbers.
+//! Minimum, mean and maximum of many numbers.
 
 use serde_json::{Value, json};
 
-/// Numbers, of which only these are kept.
+/// Running statistics of numbers, which are not kept.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Spread {
     count: u64,
@@ -40,7 +40,7 @@ impl Spread {
         (self.squares / self.count.max(1) as f64).sqrt()
     }
 
-    /// Least, mean and most; nothing where there are no numbers.
+    /// Returns minimum, mean and maximum; `None` without numbers.
     pub(super) fn range(&self) -> Option<Range> {
         (!self.is_empty()).then(|| Range {
             least: self.least,
@@ -49,7 +49,7 @@ impl Spread {
         })
     }
 
-    /// Of intervals in ns, their rates in Hz. The mean one is how often they come.
+    /// Converts intervals in ns to rates in Hz. The mean is how often they occur.
     pub(super) fn rate_hz(&self) -> Option<Range> {
         self.range().map(|interval_ns| Range {
             least: 1e9 / interval_ns.most,
@@ -59,7 +59,7 @@ impl Spread {
     }
 }
 
-/// Where numbers lie.
+/// The range in which numbers lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Range {
     least: f64,
@@ -68,7 +68,7 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// `least to most, mean mean` with this many decimals.
+    /// Formats it as `least to most, mean mean` with this many decimals.
     pub(super) fn text(&self, decimals: usize) -> String {
         format!(
             "{:.decimals$} to {:.decimals$}, mean {:.decimals$}",
@@ -76,13 +76,13 @@ impl Range {
         )
     }
 
-    /// As an object.
+    /// Converts it to a JSON object.
     pub(super) fn json(self) -> Value {
         json!({ "min": short(self.least), "mean": short(self.mean), "max": short(self.most) })
     }
 }
 
-/// A number without digits that mean nothing.
+/// Rounds to four decimals, beyond which digits mean nothing.
 pub(super) fn short(number: f64) -> f64 {
     (number * 1e4).round() / 1e4
 }

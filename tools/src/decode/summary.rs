@@ -1,4 +1,4 @@
-//! What a capture comes to: counts, rates and timing.
+//! Summary of a capture: counts, rates and timing.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -13,16 +13,16 @@ use super::row::command_text;
 use super::spread::{Range, Spread, short};
 use super::track::{Answer, Sighting, What};
 
-/// A rest without frames or pulses that is worth telling, ns: what an ESC takes as a lost signal.
+/// A pause without frames or pulses that is worth reporting, ns: what an ESC takes for a lost signal.
 const GAP_NS: i64 = 100_000_000;
 
-/// Samples of a bit below which a timing tells little: the least that the ESC's own timer may have.
+/// Samples per bit below which timing says little: the fewest that the ESC's own timer may have.
 const LEAST_SAMPLES: f64 = 12.0;
 
 /// Counts and spreads of what has been seen.
 pub(super) struct Summary {
     signal: Signal,
-    /// The first edge and the last.
+    /// The first and the last edge.
     span_ns: Option<(i64, i64)>,
     edges: u64,
     good: u64,
@@ -40,7 +40,7 @@ pub(super) struct Summary {
     commands: Commands,
 }
 
-/// Rests of more than 100 ms.
+/// Pauses of more than 100 ms.
 #[derive(Default)]
 struct Gaps {
     count: u64,
@@ -58,11 +58,11 @@ struct Replies {
     rate_error_pct: Spread,
 }
 
-/// Commands, each with how often it came and how often in a row at most.
+/// Commands, each with its count and its longest run.
 #[derive(Default)]
 struct Commands {
     seen: BTreeMap<u16, (u64, u32)>,
-    /// The present command and how often it has come in a row.
+    /// The current command and the length of its run.
     run: Option<(u16, u32)>,
 }
 
@@ -152,7 +152,7 @@ impl Summary {
             };
             shares.add(share * 100.0);
         }
-        // The first bit and the last stray by nothing: the mean time of a bit is theirs.
+        // The first and the last bit deviate by nothing: the mean bit time is taken from them.
         for stray_ns in &measured.strays_ns[1..15] {
             self.stray_ns.add(stray_ns.abs());
         }
@@ -178,7 +178,7 @@ impl Summary {
         }
     }
 
-    /// What makes its figures doubtful.
+    /// Returns what makes the figures doubtful.
     fn warning(&self, sample_hz: Option<f64>) -> Option<String> {
         let (Some(sample_hz), Signal::Dshot { rate, .. }) = (sample_hz, self.signal) else {
             return None;
@@ -330,7 +330,7 @@ impl Summary {
 }
 
 impl Commands {
-    /// Takes the value of the next frame.
+    /// Adds the value of the next frame.
     fn add(&mut self, value: u16) {
         if !(1..48).contains(&value) {
             self.run = None;
@@ -347,7 +347,7 @@ impl Commands {
     }
 }
 
-/// With its sign and two decimals; what rounds to zero is above it.
+/// Formats a number with its sign and two decimals; what rounds to zero gets a plus.
 fn signed(number: f64) -> String {
     // Minus zero plus zero is zero.
     format!("{:+.2}", (number * 100.0).round() / 100.0 + 0.0)

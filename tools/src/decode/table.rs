@@ -1,4 +1,4 @@
-//! The table as it is printed: equal sightings in a row as one, or each on its own.
+//! Prints the table: one line per run of equal sightings, or one per sighting.
 
 use std::io::{self, Write};
 
@@ -9,14 +9,14 @@ use super::row::{HEAD, Row};
 use super::summary::Summary;
 use super::track::Sighting;
 
-/// A table that is being printed.
+/// A table being printed.
 pub(super) struct Table<W> {
     signal: Signal,
-    /// Each sighting on a line of its own.
+    /// Print each sighting on its own line.
     all: bool,
-    /// One JSON object a line.
+    /// Print one JSON object per line.
     json: bool,
-    /// It may still be joined by the next sighting.
+    /// The next sighting may still be merged into this row.
     row: Option<Row>,
     out: W,
 }
@@ -49,7 +49,7 @@ impl<W: Write> Table<W> {
         }
     }
 
-    /// The last row, and what it all comes to, sampled at this rate if that is known.
+    /// Prints the last row and the summary, with the sample rate if it is known.
     pub(super) fn finish(mut self, summary: &Summary, sample_hz: Option<f64>) -> io::Result<()> {
         let row = self.row.take();
         self.print(row)?;

@@ -1,4 +1,4 @@
-//! What a frame or a pulse asks for.
+//! The throttle that a frame or pulse requests.
 
 use siskin_control::input::demand::{Demand, Reading};
 use siskin_control::input::dshot::Kind;
@@ -6,19 +6,19 @@ use siskin_control::input::signal::Signal;
 
 use super::track::What;
 
-/// A share of the throttle's range, by the ends from the factory and with one direction.
+/// A share of the throttle range, with the factory ends and one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Share {
-    /// It asks for none: a stop, or a command.
+    /// No throttle: a stop or a command.
     Zero,
     /// 0 to 1.
     Throttle(f64),
-    /// It cannot be told.
+    /// Cannot be determined.
     None,
 }
 
 impl Share {
-    /// As a number; nothing where it cannot be told.
+    /// Returns it as a number; `None` if it cannot be determined.
     pub(super) fn share(self) -> Option<f64> {
         match self {
             Self::Zero => Some(0.0),
@@ -28,7 +28,7 @@ impl Share {
     }
 }
 
-/// Two pulses that differ by less are shown as one, ns: a thousandth of the range.
+/// Pulses that differ by less are shown as one, ns: a thousandth of the range.
 pub(super) fn step_ns(signal: Signal) -> u32 {
     match signal {
         Signal::Pulse(kind) => {
@@ -39,7 +39,7 @@ pub(super) fn step_ns(signal: Signal) -> u32 {
     }
 }
 
-/// What a sighting asks for.
+/// Returns what a sighting requests.
 pub(super) fn of(signal: Signal, what: &What) -> Share {
     match (what, signal) {
         (What::Frame { frame, .. }, _) => match frame.kind(false) {

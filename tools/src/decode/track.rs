@@ -1,4 +1,4 @@
-//! What the decoder finds, put together with the edges it found it in.
+//! Matches what the decoder finds with the edges it was found in.
 
 use std::collections::VecDeque;
 
@@ -21,12 +21,12 @@ pub(crate) struct Sighting {
 /// What has been seen.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum What {
-    /// A frame with a right check sum.
+    /// A frame with a correct checksum.
     Frame {
         frame: Frame,
         /// The 16 bits as sent.
         bits: u16,
-        /// Nothing where a glitch has torn its pulses.
+        /// `None` if a glitch has split its pulses.
         measured: Option<Measured>,
         answer: Answer,
     },
@@ -36,7 +36,7 @@ pub(crate) enum What {
     Bad {
         /// How many.
         edges: usize,
-        /// What they look like, where they look like a frame.
+        /// Its measurements, if the edges look like a frame.
         measured: Option<Measured>,
     },
 }
@@ -44,7 +44,7 @@ pub(crate) enum What {
 /// What followed a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Answer {
-    /// The wire carries none, or the capture ends before one.
+    /// The wire carries no replies, or the capture ends before one.
     Unknown,
     /// It did not come.
     Missing,
@@ -52,17 +52,17 @@ pub(crate) enum Answer {
     Reply(Reply),
 }
 
-/// Puts sightings together.
+/// Assembles sightings.
 pub(super) struct Tracker {
     signal: Signal,
-    /// The latest two, since an error of one may be told when the next has begun.
+    /// The latest two, since an error in one may be reported when the next has begun.
     bursts: VecDeque<Burst>,
 }
 
-/// Edges between two rests.
+/// Edges between two pauses.
 #[derive(Debug)]
 struct Burst {
-    /// The first of them, as many as a frame has and one more.
+    /// The first of them: as many as a frame has, plus one.
     edges: Vec<Edge>,
     count: usize,
     last_ns: i64,
@@ -101,7 +101,7 @@ impl Tracker {
         }
     }
 
-    /// Adds what is left at the capture's end.
+    /// Adds what is left when the capture ends.
     pub(super) fn finish(mut self, seen: &mut Vec<Sighting>) {
         while let Some(burst) = self.bursts.pop_front() {
             self.close(&burst, seen);
@@ -126,7 +126,7 @@ impl Tracker {
         let Some(latest) = self.bursts.len().checked_sub(1) else {
             return;
         };
-        // An error may be told at the next burst's first edges, and a pulse at its first one.
+        // An error may be reported at the next burst's first edges, a pulse at its first one.
         let open = |burst: &Burst| burst.good.is_none() && !burst.bad;
         let earlier = latest.saturating_sub(1);
         let place = match found.event {
@@ -171,11 +171,11 @@ impl Tracker {
     }
 }
 
-/// Whether an edge begins another burst.
+/// Returns whether an edge begins another burst.
 fn begins(signal: Signal, burst: &Burst, edge: Edge) -> bool {
     match signal {
-        // Of what the decoder takes, a level within a frame lasts 1.09 nominal bits at most, and one
-        // between two frames 1.5 bits of a sender that may be a twelfth fast, 1.37 nominal ones.
+        // Within a frame that the decoder accepts, a level lasts at most 1.09 nominal bits; between two
+        // frames, at least 1.5 bits of a sender that may be a twelfth fast: 1.37 nominal bits.
         Signal::Dshot { rate, .. } => edge.at_ns - burst.last_ns > i64::from(rate.bit_ns() * 5 / 4),
         Signal::Pulse(_) => edge.level,
     }

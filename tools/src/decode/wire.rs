@@ -1,4 +1,4 @@
-//! The edges of one wire through the ESC's own decoder.
+//! Passes one wire's edges through the ESC's own decoder.
 
 use siskin_control::input::line::{Event, Line};
 use siskin_control::input::signal::Signal;
@@ -6,29 +6,29 @@ use siskin_control::input::signal::Signal;
 use super::Edge;
 use super::reply::{Heard, Listener, Reply};
 
-/// The decoder's clock: a tick is a nanosecond.
+/// The decoder's clock: one tick is a nanosecond.
 const TICK_HZ: u32 = 1_000_000_000;
 
-/// After an edge the decoder is told the time this soon, ns, and then each time as long again: a frame
-/// is known before its reply, and a rest takes few calls.
+/// After an edge the decoder is told the time this soon, ns, and then at doubling intervals: a frame is
+/// known before its reply, and a pause takes few calls.
 const FIRST_SETTLE_NS: i64 = 500;
 
-/// The longest rest that the decoder is told of, ns; a longer one is shortened to it, since ticks
-/// wrap after 4.3 s. It is beyond every time in the decoder.
+/// The longest pause passed to the decoder, ns; longer ones are shortened to it, since ticks wrap after
+/// 4.3 s. It exceeds every time in the decoder.
 const LONGEST_REST_NS: i64 = 200_000_000;
 
-/// What comes off the wire, in order of time but for an event, which follows the edges it is about.
+/// What comes off the wire, in time order, except that an event follows its edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Item {
-    /// An edge that is none of a reply's.
+    /// An edge that is not part of a reply.
     Edge(Edge),
     /// What the decoder found.
     Event(Found),
-    /// What followed the bidirectional frame before: a reply or none.
+    /// What followed the previous bidirectional frame: a reply or none.
     Reply(Option<Reply>),
 }
 
-/// An event of the decoder.
+/// An event from the decoder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Found {
     pub(super) event: Event,
@@ -36,7 +36,7 @@ pub(super) struct Found {
     pub(super) first_edge_ns: Option<i64>,
 }
 
-/// A wire that is being decoded.
+/// A wire being decoded.
 pub(super) struct Wire {
     line: Line,
     /// The decoder's time, and the capture's.
@@ -46,7 +46,7 @@ pub(super) struct Wire {
 }
 
 impl Wire {
-    /// A wire that carries this signal; without, it is detected.
+    /// Creates a wire that carries this signal; `None` detects it.
     pub(super) fn new(signal: Option<Signal>) -> Self {
         let mut line = Line::new(TICK_HZ);
         line.force(signal);
@@ -58,7 +58,7 @@ impl Wire {
         }
     }
 
-    /// The signal, once it is known.
+    /// Returns the signal, once it is known.
     pub(super) fn signal(&self) -> Option<Signal> {
         self.line.signal()
     }
@@ -72,7 +72,7 @@ impl Wire {
         }
     }
 
-    /// No edge came before this time.
+    /// Advances to a time before which no edge came.
     pub(super) fn rest(&mut self, until_ns: i64, tell: &mut impl FnMut(Item)) {
         if self
             .listener
@@ -95,7 +95,7 @@ impl Wire {
             Some(Heard::None(edges)) => {
                 self.listener = None;
                 tell(Item::Reply(None));
-                // They may begin with a frame, which is listened after again.
+                // They may begin with a frame, whose reply is listened for in turn.
                 for edge in edges {
                     self.edge(edge, tell);
                 }
@@ -110,7 +110,7 @@ impl Wire {
         tell(Item::Edge(edge));
     }
 
-    /// Lets the decoder's time pass.
+    /// Advances the decoder's time.
     fn settle(&mut self, until_ns: i64, tell: &mut impl FnMut(Item)) {
         let now_ns = *self.now_ns.get_or_insert(until_ns);
         let mut now_ns = now_ns.max(until_ns - LONGEST_REST_NS);

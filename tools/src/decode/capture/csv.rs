@@ -1,7 +1,7 @@
-//! Comma-separated values: of Saleae's Logic, of sigrok-cli and PulseView, of DSView.
+//! Comma-separated values, as written by Saleae Logic, sigrok-cli, PulseView and DSView.
 //!
-//! A row holds the level of each channel, and mostly a time first. Saleae's rows are changes, and
-//! sigrok's are samples, of which it leaves out repeated ones on request.
+//! A row holds the level of each channel, usually after a time. Saleae's rows are changes; sigrok's are
+//! samples, of which it omits repeated ones on request.
 
 use std::io::BufRead;
 
@@ -13,22 +13,22 @@ use super::{Change, Reason, later, shown};
 /// When a row was sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Clock {
-    /// The rows are samples, one after another.
+    /// The rows are successive samples.
     Rows { sample_ns: f64 },
-    /// Sigrok's column of time counts periods rounded down to a whole number of its unit, 41 of
-    /// 41.67 ns at 24 MHz, so that only their number can be believed.
+    /// Sigrok's time column counts periods rounded down to a whole number of its unit, 41 instead of
+    /// 41.67 ns at 24 MHz, so only their count can be trusted.
     Periods { period: f64, sample_ns: f64 },
-    /// The column of time is in this unit.
+    /// The time column is in this unit.
     Column { unit_ns: f64 },
 }
 
-/// A table that is being read.
+/// A table being read.
 pub(super) struct Csv<R> {
     rows: Reader<R>,
     row: ByteRecord,
-    /// Rows before the present one, the header aside.
+    /// Rows before the current one, without the header.
     count: u64,
-    /// The channel at which to go on in the present row; past the last, a row is to be read.
+    /// Next channel in the current row; if past the last, the next row is to be read.
     channel: usize,
     clock: Clock,
     names: Vec<String>,
@@ -81,7 +81,7 @@ impl<R: BufRead> Csv<R> {
         self.now_ns.unwrap_or(0)
     }
 
-    /// The next level that is another than the one in `levels`.
+    /// Returns the next level that differs from the one in `levels`.
     pub(super) fn next(&mut self, levels: &[Option<bool>]) -> Result<Option<Change>, Reason> {
         loop {
             while self.channel < self.names.len() {
@@ -103,7 +103,7 @@ impl<R: BufRead> Csv<R> {
         }
     }
 
-    /// Takes up the row that has been read.
+    /// Starts on the row just read.
     fn begin_row(&mut self) -> Result<(), Reason> {
         self.now_ns = Some(later(self.now_ns, self.time_ns()?, self.line())?);
         self.count += 1;
@@ -111,7 +111,7 @@ impl<R: BufRead> Csv<R> {
         Ok(())
     }
 
-    /// The level in the present row; nothing where the analyser has none.
+    /// Returns the level in the current row; `None` if the analyser has none.
     fn level(&self, channel: usize) -> Result<Option<bool>, Reason> {
         let column = channel + usize::from(self.clock.has_column());
         match self.row.get(column).map(<[u8]>::trim_ascii) {
@@ -131,7 +131,7 @@ impl<R: BufRead> Csv<R> {
         }
     }
 
-    /// When the present row was sampled; one that is too late for this is the latest.
+    /// Returns when the current row was sampled, saturating if it is too late for the type.
     fn time_ns(&self) -> Result<i64, Reason> {
         let time_ns = match self.clock {
             Clock::Rows { sample_ns } => self.count as f64 * sample_ns,
@@ -152,7 +152,7 @@ impl<R: BufRead> Csv<R> {
         })
     }
 
-    /// The line of the present row.
+    /// Returns the line of the current row.
     fn line(&self) -> u64 {
         self.lines_before + self.row.position().map_or(0, csv::Position::line)
     }
@@ -164,11 +164,11 @@ impl Clock {
     }
 }
 
-/// What the first row says of the columns.
+/// What the first row says about the columns.
 struct Header {
     names: Vec<String>,
     time: TimeColumn,
-    /// It is none: the levels begin here.
+    /// There is no header: the levels begin here.
     is_a_row: bool,
 }
 
@@ -179,7 +179,7 @@ enum TimeColumn {
     None,
     /// A time without a unit.
     Unitless,
-    /// A time in sigrok's label of this unit.
+    /// A time under sigrok's label for this unit.
     Sigrok(f64),
     /// A time in this unit.
     Unit(f64),
@@ -205,7 +205,7 @@ impl Header {
         }
         let time = time_column(&fields[0]);
         let names = &fields[usize::from(time != TimeColumn::None)..];
-        // Sigrok writes what a column holds, `logic` for each, where it does not write the names.
+        // Where sigrok does not write the names, it writes what a column holds: `logic` for each.
         let all_same = names.iter().all(|name| name == "logic");
         let names = if all_same && told.len() == names.len() {
             told.clone()
@@ -233,7 +233,7 @@ impl Header {
                 );
             }
             (TimeColumn::Unitless | TimeColumn::Sigrok(_), Some(sample_ns)) => {
-                // The coarsest decimal unit of which a period has at least one.
+                // The coarsest decimal unit that fits into a period at least once.
                 let hz = 1e9 / sample_ns;
                 let mut units_per_s = 1.0;
                 while units_per_s < hz {
@@ -252,7 +252,7 @@ impl Header {
     }
 }
 
-/// What a header's first field says: `Time [s]`, `Time[s]`, `Time(s)`, `Time` or `nanoseconds`.
+/// Interprets a header's first field: `Time [s]`, `Time[s]`, `Time(s)`, `Time` or `nanoseconds`.
 fn time_column(field: &str) -> TimeColumn {
     let field = field.to_ascii_lowercase();
     let sigrok = match field.as_str() {

@@ -1,4 +1,4 @@
-//! Exports of logic analysers as changes of level over time.
+//! Logic analyser exports, as level changes over time.
 
 mod csv;
 mod preamble;
@@ -9,18 +9,18 @@ use std::io::BufRead;
 use self::csv::Csv;
 use self::vcd::Vcd;
 
-/// A channel's level has changed.
+/// A change of a channel's level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Change {
-    /// When, on the capture's own clock: below 0 for what came before a trigger.
+    /// When, on the capture's own clock: below 0 before a trigger.
     pub(crate) at_ns: i64,
-    /// The channel's place among [`Capture::channels`].
+    /// The channel's index in [`Capture::channels`].
     pub(crate) channel: usize,
     /// The level from then on.
     pub(crate) level: bool,
 }
 
-/// An export that is being read, from its beginning to its end.
+/// An export being read from beginning to end.
 pub(crate) struct Capture<R> {
     format: Format<R>,
     levels: Vec<Option<bool>>,
@@ -31,13 +31,13 @@ enum Format<R> {
     Vcd(Box<Vcd<R>>),
 }
 
-/// Why an export cannot be read, on one line: what is wrong, where, and what to do.
+/// Why an export cannot be read, in one line: what is wrong, where, and what to do.
 pub(crate) type Reason = String;
 
-/// The latest time, 30 years: far from where nanoseconds overflow.
+/// The latest time, 30 years: far from overflow in nanoseconds.
 const LATEST_NS: u64 = 1_000_000_000_000_000_000;
 
-/// The time of a line, unless it is before the one above or too late.
+/// Returns a line's time, unless it is before the one above or too late.
 fn later(before_ns: Option<i64>, at_ns: i64, line: u64) -> Result<i64, Reason> {
     let wrong = if at_ns.unsigned_abs() > LATEST_NS {
         "beyond 30 years"
@@ -51,10 +51,10 @@ fn later(before_ns: Option<i64>, at_ns: i64, line: u64) -> Result<i64, Reason> {
     ))
 }
 
-/// Characters of a file that are shown at most.
+/// Most characters of a file that are shown.
 const SHOWN: usize = 40;
 
-/// Text of a file as it can be shown on a line.
+/// Returns text from a file in a form that can be printed on one line.
 fn shown(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(text);
     let shown = |c: char| if c.is_control() { ' ' } else { c };
@@ -65,7 +65,7 @@ impl<R: BufRead> Capture<R> {
     /// Reads the export's head. Its content tells whether it is CSV or VCD.
     ///
     /// # Errors
-    /// What it is instead.
+    /// What the file is instead.
     pub(crate) fn open(mut input: R) -> Result<Self, Reason> {
         let start = input.fill_buf().map_err(|error| error.to_string())?;
         let start = start.trim_ascii_start();
@@ -88,7 +88,7 @@ impl<R: BufRead> Capture<R> {
         Ok(capture)
     }
 
-    /// The channels' names.
+    /// Returns the channels' names.
     pub(crate) fn channels(&self) -> &[String] {
         match &self.format {
             Format::Csv(csv) => csv.channels(),
@@ -96,7 +96,7 @@ impl<R: BufRead> Capture<R> {
         }
     }
 
-    /// The rate of the analyser, where the export tells it, Hz.
+    /// Returns the analyser's sample rate, Hz, if the export states it.
     pub(crate) fn sample_hz(&self) -> Option<f64> {
         match &self.format {
             Format::Csv(csv) => csv.sample_hz(),
@@ -104,7 +104,7 @@ impl<R: BufRead> Capture<R> {
         }
     }
 
-    /// Up to when the export has been read, ns; its end when it has been read whole.
+    /// Returns the time up to which the export has been read, ns; its end once all of it has been read.
     pub(crate) fn now_ns(&self) -> i64 {
         match &self.format {
             Format::Csv(csv) => csv.now_ns(),
@@ -112,10 +112,10 @@ impl<R: BufRead> Capture<R> {
         }
     }
 
-    /// The next change; nothing at the end. A channel's first level is none.
+    /// Returns the next change, `None` at the end. A channel's first level is not a change.
     ///
     /// # Errors
-    /// The line that cannot be understood.
+    /// The line that cannot be parsed.
     pub(crate) fn next(&mut self) -> Result<Option<Change>, Reason> {
         loop {
             let level = match &mut self.format {

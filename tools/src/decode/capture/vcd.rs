@@ -1,4 +1,4 @@
-//! Value change dumps: of sigrok-cli and PulseView, of simulators, and of the emulator's `--record`.
+//! Value change dumps from sigrok-cli, PulseView, simulators, and the emulator's `--record`.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead};
@@ -7,7 +7,7 @@ use vcd::{Command, IdCode, Parser, TimescaleUnit, Value};
 
 use super::{Change, Reason, later, shown};
 
-/// A dump that is being read.
+/// A dump being read.
 pub(super) struct Vcd<R> {
     parser: Parser<R>,
     names: Vec<String>,
@@ -16,7 +16,7 @@ pub(super) struct Vcd<R> {
     now_ns: i64,
 }
 
-/// The unit of its times: `numerator / denominator` ns.
+/// The dump's time unit: `numerator / denominator` ns.
 #[derive(Clone, Copy, Debug)]
 struct Tick {
     numerator: u64,
@@ -24,7 +24,7 @@ struct Tick {
 }
 
 impl<R: BufRead> Vcd<R> {
-    /// Reads the definitions. The channels are the variables of one bit.
+    /// Reads the definitions. The channels are the one-bit variables.
     pub(super) fn open(input: R) -> Result<Self, Reason> {
         let mut parser = Parser::new(input);
         let mut names = Vec::new();
@@ -39,7 +39,7 @@ impl<R: BufRead> Vcd<R> {
                     scopes.pop();
                 }
                 Some(Command::VarDef(_, 1, code, name, _)) => {
-                    // A second name of the same variable is none of another channel.
+                    // A second name for the same variable is not another channel.
                     places.entry(code).or_insert_with(|| {
                         names.push(full_name(&scopes, &name));
                         names.len() - 1
@@ -68,12 +68,12 @@ impl<R: BufRead> Vcd<R> {
         self.now_ns
     }
 
-    /// The next level that is told, changed or not.
+    /// Returns the next level in the dump, changed or not.
     pub(super) fn next(&mut self) -> Result<Option<Change>, Reason> {
         loop {
             let command = match self.parser.next().transpose() {
                 Ok(Some(command)) => command,
-                // One that was cut off while it was written is good up to there.
+                // A dump cut off while being written is good up to there.
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(None),
                 Ok(None) => return Ok(None),
                 Err(error) => return Err(reason(error)),
@@ -114,7 +114,7 @@ impl Tick {
         }
     }
 
-    /// To the nearest nanosecond; what is too late for this is the latest.
+    /// Converts to the nearest nanosecond, saturating.
     fn ns(self, ticks: u64) -> i64 {
         let numerator = u128::from(ticks) * u128::from(self.numerator);
         let denominator = u128::from(self.denominator);
@@ -122,7 +122,7 @@ impl Tick {
     }
 }
 
-/// A variable's name with its scopes, outermost first, as in `siskin.throttle.signal`.
+/// Returns a variable's name with its scopes, outermost first, as in `siskin.throttle.signal`.
 fn full_name(scopes: &[String], name: &str) -> String {
     let mut full: String = scopes
         .iter()
@@ -132,7 +132,7 @@ fn full_name(scopes: &[String], name: &str) -> String {
     full
 }
 
-/// The parser's errors of content name their line.
+/// The parser's content errors name their line.
 fn reason(error: io::Error) -> Reason {
     format!("{error}; export the capture again")
 }
