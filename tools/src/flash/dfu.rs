@@ -1,4 +1,4 @@
-//! Over USB, by the chip's own loader and dfu-util.
+//! Flashes over USB, through the chip's own bootloader and dfu-util.
 
 use std::fs;
 
@@ -11,15 +11,14 @@ const DFU_UTIL: Program = Program {
     remedy: "install the package dfu-util",
 };
 
-/// The loader of every STM32, and its memory that is the flash.
+/// The USB id of every STM32's bootloader, and its alternate setting for the flash.
 const LOADER: [&str; 4] = ["--device", "0483:df11", "--alt", "0"];
 
-/// Writes the image piece by piece and compares what the flash then holds. The loader goes on running: dfu-util
-/// cannot tell a chip that has left it from one that has failed.
+/// Writes the image piece by piece and compares what the flash then holds. The bootloader keeps running:
+/// dfu-util cannot tell a chip that has left it from one that has failed.
 ///
 /// # Errors
-/// [`Error::Missing`] or [`Error::Program`]; [`Error::Output`] if there is no room for the files in
-/// between.
+/// [`Error::Missing`] or [`Error::Program`]; [`Error::Output`] if there is no room for temporary files.
 pub(super) fn write(image: &Image) -> Result<(), Error> {
     let folder = tempfile::tempdir()?;
     let bin = folder.path().join("image.bin");
@@ -30,7 +29,7 @@ pub(super) fn write(image: &Image) -> Result<(), Error> {
     };
     for (number, Piece { at, bytes }) in image.pieces.iter().enumerate() {
         fs::write(&bin, bytes)?;
-        // A file that is there already is not written over.
+        // dfu-util does not overwrite an existing file.
         let back = folder.path().join(format!("back-{number}.bin"));
         let begin = format!("{at:#010x}");
         let whole = format!("{begin}:{}", bytes.len());

@@ -1,7 +1,7 @@
-//! `siskin flash`: an image into a board's flash, once it is known to be that board's and whole.
+//! `siskin flash`: writes an image into a board's flash, once it is known to be intact and for that board.
 //!
-//! What the image does not cover stays as it is: the stored parameters, and the option bytes,
-//! without which the B-G431B-ESC1 does not start.
+//! What the image does not cover stays: the stored parameters, and the option bytes, without which the
+//! B-G431B-ESC1 does not start.
 
 mod dfu;
 mod probe;
@@ -12,7 +12,7 @@ use crate::cli::FlashArgs;
 use crate::error::Error;
 use crate::image::Image;
 
-/// Checks the image, writes it by the program for it, and starts it.
+/// Checks the image, writes it with the matching program, and starts it.
 ///
 /// # Errors
 /// [`Error::File`] and [`Error::Usage`] before anything is written; [`Error::Missing`] and

@@ -1,4 +1,4 @@
-//! Through a debug probe, by probe-rs.
+//! Flashes through a debug probe, with probe-rs.
 
 use std::fs;
 
@@ -11,11 +11,10 @@ const PROBE_RS: Program = Program {
     remedy: "install it as https://probe.rs says",
 };
 
-/// Writes the image as an ELF file, reads it back, and resets the chip. Only the pages of the image are
-/// erased.
+/// Writes the image as an ELF file, reads it back, and resets the chip. Only the image's pages are erased.
 ///
 /// # Errors
-/// [`Error::Missing`] or [`Error::Program`]; [`Error::Output`] if there is no room for the file in between.
+/// [`Error::Missing`] or [`Error::Program`]; [`Error::Output`] if there is no room for the temporary file.
 pub(super) fn write(image: &Image, probe: Option<&str>) -> Result<(), Error> {
     let folder = tempfile::tempdir()?;
     let elf = folder.path().join("image.elf");

@@ -1,10 +1,10 @@
-//! The boards that there are images for.
+//! The boards that have images.
 
 use std::ops::Range;
 
 use clap::ValueEnum;
 
-/// A board, by the name of the firmware's feature for it.
+/// A board, named after its firmware feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Board {
     /// ST's B-G431B-ESC1.
@@ -16,13 +16,13 @@ pub(crate) enum Board {
 }
 
 impl Board {
-    /// The board of that name.
+    /// Returns the board of that name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         let mut boards = Self::value_variants().iter().copied();
         boards.find(|board| board.name() == name)
     }
 
-    /// Its name.
+    /// Returns its name.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::BG431bEsc1 => "b-g431b-esc1",
@@ -30,7 +30,7 @@ impl Board {
         }
     }
 
-    /// The PWM interrupt, by the name of its vector.
+    /// Returns the name of the PWM interrupt's vector.
     pub(crate) fn pwm_interrupt(self) -> &'static str {
         match self {
             Self::BG431bEsc1 => "ADC1_2",
@@ -38,7 +38,7 @@ impl Board {
         }
     }
 
-    /// What probe-rs calls its chip.
+    /// Returns probe-rs's name for its chip.
     pub(crate) fn chip(self) -> &'static str {
         match self {
             Self::BG431bEsc1 => "STM32G431CBUx",
@@ -46,8 +46,8 @@ impl Board {
         }
     }
 
-    /// The addresses that an image may take, as the firmware's linker scripts have them. What is
-    /// stored lies behind them on the one board, and in a hole of the image on the other.
+    /// Returns the addresses that an image may use, as in the firmware's linker scripts. Stored data lie
+    /// behind them on one board, and in a hole in the image on the other.
     pub(crate) fn flash(self) -> Range<u32> {
         match self {
             Self::BG431bEsc1 => 0x0800_0000..0x0801_F000,
@@ -55,8 +55,8 @@ impl Board {
         }
     }
 
-    /// Whether the chip's own loader can be reached by USB. The other board's USB pins drive its
-    /// bridge and its CAN bus.
+    /// Returns whether the chip's own bootloader can be reached by USB. The other board's USB pins drive
+    /// its bridge and its CAN bus.
     pub(crate) fn has_usb(self) -> bool {
         self == Self::Vesc4F405
     }

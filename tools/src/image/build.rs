@@ -1,4 +1,4 @@
-//! A board's image, built by cargo.
+//! Builds a board's image with cargo.
 
 use std::path::PathBuf;
 use std::process::Stdio;
@@ -14,16 +14,16 @@ const CARGO: Program = Program {
     remedy: "install Rust from https://rustup.rs",
 };
 
-/// Builds it, in the folder of the repository, and gives the ELF file.
+/// Builds it, in the repository's folder, and returns the path of the ELF file.
 ///
 /// # Errors
-/// [`Error::Missing`] without cargo, [`Error::Program`] if it did not build.
+/// [`Error::Missing`] without cargo, [`Error::Program`] if the build fails.
 pub(super) fn build(board: Board) -> Result<PathBuf, Error> {
     let mut command = CARGO.command();
     command.args(["build", "--package", "siskin-firmware", "--release"]);
     command.args(["--target", "thumbv7em-none-eabihf"]);
     command.args(["--features", board.name()]);
-    // Its messages for a person stay on standard error.
+    // Its messages for people stay on standard error.
     command.arg("--message-format=json-render-diagnostics");
     let messages = CARGO.run(command.stdout(Stdio::piped()))?;
     let executable = String::from_utf8_lossy(&messages)

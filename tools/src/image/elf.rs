@@ -13,14 +13,14 @@ use super::seal::Seal;
 use super::{Board, Tag};
 use crate::error::Error;
 
-/// What an erased flash holds.
+/// What erased flash holds.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Bytes between two segments that are written as erased. A larger hole is left as it is: on the
-/// VESC the stored parameters lie in one, between the vectors and the code.
+/// Largest gap between two segments that is written as erased, bytes. A larger hole is left alone: on the
+/// VESC it holds the stored parameters, between the vectors and the code.
 const GAP_BYTES: u32 = 256;
 
-/// A part of an image without a hole.
+/// A contiguous part of an image.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Piece {
     /// Address of its first byte.
@@ -35,30 +35,30 @@ impl Piece {
     }
 }
 
-/// An image that may be written.
+/// An image that may be flashed.
 #[derive(Debug)]
 pub(crate) struct Image {
-    /// What it says of itself.
+    /// What it says about itself.
     pub(crate) tag: Tag,
-    /// The board of the tag.
+    /// The board named in the tag.
     pub(crate) board: Board,
     /// Where it starts to run.
     pub(crate) entry: u32,
-    /// Its parts in the order of their addresses; there is one at least.
+    /// Its pieces by address; at least one.
     pub(crate) pieces: Vec<Piece>,
     /// What its PWM interrupt reaches.
     pub(crate) reach: Reach,
-    /// The whole file; as the parts, with its check sum.
+    /// The whole ELF file, with the checksum, like the pieces.
     pub(crate) file: Vec<u8>,
 }
 
 impl Image {
-    /// Reads an ELF file, and checks that it is for a board, for the wanted one if any, that it fits, that
-    /// its PWM interrupt needs nothing from the flash while that is written, and that it is whole. One that
-    /// has no check sum yet gets it.
+    /// Reads an ELF file, and checks that it is for a known board (the wanted one, if given), that it fits,
+    /// that its PWM interrupt needs nothing from the flash while that is being written, and that it is
+    /// intact. Adds the checksum if there is none yet.
     ///
     /// # Errors
-    /// [`Error::File`] that names the file and what is wrong.
+    /// [`Error::File`] with the file and what is wrong.
     pub(crate) fn read(path: &Path, wanted: Option<Board>) -> Result<Self, Error> {
         let image = fs::read(path).map_err(|e| e.to_string());
         let image = image.and_then(|bytes| Self::parse(&bytes));
@@ -79,7 +79,7 @@ impl Image {
         if segments.is_empty() {
             return Err("nothing in it goes into the flash".to_owned());
         }
-        // Before anything is laid out: an address may be anything.
+        // Checked before anything is laid out, since an address may be anything.
         let found = segments.iter();
         let mut found = found.filter_map(|segment| Some((segment.at, Tag::find(segment.data)?)));
         let (tag_from, tag) = found.next().ok_or("no tag of a Siskin image in it")?;
@@ -130,7 +130,7 @@ impl Image {
         })
     }
 
-    /// All bytes from the first address to the last, holes as erased.
+    /// Returns all bytes from the first address to the last, with holes as erased.
     pub(crate) fn contents(&self) -> Vec<u8> {
         let mut contents = Vec::new();
         for piece in &self.pieces {
@@ -141,14 +141,14 @@ impl Image {
     }
 }
 
-/// A piece that is to be loaded: its address in the flash, its bytes, and their place in the file.
+/// A piece to be loaded: its address in the flash, its bytes, and their place in the file.
 struct Segment<'a> {
     at: u32,
     data: &'a [u8],
     place: Range<usize>,
 }
 
-/// What is to be loaded, and the entry's address.
+/// Returns what is to be loaded, and the entry address.
 fn segments(bytes: &[u8]) -> Result<(Vec<Segment<'_>>, u32), String> {
     let no_elf = |e| format!("no ELF file of 32 bits: {e}");
     let header = FileHeader32::<LittleEndian>::parse(bytes).map_err(no_elf)?;

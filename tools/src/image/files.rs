@@ -1,5 +1,5 @@
-//! The files of an image: ELF for probes, HEX for other programs, BIN for those that know neither.
-//! The first two leave holes as they are, in which parameters may be stored; BIN has them as erased.
+//! The files of an image: ELF for probes, HEX for other programs, BIN for those that read neither. The
+//! first two leave holes alone, in which parameters may be stored; BIN has them as erased.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,17 +9,17 @@ use ihex::{Record, create_object_file_representation};
 use super::Image;
 use crate::error::Error;
 
-/// Bytes of a line of HEX: as many as other programs write.
+/// Bytes per line of HEX: as many as other programs write.
 const LINE_BYTES: usize = 16;
 
-/// Bytes that the 16 address bits of a HEX line reach.
+/// Bytes that the 16 address bits of a HEX line span.
 const PAGE_BYTES: u32 = 1 << 16;
 
-/// Writes `BOARD.elf`, `.bin` and `.hex` into a folder, which is made if need be, and gives their
-/// names.
+/// Writes `BOARD.elf`, `.bin` and `.hex` into a folder, which is created if needed, and returns their
+/// paths.
 ///
 /// # Errors
-/// [`Error::File`] for what cannot be written.
+/// [`Error::File`] if one cannot be written.
 pub(super) fn write(image: &Image, folder: &Path) -> Result<[PathBuf; 3], Error> {
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
     let name = |extension| folder.join(image.board.name()).with_extension(extension);

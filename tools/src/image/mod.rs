@@ -17,11 +17,11 @@ use tag::Tag;
 use crate::cli::ImageArgs;
 use crate::error::Error;
 
-/// Builds the image if it is asked for, writes the files, and prints what they are.
+/// Builds the image if requested, writes the files, and prints what they are.
 ///
 /// # Errors
-/// [`Error::Usage`] with nothing to make it from, [`Error::File`] for a file that is no image or
-/// cannot be written, [`Error::Missing`] and [`Error::Program`] if cargo cannot build it.
+/// [`Error::Usage`] with nothing to make it from, [`Error::File`] for a file that is not an image or cannot
+/// be written, [`Error::Missing`] and [`Error::Program`] if cargo cannot build it.
 pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
     let elf = match (&args.elf, args.board) {
         (Some(elf), _) => elf.clone(),
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &ImageArgs, out: &mut dyn Write) -> Result<(), Error> {
 }
 
 impl Image {
-    /// Board, version, build, size and reach, a line each.
+    /// Returns board, version, build, size and reach, one per line.
     pub(crate) fn description(&self) -> String {
         let Tag {
             board,

@@ -1,12 +1,12 @@
-//! The check sum of an image: by it `siskin flash` refuses one that is damaged, and so does the start of the
-//! chip. The linker leaves it erased; an image is stamped when it is read.
+//! An image's checksum, by which `siskin flash` and the chip's start-up refuse a damaged one. The linker
+//! leaves it erased; it is filled in when the image is read.
 
 use siskin_control::image::{NO_WORDS, check_sum};
 
 use super::elf::{ERASED, Piece};
 use super::tag::{Tag, words};
 
-/// What stands in place of the sum and its inverse in an image that is not stamped.
+/// What an unstamped image holds in place of the sum and its inverse.
 const NOT_STAMPED: [u32; 2] = [u32::MAX; 2];
 
 /// The sum and its inverse, as they are to stand at an address.
@@ -17,7 +17,7 @@ pub(super) struct Seal {
 }
 
 impl Seal {
-    /// The sum of all pieces, whose tag stands in the contents of a segment from `tag_from` on.
+    /// Computes the sum over all pieces; the tag begins at address `tag_from`.
     ///
     /// # Errors
     /// The image is stamped and damaged, or not as the linker makes it.
@@ -60,7 +60,7 @@ impl Seal {
         Ok(Self { at, sum })
     }
 
-    /// Puts it into bytes that begin at an address.
+    /// Writes it into bytes that begin at an address.
     pub(super) fn stamp(&self, begin: u32, bytes: &mut [u8]) {
         let sum = self.sum.iter().flat_map(|word| word.to_le_bytes());
         for (byte, at) in sum.zip(self.at..) {

@@ -1,42 +1,42 @@
-//! What an image says of itself. `firmware/src/image.rs` puts it there, and the linker script what follows
-//! the texts.
+//! What an image says about itself. `firmware/src/image.rs` puts it there; the linker script adds what
+//! follows the texts.
 
 use std::ops::Range;
 
-/// What the tag begins with: the last byte is the version of its layout.
+/// What the tag begins with; the last byte is the layout version.
 const MARK: [u8; 8] = *b"SISKIN\x00\x02";
 
-/// Bytes of each text, zeros behind it.
+/// Bytes per text, zero-padded.
 const FIELD_BYTES: usize = 24;
 
-/// Where the addresses begin that the check sum is of, from the tag's begin: two ranges of two.
+/// Offset in the tag of the address ranges that the checksum covers: two ranges of two addresses.
 const RANGES_AT: usize = MARK.len() + 3 * FIELD_BYTES;
 
-/// Where the check sum stands, and its inverse.
+/// Offset of the checksum, which its inverse follows.
 const SUM_AT: usize = RANGES_AT + 4 * 4;
 
-/// Bytes of all.
+/// Bytes of the whole tag.
 const TAG_BYTES: usize = SUM_AT + 2 * 4;
 
-/// Board, version and build of an image, and its check sum.
+/// An image's board, version and build, and its checksum.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Tag {
-    /// Name of the board.
+    /// Board name.
     pub(crate) board: String,
-    /// Version of the firmware.
+    /// Firmware version.
     pub(crate) version: String,
-    /// Hash of the commit that it was built from, with `+` behind it if files differed.
+    /// Hash of the commit it was built from, followed by `+` if files differed.
     pub(crate) build: String,
-    /// The addresses that its check sum is of.
+    /// The addresses that its checksum covers.
     pub(crate) ranges: [Range<u32>; 2],
-    /// Where that stands, from the contents' begin.
+    /// Offset of the checksum in the contents.
     pub(crate) sum_at: usize,
-    /// The check sum and its inverse, all ones where it is not stamped.
+    /// The checksum and its inverse, all ones if not stamped.
     pub(crate) sum: [u32; 2],
 }
 
 impl Tag {
-    /// The first whole tag in a memory's contents. It begins at a multiple of 4.
+    /// Returns the first complete tag in a memory's contents. It begins at a multiple of 4.
     pub(crate) fn find(contents: &[u8]) -> Option<Self> {
         let mut starts = (0..contents.len()).step_by(4);
         starts.find_map(|start| Self::read(start, &contents[start..]))
@@ -63,7 +63,7 @@ impl Tag {
     }
 }
 
-/// The words that stand in a memory.
+/// Iterates over the words in a memory.
 pub(crate) fn words(bytes: &[u8]) -> impl Iterator<Item = u32> {
     let words = bytes.chunks_exact(4);
     words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))

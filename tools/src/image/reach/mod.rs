@@ -1,9 +1,9 @@
-//! What the PWM interrupt needs from the flash while that is written: nothing, since an erase stalls
-//! whoever reads there for 22 ms and more, with the bridge as it was.
+//! Checks that the PWM interrupt needs nothing from the flash while that is being written: an erase stalls
+//! any access to it for 22 ms and more, with the bridge left as it was.
 //!
-//! The interrupt has two ways. While the flash is written it only holds the bridge, which rests then; in
-//! any other period it controls, and may read from the flash what RAM has no room for. A function reaches
-//! all whose addresses it holds, called or not.
+//! The interrupt has two paths. While the flash is being written it only holds the bridge, which is at rest
+//! then; in any other period it controls, and may run from flash what does not fit into RAM. A function
+//! reaches every function whose address it holds, called or not.
 
 mod program;
 mod registers;
@@ -17,22 +17,22 @@ use program::{Function, Program};
 
 use super::Board;
 
-/// What the interrupt does not call while the flash is written, by the name in the firmware.
+/// What the interrupt does not call while the flash is being written, by its name in the firmware.
 const CONTROLS: &str = "siskin_firmware::interrupt::period::Interrupt::control";
 
-/// The flash of these chips, the part with the parameters too.
+/// The flash of these chips, including the part with the parameters.
 const FLASH: Range<u32> = 0x0800_0000..0x1000_0000;
 
-/// What a reader does about it.
+/// What the reader can do about it.
 const REMEDY: &str = "give it a place in RAM in firmware/link/sections.x, or keep it out of \
                       Interrupt::hold in firmware/src/interrupt/period.rs";
 
 /// How much the interrupt reaches.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Reach {
-    /// Functions and their bytes, while the flash is written.
+    /// While the flash is being written: functions and their bytes.
     writing: (usize, u32),
-    /// In any other period: functions, their bytes, and how many of those are in the flash.
+    /// In any other period: functions, their bytes, and how many of those are in flash.
     running: (usize, u32, u32),
 }
 
@@ -51,7 +51,7 @@ impl fmt::Display for Reach {
 /// Follows a board's PWM interrupt through an ELF file.
 ///
 /// # Errors
-/// What it needs from the flash and by which calls, the first of it; or why that cannot be told.
+/// The first things that it needs from the flash, and by which calls; or why that cannot be determined.
 pub(super) fn judge(bytes: &[u8], board: Board) -> Result<Reach, String> {
     let program = Program::parse(bytes)?;
     let name = board.pwm_interrupt();
@@ -89,14 +89,14 @@ pub(super) fn judge(bytes: &[u8], board: Board) -> Result<Reach, String> {
     })
 }
 
-/// Every function that one leads to, itself included, each with one that leads there.
+/// Every function reachable from one, itself included, each with a function that leads to it.
 struct Callers<'a> {
     program: &'a Program<'a>,
     callers: BTreeMap<u32, Option<u32>>,
 }
 
 impl<'a> Callers<'a> {
-    /// But not the one of a name, nor what only that leads to.
+    /// Leaves out the function named `without`, and what only it leads to.
     fn of(program: &'a Program<'a>, first: &Function, without: Option<&str>) -> Self {
         let mut callers = BTreeMap::from([(first.place.start, None)]);
         let mut waiting = vec![first];
@@ -120,7 +120,7 @@ impl<'a> Callers<'a> {
         begins.filter_map(move |begin| program.function(*begin))
     }
 
-    /// Each function and each datum in the flash, and each call of which it cannot be told.
+    /// Lists each function and datum in flash, and each call whose target is unknown.
     fn needs_from_flash(&self) -> Vec<String> {
         let mut found = Vec::new();
         let mut beside = BTreeSet::new();
@@ -145,7 +145,7 @@ impl<'a> Callers<'a> {
                 ));
             }
         }
-        // Data beside the code, which may lead on.
+        // Data beside the code, which may lead further.
         let leading = beside.iter().filter(|(_, to)| FLASH.contains(to));
         found.extend(
             leading.map(|(at, to)| format!("{to:#010x}, to which the word at {at:#010x} leads")),
@@ -153,12 +153,12 @@ impl<'a> Callers<'a> {
         found
     }
 
-    /// How the interrupt comes to a function.
+    /// Returns the call path from the interrupt to a function.
     fn way(&self, function: &Function) -> String {
         let mut names: Vec<&str> = Vec::new();
         let mut at = Some(function.place.start);
         while let Some(function) = at.and_then(|at| self.program.function(at)) {
-            // The linker's jumps have their targets' names.
+            // The linker's veneers are named after their targets.
             if names.last() != Some(&function.name.as_str()) {
                 names.push(&function.name);
             }

@@ -1,5 +1,5 @@
-//! A linked image as far as its control flow goes: functions, and what they hold the addresses of.
-//! The linker keeps that with `--emit-relocs`.
+//! The control flow of a linked image: its functions, and the addresses that they hold. The linker keeps
+//! the latter with `--emit-relocs`.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -17,14 +17,13 @@ use rustc_demangle::demangle;
 
 use super::thumb::{Branch, branches};
 
-/// A function; addresses are without the bit that says Thumb.
+/// A function; addresses are without the Thumb bit.
 #[derive(Debug)]
 pub(super) struct Function {
-    /// As the source has it, and the same whichever way the compiler spells it.
+    /// As in the source, and independent of the compiler's mangling.
     pub(super) name: String,
     pub(super) place: Range<u32>,
-    /// The linker's way to a function that is too far for a branch. Whoever goes there names that
-    /// function itself.
+    /// A linker veneer to a function too far away for a branch. Callers name that function itself.
     pub(super) is_jump: bool,
 }
 
@@ -36,12 +35,12 @@ pub(super) struct Program<'a> {
     /// Which words hold an address, and which instructions call one.
     held: BTreeMap<u32, u32>,
     called: BTreeMap<u32, u32>,
-    /// Where instructions begin (true), and where data do.
+    /// Where code (true) and data begin.
     kinds: BTreeMap<u32, bool>,
 }
 
 impl<'a> Program<'a> {
-    /// Reads an ELF file.
+    /// Parses an ELF file.
     ///
     /// # Errors
     /// What it lacks.
@@ -120,7 +119,7 @@ impl<'a> Program<'a> {
             self.symbols.insert(name.to_owned(), at);
             if symbol.kind() == SymbolKind::Text && symbol.is_definition() {
                 let (begin, end) = (at & !1, (at & !1) + symbol.size() as u32);
-                // Of several names for one function, one that tells its size.
+                // Of several names for a function, prefer one with its size.
                 if self
                     .functions
                     .get(&begin)
@@ -130,7 +129,8 @@ impl<'a> Program<'a> {
                 }
             }
         }
-        // One in assembly may not tell its size: it ends where another begins, or its section.
+        // An assembly function may not state its size: it ends where the next one begins, or with its
+        // section.
         let begins: Vec<u32> = self.functions.keys().copied().collect();
         for (index, begin) in begins.iter().enumerate() {
             let section = self.section(*begin).map_or(*begin, |(place, _)| place.end);
@@ -143,23 +143,23 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// The value of a symbol.
+    /// Returns the value of a symbol.
     pub(super) fn symbol(&self, name: &str) -> Option<u32> {
         self.symbols.get(name).copied()
     }
 
-    /// The function that begins at an address.
+    /// Returns the function that begins at an address.
     pub(super) fn function(&self, address: u32) -> Option<&Function> {
         self.functions.get(&(address & !1))
     }
 
-    /// The function that an address is in.
+    /// Returns the function that contains an address.
     fn function_around(&self, address: u32) -> Option<&Function> {
         let (_, function) = self.functions.range(..=address & !1).next_back()?;
         function.place.contains(&(address & !1)).then_some(function)
     }
 
-    /// Addresses that a function calls or holds, and whether it goes where none of them tells.
+    /// Returns the addresses that a function calls or holds, and whether it goes where none of them says.
     pub(super) fn leads(&self, function: &Function) -> (Vec<u32>, bool) {
         if function.is_jump {
             return (Vec::new(), false);
@@ -174,13 +174,14 @@ impl<'a> Program<'a> {
         for (begin, code) in self.code(&place) {
             for branch in branches(begin, code) {
                 match branch {
-                    // Within a function no relocation is needed, nor to its neighbour in assembly.
+                    // Branches within a function, or to its neighbour in assembly, need no relocation.
                     Branch::To(to) if place.contains(&to) => {}
                     Branch::To(to) => {
                         let function = self.function_around(to);
                         addresses.push(function.map_or(to, |function| function.place.start));
                     }
-                    // Code for size has a call's target in a register; its address is among those held.
+                    // Code built for size calls through a register; the target's address is among those
+                    // held.
                     Branch::Computed(by) => {
                         let to = by.and_then(|by| self.held.get(&by));
                         computed |= to.is_none_or(|to| self.function(*to).is_none());
@@ -191,7 +192,7 @@ impl<'a> Program<'a> {
         (addresses, computed)
     }
 
-    /// The pieces of a function that are instructions, and not data.
+    /// Returns the parts of a function that are instructions rather than data.
     fn code(&self, place: &Range<u32>) -> Vec<(u32, &'a [u8])> {
         let Some((section, bytes)) = self.section(place.start) else {
             return Vec::new();
@@ -210,8 +211,8 @@ impl<'a> Program<'a> {
             .collect()
     }
 
-    /// Places and addresses of the words that hold one, in the section around an address and outside of
-    /// functions.
+    /// Returns place and value of the words that hold an address, in the section around `address` and
+    /// outside functions.
     pub(super) fn data_beside(&self, address: u32) -> Vec<(u32, u32)> {
         let Some((section, _)) = self.section(address) else {
             return Vec::new();
@@ -240,19 +241,19 @@ fn function(symbol: &str, place: Range<u32>) -> Function {
     let thunk = symbol.strip_prefix("__Thumbv7");
     let target = thunk.and_then(|rest| Some(rest.split_once("Thunk_")?.1));
     Function {
-        // v0 has a method's type in brackets.
+        // v0 mangling puts a method's type in angle brackets.
         name: format!("{:#}", demangle(target.unwrap_or(symbol))).replace(['<', '>'], ""),
         place,
         is_jump: target.is_some(),
     }
 }
 
-/// The register of a movw or a movt.
+/// Returns the register of a movw or movt.
 fn register(code: u32) -> u32 {
     code >> 24 & 0xF
 }
 
-/// The 16 bits of a movw or a movt.
+/// Returns the 16-bit immediate of a movw or movt.
 fn immediate(code: u32) -> u32 {
     let (first, second) = (code & 0xFFFF, code >> 16);
     (first & 0xF) << 12 | (first >> 10 & 1) << 11 | (second >> 12 & 7) << 8 | second & 0xFF

@@ -1,15 +1,15 @@
-//! Which registers hold an address that an instruction tells: enough of Thumb-2 (Armv7-M manual, chapter A7.7)
-//! to know where a call by a register leads.
+//! Tracks which registers hold an address known from an instruction: enough of Thumb-2 (Armv7-M manual, chapter
+//! A7.7) to know where a call through a register leads.
 //!
-//! Instructions are taken in the order in which they stand, whichever way the control flows: compilers load an
+//! Instructions are taken in the order in which they stand, whatever the control flow: compilers load an
 //! address shortly before the call.
 
-/// Where each register has its value from: the place of the word or of the `movt` whose address was loaded into
-/// it last; nothing where the value is another.
+/// Where each register's value comes from: the place of the word or the `movt` whose address was last loaded
+/// into it; `None` for any other value.
 #[derive(Debug, Default)]
 pub(super) struct Registers([Option<u32>; 16]);
 
-/// What the procedure call standard leaves to a function that is called: r0 to r3, and r12.
+/// The registers that the procedure call standard lets a callee overwrite: r0 to r3, and r12.
 const SCRATCH: u16 = 0x100F;
 
 impl Registers {
@@ -17,24 +17,24 @@ impl Registers {
         self.0[usize::from(register & 15)]
     }
 
-    /// A function has been called.
+    /// Notes that a function has been called.
     pub(super) fn called(&mut self) {
         self.forget_all(SCRATCH);
     }
 
-    /// Takes an instruction of 16 bits; `here` is its address and 4.
+    /// Takes a 16-bit instruction; `here` is its address plus 4.
     pub(super) fn narrow(&mut self, here: u32, code: u16) {
         let (low, high) = (code & 7, code >> 8 & 7);
         match code {
-            // Shifts, sums, extensions and reversals, whose result is in the lowest bits.
+            // Shifts, sums, extensions and reversals, with the result register in the lowest bits.
             0x0000..=0x1FFF | 0xB200..=0xB2FF | 0xBA00..=0xBAFF => self.forget(low),
-            // mov, add and sub of a number, but not cmp.
+            // mov, add and sub with an immediate, but not cmp.
             0x2000..=0x27FF | 0x3000..=0x3FFF => self.forget(high),
-            // Of registers; tst, cmp and cmn change none.
+            // Register operations; tst, cmp and cmn change none.
             0x4000..=0x43FF if !matches!(code >> 6 & 15, 8 | 10 | 11) => self.forget(low),
             0x4400..=0x44FF => self.forget(code >> 4 & 8 | low),
             0x4600..=0x46FF => self.set(code >> 4 & 8 | low, self.get(code >> 3)),
-            // ldr from beside the code.
+            // PC-relative ldr.
             0x4800..=0x4FFF => {
                 self.set(high, Some((here & !3) + 4 * u32::from(code & 0xFF)));
             }
@@ -42,7 +42,7 @@ impl Registers {
             0x5600..=0x5FFF | 0x6800..=0x6FFF | 0x7800..=0x7FFF | 0x8800..=0x8FFF => {
                 self.forget(low);
             }
-            // ldr from the stack, addresses beside the code and in the stack.
+            // SP-relative ldr, and PC- and SP-relative addresses.
             0x9800..=0xAFFF => self.forget(high),
             // pop, ldm.
             0xBC00..=0xBDFF | 0xC800..=0xCFFF => self.forget_all(code & 0xFF),
@@ -50,11 +50,11 @@ impl Registers {
         }
     }
 
-    /// Takes one of 32 bits.
+    /// Takes a 32-bit instruction.
     pub(super) fn wide(&mut self, here: u32, first: u16, second: u16) {
         let (target, result) = (second >> 12, second >> 8 & 15);
         if first & 0xFF7F == 0xF85F {
-            // ldr from beside the code, ahead or behind.
+            // PC-relative ldr, forwards or backwards.
             let (base, offset) = (here & !3, u32::from(second & 0xFFF));
             let ahead = first & 0x80 != 0;
             let place = base.wrapping_add(if ahead { offset } else { offset.wrapping_neg() });
@@ -77,7 +77,7 @@ impl Registers {
             self.forget(target);
             self.forget(first);
         } else {
-            // Loads of two, and arithmetic, of two results too. A branch has none.
+            // Loads of two registers, and arithmetic, including that with two results. A branch has none.
             let is_branch = first & 0xF800 == 0xF000 && second & 0x8000 != 0;
             let is_store = first & 0xFE50 == 0xE840 || first & 0xFE50 == 0xE800;
             let is_float = first & 0xEC00 == 0xEC00;
@@ -109,7 +109,7 @@ impl Registers {
 mod tests {
     use super::*;
 
-    /// r3 by the instructions, from 0x1000 on.
+    /// Returns r3 after the instructions, which begin at 0x1000.
     fn r3(code: &[&[u16]]) -> Option<u32> {
         let mut registers = Registers::default();
         let mut here = 0x1004;
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!(r3(&[&[0xF85F, 0x3010]]), Some(0x0FF4)); // ldr.w r3, [pc, #-16]
         assert_eq!(r3(&[&[0xF241, 0x2334], &[0xF2C0, 0x0308]]), Some(0x1004)); // movw, movt r3
         assert_eq!(r3(&[other, &[0x4623]]), Some(0x1008)); // mov r3, r4
-        // As GNU as writes them.
+        // As assembled by GNU as.
         let writes: [&[u16]; 15] = [
             &[0x6803],         // ldr r3, [r0]
             &[0x5883],         // ldr r3, [r0, r2]

@@ -1,21 +1,21 @@
-//! Where instructions lead: the branches and calls of Thumb-2 (Armv7-M manual, chapter A7.7).
+//! Where instructions lead: the Thumb-2 branches and calls (Armv7-M manual, chapter A7.7).
 
 use super::registers::Registers;
 
-/// Where an instruction goes on.
+/// Where execution continues after an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Branch {
     /// At this address.
     To(u32),
-    /// Wherever a register or the memory says; a return is none of these. With the place of the word or of the
-    /// `movt` whose address the register has been given, if it has.
+    /// Wherever a register or memory says; returns excepted. With the place of the word or `movt` from which
+    /// the register was loaded, if known.
     Computed(Option<u32>),
 }
 
 const LINK: u16 = 14;
 const STACK: u16 = 13;
 
-/// The branches of the instructions from an address on, in turn.
+/// Returns the branches among the instructions that begin at an address, in order.
 pub(super) fn branches(begin: u32, code: &[u8]) -> Vec<Branch> {
     let halves: Vec<u16> = code
         .chunks_exact(2)
@@ -23,7 +23,7 @@ pub(super) fn branches(begin: u32, code: &[u8]) -> Vec<Branch> {
         .collect();
     let (mut found, mut at, mut registers) = (Vec::new(), 0, Registers::default());
     while let Some(&first) = halves.get(at) {
-        // What it counts from.
+        // The PC value that offsets count from.
         let here = begin + 2 * at as u32 + 4;
         let second = halves.get(at + 1).copied().unwrap_or(0);
         let is_wide = first >> 11 > 0b11100;
@@ -42,7 +42,7 @@ pub(super) fn branches(begin: u32, code: &[u8]) -> Vec<Branch> {
     found
 }
 
-/// bl, or blx of a register.
+/// bl, or blx with a register.
 fn is_call(is_wide: bool, first: u16, second: u16) -> bool {
     if is_wide {
         first & 0xF800 == 0xF000 && second & 0xD000 == 0xD000
@@ -53,7 +53,7 @@ fn is_call(is_wide: bool, first: u16, second: u16) -> bool {
 
 fn narrow(here: u32, code: u16, registers: &Registers) -> Option<Branch> {
     match code {
-        // b, under a condition; of the 16 the last two are other instructions.
+        // Conditional b; the last two of the 16 conditions encode other instructions.
         0xD000..=0xDDFF => Some(Branch::To(moved(here, code, 8))),
         0xE000..=0xE7FF => Some(Branch::To(moved(here, code, 11))),
         // bx, blx.
@@ -79,7 +79,7 @@ fn wide(here: u32, first: u16, second: u16) -> Option<Branch> {
     let (sign, j1, j2) = (bit(first, 10), bit(second, 13), bit(second, 11));
     let low = u32::from(second & 0x7FF) << 1;
     match second & 0x5000 {
-        // b under a condition, which the other instructions of this form have not.
+        // Conditional b, which the other instructions of this form are not.
         0 if first >> 7 & 7 != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | u32::from(first & 0x3F) << 12 | low;
             Some(Branch::To(here.wrapping_add(signed(offset, 21))))
@@ -94,12 +94,12 @@ fn wide(here: u32, first: u16, second: u16) -> Option<Branch> {
     }
 }
 
-/// By the lowest bits of an instruction, which count half words.
+/// Adds the offset in an instruction's lowest bits, which counts half-words.
 fn moved(here: u32, code: u16, bits: u32) -> u32 {
     here.wrapping_add(signed(u32::from(code) << 1, bits + 1))
 }
 
-/// The lowest bits of a number with its sign.
+/// Sign-extends the lowest `bits` of a number.
 fn signed(value: u32, bits: u32) -> u32 {
     let unused = 32 - bits;
     ((value << unused) as i32 >> unused) as u32
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn branches_are_found_among_other_instructions() {
-        // As GNU as writes them, at 0x1000.
+        // As assembled by GNU as, at 0x1000.
         let code: [(&[u16], Option<Branch>); 17] = [
             (&[0xB510], None),                                 // push {r4, lr}
             (&[0xF000, 0xF87D], Some(Branch::To(0x1100))),     // bl 0x1100
