@@ -1,4 +1,4 @@
-//! `siskin check`: the ESC tests itself, and says what it has found.
+//! `siskin check`: has the ESC test itself, and prints the results.
 
 use std::io::Write;
 
@@ -11,14 +11,14 @@ use crate::{ftp, json, step_by_step};
 
 const COMMAND: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;
 
-/// Where the ESC has what it has found.
+/// Where the ESC serves its results.
 const REPORT: &str = "@SYS/check.txt";
 
 /// A line of the report.
 #[derive(Debug, PartialEq)]
 struct Item {
     name: String,
-    /// Nothing where a sensor gives no value.
+    /// `None` if a sensor gives no value.
     value: Option<f32>,
     unit: String,
     low: f32,
@@ -29,8 +29,7 @@ struct Item {
 /// Runs the self-test and prints its lines.
 ///
 /// # Errors
-/// [`Error::Refused`] where the ESC does not test itself now, [`Error::Partly`] where something is wrong
-/// with it.
+/// [`Error::Refused`] if the ESC cannot test itself now, [`Error::Partly`] if an item has failed.
 pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> Result<(), Error> {
     let what = "self-test";
     let (result, texts) = step_by_step::run(session, what, (COMMAND, 0.0), &["Fault: "])?;
@@ -75,7 +74,7 @@ pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> 
 }
 
 impl Item {
-    /// Reads a line: name, value, unit, bounds, verdict.
+    /// Parses a line: name, value, unit, bounds, verdict.
     fn parse(line: &str) -> Option<Self> {
         let mut words = line.split(' ');
         let name = words.next()?.to_owned();

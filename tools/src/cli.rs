@@ -24,11 +24,11 @@ pub(crate) struct Cli {
     )]
     pub(crate) connect: Endpoint,
 
-    /// System id to talk to, instead of that of the first ESC heard.
+    /// System id to talk to, instead of the first ESC heard.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub(crate) system: Option<u8>,
 
-    /// Component id to talk to, instead of that of the first ESC heard.
+    /// Component id to talk to, instead of the first ESC heard.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     pub(crate) component: Option<u8>,
 
@@ -41,77 +41,79 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Have the ESC test itself at rest: supply, sensors and switches, each with its bounds.
     ///
-    /// The motor does not turn; a current of a fifth of LIM_PHASE_A flows through it for some
-    /// milliseconds. The exit status is 1 where something is out of its bounds.
+    /// The motor does not turn; a fifth of LIM_PHASE_A flows through it for a few milliseconds. The exit status
+    /// is 1 if anything is out of bounds.
     Check {
         /// One JSON object: items, a list of name, value, unit, low, high and ok.
         #[arg(long)]
         json: bool,
     },
-    /// Have the ESC find out what motor it has: resistance, inductance, flux and inertia.
+    /// Have the ESC identify its motor: resistance, inductance, flux and inertia.
     ///
-    /// The motor turns for some seconds, up to four tenths of its full speed, with half of LIM_PHASE_A at most.
-    /// Throttle, disarming or a fault ends it. Nothing is set without --keep.
+    /// The motor turns for a few seconds, at up to four tenths of its full speed and at most half of
+    /// LIM_PHASE_A. Throttle, disarming or a fault ends it. Nothing is set without --keep.
     Identify {
-        /// Keep what is found: MOT_R_MOHM, MOT_L_UH, MOT_FLUX_MWB and MOT_J_GCM2, stored once the shaft stands.
+        /// Keep the results: MOT_R_MOHM, MOT_L_UH, MOT_FLUX_MWB and MOT_J_GCM2, stored once the shaft stands.
         #[arg(long)]
         keep: bool,
         /// One JSON object: figures, a list of name, value, unit and spread_percent.
         #[arg(long)]
         json: bool,
     },
-    /// Show the last faults, and what the control did just before one: kept over a reset, not over a power-down.
+    /// Show the last faults, and what the control did just before one; kept across a reset, not across a
+    /// power-down.
     ///
-    /// The exit status is 1 where a fault is on record.
+    /// The exit status is 1 if a fault is on record.
     Faults(FaultsArgs),
     /// Read, change, save and load parameters.
     #[command(subcommand)]
     Params(ParamsCommand),
     /// Show speed, voltage, current and faults as they come.
     Monitor(MonitorArgs),
-    /// Serve a page for the browser that shows the ESC: traces, parameters, tests, faults on record.
+    /// Serve a browser page that shows the ESC: traces, parameters, tests, faults on record.
     ///
-    /// It turns the motor by a motor test, for three seconds at most, with a fifth of LIM_PHASE_A at most, while its
-    /// button is held, and by an identification. Both end when the page goes, and with the program, by Ctrl-C.
+    /// It turns the motor for identification, and for a motor test while its button is held: for at most three
+    /// seconds, with at most a fifth of LIM_PHASE_A. Both end when the page is closed, and with the program, by
+    /// Ctrl-C.
     Scope(ScopeArgs),
-    /// Show what a logic analyser has seen on a throttle wire: frames, commands, replies, errors and
+    /// Show what a logic analyser has captured on a throttle wire: frames, commands, replies, errors and
     /// timing.
     ///
-    /// Reads CSV as PulseView, sigrok-cli and Saleae Logic export it, and VCD. Equal frames in a row
-    /// are one line. Throttle is told for one direction and the pulse ends from the factory.
+    /// Reads VCD, and CSV as exported by PulseView, sigrok-cli and Saleae Logic. Successive equal frames share
+    /// a line. Throttle is shown for one direction and the factory pulse ends.
     Decode(DecodeArgs),
-    /// Compute between which speeds the flux crossings (CTL_OBSERVER 1) hold the rotor's angle, and
-    /// what limits them.
+    /// Compute between which speeds the flux crossings (CTL_OBSERVER 1) hold the rotor's angle, and what limits
+    /// them.
     ///
-    /// The worst case of Colton 2014, Table 1, from the ESC's parameters; what is given here takes
-    /// their place. N and A_e from the parameters count from the speeds that the drive begins them
-    /// at; given here they count at every speed, as in the paper. The drive takes off what it knows
-    /// of lead and delay, so that it stays below.
+    /// The worst case of Colton 2014, Table 1, from the ESC's parameters; options given here override them. N
+    /// and A_e from the parameters apply from the speeds at which the drive begins to use them; given here they
+    /// apply at every speed, as in the paper. The drive compensates for the lead and delay that it knows of, so
+    /// its errors stay below these.
     Budget(BudgetArgs),
-    /// Compute the settings of start and control loops that follow from the motor, and say from what.
+    /// Compute the settings of the start and the control loops that follow from the motor, and say from what.
     ///
     /// From resistance, flux, pole pairs and inertia (MOT_...), LIM_PHASE_A, LIM_BUS_V_MAX, CTL_RPM_MAX,
-    /// PWM_FREQ_HZ and PWM_DEADTIME_NS, by what starts motors from 3-inch propellers to lifts of 3 kW in the
-    /// simulation.
+    /// PWM_FREQ_HZ and PWM_DEADTIME_NS, by the rules that start motors from 3-inch propellers to 3 kW lift
+    /// motors in simulation.
     Tune(TuneArgs),
     /// Make the files that go onto a board: BOARD.elf, BOARD.bin and BOARD.hex.
     ///
-    /// Prints for which board they are, which version, from which commit (+ behind it where files
-    /// differed), how much of the flash they take, and what the PWM interrupt reaches. An image in which
-    /// that needs the flash while it is written is refused. The files hold a check sum, by which 'siskin
-    /// flash' and each start of the ESC see damage.
+    /// Prints their board, version and commit (followed by + if files differed from it), how much of the flash
+    /// they take, and what the PWM interrupt reaches. An image whose interrupt needs the flash while it is
+    /// being written is refused. The files hold a checksum, by which 'siskin flash' and the ESC at each start
+    /// detect damage.
     Image(ImageArgs),
-    /// Write an image into a board's flash, once it is known to be that board's and whole.
+    /// Write an image into a board's flash, after checking that it is intact and for that board.
     ///
-    /// By the program probe-rs through a debug probe (the B-G431B-ESC1 has one on it), or by dfu-util
-    /// over USB with BOOT0 at 3.3 V. Stored parameters and option bytes stay.
+    /// Uses probe-rs through a debug probe (the B-G431B-ESC1 has one on it), or dfu-util over USB with BOOT0 at
+    /// 3.3 V. Stored parameters and option bytes stay.
     Flash(FlashArgs),
 }
 
 /// What to do with parameters.
 #[derive(Debug, Subcommand)]
 pub(crate) enum ParamsCommand {
-    /// Print every parameter in the order of the ESC.
+    /// Print every parameter in the ESC's order.
     List {
         /// One JSON object, name to value.
         #[arg(long)]
@@ -126,24 +128,24 @@ pub(crate) enum ParamsCommand {
         #[arg(required = true, value_name = "NAME")]
         names: Vec<String>,
     },
-    /// Tell what parameters mean: unit, range, value from the factory.
+    /// Print what parameters mean: unit, range, factory value.
     Describe {
-        /// Names in any case; without, all.
+        /// Names in any case; all if none is given.
         #[arg(value_name = "NAME")]
         names: Vec<String>,
     },
-    /// Show which parameters are not as they come from the factory, or not as in a file.
+    /// Show which parameters differ from the factory values, or from a file.
     Diff {
         /// File to compare with, as 'siskin params load' reads it.
         file: Option<PathBuf>,
     },
-    /// Give parameters back their values from the factory.
+    /// Return parameters to their factory values.
     Reset {
         /// Store all parameters in the ESC afterwards.
         #[arg(long)]
         store: bool,
-        /// Reset all of them, and forget what else is stored, but for the statistics: the key of
-        /// signatures too. It is stored at once.
+        /// Reset all of them, and erase everything else that is stored except the statistics: the signing key
+        /// too. Stored at once.
         #[arg(long, conflicts_with_all = ["store", "names"])]
         all: bool,
         /// Names in any case.
@@ -155,7 +157,7 @@ pub(crate) enum ParamsCommand {
         /// Store all parameters in the ESC afterwards.
         #[arg(long)]
         store: bool,
-        /// Names, in any case, and values in turn, for example LIM_PHASE_A 15 MOT_STOP 0.
+        /// Alternating names, in any case, and values, for example LIM_PHASE_A 15 MOT_STOP 0.
         #[arg(required = true, value_names = ["NAME", "VALUE"], num_args = 2.., allow_negative_numbers = true)]
         pairs: Vec<String>,
     },
@@ -164,7 +166,7 @@ pub(crate) enum ParamsCommand {
         /// File to write, usually NAME.param.
         file: PathBuf,
     },
-    /// Set what a file says; MAVProxy's, Mission Planner's and QGroundControl's files are read.
+    /// Set the parameters in a file; reads MAVProxy's, Mission Planner's and QGroundControl's files.
     Load {
         /// Store all parameters in the ESC afterwards, if none was refused.
         #[arg(long)]
@@ -185,11 +187,12 @@ pub(crate) struct MonitorArgs {
     pub(crate) count: Option<u64>,
 }
 
-/// Where the page is.
+/// Where to serve the page.
 #[derive(Debug, Args)]
 pub(crate) struct ScopeArgs {
-    /// HOST:PORT to serve the page at; beyond this machine, 0.0.0.0:PORT say, its address holds a token.
-    // The emulator's own page has 8080.
+    /// HOST:PORT to serve the page at; if other machines can reach it, as at 0.0.0.0:PORT, its address holds a
+    /// token.
+    // The emulator's own page is at 8080.
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:8081")]
     pub(crate) web: HostPort,
 }
@@ -200,7 +203,7 @@ pub(crate) struct FaultsArgs {
     /// One JSON object: items, a list of the faults, and periods, what the control did before one.
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write the record to a file as well, for siskin-emulator plot: it ends in .bin.
+    /// Also write the record to a file for siskin-emulator plot; its name ends in .bin.
     #[arg(long, value_name = "FILE.bin")]
     pub(crate) save: Option<PathBuf>,
 }
@@ -214,12 +217,12 @@ pub(crate) struct DecodeArgs {
     pub(crate) options: decode::Options,
 }
 
-/// What an image is made from.
+/// What to make an image from.
 #[derive(Debug, Args)]
 pub(crate) struct ImageArgs {
-    /// Image as the linker left it; without, it is built for --board.
+    /// Image as linked; without it, one is built for --board.
     pub(crate) elf: Option<PathBuf>,
-    /// Board that it is for.
+    /// Board to make it for.
     #[arg(long)]
     pub(crate) board: Option<Board>,
     /// Folder for the files.
@@ -227,34 +230,34 @@ pub(crate) struct ImageArgs {
     pub(crate) output: PathBuf,
 }
 
-/// What to write where.
+/// What to flash, and how.
 #[derive(Debug, Args)]
 pub(crate) struct FlashArgs {
-    /// Image, as 'siskin image' makes it or as the linker left it.
+    /// Image, as made by 'siskin image' or as linked.
     pub(crate) elf: PathBuf,
-    /// Board that is connected; an image for another is refused.
+    /// Connected board; an image for another is refused.
     #[arg(long)]
     pub(crate) board: Option<Board>,
-    /// Debug probe, where several are connected: VID:PID or VID:PID:SERIAL.
+    /// Debug probe if several are connected: VID:PID or VID:PID:SERIAL.
     #[arg(long, value_name = "SELECTOR", conflicts_with = "dfu")]
     pub(crate) probe: Option<String>,
-    /// Over USB, by the chip's own loader.
+    /// Use the chip's own bootloader, over USB.
     #[arg(long)]
     pub(crate) dfu: bool,
 }
 
-/// Parameters, without an ESC.
+/// Parameters without an ESC.
 #[derive(Debug, Args)]
 pub(crate) struct GivenArgs {
-    /// Parameters as 'siskin params save' writes them; without, those from the factory. Of a file of
-    /// several components --component chooses one.
+    /// Parameters as 'siskin params save' writes them; without it, the factory values. --component selects one
+    /// of several components in the file.
     pub(crate) file: Option<PathBuf>,
-    /// A parameter in place of the file's, for example PWM_FREQ_HZ=48000.
+    /// A parameter that overrides the file's, for example PWM_FREQ_HZ=48000.
     #[arg(long = "param", value_name = "NAME=VALUE")]
     pub(crate) params: Vec<String>,
 }
 
-/// What settings are made of.
+/// What to compute settings from.
 #[derive(Debug, Args)]
 pub(crate) struct TuneArgs {
     #[command(flatten)]
@@ -273,12 +276,12 @@ pub(crate) struct TuneArgs {
     pub(crate) json: bool,
 }
 
-/// What a budget is made of.
+/// What to compute a budget from.
 #[derive(Debug, Args)]
 pub(crate) struct BudgetArgs {
     #[command(flatten)]
     pub(crate) given: GivenArgs,
-    /// Greatest error of the angle, electrical degrees.
+    /// Largest angle error, electrical degrees.
     #[arg(long, value_name = "DEG", default_value_t = 20.0, value_parser = positive)]
     pub(crate) error: f64,
     /// Poles of the motor, twice MOT_POLE_PAIRS.
@@ -287,30 +290,30 @@ pub(crate) struct BudgetArgs {
     /// Pole pairs of the motor, for MOT_POLE_PAIRS.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) pole_pairs: Option<u32>,
-    /// Greatest acceleration, rpm/s, for CTL_SLEW_RPM_S.
+    /// Largest acceleration, rpm/s, for CTL_SLEW_RPM_S.
     #[arg(long, value_name = "RPM_S", value_parser = not_negative)]
     pub(crate) acceleration: Option<f64>,
-    /// Greatest deceleration, rpm/s; without, the acceleration.
+    /// Largest deceleration, rpm/s; without it, the acceleration.
     #[arg(long, value_name = "RPM_S", value_parser = not_negative)]
     pub(crate) braking: Option<f64>,
-    /// PWM frequency, which is the sampling's, Hz, for PWM_FREQ_HZ.
+    /// PWM and sampling frequency, Hz, for PWM_FREQ_HZ.
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub(crate) pwm: Option<f64>,
-    /// N, electrical turns over which the speed is measured once, as in the paper; without,
-    /// CTL_POS_N turns at every crossing, as the drive does.
+    /// N, electrical turns over which the speed is measured once, as in the paper; without it, CTL_POS_N turns
+    /// at every crossing, as in the drive.
     #[arg(long, value_name = "N", value_parser = positive)]
     pub(crate) turns: Option<f64>,
     /// A_e, share of the extrapolated angle that a crossing leaves, for CTL_AE.
     #[arg(long, value_name = "A_E", value_parser = share)]
     pub(crate) a_e: Option<f64>,
-    /// Time constant of the flux integrator, s, or inf; without, what CTL_RPM_MIN and STA_RUN_RPM
-    /// make it. It alone, where --tau-hpfs is not given.
+    /// Time constant of the flux integrator, s, or inf; without it, what follows from CTL_RPM_MIN and
+    /// STA_RUN_RPM. Acts alone unless --tau-hpfs is given.
     #[arg(long, value_name = "S", value_parser = time_constant)]
     pub(crate) tau_int: Option<f64>,
     /// Time constant of the second-order form's high-pass, s.
     #[arg(long, value_name = "S", value_parser = time_constant)]
     pub(crate) tau_hpfs: Option<f64>,
-    /// Hold-off after a crossing, us; without, the drive's 5 % of the time between two.
+    /// Hold-off after a crossing, us; without it, the drive's 5 % of the time between two.
     #[arg(long, value_name = "US", value_parser = not_negative)]
     pub(crate) hold_off: Option<f64>,
     /// One JSON object.

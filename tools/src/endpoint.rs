@@ -8,9 +8,9 @@ use std::str::FromStr;
 pub(crate) enum Endpoint {
     /// A TCP server, `HOST:PORT`.
     Tcp(String),
-    /// A UDP port here, on which vehicles report, `HOST:PORT`.
+    /// A local UDP port to which vehicles report, `HOST:PORT`.
     UdpIn(String),
-    /// A UDP port there, `HOST:PORT`.
+    /// A remote UDP port, `HOST:PORT`.
     UdpOut(String),
     /// A serial port, 8 data bits, no parity, one stop bit.
     Serial {

@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Why the work was not done. Each text names the input and what to do.
+/// Why the work was not done. Each text names the input and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
     /// An argument that makes no sense.
@@ -28,25 +28,25 @@ pub(crate) enum Error {
     #[error("{endpoint}: {heard}")]
     NoComponent { endpoint: String, heard: String },
 
-    /// A file could not be read, written or understood.
+    /// A file could not be read, written or parsed.
     #[error("{path}: {reason}")]
     File { path: String, reason: String },
 
-    /// A program that does a part of the work is not installed.
+    /// A program that does part of the work is not installed.
     #[error("{program} is not installed: {remedy}")]
     Missing {
         program: &'static str,
         remedy: &'static str,
     },
 
-    /// A program that does a part of the work has not done it.
+    /// A program that does part of the work has failed.
     #[error("{program}: {reason}")]
     Program {
         program: &'static str,
         reason: String,
     },
 
-    /// The ESC said no.
+    /// The ESC refused.
     #[error("{what}: {reason}")]
     Refused { what: String, reason: String },
 
@@ -58,17 +58,17 @@ pub(crate) enum Error {
     #[error("{what}: nothing for {seconds} s; check the link and TEL_RATE_HZ")]
     Silent { what: String, seconds: u64 },
 
-    /// Some of several were refused; each has been listed.
+    /// Some of several items were refused; each has been listed.
     #[error("{0}")]
     Partly(String),
 
-    /// Standard output is gone.
+    /// Standard output cannot be written.
     #[error("standard output: {0}")]
     Output(#[from] io::Error),
 }
 
 impl Error {
-    /// A file could not be read, written or understood, for this reason.
+    /// A file could not be read, written or parsed, for this reason.
     pub(crate) fn file(path: &Path, reason: impl Display) -> Self {
         Self::File {
             path: path.display().to_string(),
@@ -76,8 +76,8 @@ impl Error {
         }
     }
 
-    /// 2 for bad input or no connection, 1 for what the ESC or another program refused or did not
-    /// answer, 0 where only the reader of the output went away, as in `siskin monitor | head -1`.
+    /// Returns 2 for bad input or no connection, 1 if the ESC or another program refused or did not answer,
+    /// 0 if only the reader of the output went away, as in `siskin monitor | head -1`.
     pub(crate) fn exit_code(&self) -> ExitCode {
         match self {
             Self::Usage(_)

@@ -1,5 +1,5 @@
-//! The values from the factory, as the ESC itself has them: a board may have others than the table with which
-//! this program was built, as its least dead time is above the table's.
+//! The factory values, as the ESC itself has them: a board's may differ from the table built into this
+//! program, for example if its least dead time is above the table's.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,22 @@ use crate::ftp;
 use crate::param_text;
 use crate::session::Session;
 
-/// Every parameter with its default, packed as ArduPilot does (`shared/src/mavlink/ftp/packed.rs`).
+/// Every parameter with its default, in ArduPilot's packed format (`shared/src/mavlink/ftp/packed.rs`).
 const FILE: &str = "@PARAM/param.pck?withdefaults=1";
 const MAGIC: u16 = 0x671C;
 const HEADER: usize = 6;
 const FLOAT: u8 = 4;
 const WITH_DEFAULT: u8 = 1 << 4;
 
-/// The values from the factory, by name.
+/// The factory values, by name.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Factory(BTreeMap<String, f32>);
 
 impl Factory {
-    /// Asks the ESC.
+    /// Reads them from the ESC.
     ///
     /// # Errors
-    /// Those of [`ftp::read`], and [`Error::Refused`] where the file is not what it should be.
+    /// Those of [`ftp::read`], and [`Error::Refused`] if the file has another format.
     pub(crate) fn ask(session: &mut Session) -> Result<Self, Error> {
         let file = ftp::read(session, FILE)?;
         parse(&file).map(Self).ok_or_else(|| Error::Refused {
@@ -32,7 +32,7 @@ impl Factory {
         })
     }
 
-    /// The value of a parameter that has one of its own.
+    /// Returns the factory value of a parameter that has one.
     pub(crate) fn value(&self, name: &str) -> Option<f32> {
         self.0
             .get(name)
@@ -41,7 +41,7 @@ impl Factory {
     }
 }
 
-/// Names and defaults of a packed file; nothing if it is none.
+/// Parses the names and defaults of a packed file; `None` if it is not one.
 fn parse(file: &[u8]) -> Option<BTreeMap<String, f32>> {
     let word = |at| Some(u16::from_le_bytes(*file.get(at..)?.first_chunk()?));
     let (magic, count) = (word(0)?, word(2)?);
@@ -87,7 +87,7 @@ mod tests {
         file.extend(7.0_f32.to_le_bytes());
         let named = [("MOT_LU", 2.5), ("MOT_KV", 7.0)].map(|(name, value)| (name.into(), value));
         assert_eq!(parse(&file), Some(named.into()));
-        // Whatever is cut off, or another format, is no file.
+        // Anything truncated, or in another format, is refused.
         for len in 0..file.len() {
             assert_eq!(parse(&file[..len]), None, "{len}");
         }

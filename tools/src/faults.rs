@@ -12,13 +12,13 @@ use crate::ftp;
 use crate::json::number;
 use crate::session::Session;
 
-/// Where the ESC has its record.
+/// Where the ESC serves its record.
 const RECORD: &str = "@SYS/faults.bin";
 
-/// Prints the record; keeps it as a file, if that is asked for.
+/// Prints the record, and saves it to a file on request.
 ///
 /// # Errors
-/// [`Error::Partly`] where a fault is on record, [`Error::Refused`] where there is no record.
+/// [`Error::Partly`] if a fault is on record, [`Error::Refused`] if there is no record.
 pub(crate) fn run(
     session: &mut Session,
     args: &FaultsArgs,
@@ -95,7 +95,7 @@ fn print(recorded: &Recorded, out: &mut dyn Write) -> Result<(), Error> {
     Ok(())
 }
 
-/// At most 79 characters, for as long as an ESC has not run for months.
+/// Formats a fault in at most 79 characters, unless the ESC has run for months.
 fn line(seen: &FaultSeen) -> String {
     let when = match seen.starts_ago {
         0 => String::new(),
@@ -113,7 +113,7 @@ fn line(seen: &FaultSeen) -> String {
     )
 }
 
-/// As recordings spell it.
+/// Spells the phase as recordings do.
 fn phase(seen: &FaultSeen) -> String {
     format!("{:?}", seen.phase).to_lowercase()
 }

@@ -1,4 +1,4 @@
-//! Files of the ESC, read by MAVLink FTP.
+//! Reads the ESC's files by MAVLink FTP.
 
 use mavlink::dialects::ardupilotmega::FILE_TRANSFER_PROTOCOL_DATA;
 
@@ -11,19 +11,19 @@ const OPEN_FILE_RO: u8 = 4;
 const READ_FILE: u8 = 5;
 const ACK: u8 = 128;
 
-/// The refusals (MAVLink FTP's error codes): another has a file open, and the end of the file.
+/// Refusals (MAVLink FTP error codes): another client has a file open, and end of file.
 const NO_SESSIONS_AVAILABLE: u8 = 5;
 const END_OF_FILE: u8 = 6;
 
-/// Bytes of a message before its data.
+/// Bytes of a message ahead of its data.
 const HEADER: usize = 12;
-/// What is asked for at once: all that a message holds.
+/// Bytes per request: as many as a message holds.
 const PIECE: usize = 239;
 
 /// Reads a whole file.
 ///
 /// # Errors
-/// [`Error::Refused`] where the ESC has none of that name, [`Error::NoAnswer`] when it is silent.
+/// [`Error::Refused`] if the ESC has no such file, [`Error::NoAnswer`] if it is silent.
 pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> {
     let mut sequence = 0;
     let mut request = |opcode, offset: usize, data: &[u8], size| {
@@ -40,7 +40,7 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
         .into(),
     }
     };
-    // One that a run of this program has left open would be in the way.
+    // A session that an earlier run of this program left open would be in the way.
     request(RESET_SESSIONS, 0, &[], 0)?.map_err(refused)?;
     request(OPEN_FILE_RO, 0, path.as_bytes(), path.len())?.map_err(refused)?;
     let mut file = Vec::new();
@@ -58,7 +58,7 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
     }
 }
 
-/// One request: the data of its answer, or the number of its refusal.
+/// Sends one request; returns the data of the answer, or the number of the refusal.
 fn ask(
     session: &mut Session,
     path: &str,

@@ -1,4 +1,4 @@
-//! Parameters that a command is given, without an ESC: from a file and from the command line.
+//! Parameters given without an ESC: from a file and from the command line.
 
 use std::fs;
 use std::path::Path;
@@ -9,12 +9,11 @@ use crate::cli::GivenArgs;
 use crate::error::Error;
 use crate::param_file;
 
-/// The component of an ESC beside an autopilot: whose lines a file of several components is read
-/// for by default.
+/// The component of an ESC beside an autopilot: the default for a file with several components.
 const PERIPHERAL: u8 = 140;
 
-/// What the arguments say over the factory's parameters. `component` is whose lines of a file of several
-/// components count.
+/// Returns the factory parameters, overridden by the arguments. `component` selects the lines of a file
+/// with several components.
 ///
 /// # Errors
 /// [`Error::Usage`] or [`Error::File`].
@@ -29,7 +28,7 @@ pub(crate) fn params(args: &GivenArgs, component: Option<u8>) -> Result<Params, 
     Ok(params)
 }
 
-/// Takes the parameters of a file over those that there are.
+/// Overrides the parameters with those in a file.
 fn read(params: &mut Params, file: &Path, component: u8) -> Result<(), Error> {
     let failed = |reason: String| Error::file(file, reason);
     let content = fs::read_to_string(file).map_err(|error| Error::file(file, error))?;
@@ -37,7 +36,7 @@ fn read(params: &mut Params, file: &Path, component: u8) -> Result<(), Error> {
     for line in param_file::for_component(file, lines, component)? {
         let (name, value) = (&line.param.name, line.param.value);
         let id = find(name).map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
-        // A file that was saved has the derived ones too.
+        // A saved file holds the derived ones too.
         if id.entry().kind != Kind::Derived {
             set(params, id, value)
                 .map_err(|reason| failed(format!("line {}: {reason}", line.number)))?;
@@ -46,7 +45,7 @@ fn read(params: &mut Params, file: &Path, component: u8) -> Result<(), Error> {
     Ok(())
 }
 
-/// Takes one `NAME=VALUE`.
+/// Applies one `NAME=VALUE`.
 fn assign(params: &mut Params, text: &str) -> Result<(), Error> {
     let usage = |reason: String| Error::Usage(format!("--param {text}: {reason}"));
     let (name, value) = text
@@ -63,7 +62,7 @@ fn find(name: &str) -> Result<ParamId, String> {
     ParamId::find(name).ok_or_else(|| format!("no parameter is called {name}"))
 }
 
-/// Sets a parameter, or says why it does not take the value.
+/// Sets a parameter, or says why it does not accept the value.
 pub(crate) fn set(params: &mut Params, id: ParamId, value: f32) -> Result<(), String> {
     let entry = id.entry();
     params.set(id, value).map_err(|error| match error {

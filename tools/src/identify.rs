@@ -1,4 +1,4 @@
-//! `siskin identify`: the ESC finds out what motor it has, and says what it has found.
+//! `siskin identify`: has the ESC identify its motor, and prints the results.
 
 use std::io::Write;
 use std::thread::sleep;
@@ -11,15 +11,15 @@ use crate::error::Error;
 use crate::session::Session;
 use crate::{ftp, json, step_by_step};
 
-/// The dialect has no command for it; parameter 1 is what to do.
+/// The dialect has no command of its own for it; parameter 1 says what to do.
 const COMMAND: MavCmd = MavCmd::MAV_CMD_USER_1;
 const BEGIN: f32 = 1.0;
 const KEEP: f32 = 2.0;
 
-/// Where the ESC has what it has found.
+/// Where the ESC serves its results.
 const REPORT: &str = "@SYS/identify.txt";
 
-/// How often, and how far apart, it is asked to keep what it has found: once the shaft stands.
+/// How often, and how far apart, it is asked to keep the results, which it does once the shaft stands.
 const KEEP_ATTEMPTS: u32 = 40;
 const KEEP_PAUSE: Duration = Duration::from_millis(500);
 
@@ -32,7 +32,7 @@ struct Figure {
     spread_percent: f32,
 }
 
-/// Has the motor identified, prints what was found, and has it kept if that is asked for.
+/// Has the motor identified, prints the results, and has them kept if requested.
 ///
 /// # Errors
 /// [`Error::Refused`] with the ESC's reason.
@@ -65,7 +65,7 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// Has it kept and stored, once the shaft stands.
+/// Has the results kept and stored, once the shaft stands.
 fn keep(session: &mut Session) -> Result<(), Error> {
     let what = "what was found";
     for attempt in 1.. {
@@ -92,7 +92,7 @@ fn accepted(what: &str, result: MavResult, texts: &[String]) -> Result<(), Error
 }
 
 impl Figure {
-    /// Reads a line: name, value, unit, spread.
+    /// Parses a line: name, value, unit, spread.
     fn parse(line: &str) -> Option<Self> {
         let words: Vec<_> = line.split(' ').collect();
         let [name, value, unit, spread, "%"] = words[..] else {

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-/// The number with the digits of a 32-bit value: 30.6, where widening it would print
-/// 30.600000381469727. What is not finite is null.
+/// Returns the number with the digits of a 32-bit value: 30.6, where widening would print
+/// 30.600000381469727. Non-finite values are null.
 pub(crate) fn number(value: f32) -> Value {
     value
         .to_string()

@@ -43,7 +43,7 @@ use link::Link;
 use param_commands::Task;
 use session::Session;
 
-/// Does what the program's arguments say.
+/// Runs the command given by the program's arguments.
 pub fn main() -> ExitCode {
     let cli = match parse() {
         Ok(cli) => cli,
@@ -51,7 +51,7 @@ pub fn main() -> ExitCode {
             eprintln!("siskin: {}", one_line(&e.to_string()));
             return ExitCode::from(2);
         }
-        // The help, which no argument at all stands for, or the version.
+        // The help, which is also what no argument at all gets, or the version.
         Err(e) => e.exit(),
     };
     match run(&cli) {
@@ -66,22 +66,22 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Commands that work without an ESC, and what of the options that choose one means nothing to them.
+/// Commands that work without an ESC, and which of the options that select one they do not take.
 const WITHOUT_ESC: [(&str, &[&str]); 5] = [
     ("decode", &["connect", "system", "component"]),
-    // Of a file of several ESCs --component chooses one.
+    // --component selects one of several ESCs in a file.
     ("budget", &["connect", "system"]),
     ("tune", &["connect", "system"]),
     ("image", &["connect", "system", "component"]),
     ("flash", &["connect", "system", "component"]),
 ];
 
-/// The arguments; an option that a command has no use for is neither shown in its help nor taken.
+/// Parses the arguments; options a command does not take are hidden in its help and refused.
 fn parse() -> Result<Cli, clap::Error> {
     let refusal = |name: &str, id: &str| format!("'{name}' needs no ESC: leave out --{id}");
     let mut command = Cli::command();
     for (name, idle) in WITHOUT_ESC {
-        // An option of the command's own stands in the way of that of all commands.
+        // An option of the subcommand shadows the global one.
         let own = idle.iter().map(|id| {
             let refused = move |_: &str| Err::<String, _>(refusal(name, id));
             Arg::new(*id).long(*id).hide(true).value_parser(refused)
@@ -122,7 +122,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     }
 }
 
-/// The argument parser's complaint and its hint on one line, without the usage that follows.
+/// Returns the argument parser's error and hint on one line, without the usage that follows.
 fn one_line(message: &str) -> String {
     let words: Vec<&str> = message
         .lines()

@@ -9,10 +9,9 @@ use serial2::SerialPort;
 use crate::endpoint::Endpoint;
 use crate::error::Error;
 
-/// How long a TCP connection may take; a host that drops packets would otherwise hold us for
-/// minutes.
+/// How long a TCP connection may take; a host that drops packets would otherwise block for minutes.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
-/// How long the operating system may hold bytes that we send.
+/// How long the operating system may hold outgoing bytes.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Vehicles that a waiting UDP port answers; a ninth is heard but not talked to.
 const MAX_PEERS: usize = 8;
@@ -67,17 +66,17 @@ impl Link {
             })
     }
 
-    /// The endpoint, as it was named.
+    /// Returns the endpoint, as it was named.
     pub(crate) fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// Waits at most `wait` for bytes; 0 if none came.
+    /// Waits at most `wait` for bytes; returns 0 if none came.
     ///
     /// # Errors
-    /// [`Error::Link`] when the other side has closed or the device is gone.
+    /// [`Error::Link`] if the other side has closed or the device is gone.
     pub(crate) fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, Error> {
-        // A wait of zero would mean for ever to a socket.
+        // A socket takes a zero timeout for none at all.
         let wait = wait.max(Duration::from_millis(1));
         let received = match &mut self.stream {
             Stream::Tcp(stream) => stream
@@ -104,10 +103,10 @@ impl Link {
         self.or_lost(received)
     }
 
-    /// Sends bytes; on a waiting UDP port to everyone who has been heard.
+    /// Sends bytes; on a waiting UDP port, to everyone who has been heard.
     ///
     /// # Errors
-    /// [`Error::Link`] when the other side has closed or the device is gone.
+    /// [`Error::Link`] if the other side has closed or the device is gone.
     pub(crate) fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let sent = match &mut self.stream {
             Stream::Tcp(stream) => stream.write_all(bytes),
@@ -120,7 +119,7 @@ impl Link {
         self.or_lost(sent.map(|()| 0)).map(drop)
     }
 
-    /// Nothing yet is no error, and neither is a UDP port that nobody has opened yet.
+    /// Treats neither a timeout nor a UDP port that nobody has opened yet as an error.
     fn or_lost(&self, result: io::Result<usize>) -> Result<usize, Error> {
         let datagrams = matches!(self.stream, Stream::UdpIn(..) | Stream::UdpOut(_));
         match result {
@@ -188,7 +187,7 @@ fn open_serial(path: &str, baud: u32) -> io::Result<SerialPort> {
     Ok(port)
 }
 
-/// The system's words without the error number, which helps nobody.
+/// Returns the system's message without the error number.
 fn plain(error: &io::Error) -> String {
     let text = error.to_string();
     match text.split_once(" (os error") {

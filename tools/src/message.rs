@@ -1,4 +1,4 @@
-//! The messages that an ESC sends and this program reads.
+//! The messages from an ESC that this program reads.
 
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA,
@@ -10,7 +10,7 @@ use mavlink::types::CharArray;
 use mavlink::{MavlinkVersion, MessageData};
 use siskin_control::mavlink::Address;
 
-/// An address in words.
+/// Spells out an address.
 pub(crate) fn name_of(address: Address) -> String {
     format!("system {} component {}", address.system, address.component)
 }
@@ -22,7 +22,7 @@ pub(crate) struct Incoming {
     pub(crate) message: Message,
 }
 
-/// What this program makes use of.
+/// The messages that this program uses.
 #[derive(Clone, Debug)]
 pub(crate) enum Message {
     Heartbeat(Heartbeat),
@@ -34,20 +34,20 @@ pub(crate) enum Message {
     EscStatus(ESC_STATUS_DATA),
     EscTelemetry(EscTelemetry),
     Named(NAMED_VALUE_FLOAT_DATA),
-    /// An answer of MAVLink FTP, as it is.
+    /// A MAVLink FTP answer, unparsed.
     File([u8; 251]),
 }
 
-/// One of the messages `ESC_TELEMETRY_*`, which are laid out alike.
+/// One of the `ESC_TELEMETRY_*` messages, which share a layout.
 #[derive(Clone, Debug)]
 pub(crate) struct EscTelemetry {
-    /// The number of the first ESC in it, from 0.
+    /// Number of its first ESC, from 0.
     pub(crate) index: u8,
     pub(crate) data: ESC_TELEMETRY_1_TO_4_DATA,
 }
 
-/// The two numbers of a heartbeat that tell an ESC from other components. They are raw because
-/// the typed message refuses a kind of vehicle that it does not know.
+/// The two fields of a heartbeat that tell an ESC from other components. They are raw because the typed
+/// message rejects vehicle types that it does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Heartbeat {
     /// `MAV_TYPE`.
@@ -57,7 +57,8 @@ pub(crate) struct Heartbeat {
 }
 
 impl Heartbeat {
-    /// Whether an ESC may introduce itself so: as a vehicle of its own, or beside an autopilot.
+    /// Returns whether an ESC may introduce itself like this: as a vehicle of its own, or beside an
+    /// autopilot.
     pub(crate) fn may_be_esc(self) -> bool {
         let standalone = self.kind == MavType::MAV_TYPE_GENERIC as u8
             && self.autopilot == MavAutopilot::MAV_AUTOPILOT_GENERIC as u8;
@@ -70,18 +71,18 @@ impl Heartbeat {
 pub(crate) struct StatusText {
     pub(crate) severity: MavSeverity,
     pub(crate) text: String,
-    /// Number that the pieces of a text share; 0 for a text in one piece.
+    /// Number shared by the pieces of a text; 0 for a text in one piece.
     id: u16,
     /// Number of the piece, from 0.
     piece: u8,
-    /// Whether no piece follows: its text ends before the field does.
+    /// Whether this is the last piece: its text ends before the field does.
     last: bool,
 }
 
 impl StatusText {
     fn read(payload: &[u8]) -> Option<Self> {
         let data = STATUSTEXT_DATA::deser(MavlinkVersion::V2, payload).ok()?;
-        // The extension fields, which the generated type does not have, follow it.
+        // The extension fields follow it; the generated type lacks them.
         let byte = |offset| {
             payload
                 .get(STATUSTEXT_DATA::ENCODED_LEN + offset)
@@ -99,7 +100,7 @@ impl StatusText {
     }
 }
 
-/// Texts that are longer than a message, while their pieces arrive.
+/// Texts longer than one message, while their pieces arrive.
 #[derive(Debug, Default)]
 pub(crate) struct Texts {
     open: Vec<(Address, StatusText)>,
@@ -109,7 +110,7 @@ impl Texts {
     /// Texts that may be open at once; the oldest gives way.
     const OPEN_MAX: usize = 8;
 
-    /// Takes in a piece; the whole text once its last has come. A lost one leaves `...` behind.
+    /// Takes a piece, and returns the whole text after its last one. A lost piece leaves `...`.
     pub(crate) fn join(&mut self, from: Address, next: StatusText) -> Option<StatusText> {
         if next.id == 0 {
             return Some(next);
@@ -147,9 +148,9 @@ impl Texts {
 }
 
 impl Message {
-    /// Reads a payload; `None` for what this program does not use or cannot understand.
+    /// Parses a payload; `None` if this program does not use or cannot parse it.
     pub(crate) fn read(id: u32, payload: &[u8]) -> Option<Self> {
-        // The versions differ in extension fields only, which these types do not have.
+        // The versions differ only in extension fields, which these types do not have.
         fn typed<D: MessageData>(payload: &[u8]) -> Option<D> {
             D::deser(MavlinkVersion::V2, payload).ok()
         }
@@ -159,7 +160,7 @@ impl Message {
         };
         match id {
             HEARTBEAT_DATA::ID => Some(Self::Heartbeat(Heartbeat {
-                // Trailing zeroes are not sent.
+                // Trailing zero bytes are not sent.
                 kind: payload.get(4).copied().unwrap_or(0),
                 autopilot: payload.get(5).copied().unwrap_or(0),
             })),
@@ -182,8 +183,8 @@ impl Message {
     }
 }
 
-/// The text of a field that ends at its first zero byte or at its length. Bytes that are not
-/// printable ASCII become `?`: they come from outside and go to a terminal.
+/// Returns the text of a field, up to its first zero byte or its full length. Bytes other than printable
+/// ASCII become `?`: they come from outside and go to a terminal.
 pub(crate) fn text<const N: usize>(field: &CharArray<N>) -> String {
     field
         .into_iter()

@@ -16,16 +16,16 @@ use crate::message::{Message, StatusText, name_of, text};
 use crate::sample::Source;
 use crate::session::Session;
 
-/// Silence after which a person is told. `ESC_STATUS` comes at least once a second.
+/// Silence after which the user is told. `ESC_STATUS` comes at least once a second.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Our own heartbeat, without which some links forget us.
+/// Interval of our own heartbeat, without which some links forget us.
 const GREETING_PERIOD: Duration = Duration::from_secs(1);
 
-/// Shows telemetry until `--count` samples have come, or for ever.
+/// Shows telemetry until `--count` samples have come, or forever.
 ///
 /// # Errors
-/// [`Error::Silent`] when samples are counted and none come; any of the link.
+/// [`Error::Silent`] if samples are counted and none come; any error of the link.
 pub(crate) fn run(
     session: &mut Session,
     args: &MonitorArgs,
@@ -57,8 +57,8 @@ pub(crate) fn run(
             writeln!(complaints, "{silent}")?;
             heard = Instant::now();
         }
-        // Of several ESCs on one link, one sends the telemetry of all: any component of the
-        // system is listened to.
+        // If a link has several ESCs, one of them sends the telemetry of all: listen to every component of
+        // the system.
         let Some(incoming) = session.next(Instant::now() + GREETING_PERIOD)? else {
             continue;
         };
@@ -76,7 +76,7 @@ pub(crate) fn run(
             }
             Message::Named(signal) => {
                 let name = text(&signal.name);
-                // What comes unasked is not shown: the share of bad frames.
+                // The share of bad frames, which comes unrequested, is not shown.
                 let Some(number) = SIGNALS.iter().position(|signal| *signal == name) else {
                     continue;
                 };
@@ -121,16 +121,16 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// What is known of all ESCs of the system.
+/// What is known about all ESCs of the system.
 #[derive(Default)]
 struct View {
-    /// By component and `index`, the number of the first ESC of a message.
+    /// By component and `index`, the number of a message's first ESC.
     sources: BTreeMap<(u8, u8), Source>,
     /// The rows to show.
     latest: BTreeMap<Line, String>,
 }
 
-/// What a row is about, in the order of the rows.
+/// What a row is about, in display order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Line {
     /// An ESC, by its number.
@@ -171,15 +171,15 @@ fn status_json(status: &StatusText) -> Value {
     json!({ "severity": severity(status), "text": status.text })
 }
 
-/// Lines that a terminal shows again in the same place, and that a pipe gets one after another.
+/// Lines that a terminal shows in place, and a pipe gets one after another.
 struct Screen {
     in_place: bool,
-    /// Lines that stand above the cursor and are to be replaced.
+    /// Lines above the cursor that are to be replaced.
     shown: usize,
 }
 
 impl Screen {
-    /// Shows these rows in the place of those before.
+    /// Shows these rows in place of the previous ones.
     fn show(&mut self, out: &mut dyn Write, rows: &BTreeMap<Line, String>) -> io::Result<()> {
         self.clear(out)?;
         for row in rows.values() {
@@ -189,10 +189,10 @@ impl Screen {
         Ok(())
     }
 
-    /// Takes the rows away, so that what comes next stands in their place for good.
+    /// Removes the rows, so that what is printed next takes their place for good.
     fn clear(&mut self, out: &mut dyn Write) -> io::Result<()> {
         if self.shown > 0 {
-            // Up by the rows, to the first column, and erase to the end of the screen.
+            // Up by that many rows to the first column, and erase to the end of the screen.
             write!(out, "\x1b[{}F\x1b[J", self.shown)?;
             self.shown = 0;
         }

@@ -17,7 +17,7 @@ use crate::param_text;
 use crate::params::{self, Param, SetOutcome, Storage};
 use crate::session::Session;
 
-/// Work on parameters whose input has been checked, so that nothing is sent where any of it is bad.
+/// Parameter work with checked input, so that nothing is sent if any of it is bad.
 pub(crate) enum Task<'a> {
     List {
         json: bool,
@@ -30,11 +30,11 @@ pub(crate) enum Task<'a> {
         names: Vec<String>,
     },
     Diff {
-        /// A file with its sound lines; without, the factory's values.
+        /// A file and its valid lines; `None` for the factory values.
         against: Option<(&'a Path, Vec<Line>)>,
     },
     Reset {
-        /// Nothing for all.
+        /// `None` for all.
         names: Option<Vec<String>>,
         store: bool,
     },
@@ -53,8 +53,7 @@ pub(crate) enum Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    /// Checks names and values, and reads the file to load; each of its bad lines is listed on
-    /// `complaints`.
+    /// Checks names and values, and reads the file to load; lists each of its bad lines on `complaints`.
     ///
     /// # Errors
     /// [`Error::Usage`] or [`Error::File`].
@@ -105,7 +104,7 @@ impl<'a> Task<'a> {
         })
     }
 
-    /// Does it, with results on `out` and complaints about single parameters on `complaints`.
+    /// Does the work, with results on `out` and complaints about single parameters on `complaints`.
     ///
     /// # Errors
     /// Any [`Error`].
@@ -157,7 +156,7 @@ impl<'a> Task<'a> {
                 store,
             } => {
                 let factory = Factory::ask(session)?;
-                // One that the ESC does not have: it will say so.
+                // If the ESC does not have it, it will say so.
                 let params = names.into_iter().map(|name| Param {
                     value: factory.value(&name).unwrap_or_default(),
                     name,
@@ -185,7 +184,7 @@ impl<'a> Task<'a> {
     }
 }
 
-/// The name as an ESC has it: a person may write it in any case.
+/// Returns the name as an ESC has it: it may be typed in any case.
 fn checked_name(name: &str) -> Result<String, Error> {
     if params::is_name(name) {
         return Ok(name.to_ascii_uppercase());
@@ -197,7 +196,7 @@ fn checked_name(name: &str) -> Result<String, Error> {
     )))
 }
 
-/// The name of a parameter that has a value from the factory.
+/// Checks the name of a parameter that has a factory value.
 fn checked_factory_name(name: &str) -> Result<String, Error> {
     let name = checked_name(name)?;
     if param_text::has_factory(&name) {
@@ -209,7 +208,7 @@ fn checked_factory_name(name: &str) -> Result<String, Error> {
     )))
 }
 
-/// The settings of a file, if all its lines make sense.
+/// Returns a file's settings, if all its lines parse.
 fn read(file: &Path, complaints: &mut dyn Write) -> Result<Vec<Line>, Error> {
     let content = fs::read_to_string(file).map_err(|e| Error::file(file, e))?;
     param_file::read(&content).or_else(|bad| {
@@ -221,7 +220,7 @@ fn read(file: &Path, complaints: &mut dyn Write) -> Result<Vec<Line>, Error> {
     })
 }
 
-/// `1 line`, `2 lines`.
+/// Formats as `1 line`, `2 lines`.
 fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
@@ -266,7 +265,7 @@ pub(crate) fn print(params: &[Param], json: bool, out: &mut dyn Write) -> Result
     Ok(())
 }
 
-/// Prints what differs from the factory's values.
+/// Prints what differs from the factory values.
 fn diff_to_factory(params: &[Param], factory: &Factory, out: &mut dyn Write) -> Result<(), Error> {
     let pairs = params
         .iter()
@@ -309,7 +308,7 @@ fn diff<'a>(
     Ok(())
 }
 
-/// Those of the names that the ESC has, and how that ended; each of the others is a complaint.
+/// Returns those parameters that the ESC has, and the overall result; complains about each of the others.
 fn get(
     session: &mut Session,
     names: &[String],
@@ -338,7 +337,7 @@ fn get(
     Ok((found, ended))
 }
 
-/// Sends each value; the number of those refused.
+/// Sends each value; returns the number refused.
 fn set(
     session: &mut Session,
     params: &[Param],
@@ -360,7 +359,7 @@ fn set(
     Ok(refused)
 }
 
-/// Stores where that was asked for and everything was taken.
+/// Stores if requested and if everything was accepted.
 fn finish(
     session: &mut Session,
     store: bool,

@@ -1,8 +1,8 @@
 //! Parameter files.
 //!
-//! Written is `NAME VALUE`, separated by white space, with `#` before comments: MAVProxy and
-//! Mission Planner both read it, and MAVProxy itself writes it. Read are this, Mission Planner's
-//! `NAME,VALUE`, and QGroundControl's five columns: system, component, name, value, type.
+//! Files are written as `NAME VALUE`, separated by white space, with `#` before comments: MAVProxy and
+//! Mission Planner both read that, and MAVProxy writes it. They are read in that format, in Mission
+//! Planner's `NAME,VALUE`, and in QGroundControl's five columns: system, component, name, value, type.
 
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -11,32 +11,32 @@ use std::path::Path;
 use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param, is_name};
 
-/// One setting of a file.
+/// A setting in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Line {
     /// Line number from 1.
     pub(crate) number: usize,
-    /// Component id, where the format tells it.
+    /// Component id, if the format states it.
     component: Option<u8>,
     pub(crate) param: Param,
 }
 
-/// The text of a file with these parameters, and whose they are. Values have as many digits as it takes to
-/// read the same number back.
+/// Returns the text of a file with these parameters, and whose they are. Values have as many digits as it
+/// takes to read back the same number.
 pub(crate) fn write(of: &str, params: &[Param]) -> String {
     let count = params.len();
     let mut file = format!("# Siskin: {count} parameters of {of}\n# NAME VALUE\n");
     for Param { name, value } in params {
-        // The standard library formats into a string without fail.
+        // Formatting into a string cannot fail.
         let _ = writeln!(file, "{name:<NAME_LENGTH$} {value}");
     }
     file
 }
 
-/// Reads a file, or says what is wrong with each bad line.
+/// Parses a file, or says what is wrong with each bad line.
 ///
 /// # Errors
-/// One text a bad line, with its number.
+/// One text per bad line, with its number.
 pub(crate) fn read(file: &str) -> Result<Vec<Line>, Vec<String>> {
     let mut lines = Vec::new();
     let mut bad = Vec::new();
@@ -66,11 +66,11 @@ pub(crate) fn read(file: &str) -> Result<Vec<Line>, Vec<String>> {
     if bad.is_empty() { Ok(lines) } else { Err(bad) }
 }
 
-/// What a file says for a component. Of a file of several components it is the lines of this one;
-/// a file of a single component is for any, so that an ESC's settings can be copied to the next.
+/// Returns a file's settings for a component: if it has several components, the lines of this one; a file
+/// with a single component is for any, so that an ESC's settings can be copied to the next.
 ///
 /// # Errors
-/// [`Error::File`] if that is nothing.
+/// [`Error::File`] if there are none.
 pub(crate) fn for_component(
     file: &Path,
     lines: Vec<Line>,
@@ -94,7 +94,7 @@ fn chosen(lines: Vec<Line>, component: u8) -> Vec<Line> {
         .collect()
 }
 
-/// The component, where the format tells it, and the setting; `None` for a line without one.
+/// Returns the component, if the format states it, and the setting; `None` for a line without one.
 fn read_line(line: &str) -> Result<Option<(Option<u8>, Param)>, String> {
     let content = line.split('#').next().unwrap_or("");
     let columns: Vec<&str> = content
@@ -127,7 +127,7 @@ fn read_line(line: &str) -> Result<Option<(Option<u8>, Param)>, String> {
     }
 }
 
-/// At most 40 characters that are safe on a terminal.
+/// Returns at most 40 characters, safe for a terminal.
 fn printable(text: &str) -> String {
     text.chars()
         .take(40)
@@ -161,7 +161,7 @@ mod tests {
         for file in [
             // MAVProxy
             "# saved\n\nMOT_POLE_PAIRS   12.000000\nMOT_L_UH         30.600000 # uH\n\nCTL_X -0.001500\n",
-            // Mission Planner, with the line ends of its system
+            // Mission Planner, with Windows line ends
             "#NOTE: 1/1/2030\r\n\r\nMOT_POLE_PAIRS,12\r\nMOT_L_UH,30.6\r\n\r\nCTL_X,-1.5E-3\r\n",
             // QGroundControl
             "# Vehicle-Id Component-Id Name Value Type\n#\n1\t140\tMOT_POLE_PAIRS\t12.000000000000000000\t9\n\
@@ -201,7 +201,7 @@ mod tests {
     }
 
     proptest! {
-        // Always the same cases: a run can be repeated.
+        // Always the same cases, so that a run can be repeated.
         #![proptest_config(ProptestConfig {
             rng_seed: RngSeed::Fixed(1),
             ..ProptestConfig::default()
@@ -226,7 +226,7 @@ mod tests {
 
         #[test]
         fn any_text_is_read_or_refused(file in "\\PC*[\\n\\t ,#0-9A-Z]*") {
-            // A line is a setting, a fault, or neither.
+            // A line is a setting, an error, or neither.
             let found = read(&file).map_or_else(|bad| bad.len(), |lines| lines.len());
             prop_assert!(found <= file.lines().count());
         }

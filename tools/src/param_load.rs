@@ -1,4 +1,4 @@
-//! `siskin params load`: from a file's settings to those of the ESC.
+//! `siskin params load`: sets the ESC to a file's settings.
 
 use std::collections::HashMap;
 use std::io::Write;
@@ -10,7 +10,7 @@ use crate::param_text;
 use crate::params::{self, Param, SetOutcome};
 use crate::session::Session;
 
-/// Sets what differs from the ESC; the number of settings refused.
+/// Sets what differs from the ESC; returns the number of settings refused.
 pub(crate) fn load(
     session: &mut Session,
     lines: &[Line],
@@ -33,9 +33,9 @@ pub(crate) fn load(
         }
     }
 
-    // A value may be refused only because another, further down, is still the old one; and a
-    // derived one, which is never taken, may have become right meanwhile. So those refused are
-    // tried again for as long as that gets any further.
+    // A value may be refused only because another, further down, is still the old one; and a derived one,
+    // which is never accepted, may have become right meanwhile. So retry the refused ones as long as that
+    // makes progress.
     let mut again = false;
     loop {
         let before = open.len();
@@ -80,7 +80,7 @@ pub(crate) fn load(
     Ok(refused.len())
 }
 
-/// Whether two values are the same but for the last digits that a file may have lost.
+/// Returns whether two values are equal except for the last digits, which a file may have lost.
 pub(crate) fn same(a: f32, b: f32) -> bool {
     (a - b).abs() <= 2.0 * f32::EPSILON * a.abs().max(b.abs())
 }

@@ -1,5 +1,5 @@
-//! What a person reads of a parameter: unit, range, choices and sentence, from the table with which this
-//! program was built. An ESC of another version may have others: of these there is the value alone.
+//! What people read about a parameter: unit, range, choices and description, from the table built into this
+//! program. An ESC of another version may have other parameters: only their value is shown.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -9,7 +9,7 @@ use siskin_control::params::{Kind, ParamId};
 use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param};
 
-/// A value with its unit, or with what it means where it is a choice: `20 A`, `1 (brake)`.
+/// Formats a value with its unit, or its meaning if it is a choice: `20 A`, `1 (brake)`.
 pub(crate) fn value(name: &str, value: f32) -> String {
     let Some(text) = ParamId::find(name).map(ParamId::text) else {
         return value.to_string();
@@ -25,17 +25,17 @@ pub(crate) fn value(name: &str, value: f32) -> String {
     }
 }
 
-/// What 0 means to a parameter that has no such value itself.
+/// Returns what 0 means for a parameter for which it stands for something else.
 fn zero(name: &str) -> Option<&'static str> {
     let id = ParamId::find(name)?;
     match id {
-        // A whole number of the motor: of that kind there is no other.
+        // The only whole number among the motor's parameters.
         ParamId::MotPolePairs => Kind::OfMotor.zero(),
         _ => id.entry().kind.zero(),
     }
 }
 
-/// Why a value cannot be taken, where that is for its range: `; give 1 to 60 A`.
+/// Returns what to give instead of a value that is out of range: `; give 1 to 60 A`.
 pub(crate) fn remedy(name: &str, value: f32) -> String {
     let Some(id) = ParamId::find(name) else {
         return String::new();
@@ -51,12 +51,12 @@ pub(crate) fn remedy(name: &str, value: f32) -> String {
     }
 }
 
-/// True for a parameter that this program knows and that has a value of its own from the factory.
+/// Returns whether this program knows the parameter and it has a factory value of its own.
 pub(crate) fn has_factory(name: &str) -> bool {
     ParamId::find(name).is_some_and(|id| id.entry().kind != Kind::Derived)
 }
 
-/// Prints a parameter with all that is known of it.
+/// Prints a parameter with everything known about it.
 pub(crate) fn describe(
     param: &Param,
     factory: Option<f32>,
@@ -70,7 +70,7 @@ pub(crate) fn describe(
     };
     let mut facts = String::new();
     if let Some(factory) = factory {
-        // A String takes all that is written to it.
+        // Writing to a String cannot fail.
         let _ = write!(
             facts,
             "{}; from the factory {}",
@@ -91,7 +91,7 @@ pub(crate) fn describe(
     Ok(())
 }
 
-/// `1 to 60 A`, `a whole number from 1 to 64`, `0 (coast) or 1 (brake)`.
+/// Formats as `1 to 60 A`, `a whole number from 1 to 64`, `0 (coast) or 1 (brake)`.
 fn range(id: ParamId) -> String {
     let (entry, text) = (id.entry(), id.text());
     if let Some(((last, meaning), others)) = text.choices.split_last() {

@@ -16,11 +16,11 @@ use crate::session::{ANSWER_TIMEOUT, ATTEMPTS, Session};
 /// Longest name that the protocol carries.
 pub(crate) const NAME_LENGTH: usize = 16;
 
-/// Missing parameters that are asked for at once. Ten answers of 37 bytes take 65 ms at
-/// 57600 baud, well within the time that an answer is waited for.
+/// Missing parameters requested at once. Ten answers of 37 bytes take 65 ms at 57600 baud, well within the
+/// answer timeout.
 const BATCH: usize = 10;
 
-/// How long the reason for a refusal is waited for once the refusal is known.
+/// How long to wait for the reason once a refusal is known.
 const REASON_TIMEOUT: Duration = Duration::from_millis(300);
 
 /// A parameter's name and value.
@@ -35,20 +35,20 @@ pub(crate) struct Param {
 pub(crate) enum SetOutcome {
     /// The ESC has it.
     Taken,
-    /// The ESC said no, and why, as far as it told.
+    /// The ESC refused, with its reason if it gave one.
     Refused(String),
 }
 
-/// Whether the protocol can carry this as a parameter's name.
+/// Returns whether the protocol can carry this as a parameter name.
 pub(crate) fn is_name(name: &str) -> bool {
     (1..=NAME_LENGTH).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_graphic())
 }
 
-/// Every parameter in the order of the ESC. What was lost on the way is asked for again by index
-/// until the list is complete.
+/// Returns every parameter in the ESC's order. Lost ones are requested again by index until the list is
+/// complete.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] when the ESC stays silent.
+/// [`Error::NoAnswer`] if the ESC stays silent.
 pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
     let mut values = BTreeMap::new();
     let mut count = None;
@@ -75,7 +75,7 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
             })?;
         }
         for &index in &missing {
-            // An index above 32767 cannot be asked for; no ESC has so many.
+            // An index above 32767 cannot be requested; no ESC has so many.
             let Ok(param_index) = i16::try_from(index) else {
                 continue;
             };
@@ -92,7 +92,7 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
             let Message::ParamValue(value) = message else {
                 continue;
             };
-            // Answers to a set may carry 65535 instead of the index.
+            // An answer to a set may carry 65535 instead of the index.
             if value.param_index >= value.param_count {
                 continue;
             }
@@ -121,10 +121,10 @@ pub(crate) fn list(session: &mut Session) -> Result<Vec<Param>, Error> {
     }
 }
 
-/// One parameter by name.
+/// Returns one parameter by name.
 ///
 /// # Errors
-/// [`Error::Refused`] when the ESC has none of that name, [`Error::NoAnswer`] when it is silent.
+/// [`Error::Refused`] if the ESC has no such parameter, [`Error::NoAnswer`] if it is silent.
 pub(crate) fn get(session: &mut Session, name: &str) -> Result<f32, Error> {
     let target = session.target();
     let answer = session.ask(
@@ -152,7 +152,7 @@ pub(crate) fn get(session: &mut Session, name: &str) -> Result<f32, Error> {
 /// Sends a value and waits for what the ESC makes of it.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] when the ESC is silent; a refusal is no error here.
+/// [`Error::NoAnswer`] if the ESC is silent; a refusal is not an error here.
 pub(crate) fn set(session: &mut Session, name: &str, value: f32) -> Result<SetOutcome, Error> {
     let target = session.target();
     let mut reasons = Reasons::default();
@@ -170,8 +170,8 @@ pub(crate) fn set(session: &mut Session, name: &str, value: f32) -> Result<SetOu
     if first == Some(value) {
         return Ok(SetOutcome::Taken);
     }
-    // Another value may be one that was on its way when ours was sent, as part of a list that
-    // somebody else asked for; and the reason for a refusal may follow it.
+    // A different value may have been on its way when ours was sent, in a list that someone else requested;
+    // and the reason for a refusal may follow it.
     let mut last = first;
     let deadline = Instant::now() + REASON_TIMEOUT;
     while let Some(message) = session.next_of_target(deadline)? {
@@ -184,7 +184,7 @@ pub(crate) fn set(session: &mut Session, name: &str, value: f32) -> Result<SetOu
             break;
         }
     }
-    // A refusal by an error, whose value was lost on its way.
+    // Refused by an error whose value was lost on the way.
     if last.is_none() && reasons.error != Some(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST) {
         last = Some(get(session, name)?);
     }
@@ -195,13 +195,13 @@ pub(crate) fn set(session: &mut Session, name: &str, value: f32) -> Result<SetOu
 #[derive(Default)]
 struct Reasons {
     error: Option<MavParamError>,
-    /// A message that names the parameter, without the name where it begins with it.
+    /// A message that names the parameter, without the name if it begins with it.
     text: Option<String>,
 }
 
 impl Reasons {
-    /// Takes in a message; `Some` if it answers the set: the value that the parameter now has, or
-    /// `None` where only an error tells of it.
+    /// Takes a message; `Some` if it answers the set: with the parameter's current value, or with `None` if
+    /// there is only an error.
     fn hear(&mut self, name: &str, message: Message) -> Option<Option<f32>> {
         match message {
             Message::ParamValue(value) if text(&value.param_id) == name => {
@@ -221,7 +221,7 @@ impl Reasons {
         }
     }
 
-    /// In the ESC's own words where there are any.
+    /// Returns the reason, in the ESC's own words if there are any.
     fn told(self, now: Option<f32>) -> String {
         let reason = self
             .text
@@ -233,14 +233,14 @@ impl Reasons {
     }
 }
 
-/// Who reads the reason has just read the name and that it was refused.
+/// Strips what the reader of the reason has just read: the name and that it was refused.
 fn without_name<'a>(text: &'a str, name: &str) -> &'a str {
     text.strip_prefix(name)
         .and_then(|rest| rest.strip_prefix(" refused: "))
         .unwrap_or(text)
 }
 
-/// The text of a message that tells of something wrong.
+/// Returns the text of a message that reports a problem.
 fn complaint(status: StatusText) -> Option<String> {
     (status.severity as u32 <= MavSeverity::MAV_SEVERITY_NOTICE as u32).then_some(status.text)
 }
@@ -250,14 +250,14 @@ fn complaint(status: StatusText) -> Option<String> {
 pub(crate) enum Storage {
     /// Write the parameters.
     Write,
-    /// Forget all but the statistics, and take the factory's values.
+    /// Erase everything except the statistics, and return to the factory values.
     Reset,
 }
 
-/// Has the ESC do something with its storage, and waits until that would survive a loss of power.
+/// Has the ESC do something with its storage, and waits until the result would survive a loss of power.
 ///
 /// # Errors
-/// [`Error::Refused`] with the ESC's reason, [`Error::NoAnswer`] when it is silent.
+/// [`Error::Refused`] with the ESC's reason, [`Error::NoAnswer`] if it is silent.
 pub(crate) fn storage(session: &mut Session, what: Storage) -> Result<(), Error> {
     const COMMAND: MavCmd = MavCmd::MAV_CMD_PREFLIGHT_STORAGE;
     const BUSY: MavResult = MavResult::MAV_RESULT_TEMPORARILY_REJECTED;
@@ -282,8 +282,8 @@ pub(crate) fn storage(session: &mut Session, what: Storage) -> Result<(), Error>
                 command: COMMAND,
                 target_system: target.system,
                 target_component: target.component,
-                // Always the first transmission: where that was lost, a higher number would look
-                // like a repetition of the store before, and be answered without storing.
+                // Always marked as the first transmission: if that was lost, a higher number would look
+                // like a repetition of the previous store, and be answered without storing.
                 confirmation: 0,
                 ..COMMAND_LONG_DATA::DEFAULT
             }
@@ -291,7 +291,7 @@ pub(crate) fn storage(session: &mut Session, what: Storage) -> Result<(), Error>
         |message| match message {
             Message::CommandAck(ack) if ack.command == COMMAND => match ack.result {
                 MavResult::MAV_RESULT_IN_PROGRESS => None,
-                // It may be our own first attempt that keeps the ESC busy.
+                // Our own first attempt may be what keeps the ESC busy.
                 BUSY if attempts.get() > 1 => {
                     busy.set(true);
                     None
@@ -358,7 +358,7 @@ mod tests {
                 "CTL_RPM_MIN refused: CTL_RPM_MAX: too low",
                 "CTL_RPM_MAX: too low",
             ),
-            // Of another firmware, or of a longer name.
+            // From another firmware, or with a longer name.
             ("LIM_PHASE_A too high", "LIM_PHASE_A too high"),
             ("CTL_RPM_MINI refused: no", "CTL_RPM_MINI refused: no"),
         ] {

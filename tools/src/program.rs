@@ -1,4 +1,4 @@
-//! Other programs that do a part of the work.
+//! Other programs that do part of the work.
 
 use std::io::ErrorKind;
 use std::process::Command;
@@ -9,21 +9,20 @@ use crate::error::Error;
 pub(crate) struct Program {
     /// Its name on the search path.
     pub(crate) name: &'static str,
-    /// How to come by it.
+    /// How to get it.
     pub(crate) remedy: &'static str,
 }
 
 impl Program {
-    /// A command of it, to be given arguments.
+    /// Returns a command for it, to be given arguments.
     pub(crate) fn command(&self) -> Command {
         Command::new(self.name)
     }
 
-    /// Runs it to its end; gives its standard output where that is piped.
+    /// Runs it to completion; returns its standard output if that is piped.
     ///
     /// # Errors
-    /// [`Error::Missing`] if it is not installed, [`Error::Program`] if it ends with another status
-    /// than 0.
+    /// [`Error::Missing`] if it is not installed, [`Error::Program`] if its exit status is not 0.
     pub(crate) fn run(&self, command: &mut Command) -> Result<Vec<u8>, Error> {
         let child = command.spawn().map_err(|e| match e.kind() {
             ErrorKind::NotFound => Error::Missing {
@@ -40,7 +39,7 @@ impl Program {
         }
     }
 
-    /// That it did not do its part.
+    /// Returns the error that it failed.
     pub(crate) fn failed(&self, reason: &str) -> Error {
         Error::Program {
             program: self.name,

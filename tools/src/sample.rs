@@ -1,4 +1,4 @@
-//! What telemetry says of each ESC, as a line for a person and as JSON.
+//! Telemetry of each ESC, as a line for people and as JSON.
 
 use mavlink::dialects::ardupilotmega::{
     ESC_INFO_DATA, ESC_STATUS_DATA, ESC_TELEMETRY_1_TO_4_DATA, EscFailureFlags,
@@ -10,7 +10,7 @@ use crate::json::number;
 /// ESCs in one `ESC_STATUS`.
 const SLOTS: usize = 4;
 
-/// Failure flags in words. The protocol has no flag for under-voltage or a lost rotor: they are
+/// Failure flags in words. The protocol has no flag for under-voltage or a lost rotor: these show as
 /// `fault`, and a message names them.
 const FAILURES: [(EscFailureFlags, &str); 7] = [
     (EscFailureFlags::ESC_FAILURE_OVER_CURRENT, "over-current"),
@@ -36,8 +36,8 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// One row for each ESC that is there: by the bits of `ESC_INFO`, which are for the first
-    /// eight, or, where it has none and until it has come, by having a voltage.
+    /// Returns one row per ESC present: by the bits of `ESC_INFO`, which cover the first eight; beyond
+    /// those, and until it has come, by having a voltage.
     pub(crate) fn rows(&self, status: &ESC_STATUS_DATA) -> Vec<Row> {
         let first = usize::from(status.index);
         (0..SLOTS)
@@ -76,7 +76,7 @@ fn failures(flags: u16) -> Vec<&'static str> {
         .collect()
 }
 
-/// One sample of one ESC; `None` is what has not been told yet.
+/// A sample of one ESC; `None` for what has not been received yet.
 pub(crate) struct Row {
     /// Number of the ESC, from 0.
     pub(crate) esc: usize,
@@ -94,7 +94,7 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// At most 79 characters where no more than one failure is shown.
+    /// Formats it in at most 79 characters, if no more than one failure is shown.
     pub(crate) fn line(&self) -> String {
         let mut line = format!(
             "ESC {} {:>8.2} s {:>6} rpm {:>6.2} V {:>7.2} A",
@@ -214,7 +214,7 @@ mod tests {
         };
         assert_eq!(numbers(0, 0b1111_0101), [0, 2]);
         assert_eq!(numbers(4, 0b0110_1111), [5, 6]);
-        // Info has bits for eight: of those after them the first slot has a voltage.
+        // Info has bits for eight: of those after them, the first slot has a voltage.
         assert_eq!(numbers(8, 0), [8]);
         assert_eq!(numbers(255, 0xFF), [255]);
     }

@@ -1,7 +1,7 @@
-//! `siskin scope`: the page in the browser, for an ESC on a link.
+//! `siskin scope`: the browser page for an ESC on a link.
 //!
-//! The page is a MAVLink client, and this a bridge between its socket and the link. Nothing else goes over it, so
-//! that a page can do no more than a ground station can.
+//! The page is a MAVLink client, and this module bridges its socket to the link. Nothing else passes, so a page
+//! can do no more than a ground station can.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -21,19 +21,19 @@ use crate::cli::ScopeArgs;
 use crate::error::Error;
 use crate::session::Session;
 
-/// How long the link is waited for, and so what waits for a page.
+/// How long to wait on the link, and so how long a page may wait.
 const LOOK: Duration = Duration::from_millis(5);
 
-/// Our own heartbeat, without which some links forget us.
+/// Interval of our own heartbeat, without which some links forget us.
 const GREETING_PERIOD: Duration = Duration::from_secs(1);
 
 /// Identification of the motor: `param1` 1 begins it, 0 ends it.
 const IDENTIFY: MavCmd = MavCmd::MAV_CMD_USER_1;
 
-/// All goes by MAVLink.
+/// Everything goes by MAVLink.
 struct LinkAlone;
 
-/// What else a page may ask for: nothing.
+/// What else a page may request: nothing.
 #[derive(Deserialize)]
 enum Asked {}
 
@@ -51,7 +51,7 @@ impl Show for LinkAlone {
 /// Serves the page until the link is lost.
 ///
 /// # Errors
-/// [`Error::Page`] where it cannot be served; any of the link.
+/// [`Error::Page`] if it cannot be served; any error of the link.
 pub(crate) fn run(
     mut session: Session,
     args: &ScopeArgs,
@@ -61,7 +61,7 @@ pub(crate) fn run(
     let mut hello = serde_json::Map::new();
     hello.insert("simulated".into(), false.into());
     hello.insert("signals".into(), SIGNALS.to_vec().into());
-    // Without it every ESC of the system is there to be chosen.
+    // Without it, every ESC of the system can be selected.
     hello.insert("component".into(), component.into());
     let site = Site::open(
         &args.web,
@@ -77,15 +77,15 @@ pub(crate) fn run(
     }
     let mut turners = Turners::default();
     let served = serve(&mut session, &site, &mut turners, &stop);
-    // However it ends: nobody holds a button any more.
+    // However it ends, nobody holds a button any more.
     for end in turners.end(|_| true) {
-        // Where the link is lost it is the ESC's three seconds that end a test.
+        // If the link is lost, the ESC's own three seconds end a test.
         let _ = session.send(&end);
     }
     served
 }
 
-/// Until it is to stop, which is the end of a program that is interrupted.
+/// Serves until told to stop, which happens when the program is interrupted.
 fn serve(
     session: &mut Session,
     site: &Site<LinkAlone>,
@@ -101,7 +101,7 @@ fn serve(
         let mut frames = Vec::new();
         session.relay(LOOK, |frame| frames.extend_from_slice(frame))?;
         site.send(&frames);
-        // No more than the queue has held: pages that go on sending hold nothing up.
+        // No more than the queue held, so that pages that keep sending block nothing.
         for Order { viewer, what, .. } in (0..ORDERS).map_while(|_| site.order()) {
             match what {
                 What::Mavlink(bytes) => {
@@ -120,13 +120,12 @@ fn serve(
     Ok(())
 }
 
-/// Pages, and the ESCs whose motors they have had turned by a test or by an identification: what is gone must not go
-/// on with it.
+/// Pages, and the ESCs whose motors they turn by a test or an identification, which must not outlive the page.
 #[derive(Default)]
 struct Turners(Vec<(ViewerId, Address)>);
 
 impl Turners {
-    /// Looks at the frames that a page sends.
+    /// Inspects the frames that a page sends.
     fn look(&mut self, viewer: ViewerId, bytes: &[u8]) {
         // A page sends whole frames.
         Receiver::new().push(0, bytes, |frame| {
@@ -155,10 +154,10 @@ impl Turners {
         });
     }
 
-    /// What ends the tests and identifications of these pages.
+    /// Returns what ends these pages' tests and identifications.
     fn end(&mut self, these: impl Fn(ViewerId) -> bool) -> Vec<COMMAND_LONG_DATA> {
         let ended = self.0.extract_if(.., |(viewer, _)| these(*viewer));
-        // A test of no value, and the identification's end.
+        // A test without a value, and the end of the identification.
         let ends = [(MavCmd::MAV_CMD_ACTUATOR_TEST, f32::NAN), (IDENTIFY, 0.0)];
         let both = |(_, of): (ViewerId, Address)| {
             ends.map(|(command, param1)| COMMAND_LONG_DATA {

@@ -1,4 +1,4 @@
-//! A conversation with one ESC: finding it, asking, and asking again when an answer is lost.
+//! A conversation with one ESC: finds it, asks, and asks again if an answer is lost.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -13,26 +13,25 @@ use crate::error::Error;
 use crate::link::Link;
 use crate::message::{Incoming, Message, Texts, name_of};
 
-/// This program on the network: a ground station, by its customary ids.
+/// This program on the network: a ground station with its customary ids.
 const OWN: MavHeader = MavHeader {
     system_id: 255,
     component_id: 190,
     sequence: 0,
 };
 
-/// How long a heartbeat, which comes once a second, is waited for.
+/// How long to wait for a heartbeat, which comes once a second.
 const FIND_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// How often a question is put before the ESC counts as silent. With one packet in five lost in
-/// either direction, 64 % of the attempts succeed, and one question in 3500 fails.
+/// How often a question is asked before the ESC counts as silent. With one packet in five lost in either
+/// direction, 64 % of the attempts succeed, and one question in 3500 fails.
 pub(crate) const ATTEMPTS: u32 = 8;
 
-/// How long an answer is waited for. 40 ms are enough for a question and an answer at 57600 baud;
-/// telemetry in the queue ahead of them, or a radio, needs several times that.
+/// How long to wait for an answer. 40 ms is enough for a question and an answer at 57600 baud; with telemetry
+/// queued ahead, or a radio, it takes several times that.
 pub(crate) const ANSWER_TIMEOUT: Duration = Duration::from_millis(400);
 
-/// How often the receiver is called when nothing arrives, so that it gives up a frame of which the
-/// rest was lost.
+/// How often the receiver is called when nothing arrives, so that it drops a frame whose rest was lost.
 const RECEIVER_PERIOD: Duration = Duration::from_millis(20);
 
 /// A link on which one ESC has been chosen.
@@ -50,7 +49,7 @@ impl Session {
     /// Waits for the heartbeat of the wanted component, or of the first that may be an ESC.
     ///
     /// # Errors
-    /// [`Error::NoComponent`] tells what was heard instead.
+    /// [`Error::NoComponent`] with what was heard instead.
     pub(crate) fn find(
         link: Link,
         system: Option<u8>,
@@ -81,8 +80,8 @@ impl Session {
                 && component.is_none_or(|n| n == from.component);
             if wanted && (named || heartbeat.may_be_esc()) {
                 session.target = from;
-                // A UDP vehicle that waits to be spoken to has heard the first greeting; one that
-                // speaks first is known only now.
+                // A UDP vehicle that waits to be spoken to has heard the first greeting; one that speaks first
+                // is known only now.
                 session.greet()?;
                 return Ok(session);
             }
@@ -96,12 +95,12 @@ impl Session {
         })
     }
 
-    /// The ESC that is being talked to.
+    /// Returns the ESC being talked to.
     pub(crate) fn target(&self) -> Address {
         self.target
     }
 
-    /// Tells the other side that a ground station is here: it answers the address that it hears.
+    /// Tells the other side that a ground station is here: it replies to the address that it hears.
     ///
     /// # Errors
     /// As [`Link::send`].
@@ -133,8 +132,8 @@ impl Session {
         self.link.send(frame.raw_bytes())
     }
 
-    /// Waits at most `wait` for bytes, and hands on what they complete: whole frames of the ESC's system, as they
-    /// were sent.
+    /// Waits at most `wait` for bytes, and passes on the frames that they complete: whole frames of the ESC's
+    /// system, as sent.
     ///
     /// # Errors
     /// As [`Link::receive`].
@@ -154,7 +153,7 @@ impl Session {
         Ok(())
     }
 
-    /// Sends another's bytes.
+    /// Sends another client's bytes.
     ///
     /// # Errors
     /// As [`Link::send`].
@@ -162,12 +161,12 @@ impl Session {
         self.link.send(bytes)
     }
 
-    /// Time since the start, µs.
+    /// Returns the time since the start, µs.
     fn now_us(&self) -> u64 {
         u64::try_from(self.started.elapsed().as_micros()).unwrap_or(u64::MAX)
     }
 
-    /// The next message of anyone; `None` at the deadline.
+    /// Returns the next message from anyone; `None` at the deadline.
     ///
     /// # Errors
     /// As [`Link::receive`].
@@ -184,7 +183,7 @@ impl Session {
         }
     }
 
-    /// Waits for bytes, but not for longer than the receiver may go without a call.
+    /// Waits for bytes, but no longer than the receiver may go without a call.
     fn fill(&mut self, wait: Duration) -> Result<(), Error> {
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer, wait.min(RECEIVER_PERIOD))?;
@@ -203,7 +202,7 @@ impl Session {
         Ok(())
     }
 
-    /// The next message of the chosen ESC; `None` at the deadline.
+    /// Returns the next message from the selected ESC; `None` at the deadline.
     ///
     /// # Errors
     /// As [`Link::receive`].
@@ -216,7 +215,7 @@ impl Session {
         Ok(None)
     }
 
-    /// Puts a question until `accept` finds the answer among what the ESC says.
+    /// Repeats a question until `accept` finds the answer among the ESC's messages.
     ///
     /// # Errors
     /// [`Error::NoAnswer`] about `what` after [`ATTEMPTS`].

@@ -8,17 +8,17 @@ use crate::error::Error;
 use crate::message::Message;
 use crate::session::{ATTEMPTS, Session};
 
-/// How long an acknowledgement is waited for before the ESC is asked how far it is.
+/// How long to wait for an acknowledgement before asking the ESC how far it is.
 const STEP_TIMEOUT: Duration = Duration::from_millis(800);
 
-/// How long the texts that say why it has failed are waited for.
+/// How long to wait for the texts that say why it has failed.
 const REASON_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Has the ESC do this, called `what`: how it ended, and the texts with one of these beginnings that it has told
+/// Has the ESC do this, called `what`; returns the result, and the texts with one of these beginnings received
 /// meanwhile.
 ///
 /// # Errors
-/// [`Error::NoAnswer`] where it falls silent.
+/// [`Error::NoAnswer`] if the ESC falls silent.
 pub(crate) fn run(
     session: &mut Session,
     what: &str,
@@ -35,7 +35,7 @@ pub(crate) fn run(
             param1,
             target_system: target.system,
             target_component: target.component,
-            // Those after the first ask how far it is.
+            // Repetitions ask how far it is.
             confirmation,
             ..COMMAND_LONG_DATA::DEFAULT
         })?;
@@ -75,7 +75,7 @@ pub(crate) fn run(
     })
 }
 
-/// Why the ESC does not begin it.
+/// Returns why the ESC does not begin.
 pub(crate) fn why(result: MavResult) -> &'static str {
     match result {
         MavResult::MAV_RESULT_TEMPORARILY_REJECTED => {

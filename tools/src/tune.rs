@@ -1,4 +1,4 @@
-//! `siskin tune`: the settings of start and control loops that follow from a motor.
+//! `siskin tune`: the settings of the start and the control loops that follow from a motor.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::params::{NAME_LENGTH, Param};
 use crate::{given, json, param_file, param_text};
 
-/// The motor, and what else its settings are made of.
+/// The motor, and what else its settings are computed from.
 const MADE_OF: [ParamId; 10] = [
     ParamId::MotPolePairs,
     ParamId::MotRMohm,
@@ -27,7 +27,7 @@ const MADE_OF: [ParamId; 10] = [
     ParamId::LimBusVMax,
 ];
 
-/// Periods of the PWM in an electrical turn at `CTL_RPM_MAX`, at least.
+/// Minimum PWM periods per electrical turn at `CTL_RPM_MAX`.
 const TURN_PERIODS: f32 = 20.0;
 
 /// A setting in force.
@@ -38,8 +38,8 @@ struct Setting {
     from: &'static str,
 }
 
-/// Computes the settings, prints them and writes the file. `component` is whose parameters a file of several
-/// gives.
+/// Computes the settings, prints them and writes the file. `component` selects whose parameters to take from
+/// a file with several.
 ///
 /// # Errors
 /// [`Error::Usage`] or [`Error::File`] for bad input.
@@ -58,7 +58,7 @@ pub(crate) fn run(
         set(&mut params, ParamId::MotFluxMwb, flux_mwb)?;
     }
     if params.is_default(ParamId::CtlRpmMin) {
-        // 300 rpm suit the motor of the first bench.
+        // 300 rpm suits the first bench's motor.
         set(&mut params, ParamId::CtlRpmMin, 0.0)?;
     }
     let pwm = pwm(&params.in_force());
@@ -91,7 +91,7 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// The flux linkage of a motor of these pole pairs, or of those assumed, by its KV.
+/// Returns a motor's flux linkage from its KV and its pole pairs, assumed if not given.
 fn flux_mwb(kv: f64, params: &Params) -> f32 {
     let pole_pairs = f64::from(params.in_force().get(ParamId::MotPolePairs));
     (1e3 * 60.0 / (TAU * 3_f64.sqrt() * pole_pairs * kv)) as f32
@@ -104,7 +104,7 @@ fn param(params: &Params, id: ParamId) -> Param {
     }
 }
 
-/// The PWM that the speed at full throttle needs.
+/// Returns the PWM frequency that the speed at full throttle needs.
 fn pwm(params: &Params) -> Setting {
     let id = ParamId::PwmFreqHz;
     let as_it_is = params.get(id);
@@ -118,11 +118,11 @@ fn pwm(params: &Params) -> Setting {
     Setting { id, value, from }
 }
 
-/// The motor with what of it is assumed, and each setting in force with what it follows from.
+/// Returns the motor, with what is assumed about it, and each setting in force with what it follows from.
 fn table(params: &Params, made: &Params, settings: &[Setting]) -> String {
     let mut out = String::new();
     let mut line = |name: &str, value: &str, from: &str| {
-        // A String takes all that is written to it.
+        // Writing to a String cannot fail.
         let _ = writeln!(
             out,
             "{}",
@@ -149,7 +149,7 @@ fn table(params: &Params, made: &Params, settings: &[Setting]) -> String {
     out
 }
 
-/// As much of a value as a person reads.
+/// Rounds to as many digits as people read.
 fn three_digits(value: f32) -> f32 {
     format!("{value:.2e}").parse().unwrap_or(value)
 }
