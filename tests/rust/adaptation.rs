@@ -1,4 +1,4 @@
-//! The inductance is found while the motor turns.
+//! Adaptation: the inductance is found while the motor turns.
 
 use std::f64::consts::TAU;
 
@@ -9,8 +9,7 @@ use siskin_emulator::rig::{Bench, Rig};
 const RPM: f32 = 4500.0;
 const L_UH: f64 = 30.6;
 
-/// What the drive takes the inductance for, over the truth, after 0.3 s at 4500 rpm from a caught
-/// rotor.
+/// Returns the drive's inductance over the true one, after 0.3 s at 4500 rpm from a caught rotor.
 fn found_over_true(stated_uh: f32) -> f64 {
     let mut params = Params::of(&BOSSO_BENCH);
     for (id, value) in [

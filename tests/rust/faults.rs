@@ -1,5 +1,5 @@
-//! What turns the bridge off by itself, and what a ground station hears of it: the tasks' side and
-//! the drive on its bench, with a temperature that the test gives.
+//! What turns the bridge off by itself, and what a ground station hears of it: the tasks' side and the
+//! drive on its bench, at a temperature set by the test.
 
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, EscFailureFlags, MavCmd, MavMessage, MavParamType, MavResult, PARAM_SET_DATA,
@@ -19,13 +19,13 @@ use siskin_emulator::wire::Wire;
 const CAPTURE_HZ: u32 = 170_000_000;
 const MS_NS: u64 = 1_000_000;
 const STOP: u16 = 0;
-/// Maps onto 3150 rpm.
+/// Maps to 3150 rpm.
 const HALF: u16 = 1048;
-/// Maps onto 6000 rpm.
+/// Maps to 6000 rpm.
 const FULL: u16 = 2047;
 const ROOM_C: f32 = 25.0;
 
-/// An ESC on its bench, with a flight controller that sends a frame a millisecond.
+/// An ESC on its bench, with a flight controller that sends a frame every millisecond.
 struct Station {
     esc: Esc,
     throttle: Throttle,
@@ -40,11 +40,11 @@ struct Station {
     periods: u64,
 }
 
-/// What a stretch of time ended with.
+/// How a stretch of time ended.
 #[derive(Debug)]
 struct Seen {
     rpm: f64,
-    /// A period in which the bridge was on.
+    /// Whether the bridge was on in any period.
     on: bool,
 }
 
@@ -73,7 +73,7 @@ impl Station {
         }
     }
 
-    /// One that has turned at half throttle for 3 s.
+    /// Creates one that has turned at half throttle for 3 s.
     fn turning() -> Self {
         let mut station = Self::new(Params::of(&BOSSO_BENCH));
         station.run(400, STOP);
@@ -82,7 +82,7 @@ impl Station {
         station
     }
 
-    /// So many milliseconds, each with a frame of this throttle at its start.
+    /// Runs for `count_ms`, with a frame of this throttle at the start of each millisecond.
     fn run(&mut self, count_ms: u64, throttle: u16) -> Seen {
         let mut seen = Seen {
             rpm: 0.0,
@@ -138,7 +138,7 @@ impl Station {
         }
     }
 
-    /// Sends what a ground station would.
+    /// Sends the ESC a ground station's message.
     fn receive(&mut self, message: &MavMessage) {
         let header = MavHeader {
             system_id: 255,
@@ -174,7 +174,7 @@ impl Station {
         assert_eq!(self.esc.params().get(id), value);
     }
 
-    /// Asks for a test of the motor, and gives the answer.
+    /// Requests a motor test, and returns the result.
     fn test(&mut self) -> MavResult {
         self.receive(&MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
             param1: 0.5,
@@ -212,7 +212,7 @@ impl Station {
         texts.collect()
     }
 
-    /// What the last ESC_INFO says has failed.
+    /// Returns the failures in the last ESC_INFO.
     fn flags(&self) -> EscFailureFlags {
         let mut infos = self.heard.iter().rev();
         infos
@@ -254,7 +254,7 @@ fn above_lim_temp_c_the_bridge_is_off_until_5_degrees_below_it_and_zero_throttle
             .contains(EscFailureFlags::ESC_FAILURE_OVER_TEMPERATURE)
     );
 
-    // Within the hysteresis zero throttle does not end it; below it, an open throttle does not.
+    // Within the hysteresis zero throttle does not clear it; below it, an open throttle does not.
     station.temperature_c = 95.1;
     assert!(!station.run(1_000, STOP).on);
     assert!(station.has(Fault::OverTemperature));
@@ -294,7 +294,7 @@ fn a_limit_that_is_lowered_in_flight_stops_no_motor() {
         for lowered_a in [5.0, 2.0] {
             let before_a = limit_a(&station);
             station.set(ParamId::LimPhaseA, lowered_a);
-            // Neither does the board's own trip go below a current that still flows.
+            // Nor does the board's own trip drop below a current that still flows.
             assert!(limit_a(&station) > 0.99 * before_a, "{drive}, {lowered_a}");
             let slower = station.run(1_000, FULL);
             assert!(
@@ -330,7 +330,7 @@ fn a_motor_is_not_tested_while_its_shaft_turns_after_a_fault() {
     loop {
         let seen = station.run(50, STOP);
         if station.test() == MavResult::MAV_RESULT_ACCEPTED {
-            // A start is for a shaft at rest.
+            // Only a shaft at rest may start.
             assert!(seen.rpm.abs() < 100.0, "{seen:?}");
             break;
         }
@@ -340,8 +340,8 @@ fn a_motor_is_not_tested_while_its_shaft_turns_after_a_fault() {
     assert!(refused > 10, "{refused}");
 }
 
-/// With a third of the true resistance and less, the voltage that the winding takes at a low speed is
-/// believed to be back-EMF, and the shaft to turn.
+/// At a third of the true resistance or less, the winding's voltage drop at low speed is taken for
+/// back-EMF, and the shaft is believed to turn.
 const THIRD_AND_LESS_MOHM: [f32; 3] = [18.0, 27.0, 36.0];
 
 #[test]
@@ -414,7 +414,7 @@ fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {
     }
     assert!(station.has(Fault::Stuck), "after {starts} starts");
     assert!((2..=5).contains(&starts), "{starts} starts");
-    // Each failed one but the last, which is the fault.
+    // Each failed start but the last, which is the fault.
     let failed = station.texts().into_iter().filter(|text| *text == FAILED);
     assert_eq!(failed.count(), starts as usize - 1);
     assert!(!station.run(1_100, HALF).on);
@@ -425,7 +425,7 @@ fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {
     assert!(!station.has(Fault::Stuck));
 }
 
-/// An offset beyond a tenth of the sensors' 40 A is a defect; below it, it is measured and taken off.
+/// An offset beyond a tenth of the sensors' 40 A is a defect; a smaller one is measured and subtracted.
 #[test]
 fn a_current_sensor_whose_zero_is_far_off_is_a_fault_before_the_bridge_is_on() {
     let started = |offset_a: f64| {
@@ -449,7 +449,7 @@ fn a_current_sensor_whose_zero_is_far_off_is_a_fault_before_the_bridge_is_on() {
     }
 }
 
-/// With the bridge off the open terminals tell the speed, and the throttle finds the shaft turning.
+/// With the bridge off, the open terminals tell the speed, and the throttle catches the turning shaft.
 #[test]
 fn a_coasting_shaft_is_reported_and_caught() {
     let mut station = Station::turning();

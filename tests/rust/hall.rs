@@ -1,4 +1,4 @@
-//! Hall sensors that break, on the bench: in merged mode the flux crossings take their place.
+//! Hall sensors that fail on the bench: in merged mode the flux crossings take over.
 
 use siskin_control::drive::{Phase, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
@@ -18,13 +18,13 @@ fn rig(bench: Bench) -> Rig {
     Rig::new(bench, config)
 }
 
-/// Lets Hall sensors show one level from now on.
+/// Sticks Hall sensors at a level from now on.
 fn stick(rig: &mut Rig, hall: [Option<bool>; 3]) {
     let before = InForce::default();
     rig.disturb(&before, &InForce { hall, ..before });
 }
 
-/// One sensor that shows a level.
+/// One sensor stuck at a level.
 fn one(phase: usize, level: bool) -> [Option<bool>; 3] {
     let mut stuck = [None; 3];
     stuck[phase] = Some(level);
@@ -40,9 +40,9 @@ struct Seen {
     most_rpm: f64,
     /// Periods in Park.
     parked: u32,
-    /// When a sensor was first said to be at fault, s.
+    /// When a sensor was first reported faulty, s.
     fault_at_s: Option<f64>,
-    /// Greatest angle error in Run, degrees.
+    /// Largest angle error in Run, degrees.
     error_deg: f64,
 }
 
@@ -89,7 +89,7 @@ fn a_sensor_that_breaks_while_it_runs_is_detected_and_survived() {
                 stick(&mut rig, one(phase, level));
                 let after = run(&mut rig, rpm, 1.0);
                 let case = format!("{rpm} rpm, {phase} {level}: {after:?}");
-                // Two turns make three contradictions or more, and the first begins anywhere.
+                // Two turns bring at least three contradictions, and the first turn begins anywhere.
                 let three_turns_s = 3.0 * 60.0 / f64::from(rpm) / 12.0;
                 assert!(
                     after.fault_at_s.is_some_and(|s| s < three_turns_s),
@@ -106,7 +106,7 @@ fn a_sensor_that_breaks_while_it_runs_is_detected_and_survived() {
     }
 }
 
-/// Merged sensors that are at fault before the start, or show it there, leave a sensorless one.
+/// Merged sensors that fail before the start, or prove faulty in it, leave a sensorless start.
 #[test]
 fn a_sensor_broken_at_standstill_leaves_a_start_by_park_and_ramp() {
     let cable_off = [Some(true); 3];
@@ -141,7 +141,7 @@ fn a_second_start_finds_the_rotor_where_it_has_been_left() {
             ..Bench::default()
         });
         run(&mut rig, 1000.0, 0.5);
-        // Braked and at rest, its low sides on.
+        // Braked and at rest, with the low sides on.
         for _ in 0..(2.0 / rig.period_s()) as u32 {
             rig.period(Setpoint::Zero);
         }

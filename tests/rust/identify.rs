@@ -1,5 +1,5 @@
-//! Identification of the motor by command, on the emulated ESC: what it finds is the motor on the bench, whatever that
-//! is; it is done only under the rule of what may turn one, and sets nothing until it is asked to.
+//! Identification of the motor by command, on the emulated ESC: it finds the motor on the bench, whatever that
+//! is; it runs only when a motor may be turned, and sets nothing until asked to.
 
 mod station;
 
@@ -32,10 +32,10 @@ const FOUND: [ParamId; 4] = [
     ParamId::MotJGcm2,
 ];
 
-/// The longest that one may take, ms.
+/// The longest that an identification may take, ms.
 const LONGEST_MS: u64 = 20_000;
 
-/// An ESC that knows nothing of the motor on its bench, with these parameters.
+/// Creates an ESC that knows nothing about the motor on its bench, with these parameters.
 fn bench(start: Start, params: &[(ParamId, f32)]) -> Station {
     let unknown = FOUND.map(|id| (id, 0.0));
     Station::new(Start {
@@ -44,7 +44,7 @@ fn bench(start: Start, params: &[(ParamId, f32)]) -> Station {
     })
 }
 
-/// The default bench.
+/// Creates the default bench.
 fn default() -> Station {
     bench(Start::default(), &[])
 }
@@ -66,7 +66,7 @@ fn found(station: &Station) -> [f32; 4] {
     FOUND.map(|id| station.device.esc().params().get(id))
 }
 
-/// The whole of one, and what it has found is kept: how it ends.
+/// Runs a whole identification and keeps its results; returns how it ends.
 fn identify(station: &mut Station) -> MavResult {
     station.ask(IDENTIFY, BEGIN);
     for _ in 0..LONGEST_MS / 100 {
@@ -90,7 +90,7 @@ fn identify(station: &mut Station) -> MavResult {
     last(station)
 }
 
-/// R, L, flux and inertia of a motor with its load, in the units of the parameters.
+/// Returns R, L, flux and inertia of a motor with its load, in the parameters' units.
 fn truth(start: &Start) -> [f64; 4] {
     let (motor, load) = (start.bench.motor, start.bench.load);
     [
@@ -101,7 +101,7 @@ fn truth(start: &Start) -> [f64; 4] {
     ]
 }
 
-/// How far what was found is from the truth, as shares of it, beside what it may be.
+/// Returns the relative error of each figure found, next to its bound.
 fn errors(station: &Station, truth: [f64; 4]) -> [(f64, f64); 4] {
     let found = found(station).map(f64::from);
     let bounds = [0.03, 0.05, 0.02, 0.1];
@@ -117,11 +117,11 @@ fn within(errors: [(f64, f64); 4]) -> bool {
 struct Drawn {
     supply_v: f64,
     limit_a: f64,
-    /// What the limit drops across R, of the supply.
+    /// The limit's drop across R, as a share of the supply.
     drop: f64,
     /// L/R, s.
     winding_s: f64,
-    /// Electrical speed of the supply's back-EMF, turns a period.
+    /// Electrical speed at which the back-EMF equals the supply, turns per period.
     turns: f64,
     /// Time in which the limit takes the shaft to three quarters of that, s.
     run_up_s: f64,
@@ -184,7 +184,7 @@ impl Drawn {
         let rad_s = 0.75 * phase_v / flux / pole_pairs;
         let torque = 1.5 * pole_pairs * flux * limit_a;
         let half_inertia = 0.5 * torque * self.run_up_s / rad_s;
-        // The propeller takes half of the limit's torque there.
+        // There the propeller takes half of the limit's torque.
         let drag = 0.5 * torque / (rad_s * rad_s);
         let range = 2.0 * limit_a;
         let text = format!(
@@ -219,7 +219,7 @@ impl Drawn {
     }
 }
 
-/// `PROPTEST_CASES=500` draws more of them, and another `PROPTEST_RNG_SEED` others.
+/// `PROPTEST_CASES=500` draws more of them, and another `PROPTEST_RNG_SEED` different ones.
 #[test]
 fn any_motor_is_found_out_within_20_s_or_refused_with_a_reason() {
     let chosen = std::env::var_os("PROPTEST_CASES").is_some();
@@ -260,10 +260,10 @@ fn any_motor_is_found_out_within_20_s_or_refused_with_a_reason() {
     assert!(100 * near >= 95 * cases, "{near} and {accepted} of {cases}");
 }
 
-/// And turns as it does with the figures of the library.
+/// Each also turns as it does with the library's figures.
 #[test]
 fn each_bench_is_found_out_and_flies() {
-    // On those two there is a rider.
+    // These two carry a rider.
     let ridden = ["scooter", "skateboard"];
     for name in library::names().filter(|name| !ridden.contains(name)) {
         let start = of_the_library(name);
@@ -287,10 +287,10 @@ fn each_bench_is_found_out_and_flies() {
     }
 }
 
-/// STATUSTEXT has room for 50 letters.
+/// STATUSTEXT has room for 50 characters.
 #[test]
 fn a_reason_that_is_too_long_for_a_text_is_cut_and_not_left_out() {
-    // The slow motor's flux is too great for it.
+    // The slow motor's flux is too high for it.
     let fast = [(ParamId::PwmFreqHz, 24_000.0)];
     let mut station = bench(of_the_library("gimbal"), &fast);
     assert_eq!(identify(&mut station), MavResult::MAV_RESULT_FAILED);
@@ -329,12 +329,12 @@ fn it_ends_by_command_by_disarming_and_by_the_throttle_and_sets_nothing() {
                 "{:?}",
                 station.texts
             );
-            // The throttle has what is on the bench turn as before.
+            // The throttle turns whatever is on the bench, as before.
             station.run(5000, Some(throttle));
             let turning = station.device.rig().snapshot().phase == Phase::Run;
             assert_eq!(turning, throttle == HALF);
             assert_eq!(found(&station), [0.0; 4]);
-            // Nothing has been found, so there is nothing to be kept.
+            // Nothing has been found, so there is nothing to keep.
             station.texts.clear();
             station.run(3000, Some(ZERO));
             station.ask(IDENTIFY, KEEP);
@@ -365,7 +365,7 @@ fn write(station: &mut Station, value: f32) {
         .receive(link, bytes, &mut |_: f64, _: &Period, _: &Rig| {});
 }
 
-/// Holds the stick so long, by servo pulses.
+/// Holds the stick by servo pulses of `width_us` for `for_ms`.
 fn hold(station: &mut Station, for_ms: u64, width_us: u32) {
     for _ in 0..for_ms / 20 {
         let now_ns = station.device.now_ns();
@@ -420,7 +420,7 @@ fn a_parameter_begins_it_ends_it_and_keeps_what_it_has_found() {
     station.run(200, Some(ZERO));
     asserts_found(&station);
     assert_eq!(order(&station), 0.0);
-    // Nor is it begun while the motor turns.
+    // Nor does it begin while the motor turns.
     station.run(3000, Some(HALF));
     write(&mut station, BEGIN);
     station.run(20, Some(HALF));

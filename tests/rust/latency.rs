@@ -1,4 +1,4 @@
-//! From the last edge of a frame on the throttle wire to the set-point of a control period.
+//! Latency from the last edge of a throttle frame to the set-point of a control period.
 
 use siskin_control::drive::Setpoint;
 use siskin_control::input::dshot::{Frame, check_mask};
@@ -6,15 +6,15 @@ use siskin_control::params::ParamId;
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::rig::{Period, Rig};
 
-/// The last edge of a frame before each change of the set-point, and when `step` was first given the
-/// new one.
+/// Measures from the last edge of a frame before each set-point change to when `step` first gets the new
+/// one.
 #[derive(Default)]
 struct Latency {
     edge_ns: u64,
-    /// The frame is answered: the edges that follow are the reply's.
+    /// The frame has been answered: the edges that follow are the reply's.
     answered: bool,
     setpoint: Option<Setpoint>,
-    /// Changes seen, and the longest of their latencies.
+    /// Changes seen, and their longest latency.
     changes: u32,
     longest_s: f64,
 }
@@ -48,7 +48,7 @@ fn device() -> Device {
     device
 }
 
-/// Plays a datagram at a time and runs until another.
+/// Plays a datagram at one time and runs until another.
 fn play(device: &mut Device, at_ns: u64, datagram: &[u8], until_ns: u64, latency: &mut Latency) {
     device.advance(at_ns, |_, _| None, latency, &mut |_| {});
     let now_ns = device.now_ns();
@@ -75,9 +75,9 @@ fn pulse(protocol: u8, width_ns: u32) -> [u8; 5] {
     [protocol, a, b, c, d]
 }
 
-/// Arms, opens, and then changes the throttle a thousand times at all phases against the PWM.
+/// Arms, opens, and then changes the throttle a thousand times at all phases of the PWM.
 ///
-/// Returns the longest time to the set-point less a control period, s.
+/// Returns the longest time to the set-point, less a control period, s.
 fn beyond_a_period(spacing_ns: u64, datagram: impl Fn(u64) -> Vec<u8>) -> f64 {
     let mut device = device();
     let mut latency = Latency::default();
@@ -94,7 +94,7 @@ fn beyond_a_period(spacing_ns: u64, datagram: impl Fn(u64) -> Vec<u8>) -> f64 {
     latency.longest_s - device.rig().period_s()
 }
 
-/// The throttle of a frame: zero while it arms, then a step on with each.
+/// Returns a frame's throttle: zero while arming, then another step each time.
 fn step(number: u64) -> u32 {
     match number {
         0..400 => 0,
@@ -116,7 +116,7 @@ fn a_frame_is_in_the_set_point_within_a_control_period() {
     }
 }
 
-/// A pulse has no check sum, so that its end is believed only after the filter's time.
+/// A pulse has no checksum, so its end is believed only after the filter time.
 #[test]
 fn a_pulse_is_in_the_set_point_within_a_control_period_and_the_filter_s_time() {
     let kinds = [

@@ -1,5 +1,5 @@
-//! Whatever comes from outside, on the throttle wire and on MAVLink, neither ends the program nor
-//! turns the motor nor breaks a parameter.
+//! Whatever comes from outside, on the throttle wire and by MAVLink, neither ends the program nor turns the
+//! motor nor corrupts a parameter.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{Message, calculate_crc};
@@ -20,7 +20,7 @@ use siskin_emulator::wire::Wire;
 const MS_NS: u64 = 1_000_000;
 const CAPTURE_HZ: u32 = 170_000_000;
 
-/// Messages that the ESC obeys; the last is one that it does not.
+/// Messages that the ESC obeys; it ignores the last one.
 const MESSAGES: [u32; 11] = [0, 4, 20, 21, 23, 43, 75, 76, 110, SETUP_SIGNING, 290];
 const SETUP_SIGNING: u32 = 256;
 const COMMANDS: [u32; 2] = [75, 76];
@@ -28,8 +28,7 @@ const PARAM_SET: u32 = 23;
 const COMMAND_OFFSET: usize = 28;
 /// The commands that may turn the motor: ACTUATOR_TEST and DO_MOTOR_TEST.
 const TESTS: [u16; 2] = [310, 209];
-/// Commands that it obeys otherwise: calibration, storage, restart, settings, arming, intervals and
-/// messages.
+/// Other commands that it obeys: calibration, storage, restart, settings, arming, intervals and messages.
 const OBEYED: [u16; 7] = [241, 245, 246, 311, 400, 511, 512];
 
 /// An ESC with a wire and a link, at rest.
@@ -68,7 +67,7 @@ impl Desk {
         }
     }
 
-    /// One at power-up. What is stored has been in force: it fits the board.
+    /// Creates one at power-up. The stored parameters have been in force, so they fit the board.
     fn esc(params: Params, board: Board) -> (Esc, Throttle) {
         Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("the parameters fit the bench")
     }
@@ -87,7 +86,7 @@ impl Desk {
         self.check();
     }
 
-    /// A millisecond passes.
+    /// Lets a millisecond pass.
     fn pass(&mut self) {
         self.now_ns += MS_NS;
         while let Some((edge_ns, level)) = self.wire.next_edge(self.now_ns) {
@@ -147,7 +146,7 @@ impl Desk {
         );
     }
 
-    /// Every parameter is in its range, and every frame that was sent can be read.
+    /// Asserts that every parameter is in range, and that every frame sent can be read.
     fn check_at_end(&self) {
         for id in ParamId::ALL {
             let (value, entry) = (self.esc.params().get(id), id.entry());
@@ -157,7 +156,7 @@ impl Desk {
     }
 }
 
-/// A sound MAVLink 2 frame of a ground station.
+/// Returns a valid MAVLink 2 frame from a ground station.
 fn frame(id: u32, payload: &[u8]) -> Vec<u8> {
     let [low, middle, high, _] = id.to_le_bytes();
     let mut bytes = vec![
@@ -178,8 +177,8 @@ fn frame(id: u32, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A sound frame for this ESC or for another; half of those with a name use one that there is, half
-/// of the values are in its range, and half of the commands are obeyed.
+/// Draws a valid frame for this ESC or for another; half of those with a name use an existing one, half of
+/// the values are in its range, and half of the commands are ones that it obeys.
 fn any_frame() -> impl Strategy<Value = Vec<u8>> {
     let body = vec(any::<u8>(), 0..=255);
     let name = proptest::option::of(select(&ParamId::ALL[..]));
@@ -213,9 +212,9 @@ fn is_command(id: u32) -> bool {
     COMMANDS.contains(&id)
 }
 
-/// Puts the address of this ESC and the name of a parameter into a payload.
+/// Puts this ESC's address and a parameter name into a payload.
 fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool) -> Vec<u8> {
-    // Where the target and the name stand in each.
+    // Offsets of the target and the name in each message.
     let (target, place) = match id {
         4 => (Some(12), None),
         20 => (Some(2), Some(4)),
@@ -235,7 +234,7 @@ fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool)
         put(target, &[1, 1]);
     }
     if id == SETUP_SIGNING {
-        // A time that is one: it has 48 bits.
+        // A valid time: it has 48 bits.
         put(5, &[0; 3]);
     }
     if let (Some(place), Some(id)) = (place, name) {
@@ -253,7 +252,7 @@ fn spoken_to(id: u32, mut body: Vec<u8>, name: Option<ParamId>, addressed: bool)
 }
 
 proptest! {
-    // Always the same cases: a run can be repeated.
+    // Always the same cases, so that a run can be repeated.
     #![proptest_config(ProptestConfig {
         cases: 200,
         rng_seed: RngSeed::Fixed(1),

@@ -1,5 +1,5 @@
-//! What may turn the motor and what must stop it, from datagrams on the throttle wire to the torque
-//! of the simulated motor, to the millisecond of simulated time and with default parameters.
+//! What may turn the motor and what must stop it, from datagrams on the throttle wire to the simulated
+//! motor's torque, to the millisecond of simulated time and with default parameters.
 
 use siskin_control::drive::{Bridge, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, ParamId};
@@ -11,16 +11,16 @@ const MS_NS: u64 = 1_000_000;
 
 const DSHOT600: u8 = 12;
 const STOP: u16 = 0;
-/// The step above the middle of 48..2047, mapped onto 300..6000 rpm.
+/// The step above the middle of 48..2047, mapped to 300..6000 rpm.
 const HALF: u16 = 1048;
 const HALF_RPM: f64 = 3150.0;
 
-/// Greatest mean torque over 10 ms that counts as none, Nm: 2 % of what half throttle takes, from
-/// currents that are regulated to zero through the converter's noise.
+/// Largest mean torque over 10 ms that counts as none, Nm: 2 % of what half throttle takes, for currents
+/// that are regulated to zero through the converter's noise.
 const NO_TORQUE_NM: f64 = 0.0015;
 const TORQUE_OVER_MS: u64 = 10;
 
-/// One ESC on its bench, with a flight controller that sends a frame a millisecond.
+/// An ESC on its bench, with a flight controller that sends a frame every millisecond.
 struct Flight {
     device: Device,
 }
@@ -32,7 +32,7 @@ struct Seen {
     most_rpm: f64,
     /// Mean over 10 ms.
     most_torque_nm: f64,
-    /// A period in which the bridge drove the motor, and not to be heard.
+    /// Whether the bridge drove the motor in any period, other than for a tone.
     driven: bool,
 }
 
@@ -47,7 +47,7 @@ impl Flight {
         Self { device }
     }
 
-    /// An armed one, just after the frame that armed it.
+    /// Creates an armed one, just after the frame that armed it.
     fn armed(overrides: &[(ParamId, f32)]) -> Self {
         let mut flight = Self::new(overrides);
         flight.send(400, frame(DSHOT600, STOP));
@@ -55,7 +55,7 @@ impl Flight {
         flight
     }
 
-    /// One that has turned at half throttle for 3 s.
+    /// Creates one that has turned at half throttle for 3 s.
     fn turning(overrides: &[(ParamId, f32)]) -> Self {
         let mut flight = Self::armed(overrides);
         flight.send(3_000, frame(DSHOT600, HALF));
@@ -66,12 +66,12 @@ impl Flight {
         self.device.esc().telemetry().armed
     }
 
-    /// Sends a datagram at the start of each of so many milliseconds.
+    /// Sends a datagram at the start of each of `count_ms` milliseconds.
     fn send(&mut self, count_ms: u64, datagram: [u8; 3]) -> Seen {
         self.run(count_ms, |_| Some(datagram))
     }
 
-    /// Nothing on the wire for so many milliseconds.
+    /// Leaves the wire silent for `count_ms`.
     fn silence(&mut self, count_ms: u64) -> Seen {
         self.run(count_ms, |_| None)
     }
@@ -115,7 +115,7 @@ impl Flight {
     }
 }
 
-/// A datagram with a frame of this value.
+/// Returns a datagram with a frame of this value.
 fn frame(protocol: u8, value: u16) -> [u8; 3] {
     let data = value << 1;
     let sum = (data ^ data >> 4 ^ data >> 8) & 0xF;
@@ -123,7 +123,7 @@ fn frame(protocol: u8, value: u16) -> [u8; 3] {
     [protocol, low, high]
 }
 
-/// The same with its check sum changed by `flip`, 1 to 15.
+/// Returns the same with its checksum changed by `flip`, 1 to 15.
 fn bad_frame(value: u16, flip: u8) -> [u8; 3] {
     let [protocol, low, high] = frame(DSHOT600, value);
     [protocol, low ^ flip, high]
@@ -132,11 +132,11 @@ fn bad_frame(value: u16, flip: u8) -> [u8; 3] {
 #[test]
 fn zero_throttle_arms_after_its_time_and_not_before() {
     let mut flight = Flight::new(&[]);
-    // The board tests itself first, for three looks, a millisecond apart.
+    // The board's power-up test comes first: three polls, a millisecond apart.
     flight.silence(5);
     flight.send(300, frame(DSHOT600, STOP));
     assert!(!flight.is_armed());
-    // The first frame ends 27 µs after its start, and telemetry is taken each millisecond.
+    // The first frame ends 27 µs after its start, and telemetry is read every millisecond.
     flight.send(2, frame(DSHOT600, STOP));
     assert!(flight.is_armed());
 }
@@ -212,7 +212,7 @@ fn after_the_last_frame_no_driving_torque_remains_and_the_shaft_stops() {
         after.most_rpm < 100.0 && after.least_rpm > -100.0,
         "{after:?}"
     );
-    // It must be armed anew.
+    // It must be armed again.
     let back = flight.send(1_000, frame(DSHOT600, HALF));
     assert!(!back.driven, "{back:?}");
 }
@@ -292,7 +292,7 @@ fn a_short_is_tried_three_times_in_flight_and_then_held() {
         let held = flight.send(2_000, frame(DSHOT600, HALF));
         assert!(!held.driven, "{policy}: {held:?}");
         assert_eq!(trips(&flight), attempts, "{policy}");
-        // Mended, it is flown again behind zero throttle, and not before.
+        // Once mended, it flies again only after zero throttle.
         flight.device.mend();
         let waiting = flight.send(500, frame(DSHOT600, HALF));
         assert!(!waiting.driven, "{policy}: {waiting:?}");
@@ -320,7 +320,7 @@ fn zero_throttle_and_a_lost_signal_win_over_a_retry() {
         let after = flight.run(1_000, |_| signal.then_some(wire));
         assert!(!after.driven, "{signal}: {after:?}");
         let open = flight.send(500, frame(DSHOT600, HALF));
-        // Zero throttle has armed it again; after a lost signal it must be.
+        // Zero throttle has re-armed it; after a lost signal it must be armed again.
         assert_eq!(open.driven, signal, "{open:?}");
     }
 }

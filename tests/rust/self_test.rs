@@ -1,5 +1,5 @@
 //! The self-test by command, on the emulated ESC: a sound one passes, each defect is named, the motor does
-//! not turn, and it is done only under the rule of what may turn one.
+//! not turn, and it runs only when a motor may be turned.
 
 mod station;
 
@@ -11,7 +11,7 @@ use station::{HALF, Station, ZERO};
 
 const CHECK: MavCmd = MavCmd::MAV_CMD_RUN_PREARM_CHECKS;
 
-/// An ESC with these defects and parameters.
+/// Creates an ESC with these defects and parameters.
 fn bench(kinds: &[Kind], params: &[(ParamId, f32)]) -> Station {
     let at_s = 0.2;
     let fault = |kind: &Kind| Fault {
@@ -26,7 +26,7 @@ fn bench(kinds: &[Kind], params: &[(ParamId, f32)]) -> Station {
     })
 }
 
-/// The whole of one: how it ends.
+/// Runs a whole self-test; returns how it ends.
 fn check(station: &mut Station) -> MavResult {
     station.ask(CHECK, 0.0);
     station.run(1500, None);
@@ -34,7 +34,7 @@ fn check(station: &mut Station) -> MavResult {
     result
 }
 
-/// What is out of bounds, by the text that tells of it.
+/// Returns what is out of bounds, from the text that reports it.
 fn named(station: &Station) -> Vec<&str> {
     let told = station
         .texts
@@ -69,7 +69,7 @@ fn a_sound_esc_passes_and_its_motor_does_not_turn() {
         );
         let percents: Vec<_> = going.iter().map(|(_, percent)| *percent).collect();
         assert_eq!(percents, [255, 30, 40, 50, 60, 70, 80, 90]);
-        // A fifth of LIM_PHASE_A, and what a period or two of delay add.
+        // A fifth of LIM_PHASE_A, plus what a period or two of delay add.
         let limit = Params::default().get(ParamId::LimPhaseA);
         assert!(
             station.current_a < 0.35 * f64::from(limit),
@@ -77,7 +77,7 @@ fn a_sound_esc_passes_and_its_motor_does_not_turn() {
             station.current_a
         );
         assert!(station.rpm < 30.0, "{} rpm", station.rpm);
-        // Again, once it is done.
+        // Again, once it has finished.
         assert_eq!(check(&mut station), MavResult::MAV_RESULT_ACCEPTED);
     }
 }
@@ -96,7 +96,7 @@ fn each_defect_is_named() {
             (Kind::OffsetDrift(phase, 6.0), own("zero")),
             (Kind::OffsetDrift(phase, -6.0), own("zero")),
         ] {
-            // The tunes would find an offset before.
+            // The tunes would find an offset first.
             let mut station = bench(&[kind], &[(ParamId::MotToneA, 0.0)]);
             assert_eq!(
                 check(&mut station),
@@ -113,8 +113,8 @@ fn each_defect_is_named() {
     assert_eq!(named(&station)[..3], ["noise_a", "noise_b", "noise_c"]);
 }
 
-/// The others are pulled up with rising duty: the current of a test shows it before one that trips. The
-/// first leg to be pulled has none before it, and shoots through as a start would.
+/// A short in another leg shows while one is pulled up with rising duty: by the test's current, before one
+/// that trips. The first leg pulled has none before it, and shoots through as it would at a start.
 #[test]
 fn a_shorted_low_side_is_named_by_a_small_current() {
     for phase in 0..3 {
@@ -146,7 +146,7 @@ fn it_is_done_at_rest_alone_and_ends_with_any_throttle() {
         MavResult::MAV_RESULT_ACCEPTED
     );
 
-    // The throttle takes the motor over within the time of the frame that opens it.
+    // The throttle takes over the motor within the time of the frame that opens it.
     station.acks.clear();
     station.ask(CHECK, 0.0);
     station.run(150, Some(ZERO));
@@ -165,7 +165,7 @@ fn it_is_done_at_rest_alone_and_ends_with_any_throttle() {
     station.run(2000, Some(HALF));
     assert!(station.rpm > 3000.0, "{}", station.rpm);
 
-    // And while it turns, or coasts, there is none.
+    // While it turns or coasts, there is no self-test.
     station.acks.clear();
     station.pulls = 0;
     station.ask(CHECK, 0.0);

@@ -33,13 +33,13 @@ fn rpm(rig: &Rig, rpm: f32) -> Setpoint {
 struct Seen {
     /// Mean speed over the last tenth of a second.
     rpm: f64,
-    /// When 300 rpm were reached, s.
+    /// When 300 rpm was reached, s.
     at_300_s: Option<f64>,
-    /// How often it was parked.
+    /// How often it entered Park.
     parks: u32,
-    /// Greatest phase current, A.
+    /// Largest phase current, A.
     most_a: f64,
-    /// Greatest angle error in Run, degrees.
+    /// Largest angle error in Run, degrees.
     error_deg: f64,
 }
 
@@ -124,7 +124,7 @@ fn the_current_stays_within_its_bound_in_steps() {
             (seen.rpm / f64::from(wanted_rpm) - 1.0).abs() < 0.02,
             "{seen:?}"
         );
-        // The ripple and what a commutation adds stay below the trip at 1.4 times.
+        // Ripple and the extra current of a commutation stay below the trip at 1.4 times.
         assert!(seen.most_a < 1.4 * f64::from(limit_a), "{seen:?}");
         assert!(seen.error_deg < 15.0, "{seen:?}");
     }

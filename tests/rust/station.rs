@@ -1,4 +1,4 @@
-//! An emulated ESC and a ground station beside it.
+//! An emulated ESC with a ground station.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, MavMessage, MavResult};
 use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion, Message};
@@ -9,18 +9,18 @@ use siskin_emulator::link::LinkId;
 use siskin_emulator::rig::{Period, Rig};
 
 const MS_NS: u64 = 1_000_000;
-/// A DShot frame's zero throttle, and half.
+/// Zero and half throttle in a DShot frame.
 pub(crate) const ZERO: u16 = 0;
 pub(crate) const HALF: u16 = 1048;
 
-/// An ESC, and a ground station that hears it.
+/// An ESC, and a ground station that listens to it.
 pub(crate) struct Station {
     pub(crate) device: Device,
     listener: Receiver,
-    /// The results of commands, with the percentages.
+    /// Results of commands, with their percentages.
     pub(crate) acks: Vec<(MavResult, u8)>,
     pub(crate) texts: Vec<String>,
-    /// Greatest speed of the shaft, rpm, and greatest phase current, A.
+    /// Highest shaft speed, rpm, and largest phase current, A.
     pub(crate) rpm: f64,
     pub(crate) current_a: f64,
     /// Periods in which a self-test has pulled a leg.
@@ -28,7 +28,7 @@ pub(crate) struct Station {
 }
 
 impl Station {
-    /// One that has been on for a second.
+    /// Creates one that has been on for a second.
     pub(crate) fn new(start: Start) -> Self {
         let (device, warning) = Device::start(Start {
             link_bytes_per_s: 1_000_000,
@@ -52,7 +52,7 @@ impl Station {
         station
     }
 
-    /// So many milliseconds, each with a frame of this throttle, if there is one.
+    /// Runs for `count_ms`, with a frame of this throttle, if any, each millisecond.
     pub(crate) fn run(&mut self, count_ms: u64, throttle: Option<u16>) {
         for _ in 0..count_ms {
             let now_ns = self.device.now_ns();
@@ -93,7 +93,7 @@ impl Station {
                             .into_iter()
                             .find(|of| *of as u8 == result)
                             .expect("one of these");
-                            // Trailing zeros are not sent.
+                            // Trailing zero bytes are not sent.
                             acks.push((result, frame.payload.get(3).copied().unwrap_or(0)));
                         }
                         Ok(MavMessage::STATUSTEXT(text)) => {

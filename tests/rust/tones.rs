@@ -1,4 +1,4 @@
-//! Tunes on the benches: heard, with a bounded current, by a motor that does not turn.
+//! Tunes on the benches: audible, with bounded current, on a motor that does not turn.
 
 use siskin_control::drive::{Phase, Setpoint};
 use siskin_control::params::{BOSSO_BENCH, ParamId, Params, build};
@@ -32,7 +32,7 @@ const BOUND_A: f64 = 1.5;
 
 const MS_NS: u64 = 1_000_000;
 
-/// A drive on its bench, and what maps a note to its set-point.
+/// A drive on its bench, and the mapping from a note to its set-point.
 struct Stage {
     rig: Rig,
     mapping: Mapping,
@@ -46,13 +46,13 @@ struct Stage {
 /// What a stretch of time showed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    /// Greatest phase current at a sample, A.
+    /// Largest phase current at a sample, A.
     peak_a: f64,
-    /// Furthest that the shaft was from where it stood, mechanical degrees.
+    /// Largest distance of the shaft from where it stood, mechanical degrees.
     moved_deg: f64,
-    /// How long a tone was played, s.
+    /// How long tones were played, s.
     tone_s: f64,
-    /// How often the current of phase a changed its sign beyond a third of the bound.
+    /// How often phase a's current changed sign beyond a third of the bound.
     crossings: u32,
 }
 
@@ -78,7 +78,7 @@ impl Stage {
         }
     }
 
-    /// One whose rotor rests at a detent of its cogging: a first tone has shaken it loose from where
+    /// Creates one whose rotor rests at a cogging detent: a first tone has shaken it loose from where
     /// friction alone may have held it.
     fn at_rest(name: &str, changes: &[(ParamId, f32)], on: impl FnOnce(&mut Bench)) -> Self {
         let mut stage = Self::new(name, changes, on);
@@ -125,7 +125,7 @@ impl Stage {
         self.run(time_s, |_, _| Setpoint::Stop)
     }
 
-    /// A tune, and what there is of the time after it.
+    /// Plays a tune, for the given time in total.
     fn play(&mut self, tune: Tune, time_s: f64) -> Seen {
         let mut player = Player::default();
         player.play(self.now_us(), tune);
@@ -135,7 +135,7 @@ impl Stage {
         })
     }
 
-    /// A pitch for some time.
+    /// Plays a pitch for some time.
     fn hum(&mut self, hz: u16, time_s: f64) -> Seen {
         self.run(time_s, |_, mapping| mapping.tone(Note::Pitch { hz }))
     }
@@ -181,7 +181,8 @@ fn the_rotor_may_stand_at_any_angle() {
     }
 }
 
-/// The greatest current of each pitch, on a motor whose R and L are so much of what is stated.
+/// Checks the largest current at each pitch, on a motor whose R and L are these multiples of the stated
+/// ones.
 fn each_pitch(name: &str, plant: Fidelity, truth: (f64, f64), holds: impl Fn(f64) -> bool) {
     let mut stage = Stage::at_rest(name, &[], |bench| {
         askew(bench);
@@ -217,7 +218,7 @@ fn the_current_is_bounded_with_r_and_l_stated_wrongly() {
     }
 }
 
-/// By their means, voltages as small as these are not known as well: a quarter more.
+/// With averaged voltages, voltages this small are known less well: a quarter more.
 #[test]
 fn the_current_is_bounded_by_means_too_with_r_and_l_stated_wrongly() {
     for name in BENCHES {
@@ -230,7 +231,8 @@ fn the_current_is_bounded_by_means_too_with_r_and_l_stated_wrongly() {
 
 #[test]
 fn the_current_is_bounded_with_r_or_l_stated_far_too_high() {
-    // 145 times the bench's own, which only some observers take; and eight times theirs.
+    // L at 145 times the bench's own, which only some observers accept, and R at eight times each bench's
+    // own.
     let l = vec![(ParamId::MotLUh, 4437.0), (ParamId::CtlObserver, 1.0)];
     let eightfold = |name| {
         let standing = stand(name, Default::default()).expect("a built-in bench");
@@ -265,11 +267,11 @@ fn the_current_has_the_note_s_frequency() {
                 askew(bench);
                 bench.plant = plant;
             });
-            // The scooter's 15.6 kHz play up to 1953 Hz.
+            // The scooter, at 15.6 kHz, plays up to 1953 Hz.
             for hz in [587, 1319, 1760] {
                 stage.hum(hz, 0.05);
                 let seen = stage.hum(hz, 0.5);
-                // Two changes of sign a cycle.
+                // Two sign changes per cycle.
                 let changes = f64::from(seen.crossings);
                 assert!(
                     (changes - f64::from(hz)).abs() <= 3.0,
@@ -308,7 +310,7 @@ fn throttle_in_a_tune_turns_the_motor_with_either_drive() {
     }
 }
 
-/// The bridge in a tune after the motor has been stopped by the brake: the brake again.
+/// A tune after a braked stop is heard, and then the brake is on again.
 #[test]
 fn a_tune_is_heard_after_the_brake_and_leaves_it() {
     let mut stage = Stage::new("quad-10-inch", &[], askew);
@@ -321,8 +323,8 @@ fn a_tune_is_heard_after_the_brake_and_leaves_it() {
     assert_eq!(stage.phase(), Phase::Brake);
 }
 
-/// An ESC with a flight controller that sends a frame each millisecond: zero until a time, then half
-/// throttle. Gives how long tones were played, and when the rotor was parked, s.
+/// Runs an ESC with a flight controller that sends a frame each millisecond: zero until a given time, then
+/// half throttle. Returns how long tones were played, and when the rotor was parked, s.
 fn power_up(tone_a: f32, throttle_at_s: f64) -> (f64, Option<f64>) {
     let started = Device::start(Start {
         overrides: vec![(ParamId::MotToneA, tone_a)],

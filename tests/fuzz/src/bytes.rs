@@ -1,6 +1,6 @@
-//! A fuzzer's bytes as numbers, until there are no more.
+//! Reads a fuzzer's bytes as numbers, until there are none left.
 
-/// What is left of them.
+/// The bytes left.
 pub struct Bytes<'a>(pub &'a [u8]);
 
 impl Bytes<'_> {
@@ -11,7 +11,7 @@ impl Bytes<'_> {
         Some(*first)
     }
 
-    /// The next two, the lower one first.
+    /// Returns the next two bytes, little-endian.
     pub fn u16(&mut self) -> Option<u16> {
         Some(u16::from_le_bytes([self.u8()?, self.u8()?]))
     }

@@ -1,4 +1,4 @@
-//! An ESC at rest with a throttle wire, and a judge who knows when its motor may turn.
+//! An ESC at rest with a throttle wire, and a judge that knows when its motor may turn.
 
 use siskin_control::answer::Ask;
 use siskin_control::drive::{Setpoint, Snapshot, State};
@@ -11,20 +11,20 @@ use siskin_control::throttle::Throttle;
 use siskin_emulator::device::Latest;
 use siskin_emulator::rig::Bench;
 
-/// The rate of the capturing timer.
+/// Clock of the capture timer.
 pub const CAPTURE_HZ: u32 = 170_000_000;
 
-/// What `INP_ARM_MS` and `INP_LOSS_MS` are by default.
+/// The defaults of `INP_ARM_MS` and `INP_LOSS_MS`.
 const ARM_NS: u64 = 300_000_000;
 const LOSS_NS: u64 = 100_000_000;
-/// How long an armed wire may be silent behind a DShot command.
+/// How long an armed wire may be silent after a DShot command.
 const COMMAND_GAP_NS: u64 = 300_000_000;
 
-/// Frames and pulses of zero throttle that arm.
+/// Frames and pulses of zero throttle needed to arm.
 const ARMING_FRAMES: u32 = 30;
 const ARMING_PULSES: u32 = 5;
 
-/// No edge waits longer to be believed, where time is told.
+/// The longest that an edge waits to be believed while time passes.
 const LONGEST_FILTER_NS: u64 = 3_000;
 
 /// How often the tasks run.
@@ -36,17 +36,17 @@ pub struct Desk {
     pub esc: Esc,
     /// Its wire.
     pub throttle: Throttle,
-    /// What it is told of its drive.
+    /// What its drive reports.
     pub snapshot: Snapshot,
     judge: Judge,
     now_ns: u64,
-    /// Where the timer's count was at the start.
+    /// The timer's count at the start.
     origin_ticks: u32,
     polled_ns: u64,
 }
 
 impl Desk {
-    /// One with a signal that `INP_PROTO` forces, or none.
+    /// Creates one whose signal `INP_PROTO` forces, or detects.
     pub fn new(signal: Option<Signal>, origin_ticks: u32) -> Self {
         let mut params = Params::of(&BOSSO_MOTOR);
         if let Some(signal) = signal {
@@ -60,7 +60,8 @@ impl Desk {
             Esc::new(params, board, CAPTURE_HZ, 1_000_000).expect("its motor fits the bench");
         let config = esc.config().expect("its motor fits the bench");
         let snapshot = State::new(&config).snapshot();
-        // The board has tested itself before the wire begins: of what may turn the motor the wire alone is judged.
+        // The board's power-up test is over before the wire begins, so only the wire decides whether the motor
+        // may turn.
         for _ in 0..4 {
             esc.poll(&mut throttle, 0, &snapshot, 25.0, &mut |_| {});
             esc.test_itself(&snapshot, &mut Latest::at_rest());
@@ -81,7 +82,7 @@ impl Desk {
         self.origin_ticks.wrapping_add(ticks as u32)
     }
 
-    /// An edge after a time; what it asks for.
+    /// Plays an edge after a time; returns what it asks for.
     pub fn edge(&mut self, after_ns: u64, level: bool) -> Option<Ask> {
         self.now_ns += after_ns;
         let ticks = self.ticks();
@@ -91,7 +92,7 @@ impl Desk {
         ask
     }
 
-    /// Time passes without an edge; what it asks for. The tasks run at its end.
+    /// Lets time pass without an edge; returns what it asks for. The tasks run at its end.
     pub fn settle(&mut self, after_ns: u64) -> Option<Ask> {
         self.now_ns += after_ns;
         let ticks = self.ticks();
@@ -99,7 +100,7 @@ impl Desk {
         let ask = self.throttle.settle(self.now_ns / 1000, ticks);
         if self.now_ns - self.polled_ns >= POLL_NS {
             self.polled_ns = self.now_ns;
-            // Between two polls a signal lasts longer than it should.
+            // Between two polls a signal outlasts its time limit.
             self.judge.poll(self.now_ns);
             let now_us = self.now_ns / 1000;
             let throttle = &mut self.throttle;
@@ -130,21 +131,21 @@ impl Desk {
     }
 }
 
-/// Knows what has been on the wire: least of all that an armed wire must have had.
+/// Knows what has been on the wire: the minimum that an armed wire must have had.
 struct Judge {
-    /// The decoder of a signal that is forced sees what the ESC's sees. While the ESC detects one, it
-    /// is not known when it begins anew.
+    /// For a forced signal, a decoder that sees what the ESC's sees. While the ESC detects one, it is not known
+    /// when it starts over.
     line: Option<Line>,
     least: u32,
     zeros: u32,
     since_ns: u64,
     last_ns: u64,
-    /// Whether the last frame was a command, or may have been one.
+    /// Whether the last frame was, or may have been, a command.
     command: bool,
-    /// The last edge, which no time has let the ESC believe yet.
+    /// The last edge, if too little time has passed for the ESC to believe it.
     waits_ns: Option<u64>,
     has_armed: bool,
-    /// The wire has been silent for too long since the tasks looked.
+    /// Whether the wire has been silent for too long since the last poll.
     has_lapsed: bool,
 }
 
@@ -189,7 +190,7 @@ impl Judge {
     fn settle(&mut self, now_ns: u64, ticks: u32) {
         let event = self.line.as_mut().and_then(|line| line.settle(ticks));
         self.event(now_ns, event);
-        // What an edge has ended counts from when it is believed.
+        // What an edge ends counts from the time when it is believed.
         if let Some(edge_ns) = self.waits_ns {
             self.zero(now_ns, true);
             if now_ns - edge_ns >= LONGEST_FILTER_NS {
@@ -207,7 +208,7 @@ impl Judge {
                 self.zeros = 0;
             }
             Some(Event::Frame { frame, .. }) => self.zero(now_ns, frame.is_command()),
-            // The pulses' end points may have been calibrated: each might be zero.
+            // The pulse ends may have been calibrated: any pulse might be zero.
             Some(Event::Pulse { .. }) => self.zero(now_ns, false),
             Some(Event::Bad) | None => {}
         }
@@ -225,12 +226,12 @@ impl Judge {
         let held_ns = now_ns - self.since_ns + 1000;
         if self.zeros >= self.least && held_ns >= ARM_NS {
             self.has_armed = true;
-            // Armed anew since the silence, which then says nothing any more.
+            // Armed again since the silence, which no longer matters.
             self.has_lapsed = false;
         }
     }
 
-    /// Begins to count anew after too long a silence.
+    /// Starts counting again after too long a silence.
     fn expire(&mut self, now_ns: u64) {
         let silence_ns = now_ns - self.last_ns;
         let lapse_ns = if self.command {
@@ -244,7 +245,7 @@ impl Judge {
         self.has_lapsed |= silence_ns > lapse_ns + 1000;
     }
 
-    /// The tasks look, and find a silence.
+    /// Applies a silence, as the tasks do in their poll.
     fn poll(&mut self, now_ns: u64) {
         self.expire(now_ns);
         self.has_armed &= !core::mem::take(&mut self.has_lapsed);
@@ -261,8 +262,8 @@ mod tests {
     use siskin_control::input::dshot::{Frame, Rate, edges};
     use siskin_control::input::signal::Pulse;
 
-    /// Whether it turns after this many frames of no throttle and some of half, 1 ms apart, and
-    /// whether it may.
+    /// Returns whether the motor turns after this many zero throttle frames and some at half throttle, 1 ms
+    /// apart, and whether it may.
     fn turns_after(zeros: u32) -> (bool, bool) {
         let rate = Rate::Dshot300;
         let mut desk = Desk::new(
@@ -286,12 +287,12 @@ mod tests {
         (turns, desk.judge.may_turn())
     }
 
-    /// A wire of servo pulses of zero throttle.
+    /// A wire with zero throttle servo pulses.
     fn pulsed() -> Desk {
         Desk::new(Some(Signal::Pulse(Pulse::Servo)), 0)
     }
 
-    /// Half a second of pulses of no throttle at 50 Hz. The tasks do not run.
+    /// Sends zero throttle pulses at 50 Hz for half a second, in which the tasks do not run.
     fn half_a_second(desk: &mut Desk) {
         for _ in 0..25 {
             desk.edge(19_000_000, true);

@@ -1,4 +1,4 @@
-//! Any file for `siskin decode`: it is decoded, or refused on one line.
+//! Feeds any file to `siskin decode`: it is decoded, or refused in one line.
 #![no_main]
 
 use std::io::Cursor;

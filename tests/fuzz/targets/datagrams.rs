@@ -1,4 +1,4 @@
-//! Any datagrams on the emulator's throttle wire: what is played comes out as edges in order, and
+//! Feeds any datagrams to the emulator's throttle wire: what is accepted comes out as edges in order, and
 //! what is not has a reason.
 #![no_main]
 
@@ -6,7 +6,7 @@ use libfuzzer_sys::fuzz_target;
 use siskin_emulator::wire::Wire;
 use siskin_fuzz::bytes::Bytes;
 
-/// The longest time between two datagrams, ns.
+/// Longest time between two datagrams, ns.
 const REST_NS: u64 = 2_000_000;
 
 fuzz_target!(|input: &[u8]| {

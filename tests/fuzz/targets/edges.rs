@@ -1,5 +1,5 @@
-//! Any edges on the throttle wire, in any rhythm: the ESC neither panics nor turns its motor before
-//! the wire has been armed.
+//! Feeds any edges in any rhythm to the throttle wire: the ESC neither panics nor turns its motor before
+//! the wire is armed.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -7,10 +7,10 @@ use siskin_control::input::signal::Signal;
 use siskin_fuzz::bytes::Bytes;
 use siskin_fuzz::desk::Desk;
 
-/// A run of steps is played again up to so often: enough to arm by the frames of one.
+/// Most steps played, repetitions included: enough to arm by repeating one frame.
 const STEPS_PLAYED: usize = 8_000;
 
-/// One step: an edge, or time.
+/// A step: an edge, or time.
 #[derive(Clone, Copy)]
 enum Step {
     Edge(u64, bool),
@@ -31,7 +31,7 @@ fuzz_target!(|input: &[u8]| {
             let time = u64::from(input.u8()?);
             let level = kind & 1 != 0;
             let step = match kind >> 1 & 7 {
-                // About a bit of each rate, and what lies between.
+                // About a bit at each rate, and what lies between.
                 0 => Step::Edge(time * 10, level),
                 1 => Step::Edge(time * 53, level),
                 2 => Step::Edge(time * 1_000, level),
@@ -40,7 +40,7 @@ fuzz_target!(|input: &[u8]| {
                 5 => Step::Settle(time * 1_000_000),
                 6 => Step::Settle(u64::from(input.u16()?) * 1_000_000),
                 _ => {
-                    // The last steps again, as often as told.
+                    // Repeats the last steps as often as given.
                     let from = steps.len() - steps.len().min(time as usize);
                     let again = steps[from..].to_vec();
                     for _ in 0..input.u8()? {

@@ -1,5 +1,5 @@
-//! Any sequence of frames and pulses, right and wrong: the ESC neither panics nor turns its motor
-//! before the wire has been armed, and whatever it answers can be read.
+//! Feeds any sequence of good and bad frames and pulses: the ESC neither panics nor turns its motor before
+//! the wire is armed, and its answers can be read.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -11,13 +11,13 @@ use siskin_control::units::Speed;
 use siskin_fuzz::bytes::Bytes;
 use siskin_fuzz::desk::{CAPTURE_HZ, Desk};
 
-/// How long a case may play, frames: a second and more.
+/// Most frames in a case: more than a second.
 const FRAMES: u32 = 1_500;
 
-/// The time from one settling to the next, ns: the longest control period.
+/// Time between settle calls, ns: the longest control period.
 const PERIOD_NS: u64 = 125_000;
 
-/// The signal that is sent, and the ESC that hears it.
+/// A signal's sender, and the ESC that hears it.
 struct Sender {
     desk: Desk,
     signal: Signal,
@@ -40,7 +40,7 @@ fuzz_target!(|input: &[u8]| {
         let mut last = 0;
         while sender.frames < FRAMES {
             let kind = input.u8()?;
-            // Each thing is followed by a rest of up to 25 ms.
+            // Each item is followed by a pause of up to 25 ms.
             let rest_ns = match kind >> 4 {
                 0..=12 => u64::from(kind >> 4) * 100_000 + 50_000,
                 long => u64::from(long) * 2_000_000,
@@ -77,7 +77,7 @@ fuzz_target!(|input: &[u8]| {
 });
 
 impl Sender {
-    /// A frame of these bits, or a pulse whose width they tell.
+    /// Sends a frame with these bits, or a pulse of a width given by them.
     fn send(&mut self, bits: u16, rest_ns: u64) {
         self.frames += 1;
         match self.signal {
@@ -100,7 +100,7 @@ impl Sender {
                 self.rest(u64::from(rate.frame_ns() - before_ns) + rest_ns);
             }
             Signal::Pulse(kind) => {
-                // The whole range of the kind and more.
+                // More than the kind's whole range.
                 let scale_ns = match kind {
                     Pulse::Servo => 40,
                     Pulse::OneShot125 => 5,
@@ -134,7 +134,7 @@ impl Sender {
         }
     }
 
-    /// The motor turns with this speed, or stands.
+    /// Turns the motor at this speed; 0 stops it.
     fn turn(&mut self, speed: u16) {
         let snapshot = &mut self.desk.snapshot;
         snapshot.speed = Speed::from_bits(i32::from(speed as i16) << 14);

@@ -1,4 +1,4 @@
-//! A small image: nothing but the assembly that a test gives.
+//! A small image that holds only a test's assembly.
 #![no_std]
 #![no_main]
 

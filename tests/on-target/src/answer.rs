@@ -4,16 +4,16 @@ use siskin_control::drive::{Bridge, Config, Snapshot, State};
 use siskin_control::units::{AdcCounts, Duty};
 use xxhash_rust::xxh32::xxh32;
 
-/// Words that say what a period has done: the bridge's and the digest of the state.
+/// Words of a period's result: the bridge's, and the digest of the state.
 pub const RESULT_WORDS: usize = 5;
 
-/// Words of one period on the chip: its result and the instructions that it took.
+/// Words per period on the chip: its result and its instruction count.
 pub const PERIOD_WORDS: usize = RESULT_WORDS + 1;
 
-/// Bytes of the state's words, at most: there are some 200 of four.
+/// Most bytes of the state's words: there are some 200 of four bytes.
 const STATE_BYTES: usize = 4096;
 
-/// The result of one period.
+/// Returns the result of one period.
 pub fn result(config: &Config, state: &State, bridge: Bridge) -> [u32; RESULT_WORDS] {
     let [kind, a, b, c] = bridge_words(bridge);
     let mut bytes = [0; STATE_BYTES];
@@ -25,10 +25,10 @@ pub fn result(config: &Config, state: &State, bridge: Bridge) -> [u32; RESULT_WO
     [kind, a, b, c, xxh32(&bytes[..len], 0)]
 }
 
-/// Words of one period of the whole interrupt: what it has published and its instructions.
+/// Words per period of the whole interrupt: what it has published, and its instruction count.
 pub const INTERRUPT_WORDS: usize = 2;
 
-/// A digest of what the interrupt publishes.
+/// Returns a digest of what the interrupt publishes.
 pub fn snapshot(snapshot: &Snapshot) -> u32 {
     let [a, b, c] = snapshot.currents.map(AdcCounts::to_bits);
     let words = [
@@ -53,7 +53,7 @@ pub fn snapshot(snapshot: &Snapshot) -> u32 {
     xxh32(&bytes, 0)
 }
 
-/// What the bridge does: the kind in the low byte, in `Legs` the phases that switch above it, and
+/// Returns what the bridge does: the kind in the low byte, for `Legs` the switching phases above it, and
 /// the duties.
 fn bridge_words(bridge: Bridge) -> [u32; 4] {
     match bridge {

@@ -1,7 +1,7 @@
 //! Counts instructions with the system timer.
 //!
-//! QEMU with `-icount shift=10` lets each instruction take 2^10 ns; the board's timer counts at
-//! 25 MHz: 25.6 ticks an instruction, so every count is exact.
+//! With `-icount shift=10`, QEMU lets each instruction take 2^10 ns; the board's timer runs at 25 MHz: 25.6
+//! ticks per instruction, so every count is exact.
 
 use core::hint::black_box;
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -13,7 +13,7 @@ use cortex_m::peripheral::syst::SystClkSource;
 /// The timer's 24 bits.
 const TOP: u32 = 0x00ff_ffff;
 
-/// Ticks of five instructions.
+/// Ticks in five instructions.
 const TICKS_OF_FIVE: u32 = 128;
 
 /// The running timer.
@@ -43,7 +43,7 @@ impl Counter {
         counter
     }
 
-    /// Does something of at most 600 000 instructions, and says how many they were.
+    /// Runs `work`, at most 600 000 instructions, and returns how many there were.
     #[inline(always)]
     pub(crate) fn count<T>(&self, work: impl FnOnce() -> T) -> (T, u32) {
         let before = SYST::get_current();
@@ -52,7 +52,7 @@ impl Counter {
         compiler_fence(Ordering::SeqCst);
         let ticks = before.wrapping_sub(SYST::get_current()) & TOP;
         let instructions = (ticks * 5 + TICKS_OF_FIVE / 2) / TICKS_OF_FIVE;
-        // Worked out here, not while something else is counted.
+        // Computed here, not while something else is being counted.
         (done, black_box(instructions - self.idle))
     }
 }

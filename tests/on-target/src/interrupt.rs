@@ -1,6 +1,5 @@
-//! The chip's program for the whole interrupt: the board's registers are memory here, where the
-//! recorded counts are put before each period, and what the interrupt publishes is what it answers
-//! with.
+//! The chip's program for the whole interrupt. The board's registers are memory here: the recorded counts
+//! are put there before each period, and the answer is what the interrupt publishes.
 
 #![no_std]
 #![no_main]
@@ -20,8 +19,8 @@ use siskin_on_target::{answer, request};
 use count::Counter;
 use words::{Reader, Writer};
 
-/// A task renews the set-point once a millisecond, or at once where another one is wanted: at the
-/// slowest PWM each so many periods.
+/// A task renews the set-point once a millisecond, or at once if another one is wanted: at the slowest PWM,
+/// once in this many periods.
 const RENEWED_EVERY: usize = 8;
 
 const STALE_PERIODS: u32 = 10;
@@ -58,8 +57,8 @@ fn replay(counter: &Counter) -> io::Result<()> {
     writer.flush()
 }
 
-/// What is counted: from the call to the return. The processor's own entry and exit, which store
-/// and restore registers, are no instructions.
+/// The part that is counted: from call to return. The processor's exception entry and exit, which save and
+/// restore registers, are not instructions.
 #[inline(never)]
 fn period(interrupt: &mut Interrupt) {
     black_box(interrupt).run();

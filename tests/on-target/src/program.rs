@@ -16,7 +16,7 @@ pub(crate) fn run(replay: impl FnOnce(&Counter) -> io::Result<()>) -> ! {
     process::exit(0)
 }
 
-/// The configuration that the recorded run begins with.
+/// Returns the configuration with which the recorded run begins.
 pub(crate) fn configuration(reader: &mut Reader) -> io::Result<Config> {
     let set_up = reader.next()?.expect("the set-up comes first");
     let (params, board) = request::read_set_up(&set_up);

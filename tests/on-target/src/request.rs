@@ -1,4 +1,4 @@
-//! What the chip is given: parameters and board first, then the inputs of each control period.
+//! The chip's input: parameters and board first, then the inputs of each control period.
 
 use fixed::types::I1F31;
 use siskin_control::control::delay::Delay;
@@ -11,12 +11,12 @@ use siskin_control::units::{AdcCounts, Current, Speed};
 /// Words of the parameters and the board.
 pub const SET_UP_WORDS: usize = TABLE.len() + BOARD_WORDS;
 
-/// Words of one period.
+/// Words per period.
 pub const PERIOD_WORDS: usize = 9;
 
 const BOARD_WORDS: usize = 9;
 
-/// The parameters in the order of the table, then the board.
+/// Returns the parameters in the table's order, then the board.
 pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
     let Board {
         image: _,
@@ -29,7 +29,7 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
         low_side_on_s,
         refresh_s,
         charge_s,
-        // Whoever asks has built it before.
+        // The requester has built it before.
         least_dead_time: _,
     } = *board;
     let mut words = [0; SET_UP_WORDS];
@@ -49,12 +49,12 @@ pub fn set_up(params: &Params, board: &Board) -> [u32; SET_UP_WORDS] {
     words
 }
 
-/// The reverse of [`set_up`]. Derived parameters are derived anew.
+/// The inverse of [`set_up`]. Derived parameters are derived again.
 pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
     let (table, rest) = words.split_at(TABLE.len());
     let mut params = Params::of(&BOSSO_BENCH);
     for (id, &bits) in ParamId::ALL.into_iter().zip(table) {
-        // Refused are the derived ones only: the others have been accepted once.
+        // Only derived parameters are refused: the others have been accepted before.
         let _ = params.set(id, f32::from_bits(bits));
     }
     let si = |i: usize| f32::from_bits(rest[i]);
@@ -82,7 +82,7 @@ pub fn read_set_up(words: &[u32; SET_UP_WORDS]) -> (Params, Board) {
     (params, board)
 }
 
-/// The inputs of one period.
+/// Returns the inputs of one period.
 pub fn period(sample: &Sample, setpoint: Setpoint) -> [u32; PERIOD_WORDS] {
     let [a, b, c] = sample.currents.map(|counts| counts.to_bits() as u32);
     let [ta, tb, tc] = sample.terminals.map(|counts| counts.to_bits() as u32);
@@ -103,7 +103,7 @@ pub fn period(sample: &Sample, setpoint: Setpoint) -> [u32; PERIOD_WORDS] {
     [a, b, c, ta, tb, tc, bus, hall_and_kind, value as u32]
 }
 
-/// The reverse of [`period`].
+/// The inverse of [`period`].
 pub fn read_period(words: &[u32; PERIOD_WORDS]) -> (Sample, Setpoint) {
     let [a, b, c, ta, tb, tc, bus, hall_and_kind, value] = words.map(|word| word as i32);
     let sample = Sample {

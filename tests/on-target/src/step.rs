@@ -1,4 +1,4 @@
-//! The chip's program for the control's step: replays the recorded control periods and answers with what they did.
+//! The chip's program for the control step: replays the recorded periods and answers with what they did.
 
 #![no_std]
 #![no_main]
@@ -36,7 +36,7 @@ fn replay(counter: &Counter) -> io::Result<()> {
     writer.flush()
 }
 
-/// What is counted: from the call to the return.
+/// The part that is counted: from call to return.
 #[inline(never)]
 fn period(config: &Config, state: &mut State, input: &(Sample, Setpoint)) -> Bridge {
     let (sample, setpoint) = *input;

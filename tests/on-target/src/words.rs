@@ -1,4 +1,4 @@
-//! The PC's files, word by word, in few large pieces: each takes a call of the emulator.
+//! The PC's files, word by word, in a few large pieces: each one takes a call of the emulator.
 
 use semihosting::fs::File;
 use semihosting::io::{self, Read, Write};
@@ -24,7 +24,7 @@ impl Reader {
         })
     }
 
-    /// So many words, or `None` where fewer are left.
+    /// Returns the next `N` words, or `None` if fewer are left.
     pub(crate) fn next<const N: usize>(&mut self) -> io::Result<Option<[u32; N]>> {
         let mut words = [0; N];
         for word in &mut words {

@@ -7,12 +7,12 @@ use siskin_emulator::rig::{Period, Rig};
 
 use super::reply::{Reply, levels};
 
-/// A bidirectional rate as the wire numbers it.
+/// A bidirectional rate with its protocol number on the emulator's wire.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
     pub(super) protocol: u8,
     pub(super) bit_hz: f64,
-    /// From frame to frame, ns: some more than a frame, its reply and two rests take.
+    /// Frame interval, ns: slightly longer than a frame, its reply and two rests.
     pub(super) interval_ns: u64,
 }
 
@@ -34,13 +34,13 @@ const fn kind(protocol: u8, bit_hz: f64, interval_ns: u64) -> Kind {
     }
 }
 
-/// One frame's answer.
+/// The answer to one frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Answered {
     pub(super) reply: Reply,
-    /// What the control said of itself when it answered.
+    /// The control's snapshot when it answered.
     pub(super) snapshot: Snapshot,
-    /// The motor's true speed then, electrical turns a second.
+    /// The motor's true speed then, electrical turns per second.
     pub(super) true_hz: f64,
 }
 
@@ -49,7 +49,7 @@ pub(super) struct Answered {
 struct Seen {
     edges: Vec<(u64, bool)>,
     latest: Option<(Snapshot, f64)>,
-    /// Replies with what was known when they were given.
+    /// Replies, with what was known when they were given.
     replies: Vec<(Vec<u8>, Snapshot, f64)>,
     serial: Vec<Vec<u8>>,
 }
@@ -96,12 +96,12 @@ impl Flight {
             now_ns: 0,
             seen: Seen::default(),
         };
-        // The line comes to rest high.
+        // The line settles at its high rest level.
         flight.raw(1, &[900_000]);
         flight
     }
 
-    /// Plays raw levels of less than a millisecond, and lets that pass.
+    /// Plays raw levels of less than a millisecond, and lets that millisecond pass.
     pub(super) fn raw(&mut self, first: u8, durations_ns: &[u32]) {
         let mut datagram = vec![255, first];
         datagram.extend(durations_ns.iter().flat_map(|d| d.to_le_bytes()));
@@ -125,7 +125,7 @@ impl Flight {
             .advance(self.now_ns, |_, _| None, seen, &mut |_| {});
     }
 
-    /// Sends so many frames and leaves one out; each one's answer, where there was one.
+    /// Sends `frames` frames and then skips one; returns the answer to each, if any.
     pub(super) fn fly(
         &mut self,
         frames: usize,
@@ -140,7 +140,7 @@ impl Flight {
             self.play(&[self.kind.protocol, low, high]);
             self.wait(self.kind.interval_ns);
         }
-        // What is late by a control period is heard meanwhile.
+        // Long enough to hear replies that are late by a control period.
         self.wait(self.kind.interval_ns);
         let mut edges = std::mem::take(&mut self.seen.edges).into_iter().peekable();
         let mut replies = std::mem::take(&mut self.seen.replies).into_iter();
@@ -152,7 +152,7 @@ impl Flight {
             }
             assert_eq!(own[0], (start_ns, false));
             if own.len() == 32 {
-                // Nothing but the frame is on the wire.
+                // Only the frame is on the wire.
                 return None;
             }
             let (datagram, snapshot, true_hz) = replies.next().expect("a datagram a reply");
@@ -167,25 +167,25 @@ impl Flight {
         answers
     }
 
-    /// Sends so many frames; every one of them is answered.
+    /// Sends `frames` frames, each of which must be answered.
     pub(super) fn send(&mut self, frames: usize, value: u16) -> Vec<Answered> {
         let answers = self.fly(frames, value, false).into_iter();
         let answers = answers.collect::<Option<_>>();
         answers.expect("every frame is answered")
     }
 
-    /// What has come on the serial line.
+    /// Returns what has come on the serial line.
     pub(super) fn serial(&self) -> &[Vec<u8>] {
         &self.seen.serial
     }
 
-    /// Frames of so many seconds.
+    /// Returns the number of frames in this many seconds.
     pub(super) fn frames(&self, seconds: f64) -> usize {
         (seconds * 1e9) as usize / self.kind.interval_ns as usize
     }
 
-    /// Reads a reply where it begins and how long its bits are, from the levels on the wire, and
-    /// that the datagram says the same.
+    /// Reads a reply, its start and its bit time from the levels on the wire, and checks that the datagram
+    /// says the same.
     fn read(&self, datagram: &[u8], edges: &[(u64, bool)]) -> Reply {
         assert_eq!((datagram[0], datagram.len()), (self.kind.protocol, 9));
         let word = |place: usize| {

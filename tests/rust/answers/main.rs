@@ -1,4 +1,4 @@
-//! What the ESC answers on a bidirectional wire, frame by frame: when, with what, and that it is
+//! The ESC's answers on a bidirectional wire, frame by frame: when they come, what they say, and that it is
 //! true.
 
 mod flight;
@@ -15,20 +15,20 @@ const ESC_INFO: u16 = 6;
 const EXTENDED_ON: u16 = 13;
 const EXTENDED_OFF: u16 = 14;
 
-/// The longest period that is told, µs; above it, less half a step, the motor is told to stand.
+/// The longest period that can be reported, µs; from half a step above it, the motor is reported at
+/// standstill.
 const LONGEST_US: f64 = 65_280.0;
 
 fn forced(kind: Kind) -> [(ParamId, f32); 1] {
     [(ParamId::InpProto, kind.protocol.into())]
 }
 
-/// What the control takes for the time of an electrical turn, µs. Its speed is in turns a period of
-/// 1/24 kHz.
+/// Returns the control's electrical period, µs. Its speed is in turns per 1/24 kHz period.
 fn believed_us(snapshot: &Snapshot) -> f64 {
     1e6 / 24_000.0 / snapshot.speed.to_num::<f64>().abs()
 }
 
-/// A reply that is no extended word tells the speed that the control believes, to the nearest step.
+/// Asserts that a reply other than extended telemetry holds the control's speed, to the nearest step.
 fn tells_the_speed(answered: &Answered) {
     let believed_us = believed_us(&answered.snapshot);
     match answered.reply {
@@ -36,7 +36,7 @@ fn tells_the_speed(answered: &Answered) {
         Reply::Stopped => assert!(believed_us >= LONGEST_US + 63.0, "{answered:?}"),
         Reply::Turn { period_us, step_us } => {
             let error_us = (f64::from(period_us) - believed_us).abs();
-            // Single precision: one part in some millions.
+            // Single precision: one part in a few million.
             let resolution_us = f64::from(step_us) / 2.0 + believed_us * 1e-6;
             assert!(error_us <= resolution_us, "{answered:?}: {believed_us}");
         }
@@ -61,7 +61,7 @@ fn every_frame_is_answered_in_time_with_the_speed() {
         };
         let turning = flight.frames(0.35)..flight.frames(0.35 + 1.2);
         let last = &answers[turning.end - 100..turning.end];
-        // 3150 rpm of 12 pole pairs are 630 Hz: a turn in 1587 µs, told in steps of 4.
+        // 3150 rpm with 12 pole pairs is 630 Hz: 1587 µs per turn, reported in steps of 4.
         for answered in last {
             let told_hz = told(answered).expect("it turns");
             assert!((told_hz / 630.0 - 1.0).abs() < 0.01, "{answered:?}");
@@ -76,7 +76,7 @@ fn every_frame_is_answered_in_time_with_the_speed() {
     }
 }
 
-/// Nothing is answered before the wire is known, and everything from then on.
+/// Nothing is answered before the signal is detected, and everything after.
 #[test]
 fn a_wire_that_is_found_out_is_answered_from_then_on() {
     for kind in KINDS {
@@ -109,7 +109,7 @@ fn a_wire_that_is_not_bidirectional_is_not_answered() {
         assert_eq!(look.answers, 0, "at {ms} ms");
         edges += look.edges;
     }
-    // The line comes to rest low first.
+    // The line first goes to its low rest level.
     assert_eq!(edges, 300 * 32 + 1);
 }
 
@@ -131,7 +131,7 @@ impl siskin_emulator::device::Onlooker for Counter {
     }
 }
 
-/// Extended telemetry is announced, never comes twice in a row, at least once a second, and ends.
+/// Extended telemetry is announced, never comes twice in a row, comes at least once a second, and ends.
 #[test]
 fn extended_telemetry_keeps_its_rules() {
     let mut flight = Flight::new(DSHOT600, &forced(DSHOT600));
@@ -159,7 +159,7 @@ fn extended_telemetry_keeps_its_rules() {
     }
     assert!(told[0].0 < 8000 && answers.len() - told[told.len() - 1].0 < 8000);
     for (kind, least, greatest) in [
-        // The thermistor is warmer than 0 °C and colder than the limit; the bench has 24 V.
+        // The thermistor is warmer than 0 °C and below the limit; the bench has 24 V.
         (0x2, 15..=60, 15..=60),
         (0x4, 94..=98, 94..=98),
         (0x6, 0..=0, 1..=10),
@@ -183,10 +183,10 @@ fn extended_telemetry_keeps_its_rules() {
     assert_eq!(words(&flight.send(seconds(2.0), STOP)), []);
 }
 
-/// A fault is an error in the next status word.
+/// A fault shows as an error in the next status word.
 #[test]
 fn a_fault_is_told_by_the_status() {
-    // The bench's 24 V are above what is allowed from the start.
+    // The bench's 24 V exceed the limit from the start.
     let overrides = [forced(DSHOT600)[0], (ParamId::LimBusVMax, 20.0)];
     let mut flight = Flight::new(DSHOT600, &overrides);
     flight.send(400, STOP);
@@ -199,7 +199,7 @@ fn a_fault_is_told_by_the_status() {
     assert_eq!(errors.collect::<Vec<_>>(), [true, true]);
 }
 
-/// Ten bytes with a right check sum, once a millisecond at most.
+/// Ten bytes with a correct checksum, once a millisecond at most.
 #[test]
 fn the_telemetry_bit_is_answered_on_the_serial_line() {
     let mut flight = Flight::new(DSHOT600, &forced(DSHOT600));
@@ -216,7 +216,7 @@ fn the_telemetry_bit_is_answered_on_the_serial_line() {
         assert!((2380..2420).contains(&word(2)), "0.01 V: {}", word(2));
         assert!((50..1000).contains(&word(4)), "0.01 A: {}", word(4));
         assert!(word(6) < 10, "mAh: {}", word(6));
-        // 3150 rpm of 12 pole pairs.
+        // 3150 rpm with 12 pole pairs.
         assert!((370..386).contains(&word(8)), "eRPM/100: {}", word(8));
         assert_eq!(remainder(&datagram[1..]), 0);
     }
@@ -236,7 +236,7 @@ fn the_information_is_sent_when_it_is_asked_for() {
     assert_eq!(remainder(&datagram[1..]), 0);
 }
 
-/// The remainder of bytes as a polynomial over x⁸ + x² + x + 1: 0 where the last is their check sum.
+/// Returns the bytes' remainder modulo x⁸ + x² + x + 1: 0 if the last one is their checksum.
 fn remainder(bytes: &[u8]) -> u16 {
     bytes.iter().fold(0, |rest, byte| {
         let mut rest = rest << 8 | u16::from(*byte);
@@ -249,12 +249,12 @@ fn remainder(bytes: &[u8]) -> u16 {
     })
 }
 
-/// The pin is an output while the ESC answers: what a sender does meanwhile is not heard.
+/// The pin is an output while the ESC answers, so whatever the sender does meanwhile is not heard.
 #[test]
 fn the_esc_is_deaf_while_it_answers() {
     let mut flight = Flight::new(DSHOT600, &forced(DSHOT600));
     flight.send(100, STOP);
-    // A zero frame by hand, bits of 1667 ns with 625 ns low; its last nibble is four ones.
+    // A zero frame by hand, with 1667 ns bits that are low for 625 ns; its last nibble is four ones.
     let mut durations: Vec<u32> = Vec::new();
     for bit in 0..16 {
         let low_ns = if bit < 12 { 625 } else { 1250 };
@@ -263,7 +263,7 @@ fn the_esc_is_deaf_while_it_answers() {
     let spoil = |pause_ns: u32| {
         let mut durations = durations.clone();
         *durations.last_mut().expect("not empty") += pause_ns;
-        // Two pulses that are no frame.
+        // Two pulses that are not a frame.
         durations.extend([700, 1000, 700, 100_000]);
         durations
     };

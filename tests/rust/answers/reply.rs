@@ -1,7 +1,7 @@
-//! A reply as a flight controller reads it, written from the protocol's description and not from the
+//! A flight controller's decoder for replies, written from the protocol's description rather than from the
 //! control's encoder.
 
-/// Each nibble with the five bits that stand for it on the wire.
+/// Each nibble with its five-bit code on the wire.
 const GROUPS: [(u16, &str); 16] = [
     (0x0, "11001"),
     (0x1, "11011"),
@@ -25,17 +25,17 @@ const GROUPS: [(u16, &str); 16] = [
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reply {
     Stopped,
-    /// The time of an electrical turn and the step in which it is told, µs.
+    /// The electrical period and its step, µs.
     Turn {
         period_us: u32,
         step_us: u32,
     },
-    /// The first and the last two digits of a word of extended telemetry.
+    /// The first digit and the last two digits of an extended telemetry word.
     Extended(u16, u8),
 }
 
 impl Reply {
-    /// Reads the line's 21 levels, the first one first.
+    /// Decodes the line's 21 levels, first level first.
     pub(super) fn of_levels(levels: &[bool]) -> Self {
         assert_eq!(levels.len(), 21);
         assert!(!levels[0], "the start bit is low");
@@ -68,7 +68,7 @@ impl Reply {
     }
 }
 
-/// The levels of the datagram's number: bit 20 comes first.
+/// Returns the levels of the datagram's number, starting with bit 20.
 pub(super) fn levels(bits: u32) -> Vec<bool> {
     assert!(bits < 1 << 21);
     (0..21).rev().map(|bit| bits >> bit & 1 != 0).collect()
@@ -76,7 +76,8 @@ pub(super) fn levels(bits: u32) -> Vec<bool> {
 
 #[test]
 fn a_reply_worked_out_by_hand_is_read() {
-    // 0x9A1: 417·2^4 µs. 9, A and 1 come to 2, so that the check sum is D: 01001 01010 11011 01101.
+    // 0x9A1: 417·2^4 µs. The exclusive-or of 9, A and 1 is 2, so the checksum is D: 01001 01010 11011
+    // 01101.
     let mut level = false;
     let toggled = "01001010101101101101".chars().map(|bit| {
         level ^= bit == '1';

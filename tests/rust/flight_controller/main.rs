@@ -7,7 +7,7 @@ mod serial;
 use sender::{FlightController, STOP};
 use siskin_control::params::ParamId;
 
-/// An eighth of the throttle's range.
+/// An eighth of the throttle range.
 const LOW: u16 = 300;
 const BEACON: u16 = 1;
 const EXTENDED_ON: u16 = 13;
@@ -22,7 +22,7 @@ fn is_extended(word: &u16) -> bool {
     word >> 8 != 0 && word & 0x100 == 0
 }
 
-/// PX4 calibrates pulses: full throttle for 3.00 s from the battery's connection on, and then none.
+/// PX4 calibrates pulses: full throttle for 3.00 s after the battery is connected, then none.
 #[test]
 fn a_calibration_by_px4_is_taken() {
     let mut fc = FlightController::new(&[]);
@@ -34,7 +34,7 @@ fn a_calibration_by_px4_is_taken() {
     assert_eq!(ends, [1_060.0, 1_940.0]);
 }
 
-/// Betaflight restarts, and nobody asks for extended telemetry: it would take the words for speeds.
+/// Betaflight restarts, and nobody asks for extended telemetry: its words would be taken for speeds.
 #[test]
 fn extended_telemetry_ends_with_the_signal() {
     let mut fc = FlightController::armed(&[]);
@@ -49,8 +49,8 @@ fn extended_telemetry_ends_with_the_signal() {
     assert!(!words.iter().any(is_extended));
 }
 
-/// Betaflight asks for extended telemetry at each arming, and a pilot who arms again at once does so while
-/// the propeller still runs down.
+/// Betaflight requests extended telemetry at each arming; a pilot who re-arms at once does so while the
+/// propeller is still running down.
 #[test]
 fn extended_telemetry_is_answered_while_the_motor_runs_down() {
     for (command, answer) in [(EXTENDED_ON, 0xE00), (EXTENDED_OFF, 0xEFF)] {
@@ -62,7 +62,7 @@ fn extended_telemetry_is_answered_while_the_motor_runs_down() {
         fc.frames(5, STOP);
         assert!(fc.rpm() > 500.0, "it still turns");
         assert!(fc.replies().contains(&answer), "{answer:03x}");
-        // Under throttle it is no command.
+        // Under throttle it is not a command.
         fc.frames(500, LOW);
         fc.replies();
         fc.frames(5, command);
@@ -85,13 +85,13 @@ fn the_configurator_sets_the_direction_of_a_motor_that_coasts() {
         fc.frames(1_000, STOP);
     }
     assert_eq!(fc.param(ParamId::MotDir), 1.0);
-    // The save came behind it: this bench has nothing to store on.
+    // The save followed: this bench has nothing to store on.
     assert!(fc.said("storage: none, nothing would survive a restart"));
     fc.frames(1_500, LOW);
     assert!(fc.rpm() < -200.0, "{} rpm", fc.rpm());
 }
 
-/// What waits for a motor at rest is forgotten when the wire asks for something else before.
+/// A command that waits for the motor to rest is dropped if the wire asks for something else first.
 #[test]
 fn a_command_that_waits_is_forgotten_at_throttle_and_with_the_signal() {
     for lost in [false, true] {
@@ -115,7 +115,7 @@ fn a_command_that_waits_is_forgotten_at_throttle_and_with_the_signal() {
     }
 }
 
-/// Betaflight's loop stands for 100 ms after a beacon, and 10 ms more before the next command.
+/// Betaflight's loop blocks for 100 ms after a beacon, and 10 ms more before the next command.
 #[test]
 fn the_command_after_a_blocking_beacon_is_obeyed() {
     let mut fc = FlightController::armed(&[]);
@@ -125,7 +125,7 @@ fn the_command_after_a_blocking_beacon_is_obeyed() {
     assert_eq!(fc.param(ParamId::MotDir), 1.0);
     assert!(fc.is_armed());
     assert!(!fc.said("Throttle: signal lost while armed"));
-    // What is silent for longer is lost, and so is one that has not just sent a command.
+    // A longer silence is a loss, and so is this one without a command just before.
     fc.frames(10, BEACON);
     fc.wait_us(350_000);
     assert!(!fc.is_armed());
@@ -136,7 +136,7 @@ fn the_command_after_a_blocking_beacon_is_obeyed() {
 }
 
 /// The line is low while the flight controller starts, and the first frame begins with its rise; later
-/// every tenth frame or so is spoilt, as Betaflight sends a command ten times.
+/// about every tenth frame is corrupted, as Betaflight sends a command ten times.
 #[test]
 fn a_command_survives_single_bad_frames() {
     let mut fc = FlightController::armed(&[]);
@@ -154,7 +154,7 @@ fn a_command_survives_single_bad_frames() {
     }
 }
 
-/// One bad frame every 0.9 s, and a beacon after each of them.
+/// One bad frame every 0.9 s, followed by a beacon.
 #[test]
 fn a_beacon_is_heard_on_a_wire_with_a_bad_frame_now_and_then() {
     let mut fc = FlightController::armed(&[]);

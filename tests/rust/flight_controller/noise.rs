@@ -1,4 +1,4 @@
-//! Words at random on an armed wire, and true links with errors.
+//! Random words on an armed wire, and genuine links with errors.
 
 use siskin_control::params::ParamId;
 
@@ -7,7 +7,7 @@ use super::sender::{FlightController, frame};
 const HALF: u16 = 1048;
 const HALF_RPM: f64 = 3_150.0;
 
-/// xorshift64*, for words and errors that are the same in each run.
+/// xorshift64*, so that words and errors are the same in each run.
 struct Chance(u64);
 
 impl Chance {
@@ -37,7 +37,7 @@ fn random_words_on_an_armed_wire_are_a_lost_signal() {
             while fc.is_armed() {
                 fc.word((chance.next() >> 48) as u16, period_us);
                 armed_us += period_us;
-                // The peak: the shaft was at rest, and stays.
+                // A shaft at rest stays so throughout.
                 assert!(turns || fc.rpm().abs() < 1.0, "{} rpm", fc.rpm());
                 assert!(armed_us < 1_000_000, "seed {seed}, {period_us} µs");
             }
@@ -55,7 +55,7 @@ fn random_words_on_an_armed_wire_are_a_lost_signal() {
     }
 }
 
-/// A link in which one bit in twenty is wrong: more than half of its frames fail.
+/// A link with one bit in twenty wrong: more than half of its frames fail.
 #[test]
 fn a_true_link_with_errors_keeps_flying() {
     for (bit_errors, least_rpm, most_rpm) in [(0.01, 3_087.0, 3_213.0), (0.05, 2_800.0, 3_500.0)] {
@@ -75,7 +75,7 @@ fn a_true_link_with_errors_keeps_flying() {
     }
 }
 
-/// Nothing gets through for 80 ms, as beside a strong transmitter, four times a second.
+/// Nothing gets through for 80 ms, as next to a strong transmitter, four times a second.
 #[test]
 fn a_true_link_survives_bursts() {
     for period_us in [125, 1_000, 5_000] {

@@ -1,5 +1,5 @@
-//! A flight controller with a clock of its own, and an ESC on the emulator's bench: frames and pulses go
-//! out when they are due, and replies, texts and speeds come back.
+//! A flight controller with a clock of its own, and an ESC on the emulator's bench: frames and pulses go out
+//! when due, and replies, texts and speeds come back.
 
 use mavlink::dialects::ardupilotmega::{MavMessage, STATUSTEXT_DATA};
 use mavlink::{MavlinkVersion, Message, MessageData};
@@ -10,7 +10,7 @@ use siskin_control::units::Speed;
 use siskin_emulator::device::{Device, Onlooker, Start};
 use siskin_emulator::rig::{Period, Rig};
 
-/// Of the wire's datagrams.
+/// Protocol numbers of the wire's datagrams.
 const SERVO: u8 = 0;
 const BIDIRECTIONAL_DSHOT600: u8 = 22;
 
@@ -18,10 +18,10 @@ const BEACONS: core::ops::RangeInclusive<u16> = 1..=5;
 
 pub(super) const STOP: u16 = 0;
 
-/// All that comes back.
+/// Everything that comes back.
 #[derive(Default)]
 struct Seen {
-    /// The data of each reply.
+    /// The data in each reply.
     replies: Vec<u16>,
     rpm: f64,
     /// Whether a tone was played.
@@ -64,7 +64,7 @@ pub(super) struct FlightController {
 }
 
 impl FlightController {
-    /// One whose ESC has just been powered up.
+    /// Creates one whose ESC has just been powered up.
     pub(super) fn new(overrides: &[(ParamId, f32)]) -> Self {
         let (device, warning) = Device::start(Start {
             overrides: [BOSSO_BENCH.settings, overrides].concat(),
@@ -79,7 +79,7 @@ impl FlightController {
         }
     }
 
-    /// Armed by zero throttle, with the tunes of that over.
+    /// Creates one whose ESC has been armed by zero throttle, with its tunes over.
     pub(super) fn armed(overrides: &[(ParamId, f32)]) -> Self {
         let mut fc = Self::new(overrides);
         fc.frames(1_500, STOP);
@@ -101,7 +101,7 @@ impl FlightController {
         played.expect("there is room");
     }
 
-    /// Servo pulses, 50 a second.
+    /// Sends servo pulses, 50 a second.
     pub(super) fn pulses(&mut self, ms: u64, width_us: u32) {
         for _ in 0..ms / 20 {
             let mut datagram = vec![SERVO];
@@ -111,22 +111,22 @@ impl FlightController {
         }
     }
 
-    /// A word of bidirectional DShot600, whatever it is, and the time until the next.
+    /// Sends any word at bidirectional DShot600, and waits until the next is due.
     pub(super) fn word(&mut self, word: u16, us: u64) {
         let [low, high] = word.to_le_bytes();
         self.play(&[BIDIRECTIONAL_DSHOT600, low, high]);
         self.wait_us(us);
     }
 
-    /// Frames of one value, 1 ms apart.
+    /// Sends frames of one value, 1 ms apart.
     pub(super) fn frames(&mut self, count: u32, value: u16) {
         for _ in 0..count {
             self.word(frame(value), 1_000);
         }
     }
 
-    /// A command as Betaflight sends it while its loop waits: a pause of 10 ms, a beacon once and others ten
-    /// times, and a pause after beacons.
+    /// Sends a command as Betaflight does while its loop blocks: after a 10 ms pause, a beacon once and
+    /// others ten times, with a pause after beacons.
     pub(super) fn blocking(&mut self, command: u16) {
         self.wait_us(10_000);
         if BEACONS.contains(&command) {
@@ -136,12 +136,12 @@ impl FlightController {
         }
     }
 
-    /// Whether the motor has sounded a tone since this was last asked.
+    /// Returns whether the motor has sounded a tone since the last call.
     pub(super) fn heard(&mut self) -> bool {
         core::mem::take(&mut self.seen.tone)
     }
 
-    /// The data of the replies since this was last asked.
+    /// Returns the data of the replies since the last call.
     pub(super) fn replies(&mut self) -> Vec<u16> {
         core::mem::take(&mut self.seen.replies)
     }
@@ -150,7 +150,7 @@ impl FlightController {
         self.seen.texts.iter().any(|said| said == text)
     }
 
-    /// The shaft's true speed.
+    /// Returns the shaft's true speed.
     pub(super) fn rpm(&self) -> f64 {
         self.seen.rpm
     }
@@ -164,7 +164,7 @@ impl FlightController {
     }
 }
 
-/// The 16 bits of a frame, with the inverted check sum of a bidirectional wire.
+/// Returns a frame's 16 bits, with the inverted checksum of a bidirectional wire.
 pub(super) fn frame(value: u16) -> u16 {
     let data = value << 1;
     data << 4 | !(data ^ data >> 4 ^ data >> 8) & 0xF

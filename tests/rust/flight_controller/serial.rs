@@ -9,7 +9,7 @@ use siskin_emulator::rig::Bench;
 const TICKS_PER_US: u64 = 170;
 const DSHOT600: f32 = 12.0;
 
-/// Betaflight, PX4 and ArduPilot take the first byte for a number without a sign.
+/// Betaflight, PX4 and ArduPilot read the first byte as unsigned.
 #[test]
 fn a_cold_esc_does_not_tell_246_degrees() {
     let mut params = Params::default();

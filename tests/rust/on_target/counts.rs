@@ -1,4 +1,4 @@
-//! Instructions of control periods, by what the drive did in them.
+//! Instruction counts of control periods, by what the drive did in them.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use siskin_control::drive::Phase;
 
 use crate::record::Label;
 
-/// The least, the median and the most of some counts.
+/// Minimum, median and maximum of counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spread {
     pub(crate) periods: usize,
@@ -16,7 +16,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// `None` of nothing.
+    /// Returns `None` without counts.
     fn of(mut counts: Vec<u32>) -> Option<Self> {
         counts.sort_unstable();
         Some(Self {
@@ -30,11 +30,11 @@ impl Spread {
 
 /// The counts of a run.
 pub(crate) struct Counts {
-    /// Of all periods.
+    /// All periods.
     pub(crate) all: Spread,
-    /// Of those with a fault.
+    /// Periods with a fault.
     latched: Option<Spread>,
-    /// Of those without.
+    /// Periods without one.
     phases: Vec<(Phase, Spread)>,
 }
 
@@ -60,12 +60,12 @@ impl Counts {
         }
     }
 
-    /// Whether a fault was ever latched.
+    /// Returns whether a fault was ever latched.
     pub(crate) fn has_faults(&self) -> bool {
         self.latched.is_some()
     }
 
-    /// Whether the drive was ever in this phase.
+    /// Returns whether the drive was ever in this phase.
     pub(crate) fn has(&self, phase: Phase) -> bool {
         self.phases.iter().any(|(seen, _)| *seen == phase)
     }

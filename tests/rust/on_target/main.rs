@@ -1,13 +1,12 @@
-//! The control on a Cortex-M4F, which QEMU emulates: the same bits as on a PC after every control
-//! period, and how many instructions a period takes.
+//! The control on a Cortex-M4F, emulated by QEMU: the same bits as on a PC after every control period, and
+//! how many instructions a period takes.
 //!
 //! ```text
 //! cargo test -p siskin-tests --features on-target --test on_target -- --nocapture --test-threads=1
 //! ```
 //!
-//! A run is recorded on the emulator's bench ([`record`]), replayed by the program of
-//! `tests/on-target` ([`target`]) and compared word for word. The tables ([`counts`]) are by what the
-//! drive did in the period.
+//! A run is recorded on the emulator's bench ([`record`]), replayed by the program in `tests/on-target`
+//! ([`target`]) and compared word for word. The tables ([`counts`]) are by what the drive did in a period.
 
 mod counts;
 mod record;
@@ -18,16 +17,16 @@ use record::{Act, Run};
 use siskin_control::drive::Phase;
 use siskin_control::params::{ParamId, Params};
 
-/// Instructions of a control period of the default drive, start-up and faults included. Wanted are 330
-/// and 500; at 24 kHz a chip of 170 MHz has 7083 clocks a period, one of 84 MHz 3500.
+/// Instructions per control period of the default drive, including start-up and faults. The targets are 330
+/// and 500; at 24 kHz a 170 MHz chip has 7083 clocks per period, an 84 MHz one 3500.
 const STEP_MAX: Bounds = Bounds {
     median: 330,
     most: 635,
 };
 
-/// Instructions of the whole interrupt around it: from the converters' registers to the timer's, the
-/// set-point taken and the snapshot published. Wanted are 470 and 750. The first board keeps no fault
-/// record; where one is written, it takes some 40 more.
+/// Instructions of the whole interrupt around it: from the converters' registers to the timer's, including
+/// taking the set-point and publishing the snapshot. The targets are 470 and 750. The first board keeps no
+/// fault record; writing one takes some 40 more.
 const INTERRUPT_MAX: Bounds = Bounds {
     median: 470,
     most: 820,
@@ -51,8 +50,8 @@ impl Bounds {
     }
 }
 
-/// From power-up: heard, started, through its speeds; a sensor fails and the fault is cleared; caught,
-/// driven by torque and by voltage, stopped.
+/// From power-up: armed, a tone, started, through its speeds; a sensor fails and the fault is cleared;
+/// caught, driven by torque and by voltage, stopped.
 const FLIGHT: [(f64, Act); 14] = [
     (0.2, Act::Zero),
     (0.2, Act::Tone(1000.0)),
@@ -70,7 +69,7 @@ const FLIGHT: [(f64, Act); 14] = [
     (0.6, Act::Stop),
 ];
 
-/// Less of the same.
+/// A shorter version.
 const HOP: [(f64, Act); 7] = [
     (0.05, Act::Zero),
     (1.35, Act::Rpm(3000.0)),
@@ -81,7 +80,7 @@ const HOP: [(f64, Act); 7] = [
     (0.3, Act::Zero),
 ];
 
-/// Records a run, replays it on the chip, prints the counts, and gives them if all words agree.
+/// Records a run, replays it on the chip, prints the counts, and returns them if all words agree.
 fn replay(name: &str, changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Counts {
     let run = Run::record(changes, acts);
     let answer = target::replay(&target::STEP, name, &run.request);

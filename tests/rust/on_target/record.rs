@@ -1,4 +1,4 @@
-//! A run of the emulator's bench, and what the chip must answer to it.
+//! A run on the emulator's bench, and what the chip must answer to it.
 
 use fixed::types::I1F31;
 use siskin_control::drive::{Config, Phase, Sample, Setpoint, State, step};
@@ -8,7 +8,7 @@ use siskin_emulator::fault::InForce;
 use siskin_emulator::rig::{Bench, Rig};
 use siskin_on_target::{answer, request};
 
-/// The interrupt publishes a snapshot every so many periods, from the first one on.
+/// The interrupt publishes a snapshot once in this many periods, beginning with the first.
 const PUBLISHED_EVERY: usize = 8;
 
 /// What the drive is asked for, or suffers.
@@ -20,9 +20,9 @@ pub(crate) enum Act {
     Tone(f64),
     Rpm(f32),
     Amperes(f32),
-    /// Of the supply's voltage.
+    /// Share of the supply voltage.
     Share(f64),
-    /// Phase a's current sensor is stuck at 35 A while speed is asked for.
+    /// Phase a's current sensor sticks at 35 A while a speed is requested.
     SensorStuck,
 }
 
@@ -62,16 +62,16 @@ pub(crate) struct Label {
 
 /// A recorded run.
 pub(crate) struct Run {
-    /// What the chip is given.
+    /// The chip's input.
     pub(crate) request: Vec<u32>,
-    /// Of each period.
+    /// One per period.
     pub(crate) labels: Vec<Label>,
     results: Vec<[u32; answer::RESULT_WORDS]>,
     snapshots: Vec<u32>,
 }
 
 impl Run {
-    /// Each of the acts for so many seconds, on the default bench with its realistic sensing.
+    /// Records the acts, each for its number of seconds, on the default bench with its realistic sensing.
     pub(crate) fn record(changes: &[(ParamId, f32)], acts: &[(f64, Act)]) -> Self {
         let mut params = Params::of(&BOSSO_BENCH);
         for (id, value) in changes {
@@ -81,7 +81,7 @@ impl Run {
         let board = bench.sensing.board(bench.delay);
         let config = build(&params, &board).expect("the parameters fit the bench");
         let mut rig = Rig::new(bench, config.clone());
-        // The rig's own state is not to be seen; this one does the same.
+        // The rig's own state is private; this one does the same.
         let mut state = State::new(&config);
         let mut run = Self {
             request: request::set_up(&params, &board).to_vec(),
@@ -114,7 +114,7 @@ impl Run {
         self.snapshots.push(answer::snapshot(&snapshot));
     }
 
-    /// Checks the chip's answer word for word, and gives the instructions of each period.
+    /// Checks the chip's answer word for word, and returns each period's instruction count.
     pub(crate) fn compare(&self, words: &[u32]) -> Vec<u32> {
         let (periods, rest) = words.as_chunks::<{ answer::PERIOD_WORDS }>();
         assert!(rest.is_empty() && periods.len() == self.results.len());
@@ -127,7 +127,7 @@ impl Run {
         instructions
     }
 
-    /// As [`compare`](Self::compare), for the whole interrupt.
+    /// Like [`compare`](Self::compare), for the whole interrupt.
     pub(crate) fn compare_interrupt(&self, words: &[u32]) -> Vec<u32> {
         let (periods, rest) = words.as_chunks::<{ answer::INTERRUPT_WORDS }>();
         assert!(rest.is_empty() && periods.len() == self.snapshots.len());
@@ -141,7 +141,7 @@ impl Run {
     }
 }
 
-/// A set-point as it comes out of the firmware's exchange, which carries the upper 24 bits of a value.
+/// Returns a set-point after the firmware's exchange, which carries a value's upper 24 bits.
 fn exchanged(setpoint: Setpoint) -> Setpoint {
     let upper = |bits: i32| bits & !0xff;
     match setpoint {

@@ -1,4 +1,4 @@
-//! The chip's program, as the firmware is built, on QEMU.
+//! The chip's program, built like the firmware, on QEMU.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,10 +9,10 @@ use siskin_on_target::{ANSWER_FILE, REQUEST_FILE};
 
 const CHIP: &str = "thumbv7em-none-eabihf";
 
-/// Longest that a run may take, s: 10 s of the drive take a few.
+/// Longest time for a run, s: 10 s of the drive take a few.
 const TIMEOUT: &str = "120";
 
-/// The control's step alone.
+/// The control step alone.
 pub(crate) static STEP: LazyLock<PathBuf> =
     LazyLock::new(|| build("siskin-step-on-target", "chip"));
 
@@ -44,7 +44,7 @@ fn build(program: &str, feature: &str) -> PathBuf {
     target.join(CHIP).join("release").join(program)
 }
 
-/// Lets a program for the chip do the periods of a request, and gives its answer.
+/// Has a program for the chip run a request's periods, and returns its answer.
 pub(crate) fn replay(program: &Path, name: &str, request: &[u32]) -> Vec<u32> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .join("on-target")

@@ -1,4 +1,4 @@
-//! The detection matrix: every signal, under every condition, is found, and nothing else is.
+//! The detection matrix: every signal is detected under every condition, and nothing else is.
 
 use siskin_control::input::dshot::Frame;
 use siskin_control::input::line::Line;
@@ -8,10 +8,10 @@ use crate::sender::{Errors, TICK_HZ, Wire, least_period_ns};
 
 const PS_PER_MS: u64 = 1_000_000_000;
 
-/// Each cell is played so often, with other chances and from another place in the first frame.
+/// Runs per cell, each with another random sequence and another start within the first frame.
 const RUNS: u64 = 20;
 
-/// How long each run lasts, and by when the signal is to be known.
+/// How long each run lasts, and by when the signal must be known.
 const RUN_MS: u64 = 200;
 const KNOWN_MS: f64 = 100.0;
 
@@ -19,7 +19,7 @@ const KNOWN_MS: f64 = 100.0;
 struct Condition {
     name: &'static str,
     errors: Errors,
-    /// Frames a second.
+    /// Frames per second.
     pace: Pace,
 }
 
@@ -103,7 +103,7 @@ const CONDITIONS: [Condition; 9] = [
 ];
 
 impl Pace {
-    /// From one frame to the next, ns.
+    /// Returns the frame interval, ns.
     fn period_ns(self, signal: Signal) -> u64 {
         let servo = signal == Signal::Pulse(Pulse::Servo);
         let ns = match self {
@@ -111,7 +111,7 @@ impl Pace {
             Self::Slowest => 2_500_000,
             Self::Usual if servo => 5_000_000,
             Self::Usual => 1_000_000,
-            // 8 kHz, or as fast as the kind allows.
+            // 8 kHz, or as fast as the signal allows.
             Self::Fastest if matches!(signal, Signal::Dshot { .. }) => 125_000,
             Self::Fastest => 0,
         };
@@ -119,7 +119,7 @@ impl Pace {
     }
 }
 
-/// Sends a frame or a pulse near least throttle; the first one begins within.
+/// Sends a frame, or a pulse near minimum throttle; the first one is joined midway.
 fn send(wire: &mut Wire<Line>, signal: Signal, first: bool) {
     match signal {
         Signal::Dshot {
@@ -138,7 +138,7 @@ fn send(wire: &mut Wire<Line>, signal: Signal, first: bool) {
             let moved_ns = u64::from(end_points.most - end_points.least) / 10;
             let width_ns = u64::from(end_points.least) + wire.chance.below(moved_ns);
             if first {
-                // The line was high when it was first looked at.
+                // The line was high when listening began.
                 wire.rest_at(false);
             } else {
                 wire.pulse(width_ns);
@@ -153,7 +153,7 @@ fn known_after_ms(signal: Signal, condition: &Condition, seed: u64) -> Option<f6
     wire.errors = condition.errors;
     let period_ps = condition.pace.period_ns(signal) * 1000;
     wire.now_ps = PS_PER_MS;
-    // The line has been at rest, or it is first looked at while a frame or pulse is sent.
+    // The line has been at rest, or listening begins in the middle of a frame or pulse.
     let mut first = wire.chance.once_in(2);
     if !first {
         wire.rest_at(signal.rests_high());

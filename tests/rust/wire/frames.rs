@@ -1,4 +1,4 @@
-//! A million frames of every signal from a sender that strays: each is decoded, and right.
+//! A million frames of every signal from a sender with timing errors: each one is decoded correctly.
 
 use siskin_control::input::dshot::{Frame, Rate};
 use siskin_control::input::line::{Event, Line};
@@ -6,14 +6,13 @@ use siskin_control::input::signal::{Pulse, Signal};
 
 use crate::sender::{SLOW_TICK_HZ, TICK_HZ, Wire, least_period_ns};
 
-/// Frames of each signal, in runs of which each has a clock of its own.
+/// Frames of each signal, in runs that each have a clock of their own.
 const RUNS: u64 = 1_000;
 const RUN_FRAMES: u64 = 1_000;
 
 const JITTER_NS: u64 = 60;
 
-/// A wire whose signal is known: because it was forced in the first half of the runs, and because it
-/// was detected in the others.
+/// Returns a wire whose signal is known: forced in the first half of the runs, detected in the others.
 fn known_wire(tick_hz: u32, signal: Signal, forced: bool) -> Wire<Line> {
     let mut wire = Wire::to_line(tick_hz, u64::from(signal.number()) << 1 | u64::from(forced));
     wire.rest_at(signal.rests_high());
@@ -90,7 +89,7 @@ fn pulses(tick_hz: u32, kind: Pulse) {
     let signal = Signal::Pulse(kind);
     let end_points = kind.end_points_ns();
     let period_ps = least_period_ns(signal) * 1000;
-    // Both edges stray, and each is seen up to a tick late.
+    // Both edges have jitter, and each is seen up to a tick late.
     let allowed_ns = 2 * JITTER_NS + u64::from(1_000_000_000 / tick_hz) + 1;
     for forced in [true, false] {
         let mut wire = known_wire(tick_hz, signal, forced);
@@ -128,7 +127,7 @@ fn pulses(tick_hz: u32, kind: Pulse) {
     }
 }
 
-/// A test for each signal, so that they share the processors.
+/// A test per signal, so that they share the processors.
 macro_rules! million {
     ($($test:ident: $play:ident($($argument:expr),*);)*) => {$(
         #[test]
@@ -158,7 +157,7 @@ fn a_million_dshot1200_on_the_slow_timer() {
     dshot_frames(SLOW_TICK_HZ, Rate::Dshot1200, true);
 }
 
-/// Every frame with every single bit wrong, and whole between them.
+/// Every frame with each single bit wrong, next to correct ones.
 #[test]
 fn a_single_wrong_bit_is_rejected_and_changes_nothing() {
     for signal in Signal::all() {

@@ -1,6 +1,6 @@
-//! The throttle wire's decoder against senders that stray, and against noise.
+//! The throttle wire's decoder against senders with errors, and against noise.
 //!
-//! Everything goes through `input::line::Line`, as edges in ticks of the capturing timer.
+//! Everything goes through `input::line::Line`, as edges in ticks of the capture timer.
 
 mod detection;
 mod frames;

@@ -1,8 +1,8 @@
-//! Noise of four kinds on the wire, 10⁸ edges together: it never arms, and orders nothing.
+//! Four kinds of noise on the wire, 10⁸ edges in total: it never arms, and never gives an order.
 //!
-//! The arming time is as short as the parameter admits. Each kind is heard in both polarities, with
-//! the signal to be detected and with each signal forced; afterwards real frames arm the same wire,
-//! which shows that it could have been armed.
+//! The arming time is the shortest that the parameter allows. Each kind is heard in both polarities, with
+//! the signal to be detected and with each signal forced; afterwards real frames arm the same wire, which
+//! shows that it could have been armed.
 
 use siskin_control::input::authority::{DriveStatus, Timing};
 use siskin_control::input::demand::Reading;
@@ -13,12 +13,12 @@ use siskin_control::input::{Heard, Input, Settings};
 
 use crate::sender::{Listener, TICK_HZ, Wire, least_period_ns};
 
-/// Edges of each kind, split into runs: half of them with the signal to be detected.
+/// Edges of each kind, split into runs: in half of them the signal is to be detected.
 const EDGES: u64 = 25_000_000;
 const SIGNALS: u64 = 12;
 const RUN_EDGES: u64 = EDGES / (2 * 2 * SIGNALS);
 
-/// The least of `INP_ARM_MS`.
+/// The minimum of `INP_ARM_MS`.
 const ARM_US: u64 = 10_000;
 
 const PS_PER_NS: u64 = 1_000;
@@ -27,7 +27,7 @@ const PS_PER_US: u64 = 1_000_000;
 /// How often the tasks run, µs.
 const POLL_US: u64 = 1_000;
 
-/// The wire's whole input, which must neither arm nor order anything while there is noise.
+/// The wire's whole input, which must neither arm nor give an order while there is noise.
 struct Ear {
     input: Input,
     noise: bool,
@@ -53,7 +53,7 @@ impl Ear {
         }
     }
 
-    /// The motor stands: commands are obeyed.
+    /// Polls with the motor at rest, so that commands are obeyed.
     fn poll(&mut self, now_us: u64) {
         if now_us - self.polled_us >= POLL_US {
             self.polled_us = now_us;
@@ -71,7 +71,7 @@ impl Ear {
             assert!(self.input.authority().command().rests(), "turned by noise");
         }
         let Heard { event, order } = heard?;
-        // Before the first bad frame, a good one is all that is known of the wire.
+        // Before the first bad frame, the wire is only known to carry good ones.
         let clean = self.input.bad_frames() == 0;
         assert!(
             order.is_none() || !self.noise || clean,
@@ -103,31 +103,31 @@ impl Listener for Ear {
     }
 }
 
-/// One listener under one noise.
+/// A listener exposed to a kind of noise.
 struct Run {
     wire: Wire<Ear>,
-    /// Whether everything is upside down.
+    /// Whether all levels are inverted.
     inverted: bool,
-    /// A number of the run, for noise that has several forms.
+    /// Number of the run, for noise that has several forms.
     form: u64,
     frames: u64,
 }
 
 impl Run {
-    /// An edge, so long after the one before.
+    /// Plays an edge, `after_ps` after the previous one.
     fn edge(&mut self, after_ps: u64, level: bool) {
         self.wire.now_ps += after_ps;
         self.wire.edge(self.wire.now_ps, level != self.inverted);
     }
 
-    /// A perfectly timed word as it is on the wire, and a pause of 2 to 100 µs.
+    /// Sends a perfectly timed word, and pauses for 2 to 100 µs.
     fn word(&mut self, bits: u16, rate: Rate) {
-        // It goes out as it is given: the sender inverts the check sum of a bidirectional one.
+        // Sent as given: the sender inverts the checksum of a bidirectional one.
         self.wire.frame(rate, self.inverted, bits);
         self.wire.now_ps += self.wire.chance.between(0, 98 * PS_PER_US);
     }
 
-    /// The forced rate, or one that stays for the run, or another one each time.
+    /// Returns the forced rate, or one that stays for the run, or a different one each time.
     fn rate(&mut self, protocol: Option<Signal>) -> Rate {
         match protocol {
             Some(Signal::Dshot { rate, .. }) => rate,
@@ -139,13 +139,13 @@ impl Run {
 
 /// What came of a kind of noise.
 struct Outcome {
-    /// What was no frame.
+    /// Whatever was not a frame.
     bad: u64,
     /// Frames and pulses of a known signal.
     frames: u64,
 }
 
-/// Plays noise, a burst of which is made by each call of `burst`.
+/// Plays noise; each call of `burst` makes one burst.
 fn play(seed: u64, mut burst: impl FnMut(&mut Run, Option<Signal>)) -> Outcome {
     let mut outcome = Outcome { bad: 0, frames: 0 };
     for (number, signal) in Signal::all().enumerate() {
@@ -175,7 +175,7 @@ fn play(seed: u64, mut burst: impl FnMut(&mut Run, Option<Signal>)) -> Outcome {
     outcome
 }
 
-/// Whether zero throttle of this signal arms the wire, after a rest and within a second.
+/// Returns whether zero throttle of this signal arms the wire, after a rest and within a second.
 fn arms(wire: &mut Wire<Ear>, signal: Signal) -> bool {
     wire.listener.noise = false;
     wire.rest_at(signal.rests_high());
@@ -198,7 +198,7 @@ fn arms(wire: &mut Wire<Ear>, signal: Signal) -> bool {
 #[test]
 fn edges_at_random_times() {
     let outcome = play(1, |run, _| {
-        // Up to 1, 3.5, 12, 60, 500 or 3000 µs apart, and now and then a rest.
+        // Up to 1, 3.5, 12, 60, 500 or 3000 µs apart, with an occasional rest.
         let longest_ns = [1_000, 3_500, 12_000, 60_000, 500_000, 3_000_000][run.form as usize % 6];
         let mut level = true;
         for _ in 0..32 {
@@ -222,8 +222,8 @@ fn well_timed_random_words() {
         run.word(bits, rate);
     });
     assert!(outcome.bad > EDGES / 64, "{}", outcome.bad);
-    // One word in sixteen has a right check sum. It is heard where its rate was forced and its
-    // polarity is right: in a third of the runs with a forced signal.
+    // One word in sixteen has a correct checksum. It is heard if its rate was forced and its polarity is
+    // right: in a third of the runs with a forced signal.
     let heard = EDGES / 32 / 2 / 3;
     let share = outcome.frames as f64 / heard as f64;
     assert!((share - 1.0 / 16.0).abs() < 0.01, "{share}");
@@ -261,7 +261,7 @@ fn bursts_at_the_rate_of_a_motor() {
             let start_ps = run.wire.now_ps;
             for instant_ps in &instants[..switching] {
                 run.wire.now_ps = run.wire.now_ps.max(start_ps + instant_ps);
-                // The line rings and comes back, but for once in a while.
+                // The line rings and returns to its level, with few exceptions.
                 let rings = 2 * run.wire.chance.between(1, 4);
                 let edges = rings - u64::from(run.wire.chance.once_in(50));
                 for _ in 0..edges {

@@ -1,4 +1,4 @@
-//! A sender of throttle signals with the errors that a real one has, and the line that hears it.
+//! A throttle signal sender with the errors of a real one, and the listener on its line.
 
 use siskin_control::input::dshot::{Rate, check_mask, edges};
 use siskin_control::input::line::{Event, Line};
@@ -8,12 +8,12 @@ use siskin_control::input::signal::{Pulse, Signal};
 pub(crate) const TICK_HZ: u32 = 170_000_000;
 pub(crate) const SLOW_TICK_HZ: u32 = 84_000_000;
 
-/// Control periods a second: so often the line is asked whether it has settled.
+/// Control periods per second: how often the line is asked whether it has settled.
 const SETTLE_HZ: u64 = 24_000;
 
 const PS_PER_NS: u64 = 1_000;
 
-/// Binary places of the ratio of the sender's time to the true one.
+/// Fraction bits of the ratio of the sender's time to true time.
 const RATIO_PLACES: u32 = 32;
 
 /// Splitmix64.
@@ -28,18 +28,18 @@ impl Chance {
         mixed ^ mixed >> 31
     }
 
-    /// 0 to below `end`.
+    /// Returns 0 to below `end`.
     pub(crate) fn below(&mut self, end: u64) -> u64 {
-        // The upper half of the product: even to one part in 2³² or better, and without a division.
+        // The upper half of the product: even to one part in 2³² or better, without a division.
         ((u128::from(self.next()) * u128::from(end)) >> 64) as u64
     }
 
-    /// From `least` to below `end`.
+    /// Returns `least` to below `end`.
     pub(crate) fn between(&mut self, least: u64, end: u64) -> u64 {
         least + self.below(end - least)
     }
 
-    /// True once in so many times, on the average.
+    /// Returns true once in `times` calls, on average.
     pub(crate) fn once_in(&mut self, times: u64) -> bool {
         self.below(times) == 0
     }
@@ -48,17 +48,17 @@ impl Chance {
 /// What is wrong with a sender and its line.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Errors {
-    /// By how much its clock is fast, parts in a thousand.
+    /// How fast its clock is, parts per thousand.
     pub(crate) fast_permille: i64,
-    /// Every edge comes at most so much early or late, ns.
+    /// Largest deviation of every edge, early or late, ns.
     pub(crate) jitter_ns: u64,
-    /// Every level is interrupted for at most so long, ns.
+    /// Longest glitch, one of which interrupts every level, ns.
     pub(crate) glitch_ns: u64,
-    /// Of a thousand bits, so many are flipped.
+    /// Bits flipped per thousand.
     pub(crate) flipped_permille: u64,
 }
 
-/// Who hears what is on the wire. Times are in ticks of a timer that does not wrap.
+/// Hears what is on the wire. Times are in ticks of a timer that does not wrap.
 pub(crate) trait Listener {
     fn edge(&mut self, at_ticks: u64, level: bool) -> Option<Event>;
     fn settle(&mut self, now_ticks: u64) -> Option<Event>;
@@ -74,21 +74,21 @@ impl Listener for Line {
     }
 }
 
-/// A sender and who hears it.
+/// A sender and its listener.
 pub(crate) struct Wire<L> {
     pub(crate) listener: L,
     pub(crate) chance: Chance,
     pub(crate) errors: Errors,
     /// When the next signal begins, ps.
     pub(crate) now_ps: u64,
-    /// What has been heard and not taken yet, and when, ticks.
+    /// What has been heard and not yet taken, and when, ticks.
     pub(crate) events: Vec<(u64, Event)>,
     tick_mhz: u64,
     settled_ticks: u64,
 }
 
 impl Wire<Line> {
-    /// A sender and a decoder with a timer of `tick_hz`.
+    /// Creates a sender, and a decoder with a timer of `tick_hz`.
     pub(crate) fn to_line(tick_hz: u32, seed: u64) -> Self {
         Self::new(Line::new(tick_hz), tick_hz, seed)
     }
@@ -107,20 +107,20 @@ impl<L: Listener> Wire<L> {
         }
     }
 
-    /// The count that the timer would have if it did not wrap.
+    /// Returns the count that the timer would have if it did not wrap.
     pub(crate) fn ticks(&self, at_ps: u64) -> u64 {
         at_ps * self.tick_mhz / 1_000_000
     }
 
-    /// How long a time of the sender's is, ps.
+    /// Converts a duration on the sender's clock to true time, ps.
     pub(crate) fn sent(&self, ps: u64) -> u64 {
         let thousand = 1000_u64.saturating_add_signed(self.errors.fast_permille);
-        // The compiler turns a division by 1000 into a product, but not this one: it is done once.
+        // The compiler turns a division by 1000 into a product, but not this one, so it is done once.
         let ratio = (1000 << RATIO_PLACES) / thousand;
         ((u128::from(ps) * u128::from(ratio)) >> RATIO_PLACES) as u64
     }
 
-    /// An edge at exactly this time.
+    /// Plays an edge at exactly this time.
     pub(crate) fn edge(&mut self, at_ps: u64, level: bool) {
         let ticks = self.ticks(at_ps);
         self.settle_until(ticks);
@@ -128,7 +128,7 @@ impl<L: Listener> Wire<L> {
         self.events.extend(event.map(|event| (ticks, event)));
     }
 
-    /// Asks the line once a control period.
+    /// Lets the line settle once per control period.
     fn settle_until(&mut self, ticks: u64) {
         let period = self.tick_mhz * 1_000_000 / SETTLE_HZ;
         while self.settled_ticks + period <= ticks {
@@ -139,7 +139,7 @@ impl<L: Listener> Wire<L> {
         }
     }
 
-    /// Lets the line settle at the time that has come.
+    /// Lets the line settle at the current time.
     pub(crate) fn settle(&mut self) {
         let ticks = self.ticks(self.now_ps);
         self.settle_until(ticks);
@@ -147,7 +147,7 @@ impl<L: Listener> Wire<L> {
         self.events.extend(event.map(|event| (ticks, event)));
     }
 
-    /// The line goes to `level` at about this time, and stays there for `for_ps`.
+    /// Sets the line to `level` at about this time, for `for_ps`.
     fn level(&mut self, at_ps: u64, level: bool, for_ps: u64) {
         let jitter_ps = self.errors.jitter_ns * PS_PER_NS;
         let strayed_ps = match jitter_ps {
@@ -168,14 +168,14 @@ impl<L: Listener> Wire<L> {
         self.edge(self.now_ps, level);
     }
 
-    /// Nothing happens until this time.
+    /// Waits until this time, without an edge.
     pub(crate) fn wait_until(&mut self, ps: u64) {
         self.now_ps = self.now_ps.max(ps);
         self.settle_until(self.ticks(self.now_ps));
     }
 
-    /// Sends 16 bits from the edge `first` on, and rests for two bits. Of a bidirectional rate both
-    /// the levels and the check sum are inverted.
+    /// Sends 16 bits from the edge `first` on, and rests for two bits. A bidirectional rate inverts both
+    /// the levels and the checksum.
     pub(crate) fn frame_from(&mut self, first: usize, rate: Rate, bidirectional: bool, bits: u16) {
         let mut bits = bits ^ check_mask(bidirectional);
         if self.errors.flipped_permille > 0 {
@@ -216,15 +216,14 @@ impl<L: Listener> Wire<L> {
     }
 }
 
-/// The time of a signal and of the least rest after it, ns: for how many fit into a second.
+/// Returns a signal's duration with the shortest rest after it, ns: how many fit into a second.
 pub(crate) fn least_period_ns(signal: Signal) -> u64 {
     match signal {
         Signal::Dshot {
             rate,
             bidirectional,
         } => {
-            // A bidirectional frame is followed by 30 µs, its reply of 21 bits at 5/4 of the rate
-            // and a rest.
+            // A bidirectional frame is followed by 30 µs, its 21-bit reply at 5/4 of the rate, and a rest.
             let reply_ns = 30_000 + 21 * 4 / 5 * rate.bit_ns();
             let rest_ns = 2 * rate.bit_ns();
             let answer_ns = if bidirectional { reply_ns } else { 0 };
