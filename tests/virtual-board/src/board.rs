@@ -1,6 +1,6 @@
 //! The B-G431B-ESC1 outside its chip: what its resistors make of currents and voltages.
 //!
-//! Pins are (port, number), where 0 is port A.
+//! Pins are (port, number), where port 0 is A.
 
 /// The supply of the chip and of the sensors, V.
 const SUPPLY_V: f64 = 3.3;
@@ -8,8 +8,8 @@ const SUPPLY_V: f64 = 3.3;
 /// Each leg's shunt, below its low side, Ω.
 const SHUNT_OHM: f64 = 0.003;
 
-/// An op-amp's input, kΩ: to the shunt, to the shunts' ground, and to the chip's supply. The schematic says
-/// "GND" of the second; ended at the chip's ground, it would show 4/7 of a shift instead of all but 4 %.
+/// An op-amp's input, kΩ: to the shunt, to the shunts' ground, and to the chip's supply. The schematic labels
+/// the second end "GND"; at the chip's ground it would show 4/7 of a ground shift instead of all but 4 %.
 const SHUNT_KOHM: [f64; 3] = [1.5, 2.2, 22.0];
 
 /// The supply's divider, kΩ: above and below the pin.
@@ -24,7 +24,7 @@ const THERMISTOR_KOHM: f64 = 10.0;
 /// Its β, K.
 const THERMISTOR_BETA_K: f64 = 3380.0;
 
-/// From it to ground, kΩ.
+/// Its resistor to ground, kΩ.
 const THERMISTOR_DOWN_KOHM: f64 = 4.7;
 
 /// 0 °C, K.
@@ -33,8 +33,8 @@ const FREEZING_K: f64 = 273.15;
 /// The op-amps' inputs at the shunts of legs a, b and c: PA1, PA7 and PB0.
 pub const SHUNTS: [(u8, u8); 3] = [(0, 1), (0, 7), (1, 0)];
 
-/// The op-amps' feet at the grounds of these shunts: PA3, PA5 and PB2, without a resistor (schematic of the
-/// MB1419, shunt sensing circuit: Vshunt−).
+/// The op-amps' reference inputs at these shunts' grounds: PA3, PA5 and PB2, without a resistor (MB1419
+/// schematic, shunt sensing circuit: Vshunt−).
 pub const GROUNDS: [(u8, u8); 3] = [(0, 3), (0, 5), (1, 2)];
 
 /// The dividers of terminals a, b and c: PA4, PC4 and PB11.
@@ -46,10 +46,10 @@ pub const BUS: (u8, u8) = (0, 0);
 /// The thermistor: PB14.
 pub const THERMISTOR: (u8, u8) = (1, 14);
 
-/// While it is low, the terminals' dividers have a ground: PB5.
+/// Grounds the terminals' dividers while low: PB5.
 pub const DIVIDERS_GROUND: (u8, u8) = (1, 5);
 
-/// Pins with the converter (1 or 2) and the channel at which each is (data sheet, pins).
+/// Pins with the converter (1 or 2) and channel of each (data sheet, pinout).
 const CHANNELS: [((u8, u8), (u8, u8)); 8] = [
     (BUS, (1, 1)),
     (BUS, (2, 1)),
@@ -61,24 +61,25 @@ const CHANNELS: [((u8, u8), (u8, u8)); 8] = [
     (SHUNTS[1], (2, 4)),
 ];
 
-/// The pin at a converter's channel; the op-amps' outputs are none of the board's.
+/// Returns the pin at a converter's channel; the op-amps' outputs are not the board's.
 pub fn pin(converter: u8, channel: u8) -> Option<(u8, u8)> {
     let mut channels = CHANNELS.iter();
     let found = channels.find(|(_, at)| *at == (converter, channel));
     found.map(|(pin, _)| *pin)
 }
 
-/// What the sensors are at.
+/// What the sensors are exposed to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outside {
     /// Currents down through the shunts of legs a, b, c, out of the motor, A: 0 while a leg's low side
-    /// conducts none.
+    /// carries none.
     pub shunts_a: [f64; 3],
-    /// Voltages of these shunts' grounds above the chip's, V: what their currents make of the copper between.
+    /// Voltages of these shunts' grounds above the chip's, V: the drop of their currents across the copper
+    /// between.
     pub grounds_v: [f64; 3],
     /// Voltages of terminals a, b, c, V.
     pub terminals_v: [f64; 3],
-    /// Voltage of the supply, V.
+    /// Supply voltage, V.
     pub bus_v: f64,
     /// The thermistor's temperature, °C.
     pub temperature_c: f64,
@@ -87,9 +88,9 @@ pub struct Outside {
 }
 
 impl Outside {
-    /// Volts at a pin; nothing at one which has no sensor, and at the terminals' without a ground.
+    /// Returns the voltage at a pin; `None` without a sensor, and at the terminals' pins without a ground.
     ///
-    /// The diodes that keep a pin near the supply are not there: the converter clamps as well.
+    /// The diodes that clamp a pin near the supply are left out: the converter clamps too.
     pub fn volts(&self, pin: (u8, u8)) -> Option<f64> {
         let among = |pins: [(u8, u8); 3]| pins.iter().position(|of| *of == pin);
         if let Some(leg) = among(SHUNTS) {
@@ -113,7 +114,8 @@ impl Outside {
     }
 }
 
-/// Where the three resistors meet, with this current through the shunt and this voltage below it.
+/// Returns the voltage where the three resistors meet, for this shunt current and this voltage below the
+/// shunt.
 fn shunt_input(current_a: f64, ground_v: f64) -> f64 {
     let [shunt, ground, supply] = SHUNT_KOHM.map(|kohm| 1.0 / kohm);
     let above_v = ground_v + current_a * SHUNT_OHM;
@@ -150,10 +152,10 @@ mod tests {
 
     #[test]
     fn pins_have_what_the_resistors_make() {
-        // 3.3 V by 3 of 77 are 128.57 mV, and 4/7 of 105 mV for 35 A are 60 mV.
+        // 3.3 V times 3/77 is 128.57 mV, and 4/7 of 105 mV at 35 A is 60 mV.
         assert_volts((0, 1), 0.188571);
         assert_volts((0, 7), 0.068571);
-        // And 37/38.5 of 10 mV below it.
+        // Plus 37/38.5 of 10 mV below it.
         assert_volts((1, 0), 0.138182);
         assert_volts((1, 2), 0.01);
         assert_volts((0, 3), 0.0);
@@ -161,7 +163,7 @@ mod tests {
         assert_volts((2, 4), 0.0);
         assert_volts((1, 11), 1.1);
         assert_volts((0, 0), 1.8);
-        // 3.3 V by 4.7 of 14.7.
+        // 3.3 V times 4.7/14.7.
         assert_volts((1, 14), 1.0551);
         assert_eq!(OUTSIDE.volts((1, 12)), None);
     }

@@ -1,5 +1,5 @@
-//! A watch on the bridge's gates, as a logic analyser at the pins would keep it: it knows nothing of the
-//! timer that makes them.
+//! Watches the bridge's gates as a logic analyser at the pins would: it knows nothing about the timer that
+//! drives them.
 
 use std::fmt;
 
@@ -9,26 +9,26 @@ use crate::time::{CLOCK_HZ, Cycles, NEVER};
 /// Legs of the bridge.
 const LEGS: usize = 3;
 
-/// Violations that are kept; the others are only counted.
+/// Violations kept; the rest are only counted.
 const KEPT: usize = 8;
 
-/// What must not be.
+/// What must not happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// Both gates of a leg are on.
     Both,
-    /// One gate went on so few cycles after the other had gone off.
+    /// One gate turned on this few cycles after the other had turned off.
     Short(Cycles),
 }
 
-/// Something that must not be, where and when. One line says it.
+/// A violation, with place and time. Displayed on one line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// The time.
+    /// When it happened.
     pub at: Cycles,
     /// The leg, from 0.
     pub leg: usize,
-    /// What it is.
+    /// What happened.
     pub fault: Fault,
 }
 
@@ -49,7 +49,7 @@ impl fmt::Display for Violation {
     }
 }
 
-/// A leg's gates: high side, low side; and the supply of the high side's driver.
+/// A leg's gates, high side and low side, and its high-side driver's supply.
 #[derive(Clone, Copy, Debug, Default)]
 struct Leg {
     on: [bool; 2],
@@ -70,7 +70,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// A watch over this least dead time.
+    /// Creates a watch for this minimum dead time.
     pub fn new(dead_time: Cycles) -> Self {
         Self {
             dead_time,
@@ -83,7 +83,7 @@ impl Bridge {
         }
     }
 
-    /// A leg's gates are now so.
+    /// Takes the current state of a leg's gates.
     pub fn gates(&mut self, leg: usize, high: bool, low: bool, now: Cycles) {
         let was_off = self.is_off();
         let on = [high, low];
@@ -128,38 +128,38 @@ impl Bridge {
         }
     }
 
-    /// Whether all gates are off.
+    /// Returns whether all gates are off.
     pub fn is_off(&self) -> bool {
         self.legs.iter().all(|leg| leg.on == [false, false])
     }
 
-    /// Since when all gates are off, if they are.
+    /// Returns since when all gates have been off, if they are.
     pub fn off_since(&self) -> Option<Cycles> {
         self.is_off().then_some(self.off_since)
     }
 
-    /// A leg's gates: high side, low side.
+    /// Returns a leg's gates: high side, low side.
     pub fn on(&self, leg: usize) -> [bool; 2] {
         self.legs[leg].on
     }
 
-    /// How often a gate has gone on or off.
+    /// Returns how often a gate has turned on or off.
     pub fn edges(&self) -> u64 {
         self.edges
     }
 
-    /// How many violations there were.
+    /// Returns the number of violations.
     pub fn violations(&self) -> u64 {
         self.count
     }
 
-    /// The first of them.
+    /// Returns the first violations.
     pub fn first(&self) -> &[Violation] {
         &self.kept
     }
 
-    /// How often a high side was to go on that its driver had no supply for. None of the violations: a self-test
-    /// tries each high side as it charges its supply.
+    /// Returns how often a high side was turned on without enough supply for its driver. Not a violation: a
+    /// self-test tries each high side while it charges its supply.
     pub fn starved(&self) -> u64 {
         self.starved
     }
@@ -177,10 +177,10 @@ mod tests {
         assert_eq!(bridge.off_since(), None);
         bridge.gates(0, false, false, 200);
         bridge.gates(0, true, false, 285);
-        // The other leg's times do not matter.
+        // The other leg's timing does not matter.
         bridge.gates(1, false, true, 286);
         bridge.gates(0, false, false, 400);
-        // The same side may come back at once.
+        // The same side may turn on again at once.
         bridge.gates(0, true, false, 401);
         bridge.gates(0, false, false, 500);
         bridge.gates(1, false, false, 510);

@@ -1,4 +1,4 @@
-//! The linked image: what of it stands where in the flash, and its symbols.
+//! The linked image: what goes where in the flash, and its symbols.
 
 use std::fs;
 use std::io;
@@ -9,10 +9,10 @@ use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Object, ObjectSymbol};
 use thiserror::Error;
 
-/// The name of the board, which its image has behind the vectors.
+/// The board's name, which its image has after the vectors.
 const BOARD: &str = "b-g431b-esc1";
 
-/// Why a file is no image for this board; one line.
+/// Why a file is not an image for this board, in one line.
 #[derive(Debug, Error)]
 pub enum ImageError {
     /// It cannot be read.
@@ -24,10 +24,10 @@ pub enum ImageError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// It is no program for the chip.
+    /// It is not a program for the chip.
     #[error("{}: {reason}; give the ELF file that the linker made for the B-G431B-ESC1", path.display())]
     Not {
         /// The file.
@@ -37,7 +37,7 @@ pub enum ImageError {
     },
 }
 
-/// A stretch of bytes that is flashed.
+/// A stretch of bytes to be flashed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Segment {
     /// Where it is flashed.
@@ -112,7 +112,7 @@ impl Image {
         })
     }
 
-    /// Address and bytes of the one symbol whose name has all these parts.
+    /// Returns address and size of the one symbol whose name has all these parts.
     pub fn symbol(&self, parts: &[&str]) -> Option<(u32, u32)> {
         let mut found = self
             .symbols

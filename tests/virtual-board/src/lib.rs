@@ -15,14 +15,13 @@
 //! | [`machine`] | all this as the emulator's library runs it |
 //!
 //! # What is simulated how
-//! The chip is what its registers say: nothing of the firmware but its image is used. A register that is
-//! not modelled ends the run with its address and the instruction's; so does one whose part has no clock,
-//! and a clock beyond the chip's limits.
+//! The chip is what its registers say: only the firmware's image is used. An access to a register that is not
+//! modelled, or whose part has no clock, ends the run with its address and the instruction's; so does a clock
+//! beyond the chip's limits.
 //!
-//! Time advances by the instructions that are executed, with [an estimate of their
-//! cycles](processor#what-code-costs), and by what the parts do at their own times. Motor, inverter and
-//! supply are the emulator's; they follow the gates edge by edge, and are looked at when a converter's
-//! sampling ends. Equal inputs give equal bits.
+//! Time advances by the executed instructions, with [an estimate of their cycles](processor#what-code-costs),
+//! and by what the parts do at their own times. Motor, inverter and supply are the emulator's; they follow the
+//! gates edge by edge, and are read when a converter's sampling ends. Equal inputs give equal bits.
 
 pub mod board;
 pub mod bridge;

@@ -1,4 +1,4 @@
-//! How the processor's time is spent: figures of the PWM interrupt, and how soon a throttle acts.
+//! How the processor's time is spent: figures for the PWM interrupt, and how soon a throttle acts.
 
 use std::fmt;
 
@@ -7,14 +7,14 @@ use serde::Serialize;
 use crate::processor::ENTRY;
 use crate::time::{CLOCK_HZ, Cycles};
 
-/// The PWM interrupt as it has been so far.
+/// The PWM interrupt so far.
 #[derive(Clone, Debug, Default)]
 pub struct Load {
     /// When its line came up.
     asked: Option<Cycles>,
     /// When it was entered, and after how many instructions.
     entered: Option<(Cycles, u64)>,
-    /// Since when this is measured.
+    /// When the measurement began.
     since: Cycles,
     spent: Cycles,
     times: u64,
@@ -26,14 +26,14 @@ pub struct Load {
     throttle: Throttle,
 }
 
-/// From the end of a frame to the duties that it makes.
+/// Latency from the end of a frame to the resulting duties.
 #[derive(Clone, Debug, Default)]
 struct Throttle {
-    /// The end of the last frame.
+    /// End of the last frame.
     frame: Option<Cycles>,
-    /// A frame whose set-point is new, until its duties are in force.
+    /// A frame with a new set-point, until its duties are in force.
     waits: Option<Cycles>,
-    /// The set-point of the last period.
+    /// Set-point of the last period.
     setpoint: u32,
     count: u64,
     sum: Cycles,
@@ -41,7 +41,7 @@ struct Throttle {
 }
 
 impl Load {
-    /// Begins anew at a time.
+    /// Starts over at a time.
     pub fn begin(&mut self, now: Cycles) {
         *self = Self {
             since: now,
@@ -49,16 +49,16 @@ impl Load {
         };
     }
 
-    /// The interrupt's line has come up.
+    /// Notes that the interrupt's line has come up.
     pub fn asked(&mut self, now: Cycles) {
         self.asked = Some(now);
     }
 
-    /// The handler begins: its first instruction comes next. The processor could have taken it at any
+    /// Notes that the handler begins with the next instruction. The processor could have taken it at any
     /// instruction since `since`.
     pub fn entered(&mut self, now: Cycles, instructions: u64, since: Cycles) {
         self.entered = Some((now, instructions));
-        // The first one may have been asked for before the interrupt was enabled, and the second while that
+        // The first one may have been requested before the interrupt was enabled, and the second while that
         // one was handled.
         if let Some(asked) = self.asked.take()
             && self.times > 1
@@ -69,7 +69,7 @@ impl Load {
         }
     }
 
-    /// The handler has ended.
+    /// Notes that the handler has ended.
     pub fn left(&mut self, now: Cycles, instructions: u64) {
         if let Some((entered, before)) = self.entered.take() {
             let (spent, count) = (now - entered, instructions - before);
@@ -81,12 +81,12 @@ impl Load {
         }
     }
 
-    /// A frame has ended on the throttle wire.
+    /// Notes the end of a frame on the throttle wire.
     pub fn frame(&mut self, now: Cycles) {
         self.throttle.frame = Some(now);
     }
 
-    /// A period begins with this set-point, without its number.
+    /// Notes the set-point of a period that begins, without its number.
     pub fn setpoint(&mut self, setpoint: u32) {
         if self.throttle.setpoint != setpoint {
             self.throttle.setpoint = setpoint;
@@ -94,7 +94,7 @@ impl Load {
         }
     }
 
-    /// The duties of the last period come into force.
+    /// Notes that the last period's duties come into force.
     pub fn duties(&mut self, now: Cycles) {
         if let Some(frame) = self.throttle.waits.take() {
             let took = now - frame;
@@ -104,7 +104,7 @@ impl Load {
         }
     }
 
-    /// The figures at a time.
+    /// Returns the figures at a time.
     pub fn figures(&self, now: Cycles) -> Option<Figures> {
         let us = |cycles: Cycles| cycles as f64 * 1e6 / CLOCK_HZ as f64;
         let mean = |sum: u64, count: u64| (count > 0).then(|| sum as f64 / count as f64);
@@ -124,28 +124,28 @@ impl Load {
     }
 }
 
-/// Figures of the PWM interrupt. Instructions are counted; cycles are estimated, by
-/// [the model](crate::processor).
+/// Figures for the PWM interrupt. Instructions are counted; cycles are estimated by [the
+/// model](crate::processor).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// How often it has run.
     pub interrupts: u64,
-    /// Its instructions, mean.
+    /// Mean instructions.
     pub instructions_mean: f64,
-    /// Its instructions, most.
+    /// Maximum instructions.
     pub instructions_most: u64,
-    /// Its cycles from entry to return, mean.
+    /// Mean cycles from entry to return.
     pub cycles_mean: f64,
-    /// Its cycles from entry to return, most.
+    /// Maximum cycles from entry to return.
     pub cycles_most: Cycles,
     /// Its share of the processor.
     pub load_percent: f64,
-    /// Cycles from the converters' end to its first instruction: least and most. To the least a chip adds
-    /// what is left of the instruction that it is at, as a rule 1 to 3 cycles.
+    /// Cycles from the end of the conversions to its first instruction: minimum and maximum. On a chip the
+    /// rest of the current instruction adds to the minimum, usually 1 to 3 cycles.
     pub entry_cycles: [Cycles; 2],
-    /// From the end of a frame to the duties that it makes, µs, mean.
+    /// Mean time from the end of a frame to the resulting duties, µs.
     pub throttle_us_mean: Option<f64>,
-    /// The same, most.
+    /// Its maximum.
     pub throttle_us_most: Option<f64>,
 }
 
@@ -187,7 +187,7 @@ mod tests {
         let mut load = Load::default();
         load.begin(1000);
         assert_eq!(load.figures(2000), None);
-        // The first comes within a block of code, the second while it may not be taken.
+        // The first comes within a block of code, the second while it cannot be taken.
         for (asked, since, entered, left, instructions) in [
             (1000, 1000, 4000, 4200, 200),
             (1500, 1500, 4206, 4406, 200),

@@ -1,4 +1,4 @@
-//! The virtual board's command line: the linked image in real time, with the emulator's options.
+//! The virtual board's command line: runs the linked image in real time, with the emulator's options.
 #![forbid(unsafe_code)]
 
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use siskin_vboard::image::Image;
 use siskin_vboard::load::Figures;
 use siskin_vboard::machine::VirtualBoard;
 
-/// The image that is flashed, on a simulated B-G431B-ESC1 that turns a simulated motor.
+/// The flashed image, on a simulated B-G431B-ESC1 that turns a simulated motor.
 #[derive(Debug, Parser)]
 #[command(name = "siskin-vboard", version)]
 struct Cli {
@@ -32,7 +32,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Plays a scenario from a file, offline: one that asks for throttle, not for speed or current
+    /// Plays a scenario from a file, offline; it must ask for throttle, not for speed or current
     Scenario(ScenarioArgs),
 }
 
@@ -44,7 +44,7 @@ struct Summary {
     processor: Option<Figures>,
 }
 
-/// The same of a scenario.
+/// The same for a scenario.
 #[derive(Serialize)]
 struct Played {
     #[serde(flatten)]

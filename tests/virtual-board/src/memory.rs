@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::ops::Range;
 use std::rc::Rc;
 
-/// A stretch of memory; clones are the same memory.
+/// A stretch of memory; clones share it.
 #[derive(Clone, Debug)]
 pub struct Memory {
     origin: u32,
@@ -12,7 +12,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// So many bytes from this address on, all of one value.
+    /// Creates `bytes` bytes from this address, all of one value.
     pub fn new(origin: u32, bytes: usize, fill: u8) -> Self {
         Self {
             origin,
@@ -20,30 +20,30 @@ impl Memory {
         }
     }
 
-    /// The addresses that it has.
+    /// Returns its addresses.
     pub fn range(&self) -> Range<u32> {
         self.origin..self.origin + self.cells.len() as u32
     }
 
-    /// The bytes themselves, for an engine that executes out of them.
+    /// Returns the bytes themselves, for an engine that executes from them.
     pub fn cells(&self) -> &[Cell<u8>] {
         &self.cells
     }
 
-    /// Whether so many bytes from this address on lie within.
+    /// Returns whether this many bytes from this address lie within.
     pub fn holds(&self, address: u32, bytes: u32) -> bool {
         let offset = address.wrapping_sub(self.origin) as usize;
         offset < self.cells.len() && self.cells.len() - offset >= bytes as usize
     }
 
-    /// Up to four bytes, the lowest first; they must lie within.
+    /// Reads up to four bytes, little-endian; they must lie within.
     pub fn read(&self, address: u32, bytes: u32) -> u32 {
         let cells = self.part(address, bytes as usize);
         let fold = |value, cell: &Cell<u8>| value << 8 | u32::from(cell.get());
         cells.iter().rev().fold(0, fold)
     }
 
-    /// Writes up to four bytes, the lowest first; they must lie within.
+    /// Writes up to four bytes, little-endian; they must lie within.
     pub fn write(&self, address: u32, bytes: u32, value: u32) {
         let cells = self.part(address, bytes as usize);
         for (cell, byte) in cells.iter().zip(value.to_le_bytes()) {

@@ -1,4 +1,4 @@
-//! The serial lines' far ends: MAVLink's, which all links share, and the telemetry's.
+//! The far ends of the serial lines: MAVLink's, which all links share, and telemetry's.
 
 use std::collections::BTreeMap;
 
@@ -8,28 +8,28 @@ use siskin_emulator::link::LinkId;
 
 use crate::time::{CLOCK_HZ, Cycles, ns};
 
-/// Bytes that may wait for the line, of all links: more is lost whole frame by whole frame, as by a
-/// radio. 0.7 s at 57600 baud.
+/// Bytes that may wait for the line, from all links: beyond that, whole frames are lost, as over a radio.
+/// 0.7 s at 57600 baud.
 const WAITING_MAX: usize = 4096;
 
 /// Byte 0 of a datagram with KISS telemetry, and of one with the ESC's information.
 const KISS: u8 = 30;
 const INFO: u8 = 31;
 
-/// The MAVLink line: frames from any link go to the chip one after the other, and what it sends goes to
-/// all of them.
+/// The MAVLink line: frames from any link go to the chip one after another, and what it sends goes to all
+/// of them.
 #[derive(Default)]
 pub struct Mavlink {
-    /// What each link has sent so far of a frame.
+    /// What each link has sent of a frame so far.
     links: BTreeMap<LinkId, Receiver>,
     /// What the chip has sent of one.
     chip: Receiver,
-    /// Refused on links that are gone.
+    /// Frames refused on links that are gone.
     refused: u64,
 }
 
 impl Mavlink {
-    /// Bytes from a link. Whole frames go to `forward`, unless too many bytes wait already.
+    /// Takes bytes from a link. Whole frames go to `forward`, unless too many bytes are already waiting.
     pub fn receive(
         &mut self,
         stream: LinkId,
@@ -47,27 +47,27 @@ impl Mavlink {
         });
     }
 
-    /// The links that have sent anything. Each must be told now and then that time has passed, by
-    /// [`receive`](Self::receive) without bytes: after silence, what a start without its frame held
-    /// back is searched.
+    /// Returns the links that have sent anything. Each needs a call of [`receive`](Self::receive) without
+    /// bytes now and then: after silence, what a start without its frame has held back is searched for
+    /// frames.
     pub fn links(&self) -> Vec<LinkId> {
         self.links.keys().copied().collect()
     }
 
-    /// A link that has ended.
+    /// Forgets a link that has ended.
     pub fn forget(&mut self, stream: LinkId) {
         if let Some(receiver) = self.links.remove(&stream) {
             self.refused += receiver.counters().rejected();
         }
     }
 
-    /// Bytes from the chip, or none: time has passed. A frame that is whole with them goes to `send`.
+    /// Takes bytes from the chip, or none, just to let time pass. A frame completed by them goes to `send`.
     pub fn sent(&mut self, now: Cycles, bytes: &[u8], mut send: impl FnMut(&[u8])) {
         self.chip
             .push(ns(now) / 1000, bytes, |frame| send(frame.raw));
     }
 
-    /// Frames of the links that were refused.
+    /// Returns how many of the links' frames were refused.
     pub fn refused(&self) -> u64 {
         let rejected = self
             .links
@@ -77,7 +77,7 @@ impl Mavlink {
     }
 }
 
-/// The telemetry's line: frames end with a quiet time.
+/// The telemetry line: frames end with a quiet time.
 #[derive(Debug, Default)]
 pub struct Telemetry {
     bytes: Vec<u8>,
@@ -85,13 +85,13 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// A byte of the chip.
+    /// Takes a byte from the chip.
     pub fn sent(&mut self, now: Cycles, byte: u8) {
         self.bytes.push(byte);
         self.last = now;
     }
 
-    /// The datagram of a frame that has ended by now.
+    /// Returns the datagram of a frame that has ended by now.
     pub fn take(&mut self, now: Cycles) -> Option<Vec<u8>> {
         // Three bytes at 115200 baud.
         let quiet = CLOCK_HZ * 30 / 115_200;

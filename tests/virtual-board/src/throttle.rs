@@ -9,11 +9,11 @@ use siskin_emulator::wire::Wire;
 
 use crate::time::{Cycles, NEVER, ns, of_ns};
 
-/// A level that lasts longer ends a frame: two bits of the slowest DShot, ns.
+/// A longer level ends a frame: two bits of the slowest DShot, ns.
 const REST_NS: u64 = 13_400;
 
-/// By how much later an edge arrives than it is sent, ns: a processor stops where a block of code ends, a
-/// little behind the time to which it was to run, and no edge may come in its past.
+/// Delay from sending an edge to its arrival, ns: a processor stops at the end of a code block, slightly
+/// after the time it was to run to, and no edge may arrive in its past.
 const CABLE_NS: u64 = 2_000;
 
 /// A reply that the chip has put on the wire.
@@ -30,7 +30,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// The datagram to the sender: its signal's number, the levels, and the time.
+    /// Returns the datagram to the sender: its signal's number, the levels, and the time.
     pub fn datagram(&self) -> Vec<u8> {
         let signal = Signal::Dshot {
             rate: self.rate,
@@ -46,11 +46,11 @@ impl Reply {
 /// The wire.
 #[derive(Debug, Default)]
 pub struct Throttle {
-    /// Edges that are yet to come: when, and the level after each.
+    /// Edges still to come: when, and the level after each.
     coming: VecDeque<(Cycles, bool)>,
     /// First edge of the latest frame, ns.
     frame_ns: Option<u64>,
-    /// Time from its first edge to its next one of that direction, ns: a bit.
+    /// Time from its first edge to the next in the same direction, ns: a bit.
     bit_ns: Option<u64>,
     last_ns: u64,
     edges: u32,
@@ -59,19 +59,19 @@ pub struct Throttle {
 }
 
 impl Throttle {
-    /// Takes from the wire what comes before a time.
+    /// Takes everything from the wire before a time.
     pub fn take(&mut self, wire: &mut Wire, before_ns: u64) {
         while let Some((time_ns, level)) = wire.next_edge(before_ns) {
             self.coming.push_back((of_ns(time_ns + CABLE_NS), level));
         }
     }
 
-    /// When the next edge comes.
+    /// Returns when the next edge comes.
     pub fn due(&self) -> Cycles {
         self.coming.front().map_or(NEVER, |(at, _)| *at)
     }
 
-    /// The level from the next edge on.
+    /// Returns the level after the next edge.
     pub fn take_edge(&mut self) -> Option<bool> {
         let (at, level) = self.coming.pop_front()?;
         if self.driven.is_none() {
@@ -94,17 +94,17 @@ impl Throttle {
         self.last_ns = now_ns;
     }
 
-    /// When the latest frame began, ns.
+    /// Returns when the latest frame began, ns.
     pub fn frame_ns(&self) -> Option<u64> {
         self.frame_ns
     }
 
-    /// Whether the edge that came last is the last of a DShot frame: its 32nd.
+    /// Returns whether the latest edge is the last of a DShot frame: its 32nd.
     pub fn is_whole(&self) -> bool {
         self.edges == 32
     }
 
-    /// The chip drives its pin, or lets it go, from now on; a reply that is whole with that.
+    /// Lets the chip drive its pin, or release it, from now on; returns a reply completed by that.
     pub fn drive(&mut self, now: Cycles, level: Option<bool>) -> Option<Reply> {
         match (level, &mut self.driven) {
             (Some(level), Some(edges)) => {
@@ -122,7 +122,7 @@ impl Throttle {
         }
     }
 
-    /// What the chip's edges say, if the first level is the line at rest and a low follows.
+    /// Decodes the chip's edges, if the first level is the line's rest level and a low follows.
     fn reply(&self, edges: &[(u64, bool)]) -> Option<Reply> {
         let asked_ns = self.frame_ns?;
         let rate = rate_of(self.bit_ns?)?;
@@ -144,7 +144,7 @@ impl Throttle {
     }
 }
 
-/// The rate whose bit is nearest, to an eighth.
+/// Returns the rate with the nearest bit time, to within an eighth.
 fn rate_of(bit_ns: u64) -> Option<Rate> {
     let near =
         |rate: &Rate| bit_ns.abs_diff(u64::from(rate.bit_ns())) < u64::from(rate.bit_ns()) / 8;

@@ -1,5 +1,5 @@
-//! The image of the VESC, which has no virtual board: its start and its control's interrupt, on a processor whose
-//! chip keeps what is written to its registers and is ready at once. Run with `--release`.
+//! The image of the VESC, which has no virtual board: its start and its control interrupt, on a processor whose
+//! chip keeps what is written to its registers and is always ready. Run with `--release`.
 //!
 //! The image is what this makes:
 //!
@@ -28,7 +28,7 @@ const CCM_BYTES: usize = 0x1_0000;
 const SRAM: u32 = 0x2000_0000;
 const SRAM_BYTES: usize = 0x2_0000;
 
-/// Registers (RM0090), and the bits that count here.
+/// Registers (RM0090), and the bits that matter here.
 const RCC_CR: u32 = 0x4002_3800;
 const SWITCHED_ON: u32 = 1 | 1 << 16 | 1 << 24;
 const RCC_CFGR: u32 = 0x4002_3808;
@@ -51,7 +51,7 @@ const CODE_CACHE: u32 = 1 << 9;
 const CONSTANTS_CACHE: u32 = 1 << 10;
 const DBGMCU_IDCODE: u32 = 0xe004_2000;
 
-/// The time's timer counts microseconds.
+/// The time driver's timer counts microseconds.
 const TIM4_CNT: u32 = 0x4000_0824;
 const CYCLES_A_US: Cycles = 168;
 const ADC1_SR: u32 = 0x4001_2000;
@@ -70,18 +70,18 @@ const EXTI_IMR: u32 = 0x4001_3c00;
 const REVISION_A: u32 = 0x1000_6413;
 const REVISION_1: u32 = 0x1007_6413;
 
-/// The control's interrupt comes in half of it.
+/// The control interrupt comes within half of it.
 const END: Cycles = 40_000_000;
 
-/// The interrupt at the end of the injected conversions, and how often it comes: 24 kHz.
+/// The end-of-conversion interrupt of the injected sequence, and how often it comes: 24 kHz.
 const CONVERTED: u16 = 18;
 const PERIOD: Cycles = 7_000;
 
-/// Exceptions of the vector table before the interrupts, and the second DMA's streams behind them.
+/// Exceptions in the vector table before the interrupts, and the second DMA's streams after them.
 const EXCEPTIONS: usize = 16;
 const SECOND_DMA: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 
-/// What the linker has made of the image, from the flash's beginning on.
+/// Returns the linked image, from the start of the flash.
 fn image() -> Vec<u8> {
     const BOARD: &str = "vesc4-f405";
     let path = made::made(BOARD, "bin");
@@ -89,7 +89,7 @@ fn image() -> Vec<u8> {
     fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The gate driver's alarm and its enable, as the program has set them up.
+/// The gate driver's alarm and its enable, as set up by the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Driver {
     heard: bool,
@@ -103,9 +103,9 @@ struct Registers {
     words: HashMap<u32, u32>,
     lines: Lines,
     now: Cycles,
-    /// When the converters are done next.
+    /// When the converters are next done.
     converted: Cycles,
-    /// The gate driver at the beginning of each control period.
+    /// The gate driver at the start of each control period.
     periods: Vec<Driver>,
     /// The control periods in which the gate driver's alarm is low.
     alarm: Range<usize>,
@@ -113,7 +113,7 @@ struct Registers {
     outputs_were_on: bool,
     /// What the serial line has sent.
     sent: Vec<u8>,
-    /// Until then the program runs.
+    /// When the run ends.
     ends: fn(&Self) -> bool,
 }
 
@@ -126,7 +126,7 @@ impl Registers {
             PWR_CSR => word | SCALED,
             DBGMCU_IDCODE => self.revision,
             TIM4_CNT => (self.now / CYCLES_A_US) as u32 & 0xffff,
-            // It counts down where the control begins.
+            // It is counting down when the control begins.
             TIM1_CR1 => word | DOWN,
             TIM1_SR => word | UPDATED,
             USART6_SR => SENT,
@@ -141,13 +141,13 @@ impl Registers {
         }
     }
 
-    /// Whether the gate driver's alarm is low in this period.
+    /// Returns whether the gate driver's alarm is low in this period.
     fn alarms(&self) -> bool {
         let period = self.periods.len().checked_sub(1);
         period.is_some_and(|period| self.alarm.contains(&period))
     }
 
-    /// Whether the program has taken the PWM timer, after the clocks have been set up.
+    /// Returns whether the program has set up the PWM timer, which it does after the clocks.
     fn timer_taken(&self) -> bool {
         self.word(RCC_APB2ENR) & TIM1 != 0
     }
@@ -168,12 +168,12 @@ impl Surroundings for Registers {
     }
 
     fn write(&mut self, address: u32, width: Width, value: u32) -> Result<(), BusError> {
-        // What is set up is written in whole words.
+        // Set-up writes are whole words.
         if width == Width::Word {
             self.words.insert(address, value);
         }
         match address {
-            // The control takes the request back.
+            // The control clears the request.
             ADC1_SR => self.lines.set(CONVERTED, false),
             GPIOC_BSRR if value & ENABLE != 0 => self.driver_enabled = true,
             GPIOC_BSRR if value & DISABLE != 0 => self.driver_enabled = false,
@@ -277,7 +277,7 @@ fn revision_a_does_not_read_ahead() {
     assert_eq!(access & (wanted | PREFETCH), wanted, "{access:#x}");
 }
 
-/// The second DMA corrupts data where it serves an AHB peripheral, as a port, beside one of APB2 (ES0182,
+/// The second DMA corrupts data if it serves an AHB peripheral, such as a port, as well as one on APB2 (ES0182,
 /// 2.1.10), and the serial line is on APB2: it has the two streams to itself.
 #[test]
 fn the_second_dma_serves_the_serial_line_alone() {
@@ -286,7 +286,7 @@ fn the_second_dma_serves_the_serial_line_alone() {
         let at = 4 * (EXCEPTIONS + interrupt);
         u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
     };
-    // What a driver does not serve has one handler, which most of the interrupts share.
+    // Interrupts that no driver serves share one handler, which most have.
     let mut shared = HashMap::new();
     for interrupt in 0..82 {
         *shared.entry(handler(interrupt)).or_insert(0) += 1;
@@ -295,7 +295,7 @@ fn the_second_dma_serves_the_serial_line_alone() {
     let (default, _) = default.expect("there are interrupts");
     let served = |stream: &usize| handler(SECOND_DMA[*stream]) != *default;
     let streams: Vec<usize> = (0..SECOND_DMA.len()).filter(served).collect();
-    // USART6's, into the memory and out of it (RM0090, table 43).
+    // USART6's, into memory and out of it (RM0090, table 43).
     assert_eq!(streams, [2, 6]);
 }
 
@@ -304,8 +304,8 @@ fn the_second_dma_serves_the_serial_line_alone() {
 const REST: usize = 640;
 const ASLEEP: usize = 20;
 
-/// A driver that sleeps or comes up pulls nFAULT low: its alarm is not heard until the rest is over, so that the
-/// edge of that asks for no new rest.
+/// A driver that sleeps or comes up pulls nFAULT low: its alarm is masked until the rest is over, so that this
+/// edge requests no new rest.
 #[test]
 fn the_gate_drivers_alarm_is_masked_while_it_rests() {
     const ALARM: usize = 100;
@@ -328,8 +328,8 @@ fn the_gate_drivers_alarm_is_masked_while_it_rests() {
     }
 }
 
-/// A wrong bit among the vectors, in the midst of the program or in its last byte: it says so, and neither the PWM
-/// nor the gate driver comes on.
+/// A wrong bit in the vectors, in the middle of the program or in its last byte: the image reports it, and
+/// neither the PWM nor the gate driver turns on.
 #[test]
 fn a_damaged_image_goes_no_further_than_to_say_so() {
     let told = |registers: &Registers| registers.sent.len() >= 62;
@@ -347,7 +347,7 @@ fn a_damaged_image_goes_no_further_than_to_say_so() {
         assert!(registers.periods.is_empty());
         assert!(!registers.outputs_were_on && !registers.driver_enabled);
     }
-    // A sound one runs the PWM and says nothing of it.
+    // A sound one runs the PWM and says nothing about it.
     let registers = run(&sound, REVISION_1, 0..0, |registers| {
         registers.periods.len() > 10
     });

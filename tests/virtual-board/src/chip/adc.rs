@@ -1,9 +1,8 @@
-//! ADC1 and ADC2 with what they have in common, as far as the image uses them.
+//! ADC1 and ADC2 with their common registers, as far as the image uses them.
 //!
-//! Either converts up to four injected ranks at TIM1's trigger output, and single regular conversions at
-//! the program's request. The registers of the first are at 0, of the second at 0x100, the common
-//! ones at 0x300. Their kernel clock is the chip's (ADC12SEL of RCC's CCIPR), divided by the common
-//! prescaler.
+//! Each converts up to four injected ranks on TIM1's trigger output, and single regular conversions on the
+//! program's request. The first one's registers are at 0, the second one's at 0x100, the common ones at
+//! 0x300. Their kernel clock is the chip's (ADC12SEL in RCC's CCIPR), divided by the common prescaler.
 
 mod converter;
 #[cfg(test)]
@@ -24,7 +23,7 @@ const CCR: u32 = 0x308;
 /// The interrupt of both, in the vector table.
 const INTERRUPT: u16 = 18;
 
-/// The fastest clock that a converter takes is 60 MHz (data sheet), a third of the chip's.
+/// A converter's fastest clock is 60 MHz (data sheet), a third of the chip's.
 const LEAST_RATIO: Cycles = 3;
 
 /// Both converters.
@@ -36,12 +35,12 @@ pub struct Converters {
 }
 
 impl Converters {
-    /// Both as they are after a reset.
+    /// Creates both as after a reset.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A reset of the block by RCC.
+    /// Resets the block, as RCC does.
     pub fn reset(&mut self, context: &mut Context) {
         for converter in &mut self.converters {
             converter.reset();
@@ -50,15 +49,15 @@ impl Converters {
         self.update(context);
     }
 
-    /// Lets the first regular conversion behind each injected sequence be one of channel 0, as ES0431 (2.5.8)
-    /// says that it may.
+    /// Makes the first regular conversion after each injected sequence convert channel 0, which ES0431
+    /// (2.5.8) says may happen.
     pub fn mislead(&mut self) {
         for converter in &mut self.converters {
             converter.mislead();
         }
     }
 
-    /// TIM1's trigger output has risen.
+    /// Takes a rising edge of TIM1's trigger output.
     pub fn trigger(&mut self, context: &mut Context) {
         let Some(clock) = clock(self.common) else {
             return;
@@ -68,23 +67,23 @@ impl Converters {
         }
     }
 
-    /// The voltage at the channel for which `converter` (1 or 2) has asked by [`Signal::Sample`].
+    /// Takes the voltage at the channel that `converter` (1 or 2) has requested by [`Signal::Sample`].
     pub fn sampled(&mut self, converter: u8, volts: f64) {
         self.converters[usize::from(converter) - 1].sampled(volts);
     }
 
-    /// The results of the injected sequences, by rank.
+    /// Returns the results of the injected sequences, by rank.
     pub fn injected(&self) -> [[u16; 4]; 2] {
         [0, 1].map(|number: usize| self.converters[number].injected())
     }
 
-    /// Triggers that came while a converter (1 or 2) was still at the sequence of the one before: it
-    /// has not taken them.
+    /// Returns the triggers that a converter (1 or 2) has ignored because it was still busy with the previous
+    /// sequence.
     pub fn ignored(&self, converter: u8) -> u64 {
         self.converters[usize::from(converter) - 1].ignored()
     }
 
-    /// The interrupt's line follows the flags.
+    /// Updates the interrupt line from the flags.
     fn update(&mut self, context: &mut Context) {
         let up = self.converters.iter().any(Converter::interrupts);
         if up != self.line {
@@ -97,7 +96,7 @@ impl Converters {
         let mut known = Ccr(0);
         known.set_ckmode(Ckmode::from_bits(3));
         known.set_presc(Presc::from_bits(15));
-        // The clock is not to be changed while a converter is on (RM0440, ADC_CCR).
+        // The clock must not change while a converter is on (RM0440, ADC_CCR).
         let on = self.converters.iter().any(Converter::on);
         if value & !known.0 != 0 || on && value != self.common.0 {
             return Err(Unmodelled);
@@ -155,8 +154,7 @@ impl Part for Converters {
     }
 }
 
-/// Cycles of the chip's clock in half a clock of the converters; nothing if that is too fast for
-/// them.
+/// Returns the chip's clock cycles per half converter clock; `None` if that is too fast for the converters.
 fn clock(common: Ccr) -> Option<Cycles> {
     let ratio = match (common.ckmode(), common.presc().to_bits()) {
         (Ckmode::ASYNCHRONOUS, 0) | (Ckmode::SYNC_DIV1, _) => 1,

@@ -1,9 +1,9 @@
-//! A part alone on the bench, for its tests.
+//! A bench for testing a part alone.
 
 use super::{Context, Part, Signal, Unmodelled};
 use crate::time::Cycles;
 
-/// A part, the time, and what it has said when.
+/// A part, the time, and its signals with their times.
 pub(super) struct Bench<P> {
     pub(super) part: P,
     pub(super) now: Cycles,
@@ -19,7 +19,7 @@ impl<P: Part> Bench<P> {
         }
     }
 
-    /// Does something with it at the present time.
+    /// Does something with it at the current time.
     pub(super) fn with<R>(&mut self, act: impl FnOnce(&mut P, &mut Context) -> R) -> R {
         let mut signals = Vec::new();
         let mut context = Context {
@@ -46,7 +46,7 @@ impl<P: Part> Bench<P> {
             .expect("it is modelled")
     }
 
-    /// Lets it act until a time, and at it.
+    /// Lets it act up to and including a time.
     pub(super) fn until(&mut self, end: Cycles) {
         while self.part.due() <= end {
             assert!(self.part.due() > self.now, "what was due has been done");

@@ -6,10 +6,10 @@ use stm32_metapac::comp::vals::{Blanking, Hysteresis, Inm, Polarity};
 use super::dac::Dac;
 use super::{Context, Part, Unmodelled};
 
-/// The comparators that are modelled, by their numbers.
+/// The modelled comparators, by number.
 const NUMBERS: [u8; 3] = [1, 2, 4];
 
-/// Their pins (port, number; 0 is port A) at INPSEL 0 and 1 (RM0440, comparators' plus inputs).
+/// Their pins (port, number; port 0 is A) at INPSEL 0 and 1 (RM0440, comparators' plus inputs).
 const PINS: [[(u8, u8); 2]; 3] = [[(0, 1), (1, 1)], [(0, 7), (0, 3)], [(1, 0), (4, 7)]];
 
 /// DAC3's channels, from 0, at INMSEL 4 (RM0440, comparators' minus inputs).
@@ -21,9 +21,9 @@ pub enum Defect {
     /// Nothing.
     #[default]
     None,
-    /// Its output is always at this level.
+    /// Its output is stuck at this level.
     Stuck(bool),
-    /// It sees its pin so many volts higher.
+    /// It sees its pin this many volts higher.
     Offset(f64),
 }
 
@@ -35,19 +35,19 @@ struct Comparator {
     defect: Defect,
 }
 
-/// The comparators. Their registers are a word each, COMP1's at 0.
+/// The comparators. Each has one register, COMP1's at 0.
 #[derive(Clone, Debug, Default)]
 pub struct Comparators {
     comparators: [Comparator; 3],
 }
 
 impl Comparators {
-    /// As they are after a reset.
+    /// Creates them as after a reset.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// As after a reset of the chip; a defect stays.
+    /// Resets them with the chip; a defect stays.
     pub(crate) fn reset(&mut self) {
         for comparator in &mut self.comparators {
             *comparator = Comparator {
@@ -57,15 +57,14 @@ impl Comparators {
         }
     }
 
-    /// Gives a comparator a defect, by its number.
+    /// Gives a comparator, by number, a defect.
     pub(crate) fn set_defect(&mut self, number: u8, defect: Defect) {
         if let Some(which) = index(number) {
             self.comparators[which].defect = defect;
         }
     }
 
-    /// The pin (port, number; 0 is port A) at a comparator's plus input, by its number, while it is
-    /// on.
+    /// Returns the pin (port, number; port 0 is A) at a comparator's plus input, by number, while it is on.
     pub fn pin(&self, number: u8) -> Option<(u8, u8)> {
         let which = index(number)?;
         let control = self.comparators[which].control;
@@ -73,15 +72,15 @@ impl Comparators {
         control.en().then_some(pin)
     }
 
-    /// A comparator's output, by its number, with these volts at its plus input; its delay of some
-    /// 20 ns is not there. Low while it is off.
+    /// Returns a comparator's output, by number, with this voltage at its plus input; without its delay of
+    /// some 20 ns. Low while it is off.
     pub fn level(&mut self, number: u8, volts: f64, dac: &Dac) -> bool {
         let Some(which) = index(number) else {
             return false;
         };
         let comparator = &mut self.comparators[which];
         let control = comparator.control;
-        // One without a level floats: it does not trip.
+        // Without a level it floats, and does not trip.
         let level = dac.volts(CHANNELS[which]);
         let above = |volts| level.is_some_and(|level| volts > level);
         let inverted = control.polarity() == Polarity::INVERTED;
@@ -95,12 +94,12 @@ impl Comparators {
     }
 }
 
-/// Where a comparator is among those that are modelled.
+/// Returns a comparator's index among the modelled ones.
 fn index(number: u8) -> Option<usize> {
     NUMBERS.iter().position(|which| *which == number)
 }
 
-/// Which of them has its register there.
+/// Returns the comparator that has its register there.
 fn at(offset: u32) -> Result<usize, Unmodelled> {
     let number = u8::try_from(offset / 4 + 1).map_err(|_| Unmodelled)?;
     index(number).ok_or(Unmodelled)
@@ -121,7 +120,7 @@ impl Part for Comparators {
         known.set_inmsel(Inm::from_bits(7));
         known.set_inpsel(true);
         known.set_polarity(Polarity::INVERTED);
-        // The output is read only.
+        // The output is read-only.
         known.set_value(true);
         let plain = new.hyst() == Hysteresis::NONE && new.blanksel() == Blanking::NO_BLANKING;
         let led = !new.en() || new.inmsel() == Inm::DACA;
@@ -168,7 +167,7 @@ mod tests {
         assert_eq!(comparators.pin(2), Some((0, 7)));
         assert_eq!(comparators.pin(4), Some((1, 0)));
         assert_eq!(comparators.pin(3), None);
-        // Half-way: above the first channel, below the second.
+        // Midway: above the first channel, below the second.
         let volts = 1500.0 / 4096.0 * 3.3;
         let levels = [1, 2, 4].map(|number| comparators.level(number, volts, &dac));
         assert_eq!(levels, [true, false, false]);
@@ -176,7 +175,7 @@ mod tests {
         assert_eq!(levels, [true; 3]);
     }
 
-    /// 40 A out of the motor: 128.57 mV, and 40 A of 3 mΩ by 4/7, are 197.1 mV, which is 244.7 steps of the
+    /// 40 A out of the motor: 128.57 mV plus 40 A times 3 mΩ times 4/7 is 197.1 mV, or 244.7 steps of the
     /// DAC; a step is 0.47 A.
     #[test]
     fn they_trip_at_the_rating() {

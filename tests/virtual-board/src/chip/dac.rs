@@ -1,4 +1,4 @@
-//! DAC3, whose two channels feed the comparators only.
+//! DAC3, whose two channels only feed the comparators.
 
 use stm32_metapac::dac::regs::{Cr, Mcr};
 use stm32_metapac::dac::vals::Mode;
@@ -15,7 +15,7 @@ const MCR: u32 = 0x3c;
 /// The reference, V.
 const SUPPLY_V: f64 = 3.3;
 
-/// The converter: levels take effect as they are written, without its settling time.
+/// The converter: levels take effect when written, without its settling time.
 #[derive(Clone, Debug, Default)]
 pub struct Dac {
     control: Cr,
@@ -24,12 +24,12 @@ pub struct Dac {
 }
 
 impl Dac {
-    /// The converter as it is after a reset.
+    /// Creates it as after a reset.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Volts of a channel, from 0; nothing while it is off.
+    /// Returns the voltage of a channel, from 0; `None` while it is off.
     pub fn volts(&self, channel: usize) -> Option<f64> {
         let level = f64::from(self.levels[channel]);
         self.control.en(channel).then(|| level / 4096.0 * SUPPLY_V)
@@ -53,7 +53,7 @@ impl Part for Dac {
                 let (mut known, new) = (Cr(0), Cr(value));
                 known.set_en(0, true);
                 known.set_en(1, true);
-                // Of the modes only that of the chip's inside without a buffer.
+                // Only the internal, unbuffered mode.
                 let inside = |channel| self.mode.mode(channel) == Mode::NORMAL_INT_BUFDIS;
                 let led = (0..2).all(|channel| !new.en(channel) || inside(channel));
                 if value & !known.0 != 0 || !led {
@@ -66,7 +66,7 @@ impl Part for Dac {
                 known.set_mode(0, Mode::from_bits(7));
                 known.set_mode(1, Mode::from_bits(7));
                 known.set_hfsel(3);
-                // A channel's mode is set while it is off (RM0440, DAC_MCR).
+                // A channel's mode may only be set while it is off (RM0440, DAC_MCR).
                 if value & !known.0 != 0 || self.control.0 != 0 {
                     return Err(Unmodelled);
                 }
@@ -94,9 +94,9 @@ mod tests {
         };
         let mut dac = Dac::new();
         let mut write = |dac: &mut Dac, offset, value| dac.write(offset, value, &mut context);
-        // As after a reset, it would drive a pin.
+        // In its reset mode it would drive a pin.
         assert_eq!(write(&mut dac, CR, 1), Err(Unmodelled));
-        // The chip's inside for both channels, and a bus above 160 MHz.
+        // Internal for both channels, and a bus above 160 MHz.
         assert_eq!(write(&mut dac, MCR, 0x0003_0003 | 2 << 14), Ok(()));
         assert_eq!(write(&mut dac, DHR12R1, 1024), Ok(()));
         assert_eq!(write(&mut dac, DHR12R2, 4095), Ok(()));
@@ -107,7 +107,7 @@ mod tests {
         assert_eq!(write(&mut dac, CR, 0x0001_0001), Ok(()));
         let top = dac.volts(1).expect("it is on");
         assert!((top - 3.2992).abs() < 1e-4);
-        // A wave is not modelled.
+        // Waves are not modelled.
         assert_eq!(write(&mut dac, CR, 0x0001_0001 | 1 << 6), Err(Unmodelled));
         assert_eq!(write(&mut dac, DHR12R1, 4096), Err(Unmodelled));
     }

@@ -12,7 +12,7 @@ pub struct Debug {
 }
 
 impl Debug {
-    /// As it is after power-up: other resets leave it (RM0440, DBGMCU_CR).
+    /// Creates it as after power-up: other resets leave it (RM0440, DBGMCU_CR).
     pub fn new() -> Self {
         Self {
             control: Cr(0),
@@ -22,7 +22,8 @@ impl Debug {
 }
 
 impl Debug {
-    /// Whether TIM1 stops with the processor, and turns its outputs off (RM0440, TIM1's debug mode).
+    /// Returns whether TIM1 stops with the processor, and turns its outputs off (RM0440, TIM1's debug
+    /// mode).
     pub fn stops_tim1(&self) -> bool {
         self.stopped_apb2.tim1()
     }

@@ -1,7 +1,7 @@
-//! DMA1: moves data between parts and memory at their requests (RM0440, 12.6).
+//! DMA1: moves data between parts and memory on their requests (RM0440, 12.6).
 //!
-//! Who owns the chip asks for the transfer of a channel, moves the datum, and says that it is done. That
-//! takes no time here, where the chip's takes some ten cycles of its bus.
+//! The chip's owner asks for a channel's transfer, moves the datum, and reports that it is done. That takes
+//! no time here, while on the chip it takes some ten bus cycles.
 
 use stm32_metapac::Interrupt;
 use stm32_metapac::bdma::regs::{Cr, Isr, Ndtr};
@@ -10,7 +10,7 @@ use stm32_metapac::bdma::vals::{Dir, Size};
 use super::{Context, Part, Signal, Unmodelled};
 use crate::processor::Width;
 
-/// Channels of the STM32G431's.
+/// Channels on the STM32G431.
 pub const CHANNELS: usize = 6;
 
 /// Bytes of a channel's registers; the first channel's begin at 8.
@@ -19,23 +19,22 @@ const CHANNEL_BYTES: u32 = 20;
 /// What may change while a channel is on: EN, TCIE, HTIE, TEIE, CIRC.
 const CHANGES_ON: u32 = 0b10_1111;
 
-/// One datum on its way. From the wider to the narrower the low bits are taken, and zeros are added the
-/// other way.
+/// A datum in transit. A wider source is truncated to its low bits, a narrower one is zero-extended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Transfer {
     /// The channel, from 0.
     pub channel: usize,
-    /// Where it is read.
+    /// Source address.
     pub from: u32,
-    /// Where it is written.
+    /// Destination address.
     pub to: u32,
-    /// How it is read.
+    /// Source width.
     pub from_width: Width,
-    /// How it is written.
+    /// Destination width.
     pub to_width: Width,
 }
 
-/// A channel's registers, and how far it has come.
+/// A channel's registers and its progress.
 #[derive(Clone, Copy, Debug)]
 struct Channel {
     control: Cr,
@@ -56,7 +55,7 @@ impl Channel {
         line: false,
     };
 
-    /// The addresses at the part and in memory for the next datum.
+    /// Returns the part's and the memory address for the next datum.
     fn addresses(&self) -> [u32; 2] {
         let control = self.control;
         let passed = u32::from(self.count - self.left);
@@ -70,7 +69,7 @@ impl Channel {
         ]
     }
 
-    /// Whether it has begun and has not come to its end.
+    /// Returns whether it has begun and not ended.
     fn is_amidst(&self) -> bool {
         self.left != self.count
     }
@@ -88,7 +87,7 @@ impl Channel {
     fn write(&mut self, register: u32, value: u32) -> Result<(), Unmodelled> {
         match register {
             0x00 => return self.control(Cr(value)),
-            // The others may not be written while the channel is on.
+            // The others must not be written while the channel is on.
             _ if self.control.en() => return Err(Unmodelled),
             0x04 => {
                 self.count = Ndtr(value).ndt();
@@ -106,7 +105,7 @@ impl Channel {
         let changes = wanted.0 ^ self.control.0;
         let starts = wanted.en() && !self.control.en();
         let sizes = [wanted.psize(), wanted.msize()];
-        // The chip does not promise how a transfer goes on that was turned off amidst.
+        // How a transfer continues that was turned off midway is not specified.
         if wanted.0 >> 14 != 0
             || sizes.iter().any(|size| width(*size).is_none())
             || stays_on && changes & !CHANGES_ON != 0
@@ -136,7 +135,7 @@ pub struct Dma {
 }
 
 impl Dma {
-    /// As it is after a reset.
+    /// Creates it as after a reset.
     pub fn new() -> Self {
         Self {
             channels: [Channel::RESET; CHANNELS],
@@ -144,8 +143,8 @@ impl Dma {
         }
     }
 
-    /// What a channel, from 0, moves at a request; nothing unless it is on and has data left. The request
-    /// then stands until the channel is on.
+    /// Returns what a channel, from 0, moves on a request; `None` unless it is on and has data left. The
+    /// request then stands until the channel is on.
     pub fn request(&self, channel: usize) -> Option<Transfer> {
         let registers = self.channels.get(channel)?;
         let control = registers.control;
@@ -168,11 +167,11 @@ impl Dma {
         })
     }
 
-    /// The datum of a channel's request has been moved.
+    /// Notes that the datum of a channel's request has been moved.
     pub fn done(&mut self, channel: usize, context: &mut Context) {
         let registers = &mut self.channels[channel];
         registers.left = registers.left.saturating_sub(1);
-        // Of an odd count the smaller half, of one all.
+        // Half, rounded down, but at least one.
         if registers.count - registers.left == (registers.count / 2).max(1) {
             self.flags.set_htif(channel, true);
         }
@@ -187,7 +186,7 @@ impl Dma {
 
     fn tell(&mut self, context: &mut Context) {
         for (index, channel) in self.channels.iter_mut().enumerate() {
-            // The enables TCIE, HTIE, TEIE are where a channel's flags are.
+            // The enables TCIE, HTIE, TEIE have the bit positions of a channel's flags.
             let line = self.flags.0 >> (4 * index) & channel.control.0 & 0b1110 != 0;
             if line != channel.line {
                 channel.line = line;
@@ -197,7 +196,7 @@ impl Dma {
         }
     }
 
-    /// The flags with each channel's sum of them.
+    /// Returns the flags with each channel's global flag.
     fn all_flags(&self) -> Isr {
         let mut flags = self.flags;
         for channel in 0..CHANNELS {
@@ -206,7 +205,7 @@ impl Dma {
         flags
     }
 
-    /// Removes flags; a channel's first removes all of its.
+    /// Clears flags; a channel's global flag clears all of its flags.
     fn clear(&mut self, bits: Isr) {
         for channel in 0..CHANNELS {
             let mask = if bits.gif(channel) { 0b1111 } else { 0 };
@@ -222,7 +221,7 @@ impl Default for Dma {
     }
 }
 
-/// The channel and its register at this offset.
+/// Returns the channel and its register at an offset.
 fn place(offset: u32) -> Result<(usize, u32), Unmodelled> {
     let offset = offset.checked_sub(8).ok_or(Unmodelled)?;
     let channel = (offset / CHANNEL_BYTES) as usize;

@@ -1,5 +1,5 @@
-//! DMAMUX1: which request each of DMA1's channels serves (RM0440, 13.6). Nothing is synchronised, and
-//! there are no request generators.
+//! DMAMUX1: which request each of DMA1's channels serves (RM0440, 13.6). Without synchronisation and
+//! request generators.
 
 use stm32_metapac::dmamux::regs::Ccr;
 
@@ -13,14 +13,14 @@ pub struct DmaMux {
 }
 
 impl DmaMux {
-    /// As it is after a reset.
+    /// Creates it as after a reset.
     pub fn new() -> Self {
         Self {
             channels: [Ccr(0); CHANNELS],
         }
     }
 
-    /// DMA1's channel, from 0, that serves a request (RM0440, table 91).
+    /// Returns DMA1's channel, from 0, that serves a request (RM0440, table 91).
     pub fn channel(&self, request: u8) -> Option<usize> {
         self.channels
             .iter()
@@ -34,7 +34,7 @@ impl Default for DmaMux {
     }
 }
 
-/// The channel whose register this is.
+/// Returns the channel of a register.
 fn index(offset: u32) -> Result<usize, Unmodelled> {
     let index = offset as usize / 4;
     (index < CHANNELS).then_some(index).ok_or(Unmodelled)
@@ -51,9 +51,9 @@ impl Part for DmaMux {
         let request = asked.dmareq_id();
         let mut wanted = Ccr(0);
         wanted.set_dmareq_id(request);
-        // An event after each transfer, which nothing takes.
+        // An event after each transfer, which nothing uses.
         wanted.set_ege(asked.ege());
-        // No two channels may have one request.
+        // No two channels may have the same request.
         let is_others = self.channel(request).is_some_and(|other| other != index);
         if value != wanted.0 || is_others {
             return Err(Unmodelled);
@@ -83,7 +83,7 @@ mod tests {
             [None, Some(0), Some(5)]
         );
         assert_eq!(mux.read(0x14, &mut context), Ok(1 << 9 | 56));
-        // The request of another channel, a synchronisation, DMA2's channels, a generator.
+        // Another channel's request, a synchronisation, DMA2's channels, a generator.
         for (offset, value) in [(0x04, 27), (0x04, 1 << 16 | 5), (0x20, 5), (0x100, 1)] {
             let written = mux.write(offset, value, &mut context);
             assert_eq!(written, Err(Unmodelled), "{offset:#x}");

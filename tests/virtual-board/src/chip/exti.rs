@@ -1,17 +1,17 @@
-//! EXTI: interrupts at the edges of pins, lines 0 to 15 (RM0440, 16.5). The other lines' registers are
-//! as after a reset.
+//! EXTI: interrupts on pin edges, lines 0 to 15 (RM0440, 16.5). The other lines' registers are as after a
+//! reset.
 
 use stm32_metapac::Interrupt;
 
 use super::{Context, Part, Signal, Unmodelled};
 
-/// The lines of pins.
+/// The pins' lines.
 const PINS: u32 = 0xffff;
 
-/// IMR1 after a reset: the lines of parts, which reach the processor directly.
+/// IMR1 after a reset: the direct lines, from parts to the processor.
 const DIRECT: u32 = 0x1f84_0000;
 
-/// Interrupts and the lines that each is for.
+/// Interrupts and the lines that raise them.
 const INTERRUPTS: [(Interrupt, u32); 7] = [
     (Interrupt::EXTI0, 1 << 0),
     (Interrupt::EXTI1, 1 << 1),
@@ -34,12 +34,12 @@ pub struct Exti {
 }
 
 impl Exti {
-    /// As it is after a reset, with low pins.
+    /// Creates it as after a reset, with low pins.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The pin at a line, from 0 to 15, has this level now.
+    /// Takes the level of the pin at a line, from 0 to 15.
     pub fn set_level(&mut self, line: u8, level: bool, context: &mut Context) {
         let bit = 1 << line;
         let edges = if level { self.rising } else { self.falling };

@@ -1,7 +1,7 @@
-//! The digital filter of a timer's inputs: a level is taken once so many samples in a row have it.
+//! The digital filter of a timer input: a level is accepted once enough samples in a row have it.
 //!
-//! A change is first seen by the sample after it. A change and its return between two samples start
-//! the count anew, which the hardware would not have seen.
+//! A change is first seen by the next sample. A change and its return between two samples restart the
+//! count, though the hardware would not have seen them.
 
 use stm32_metapac::timer::vals::FilterValue;
 
@@ -28,7 +28,7 @@ const SETTINGS: [(u64, u64); 16] = [
     (8, 32),
 ];
 
-/// A filter; both its sides are low at first.
+/// A filter, with input and output low at first.
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
     input: bool,
@@ -39,7 +39,7 @@ pub(super) struct Filter {
 }
 
 impl Filter {
-    /// One that lets everything pass.
+    /// Creates one that passes everything.
     pub(super) fn new() -> Self {
         Self {
             input: false,
@@ -50,12 +50,12 @@ impl Filter {
         }
     }
 
-    /// Sets it as its field says.
+    /// Sets it from its field.
     pub(super) fn set(&mut self, value: FilterValue) {
         (self.samples, self.every) = SETTINGS[usize::from(value.to_bits())];
     }
 
-    /// The level before it.
+    /// Takes the input level.
     pub(super) fn input(&mut self, level: bool, now: Cycles) {
         if self.input != level {
             self.input = level;
@@ -63,17 +63,17 @@ impl Filter {
         }
     }
 
-    /// The level before it, as it is.
+    /// Returns the input level.
     pub(super) fn level(&self) -> bool {
         self.input
     }
 
-    /// The level behind it.
+    /// Returns the output level.
     pub(super) fn output(&self) -> bool {
         self.output
     }
 
-    /// When the level behind it changes, if the one before it stays.
+    /// Returns when the output changes, if the input stays.
     pub(super) fn due(&self) -> Cycles {
         if self.input == self.output {
             NEVER
@@ -84,7 +84,7 @@ impl Filter {
         }
     }
 
-    /// Does what is due; whether the level behind it has changed.
+    /// Does what is due; returns whether the output has changed.
     pub(super) fn act(&mut self, now: Cycles) -> bool {
         let changes = self.due() <= now;
         if changes {

@@ -1,8 +1,8 @@
 //! The flash: its registers, and the store that the program writes (RM0440, 3.3 and 3.7).
 //!
-//! The rest of the array is read where it lies and never written. A word is programmed in 81.7 µs and a
-//! page erased in 22.02 ms, the typical times of DS12589 (at most 90 µs and 24.5 ms); what is written
-//! is there when that has passed. A read meanwhile, which would hold the processor up, is refused.
+//! The rest of the array is read in place and never written. Programming a double word takes 81.7 µs and
+//! erasing a page 22.02 ms, the typical times in DS12589 (at most 90 µs and 24.5 ms); the result appears
+//! when that has passed. A read in the meantime, which would stall the processor, is refused.
 
 mod array;
 
@@ -19,19 +19,19 @@ use crate::memory::Memory;
 use crate::processor::Width;
 use crate::time::{Cycles, NEVER, of_ns};
 
-/// The beginning of the flash.
+/// Start of the flash.
 const ORIGIN: u32 = 0x0800_0000;
 
-/// What opens the control register, in this order.
+/// The keys that unlock the control register, in this order.
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
 
-/// Programs a double word.
+/// Time to program a double word.
 const PROGRAM_NS: u64 = 81_700;
 
-/// Erases a page.
+/// Time to erase a page.
 const ERASE_NS: u64 = 22_020_000;
 
-/// Option bytes as they leave the factory, but for nSWBOOT0: the board's boot does not ask its pin.
+/// Factory option bytes, except for nSWBOOT0: the board boots without reading its pin.
 const OPTIONS: u32 = 0xffef_f8aa & !(1 << 26);
 
 /// Whether the control register may be written.
@@ -41,7 +41,7 @@ enum Lock {
     /// The first key has been written.
     Half,
     Open,
-    /// A wrong key has been written: closed until a reset.
+    /// A wrong key has been written: locked until a reset.
     Shut,
 }
 
@@ -55,9 +55,9 @@ pub struct Flash {
     torn: Eccr,
     /// The option bytes.
     pub(crate) options: u32,
-    /// Whether ADDR_ECC counts double words and not bytes.
+    /// Whether ADDR_ECC counts double words rather than bytes.
     torn_by_words: bool,
-    /// How often the program has removed ECCD.
+    /// How often the program has cleared ECCD.
     torn_removed: u32,
     lock: Lock,
     /// The first half of a double word, with its address.
@@ -68,7 +68,7 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// The flash after a reset. The store is a range of its memory.
+    /// Creates the flash as after a reset. The store is a range of its memory.
     pub fn new(memory: Memory, store: Range<u32>) -> Self {
         Self::around(Array::new(memory, store))
     }
@@ -97,8 +97,8 @@ impl Flash {
         }
     }
 
-    /// The registers are reset, and what was under way stays as it is in that moment: torn, by this seed.
-    /// So it is too when the power fails.
+    /// Resets the registers, and interrupts any operation: what it was writing is torn, by this seed. A
+    /// power failure does the same.
     pub fn reset(&mut self, seed: u64, context: &mut Context) {
         self.settle(context);
         if let Some((work, _)) = self.work.take() {
@@ -119,38 +119,38 @@ impl Flash {
         self.tell(context);
     }
 
-    /// Lets every write and erase fail from now on, or no more, as a worn-out or protected flash.
+    /// Makes every write and erase fail from now on, or no longer, as in a worn-out or protected flash.
     pub fn fail(&mut self, fails: bool) {
         self.fails = fails;
     }
 
-    /// Lets ADDR_ECC count double words from now on, or bytes as it does at first: RM0440 (3.7.7) does not
-    /// say which of them a chip does.
+    /// Makes ADDR_ECC count double words, or bytes as it does at first: RM0440 (3.7.7) does not say which
+    /// one a chip does.
     pub fn tell_torn_by_words(&mut self, by_words: bool) {
         self.torn_by_words = by_words;
     }
 
-    /// How often the program has been told of a torn double word, and has said that it knows.
+    /// Returns how often the program has been told of a torn double word and has acknowledged it.
     pub fn torn_removed(&self) -> u32 {
         self.torn_removed
     }
 
-    /// Until when the array cannot be read.
+    /// Returns until when the array cannot be read.
     pub fn busy_until(&self) -> Cycles {
         self.work.as_ref().map_or(0, |(_, ends)| *ends)
     }
 
-    /// Wait states of a read.
+    /// Returns the wait states of a read.
     pub fn wait_states(&self) -> u8 {
         self.access.latency().to_bits()
     }
 
-    /// Whether it reads ahead.
+    /// Returns whether it prefetches.
     pub fn prefetches(&self) -> bool {
         self.access.prften()
     }
 
-    /// What has changed in the store since this was asked last, in order.
+    /// Takes what has changed in the store since the last call, in order.
     pub fn take_changes(&mut self) -> Vec<Change> {
         self.array.take_changes()
     }
@@ -167,7 +167,7 @@ impl Flash {
             return Err(Unmodelled);
         }
         let value = self.array.read(address, width)?;
-        // The first one is told until its flag is removed.
+        // Only the first one is reported until its flag is cleared.
         if self.array.is_torn(address) && !self.torn.eccd() {
             let bytes = (address - ORIGIN) & !7;
             let counted = if self.torn_by_words { bytes / 8 } else { bytes };
@@ -204,7 +204,7 @@ impl Flash {
         } else if address.is_multiple_of(8) {
             self.first = Some((address, value));
         } else {
-            // The second half alone: the manual does not tell what comes of it.
+            // The second half alone: the manual does not say what happens.
             return Err(Unmodelled);
         }
         self.tell(context);
@@ -241,7 +241,7 @@ impl Flash {
         Ok(())
     }
 
-    /// Ends what is due.
+    /// Completes what is due.
     fn settle(&mut self, context: &mut Context) {
         if let Some((work, _)) = self.work.take_if(|(_, ends)| *ends <= context.now) {
             self.array.finish(&work);
@@ -252,7 +252,7 @@ impl Flash {
         }
     }
 
-    /// Whether an error has not been removed yet.
+    /// Returns whether an error has not been cleared yet.
     fn has_errors(&self) -> bool {
         let mut errors = self.status;
         errors.set_eop(false);
@@ -274,7 +274,7 @@ impl Flash {
 
     fn write_access(&mut self, value: u32) -> Result<(), Unmodelled> {
         let access = Acr(value);
-        // A cache is emptied while it is off; no power-down of the flash.
+        // A cache is cleared only while off; the flash is never powered down.
         if access.icrst() && access.icen()
             || access.dcrst() && access.dcen()
             || access.run_pd()
@@ -297,7 +297,7 @@ impl Flash {
     }
 
     fn write_control(&mut self, value: u32, context: &mut Context) -> Result<(), Unmodelled> {
-        // The bus would wait.
+        // The bus would stall.
         if self.work.is_some() {
             return Err(Unmodelled);
         }
@@ -315,7 +315,7 @@ impl Flash {
         known.set_strt(asked.strt());
         known.set_lock(asked.lock());
         known.set_optlock(asked.optlock());
-        // Neither mass erases nor fast programming nor option bytes.
+        // No mass erase, fast programming or option bytes.
         if known.0 != value || asked.strt() && !asked.per() {
             return Err(Unmodelled);
         }
@@ -341,7 +341,7 @@ impl Flash {
         if asked.eccie() {
             return Err(Unmodelled);
         }
-        // Flags are removed by ones.
+        // Flags are cleared by ones.
         if asked.eccd() && self.torn.eccd() {
             self.torn.set_eccd(false);
             self.torn_removed += 1;
@@ -379,7 +379,7 @@ impl Part for Flash {
             0x00 => self.write_access(value),
             0x08 => self.write_key(value),
             0x10 => {
-                // Flags are removed by ones.
+                // Flags are cleared by ones.
                 self.status = Sr(self.status.0 & !value);
                 self.tell(context);
                 Ok(())

@@ -23,7 +23,7 @@ pub struct Port {
 }
 
 impl Port {
-    /// A port, 0 for A, as it is after a reset; nothing drives its pins. The debugger's pins have their
+    /// Creates a port, 0 for A, as after a reset, with undriven pins. The debugger's pins have their
     /// alternate function, all others are analog.
     pub fn new(port: u8) -> Self {
         let (modes, speeds, pulls) = match port {
@@ -44,7 +44,7 @@ impl Port {
         }
     }
 
-    /// Its registers are reset; what comes from outside stays.
+    /// Resets its registers; what comes from outside stays.
     pub fn reset(&mut self, context: &mut Context) {
         *self = Self {
             driven: self.driven,
@@ -54,25 +54,25 @@ impl Port {
         self.tell(context);
     }
 
-    /// Something outside, or a part of the chip by its alternate function, drives a pin, or lets it go.
+    /// Drives a pin from outside, or from a part of the chip by its alternate function, or releases it.
     pub fn set_input(&mut self, pin: u8, level: Option<bool>) {
         self.inputs[usize::from(pin)] = level;
     }
 
-    /// What a pin is used for.
+    /// Returns what a pin is used for.
     pub fn mode(&self, pin: u8) -> vals::Moder {
         self.modes.moder(pin.into())
     }
 
-    /// The alternate function that a pin has, if it has one.
+    /// Returns a pin's alternate function, if it has one.
     pub fn alternate(&self, pin: u8) -> Option<u8> {
         let pin = usize::from(pin);
         let is_alternate = self.modes.moder(pin) == vals::Moder::ALTERNATE;
         is_alternate.then(|| self.functions[pin / 8].afr(pin % 8))
     }
 
-    /// A pin's level: as it is driven, or pulled; a pin that floats is low. What the port drives comes
-    /// before what drives it from outside.
+    /// Returns a pin's level: as driven, or as pulled; a floating pin is low. The port's own drive
+    /// overrides one from outside.
     pub fn level(&self, pin: u8) -> bool {
         let pin = usize::from(pin);
         let is_digital = self.modes.moder(pin) != vals::Moder::ANALOG;
@@ -80,7 +80,7 @@ impl Port {
         self.driven[pin].or(self.inputs[pin]).unwrap_or(pull)
     }
 
-    /// What the port itself drives a pin to as a general output.
+    /// Returns the level to which the port itself drives a pin as a general-purpose output.
     fn drive(&self, pin: usize) -> Option<bool> {
         let high = self.output.odr(pin) == vals::Odr::HIGH;
         let lets_go = high && self.types.ot(pin) == Ot::OPEN_DRAIN;
@@ -102,14 +102,14 @@ impl Port {
         }
     }
 
-    /// The levels that are read: an analog pin's is low.
+    /// Returns the levels as read: an analog pin reads low.
     pub(crate) fn input(&self) -> u32 {
         (0..PINS as u8)
             .filter(|pin| self.mode(*pin) != vals::Moder::ANALOG && self.level(*pin))
             .fold(0, |levels, pin| levels | 1 << pin)
     }
 
-    /// Sets and resets outputs; a pin of both is set.
+    /// Sets and resets outputs; set wins.
     fn change(&mut self, bits: Bsrr) {
         let [set, reset] = [bits.0 & 0xffff, bits.0 >> 16];
         self.output = Odr(self.output.0 & !reset | set);
@@ -125,7 +125,7 @@ impl Part for Port {
             0x0c => Ok(self.pulls.0),
             0x10 => Ok(self.input()),
             0x14 => Ok(self.output.0),
-            // These are written only.
+            // Write-only.
             0x18 | 0x28 => Ok(0),
             0x20 => Ok(self.functions[0].0),
             0x24 => Ok(self.functions[1].0),
@@ -199,7 +199,7 @@ mod tests {
         port.read(0x10, &mut context).unwrap()
     }
 
-    /// All pins of port C are inputs.
+    /// Returns port C with all pins as inputs.
     fn inputs() -> Port {
         let mut port = Port::new(2);
         assert_eq!(write(&mut port, MODES, 0), []);

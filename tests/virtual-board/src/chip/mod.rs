@@ -25,18 +25,18 @@ pub mod watchdog;
 
 use crate::time::{Cycles, NEVER};
 
-/// A register that the chip has and this crate does not, or an access that it does not take so.
+/// A register that the chip has and this crate does not model, or an access that it does not model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unmodelled;
 
 /// What one part of the chip tells the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Signal {
-    /// An interrupt's line, by its position in the vector table, goes up or down.
+    /// An interrupt line, by its position in the vector table, goes up or down.
     Interrupt(u16, bool),
-    /// The line of the non-maskable interrupt goes up or down.
+    /// The non-maskable interrupt's line goes up or down.
     NonMaskable(bool),
-    /// A request for a DMA transfer, by its number at the multiplexer (RM0440, table 91).
+    /// A DMA request, by its number at the multiplexer (RM0440, table 91).
     Request(u8),
     /// TIM1's trigger output rose.
     Trigger,
@@ -49,16 +49,16 @@ pub enum Signal {
         /// The low side's.
         low: bool,
     },
-    /// A converter's sampling ends: it wants the voltage at this channel.
+    /// A converter's sampling ends: it needs the voltage at this channel.
     Sample {
         /// 1 or 2.
         converter: u8,
         /// Its channel.
         channel: u8,
     },
-    /// A pin is driven to this level, or let go.
+    /// A pin is driven to this level, or released.
     Pin {
-        /// 0 is port A.
+        /// Port 0 is A.
         port: u8,
         /// From 0.
         pin: u8,
@@ -81,7 +81,7 @@ pub enum Signal {
 /// Why the chip was reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The supply came.
+    /// Power-up.
     Power,
     /// The program.
     Software,
@@ -91,22 +91,22 @@ pub enum Cause {
     Pin,
 }
 
-/// What a part may use of the others.
+/// What a part may use of the rest of the chip.
 pub struct Context<'a> {
     /// The time.
     pub now: Cycles,
-    /// What it tells the others, in order.
+    /// Its signals to the others, in order.
     pub signals: &'a mut Vec<Signal>,
 }
 
-/// A part of the chip with registers. Offsets are from its first, in bytes, and multiples of 4; what is
-/// narrower than a word comes as a word.
+/// A part of the chip with registers. Offsets are in bytes from its first one, and multiples of 4; narrower
+/// accesses come as words.
 pub trait Part {
-    /// A register's value.
+    /// Reads a register.
     fn read(&mut self, offset: u32, context: &mut Context) -> Result<u32, Unmodelled>;
     /// Writes a register.
     fn write(&mut self, offset: u32, value: u32, context: &mut Context) -> Result<(), Unmodelled>;
-    /// When it will do something by itself next.
+    /// Returns when it next does something by itself.
     fn due(&self) -> Cycles {
         NEVER
     }
@@ -116,11 +116,11 @@ pub trait Part {
     }
 }
 
-/// The flash that has code: all but the store.
+/// The flash that holds code: all but the store.
 pub const CODE: std::ops::Range<u32> = 0x0800_0000..0x0801_f000;
 
-/// The flash's last two pages, which keep the parameters.
+/// The flash's last two pages, which hold the parameters.
 pub const STORE: std::ops::Range<u32> = 0x0801_f000..0x0802_0000;
 
-/// The chip's own number (RM0440, 48.1).
+/// The chip's unique id (RM0440, 48.1).
 pub const UNIQUE_ID: std::ops::Range<u32> = 0x1fff_7590..0x1fff_759c;

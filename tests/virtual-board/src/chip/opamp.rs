@@ -1,14 +1,15 @@
-//! OPAMP1 to OPAMP3 as amplifiers by 2 to 64 of a pin's voltage, above the chip's ground or another pin's.
+//! OPAMP1 to OPAMP3 as amplifiers with gains of 2 to 64, of a pin's voltage above the chip's ground or another
+//! pin's.
 
 use stm32_metapac::opamp::regs::Csr;
 use stm32_metapac::opamp::vals::{PgaGain, VmSel, VpSel};
 
 use super::{Context, Part, Unmodelled};
 
-/// Its outputs reach the supply, V.
+/// Supply, which the outputs can reach, V.
 const SUPPLY_V: f64 = 3.3;
 
-/// Pins (port, number; 0 is port A) at VP_SEL 0 to 2 (RM0440, op-amps' inputs).
+/// Pins (port, number; port 0 is A) at VP_SEL 0 to 2 (RM0440, op-amps' inputs).
 const INPUTS: [[(u8, u8); 3]; 3] = [
     [(0, 1), (0, 3), (0, 7)],
     [(0, 7), (1, 14), (1, 0)],
@@ -18,37 +19,38 @@ const INPUTS: [[(u8, u8); 3]; 3] = [
 /// Pins at VINM0.
 const FEET: [(u8, u8); 3] = [(0, 3), (0, 5), (1, 2)];
 
-/// Converters with their channels at the internal output (RM0440, ADC connectivity).
+/// Converters and channels at the internal output (RM0440, ADC connectivity).
 const INSIDE: [(u8, u8); 3] = [(1, 13), (2, 16), (2, 18)];
 
-/// Converters with their channels at the output's pin: PA2, PA6 and PB1.
+/// Converters and channels at the output pin: PA2, PA6 and PB1.
 const OUTSIDE: [(u8, u8); 3] = [(1, 3), (2, 3), (1, 12)];
 
-/// The op-amps. Their registers are a word each. The settling of their outputs is not modelled.
+/// The op-amps. Each has one register. The settling of their outputs is not modelled.
 #[derive(Clone, Debug, Default)]
 pub struct OpAmps {
     controls: [Csr; 3],
 }
 
 impl OpAmps {
-    /// As they are after a reset.
+    /// Creates them as after a reset.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// The pin (port, number) at the input of an op-amp, from 0, while it is on.
+    /// Returns the pin (port, number) at the input of an op-amp, from 0, while it is on.
     pub fn pin(&self, which: usize) -> Option<(u8, u8)> {
         let control = self.controls[which];
         let pin = INPUTS[which][usize::from(control.vp_sel().to_bits())];
         control.opampen().then_some(pin)
     }
 
-    /// The pin (port, number) at which an op-amp's resistors end, from 0, where that is not the chip's ground.
+    /// Returns the pin (port, number) at which the resistors of an op-amp, from 0, end, if not at the chip's
+    /// ground.
     pub fn foot(&self, which: usize) -> Option<(u8, u8)> {
         matches!(gain(self.controls[which]), Some((_, Foot::Pin))).then_some(FEET[which])
     }
 
-    /// The output of an op-amp, from 0, with these volts at its input and its foot, while it is on.
+    /// Returns the output of an op-amp, from 0, for these voltages at its input and its foot, while it is on.
     pub fn output(&self, which: usize, volts: f64, foot_v: f64) -> Option<f64> {
         let control = self.controls[which];
         let (gain, _) = gain(control)?;
@@ -56,7 +58,8 @@ impl OpAmps {
         control.opampen().then_some(output)
     }
 
-    /// The op-amp, from 0, whose output is at a channel of a converter (1 or 2): inside, or at its pin.
+    /// Returns the op-amp, from 0, whose output is at a channel of a converter (1 or 2): internally, or at its
+    /// pin.
     pub fn at(&self, converter: u8, channel: u8) -> Option<usize> {
         let led = |&which: &usize| {
             let control = self.controls[which];
@@ -67,7 +70,7 @@ impl OpAmps {
     }
 }
 
-/// Where the resistors of the amplification end.
+/// Where the gain resistors end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Foot {
     /// The chip's ground.
@@ -76,12 +79,12 @@ enum Foot {
     Pin,
 }
 
-/// The amplification; nothing if that is none of the modelled ones.
+/// Returns the gain; `None` if it is not modelled.
 fn gain(control: Csr) -> Option<(f64, Foot)> {
     match control.vm_sel() {
         VmSel::OUTPUT => Some((1.0, Foot::Ground)),
         VmSel::PGA => match control.pga_gain().to_bits() {
-            // 2 to 64, the resistors' end at the chip's ground; from 8 on at VINM0 (RM0440, PGA_GAIN).
+            // 2 to 64, with the resistors at the chip's ground; from 8 on at VINM0 (RM0440, PGA_GAIN).
             bits @ 0..=5 => Some((f64::from(2_u8 << bits), Foot::Ground)),
             bits @ 8..=13 => Some((f64::from(2_u8 << (bits - 8)), Foot::Pin)),
             _ => None,
@@ -122,7 +125,7 @@ mod tests {
     /// On, PGA, ×16, high speed.
     const BY_16: u32 = 1 | 2 << 5 | 1 << 7 | 3 << 14;
 
-    /// Through the inside to the converter.
+    /// Internally to the converter.
     const INTERNAL: u32 = 1 << 8;
 
     #[test]
@@ -144,7 +147,7 @@ mod tests {
         assert_eq!(amps.at(1, 13), Some(0));
         assert_eq!(amps.at(2, 16), Some(1));
         assert_eq!(amps.at(1, 12), Some(2));
-        // The internal way of the third and the pins of the others are not used.
+        // The third one's internal output and the others' pins are not used.
         for (converter, channel) in [(2, 18), (1, 3), (2, 3)] {
             assert_eq!(amps.at(converter, channel), None);
         }
@@ -166,7 +169,7 @@ mod tests {
         assert_eq!(amps.write(4, BY_16, &mut context), Ok(()));
         assert_eq!(amps.foot(0), Some((0, 3)));
         assert_eq!(amps.foot(1), None);
-        // 16 times the one less 15 times the other.
+        // 16 times one less 15 times the other.
         let shown = amps.output(0, 0.11, 0.01).expect("it is on");
         assert!((shown - 1.61).abs() < 1e-9, "{shown}");
     }
@@ -179,7 +182,7 @@ mod tests {
             signals: &mut signals,
         };
         let mut amps = OpAmps::new();
-        // Standalone, a filter at the resistors, the DAC's input, trimming, a fourth.
+        // Standalone, a filter at the resistors, the DAC's input, trimming, a fourth one.
         let refused = [
             (0, 1),
             (0, 1 | 2 << 5 | 19 << 14),

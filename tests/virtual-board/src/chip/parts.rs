@@ -23,10 +23,10 @@ use super::{Cause, Context, Part};
 use crate::memory::Memory;
 use crate::time::Cycles;
 
-/// Ports A, B, C and the ones behind them, up to G.
+/// Ports A, B, C and the rest, up to G.
 const PORTS: u8 = 7;
 
-/// Where the ports are, and the bytes that each takes.
+/// Where the ports begin, and the bytes that each takes.
 const PORTS_AT: u32 = 0x4800_0000;
 const PORT_BYTES: u32 = 0x400;
 
@@ -55,7 +55,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// As they are at power-up, with this flash.
+    /// Creates them as at power-up, with this flash.
     pub fn new(flash: Flash) -> Self {
         Self {
             tim1: AdvancedTimer::new(),
@@ -81,10 +81,9 @@ impl Parts {
         }
     }
 
-    /// As they are after a reset of the chip: the flash keeps its bytes, and what the backup domain and
-    /// the reset flags keep stays.
+    /// Resets the chip: the flash keeps its bytes, and the backup domain and the reset flags keep theirs.
     pub fn reset(&mut self, cause: Cause, context: &mut Context) {
-        // What a loss of power leaves of a word is drawn from the moment.
+        // The time seeds what a power loss leaves of a word.
         self.flash.reset(context.now, context);
         self.rcc.reset(cause);
         let empty = Flash::new(Memory::new(0, 0, 0), 0..0);
@@ -99,7 +98,7 @@ impl Parts {
         };
     }
 
-    /// The part whose registers hold an address, with the offset there.
+    /// Returns the part whose registers hold an address, with the offset there.
     pub(crate) fn at(&mut self, address: u32) -> Option<(&mut dyn Part, u32)> {
         if (PORTS_AT..PORTS_AT + u32::from(PORTS) * PORT_BYTES).contains(&address) {
             let port = ((address - PORTS_AT) / PORT_BYTES) as usize;
@@ -130,7 +129,7 @@ impl Parts {
         Some((part, address - base))
     }
 
-    /// The requests for the DMA that stand until they are served.
+    /// Returns the DMA requests that stand until served.
     pub(crate) fn standing(&self) -> impl Iterator<Item = u8> {
         let lines = [&self.usart1, &self.usart2];
         let timers = [&self.tim2, &self.tim3, &self.tim4];
@@ -138,14 +137,15 @@ impl Parts {
         of_lines.chain(timers.into_iter().flat_map(Timer::requests))
     }
 
-    /// The DMA has served a request. A serial line needs not be told: its data register was read or written.
+    /// Notes that the DMA has served a request. A serial line need not be told: its data register was read
+    /// or written.
     pub(crate) fn served(&mut self, number: u8) {
         for timer in [&mut self.tim2, &mut self.tim3, &mut self.tim4] {
             timer.served(number);
         }
     }
 
-    /// When any of them does something by itself next.
+    /// Returns when any of them next does something by itself.
     pub(crate) fn due(&self) -> Cycles {
         let of_timers = self.tim1.due().min(self.tim2.due()).min(self.tim3.due());
         let of_lines = self.usart1.due().min(self.usart2.due());
@@ -157,7 +157,7 @@ impl Parts {
             .min(self.flash.due())
     }
 
-    /// Lets those act whose time has come.
+    /// Lets those act that are due.
     pub(crate) fn act(&mut self, context: &mut Context) {
         let mut act = |part: &mut dyn Part| {
             if part.due() <= context.now {

@@ -1,15 +1,15 @@
-//! PWR: the core's voltage, and the lock of the backup domain (RM0440, 6.4).
+//! PWR: the core voltage, and the backup domain's lock (RM0440, 6.4).
 
 use stm32_metapac::pwr::regs::{Cr1, Cr3};
 use stm32_metapac::pwr::vals::Vos;
 
 use super::{Context, Part, Unmodelled};
 
-/// R1MODE of CR5: the normal mode of voltage range 1, without boost. stm32-metapac 21.0.0 has it at bit
-/// 0; RM0440 and ST's headers have it here.
+/// R1MODE in CR5: normal mode of voltage range 1, without boost. stm32-metapac 21.0.0 has it at bit 0;
+/// RM0440 and ST's headers have it here.
 const NORMAL_MODE: u32 = 1 << 8;
 
-/// EIWUL of CR3: set after a reset.
+/// EIWUL in CR3: set after a reset.
 const INTERNAL_WAKE_UP: u32 = 1 << 15;
 
 /// The part.
@@ -21,7 +21,7 @@ pub struct Pwr {
 }
 
 impl Pwr {
-    /// As it is after a reset: voltage range 1 without boost.
+    /// Creates it as after a reset: voltage range 1 without boost.
     pub fn new() -> Self {
         let mut control = Cr1(0);
         control.set_vos(Vos::RANGE1);
@@ -32,12 +32,12 @@ impl Pwr {
         }
     }
 
-    /// Whether range 1's boost is on, which clocks above 150 MHz need.
+    /// Returns whether range 1's boost is on, which clocks above 150 MHz need.
     pub fn boost(&self) -> bool {
         self.range & NORMAL_MODE == 0
     }
 
-    /// Whether the backup domain's registers may be written.
+    /// Returns whether the backup domain's registers may be written.
     pub fn backup_open(&self) -> bool {
         self.control.dbp()
     }
@@ -72,7 +72,7 @@ impl Part for Pwr {
                 self.control = wanted;
             }
             0x08 => {
-                // UCPD's pulls at PB4 and PB6 of a dead battery: the pins are modelled without.
+                // UCPD's dead-battery pulls at PB4 and PB6, which are not modelled.
                 let mut others = Cr3(value);
                 others.set_ucpd1_dbdis(false);
                 if others.0 != INTERNAL_WAKE_UP {

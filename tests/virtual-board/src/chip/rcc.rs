@@ -1,6 +1,6 @@
-//! RCC: clocks, resets and why there was one (RM0440, 7.4).
+//! RCC: clocks, resets and their causes (RM0440, 7.4).
 //!
-//! Oscillators and the PLL are ready at once. The system clock is that of HSI or of the PLL behind it.
+//! Oscillators and the PLL are ready at once. The system clock is HSI or the PLL fed by it.
 
 mod clock;
 mod gates;
@@ -19,9 +19,9 @@ use crate::time::Cycles;
 pub struct Rcc {
     control: Cr,
     configuration: Cfgr,
-    /// Since when the system has had the PLL's clock and the processor a part of it.
+    /// Since when the system has run from the PLL with the processor's clock divided.
     divided_since: Option<Cycles>,
-    /// Whether the processor has got the PLL's clock in one step.
+    /// Whether the processor got the PLL's clock in one step.
     in_one_step: bool,
     pll: Pllcfgr,
     sources: Ccipr,
@@ -33,7 +33,7 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// As it is at power-up.
+    /// Creates it as at power-up.
     pub fn new() -> Self {
         let mut control = Cr(0);
         control.set_hsion(true);
@@ -54,8 +54,8 @@ impl Rcc {
         }
     }
 
-    /// After a reset of the chip. The causes add up until the program removes them, and the backup domain
-    /// keeps its registers, but for a loss of power.
+    /// Resets it with the chip. The causes accumulate until the program clears them, and the backup domain
+    /// keeps its registers, except after a loss of power.
     pub fn reset(&mut self, cause: Cause) {
         let (causes, backup) = match cause {
             Cause::Power => (Csr(0), Bdcr(0)),
@@ -71,22 +71,22 @@ impl Rcc {
         };
     }
 
-    /// Lets the backup domain be written, or no more: PWR's DBP.
+    /// Makes the backup domain writable, or no longer: PWR's DBP.
     pub fn open_backup(&mut self, open: bool) {
         self.backup_open = open;
     }
 
-    /// Whether the part at this address has a clock, or needs none.
+    /// Returns whether the part at this address has a clock, or needs none.
     pub fn has_clock(&self, address: u32) -> bool {
         self.gates.open(address)
     }
 
-    /// The processor's clock in Hz with this supply of the core and these wait states of the flash.
+    /// Returns the processor's clock in Hz with this core supply and these flash wait states.
     pub fn clock_hz(&self, supply: Supply) -> Result<u64, ClockError> {
         clock::frequency(self.configuration, self.pll, supply, self.in_one_step)
     }
 
-    /// Where the parts' own clocks come from.
+    /// Returns the sources of the parts' own clocks.
     pub fn sources(&self) -> Ccipr {
         self.sources
     }
@@ -101,7 +101,7 @@ impl Rcc {
         known.set_pllrdy(asked.pllrdy());
         let on_pll = self.configuration.sw() == Sw::PLL1_R;
         let starts = wanted.pllon() && !self.control.pllon();
-        // HSI is what all runs by; the PLL is not turned off under the system's clock.
+        // Everything runs from HSI; the PLL is not turned off while the system runs from it.
         if known.0 != value
             || !wanted.hsion()
             || on_pll && !wanted.pllon()
@@ -125,7 +125,7 @@ impl Rcc {
             Sw::PLL1_R => self.control.pllon() && self.pll.pllren(),
             _ => false,
         };
-        // The parts have the processor's clock.
+        // The parts run at the processor's clock.
         let undivided = asked.ppre1() == Ppre::DIV1 && asked.ppre2() == Ppre::DIV1;
         if known.0 != value || !undivided || !is_ready {
             return Err(Unmodelled);
@@ -153,12 +153,12 @@ impl Rcc {
         Ok(())
     }
 
-    /// The serial lines by their bus's clock or the system's, which are equal; the converters by the system's.
+    /// Serial lines from their bus or system clock, which are equal; the converters from the system clock.
     fn write_sources(&mut self, value: u32) -> Result<(), Unmodelled> {
         let asked = Ccipr(value);
         let mut wanted = Ccipr(0);
         wanted.set_adc12sel(asked.adc12sel());
-        // USB's and the random numbers': neither is there.
+        // The clock of USB and the random number generator, neither of which is modelled.
         wanted.set_clk48sel(asked.clk48sel());
         wanted.set_usart1sel(asked.usart1sel());
         wanted.set_usart2sel(asked.usart2sel());
@@ -186,7 +186,7 @@ impl Rcc {
         if value != wanted.0 || !known {
             return Err(Unmodelled);
         }
-        // What the clock comes from is chosen once.
+        // The clock source can only be chosen once.
         if self.backup.rtcsel() != Rtcsel::DISABLE {
             wanted.set_rtcsel(self.backup.rtcsel());
         }
@@ -210,7 +210,7 @@ impl Default for Rcc {
     }
 }
 
-/// What a reset leaves in CSR. Each one of the chip's own is seen at its reset pin too.
+/// Returns the flags that a reset leaves in CSR. The chip's own resets show at its reset pin too.
 fn flags(cause: Cause) -> Csr {
     let mut flags = Csr(0);
     flags.set_pinrstf(true);

@@ -4,7 +4,7 @@ use stm32_metapac::syscfg::regs::{Cfgr2, Exticr};
 
 use super::{Context, Part, Unmodelled};
 
-/// CFGR1 after a reset: the floating-point unit's interrupts but that of an inexact result.
+/// CFGR1 after a reset: the floating-point unit's interrupts, except for an inexact result.
 const CONFIGURATION: u32 = 0x7c00_0001;
 
 /// The part.
@@ -15,7 +15,7 @@ pub struct Syscfg {
 }
 
 impl Syscfg {
-    /// As it is after a reset.
+    /// Creates it as after a reset.
     pub fn new() -> Self {
         Self {
             ports: [Exticr(0); 4],
@@ -23,12 +23,12 @@ impl Syscfg {
         }
     }
 
-    /// Whether a locked-up processor breaks TIM1's outputs.
+    /// Returns whether a processor lockup breaks TIM1's outputs.
     pub fn lock_up_breaks(&self) -> bool {
         self.breaks.cll()
     }
 
-    /// The port, 0 for A, whose pin is at this line of EXTI, from 0 to 15.
+    /// Returns the port, 0 for A, whose pin is at this line of EXTI, from 0 to 15.
     pub fn port(&self, line: u8) -> u8 {
         let line = usize::from(line);
         self.ports[line / 4].exti(line % 4)

@@ -1,4 +1,4 @@
-//! Where the timers' registers are (RM0440, register maps of TIM1 and of TIM2 to TIM5).
+//! Offsets of the timers' registers (RM0440, register maps of TIM1 and of TIM2 to TIM5).
 
 use super::Unmodelled;
 
@@ -19,12 +19,12 @@ pub(super) const CCR4: u32 = 0x40;
 pub(super) const BDTR: u32 = 0x44;
 pub(super) const AF1: u32 = 0x60;
 
-/// The channel, from 0, of a compare register.
+/// Returns the channel, from 0, of a compare register.
 pub(super) fn channel(offset: u32) -> usize {
     ((offset - CCR1) / 4) as usize
 }
 
-/// The value, if it has none but these bits.
+/// Returns the value, if it has only these bits.
 pub(super) fn only(value: u32, bits: u32) -> Result<u32, Unmodelled> {
     if value & !bits == 0 {
         Ok(value)

@@ -1,5 +1,5 @@
-//! USART1 and USART2: 8 data bits, no parity, one stop bit, 16 samples a bit, with or without FIFOs, by
-//! DMA and interrupt.
+//! USART1 and USART2: 8 data bits, no parity, one stop bit, oversampling by 16, with or without FIFOs, with
+//! DMA and interrupts.
 
 #[cfg(test)]
 mod tests;
@@ -22,29 +22,29 @@ const RDR: u32 = 0x24;
 const TDR: u32 = 0x28;
 const PRESC: u32 = 0x2c;
 
-/// Bits of a byte on the line: start, data, stop. An idle frame is as long.
+/// Bits per byte on the line: start, data, stop. An idle frame is as long.
 const FRAME_BITS: Cycles = 10;
 
-/// The least that divides the clock with 16 samples a bit.
+/// Minimum divider of the clock with oversampling by 16.
 const LEAST_DIVIDER: u32 = 16;
 
-/// Bytes that each FIFO holds. The receiver's register holds one more (RM0440, RXFF).
+/// Bytes in each FIFO. The receiver's register holds one more (RM0440, RXFF).
 const FIFO: usize = 8;
 
-/// What differs between the two.
+/// What distinguishes the two.
 #[derive(Clone, Copy, Debug)]
 struct Identity {
     number: u8,
     /// In the vector table.
     interrupt: u16,
-    /// Of the receiver and the transmitter, at the DMA's multiplexer.
+    /// The receiver's and the transmitter's, at the DMA multiplexer.
     requests: [u8; 2],
 }
 
 /// A USART. Its clock is the chip's, undivided.
 ///
-/// Each [`Signal::Request`] asks for one transfer. It is given when the need for one arises and after
-/// each access to the data register that leaves it; a channel that is switched on later finds it by
+/// Each [`Signal::Request`] requests one transfer. It is sent when the need for one arises and after each
+/// access to the data register that leaves it; a channel that is enabled later finds it by
 /// [`Usart::requests`].
 #[derive(Clone, Debug)]
 pub struct Usart {
@@ -55,15 +55,15 @@ pub struct Usart {
     overrun: bool,
     idle: bool,
     complete: bool,
-    /// To be sent, and what is being sent until when.
+    /// Bytes to be sent, and the one being sent, until when.
     out: VecDeque<u8>,
     sending: Option<(u8, Cycles)>,
     /// The idle frame before the first byte.
     preamble_until: Cycles,
-    /// Received, and the register's last.
+    /// Received bytes, and the register's last.
     received: VecDeque<u8>,
     last: u8,
-    /// On the line, the first until that time.
+    /// Bytes on the line, the first arriving at that time.
     coming: VecDeque<u8>,
     arrives: Cycles,
     idle_at: Cycles,
@@ -72,7 +72,7 @@ pub struct Usart {
 }
 
 impl Usart {
-    /// USART1 after a reset.
+    /// Creates USART1 as after a reset.
     pub fn first() -> Self {
         Self::new(Identity {
             number: 1,
@@ -81,7 +81,7 @@ impl Usart {
         })
     }
 
-    /// USART2 after a reset.
+    /// Creates USART2 as after a reset.
     pub fn second() -> Self {
         Self::new(Identity {
             number: 2,
@@ -112,7 +112,7 @@ impl Usart {
         }
     }
 
-    /// A reset by RCC.
+    /// Resets it, as RCC does.
     pub fn reset(&mut self, context: &mut Context) {
         let line = self.line;
         *self = Self::new(self.identity);
@@ -120,14 +120,14 @@ impl Usart {
         self.update(context);
     }
 
-    /// Bits a second on the line; nothing while it is off.
+    /// Returns the line's bits per second; `None` while it is off.
     pub fn baud(&self) -> Option<f64> {
         let baud = CLOCK_HZ as f64 / f64::from(self.divider);
         self.control.ue().then_some(baud)
     }
 
-    /// Bytes come on the line from now on, without a gap, at the rate that is set. A receiver that is
-    /// off misses them.
+    /// Puts bytes on the line from now on, without gaps, at the configured rate. A receiver that is off
+    /// misses them.
     pub fn queue(&mut self, bytes: &[u8], now: Cycles) {
         if !self.receives() || bytes.is_empty() {
             return;
@@ -139,12 +139,12 @@ impl Usart {
         self.coming.extend(bytes);
     }
 
-    /// Bytes that wait on the line.
+    /// Returns how many bytes wait on the line.
     pub fn waiting(&self) -> usize {
         self.coming.len()
     }
 
-    /// The DMA's requests that are up, by their numbers at the multiplexer.
+    /// Returns the DMA requests that are up, by their numbers at the multiplexer.
     pub fn requests(&self) -> impl Iterator<Item = u8> + use<> {
         let both = self.identity.requests.into_iter().zip(self.needs());
         both.filter_map(|(number, needed)| needed.then_some(number))
@@ -162,7 +162,7 @@ impl Usart {
         FRAME_BITS * Cycles::from(self.divider)
     }
 
-    /// Bytes that it holds: received, and to be sent.
+    /// Returns its capacity in bytes: received, and to be sent.
     fn room(&self) -> [usize; 2] {
         if self.control.fifoen() {
             [FIFO + 1, FIFO]
@@ -175,7 +175,7 @@ impl Usart {
         self.out.len() < self.room()[1]
     }
 
-    /// Whether the receiver and the transmitter need a transfer.
+    /// Returns whether the receiver and the transmitter need a transfer.
     fn needs(&self) -> [bool; 2] {
         [
             self.receives() && self.transfers.dmar() && !self.received.is_empty(),
@@ -183,7 +183,7 @@ impl Usart {
         ]
     }
 
-    /// ISR. The thresholds of the FIFOs are not modelled.
+    /// Returns ISR. The FIFOs' thresholds are not modelled.
     fn flags(&self) -> Isr {
         let mut flags = Isr(0);
         flags.set_ore(self.overrun);
@@ -201,7 +201,7 @@ impl Usart {
         flags
     }
 
-    /// The interrupt's line and the requests follow the flags.
+    /// Updates the interrupt line and the requests from the flags.
     fn update(&mut self, context: &mut Context) {
         let (flags, control) = (self.flags(), self.control);
         let up = control.rxneie() && (flags.rxne() || flags.ore())
@@ -256,7 +256,7 @@ impl Usart {
         Ok(())
     }
 
-    /// Switched off, it forgets what it was at, and its flags (RM0440, UE).
+    /// Drops what it was doing, and its flags, when disabled (RM0440, UE).
     fn give_up(&mut self) {
         self.overrun = false;
         self.idle = false;
@@ -290,7 +290,7 @@ impl Usart {
         Ok(())
     }
 
-    /// The next byte goes onto a line that is free.
+    /// Puts the next byte on the line if that is free.
     fn load(&mut self, from: Cycles) {
         if self.sending.is_none() {
             let end = from + self.frame();
@@ -306,7 +306,7 @@ impl Usart {
         self.last
     }
 
-    /// The first byte on the line is there.
+    /// Takes the first byte on the line, which has arrived.
     fn arrive(&mut self) {
         let Some(byte) = self.coming.pop_front() else {
             return;
@@ -345,7 +345,7 @@ impl Part for Usart {
     fn write(&mut self, offset: u32, value: u32, context: &mut Context) -> Result<(), Unmodelled> {
         match offset {
             CR1 => self.set_control(value, context.now)?,
-            // One stop bit, nothing inverted; the clock undivided.
+            // One stop bit, no inversion, an undivided clock.
             CR2 | PRESC if value == 0 => {}
             CR3 => self.set_transfers(value)?,
             BRR if value == self.divider || !self.control.ue() && value <= 0xffff => {
@@ -361,7 +361,7 @@ impl Part for Usart {
                     self.received.clear();
                 }
             }
-            // The HAL writes all flags that it has read: those of other bits mean nothing here.
+            // The HAL writes all flags that it has read: the other bits mean nothing here.
             ICR => {
                 let clear = Icr(value);
                 self.overrun &= !clear.ore();

@@ -1,7 +1,7 @@
-//! IWDG: the independent watchdog, on the 32 kHz of LSI (RM0440, 42.4).
+//! IWDG: the independent watchdog, clocked by LSI at 32 kHz (RM0440, 42.4).
 //!
-//! Its registers take effect at once, where the chip takes some cycles of LSI: SR reads 0. LSI is exact,
-//! where the chip's has 29.5 to 34 kHz (DS12589).
+//! Its registers take effect at once, while the chip takes a few cycles of LSI: SR reads 0. LSI is exact,
+//! while the chip's runs at 29.5 to 34 kHz (DS12589).
 
 use stm32_metapac::iwdg::regs::{Kr, Pr, Rlr};
 use stm32_metapac::iwdg::vals::Key;
@@ -9,13 +9,13 @@ use stm32_metapac::iwdg::vals::Key;
 use super::{Cause, Context, Part, Signal, Unmodelled};
 use crate::time::{CLOCK_HZ, Cycles, NEVER};
 
-/// LSI's rate.
+/// LSI's frequency.
 const LSI_HZ: u64 = 32_000;
 
-/// What it counts down from unless it was told otherwise.
+/// What it counts down from by default.
 const LONGEST: u16 = 0xfff;
 
-/// The part. Once started, nothing but a reset of the chip stops it.
+/// The part. Once started, only a reset of the chip stops it.
 #[derive(Debug)]
 pub struct Watchdog {
     open: bool,
@@ -26,7 +26,7 @@ pub struct Watchdog {
 }
 
 impl Watchdog {
-    /// As it is after a reset: it does not run.
+    /// Creates it as after a reset: not running.
     pub fn new() -> Self {
         let mut reload = Rlr(0);
         reload.set_rl(LONGEST);
@@ -39,7 +39,7 @@ impl Watchdog {
         }
     }
 
-    /// The time to count down from `count` and once more.
+    /// Returns the time to count down from `count` and once more.
     fn time(&self, count: u16) -> Cycles {
         // 4 to 256; the last two are the same.
         let divider = 4 << self.prescaler.pr().to_bits().min(6);
@@ -72,13 +72,13 @@ impl Part for Watchdog {
                 self.open = key == Key::ENABLE;
                 if key == Key::START && !self.runs {
                     self.runs = true;
-                    // What is to be reloaded is loaded by the first reload.
+                    // The reload value is first used by the first reload.
                     self.ends = context.now + self.time(LONGEST);
                 } else if key == Key::RESET && self.runs {
                     self.ends = context.now + self.time(self.reload.rl());
                 }
             }
-            // The prescaler changes while it stands only: what is counted already stays as it is.
+            // The prescaler may only change while it stands: what has already been counted would stay.
             0x04 if self.open && !self.runs => self.prescaler = Pr(value & 7),
             0x08 if self.open => self.reload = Rlr(value & u32::from(LONGEST)),
             _ => return Err(Unmodelled),

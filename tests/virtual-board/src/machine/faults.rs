@@ -1,4 +1,4 @@
-//! What goes wrong on the bench, on the wire and with the chip, by a scenario's time line.
+//! Faults of the bench, the wire and the chip, by a scenario's timeline.
 
 use siskin_emulator::fault::CHIP_V;
 use siskin_emulator::machine::Stopped;
@@ -6,11 +6,11 @@ use siskin_emulator::machine::Stopped;
 use super::VirtualBoard;
 use crate::chip::Cause;
 
-/// How often what changes steadily is looked at, and a supply that may be too low for the chip, ns.
+/// How often steady changes, and a supply that may be too low for the chip, are checked, ns.
 const STEP_NS: u64 = 50_000;
 
 impl VirtualBoard {
-    /// Runs until a time, with the faults of each moment.
+    /// Runs until a time, applying the faults of each moment.
     pub(super) fn play(&mut self, until_ns: u64) -> Result<(), Stopped> {
         while self.now_ns < until_ns {
             let now_s = self.now_ns as f64 * 1e-9;
@@ -37,7 +37,7 @@ impl VirtualBoard {
         let now = self.faults.now;
         self.wire.disturb(now.wire);
         let world = self.processor.surroundings();
-        // The chip's own comparators act.
+        // The chip's own comparators react.
         world.bench().disturb(&before, &now);
         world.parts().flash.fail(now.flash_fails);
         let starved = now.bus_weakened && world.bench().bus_v() < CHIP_V;

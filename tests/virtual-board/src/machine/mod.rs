@@ -29,22 +29,22 @@ use crate::world::{Event, World};
 /// All of the store, in the file's offsets.
 const ALL: std::ops::Range<u32> = 0..FLASH_BYTES as u32;
 
-/// Fast memory and SRAM, to whole pages of the engine: 2 KB more than the chip has, each.
+/// CCM SRAM and SRAM, rounded up to the engine's pages: each 2 KB more than the chip has.
 const CCM: (u32, usize) = (0x1000_0000, 12 * 1024);
 const SRAM: (u32, usize) = (0x2000_0000, 24 * 1024);
 
-/// MAVLink's line; the other one is the telemetry's.
+/// MAVLink's line; the other one carries telemetry.
 const MAVLINK: u8 = 2;
 
 /// A board with an image in its flash.
 pub struct VirtualBoard {
     processor: Processor<World>,
-    /// Those at the start.
+    /// The parameters at the start.
     params: Params,
     now_ns: u64,
     locked_up: bool,
     faults: Timeline,
-    /// Held in reset, and for want of a supply.
+    /// Whether it is held in reset, and whether for lack of a supply.
     held: bool,
     starved: bool,
     wire: Wire,
@@ -54,11 +54,11 @@ pub struct VirtualBoard {
 }
 
 impl VirtualBoard {
-    /// A board with this image at power-up, on what `start` has; with a warning where what was stored is
-    /// not whole.
+    /// Creates a board with this image at power-up, on the bench of `start`; with a warning if what was
+    /// stored is damaged.
     ///
-    /// The image knows no command line: parameters that are set over the stored ones are put into its
-    /// flash before, and are stored with the others when it stores.
+    /// The image knows no command line: parameters set over the stored ones are put into its flash first,
+    /// and are stored with the others when it stores.
     ///
     /// # Errors
     /// The parameters cannot be put there.
@@ -135,22 +135,22 @@ impl VirtualBoard {
         Ok((board, warning))
     }
 
-    /// Chip and bench.
+    /// Returns the chip and the bench.
     pub fn world(&mut self) -> &mut World {
         self.processor.surroundings()
     }
 
-    /// The processor.
+    /// Returns the processor.
     pub fn processor(&mut self) -> &mut Processor<World> {
         &mut self.processor
     }
 
-    /// The parameters that its flash has at the start.
+    /// Returns the parameters in its flash at the start.
     pub fn params(&self) -> &Params {
         &self.params
     }
 
-    /// Figures of the PWM interrupt so far.
+    /// Returns the PWM interrupt's figures so far.
     pub fn figures(&mut self) -> Option<Figures> {
         let world = self.world();
         world.load.figures(world.now())
@@ -218,7 +218,7 @@ impl VirtualBoard {
         Ok(())
     }
 
-    /// Hands on what has happened.
+    /// Passes on what has happened.
     fn tell(&mut self, onlooker: &mut impl Onlooker, send: &mut dyn FnMut(&[u8])) {
         let world = self.processor.surroundings();
         let now = world.now();
@@ -251,7 +251,7 @@ impl VirtualBoard {
         }
     }
 
-    /// Puts what the chip has changed in its store into the file.
+    /// Writes what the chip has changed in its store to the file.
     fn persist(&mut self) -> Result<(), Stopped> {
         let changes = self.processor.surroundings().parts().flash.take_changes();
         let failed = |error: &dyn std::fmt::Display| Stopped(format!("--storage: {error}"));
@@ -331,7 +331,7 @@ impl Machine for VirtualBoard {
         let wire = self.wire.counts();
         Rejected {
             wire_datagrams: wire.rejected + wire.dropped,
-            // What the chip refuses it tells by MAVLink.
+            // The chip reports its refusals by MAVLink.
             wire_frames: 0,
             mavlink_frames: self.mavlink.refused(),
             lockstep_requests: None,
@@ -339,7 +339,7 @@ impl Machine for VirtualBoard {
     }
 }
 
-/// All bytes of the file.
+/// Returns all bytes of the file.
 fn bytes(flash: &mut FileFlash) -> Vec<u8> {
     let mut bytes = vec![0; FLASH_BYTES];
     // All of it can be read: it is in memory.

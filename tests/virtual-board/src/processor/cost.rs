@@ -1,21 +1,21 @@
-//! What code costs: an estimate of the cycles of a Cortex-M4 at 170 MHz, by the table of
-//! [the processor](super#what-code-costs).
+//! What code costs: an estimate of a Cortex-M4's cycles at 170 MHz, by [the processor's
+//! table](super#what-code-costs).
 
 use std::ops::Range;
 
 use super::flash_cache::{Cache, WAIT_STATES, WORD_BYTES};
 
-/// Cycles from a request to the first instruction of the handler, its stacking included.
+/// Cycles from a request to the first instruction of the handler, including stacking.
 pub const ENTRY: u64 = 12;
 /// Cycles to return.
 pub(super) const RETURN: u64 = 10;
 /// Cycles from one handler to the next.
 pub(super) const TAIL_CHAIN: u64 = 6;
 
-/// The pipeline's refill.
+/// Pipeline refill.
 const REFILL: u16 = 2;
 
-/// Where the code of the chip may lie, by what it costs.
+/// Where the chip's code may lie, by cost.
 const FLASH: Range<u32> = 0x0800_0000..0x0802_0000;
 const CCM: Range<u32> = 0x1000_0000..0x1000_2800;
 const SRAM: Range<u32> = 0x2000_0000..0x2000_8000;
@@ -26,20 +26,20 @@ pub(super) struct Block {
     bytes: u32,
     /// Instructions.
     pub(super) instructions: u32,
-    /// Cycles without waiting for the flash.
+    /// Cycles without flash wait states.
     cycles: u32,
-    /// Cycles before each half word of it.
+    /// Cycles before each of its half-words.
     before: Box<[u16]>,
-    /// Constants in flash that it loads by the program counter.
+    /// Constants in flash that it loads PC-relative.
     constants: Box<[u32]>,
-    /// Whether it has the instruction SEV.
+    /// Whether it contains a SEV.
     pub(super) sends_event: bool,
 }
 
 /// The blocks seen so far, and the caches.
 pub(super) struct Costs {
     blocks: Vec<Block>,
-    /// The block that begins at each half word of flash, CCM and SRAM, its number and one; 0 is none.
+    /// Number plus one of the block that begins at each half-word of flash, CCM and SRAM; 0 is none.
     index: [Vec<u32>; 3],
     instructions: Cache<32>,
     constants: Cache<8>,
@@ -59,7 +59,7 @@ impl Costs {
         }
     }
 
-    /// Forgets what it knows of the code.
+    /// Forgets what it knows about the code.
     pub(super) fn forget(&mut self) {
         self.blocks.clear();
         for index in &mut self.index {
@@ -67,7 +67,7 @@ impl Costs {
         }
     }
 
-    /// The number of the block of so many bytes at this address, and what it costs now.
+    /// Returns the number of the block of `bytes` bytes at this address, and its current cost.
     #[inline]
     pub(super) fn enter(
         &mut self,
@@ -158,9 +158,9 @@ impl Block {
         block
     }
 
-    /// Cycles that it waits for so many double words that are not in the cache, with the prefetch: all of a
-    /// read for the first, unless the code before goes on here, and for the others what is left of one
-    /// when the double word before has been executed.
+    /// Returns the cycles that it waits for `misses` double words not in the cache, with the prefetch: a
+    /// full read for the first, unless execution continues from the code before, and for each of the others
+    /// what is left of a read when the previous double word has been executed.
     fn waits_behind_prefetch(&self, misses: u32, goes_on: bool) -> u32 {
         let words = self.bytes.div_ceil(WORD_BYTES).max(1);
         let left = (WAIT_STATES + 1).saturating_sub(self.cycles / words);
@@ -168,25 +168,25 @@ impl Block {
         asked * WAIT_STATES + (misses - asked) * left.min(WAIT_STATES)
     }
 
-    /// Cycles of the block before the instruction at this offset.
+    /// Returns the block's cycles before the instruction at this offset.
     pub(super) fn before(&self, offset: u32) -> u32 {
         let before = self.before.get(offset as usize / 2);
         before.map_or(self.cycles, |cycles| u32::from(*cycles))
     }
 }
 
-/// Whether an instruction has a second half.
+/// Returns whether an instruction has a second half.
 fn is_wide(first: u16) -> bool {
     first >> 11 >= 0b11101
 }
 
-/// Cycles of an instruction of 16 bits.
+/// Returns the cycles of a 16-bit instruction.
 fn narrow(code: u16) -> u16 {
     match code >> 12 {
-        // LDR by the program counter; BX and BLX.
+        // PC-relative LDR; BX and BLX.
         0b0100 if code & 0x0800 != 0 => 2,
         0b0100 if code & 0x0700 == 0x0700 => 1 + REFILL,
-        // By a register: STR, STRH, STRB, LDRSB; LDR, LDRH, LDRB, LDRSH.
+        // By register: STR, STRH, STRB, LDRSB; LDR, LDRH, LDRB, LDRSH.
         0b0101 if code & 0x0e00 >= 0x0600 => 2,
         0b0110..=0b1001 if code & 0x0800 != 0 => 2,
         0b1011 => match code & 0x0f00 {
@@ -200,17 +200,17 @@ fn narrow(code: u16) -> u16 {
         },
         // STM and LDM.
         0b1100 => 1 + (code & 0xff).count_ones() as u16,
-        // B, with a condition or without.
+        // B, conditional or not.
         0b1101 | 0b1110 => 1 + REFILL,
         _ => 1,
     }
 }
 
-/// Cycles of an instruction of 32 bits.
+/// Returns the cycles of a 32-bit instruction.
 fn wide(first: u16, second: u16) -> u16 {
     let several = |registers: u16| 1 + registers.count_ones() as u16;
     match first >> 9 & 0x3f {
-        // LDM and STM; LDRD, STRD, the exclusive ones, TBB.
+        // LDM and STM; LDRD, STRD, the exclusives, TBB.
         _ if first & 0xfe40 == 0xe800 => {
             let to_pc = first & 0x10 != 0 && second & 0x8000 != 0;
             several(second) + if to_pc { REFILL } else { 0 }
@@ -225,11 +225,11 @@ fn wide(first: u16, second: u16) -> u16 {
             let special = second & 0xd000 == 0x8000 && first & 0x0380 == 0x0380;
             if special { 2 } else { 1 + REFILL }
         }
-        // Loads, and stores, of one register.
+        // Single loads and stores.
         _ if first & 0xfe10 == 0xf810 => 2,
         // Divisions.
         _ if first & 0xffd0 == 0xfb90 && second & 0xf0 == 0xf0 => 7,
-        // Floating point: several registers, one, computing.
+        // Floating point: several registers, one, arithmetic.
         _ if first & 0xee00 == 0xec00 && second & 0x0e00 == 0x0a00 => {
             if first & 0x0f00 == 0x0d00 {
                 if first & 0x10 != 0 { 2 } else { 1 }
@@ -242,24 +242,24 @@ fn wide(first: u16, second: u16) -> u16 {
     }
 }
 
-/// Cycles of a floating-point instruction that computes.
+/// Returns the cycles of a floating-point arithmetic instruction.
 fn float(first: u16, second: u16) -> u16 {
     match first & 0xb0 {
         0x80 => 14,
         0xb0 if first & 0xf == 1 && second & 0xc0 == 0xc0 => 14,
-        // Multiply and add or subtract, in one or two roundings.
+        // Multiply and add or subtract, with one or two roundings.
         0x00 | 0x10 | 0x90 | 0xa0 => 3,
         _ => 1,
     }
 }
 
-/// The address of the constant that an instruction loads by the program counter.
+/// Returns the address of the constant that an instruction loads PC-relative.
 fn constant(pc: u32, first: u16, second: u16) -> Option<u32> {
     let base = (pc + 4) & !3;
     if first & 0xf800 == 0x4800 {
         return Some(base + 4 * u32::from(first & 0xff));
     }
-    // LDR and VLDR of 32 bits.
+    // 32-bit LDR and VLDR.
     let (offset, matches) = match first {
         0xf85f | 0xf8df => (u32::from(second & 0xfff), true),
         _ => (
@@ -282,7 +282,7 @@ mod tests {
         block.cycles
     }
 
-    /// By the manual's table (DDI 0439), with the figures of this module where it gives a range.
+    /// By the manual's table (DDI 0439), with this module's figures where it gives a range.
     #[test]
     fn instructions_cost_what_the_manual_says() {
         for (code, cycles, what) in [
@@ -330,7 +330,7 @@ mod tests {
             .collect();
         let mut costs = Costs::new();
         let mut enter = |address| costs.enter(address, 4, false, || code[..4].to_vec()).1;
-        // 2 and 3, and two double words: the code's, and the constant's at 8.
+        // 2 and 3, plus two double words: the code's, and the constant's at 8.
         assert_eq!(enter(0x0800_0000), 5 + 4 + 4);
         assert_eq!(enter(0x0800_0000), 5);
         assert_eq!(enter(0x1000_0000), 5);

@@ -2,17 +2,17 @@
 
 use crate::time::{Cycles, NEVER};
 
-/// SysTick: it counts down from its reload value.
+/// SysTick: counts down from its reload value.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SysTick {
     pub(super) reload: u32,
     /// Bits 0 to 2 of its control register.
     bits: u32,
-    /// When it was, or will be, at zero.
+    /// When it was, or will be, zero.
     zero: Cycles,
-    /// Where it has been stopped.
+    /// The count at which it was stopped.
     stopped: u32,
-    /// Whether it has come to zero since that was asked last.
+    /// Whether it has reached zero since this was last read.
     flag: bool,
 }
 
@@ -24,7 +24,7 @@ impl SysTick {
         Cycles::from(self.reload) + 1
     }
 
-    /// When it comes to zero next.
+    /// Returns when it next reaches zero.
     #[inline(always)]
     pub(super) fn due(&self) -> Cycles {
         if self.bits & ENABLED == 0 {
@@ -34,7 +34,7 @@ impl SysTick {
         }
     }
 
-    /// Comes to zero as often as is due; whether that is an interrupt.
+    /// Reaches zero as often as due; returns whether that raises an interrupt.
     pub(super) fn act(&mut self, now: Cycles) -> bool {
         while self.due() <= now {
             self.flag = true;
@@ -54,7 +54,7 @@ impl SysTick {
     pub(super) fn set_control(&mut self, value: u32, now: Cycles) {
         let count = self.current(now);
         match (self.bits & ENABLED != 0, value & ENABLED != 0) {
-            // From zero it begins with a reload.
+            // From zero it starts with a reload.
             (false, true) if count == 0 => self.zero = now + self.period(),
             (false, true) => self.zero = now + Cycles::from(count),
             (true, false) => self.stopped = count,
@@ -70,7 +70,7 @@ impl SysTick {
         (self.zero.saturating_sub(now) % self.period()) as u32
     }
 
-    /// Any write sets it to zero, from where it begins anew.
+    /// Clears it to zero, from where it starts over; any write does so.
     pub(super) fn clear(&mut self, now: Cycles) {
         self.zero = now + self.period();
         self.stopped = 0;
@@ -82,7 +82,7 @@ impl SysTick {
 #[derive(Clone, Debug, Default)]
 pub(super) struct CycleCounter {
     runs: bool,
-    /// Its count less the time while it runs; else its count.
+    /// Its count minus the time while it runs; otherwise its count.
     offset: u32,
 }
 

@@ -1,63 +1,63 @@
-//! Entry into a handler and return from it (ARMv7-M, B1.5.6 to B1.5.8).
+//! Exception entry and return (ARMv7-M, B1.5.6 to B1.5.8).
 //!
-//! The floating-point state is stored at once where the processor would only keep room for it and store
-//! it when the handler uses the unit: what a program can see is the same.
+//! The floating-point state is stored at once, while the processor would only reserve its space and store
+//! it when the handler uses the unit: a program cannot tell the difference.
 
 use super::Register::{Control, Lr, Msp, Pc, Psp, R, Sp, Xpsr};
 use super::priority::{Exceptions, Masks, number};
 use super::{Register, cost};
 
-/// Bits of CONTROL: the process stack, and floating-point state to be kept.
+/// CONTROL bits: the process stack, and floating-point state to be saved.
 const SPSEL: u32 = 2;
 const FPCA: u32 = 4;
 
-/// Bits of xPSR: the exception's number, Thumb, and that the stack was moved to be aligned.
+/// xPSR bits: the exception's number, Thumb, and that the stack was realigned.
 const NUMBER: u32 = 0x1ff;
 const THUMB: u32 = 1 << 24;
 const PADDED: u32 = 1 << 9;
 /// The flags N, Z, C, V, Q and the four GE.
 const FLAGS: u32 = 0xf80f_0000;
-/// What of a stacked xPSR is taken back: flags, IT and T.
+/// What is restored from a stacked xPSR: flags, IT and T.
 const RESTORED: u32 = 0xff0f_fc00 & !PADDED;
 
-/// EXC_RETURN, with bits for a frame without floating point, thread mode and the process stack.
+/// EXC_RETURN, with the bits for a frame without floating point, thread mode and the process stack.
 const EXC_RETURN: u32 = 0xffff_ffe1;
 const BASIC: u32 = 0x10;
 const THREAD: u32 = 8;
 const PROCESS: u32 = 4;
 
-/// Words of a frame: without and with floating point.
+/// Words in a frame: without and with floating point.
 const BASIC_WORDS: u32 = 8;
 const FLOAT_WORDS: u32 = 26;
 
 /// The registers that a frame begins with; the return address and xPSR follow.
 const STACKED: [Register; 6] = [R(0), R(1), R(2), R(3), R(12), Lr];
 
-/// What exceptions need of a processor.
+/// What exceptions need from a processor.
 pub(super) trait State {
     fn get(&self, register: Register) -> u32;
     fn set(&mut self, register: Register, value: u32);
     /// s0 to s15, and FPSCR as the 17th.
     fn float(&self, index: u32) -> u32;
     fn set_float(&mut self, index: u32, value: u32);
-    /// A word of plain memory.
+    /// Reads a word of plain memory.
     fn load(&self, address: u32) -> Option<u32>;
-    /// Writes one; false where there is none.
+    /// Writes one; returns false if there is none.
     fn store(&mut self, address: u32, value: u32) -> bool;
     fn exceptions(&mut self) -> &mut Exceptions;
     fn vector_table(&self) -> u32;
-    /// Faultmask goes with the return from any exception but the NMI.
+    /// Clears FAULTMASK, as the return from any exception except the NMI does.
     fn clear_faultmask(&mut self);
     fn masks(&self) -> Masks;
-    /// The handler of an exception begins, or has ended.
+    /// Notes that an exception's handler begins, or has ended.
     fn note(&mut self, exception: u16, entered: bool);
-    /// Time that this takes.
+    /// Spends the time that this takes.
     fn spend(&mut self, cycles: u64);
-    /// A stack that is no memory: the hard fault that follows.
+    /// Returns the hard fault that follows when the stack is not in memory.
     fn stacking_fault(&mut self) -> u16;
 }
 
-/// Takes an exception at an instruction boundary: the program goes on at `return_address` after it.
+/// Takes an exception at an instruction boundary: the program continues at `return_address` afterwards.
 pub(super) fn enter(state: &mut impl State, exception: u16, return_address: u32) {
     let control = state.get(Control);
     let xpsr = state.get(Xpsr);
@@ -93,12 +93,12 @@ pub(super) fn enter(state: &mut impl State, exception: u16, return_address: u32)
     };
     state.spend(cost::ENTRY);
     begin(state, exception, exc_return);
-    // Behind the change to handler mode, in which another stack does not matter.
+    // After the change to handler mode, where a different stack does not matter.
     state.set(Control, control & !FPCA);
 }
 
-/// Returns from the exception that is being handled, by the value that was loaded into the program
-/// counter; or goes on with the next one that is due.
+/// Returns from the current exception, by the value loaded into the program counter; or continues with the
+/// next one due.
 pub(super) fn leave(state: &mut impl State, exc_return: u32) {
     let exc_return = exc_return | 1;
     let exception = (state.get(Xpsr) & NUMBER) as u16;
@@ -163,7 +163,7 @@ fn begin(state: &mut impl State, exception: u16, exc_return: u32) {
     state.set(Pc, handler | 1);
 }
 
-/// A word that must be there: a vector, or of a frame that has been stored.
+/// Reads a word that must exist: a vector, or part of a stored frame.
 fn load(state: &mut impl State, address: u32) -> u32 {
     state.load(address).unwrap_or(0)
 }

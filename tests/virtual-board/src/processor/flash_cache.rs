@@ -1,26 +1,26 @@
-//! The flash's caches (RM0440, 3.3.4): what is not in them costs wait states.
+//! The flash's caches (RM0440, 3.3.4): a miss costs wait states.
 //!
-//! Instructions: 32 lines of four double words; constants: 8 lines. A line is filled double word by double
-//! word as they are asked for, and the line that was used longest ago makes room. With the prefetch on,
-//! the double word behind the one that is executed is on its way meanwhile.
+//! Instructions: 32 lines of four double words; constants: 8 lines. A line is filled one double word at a
+//! time, on demand, and the least recently used line is replaced. With the prefetch on, the double word
+//! after the one being executed is already on its way.
 
 /// Wait states at 170 MHz in range 1 boost (RM0440, table 29).
 pub(super) const WAIT_STATES: u32 = 4;
 
-/// Bytes of a line.
+/// Bytes per line.
 const LINE_BYTES: u32 = 32;
 
-/// Bytes that the flash gives at once.
+/// Bytes per flash read.
 pub(super) const WORD_BYTES: u32 = 8;
 
-/// A cache of so many lines.
+/// A cache with this many lines.
 #[derive(Clone, Debug)]
 pub(super) struct Cache<const LINES: usize> {
-    /// Which line each place has; none at the start.
+    /// Tag of each place; none at the start.
     tags: [u32; LINES],
-    /// Which of its double words are there.
+    /// Which of its double words are valid.
     filled: [u8; LINES],
-    /// When each was used last.
+    /// When each was last used.
     used: [u64; LINES],
     uses: u64,
 }
@@ -35,7 +35,7 @@ impl<const LINES: usize> Cache<LINES> {
         }
     }
 
-    /// Fetches the bytes from `start` to `end`; how many double words were not there.
+    /// Fetches the bytes from `start` to `end`; returns the number of double words missing.
     pub(super) fn fetch(&mut self, start: u32, end: u32) -> u32 {
         let mut misses = 0;
         let mut line = start & !(LINE_BYTES - 1);
@@ -52,7 +52,7 @@ impl<const LINES: usize> Cache<LINES> {
         misses
     }
 
-    /// Where a line is, or is from now on.
+    /// Returns a line's place, allocating one if needed.
     fn place(&mut self, line: u32) -> usize {
         self.uses += 1;
         let known = self.tags.iter().position(|tag| *tag == line);
@@ -82,9 +82,9 @@ mod tests {
         // Three double words of two lines.
         assert_eq!(cache.fetch(24, 44), 3);
         assert_eq!(cache.fetch(24, 44), 0);
-        // Another double word of a line that is there.
+        // Another double word of a cached line.
         assert_eq!(cache.fetch(0, 2), 1);
-        // A third line: the second has to go, then the first is still there.
+        // A third line: the second is replaced, then the first is still there.
         assert_eq!(cache.fetch(64, 66), 1);
         assert_eq!(cache.fetch(24, 32), 0);
         assert_eq!(cache.fetch(32, 34), 1);

@@ -1,28 +1,28 @@
-//! The Cortex-M4F: what executes the image, and what it stands in.
+//! The Cortex-M4F that executes the image, and its surroundings.
 //!
-//! [`Processor`] translates the code by QEMU's engine; exceptions, the interrupt controller, SysTick and
-//! the cycle counter are this crate's (`exceptions`, `private`). It stands in its [`Surroundings`].
+//! [`Processor`] translates the code with QEMU's engine; exceptions, the interrupt controller, SysTick and
+//! the cycle counter are this crate's (`exceptions`, `private`). It runs in its [`Surroundings`].
 //!
 //! # What code costs
-//! Instructions by the table of the processor's manual (DDI 0439, 3.3.1), where it gives a range by the
-//! figures below. What is in flash waits for it: four wait states a double word that is not in the caches
-//! (32 lines of four double words for code, 8 for constants), less with the prefetch.
+//! Instructions cost what the processor's manual says (DDI 0439, 3.3.1); where that gives a range, the
+//! figures below apply. Flash adds four wait states per double word that is not in the caches (32 lines of
+//! four double words for code, 8 for constants), fewer with the prefetch.
 //!
 //! | | cycles |
 //! |---|---|
-//! | most instructions, and a store by the write buffer | 1 |
+//! | most instructions, and a store through the write buffer | 1 |
 //! | a load | 2 |
-//! | several registers, or a double word | 1 and 1 each |
-//! | a branch that ends a block, taken or not | 1, and 2 to refill the pipeline |
-//! | a division | 7, of 2 to 12 |
-//! | a floating-point division or root; multiply and add | 14; 3 |
+//! | several registers, or a double word | 1, plus 1 each |
+//! | a branch that ends a block, taken or not | 1, plus 2 to refill the pipeline |
+//! | a division | 7, from a range of 2 to 12 |
+//! | a floating-point division or root; multiply-add | 14; 3 |
 //! | a barrier, to or from a special register | 2 |
-//! | code in SRAM: a word over the system bus | 1 more |
+//! | code in SRAM: per word over the system bus | 1 more |
 //! | code in CCM | 0 more |
-//! | entry into a handler, return, from one to the next | 12, 10, 6 |
+//! | entry into a handler, return, tail-chaining | 12, 10, 6 |
 //!
-//! An instruction whose condition does not hold counts as one that is executed. Not counted: contention
-//! for the bus with the DMA, constants from flash by another way than by the program counter.
+//! An instruction whose condition fails counts as executed. Not counted: bus contention with the DMA, and
+//! constants read from flash other than PC-relative.
 
 mod cost;
 mod counters;
@@ -42,7 +42,7 @@ use std::cell::Cell;
 use crate::memory::Memory;
 use crate::time::Cycles;
 
-/// Bytes of an access.
+/// Width of an access in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
     /// One.
@@ -54,7 +54,7 @@ pub enum Width {
 }
 
 impl Width {
-    /// As a number.
+    /// Returns it as a number.
     pub fn bytes(self) -> u32 {
         match self {
             Self::Byte => 1,
@@ -64,7 +64,7 @@ impl Width {
     }
 }
 
-/// What an instruction does with a memory.
+/// How an instruction accesses memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// It reads.
@@ -78,24 +78,24 @@ pub enum Access {
 pub enum BusError {
     /// Nothing is there: the processor takes a bus fault.
     Nothing,
-    /// The chip has it, but it is not modelled, or not so: the run ends and says where.
+    /// The chip has it, but it is not modelled, or not like this: the run ends and says where.
     Unmodelled,
 }
 
-/// Interrupt lines from the chip to the processor: they stay up for as long as their cause does.
+/// Interrupt lines from the chip to the processor: they stay up as long as their cause lasts.
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
-    /// A bit an interrupt, by its position in the vector table.
+    /// One bit per interrupt, by its position in the vector table.
     pub interrupts: u128,
     /// The non-maskable interrupt.
     pub non_maskable: bool,
-    /// Those that have come up since the processor looked last: some are down again, their cause taken
-    /// away by the DMA, and have made their interrupt pending all the same.
+    /// Lines that have risen since the processor last looked: some are down again, their cause removed by
+    /// the DMA, but their interrupts are pending all the same.
     risen: Cell<u128>,
 }
 
 impl Lines {
-    /// An interrupt's line goes up or down.
+    /// Raises or lowers an interrupt's line.
     pub fn set(&mut self, position: u16, up: bool) {
         let line = 1 << position;
         if up {
@@ -107,7 +107,7 @@ impl Lines {
         }
     }
 
-    /// Those that have come up since this was asked last.
+    /// Returns those that have risen since the last call.
     pub fn take_risen(&self) -> u128 {
         self.risen.take()
     }
@@ -118,65 +118,65 @@ impl Lines {
 pub enum Stop {
     /// The surroundings asked for it.
     Asked,
-    /// The program has asked for a reset of the chip.
+    /// The program has requested a chip reset.
     Reset,
     /// A fault within a fault: the processor does nothing any more.
     LockedUp,
     /// An access that is not modelled.
     Unmodelled {
-        /// Where to.
+        /// The address accessed.
         address: u32,
-        /// By which instruction.
+        /// The instruction's address.
         pc: u32,
         /// What was written, if it was a write.
         written: Option<u32>,
     },
     /// An instruction that the engine does not know.
     Undefined {
-        /// Where it is.
+        /// Its address.
         pc: u32,
     },
 }
 
-/// What a processor stands in: registers, time, interrupt lines. Plain memory is the engine's.
+/// What a processor runs in: registers, time, interrupt lines. Plain memory is the engine's.
 pub trait Surroundings {
-    /// The time.
+    /// Returns the time.
     fn now(&self) -> Cycles;
     /// Reads outside plain memory.
     fn read(&mut self, address: u32, width: Width) -> Result<u32, BusError>;
     /// Writes outside plain memory.
     fn write(&mut self, address: u32, width: Width, value: u32) -> Result<(), BusError>;
-    /// The processor has spent this time.
+    /// Advances by the time that the processor has spent.
     fn pass(&mut self, cycles: Cycles);
-    /// The next time at which something may happen by itself.
+    /// Returns when something may next happen by itself.
     fn next(&self) -> Cycles;
-    /// The lines, as they are now.
+    /// Returns the current lines.
     fn lines(&self) -> &Lines;
-    /// Whether the processor shall stop before its next instruction.
+    /// Returns whether the processor shall stop before its next instruction.
     fn asks_to_stop(&self) -> bool;
-    /// Until when code that lies in flash has to wait.
+    /// Returns until when code in flash has to wait.
     fn flash_busy_until(&self) -> Cycles;
-    /// Whether the flash reads ahead.
+    /// Returns whether the flash prefetches.
     fn flash_prefetches(&self) -> bool {
         false
     }
-    /// The processor has entered the handler of an exception, or has returned from it.
+    /// Notes that the processor has entered an exception's handler, or returned from it.
     fn exception(&mut self, passage: &HandlerEvent) {
         let _ = passage;
     }
 }
 
-/// An entry into a handler, or a return from it.
+/// Entry into a handler, or return from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HandlerEvent {
     /// The exception's number; interrupts are numbered from 16.
     pub exception: u16,
-    /// Whether it is entered.
+    /// Whether it is an entry.
     pub entered: bool,
     /// Instructions since power-up.
     pub instructions: u64,
     /// Since when the processor could have taken an exception of this priority between two instructions,
-    /// and did so only now: the engine looks where a block of code begins.
+    /// though it did so only now: the engine checks at the start of a code block.
     pub since: Cycles,
 }
 
@@ -196,7 +196,7 @@ pub enum Register {
     R(u8),
     /// The stack pointer in use.
     Sp,
-    /// Where a call returns to.
+    /// The return address of a call.
     Lr,
     /// The next instruction.
     Pc,

@@ -2,7 +2,7 @@
 
 use super::Lines;
 
-/// Exceptions by their numbers.
+/// Exceptions by number.
 pub(super) mod number {
     pub(crate) const NMI: u16 = 2;
     pub(crate) const HARD_FAULT: u16 = 3;
@@ -18,16 +18,16 @@ pub(super) mod number {
 
 use number::{HARD_FAULT, INTERRUPTS, NMI};
 
-/// Exceptions that there can be: the system's and 102 interrupts (RM0440, table 97), to a whole word.
+/// Possible exceptions: the system's and 102 interrupts (RM0440, table 97), rounded up to a word.
 const EXCEPTIONS: usize = 16 + 112;
 
-/// Bits of a priority that the chip has: the upper four.
+/// Priority bits that the chip implements: the upper four.
 pub(super) const PRIORITY_MASK: u8 = 0xf0;
 
-/// The priority of no exception: below all.
+/// Priority when no exception is active: below all.
 pub(super) const NONE: i16 = 256;
 
-/// The masks of the processor.
+/// The processor's masks.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Masks {
     pub(super) primask: bool,
@@ -35,14 +35,14 @@ pub(super) struct Masks {
     pub(super) basepri: u8,
 }
 
-/// Pending, enabled and active exceptions; a bit an exception, by its number.
+/// Pending, enabled and active exceptions, one bit each, by number.
 #[derive(Clone, Debug)]
 pub(super) struct Exceptions {
     pub(super) enabled: u128,
     pub(super) pending: u128,
     pub(super) active: u128,
     priorities: [u8; EXCEPTIONS],
-    /// The lines when they were looked at last.
+    /// The lines when last looked at.
     lines: u128,
 }
 
@@ -58,8 +58,8 @@ impl Exceptions {
         }
     }
 
-    /// Takes the lines in: one that is up makes its interrupt pending unless that is being handled; one
-    /// that comes up does so in any case.
+    /// Samples the lines: one that is up makes its interrupt pending unless that is being handled; one that
+    /// rises does so in any case.
     #[inline(always)]
     pub(super) fn latch(&mut self, lines: &Lines) {
         let risen = lines.take_risen() << INTERRUPTS;
@@ -70,7 +70,7 @@ impl Exceptions {
         self.lines = lines;
     }
 
-    /// Whether any exception is pending that is enabled, masked or not.
+    /// Returns whether any enabled exception is pending, masked or not.
     #[inline(always)]
     pub(super) fn any(&self) -> bool {
         self.pending & self.enabled != 0
@@ -84,7 +84,7 @@ impl Exceptions {
         }
     }
 
-    /// The priority as the register has it.
+    /// Returns the priority as in the register.
     pub(super) fn priority_bits(&self, exception: u16) -> u8 {
         let priority = self.priorities.get(usize::from(exception));
         priority.copied().unwrap_or(0)
@@ -96,13 +96,13 @@ impl Exceptions {
         }
     }
 
-    /// The highest priority of those that are being handled.
+    /// Returns the highest priority among the active exceptions.
     pub(super) fn active_priority(&self) -> i16 {
         self.first(self.active)
             .map_or(NONE, |(_, priority)| priority)
     }
 
-    /// The priority at which the processor executes.
+    /// Returns the current execution priority.
     pub(super) fn execution_priority(&self, masks: Masks) -> i16 {
         let mut priority = self.active_priority();
         if masks.basepri != 0 {
@@ -117,30 +117,30 @@ impl Exceptions {
         priority
     }
 
-    /// The exception that is to be taken now.
+    /// Returns the exception to be taken now.
     pub(super) fn due(&self, masks: Masks) -> Option<u16> {
         let (exception, priority) = self.highest()?;
         (priority < self.execution_priority(masks)).then_some(exception)
     }
 
-    /// The pending exception of the highest priority, masked or not.
+    /// Returns the pending exception of the highest priority, masked or not.
     pub(super) fn highest(&self) -> Option<(u16, i16)> {
         self.first(self.pending & self.enabled)
     }
 
-    /// An exception is entered.
+    /// Notes that an exception is entered.
     pub(super) fn enter(&mut self, exception: u16) {
         self.pending &= !bit(exception);
         self.active |= bit(exception);
     }
 
-    /// An exception has been handled; its line may be up still.
+    /// Notes that an exception has been handled; its line may still be up.
     pub(super) fn leave(&mut self, exception: u16) {
         self.active &= !bit(exception);
         self.pending |= self.lines & bit(exception);
     }
 
-    /// Of these, the one with the highest priority, or the lowest number of several.
+    /// Returns the one with the highest priority, or the lowest number among equals.
     fn first(&self, mut of: u128) -> Option<(u16, i16)> {
         let mut best: Option<(u16, i16)> = None;
         while of != 0 {
@@ -155,7 +155,7 @@ impl Exceptions {
     }
 }
 
-/// The bit of an exception.
+/// Returns an exception's bit.
 pub(super) const fn bit(exception: u16) -> u128 {
     1 << exception
 }

@@ -6,29 +6,29 @@ use super::counters::{CycleCounter, SysTick};
 use super::priority::{Exceptions, bit, number};
 use crate::time::Cycles;
 
-/// The processor as CPUID names it: Cortex-M4 r0p1.
+/// CPUID: Cortex-M4 r0p1.
 const CPUID: u32 = 0x410f_c241;
 
 /// AIRCR's key for writing.
 const KEY: u32 = 0x05fa;
-/// The same as it is read.
+/// The same as read back.
 const KEY_READ: u32 = 0xfa05;
 
-/// CCR: the stack is aligned to 8 bytes at an exception.
+/// CCR: the stack is aligned to 8 bytes on exceptions.
 const STACK_ALIGNED: u32 = 1 << 9;
 
-/// FPCCR as it is after a reset: the floating-point state is kept, lazily.
+/// FPCCR after a reset: the floating-point state is saved, lazily.
 const FPCCR: u32 = 0xc000_0000;
 const FPCCR_LAZY: u32 = 1 << 30;
 
-/// The fault handlers that SHCSR enables, with its bits.
+/// The fault handlers that SHCSR enables, with their bits.
 const FAULTS: [(u16, u32); 3] = [
     (number::MEMORY_FAULT, 1 << 16),
     (number::BUS_FAULT, 1 << 17),
     (number::USAGE_FAULT, 1 << 18),
 ];
 
-/// The registers with the exceptions' state behind them.
+/// The registers, with the exception state behind them.
 #[derive(Clone, Debug)]
 pub(super) struct Private {
     pub(super) exceptions: Exceptions,
@@ -64,7 +64,7 @@ impl Private {
         }
     }
 
-    /// Reads a register, or a part of one.
+    /// Reads a register, or part of one.
     pub(super) fn read(
         &mut self,
         address: u32,
@@ -117,7 +117,7 @@ impl Private {
         })
     }
 
-    /// Writes a register, or a part of one.
+    /// Writes a register, or part of one.
     pub(super) fn write(
         &mut self,
         address: u32,
@@ -173,7 +173,7 @@ impl Private {
             0xe000_ed2c => self.hfsr &= !value,
             0xe000_ed88 => self.cpacr = value,
             0xe000_edfc => self.demcr = value,
-            // Lazily or at once: a program sees the same.
+            // Lazily or at once: a program cannot tell.
             0xe000_ef34 if value & !FPCCR_LAZY == FPCCR & !FPCCR_LAZY => self.fpccr = value,
             0xe000_1000 => self.cycles.set_control(value, now),
             0xe000_1004 => self.cycles.set(value, now),
@@ -182,7 +182,7 @@ impl Private {
         Ok(())
     }
 
-    /// Four priorities from an exception on.
+    /// Returns four priorities, starting with an exception's.
     fn priorities(&self, exception: u32) -> u32 {
         let bits = |index: u32| self.exceptions.priority_bits((exception + index) as u16);
         u32::from_le_bytes([bits(0), bits(1), bits(2), bits(3)])
@@ -203,7 +203,7 @@ impl Private {
             | pending(number::NMI) << 31
     }
 
-    /// The exception that is being handled, or 0.
+    /// Returns the exception being handled, or 0.
     fn current(&self) -> u16 {
         let exceptions = &self.exceptions;
         let active = (1..128).filter(|exception| exceptions.active & bit(*exception) != 0);
@@ -229,7 +229,7 @@ impl Private {
         }
     }
 
-    /// All four bits of the priorities pre-empt: other groupings are not modelled.
+    /// Writes AIRCR. All four priority bits pre-empt: other groupings are not modelled.
     fn set_aircr(&mut self, value: u32) -> Result<(), BusError> {
         let grouping = value >> 8 & 7;
         if value >> 16 != KEY {

@@ -1,8 +1,8 @@
-//! The engine that translates the image's code: QEMU's, by the crate `unicorn-engine`.
+//! The engine that translates the image's code: QEMU's, through the crate `unicorn-engine`.
 //!
-//! It executes instructions; what makes a Cortex-M of it is here and in `exceptions`
-//! and `private`. Time is counted where a block of code begins: there an exception is
-//! taken, and there a run stops. A register is accessed at the time of the instruction that does so.
+//! It executes instructions; what makes it a Cortex-M is here and in `exceptions` and `private`. Time is
+//! counted at the start of each code block: there an exception is taken, and there a run stops. A register
+//! is accessed at the time of its instruction.
 
 mod hooks;
 mod registers;
@@ -26,7 +26,7 @@ use super::private::Private;
 use super::{Access, HandlerEvent, Mapped, Register, Stop, Surroundings};
 use crate::time::Cycles;
 
-/// Where the chip's registers are, and the store that is handed out like them.
+/// Where the chip's registers are, and the store, which is accessed like them.
 const REGISTERS: [Range<u64>; 4] = [
     0x0801_f000..0x0802_0000,
     0x1fff_0000..0x2000_0000,
@@ -34,7 +34,7 @@ const REGISTERS: [Range<u64>; 4] = [
     0xe000_0000..0xe010_0000,
 ];
 
-/// A Cortex-M4F in its surroundings, by that engine.
+/// A Cortex-M4F in its surroundings, run by that engine.
 pub struct Processor<S: Surroundings + 'static> {
     engine: Unicorn<'static, Inside<S>>,
 }
@@ -47,10 +47,10 @@ struct Inside<S> {
     costs: Costs,
     /// When the latest block began.
     began: Cycles,
-    /// The block that is being executed.
+    /// The block being executed.
     running: Option<Running>,
     instructions: u64,
-    /// What an instruction has done first with each memory that is watched.
+    /// The first access to each watched memory.
     watched: Vec<Option<Access>>,
     /// The event register.
     event: bool,
@@ -63,7 +63,7 @@ struct Running {
     address: u32,
     number: usize,
     cycles: u64,
-    /// Those that have been counted already.
+    /// Those that have already been counted.
     spent: u64,
 }
 
@@ -74,7 +74,7 @@ enum Sleep {
 }
 
 impl<S: Surroundings> Inside<S> {
-    /// Ends the block that was being executed: its time has passed.
+    /// Completes the block that was being executed: its time has passed.
     #[inline]
     fn settle(&mut self) {
         if let Some(running) = self.running.take() {
@@ -86,7 +86,7 @@ impl<S: Surroundings> Inside<S> {
         }
     }
 
-    /// Comes to the time of an instruction in the block.
+    /// Advances to the time of an instruction in the block.
     fn reach(&mut self, pc: u32) {
         if let Some(running) = &mut self.running {
             let block = self.costs.block(running.number);
@@ -97,7 +97,7 @@ impl<S: Surroundings> Inside<S> {
         }
     }
 
-    /// What has come up by now.
+    /// Samples what has come up by now.
     #[inline(always)]
     fn latch(&mut self) {
         self.private.exceptions.latch(self.surroundings.lines());
@@ -113,7 +113,7 @@ impl<S: Surroundings> Inside<S> {
         }
     }
 
-    /// Lets time pass to the next thing that happens, or to `until`.
+    /// Lets time pass until the next event, or `until`.
     fn wait(&mut self, until: Cycles) {
         let next = self.surroundings.next().min(self.private.sys_tick.due());
         let now = self.surroundings.now();
@@ -146,7 +146,7 @@ impl<S: Surroundings + 'static> State for Unicorn<'_, Inside<S>> {
     }
 
     fn set_float(&mut self, index: u32, value: u32) {
-        // The engine has all of the registers that are asked for.
+        // The engine has all registers requested here.
         let _ = self.reg_write(float_name(index), value.into());
     }
 
@@ -211,10 +211,10 @@ impl<S: Surroundings + 'static> State for Unicorn<'_, Inside<S>> {
 }
 
 impl<S: Surroundings + 'static> Processor<S> {
-    /// One at power-up, with this plain memory.
+    /// Creates one at power-up, with this plain memory.
     ///
     /// # Panics
-    /// When the engine cannot be had, for want of memory.
+    /// If the engine cannot be created for lack of memory.
     pub fn new(surroundings: S, memories: &[Mapped]) -> Self {
         let inside = Inside {
             surroundings,
@@ -229,7 +229,7 @@ impl<S: Surroundings + 'static> Processor<S> {
             asleep: None,
             stop: None,
         };
-        // In Thumb mode only: with that for the M class any model would become a Cortex-M33.
+        // Thumb mode only: adding the M-class mode would turn any model into a Cortex-M33.
         let engine = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let engine = engine.expect("the engine is linked");
         let mut processor = Self { engine };
@@ -239,7 +239,7 @@ impl<S: Surroundings + 'static> Processor<S> {
         processor
     }
 
-    /// Starts by the vector table at this address.
+    /// Starts from the vector table at this address.
     pub fn reset(&mut self, vector_table: u32) {
         let engine = &mut self.engine;
         let inside = engine.get_data_mut();
@@ -265,7 +265,7 @@ impl<S: Surroundings + 'static> Processor<S> {
         engine.set(Register::Pc, start | 1);
     }
 
-    /// Runs until something stops it; goes on where it was when it is called again.
+    /// Runs until something stops it; a later call continues from there.
     pub fn run(&mut self) -> Stop {
         loop {
             if self.engine.get_data().asleep.is_some() {
@@ -278,18 +278,18 @@ impl<S: Surroundings + 'static> Processor<S> {
         }
     }
 
-    /// What it stands in.
+    /// Returns its surroundings.
     pub fn surroundings(&mut self) -> &mut S {
         &mut self.engine.get_data_mut().surroundings
     }
 
-    /// A register, while it does not run.
+    /// Reads a register, while it does not run.
     pub fn register(&self, register: Register) -> u32 {
         self.engine.get(register)
     }
 
-    /// Writes a register, while it does not run, as a debugger does. A program counter wakes a processor
-    /// that waits.
+    /// Writes a register, while it does not run, as a debugger does. Writing the program counter wakes a
+    /// sleeping processor.
     pub fn set_register(&mut self, register: Register, value: u32) {
         let value = if register == Register::Pc {
             self.engine.get_data_mut().asleep = None;
@@ -300,12 +300,12 @@ impl<S: Surroundings + 'static> Processor<S> {
         self.engine.set(register, value);
     }
 
-    /// Instructions since power-up.
+    /// Returns the instructions executed since power-up.
     pub fn instructions(&self) -> u64 {
         self.engine.get_data().instructions
     }
 
-    /// Notes what instructions do first with each of these memories, from now on. The engine is slower then.
+    /// Records the first access to each of these memories, from now on. This slows the engine down.
     pub fn watch(&mut self, memories: &[Range<u32>]) {
         self.engine.get_data_mut().watched = vec![None; memories.len()];
         for (number, memory) in memories.iter().enumerate() {
@@ -324,22 +324,22 @@ impl<S: Surroundings + 'static> Processor<S> {
         }
     }
 
-    /// What has been done first with each of the memories that are watched.
+    /// Returns the first access to each watched memory.
     pub fn first_accesses(&self) -> &[Option<Access>] {
         &self.engine.get_data().watched
     }
 
-    /// Memory that may hold code has been changed by other means than the program's writes.
+    /// Notes that memory that may hold code has changed other than by the program's writes.
     pub fn forget_code(&mut self, addresses: Range<u32>) {
         self.engine.get_data_mut().costs.forget();
         let Range { start, end } = addresses;
-        // Where nothing was translated there is nothing to forget.
+        // If nothing was translated, there is nothing to forget.
         let _ = self.engine.ctl_remove_cache(start.into(), end.into());
     }
 }
 
 impl<S: Surroundings + 'static> Processor<S> {
-    /// Lets the engine execute until it leaves off.
+    /// Lets the engine execute until it stops.
     fn execute(&mut self) {
         let engine = &mut self.engine;
         let pc = read(engine, RegisterARM::PC) | 1;
@@ -350,7 +350,7 @@ impl<S: Surroundings + 'static> Processor<S> {
         }
         let pc = read(engine, RegisterARM::PC) & !1;
         match result {
-            // What else ends a run is an instruction that waits for an interrupt.
+            // The only other end of a run is an instruction that waits for an interrupt.
             Ok(()) => engine.get_data_mut().asleep = Some(Sleep::Interrupt),
             Err(uc_error::READ_UNMAPPED | uc_error::WRITE_UNMAPPED | uc_error::WRITE_PROT) => {
                 fault(engine, number::BUS_FAULT, PRECISE | ADDRESS_VALID, pc);
@@ -362,7 +362,7 @@ impl<S: Surroundings + 'static> Processor<S> {
 
     fn open(&mut self) -> Result<(), uc_error> {
         let engine = &mut self.engine;
-        // Before anything else: the engine's state is made anew for the model.
+        // First of all: this rebuilds the engine's state for the model.
         engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32)?;
         let memories = engine.get_data().memories.clone();
         for mapped in &memories {
@@ -373,8 +373,8 @@ impl<S: Surroundings + 'static> Processor<S> {
                 Prot::READ | Prot::EXEC
             };
             let start = u64::from(mapped.memory.range().start);
-            // SAFETY: the engine reads and writes bytes that may change behind a shared reference
-            // (cells), on this thread; `Inside` holds the memory for as long as the engine lives.
+            // SAFETY: the engine reads and writes bytes that may change behind a shared reference (cells),
+            // on this thread; `Inside` holds the memory for as long as the engine lives.
             unsafe {
                 engine.mem_map_ptr(start, cells.len() as u64, prot, cells.as_ptr() as *mut _)?;
             }
@@ -383,7 +383,7 @@ impl<S: Surroundings + 'static> Processor<S> {
             let mut memories = memories.iter();
             memories.any(|mapped| mapped.memory.holds(address as u32, 1))
         };
-        // The store's place is plain memory in another chip.
+        // On another chip, the store's addresses are plain memory.
         for registers in REGISTERS.into_iter().filter(|each| !is_memory(each.start)) {
             let Range { start, end } = registers;
             engine.mmio_map(
@@ -399,7 +399,7 @@ impl<S: Surroundings + 'static> Processor<S> {
                     },
                 ),
             )?;
-            // It does nothing: with a hook the engine's program counter is that of the access.
+            // It does nothing, but with a hook the engine's program counter is that of the access.
             let accesses = HookType::MEM_READ | HookType::MEM_WRITE;
             engine.add_mem_hook(accesses, start, end - 1, |_, _: MemType, _, _, _| true)?;
         }

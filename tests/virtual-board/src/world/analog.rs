@@ -10,14 +10,13 @@ use crate::bridge::Bridge;
 use crate::chip::Context;
 use crate::time::{CLOCK_HZ, Cycles, seconds};
 
-/// Without PWM the bench comes to an end of a period so often.
+/// Length of a bench period without PWM.
 const IDLE_PERIOD: Cycles = CLOCK_HZ / 1000;
 
-/// The least dead time that the bridge's transistors take: 0.2 µs, in cycles.
+/// The bridge transistors' minimum dead time: 0.2 µs, in cycles.
 const DEAD_TIME: Cycles = CLOCK_HZ / 5_000_000;
 
-/// The gates' pins with the alternate functions at which TIM1 has them: high sides, low sides (data
-/// sheet, table 13).
+/// The gates' pins with TIM1's alternate function on each: high sides, low sides (data sheet, table 13).
 const GATE_PINS: [[((u8, u8), u8); 2]; 3] = [
     [((0, 8), 6), ((2, 13), 4)],
     [((0, 9), 6), ((0, 12), 6)],
@@ -30,24 +29,24 @@ const HALL_PINS: [(u8, u8); 3] = [(1, 6), (1, 7), (1, 8)];
 /// The comparators that may break.
 const COMPARATORS: [u8; 3] = [1, 2, 4];
 
-/// The bench with where it is in time.
+/// The bench with its position in time.
 pub(super) struct Coupling {
     pub(super) bench: Bench,
     pub(super) bridge: Bridge,
     gates: [Gate; 3],
-    /// Which high sides' drivers have lost their supply.
+    /// Which high-side drivers have lost their supply.
     pub(super) unsupplied: [bool; 3],
     /// What a damaged thermistor shows, °C.
     pub(super) sensor_c: Option<f64>,
     /// Voltages of the shunts' grounds above the chip's, V.
     pub(super) grounds_v: [f64; 3],
-    /// Up to here the bench has been simulated.
+    /// How far the bench has been simulated.
     at: Cycles,
     /// When its period began.
     began: Cycles,
     /// What the comparators tell the timer.
     breaks: bool,
-    /// When they last began to ask for a break.
+    /// When they last began to request a break.
     pub(super) tripped: Option<Cycles>,
 }
 
@@ -67,12 +66,12 @@ impl Coupling {
         }
     }
 
-    /// When a period of the bench ends without PWM.
+    /// Returns when a period of the bench ends without PWM.
     pub(super) fn due(&self) -> Cycles {
         self.began + IDLE_PERIOD
     }
 
-    /// Takes the bench to a time.
+    /// Advances the bench to a time.
     fn reach(&mut self, now: Cycles) {
         if now > self.at {
             self.bench.stretch(self.gates, seconds(now - self.at));
@@ -82,7 +81,7 @@ impl Coupling {
 }
 
 impl World {
-    /// Takes the bench to the present, and lets the comparators look at it.
+    /// Advances the bench to the present, and updates the comparators.
     fn reach(&mut self) {
         self.coupling.reach(self.now);
         let [first, second, third] = self.parts.tim1.break_comparators();
@@ -105,7 +104,7 @@ impl World {
         }
     }
 
-    /// The comparators look at what the bench was taken to, and say whether they trip.
+    /// Updates the comparators from the bench's current state, and returns which of them trip.
     fn compare(&mut self) -> [bool; 3] {
         let outside = self.outside();
         let parts = &mut self.parts;
@@ -116,16 +115,16 @@ impl World {
         })
     }
 
-    /// The comparators look at the present, for who reads their outputs.
+    /// Updates the comparators to the present, for a read of their outputs.
     pub(super) fn look(&mut self) {
         self.coupling.reach(self.now);
         self.compare();
     }
 
-    /// What the sensors are at now, before any noise.
+    /// Returns what the sensors are exposed to now, before any noise.
     fn outside(&self) -> Outside {
         let truth = self.coupling.bench.truth();
-        // Only a low side that conducts has a current in its shunt; out of the motor it comes down.
+        // Only a conducting low side has current in its shunt; current out of the motor flows down.
         let shunt_a = |leg: usize| truth.low_s[leg].map_or(0.0, |_| -truth.currents_a[leg]);
         let (port, pin) = board::DIVIDERS_GROUND;
         let ground = &self.parts.ports[usize::from(port)];
@@ -140,7 +139,7 @@ impl World {
         }
     }
 
-    /// A leg's gates change, as far as the timer's outputs reach the pins.
+    /// Changes a leg's gates, as far as the timer's outputs reach the pins.
     pub(super) fn gates(&mut self, leg: usize, high: bool, low: bool) {
         let reaches = |((port, pin), function): ((u8, u8), u8)| {
             self.parts.ports[usize::from(port)].alternate(pin) == Some(function)
@@ -153,7 +152,7 @@ impl World {
         self.set_gate(leg, gate);
     }
 
-    /// The pull-downs of the gates act.
+    /// Turns the gates off by their pull-downs.
     pub(super) fn gates_off(&mut self) {
         for leg in 0..3 {
             self.set_gate(leg, Gate::default());
@@ -170,7 +169,7 @@ impl World {
         }
     }
 
-    /// The PWM timer has triggered the converters: a period ends and the next begins.
+    /// Handles the PWM timer's trigger for the converters: a period ends and the next begins.
     pub(super) fn trigger(&mut self) {
         self.end_period();
         self.load.duties(self.now);
@@ -185,7 +184,7 @@ impl World {
         self.parts.converters.trigger(&mut context);
     }
 
-    /// A period of the bench ends, by the PWM or since there is none.
+    /// Ends a period of the bench, by the PWM or for lack of it.
     pub(super) fn end_period(&mut self) {
         self.reach();
         let coupling = &mut self.coupling;
@@ -196,14 +195,14 @@ impl World {
         coupling.began = self.now;
     }
 
-    /// A converter's sampling ends.
+    /// Handles the end of a converter's sampling.
     pub(super) fn sample(&mut self, converter: u8, channel: u8) {
         self.reach();
         let volts = self.volts(converter, channel).unwrap_or(0.0);
         self.parts.converters.sampled(converter, volts);
     }
 
-    /// The voltage at a converter's channel.
+    /// Returns the voltage at a converter's channel.
     fn volts(&mut self, converter: u8, channel: u8) -> Option<f64> {
         let outside = self.outside();
         let Some(which) = self.parts.op_amps.at(converter, channel) else {
@@ -212,7 +211,7 @@ impl World {
         let pin = self.parts.op_amps.pin(which)?;
         let shunts = board::SHUNTS.iter();
         let leg = shunts.enumerate().find(|(_, shunt)| **shunt == pin)?.0;
-        // What the amplifier shows, with its settling, its errors and its noise.
+        // What the amplifier shows, with its settling, errors and noise.
         let mut shunts_a = outside.shunts_a;
         shunts_a[leg] = -self.coupling.bench.shown_a(leg);
         let shown = Outside {

@@ -1,8 +1,8 @@
-//! Chip and bench together, as the processor stands in them.
+//! Chip and bench together, as the surroundings of the processor.
 //!
-//! Time moves from one thing that happens to the next: a part of the chip that is due, an edge on the
-//! throttle wire. What parts tell each other goes through `signals`; the bench follows the gates edge
-//! by edge, and is looked at where a converter samples (`analog`).
+//! Time moves from one event to the next: a part of the chip that is due, an edge on the throttle wire.
+//! What parts tell each other goes through `signals`; the bench follows the gates edge by edge, and is read
+//! where a converter samples (`analog`).
 
 mod analog;
 mod signals;
@@ -24,13 +24,13 @@ use crate::throttle::{Reply, Throttle};
 use crate::time::{CLOCK_HZ, Cycles};
 use analog::Coupling;
 
-/// The interrupt at the converters' end, by its position in the vector table.
+/// The end-of-conversion interrupt, by its position in the vector table.
 const CONVERTED: u16 = 18;
 
 /// The first exception that is an interrupt.
 const INTERRUPTS: u16 = 16;
 
-/// Reserved up to the SRAM (RM0440, table 3): a stack that leaves its memory comes there.
+/// Reserved up to the SRAM (RM0440, table 3): where a stack that leaves its memory ends up.
 const RESERVED: std::ops::Range<u32> = 0x1fff_8000..0x2000_0000;
 
 /// The comparators' registers.
@@ -39,13 +39,13 @@ const COMPARATORS: std::ops::Range<u32> = 0x4001_0200..0x4001_0300;
 /// The processor's clock after a reset: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
 
-/// The chip's number, as a serial one has it: its text's bytes.
+/// The chip's unique id, in the form of a real one: the bytes of its text.
 const ID: [u32; 3] = [0x5156_0001, 0x3143_5307, 0x2038_3153];
 
-/// What has happened, for those who look on.
+/// Events for onlookers.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// A period of the PWM that began at a time, s.
+    /// A PWM period that began at a time, s.
     Passage(f64, Passage),
     /// A leg's gates changed.
     Gates(Cycles, usize, Gate),
@@ -53,18 +53,18 @@ pub enum Event {
     Edge(Cycles, bool),
     /// The chip has replied on the throttle wire.
     Reply(Reply),
-    /// A serial line, by its number, has sent a byte.
+    /// A serial line, by number, has sent a byte.
     Byte(Cycles, u8, u8),
 }
 
 /// The chip on its bench.
 pub struct World {
     now: Cycles,
-    /// When something happens by itself next.
+    /// When something next happens by itself.
     next: Cycles,
     /// When the run stops.
     pub(crate) until: Cycles,
-    /// A cycle of the processor, in eighths of one of the 170 MHz; and what of one is over.
+    /// The processor's cycle, in eighths of a 170 MHz cycle, and the eighths left over.
     eighths: u64,
     rest: u64,
     lines: Lines,
@@ -76,17 +76,17 @@ pub struct World {
     pub(crate) happened: Vec<Event>,
     /// Why the chip was reset, if it was.
     pub(crate) reset: Option<Cause>,
-    /// What cannot go on.
+    /// Why the run cannot continue.
     pub(crate) failed: Option<Stopped>,
-    /// Figures of the PWM interrupt.
+    /// Figures for the PWM interrupt.
     pub load: Load,
-    /// Where the image has its set-point's word, if that is known.
+    /// Where the image keeps its set-point word, if known.
     setpoint_at: Option<u32>,
-    /// What looks at each control period's beginning and end.
+    /// Looks at the start and end of each control period.
     probe: Option<Probe>,
 }
 
-/// Who looks on at each control period.
+/// Called at the start and end of each control period.
 type Probe = Box<dyn FnMut(Moment, &Probed)>;
 
 /// A moment of the control interrupt.
@@ -109,36 +109,37 @@ pub struct Probed<'a> {
 }
 
 impl Probed<'_> {
-    /// Bytes of the memory.
+    /// Returns bytes from memory.
     pub fn bytes(&self, address: u32, count: u32) -> Option<Vec<u8>> {
         let mut memories = self.memories.iter();
         let memory = memories.find(|memory| memory.holds(address, count))?;
         Some(memory.bytes(address, count as usize))
     }
 
-    /// What the injected sequences of the two converters have read, by rank.
+    /// Returns what the converters' injected sequences have read, by rank.
     pub fn injected(&self) -> [[u16; 4]; 2] {
         self.parts.converters.injected()
     }
 
-    /// The levels at the pins of port B.
+    /// Returns the levels at port B's pins.
     pub fn port_b(&self) -> u32 {
         self.parts.ports[1].input()
     }
 
-    /// TIM1's compare values of the legs, as they were written.
+    /// Returns TIM1's compare values of the legs, as written.
     pub fn compares(&self) -> [u16; 3] {
         self.parts.tim1.compares()
     }
 
-    /// Whether TIM1's break has turned the bridge off (BIF), and whether the main output is on (MOE).
+    /// Returns whether TIM1's break has turned the bridge off (BIF), and whether the main output is on
+    /// (MOE).
     pub fn broken_and_on(&self) -> (bool, bool) {
         self.parts.tim1.broken_and_on()
     }
 }
 
 impl World {
-    /// A chip with this flash and these memories on its bench, at power-up.
+    /// Creates a chip with this flash and these memories on its bench, at power-up.
     pub fn new(
         flash: Flash,
         memories: Vec<Memory>,
@@ -169,12 +170,12 @@ impl World {
         world
     }
 
-    /// Lets a closure look on at each control period.
+    /// Lets a closure look at each control period.
     pub fn probe(&mut self, probe: impl FnMut(Moment, &Probed) + 'static) {
         self.probe = Some(Box::new(probe));
     }
 
-    /// The chip is reset: its gates are off, and all but flash, RAM and what keeps the cause is as at
+    /// Resets the chip: its gates turn off, and everything except flash, RAM and the reset cause is as at
     /// power-up.
     pub fn restart(&mut self, cause: Cause) {
         let mut context = Context {
@@ -190,7 +191,7 @@ impl World {
         self.settle();
     }
 
-    /// What memory held is lost: it is nobody's.
+    /// Loses the memories' contents, which become random.
     pub fn forget_memory(&mut self) {
         let mut state = 1_u32;
         for cell in self.memories.iter().flat_map(Memory::cells) {
@@ -199,7 +200,7 @@ impl World {
         }
     }
 
-    /// A debugger halts the processor, which does not run from then on.
+    /// Halts the processor for good, as a debugger does.
     pub fn halt(&mut self) {
         if self.parts.debug.stops_tim1() {
             let mut context = Context {
@@ -211,7 +212,7 @@ impl World {
         }
     }
 
-    /// The processor has locked up.
+    /// Notes that the processor has locked up.
     pub fn lock_up(&mut self) {
         if self.parts.syscfg.lock_up_breaks() {
             let mut context = Context {
@@ -223,12 +224,12 @@ impl World {
         }
     }
 
-    /// The chip's parts.
+    /// Returns the chip's parts.
     pub fn parts(&mut self) -> &mut Parts {
         &mut self.parts
     }
 
-    /// Gives a comparator of the board's a defect, by its number.
+    /// Gives one of the board's comparators, by number, a defect.
     pub fn set_comparator_defect(&mut self, number: u8, defect: Defect) {
         self.parts.comparators.set_defect(number, defect);
     }
@@ -238,7 +239,7 @@ impl World {
         self.parts.flash.options = options;
     }
 
-    /// Takes its supply from the driver of a leg's high side, which never turns on from then on.
+    /// Cuts the supply of a leg's high-side driver, which never turns on from then on.
     pub fn open_gate_supply(&mut self, leg: usize) {
         self.coupling.unsupplied[leg] = true;
     }
@@ -248,55 +249,55 @@ impl World {
         self.coupling.sensor_c = Some(shown_c);
     }
 
-    /// Moves the grounds of the three shunts above the chip's, V: currents beside them do so on a board.
+    /// Shifts the three shunts' grounds above the chip's, V, as other currents do on a board.
     pub fn shift_grounds(&mut self, grounds_v: [f64; 3]) {
         self.coupling.grounds_v = grounds_v;
     }
 
-    /// What the injected sequences of the two converters have read last, by rank.
+    /// Returns what the converters' injected sequences last read, by rank.
     pub fn injected(&self) -> [[u16; 4]; 2] {
         self.parts.converters.injected()
     }
 
-    /// Lets the converters err as [`Converters::mislead`] says.
+    /// Makes the converters err as described at [`Converters::mislead`].
     ///
     /// [`Converters::mislead`]: crate::chip::adc::Converters::mislead
     pub fn mislead_converters(&mut self) {
         self.parts.converters.mislead();
     }
 
-    /// The flash.
+    /// Returns the flash.
     pub fn flash(&mut self) -> &mut Flash {
         &mut self.parts.flash
     }
 
-    /// SRAM and CCM.
+    /// Returns SRAM and CCM.
     pub fn memories(&self) -> &[Memory] {
         &self.memories
     }
 
-    /// The bench.
+    /// Returns the bench.
     pub fn bench(&mut self) -> &mut Bench {
         &mut self.coupling.bench
     }
 
-    /// The independent check of the gates.
+    /// Returns the independent check of the gates.
     pub fn bridge(&self) -> &Bridge {
         &self.coupling.bridge
     }
 
-    /// When a comparator last began to ask for a break, if one ever did.
+    /// Returns when a comparator last began to request a break, if one ever did.
     pub fn tripped(&self) -> Option<Cycles> {
         self.coupling.tripped
     }
 
-    /// Bytes come in on MAVLink's line.
+    /// Receives bytes on MAVLink's line.
     pub fn serial(&mut self, bytes: &[u8]) {
         self.parts.usart2.queue(bytes, self.now);
         self.settle();
     }
 
-    /// Edges were added to the throttle wire.
+    /// Notes that edges were added to the throttle wire.
     pub fn edges_come(&mut self) {
         self.settle();
     }
@@ -309,7 +310,7 @@ impl World {
         }
     }
 
-    /// Comes to a time, with all that happens until then.
+    /// Advances to a time, with everything that happens until then.
     fn go(&mut self, target: Cycles) {
         while self.next <= target {
             self.now = self.now.max(self.next);
@@ -329,14 +330,14 @@ impl World {
         self.now = self.now.max(target);
     }
 
-    /// Deals with what parts have told, and finds out what happens next.
+    /// Handles the parts' signals, and finds what happens next.
     fn settle(&mut self) {
         self.deal();
         let of_bench = self.coupling.due();
         self.next = self.parts.due().min(self.throttle.due()).min(of_bench);
     }
 
-    /// The processor's clock may have changed.
+    /// Updates the processor's clock, which may have changed.
     fn reclock(&mut self) {
         let supply = Supply {
             boost: self.parts.pwr.boost(),
@@ -432,7 +433,7 @@ impl Surroundings for World {
         self.access(address, |part, offset, context| {
             part.write(offset, value, context)
         })?;
-        // RCC, the flash's wait states and the supply of the core.
+        // RCC, the flash's wait states and the core's supply.
         if matches!(address >> 12, 0x4_0021 | 0x4_0022 | 0x4_0007) {
             self.reclock();
         }

@@ -9,11 +9,11 @@ use crate::processor::{BusError, Width};
 const WIRE: (u8, u8) = (0, 15);
 const WIRE_FUNCTION: u8 = 1;
 
-/// The number's place in the set-point's word, which is another in each.
+/// Mask of the number in the set-point word, which differs in each.
 const NUMBER_MASK: u32 = 0x1f00_0000;
 
 impl World {
-    /// Deals with all signals, and with those that come of that.
+    /// Handles all signals, and those that follow from them.
     pub(super) fn deal(&mut self) {
         let mut at = 0;
         while let Some(signal) = self.signals.get(at) {
@@ -50,8 +50,8 @@ impl World {
         }
     }
 
-    /// A part of the chip asks for a datum to be moved. A request that finds its channel off, or all of its
-    /// data moved, stands until that is turned on again.
+    /// Handles a part's request to move a datum. A request that finds its channel off, or all of its data
+    /// moved, stands until the channel is turned on again.
     fn request(&mut self, number: u8) {
         let channel = self.parts.mux.channel(number);
         let Some(transfer) = channel.and_then(|channel| self.parts.dma.request(channel)) else {
@@ -101,9 +101,9 @@ impl World {
         })
     }
 
-    /// A channel that has been turned on finds the requests that stand already.
+    /// Offers the standing requests to a channel that has been turned on.
     pub(super) fn offer_requests(&mut self) {
-        // The request is not told again where it stood before: the part tells the next ones.
+        // A request that already stood is not signalled again: the part signals the next ones.
         let ready = |number: &u8| {
             let channel = self.parts.mux.channel(*number);
             channel.is_some_and(|channel| self.parts.dma.request(channel).is_some())
@@ -114,7 +114,7 @@ impl World {
         }
     }
 
-    /// The wire's level changes.
+    /// Changes the wire's level.
     pub(super) fn edge(&mut self) {
         let Some(level) = self.throttle.take_edge() else {
             return;
@@ -125,7 +125,7 @@ impl World {
         let (port, pin) = WIRE;
         let port = &mut self.parts.ports[usize::from(port)];
         port.set_input(pin, Some(level));
-        // What the chip drives itself it does not capture.
+        // What the chip drives itself, it does not capture.
         if port.alternate(pin) == Some(WIRE_FUNCTION) {
             self.happened.push(Event::Edge(self.now, level));
             self.capture(level);
@@ -140,7 +140,7 @@ impl World {
         self.parts.tim2.pin(level, &mut context);
     }
 
-    /// The chip drives the wire, or lets it go.
+    /// Lets the chip drive the wire, or release it.
     fn drive(&mut self, level: Option<bool>) {
         if let Some(level) = level {
             self.happened.push(Event::Edge(self.now, level));
@@ -150,7 +150,7 @@ impl World {
         }
     }
 
-    /// The control's period begins with the set-point that the tasks have left.
+    /// Starts a control period with the set-point that the tasks have left.
     pub(super) fn hear(&mut self) {
         let Some(address) = self.setpoint_at else {
             return;

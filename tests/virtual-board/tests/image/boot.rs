@@ -1,4 +1,4 @@
-//! The image starts, speaks on its serial port, and runs alike each time. Run with `--release`.
+//! The image starts, speaks on its serial port, and runs the same each time. Run with `--release`.
 
 use std::hash::Hasher;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use siskin_emulator::link::LinkId;
 use siskin_emulator::machine::Machine as _;
 use siskin_vboard::processor::Access;
 
-/// 115200 baud as the 170 MHz divide to: bits of eight data bits, start and stop.
+/// 115200 baud as divided from 170 MHz: bytes of eight data bits, start and stop.
 const BYTE_NS: u64 = 10 * 1_000_000_000 / 115_200;
 
 #[test]
@@ -30,7 +30,7 @@ fn it_starts_and_answers() {
     let texts = board.heard.texts();
     let greets = |text: &String| text.starts_with("Siskin ESC ") && text.ends_with("b-g431b-esc1");
     assert!(texts.len() == 1 && texts.iter().all(greets), "{texts:?}");
-    // What a frame of 20 bytes takes on the line, and some ms of telemetry before it.
+    // The time of a 20-byte frame on the line, and a few ms of telemetry before it.
     let (value, took_ns) = board.param("LIM_PHASE_A", 100 * MS).expect("an answer");
     println!("parameter after {took_ns} ns");
     assert_eq!(value, 20.0);
@@ -38,12 +38,12 @@ fn it_starts_and_answers() {
     let bridge = board.world().bridge();
     assert_eq!((bridge.violations(), bridge.is_off()), (0, true));
     let figures = board.board.figures().expect("the control runs");
-    // 24 kHz, but for the start.
+    // 24 kHz, except during the start.
     assert!((50_000..=55_200).contains(&figures.interrupts), "{figures}");
 }
 
-/// The board's link hands on whole frames. One that waits behind the start of another, which never comes, is
-/// handed on after 0.1 s of silence.
+/// The board's link passes on whole frames. One held back by the start of another, which never comes, is
+/// passed on after 0.1 s of silence.
 #[test]
 fn a_question_behind_a_start_without_its_frame_is_answered_though_nothing_more_is_sent() {
     let mut board = Board::new(&image(), &[]);
@@ -66,7 +66,7 @@ fn a_question_behind_a_start_without_its_frame_is_answered_though_nothing_more_i
 }
 
 /// The board's least dead time is its default, also after a reset to the defaults, and nothing shorter is
-/// taken.
+/// accepted.
 #[test]
 fn a_dead_time_below_the_boards_is_refused() {
     let id = "PWM_DEADTIME_NS";
@@ -85,7 +85,7 @@ fn a_dead_time_below_the_boards_is_refused() {
     assert_eq!(board.param(id, 100 * MS).expect("an answer").0, 750.0);
 }
 
-/// What an image before has stored is raised, and that is told.
+/// A shorter one stored by an earlier image is raised, which is reported.
 #[test]
 fn a_stored_dead_time_below_the_boards_is_raised() {
     let mut board = Board::new(&image(), &[(ParamId::PwmDeadtimeNs, 300.0)]);
@@ -97,7 +97,7 @@ fn a_stored_dead_time_below_the_boards_is_raised() {
     assert_eq!(value, 750.0);
 }
 
-/// Runs with the motor and MAVLink; what came of it.
+/// Runs with the motor and MAVLink; returns what came of it.
 fn run() -> (u64, u64, u64) {
     let mut board = Board::turning(&image());
     board.param("MOT_KV", 100 * MS).expect("an answer");
@@ -119,7 +119,7 @@ fn equal_inputs_give_equal_bits() {
     assert_eq!(first, run());
 }
 
-/// The chip's memories, each a part of its own: SRAM1, SRAM2 and the CCM SRAM (RM0440, 2.2.2).
+/// The chip's memories, each a separate one: SRAM1, SRAM2 and the CCM SRAM (RM0440, 2.2.2).
 const RAMS: [Range<u32>; 3] = [
     0x2000_0000..0x2000_4000,
     0x2000_4000..0x2000_5800,

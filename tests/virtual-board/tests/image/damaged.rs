@@ -1,13 +1,13 @@
-//! An image that `siskin image` has stamped is known to be whole by its start; one that is damaged goes no
-//! further. Run with `--release`.
+//! The start-up code verifies an image stamped by `siskin image`; a damaged one goes no further. Run with
+//! `--release`.
 
 use crate::common::{Board, MS, Throttle, image};
 use siskin_vboard::image::Image;
 
-/// The start's words where all is well.
+/// The start's text if all is well.
 const GREETING: &str = "Siskin ESC ";
 
-/// A bit of the table of sines: whoever flips it stops no start.
+/// A bit of the sine table: flipping it stops no start.
 fn table(image: &Image) -> (u32, u8) {
     let (address, _) = image
         .symbol(&["math", "trig", "TABLE"])
@@ -23,7 +23,7 @@ fn flip(image: &mut Image, (address, bits): (u32, u8)) {
     *found.expect("it is flashed") ^= bits;
 }
 
-/// Makes of a stamped image what the linker left.
+/// Turns a stamped image back into what the linker left.
 fn unstamp(image: &mut Image) {
     let (sum, _) = image.symbol(&["__check_sum"]).expect("it has a sum");
     let erase: Vec<(u32, u8)> = image
@@ -39,7 +39,7 @@ fn unstamp(image: &mut Image) {
     }
 }
 
-/// Gives it all that arms and turns a motor.
+/// Sends it everything that arms and turns a motor.
 fn throttled(image: &Image) -> Board {
     let mut board = Board::new(image, &[]);
     board.throttle = Throttle::Dshot(0);
@@ -52,7 +52,7 @@ fn throttled(image: &Image) -> Board {
 #[test]
 fn a_damaged_image_never_turns_the_bridge_on_and_tells_why() {
     let (sum, _) = image().symbol(&["__check_sum"]).expect("it has a sum");
-    // In the program, in the sum, in its inverse, and in the vectors of an interrupt that nobody uses.
+    // In the program, in the sum, in its inverse, and in the vectors of an unused interrupt.
     for bits in [table(&image()), (sum, 1), (sum + 7, 0x80), (0x0800_01d4, 2)] {
         let mut image = image();
         flip(&mut image, bits);

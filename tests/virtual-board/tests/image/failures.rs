@@ -1,4 +1,4 @@
-//! What ends everything turns the bridge off while the motor turns, and is told after the restart. Run with
+//! Fatal failures turn the bridge off while the motor turns, and are reported after the restart. Run with
 //! `--release`.
 
 use crate::common::{Board, ERASED, MS, PWM_PERIOD, Throttle, US, endless_loop, image, us};
@@ -6,33 +6,33 @@ use siskin_vboard::image::Image;
 use siskin_vboard::processor::{Register, Surroundings};
 use siskin_vboard::time::{CLOCK_HZ, Cycles};
 
-/// The exceptions in whose handlers a failure is put: the tasks' thread, and the PWM interrupt.
+/// The contexts into which a failure is put: the tasks' thread, and the PWM interrupt.
 const THREAD: u32 = 0;
 const PWM_INTERRUPT: u32 = 16 + 18;
 
-/// ADC1's interrupt enable, TIM1's control, and the mask of the interrupts' registers that the tests use.
+/// ADC1's interrupt enable and TIM1's control, which the tests use.
 const ADC1_IER: u32 = 0x5000_0004;
 const TIM1_CR1: u32 = 0x4001_2c00;
 
-/// The beginning of SRAM, where the stack ends.
+/// Start of SRAM, where the stack ends.
 const STACK_END: u32 = 0x2000_0000;
 
-/// The entry of all panics.
+/// Returns the entry of all panics.
 fn panic_entry(image: &Image) -> u32 {
     let symbol = image.symbol(&["rust_begin_unwind"]);
     let (address, _) = symbol.expect("the image has a panic");
     address & !1
 }
 
-/// Where the control period begins: it puts nine registers on the stack.
+/// Returns where the control period begins: it pushes nine registers.
 fn step_entry(image: &Image) -> u32 {
     let symbol = image.symbol(&["5drive4step4step"]);
     let (address, _) = symbol.expect("the image has a control period");
     address & !1
 }
 
-/// Puts something into registers in both contexts; the bridge is off within a period, and the next start
-/// tells these words.
+/// Sets registers in both contexts; asserts that the bridge is off within a period, and that the next start
+/// reports these words.
 fn fails(name: &str, registers: &[(Register, u32)], words: &str) {
     let image = image();
     let mut board = Board::turning(&image);
@@ -80,14 +80,14 @@ fn a_stack_that_leaves_its_memory() {
     fails("stack", &registers, "Restart: stack overflow");
 }
 
-/// The supervisor looks each 50 ms.
+/// Stops the control; asserts that the supervisor, which checks every 50 ms, turns the bridge off.
 fn stands_still(name: &str, stop: impl Fn(&mut Board)) {
     let mut board = Board::turning(&image());
     board.stop_in(THREAD);
     stop(&mut board);
     let took = board.until_off(200 * MS);
     println!("{name}: off after {:.0} us", us(took));
-    // Between two looks there may be one period yet, and the task comes each millisecond.
+    // One more period may pass between two checks, and the task runs every millisecond.
     assert!(took <= 102 * CLOCK_HZ / 1000, "{took} cycles");
     board.heard.frames.clear();
     board.throttle = Throttle::Silent;
@@ -117,7 +117,7 @@ fn tasks_that_stand_still() {
     let took = board.until_off(2_200 * MS);
     println!("watchdog: off after {:.1} ms", us(took) / 1e3);
     let ms = |ms: u64| ms * CLOCK_HZ / 1000;
-    // 1.6 s after it was fed last, at most 50 ms and a millisecond before.
+    // 1.6 s after the last feed, which came at most 50 ms and a millisecond before.
     let range = ms(1_545)..=ms(1_601);
     assert!(range.contains(&took), "{took} cycles");
     board.heard.frames.clear();
@@ -125,7 +125,7 @@ fn tasks_that_stand_still() {
     board.hear("Restart: the watchdog was not fed", 500 * MS);
 }
 
-/// With the processor stopped the duties stand, and the current rises until a comparator sees it.
+/// With the processor stopped, the duties stay and the current rises until a comparator trips.
 #[test]
 fn too_much_current_while_the_processor_stands() {
     let mut board = Board::turning(&image());
@@ -145,7 +145,7 @@ fn too_much_current_while_the_processor_stands() {
         us(tripped - from),
         us(filter)
     );
-    // Six samples at a sixteenth of the clock, of which the first is up to a sample late.
+    // Six samples at a sixteenth of the clock, the first of which is up to a sample late.
     assert!((5 * 16..=7 * 16 + 8).contains(&filter), "{filter} cycles");
     // Nothing turns it on again by itself.
     let until = Surroundings::now(world) + 5 * PWM_PERIOD;
@@ -156,7 +156,7 @@ fn too_much_current_while_the_processor_stands() {
     assert_eq!(board.world().bridge().violations(), 0);
 }
 
-/// A breakpoint: nothing of the program runs any more.
+/// A breakpoint: the program stops running.
 #[test]
 fn a_debugger_that_halts_the_processor() {
     let mut board = Board::turning(&image());
@@ -169,7 +169,7 @@ fn a_debugger_that_halts_the_processor() {
     assert!(world.bridge().is_off(), "and so it stays");
 }
 
-/// A fault in the hard fault's handler, before its first instruction: the processor does nothing any more,
+/// A fault in the hard fault handler, before its first instruction: the processor does nothing any more,
 /// and the timer's break acts.
 #[test]
 fn a_processor_that_locks_up() {

@@ -1,7 +1,7 @@
 //! A flight controller's end of the throttle wire: it sends bidirectional DShot, and reads the replies off the
-//! line in the two ways that flight controllers have. Betaflight's bit-banged ports sample it three times a
-//! bit; its other ports, and ArduPilot's, capture the times of its edges. Nothing of Siskin's own decoders is
-//! used here, neither its tables nor its tolerances.
+//! line in the two ways that flight controllers use. Betaflight's bit-banged ports sample it three times per
+//! bit; its other ports, and ArduPilot's, capture the times of its edges. None of Siskin's own decoders is used
+//! here, neither their tables nor their tolerances.
 
 use siskin_emulator::machine::Machine;
 
@@ -13,18 +13,18 @@ const FRAME_BITS: f64 = 16.0;
 /// From a frame's end to its reply, ns.
 pub(crate) const DELAY_NS: f64 = 30_000.0;
 
-/// Bits of a reply: a low one first, then the word.
+/// Bits of a reply: a low start bit, then the word.
 const REPLY_BITS: u32 = 21;
 
-/// What the sampling lasts for beyond the delay: a reply and a margin of 9 samples, 140 samples in all at
-/// DShot600, as many as Betaflight takes.
+/// How long sampling lasts after the delay: a reply and a margin of 9 samples, 140 samples in all at DShot600,
+/// as many as Betaflight takes.
 const SAMPLES_A_BIT: f64 = 3.0;
 const MARGIN_SAMPLES: f64 = 9.0;
 
-/// Samples from the first low one on in which edges are looked for: two bits more than a reply has.
+/// Samples from the first low one in which edges are looked for: two bits more than a reply has.
 const LONGEST_SAMPLES: usize = 3 * (REPLY_BITS as usize + 2);
 
-/// A capturing timer's ticks of a reply's bit.
+/// A capture timer's ticks per reply bit.
 const TICKS_A_BIT: f64 = 16.0;
 
 /// Five bits on the line for each four of the word.
@@ -35,33 +35,33 @@ const QUINTETS: [u32; 16] = [
 /// A datagram of raw levels on the wire (`emulator/README.md`).
 const RAW: u8 = 255;
 
-/// Frames that are put on the wire at once: they may wait for no longer than 100 ms.
+/// Frames put on the wire at once: they may wait for no longer than 100 ms.
 const FRAMES_AT_ONCE: usize = 32;
 
 /// A flight controller.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FlightController {
-    /// Bits a second that it sends.
+    /// Bit rate at which it sends.
     pub(crate) bit_hz: f64,
 }
 
 /// A frame and what was read of its reply.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exchange {
-    /// When the line first fell behind the frame, ns.
+    /// When the line first fell after the frame, ns.
     pub(crate) at_ns: Option<u64>,
     /// From the frame's end to then, ns.
     pub(crate) after_ns: Option<f64>,
-    /// The word, by samples and by edges.
+    /// The word, from samples and from edges.
     pub(crate) sampled: Option<u16>,
     pub(crate) timed: Option<u16>,
 }
 
-/// What a word tells.
+/// What a word says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Told {
     Stopped,
-    /// The time of an electrical turn, and by how much the next longer one differs, µs.
+    /// The electrical period, and the step to the next longer one, µs.
     Turn {
         period_us: u32,
         step_us: u32,
@@ -74,17 +74,17 @@ pub(crate) enum Told {
 }
 
 impl FlightController {
-    /// How long a frame is, ns.
+    /// Returns the length of a frame, ns.
     fn frame_ns(&self) -> f64 {
         FRAME_BITS * 1e9 / self.bit_hz
     }
 
-    /// Bits a second that it reads.
+    /// Returns the bit rate that it reads.
     fn reply_hz(&self) -> f64 {
         self.bit_hz * 5.0 / 4.0
     }
 
-    /// Sends so many frames with this value, each so long after the one before, and reads the replies.
+    /// Sends `frames` frames with this value, each `apart_ns` after the previous one, and reads the replies.
     pub(crate) fn fly(
         &self,
         board: &mut Board,
@@ -115,7 +115,7 @@ impl FlightController {
         exchanges
     }
 
-    /// A frame as raw levels, whose times are this one's alone: a zero is low for 3/8 of a bit, a one for 6/8.
+    /// Returns a frame as raw levels, timed independently: a zero is low for 3/8 of a bit, a one for 6/8.
     fn frame(&self, value: u16) -> Vec<u8> {
         let word = value << 1;
         let bits = word << 4 | !(word ^ word >> 4 ^ word >> 8) & 0xf;
@@ -132,13 +132,13 @@ impl FlightController {
         datagram
     }
 
-    /// Reads the reply to a frame, of which the edges begin with the frame's.
+    /// Reads the reply to a frame, from edges that begin with the frame's.
     fn read(&self, frame: usize, edges: &[(u64, bool)]) -> Exchange {
         let Some(&(first_ns, _)) = edges.first() else {
             return Exchange::NONE;
         };
         let end_ns = first_ns as f64 + self.frame_ns();
-        // Its own last edge is a quarter of a bit before.
+        // Its own last edge is a quarter of a bit earlier.
         let own = edges.partition_point(|edge| (edge.0 as f64) < end_ns - 0.1e9 / self.bit_hz);
         let reply = &edges[own..];
         let first = reply.iter().find(|edge| !edge.1);
@@ -150,8 +150,8 @@ impl FlightController {
         }
     }
 
-    /// Samples the line from the frame's end on; the reply's bits. Where the samples lie, and how fast its own
-    /// clock is, within 1 %, is another in each frame.
+    /// Samples the line from the frame's end; returns the reply's bits. The phase of the samples and the error
+    /// of its clock, within 1 %, differ in each frame.
     fn sample(&self, frame: usize, reply: &[(u64, bool)], end_ns: f64) -> Option<u32> {
         let phase = (frame as f64 * 0.618_034).fract();
         let clock = 1.0 + 0.02 * ((frame as f64 * 0.754_878).fract() - 0.5);
@@ -168,12 +168,12 @@ impl FlightController {
         let first = samples.iter().position(|level| !level)?;
         let last = samples.len().min(first + LONGEST_SAMPLES);
         let mut runs: Vec<_> = samples[first..last].chunk_by(|a, b| a == b).collect();
-        // The line rests behind the reply: how long its last level was is what is left of it.
+        // The line rests after the reply: its last level lasts for whatever is left.
         runs.pop();
         assembled(runs.into_iter().map(|run| (run.len() as u32 + 1) / 3))
     }
 
-    /// Captures the times of the line's edges; the reply's bits.
+    /// Captures the times of the line's edges; returns the reply's bits.
     fn capture(&self, reply: &[(u64, bool)]) -> Option<u32> {
         let ticks = |ns: u64| (ns as f64 * 1e-9 * TICKS_A_BIT * self.reply_hz()) as u64;
         let falls = reply.iter().position(|edge| !edge.1)?;
@@ -193,13 +193,13 @@ impl Exchange {
         timed: None,
     };
 
-    /// The word, if both ways read one and the same.
+    /// Returns the word, if both ways read the same one.
     pub(crate) fn word(&self) -> Option<u16> {
         self.sampled.filter(|word| self.timed == Some(*word))
     }
 }
 
-/// The bits of levels that last for so many, the last one left out: each level is a one, and zeros behind it.
+/// Assembles bits from the lengths of all levels except the last: each is a one followed by zeros.
 fn assembled(lengths: impl Iterator<Item = u32>) -> Option<u32> {
     let (mut bits, mut value) = (0, 0_u32);
     for length in lengths {
@@ -210,14 +210,14 @@ fn assembled(lengths: impl Iterator<Item = u32>) -> Option<u32> {
         }
         value = value << length | 1 << (length - 1);
     }
-    // What is left is the last level, which is high in every reply: none is longer than three bits.
+    // What is left is the last level, high in every reply and no longer than three bits.
     let left = REPLY_BITS - bits;
     (1..=3)
         .contains(&left)
         .then(|| value << left | 1 << (left - 1))
 }
 
-/// The 12 bits of a reply whose five-bit groups and check sum are right.
+/// Returns the 12 bits of a reply whose five-bit groups and checksum are right.
 fn word(reply: u32) -> Option<u16> {
     let mut data = 0;
     for group in (0..4).rev() {
@@ -250,8 +250,8 @@ impl Told {
 fn known_replies_are_read() {
     let controller = FlightController { bit_hz: 600e3 };
     let bit_ns = 1e9 / controller.reply_hz();
-    // By hand: 0x123 has the check sum f ^ 1 ^ 2 ^ 3; 123f becomes 11011 10010 10011 01111, and each one of that
-    // toggles the line, from the low start bit on.
+    // By hand: 0x123 has the checksum f ^ 1 ^ 2 ^ 3; 123f becomes 11011 10010 10011 01111, and each one in that
+    // toggles the line, starting from the low start bit.
     let levels = "0 10010 11100 11101 10101".replace(' ', "");
     assert_eq!(levels.len(), REPLY_BITS as usize);
     for frame in 0..1000 {

@@ -1,4 +1,4 @@
-//! The image finds out what motor it has. Run with `--release`.
+//! The image identifies its motor. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
 use siskin_control::params::ParamId;
@@ -10,7 +10,7 @@ const IDENTIFY: MavCmd = MavCmd::MAV_CMD_USER_1;
 const BEGIN: f32 = 1.0;
 const KEEP: f32 = 2.0;
 
-/// What is found, what it is on the first paper's bench, and the bounds.
+/// What is found, its value on the first paper's bench, and the bounds.
 const FOUND: [(ParamId, f32, f32); 4] = [
     (ParamId::MotRMohm, 108.0, 0.03),
     (ParamId::MotLUh, 30.6, 0.05),
@@ -18,7 +18,7 @@ const FOUND: [(ParamId, f32, f32); 4] = [
     (ParamId::MotJGcm2, 1430.0, 0.1),
 ];
 
-/// The longest that one may take.
+/// The longest that an identification may take.
 const LONGEST: u64 = 20_000 * MS;
 
 /// A board that knows no motor, armed at zero throttle by nobody.
@@ -30,7 +30,7 @@ fn unknown() -> Board {
     board
 }
 
-/// Runs until a command has its last answer, and gives it.
+/// Runs until a command has its last answer, and returns that.
 fn result(board: &mut Board, what: f32) -> MavResult {
     board.heard.frames.clear();
     board.command(IDENTIFY, what);
@@ -43,7 +43,7 @@ fn result(board: &mut Board, what: f32) -> MavResult {
     last.expect("it is answered")
 }
 
-/// Has what is found kept, once the shaft stands.
+/// Has the results kept, once the shaft stands.
 fn keep(board: &mut Board) -> MavResult {
     for _ in 0..60 {
         let result = result(board, KEEP);

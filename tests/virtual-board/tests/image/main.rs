@@ -1,19 +1,19 @@
-//! The image that is flashed, on the virtual board. Run with `--release`.
+//! The flashed image on the virtual board. Run with `--release`.
 //!
 //! | module | what it shows |
 //! |---|---|
 //! | [`boot`] | it starts, answers by MAVLink, and two runs are equal |
-//! | [`throttle`] | DShot and pulses turn the motor, and each frame is answered at its time |
+//! | [`throttle`] | DShot and pulses turn the motor, and each frame is answered on time |
 //! | [`replies`] | a flight controller's decoder reads each reply at DShot300, 600 and 1200 |
-//! | [`storage`] | what is stored survives cuts of the power and resets in any write and erase |
-//! | [`readings`] | shifted grounds and a chip's errors do not show in what it reads |
+//! | [`storage`] | what is stored survives power cuts and resets during any write and erase |
+//! | [`readings`] | shifted grounds and the chip's errors do not show in its readings |
 //! | [`self_test`] | a sound board passes its self-test, and each defect is named |
-//! | [`identify`] | it finds out what motor it has, by command and by parameter, and keeps it |
-//! | [`failures`] | panic, fault, standstill, break and lock-up turn the bridge off |
+//! | [`identify`] | it identifies its motor, by command and by parameter, and keeps the result |
+//! | [`failures`] | panic, fault, standstill, break and lockup turn the bridge off |
 //! | [`damaged`] | a damaged image never turns the bridge on |
-//! | [`agreement`] | the control's state and the motor are those of the emulator |
+//! | [`agreement`] | the control's state and the motor agree with the emulator's |
 //!
-//! The image is `SISKIN_IMAGE`, else what this makes:
+//! The image is `SISKIN_IMAGE`, or else what this makes:
 //!
 //! ```text
 //! cargo run --release -p siskin -- image --board b-g431b-esc1 --output target/images

@@ -1,5 +1,4 @@
-//! What the image reads is what there is, where a chip or a board is not as one would like it. Run with
-//! `--release`.
+//! The image reads the truth even where the chip or the board is less than ideal. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::ESC_INFO_DATA;
 use siskin_control::params::ParamId;
@@ -10,7 +9,7 @@ use crate::common::{Board, MS, Throttle, US, image};
 /// Converter and rank of the currents of a, b and c.
 const CURRENTS: [(usize, usize); 3] = [(0, 0), (1, 0), (0, 1)];
 
-/// Amperes into the motor that the phases' readings tell on the mean, with no current at all.
+/// Returns the mean current into the motor that the phases' readings show without any current, A.
 fn shown_a(board: &mut Board) -> [f64; 3] {
     const PERIODS: u32 = 200;
     let mut sums = [0; 3];
@@ -24,7 +23,8 @@ fn shown_a(board: &mut Board) -> [f64; 3] {
     sums.map(|sum| f64::from(sum) / f64::from(PERIODS) * f64::from(BOARD.current_a_per_count))
 }
 
-/// The shunts' grounds are some mV above the chip's under load: a tenth of a millivolt an ampere, or more.
+/// Under load the shunts' grounds are a few mV above the chip's: a tenth of a millivolt per ampere, or
+/// more.
 #[test]
 fn a_shift_of_the_shunts_grounds_is_no_current() {
     let mut board = Board::new(&image(), &[]);
@@ -33,13 +33,13 @@ fn a_shift_of_the_shunts_grounds_is_no_current() {
         board.world().shift_grounds(grounds_v);
         let shown = shown_a(&mut board);
         println!("{grounds_v:?} V: {shown:.2?} A");
-        // The rounding of counts and 0.014 A/mV, which the resistor to the supply leaves.
+        // The rounding to counts, and 0.014 A/mV left by the resistor to the supply.
         assert!(shown.iter().all(|a| a.abs() < 0.2), "{shown:?}");
     }
 }
 
-/// ES0431 2.5.8: a regular conversion beside injected ones may be one of channel 0. The more of them there
-/// are, and the more often the task that reads is held up, the more often.
+/// ES0431 2.5.8: a regular conversion next to injected ones may convert channel 0; the more of them there
+/// are, and the more often the reading task is held up, the more often.
 #[test]
 fn the_thermistor_is_read_beside_the_currents() {
     for (pwm_hz, throttle) in [(24_000.0, Throttle::Silent), (48_000.0, Throttle::Dshot(0))] {

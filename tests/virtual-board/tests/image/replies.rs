@@ -1,6 +1,6 @@
-//! A [flight controller's decoder](crate::flight_controller) reads the reply to each frame: at DShot300, 600 and
-//! 1200, frames as close as they may come and frames with gaps, the motor turning and the parameter list
-//! being sent meanwhile. Run with `--release`.
+//! A [flight controller's decoder](crate::flight_controller) reads the reply to each frame: at DShot300, 600
+//! and 1200, with frames as close as allowed and with gaps, while the motor turns and the parameter list is
+//! being sent. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
 
@@ -14,13 +14,13 @@ const FRAMES: usize = 10_000;
 /// The throttle.
 const VALUE: u16 = 1000;
 
-/// By how much more frames with gaps are apart at most.
+/// Largest gap added between frames.
 const GAP_NS: f64 = 400_000.0;
 
-/// By how much the control's estimate of the speed may stray from the plant's.
+/// Largest deviation of the control's speed estimate from the plant's.
 const SPEED_ERROR: f64 = 0.002;
 
-/// DShot's command that turns extended telemetry on.
+/// DShot command that turns extended telemetry on.
 const EXTENDED_ON: u16 = 13;
 
 /// What a window of frames has shown.
@@ -60,8 +60,8 @@ impl Seen {
                 self.extended[usize::from(kind)] += 1;
                 let value = f64::from(value);
                 match kind {
-                    // Room temperature; volts in quarters; amperes, whose ripple a mean leaves out; no stress;
-                    // nothing to report.
+                    // Room temperature; volts in quarters; amperes, whose mean leaves out the ripple; no
+                    // stress; nothing to report.
                     0x2 => (15.0..40.0).contains(&value),
                     0x4 => (value / 4.0 - motion.bus_v).abs() < 0.5,
                     0x6 => value <= 3.0,
@@ -74,14 +74,14 @@ impl Seen {
     }
 }
 
-/// Frames of [`FRAMES`] that may stay without a reply, half a per cent. From a frame's first edge to its reply
-/// are 43 µs at DShot1200, of which the task takes 30 and the PWM interrupt up to 11: where other interrupts
-/// come together with these, it would begin too late, and is left out. How often that is depends on how the
-/// frames fall against the PWM, and changes from one image to the next: from none to 30 so far. The flight
-/// controller then goes on with the speed of the frame before.
+/// How many of the [`FRAMES`] may stay without a reply: half a percent. At DShot1200 there are 43 µs from a
+/// frame's first edge to its reply, of which the task takes 30 and the PWM interrupt up to 11: if other
+/// interrupts coincide with these, the reply would begin too late, and is left out. How often that happens
+/// depends on how the frames fall against the PWM, and changes from one image to the next: none to 30 so far.
+/// The flight controller then continues with the speed from the previous frame.
 const LATE: usize = FRAMES / 200;
 
-/// `close_ns` is how far frames are apart that are as close as this is to hold for.
+/// Asserts that every reply is read; `close_ns` is the closest frame interval for which this must hold.
 fn every_reply_is_read(protocol: u8, bit_hz: f64, close_ns: f64) {
     let controller = FlightController { bit_hz };
     let mut board = Board::new(&image(), &[]);
@@ -113,15 +113,15 @@ fn every_reply_is_read(protocol: u8, bit_hz: f64, close_ns: f64) {
         assert!(seen.missing <= LATE, "{} of {FRAMES}", seen.missing);
         let (least_ns, most_ns) = seen.after_ns.expect("replies");
         assert!(least_ns > DELAY_NS - 2_000.0 && most_ns < DELAY_NS + 2_000.0);
-        // Some 16 a second.
+        // Some 16 per second.
         assert!(seen.extended.iter().sum::<usize>() > 5);
         assert!(values > 20, "{values}");
     }
     assert_eq!(board.world().bridge().violations(), 0);
 }
 
-// Betaflight sends no closer than every 200 µs at DShot300 and every 100 µs at DShot600 where it wants replies.
-// A frame, the delay and the reply take 139, 85 and 57 µs.
+// If Betaflight wants replies, it sends at most every 200 µs at DShot300 and every 100 µs at DShot600. A frame,
+// the delay and the reply take 139, 85 and 57 µs.
 
 #[test]
 fn every_reply_is_read_at_dshot300() {
@@ -138,7 +138,7 @@ fn every_reply_is_read_at_dshot1200() {
     every_reply_is_read(BIDIRECTIONAL_1200, 1.2e6, 90_000.0);
 }
 
-/// A flight controller that has been sending before the ESC starts: it hears the first frame from somewhere within.
+/// A flight controller that sends before the ESC starts: it is heard from somewhere within its first frame.
 #[test]
 fn who_sends_while_the_esc_starts_is_answered() {
     for protocol in [BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200] {

@@ -1,4 +1,4 @@
-//! The image tests its board: one that is sound passes, and each defect is named. Run with `--release`.
+//! The image tests its board: a sound one passes, and each defect is named. Run with `--release`.
 
 use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavCmd, MavResult};
 use siskin_control::params::ParamId;
@@ -9,14 +9,14 @@ use siskin_vboard::time::ns;
 
 use crate::common::{Board, MS, PWM_PERIOD, Scope, Throttle, image};
 
-/// nBOOT0 and nSWBOOT0 of the option bytes.
+/// nBOOT0 and nSWBOOT0 in the option bytes.
 const N_BOOT0: u32 = 1 << 27;
 const N_SW_BOOT0: u32 = 1 << 26;
 
 const PASSED: MavResult = MavResult::MAV_RESULT_ACCEPTED;
 const FAILED: MavResult = MavResult::MAV_RESULT_FAILED;
 
-/// The result of a self-test by command, at zero throttle.
+/// Runs a self-test by command, at zero throttle, and returns its result.
 fn check(board: &mut Board) -> MavResult {
     board.command(MavCmd::MAV_CMD_RUN_PREARM_CHECKS, 0.0);
     let answer = |board: &Board| {
@@ -26,19 +26,19 @@ fn check(board: &mut Board) -> MavResult {
         Some(ack.result).filter(|result| *result != MavResult::MAV_RESULT_IN_PROGRESS)
     };
     board.run_until(10 * MS, 2_000 * MS, |board| answer(board).is_some());
-    // What is said of it may come behind.
+    // Its texts may follow.
     board.run(50 * MS);
     answer(board).expect("an answer at its end")
 }
 
-/// What was told of items out of their bounds.
+/// Returns the texts about items out of bounds.
 fn named(board: &mut Board) -> Vec<String> {
     let mut texts = board.heard.texts();
     texts.retain(|text| text.starts_with("Self-test: "));
     texts
 }
 
-/// What is to be told of an item: nothing, if the board is sound.
+/// Returns what is to be reported about an item: nothing, if the board is sound.
 fn named_unless(sound: bool, item: &str) -> Vec<String> {
     let named = (!sound).then(|| format!("Self-test: {item}"));
     named.into_iter().collect()
@@ -52,7 +52,7 @@ fn a_sound_board_passes() {
     let result = check(&mut board);
     assert_eq!(named(&mut board), [""; 0]);
     assert_eq!(result, PASSED);
-    // The comparators protect it still: their levels are as they were.
+    // The comparators still protect it: their levels are as before.
     board.throttle = Throttle::Dshot(1_048);
     board.run(1_500 * MS);
     assert!(board.rpm() > 3_000.0, "{} rpm", board.rpm());
@@ -79,8 +79,8 @@ fn a_comparator_that_never_trips_is_named_and_keeps_the_motor_off() {
     }
 }
 
-/// A comparator that trips too early or too late by 30 mV, 17.5 A, is named, and one by 15 mV is not: the bound
-/// is 0.4 of the board's range.
+/// A comparator that trips 30 mV, or 17.5 A, too early or too late is named; one that is off by 15 mV is not:
+/// the bound is 0.4 of the board's range.
 #[test]
 fn a_comparator_whose_level_is_off_is_named_and_one_within_the_bounds_is_not() {
     for (offset_v, sound) in [(0.03, false), (-0.03, false), (0.015, true), (-0.015, true)] {
@@ -111,9 +111,9 @@ fn a_comparator_that_always_trips_is_named() {
     assert!(board.rpm().abs() < 1.0, "{} rpm", board.rpm());
 }
 
-/// Leg a is pulled before a current through the motor could tell that its low side is shorted. The comparator on
-/// its shunt ends that with the first pulse of its high side, which the rising duty leaves no longer than one of
-/// its 256 steps: in so long 24 V bring 200 A through the 20 nH or so of a leg and its capacitors.
+/// Leg a is pulled before a current through the motor could reveal that its low side is shorted. The comparator
+/// on its shunt ends that within the first pulse of its high side, which the rising duty limits to one of its
+/// 256 steps: in that time 24 V drives 200 A through the 20 nH or so of a leg and its capacitors.
 #[test]
 fn a_shorted_low_side_of_the_first_leg_ends_the_test_in_one_short_pulse() {
     let mut board = Board::new(&image(), &[(ParamId::MotToneA, 0.0)]);
@@ -142,7 +142,7 @@ fn a_shorted_low_side_of_the_first_leg_ends_the_test_in_one_short_pulse() {
     assert!(named.starts_with("Self-test: high_a"), "{named}");
 }
 
-/// What the bench breaks in a leg or in the sensors of its phase, and the line that names it.
+/// What the bench breaks in a leg or in its phase's sensors, and the line that names it.
 type Broken = (fn(&mut InForce, usize), &'static str);
 
 const BROKEN: [Broken; 7] = [
@@ -155,9 +155,9 @@ const BROKEN: [Broken; 7] = [
     (|now, phase| now.drift_a[phase] = -6.0, "zero"),
 ];
 
-/// A self-test of the image on a board that is not sound: what was named, and the motor stands.
+/// Runs the image's self-test on a defective board; returns what was named, and asserts that the motor stands.
 fn named_by_check(spoil: impl FnOnce(&mut Board)) -> Vec<String> {
-    // The tunes would find an offset before.
+    // The tunes would find an offset first.
     let mut board = Board::new(&image(), &[(ParamId::MotToneA, 0.0)]);
     spoil(&mut board);
     board.run(300 * MS);
@@ -195,7 +195,7 @@ fn a_high_side_without_a_supply_of_its_driver_is_named() {
     }
 }
 
-/// One that is torn off shows absolute zero; one that is shorted is hotter than any board.
+/// If torn off, it shows absolute zero; if shorted, it is hotter than any board.
 #[test]
 fn a_thermistor_that_is_torn_off_or_shorted_is_named() {
     for shown_c in [-273.15, -40.0, 10_000.0] {

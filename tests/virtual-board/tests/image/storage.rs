@@ -1,4 +1,4 @@
-//! What is kept survives a loss of power and a reset at any moment of a save. Run with `--release`.
+//! What is stored survives a loss of power and a reset at any moment of a save. Run with `--release`.
 
 use crate::common::{Board, MS, US, image};
 use mavlink::dialects::ardupilotmega::MavCmd;
@@ -6,7 +6,7 @@ use siskin_vboard::chip::Cause;
 use siskin_vboard::processor::Surroundings;
 use siskin_vboard::time::{Cycles, ns};
 
-/// The parameter that is changed, and what it is by default.
+/// The parameter that is changed, and its default.
 const PARAM: &str = "LIM_PHASE_A";
 const DEFAULT: f32 = 20.0;
 
@@ -17,8 +17,8 @@ const FORGET: f32 = 2.0;
 /// Cuts within each programming and each erase.
 const CUTS: u64 = 3;
 
-/// Asks for something to be done with the store until it is begun, which is not while a start still plays
-/// its tones; until when the flash is busy with the first of it.
+/// Requests something of the store until it begins, which is not while a start still plays its tones;
+/// returns until when the flash is busy with the first operation.
 fn store(board: &mut Board, what: f32) -> Cycles {
     for _ in 0..60 {
         board.command(MavCmd::MAV_CMD_PREFLIGHT_STORAGE, what);
@@ -30,7 +30,7 @@ fn store(board: &mut Board, what: f32) -> Cycles {
     panic!("nothing is stored: {:?}", board.heard.texts());
 }
 
-/// Runs until the flash begins with something; until when it is busy.
+/// Runs until the flash begins an operation; returns until when it is busy.
 fn next_work(board: &mut Board, after: Cycles, within_ns: u64) -> Option<Cycles> {
     let mut ends = 0;
     let found = board.run_until(5 * US, within_ns, |board| {
@@ -49,7 +49,7 @@ fn value(board: &mut Board) -> f32 {
     value
 }
 
-/// SplitMix64, of Steele, Lea and Flood.
+/// SplitMix64, by Steele, Lea and Flood.
 fn random(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let mixed = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -57,8 +57,8 @@ fn random(state: &mut u64) -> u64 {
     mixed ^ mixed >> 31
 }
 
-/// Interrupts a command to the store in each of its works, and looks what is kept after that. Words that a
-/// loss of power has torn are told by their addresses in bytes, or in double words.
+/// Interrupts a command to the store in each of its operations, and checks what is kept. Words torn by a
+/// loss of power are reported by byte addresses, or by double words.
 fn interrupt(cause: Cause, what: f32, by_words: bool) {
     let mut board = Board::new(&image(), &[]);
     board.world().flash().tell_torn_by_words(by_words);
@@ -71,7 +71,7 @@ fn interrupt(cause: Cause, what: f32, by_words: bool) {
         let mut is_last = false;
         for _ in 0..CUTS {
             if what == FORGET {
-                // There must be something to be forgotten.
+                // There must be something to be erased.
                 wanted = if kept == 15.0 { 12.0 } else { 15.0 };
                 board.set_param(PARAM, wanted);
                 store(&mut board, SAVE);

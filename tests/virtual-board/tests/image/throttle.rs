@@ -1,4 +1,4 @@
-//! The motor turns by what the flight controller sends, and its replies tell the speed. Run with `--release`.
+//! The motor follows what the flight controller sends, and its replies tell the speed. Run with `--release`.
 
 use crate::common::{
     BIDIRECTIONAL_300, BIDIRECTIONAL_600, BIDIRECTIONAL_1200, Board, MS, Throttle, US, image,
@@ -7,13 +7,13 @@ use crate::flight_controller::{Exchange, FlightController};
 use mavlink::dialects::ardupilotmega::{PARAM_REQUEST_LIST_DATA, PARAM_VALUE_DATA};
 use siskin_control::answer::{REPLY_DELAY_NS, gcr};
 
-/// The period that a reply tells, µs: `eeemmmmmmmmm`, m·2^e; none for a shaft that stands.
+/// Returns the period in a reply, µs: `eeemmmmmmmmm`, m·2^e; `None` at standstill.
 fn period_us(bits: u32) -> Option<u32> {
     let data = gcr::decode(bits).expect("a reply that decodes");
     (data != 0xfff).then(|| u32::from(data & 0x1ff) << (data >> 9))
 }
 
-/// Looks at the replies of a time: each frame has one, at its time, with the plant's speed.
+/// Checks the replies over a time: each frame has one, on time, with the plant's speed.
 fn answered(board: &mut Board, for_ns: u64) {
     let pole_pairs = f64::from(board.world().bench().bench().motor.pole_pairs);
     let (played, replied) = (board.played, board.heard.replies.len());
@@ -40,7 +40,7 @@ fn answered(board: &mut Board, for_ns: u64) {
     let told_us = replies.last().and_then(|reply| period_us(reply.bits));
     let told = 60e6 / f64::from(told_us.expect("it turns"));
     let turns = board.rpm() * pole_pairs;
-    // A word has 8 bits or 9; the control's estimate strays by some tenths of a percent.
+    // A word has 8 or 9 bits; the control's estimate is off by a few tenths of a percent.
     assert!((told / turns - 1.0).abs() < 0.02, "{told} of {turns} eRPM");
 }
 
@@ -65,7 +65,7 @@ fn each_frame_is_answered_at_its_time() {
     assert!(values.len() > 20, "{}", values.len());
 }
 
-/// DShot arms it and turns it to a speed that the throttle sets, without a fault.
+/// DShot arms it and turns it at a speed set by the throttle, without a fault.
 #[test]
 fn dshot_turns_the_motor() {
     let mut board = Board::new(&image(), &[]);
@@ -86,7 +86,7 @@ fn dshot_turns_the_motor() {
         !texts.iter().any(|text| text.contains("Fault")),
         "{texts:?}"
     );
-    // The speed is what is commanded: CTL_RPM_MIN to CTL_RPM_MAX over 48 to 2047.
+    // The speed is as commanded: CTL_RPM_MIN to CTL_RPM_MAX over 48 to 2047.
     for (rpm, value) in [(half, 1000.0), (more, 1500.0)] {
         let commanded = 300.0 + 5700.0 * (value - 48.0) / 1999.0;
         assert!((rpm / commanded - 1.0).abs() < 0.03, "{rpm} of {commanded}");
@@ -106,8 +106,8 @@ fn pulses_turn_the_motor() {
     assert_eq!(board.world().bridge().violations(), 0);
 }
 
-/// Frames of rest at 4 kHz, a sixth of the PWM's rate, from wherever in its start the board is. At DShot150
-/// that would leave 1.3 µs between a reply's end and the next frame.
+/// Zero throttle frames at 4 kHz, a sixth of the PWM frequency, starting anywhere in the board's start. At
+/// DShot150 that would leave 1.3 µs between a reply's end and the next frame.
 #[test]
 fn a_signal_of_4_khz_is_found_out_and_answered() {
     for (protocol, bit_hz, name) in [
@@ -127,7 +127,7 @@ fn a_signal_of_4_khz_is_found_out_and_answered() {
                     .filter(|exchange| exchange.word().is_some())
                     .count()
             };
-            // A signal is known after 50 ms of frames at the earliest, and the wire is the sender's until then.
+            // A signal is known after 50 ms of frames at the earliest; until then the wire is the sender's.
             assert_eq!(answered(&exchanges[..190]), 0, "{name}: not known yet");
             let late = answered(&exchanges[2400..]);
             let texts = board.heard.texts();
@@ -138,8 +138,8 @@ fn a_signal_of_4_khz_is_found_out_and_answered() {
     }
 }
 
-/// The tunes of power-up, a start, a stop of which the supplies last only for some of the time, and another
-/// start: all begin with the low sides.
+/// The power-up tunes, a start, a stop that outlasts the drivers' supplies, and another start: all begin with
+/// the low sides.
 #[test]
 fn the_high_sides_drivers_are_supplied_before_a_high_side_goes_on() {
     let mut board = Board::new(&image(), &[]);

@@ -1,4 +1,4 @@
-//! One converter.
+//! A single converter.
 
 use stm32_metapac::adc::regs::{Cfgr, Cr, Ier, Isr, Jsqr, Smpr, Smpr2, Sqr1};
 use stm32_metapac::adc::vals::{Adstp, Exten, SampleTime};
@@ -19,34 +19,34 @@ const JDR1: u32 = 0x80;
 const JDR4: u32 = 0x8c;
 const DIFSEL: u32 = 0xb0;
 
-/// CFGR as it is after a reset, and as the image has it: JSQR without a queue, regular conversions
-/// one at a time by the program, right-aligned 12 bits.
+/// CFGR after a reset, which the image leaves alone: JSQR without a queue, regular conversions one at a
+/// time by the program, right-aligned 12 bits.
 const PLAIN: Cfgr = Cfgr(1 << 31);
 
-/// TIM1_TRGO among the triggers of the injected sequence (RM0440, ADC1/2 injected channels'
-/// external triggers).
+/// TIM1_TRGO among the injected sequence's triggers (RM0440, ADC1/2 external triggers for injected
+/// channels).
 const TIM1_TRGO: u8 = 0;
 
 /// The analogue supply, V: the converters' reference.
 const SUPPLY_V: f64 = 3.3;
-/// Counts of it.
+/// Full scale in counts.
 const COUNTS: f64 = 4096.0;
 
-/// The regulator's start, ns (data sheet: at most 20 µs).
+/// The regulator's start-up time, ns (data sheet: at most 20 µs).
 const REGULATOR_NS: u64 = 20_000;
 
-// In halves of the converter's clock.
+// In half periods of the converter's clock.
 
 /// The calibration (data sheet).
 const CALIBRATION: Cycles = 2 * 116;
-/// After it the converter is not to be switched on (RM0440, calibration).
+/// After calibration, how long the converter must not be enabled (RM0440, calibration).
 const AFTER_CALIBRATION: Cycles = 2 * 4;
-/// From switching on until it is ready: one conversion (data sheet), the shortest.
+/// From enabling until ready: one conversion (data sheet), the shortest.
 const STABLE: Cycles = 2 * (2 + 12) + 2;
-/// From a trigger to the sampling: 1.5 to 2.5 clocks with the asynchronous clock (data sheet, t_LATR);
-/// their middle.
+/// From a trigger to the sampling: 1.5 to 2.5 clocks with the asynchronous clock (data sheet, t_LATR); the
+/// middle.
 const LATENCY: Cycles = 2 * 2;
-/// The same where a regular conversion has to be given up: 2.5 to 3.5 (t_LATRINJ).
+/// The same if a regular conversion has to be aborted: 2.5 to 3.5 (t_LATRINJ).
 const ABORTING_LATENCY: Cycles = 2 * 3;
 /// From the end of the sampling to the result.
 const CONVERSION: Cycles = 25;
@@ -60,10 +60,10 @@ enum Group {
     Injected(usize),
 }
 
-/// What a converter is at.
+/// What a converter is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
-    /// Off, or no conversion.
+    /// Off, or not converting.
     Rest,
     /// Becomes ready then.
     Start(Cycles),
@@ -90,7 +90,7 @@ pub(super) struct Converter {
     enabled_not_before: Cycles,
     held: u16,
     ignored: u64,
-    /// Whether it errs as ES0431 (2.5.8) says, and is about to.
+    /// Whether it errs as ES0431 (2.5.8) says, and whether it is about to.
     misleads: bool,
     errs: bool,
 }
@@ -128,7 +128,7 @@ impl Converter {
         };
     }
 
-    /// Lets the first regular conversion behind each injected sequence be one of channel 0.
+    /// Makes the first regular conversion after each injected sequence convert channel 0.
     pub(super) fn mislead(&mut self) {
         self.misleads = true;
     }
@@ -137,12 +137,12 @@ impl Converter {
         self.flags.0
     }
 
-    /// Whether a flag asks for the interrupt.
+    /// Returns whether a flag requests the interrupt.
     pub(super) fn interrupts(&self) -> bool {
         self.flags.0 & self.enables.0 != 0
     }
 
-    /// Whether it is switched on.
+    /// Returns whether it is enabled.
     pub(super) fn on(&self) -> bool {
         self.control.aden()
     }
@@ -178,7 +178,7 @@ impl Converter {
         })
     }
 
-    /// Writes a register; half a clock lasts `clock`.
+    /// Writes a register; `clock` is half a converter clock.
     pub(super) fn write(
         &mut self,
         offset: u32,
@@ -187,7 +187,7 @@ impl Converter {
         now: Cycles,
     ) -> Result<(), Unmodelled> {
         let [regular, injected] = [self.control.adstart(), self.control.jadstart()];
-        // What may not be changed any more (RM0440, at each register) is written as it was.
+        // What must not change now (RM0440, at each register) may be written with its old value.
         let (locked, was) = match offset {
             CFGR => (true, PLAIN.0),
             SMPR1 => (regular || injected, self.samplings.0.0),
@@ -240,19 +240,18 @@ impl Converter {
         Ok(())
     }
 
-    /// Writes CR, whose bits are set by the program and, but for the supply's, taken back by the
-    /// converter.
+    /// Writes CR, whose bits the program sets and, except for the supply's, the converter clears.
     fn control(&mut self, new: Cr, clock: Cycles, now: Cycles) -> Result<(), Unmodelled> {
         let old = self.control;
-        // A bit that is written back as it was read is an order again if the converter has taken it back
-        // meanwhile: each order is to be written alone (RM0440, ADC_CR: zeros have no effect).
+        // A bit written back as it was read is another order if the converter has cleared it meanwhile:
+        // each order must be written alone (RM0440, ADC_CR: zeros have no effect).
         let again = (old.aden() && new.aden())
             || (old.adcal() && new.adcal())
             || (old.adstart() && new.adstart())
             || (old.jadstart() && new.jadstart());
         let unknown =
             again || new.addis() || new.adstp() == Adstp::STOP || new.jadstp() == Adstp::STOP;
-        // Without its supply a converter that is on would be none.
+        // An enabled converter cannot go without its supply.
         let supplied = new.advregen() && !new.deeppwd();
         if unknown || old.aden() && !supplied {
             return Err(Unmodelled);
@@ -294,7 +293,7 @@ impl Converter {
         Ok(())
     }
 
-    /// From now on it waits for triggers.
+    /// Starts to wait for triggers.
     fn arm(&mut self) -> Result<(), Unmodelled> {
         self.ready()?;
         let [edge, trigger] = [self.injected.jexten().to_bits(), self.injected.jextsel()];
@@ -305,7 +304,7 @@ impl Converter {
         Ok(())
     }
 
-    /// A conversion needs a converter that is on and ready.
+    /// Checks that the converter is enabled and ready, which a conversion needs.
     fn ready(&self) -> Result<(), Unmodelled> {
         let ready = self.control.aden() && !matches!(self.phase, Phase::Start(_));
         ready.then_some(()).ok_or(Unmodelled)
@@ -321,7 +320,7 @@ impl Converter {
                 self.ignored += 1;
                 return;
             }
-            // It begins again afterwards.
+            // It starts over afterwards.
             Phase::Sampling(Group::Regular, _) | Phase::Converting(Group::Regular, _) => {
                 ABORTING_LATENCY
             }
@@ -349,9 +348,9 @@ impl Converter {
         self.phase = Phase::Sampling(group, from + halves(time) * clock);
     }
 
-    /// The voltage at the end of the sampling.
+    /// Takes the voltage at the end of the sampling.
     pub(super) fn sampled(&mut self, volts: f64) {
-        // The greatest level of the ladder that is not above it: a cast clamps below.
+        // Rounded down to a step of the ladder; the cast clamps at 0.
         let counts = (volts / SUPPLY_V * COUNTS) as u16;
         self.held = counts.min(COUNTS as u16 - 1);
     }
@@ -364,7 +363,7 @@ impl Converter {
         phase.min(self.calibrated_at.unwrap_or(NEVER))
     }
 
-    /// Does what is due, and tells the channel that is to be sampled now.
+    /// Does what is due, and returns the channel to be sampled now.
     pub(super) fn act(&mut self, clock: Cycles, now: Cycles) -> Option<u8> {
         if self.calibrated_at.is_some_and(|end| end <= now) {
             self.calibrated_at = None;
@@ -377,7 +376,7 @@ impl Converter {
             }
             Phase::Sampling(group, end) if end <= now => {
                 self.phase = Phase::Converting(group, end + CONVERSION * clock);
-                // The flag is the regular conversion's (RM0440, end of sampling phase).
+                // The flag is only the regular conversion's (RM0440, end of sampling phase).
                 if group == Group::Regular {
                     self.flags.set_eosmp(true);
                     if std::mem::take(&mut self.errs) {
@@ -396,7 +395,7 @@ impl Converter {
         self.phase = Phase::Rest;
         match group {
             Group::Regular => {
-                // Without OVRMOD the reading that has not been fetched stays.
+                // Without OVRMOD, an unread result stays.
                 if self.flags.eoc() {
                     self.flags.set_ovr(true);
                 } else {
@@ -414,7 +413,7 @@ impl Converter {
                     return;
                 }
                 self.flags.set_jeos(true);
-                // One that was asked for meanwhile, or given up for the sequence.
+                // A regular conversion that was requested meanwhile, or aborted for the sequence.
                 if self.control.adstart() {
                     self.sample(Group::Regular, end, clock);
                 }
@@ -423,7 +422,7 @@ impl Converter {
     }
 }
 
-/// Sampling times in halves of a clock (RM0440, ADC_SMPR1).
+/// Sampling times in half clocks (RM0440, ADC_SMPR1).
 fn halves(time: SampleTime) -> Cycles {
     match time {
         SampleTime::CYCLES2_5 => 5,

@@ -64,12 +64,12 @@ impl Bench {
         self.try_write(offset, value).expect("modelled");
     }
 
-    /// Gives an order to a converter that is supplied.
+    /// Gives an order to a converter whose supply is on.
     fn order(&mut self, at: u32, bit: u32) {
         self.write(at + CR, ADVREGEN | bit);
     }
 
-    /// Runs to that time.
+    /// Runs until a time.
     fn run_to(&mut self, end: Cycles) {
         while self.converters.due() <= end {
             self.now = self.converters.due();
@@ -82,9 +82,9 @@ impl Bench {
         self.with(Converters::trigger);
     }
 
-    /// Switches one on, in the HAL's order.
+    /// Enables one, in the HAL's order.
     fn switch_on(&mut self, at: u32) {
-        // 170 MHz by 4.
+        // 170 MHz divided by 4.
         self.write(CCR, 2 << 18);
         self.write(at + CR, ADVREGEN);
         self.run_to(self.now + 3400);
@@ -97,7 +97,7 @@ impl Bench {
         assert!(Isr(self.read(at + ISR)).adrdy());
     }
 
-    /// The sequences of the board, armed.
+    /// The board's sequences, armed.
     fn armed() -> Self {
         let mut bench = Self::new();
         for at in [0x100, 0] {
@@ -144,7 +144,7 @@ impl Bench {
         bench
     }
 
-    /// The samples that were asked for: converter, channel, cycles since `from`.
+    /// Returns the samples requested: converter, channel, cycles since `from`.
     fn samples(&self, from: Cycles) -> Vec<(u8, u8, Cycles)> {
         let sample = |&(at, signal): &_| match signal {
             Signal::Sample { converter, channel } => Some((converter, channel, at - from)),
@@ -154,8 +154,9 @@ impl Bench {
     }
 }
 
-/// By hand, in clocks of 4 cycles from the trigger, 2 of latency: the first samples 12.5, 12.5, 24.5
-/// and 47.5 with 12.5 after each, the second 12.5, 24.5, 24.5. The end is at 2 + 97 + 4 · 12.5 clocks.
+/// Worked out by hand, in clocks of 4 cycles from the trigger, with 2 of latency: the first samples for
+/// 12.5, 12.5, 24.5 and 47.5, each with 12.5 after it, the second for 12.5, 24.5, 24.5. The end is at 2 +
+/// 97 + 4 · 12.5 clocks.
 #[test]
 fn a_trigger_converts_both_sequences_at_their_times() {
     let mut bench = Bench::armed();
@@ -185,8 +186,8 @@ fn a_trigger_converts_both_sequences_at_their_times() {
     );
 }
 
-/// The windows which the board's firmware states, in µs from the counter's top; the trigger is half
-/// of the first window before it. The converters' latency is not in them.
+/// The windows stated by the board's firmware, in µs from the counter's top; the trigger comes half of the
+/// first window earlier. They exclude the converters' latency.
 #[test]
 fn the_windows_are_those_of_the_board_and_the_latency() {
     const FIRST: [(f64, f64); 4] = [(-0.15, 0.15), (0.44, 0.74), (1.03, 1.61), (1.90, 3.02)];
@@ -211,7 +212,7 @@ fn a_trigger_during_a_sequence_is_ignored() {
     let mut bench = Bench::armed();
     let start = bench.now;
     bench.trigger();
-    // The second converter has ended its three ranks at 404 and takes the next.
+    // The second converter has finished its three ranks at 404 and takes the next trigger.
     bench.run_to(start + 500);
     bench.trigger();
     bench.run_to(start + 2000);
@@ -233,7 +234,7 @@ fn a_regular_conversion_alone() {
     bench.run_to(start + 1048);
     assert_eq!(bench.samples(start), [(1, 5, 998)]);
     assert!(Isr(bench.read(ISR)).eoc());
-    // 1.1 V of 3.3 V are 1365.33.
+    // 1.1 V of 3.3 V is 1365.33.
     assert_eq!(bench.read(DR), 1365);
     assert!(!Isr(bench.read(ISR)).eoc());
     assert!(!Cr(bench.read(CR)).adstart());
@@ -288,7 +289,7 @@ fn one_that_is_not_armed_ignores_the_trigger() {
 #[test]
 fn what_is_not_to_be_done_is_refused() {
     let mut bench = Bench::new();
-    // 170 MHz are too fast.
+    // 170 MHz is too fast.
     assert_eq!(bench.try_write(CR, 1 << 28), Err(Unmodelled));
     bench.write(CCR, 2 << 18);
     bench.write(CR, 1 << 28);
@@ -296,14 +297,14 @@ fn what_is_not_to_be_done_is_refused() {
     assert_eq!(bench.try_write(CR, 1 << 28 | 1 << 31), Err(Unmodelled));
 
     let mut bench = Bench::armed();
-    // Sampling times of an armed converter, its queue, a clock of converters that are on.
+    // Sampling times of an armed converter, its queue, and the clock of enabled converters.
     for (offset, value) in [(SMPR1, 0), (JSQR, 0), (0x0c, 0), (CCR, 1 << 18), (0x20, 0)] {
         assert_eq!(bench.try_write(offset, value), Err(Unmodelled), "{offset}");
     }
-    // Orders that are written back with another one: ADEN and JADSTART with ADSTART.
+    // Orders written back with another one: ADEN and JADSTART with ADSTART.
     let read = bench.read(CR);
     assert_eq!(bench.try_write(CR, read | 1 << 2), Err(Unmodelled));
-    // What it was may be written.
+    // Old values may be written.
     let same = bench.read(SMPR1);
     bench.write(SMPR1, same);
     bench.write(CCR, 2 << 18);

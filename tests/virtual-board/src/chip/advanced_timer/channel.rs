@@ -9,17 +9,17 @@ use crate::time::{Cycles, NEVER};
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     mode: Ocm,
-    /// Whether what is written waits for an update.
+    /// Whether writes wait for an update.
     preloaded: bool,
     written: u16,
     compare: u16,
-    /// What the comparison has said last.
+    /// The last result of the comparison.
     below: bool,
     reference: bool,
 }
 
 impl Channel {
-    /// As after a reset.
+    /// Creates it as after a reset.
     pub(super) const fn new() -> Self {
         Self {
             mode: Ocm::FROZEN,
@@ -31,27 +31,27 @@ impl Channel {
         }
     }
 
-    /// Whether this mode is modelled.
+    /// Returns whether this mode is modelled.
     pub(super) fn has(mode: Ocm) -> bool {
         pwm(mode) || matches!(mode, Ocm::FROZEN | Ocm::FORCE_ACTIVE | Ocm::FORCE_INACTIVE)
     }
 
-    /// The reference output.
+    /// Returns the reference output.
     pub(super) fn reference(&self) -> bool {
         self.reference
     }
 
-    /// The compare register, as it was written.
+    /// Returns the compare register as written.
     pub(super) fn written(&self) -> u16 {
         self.written
     }
 
-    /// The value that is compared with.
+    /// Returns the value compared with.
     pub(super) fn compare(&self) -> u16 {
         self.compare
     }
 
-    /// Whether what is written to the compare register waits for an update.
+    /// Sets whether writes to the compare register wait for an update.
     pub(super) fn set_preloaded(&mut self, preloaded: bool) {
         self.preloaded = preloaded;
         self.write(self.written);
@@ -65,13 +65,13 @@ impl Channel {
         }
     }
 
-    /// An update: the compare register is taken.
+    /// Takes the compare register at an update.
     pub(super) fn update(&mut self) {
         self.compare = self.written;
     }
 
-    /// Changes the mode. From one PWM mode to the other the reference stays until the comparison
-    /// changes its result; from any other mode it follows at once (RM0440, TIM1_CCMR1.OC1M).
+    /// Changes the mode. Between the PWM modes the reference stays until the comparison's result changes;
+    /// from any other mode it follows at once (RM0440, TIM1_CCMR1.OC1M).
     pub(super) fn set_mode(&mut self, mode: Ocm) {
         let before = std::mem::replace(&mut self.mode, mode);
         match mode {
@@ -86,7 +86,7 @@ impl Channel {
         self.reference = self.below == (self.mode == Ocm::PWM_MODE1);
     }
 
-    /// Compares with the counter; whether the result has changed.
+    /// Compares with the counter; returns whether the result has changed.
     pub(super) fn look(&mut self, ramp: &Ramp, now: Cycles) -> bool {
         let (elapsed, compare) = (ramp.elapsed(now), Cycles::from(self.compare));
         let below = if ramp.down() {
@@ -104,7 +104,7 @@ impl Channel {
         changes
     }
 
-    /// When the comparison changes its result next, before the counter turns.
+    /// Returns when the comparison's result changes next, before the counter turns.
     pub(super) fn due(&self, ramp: &Ramp) -> Cycles {
         let compare = Cycles::from(self.compare);
         match ramp.turned_at() {

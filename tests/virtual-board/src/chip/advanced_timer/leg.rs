@@ -1,8 +1,8 @@
-//! A leg's dead-time generator and its output control.
+//! A leg's dead-time generator and output control.
 
 use crate::time::Cycles;
 
-/// Cycles of the generator's code (RM0440, TIM1_BDTR.DTG), with its clock undivided (CKD).
+/// Returns the cycles for a generator code (RM0440, TIM1_BDTR.DTG), with its clock undivided (CKD).
 pub(super) fn dead_time(code: u8) -> Cycles {
     let code = Cycles::from(code);
     match code >> 5 {
@@ -13,7 +13,7 @@ pub(super) fn dead_time(code: u8) -> Cycles {
     }
 }
 
-/// What the output control of a channel says: both main output enable and these decide.
+/// A channel's output enables; the main output enable and these decide.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Enables {
     /// CCxE.
@@ -22,8 +22,8 @@ pub(super) struct Enables {
     pub(super) low: bool,
 }
 
-/// The generator hangs on the reference output's edges alone: it runs on whatever the output control
-/// makes of it.
+/// The generator only depends on the reference output's edges: it runs whatever the output control makes of
+/// it.
 #[derive(Clone, Debug)]
 pub(super) struct Leg {
     reference: bool,
@@ -32,7 +32,7 @@ pub(super) struct Leg {
 }
 
 impl Leg {
-    /// One that has been at rest.
+    /// Creates one that has been at rest.
     pub(super) const fn new() -> Self {
         Self {
             reference: false,
@@ -41,7 +41,7 @@ impl Leg {
         }
     }
 
-    /// What the reference is, and how long the dead time after a change.
+    /// Follows the reference; `dead_time` is that after a change.
     pub(super) fn follow(&mut self, reference: bool, dead_time: Cycles, now: Cycles) {
         if self.reference != reference {
             self.reference = reference;
@@ -49,14 +49,14 @@ impl Leg {
         }
     }
 
-    /// When the dead time ends, if it has not.
+    /// Returns when the dead time ends, if it has not.
     pub(super) fn due(&self) -> Cycles {
         self.settled_at
     }
 
-    /// The gates of the high side and the low side, if they change (RM0440, output control bits of
-    /// complementary channels). An output that is driven to its inactive or idle level is low, and so
-    /// is one that is not driven: the board's pins have pulls.
+    /// Returns the gates of the high and the low side if they change (RM0440, output control bits for
+    /// complementary channels). An output at its inactive or idle level is low, and so is one that is not
+    /// driven: the board's pins have pull-downs.
     pub(super) fn drive(&mut self, main: bool, enables: Enables, now: Cycles) -> Option<[bool; 2]> {
         let settled = now >= self.settled_at;
         let gates = match (main, enables.high, enables.low) {

@@ -1,9 +1,9 @@
 //! TIM1: centre-aligned PWM with complementary outputs, dead time and a break (RM0440, advanced-control
 //! timers).
 //!
-//! Its clock is the chip's 170 MHz, undivided. The start latency of the counter and the clock or two by
-//! which the outputs follow it are neglected. Active levels are high and idle levels low; everything
-//! else is refused.
+//! Its clock is the chip's 170 MHz, undivided. The counter's start latency and the clock or two by which
+//! the outputs lag it are neglected. Active levels are high and idle levels low; everything else is
+//! refused.
 
 mod channel;
 mod leg;
@@ -33,13 +33,13 @@ const LEGS: usize = 3;
 /// The channel, from 0, whose reference may be the trigger output.
 const TRIGGERS: usize = 3;
 
-/// CR1: CEN, URS, DIR, CMS, ARPE. The direction is the hardware's.
+/// CR1: CEN, URS, DIR, CMS, ARPE. The hardware sets the direction.
 const CR1_BITS: u32 = 0x00f5;
 /// CR2: CCPC, MMS.
 const CR2_BITS: u32 = 0x0071;
 /// EGR: UG, COMG.
 const EGR_BITS: u32 = 0x0021;
-/// CCMR: OCxPE, OCxM of two channels, of the latter the bits of the modes that are modelled.
+/// CCMR: OCxPE and OCxM of two channels; of the latter, the bits of the modelled modes.
 const CCMR_BITS: u32 = 0x7878;
 /// CCER: CCxE of four channels, CCxNE of three.
 const CCER_BITS: u32 = 0x1555;
@@ -48,7 +48,7 @@ const BDTR_BITS: u32 = 0x000f_bcff;
 /// AF1: BKCMP1E, BKCMP2E, BKCMP4E.
 const AF1_BITS: u32 = 0x0016;
 
-/// The timer. What waits for an update or a commutation is held twice.
+/// The timer. Whatever waits for an update or a commutation is held twice.
 pub struct AdvancedTimer {
     cr1: Cr1Gp16,
     cr2: Cr2Adv,
@@ -66,7 +66,7 @@ pub struct AdvancedTimer {
     enables: [Enables; LEGS],
     legs: [Leg; LEGS],
     filter: Filter,
-    /// The level of the trigger output.
+    /// Level of the trigger output.
     trigger: bool,
     halted: bool,
     due: Cycles,
@@ -79,7 +79,7 @@ impl Default for AdvancedTimer {
 }
 
 impl AdvancedTimer {
-    /// One after a reset.
+    /// Creates one as after a reset.
     pub fn new() -> Self {
         Self {
             cr1: Cr1Gp16(0),
@@ -104,7 +104,7 @@ impl AdvancedTimer {
         }
     }
 
-    /// Resets it: its gates are off, the break's level stays.
+    /// Resets it: its gates turn off, the break's level stays.
     pub fn reset(&mut self, context: &mut Context) {
         self.bdtr = BdtrAdv(0);
         self.settle(context);
@@ -113,32 +113,32 @@ impl AdvancedTimer {
         self.set_break(level, context);
     }
 
-    /// The level at the break input: that of the comparators that break.
+    /// Sets the level at the break input: that of the comparators that break.
     pub fn set_break(&mut self, level: bool, context: &mut Context) {
         self.catch_up(context);
         self.filter.input(level, context.now);
         self.settle(context);
     }
 
-    /// It stops with the processor: the outputs are off as if MOE were, which stays as it is (RM0440, debug
-    /// mode). That its counter stands is not modelled: nothing hears it.
+    /// Stops it with the processor: the outputs turn off as if MOE were cleared, but MOE stays (RM0440,
+    /// debug mode). That its counter stops is not modelled: nothing observes it.
     pub fn halt(&mut self, context: &mut Context) {
         self.catch_up(context);
         self.halted = true;
         self.settle(context);
     }
 
-    /// Which of the comparators 1, 2 and 4 break.
+    /// Returns which of the comparators 1, 2 and 4 break.
     pub fn break_comparators(&self) -> [bool; 3] {
         [0, 1, 3].map(|number| self.af1.bkcmpe(number))
     }
 
-    /// The compare values of channels 1 to 3, as they were written.
+    /// Returns the compare values of channels 1 to 3, as written.
     pub fn compares(&self) -> [u16; LEGS] {
         [0, 1, 2].map(|number: usize| self.channels[number].written())
     }
 
-    /// The break's flag, and the main output's enable.
+    /// Returns the break flag and the main output enable.
     pub fn broken_and_on(&self) -> (bool, bool) {
         (self.sr.bif(0), self.bdtr.moe())
     }
@@ -148,14 +148,14 @@ impl AdvancedTimer {
         self.bdtr.bke(0) && self.filter.output() == high
     }
 
-    /// Does what has been due before an access at this time.
+    /// Does what was due before an access at this time.
     fn catch_up(&mut self, context: &mut Context) {
         if self.due <= context.now {
             self.act(context);
         }
     }
 
-    /// An update event.
+    /// Handles an update event.
     fn update(&mut self) {
         self.ramp.set_top(self.arr);
         self.repetitions = self.rcr;
@@ -164,7 +164,7 @@ impl AdvancedTimer {
         }
     }
 
-    /// The counter turns. Compare flags are raised on the way down (CMS), by a value above the top at
+    /// Turns the counter around. Compare flags rise on the way down (CMS); with a value above the top, at
     /// the top.
     fn turn(&mut self) {
         self.ramp.turn();
@@ -183,7 +183,7 @@ impl AdvancedTimer {
         }
     }
 
-    /// Modes and enable bits are taken.
+    /// Adopts modes and enable bits.
     fn commutate(&mut self) {
         for (number, channel) in self.channels.iter_mut().enumerate() {
             channel.set_mode(self.ccmr[number / 2].ocm(number % 2));
@@ -194,7 +194,7 @@ impl AdvancedTimer {
         }
     }
 
-    /// Brings everything up to the present, says what has changed and finds what is due next.
+    /// Brings everything up to date, signals what has changed and finds what is due next.
     fn settle(&mut self, context: &mut Context) {
         let now = context.now;
         self.filter.act(now);
@@ -254,7 +254,7 @@ impl AdvancedTimer {
     fn write_cr2(&mut self, value: u32) -> Result<(), Unmodelled> {
         let new = Cr2Adv(only(value, CR2_BITS)?);
         let triggers = matches!(new.mms(), Mms::RESET | Mms::COMPARE_OC4);
-        // What becomes of bits that wait is not known.
+        // What becomes of waiting bits is unknown.
         if !triggers || (self.cr2.ccpc() && !new.ccpc()) {
             return Err(Unmodelled);
         }
@@ -294,7 +294,7 @@ impl AdvancedTimer {
         Ok(())
     }
 
-    /// Modes or enable bits have been written.
+    /// Handles a write to modes or enable bits.
     fn enable(&mut self) {
         if !self.cr2.ccpc() {
             self.commutate();
@@ -303,7 +303,7 @@ impl AdvancedTimer {
 
     fn write_arr(&mut self, value: u32) -> Result<(), Unmodelled> {
         let new = u16::try_from(value).map_err(|_| Unmodelled)?;
-        // It does not count to 0.
+        // It cannot count to 0.
         if new == 0 || (self.cr1.cen() && new != self.arr) {
             return Err(Unmodelled);
         }
@@ -351,7 +351,7 @@ impl Part for AdvancedTimer {
         match offset {
             CR1 => self.write_cr1(value, context.now)?,
             CR2 => self.write_cr2(value)?,
-            // No interrupt, no request, no division of the clock.
+            // No interrupt, no request, no clock division.
             DIER | PSC => {
                 only(value, 0)?;
             }

@@ -2,20 +2,20 @@
 
 use crate::time::{Cycles, NEVER};
 
-/// The way between two turns. The counter is at the top, and at 0, for one cycle, which is the first
-/// of the next way.
+/// The ramp between two turns. The counter is at the top, and at 0, for one cycle, which is the first of
+/// the next ramp.
 #[derive(Clone, Debug)]
 pub(super) struct Ramp {
     top: Cycles,
     down: bool,
-    /// When it began this way; none while it stands.
+    /// When this ramp began; `None` while it stands.
     turned_at: Option<Cycles>,
     /// How far it had come when it was stopped.
     stood: Cycles,
 }
 
 impl Ramp {
-    /// Standing at 0.
+    /// Creates one that stands at 0.
     pub(super) fn new() -> Self {
         Self {
             top: 0xffff,
@@ -25,32 +25,32 @@ impl Ramp {
         }
     }
 
-    /// The top.
+    /// Returns the top.
     pub(super) fn top(&self) -> Cycles {
         self.top
     }
 
-    /// Sets the top, of a counter that stands or turns.
+    /// Sets the top of a counter that stands or is turning.
     pub(super) fn set_top(&mut self, top: u16) {
         self.top = top.into();
     }
 
-    /// Whether it counts down.
+    /// Returns whether it counts down.
     pub(super) fn down(&self) -> bool {
         self.down
     }
 
-    /// When it began this way; none while it stands.
+    /// Returns when this ramp began; `None` while it stands.
     pub(super) fn turned_at(&self) -> Option<Cycles> {
         self.turned_at
     }
 
-    /// How far it has come on this way.
+    /// Returns how far it has come on this ramp.
     pub(super) fn elapsed(&self, now: Cycles) -> Cycles {
         self.turned_at.map_or(self.stood, |at| now - at)
     }
 
-    /// The counter.
+    /// Returns the count.
     pub(super) fn count(&self, now: Cycles) -> u32 {
         let elapsed = self.elapsed(now);
         let count = if self.down {
@@ -61,25 +61,25 @@ impl Ramp {
         count as u32
     }
 
-    /// Lets it run or stand.
+    /// Starts or stops it.
     pub(super) fn run(&mut self, runs: bool, now: Cycles) {
         self.stood = self.elapsed(now);
         self.turned_at = runs.then(|| now - self.stood);
     }
 
-    /// Begins again at 0.
+    /// Restarts at 0.
     pub(super) fn restart(&mut self, now: Cycles) {
         self.down = false;
         self.stood = 0;
         self.turned_at = self.turned_at.map(|_| now);
     }
 
-    /// When it turns next.
+    /// Returns when it turns next.
     pub(super) fn due(&self) -> Cycles {
         self.turned_at.map_or(NEVER, |at| at + self.top)
     }
 
-    /// Turns.
+    /// Turns around.
     pub(super) fn turn(&mut self) {
         self.turned_at = self.turned_at.map(|at| at + self.top);
         self.down = !self.down;

@@ -60,7 +60,7 @@ fn bdtr(main: bool) -> u32 {
     bdtr.0
 }
 
-/// Set up as the image does it, with all outputs off, in the image's order.
+/// Sets it up in the image's order, with all outputs off.
 fn set_up() -> Bench<AdvancedTimer> {
     let mut bench = Bench::new(AdvancedTimer::new(), START - 100);
     // Centre-aligned 1, ARPE.
@@ -77,7 +77,7 @@ fn set_up() -> Bench<AdvancedTimer> {
     bench
 }
 
-/// The image's start: updates at the tops alone.
+/// Starts it as the image does: updates only at the tops.
 fn start(bench: &mut Bench<AdvancedTimer>) {
     bench.until(START);
     bench.write(RCR, 0);
@@ -86,11 +86,11 @@ fn start(bench: &mut Bench<AdvancedTimer>) {
     bench.write(RCR, 1);
 }
 
-/// Running with these compare values in all legs' two switches.
+/// Returns it running with these compare values, with both switches of all legs.
 fn switching(values: [u16; 3]) -> Bench<AdvancedTimer> {
     let mut bench = set_up();
     compares(&mut bench, values);
-    // The values are in place before the start, and the gates at rest.
+    // The values are in place before the start, with the gates off.
     bench.write(EGR, UG);
     modes(&mut bench, [Ocm::PWM_MODE1; 3]);
     enables(&mut bench, true, true);
@@ -101,7 +101,7 @@ fn switching(values: [u16; 3]) -> Bench<AdvancedTimer> {
     bench
 }
 
-/// A leg's gates: when, from the start, and high and low.
+/// Returns a leg's gates: cycles since the start, high, low.
 fn gates(bench: &Bench<AdvancedTimer>, wanted: usize) -> Vec<(Cycles, bool, bool)> {
     let of_leg = |(at, signal): &(Cycles, Signal)| match *signal {
         Signal::Gates { leg, high, low } if leg == wanted => Some((at - START, high, low)),
@@ -209,7 +209,7 @@ fn compare_values_are_taken_at_the_top() {
         .into_iter()
         .filter_map(|(at, high, _)| high.then_some(at))
         .collect();
-    // 500 before the first 0, and 200 before the second, each with the dead time.
+    // 500 before the first 0, and 200 before the second, each plus the dead time.
     assert_eq!(highs, [1520, 3820]);
 }
 
@@ -253,7 +253,7 @@ fn between_the_two_pwm_modes_the_reference_stays_until_the_next_comparison() {
     modes(&mut bench, [Ocm::PWM_MODE2; 3]);
     bench.write(EGR, COMG);
     bench.until(START + 1400);
-    // The comparison ends at 500: the other mode's reference, which it becomes then, is the same.
+    // The comparison ends at 500: the other mode's reference, which applies from then on, is the same.
     assert_eq!(gates(&bench, 0), []);
     bench.until(START + 1600);
     assert_eq!(
@@ -358,7 +358,7 @@ fn duties_that_change_every_period_keep_the_dead_time() {
         bench.until(START + 2000 * period - 800);
         let mut next = || {
             duty = duty.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            // Now and then all or nothing.
+            // Sometimes all or nothing.
             ((duty >> 16) % 1400).saturating_sub(200).min(TOP.into()) as u16
         };
         let values = [next(), next(), next()];
@@ -385,7 +385,7 @@ fn what_is_not_followed_is_refused() {
         (CR1, 0xc0),
         (CR1, 0xa8),
         (CR1, 0x1a0),
-        // An idle level that is high; the commutation's preload taken back.
+        // A high idle level; the commutation preload turned off.
         (CR2, 0x171),
         (CR2, 0x70),
         (CCER, 0x2),

@@ -35,7 +35,7 @@ fn read(dma: &mut Dma, offset: u32) -> u32 {
     with(|context| dma.read(offset, context)).0.unwrap()
 }
 
-/// The second channel with so many data, as embassy-stm32 sets it up.
+/// The second channel with `count` data, as embassy-stm32 sets it up.
 fn set_up(count: u32, control: u32) -> Dma {
     let mut dma = Dma::new();
     for (offset, value) in [
@@ -51,7 +51,7 @@ fn set_up(count: u32, control: u32) -> Dma {
     dma
 }
 
-/// Moves a datum; where to, and what is told.
+/// Moves a datum; returns its destination and the signals.
 fn step(dma: &mut Dma) -> (u32, Vec<Signal>) {
     let transfer = dma.request(1).unwrap();
     let ((), signals) = with(|context| dma.done(transfer.channel, context));
@@ -93,7 +93,7 @@ fn what_goes_once_stops_until_it_is_set_up_anew() {
         to_width: Width::Byte,
     };
     assert_eq!(dma.request(1), Some(wanted));
-    // The half raises no interrupt.
+    // The half-transfer flag raises no interrupt.
     assert_eq!(step(&mut dma), (0x4000_0034, vec![]));
     let second = Transfer {
         from: 0x2000_0101,
@@ -127,7 +127,7 @@ fn registers_stand_while_a_channel_is_on_and_memory_to_memory_is_refused() {
         let written = write(&mut dma, offset, value);
         assert_eq!(written, Err(Unmodelled), "{offset:#x}");
     }
-    // The ring may be left to end.
+    // Leaving circular mode lets it run to its end.
     write(&mut dma, CONTROL, control & !CIRC | EN).unwrap();
     step(&mut dma);
     write(&mut dma, CONTROL, control).unwrap();

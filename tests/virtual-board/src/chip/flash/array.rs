@@ -1,4 +1,4 @@
-//! The store's words and pages, and what a loss of power makes of them.
+//! The store's double words and pages, and what a loss of power makes of them.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -14,10 +14,10 @@ const WORD_BYTES: u32 = 8;
 /// Bytes of a page.
 const PAGE_BYTES: u32 = 2048;
 
-/// What an erased double word is.
+/// An erased double word.
 const ERASED: u64 = u64::MAX;
 
-/// A change of the store, by offsets from its beginning.
+/// A change of the store, by offsets from its start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// A page has been erased.
@@ -25,16 +25,16 @@ pub enum Change {
         /// Where it begins.
         offset: u32,
     },
-    /// A double word has got this content. It was erased, or it is all zeros.
+    /// A double word has been programmed. It was erased, or this is all zeros.
     Programmed {
         /// Where it begins.
         offset: u32,
-        /// What it is now.
+        /// Its content.
         bytes: [u8; WORD_BYTES as usize],
     },
 }
 
-/// What takes its time.
+/// An operation that takes time.
 #[derive(Clone, Debug)]
 pub(super) enum Work {
     Program { address: u32, word: u64 },
@@ -46,7 +46,7 @@ pub(super) enum Work {
 pub(super) struct Array {
     memory: Memory,
     store: Range<u32>,
-    /// Double words whose check bits do not fit: each counts as one with two wrong bits or more.
+    /// Double words whose check bits do not match: each counts as one with two or more wrong bits.
     torn: BTreeSet<u32>,
     changes: Vec<Change>,
 }
@@ -76,14 +76,14 @@ impl Array {
         self.torn.contains(&(address & !(WORD_BYTES - 1)))
     }
 
-    /// Whether the double word at this address is erased.
+    /// Returns whether the double word at this address is erased.
     pub(super) fn is_erased(&self, address: u32) -> Result<bool, Unmodelled> {
         let is_within = self.store.contains(&address);
         let word = is_within.then(|| self.word(address)).ok_or(Unmodelled)?;
         Ok(word == ERASED && !self.is_torn(address))
     }
 
-    /// The erase of a page of the store, by its number in the flash.
+    /// Returns the erase of a page of the store, by its number in the flash.
     pub(super) fn erase(&self, page: u8) -> Result<Work, Unmodelled> {
         let start = ORIGIN + u32::from(page) * PAGE_BYTES;
         let page = start..start + PAGE_BYTES;
@@ -91,7 +91,7 @@ impl Array {
         is_within.then_some(Work::Erase { page }).ok_or(Unmodelled)
     }
 
-    /// It has come to its end.
+    /// Completes an operation.
     pub(super) fn finish(&mut self, work: &Work) {
         match work {
             Work::Program { address, word } => {
@@ -102,7 +102,7 @@ impl Array {
         }
     }
 
-    /// It has been cut off: of the bits that were to change, some have, by this seed.
+    /// Cuts off an operation: some of the bits that were to change have, by this seed.
     pub(super) fn tear(&mut self, work: &Work, seed: u64) {
         let mut random = Random(seed);
         match work {
@@ -122,7 +122,7 @@ impl Array {
         }
     }
 
-    /// A word that is neither what it was nor what it was to be is torn.
+    /// Writes a word; one that is neither the old nor the new one is torn.
     fn put_torn(&mut self, address: u32, old: u64, mixed: u64, new: u64) {
         if mixed != self.word(address) {
             self.put(address, mixed);
@@ -153,13 +153,13 @@ impl Array {
     }
 }
 
-/// Some bits of one word, the others of another.
+/// Mixes two words bit by bit.
 fn mix(one: u64, other: u64, random: &mut Random) -> u64 {
     let chosen = random.next();
     one & !chosen | other & chosen
 }
 
-/// SplitMix64, of Steele, Lea and Flood.
+/// SplitMix64, by Steele, Lea and Flood.
 struct Random(u64);
 
 impl Random {

@@ -79,7 +79,7 @@ impl Bench {
         half(address) | half(address + 4) << 32
     }
 
-    /// Programs without waiting for the end.
+    /// Programs without waiting for completion.
     fn program(&mut self, address: u32, word: u64) {
         self.set(CONTROL, PG);
         self.put(address, Width::Word, word as u32);
@@ -157,7 +157,7 @@ fn a_word_is_programmed_once_but_for_zeros() {
     bench.wait();
     bench.program(STORE, 0x1230);
     assert_eq!(bench.get(STATUS), PROGERR);
-    // The error must be removed first.
+    // The error must be cleared first.
     bench.program(STORE + 8, 1);
     assert_eq!(bench.get(STATUS), PROGERR | PGSERR);
     bench.set(STATUS, PROGERR | PGSERR);
@@ -225,7 +225,7 @@ fn a_page_is_erased_in_22_ms_and_no_other() {
     assert_eq!(words, [7, ERASED]);
     let change = Change::Erased { offset: 2048 };
     assert_eq!(bench.flash.take_changes(), [change]);
-    // The program's pages, and all at once.
+    // The program's pages, and a mass erase.
     for control in [PER | (PAGE - 1) << 3 | STRT, 1 << 2 | STRT] {
         assert_eq!(bench.try_set(CONTROL, control), Err(Unmodelled));
     }
@@ -243,7 +243,7 @@ fn a_torn_word_raises_the_non_maskable_interrupt_until_it_is_acknowledged() {
     let torn = bench.word(STORE + 16);
     assert!(torn != word && torn != ERASED);
     assert_eq!(torn & word, word, "no bit is cleared that was not to be");
-    // Both halves were read: it is told once.
+    // Both halves were read, but it is reported once.
     assert_eq!(bench.signals, [Signal::NonMaskable(true)]);
     let status = bench.get(TORN);
     assert_eq!(status, 1 << 31 | 0x1_f010);
@@ -258,7 +258,7 @@ fn a_torn_word_raises_the_non_maskable_interrupt_until_it_is_acknowledged() {
     bench.with(|flash, context| flash.reset(1, context));
     assert_eq!(bench.signals[3..], [Signal::NonMaskable(false)]);
 
-    // It is whole again after an erase.
+    // An erase makes it whole again.
     for key in KEYS {
         bench.set(KEY, key);
     }
@@ -293,7 +293,7 @@ fn an_erase_that_is_cut_off_leaves_a_mixture() {
     let ones: u32 = words.iter().map(|word| word.count_ones()).sum();
     assert!((6_000..10_000).contains(&ones), "{ones} of 16384");
     assert_eq!(bench.signals, [Signal::NonMaskable(true)]);
-    // Who keeps the store elsewhere gets the same from the changes.
+    // A copy kept elsewhere gets the same from the changes.
     let mut kept = vec![0; 2048];
     for change in bench.flash.take_changes() {
         match change {

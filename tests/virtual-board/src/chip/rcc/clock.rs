@@ -6,19 +6,19 @@ use thiserror::Error;
 
 use crate::time::Cycles;
 
-/// HSI's rate.
+/// HSI's frequency.
 const HSI_HZ: u64 = 16_000_000;
 
-/// The least and the greatest rate into the PLL (DS12589, PLL characteristics).
+/// Minimum and maximum PLL input frequency (DS12589, PLL characteristics).
 const PLL_IN_HZ: [u64; 2] = [2_660_000, 16_000_000];
 
-/// The least and the greatest rate of the PLL's oscillator.
+/// Minimum and maximum frequency of the PLL's oscillator.
 const OSCILLATOR_HZ: [u64; 2] = [96_000_000, 344_000_000];
 
-/// The greatest clock of the core without PWR's boost.
+/// Maximum core clock without PWR's boost.
 const UNBOOSTED_HZ: u64 = 150_000_000;
 
-/// For how long a faster one must have been halved, in cycles of 170 MHz: 1 µs (RM0440, 6.1.5).
+/// How long a faster one must have been halved, in cycles at 170 MHz: 1 µs (RM0440, 6.1.5).
 pub(super) const HALVED: Cycles = 170;
 
 /// What a clock's limits depend on.
@@ -30,15 +30,15 @@ pub struct Supply {
     pub wait_states: u8,
 }
 
-/// Why the chip does not run so for sure.
+/// Why the chip may not run reliably like this.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum ClockError {
     /// The PLL's own limits.
     #[error("the PLL gets {input_hz} Hz and its oscillator {oscillator_hz} Hz: out of its range")]
     Pll {
-        /// What it gets.
+        /// Its input.
         input_hz: u64,
-        /// What its oscillator makes of it.
+        /// Its oscillator's frequency.
         oscillator_hz: u64,
     },
     /// The core's limit.
@@ -48,10 +48,10 @@ pub enum ClockError {
     Core {
         /// The clock.
         clock_hz: u64,
-        /// The greatest.
+        /// The maximum.
         greatest_hz: u64,
     },
-    /// The core's supply gets no time.
+    /// The core's supply gets no time to settle.
     #[error(
         "the core comes to {clock_hz} Hz in one step: above 150 MHz it wants half of it for 1 us first"
     )]
@@ -66,14 +66,14 @@ pub enum ClockError {
     Flash {
         /// The clock.
         clock_hz: u64,
-        /// As they are set.
+        /// As set.
         wait_states: u8,
-        /// As many as are needed.
+        /// As needed.
         needed: u64,
     },
 }
 
-/// The processor's clock in Hz.
+/// Returns the processor's clock in Hz.
 pub(super) fn frequency(
     configuration: Cfgr,
     pll: Pllcfgr,
@@ -84,7 +84,7 @@ pub(super) fn frequency(
         Sw::PLL1_R => pll_hz(pll)?,
         _ => HSI_HZ,
     };
-    // RM0440, tables of the voltage ranges and of the flash's wait states.
+    // RM0440, tables of voltage ranges and flash wait states.
     let (greatest_hz, step_hz) = if supply.boost {
         (170_000_000, 34_000_000)
     } else {
@@ -124,7 +124,7 @@ fn pll_hz(pll: Pllcfgr) -> Result<u64, ClockError> {
     Ok(oscillator_hz / (2 * (u64::from(pll.pllr().to_bits()) + 1)))
 }
 
-/// AHB's prescaler: 2 to 16 from 8 on, then 64 to 512.
+/// Returns AHB's prescaler: 2 to 16 from 8 on, then 64 to 512.
 pub(super) fn divider(configuration: Cfgr) -> u64 {
     match configuration.hpre().to_bits() {
         bits @ 8..=11 => 2 << (bits - 8),

@@ -1,8 +1,8 @@
-//! Which parts have a clock, and which are reset.
+//! Which parts have a clock, and which are in reset.
 
 use crate::chip::{Context, Signal, Unmodelled};
 
-/// The reset registers; an enable register is [`ENABLES_AFTER`] bytes after each, with the same bits.
+/// The reset registers; [`ENABLES_AFTER`] bytes after each is an enable register with the same bits.
 const RESETS: [u32; 6] = [AHB1, AHB2, 0x30, APB1, APB1_MORE, APB2];
 
 const AHB1: u32 = 0x28;
@@ -14,8 +14,7 @@ const APB2: u32 = 0x40;
 /// From a reset register to the enable register of the same parts.
 const ENABLES_AFTER: u32 = 0x20;
 
-/// Parts by their place of 1 KiB, with their reset register and bit. What is not among them needs no
-/// clock of its own.
+/// Parts by their 1 KiB block, with their reset register and bit. Anything else needs no clock of its own.
 const PARTS: [(u32, u32, u8); 49] = [
     (0x4002_0000, AHB1, 0),      // DMA1
     (0x4002_0400, AHB1, 1),      // DMA2
@@ -68,7 +67,7 @@ const PARTS: [(u32, u32, u8); 49] = [
     (0x4001_4800, APB2, 18),     // TIM17
 ];
 
-/// RTCAPBEN, which has no bit among the resets.
+/// RTCAPBEN, which has no reset bit.
 const RTC: u8 = 10;
 
 /// SYSCFGEN.
@@ -82,7 +81,7 @@ pub(super) struct Gates {
 }
 
 impl Gates {
-    /// As after a reset: the flash and RTC's registers have their clock.
+    /// Creates them as after a reset: the flash and the RTC's registers have their clock.
     pub(super) fn new() -> Self {
         Self {
             enabled: [1 << 8, 0, 0, 1 << RTC, 0, 0],
@@ -90,7 +89,7 @@ impl Gates {
         }
     }
 
-    /// Whether the part at this address has a clock, or needs none.
+    /// Returns whether the part at this address has a clock, or needs none.
     pub(super) fn open(&self, address: u32) -> bool {
         let place = address & !0x3ff;
         let part = PARTS.iter().find(|part| part.0 == place);

@@ -68,7 +68,7 @@ fn the_last_half_of_170_mhz_comes_a_microsecond_after_the_first() {
     assert_eq!(rcc.clock_hz(BOOST), Ok(85_000_000));
     write_at(1169, &mut rcc, 0x08, 3).unwrap();
     assert_eq!(rcc.clock_hz(BOOST), step);
-    // From HSI anew.
+    // From HSI again.
     write_at(2000, &mut rcc, 0x08, 1).unwrap();
     write_at(2000, &mut rcc, 0x08, HALF).unwrap();
     write_at(2170, &mut rcc, 0x08, 3).unwrap();
@@ -119,7 +119,7 @@ fn the_clock_is_170_mhz_with_boost_and_four_wait_states() {
 #[test]
 fn a_pll_beyond_its_range_is_told() {
     let mut rcc = Rcc::new();
-    // 4 MHz times 87 are 348 MHz.
+    // 4 MHz times 87 is 348 MHz.
     write(&mut rcc, 0x0c, 1 << 24 | 87 << 8 | 3 << 4 | 2).unwrap();
     write(&mut rcc, 0x00, 1 << 24 | 0x500).unwrap();
     write(&mut rcc, 0x08, 3).unwrap();
@@ -207,7 +207,7 @@ fn the_backup_domain_is_locked_and_outlives_resets_but_not_the_power() {
     assert_eq!(read(&mut rcc, 0x90), lsi);
     assert_eq!(write(&mut rcc, 0x90, lsi), Err(Unmodelled), "locked again");
     rcc.open_backup(true);
-    // No other clock without a reset of the domain.
+    // No other clock without resetting the domain.
     write(&mut rcc, 0x90, 0).unwrap();
     assert_eq!(read(&mut rcc, 0x90), 2 << 8);
     write(&mut rcc, 0x90, 1 << 16 | lsi).unwrap();

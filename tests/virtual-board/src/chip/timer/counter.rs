@@ -1,23 +1,23 @@
-//! An up-counter behind a prescaler, by time.
+//! An up-counter behind a prescaler, computed from the time.
 
 use crate::time::{Cycles, NEVER};
 
-/// The counter. It is reckoned from a moment at which its value was known.
+/// The counter, computed from a moment when its value was known.
 #[derive(Clone, Debug)]
 pub(super) struct Counter {
     runs: bool,
-    /// Cycles a count.
+    /// Cycles per count.
     every: Cycles,
     /// The moment, while it runs.
     since: Cycles,
     /// Its value then.
     from: u32,
-    /// Cycles that the prescaler had counted towards the next.
+    /// Cycles that the prescaler had counted towards the next count.
     part: Cycles,
 }
 
 impl Counter {
-    /// Standing at 0.
+    /// Creates one that stands at 0.
     pub(super) fn new() -> Self {
         Self {
             runs: false,
@@ -28,7 +28,7 @@ impl Counter {
         }
     }
 
-    /// Its value. It must not have overflowed since the moment.
+    /// Returns its value. It must not have overflowed since the moment.
     pub(super) fn count(&self, now: Cycles) -> u32 {
         self.from + (self.passed(now) / self.every) as u32
     }
@@ -37,7 +37,7 @@ impl Counter {
         self.part + if self.runs { now - self.since } else { 0 }
     }
 
-    /// When it comes to this value, if it is above the present one and nothing intervenes.
+    /// Returns when it reaches this value, if that is above the current one and nothing intervenes.
     pub(super) fn arrival(&self, value: u32, now: Cycles) -> Cycles {
         if !self.runs || value <= self.count(now) {
             return NEVER;
@@ -45,7 +45,7 @@ impl Counter {
         self.overflow(value - 1)
     }
 
-    /// When it has been at this value, which is not below the present one, for a count.
+    /// Returns when it has spent a count at this value, which is not below the current one.
     pub(super) fn overflow(&self, value: u32) -> Cycles {
         if self.runs {
             let counts = Cycles::from(value - self.from) + 1;
@@ -55,7 +55,7 @@ impl Counter {
         }
     }
 
-    /// Lets it run or stand.
+    /// Starts or stops it.
     pub(super) fn run(&mut self, runs: bool, now: Cycles) {
         let passed = self.passed(now);
         self.from += (passed / self.every) as u32;
@@ -64,13 +64,13 @@ impl Counter {
         self.runs = runs;
     }
 
-    /// Sets its value; the prescaler goes on.
+    /// Sets its value; the prescaler continues.
     pub(super) fn set(&mut self, value: u32, now: Cycles) {
         self.run(self.runs, now);
         self.from = value;
     }
 
-    /// Begins again at 0, with the prescaler.
+    /// Restarts it at 0, with the prescaler.
     pub(super) fn restart(&mut self, every: Cycles, now: Cycles) {
         self.every = every;
         self.since = now;

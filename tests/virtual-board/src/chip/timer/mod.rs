@@ -1,9 +1,9 @@
-//! The general-purpose timers TIM2, TIM3 and TIM4 (RM0440): they count up, compare, and capture the
-//! edges of one pin.
+//! The general-purpose timers TIM2, TIM3 and TIM4 (RM0440): they count up, compare, and capture the edges
+//! of one pin.
 //!
-//! Their clock is the chip's 170 MHz. The start latency of the counter and the synchronisation of the
-//! pin, a few cycles, are neglected. A compare flag rises when the counter arrives at the value: one
-//! that is written as the counter has it comes a turn later.
+//! Their clock is the chip's 170 MHz. The counter's start latency and the pin's synchronisation, a few
+//! cycles, are neglected. A compare flag rises when the counter reaches the value: writing the current
+//! count matches a turn later.
 
 mod counter;
 #[cfg(test)]
@@ -24,12 +24,12 @@ use crate::time::{Cycles, NEVER};
 /// Channels that may capture: the first two.
 const CAPTURES: usize = 2;
 
-/// What it may ask the DMA for: its update, and after it each channel.
+/// Its DMA requests: the update's, then one per channel.
 const REQUESTS: usize = 5;
 const UPDATE: usize = 0;
 const CHANNEL: usize = 1;
 
-/// DIER's first enable of a request, UDE; those of the channels follow.
+/// DIER's first request enable, UDE; those of the channels follow.
 const REQUEST_ENABLES: u32 = 8;
 
 /// CR1: CEN, URS, ARPE.
@@ -38,22 +38,22 @@ const CR1_BITS: u32 = 0x0085;
 const DIER_BITS: u32 = 0x1f1f;
 /// SR: UIF, CCxIF.
 const INTERRUPT_BITS: u32 = 0x001f;
-/// CCMR1 for inputs: CCxS, ICxF; the captures are not divided.
+/// CCMR1 for inputs: CCxS, ICxF; captures are not divided.
 const CCMR1_BITS: u32 = 0xf3f3;
 /// CCER: CCxE, CCxP of two channels.
 const CCER_BITS: u32 = 0x0033;
 /// EGR: UG.
 const EGR_BITS: u32 = 0x0001;
 
-/// What tells one of the timers from the others.
+/// What distinguishes the timers.
 #[derive(Clone, Copy, Debug)]
 struct Kind {
-    /// The highest value of its counter.
+    /// Its counter's highest value.
     max: u32,
     /// Its interrupt.
     interrupt: Interrupt,
-    /// The requests of its update and of its channels at the DMA's multiplexer (stm32-metapac's metadata
-    /// of the STM32G431CB, after RM0440's table of them).
+    /// The requests of its update and its channels at the DMA multiplexer (stm32-metapac's metadata for the
+    /// STM32G431CB, from RM0440's table).
     requests: [u8; REQUESTS],
 }
 
@@ -70,20 +70,20 @@ pub struct Timer {
     /// The value after which it overflows.
     top: u32,
     compares: [u32; 4],
-    /// When the counter comes to each of them.
+    /// When the counter reaches each of them.
     matches: [Cycles; 4],
     counter: Counter,
-    /// Of the pin, as set for the first input; both channels are behind it.
+    /// The pin's, as set for the first input; both channels are behind it.
     filter: Filter,
-    /// Requests that the DMA has not served, a bit each.
+    /// Requests that the DMA has not served, one bit each.
     asks: u32,
-    /// Whether the interrupt's line is up.
+    /// Whether the interrupt line is up.
     line: bool,
     due: Cycles,
 }
 
 impl Timer {
-    /// TIM2, with 32 bits.
+    /// Creates TIM2, with 32 bits.
     pub fn tim2() -> Self {
         Self::new(Kind {
             max: u32::MAX,
@@ -92,7 +92,7 @@ impl Timer {
         })
     }
 
-    /// TIM3.
+    /// Creates TIM3.
     pub fn tim3() -> Self {
         Self::new(Kind {
             max: 0xffff,
@@ -101,7 +101,7 @@ impl Timer {
         })
     }
 
-    /// TIM4.
+    /// Creates TIM4.
     pub fn tim4() -> Self {
         Self::new(Kind {
             max: 0xffff,
@@ -140,31 +140,31 @@ impl Timer {
         self.settle(context);
     }
 
-    /// The level of the first channel's pin.
+    /// Takes the level of the first channel's pin.
     pub fn pin(&mut self, level: bool, context: &mut Context) {
         self.catch_up(context);
         self.filter.input(level, context.now);
         self.settle(context);
     }
 
-    /// Does what has been due before an access at this time.
+    /// Does what was due before an access at this time.
     fn catch_up(&mut self, context: &mut Context) {
         if self.due <= context.now {
             self.act(context);
         }
     }
 
-    /// Whether a channel captures.
+    /// Returns whether a channel captures.
     fn captures(&self, channel: usize) -> bool {
         channel < CAPTURES && self.ccmr1.ccs(channel) != CcmrInputCcs::_RESERVED_0
     }
 
-    /// The counter runs if it is enabled; with a top of 0 it stands all the same.
+    /// Runs the counter if it is enabled; with a top of 0 it still stands.
     fn run(&mut self, now: Cycles) {
         self.counter.run(self.cr1.cen() && self.top > 0, now);
     }
 
-    /// An update event; `requests` if it raises its flag.
+    /// Handles an update event; `requests` tells whether it raises its flag.
     fn update(&mut self, requests: bool, now: Cycles, context: &mut Context) {
         self.top = self.arr;
         self.counter.restart(Cycles::from(self.psc) + 1, now);
@@ -175,8 +175,7 @@ impl Timer {
         }
     }
 
-    /// Asks the DMA for a transfer, if that is enabled. The request stands until it is served or its enable
-    /// is taken away.
+    /// Requests a DMA transfer, if enabled. The request stands until it is served or its enable is cleared.
     fn ask(&mut self, request: usize, context: &mut Context) {
         if self.dier.0 >> REQUEST_ENABLES >> request & 1 == 1 {
             self.asks |= 1 << request;
@@ -185,7 +184,7 @@ impl Timer {
         }
     }
 
-    /// The requests that stand, by their numbers at the multiplexer.
+    /// Returns the standing requests, by their numbers at the multiplexer.
     pub fn requests(&self) -> impl Iterator<Item = u8> + use<> {
         let (asks, numbers) = (self.asks, self.kind.requests);
         let stands = move |request: &usize| asks >> request & 1 == 1;
@@ -194,13 +193,13 @@ impl Timer {
             .map(move |request| numbers[request])
     }
 
-    /// The DMA has served a request, if it is one of these.
+    /// Notes that the DMA has served a request, if it is one of these.
     pub fn served(&mut self, number: u8) {
         let request = self.kind.requests.iter().position(|own| *own == number);
         self.asks &= !request.map_or(0, |request| 1 << request);
     }
 
-    /// A compare's match or a capture.
+    /// Raises the flag of a compare match or a capture.
     fn raise(&mut self, channel: usize, context: &mut Context) {
         self.sr.set_ccif(channel, true);
         self.ask(CHANNEL + channel, context);
@@ -219,7 +218,7 @@ impl Timer {
         }
     }
 
-    /// The counter starts again from 0 by itself: a value above the top is met now.
+    /// Restarts the counter from 0 by itself: a value above the top matches now.
     fn overflow(&mut self, at: Cycles, context: &mut Context) {
         let top = self.top;
         self.update(true, at, context);
@@ -232,7 +231,7 @@ impl Timer {
         self.expect(at);
     }
 
-    /// The matches up to this time.
+    /// Raises the matches up to this time.
     fn meet(&mut self, now: Cycles, context: &mut Context) {
         for channel in 0..4 {
             if self.matches[channel] <= now {
@@ -242,7 +241,7 @@ impl Timer {
         }
     }
 
-    /// Finds when the counter comes to the compare values.
+    /// Finds when the counter reaches the compare values.
     fn expect(&mut self, now: Cycles) {
         for channel in 0..4 {
             let compare = self.compares[channel];
@@ -254,7 +253,7 @@ impl Timer {
         }
     }
 
-    /// Says what has changed and finds what is due next.
+    /// Signals what has changed and finds what is due next.
     fn settle(&mut self, context: &mut Context) {
         if self.filter.act(context.now) {
             self.capture(context);
@@ -284,7 +283,7 @@ impl Timer {
 
     fn write_ccmr1(&mut self, value: u32) -> Result<(), Unmodelled> {
         let new = CcmrInput2ch(only(value, CCMR1_BITS)?);
-        // An input is the first pin, or there is none, and then the field's bits mean an output.
+        // An input is the first pin or none; with none, the field's bits describe an output.
         let direct = match new.ccs(0) {
             CcmrInputCcs::TI4 => true,
             CcmrInputCcs::_RESERVED_0 => value & 0xff == 0,
@@ -369,7 +368,7 @@ impl Part for Timer {
             ARR => self.write_arr(value, now)?,
             CCR1..=CCR4 => {
                 let channel = channel(offset);
-                // What has been captured cannot be written.
+                // A captured value cannot be written.
                 if self.captures(channel) || value > self.kind.max {
                     return Err(Unmodelled);
                 }

@@ -10,10 +10,10 @@ const UG: u32 = 1;
 const CCR2: u32 = CCR1 + 4;
 const CCR3: u32 = CCR1 + 8;
 
-/// The samples of the filter that the image uses.
+/// Samples of the filter that the image uses.
 const FILTER: Cycles = 4;
 
-/// TIM2, running, with both channels at the one pin, and their requests.
+/// TIM2, running, with both channels and their requests on the one pin.
 fn capturing() -> Bench<Timer> {
     let mut bench = Bench::new(Timer::tim2(), START);
     bench.write(PSC, 0);
@@ -24,7 +24,7 @@ fn capturing() -> Bench<Timer> {
     ccmr.set_icf(0, FilterValue::FCK_INT_N4);
     ccmr.set_icf(1, FilterValue::FCK_INT_N4);
     bench.write(CCMR1, ccmr.0);
-    // The second channel takes the falling edges.
+    // The second channel captures the falling edges.
     bench.write(CCER, 0x31);
     bench.write(DIER, 0x600);
     bench.write(EGR, UG);
@@ -66,7 +66,7 @@ fn a_train_of_pulses_is_captured() {
             pin(&mut bench, at, level);
             bench.until(at + 20);
             wanted.push((at + FILTER, request));
-            // As the DMA does it.
+            // As the DMA does.
             captured.push((START + Cycles::from(bench.read(register)), request));
         }
     }
@@ -148,7 +148,7 @@ fn the_long_counter_wraps_after_32_bits() {
     assert_eq!(bench.read(CNT), 7);
 }
 
-/// TIM4 as the time driver has it: microseconds, with interrupts half-way and at the overflow.
+/// TIM4 as the time driver sets it up: in microseconds, with interrupts halfway and at the overflow.
 fn clock() -> Bench<Timer> {
     let mut bench = Bench::new(Timer::tim4(), START);
     bench.write(CR1, 0);
@@ -204,7 +204,7 @@ fn a_stopped_counter_keeps_its_value() {
     bench.write(CCR2, 6);
     bench.write(DIER, 4);
     bench.write(CR1, 1);
-    // The prescaler had 100 of 170.
+    // The prescaler was at 100 of 170.
     bench.until(START + 10_069);
     assert_eq!(bench.read(CNT), 5);
     bench.until(START + 10_070);
@@ -215,7 +215,7 @@ fn a_stopped_counter_keeps_its_value() {
     assert_eq!(bench.read(CNT), 101);
 }
 
-/// TIM3 as replies are paced: first so many cycles, then the others.
+/// TIM3 as it paces replies: first `first` cycles, then `others`.
 fn pacing(first: u32, others: u32) -> Bench<Timer> {
     let mut bench = Bench::new(Timer::tim3(), START);
     bench.write(CR1, 0x84);
@@ -251,7 +251,7 @@ fn a_request_stands_until_it_is_served_or_its_enable_is_taken_away() {
     assert_eq!(standing(&bench), Some(65));
     bench.part.served(65);
     assert_eq!(standing(&bench), None);
-    // One that nobody serves, however often it is asked again, is one.
+    // A request that nobody serves is a single one, however often it is repeated.
     bench.until(START + 20_000);
     bench.write(CR1, 0x84);
     assert_eq!(bench.part.requests().collect::<Vec<_>>(), [65]);

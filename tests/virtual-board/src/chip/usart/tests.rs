@@ -1,6 +1,6 @@
 use super::*;
 
-/// 115200 baud of 170 MHz, as the HAL rounds, in cycles a bit.
+/// 115200 baud at 170 MHz, as the HAL rounds it, in cycles per bit.
 const DIVIDER: u32 = 1476;
 const BYTE: Cycles = 14_760;
 
@@ -18,7 +18,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Switched on, with its preamble over.
+    /// Creates one that is on, with its preamble over.
     fn new(control: u32, transfers: u32) -> Self {
         let mut bench = Self {
             usart: Usart::second(),
@@ -149,7 +149,7 @@ fn the_transmitter_asks_for_a_transfer_a_byte() {
     let request = Signal::Request(27);
     assert_eq!(bench.count(request), 1);
     assert_eq!(bench.usart.requests().last(), Some(27));
-    // The first goes on to the line, so the register is free again; the second stays in it.
+    // The first moves to the line, so the register is free again; the second stays in it.
     bench.write(TDR, 1);
     assert_eq!(bench.count(request), 2);
     bench.write(TDR, 2);
@@ -234,7 +234,7 @@ fn what_comes_to_a_receiver_that_is_off_is_lost() {
     let mut bench = Bench::new(1 | 1 << 3, 0);
     bench.usart.queue(b"x", bench.now);
     assert_eq!(bench.usart.due(), NEVER);
-    // Switched off in the midst of a byte.
+    // Switched off in the middle of a byte.
     let mut bench = Bench::new(ON, 0);
     bench.usart.queue(b"xy", bench.now);
     bench.write(CR1, 0);
@@ -257,7 +257,7 @@ fn the_rate_is_the_clock_over_the_divider() {
 fn what_is_not_modelled_is_refused() {
     let mut bench = Bench::new(ON, 0);
     for (offset, value) in [
-        // 8 samples a bit, a FIFO while it is on, two stop bits, half duplex, a prescaler, a rate while
+        // Oversampling by 8, a FIFO while it is on, two stop bits, half duplex, a prescaler, a rate while
         // it is on, a break, the time-out.
         (CR1, ON | 1 << 15),
         (CR1, ON | FIFO_ON),

@@ -1,16 +1,16 @@
-//! A small assembler: the instructions that the self-tests are written in (DDI 0403, A7.7).
+//! A small assembler for the instructions that the self-tests use (DDI 0403, A7.7).
 //!
-//! Loads, stores and moves of constants always take their encoding of 32 bits.
+//! Loads, stores and moves of constants always use their 32-bit encoding.
 
 use std::collections::BTreeMap;
 
-/// Assembled code and where its labels are.
+/// Assembled code and the addresses of its labels.
 pub(super) struct Code {
     pub(super) bytes: Vec<u8>,
     pub(super) labels: BTreeMap<String, u32>,
 }
 
-/// Conditions by their number.
+/// Conditions by number.
 const CONDITIONS: [&str; 14] = [
     "eq", "ne", "cs", "cc", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le",
 ];
@@ -18,7 +18,7 @@ const CONDITIONS: [&str; 14] = [
 /// Instructions without operands.
 const PLAIN: [(&str, u32); 15] = [
     ("nop", 0xbf00),
-    // A branch to the next instruction: there, if not before, an engine takes what is pending.
+    // A branch to the next instruction: there, at the latest, an engine takes what is pending.
     ("sync", 0xe7ff),
     ("wfe", 0xbf20),
     ("wfi", 0xbf30),
@@ -35,7 +35,7 @@ const PLAIN: [(&str, u32); 15] = [
     ("vmov.f32 s1, s0", 0xeef0_0a40),
 ];
 
-/// Loads and stores with an offset of 12 bits: their first halfword without the base.
+/// Loads and stores with a 12-bit offset: their first half-word without the base.
 const TRANSFERS: [(&str, u32); 6] = [
     ("str", 0xf8c0),
     ("ldr", 0xf8d0),
@@ -45,7 +45,7 @@ const TRANSFERS: [(&str, u32); 6] = [
     ("ldrb", 0xf890),
 ];
 
-/// Special registers by their number (B5.2.2).
+/// Special registers by number (B5.2.2).
 const SPECIAL: [(&str, u32); 10] = [
     ("apsr", 0),
     ("xpsr", 3),
@@ -60,10 +60,10 @@ const SPECIAL: [(&str, u32); 10] = [
 ];
 
 /// Assembles a program to lie at this address. A line has a label, an instruction, both or neither; a `;`
-/// begins a remark.
+/// begins a comment.
 pub(super) fn assemble(source: &str, origin: u32) -> Code {
     let mut labels = BTreeMap::new();
-    // The first pass finds where the labels are, the second where they are used.
+    // The first pass finds the labels, the second uses them.
     let mut bytes = Vec::new();
     for last in [false, true] {
         bytes.clear();
@@ -144,7 +144,7 @@ impl Line<'_> {
             "mrs" => halves(0xf3ef_8000 | register(0) << 8 | self.special(operands[1])),
             "msr" => {
                 let first = 0xf380_8000 | register(1) << 16;
-                // The flags alone, of what APSR has.
+                // Only the flags in APSR.
                 let mask = 0b1000 << 8;
                 halves(first | mask | self.special(operands[0]))
             }
@@ -173,7 +173,7 @@ impl Line<'_> {
             .and_then(|rest| rest.strip_prefix('t'))
         {
             let condition = number(operands[0]).expect("a condition") as u32;
-            // A bit for each that follows, whether it takes the condition or its opposite, then a 1.
+            // A bit for each that follows, for the condition or its opposite, then a 1.
             let mut mask = 0b1000 >> more.len();
             for (index, letter) in more.chars().enumerate() {
                 let same = u32::from(letter == 't');
@@ -184,7 +184,7 @@ impl Line<'_> {
         panic!("no such instruction: {}", self.text);
     }
 
-    /// Two instructions: a constant by r12 to the bed's register at this offset from r10.
+    /// Two instructions: a constant through r12 to the bed's register at this offset from r10.
     fn tell(&self, offset: u32) -> Vec<u8> {
         let value = self.text.split_once('#').expect("a constant").1;
         let mut code = self.wide(0xf240, 12, self.value(value));
@@ -199,7 +199,7 @@ impl Line<'_> {
         halves(first << 16 | (value >> 8 & 7) << 12 | register << 8 | value & 0xff)
     }
 
-    /// A move between a register and one of the floating-point unit's.
+    /// A move between a core and a floating-point register.
     fn float(&self, code: u32, single: &str, register: &str) -> Vec<u8> {
         let single: u32 = single[1..].parse().expect("a number");
         let register = self.register(register);
@@ -236,7 +236,7 @@ impl Line<'_> {
             .1
     }
 
-    /// A number or a label; of code, `=` before the label makes it what a branch takes.
+    /// A number or a label; for code, `=` before the label makes it a branch target.
     fn value(&self, text: &str) -> u32 {
         let text = text.trim_start_matches('#');
         if let Some(label) = text.strip_prefix('=') {
@@ -257,7 +257,7 @@ impl Line<'_> {
         }
     }
 
-    /// How far a branch goes, in a signed number of so many bits.
+    /// How far a branch goes, as a signed number of `bits` bits.
     fn distance(&self, label: &str, bits: u32) -> u32 {
         let distance = self.label(label).wrapping_sub(self.at + 4);
         let limit = 1 << (bits - 1);
@@ -267,7 +267,7 @@ impl Line<'_> {
     }
 }
 
-/// One or two halfwords, the first the upper.
+/// One or two half-words, the first one in the upper half.
 fn halves(code: u32) -> Vec<u8> {
     let lower = (code as u16).to_le_bytes();
     match (code >> 16) as u16 {
@@ -280,7 +280,7 @@ fn halves(code: u32) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// As GNU as 2.40 assembles them, at 0x0800_0000.
+    /// As assembled by GNU as 2.40, at 0x0800_0000.
     const KNOWN: &[(&str, &[u16])] = &[
         ("mov r3, #0xabcd", &[0xf64a, 0x33cd]),
         ("mov r12, #0x8f1", &[0xf640, 0x0cf1]),

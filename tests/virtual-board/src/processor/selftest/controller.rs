@@ -121,7 +121,7 @@ fn it_tells_what_is_pending() {
     assert_eq!(told, [0, 1 << 22 | 21 << 12]);
 }
 
-/// The interrupts 1 and 2, the second more urgent, nest; both tell ICSR and which are active.
+/// Interrupts 1 and 2, the second more urgent, nest; both report ICSR and which are active.
 const NESTED: &str = "
     main: mov32 r0, 0xe000e100
     mov r1, #6

@@ -1,9 +1,9 @@
-//! An exception's entry and return (B1.5.6 to B1.5.8).
+//! Exception entry and return (B1.5.6 to B1.5.8).
 
 use super::{RAM, STACK, Stop, marks, run};
 
-/// Fills registers, takes interrupt 5 in a loop, and tells the registers after it. Its handler tells the
-/// frame and moves the return address behind the loop.
+/// Fills registers, takes interrupt 5 in a loop, and reports the registers afterwards. Its handler reports
+/// the frame and moves the return address past the loop.
 const INTERRUPTED: &str = "
     interrupted: mov32 r0, 0xe000e100
     mov r1, #0x20
@@ -60,7 +60,8 @@ const INTERRUPTED: &str = "
     bx lr
 ";
 
-/// What the program tells: the frame, where it is, LR and xPSR in the handler; then the registers again.
+/// Checks what the program reports: the frame, its address, LR and xPSR in the handler; then the registers
+/// again.
 fn told(program: &str, frame: u32, aligned: bool, lr: u32, sp: u32) {
     let mut ran = run(&format!("{program}\n{INTERRUPTED}"));
     assert_eq!(ran.stop, Stop::Asked);
@@ -192,7 +193,7 @@ fn a_block_of_conditions_ends() {
 }
 
 #[test]
-// The engine leaves its exclusive monitor as it is.
+// The engine leaves its exclusive monitor alone.
 #[should_panic = "assertion `left == right` failed"]
 fn an_exception_ends_an_exclusive_access() {
     let program = "

@@ -2,7 +2,7 @@
 
 use super::{RAM, Ran, Stop, UNKNOWN, marks, run};
 
-/// A hard fault's handler that tells the fault's registers and the frame's return address.
+/// A hard fault handler that reports the fault registers and the frame's return address.
 const TELLING: &str = "
     exception_3: mov32 r0, 0xe000ed28
     ldr r1, [r0]
@@ -165,7 +165,7 @@ fn a_request_resets() {
     let mut ran = run(program);
     assert_eq!(ran.stop, Stop::Reset);
     assert_eq!(ran.processor.surroundings().marks, [1]);
-    // Out of reset it runs again, and what it wrote to memory is still there.
+    // After the reset it runs again, with what it wrote to memory still there.
     ran.ram.write(RAM, 4, 7);
     ran.processor.reset(super::FLASH);
     assert_eq!(ran.processor.run(), Stop::Reset);

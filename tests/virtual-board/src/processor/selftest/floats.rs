@@ -18,7 +18,7 @@ const ENABLED: &str = "
 ";
 
 #[test]
-// The engine does not ask CPACR.
+// The engine ignores CPACR.
 #[should_panic = "assertion `left == right` failed"]
 fn without_leave_it_faults() {
     let program = "
@@ -52,7 +52,7 @@ fn a_frame_is_short_while_it_is_not_used() {
     assert_eq!(marks(&program), [0, 0xffff_fff9, STACK - 32]);
 }
 
-/// Fills s0 to s15 and FPSCR, takes an interrupt, and tells them, CONTROL and the stack pointer.
+/// Fills s0 to s15 and FPSCR, takes an interrupt, and reports them, CONTROL and the stack pointer.
 fn interrupted(handler: &str) -> Vec<u32> {
     let mut program = format!("{ENABLED}\n");
     for single in 0..16 {
@@ -86,7 +86,7 @@ fn interrupted(handler: &str) -> Vec<u32> {
     ran.processor.surroundings().marks.clone()
 }
 
-/// What all of them tell at the end.
+/// What all of them report at the end.
 fn kept() -> Vec<u32> {
     let mut values: Vec<u32> = (0x100..0x110).collect();
     values.extend([0x9040_0000, 4, STACK]);
@@ -119,7 +119,7 @@ fn an_interrupt_that_uses_it_keeps_its_state() {
         bx lr
     ";
     let mut marks = interrupted(handler);
-    // Its modes are FPDSCR's in the handler, its flags unknown; 1 + 1 = 2; the frame has 26 words.
+    // In the handler its modes are FPDSCR's, its flags unknown; 1 + 1 = 2; the frame has 26 words.
     marks[2] &= 0x07c0_0000;
     let wanted = [LONG, STACK - 104, 0, 0x4000_0000, 0x100, 0x10f, 0x9040_0000];
     assert_eq!(marks[..7], wanted, "{marks:x?}");
@@ -178,7 +178,7 @@ fn a_frame_can_be_filled_at_once() {
         str r0, [sp, #44]
         bx lr
     ";
-    // What is unstacked is what the frame has.
+    // What is unstacked is what the frame holds.
     let marks = marks(&format!("{ENABLED}\n{program}"));
     assert_eq!(marks, [LONG, 0x123, 0x77]);
 }

@@ -2,7 +2,7 @@
 
 use super::marks;
 
-/// Enables the interrupts 1 to 3 with their priorities, and has their handlers.
+/// Enables interrupts 1 to 3 with their priorities, and provides their handlers.
 const LEVELS: &str = "
     main: mov32 r0, 0xe000e100
     mov r1, #0xffff
@@ -48,7 +48,7 @@ fn primask_holds_interrupts() {
 }
 
 #[test]
-// The engine keeps the four bits that the chip has not.
+// The engine keeps the four bits that the chip does not have.
 #[should_panic = "assertion `left == right` failed"]
 fn basepri_holds_its_priority_and_lower() {
     let body = "mov r1, #0x2f

@@ -1,8 +1,9 @@
-//! What the processor has to do as the architecture says (ARMv7-M, DDI 0403): programs, and what they tell.
+//! What the processor must do according to the architecture (ARMv7-M, DDI 0403): programs, and what they
+//! report.
 //!
-//! A program runs from flash on a bed whose few registers it tells what it does by: it leaves marks, raises
-//! and lowers interrupt lines, and stops. What is pending may be taken as late as at the next branch, so
-//! there is one where that matters. Where the engine is known to deviate, the test says so as long as it does.
+//! A program runs from flash on a bed with a few registers, through which it leaves marks, raises and lowers
+//! interrupt lines, and stops. What is pending may be taken as late as the next branch, so there is one where
+//! that matters. Where the engine is known to deviate, the test says so as long as it does.
 
 mod assembler;
 mod controller;
@@ -20,7 +21,7 @@ use crate::memory::Memory;
 use crate::time::{Cycles, NEVER};
 use assembler::{Code, assemble};
 
-/// Where the program lies, behind its vector table.
+/// Where the program lies, after its vector table.
 const FLASH: u32 = 0x0800_0000;
 /// Its working memory.
 const RAM: u32 = 0x2000_0000;
@@ -28,10 +29,10 @@ const RAM: u32 = 0x2000_0000;
 const BYTES: usize = 0x1000;
 /// Where the main stack begins.
 const STACK: u32 = RAM + BYTES as u32;
-/// Entries of the vector table: the system's and 32 interrupts.
+/// Entries in the vector table: the system's and 32 interrupts.
 const VECTORS: usize = 48;
 
-/// The bed's registers: a mark, a stop, lines to raise and to lower by a bit an interrupt, lines by their
+/// The bed's registers: a mark, a stop, lines to raise and to lower with one bit per interrupt, a line by its
 /// number to raise after [`LATER`], the non-maskable line, flash to be busy for [`LATER`].
 const BED: u32 = 0x4000_0000;
 const MARK: u32 = BED;
@@ -44,13 +45,13 @@ const BUSY: u32 = BED + 24;
 /// A register that the bed does not model.
 const UNKNOWN: u32 = BED + 0x100;
 
-/// Cycles after which a line rises that is to rise later, and for which flash is busy.
+/// Cycles after which a delayed line rises, and for which flash is busy.
 const LATER: Cycles = 5_000;
 /// Cycles after which a program that does not end is stopped.
 const END: Cycles = 1_000_000;
 
-/// What each program begins with, and what ends one that took an exception it has no handler for: a mark of
-/// the exception's number from 0xba00 on.
+/// What each program begins with, and what ends one that took an exception without a handler: a mark of the
+/// exception's number from 0xba00 on.
 const FRAME: &str = "
     start: mov32 r10, 0x40000000
     b main
@@ -69,7 +70,7 @@ pub(super) struct Bed {
     /// When lines rise by themselves.
     later: Vec<(Cycles, u16)>,
     stopped: bool,
-    /// What the program has told.
+    /// What the program has reported.
     marks: Vec<u32>,
     /// Exceptions that were entered and left.
     exceptions: Vec<(u16, bool)>,
@@ -154,7 +155,7 @@ fn run(program: &str) -> Ran {
     ran
 }
 
-/// A program that is to be run.
+/// Loads a program that is to be run.
 fn load(program: &str) -> Ran {
     let origin = FLASH + 4 * VECTORS as u32;
     let code = assemble(&format!("{FRAME}\n{program}"), origin);

@@ -2,7 +2,7 @@
 
 use super::{marks, run};
 
-/// Enables interrupts 0 to 15 and sets the priority of 1 to 3: the greater the number, the more urgent.
+/// Enables interrupts 0 to 15 and sets the priorities of 1 to 3: the higher the number, the more urgent.
 const LEVELS: &str = "
     main: mov32 r0, 0xe000e100
     mov r1, #0xffff
@@ -16,7 +16,7 @@ const LEVELS: &str = "
     strb r1, [r0, #3]
 ";
 
-/// Handlers of the interrupts 1 to 3 that leave their number.
+/// Handlers of interrupts 1 to 3 that leave their number.
 const HANDLERS: &str = "
     exception_17: lower #2
     mark #1
@@ -60,7 +60,7 @@ fn three_levels_nest() {
         str r0, [r10]
         bx lr
     ";
-    // Three frames of 32 bytes and what two handlers have pushed.
+    // Three frames of 32 bytes plus what two handlers have pushed.
     let sp = super::STACK - 3 * 32 - 2 * 8;
     assert_eq!(leveled(&[program]), [1, 2, 3, sp, 0x22, 0x11, 0x99]);
 }

@@ -2,7 +2,7 @@
 
 use super::{END, LATER, marks, run};
 
-/// Enables the interrupts 1 and 2, the second more urgent, with their handlers.
+/// Enables interrupts 1 and 2, the second more urgent, with their handlers.
 const LINES: &str = "
     main: mov32 r0, 0xe000e100
     mov r1, #6
@@ -28,7 +28,7 @@ fn told(body: &str) -> Vec<u32> {
     marks(&format!("{LINES}\nbody: {body}"))
 }
 
-/// For a program that sleeps for ever: what it leaves.
+/// Runs a program that sleeps forever; returns its marks.
 fn slept(body: &str) -> Vec<u32> {
     let mut ran = run(&format!("{LINES}\nbody: {body}"));
     let bed = ran.processor.surroundings();

@@ -1,4 +1,4 @@
-//! What the processor tells of itself, and that it goes on where it was.
+//! What the processor shows of its state, and that it continues where it was.
 
 use std::iter::repeat_n;
 
@@ -53,7 +53,7 @@ fn instructions_are_counted() {
         count(&format!("main: mov r0, #0\n{straight}b stop")),
         base + 300
     );
-    // 100 turns of a loop; those that a condition holds back count too.
+    // 100 turns of a loop; instructions that a condition holds back count too.
     let turns = "
         main: mov r0, #100
         turn: subs r0, #1
@@ -139,7 +139,7 @@ fn what_is_done_first_with_a_memory_is_told() {
     assert_eq!(ran, [Some(Access::Write), Some(Access::Read), None]);
 }
 
-/// What is done first with the words at r4, r5 and r6.
+/// Returns the first access to the words at r4, r5 and r6.
 fn watched(body: &str) -> Vec<Option<Access>> {
     let program = format!("main: mov32 r4, 0x20000010\nmov32 r5, 0x20000020\n{body}\nb stop");
     let mut ran = load(&program);

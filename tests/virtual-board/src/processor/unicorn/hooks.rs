@@ -1,4 +1,4 @@
-//! What the engine calls as it executes: where a block begins, for its exceptions, and for registers.
+//! The engine's callbacks: at the start of a block, for its exceptions, and for registers.
 
 use std::ops::Range;
 
@@ -11,13 +11,13 @@ use crate::processor::priority::{Masks, bit, number};
 use crate::processor::{BusError, Stop, Surroundings, Width};
 use crate::time::Cycles;
 
-/// The processor's own registers; the debug unit's behind them are the chip's.
+/// The processor's own registers; the debug unit's after them are the chip's.
 const PRIVATE: Range<u32> = 0xe000_0000..0xe004_0000;
 
-/// Flash, which stalls what is fetched from it while it is written.
+/// Flash, which stalls fetches while it is being written.
 const FLASH: Range<u32> = 0x0800_0000..0x0802_0000;
 
-/// What the engine calls its interrupts (QEMU, target/arm/cpu.h).
+/// The engine's names for its interrupts (QEMU, target/arm/cpu.h).
 const SV_CALL: u32 = 2;
 const BREAKPOINT: u32 = 7;
 const EXCEPTION_EXIT: u32 = 8;
@@ -28,8 +28,8 @@ const YIELD: u16 = 0xbf10;
 /// The IT state in xPSR.
 const WITHIN_IT: u32 = 0x0600_fc00;
 
-/// Bits of CFSR and HFSR: an instruction that is none, a bus error where it is known and where it came
-/// late, a stack that is no memory; a fault that has become a hard one.
+/// Bits of CFSR and HFSR: an undefined instruction, a precise and an imprecise bus error, a stacking error;
+/// a fault escalated to a hard one.
 pub(super) const UNDEFINED: u32 = 1 << 16;
 pub(super) const PRECISE: u32 = 1 << 9;
 pub(super) const ADDRESS_VALID: u32 = 1 << 15;
@@ -38,7 +38,7 @@ pub(super) const FETCH: u32 = 1 << 8;
 pub(super) const STACKING: u32 = 1 << 12;
 pub(super) const FORCED: u32 = 1 << 30;
 
-/// A block of code is about to be executed.
+/// Handles the start of a code block.
 pub(super) fn block<S: Surroundings + 'static>(
     engine: &mut Unicorn<'_, Inside<S>>,
     address: u64,
@@ -47,7 +47,7 @@ pub(super) fn block<S: Surroundings + 'static>(
     let address = address as u32;
     let inside = engine.get_data_mut();
     inside.settle();
-    // Before anything that stops it as well: it would be lost.
+    // Before anything that also stops it, or it would be lost.
     if inside.private.reset_requested && inside.stop.is_none() {
         inside.private.reset_requested = false;
         inside.stop = Some(Stop::Reset);
@@ -91,7 +91,7 @@ pub(super) fn block<S: Surroundings + 'static>(
     });
 }
 
-/// The engine reports an exception of its own.
+/// Handles an exception that the engine reports.
 pub(super) fn interrupt<S: Surroundings + 'static>(engine: &mut Unicorn<'_, Inside<S>>, kind: u32) {
     engine.get_data_mut().settle();
     let pc = read(engine, RegisterARM::PC);
@@ -103,7 +103,7 @@ pub(super) fn interrupt<S: Surroundings + 'static>(engine: &mut Unicorn<'_, Insi
     }
 }
 
-/// An instruction that the engine does not take.
+/// Handles an instruction that the engine rejects.
 pub(super) fn invalid<S: Surroundings + 'static>(engine: &mut Unicorn<'_, Inside<S>>) -> bool {
     let pc = read(engine, RegisterARM::PC) & !1;
     let inside = engine.get_data_mut();
@@ -129,7 +129,7 @@ pub(super) fn doze<S: Surroundings + 'static>(engine: &mut Unicorn<'_, Inside<S>
     while let Some(sleep) = engine.get_data().asleep {
         let inside = engine.get_data_mut();
         inside.latch();
-        // An interrupt that PRIMASK alone holds back ends WFI, and does not end WFE.
+        // An interrupt masked by PRIMASK alone ends WFI, but not WFE.
         let masks = match sleep {
             Sleep::Interrupt => Masks {
                 primask: false,
@@ -150,7 +150,7 @@ pub(super) fn doze<S: Surroundings + 'static>(engine: &mut Unicorn<'_, Inside<S>
     }
 }
 
-/// Takes an exception that the instruction itself has caused.
+/// Takes an exception caused by the instruction itself.
 fn synchronous<S: Surroundings + 'static>(
     engine: &mut Unicorn<'_, Inside<S>>,
     exception: u16,
@@ -171,7 +171,7 @@ fn synchronous<S: Surroundings + 'static>(
     }
 }
 
-/// The same of a fault, with its cause.
+/// The same for a fault, with its cause.
 pub(super) fn fault<S: Surroundings + 'static>(
     engine: &mut Unicorn<'_, Inside<S>>,
     exception: u16,
@@ -182,12 +182,12 @@ pub(super) fn fault<S: Surroundings + 'static>(
     synchronous(engine, exception, pc);
 }
 
-/// The time of an access to a register is that of its instruction.
+/// Advances to the time of the instruction that accesses a register, and returns its address.
 fn reach<S: Surroundings + 'static>(engine: &mut Unicorn<'_, Inside<S>>) -> u32 {
     let pc = read(engine, RegisterARM::PC) & !1;
     engine.get_data_mut().reach(pc);
-    // With the program counter the engine restores the IT state of the access, and keeps it: the next
-    // block would be executed by its condition.
+    // With the program counter the engine restores the access's IT state, and keeps it: the next block
+    // would be executed under its condition.
     let xpsr = read(engine, RegisterARM::XPSR);
     if xpsr & WITHIN_IT != 0 {
         write(engine, RegisterARM::XPSR, xpsr & !WITHIN_IT);
@@ -252,7 +252,7 @@ pub(super) fn store<S: Surroundings + 'static>(
     }
 }
 
-/// An access that failed: a bus fault, which comes behind the instruction, or the end of the run.
+/// Handles a failed access: by a bus fault after the instruction, or by ending the run.
 fn refused<S: Surroundings + 'static>(
     engine: &mut Unicorn<'_, Inside<S>>,
     error: BusError,

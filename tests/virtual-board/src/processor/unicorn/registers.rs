@@ -1,10 +1,10 @@
-//! The engine's registers by their names here.
+//! The engine's registers by the names used here.
 
 use unicorn_engine::{RegisterARM, Unicorn};
 
 use crate::processor::Register;
 
-/// A register of the engine, which has all that are asked for.
+/// Reads one of the engine's registers; it has all that are requested here.
 pub(super) fn read<D>(engine: &Unicorn<'_, D>, register: RegisterARM) -> u32 {
     read_number(engine, register as i32)
 }
@@ -18,7 +18,7 @@ pub(super) fn write<D>(engine: &mut Unicorn<'_, D>, register: RegisterARM, value
     let _ = engine.reg_write(register, value.into());
 }
 
-/// s0 to s15 and FPSCR.
+/// Returns s0 to s15 and FPSCR.
 pub(super) fn float_name(index: u32) -> i32 {
     match index {
         16 => RegisterARM::FPSCR as i32,
@@ -26,7 +26,7 @@ pub(super) fn float_name(index: u32) -> i32 {
     }
 }
 
-/// What the engine calls a register.
+/// Returns the engine's name for a register.
 pub(super) fn name(register: Register) -> RegisterARM {
     const GENERAL: [RegisterARM; 13] = [
         RegisterARM::R0,

@@ -1,8 +1,8 @@
-//! The chip's control on this machine: the shared code with what the chip's interrupt reads.
+//! The chip's control on this machine: the shared code, fed with what the chip's interrupt reads.
 //!
-//! What the interrupt does around `step` is written here anew, after the firmware's `interrupt` and
-//! `exchange`: which reading is what, how long a set-point lives, what a break makes of it, and what a
-//! duty is in the timer's clocks.
+//! What the interrupt does around `step` is reimplemented here, after the firmware's `interrupt` and
+//! `exchange`: which reading is what, how long a set-point lives, what a break does to it, and what a duty
+//! is in timer clocks.
 
 use siskin_control::drive::{Bridge, Config, Fault, Sample, Setpoint, State, step};
 use siskin_control::params::{BOSSO_MOTOR, Params, build};
@@ -11,10 +11,10 @@ use siskin_firmware::circuit::b_g431b_esc1::{BOARD, ZERO_COUNTS};
 use siskin_firmware::exchange::word::unpack;
 use siskin_vboard::time::CLOCK_HZ;
 
-/// Age at which a set-point is not obeyed any more, s.
+/// Age at which a set-point is no longer obeyed, s.
 const STALE_S: f32 = 0.01;
 
-/// The first Hall sensor's pin of port B.
+/// Port B's pin of the first Hall sensor.
 const HALL_PIN: u32 = 6;
 
 /// What an interrupt reads.
@@ -24,7 +24,7 @@ pub(crate) struct Inputs {
     pub(crate) injected: [[u16; 4]; 2],
     /// The levels of port B.
     pub(crate) port_b: u32,
-    /// The set-point's word.
+    /// The set-point word.
     pub(crate) word: u32,
     /// TIM1's break flag.
     pub(crate) broken: bool,
@@ -54,7 +54,7 @@ pub(crate) struct Mirror {
 }
 
 impl Mirror {
-    /// The chip's with the first paper's motor and the default parameters, before its first interrupt.
+    /// Creates the chip's with the first paper's motor and default parameters, before its first interrupt.
     pub(crate) fn new() -> Self {
         let mut params = Params::of(&BOSSO_MOTOR);
         params.fit(&BOARD);
@@ -75,7 +75,7 @@ impl Mirror {
         }
     }
 
-    /// One interrupt.
+    /// Runs one interrupt.
     pub(crate) fn period(&mut self, inputs: &Inputs) -> Outputs {
         if inputs.writing {
             self.outputs.on = false;
@@ -92,13 +92,13 @@ impl Mirror {
         self.outputs
     }
 
-    /// The control state's words.
+    /// Returns the words of the control state.
     pub(crate) fn words(&self, out: &mut Vec<u32>) {
         out.clear();
         self.state.trace(&self.config, &mut |word| out.push(word));
     }
 
-    /// The phase that the drive is in, by its name.
+    /// Returns the drive's phase by name.
     pub(crate) fn phase(&self) -> String {
         format!("{:?}", self.state.snapshot().phase)
     }
@@ -130,14 +130,14 @@ impl Mirror {
     }
 }
 
-/// What the readings are, in the order of the sequences: a, c, terminal c, supply on the first
-/// converter; b, terminals a and b on the second.
+/// Assigns the readings, in the order of the sequences: a, c, terminal c, supply on the first converter; b,
+/// terminals a and b on the second.
 fn sample(inputs: &Inputs) -> Sample {
     let [
         [current_a, current_c, terminal_c, bus],
         [current_b, terminal_a, terminal_b, _],
     ] = inputs.injected;
-    // A current into the motor comes up through the shunt: the reading falls.
+    // A current into the motor flows up through the shunt: the reading falls.
     let current = |reading: u16| AdcCounts::from_num(ZERO_COUNTS - i32::from(reading));
     Sample {
         currents: [current_a, current_b, current_c].map(current),

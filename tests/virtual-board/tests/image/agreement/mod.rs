@@ -7,10 +7,10 @@
 //!
 //! | test | what agrees |
 //! |---|---|
-//! | [`word_for_word`] | each word of the control state, and the compare values, in each period: the chip's with what the same code makes of the same readings here |
-//! | [`same_run`] | speed, current and duty with the emulator's run of the same throttle, as far as physics lets them |
+//! | [`word_for_word`] | each word of the control state, and the compare values, in each period: the chip's against the same code here with the same readings |
+//! | [`same_run`] | speed, current and duty against the emulator's run with the same throttle, as far as physics allows |
 //!
-//! The image is `SISKIN_IMAGE`, else the one that the first line makes.
+//! The image is `SISKIN_IMAGE`, or else the one that the first command makes.
 
 mod mirror;
 mod places;

@@ -1,20 +1,20 @@
-//! Where in a memory the words of a series stand, found by elimination: a place at which a word has
-//! stood after each period so far may be its own.
+//! Finds where in a memory the words of a series are, by elimination: a place that has held a word after
+//! each period so far may be its own.
 //!
-//! The layout of the chip's control state is the compiler's, and so are the numbers of an enumeration. A
-//! word that takes thousands of values in as many periods has no other place than its own at which each
-//! of them stood at its time; words that are equal always share theirs.
+//! The compiler chooses the layout of the chip's control state, and the numbers of an enumeration. A word
+//! that takes thousands of values in as many periods has only its own place where each of them stood at its
+//! time; words that are always equal share theirs.
 
 use std::collections::BTreeSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Values that an enumeration has at most.
+/// Most values that an enumeration may have.
 const CODES: usize = 16;
 
-/// Distinct values that are told apart.
+/// Most distinct values that are counted.
 const VALUES: usize = 4096;
 
-/// A place of a word: its first byte, and its bytes.
+/// A word's place: its first byte, and its size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     /// Offset in the memory.
@@ -24,7 +24,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Whether the value stands here: a narrow one by its bits, if it is that of no wider number.
+    /// Returns whether the value is here, zero- or sign-extended if the place is narrower.
     fn has(self, memory: &[u8], value: u32) -> bool {
         let at = usize::from(self.at);
         let here = &memory[at..at + usize::from(self.bytes)];
@@ -49,7 +49,7 @@ pub(crate) struct Code {
 }
 
 impl Code {
-    /// Whether the byte still says which value it is, and the value which byte.
+    /// Checks that byte and value still imply each other.
     fn tells(&mut self, memory: &[u8], value: u32) -> bool {
         let byte = memory[usize::from(self.at)];
         let known = |pair: &&(u32, u8)| pair.0 == value || pair.1 == byte;
@@ -66,40 +66,40 @@ impl Code {
 /// A word of the series.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Word {
-    /// Where it may stand.
+    /// Where it may be.
     pub(crate) places: Vec<Place>,
-    /// Where it may stand if it is not there while it is told as 0.
+    /// Where it may be if it need not be there while it is traced as 0.
     pub(crate) while_told: Vec<Place>,
-    /// Bytes that may stand for it, another for each value: an enumeration's.
+    /// Bytes that may stand for it, with a different value for each of its own: an enumeration's.
     pub(crate) codes: Vec<Code>,
-    /// The last period, from 0, at which it stood anywhere.
+    /// The last period, from 0, in which it was found anywhere.
     pub(crate) last_found: Option<u64>,
     values: BTreeSet<u32>,
     history: DefaultHasher,
 }
 
 impl Word {
-    /// The offsets at which it may begin, whatever its width.
+    /// Returns the offsets at which it may begin, whatever its width.
     pub(crate) fn own(&self) -> BTreeSet<u16> {
         self.places.iter().map(|place| place.at).collect()
     }
 
-    /// The offsets of bytes that stand for it.
+    /// Returns the offsets of bytes that stand for it.
     pub(crate) fn coded(&self) -> Vec<u16> {
         self.codes.iter().map(|code| code.at).collect()
     }
 
-    /// The offsets at which it may begin if it is not there while it is told as 0.
+    /// Returns the offsets at which it may begin if it need not be there while it is traced as 0.
     pub(crate) fn own_while_told(&self) -> BTreeSet<u16> {
         self.while_told.iter().map(|place| place.at).collect()
     }
 
-    /// How many values it has had, as far as they are counted.
+    /// Returns how many values it has had, as far as they are counted.
     pub(crate) fn values(&self) -> usize {
         self.values.len()
     }
 
-    /// What only words have in common that have been equal in each period.
+    /// Returns a hash shared only by words that have been equal in each period.
     pub(crate) fn history(&self) -> u64 {
         self.history.finish()
     }
@@ -112,13 +112,13 @@ pub(crate) struct Places {
     pub(crate) words: Vec<Word>,
     /// Periods looked at.
     pub(crate) periods: u64,
-    /// The memory after the first period, and which bytes of it have not changed since.
+    /// The memory after the first period, and which of its bytes have not changed since.
     first: Vec<u8>,
     still: Vec<bool>,
 }
 
 impl Places {
-    /// A period has ended with these values, and this memory.
+    /// Takes the values and the memory at the end of a period.
     pub(crate) fn look(&mut self, values: &[u32], memory: &[u8]) {
         if self.periods == 0 {
             let everywhere = |_: &u32| Word {
@@ -142,7 +142,7 @@ impl Places {
             word.codes.retain_mut(|code| code.tells(memory, *value));
             if word.values.len() < VALUES && word.values.insert(*value) {
                 match word.values.len() {
-                    // Until now any byte that has not changed may have stood for it.
+                    // Until now, any unchanged byte may have stood for it.
                     2 => word.codes = codes(&word.values, *value, &self.first, &self.still, memory),
                     CODES.. => word.codes.clear(),
                     _ => {}
@@ -156,7 +156,7 @@ impl Places {
         self.periods += 1;
     }
 
-    /// As many words as have had the same values as this one always, with it.
+    /// Returns how many words, including this one, have always had the same values as this one.
     pub(crate) fn alike(&self, word: &Word) -> usize {
         let history = word.history();
         let words = self.words.iter();
@@ -164,7 +164,7 @@ impl Places {
     }
 }
 
-/// Bytes that have changed with a word's second value as never before.
+/// Returns the bytes that first changed together with a word's second value.
 fn codes(
     values: &BTreeSet<u32>,
     value: u32,
@@ -182,7 +182,7 @@ fn codes(
     (0..memory.len()).filter(changes).map(code).collect()
 }
 
-/// All places, aligned as the chip's compiler does.
+/// Returns all places, aligned as by the chip's compiler.
 fn everywhere(bytes: usize) -> Vec<Place> {
     let aligned = |width: u16| {
         let places = (0..bytes as u16 / width).map(move |number| number * width);

@@ -1,16 +1,16 @@
-//! The same throttle on the emulator and on the virtual board: what motor and supply show of it.
+//! The same throttle on the emulator and on the virtual board, as motor and supply show it.
 //!
-//! The two are not the same run. Readings, noise and instants differ, so the table is held to what that
-//! may make; each bound below was set before the runs were compared.
+//! The two runs are not identical. Readings, noise and instants differ, so the table is held to what these may
+//! cause; each bound below was set before the runs were compared.
 //!
-//! | what differs | by how much | what it makes |
+//! | what differs | by how much | effect |
 //! |---|---|---|
 //! | PWM period: twice 3542 clocks, not 41.667 µs | 0.0094 % | speed lower by as much |
-//! | instants of the readings after the middle of the low sides' time | 0.15 and 0.74 µs | ripple in the readings, which the regulators balance: the load asks for the same torque |
-//! | duty in the timer's clocks | 1/3542, rounded down | 7 mV at a terminal |
-//! | a current's zero, measured | half a count of 29 mA | copper loss below 1 mW |
-//! | supply's reading | 8 mV a count, not 17 mV | voltage within 0.05 % |
-//! | the drivers are charged for 1 ms of pulses of 7.8 µs, not for 63 µs | 120 periods | a start 5 ms later |
+//! | instants of the readings after the middle of the low sides' on-time | 0.15 and 0.74 µs | ripple in the readings, which the regulators balance: the load demands the same torque |
+//! | duty in timer clocks | 1/3542, rounded down | 7 mV at a terminal |
+//! | a current's measured zero | half a count of 29 mA | copper loss below 1 mW |
+//! | supply reading | 8 mV per count, not 17 mV | voltage within 0.05 % |
+//! | the drivers charge for 1 ms in pulses of 7.8 µs, not for 63 µs | 120 periods | a start 5 ms later |
 //! | when a frame is heard | a period | 0.04 ms |
 
 use siskin_emulator::device::Device;
@@ -22,20 +22,20 @@ use siskin_emulator::surroundings::{Motion, Passage};
 use super::scenario::{STEPS, board, play, start};
 use crate::common::image;
 
-/// Each step's end, over which means are taken, s.
+/// The end of each step, over which means are taken, s.
 const WINDOW_S: f64 = 0.25;
 
-/// Share of a change of speed until which its time is taken.
+/// Share of a speed change up to which its time is taken.
 const RISEN: f64 = 0.9;
 
-/// The start's phases last as many periods in both, but that the board charges its drivers for 5 ms more; the
-/// hand-over to the observer may come an electrical turn later, 10 ms at 500 rpm.
+/// The start's phases take as many periods in both, except that the board charges its drivers for 5 ms more;
+/// the hand-over to the observer may come an electrical turn later, 10 ms at 500 rpm.
 const START_WITHIN_S: f64 = 0.015;
 
-/// A frame's millisecond, and 0.1 % of the speed at the slowest ramp.
+/// A frame's millisecond, plus 0.1 % of the speed at the slowest ramp.
 const CHANGE_WITHIN_S: f64 = 0.003;
 
-/// Of the bench, whose source has no resistance.
+/// The bench's supply, whose source has no resistance.
 const SUPPLY_V: f64 = 24.0;
 
 const RAD_S_PER_RPM: f64 = std::f64::consts::TAU / 60.0;
@@ -49,7 +49,7 @@ struct Row {
     copper_w: f64,
     torque_nm: f64,
     bus_a: f64,
-    /// The greatest less the least share of the legs' high sides.
+    /// Largest minus smallest duty of the legs' high sides.
     spread: f64,
 }
 
@@ -62,7 +62,7 @@ struct Run {
     gates: Gates,
 }
 
-/// For how long the high sides have been on in this period.
+/// How long the high sides have been on in this period.
 #[derive(Clone, Copy, Default)]
 struct HighSides {
     on: [bool; 3],
@@ -79,7 +79,7 @@ impl HighSides {
         self.since_s[leg] = at_s;
     }
 
-    /// The greatest less the least share of a period that ends.
+    /// Returns the largest minus the smallest duty of a period that ends.
     fn spread(&mut self, end_s: f64, length_s: f64) -> f64 {
         for leg in 0..3 {
             let high = self.on[leg];
@@ -106,7 +106,7 @@ impl Run {
         });
     }
 
-    /// A mean over the window before a time.
+    /// Returns a mean over the window before a time.
     fn mean(&self, end_s: f64, of: impl Fn(&Row) -> f64) -> f64 {
         let rows = || self.window(end_s);
         let sum: f64 = rows().map(|row| of(row) * row.length_s).sum();
@@ -119,7 +119,7 @@ impl Run {
         self.rows.iter().filter(is_in)
     }
 
-    /// The time from a change of the throttle to a speed on the way from one to another, s.
+    /// Returns the time from a throttle change to a speed on the way from one to another, s.
     fn takes(&self, from_s: f64, rpm: f64, up: bool) -> Option<f64> {
         let mut rows = self.rows.iter().filter(|row| row.began_s >= from_s);
         let there = rows.find(|row| (row.rpm >= rpm) == up)?;
@@ -148,7 +148,7 @@ impl Onlooker for Run {
     }
 }
 
-/// A figure of both runs, and by how much they may differ.
+/// A figure from both runs, and how much they may differ.
 struct Figure {
     what: String,
     emulator: f64,
@@ -162,11 +162,11 @@ impl Figure {
     }
 }
 
-/// A quantity of a window: its name with the unit, its value, and a bound in parts of it and beyond.
+/// A quantity of a window: its name with the unit, its value, and its relative and absolute bound.
 type Quantity = (&'static str, fn(&Run, f64) -> f64, [f64; 2]);
 
-/// The load's torque goes with the square of the speed; its current with the torque; the supply's with
-/// torque and speed, and the copper's loss.
+/// The load's torque goes with the square of the speed; the motor current with the torque; the supply current
+/// with torque and speed, and the copper loss.
 const QUANTITIES: [Quantity; 5] = [
     (
         "speed, rpm",
@@ -195,19 +195,19 @@ const QUANTITIES: [Quantity; 5] = [
     ),
 ];
 
-/// The motor's torque less what has changed the speed.
+/// Returns the motor's torque minus what has changed the speed.
 fn load_nm(run: &Run, end_s: f64) -> f64 {
     run.mean(end_s, |row| row.torque_nm) - accelerating_nm(run, end_s)
 }
 
-/// The supply's current less what has changed the speed: it is in that torque's power.
+/// Returns the supply current minus what has changed the speed: the power of that torque.
 fn load_bus_a(run: &Run, end_s: f64) -> f64 {
     let rad_s = run.mean(end_s, |row| row.rpm) * RAD_S_PER_RPM;
     run.mean(end_s, |row| row.bus_a) - accelerating_nm(run, end_s) * rad_s / SUPPLY_V
 }
 
-/// The torque that has changed the speed from one end of the window to the other: the regulator's ripple of 2 rpm
-/// there is 0.2 mNm, and 1.5 mA of the supply's at 25 %.
+/// Returns the torque that has changed the speed from one end of the window to the other: the regulator's
+/// ripple of 2 rpm there is 0.2 mNm, and 1.5 mA from the supply at 25 %.
 fn accelerating_nm(run: &Run, end_s: f64) -> f64 {
     let bench = start().bench;
     let inertia_kgm2 = bench.motor.inertia_kgm2 + bench.load.inertia_kgm2;
@@ -218,7 +218,7 @@ fn accelerating_nm(run: &Run, end_s: f64) -> f64 {
     inertia_kgm2 * faster_rad_s / (last.began_s - first.began_s)
 }
 
-/// Of one phase, by the loss in all.
+/// Returns the current of one phase, from the loss in all.
 fn rms_a(run: &Run, end_s: f64) -> f64 {
     let resistance_ohm = start().bench.motor.resistance_ohm;
     (run.mean(end_s, |row| row.copper_w) / (3.0 * resistance_ohm)).sqrt()

@@ -11,7 +11,7 @@ use siskin_firmware::circuit::b_g431b_esc1::BOARD;
 use siskin_vboard::image::Image;
 use siskin_vboard::machine::VirtualBoard;
 
-/// Time between two frames, ns.
+/// Frame interval, ns.
 const FRAME_NS: u64 = 1_000_000;
 
 /// The throttle wire.
@@ -20,7 +20,7 @@ const SIGNAL: Signal = Signal::Dshot {
     bidirectional: true,
 };
 
-/// The first value that is throttle, and how many steps there are behind it.
+/// The first throttle value, and how many steps follow it.
 const FIRST: f64 = 48.0;
 const SPAN: f64 = 1999.0;
 
@@ -28,12 +28,12 @@ const SPAN: f64 = 1999.0;
 pub(crate) struct Step {
     /// Until then, ms.
     pub(crate) until_ms: u64,
-    /// The frames' value; none are silence.
+    /// The frames' value; `None` for silence.
     pub(crate) value: Option<u16>,
 }
 
 impl Step {
-    /// Nothing is sent.
+    /// Sends nothing.
     pub(crate) const fn silence(until_ms: u64) -> Self {
         Self {
             until_ms,
@@ -41,7 +41,7 @@ impl Step {
         }
     }
 
-    /// Zero throttle, or a command.
+    /// Sends zero throttle, or a command.
     pub(crate) const fn command(until_ms: u64, value: u16) -> Self {
         Self {
             until_ms,
@@ -49,20 +49,20 @@ impl Step {
         }
     }
 
-    /// A share of full throttle.
+    /// Sends a share of full throttle.
     pub(crate) const fn throttle(until_ms: u64, share: f64) -> Self {
         Self::command(until_ms, (FIRST + share * SPAN + 0.5) as u16)
     }
 
-    /// The share of full throttle, if it is throttle.
+    /// Returns the share of full throttle, if it is throttle.
     pub(crate) fn share(&self) -> Option<f64> {
         let value = f64::from(self.value?);
         (value >= FIRST).then(|| (value - FIRST) / SPAN)
     }
 }
 
-/// Zero until it is armed, a start, up in steps and back, and to rest. The first step is long enough that the
-/// speed has settled where it is measured, though a start may be 15 ms later: a start takes 0.8 s of it.
+/// Zero until armed, a start, up in steps and back, and to rest. The first step is long enough for the speed
+/// to settle before it is measured, even if a start takes 15 ms more than its 0.8 s.
 pub(crate) const STEPS: [Step; 6] = [
     Step::command(500, 0),
     Step::throttle(2300, 0.25),
@@ -72,7 +72,7 @@ pub(crate) const STEPS: [Step; 6] = [
     Step::command(5100, 0),
 ];
 
-/// The default bench with the sensors of the board, switch by switch.
+/// Returns the default bench with the board's sensors, switch by switch.
 pub(crate) fn start() -> Start {
     let range_a = f64::from(BOARD.current_a_per_count) * 2048.0;
     Start {
@@ -84,13 +84,13 @@ pub(crate) fn start() -> Start {
             },
             ..Bench::default()
         },
-        // As short as the board takes it, for the emulator too.
+        // As short as the board allows, for the emulator too.
         overrides: vec![(ParamId::PwmDeadtimeNs, BOARD.least_dead_time.ns)],
         ..Start::default()
     }
 }
 
-/// A virtual board with the image, on a bench.
+/// Creates a virtual board with the image, on a bench.
 pub(crate) fn board(image: &Image, start: Start) -> VirtualBoard {
     let (board, warning) = VirtualBoard::new(image, start).expect("it starts");
     assert_eq!(warning, None);
@@ -99,7 +99,7 @@ pub(crate) fn board(image: &Image, start: Start) -> VirtualBoard {
 
 /// Plays steps from where the machine is, a whole number of frames from its start.
 pub(crate) fn play(machine: &mut impl Machine, steps: &[Step], onlooker: &mut impl Onlooker) {
-    // The emulator's control periods are no whole number of them.
+    // The emulator's control periods do not divide them evenly.
     let mut frame = (machine.now_ns() + FRAME_NS / 2) / FRAME_NS;
     for step in steps {
         while frame < step.until_ms {

@@ -1,10 +1,10 @@
-//! Each period of the chip's control, word for word.
+//! Compares each period of the chip's control word for word.
 //!
-//! At the interrupt's entry the test takes what it will read; at its return, what it has left: the
-//! timer's compare values and main output, and the memory that it owns. The mirror does the same period
+//! At the interrupt's entry the test takes what it is going to read; at its return, what it has left: the
+//! timer's compare values and main output, and the memory that it owns. The mirror runs the same period
 //! here. Compare values and output must be equal at once; for each word of
-//! [`State::trace`](siskin_control::drive::State::trace) there must be a place in that memory where it
-//! has stood after every period ([`places`](crate::places)).
+//! [`State::trace`](siskin_control::drive::State::trace) there must be a place in that memory that has held
+//! it after every period ([`places`](crate::places)).
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -24,17 +24,17 @@ use crate::common::image;
 /// The mirror, and how it agrees.
 struct Check {
     mirror: Mirror,
-    /// Addresses of the set-point's word and of the flag that the flash is written.
+    /// Addresses of the set-point word and of the flag that the flash is being written.
     setpoint_at: u32,
     writing_at: u32,
-    /// Address and bytes of what the interrupt owns.
+    /// Address and size of what the interrupt owns.
     owned: (u32, u32),
     inputs: Option<Inputs>,
     places: Places,
     words: Vec<u32>,
-    /// Periods by the drive's phase.
+    /// Periods in each phase of the drive.
     phases: BTreeMap<String, u64>,
-    /// The first period whose outputs differ: what there was and what there ought to be.
+    /// The first period whose outputs differ: the inputs, what there was and what there should be.
     differs: Option<(u64, Inputs, Outputs, Outputs)>,
 }
 
@@ -94,25 +94,25 @@ impl Check {
     }
 }
 
-/// A rotor that turns backwards when the chip starts, rad/s: it is caught.
+/// Speed of a rotor that turns backwards when the chip starts, rad/s: it is caught.
 const TURNS_RAD_S: f64 = -600.0;
 
 /// What a broken sensor shows, A: more than the drive's trip.
 const STUCK_A: f64 = 38.0;
 
-/// With so many values a word stands at its own place only.
+/// With this many values, a word is only found at its own place.
 const TELLING: usize = 16;
 
-/// Words that need not be there while they are told as 0: angle and speed of a rotor that turns, which
-/// [`State::trace`](siskin_control::drive::State::trace) tells as 0 of any other, and which the memory
-/// keeps from when it last turned.
+/// Words that need not be there while traced as 0: angle and speed of a rotor that turns, which
+/// [`State::trace`](siskin_control::drive::State::trace) reports as 0 otherwise, and which the memory keeps
+/// from when it last turned.
 const PAYLOAD: usize = 2;
 
-/// Words that the memory has by other numbers: the order of the phases, told as whether it is swapped.
+/// Words that the memory holds as other numbers: the order of the phases, traced as whether it is swapped.
 const CODED: usize = 1;
 
-/// The second run: the shaft turns at first; full throttle; silence, and a rotor that still turns is
-/// caught; a sensor breaks; the shaft is held as it runs, and at a start.
+/// The second run: the shaft turns at first; full throttle; silence, and a rotor still turning is caught; a
+/// sensor breaks; the shaft is held while running, and at a start.
 fn trouble() -> [(InForce, Vec<Step>); 5] {
     let sound = InForce::default;
     let broken_sensor = InForce {
@@ -172,7 +172,7 @@ fn the_chip_s_control_state_is_the_shared_code_s_word_for_word() {
     judge(&check.borrow());
 }
 
-/// From power-up on, the mirror goes with this chip.
+/// Makes the mirror follow this chip, from power-up on.
 fn look_on(chip: &mut VirtualBoard, check: &Rc<RefCell<Check>>) {
     check.borrow_mut().mirror = Mirror::new();
     let check = Rc::clone(check);

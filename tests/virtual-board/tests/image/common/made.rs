@@ -3,13 +3,13 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// A path that begins at the workspace where it is not absolute.
+/// Resolves a relative path against the workspace.
 pub(crate) fn of_workspace(path: impl AsRef<Path>) -> PathBuf {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     workspace.join(path)
 }
 
-/// A file of a board's image, where the test command has it made.
+/// Returns a file of a board's image, where the test command puts it.
 pub(crate) fn made(board: &str, extension: &str) -> PathBuf {
     let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
     let images = of_workspace(target).join("images");

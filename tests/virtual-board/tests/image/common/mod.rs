@@ -1,8 +1,8 @@
-//! The image on its board, with a flight controller at the throttle wire and a ground station at the
-//! serial port.
+//! The image on its board, with a flight controller on the throttle wire and a ground station on the serial
+//! port.
 //!
-//! `SISKIN_IMAGE` names the image; else it is where the test command puts it. To be run with `--release`:
-//! a simulated second takes about one then, and twenty without.
+//! `SISKIN_IMAGE` names the image; by default it is where the test command puts it. Run with `--release`: a
+//! simulated second then takes about one, and twenty without.
 
 mod made;
 
@@ -35,17 +35,17 @@ use made::{is_made, made, of_workspace};
 pub(crate) const US: u64 = 1_000;
 pub(crate) const MS: u64 = 1_000_000;
 
-/// A period of the PWM at its 24 kHz.
+/// A PWM period at its 24 kHz.
 pub(crate) const PWM_PERIOD: Cycles = CLOCK_HZ / 24_000;
 
-/// The protocols of the throttle wire (`emulator/README.md`): a pulse of 1 to 2 ms, and DShot300, 600 and 1200
-/// in both directions.
+/// Protocols of the throttle wire (`emulator/README.md`): a pulse of 1 to 2 ms, and bidirectional DShot300,
+/// 600 and 1200.
 const PULSE: u8 = 1;
 pub(crate) const BIDIRECTIONAL_300: u8 = 21;
 pub(crate) const BIDIRECTIONAL_600: u8 = 22;
 pub(crate) const BIDIRECTIONAL_1200: u8 = 23;
 
-/// The image to test. Paths that are not absolute begin at the workspace.
+/// Returns the image to test. Relative paths begin at the workspace.
 pub(crate) fn image() -> Image {
     const BOARD: &str = "b-g431b-esc1";
     let given = env::var_os("SISKIN_IMAGE");
@@ -59,10 +59,10 @@ pub(crate) fn image() -> Image {
 pub(crate) enum Throttle {
     /// Nothing.
     Silent,
-    /// DShot in both directions, at 1.96 kHz so that frames come at all phases of the PWM: 0 is stop, 48 to
-    /// 2047 are throttle.
+    /// Bidirectional DShot, at 1.96 kHz so that frames come at all phases of the PWM: 0 is stop, 48 to 2047
+    /// are throttle.
     Dshot(u16),
-    /// Pulses so long, ns, at 400 Hz.
+    /// Pulses of this width, ns, at 400 Hz.
     Pulse(u32),
 }
 
@@ -74,7 +74,7 @@ impl Throttle {
         }
     }
 
-    /// The frame that is sent, DShot by this protocol.
+    /// Returns the frame to send, DShot with this protocol.
     fn datagram(self, protocol: u8) -> Option<Vec<u8>> {
         Some(match self {
             Self::Silent => return None,
@@ -103,25 +103,25 @@ pub(crate) struct Reply {
 
 /// What is seen and heard of the ESC.
 pub(crate) struct Heard {
-    /// Who sends them: the ESC.
+    /// The sender: the ESC.
     pub(crate) from: Address,
-    /// The MAVLink frames: when they were whole, id and payload.
+    /// The MAVLink frames: time of completion, id and payload.
     pub(crate) frames: Vec<(u64, u32, Vec<u8>)>,
     pub(crate) replies: Vec<Reply>,
-    /// All gates' and the wire's edges, frames and replies so far.
+    /// Hash of all edges of gates and wire, frames and replies so far.
     pub(crate) hash: DefaultHasher,
-    /// The throttle wire's levels, the gates and the motor, where a test looks at them.
+    /// The throttle wire's levels, the gates and the motor, if a test looks at them.
     pub(crate) scope: Option<Scope>,
 }
 
-/// What a probe at the board has seen.
+/// What a probe on the board has seen.
 #[derive(Debug, Default)]
 pub(crate) struct Scope {
-    /// The throttle wire's edges: when, ns, and the level after each.
+    /// The throttle wire's edges: time, ns, and the level after each.
     pub(crate) line: Vec<(u64, bool)>,
-    /// Changes of gates: when, ns, the leg, and its gates from then on.
+    /// Gate changes: time, ns, the leg, and its gates from then on.
     pub(crate) gates: Vec<(u64, usize, Gate)>,
-    /// The motor and the supply at the beginning of each period of the PWM: when, ns.
+    /// The motor and the supply at the start of each PWM period: time, ns.
     pub(crate) motor: Vec<(u64, Motion)>,
 }
 
@@ -141,7 +141,7 @@ impl Default for Heard {
 }
 
 impl Heard {
-    /// The messages of a kind, with their times.
+    /// Returns the messages of a kind, with their times.
     pub(crate) fn messages<D: MessageData>(&self) -> Vec<(u64, D)> {
         let frames = self.frames.iter().filter(|(_, id, _)| *id == D::ID);
         let read = |payload: &[u8]| D::deser(MavlinkVersion::V2, payload).expect("its payload");
@@ -150,7 +150,7 @@ impl Heard {
             .collect()
     }
 
-    /// What it has said in words.
+    /// Returns its text messages.
     pub(crate) fn texts(&self) -> Vec<String> {
         let texts = self.messages::<STATUSTEXT_DATA>();
         let text = |text: STATUSTEXT_DATA| text.text.to_str().unwrap_or_default().to_owned();
@@ -217,7 +217,7 @@ pub(crate) struct Board {
     pub(crate) board: VirtualBoard,
     pub(crate) heard: Heard,
     pub(crate) throttle: Throttle,
-    /// By which DShot is sent.
+    /// Protocol of the DShot frames.
     pub(crate) protocol: u8,
     /// Frames played on the throttle wire.
     pub(crate) played: usize,
@@ -227,7 +227,7 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// At power-up, with these parameters stored and all else as it leaves the factory.
+    /// Creates it at power-up, with these parameters stored and everything else at factory values.
     pub(crate) fn new(image: &Image, overrides: &[(ParamId, f32)]) -> Self {
         let start = Start {
             overrides: overrides.to_vec(),
@@ -246,7 +246,7 @@ impl Board {
         }
     }
 
-    /// One whose motor turns at half throttle.
+    /// Creates one whose motor turns at half throttle.
     pub(crate) fn turning(image: &Image) -> Self {
         let mut board = Self::new(image, &[(ParamId::InpArmMs, 50.0)]);
         board.spin_up();
@@ -280,7 +280,7 @@ impl Board {
         self.world().bench().plant().speed_rad_s() * 60.0 / std::f64::consts::TAU
     }
 
-    /// Runs for so long, with frames on the throttle wire.
+    /// Runs for a time, with frames on the throttle wire.
     pub(crate) fn run(&mut self, for_ns: u64) {
         let until_ns = self.now_ns() + for_ns;
         while self.now_ns() < until_ns {
@@ -308,7 +308,7 @@ impl Board {
         }
     }
 
-    /// Runs until something is so, looking each `step_ns`; how long it took.
+    /// Runs until a condition holds, checked every `step_ns`; returns how long it took.
     pub(crate) fn run_until(
         &mut self,
         step_ns: u64,
@@ -325,7 +325,7 @@ impl Board {
         is_so(self).then(|| self.now_ns() - began_ns)
     }
 
-    /// Runs until it has said something with these words; all that it has said, if it does not.
+    /// Runs until it has sent a text with these words; panics with all texts if it does not.
     pub(crate) fn hear(&mut self, words: &str, within_ns: u64) {
         let said = self.run_until(5 * MS, within_ns, |board| {
             board.heard.texts().iter().any(|text| text.contains(words))
@@ -333,7 +333,7 @@ impl Board {
         assert!(said.is_some(), "not '{words}': {:?}", self.heard.texts());
     }
 
-    /// Sends a message from a ground station.
+    /// Sends a ground station's message.
     pub(crate) fn send(&mut self, data: &impl MessageData) {
         let mut frame = MAVLinkV2MessageRaw::new();
         let header = MavHeader {
@@ -346,7 +346,7 @@ impl Board {
         self.world().serial(frame.raw_bytes());
     }
 
-    /// Asks for a parameter; its value, and after how long it came.
+    /// Requests a parameter; returns its value, and how long that took.
     pub(crate) fn param(&mut self, id: &str, within_ns: u64) -> Option<(f32, u64)> {
         self.heard.frames.clear();
         self.send(&PARAM_REQUEST_READ_DATA {
@@ -375,7 +375,7 @@ impl Board {
         });
     }
 
-    /// Asks it to do something.
+    /// Sends it a command.
     pub(crate) fn command(&mut self, command: MavCmd, param1: f32) {
         self.send(&COMMAND_LONG_DATA {
             param1,
@@ -394,12 +394,12 @@ impl Board {
         self.board.processor().set_register(register, value);
     }
 
-    /// The exception that is being handled; 0 in the tasks.
+    /// Returns the exception being handled; 0 in the tasks.
     pub(crate) fn exception(&mut self) -> u32 {
         self.register(Register::Xpsr) & 0x1ff
     }
 
-    /// Stops in the handler of an exception, or for 0 in the tasks, with a gate on.
+    /// Stops in an exception's handler, or for 0 in the tasks, with a gate on.
     pub(crate) fn stop_in(&mut self, exception: u32) {
         let found = self.run_until(US / 2, 5 * MS, |board| {
             board.exception() == exception && !board.world().bridge().is_off()
@@ -407,12 +407,12 @@ impl Board {
         assert!(found.is_some(), "exception {exception} does not come");
     }
 
-    /// The time in cycles.
+    /// Returns the time in cycles.
     pub(crate) fn now(&mut self) -> Cycles {
         Surroundings::now(self.world())
     }
 
-    /// A register of the chip, as a debugger reads it.
+    /// Reads a register of the chip, as a debugger does.
     pub(crate) fn peek(&mut self, address: u32) -> u32 {
         Surroundings::read(self.world(), address, Width::Word).expect("it is modelled")
     }
@@ -423,8 +423,8 @@ impl Board {
         written.expect("it is modelled");
     }
 
-    /// Runs until all gates are off for good, which is more than a dead time of all three legs; cycles from
-    /// now to then.
+    /// Runs until all gates are off for good, for longer than a dead time of all three legs; returns the
+    /// cycles from now until then.
     pub(crate) fn until_off(&mut self, within_ns: u64) -> Cycles {
         let began = self.now();
         let mut off = None;
@@ -443,15 +443,15 @@ impl Board {
     }
 }
 
-/// Cycles as µs.
+/// Converts cycles to µs.
 pub(crate) fn us(cycles: Cycles) -> f64 {
     ns(cycles) as f64 / 1e3
 }
 
-/// The address of an instruction within the flash that the image has no part of: erased, it is none.
+/// An address in flash that the image does not use: erased, it is not an instruction.
 pub(crate) const ERASED: u32 = 0x0801_eff0;
 
-/// Puts a jump to itself where SRAM is free: behind all that the image has, below the chip's 22 KB.
+/// Puts a jump to itself into free SRAM: after everything in the image, below the end of the chip's 22 KB.
 pub(crate) fn endless_loop(board: &mut Board) -> u32 {
     const AT: u32 = 0x2000_57f0;
     let mut memories = board.world().memories().iter();
