@@ -1,4 +1,4 @@
-//! Draws a flight that `tests/flight/fly.py --record` has written, as SVG and PNG:
+//! Draws a flight recorded by `tests/flight/fly.py --record`, as SVG and PNG:
 //! `cargo run -p siskin-tests --example flight-picture -- target/flight.csv target`
 
 use std::error::Error;
@@ -7,13 +7,13 @@ use std::path::Path;
 use plotters::style::RGBColor;
 use siskin_emulator::plot::chart::{Axis, Curve, Figure, Panel, Stretch, draw};
 
-/// At most as many points has a curve, each the mean of the rows between two.
+/// Most points of a curve, each the mean of the rows up to the next one.
 const POINTS: usize = 1000;
 
 /// Size of a panel.
 const PANEL: (u32, u32) = (2400, 480);
 
-/// What lasts, with the colour behind it.
+/// Lasting events, with their background colour.
 const EVENTS: [(&str, RGBColor); 6] = [
     ("climb", RGBColor(0xdf, 0xef, 0xfa)),
     ("hover", RGBColor(0xe9, 0xf6, 0xf0)),
@@ -23,7 +23,7 @@ const EVENTS: [(&str, RGBColor); 6] = [
     ("descent", RGBColor(0xdf, 0xef, 0xfa)),
 ];
 
-/// A flight by rows: time first, and what happens last.
+/// A flight by rows: time first, the event last.
 struct Flight {
     heads: csv::StringRecord,
     rows: Vec<Vec<f64>>,
@@ -66,7 +66,7 @@ impl Flight {
         }
     }
 
-    /// Each event from its first row to the one after its last.
+    /// Returns each event from its first row to the one after its last.
     fn stretches(&self) -> Vec<(&str, f64, f64)> {
         let mut begin = 0;
         let chunks = self.events.chunk_by(|a, b| a == b);
