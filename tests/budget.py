@@ -1,16 +1,15 @@
-"""The first board's room and time in one table, from what the steps of `tests/run` have printed: how much there is
-now, and how much is wanted. The bounds that fail stand where the figures are measured.
-
+"""The first board's memory and time in one table, from what the steps of `tests/run` have printed: the current
+figures, and the targets. The bounds that fail are where the figures are measured.
     budget.py LOGS
 
-Exit status 1 if a figure is not among the logs.
+Exit status 1 if a figure is not in the logs.
 """
 
 import re
 import sys
 from pathlib import Path
 
-# What it is, the log that has it, and where: the figures are the pattern's groups. Last, what is wanted.
+# Name, the log that has it, and where: the figures are the pattern's groups. Last, the target.
 ROWS = [
     ("flash, bytes", "sizes-b-g431b-esc1", r"^flash +(\d+) of", "at most 98304"),
     ("SRAM with the worst stack, bytes", "sizes-b-g431b-esc1", r"^SRAM +(\d+) of", "at most 16384"),
@@ -43,7 +42,7 @@ ROWS = [
 
 
 def row(logs: Path, log: str, pattern: str) -> str | None:
-    """A row's figures; `None` where its step has not printed them."""
+    """Returns a row's figures; `None` if its step has not printed them."""
     path = logs / f"{log}.log"
     found = re.search(pattern, path.read_text(), re.MULTILINE) if path.exists() else None
     return found and ", ".join(found.groups())

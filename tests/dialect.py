@@ -1,7 +1,7 @@
-"""Generates a Python dialect from the message definitions that ship inside the `mavlink` crate.
+"""Generates a Python dialect from the message definitions that ship with the `mavlink` crate.
 
-The wheel of pymavlink lacks ESC_INFO (290) and ESC_STATUS (291). The crate that the control is built
-with has them, so tests and control read one and the same definition.
+pymavlink's wheel lacks ESC_INFO (290) and ESC_STATUS (291). The crate that the control is built with has them, so
+tests and control read the same definition.
 """
 
 import json
@@ -16,7 +16,7 @@ NEEDED = ("ESC_INFO", "ESC_STATUS")
 
 
 def definitions() -> Path:
-    """ardupilotmega.xml in the source of the crate that Cargo.lock names."""
+    """Returns the path of ardupilotmega.xml in the source of the crate that Cargo.lock names."""
     command = ["cargo", "metadata", "--locked", "--format-version", "1"]
     text = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
     crates = [p for p in json.loads(text)["packages"] if p["name"] == "mavlink"]

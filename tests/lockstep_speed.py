@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How fast four ESCs in lockstep are, in steps of 1 ms, with the C client on the same core.
 
-By the processor's time of both programs: what else the machine does costs them little of it.
+Measured in processor time of both programs, which other load on the machine hardly changes.
 """
 
 import json

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""How fast the Python module is: four ESCs in steps of 1 ms, with their states read in each; and scenarios, beside the
-program's.
+"""How fast the Python module is: four ESCs in steps of 1 ms, with their states read in each; and scenarios, next to
+the program's.
 
-By the processor's time: what else the machine does costs little of it.
+Measured in processor time, which other load on the machine hardly changes.
 """
 
 import os
@@ -24,7 +24,7 @@ SEEDS = range(1, 11)
 
 
 def lockstep(read: bool, **keys: object) -> float:
-    """Simulated seconds in a second of the processor's."""
+    """Returns simulated seconds per second of processor time."""
     emulator = siskin.Emulator("bosso", escs=4, bus="6s", **keys)
     emulator.advance(0.4)
     emulator.throttle[:] = 0.5

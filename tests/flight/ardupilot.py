@@ -1,9 +1,9 @@
-"""ArduPilot's simulator flies the quadrotor, by its JSON interface.
+"""ArduPilot's simulator flies the quadrotor, through its JSON interface.
 
     target/venv/bin/python tests/flight/ardupilot.py
 
 Then `sim_vehicle.py -v ArduCopter --model JSON:127.0.0.1`, with motors 1 to 4 of a quadrotor X. It is tested against
-the packets that ArduPilot documents, and not with the program itself.
+the packets that ArduPilot documents, not with the program itself.
 """
 
 import argparse
@@ -41,7 +41,7 @@ def serve(port: int, quadrotor: Quadrotor) -> None:
 
 
 def state(quadrotor: Quadrotor) -> bytes:
-    """The body in ArduPilot's axes: forward, right, down, and north, east, down."""
+    """Returns the body in ArduPilot's axes: forward, right, down, and north, east, down."""
     body = quadrotor.body
     w, x, y, z = body.attitude
     seen = {

@@ -1,4 +1,4 @@
-"""Betaflight's SITL, which `build` has made, held in step."""
+"""Betaflight's SITL, made by `build`, held in step."""
 
 import os
 import socket
@@ -15,16 +15,16 @@ EEPROM = CACHE / "eeprom.bin"
 
 GRANT = struct.Struct("<Q18dd16H")
 REPORT = struct.Struct("<QQH2x16fHH")
-"""As `held.c` has them."""
+"""As in `held.c`."""
 BEGIN_NS = 1_000_000_000
-"""What its clock shows when it has started."""
+"""Its clock when it has started."""
 
 
 class Betaflight:
     """The program, which runs only within `advance`."""
 
     def __init__(self, folder: Path):
-        """Starts it in a folder, where it has its `eeprom.bin` and writes its log."""
+        """Starts it in a folder that holds its `eeprom.bin`, and where it writes its log."""
         own, its = socket.socketpair()
         self.link = own
         with its, open(folder / "betaflight.log", "w") as log:
@@ -37,8 +37,8 @@ class Betaflight:
         self.report = self._listen()
 
     def advance(self, until_ns: int, state: list, sticks: list) -> tuple[int, tuple]:
-        """Takes a state and the sticks, goes on until this time since its start, and gives when it wrote its motors'
-        outputs last, and those, in us.
+        """Takes a state and the sticks, runs until this time since its start, and returns when it last wrote its
+        motors' outputs, and those, in us.
 
         It writes them once after each state.
         """

@@ -1,7 +1,7 @@
 """A quadrotor of 0.5 kg: a rigid body under four propellers, over ground, in wind.
 
-Axes of the body are forward, left, up; those of the earth north, west, up. Units are SI. Propellers are numbered as
-Betaflight numbers them: rear right, front right, rear left, front left; the first and the last turn clockwise.
+The body's axes are forward, left, up; the earth's are north, west, up. Units are SI. Propellers are numbered as in
+Betaflight: rear right, front right, rear left, front left; the first and the last turn clockwise.
 """
 
 import math
@@ -10,26 +10,26 @@ GRAVITY = 9.80665
 MASS = 0.5
 # Estimates: four motors of 35 g, 110 mm from the middle, and a pack along it.
 INERTIA = (1.3e-3, 1.5e-3, 2.6e-3)
-# A frame of 220 mm between opposite motors. The pack sits a little off its middle: the centre of mass is 1 mm behind it
-# and 1 mm to the left.
+# A frame with 220 mm between opposite motors. The pack sits slightly off its middle: the centre of mass is 1 mm behind
+# it and 1 mm to the left.
 ARM = 0.078
 BEHIND, LEFT = 0.001, 0.001
 PLACES = tuple((x + BEHIND, y - LEFT) for x, y in ((-ARM, -ARM), (ARM, -ARM), (-ARM, ARM), (ARM, ARM)))
 TURNS = (-1, 1, 1, -1)
-"""Of each propeller about the body's axis that points up."""
+"""Direction of each propeller about the body's upward axis."""
 
-# The propeller of the bench `quad-5-inch`, of 0.127 m: its drag is that of the bench. Its thrust coefficient is
-# 0.115, an estimate for 5x4.5: 0.115/(2 pi)^2 * 1.225 * 0.127^4.
+# The propeller of the bench `quad-5-inch`, 0.127 m: its drag is the bench's. Its thrust coefficient is 0.115, an
+# estimate for 5x4.5: 0.115/(2 pi)^2 * 1.225 * 0.127^4.
 DRAG = 1.3e-8
 THRUST = 9.28e-7
 ROTOR_INERTIA = 2.5e-6 + 3.8e-6
-# Air along the axis that takes all thrust is that of 0.127 m a turn: an advance ratio of 1, near the pitch of 4.5
+# The axial air speed at which all thrust is lost is 0.127 m per turn: an advance ratio of 1, near the pitch of 4.5
 # inches. The drag falls to some 0.4 there.
 PITCH = 0.127 / math.tau
 DRAG_LOST = 0.6
-# Blades that flap: thrust leans back with air from the front. An estimate for a small rotor.
+# Blade flapping: thrust leans back with air from the front. An estimate for a small rotor.
 LEAN = 1.0e-2
-# Frontal drag of the frame, half of the density times its area, and where it acts, above the middle.
+# Frontal drag of the frame, half of the density times its area, and its height above the middle.
 FRAME = 0.5 * 1.225 * 0.012
 FRAME_Z = 0.03
 
@@ -43,7 +43,7 @@ def cross(a, b):
 
 
 def flipped(vector) -> list[float]:
-    """From axes with left and up to those with right and down, of the body or of the earth, and back."""
+    """Converts axes with left and up to those with right and down, of the body or of the earth, and back."""
     return [vector[0], -vector[1], -vector[2]]
 
 
@@ -59,11 +59,11 @@ class Body:
         self.attitude = (1.0, 0.0, 0.0, 0.0)
         self.rates = [0.0, 0.0, 0.0]
         self.felt = (0.0, 0.0, GRAVITY)
-        """Specific force, which an accelerometer feels, in the body's axes."""
+        """Specific force, as an accelerometer feels it, in the body's axes."""
         self.last_turns = (0.0, 0.0, 0.0, 0.0)
 
     def advance(self, seconds: float, rotors, wind) -> None:
-        """So long, with the rotors at these speeds in rad/s, never negative, and the wind in the earth's axes."""
+        """Advances with the rotors at these speeds in rad/s, never negative, and the wind in the earth's axes."""
         dt = seconds / INNER_STEPS
         growth = [(now - before) / seconds for now, before in zip(rotors, self.last_turns)]
         for inner in range(1, INNER_STEPS + 1):
@@ -73,11 +73,11 @@ class Body:
         self.last_turns = tuple(rotors)
 
     def air(self, wind) -> tuple:
-        """What blows against the body, in its axes."""
+        """Returns the air speed against the body, in its axes."""
         return self.to_body([w - v for w, v in zip(wind, self.speed)])
 
     def inflow(self, wind) -> list:
-        """Air speed through each propeller, m/s, positive where it comes from above."""
+        """Returns the air speed through each propeller, m/s, positive from above."""
         down = -self.air(wind)[2]
         p, q, _ = self.rates
         return [down + p * y - q * x for x, y in PLACES]
@@ -109,7 +109,7 @@ class Body:
         self._turn(dt)
 
     def _ground(self):
-        """Each foot that touches, with the force on it, in the body's axes."""
+        """Yields each foot that touches, with the force on it, in the body's axes."""
         if self.place[2] > 3 * ARM:
             return
         for x, y in PLACES:
@@ -123,7 +123,7 @@ class Body:
             yield at, self.to_body((grip * moves[0], grip * moves[1], up))
 
     def _turn(self, dt) -> None:
-        """Turns the attitude by the rates, exactly where they are constant."""
+        """Turns the attitude by the rates, exactly if they are constant."""
         rate = math.hypot(*self.rates)
         if rate > 1e-12:
             half = 0.5 * rate * dt
@@ -160,5 +160,5 @@ class Body:
 
     @property
     def tilt_deg(self) -> float:
-        """Of the body's axis from upright."""
+        """Angle of the body's axis from upright."""
         return math.degrees(math.acos(max(-1.0, min(1.0, self.to_earth((0.0, 0.0, 1.0))[2]))))

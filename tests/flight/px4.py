@@ -1,9 +1,9 @@
-"""PX4's simulation flies the quadrotor, by the MAVLink messages of its simulator interface.
+"""PX4's simulation flies the quadrotor, through the MAVLink messages of its simulator interface.
 
     target/venv/bin/python tests/flight/px4.py
 
-Then `make px4_sitl none_iris`, which connects to TCP 4560. It is tested against the messages that PX4 documents, and
-not with the program itself.
+Then `make px4_sitl none_iris`, which connects to TCP 4560. It is tested against the messages that PX4 documents, not
+with the program itself.
 """
 
 import argparse
@@ -28,12 +28,12 @@ METRES_PER_DEGREE = 111_320.0
 # North, west and up, gauss.
 FIELD = (0.215, -0.008, -0.43)
 ALL_FIELDS = 0x1FFF
-# PX4 takes values that stay equal for those of a sensor that has died.
+# PX4 takes constant values for a dead sensor's.
 NOISE = {"gyro": 1e-3, "felt": 2e-2, "field": 1e-3, "pressure": 2e-2}
 
 
 class Px4:
-    """One connection of PX4 to this simulator."""
+    """A connection of PX4 to this simulator."""
 
     def __init__(self, link: socket.socket, quadrotor: Quadrotor):
         self.link = link
@@ -45,11 +45,11 @@ class Px4:
         self.draw = random.Random(1)
 
     def write(self, data: bytes) -> None:
-        """The codec sends through this."""
+        """Sends bytes; the codec sends through this."""
         self.link.sendall(data)
 
     def serve(self) -> None:
-        """Until PX4 ends the connection."""
+        """Serves until PX4 ends the connection."""
         step = 0
         while True:
             if step % SENSE_EVERY == 0:
@@ -62,9 +62,9 @@ class Px4:
             step += 1
 
     def listen(self) -> bool:
-        """Takes the outputs that answer the sensors. Before PX4 has any it has the time of a step for them.
+        """Takes the outputs that answer the sensors. Before PX4 has any, it gets a step's time for them.
 
-        False at the end of the connection.
+        Returns False at the end of the connection.
         """
         self.link.settimeout(10.0 if self.in_step else SENSE_EVERY * STEP_NS * 1e-9)
         while True:
@@ -84,7 +84,7 @@ class Px4:
     def take(self, message) -> None:
         self.in_step = True
         for esc, share in zip(ESC_OF_OUTPUT, message.controls):
-            # A share of the throttle; what is armed and at zero idles.
+            # A share of the throttle; an armed motor at zero idles.
             self.values[esc] = value_of(1002.0 + 998.0 * max(0.0, share)) if message.mode & ARMED else 0
 
     def tell_sensors(self) -> None:

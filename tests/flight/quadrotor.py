@@ -10,7 +10,7 @@ UNHURT = (0.0, 0.0, 0.0, 0.0)
 
 
 class Quadrotor:
-    """Goes on in steps, within which the air about each propeller stays as it was at their beginning."""
+    """Advances in steps, within which the air at each propeller stays as at their start."""
 
     SUPPLY_V, SUPPLY_OHM = 16.2, 0.016
     """The pack: four cells, nearly full."""
@@ -20,7 +20,7 @@ class Quadrotor:
         self.escs = escs
 
     def advance(self, ns: int, frames, wind=CALM, struck=UNHURT, supply_v: float = SUPPLY_V) -> None:
-        """So long, with frames as `Escs.advance` takes them, the wind in the earth's axes in m/s, and torques that
+        """Advances with frames as `Escs.advance` takes them, the wind in the earth's axes in m/s, and torques that
         strike the propellers, in Nm."""
         inflow = self.body.inflow(wind)
         around = [(torque, air_rpm(turn, air)) for torque, turn, air in zip(struck, self.rotors, inflow)]
@@ -30,12 +30,12 @@ class Quadrotor:
 
     @property
     def rotors(self) -> list[float]:
-        """How fast the propellers turn, rad/s. Which way each of them turns is the body's to know."""
+        """How fast the propellers turn, rad/s. Only the body knows which way each one turns."""
         return [abs(esc.rpm) / RPM for esc in self.escs.all]
 
 
 def air_rpm(turn: float, through: float) -> float:
-    """The emulator's air, rpm: the speed at which it would turn the propeller, which turns at `turn` rad/s.
+    """Returns the emulator's air, rpm: the speed at which it would turn the propeller, which turns at `turn` rad/s.
 
     The emulator's drag goes by the square of what is left of the speed; the body's falls with the inflow.
     """
@@ -46,5 +46,5 @@ def air_rpm(turn: float, through: float) -> float:
 
 
 def value_of(us: float) -> int:
-    """A pulse's width in us as the value of a DShot frame: motor stop, or 48 to 2047."""
+    """Converts a pulse width in us to the value of a DShot frame: motor stop, or 48 to 2047."""
     return 0 if us <= 1001.0 else min(2047, max(48, round(47 + 2 * (us - 1000))))

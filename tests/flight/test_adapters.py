@@ -1,4 +1,4 @@
-"""The adapters for ArduPilot and PX4, against packets as these document them; neither program is here."""
+"""The adapters for ArduPilot and PX4, against packets as these document them; neither program is used."""
 
 import json
 import math
@@ -69,7 +69,7 @@ def test_ardupilot_stands_then_climbs(autopilot):
     for _ in range(RATE_HZ):
         stands = autopilot.step(1000)
     assert stands["timestamp"] == pytest.approx(1 + 1 / RATE_HZ)
-    # It feels what holds it up, which is upwards: negative in its axes.
+    # It feels what holds it up, upwards: negative in its axes.
     assert stands["imu"]["accel_body"] == pytest.approx([0.0, 0.0, -9.80665], abs=1e-3)
     assert stands["imu"]["gyro"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     assert stands["position"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)

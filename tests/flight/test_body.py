@@ -12,7 +12,7 @@ HOVERS = math.sqrt(MASS * GRAVITY / (4 * THRUST))
 
 
 def flown(seconds: float, rotors, height: float = 10.0) -> Body:
-    """In the air, with rotors that already turn."""
+    """Flies a body in the air, with rotors already turning."""
     body = Body()
     body.place[2] = height
     body.last_turns = tuple(rotors)
@@ -25,14 +25,14 @@ def test_it_stands_where_it_is_put():
     body = Body()
     for _ in range(1000):
         body.advance(STEP_S, (0.0,) * 4, CALM)
-    # The pack beside its middle presses two of the feet some um deeper.
+    # The pack off its middle presses two of the feet a few um deeper.
     assert body.place == pytest.approx([0.0, 0.0, Body.STANDS], abs=2e-5)
     assert body.felt == pytest.approx((0.0, 0.0, GRAVITY), abs=5e-3)
 
 
 def test_it_falls_freely_and_feels_nothing():
     body = flown(0.1, (0.0,) * 4)
-    # Without air drag at first; a step of Euler's is half a step ahead.
+    # Without air drag at first; an Euler step is half a step ahead.
     assert body.speed[2] == pytest.approx(-GRAVITY * 0.1, rel=2e-3)
     assert body.felt == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
 

@@ -1,4 +1,4 @@
-"""Betaflight flies on the emulator's ESCs: within bounds, and twice the same."""
+"""Betaflight flies on the emulator's ESCs: within bounds, and the same twice."""
 
 import contextlib
 import subprocess

@@ -1,12 +1,12 @@
-"""What each board's image may take, and which interrupts may interrupt which."""
+"""What each board's image may take, and which interrupts may preempt which."""
 
 from dataclasses import dataclass
 
 KB = 1024
 
 MAVLINK = 15 * KB
-"""What the MAVLink component may take of any flash, text and data, without the files that it serves and
-the signatures."""
+"""What the MAVLink component may take of any flash, text and data, without the files that it serves and the
+signatures."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Region:
 
 @dataclass(frozen=True)
 class Board:
-    """A board as the firmware's linker scripts and `priority.rs` have it."""
+    """A board as in the firmware's linker scripts and `priority.rs`."""
 
     flash: Region
     memories: tuple[Region, ...]
@@ -36,7 +36,7 @@ class Board:
 
 BOARDS = {
     "b-g431b-esc1": Board(
-        # All but the store. The aim is 96 KB, beside a resident loader.
+        # All but the store. The target is 96 KB, next to a resident loader.
         flash=Region("flash", 0x0800_0000, 128 * KB, 124 * KB),
         memories=(
             Region("CCM", 0x1000_0000, 10 * KB, 9 * KB),
@@ -46,7 +46,7 @@ BOARDS = {
         alarm=None,
     ),
     "vesc4-f405": Board(
-        # Two of its sectors, behind the one with the vectors, are the store.
+        # Two of its sectors, after the one with the vectors, are the store.
         flash=Region("flash", 0x0800_0000, 1024 * KB, (1024 - 32) * KB),
         memories=(Region("SRAM", 0x2000_0000, 128 * KB, 128 * KB),),
         pwm="ADC",

@@ -1,4 +1,4 @@
-"""Who calls whom in an image, and how much stack that takes."""
+"""An image's call graph, and how much stack it takes."""
 
 import re
 from collections.abc import Iterable
@@ -9,20 +9,20 @@ from image import Function, Image, Unreadable
 from machine import Code, code_of
 
 FRAME_BYTES = 26 * 4 + 4
-"""What the processor pushes for an interrupt: 26 words with the floating-point unit's, and up to one
-more so that the stack stands at a multiple of 8."""
+"""What the processor pushes for an interrupt: 26 words with the floating-point unit's, plus up to one that aligns the
+stack to 8 bytes."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Most stack that a function can take, and the calls that lead there."""
+    """The most stack that a function can take, and the calls that lead there."""
 
     size: int
     path: tuple[Function, ...]
 
 
 class Calls:
-    """The call graph of an image. What it could not make out stands in `problems`."""
+    """The call graph of an image. What it could not make out is in `problems`."""
 
     def __init__(self, image: Image):
         self.image = image
@@ -38,7 +38,7 @@ class Calls:
         self._bounds = {}
 
     def _called_by_address(self) -> list[Function]:
-        """All functions whose address is stored, outside of the vector table, or held by code."""
+        """Returns all functions whose address is stored, outside the vector table, or held by code."""
         stored = {value & ~1 for _, value in self.image.data_addresses() if value & 1}
         held = {use & ~1 for code in self.code.values() for use in code.held() if use & 1}
         found = [self.image.functions[b] for b in sorted(stored | held) if b in self.image.functions]
@@ -48,7 +48,7 @@ class Calls:
         return found
 
     def callees(self, function: Function):
-        """Pairs of the stack in use at a call and the function called."""
+        """Yields pairs of the stack in use at a call and the function called."""
         for call in self.code[function.begin].calls:
             if call.target is None:
                 targets = [
@@ -71,7 +71,7 @@ class Calls:
             self.problems.append(problem)
 
     def bound(self, function: Function, callers: tuple = (), without: frozenset[Function] = frozenset()) -> Bound:
-        """The most stack that it and all that it calls take, but for some that are not called. A
+        """Returns the most stack that it and everything it calls take, except for some that are not called. A
         recursion has no bound and is a problem."""
         if function in callers:
             names = " -> ".join(f.name for f in (*callers[callers.index(function) :], function))
@@ -91,7 +91,7 @@ class Calls:
 
 
 def path(functions: Iterable[Function]) -> str:
-    """Names on a way of calls, in turn, without those of far jumps: they are as their targets'."""
+    """Returns the names along a call path, without far jumps, which are named after their targets."""
     names = []
     for function in functions:
         name = re.sub(r"^siskin_", "", function.name)

@@ -1,8 +1,7 @@
-"""What an image holds for MAVLink: the component's functions, and the functions and data that nothing
-else leads to.
+"""What an image holds for MAVLink: the component's functions, and the functions and data that nothing else leads to.
 
-The component's entrances are never inlined, so its code is found by name; what the compiler has inlined
-into it is its own. Data have no names: each goes from an address that something holds to the next."""
+The component's entrances are never inlined, so its code is found by name; what the compiler has inlined into it is its
+own. Data have no names: each extends from an address that something holds to the next."""
 
 import bisect
 from collections import defaultdict
@@ -17,17 +16,17 @@ PARTS = {
     "files": ("siskin_control::mavlink::ftp::",),
     "signatures": ("siskin_control::mavlink::signing::", "sha2::", "<sha2::"),
 }
-"""Parts of it that are told apart, likewise. What of them the compiler has put into others counts there."""
+"""Parts of it that are counted separately, likewise. What the compiler has inlined into others counts there."""
 
 
 def size(calls: Calls, names: tuple[str, ...]) -> int:
-    """Bytes of text and data."""
+    """Returns the bytes of text and data."""
     functions, data = contents(calls, names)
     return sum(function.size for function in functions) + sum(end - begin for begin, end in data)
 
 
 def contents(calls: Calls, names: tuple[str, ...]) -> tuple[list[Function], list[tuple[int, int]]]:
-    """The functions that begin so and what nothing but them leads to: functions, and begin and end of
+    """Returns the functions whose names begin like this and what only they lead to: functions, and start and end of
     each piece of data."""
     image = calls.image
     functions = image.functions
@@ -38,7 +37,7 @@ def contents(calls: Calls, names: tuple[str, ...]) -> tuple[list[Function], list
     pieces = sorted(target for target in targets if target & ~1 not in functions and image.section_at(target))
 
     def node(address: int) -> int | None:
-        """The begin of the function or piece of data that an address is of."""
+        """Returns the start of the function or piece of data that an address belongs to."""
         if address & ~1 in functions:
             return address & ~1
         index = bisect.bisect_right(pieces, address) - 1
@@ -66,7 +65,7 @@ def contents(calls: Calls, names: tuple[str, ...]) -> tuple[list[Function], list
 
 
 def reached(leads: dict, roots: set[int], without: frozenset | set = frozenset()) -> set[int]:
-    """All that these lead to, themselves included, but not by way of some."""
+    """Returns everything that these lead to, themselves included, but not by way of `without`."""
     found, waiting = set(roots), list(roots)
     while waiting:
         for next_ in leads.get(waiting.pop(), ()):

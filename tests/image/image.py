@@ -24,7 +24,7 @@ class Section:
     begin: int
     size: int
     bits: bytes | None
-    """What it holds; `None` if it only takes room."""
+    """Its contents; `None` if it only takes room."""
 
     @property
     def end(self) -> int:
@@ -33,7 +33,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Function:
-    """A function's place, without the bit that says Thumb."""
+    """A function's place, without the Thumb bit."""
 
     name: str
     begin: int
@@ -80,7 +80,7 @@ class Image:
             if symbol.name.startswith(("$t", "$d")):
                 kinds[address] = symbol.name[1]
             elif symbol["st_info"]["type"] == "STT_FUNC" and symbol["st_shndx"] != "SHN_UNDEF":
-                # Of several names for one function, one that tells its size.
+                # Of several names for a function, prefer one with its size.
                 known = mangled.get(address & ~1)
                 if known is None or not known[1]:
                     mangled[address & ~1] = symbol.name, symbol["st_size"]
@@ -89,7 +89,7 @@ class Image:
         self._begins = sorted(mangled)
         names = demangled([mangled[begin][0] for begin in self._begins])
         for index, (begin, name) in enumerate(zip(self._begins, names)):
-            # One in assembly may not tell its size: it ends where another begins, or its section.
+            # An assembly function may not state its size: it ends where the next one begins, or with its section.
             ends = [*self._begins[index + 1 : index + 2], self.section_at(begin).end]
             functions[begin] = Function(name, begin, mangled[begin][1] or min(ends) - begin)
         self.functions = functions
@@ -97,7 +97,7 @@ class Image:
         self._kind_begins = [begin for begin, _ in self._kinds]
 
     def _read_relocations(self, elf):
-        """The addresses of all words and instructions that hold an address."""
+        """Finds the addresses of all words and instructions that hold an address."""
         self.addresses = set()
         found = False
         for section in elf.iter_sections():
@@ -111,28 +111,28 @@ class Image:
             raise Unreadable("the image has no relocations: link it with --emit-relocs")
 
     def section_at(self, address: int) -> Section | None:
-        """The section that an address is in."""
+        """Returns the section that contains an address."""
         return next((s for s in self.sections if s.begin <= address < s.end), None)
 
     def function_at(self, address: int) -> Function | None:
-        """The function that an address is in."""
+        """Returns the function that contains an address."""
         index = bisect.bisect_right(self._begins, address & ~1) - 1
         function = self.functions[self._begins[index]] if index >= 0 else None
         return function if function and address & ~1 < function.end else None
 
     def read(self, address: int, size: int) -> bytes:
-        """Bytes of the image."""
+        """Returns bytes of the image."""
         section = self.section_at(address)
         if section is None or section.bits is None:
             raise Unreadable(f"nothing is stored at {address:#x}")
         return section.bits[address - section.begin :][:size]
 
     def word(self, address: int) -> int:
-        """A word of the image."""
+        """Returns a word of the image."""
         return int.from_bytes(self.read(address, 4), "little")
 
     def code_ranges(self, function: Function):
-        """The begin and end of each piece of a function that is instructions, and not data."""
+        """Yields start and end of each part of a function that is instructions rather than data."""
         index = max(bisect.bisect_right(self._kind_begins, function.begin) - 1, 0)
         for position in range(index, len(self._kinds)):
             begin, kind = self._kinds[position]
@@ -145,8 +145,7 @@ class Image:
                 yield begin, end
 
     def data_addresses(self):
-        """Pairs of a place and the address that stands there, outside of functions and of the vector
-        table."""
+        """Yields pairs of a place and the address stored there, outside functions and the vector table."""
         for place in sorted(self.addresses):
             section = self.section_at(place)
             stored = section and section.bits is not None and section.name != ".vector_table"

@@ -1,8 +1,7 @@
-"""Calls whose target is not known until they run, and what they can lead to.
+"""Calls whose target is only known at run time, and what they can lead to.
 
-Each line is who calls, and whom, as patterns of names. A caller without a line, and a function whose
-address is stored somewhere though no line leads to it, are found and refused: whoever adds one adds a
-line, having looked.
+Each line is the caller, and the callee, as patterns of names. A caller without a line, and a function whose address is
+stored somewhere though no line leads to it, are found and refused: whoever adds one adds a line, after checking.
 """
 
 import re
@@ -12,41 +11,41 @@ TASK = r"::TaskStorage::poll$"
 EXITED = r"^embassy_executor::raw::poll_exited$"
 
 LEADS_TO = [
-    # An executor runs what has been woken; that of the throttle's task is an interrupt.
+    # An executor runs what has been woken; the throttle task's is an interrupt.
     (r"^embassy_executor::.*Executor::(run|poll)$|^(FMAC|CAN2_SCE)$", rf"{TASK}|{EXITED}"),
-    # A waker's table: of the time queue, of channels and pipes that a task waits for.
+    # A waker's table: of the time queue, and of channels and pipes that a task waits for.
     (
         rf"^(_embassy_time_schedule_wake|embassy_time_queue_utils::|embassy_sync::waitqueue::)|{TASK}"
         r"|^siskin_firmware::tasks::kiss::send$"
         r"|^<embassy_sync::blocking_mutex::raw::\w+ as embassy_sync::blocking_mutex::raw::RawMutex>::lock$",
         WAKER,
     ),
-    # MAVLink asks the throttle's side and checks a changed parameter by what it is given.
+    # MAVLink asks the throttle side and checks a changed parameter through what it is given.
     (r"^siskin_control::mavlink::(component|context|command)::", r" as siskin_control::input::access::Access>::"),
     (r"^siskin_control::mavlink::parameter::change$", r"^siskin_control::esc::Esc::with_component::{closure}$"),
-    # What it hands bytes to is known when it is linked: the serial line's pipe, which wakes its task.
+    # What it hands bytes to is known at link time: the serial line's pipe, which wakes its task.
     (r"^siskin_control::mavlink::sender::Sender::send_payload$", WAKER),
 ]
 
 NEVER_CALLED = [
-    # They stand in tables beside those above; nothing here owns a value of unknown kind, whose end or
-    # only call these would be.
+    # They are in tables next to those above; nothing here owns a value of unknown type, whose drop or only call these
+    # would be.
     r"^core::ptr::drop_in_place$",
     r"core::ops::function::FnOnce>?::call_once{vtable.shim}$",
 ]
 
 
 def may_lead_to(caller: str, target: str) -> bool:
-    """Whether an indirect call in the one function can reach the other."""
+    """Returns whether an indirect call in one function can reach the other."""
     return any(re.search(a, caller) and re.search(b, target) for a, b in LEADS_TO)
 
 
 def is_foreseen(target: str) -> bool:
-    """Whether it is known who calls a function by its address."""
+    """Returns whether it is known who calls a function by its address."""
     patterns = [pattern for _, pattern in LEADS_TO] + NEVER_CALLED
     return any(re.search(pattern, target) for pattern in patterns)
 
 
 def may_call(caller: str) -> bool:
-    """Whether it is known whom a function calls by an address."""
+    """Returns whether it is known whom a function calls by an address."""
     return any(re.search(pattern, caller) for pattern, _ in LEADS_TO)

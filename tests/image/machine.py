@@ -13,7 +13,7 @@ DISASSEMBLER = capstone.Cs(
 DISASSEMBLER.detail = True
 
 LARGEST_FRAME = 1 << 16
-"""Bytes that no function of a small chip takes: beyond is a loop that pushes."""
+"""More than any function of a small chip takes, bytes: beyond it is a loop that pushes."""
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,12 @@ class Call:
     depth: int
     """Stack in use there, bytes."""
     target: int | None
-    """`None` if it is not known until it runs."""
+    """`None` if it is only known at run time."""
 
 
 @dataclass
 class Code:
-    """One function's doings."""
+    """What one function does."""
 
     frame: int = 0
     """Most stack that it takes itself, bytes."""
@@ -37,32 +37,32 @@ class Code:
     uses: dict[int, int] = field(default_factory=dict)
     """Addresses that it holds, by the place of each: of functions, odd, and of data."""
     called: set[int] = field(default_factory=set)
-    """Places of those among them that it calls: code for size has a call's target in a register."""
+    """Places of those that it calls: code built for size calls through a register."""
 
     def held(self) -> set[int]:
-        """Addresses that it holds and does not only call."""
+        """Returns addresses that it holds other than just to call them."""
         return {value for place, value in self.uses.items() if place not in self.called}
 
 
 @dataclass(frozen=True)
 class Pointer:
-    """A register's value: so many bytes below where the stack stood at entry."""
+    """A register's value: this many bytes below the stack pointer at entry."""
 
     depth: int
 
 
 @dataclass(frozen=True)
 class Number:
-    """A register's value, and whether the linker has put an address there."""
+    """A register's value, and whether it is an address from the linker."""
 
     value: int
     is_address: bool
     place: int = field(default=0, compare=False)
-    """Where an address stands."""
+    """Where an address is stored."""
 
 
 def code_of(image: Image, function: Function) -> Code:
-    """Follows every way through a function."""
+    """Follows every path through a function."""
     instructions = {}
     for begin, end in image.code_ranges(function):
         for instruction in DISASSEMBLER.disasm(image.read(begin, end - begin), begin):
@@ -73,8 +73,7 @@ def code_of(image: Image, function: Function) -> Code:
 
 
 class Walk:
-    """The ways through a function: at each instruction the stack's depth and what is known of the
-    registers."""
+    """The paths through a function: at each instruction the stack depth and what is known about the registers."""
 
     def __init__(self, image: Image, function: Function, instructions: dict):
         self.image, self.function, self.instructions = image, function, instructions
@@ -88,7 +87,7 @@ class Walk:
             address, depth, registers = self.open.pop()
             known = self.seen.get(address)
             if known is not None:
-                # Where ways meet, the deeper counts, and what both agree on.
+                # Where paths meet, the deeper one counts, and what both agree on.
                 deepest = max(depth, known[0])
                 common = {r: v for r, v in known[1].items() if registers.get(r) == v}
                 if (deepest, common) == known:
@@ -107,15 +106,14 @@ class Walk:
         raise Unreadable(f"{address:#x} in {self.function.name}: {why}")
 
     def go(self, address: int, depth: int, registers: dict):
-        """Goes on there, which may be in another function."""
+        """Continues there, which may be in another function."""
         if self.function.begin <= address < self.function.end:
             self.open.append((address, depth, registers))
         else:
             self.call(address, depth, address)
 
     def come_back(self, address: int, depth: int, registers: dict):
-        """Goes on behind a call. One that does not come back has data behind it, the next function,
-        or what fills up to them."""
+        """Continues after a call. One that does not return is followed by data, the next function, or padding."""
         behind = self.instructions.get(address)
         if behind and behind.mnemonic.startswith("nop"):
             behind = self.instructions.get(address + behind.size)
@@ -123,7 +121,7 @@ class Walk:
             self.go(address, depth, registers)
 
     def known(self, registers: dict, register: int) -> int | None:
-        """The function that a register holds. The linker's own jumps have no relocation."""
+        """Returns the function that a register holds. The linker's own veneers have no relocation."""
         value = registers.get(register)
         if isinstance(value, Number) and value.value & ~1 in self.image.functions:
             self.code.called.add(value.place)
@@ -168,12 +166,12 @@ class Walk:
             self.go(after, depth, registers)
 
     def leaves(self, instruction) -> bool:
-        """Whether it writes the program counter."""
+        """Returns whether it writes the program counter."""
         _, written = instruction.regs_access()
         return instruction.id == arm.ARM_INS_BX or arm.ARM_REG_PC in written
 
     def table(self, instruction) -> list[int]:
-        """Where a jump table leads: up to the next instruction, and within the function."""
+        """Returns where a jump table leads: up to the next instruction, and within the function."""
         width = 1 if instruction.id == arm.ARM_INS_TBB else 2
         base = instruction.address + 4
         later = [address for address in self.instructions if address >= base]
@@ -181,11 +179,11 @@ class Walk:
         data = self.image.read(base, end - base)
         entries = [data[i : i + width] for i in range(0, len(data) - width + 1, width)]
         targets = {base + 2 * int.from_bytes(entry, "little") for entry in entries}
-        # A zero that fills up to a whole word leads to the table itself.
+        # A zero that pads to a whole word leads to the table itself.
         return sorted(target for target in targets if target in self.instructions)
 
     def change(self, instruction, depth: int, registers: dict) -> int:
-        """Takes what an instruction does to the registers; gives the stack's depth after it."""
+        """Applies an instruction to the registers; returns the stack depth after it."""
         sp = arm.ARM_REG_SP
         before = {**registers, sp: Pointer(depth)}
         value = self.result(instruction, before)
@@ -206,7 +204,7 @@ class Walk:
         self.fail(instruction.address, f"not understood: {instruction.mnemonic} {instruction.op_str}")
 
     def result(self, instruction, registers: dict):
-        """What it puts into its first register, if that can be told."""
+        """Returns what it puts into its first register, if that can be determined."""
         kind, operands = instruction.id, instruction.operands
         if kind == arm.ARM_INS_LDR and operands[1].type == arm.ARM_OP_MEM:
             return self.literal(instruction)
@@ -243,13 +241,13 @@ class Walk:
 
 
 def kept(registers: dict) -> dict:
-    """What a function that is called leaves as it was."""
+    """Returns what a called function preserves."""
     lost = (arm.ARM_REG_R0, arm.ARM_REG_R1, arm.ARM_REG_R2, arm.ARM_REG_R3, arm.ARM_REG_R12)
     return {register: value for register, value in registers.items() if register not in lost}
 
 
 def sum_of(operands, registers: dict, subtract: bool):
-    """An address in the stack, moved by a number."""
+    """Returns an address in the stack, moved by a number."""
     source, moved = operands[-2], operands[-1]
     base = registers.get(source.reg)
     if moved.type == arm.ARM_OP_REG:
@@ -263,7 +261,7 @@ def sum_of(operands, registers: dict, subtract: bool):
 
 
 def stack_taken(instruction) -> int | None:
-    """Bytes that an instruction pushes, negative for those that it pops; `None` for another."""
+    """Returns the bytes that an instruction pushes, negative for pops; `None` for others."""
     kind, operands = instruction.id, instruction.operands
     if kind in (arm.ARM_INS_PUSH, arm.ARM_INS_STMDB):
         return bytes_of(operands[kind == arm.ARM_INS_STMDB :])

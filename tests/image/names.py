@@ -1,12 +1,11 @@
-"""Names of functions as the source has them, the same from either scheme by which compilers spell
-symbols: legacy and v0."""
+"""Names of functions as in the source, the same from both schemes by which compilers mangle symbols: legacy and v0."""
 
 import re
 import subprocess
 
 
 def demangled(symbols: list[str]) -> list[str]:
-    """The names of symbols. The linker's jumps to functions far away have the function's name."""
+    """Returns the symbols' names. The linker's far jumps have their function's name."""
     text = subprocess.run(
         ["c++filt", "-s", "rust"],
         input="\n".join(re.sub(r"\.llvm\.\d+$|^__Thumbv7\w+Thunk_", "", symbol) for symbol in symbols),
@@ -18,11 +17,11 @@ def demangled(symbols: list[str]) -> list[str]:
 
 
 def plain(name: str) -> str:
-    """A name without hashes and without what is put in for generic parameters, which legacy leaves out:
+    """Returns a name without hashes and without generic arguments, which legacy leaves out:
     `<a::B<c::D>>::e::<f::G>::{closure#0}` is `a::B::e::{closure}`, and `<a::B<c::D> as h::I<j>>::k` is
     `<a::B as h::I>::k`."""
     name = re.sub(r"::h[0-9a-f]{16}$", "", name)
-    # Of crates; nothing else has a bracket right behind a word.
+    # Crate hashes; nothing else has a bracket right after a word.
     name = re.sub(r"(?<=\w)\[[0-9a-f]+\]", "", name)
     name = re.sub(r"::\{shim:vtable#0\}|\{\{vtable\.shim\}\}", "{vtable.shim}", name)
     name = re.sub(r"\{\{(\w+)\}\}|\{(\w+)(?:#\d+|:[^{}]*#\d+)\}", lambda m: f"{{{m[1] or m[2]}}}", name)
@@ -46,7 +45,7 @@ def _without_arguments(name: str) -> str:
 
 
 def _closing(name: str, begin: int) -> int:
-    """Where the bracket that opens there is closed; the arrow of a function's type closes none."""
+    """Returns where the bracket opened there is closed; the arrow of a function type closes none."""
     depth = 0
     for at in range(begin, len(name)):
         if name[at] == "<":

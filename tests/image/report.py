@@ -1,9 +1,9 @@
-"""Sizes and stack of a linked image, against what its board allows. What its PWM interrupt reaches,
-`siskin image` judges.
+"""Sizes and stack of a linked image, against what its board allows. What its PWM interrupt reaches is judged by
+`siskin image`.
 
     report.py BOARD ELF
 
-Exit status 1 if anything is too large or not to be made out.
+Exit status 1 if anything is too large or cannot be made out.
 """
 
 import sys
@@ -18,14 +18,14 @@ from image import Image, Unreadable
 
 
 def limited(name: str, size: int, limit: int, problems: list[str]) -> str:
-    """A line that tells a size and its limit."""
+    """Returns a line with a size and its limit."""
     if size > limit:
         problems.append(f"{name}: {size} bytes, {size - limit} too many")
     return f"{name:<24}{size:>8} of {limit:>7} bytes"
 
 
 def report(board: Board, image: Image) -> list[str]:
-    """Prints what there is to know; gives what is wrong."""
+    """Prints the report; returns what is wrong."""
     problems = []
     regions = [board.flash, *board.memories]
     print(limited("flash", sizes.stored(image, board.flash), board.flash.limit, problems))

@@ -7,23 +7,23 @@ from boards import Board, Region
 from image import Image
 
 OWN = ("siskin_control", "siskin_firmware")
-"""Crates that are told by their modules."""
+"""Crates broken down by module."""
 
 
 def stored(image: Image, flash: Region) -> int:
-    """Bytes of the flash, with what lies between."""
+    """Returns the bytes of flash, including gaps."""
     return max((begin + size for begin, size in image.loaded), default=flash.begin) - flash.begin
 
 
 def used(image: Image, memory: Region) -> int:
-    """Bytes of a memory, up to the end of the last that stands there."""
+    """Returns the bytes of a memory, up to the end of the last section in it."""
     ends = [s.end for s in image.sections if s.begin in memory]
     return max(ends, default=memory.begin) - memory.begin
 
 
 def module(name: str) -> str:
-    """The crate of a function, with the module of an own one."""
-    # `<a::B as c::D>::e` belongs to a, `<&mut a::B>::e` too.
+    """Returns a function's crate, with the module if it is one of our own."""
+    # `<a::B as c::D>::e` belongs to a, and so does `<&mut a::B>::e`.
     path = re.search(r"[A-Za-z_]\w*(?:::\w+)*", re.sub(r"^<*(?:&|mut |\*const )*", "", name))
     parts = path.group().split("::") if path else [name]
     raw = re.match(r"_R.*?C\w*?_\d+(compiler_builtins|core)", name)
@@ -35,7 +35,7 @@ def module(name: str) -> str:
 
 
 def by_module(image: Image, regions: list[Region]) -> list[tuple[str, list[int]]]:
-    """Each module's code in each region, the largest first."""
+    """Returns each module's code in each region, largest first."""
     sizes = {region.name: Counter() for region in regions}
     for function in image.functions.values():
         region = next(r for r in regions if function.begin in r)
@@ -46,7 +46,7 @@ def by_module(image: Image, regions: list[Region]) -> list[tuple[str, list[int]]
 
 
 def sections(image: Image, board: Board) -> list[tuple[str, str, int]]:
-    """Memory, name and size of every section."""
+    """Returns memory, name and size of every section."""
     regions = [board.flash, *board.memories]
     return [
         (next((r.name for r in regions if s.begin in r), "?"), s.name, s.size)

@@ -1,7 +1,7 @@
 """The stack: one for the start, the tasks and all interrupts on top of each other.
 
-Before the control's interrupt is started, nothing of priority 0 or 1 runs: what takes most stack at the
-start, the making of the ESC, has the room of those two.
+Until the control interrupt is started, nothing runs at priority 0 or 1: what takes most stack at the start, creating
+the ESC, has the room of those two.
 """
 
 from boards import Board
@@ -10,19 +10,18 @@ from image import Function
 
 WORD = 4
 FIRST_VECTORS = 2
-"""The stack's begin, and the reset."""
+"""The initial stack pointer, and the reset."""
 HARD_FAULT = 3
-"""Its handler begins the stack anew."""
+"""Its handler restarts the stack."""
 BEFORE = tuple(f"siskin_firmware::tasks::start::{name}" for name in ("power_up", "open_port"))
-"""Make the ESC and its throttle, return before the control's interrupt is started, and are not called
-again."""
+"""Create the ESC and its throttle, return before the control interrupt is started, and are not called again."""
 TASK = "embassy_executor::raw::TaskStorage::poll"
 THROTTLE = "siskin_firmware::tasks::throttle::Listener::"
 """The throttle's task has an executor of its own, in an interrupt, which runs no other."""
 
 
 def vectors(calls: Calls) -> list[Function]:
-    """The functions of the vector table, each once, but for reset and hard fault."""
+    """Returns the vector table's functions, each once, except for reset and hard fault."""
     image = calls.image
     table = next(s for s in image.sections if s.name == ".vector_table")
     found = {}
@@ -34,7 +33,7 @@ def vectors(calls: Calls) -> list[Function]:
 
 
 def thread_tasks(calls: Calls) -> frozenset[Function]:
-    """The tasks of the other executor: none calls anything of the throttle's but by its port."""
+    """Returns the other executor's tasks: none calls anything of the throttle's except through its port."""
     functions = calls.image.functions
 
     def listens(task):
@@ -45,7 +44,7 @@ def thread_tasks(calls: Calls) -> frozenset[Function]:
 
 
 def deepest(calls: Calls, functions: list[Function]) -> Bound:
-    """The bound of whichever takes most, with what the processor pushes for it."""
+    """Returns the bound of whichever takes most, including what the processor pushes for it."""
     without = thread_tasks(calls)
     bounds = [calls.bound(function, without=without) for function in functions]
     most = max(bounds, key=lambda bound: bound.size, default=None)
@@ -53,7 +52,7 @@ def deepest(calls: Calls, functions: list[Function]) -> Bound:
 
 
 def levels(calls: Calls, board: Board) -> list[tuple[str, Bound]]:
-    """What each level takes at most, at the time when the sum is greatest."""
+    """Returns what each level takes at most, at the time when the sum is largest."""
     image = calls.image
     named = {name: image.symbols[name] & ~1 for name in (board.pwm, board.alarm) if name}
     handlers = vectors(calls)

@@ -30,9 +30,9 @@ class Browser:
             f"--user-data-dir={self._profile.name}", f"--window-size={width},{height}",
         ]
         if os.geteuid() == 0:
-            # Its sandbox does not run as root.
+            # The browser's sandbox does not run as root.
             command.append("--no-sandbox")
-        # The browser reads on 3 and writes on 4, of which none may be one of these.
+        # The browser reads on 3 and writes on 4; none of these may be one of those.
         to_read, to_write = (fcntl.fcntl(end, fcntl.F_DUPFD, 10) for end in (reads, writes))
         command = ["bash", "-c", f'exec "$@" 3<&{to_read} 4>&{to_write}', "bash", *command, "about:blank"]
         self.process = subprocess.Popen(
@@ -49,7 +49,7 @@ class Browser:
         self._number = 0
         self._session = None
         self.problems: list[str] = []
-        """What the page has complained of."""
+        """What the page has complained about."""
         threading.Thread(target=self._read, daemon=True).start()
         targets = self._call("Target.getTargets")["targetInfos"]
         self._target = next(target["targetId"] for target in targets if target["type"] == "page")
@@ -66,7 +66,7 @@ class Browser:
         self.process.wait()
         for end in (self._to, self._from):
             os.close(end)
-        # Its helpers may still write there for a moment.
+        # The browser's helpers may still write there for a moment.
         shutil.rmtree(self._profile.name, ignore_errors=True)
 
     def _read(self) -> None:
@@ -120,13 +120,13 @@ class Browser:
         self._call("Target.closeTarget", targetId=self._target)
 
     def run(self, script: str):
-        """What an expression gives, awaited."""
+        """Returns an expression's value, awaited."""
         answer = self._call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in answer, f"{script}: {answer['exceptionDetails']}"
         return answer["result"].get("value")
 
     def wait(self, script: str, timeout: float = TIMEOUT_S) -> float:
-        """Until an expression is true; the seconds that it took."""
+        """Waits until an expression is true; returns the seconds that it took."""
         begin = time.monotonic()
         while not self.run(script):
             took = time.monotonic() - begin
@@ -146,18 +146,18 @@ class Browser:
         return self.run(f"(({{x, y, width, height}}) => ({{x, y, width, height}}))({rectangle}.getBoundingClientRect())")
 
     def mouse(self, kind: str, x: float, y: float) -> None:
-        """The left button: mousePressed, mouseMoved or mouseReleased."""
+        """Sends an event of the left button: mousePressed, mouseMoved or mouseReleased."""
         self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def press(self, selector: str, share: float) -> tuple[float, float]:
-        """Presses and holds the mouse at a share of an element's width; where that is."""
+        """Presses and holds the mouse at a share of an element's width; returns where that is."""
         box = self.box(selector)
         at = (box["x"] + share * box["width"], box["y"] + box["height"] / 2)
         self.mouse("mousePressed", *at)
         return at
 
     def show(self, width: int, height: int, dark: bool) -> None:
-        """The size of the page, and the scheme that its reader prefers."""
+        """Sets the size of the page, and the colour scheme that its reader prefers."""
         self._call(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=1, mobile=width < 500,
@@ -167,5 +167,5 @@ class Browser:
         self._call("Emulation.setEmulatedMedia", features=features)
 
     def picture(self) -> bytes:
-        """What is on the screen, as PNG."""
+        """Returns a screenshot, as PNG."""
         return base64.b64decode(self._call("Page.captureScreenshot", format="png")["data"])

@@ -1,4 +1,4 @@
-"""A campaign: many cases, each with a folder of its own, some at a time."""
+"""A campaign: many cases, each in a folder of its own, several at a time."""
 
 import argparse
 import tempfile
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def played(cases: list, play, jobs: int):
-    """Each case with what `play` makes of it in an empty folder, in order."""
+    """Yields each case with what `play` returns for it in an empty folder, in order."""
 
     def one(case):
         with tempfile.TemporaryDirectory() as folder:
@@ -19,8 +19,8 @@ def played(cases: list, play, jobs: int):
 
 
 def words(text: str, motors: int, **more: tuple[int, str]) -> argparse.Namespace:
-    """What the command line gives: how many random motors, the first one's number, how many runs at a time, and more
-    by name, with its default and what it is. All but the first one's number are 1 or more."""
+    """Parses the command line: how many random motors, the first one's number, how many runs at a time, and more by
+    name, with a default and a description. All except the first one's number are at least 1."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--motors", type=int, default=motors, help="how many random motors")
     parser.add_argument("--first", type=int, default=0, help="number of the first")
@@ -35,5 +35,5 @@ def words(text: str, motors: int, **more: tuple[int, str]) -> argparse.Namespace
 
 
 def numbers(given: argparse.Namespace) -> range:
-    """Those of the random motors."""
+    """Returns the numbers of the random motors."""
     return range(given.first, given.first + given.motors)

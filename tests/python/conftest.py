@@ -1,4 +1,4 @@
-"""What every test may ask for."""
+"""Fixtures for every test."""
 
 import contextlib
 import sys
@@ -14,7 +14,7 @@ from emulator import Emulator  # noqa: E402  (it needs the dialect's folder)
 
 @pytest.fixture
 def start():
-    """Starts emulators, with options of the command line, and ends them after the test."""
+    """Starts emulators with command line options, and ends them after the test."""
     with contextlib.ExitStack() as running:
 
         def start(*options, **named) -> Emulator:
@@ -27,7 +27,7 @@ def start():
 
 @pytest.fixture
 def esc(start):
-    """A client of a fresh emulator on the default bench, as `esc.emulator`."""
+    """A client of a fresh emulator on the default bench, which is `esc.emulator`."""
     emulator = start()
     with emulator.connect() as esc:
         esc.emulator = emulator

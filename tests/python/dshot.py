@@ -1,4 +1,4 @@
-"""DShot as a flight controller sends it, written from the protocol and not from the control."""
+"""DShot as a flight controller sends it, written from the protocol rather than from the control."""
 
 import socket
 import threading
@@ -11,14 +11,14 @@ RAW_EDGES = 255
 STOP = 0
 EXTENDED_ON, EXTENDED_OFF = 13, 14
 STANDS = 0xFFF
-"""The data of a reply while the motor stands."""
+"""The data in a reply while the motor stands."""
 LEAST, MOST = 48, 2047
 HALF = (LEAST + MOST + 1) // 2
 """The step above the middle of 48..2047."""
 
 
 def frame(value: int, telemetry: bool = False) -> int:
-    """The 16 bits: 11 of value, the telemetry request, 4 of check sum."""
+    """Returns the 16 bits: 11 of value, the telemetry request, 4 of checksum."""
     data = value << 1 | telemetry
     return data << 4 | (data ^ data >> 4 ^ data >> 8) & 0xF
 
@@ -26,7 +26,7 @@ def frame(value: int, telemetry: bool = False) -> int:
 def datagram(
     value: int, protocol: int = DSHOT600, bad_crc: bool = False, telemetry: bool = False
 ) -> bytes:
-    """A frame for the emulator's wire. A bidirectional one's check sum is inverted."""
+    """Returns a frame for the emulator's wire. A bidirectional one's checksum is inverted."""
     bits = frame(value, telemetry) ^ (0xF if protocol >= 20 else 0) ^ (0x5 if bad_crc else 0)
     return bytes([protocol]) + bits.to_bytes(2, "little")
 
@@ -36,7 +36,7 @@ NIBBLES = {int(code, 16): nibble for nibble, code in enumerate(GROUPS.split())}
 
 
 def reply(answer: bytes) -> int:
-    """The 12 bits of data of a reply's datagram."""
+    """Returns the 12 data bits of a reply's datagram."""
     assert len(answer) == 9, answer
     levels = int.from_bytes(answer[1:5], "little")
     assert levels < 1 << 20, "the start bit is low"
@@ -47,17 +47,17 @@ def reply(answer: bytes) -> int:
 
 
 def is_extended(data: int) -> bool:
-    """Whether it is a word of extended telemetry."""
+    """Returns whether this is a word of extended telemetry."""
     return data >> 8 != 0 and not data & 0x100
 
 
 def erpm(data: int) -> float:
-    """Electrical rpm of a reply that tells the speed."""
+    """Returns the electrical rpm of a reply that holds the speed."""
     return 0.0 if data == STANDS else 60e6 / ((data & 0x1FF) << (data >> 9))
 
 
 def crc8(data: bytes) -> int:
-    """The check sum of KISS telemetry: polynomial 0x07, from 0; 0 over a frame with its own."""
+    """Returns KISS telemetry's checksum: polynomial 0x07, from 0; 0 over a frame including its own."""
     crc = 0
     for byte in data:
         crc ^= byte
@@ -67,10 +67,10 @@ def crc8(data: bytes) -> int:
 
 
 class Throttle(threading.Thread):
-    """Sends one value 1000 times a second until told otherwise; None is a silent wire.
+    """Sends a value 1000 times a second until told otherwise; None is a silent wire.
 
-    Frames that fell due while the machine was busy are left out, as a flight controller would.
-    What the ESC answers is kept in `answers`.
+    Frames that fall due while the machine is busy are skipped, as a flight controller would. The ESC's answers are
+    kept in `answers`.
     """
 
     def __init__(self, port: int, value: int | None = STOP, protocol: int = DSHOT600):
@@ -108,7 +108,7 @@ class Throttle(threading.Thread):
             pass
 
     def replies(self, since: int = 0) -> list[int]:
-        """The data of the replies on the wire, from the answer with this number on."""
+        """Returns the data of the replies on the wire, from the answer with this number on."""
         return [reply(answer) for answer in self.answers[since:] if answer[0] == self.protocol]
 
     def __enter__(self) -> "Throttle":

@@ -12,7 +12,7 @@ TIMEOUT_S = 10.0
 
 
 def gaps_us(messages: list) -> list[int]:
-    """Time from each to the next, by the sender's clock."""
+    """Returns the times from each to the next, by the sender's clock."""
     times = [m.time_usec for m in messages]
     return [later - earlier for earlier, later in zip(times, times[1:])]
 
@@ -38,7 +38,7 @@ class Esc:
 
     @classmethod
     def udp_to(cls, port: int, **address) -> "Esc":
-        """A client of `udpin:127.0.0.1:port`; its first message makes it known there."""
+        """Returns a client of `udpin:127.0.0.1:port`; its first message makes it known there."""
         link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         link.connect(("127.0.0.1", port))
         esc = cls(link, **address)
@@ -46,7 +46,7 @@ class Esc:
         return esc
 
     def write(self, data: bytes) -> None:
-        """Bytes as they are; the codec sends through this."""
+        """Sends raw bytes; the codec sends through this."""
         self.link.sendall(data)
 
     def close(self) -> None:
@@ -78,17 +78,17 @@ class Esc:
                 self._news.notify_all()
 
     def mark(self) -> int:
-        """A place in the stream: what comes later has a greater one."""
+        """Returns a place in the stream; later messages have a higher one."""
         with self._news:
             return len(self.messages)
 
     def since(self, mark: int, kind: str) -> list:
-        """The messages of a kind that have come since the mark."""
+        """Returns the messages of a kind that have come since the mark."""
         with self._news:
             return [m for m in self.messages[mark:] if m.get_type() == kind]
 
     def wait(self, kind: str, match=lambda _: True, since: int = 0, timeout: float = TIMEOUT_S):
-        """The first such message since the mark, or None when none comes in time."""
+        """Returns the first such message since the mark, or None if none comes in time."""
         until = time.monotonic() + timeout
         with self._news:
             seen = since
@@ -103,7 +103,7 @@ class Esc:
                 self._news.wait(left)
 
     def next(self, kind: str, match=lambda _: True, timeout: float = TIMEOUT_S):
-        """The next such message from now on; its absence fails the test."""
+        """Returns the next such message from now on; fails the test if there is none."""
         message = self.wait(kind, match, self.mark(), timeout)
         assert message is not None, f"no such {kind} within {timeout} s"
         return message
@@ -114,7 +114,7 @@ class Esc:
         )
 
     def params(self) -> dict[str, float]:
-        """The whole table, in the order of the indexes."""
+        """Returns the whole table, in index order."""
         mark = self.mark()
         self.codec.param_request_list_send(self.system, self.component)
         first = self.wait("PARAM_VALUE", since=mark)
@@ -128,7 +128,7 @@ class Esc:
             time.sleep(0.02)
 
     def read_param(self, name: str = "", index: int = -1):
-        """The PARAM_VALUE of a name or of an index."""
+        """Returns the PARAM_VALUE for a name or an index."""
         mark = self.mark()
         self.codec.param_request_read_send(self.system, self.component, name.encode(), index)
         return self.wait(
@@ -136,7 +136,7 @@ class Esc:
         )
 
     def set_param(self, name: str, value: float) -> float:
-        """Sends PARAM_SET and gives the value in force afterwards, as the PARAM_VALUE says."""
+        """Sends PARAM_SET and returns the value in force afterwards, from the PARAM_VALUE."""
         mark = self.mark()
         self.codec.param_set_send(
             self.system, self.component, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32
@@ -146,7 +146,7 @@ class Esc:
         return answer.param_value
 
     def command(self, number: int, *params: float, confirmation: int = 0) -> int:
-        """Sends COMMAND_LONG and gives the result of its ACK."""
+        """Sends COMMAND_LONG and returns the result in its ACK."""
         params = (*params, *[0.0] * (7 - len(params)))
         mark = self.mark()
         self.codec.command_long_send(self.system, self.component, number, confirmation, *params)
@@ -155,16 +155,16 @@ class Esc:
         return ack.result
 
     def stream(self, message: int, interval_us: int) -> None:
-        """Asks for a message at a rate."""
+        """Requests a message at a rate."""
         result = self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval_us)
         assert result == dialect.MAV_RESULT_ACCEPTED
 
     def status(self):
-        """The next ESC_STATUS."""
+        """Returns the next ESC_STATUS."""
         return self.next("ESC_STATUS")
 
     def statuses(self, seconds: float) -> list:
-        """ESC_STATUS from now on, for so many seconds of the simulation's time."""
+        """Returns the ESC_STATUS messages from now on, for this many simulated seconds."""
         mark = self.mark()
         begin = self.status().time_usec
         self.next(
@@ -175,14 +175,14 @@ class Esc:
         return self.since(mark, "ESC_STATUS")
 
     def armed(self) -> bool:
-        """Whether the next heartbeat says so."""
+        """Returns whether the next heartbeat says so."""
         return bool(self.next("HEARTBEAT").base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
 
     def wait_armed(self, armed: bool = True) -> None:
-        """Until a heartbeat says so."""
+        """Waits until a heartbeat says so."""
         flag = dialect.MAV_MODE_FLAG_SAFETY_ARMED
         self.next("HEARTBEAT", lambda m: bool(m.base_mode & flag) == armed)
 
     def wait_rpm(self, low: float, high: float):
-        """The first ESC_STATUS from now on with a speed in this range."""
+        """Returns the first ESC_STATUS from now on with a speed in this range."""
         return self.next("ESC_STATUS", lambda m: low <= m.rpm[0] <= high)

@@ -1,11 +1,11 @@
-"""Motors that the ESC identifies by the one command, and what it then makes of them, no parameter touched.
+"""Motors that the ESC identifies by the one command, and how it then drives them, with no parameter touched.
 
     target/venv/bin/python tests/python/identified.py --motors 500 --steps 150 --jobs 2
 
-identifies each, flies it by what was found, through slams of the throttle and to full speed, and prints a row for
-each. It ends with status 1 if fewer than 95 % are found within bounds, if one that is refused is told no reason, if
-one is accepted that is wrong by more than double or takes 20 s or more of motor time, or if fewer than 99 % of those
-accepted start, reach full speed and hold the slams.
+identifies each, flies it with the results, through slams of the throttle and to full speed, and prints a row for each.
+It exits with status 1 if fewer than 95 % are found within bounds, if one is refused without a reason, if one is
+accepted that is wrong by more than double or takes 20 s or more of motor time, or if fewer than 99 % of those accepted
+start, reach full speed and hold through the slams.
 """
 
 import random
@@ -39,10 +39,10 @@ KEEPS_WITHIN_S = 60.0
 
 @dataclass(frozen=True)
 class Found:
-    """What an identification has ended with."""
+    """How an identification has ended."""
 
     ratios: dict
-    """What was found over the truth; empty where it was refused."""
+    """What was found over the truth; empty if refused."""
     texts: list
     """What it was refused with."""
     took_s: float
@@ -54,13 +54,13 @@ class Found:
         return any(not 1 / WRONG < ratio < WRONG for ratio in self.ratios.values())
 
     def is_sound(self) -> bool:
-        """Refused with a reason, or found without gross error, in time."""
+        """Returns whether it was refused with a reason, or found without gross error, in time."""
         return bool(self.ratios or self.texts) and not self.is_wrong() and self.took_s < LONGEST_S
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What has become of a motor."""
+    """What became of a motor."""
 
     found: Found
     full_speed: float
@@ -79,7 +79,7 @@ class Station:
         self.codec = dialect.MAVLink(emulator.mavlink, srcSystem=255, srcComponent=190)
 
     def command(self, param: int) -> tuple[int, list, float]:
-        """Sends MAV_CMD_USER_1: its final result, the refusals in its texts, and how long it took, s."""
+        """Sends MAV_CMD_USER_1; returns its final result, the refusals in its texts, and how long it took, s."""
         begun_s = self.emulator.time_s
         self.codec.command_long_send(1, 1, dialect.MAV_CMD_USER_1, 0, param, *[0] * 6)
         messages, ends = [], []
@@ -93,13 +93,13 @@ class Station:
         return ends[0], [text for text in texts if text.startswith("Not ")], took_s
 
     def look(self, seconds: float) -> list:
-        """What is told in this time."""
+        """Returns the messages sent in this time."""
         self.emulator.advance(seconds)
         return self.codec.parse_buffer(self.emulator.mavlink.read()) or []
 
 
 def identified(folder: Path, motor: dict, params: dict) -> tuple[Found, dict]:
-    """What the ESC finds of a motor, and the parameters that it keeps."""
+    """Returns what the ESC finds about a motor, and the parameters that it keeps."""
     tables = drawn_bench(motor)
     file = folder / "bench.toml"
     file.write_text("\n".join(f"[{name}]\n{toml(table)}" for name, table in tables.items()))
@@ -121,10 +121,10 @@ def identified(folder: Path, motor: dict, params: dict) -> tuple[Found, dict]:
 
 
 def flies(folder: Path, number: int, steps: int) -> Outcome:
-    """The motor of this number is identified, and then slammed and brought to full speed; one of odd number is on the
-    switching plant there."""
+    """Identifies the motor of this number, then slams it and brings it to full speed; odd numbers do so on the
+    switching plant."""
     motor = any_motor(random.Random(f"bag {number}"))
-    # The builder's are the limits, the pole pairs and the speed at full throttle, all before it turns.
+    # The builder sets the limits, the pole pairs and the speed at full throttle, all before it turns.
     known = {name: motor["params"][name] for name in ("MOT_POLE_PAIRS", "CTL_RPM_MAX")}
     params = FACTORY | limits(motor) | known
     found, kept = identified(folder, motor, params)

@@ -1,4 +1,4 @@
-"""A client of the emulator in lockstep, written after emulator/LOCKSTEP.md alone."""
+"""A lockstep client of the emulator, written from emulator/LOCKSTEP.md alone."""
 
 import shutil
 import socket
@@ -15,12 +15,12 @@ HEAD = struct.Struct("<BBBBIQII")
 ESC = struct.Struct("<9d4fIBBH")
 MS = 1_000_000
 
-# What the example in C drives.
+# What the C example drives.
 FOUR = ("--escs", 4, "--bus", "6s")
 
 
 def build_example(folder: Path) -> Path:
-    """The example in C, compiled without a warning."""
+    """Compiles the C example without a warning; returns its path."""
     path = folder / "example"
     source = ROOT / "emulator" / "lockstep" / "example.c"
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
@@ -30,7 +30,7 @@ def build_example(folder: Path) -> Path:
 
 @dataclass
 class EscState:
-    """What is told of an ESC, with its answers: when the frame began, and the datagram."""
+    """What is reported about an ESC, with its answers: when the frame began, and the datagram."""
 
     rpm: float
     angle_turns: float
@@ -47,7 +47,7 @@ class EscState:
 
 
 class State:
-    """A state as it came, and its fields."""
+    """A state as received, and its fields."""
 
     def __init__(self, raw: bytes):
         kind, version, count, reserved, self.sequence, self.time_ns, self.refused, self.left_out = HEAD.unpack_from(raw)
@@ -66,7 +66,7 @@ class State:
 
 
 def frame(esc: int, offset_ns: int, payload: bytes) -> bytes:
-    """A frame within an advance."""
+    """Returns a frame within an advance."""
     return struct.pack("<BBHI", esc, 0, len(payload), offset_ns) + payload
 
 
@@ -83,7 +83,7 @@ class Lockstep:
         self.link.close()
 
     def exchange(self, request: bytes) -> State:
-        """Sends bytes as they are, and gives the state that answers them."""
+        """Sends raw bytes, and returns the state that answers them."""
         self.link.send(request)
         return State(self.link.recv(65536))
 
@@ -95,7 +95,7 @@ class Lockstep:
         return struct.pack("<BBHII", 41, VERSION, len(frames), sequence, time_ns) + b"".join(frames)
 
     def turn(self, request: bytes) -> State:
-        """A request that is obeyed."""
+        """Sends a request that must be obeyed."""
         before = self.state.sequence
         self.state = self.exchange(request)
         assert self.state.sequence == before + 1, f"refused: {self.state.refused}"
@@ -110,7 +110,7 @@ class Lockstep:
         return self.turn(request + b"".join(struct.pack("<2d", *shaft) for shaft in shafts))
 
     def throttle(self, milliseconds: int, values: list[int | None], protocol: int = BIDIRECTIONAL_DSHOT600) -> State:
-        """A frame a millisecond to each ESC; None is a silent wire."""
+        """Sends a frame per millisecond to each ESC; None is a silent wire."""
         escs = [(esc, value) for esc, value in enumerate(values) if value is not None]
         frames = [frame(esc, 10_000 * esc, datagram(value, protocol)) for esc, value in escs]
         for _ in range(milliseconds):

@@ -9,7 +9,7 @@ from emulator import SETTINGS, scenario, windows_of
 from paths import TOOL
 
 
-# Of a phase's current through the board: two transistors and a shunt, as the emulator has them.
+# Resistance of a phase's current path through the board: two transistors and a shunt, as in the emulator.
 BOARD_OHM = 6e-3
 
 # What follows from the motor where it is 0.
@@ -17,7 +17,7 @@ FROM_MOTOR = ["CTL_RPM_MIN", *SETTINGS]
 
 
 def tune(params: dict) -> dict:
-    """What `siskin tune` makes of these parameters."""
+    """Returns what `siskin tune` makes of these parameters."""
     words = [f"--param={name}={value:.6g}" for name, value in params.items()]
     ended = subprocess.run([str(TOOL), "tune", "--json", *words], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 0, ended.stderr
@@ -29,10 +29,10 @@ def toml(table: dict) -> str:
 
 
 def motor_of(draw: random.Random) -> dict:
-    """A motor with its propeller, supply and limits, of any size from a 3-inch one to a lift of 3 kW.
+    """Draws a motor with its propeller, supply and limits, of any size from a 3-inch one to a 3 kW lift motor.
 
-    Speed falls and supply rises with the power; at full throttle the propeller takes it all, at the limit R drops
-    5 to 15 % of the supply, and the limit's torque takes 24 to 150 ms to full speed without the load.
+    Speed falls and supply rises with power; at full throttle the propeller takes all of it, at the limit R drops 5 to
+    15 % of the supply, and the limit's torque takes 24 to 150 ms to full speed without the load.
     """
     size = draw.uniform(0.25, 1.0)
     power_w = 10 ** (1.2 + 2.3 * size) * draw.uniform(0.7, 1.4)
@@ -69,11 +69,11 @@ def log_uniform(draw: random.Random, least: float, most: float) -> float:
 
 
 def any_motor(draw: random.Random) -> dict:
-    """A motor with its propeller, supply, limits and PWM, from the smallest to the greatest that there are.
+    """Draws a motor with its propeller, supply, limits and PWM, from the smallest to the largest that exist.
 
-    R is 5 mOhm to 5 Ohm, L 3 uH to 2 mH, the flux 0.1 to 30 mWb, there are 1 to 30 pole pairs and 5 to 50 V; the
-    electrical speed that the supply allows is up to a twentieth of the PWM's frequency. The limit drops 3 to 15 % of
-    the supply across R, and takes 24 to 300 ms to full speed without the load, which takes half of it there.
+    R is 5 mOhm to 5 Ohm, L 3 uH to 2 mH, the flux 0.1 to 30 mWb, with 1 to 30 pole pairs and 5 to 50 V; the electrical
+    speed that the supply allows is up to a twentieth of the PWM frequency. The limit drops 3 to 15 % of the supply
+    across R, and takes 24 to 300 ms to full speed without the load, which takes half of its torque there.
     """
     while True:
         supply_v, limit_a = log_uniform(draw, 5.0, 50.0), log_uniform(draw, 0.7, 100.0)
@@ -110,10 +110,10 @@ def any_motor(draw: random.Random) -> dict:
 
 
 def drawn_bench(motor: dict) -> dict[str, dict]:
-    """The tables of a scenario with a drawn motor: half of its inertia is the bell's.
+    """Returns a scenario's tables with a drawn motor: half of its inertia is the bell's.
 
-    The board suits the limit: it measures twice as much, with 0.05 A of noise of 40, and is a small one of 6 K/W, or
-    one that is 60 K warmer than the air at that current.
+    The board suits the limit: it measures twice as much, with noise of 0.05 A per 40 A, and is a small one of 6 K/W,
+    or one that is 60 K warmer than the air at that current.
     """
     of = motor["params"]
     heat_w = 1.5 * BOARD_OHM * of["LIM_PHASE_A"] ** 2
@@ -141,9 +141,9 @@ def drawn_bench(motor: dict) -> dict[str, dict]:
 
 
 def flown(folder, tables: dict, throttle: list, windows: dict) -> tuple[list, dict]:
-    """Plays a scenario with these tables, with times and throttles, and with windows by name.
+    """Plays a scenario with these tables, times and throttles, and windows by name.
 
-    Gives its faults and warnings, and its windows by name.
+    Returns its faults and warnings, and its windows by name.
     """
     heads = [(f"[{name}]", table) for name, table in tables.items()]
     heads += [("[[signal]]", {"at_s": at_s, "throttle": share}) for at_s, share in throttle]

@@ -1,9 +1,9 @@
-"""Motors at an ESC out of the bag: of the motor it knows nothing, of the board's limits and PWM all.
+"""Motors on an ESC out of the bag: it knows nothing about the motor, but all of the board's limits and PWM.
 
     target/venv/bin/python tests/python/out_of_the_bag.py --motors 500 --jobs 2
 
-opens the throttle of each to 30 % and prints a row for each; it ends with status 1 if one neither turns nor is said
-to be at fault, if one has more than a fifth above its limit, or if more than one in fifty stays at rest.
+opens the throttle of each to 30 % and prints a row for each; it exits with status 1 if one neither turns nor is
+reported at fault, if one exceeds its limit by more than a fifth, or if more than one in fifty stays at rest.
 """
 
 import random
@@ -21,7 +21,7 @@ from emulator import MOTOR  # noqa: E402  (it needs the dialect's folder)
 from motors import FROM_MOTOR, any_motor, drawn_bench, flown  # noqa: E402
 
 FACTORY = {**dict.fromkeys([*MOTOR, *FROM_MOTOR], 0), "CTL_DRIVE": 2}
-"""What the default bench sets, as the factory has it."""
+"""What the default bench sets, at its factory values."""
 OPENS_S, SHARE = 0.5, 0.3
 END_S = OPENS_S + 3.0
 LEAST_SPEED = 0.5
@@ -31,35 +31,34 @@ AT_REST = 0.02
 
 @dataclass(frozen=True)
 class Outcome:
-    """What 3 s of open throttle have made of a motor."""
+    """What 3 s of open throttle have done to a motor."""
 
     told: list
     """Faults and warnings."""
     speed: float
-    """The least in the last fifth of a second, over what the throttle's share is of full speed; one that is the wrong
-    way is negative."""
+    """The lowest in the last fifth of a second, over the throttle's share of full speed; negative if the wrong way."""
     current: float
-    """The greatest of a phase, over LIM_PHASE_A."""
+    """The largest of a phase, over LIM_PHASE_A."""
 
     def is_fast(self) -> bool:
-        # Half of what a share of the supply makes of a motor without its load's losses.
+        # Half of what a share of the supply gives without the load's losses.
         return self.speed > LEAST_SPEED
 
     def turns(self) -> bool:
         return not self.told and self.is_fast()
 
     def holds(self) -> bool:
-        """It turns and nothing is said to be wrong, or it does not and something is; within the current."""
+        """Returns whether it turns and nothing is reported, or does not and something is; within the current."""
         return bool(self.told) != self.is_fast() and self.current < MOST_CURRENT
 
 
 def limits(motor: dict) -> dict:
-    """What is known: of the board and the supply."""
+    """Returns what is known: about the board and the supply."""
     return {name: value for name, value in motor["params"].items() if name.startswith(("LIM_", "PWM_"))}
 
 
 def opened(folder: Path, motor: dict, swapped: bool) -> Outcome:
-    """The throttle is opened for a motor, of which two wires may be swapped, which MOT_DIR has put right."""
+    """Opens a motor's throttle; two of its wires may be swapped, which MOT_DIR has put right."""
     tables = drawn_bench(motor)
     tables["bench"]["duration_s"] = END_S
     tables["params"] = FACTORY | limits(motor) | {"MOT_DIR": int(swapped)}
@@ -71,7 +70,7 @@ def opened(folder: Path, motor: dict, swapped: bool) -> Outcome:
 
 
 def drawn(folder: Path, number: int) -> Outcome:
-    """The random motor of this number; of half of them two wires are swapped."""
+    """Opens the random motor of this number; half of them have two wires swapped."""
     draw = random.Random(f"bag {number}")
     motor = any_motor(draw)
     return opened(folder, motor, draw.random() < 0.5)

@@ -1,4 +1,4 @@
-"""What the READMEs tell a person to type."""
+"""The commands that the READMEs tell a person to type."""
 
 import re
 import shlex
@@ -13,8 +13,8 @@ READMES += [ROOT / "tests" / folder / "README.md" for folder in ("flight", "virt
 
 
 def blocks(language: str, *readmes: Path) -> list[str]:
-    """The blocks of code in a language, of some READMEs or of all."""
-    # Those of a list stand under its text.
+    """Returns the code blocks in a language, from some READMEs or from all."""
+    # Those in a list are indented below its text.
     pattern = rf"^ *```{language}\n(.*?)^ *```"
     texts = (readme.read_text() for readme in readmes or READMES)
     return [block for text in texts for block in re.findall(pattern, text, re.MULTILINE | re.DOTALL)]
@@ -26,8 +26,8 @@ def _split(block: str) -> list[list[str]]:
 
 
 def commands(*words: str, of: Path | None = None) -> list[list[str]]:
-    """The words of each shell command that has all of `words`, each once, in its order, with what an alias
-    stands for; of one README, or of all."""
+    """Returns the words of each shell command that contains all of `words`, once each, in order, with aliases
+    expanded; from one README, or from all."""
     found = []
     for readme in [of] if of else READMES:
         aliases: dict[str, list[str]] = {}

@@ -1,9 +1,9 @@
-"""What a viewer of the page costs the simulation, in processor time of the thread that simulates.
+"""What a viewer of the page costs the simulation, in processor time of the simulating thread.
 
     target/venv/bin/python tests/python/scope_cost.py
 
-Other programs on the machine change how long a run takes, but hardly how much work it is. The motor rests, where a
-control period takes least, and so taking off its trace the largest share.
+Other programs on the machine change how long a run takes, but hardly how much work it is. The motor rests: there a
+control period takes least, so reading its trace has the largest share.
 """
 
 import json
@@ -25,7 +25,7 @@ RUNS = 5
 
 
 def work(viewed: bool) -> float:
-    """Processor seconds of the simulating thread for a simulated second."""
+    """Returns the simulating thread's processor seconds per simulated second."""
     port = free_port()
     options = ["--speed", "max", "--duration", str(SIMULATED_S), "--web", f"127.0.0.1:{port}", "--mavlink", "none"]
     options += ["--signal", "udp:127.0.0.1:0", "--storage", "none", "--json"]
@@ -44,7 +44,7 @@ def work(viewed: bool) -> float:
 
 
 def main():
-    # In turns, so that both have the same machine.
+    # Alternating, so that both have the same machine.
     pairs = [(work(False), work(True)) for _ in range(RUNS)]
     alone, viewed = (statistics.median(runs) for runs in zip(*pairs))
     print(f"alone {alone * 1e3:.2f} ms, viewed {viewed * 1e3:.2f} ms a simulated second: {viewed / alone - 1:+.1%}")

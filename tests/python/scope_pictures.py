@@ -1,9 +1,9 @@
-"""Makes the pictures of the page in the emulator's README, from a browser that drives a running emulator.
+"""Makes the page's pictures for the emulator's README, from a browser that drives a running emulator.
 
     target/venv/bin/python tests/python/scope_pictures.py [FOLDER]
 
-With a folder all of them go there, light and dark, wide and narrow, to be looked at; without one those of the README
-are made anew, in `emulator/pictures`. They show what happens live, so no two are the same bit for bit.
+With a folder all of them go there, light and dark, wide and narrow, to be looked at; without one, the README's are
+made again, in `emulator/pictures`. They show what happens live, so no two are the same bit for bit.
 """
 
 import sys
@@ -22,7 +22,7 @@ README = paths.ROOT / "emulator" / "pictures"
 
 
 def hold(browser, share, rpm=0):
-    """Holds the throttle until the motor is faster. A busy machine may let it go: it is taken in hand anew."""
+    """Holds the throttle until the motor is faster. A busy machine may let it go: then it is taken again."""
     for _ in range(8):
         if browser.text("#arm") == "Arm":
             browser.click("#arm")
@@ -113,7 +113,7 @@ IN_README = {
 
 
 def pictures(name, looks):
-    """One scene, as it looks in each way: its name, size and scheme."""
+    """Takes a scene in each look: its name, size and scheme."""
     port = free_port()
     emulator = Emulator(*OPTIONS.get(name, ()), web=f"127.0.0.1:{port}")
     try:

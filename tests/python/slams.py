@@ -1,9 +1,9 @@
-"""Slams: a throttle that jumps at random between idle and full, on motors that the ESC is told wrongly, with any
-dead time of a board.
+"""Slams: a throttle that jumps at random between idle and full, on motors stated wrongly, with any of a board's dead
+times.
 
     target/venv/bin/python tests/python/slams.py --motors 20 --steps 150 --jobs 2
 
-plays each of so many random motors in speed and in voltage mode, on both plants, and prints a row for each; it ends
+plays each of this many random motors in speed and in voltage mode, on both plants, and prints a row for each; it exits
 with status 1 if one does not hold.
 """
 
@@ -32,17 +32,17 @@ IDLE_DEG = 20.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What slams have made of a drive."""
+    """What slams have done to a drive."""
 
     told: list
     """Faults and warnings."""
     starts: int
     lost: bool
-    """90 degrees of error or more."""
+    """An error of 90 degrees or more."""
     worst_deg: float
-    """Greatest error of the angle, from the first step to the end."""
+    """Largest angle error, from the first step to the end."""
     idle_deg: float
-    """The error's rms in the last of half a second of idle."""
+    """The rms error at the end of half a second of idle."""
 
     def holds(self) -> bool:
         turned_on = not self.told and self.starts == 0 and not self.lost
@@ -50,9 +50,9 @@ class Outcome:
 
 
 def throttles(draw: random.Random, steps: int) -> tuple[list, float]:
-    """Steps of the throttle, 50 to 300 ms apart, a third of them from end to end, then half a second of idle.
+    """Draws throttle steps, 50 to 300 ms apart, a third of them from end to end, then half a second of idle.
 
-    Gives times and throttles, and when that has ended.
+    Returns times and throttles, and when it ends.
     """
     at_s, throttle = 1.5, [(0.0, 0.0), (0.5, 0.3)]
     for _ in range(steps):
@@ -64,7 +64,7 @@ def throttles(draw: random.Random, steps: int) -> tuple[list, float]:
 
 
 def slams_of(told: list, windows: dict) -> Outcome:
-    """The outcome by the windows "all" and "idle"."""
+    """Returns the outcome from the windows "all" and "idle"."""
     whole = windows["all"]
     # A drive that is off has no error, but knows no angle either.
     worst_deg, idle_deg = whole["angle_error_max_deg"], windows["idle"]["angle_error_rms_deg"]
@@ -76,7 +76,7 @@ def slams_of(told: list, windows: dict) -> Outcome:
 def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outcome:
     """Plays slams.
 
-    R, L and J are told wrong by up to 30 %, the flux by 10 %; settings follow from the motor.
+    R, L and J are stated wrong by up to 30 %, the flux by 10 %; settings follow from the motor.
     """
     throttle, end_s = throttles(draw, steps)
     dead_time_ns = tables["params"]["PWM_DEADTIME_NS"]
@@ -88,7 +88,7 @@ def slammed(folder: Path, draw: random.Random, tables: dict, steps: int) -> Outc
 
 
 def drawn(folder: Path, number: int, mode: str, plant: str, steps: int) -> Outcome:
-    """Slams of the random motor of this number, with a dead time and errors that are drawn for mode and plant."""
+    """Slams the random motor of this number, with a dead time and errors drawn for mode and plant."""
     draw = random.Random(f"{number} {mode} {plant}")
     motor = motor_of(random.Random(number))
     params = motor["params"] | {"PWM_DEADTIME_NS": draw.choice(DEAD_TIMES_NS)}

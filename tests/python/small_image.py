@@ -1,4 +1,4 @@
-"""Small images in assembly, linked for the chip, by which the report on images is tested."""
+"""Small images in assembly, linked for the chip, for testing the report on images."""
 
 import os
 import subprocess
@@ -68,8 +68,8 @@ def build(
     options: tuple[str, ...] = ("--emit-relocs",),
     script: Path = SOURCES / "link.x",
 ) -> Path:
-    """An image of `text`, which begins in the flash, defines `Reset`, and may lay out further sections:
-    with the small script `.control`, which stands in the fast memory, `.rodata`, and `.vector_table`."""
+    """Builds an image from `text`, which begins in flash, defines `Reset`, and may lay out further sections: with the
+    small script `.control`, which goes to fast memory, `.rodata`, and `.vector_table`."""
     assembly, image = folder / "text.s", folder / "image.elf"
     assembly.write_text(HEAD + text)
     arguments = [f"-T{script}", "--nmagic", *options]

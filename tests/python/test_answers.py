@@ -24,7 +24,7 @@ POLE_PAIRS = 12
 
 
 def until(wanted) -> None:
-    """Waits for something; its absence fails the test."""
+    """Waits for a condition; fails the test if it does not come true."""
     end = time.monotonic() + TIMEOUT_S
     while not wanted():
         assert time.monotonic() < end, "it did not happen in time"
@@ -32,13 +32,13 @@ def until(wanted) -> None:
 
 
 def settle(esc) -> None:
-    """Waits until the speed of half throttle is held."""
+    """Waits until half throttle's speed is held."""
     esc.wait_rpm(3100, 3200)
     esc.statuses(0.5)
 
 
 def fly(start):
-    """An emulator on a bidirectional wire that finds that out by itself."""
+    """Starts an emulator on a bidirectional wire that it detects by itself."""
     emulator = start(*PATIENT)
     return emulator, emulator.throttle(protocol=BIDIRECTIONAL_DSHOT600)
 
@@ -55,10 +55,10 @@ def test_it_arms_spins_and_tells_its_speed(start):
         told = [erpm(data) / POLE_PAIRS for data in throttle.replies(before)]
         assert len(told) > 100
         rpm = [m.rpm[0] for m in statuses]
-        # A turn of 1587 µs is told in steps of 4, and the speed itself moves.
+        # A turn of 1587 µs is reported in steps of 4, and the speed itself varies.
         assert min(rpm) * 0.995 < min(told) and max(told) < max(rpm) * 1.005, (min(told), max(told))
         assert {answer[0] for answer in throttle.answers} == {BIDIRECTIONAL_DSHOT600}
-        # From the end of the frame to the first edge, ns.
+        # From the frame's end to the first edge, ns.
         after = {int.from_bytes(answer[5:9], "little") for answer in throttle.answers}
         assert 29_900 < min(after) and max(after) < 30_100, after
 

@@ -1,4 +1,4 @@
-"""What the emulator says to input that it cannot use: one clear line and exit status 2."""
+"""How the emulator refuses input that it cannot use: with one clear line and exit status 2."""
 
 import random
 import socket
@@ -9,7 +9,7 @@ import pytest
 from emulator import free_port, run
 
 def refused(*arguments: object) -> str:
-    """Runs with these arguments and gives the one line of the refusal."""
+    """Runs with these arguments and returns the refusal's one line."""
     ended = run(*arguments, timeout=30.0)
     assert ended.returncode == 2, f"status {ended.returncode}: {ended.stdout} {ended.stderr}"
     assert ended.stdout == ""
@@ -20,7 +20,7 @@ def refused(*arguments: object) -> str:
 
 
 def short_run(*options: str) -> list:
-    """A run of 10 ms on a free port, with these options in place of its own."""
+    """Returns a run of 10 ms on a free port, with these options overriding its own."""
     port = free_port(socket.SOCK_DGRAM)
     usual = {
         "--speed": "max",
@@ -92,7 +92,7 @@ def test_a_taken_throttle_port_is_named():
 
 
 def storage(path) -> str:
-    """The refusal of a storage file."""
+    """Returns the refusal of a storage file."""
     return refused(*short_run("--storage", str(path)))
 
 
@@ -217,7 +217,7 @@ def test_a_scenario_has_so_many_entries_and_no_more(tmp_path, entry, remedy):
     began = time.monotonic()
     ended = run("scenario", path)
     assert ended.returncode == 0, ended.stderr
-    # It took 39 s for ten times as many.
+    # It used to take 39 s for ten times as many.
     assert time.monotonic() - began < 10.0
     path.write_text(10_001 * entry)
     line = refused("scenario", path)
@@ -258,7 +258,7 @@ def test_a_bad_line_of_a_course_is_named(tmp_path):
 def test_a_bench_file_that_makes_no_sense_is_named(tmp_path, text, names):
     (tmp_path / "mine.toml").write_text(text)
     path = tmp_path / "scenario.toml"
-    # What it leaves out is the bench's, in this folder.
+    # What it leaves out comes from the bench in this folder.
     path.write_text("[bench]\nbase = 'mine.toml'\nload.c2 = 1e-7")
     line = refused("scenario", path)
     assert f"{path}: line 2: bench.base: bench file {tmp_path / 'mine.toml'}: " in line

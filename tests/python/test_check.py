@@ -54,7 +54,7 @@ def test_a_sound_esc_passes(start):
     ],
 )
 def test_a_defect_is_named(start, fault, item):
-    # The tune at the start would find some of them before.
+    # The tune at the start would find some of them first.
     emulator = start("--fault", fault, "--param", "MOT_TONE_A=0")
     ended = check(emulator, "--json")
     assert ended.returncode == 1, ended.stderr
@@ -65,7 +65,7 @@ def test_a_defect_is_named(start, fault, item):
 
 def test_a_fault_that_holds_refuses_it(start):
     emulator = start("--bus", "8")
-    # The fault has its filter's time; before it, the test of itself would find the supply low.
+    # The fault takes its filter's time; before that, the power-up test would find the supply low.
     with emulator.connect() as esc:
         esc.wait("HEARTBEAT", lambda beat: beat.system_status == dialect.MAV_STATE_CRITICAL)
     ended = check(emulator)

@@ -1,4 +1,4 @@
-"""Commands: each that is addressed to the ESC gets its ACK."""
+"""Commands: each one addressed to the ESC gets its ACK."""
 
 import math
 import time
@@ -72,7 +72,7 @@ def test_an_interval_holds_and_can_be_ended(esc):
 
 
 def test_arming_by_command_needs_zero_throttle_on_the_wire(start):
-    # Long enough that a busy machine is no lost signal.
+    # Long enough that a busy machine does not count as a lost signal.
     emulator = start(*PATIENT)
     with emulator.connect() as esc:
         assert esc.command(ARM_DISARM, 1) == DENIED, "a silent wire"
@@ -103,7 +103,7 @@ def test_disarming_stops_a_turning_motor_until_zero_throttle(start):
 
 
 def begin_test(esc, *command: float) -> None:
-    """Begins a test of the motor. While the ESC plays its tune after the start, it is rejected for now."""
+    """Begins a motor test. While the ESC still plays its start-up tune, it is temporarily rejected."""
     for _ in range(50):
         result = esc.command(*command)
         if result != REJECTED:
@@ -125,7 +125,7 @@ def test_an_actuator_test_turns_the_motor_for_its_time_only(esc):
 
 
 def stops_within_its_braking(esc) -> None:
-    """From the order on, not from the start of the test: between them a busy machine may let time pass."""
+    """From the order on, not from the start of the test: on a busy machine time may pass between them."""
     ordered = esc.status().time_usec
     assert esc.wait_rpm(-50, 50).time_usec - ordered < 2.2e6
 

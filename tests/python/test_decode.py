@@ -1,4 +1,4 @@
-"""`siskin decode` on what the emulator's wire carried."""
+"""`siskin decode` on recordings of the emulator's wire."""
 
 import json
 import subprocess
@@ -17,10 +17,10 @@ def test_it_shows_what_a_scenario_sent(tmp_path):
     assert ended.returncode == 0, ended.stderr
     *rows, last = map(json.loads, ended.stdout.splitlines())
     summary = last["summary"]
-    # The first frame begins with the recording, which does not have its first edge.
+    # The first frame begins with the recording, which lacks its first edge.
     assert (summary["signal"], summary["bad"]) == ("DShot600", 1)
     assert rows.pop(0)["error"] == "31 edges, no frame"
-    # A frame a millisecond, and the throttle opens at 0.31 s.
+    # A frame per millisecond, and the throttle opens at 0.31 s.
     assert summary["good"] == pytest.approx(400, abs=2)
     assert summary["rate_hz"]["mean"] == pytest.approx(1000, rel=0.01)
     assert [row["throttle"] for row in rows] == [0, pytest.approx(0.5, abs=0.001)]

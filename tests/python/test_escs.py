@@ -32,7 +32,7 @@ def test_they_are_numbered_components_of_one_system(start, tmp_path):
         assert tells("ESC_STATUS") == tells("ESC_INFO") == {(140, 0), (144, 4)}
         info = {m.get_srcComponent(): (m.count, m.info) for m in esc.since(0, "ESC_INFO")}
         assert info == {140: (6, 0b1111), 144: (6, 0b110000)}
-        # One that another tells of has no such message.
+        # An ESC whose telemetry another one sends has no such message.
         esc.component = 142
         assert esc.command(512, 291) == 2
         assert esc.read_param("MAV_COMP_ID").param_value == 142

@@ -1,4 +1,4 @@
-"""`siskin faults` against the emulator: what is on record of a fault, over a restart, and as a picture."""
+"""`siskin faults` against the emulator: the record of a fault, across a restart, and as a picture."""
 
 import json
 import subprocess
@@ -22,7 +22,7 @@ def faults(emulator: Emulator, *arguments: object) -> subprocess.CompletedProces
 
 
 def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path):
-    # When the motor turns, a busy machine included, the supply falls below the 9 V of LIM_BUS_V_MIN.
+    # Once the motor turns, even on a busy machine, the supply falls below the 9 V of LIM_BUS_V_MIN.
     emulator = start(*PATIENT, "--fault", f'at_s = {SAG_S}, for_s = 1.0, kind = "bus_sag", value = 18.0')
     ended = faults(emulator, "--json")
     assert (ended.returncode, ended.stderr) == (0, "")
@@ -43,22 +43,22 @@ def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path
     [fault] = told["items"]
     assert (fault["number"], fault["condition"], fault["name"]) == (1, 2, "bus under-voltage")
     assert (fault["phase"], fault["starts_ago"]) == ("run", 0)
-    # What the ESC believes: with a supply at once too low for the speed, its estimate is off by then.
+    # What the ESC believes: with a supply suddenly too low for the speed, its estimate is off by then.
     assert abs(fault["rpm"] / HALF_RPM - 1.0) < 0.2
     assert abs(fault["bus_v"] - 6.0) < 0.1
-    # When the chip has found it, by the clock of the emulator.
+    # When the chip has found it, by the emulator's clock.
     assert SAG_S < fault["time_s"] < SAG_S + 0.05
     periods = told["periods"]
     assert told["periods_of"] == 1 and len(periods) == 64
     assert periods[-1]["duties"] == [None] * 3
     step = periods[1]["time_s"] - periods[0]["time_s"]
     assert abs(step - 1 / 24_000) < 1e-8 and abs(periods[-1]["time_s"] + step) < 1e-8
-    # The supply's filter takes some 10 periods to the limit.
+    # The supply's filter takes some 10 periods to reach the limit.
     sound = periods[:48]
     assert all(abs(period["bus_v"] - 24.0) < 0.1 for period in sound)
     for before, period in zip(sound, sound[1:]):
         assert all(0.0 <= duty <= 1.0 for duty in period["duties"])
-        # 0.02 A a count: three shunts, each read by itself.
+        # 0.02 A per count: three shunts, each read separately.
         assert abs(sum(period["currents_a"])) < 0.5
         turned = (period["angle_deg"] - before["angle_deg"]) % 360.0
         assert abs(turned - period["rpm"] / 60 * POLE_PAIRS * 360 / 24_000) < 0.5
@@ -70,7 +70,7 @@ def test_a_trip_at_speed_is_on_record_with_the_periods_before_it(start, tmp_path
     assert (drawn.returncode, drawn.stderr) == (0, "")
     assert "bus under-voltage" in picture.read_text()
 
-    # It was read, but nothing has turned since; a restart leaves it alone.
+    # It was read, but nothing has turned since; a restart keeps it.
     with emulator.connect() as esc:
         esc.wait_rpm(-100, 100)
         esc.wait_armed(False)

@@ -1,4 +1,4 @@
-"""The figures that the READMEs print are those that their commands give."""
+"""The figures in the READMEs are those that their commands print."""
 
 import re
 
@@ -7,8 +7,8 @@ import pytest
 from emulator import scenario, windows_of
 from paths import ROOT, SCENARIOS
 
-# The scenario of each row, its seeds and the expectations whose worst values the row has. A row without a
-# figure says that none was lost: that is the scenario's own expectation, which test_scenarios.py plays.
+# Each row's scenario, its seeds and the expectations whose worst values the row has. A row without a figure says that
+# none was lost: that is the scenario's own expectation, which test_scenarios.py plays.
 ROWS = {
     "robust-steady": (None, ["angle_error_mean_deg", "angle_error_std_deg"]),
     "grid-steady": (None, ["angle_error_max_deg"]),
@@ -22,12 +22,12 @@ ROWS = {
     "catch": ("1..20", ["current_max_a"]),
 }
 
-# A figure may move by this share of its limit before the table has to be written again.
+# A figure may move by this share of its limit before the table has to be rewritten.
 STALE = 0.1
 
 
 def table() -> dict[str, list[str]]:
-    """The cells of the rows, by the scenario in the last one."""
+    """Returns the cells of the rows, by the scenario in the last one."""
     _, section = (ROOT / "shared" / "README.md").read_text().split("\n### What the default drive holds\n")
     section = section.split("\n## ")[0]
     rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in re.findall(r"^\|.*`.*$", section, re.M)]

@@ -1,4 +1,4 @@
-"""Files over MAVLink FTP, as pymavlink's own client reads them."""
+"""Files over MAVLink FTP, read with pymavlink's own client."""
 
 import contextlib
 import json
@@ -19,10 +19,10 @@ PACK = "@PARAM/param.pck"
 COMPONENT_METADATA = 397
 COMPONENT_INFORMATION = 395
 URI = re.compile(r"^mftp://(?:\[;comp=\d+\])?(/.+)$")
-"""MAVLink FTP's URL scheme; QGroundControl takes the same."""
+"""MAVLink FTP's URL scheme; QGroundControl accepts the same."""
 
-# github.com/mavlink/mavlink, component_metadata/general.schema.json and parameter.schema.json: the
-# fields that there may be, with their types; the first of each are required.
+# github.com/mavlink/mavlink, component_metadata/general.schema.json and parameter.schema.json: the fields allowed,
+# with their types; the first ones of each are required.
 GENERAL = {
     "version": int,
     "metadataTypes": list,
@@ -54,29 +54,29 @@ PARAMETER = {
     "bitmask": list,
     "readOnly": bool,
 }
-# The schema requires the name; QGroundControl (FactMetaData::createFromJsonObject) the type as well.
+# The schema requires the name; QGroundControl (FactMetaData::createFromJsonObject) also the type.
 PARAMETER_REQUIRED = ("name", "type")
 
 
 def crc32(data: bytes) -> int:
-    """As MAVLink FTP and component metadata have it: from 0, and not inverted."""
+    """The CRC of MAVLink FTP and component metadata: from 0, and not inverted."""
     return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def single(value: float) -> float:
-    """A number as a float of four bytes."""
+    """Rounds a number to a four-byte float."""
     return struct.unpack("<f", struct.pack("<f", value))[0]
 
 
 def check(data: dict, fields: dict, required: tuple) -> None:
-    """Whether an object is as the schema wants it."""
+    """Asserts that an object follows the schema."""
     assert set(required) <= set(data), data
     for name, value in data.items():
         assert isinstance(value, fields[name]), (name, value)
 
 
 class Files:
-    """pymavlink's client of a component's files."""
+    """pymavlink's client for a component's files."""
 
     def __init__(self, port: int, system: int = 254):
         self.link = mavutil.mavlink_connection(
@@ -91,14 +91,14 @@ class Files:
         self.link.close()
 
     def get(self, path: str) -> tuple[int, bytes | None]:
-        """The result and the bytes of a file."""
+        """Returns the result and the bytes of a file."""
         read = []
         self.client.cmd_get([path], callback=lambda file: read.append(file and file.read()))
         result = self.client.process_ftp_reply("Get", timeout=30)
         return result.error_code, read[0] if read else None
 
     def file(self, path: str) -> bytes:
-        """A file that there is."""
+        """Returns a file that must exist."""
         code, data = self.get(path)
         assert code == FtpError.Success, (path, code)
         return data
@@ -106,13 +106,13 @@ class Files:
 
 @pytest.fixture
 def files(esc):
-    """A client of the emulator of `esc`."""
+    """A client of `esc`'s emulator."""
     with Files(esc.emulator.port) as files:
         yield files
 
 
 def metadata(esc, message: int):
-    """Asks for a message and gives it."""
+    """Requests a message and returns it."""
     mark = esc.mark()
     accepted = esc.command(dialect.MAV_CMD_REQUEST_MESSAGE, message)
     assert accepted == dialect.MAV_RESULT_ACCEPTED
@@ -138,7 +138,7 @@ def test_the_parameters_are_those_of_the_list(esc, files):
     assert changed - {"MOT_KV"} == set(OF_BENCH)
     assert {defaults[name] for name in OF_BENCH} == {0.0}
 
-    # The header of a part still names all, so the decoder for whole files takes it.
+    # A part's header still counts all, so the decoder for whole files takes it.
     data = mavftp.MAVFTP.ftp_param_decode(files.file(f"{PACK}?start=10&count=3"))
     assert [name.decode() for name, _, _ in data.params] == list(listed)[10:13]
 
@@ -159,7 +159,7 @@ def test_the_metadata_describes_every_parameter(esc, files):
     assert crc32(packed) == parameter_type["fileCrc"]
     parameter = json.loads(lzma.decompress(packed))
     assert set(parameter) == {"version", "parameters"}
-    # QGroundControl refuses any other.
+    # QGroundControl refuses any other version.
     assert (general["version"], parameter["version"]) == (1, 1)
 
     listed = esc.params()
@@ -168,7 +168,7 @@ def test_the_metadata_describes_every_parameter(esc, files):
     for name, entry in described.items():
         check(entry, PARAMETER, PARAMETER_REQUIRED)
         assert re.match(r"^[.\-a-zA-Z0-9_{}]{1,16}$", name)
-        # As PARAM_VALUE says of each.
+        # As PARAM_VALUE says for each.
         assert entry["type"] == "Float"
         assert entry["shortDesc"] and entry["group"]
         assert entry["min"] <= listed[name] <= entry["max"]
@@ -235,11 +235,11 @@ def test_what_is_not_served_is_refused(files):
 def test_files_are_whole_over_a_link_that_loses_a_fifth(files):
     whole = {path: files.file(path) for path in (PACK, "parameter.json.xz")}
     random.seed(1)
-    # Of what arrives at the client.
+    # Share of what arrives at the client.
     files.client.ftp_settings.pkt_loss_rx = 20
     for path, data in whole.items():
         for _ in range(5):
-            # The client opens a file three times and then gives up.
+            # The client tries three times to open a file and then gives up.
             tries = (files.get(path) for _ in range(5))
             assert next(read for code, read in tries if code == FtpError.Success) == data
 

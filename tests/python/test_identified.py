@@ -1,4 +1,4 @@
-"""Identified motors, as `identified.py` draws and flies them, over the whole range."""
+"""Identified motors, drawn and flown by `identified.py`, over the whole range."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def test_random_motors_are_found_or_refused_with_a_reason(outcomes):
     found = {number: outcome.found for number, outcome in outcomes.items()}
     assert {number: one for number, one in found.items() if not one.is_sound()} == {}
     off = {number: one for number, one in found.items() if not one.is_near()}
-    # Of many it is to be one in twenty: of twenty two may be.
+    # The aim is one in twenty over many: of twenty, two may be off.
     assert len(off) <= 2, off
 
 

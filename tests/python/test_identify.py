@@ -7,7 +7,7 @@ from emulator import Emulator
 from paths import TOOL
 
 FOUND = ["MOT_R_MOHM", "MOT_L_UH", "MOT_FLUX_MWB", "MOT_J_GCM2"]
-# Nothing is known of the motor, whatever the bench brings.
+# Nothing is known about the motor, whatever the bench states.
 UNKNOWN = [word for name in FOUND for word in ("--param", f"{name}=0")]
 
 
@@ -31,7 +31,7 @@ def test_what_is_found_is_shown_and_set_only_when_it_is_to_be_kept(start, tmp_pa
     assert ended.returncode == 0, ended.stderr
     figures = {figure["name"]: figure for figure in json.loads(ended.stdout)["figures"]}
     assert list(figures)[:4] == FOUND
-    # The first paper's bench, within what the identification promises.
+    # The first paper's bench, within what identification promises.
     for name, truth, share in zip(FOUND, [108.0, 30.6, 1.3, 1430.0], [0.03, 0.05, 0.02, 0.1]):
         assert abs(figures[name]["value"] / truth - 1) < share, figures[name]
     # 500 ns is the factory's.

@@ -1,4 +1,4 @@
-"""Who the ESC is, and what it sends by itself."""
+"""How the ESC introduces itself, and what it sends unasked."""
 
 import siskin_dialect as dialect
 from esc import gaps_us
@@ -39,7 +39,7 @@ def test_a_peripheral_is_component_140_and_takes_the_system_of_its_autopilot(sta
 
 def test_telemetry_comes_at_its_rates_in_simulated_time(esc):
     esc.statuses(3.2)
-    # From the end of the first second: the start's burst shares the link.
+    # From the end of the first second: the burst at the start shares the link.
     status = gaps_us(esc.since(0, "ESC_STATUS"))[10:]
     info = gaps_us(esc.since(0, "ESC_INFO"))
     assert len(status) >= 20 and len(info) >= 2

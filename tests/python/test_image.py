@@ -1,4 +1,4 @@
-"""The report on images: the stack that small ones take, which is known to the byte."""
+"""The report on images: the stack of small ones, known to the byte."""
 
 import sys
 

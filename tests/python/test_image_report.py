@@ -29,8 +29,7 @@ def test_without_relocations_nothing_is_said(tmp_path):
 
 def test_sizes_are_those_of_the_memories(tmp_path):
     image = Image(build(tmp_path, LEVELS + VECTORS))
-    # Nine vectors, the code in the flash, of which the compiler adds some, and the 18 bytes of the CCM in
-    # whole words.
+    # Nine vectors, the code in flash, to which the compiler adds some, and the CCM's 18 bytes in whole words.
     text = next(s.size for s in image.sections if s.name == ".text")
     assert sizes.stored(image, BOARD.flash) == 36 + text + 20
     ccm, sram = BOARD.memories
@@ -106,7 +105,7 @@ def test_the_report_ends_well_or_says_why_not(tmp_path):
     assert good.returncode == 0, good.stdout + good.stderr
     assert "stack at most" in good.stdout
 
-    # The room is 1 KB, of which this alone takes 4.
+    # There is room for 1 KB, and this alone takes 4.
     greedy = LEVELS.replace("sub sp, #24", "sub sp, #4096").replace("add sp, #24", "add sp, #4096")
     greedy = report("b-g431b-esc1", build(tmp_path, greedy + VECTORS))
     assert greedy.returncode == 1
@@ -195,7 +194,7 @@ def test_the_frames_of_a_board_are_those_that_the_compiler_notes(board):
             if begin not in calls.code:
                 continue
             frames = [row["cfa"] for row in entry.get_decoded().table]
-            # Once the frame is held by another register, the stack may go deeper than that.
+            # Once another register holds the frame, the stack may grow deeper than that.
             by_stack_pointer = all(frame.reg == 13 for frame in frames)
             noted, found = max(frame.offset for frame in frames), calls.code[begin].frame
             assert found == noted if by_stack_pointer else found >= noted, entry

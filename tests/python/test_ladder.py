@@ -1,9 +1,9 @@
-"""Modules use those below them in their folder, never those above, and no two each other.
+"""Modules use those below them in their folder, never those above, and no two use each other.
 
-A folder's modules are its files and folders, without tests. What a file names by `use`, `crate::`, `super::`
-or the name of a child of its own is an edge between the two modules in which they part. The file that has a
-folder's name is a module of that folder itself: it may re-export its children, but where it uses one, that
-child may not use what the file defines.
+A folder's modules are its files and folders, without tests. What a file names by `use`, `crate::`, `super::` or the
+name of a child of its own is an edge between the two modules where their paths part. The file with a folder's name is
+itself a module of that folder: it may re-export its children, but if it uses one, that child may not use what the file
+defines.
 """
 
 import functools
@@ -28,7 +28,7 @@ PATH = re.compile(r"(?<![\w:])((?:crate|self|super)(?:::\w+)+)")
 
 
 def expanded(tree: str) -> list[tuple[list[str], str]]:
-    """The paths of a `use` with the name that each brings in."""
+    """Returns a `use` tree's paths with the name that each brings in."""
     tree = tree.strip()
     if "{" in tree:
         head, _, rest = tree.partition("{")
@@ -48,7 +48,7 @@ def expanded(tree: str) -> list[tuple[list[str], str]]:
 
 
 def closing(code: str, start: int) -> int:
-    """Where the brace ends that is open at the start."""
+    """Returns where the brace open at the start is closed."""
     depth = 1
     for at in range(start, len(code)):
         depth += {"{": 1, "}": -1}.get(code[at], 0)
@@ -58,7 +58,7 @@ def closing(code: str, start: int) -> int:
 
 
 class Crate:
-    """The modules of a crate, and what each file of it names."""
+    """A crate's modules, and what each of its files names."""
 
     def __init__(self, name: str):
         self.code, self.children = {}, {}
@@ -74,7 +74,7 @@ class Crate:
         code = re.sub(r"pub\(in [^)]*\)", "pub", code)
         code = INLINE_TESTS.sub("", code)
         for inline in INLINE.finditer(code):
-            # What is above a module within the file is the file.
+            # For a module within a file, `super` is the file.
             body = code[inline.end() : closing(code, inline.end())]
             code = code.replace(body, body.replace("super::", " self::"))
         self.code[module] = code
@@ -86,7 +86,7 @@ class Crate:
                 self.read((*module, child), path, below)
 
     def absolute(self, module, steps):
-        """A path from the crate's root; None where it leaves the crate."""
+        """Returns a path from the crate's root; None if it leaves the crate."""
         first, *rest = steps
         if first == "crate":
             return tuple(rest)
@@ -97,7 +97,7 @@ class Crate:
         return (*module, *steps) if first in self.children[module] else None
 
     def used(self, module):
-        """Whether it is a re-export, the path, and the name that it has here."""
+        """Yields whether it is a re-export, the path, and its name here."""
         code = self.code[module]
         for visible, tree in USE.findall(code):
             for steps, name in expanded(tree):
@@ -113,7 +113,7 @@ class Crate:
 
     @functools.cache
     def defined(self, path, followed=10):
-        """Where that is defined which a path names: re-exports are followed."""
+        """Returns where the item that a path names is defined, following re-exports."""
         for length in range(len(path)):
             module, name = path[:length], path[length]
             if followed and module in self.code and (*module, name) not in self.code and name in self.names[module]:
@@ -123,7 +123,7 @@ class Crate:
         return path
 
     def edges(self):
-        """In each folder, which modules each module uses."""
+        """Returns, for each folder, which modules each module uses."""
         folders = {module: defaultdict(set) for module, below in self.children.items() if below}
         for module, uses in self.uses.items():
             body = USE.sub("", self.code[module])
@@ -141,7 +141,7 @@ class Crate:
 
 
 def circle(uses):
-    """The modules of a circle, each used by the one after it; none if there is an order."""
+    """Returns the modules of a cycle, each used by the one after it; none if there is an order."""
     try:
         graphlib.TopologicalSorter(uses).prepare()
     except graphlib.CycleError as error:

@@ -1,4 +1,4 @@
-"""MAVLink endpoints: several clients, clients that go and come back, noise on the line."""
+"""MAVLink endpoints: several clients, clients that come and go, noise on the line."""
 
 import os
 import random
@@ -16,7 +16,7 @@ from esc import Esc, gaps_us
 def test_several_clients_see_the_same_esc_and_one_may_leave_and_come_back(start):
     emulator = start()
     clients = [emulator.connect() for _ in range(4)]
-    # Each sees every answer: the first reads last, so that an old value cannot come after what it sets.
+    # Each sees every answer: the first reads last, so that no old value comes after what it sets.
     for client in reversed(clients):
         assert client.read_param("MOT_STOP").param_value == 1.0
     clients.pop().close()
@@ -41,7 +41,7 @@ def test_a_client_that_does_not_read_holds_up_no_other(start):
         mark = esc.mark()
         until = time.monotonic() + 120.0
         dropped = False
-        # The emulator drops whom it cannot send to any more: what it has for the other is sent on.
+        # The emulator drops a client that it can no longer send to: what it has for the other is still sent.
         while not dropped and time.monotonic() < until:
             try:
                 for _ in range(10):
@@ -98,7 +98,7 @@ def test_a_pty_is_a_serial_port(start, tmp_path):
 
 
 def frames(esc: Esc) -> list[bytes]:
-    """Sound frames to spoil; none changes anything."""
+    """Valid frames to corrupt; none changes anything."""
     codec = esc.codec
     messages = [
         dialect.MAVLink_param_request_read_message(1, 1, b"MOT_STOP", -1),
@@ -121,7 +121,7 @@ def test_malformed_bytes_do_no_harm(esc):
                 del spoilt[noise.randrange(1, len(spoilt)) :]
             case 2:  # Noise with start bytes.
                 spoilt = bytearray(noise.randbytes(40)) + b"\xfd\xfe" * 3
-            case 3:  # A length that is too long, and flags that nobody knows.
+            case 3:  # A length that is too long, and unknown flags.
                 spoilt[1:3] = b"\xff\xfe"
             case 4:  # An id that no dialect has.
                 spoilt[7:10] = b"\xff\xff\xff"

@@ -1,4 +1,4 @@
-"""Simulated time in a client's hand: the datagrams of emulator/LOCKSTEP.md, in Python and in C."""
+"""Simulated time under a client's control: the datagrams of emulator/LOCKSTEP.md, in Python and in C."""
 
 import json
 import math
@@ -34,12 +34,12 @@ def lockstep(start):
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory):
-    """The example in C."""
+    """The C example."""
     return build_example(tmp_path_factory.mktemp("c"))
 
 
 def play(client: Lockstep, pause=lambda: None) -> tuple[list[State], int]:
-    """What the example does: its states and their hash."""
+    """Does what the example does; returns its states and their hash."""
     states = []
     for step in range(STEPS):
         pause()
@@ -62,7 +62,7 @@ def test_clients_in_c_and_in_python_agree_bit_for_bit_at_any_pace(lockstep, exam
     assert all(abs(esc.rpm - esc.reported[0]) < 30 for esc in last.escs)
     assert all(esc.faults == 0 and esc.armed and esc.phase == 5 for esc in last.escs)
 
-    # The same with pauses, at which nothing may look at the wall's clock.
+    # The same with pauses, during which nothing may look at the wall clock.
     chance = random.Random(1)
     slow, slowly = play(lockstep(*FOUR), lambda: time.sleep(0.02 if chance.random() < 0.02 else 0.0))
     assert slowly == hash and slow[-1].raw == last.raw
@@ -83,7 +83,7 @@ def test_replies_come_with_their_times(lockstep):
         for index, esc in enumerate(client.state.escs):
             asked.append((index, begun + 10_000 * index))
             told += [(index, asked_ns, answer) for asked_ns, answer in esc.answers]
-    # Each frame has its reply, the last perhaps in the advance that would come.
+    # Each frame has its reply, the last one perhaps in the advance after the end.
     assert len(asked) - 4 <= len(told) <= len(asked)
     times = {(index, round(asked_ns, -2)) for index, asked_ns, _ in told}
     assert len({(i, round(t, -2)) for i, t in asked} - times) <= 4
@@ -134,7 +134,7 @@ def test_a_malformed_request_is_counted_and_not_obeyed(lockstep):
         kind = chance.choice([41, 42, 43])
         client.link.send(bytes([kind]) + chance.randbytes(chance.randrange(80)))
         assert State(client.link.recv(65536)).time_ns == before.time_ns
-    # A good one still is.
+    # A good one still is accepted.
     assert client.turn(good).time_ns == before.time_ns + MS
     assert "is malformed: it ends before its fields do" in client.emulator.output()
 
@@ -162,12 +162,12 @@ def test_a_client_that_vanishes_leaves_time_standing(lockstep):
     other = Lockstep(port)
     try:
         assert other.state.raw == before.raw, "time stands"
-        # Nobody sends: the signal is lost 100 ms after the last frame, by simulated time.
+        # Nobody sends: the signal is lost 100 ms after the last frame, in simulated time.
         other.advance(95 * MS)
         assert all(esc.phase == 5 and esc.rpm > 2900 for esc in other.state.escs)
         other.throttle(400, [None, None])
         assert all(not esc.armed and esc.phase != 5 for esc in other.state.escs)
-        # A throttle that is open does not turn them again.
+        # An open throttle does not turn them again.
         other.throttle(1000, [HALF, HALF])
         other.throttle(1000, [HALF, HALF])
         assert all(not esc.armed and abs(esc.rpm) < 1 for esc in other.state.escs), other.state.escs
@@ -186,7 +186,7 @@ def test_the_escs_share_their_supply(lockstep):
     escs = client.state.escs
     drawn_a = sum(esc.bus_a for esc in escs)
     assert drawn_a > 1.0 and rest_v > 24.0
-    # The capacitors settle in a millisecond; what is left is the ripple of the currents.
+    # The capacitors settle within a millisecond; what is left is current ripple.
     assert abs(24.0 - 0.5 * drawn_a - escs[3].bus_v) < 0.03 * drawn_a, (drawn_a, escs[3].bus_v)
     assert all(abs(esc.reported[1] - esc.bus_v) < 0.2 for esc in escs)
 
@@ -197,8 +197,8 @@ def test_the_environment_acts(lockstep):
     calm = client.throttle(300, [HALF, HALF]).escs[0].torque_nm
     client.environment(ambient_c=60.0, shafts=[(-0.02, 0.0), (0.0, 1500.0)])
     escs = client.throttle(1000, [HALF, HALF]).escs
-    # The speed is held: the torque rises by what pulls at the shaft, and a propeller of c2 = 0.3 µNms² takes the less
-    # the less fast it is against the wind. Ripple within a millisecond is some mNm.
+    # The speed is held: the torque rises by what pulls at the shaft, and a propeller with c2 = 0.3 µNms² takes the
+    # less, the less its speed against the wind. Ripple within a millisecond is a few mNm.
     speed, wind = (rpm * math.pi / 30 for rpm in (escs[1].rpm, 1500.0))
     eased = 0.3e-6 * (speed**2 - (speed - wind) ** 2)
     mean = [0.0, 0.0]

@@ -16,47 +16,47 @@ def cells(drives, faults, moments, *misses) -> dict:
     return {(drive, fault, moment): {*misses} for drive in drives for fault in faults for moment in moments}
 
 
-# What is not as it is to be, and why. The trip is at 1.4 times LIM_PHASE_A for two samples and the comparators' at
-# 1.6: where a current rises as far as that, it passes 1.2 times the limit before.
+# What is not yet as it should be, and why. The trip is at 1.4 times LIM_PHASE_A for two samples and the comparators'
+# at 1.6: a current that rises that far passes 1.2 times the limit first.
 OPEN = {
-    # A phase is known to be open once the rotor has been seen everywhere in some turns. Where two phases do not turn the
-    # motor for as long, the regulator's voltage rises until the current trips.
+    # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
+    # the motor that far, the regulator's voltage rises until the current trips.
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
     **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
-    # With a switch that never turns on, the torque that low speed allows, a drop as great as the back-EMF, takes the
-    # currents of the others up to 2.6 A over 1.2 times the limit in a start, and 1 A in braking. With half of that
-    # torque it is met, and thrust comes later.
+    # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
+    # others' currents up to 2.6 A above 1.2 times the limit in a start, and 1 A in braking. With half of that torque
+    # it is met, and thrust comes later.
     **cells([FOC], ["high_open", "low_open"], ["start", "braking"], "current"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
-    # Nor does the six-step drive tell of a high side that never turns on at full speed, where it goes on with it.
+    # Nor does the six-step drive report a high side that never turns on at full speed, where it carries on with it.
     **cells([SIX], ["high_open"], ["full"], "cause", "time"),
     # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
     # nothing with more current.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
     **cells([SIX], ["sensor_zero"], ["start"], "current"),
-    # The control knows of a Hall sensor that is at fault, and cannot turn on without it where it is slow.
+    # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
     **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
-    # A rotor that jams at speed is tried again, by starts of which each takes longer than the one before: 1.5 s after it
-    # was freed one is still under way. What jams in the six-step drive's start is not. It is known for lost by its flux
-    # after 0.1 s where no current trips.
+    # After a rotor jams at speed, starts are retried, each longer than the previous one: 1.5 s after it was freed one
+    # is still under way. A jam in the six-step drive's start is not retried. A rotor is known to be lost from its flux
+    # after 0.1 s, if no current trips.
     **cells([FOC], ["rotor_blocked"], ["full"], "reaction"),
     **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "reaction", "time"),
     **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
-    # Nearly all of the back-EMF is gone faster than the currents are regulated.
+    # Nearly all of the back-EMF vanishes faster than the currents are regulated.
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
     **cells([SIX], ["strike"], ["half"], "current"),
-    # A start that is struck is tried again, and takes its time.
+    # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
-    # 10 A on 470 µF are 0.9 V a period: braking backs off ahead of the limit, and what is in the inductances still takes
-    # the supply a tenth of a volt beyond it.
+    # 10 A into 470 µF is 0.9 V per period: braking backs off ahead of the limit, and what the inductances hold still
+    # takes the supply a tenth of a volt beyond it.
     **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
-    # The six-step drive shoots a short through the winding in its start, and has the comparators' level.
+    # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }
 
@@ -66,7 +66,7 @@ PICTURE = ROOT / "emulator" / "pictures" / "fault-matrix.svg"
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
-    """Where the README's command has drawn, and what it prints."""
+    """Runs the README's command; returns where it has drawn, and what it prints."""
     (command,) = readme.commands("--", "matrix")
     words = command[command.index("--") + 1 :]
     picture = tmp_path_factory.mktemp("matrix") / PICTURE.name

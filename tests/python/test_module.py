@@ -32,7 +32,7 @@ def turning(emulator: siskin.Emulator) -> siskin.Emulator:
 
 
 def told(state) -> list[tuple]:
-    """What a state tells, as the datagram of lockstep has it."""
+    """Returns a state's fields, as in the lockstep datagram."""
     return [
         (
             esc.rpm,
@@ -167,7 +167,7 @@ def test_errors_are_the_program_s():
 
 @pytest.fixture
 def unasked():
-    """Python does not change threads by itself: only where one lets others run."""
+    """Python does not switch threads by itself: only when one lets others run."""
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(1000.0)
     yield

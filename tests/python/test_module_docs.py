@@ -1,4 +1,4 @@
-"""The Python module as its guide, its help and its types have it."""
+"""The Python module against its guide, its help and its types."""
 
 import inspect
 import os
@@ -55,7 +55,7 @@ def test_an_example_runs(example, tmp_path):
 
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory):
-    """What mypy has found out already; a folder from which what is installed is found."""
+    """mypy's cache; a folder from which the installed package is found."""
     return tmp_path_factory.mktemp("mypy")
 
 

@@ -1,4 +1,4 @@
-"""The Python module: what is around its ESCs, their parameters, MAVLink, faults and recordings."""
+"""The Python module: what surrounds its ESCs, their parameters, MAVLink, faults and recordings."""
 
 import csv
 import math
@@ -37,7 +37,7 @@ def test_the_environment_acts(two):
     pulled_nm, blown_nm = means(two)
     speed, wind = (rpm * math.pi / 30 for rpm in (two.state[1].rpm, 1500.0))
     eased_nm = BLADE_NM_S2 * (speed**2 - (speed - wind) ** 2)
-    # The speed is held: the torque follows what acts on the shaft, with ripple of less than a mNm in 0.1 s.
+    # The speed is held: the torque follows what acts on the shaft, with less than a mNm of ripple over 0.1 s.
     assert pulled_nm - calm_nm == pytest.approx(0.02, abs=1e-3)
     assert calm_nm - blown_nm == pytest.approx(eased_nm, abs=1e-3)
     state = two.state[0]
@@ -92,7 +92,7 @@ def test_settings_are_stored_where_a_file_is_given(tmp_path):
         emulator.throttle[:] = None
         # Settings store themselves some seconds after the last change.
         emulator.advance(30.0)
-        # The file is another's once it is gone.
+        # The file is free for others once it is gone.
         del emulator
     assert stored[1] == 77.0 != stored[0]
     (tmp_path / "flash.1").write_bytes(b"no flash")
@@ -153,7 +153,7 @@ def test_faults_come_and_are_mended(two):
     # Before the first retry.
     two.advance(0.01)
     assert two.state[0].phase == "idle" and two.state[0].faults == ["over-current"]
-    # One that has had its time is not there any more.
+    # An expired one is gone.
     two.faults.inject(1, "signal_loss", for_s=0.05)
     assert len(two.faults[1]) == 1
     two.advance(0.2)
@@ -177,7 +177,7 @@ def test_a_recording_has_every_control_period(two):
     assert {siskin.PHASES[phase] for phase in np.unique(rows["phase"])} >= {"idle", "park", "ramp", "run"}
     assert rows["rpm"][-1] == pytest.approx(two.state[1].rpm, abs=1.0)
     assert rows["bus_v"][-1] == pytest.approx(two.state[1].bus_v, abs=0.01)
-    # The currents of a star add up to nothing, and the bridge is off at first.
+    # Star currents sum to zero, and the bridge is off at first.
     assert np.abs(rows["i_a_a"] + rows["i_b_a"] + rows["i_c_a"]).max() < 1e-3
     assert np.isnan(rows["duty_a"][0]) and not np.isnan(rows["duty_a"][-1])
     steady = rows[rows["t_s"] > 1.8]

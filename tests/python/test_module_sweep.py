@@ -1,4 +1,4 @@
-"""The Python module: scenarios and sweeps are the program's, whoever plays them."""
+"""The Python module: scenarios and sweeps match the program's, whoever plays them."""
 
 import contextlib
 import os
@@ -23,7 +23,7 @@ FEW = range(1, 7)
 
 @contextlib.contextmanager
 def two_workers():
-    """A cluster of two workers, each a process with one thread, which are started again when they die."""
+    """A cluster of two single-threaded worker processes, restarted when they die."""
     options = {"host": "127.0.0.1", "dashboard_address": None, "threads_per_worker": 1}
     with LocalCluster(n_workers=2, processes=True, **options) as cluster, Client(cluster) as client:
         yield client
@@ -31,14 +31,14 @@ def two_workers():
 
 @pytest.fixture(scope="module")
 def client():
-    """A cluster that is left as it is."""
+    """A cluster that is left alone."""
     with two_workers() as client:
         yield client
 
 
 @pytest.fixture
 def grid(tmp_path):
-    """Six runs of two seconds, of which the two fail that ask for less than is expected."""
+    """Six runs of two seconds, two of which fail because they ask for less than is expected."""
     path = tmp_path / "grid.toml"
     path.write_text(
         """
@@ -66,7 +66,7 @@ def grid(tmp_path):
 
 
 def of_program(path, table, *options, threads: int) -> bytes:
-    """The table that the program writes."""
+    """Returns the table that the program writes."""
     command = [PROGRAM, "scenario", path, "--table", table, "--json", *map(str, options)]
     environment = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
     ended = subprocess.run(command, env=environment, capture_output=True, text=True)
@@ -168,7 +168,7 @@ def test_a_worker_with_another_file_is_found_out(client, grid):
 
 
 def sweep_with_one_killed(client) -> siskin.Table:
-    """All drives by two workers, of which one is killed once some are done and others are not."""
+    """Sweeps all drives with two workers, one of which is killed once some are done and others are not."""
     tables = []
     sweep = threading.Thread(target=lambda: tables.append(siskin.sweep(DRIVES, seeds=ALL, client=client)))
     before = client.run(os.getpid)

@@ -1,4 +1,4 @@
-"""An ESC out of the bag, as `out_of_the_bag.py` plays it, with motors of the usual sizes."""
+"""An ESC out of the bag, played by `out_of_the_bag.py`, with motors of the usual sizes."""
 
 import random
 
@@ -9,7 +9,7 @@ MOTORS = 150
 
 
 def test_any_motor_turns_the_right_way_within_3_s_of_the_throttle(tmp_path):
-    """At 30 % of throttle; the phase current stays within a fifth above LIM_PHASE_A."""
+    """At 30 % throttle; the phase current stays within a fifth above LIM_PHASE_A."""
     outcomes = {}
     for number in range(MOTORS):
         draw = random.Random(f"bag {number}")

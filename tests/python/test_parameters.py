@@ -130,7 +130,7 @@ def test_six_step_needs_a_pwm_that_sees_its_crossings(start):
 
 
 def test_a_value_is_kept_as_the_float_that_was_sent(esc):
-    sent = 30.600000381469727 * 1.25  # An f32 has no such number.
+    sent = 30.600000381469727 * 1.25  # No f32 has this value.
     kept = esc.set_param("MOT_L_UH", sent)
     assert abs(kept - sent) < 1e-5 and kept == esc.read_param("MOT_L_UH").param_value
 

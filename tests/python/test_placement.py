@@ -1,5 +1,5 @@
-"""The firmware's linker script: the same functions stand in RAM whichever way a compiler spells their
-names, and a script that no longer finds them does not link."""
+"""The firmware's linker script: the same functions go to RAM however a compiler mangles their names, and a script that
+no longer finds them does not link."""
 
 import subprocess
 
@@ -40,7 +40,7 @@ OTHERS = {
     ("siskin_control", "control", "speed", "Config", "begin"): (".control_rest", 4),
     ("siskin_control", "params", "build", "build"): (".text", 4),
 }
-"""Others, and how many bytes they have."""
+"""Others, with their sizes in bytes."""
 
 
 def legacy(path) -> str:
@@ -48,7 +48,7 @@ def legacy(path) -> str:
 
 
 def v0(path) -> str:
-    """A method is within its type, which is told in the module's place."""
+    """Mangles a path; a method is within its type, which takes the module's place."""
     crate, *modules, last = path
     type_ = modules.pop() if modules and modules[-1][0].isupper() else None
     within = "Nt" * len(modules) + f"Cs6RWeDgMq4dC_{len(crate)}{crate}"
@@ -59,7 +59,7 @@ def v0(path) -> str:
 
 
 def code(spelled: dict[str, int]) -> str:
-    """Functions of so many bytes, all of which the start holds."""
+    """Returns functions of these sizes, all held by the start."""
     text = """
     .section .text.Reset, "ax"
     function Reset

@@ -1,5 +1,5 @@
-"""`siskin image` and `siskin flash` refuse an image whose PWM interrupt needs the flash while that is
-written. The images are small, and linked as the boards' are."""
+"""`siskin image` and `siskin flash` refuse an image whose PWM interrupt needs the flash while that is being written.
+The images are small, and linked like the boards'."""
 
 import subprocess
 
@@ -76,7 +76,7 @@ def judge(folder, text) -> subprocess.CompletedProcess:
 @pytest.mark.parametrize(
     ("does", "beside", "needs"),
     [
-        # The linker makes a jump for the call: it is far.
+        # The linker makes a veneer for the call: it is far.
         ("bl far", "", "far (ADC1_2 -> between -> far)"),
         ("b far", "", "far (ADC1_2 -> between -> far)"),
         ("ldr r3, =far; blx r3", "", "far (ADC1_2 -> between -> far)"),
@@ -88,13 +88,13 @@ def judge(folder, text) -> subprocess.CompletedProcess:
             "what between reads at {table} (ADC1_2 -> between)",
         ),
         ("ldr r3, [r0]; blx r3", "", "perhaps what between calls by a pointer (ADC1_2 -> between)"),
-        # The address of one function tells nothing of the next call.
+        # One function's address says nothing about the next call.
         (
             "ldr r3, =between; blx r3; ldr r3, [r0]; blx r3",
             "",
             "perhaps what between calls by a pointer (ADC1_2 -> between)",
         ),
-        # Of two addresses in one datum, that of each register is its own.
+        # Of two addresses in one datum, each register has its own.
         (
             "movw r2, #:lower16:table; movw r3, #:lower16:(table + 4); "
             "movt r2, #:upper16:table; movt r3, #:upper16:(table + 4)",

@@ -1,4 +1,4 @@
-"""What the READMEs have a person type: every command and script, as it is pasted."""
+"""What the READMEs have a person type: every command and script, as pasted."""
 
 import json
 import os
@@ -31,7 +31,7 @@ for _ in range(5):
 
 
 def run_script(text: str, emulator) -> str:
-    """Runs a script with its ports exchanged for those of an emulator; gives what it prints."""
+    """Runs a script with its ports replaced by an emulator's; returns what it prints."""
     text = text.replace("5760", str(emulator.port)).replace("14600", str(emulator.signal_port))
     # The generated dialect must not be found.
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "MAVLINK"))}
@@ -68,14 +68,14 @@ def test_readme_has_a_script_that_reads_the_telemetry():
 @pytest.mark.parametrize("speed", [1, 0.6])
 @pytest.mark.parametrize("index", range(len(blocks("python"))))
 def test_a_script_of_a_readme_works_as_pasted(start, index, speed):
-    # A busy machine is no lost signal. The virtual board runs below real time on a slow one.
+    # A busy machine is not a lost signal. The virtual board runs below real time on a slow one.
     printed = run_script(blocks("python")[index], start(*PATIENT, speed=speed))
     rpm = [int(number) for number in re.findall(r"(-?\d+) rpm", printed)]
     assert abs(rpm[-1] - 3150) <= 32, f"half throttle: {rpm}"
 
 
 def recipe(word: str) -> str:
-    """The recipe of the emulator's README that has this word."""
+    """Returns the recipe in the emulator's README that contains this word."""
     return next(block for block in blocks("py", EMULATOR) if word in block)
 
 
@@ -104,16 +104,16 @@ def test_the_container_builds_what_the_workspace_has():
     channel = re.search(r'channel = "(\d+\.\d+)', (ROOT / "rust-toolchain.toml").read_text()).group(1)
     assert f"rust:{channel}-slim" in text
     entry = json.loads(re.search(r"^ENTRYPOINT (\[.*\])$", text, re.MULTILINE).group(1))
-    # Ports of the machine's choice, since others may hold these.
+    # Ports of the machine's choice, since others may be using these.
     options = [re.sub(r":(5760|14600)$", ":0", word) for word in entry[1:]]
     ended = run(*options, "--json", "--duration", 0.01)
     assert entry[0] == PROGRAM.name and ended.returncode == 0, ended.stderr
 
 
-# The programs that `cargo run` starts, by what stands behind -p.
+# The programs that `cargo run` starts, by their -p option.
 PROGRAMS = {None: PROGRAM, "siskin": TOOL, "siskin-vboard": VIRTUAL_BOARD}
 
-# A bench on which a README's commands make sense, where it is not the default one.
+# A bench that suits a README's commands, if the default one does not.
 BENCHES = {"firmware": ("--bench", "bare", "--bus", "12")}
 
 PROBE_RS = """#!/bin/sh
@@ -122,7 +122,7 @@ echo "probe-rs $*" >>"$0.log"
 
 
 def program(command: list[str]) -> tuple[Path | None, list[str]]:
-    """The program that a command runs, and its arguments; none for what is no `cargo run`."""
+    """Returns the program that a command runs, and its arguments; no program if it is not `cargo run`."""
     if command[:3] != ["cargo", "run", "--release"]:
         return None, command
     options, _, arguments = " ".join(command[3:]).partition("--")
@@ -132,10 +132,10 @@ def program(command: list[str]) -> tuple[Path | None, list[str]]:
 
 
 def is_run_elsewhere(command: list[str]) -> bool:
-    """True for what another test runs as it stands in the README."""
+    """Returns whether another test runs it as in the README."""
     path, words = program(command)
     if path is None:
-        # This test is a part of the first; tests/flight/test_flight.py runs the others.
+        # This test is part of the first; tests/flight/test_flight.py runs the others.
         return words == ["tests/run"] or "tests/flight/fly.py" in words or "flight-picture" in words
     if path == VIRTUAL_BOARD:
         # test_virtual_board.py
@@ -158,14 +158,14 @@ def is_run_elsewhere(command: list[str]) -> bool:
 
 
 def first_has(readme: Path) -> list[list[str]]:
-    """The commands of a README that no README before it has."""
+    """Returns the commands of a README that no earlier README has."""
     before = [command for other in READMES[: READMES.index(readme)] for command in commands(of=other)]
     return [command for command in commands(of=readme) if command not in before]
 
 
 @pytest.mark.parametrize("readme", READMES, ids=lambda path: path.parent.name)
 def test_every_command_of_a_readme_ends_well(start, tmp_path, readme):
-    # They are typed one after the other: some read what others have written.
+    # They are typed one after another: some read what others have written.
     todo = [command for command in first_has(readme) if not is_run_elsewhere(command)]
     if not todo:
         return
@@ -215,7 +215,7 @@ def test_every_toml_block_is_part_of_a_scenario_that_holds(tmp_path):
 
 
 def anchors(text: str) -> set[str]:
-    """The addresses of a file's headings, as GitHub makes them."""
+    """Returns the anchors of a file's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
@@ -238,7 +238,7 @@ def test_every_link_leads_somewhere(file):
 def test_the_files_that_contributors_are_led_to_are_there():
     named = re.findall(r"`([\w./-]+/[\w./-]*)`", CONTRIBUTING.read_text())
     assert len(named) > 20
-    # NAME is that of a board or a bench to come.
+    # NAME stands for a board or bench to come.
     absent = [name for name in named if "NAME" not in name and not (ROOT / name).exists()]
     assert absent == []
 
@@ -250,6 +250,6 @@ def test_every_parameter_that_is_named_exists():
     groups = "|".join({name[:4] for name in known})
     for file in [*READMES, CONTRIBUTING]:
         named = set(re.findall(rf"\b(?:{groups})[A-Z0-9_]+\b", file.read_text()))
-        # MAVLink's own commands begin as its parameters do.
+        # MAVLink's own commands begin like its parameters.
         unknown = {name for name in named - known if not name.startswith("MAV_CMD_")}
         assert unknown == set(), file

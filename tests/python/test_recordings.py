@@ -14,12 +14,12 @@ import siskin_dialect as dialect
 from emulator import Emulator, run, scenario
 from paths import PROGRAM, SCENARIOS
 
-# When an offline run begins by its log: 2020-01-01 00:00 UTC.
+# When an offline run begins in its log: 2020-01-01 00:00 UTC.
 OFFLINE_START_S = 1_577_836_800.0
 
 
 def messages(path) -> list:
-    """All messages of a log, each with its time as `_timestamp`."""
+    """Returns all messages of a log, each with its time as `_timestamp`."""
     log = mavutil.mavlink_connection(str(path), dialect="ardupilotmega")
     found = []
     while (message := log.recv_msg()) is not None:
@@ -64,7 +64,7 @@ def test_a_log_has_what_a_false_start_has_held_back(tmp_path):
     emulator = Emulator("--record", path)
     with emulator.connect() as esc:
         mark = esc.mark()
-        # A start byte in noise claims 255 bytes: the frame behind it is found when nothing more has come.
+        # A start byte in noise claims 255 bytes: the frame after it is found when nothing more has come.
         request = dialect.MAVLink_param_request_read_message(1, 1, b"MOT_STOP", -1)
         esc.write(b"\xfd\xff" + request.pack(esc.codec))
         answer = esc.wait("PARAM_VALUE", lambda m: m.param_id == "MOT_STOP", mark)
@@ -146,7 +146,7 @@ def test_output_that_nobody_takes_is_kept_until_an_interrupt_comes(interrupted):
             with pytest.raises(subprocess.TimeoutExpired):
                 played.wait(timeout=3.0)
             if interrupted:
-                # One that comes too soon ends what is played, not the writing.
+                # One that comes too soon ends the playing, not the writing.
                 deadline = time.monotonic() + 20.0
                 while played.poll() is None:
                     assert time.monotonic() < deadline
@@ -178,9 +178,9 @@ def test_a_dump_of_a_scenario_has_its_wires(tmp_path):
     for line in changes.splitlines():
         if line[0] in "01":
             count[wires[line[1:]]] += 1
-    # A frame of DShot has 16 bits, a frame a millisecond.
+    # A DShot frame has 16 bits, and there is one per millisecond.
     assert count["signal"] == pytest.approx(400 * 32, rel=0.02)
-    # The throttle opens at 0.31 s; parking takes both gates of each leg through 24 periods a ms.
+    # The throttle opens at 0.31 s; parking takes both gates of each leg through 24 periods per ms.
     assert all(count[f"{leg}_{side}"] > 1000 for leg in "abc" for side in ("high", "low"))
 
 

@@ -8,7 +8,7 @@ import readme
 from emulator import run
 from paths import ROOT
 
-# What was printed, and within what the simulation must show it.
+# What was published, and within what bound the simulation must show it.
 BOSSO = {
     "copper_loss_ratio": (1.0966, 1e-4),
     "efficiency_diff_3000": (3.65, 0.8),
@@ -29,7 +29,7 @@ REDRAW = "the README's picture is not what its commands draw: draw it again by t
 
 
 def assert_compared(items: list[dict]) -> None:
-    """Each item has a verdict that follows from its bound, and a reason."""
+    """Asserts that each item has a verdict that follows from its bound, and a reason."""
     for item in items:
         assert {"name", "paper", "measured", "unit", "note", "verdict", "bound", "reason"} == set(item)
         assert item["reason"], item
@@ -42,7 +42,7 @@ def assert_compared(items: list[dict]) -> None:
 
 
 def reproduce(paper: str, folder: object) -> list[str]:
-    """The README's command for a paper, which draws into this folder."""
+    """Returns the README's command for a paper, drawing into this folder."""
     (command,) = readme.commands("reproduce", paper)
     words = command[command.index("--") + 1 :]
     return [word.replace(f"target/{paper}", str(folder)) for word in words]

@@ -1,4 +1,4 @@
-"""Each scenario of the repository holds what it expects."""
+"""Each of the repository's scenarios holds what it expects."""
 
 import pytest
 
@@ -22,11 +22,11 @@ FAULTS = {
     "under-voltage": "under-voltage",
 }
 
-# What the motor goes on with is told; without a fault, nothing.
+# Warnings expected where the motor carries on; without a fault, none.
 WARNINGS = {
     "fault-hall-stuck": {"position sensor defect"},
     "fault-mosfet-open": {"phase open"},
-    # 3 A rms on each: no sensor is sound that shows that.
+    # 3 A rms on each: no sound sensor shows that.
     "fault-noise": {"current sensor drifts"},
     "fault-offset-drift": {"current sensor drifts"},
     "fault-phase-open": {"phase open"},
@@ -34,7 +34,7 @@ WARNINGS = {
     "fault-sensor-stuck": {"current sensor drifts"},
 }
 
-# A part of the seeds that the files name for all.
+# Some of the seeds that the files name for all of them.
 SEEDS = {
     "bench-cinelifter": "1..4",
     "bench-ducted-fan": "1..4",

@@ -1,4 +1,4 @@
-"""The page in a browser: it shows the ESC, drives it while it is held, and is for nobody else."""
+"""The page in a browser: it shows the ESC, drives it while held, and is closed to others."""
 
 import csv
 import http.client
@@ -42,7 +42,7 @@ def esc(start, port, browser):
     with emulator.connect() as esc:
         esc.emulator = emulator
         yield esc
-        # A page that is left would go on looking for its program.
+        # A page left open would keep looking for its program.
         browser.open("about:blank")
 
 
@@ -54,10 +54,10 @@ def look(browser, port):
 
 
 def spin(browser, esc, escs=(0,), components=(1,)) -> tuple[float, float]:
-    """Arms, and holds the throttle at its middle until the motor has that speed; where the mouse holds it.
+    """Arms, and holds the throttle at its middle until the motor has that speed; returns where the mouse holds it.
 
-    A busy machine may keep the page from saying for 200 ms that it is held, and that means zero: as often as that
-    happens it is taken in hand anew.
+    On a busy machine the page may fail for 200 ms to report that it is held, which means zero: whenever that happens
+    it is taken again.
     """
     for _ in range(8):
         if browser.text("#arm") == "Arm":
@@ -252,7 +252,7 @@ def test_each_of_several_is_shown_and_driven_and_all_together(browser, start, po
         spin(browser, esc, escs=[2], components=[142])
         status = esc.status()
         assert [abs(rpm) < 100 for rpm in status.rpm] == [True, True, False, True]
-        # The third's figures and its trace, not another's.
+        # The third one's figures and its trace, not another's.
         browser.wait(f"Math.abs(Number(document.querySelector('#tile-rpm').textContent) - {HOLD_RPM}) < 60")
         shown = "Number.parseInt(document.querySelector('#fleet button:nth-child(3) .rpm').textContent)"
         browser.wait(f"Math.abs({shown} - {HOLD_RPM}) < 60")
@@ -295,7 +295,7 @@ def test_the_six_switches_of_a_period_are_shown(browser, start, port):
     with emulator.connect() as esc:
         look(browser, port)
         browser.run("document.querySelector('#switches').open = true")
-        # At rest with its brake the low sides are on all the time.
+        # At rest with the brake, the low sides are always on.
         browser.wait("document.querySelectorAll('#switch-times dd').length === 6")
         spin(browser, esc)
         edges = "[...document.querySelectorAll('#switch-times dd')].map((edges) => edges.textContent)"
@@ -306,7 +306,7 @@ def test_the_six_switches_of_a_period_are_shown(browser, start, port):
             times = {word: float(at) for word, at in (part.split() for part in text.split(", "))}
             assert all(0.0 <= at <= 1e6 / 24000 for at in times.values()), text
             (lows if place % 2 else highs).append(times)
-        # A high side is on within the time for which its low side is off, half a microsecond away.
+        # A high side is on within its low side's off time, half a microsecond apart.
         for high, low in zip(highs, lows):
             assert abs(high["on"] - low["off"] - 0.5) < 0.002 and abs(low["on"] - high["off"] - 0.5) < 0.002
         assert "as the plant was switched" in browser.text("#switch-text")
@@ -329,16 +329,16 @@ def test_another_motor_takes_the_place_of_one_at_rest(browser, esc, port):
     refused = "[...document.querySelectorAll('#events li')].filter((line) => line.textContent.includes('stop it')).length"
     browser.run("document.querySelector('#events').replaceChildren()")
     until = time.monotonic() + TIMEOUT_S
-    # The shaft has some turns left where its speed cannot be measured any more.
+    # The shaft still has some turns left when its speed can no longer be measured.
     while "The ESC knows this motor" not in browser.text("#events"):
         assert time.monotonic() < until, browser.text("#events")
         browser.click("#fit")
         browser.wait(f"{refused} > 0 || document.querySelector('#events').textContent.includes('The ESC knows')")
         browser.run("document.querySelectorAll('#events li').forEach((line) => line.textContent.includes('stop it') && line.remove())")
-    # The board's sensors do not reach so far as that bench's.
+    # The board's sensors do not reach as far as that bench's.
     assert "refused LIM_PHASE_A" in browser.text("#events")
     assert esc.read_param("MOT_POLE_PAIRS").param_value == 7
-    # A pack of four cells in place of 24 V.
+    # A four-cell pack instead of 24 V.
     browser.wait("Number(document.querySelector('#tile-volts').textContent) < 18")
     assert browser.problems == []
 
@@ -355,7 +355,7 @@ fault = [{ at_s = 3.0, for_s = 0.3, kind = "bus_sag", value = 2.0 }]
 
 
 def play(browser, text):
-    """Gives the page a scenario's file."""
+    """Gives the page a scenario file."""
     browser.run(f"""{{
         const files = new DataTransfer();
         files.items.add(new File([{json.dumps(text)}], "some.toml"));
@@ -376,7 +376,7 @@ def test_a_scenario_is_played_on_what_runs(browser, esc, port):
     browser.wait(f"{events}.includes('Scenario: over')")
     esc.wait_rpm(-100, 1000)
 
-    # Stopped by a person, it does not go on.
+    # Stopped by a person, it does not continue.
     play(browser, SCENARIO)
     esc.next("ESC_STATUS", lambda m: m.rpm[0] > 1000)
     browser.click("#stop")

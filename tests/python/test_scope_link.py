@@ -1,4 +1,4 @@
-"""`siskin scope`: the page in a browser, of an ESC on a MAVLink link."""
+"""`siskin scope`: the browser page, for an ESC on a MAVLink link."""
 
 import http.client
 import json
@@ -37,7 +37,7 @@ def served(start, browser):
             esc.emulator = emulator
             yield esc, found.group(1)
     finally:
-        # A page that is left would go on looking for its program.
+        # A page left open would keep looking for its program.
         browser.open("about:blank")
         program.terminate()
         program.wait()
@@ -53,9 +53,9 @@ def look(browser, url):
 
 
 def hold(browser, esc) -> tuple[float, float]:
-    """Holds the button of the motor test until the motor turns; where the mouse is.
+    """Holds the motor test's button until the motor turns; returns where the mouse is.
 
-    While the ESC still tests itself it refuses: then it is asked anew.
+    While the ESC is still testing itself it refuses, and is asked again.
     """
     browser.run("document.querySelector('#test-value').value = 100")
     for _ in range(8):
@@ -103,7 +103,7 @@ def test_the_motor_turns_while_the_button_is_held_and_its_trace_moves(browser, s
     # It turns for three seconds at most, however slow the browser is.
     browser.wait(f"window.fastest > {TURNING_RPM}")
     browser.wait(f"{picture} !== {first!r}")
-    # With the streamed currents there is a d-q plane.
+    # With streamed currents there is a d-q plane.
     browser.wait("document.querySelector('#plane').checkVisibility()")
     browser.mouse("mouseReleased", *at)
     esc.wait_rpm(-100, 100)
@@ -132,12 +132,12 @@ def test_what_is_traced_can_be_exported(browser, served):
     while len(volts) < 50:
         assert time.monotonic() < until, f"{len(volts)} values of the supply's voltage"
         head, rows = exported()
-        # Those of the telemetry, before the stream has begun, have no current.
+        # Rows of telemetry, before the stream began, have no current.
         rows = [row for row in rows if row[head.index("i_q_a")]]
         volts = [float(row[head.index("bus_v")]) for row in rows]
     times = [float(row[0]) for row in rows]
     assert times == sorted(times)
-    # 50 Hz from the factory.
+    # 50 Hz is the factory's.
     assert all(abs(later - earlier - 0.02) < 0.002 for earlier, later in zip(times, times[1:]))
     assert all(abs(value - 24.0) < 0.5 for value in volts)
 
@@ -152,7 +152,7 @@ def test_a_parameter_that_is_set_is_the_esc_s(browser, served):
     """)
     browser.wait("document.querySelector('#param-CTL_RPM_MAX').closest('.param').classList.contains('changed')")
     assert esc.read_param("CTL_RPM_MAX").param_value == 5000
-    # And one that another sets is the page's.
+    # What another client sets shows on the page too.
     esc.set_param("CTL_RPM_MAX", 4500)
     browser.wait("document.querySelector('#param-CTL_RPM_MAX').value === '4500'")
 

@@ -1,4 +1,4 @@
-"""Slams, as `slams.py` plays them: of the library's benches, and of random motors."""
+"""Slams, played by `slams.py`: on the library's benches, and on random motors."""
 
 import random
 
@@ -14,7 +14,7 @@ LIBRARY = ["bosso", "quad-3-inch", "quad-5-inch", "quad-7-inch", "quad-10-inch",
 @pytest.mark.parametrize("bench", LIBRARY)
 def test_a_bench_of_the_library_keeps_its_rotor_through_slams(tmp_path, bench, mode, plant):
     draw = random.Random(f"{bench} {mode} {plant}")
-    # Of a 3-inch motor's 60 kHz 750 ns are a twentieth: there the angle is known to 50 degrees.
+    # At a 3-inch motor's 60 kHz, 750 ns is a twentieth of the period: there the angle is known to 50 degrees.
     dead_times_ns = DEAD_TIMES_NS[:-1] if bench == "quad-3-inch" else DEAD_TIMES_NS
     params = {"CTL_MODE": mode, "PWM_DEADTIME_NS": draw.choice(dead_times_ns)}
     tables = {"bench": {"base": bench, "plant": plant}, "params": params}
@@ -24,6 +24,6 @@ def test_a_bench_of_the_library_keeps_its_rotor_through_slams(tmp_path, bench, m
 
 @pytest.mark.parametrize("mode", MODES)
 def test_random_motors_hold_through_slams(tmp_path, mode):
-    # The plants by turns: `slams.py` plays all, and more.
+    # The plants alternate: `slams.py` plays both, and more.
     outcomes = {number: drawn(tmp_path, number, mode, PLANTS[number % 2], steps=60) for number in range(40)}
     assert {number: outcome for number, outcome in outcomes.items() if not outcome.holds()} == {}

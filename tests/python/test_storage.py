@@ -1,4 +1,4 @@
-"""What survives a kill: at any moment all that was stored last, or all of the time before."""
+"""What survives a kill at any moment: all of what was last stored, or all of what was stored before."""
 
 import os
 import random
@@ -19,14 +19,14 @@ ESC_STATUS = 291
 HALF = 1048
 
 QUIET_S = 2.5
-"""Longer than the second for which nothing must have changed before it is stored, on a busy machine."""
+"""Longer than the second without changes after which settings are stored, on a busy machine."""
 
 TUNE_S = 0.5
 
 
 @pytest.fixture
 def stored(start, tmp_path):
-    """Starts emulators with one storage, one after the other."""
+    """Starts emulators with the same storage, one after another."""
     return lambda: start(storage=tmp_path / "flash.bin")
 
 
@@ -58,7 +58,7 @@ def test_a_kill_while_values_are_stored_leaves_the_old_or_the_new_ones(stored):
     for _ in range(20):
         emulator = stored()
         with emulator.connect() as esc:
-            # Nothing is stored as long as the tune of the start plays.
+            # Nothing is stored while the start-up tune plays.
             time.sleep(TUNE_S)
             found = tuple(
                 esc.read_param(name).param_value for name in ("LIM_PHASE_A", "CTL_RPM_MAX")
@@ -82,7 +82,7 @@ def test_statistics_outlive_a_kill(stored):
         esc.wait_armed()
         throttle.value = HALF
         esc.wait_rpm(3000, 3300)
-        # The run time is told in whole seconds, and half throttle may be reached in less than one.
+        # The run time is reported in whole seconds, and half throttle may be reached in less than one.
         time.sleep(1.0)
         throttle.value = 0
         time.sleep(2 * QUIET_S)
@@ -101,7 +101,7 @@ WORD = 8
 
 
 def test_a_bit_that_rots_changes_no_setting(stored, tmp_path):
-    """Each save stands twice: else one bit would leave another motor's settings, and arm."""
+    """Each save is stored twice: otherwise one bit would leave another motor's settings, and arm."""
     path = tmp_path / "flash.bin"
     emulator = stored()
     with emulator.connect() as esc:
@@ -129,14 +129,14 @@ def test_a_file_that_is_gone_is_told_to_who_stores(stored, tmp_path, harm):
     with emulator.connect() as esc:
         assert esc.command(STORAGE, 1) == ACCEPTED
         harm(path)
-        # Whether there is something to be written or not.
+        # Whether there is something to write or not.
         for value in (None, 12.5):
             if value:
                 esc.set_param("LIM_PHASE_A", value)
             assert esc.command(STORAGE, 1) == FAILED
         texts = [m.text for m in esc.since(0, "STATUSTEXT")]
         assert "storage: the file was removed or cut" in texts
-        # Another start makes a new file; that this one has lost its own does not change.
+        # Another start makes a new file; this one has still lost its own.
         if not path.exists():
             with stored().connect():
                 assert esc.command(STORAGE, 1) == FAILED
@@ -157,7 +157,7 @@ def test_nobody_else_may_read_what_is_stored(stored, tmp_path):
 
 
 def test_an_esc_that_has_lost_its_settings_arms_once_somebody_stores_some(stored, tmp_path):
-    """The first save of all, cut off in its second word."""
+    """The very first save, cut off in its second word."""
     path = tmp_path / "flash.bin"
     emulator = stored()
     with emulator.connect() as esc:

@@ -1,4 +1,4 @@
-"""The summary at the end of a run: its keys, and that it is the same again."""
+"""The summary at the end of a run: its keys, and that it is reproducible."""
 
 import math
 

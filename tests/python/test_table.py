@@ -60,7 +60,7 @@ def test_each_run_has_a_row_whatever_ran_beside_it(sweep, tmp_path):
     assert len(rows) == summary["runs"] == 12
     keys = {(row["seed"], row["params.MOT_R_MOHM"], row["bench.load"]) for row in rows}
     assert len(keys) == 12 and {key[0] for key in keys} == {"3", "4", "5"}
-    # What a seed draws is its own, and the same for all that it plays.
+    # What a seed draws is its own, and the same for everything it plays.
     assert len({(row["seed"], row["bench.initial_angle_deg"]) for row in rows}) == 3
     assert sum(row["held"] == "false" for row in rows) == summary["failed"]
     for row in rows:

@@ -1,8 +1,7 @@
 """From frames on the throttle wire to the speed in the telemetry, in real time.
 
-What must hold to the millisecond is in the scenarios, in simulated time. Here the flight controller
-is a thread on a busy machine, so a gap in its frames may be longer than `INP_LOSS_MS`: where the
-test is not about that, the time is set to 500 ms.
+What must hold to the millisecond is in the scenarios, in simulated time. Here the flight controller is a thread on a
+busy machine, so gaps between its frames may exceed `INP_LOSS_MS`: where a test is not about that, it is set to 500 ms.
 """
 
 import random
@@ -20,29 +19,29 @@ from esc import Esc
 STANDS_RPM = 100
 
 CURRENT_SETTLED_US = 1_000_000
-"""After this the reported current, a mean over 0.2 s, has forgotten what was before."""
+"""After this time the reported current, a mean over 0.2 s, has forgotten what came before."""
 
 
 def spin(esc, throttle):
-    """Waits for the arming, then brings the motor to half throttle's speed."""
+    """Waits until armed, then brings the motor to half throttle's speed."""
     esc.wait_armed()
     throttle.value = HALF
     esc.wait_rpm(3000, 3300)
 
 
 def rpm_of(value: int) -> float:
-    """The default mapping of throttle in speed mode."""
+    """The default mapping from throttle in speed mode."""
     return 300.0 + (value - LEAST) / (MOST - LEAST) * 5700.0
 
 
 def fast(esc: Esc) -> None:
-    """A status every 10 ms, to see when things happen."""
+    """Requests a status every 10 ms, to see when things happen."""
     esc.stream(dialect.MAVLINK_MSG_ID_ESC_STATUS, 10_000)
     esc.status()
 
 
 def stands(esc: Esc, seconds: float = 1.0) -> bool:
-    """Whether the shaft does not turn at all for a while."""
+    """Returns whether the shaft stands still for a while."""
     return all(m.rpm[0] == 0 for m in esc.statuses(seconds))
 
 
@@ -122,7 +121,7 @@ def test_frames_with_a_bad_check_sum_neither_arm_nor_turn(start, value):
         assert stands(esc, 1.0)
         assert not esc.armed()
         before = throttle.sent
-        # The next may be on its way already, and not know of them.
+        # The next one may already be on its way, without them.
         esc.next("ESC_INFO")
         counted = esc.next("ESC_INFO").error_count[0]
         assert before <= counted <= throttle.sent, "each is counted once"
@@ -161,7 +160,7 @@ def test_with_mot_stop_0_the_motor_coasts(start):
 
 
 def raw_frame(value: int, bit_ns: int) -> bytes:
-    """A frame as levels, beginning and ending low: a one is high for 3/4 of its bit."""
+    """Returns a frame as levels, beginning and ending low: a one is high for 3/4 of its bit."""
     levels = [200_000]
     for bit in range(15, -1, -1):
         high = bit_ns * (6 if frame(value) >> bit & 1 else 3) // 8
@@ -226,7 +225,7 @@ def test_a_fault_on_the_bench_latches_until_zero_throttle(start):
         throttle.value = HALF
         esc.wait_rpm(3100, 3200)
         mark = esc.mark()
-        # Half throttle takes 3 A, and 1.4 times the bound trips.
+        # Half throttle takes 3 A, and 1.4 times the limit trips.
         assert esc.set_param("LIM_PHASE_A", 0.5) == 0.5
         assert esc.wait("STATUSTEXT", lambda m: m.text.startswith("Fault: "), mark) is not None
         assert esc.wait("ESC_INFO", lambda m: m.failure_flags[0] != 0, mark) is not None
@@ -256,7 +255,7 @@ def test_a_sender_that_simulated_time_outruns_is_told_so(start):
 
 
 def test_a_machine_that_falls_behind_real_time_says_so(start):
-    # So fast no machine is.
+    # No machine is that fast.
     emulator = start(speed=1000)
     deadline = time.monotonic() + 20.0
     while "too slow" not in emulator.output() and time.monotonic() < deadline:

@@ -1,4 +1,4 @@
-"""The least time of a climb, as `thrust.py` works it out, on shafts whose time can be worked out by hand."""
+"""The shortest time for a climb, computed by `thrust.py`, on shafts whose time can be worked out by hand."""
 
 import math
 
@@ -10,7 +10,7 @@ RPM_PER_RAD_S = 60 / math.tau
 
 
 def shaft(volts: float) -> dict:
-    """7 pole pairs of 1 mWb: 20 A make 0.21 Nm, and 21 000 rad/s^2 of 1e-5 kg*m^2."""
+    """7 pole pairs with 1 mWb: 20 A gives 0.21 Nm, and 21 000 rad/s^2 with 1e-5 kg*m^2."""
     motor = {"R": 1e-3, "L": 1e-9, "flux": 1e-3, "pole_pairs": 7, "J": 0.6e-5}
     load = {"c2": 0.0, "J": 0.4e-5}
     return {"bench": {"motor": motor, "load": load, "bus": volts}, "params": {"LIM_PHASE_A": 20, "LIM_BUS_A": 200}}
@@ -30,14 +30,14 @@ def test_a_load_takes_its_part_of_the_torque():
 
 
 def test_a_speed_that_the_supply_does_not_give_is_never_reached():
-    # 5 V turn 1 mWb with 412 rad/s of the shaft.
+    # With 1 mWb, 5 V turns the shaft at 412 rad/s.
     tables = shaft(5.0)
     tables["bench"]["load"]["c2"] = 1e-7
     assert least_s(tables, Punch(0.0, 420 * RPM_PER_RAD_S, 5.0, None)) == math.inf
     assert math.isfinite(least_s(tables, Punch(0.0, 400 * RPM_PER_RAD_S, 5.0, None)))
 
 
-# Over the least time. A bound of their own keeps others: the winding's flux, or what the back-EMF is at idle.
+# Over the shortest time. Others have a bound of their own: the winding's flux, or the back-EMF at idle.
 @pytest.mark.parametrize("name", ["bosso", "quad-7-inch"])
 def test_thrust_comes_in_little_more_than_the_least_time(tmp_path, name):
     punch = punched(tmp_path, name, FIELD_ORIENTED)

@@ -18,7 +18,7 @@ def siskin(start):
 
 @pytest.fixture
 def siskin_stored(start, tmp_path):
-    """Likewise, with a file behind its storage."""
+    """The same, with a file for its storage."""
     return tool(start(storage=tmp_path / "flash"))
 
 

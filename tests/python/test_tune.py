@@ -1,4 +1,4 @@
-"""Motors that nobody has tuned by hand start and follow the throttle with the settings that follow from them."""
+"""Motors that nobody has tuned by hand start and follow the throttle with the settings derived from them."""
 
 import random
 
@@ -8,9 +8,9 @@ from motors import FROM_MOTOR, drawn_bench, flown, motor_of, tune
 
 
 def flight(folder, number: int, plant: str) -> tuple[bool, bool]:
-    """At 0.5 s the throttle goes to 30 %, and at 2.5 s to 90 %.
+    """Opens the throttle to 30 % at 0.5 s, and to 90 % at 2.5 s.
 
-    Whether a drawn motor turns in the end, without a fault, and whether it does so at the first attempt.
+    Returns whether a drawn motor turns in the end, without a fault, and whether it does so at the first attempt.
     """
     motor = motor_of(random.Random(number))
     followed = tune(motor["params"])
@@ -33,7 +33,7 @@ def flight(folder, number: int, plant: str) -> tuple[bool, bool]:
     return turns, turns and follows and at_once
 
 
-# The ripple of the switching plant is one more thing that the ramp's estimate has to live with.
+# The switching plant's ripple is one more disturbance to the ramp's estimate.
 @pytest.mark.parametrize(("plant", "motors", "again_share"), [("averaged", 120, 0.05), ("switching", 20, 0.2)])
 def test_motors_that_nobody_tuned_start_and_follow_the_throttle(tmp_path, plant, motors, again_share):
     flights = {number: flight(tmp_path, number, plant) for number in range(motors)}

@@ -25,7 +25,7 @@ POLE_PAIRS = 12
 
 @pytest.fixture
 def board(start, tmp_path):
-    """Starts boards with one storage, one after the other."""
+    """Starts boards with the same storage, one after another."""
     program = (VIRTUAL_BOARD, IMAGE)
     return lambda *options: start(*options, program=program, storage=tmp_path / "flash.bin")
 
@@ -66,14 +66,14 @@ def test_what_is_stored_survives_kills_at_any_moment(board):
     for attempt in range(4):
         emulator = board()
         with emulator.connect() as esc:
-            # Before it has started it hears nothing.
+            # It hears nothing until it has started.
             esc.next("HEARTBEAT")
             found = esc.read_param("LIM_PHASE_A").param_value
             assert found in ((20.0,) if attempt == 0 else (value, value - 0.5, 20.0))
             value = 12.0 + attempt
             esc.set_param("LIM_PHASE_A", value)
             esc.codec.command_long_send(1, 1, STORAGE, 0, 1, 0, 0, 0, 0, 0, 0)
-            # A page takes 22 ms to erase, a set 8 ms to write.
+            # Erasing a page takes 22 ms, writing a set 8 ms.
             time.sleep(moments.uniform(0.0, 0.08))
         emulator.kill()
     emulator = board()
@@ -97,8 +97,8 @@ def test_the_motor_turns_and_frames_are_answered_in_time(board):
         since, sent = len(throttle.answers), throttle.sent
         time.sleep(1.0)
         told = [data for data in throttle.replies(since) if not is_extended(data)]
-        # Frames that arrive in one millisecond of the machine's time follow each other too closely for a
-        # reply between them. On an exact wire each is answered, as tests/virtual-board/tests shows.
+        # Frames that arrive within one millisecond of the machine's time follow each other too closely for a reply in
+        # between. On an exact wire each is answered, as tests/virtual-board/tests shows.
         assert len(told) >= 100, f"{len(told)} replies to {throttle.sent - sent} frames"
         speeds = [erpm(data) / POLE_PAIRS for data in told]
         assert all(3000 < rpm < 3300 for rpm in speeds), (min(speeds), max(speeds))
@@ -132,9 +132,8 @@ def test_the_scenario_of_the_readme_holds_and_what_nobody_sees_is_no_failure():
     assert ended.returncode == 0, ended.stdout + ended.stderr
     held = {(e["window"], e["key"]): e["held"] for e in json.loads(ended.stdout)["expectations"]}
     assert held["held", "rpm_mean"] is True
-    # The row of this rate in the README's table: instructions and cycles in the mean and at most. What
-    # coincides in the longest interrupt hangs on when the image has started: this one is stamped and checks
-    # itself first, for 1.4 ms.
+    # The row for this rate in the README's table: mean and maximum instructions and cycles. What coincides in the
+    # longest interrupt depends on when the image has started: this one is stamped and checks itself first, for 1.4 ms.
     row = re.search(r"^\| 48 kHz \| (\d+), (\d+) \| (\d+), (\d+) \|", README.read_text(), re.MULTILINE)
     processor = json.loads(ended.stdout)["processor"]
     names = ("instructions_mean", "instructions_most", "cycles_mean", "cycles_most")

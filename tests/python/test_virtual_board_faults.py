@@ -1,6 +1,6 @@
-"""Ten faults that are dangerous, on the flashed image and in the emulator: the same reactions at the same times.
+"""Ten dangerous faults, on the flashed image and in the emulator: the same reactions at the same times.
 
-Both have the same plant and fault; the rotor's angle at the fault is each one's own, since the chip boots.
+Both have the same plant and fault; the rotor's angle at the fault differs, since the chip boots.
 """
 
 import json
@@ -13,11 +13,11 @@ from paths import IMAGES, VIRTUAL_BOARD
 IMAGE = IMAGES / "b-g431b-esc1.elf"
 HALF, FULL = "half", "full"
 FAULT_S = {HALF: 1.8, FULL: 2.6}
-"""When the fault comes: speeds are settled."""
+"""When the fault comes: speeds have settled."""
 OPENS_S = 0.4
 
-# Without a supply that comes off: the motor then lives on what the rotor gives, once more and once less, and two runs
-# part.
+# Without a disconnected supply: the motor then lives on what the rotor gives, sometimes more and sometimes less, and
+# two runs diverge.
 CELLS = {
     "high side shorted at full speed": (FULL, 'kind = "mosfet_short"\nphase = 1\nside = "high"'),
     "low side shorted at half": (HALF, 'kind = "mosfet_short"\nphase = 1\nside = "low"'),
@@ -32,8 +32,8 @@ CELLS = {
 }
 
 WINDOWS_S = {"before": (-0.01, 0.0), "at once": (0.0, 0.002), "soon": (0.002, 0.02), "after": (0.02, 0.2)}
-"""From the fault on. The rotor's angle decides much of the first 2 ms, but a bridge that is off a millisecond later
-has taken half of the power from before for longer."""
+"""From the fault on. The rotor's angle decides much of the first 2 ms, but a bridge that turns off a millisecond later
+has taken half of the earlier power for longer."""
 
 
 def written(path, moment: str, fault: str) -> None:

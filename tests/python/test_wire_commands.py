@@ -1,7 +1,7 @@
-"""What a flight controller orders by DShot's commands and a pilot by the stick, over the socket.
+"""What a flight controller orders by DShot commands and a pilot by the stick, over the socket.
 
-Exact counts and times are in the control's own tests; here the way from the socket to MAVLink and
-to the storage is shown.
+Exact counts and times are in the control's own tests; these show the way from the socket to MAVLink and to the
+storage.
 """
 
 import socket
@@ -14,11 +14,11 @@ from test_throttle import PATIENT, stands
 
 REVERSED, SAVE, DIRECTION_2 = 1.0, 12, 8
 REPEATS = 10
-"""Flight controllers send a command so often, 1 ms apart."""
+"""How often flight controllers send a command, 1 ms apart."""
 
 
 def wait_text(esc, text: str, since: int = 0):
-    """The STATUSTEXT that says this, from the mark on."""
+    """Returns the STATUSTEXT that says this, from the mark on."""
     found = esc.wait("STATUSTEXT", lambda m: m.text == text, since)
     said = [m.text for m in esc.since(since, "STATUSTEXT")]
     assert found is not None, f"not said: {text}; but: {said}"
@@ -26,7 +26,7 @@ def wait_text(esc, text: str, since: int = 0):
 
 
 def order(throttle, command: int) -> None:
-    """Sends a command often enough, in the place of zero throttle."""
+    """Sends a command often enough, in place of zero throttle."""
     before = throttle.sent
     throttle.value = command
     until = time.monotonic() + 10.0
@@ -36,7 +36,7 @@ def order(throttle, command: int) -> None:
 
 
 def pulses(port: int, seconds: float, width_us: int) -> None:
-    """Servo pulses, 50 a second."""
+    """Sends servo pulses, 50 a second."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
         for _ in range(int(seconds * 50)):
             wire.sendto(struct.pack("<BI", 0, width_us * 1000), ("127.0.0.1", port))
@@ -124,5 +124,5 @@ def test_the_stick_teaches_its_ends(start, tmp_path):
     emulator.kill()
     with start(storage=storage).connect() as esc:
         ends = [esc.read_param(f"INP_PULSE_{end}_US").param_value for end in ("MIN", "MAX")]
-        # The ends of the emulated timer's pulses are exact to its tick.
+        # The emulated timer's pulse ends are exact to its tick.
         assert ends == [1120.0, 1900.0]

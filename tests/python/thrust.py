@@ -1,9 +1,9 @@
-"""Thrust: the time from idle to nine tenths of full speed, beside the least that limits and supply allow.
+"""Thrust: the time from idle to nine tenths of full speed, next to the shortest that limits and supply allow.
 
     target/venv/bin/python tests/python/thrust.py quad-5-inch quad-7-inch
 
-prints a row for each bench: the least time, that of the field-oriented drive and that of the six-step one, which
-has 60 kHz of PWM, and may be too slow for the motor even so.
+prints a row for each bench: the shortest time, the field-oriented drive's and the six-step drive's, which runs at
+60 kHz PWM, and may still be too slow for the motor.
 """
 
 import csv
@@ -42,20 +42,20 @@ class Punch:
     rest_v: float
     """Of the supply, without load."""
     took_s: float | None
-    """None where it never came there."""
+    """None if it was never reached."""
 
 
 def bench(name: str) -> dict:
-    """The tables of a bench of the library."""
+    """Returns the tables of a bench in the library."""
     return tomllib.loads((paths.ROOT / "emulator" / "library" / f"{name}.toml").read_text())
 
 
 def punched(folder: Path, name: str, drive: int) -> Punch | None:
-    """Plays it, with the settings that follow from the motor; None where the motor is too fast for the drive."""
+    """Plays it, with the settings that follow from the motor; None if the motor is too fast for the drive."""
     full_rpm = bench(name)["params"].get("CTL_RPM_MAX", 6000)
     params = dict.fromkeys(FROM_MOTOR, 0) | {"CTL_DRIVE": drive}
     if drive == SIX_STEP:
-        # It needs 24 periods a turn.
+        # It needs 24 periods per turn.
         params |= {"PWM_FREQ_HZ": 60_000}
     signals = [(0.0, 0.0), (0.5, IDLE), (PUNCH_S, 1.0)]
     file, record = folder / "punch.toml", folder / "punch.csv"
@@ -86,10 +86,10 @@ def supply_ohm(bus: float | dict) -> float:
 
 
 def least_s(tables: dict, punch: Punch) -> float:
-    """The time that limits and supply allow at best, with no current along d.
+    """Returns the shortest time that limits and supply allow, with no current along d.
 
-    J*dw/dt is the torque of the greatest current along q less the load. That current is LIM_PHASE_A, or what the
-    supply's voltage, or LIM_BUS_A, leaves.
+    J*dw/dt is the torque of the largest current along q minus the load. That current is LIM_PHASE_A, or what the
+    supply voltage, or LIM_BUS_A, leaves.
     """
     motor, load, params = tables["bench"]["motor"], tables["bench"]["load"], tables["params"]
     inductance_h = motor.get("L_q", motor.get("L"))
@@ -103,7 +103,7 @@ def least_s(tables: dict, punch: Punch) -> float:
         def allowed(i_q: float) -> bool:
             v_q, v_d = resistance_ohm * i_q + electric * flux_wb, electric * inductance_h * i_q
             power_w = 1.5 * v_q * i_q
-            # The bus sags with the current that the power takes of it.
+            # The bus sags with the current that the power draws from it.
             root = punch.rest_v**2 - 4 * source_ohm * power_w
             if root <= 0:
                 return False

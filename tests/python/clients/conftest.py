@@ -1,4 +1,4 @@
-"""What the tests with real ground tools may ask for."""
+"""Fixtures of the tests with real ground tools."""
 
 import pytest
 
@@ -8,13 +8,13 @@ from lossy import Lossy
 
 @pytest.fixture(params=WAYS)
 def desk(request, start, tmp_path) -> Desk:
-    """An ESC that is reached by UDP, by TCP, or by a serial line of 115200 baud."""
+    """An ESC reached by UDP, by TCP, or by a serial line at 115200 baud."""
     return Desk(start, request.param, tmp_path)
 
 
 @pytest.fixture
 def slow_desk(start, tmp_path) -> Desk:
-    """An ESC at a serial line of 57600 baud."""
+    """An ESC on a serial line at 57600 baud."""
     return Desk(start, "pty", tmp_path, baud=57_600)
 
 
@@ -26,7 +26,7 @@ def peripheral_desk(start, tmp_path) -> Desk:
 
 @pytest.fixture
 def lossy_desk(start, tmp_path):
-    """An ESC behind a path that loses, doubles and delays a fifth of all packets both ways."""
+    """An ESC behind a path that loses, doubles and delays a fifth of all packets in both directions."""
     desk = Desk(start, "udp", tmp_path)
     with Lossy(desk.port, seed=1) as path:
         desk.port = path.port

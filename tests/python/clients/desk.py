@@ -1,4 +1,4 @@
-"""An ESC as it lies on a desk, with a flash of its own and one way for a client to reach it."""
+"""An ESC on a desk, with a flash of its own and one way for a client to reach it."""
 
 import shutil
 import time
@@ -12,7 +12,7 @@ WAYS = ("udp", "tcp", "pty")
 
 
 class Desk:
-    """Its addresses are written as each client writes them; a restart may change them."""
+    """Its addresses are as each client writes them; a restart may change them."""
 
     def __init__(self, start, way: str, folder: Path, *options: str, baud: int = 115_200):
         self._start, self._way, self._options = start, way, options
@@ -36,7 +36,7 @@ class Desk:
 
     @property
     def pymavlink(self) -> str:
-        """As pymavlink, and so MAVProxy, writes the address."""
+        """The address as pymavlink, and so MAVProxy, writes it."""
         addresses = {
             "udp": f"udpout:127.0.0.1:{self.port}",
             "tcp": f"tcp:127.0.0.1:{self.port}",
@@ -46,7 +46,7 @@ class Desk:
 
     @property
     def mavsdk(self) -> str:
-        """As MAVSDK writes the address."""
+        """The address as MAVSDK writes it."""
         addresses = {
             "udp": f"udpout://127.0.0.1:{self.port}",
             "tcp": f"tcpout://127.0.0.1:{self.port}",
@@ -55,12 +55,12 @@ class Desk:
         return addresses[self._way]
 
     def params(self) -> dict[str, float]:
-        """What the ESC has, by the tests' own client on a link of its own."""
+        """Returns the ESC's parameters, read by the tests' own client on a link of its own."""
         with self._emulator.connect(system=0, component=0) as esc:
             return esc.params()
 
     def power_cycle(self) -> None:
-        """Cuts the power once what has been set is stored, as it is by itself, and turns it on again."""
+        """Cuts the power once the ESC has stored by itself what was set, and turns it on again."""
         params = self.params()
         until = time.monotonic() + TIMEOUT_S
         while self._stored() != params:
@@ -70,7 +70,7 @@ class Desk:
         self.power_on()
 
     def _stored(self) -> dict[str, float]:
-        """What the ESC would begin with if the power were cut now."""
+        """Returns what the ESC would begin with if the power were cut now."""
         other = self._start(storage=shutil.copy(self._flash, self._flash.with_suffix(".copy")))
         with other.connect() as esc:
             params = esc.params()

@@ -1,4 +1,4 @@
-"""A UDP path that loses, doubles and delays packets, and has the same in store for each in every run."""
+"""A UDP path that loses, doubles and delays packets, the same ones in every run."""
 
 import contextlib
 import random
@@ -8,7 +8,7 @@ import threading
 import time
 
 LATE_S = 0.05
-"""A packet held back leaves behind the next one, or after this time when none comes."""
+"""A delayed packet leaves after the next one, or after this time if none comes."""
 
 
 class Way:
@@ -22,9 +22,9 @@ class Way:
         self.taken = self.lost = self.doubled = self.late = 0
 
     def take(self, packet: bytes, now: float) -> list[bytes]:
-        """What leaves as this packet comes."""
+        """Returns what leaves when this packet comes."""
         self.taken += 1
-        # Three draws each time, so that the fate of a packet depends on its number alone.
+        # Three draws each time, so that a packet's fate only depends on its number.
         lost, doubled, late = (self._random.random() < self._share for _ in range(3))
         if lost:
             self.lost += 1
@@ -39,7 +39,7 @@ class Way:
         return copies + self._release()
 
     def overdue(self, now: float) -> list[bytes]:
-        """What has been held back for long enough."""
+        """Returns what has been held back for long enough."""
         return self._release() if now - self._since >= LATE_S else []
 
     def _release(self) -> list[bytes]:
@@ -50,8 +50,8 @@ class Way:
 class Lossy:
     """Stands between a client, which sends to `port`, and the emulator's `udpin` at `far_port`.
 
-    Of the packets in each direction the share is lost; of those that are left, the share comes twice,
-    and the share comes behind the next one. `far_side` is the address that the emulator sees.
+    In each direction the share of the packets is lost; of the rest, the share is doubled, and the share arrives after
+    the next one. `far_side` is the address that the emulator sees.
     """
 
     def __init__(self, far_port: int, seed: int, share: float = 0.2):
@@ -72,7 +72,7 @@ class Lossy:
             ready = select.select([self._near, self._far], [], [], LATE_S / 5)[0]
             now = time.monotonic()
             up, down = self.up.overdue(now), self.down.overdue(now)
-            # That nobody listens at the other end is one more way to lose a packet.
+            # If nobody listens at the other end, that is one more way to lose a packet.
             with contextlib.suppress(ConnectionRefusedError):
                 if self._near in ready:
                     packet, client = self._near.recvfrom(4096)

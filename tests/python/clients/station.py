@@ -1,4 +1,4 @@
-"""MAVProxy as a program without a terminal: commands go in by its stdin, what it prints is read."""
+"""MAVProxy without a terminal: commands go to its stdin, and what it prints is read."""
 
 import os
 import re
@@ -13,11 +13,11 @@ from esc import TIMEOUT_S
 
 
 PROMPT = re.compile(r"(MAV|Mode\(0x[0-9a-f]{8}\))> ")
-"""Its other thread prints it, anywhere in a line."""
+"""Another thread of it prints this, anywhere in a line."""
 
 
 class MavProxy:
-    """One session with an ESC. All its files land in `folder`."""
+    """A session with an ESC. All its files go to `folder`."""
 
     def __init__(self, desk: Desk, folder: Path):
         folder.mkdir(exist_ok=True)
@@ -44,14 +44,14 @@ class MavProxy:
                 self._news.notify_all()
 
     def say(self, command: str) -> int:
-        """Types a command; the place in what is printed from which its answer comes."""
+        """Types a command; returns the place in the output from which its answer comes."""
         with self._news:
             place = len(self._printed)
         print(command, file=self._process.stdin, flush=True)
         return place
 
     def wait(self, pattern: str, place: int = 0, timeout: float = TIMEOUT_S) -> re.Match:
-        """The first match from the place on; its absence fails the test."""
+        """Returns the first match after the place; fails the test if there is none."""
         wanted = re.compile(pattern, re.MULTILINE)
         with self._news:
             found = self._news.wait_for(lambda: wanted.search(self._since(place)), timeout)
@@ -66,7 +66,7 @@ class MavProxy:
         return self.wait(pattern, self.say(command), timeout)
 
     def wait_value(self, name: str, value: float, timeout: float = TIMEOUT_S) -> bool:
-        """Whether it comes to have this value: what the ESC sends may take its time."""
+        """Returns whether the parameter reaches this value: the ESC's answer may take time."""
         until = time.monotonic() + timeout
         while float(self.ask(f"param show {name}", rf"^{name} +(\S+)$")[1]) != value:
             if time.monotonic() > until:
@@ -75,7 +75,7 @@ class MavProxy:
         return True
 
     def set(self, name: str, value: float) -> None:
-        """Sets a parameter; as it gives up after three packets in 3 s, again if need be."""
+        """Sets a parameter, repeatedly if need be: MAVProxy gives up after three packets in 3 s."""
         for _ in range(5):
             self.say(f"param set {name} {value}")
             if self.wait_value(name, value, timeout=4.0):
@@ -83,10 +83,10 @@ class MavProxy:
         raise AssertionError(f"{name} is not {value}")
 
     def listed(self, timeout: float = TIMEOUT_S) -> dict[str, float]:
-        """All parameters, as it shows them once it has the list.
+        """Returns all parameters, as shown once MAVProxy has the list.
 
-        That it has received one is not enough: before it hears a heartbeat it asks nobody in
-        particular, and asks again when it knows the ESC.
+        To have received a list is not enough: before it hears a heartbeat it asks nobody in particular, and asks again
+        once it knows the ESC.
         """
         until = time.monotonic() + timeout
         while True:
@@ -102,8 +102,8 @@ class MavProxy:
         return {name: float(value) for name, value in shown}
 
     def close(self) -> None:
-        """As a person leaves it, by the end of the input, once it has said all that it was asked."""
-        # What its threads still do while it unloads its modules they do with half of them, and some print a traceback.
+        """Quits it as a person does, by the end of the input, once it has answered everything."""
+        # While it unloads its modules its threads run with half of them, and some print a traceback.
         self.ask("param status", r"Have \d+/\d+ params")
         with self._news:
             assert "Traceback" not in self._printed, self._printed

@@ -1,4 +1,4 @@
-"""The lossy path does to packets what it says."""
+"""The lossy path treats packets as it says."""
 
 import contextlib
 import socket
@@ -10,7 +10,7 @@ PACKETS = 1000
 
 
 def pass_through(source: socket.socket, sink: socket.socket, numbers: range) -> list[int]:
-    """Sends numbered packets one after the other, and gives the numbers that arrive."""
+    """Sends numbered packets one after another, and returns the numbers that arrive."""
     arrived = []
 
     def collect() -> None:
@@ -29,7 +29,7 @@ def pass_through(source: socket.socket, sink: socket.socket, numbers: range) -> 
 
 
 def check(numbers: range, arrived: list[int]) -> None:
-    """A fifth, within four standard deviations of a draw of so many."""
+    """Asserts a fifth each, within four standard deviations of so many draws."""
     share = len(numbers) / 5
     tolerance = 4 * (len(numbers) * 0.2 * 0.8) ** 0.5
     lost = len(set(numbers) - set(arrived))
@@ -39,7 +39,7 @@ def check(numbers: range, arrived: list[int]) -> None:
     assert abs(doubled - left / 5) < tolerance, f"{doubled} doubled"
     first = list(dict.fromkeys(arrived))
     overtaken = sum(later < earlier for earlier, later in zip(first, first[1:]))
-    # One or several that wait leave together: of n each with a fifth, n times 0.8 · 0.2 turns.
+    # One or several that wait leave together: with a fifth of n delayed, 0.8 · 0.2 · n are overtaken.
     assert abs(overtaken - left * 0.16) < tolerance, f"{overtaken} overtaken"
 
 

@@ -1,7 +1,7 @@
 """MAVProxy with its default modules, as its command line starts it, but without windows.
 
-An unknown name is known from the list only: `param fetch` of one hears the ESC's PARAM_ERROR and says
-nothing. A refused value is sent three times, and then told with the value in force.
+That a name is unknown only shows in the list: `param fetch` of one hears the ESC's PARAM_ERROR and prints nothing. A
+refused value is sent three times, and then reported with the value in force.
 """
 
 import time
@@ -44,7 +44,7 @@ def test_an_unknown_name_and_a_refused_value_are_told(start, tmp_path):
 
 def test_a_peripheral_is_reached_as_component_140(peripheral_desk, tmp_path):
     with MavProxy(peripheral_desk, tmp_path / "station") as station:
-        # On a vehicle the system is the flight controller's.
+        # On a vehicle, the system is the flight controller's.
         station.say("set target_system 1")
         station.say("set target_component 140")
         values = station.listed()

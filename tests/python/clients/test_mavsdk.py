@@ -1,7 +1,6 @@
-"""MAVSDK, its Python wheel, by its blocking calls.
+"""MAVSDK, through its Python wheel's blocking calls.
 
-A component beside an autopilot can be selected, but this version of the wheel says that this failed
-when it has not.
+A component beside an autopilot can be selected, but this version of the wheel reports a failure when there was none.
 """
 
 import json
@@ -23,13 +22,13 @@ from esc import TIMEOUT_S
 
 @pytest.fixture(autouse=True)
 def home(tmp_path, monkeypatch):
-    """It keeps a cache in the user's folder."""
+    """Gives MAVSDK a home folder, in which it keeps a cache."""
     monkeypatch.setenv("HOME", str(tmp_path))
 
 
 @contextmanager
 def connect(desk: Desk):
-    """The ESC that it finds."""
+    """Yields the ESC that it finds."""
     station = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     try:
         station.add_any_connection_with_handle(desk.mavsdk)
@@ -81,7 +80,7 @@ def test_a_lossy_path_ends_with_the_full_list_and_the_set_value(lossy_desk):
         values = fetch(params)
         assert values == lossy_desk.params()
         for _ in range(5):
-            # Once in a hundred times all of its six tries are lost.
+            # Once in a hundred times, all six tries are lost.
             with suppress(ParamError):
                 params.set_param_float("CTL_RPM_MAX", 5432.5)
                 break
@@ -115,8 +114,8 @@ def test_ftp_has_what_describes_the_parameters(desk):
     assert set(described) == set(values)
     assert all(param["shortDesc"] for param in described.values())
     defaults = {name: param["default"] for name, param in described.items() if "default" in param}
-    # What follows from others has none.
+    # Derived parameters have none.
     assert set(values) - set(defaults) == {"MOT_KV"}
-    # Those of the factory.
+    # These are the factory's.
     values.update(dict.fromkeys(OF_BENCH, 0))
     assert defaults == pytest.approx({name: values[name] for name in defaults}, rel=1e-6)

@@ -1,9 +1,8 @@
-"""pymavlink, the wheel alone, as a person's script uses it.
+"""pymavlink, the wheel alone, as used by a person's script.
 
-Its `mavparm` sets, saves and loads, but has no list: a script asks for the list, and for what is
-missing by its index. `mavset` takes any PARAM_VALUE of the name for its answer, so that one which
-comes late from a list passes for it: over a lossy path a script looks again. A refused value passes
-likewise; the ESC's PARAM_ERROR tells why.
+Its `mavparm` sets, saves and loads, but does not list: a script requests the list, and what is missing by index.
+`mavset` takes any PARAM_VALUE with that name for its answer, so a late one from a list passes too: over a lossy path a
+script checks again. A refused value passes likewise; the ESC's PARAM_ERROR says why.
 """
 
 import time
@@ -18,7 +17,7 @@ from esc import TIMEOUT_S
 
 
 def connect(desk: Desk):
-    """A connection that knows its ESC."""
+    """Returns a connection that knows its ESC."""
     master = mavutil.mavlink_connection(desk.pymavlink, baud=desk.baud, dialect="ardupilotmega")
     until = time.monotonic() + TIMEOUT_S
     while time.monotonic() < until:
@@ -32,7 +31,7 @@ def connect(desk: Desk):
 
 
 def fetch(master, timeout: float = TIMEOUT_S) -> mavparm.MAVParmDict:
-    """The whole list, asked for again and then by index where a packet was lost."""
+    """Returns the whole list, requested again, and then by index, if a packet was lost."""
     values, count = {}, 0
     until = time.monotonic() + timeout
     master.param_fetch_all()
@@ -53,7 +52,7 @@ def fetch(master, timeout: float = TIMEOUT_S) -> mavparm.MAVParmDict:
 
 
 def download(master) -> mavftp.ParamData:
-    """The parameters and their defaults as one file, by MAVLink FTP."""
+    """Returns the parameters and their defaults, read as one file by MAVLink FTP."""
     files: list[bytes] = []
     ftp = mavftp.MAVFTP(master, master.target_system, master.target_component)
     ftp.cmd_get(["@PARAM/param.pck?withdefaults=1"], callback=lambda file: files.append(file.read()))
@@ -98,7 +97,7 @@ def test_an_unknown_name_and_a_refused_value_are_told(desk):
 
 def test_a_peripheral_answers_who_asks_nobody_in_particular(peripheral_desk):
     with closing(connect(peripheral_desk)) as master:
-        # It takes no target from the heartbeat of what has no autopilot.
+        # It takes no target from the heartbeat of a component without an autopilot.
         assert (master.target_system, master.target_component) == (0, 0)
         params = fetch(master)
         assert params == peripheral_desk.params()
@@ -134,7 +133,7 @@ def test_ftp_has_the_same_list_and_its_defaults(desk):
         assert params.mavset(master, "CTL_RPM_MAX", 5432.5)
         file = download(master)
     assert named(file.params) == {**defaults, "CTL_RPM_MAX": 5432.5}
-    # Those of the factory.
+    # These are the factory's.
     assert named(file.defaults) == {**defaults, **dict.fromkeys([*OF_BENCH, "MOT_KV"], 0)}
 
 

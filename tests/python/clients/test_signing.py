@@ -1,7 +1,7 @@
-"""Signed frames, by pymavlink's own signing.
+"""Signed frames, with pymavlink's own signing.
 
-A ground station gives the ESC a key with SETUP_SIGNING and signs with it from then on. What it sends is
-recorded, so that the same bytes can be sent again.
+A ground station gives the ESC a key by SETUP_SIGNING and signs with it from then on. What it sends is recorded, so
+that the same bytes can be sent again.
 """
 
 import time
@@ -21,7 +21,7 @@ TICKS_PER_S = 100_000
 
 
 class Station:
-    """pymavlink on a link of its own, which keeps what it has sent."""
+    """pymavlink on a link of its own, recording what it sends."""
 
     def __init__(self, desk: Desk):
         self.master = connect(desk)
@@ -35,13 +35,13 @@ class Station:
         self.master.write = keep
 
     def sign(self, key: bytes, **options) -> None:
-        """Signs from now on, and takes what is not signed too."""
+        """Signs from now on, and still accepts unsigned frames."""
         self.master.setup_signing(
             key, sign_outgoing=True, allow_unsigned_callback=lambda *_: True, **options
         )
 
     def give(self, key: bytes) -> None:
-        """Gives the ESC a key; it tells of that in words."""
+        """Gives the ESC a key, which it reports in a text."""
         timestamp = int((time.time() - 1_420_070_400) * TICKS_PER_S)
         self.master.mav.setup_signing_send(1, 1, list(key), timestamp)
         self.heard("STATUSTEXT", lambda m: m.text.startswith("Signing: "))
@@ -67,7 +67,7 @@ class Station:
 
 
 def now(desk: Desk) -> float:
-    """The value in the ESC, as anybody may read it."""
+    """Returns the value in the ESC, which anybody may read."""
     return desk.params()[NAME]
 
 
@@ -78,7 +78,7 @@ def desk(start, tmp_path):
 
 @pytest.fixture
 def station(desk):
-    """One that has given the ESC its key, and has set 5 Hz with it."""
+    """Yields one that has given the ESC its key, and has set 5 Hz with it."""
     with Station(desk) as station:
         station.give(KEY)
         station.sign(KEY)
@@ -137,7 +137,7 @@ def test_neither_the_key_nor_what_was_heard_is_forgotten_without_power(desk, sta
         again.sign(KEY)
         again.set(6.5)
         again.heard("PARAM_VALUE", lambda m: m.param_value == 6.5)
-        # Who has the key takes it away.
+        # Whoever has the key can take it away.
         again.give(bytes(32))
     with Station(desk) as anybody:
         anybody.set(7.5)
