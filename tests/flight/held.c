@@ -1,12 +1,12 @@
-/* A clock and a network for Betaflight's SITL, preloaded into it, which a test holds in its hand.
+/* A clock and a network for Betaflight's SITL, preloaded into it and controlled by a test.
  *
  * The program takes its time from a clock that runs only as far as the test grants, gets its state and its sticks
- * from the test, and gives it its motors' outputs: all through one connected stream socket, whose number stands in
- * HELD_LINK. None of its fixed ports is opened. What it does then depends on nothing but what the test sends.
+ * from the test, and returns its motors' outputs: all through one connected stream socket, whose number is in
+ * HELD_LINK. None of its fixed ports is opened. What it does then only depends on what the test sends.
  *
- * Its main thread computes; two others take a packet each and hand it over. They run in turn: the main thread waits
- * at the end of its grant, the packets are handed over, it goes on. Its fourth thread serves the command line on a
- * port of the system's choosing, on loopback, and has no part in a flight.
+ * Its main thread computes; two others each take a packet and hand it over. They run in turn: the main thread waits
+ * at the end of its grant, the packets are handed over, it continues. Its fourth thread serves the command line on
+ * a loopback port of the system's choosing, and has no part in a flight.
  */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
@@ -20,30 +20,30 @@
 #include <time.h>
 #include <unistd.h>
 
-/* As Betaflight has them. */
+/* As in Betaflight. */
 enum { MOTORS_PORT = 9001, STATE_PORT = 9003, STICKS_PORT = 9004, COMMAND_LINE_PORT = 5761 };
 enum { MOTORS_SIZE = 68, STATE_SIZE = 144, STICKS_SIZE = 40 };
 
-/* What a look at the clock takes: a loop that waits for a time ends, and tasks take some. */
+/* Time that reading the clock takes: a loop that waits for a time ends, and tasks take some. */
 enum { LOOK_NS = 100 };
 
-/* It starts by itself, without packets; then the test has it in its hand. */
+/* It starts by itself, without packets; then the test controls it. */
 enum { START_NS = 1000000000 };
 
-/* From the test: how far the clock may go, in ns, and what is handed over before. Ended by the end of the stream. */
+/* From the test: how far the clock may run, in ns, and what is handed over first. Ends with the stream. */
 struct grant {
     uint64_t until_ns;
     uint8_t state[STATE_SIZE], sticks[STICKS_SIZE];
 };
 
-/* To the test: where the clock stands, when the motors' outputs were last written, and those. */
+/* To the test: the clock, when the motors' outputs were last written, and those. */
 struct report {
     uint64_t now_ns, written_ns;
     uint8_t motors[MOTORS_SIZE];
     uint16_t command_line_port, reserved;
 };
 
-/* A packet that waits for its thread: empty, full, or taken, while the thread works on it. */
+/* A packet waiting for its thread: empty, full, or taken while the thread works on it. */
 struct box {
     int socket;
     enum { EMPTY, FULL, TAKEN } is;
@@ -85,7 +85,7 @@ static int is_main(void)
     return pthread_equal(pthread_self(), computes);
 }
 
-/* With the lock held. Returns once the thread has dealt with it. */
+/* Called with the lock held. Returns once the thread has dealt with the packet. */
 static void hand_over(struct box *box, const void *packet, size_t size)
 {
     box->packet = packet;
@@ -96,7 +96,7 @@ static void hand_over(struct box *box, const void *packet, size_t size)
         pthread_cond_wait(&changed, &lock);
 }
 
-/* At the end of what was granted. */
+/* Asks for the next grant at the end of the last one. */
 static void ask(void)
 {
     struct grant grant;
@@ -131,7 +131,7 @@ int nanosleep(const struct timespec *time, struct timespec *left)
     return 0;
 }
 
-/* Each thread comes to its first wait before the next one starts. */
+/* Each thread reaches its first wait before the next one starts. */
 int pthread_create(pthread_t *thread, const pthread_attr_t *how, void *(*run)(void *), void *argument)
 {
     pthread_mutex_lock(&lock);
@@ -147,7 +147,7 @@ static struct box *box_of(int socket)
     return socket == state.socket ? &state : socket == sticks.socket ? &sticks : NULL;
 }
 
-/* Of two threads only a packet ends the wait; the command line begins once the program has started. */
+/* For two threads only a packet ends the wait; the command line begins once the program has started. */
 int select(int count, fd_set *read, fd_set *write, fd_set *except, struct timeval *timeout)
 {
     struct box *box = read && count > 0 && FD_ISSET(count - 1, read) ? box_of(count - 1) : NULL;
@@ -216,7 +216,7 @@ int bind(int socket, const struct sockaddr *address, socklen_t length)
     return failed;
 }
 
-/* It waits for its threads only to end, and they wait for packets. */
+/* The program only waits for its threads when it ends, and they wait for packets. */
 int pthread_join(pthread_t thread, void **result)
 {
     (void)thread, (void)result;

@@ -124,8 +124,8 @@ impl Load {
     }
 }
 
-/// Figures for the PWM interrupt. Instructions are counted; cycles are estimated by [the
-/// model](crate::processor).
+/// Figures for the PWM interrupt. Instructions are counted; cycles are estimated by
+/// [the model](crate::processor).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Figures {
     /// How often it has run.

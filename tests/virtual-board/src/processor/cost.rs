@@ -1,5 +1,5 @@
-//! What code costs: an estimate of a Cortex-M4's cycles at 170 MHz, by [the processor's
-//! table](super#what-code-costs).
+//! What code costs: an estimate of a Cortex-M4's cycles at 170 MHz, by
+//! [the processor's table](super#what-code-costs).
 
 use std::ops::Range;
 
