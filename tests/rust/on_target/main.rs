@@ -50,8 +50,8 @@ impl Bounds {
     }
 }
 
-/// From power-up: armed, a tone, started, through its speeds; a sensor fails and the fault is cleared;
-/// caught, driven by torque and by voltage, stopped.
+/// From power-up: a tone, started, through its speeds; a sensor fails and the fault is cleared; caught,
+/// driven by torque and by voltage, stopped.
 const FLIGHT: [(f64, Act); 14] = [
     (0.2, Act::Zero),
     (0.2, Act::Tone(1000.0)),

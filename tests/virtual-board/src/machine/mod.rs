@@ -54,7 +54,7 @@ pub struct VirtualBoard {
 }
 
 impl VirtualBoard {
-    /// Creates a board with this image at power-up, on the bench of `start`; with a warning if what was
+    /// Creates a board with this image at power-up, with what `start` provides, and a warning if what was
     /// stored is damaged.
     ///
     /// The image knows no command line: parameters set over the stored ones are put into its flash first,

@@ -23,7 +23,8 @@ pub(super) struct Function {
     /// As in the source, and independent of the compiler's mangling.
     pub(super) name: String,
     pub(super) place: Range<u32>,
-    /// A linker veneer to a function too far away for a branch. Callers name that function itself.
+    /// Whether it is a linker veneer to a function too far away for a branch. Callers name that function
+    /// itself.
     pub(super) is_jump: bool,
 }
 

@@ -422,7 +422,7 @@ impl Converter {
     }
 }
 
-/// Sampling times in half clocks (RM0440, ADC_SMPR1).
+/// Returns a sampling time in half clocks (RM0440, ADC_SMPR1).
 fn halves(time: SampleTime) -> Cycles {
     match time {
         SampleTime::CYCLES2_5 => 5,

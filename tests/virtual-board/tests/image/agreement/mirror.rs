@@ -92,7 +92,7 @@ impl Mirror {
         self.outputs
     }
 
-    /// Returns the words of the control state.
+    /// Writes the words of the control state to `out`.
     pub(crate) fn words(&self, out: &mut Vec<u32>) {
         out.clear();
         self.state.trace(&self.config, &mut |word| out.push(word));
