@@ -21,20 +21,10 @@ pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoin
     }
 }
 
-/// Returns true if a set-point wants the motor to turn the way it does, or is being started.
-fn is_along(config: &Config, shared: &Shared, setpoint: &Setpoint) -> bool {
-    let present = if shared.reversed {
-        Rotation::Backward
-    } else {
-        Rotation::Forward
-    };
-    setpoint.rotation(config.both_ways) == present
-}
-
 /// While field-oriented control drives.
 #[inline(always)] // in the longest period
 fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
-    let along = is_along(config, shared, setpoint);
+    let along = shared.is_along(config, setpoint);
     match phase {
         Phase::Stopping if along => return Some(Why::Resumed),
         _ if along => return None,
@@ -102,7 +92,7 @@ fn start(config: &Config, state: &State, phase: Phase, setpoint: &Setpoint) -> O
             None
         }
     } else if phase == Phase::Brake
-        && is_along(config, shared, setpoint)
+        && shared.is_along(config, setpoint)
         && shared.seen.speed > config.slow
     {
         Some(Why::Resumed)

@@ -1,7 +1,7 @@
 //! State that every mode uses and none owns: protection, current offsets, faults, applied duties.
 
 use super::config::{Config, Direction};
-use super::io::{Sample, Setpoint};
+use super::io::{Rotation, Sample, Setpoint};
 use super::phase::Phase;
 use super::seen::Seen;
 use crate::control::delay::Delay;
@@ -138,6 +138,17 @@ impl Shared {
     #[inline(always)] // in each period
     pub(super) fn swapped(&self, config: &Config) -> bool {
         (config.direction == Direction::Reversed) != self.reversed
+    }
+
+    /// Returns true if a set-point wants the motor to turn the way it does, or is being started.
+    #[inline(never)] // three callers
+    pub(super) fn is_along(&self, config: &Config, setpoint: &Setpoint) -> bool {
+        let present = if self.reversed {
+            Rotation::Backward
+        } else {
+            Rotation::Forward
+        };
+        setpoint.rotation(config.both_ways) == present
     }
 
     /// Until something tells the shaft's speed, what is reported falls as slowly as a large propeller

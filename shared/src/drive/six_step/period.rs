@@ -38,19 +38,9 @@ pub(in crate::drive) fn mode_change(
     match phase {
         Phase::Stopping if !is_to_stop => Some(Why::Resumed),
         Phase::Run if is_to_stop => Some(Why::Released),
-        Phase::Park | Phase::Ramp if !is_along(config, shared, setpoint) => Some(Why::Released),
+        Phase::Park | Phase::Ramp if !shared.is_along(config, setpoint) => Some(Why::Released),
         _ => None,
     }
-}
-
-/// Returns true if the set-point wants the motor to turn the way in which it is being started.
-fn is_along(config: &config::Config, shared: &Shared, setpoint: &Setpoint) -> bool {
-    let present = if shared.reversed {
-        Rotation::Backward
-    } else {
-        Rotation::Forward
-    };
-    setpoint.rotation(config.both_ways) == present
 }
 
 /// Returns true if a shaft turns too fast to be parked: it is left to slow down first.
@@ -60,7 +50,7 @@ pub(in crate::drive) fn is_too_fast(
     shared: &Shared,
     (position, setpoint): (Position, &Setpoint),
 ) -> bool {
-    let may_be_caught = position.is_some() && is_along(config, shared, setpoint);
+    let may_be_caught = position.is_some() && shared.is_along(config, setpoint);
     shared.seen.speed > six_step.run_speed && !may_be_caught
 }
 
