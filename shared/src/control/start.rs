@@ -120,10 +120,11 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
         .yielded
         .plus((state.yielding * periods as i32).over_period());
     let omega_s = state.omega_s;
+    let omega = omega_s.plus(state.yielding);
     let h_d = config
         .resistance
         .saturating_apply(i.d)
-        .minus(config.reactance.saturating_apply(omega_s.top(i.q)))
+        .minus(config.reactance.saturating_apply(omega.top(i.q)))
         .minus(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
     let rotor = config.xi_nominal.top(h_d);
@@ -243,6 +244,31 @@ mod tests {
         assert!(settle(0.001, 0.00025).abs() < 1e-3);
         assert!((settle(1.0, 0.0) + 0.0625).abs() < 1e-3);
         assert!((settle(-1.0, 0.0) - 0.0625).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_frame_that_yields_is_no_swing_of_the_rotor() {
+        let config = config();
+        let (omega_s, yielding) = (0.001, 0.0005);
+        let mut state = State {
+            omega_s: Speed::from_num(omega_s),
+            yielding: Speed::from_num(yielding),
+            ..State::default()
+        };
+        // The rotor turns as fast as the current's vector without its yielding. R·i_d is none.
+        let i = Dq {
+            d: Current::ZERO,
+            q: Current::from_num(0.5),
+        };
+        let u = Dq {
+            d: Voltage::from_num(-2.0 * 0.5 * (omega_s + yielding) - 4.0 * omega_s),
+            q: Voltage::ZERO,
+        };
+        damp(&config, &mut state, (i, u), 2);
+        // Back by a fiftieth of what it has yielded in the two periods.
+        let back = 0.02 * 2.0 * yielding;
+        let error = state.yielding.to_num::<f64>() + back;
+        assert!(error.abs() < 1e-7, "{state:?}");
     }
 
     #[test]
