@@ -49,6 +49,10 @@ pub struct Charge {
 /// Attempts of a start.
 pub const ATTEMPTS: usize = 4;
 
+/// Quick attempts ahead of them of a motor that has turned in this flight: something holds it, or has, and when it is let
+/// go it is to turn again soon.
+pub const QUICK_ATTEMPTS: u8 = 32;
+
 /// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
@@ -76,8 +80,8 @@ pub struct Config {
     pub adapt_l: Option<inductance::Config>,
     /// Currents and bounds for the observer at low speed.
     pub low_speed: low_speed::Config,
-    /// The attempts of a start, in order.
-    pub start: [start::Config; ATTEMPTS],
+    /// The quick attempt, and those of a start in order.
+    pub start: [start::Config; 1 + ATTEMPTS],
     /// Greatest current of a test of the motor.
     pub test_current: Current,
     /// Speed below which the observer no longer leads.

@@ -45,6 +45,8 @@ traced! {
         pub(super) last: (Fault, Phase),
         /// Periods after which a fault ends for the next retry; 0 if there is none.
         pub(super) retry_periods: u32,
+        /// Quick attempts that are left.
+        pub(super) quick_attempts: u8,
         /// Periods since the last sample that was a fault, for which it has been on its way to its end.
         clear_periods: u32,
     }
@@ -94,6 +96,7 @@ impl Shared {
                 count: 0,
                 last: (Fault::OverCurrent, Phase::Idle),
                 retry_periods: 0,
+                quick_attempts: 0,
                 clear_periods: 0,
             },
             reversed: false,
@@ -176,12 +179,18 @@ impl Latch {
         !known || phase != Phase::Idle
     }
 
+    /// Nothing is tried again of a flight that has ended.
+    pub(super) fn forget_flight(&mut self) {
+        self.retry_periods = 0;
+        self.quick_attempts = 0;
+    }
+
     /// A fault ends when zero throttle has stood for a while without its cause: the tasks have seen it
     /// by then, and a grazed limit does not come and go. Under open throttle it ends for a retry, if one is left:
     /// the first comes after a pause, each further one after a longer one.
     pub(super) fn clear(&mut self, config: &Config, setpoint: &Setpoint) {
         if matches!(setpoint, Setpoint::Stop | Setpoint::Zero) {
-            self.retry_periods = 0;
+            self.forget_flight();
         }
         let periods = if *setpoint == Setpoint::Zero {
             config.clear_periods

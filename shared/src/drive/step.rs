@@ -107,7 +107,7 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
             let nothing = !state.tone.shorted_before && state.shared.latch.faults.is_empty();
             if nothing {
                 state.shared.failed_starts = 0;
-                state.shared.latch.retry_periods = 0;
+                state.shared.latch.forget_flight();
             }
             nothing
         }

@@ -4,7 +4,7 @@ use super::state::State;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, rotate_frame};
 use crate::control::{PERIODS, observer, start};
-use crate::drive::config::{ATTEMPTS, Config};
+use crate::drive::config::{ATTEMPTS, Config, QUICK_ATTEMPTS};
 use crate::drive::io::Setpoint;
 use crate::drive::phase::Phase;
 use crate::drive::schedule::{CYCLE, DAMP_PERIODS};
@@ -16,7 +16,12 @@ use crate::units::{Angle, Current};
 
 /// The coefficients of the attempt that is being made.
 fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
-    &config.start[usize::from(shared.failed_starts).min(ATTEMPTS - 1)]
+    let n = if shared.latch.quick_attempts > 0 {
+        0
+    } else {
+        usize::from(shared.failed_starts) + 1
+    };
+    &config.start[n.min(ATTEMPTS)]
 }
 
 /// The rotor's swing; once, at the end of Park, where the rotor is.
@@ -108,6 +113,10 @@ pub(in crate::drive) fn rotor(
             if progress.run_periods >= config.proven_periods {
                 shared.failed_starts = 0;
                 shared.latch.retry_periods = config.retry_periods;
+                // With sensors an attempt is not quick.
+                if config.slow_periods == 0 {
+                    shared.latch.quick_attempts = QUICK_ATTEMPTS;
+                }
             }
             None
         }
@@ -118,6 +127,13 @@ pub(in crate::drive) fn rotor(
 /// A start has failed, or the motor has become too slow: the next attempt, if there is one.
 #[cold]
 fn failed(shared: &mut Shared) -> Why {
+    let quick = &mut shared.latch.quick_attempts;
+    if *quick > 0 {
+        *quick -= 1;
+        // Told once. What more current has not turned the first attempt of a start need not try.
+        shared.failed_starts = 1;
+        return Why::Failed;
+    }
     shared.failed_starts += 1;
     if usize::from(shared.failed_starts) >= ATTEMPTS {
         Why::Tripped(Fault::Stuck)

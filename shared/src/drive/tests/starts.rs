@@ -3,6 +3,7 @@
 use super::*;
 use crate::control::observer::sector::Sector;
 use crate::control::transform::clarke_in;
+use crate::drive::config::QUICK_ATTEMPTS;
 use crate::drive::foc::any::any;
 use crate::drive::foc::begin::READY_PERIODS;
 use crate::drive::foc::current_loop::Drive;
@@ -78,7 +79,8 @@ fn a_start_that_fails_is_tried_again_with_more_current_and_ends_as_stuck() {
             assert_ne!(phase, Phase::Run, "{observer}: nothing has turned");
             if phase == Phase::Ramp && before != phase {
                 ramps += 1;
-                let attempt = &bench.config.start[usize::from(bench.state.shared.failed_starts)];
+                let attempt =
+                    &bench.config.start[1 + usize::from(bench.state.shared.failed_starts)];
                 currents.push(scale.amperes(attempt.current));
             }
             before = phase;
@@ -96,6 +98,42 @@ fn a_start_that_fails_is_tried_again_with_more_current_and_ends_as_stuck() {
         bench.quiet(bench.periods(0.32), Setpoint::Zero);
         assert!(bench.faults().is_empty());
         assert_eq!(bench.state.shared.failed_starts, 0);
+    }
+}
+
+#[test]
+fn a_motor_that_has_turned_in_this_flight_is_first_tried_by_quick_attempts() {
+    let mut bench = Bench::new(&[]);
+    let turn = bench.turn();
+    bench.state.shared.latch.quick_attempts = QUICK_ATTEMPTS;
+    let mut lengths = Vec::new();
+    let mut parked = 0;
+    while bench.faults().is_empty() {
+        bench.quiet(1, turn);
+        match bench.phase() {
+            Phase::Park => parked += 1,
+            Phase::Ramp if parked > 0 => lengths.push(core::mem::take(&mut parked)),
+            _ => {}
+        }
+    }
+    assert!(bench.faults().contains(Fault::Stuck));
+    // Four times the current: swings of half the length. The first attempt of a start is left out.
+    let quick = usize::from(QUICK_ATTEMPTS);
+    assert_eq!(lengths.len(), quick + ATTEMPTS - 1);
+    let seconds = |n: usize| lengths[n] as f32 * bench.config.scale.period_s;
+    for n in [0, quick - 1] {
+        assert!((seconds(n) - 0.106).abs() < 1e-3, "{}", seconds(n));
+    }
+    assert!((seconds(quick) - 0.550).abs() < 1e-3, "{}", seconds(quick));
+}
+
+#[test]
+fn zero_throttle_ends_the_quick_attempts() {
+    for stopped in [Setpoint::Zero, Setpoint::Stop] {
+        let mut bench = Bench::new(&[]);
+        bench.state.shared.latch.quick_attempts = QUICK_ATTEMPTS;
+        bench.quiet(2, stopped);
+        assert_eq!(bench.state.shared.latch.quick_attempts, 0);
     }
 }
 

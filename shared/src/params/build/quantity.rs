@@ -142,7 +142,7 @@ quantities! {
     }
     // Of the start.
     own {
-        AttemptA, AttemptJ, TorqueNm, PossibleRadS2, RampRadS2, SwingRadS, SwingTurns, SwingAs,
+        AttemptA, AttemptJ, Haste, TorqueNm, PossibleRadS2, RampRadS2, SwingRadS, SwingTurns, SwingAs,
         ParkCharge, HalfCharge,
     }
     // Of the other observers.

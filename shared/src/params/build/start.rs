@@ -22,11 +22,15 @@ const YIELD_RATE_MAX: f32 = 0.5;
 /// Share of its current's torque that the ramp uses; the rest is for the load and a swinging rotor.
 const TORQUE_SHARE: f32 = 0.3;
 
-/// Current of an attempt over the previous one's.
-const CURRENT_GROWTH: f32 = 1.5;
-
-/// Inertia that each attempt assumes over the stated one.
-const INERTIA: [f32; ATTEMPTS] = [1.0, 10.0, 20.0, 40.0];
+/// The quick attempt, then those of a start: current over `STA_RAMP_A`, half more each time; the inertia that the attempt
+/// assumes over the stated one; and how much shorter Park and steeper Ramp are than stated, where the rotor follows.
+const COURSES: [[f32; 3]; 1 + ATTEMPTS] = [
+    [4.0, 1.0, 6.0],
+    [1.0, 1.0, 1.0],
+    [1.5, 10.0, 1.0],
+    [2.25, 20.0, 1.0],
+    [3.375, 40.0, 1.0],
+];
 
 /// Least length of Park in periods of the rotor's swing: the first half sweeps, and in the second a swing damped by ζ =
 /// 0.5 decays to 3 %.
@@ -37,13 +41,12 @@ const ASTRAY_SWINGS: f32 = 1.0;
 
 /// Fills in the attempts of a start (section 3.2 of the second paper): each has more current, up to `LIM_PHASE_A`, and
 /// is slower than the one before.
-pub(super) fn attempts(p: &Si, places: &mut [start::Config; ATTEMPTS]) {
-    let mut current_a = p.of(Quantity::RampA);
-    for (place, inertia) in places.iter_mut().zip(INERTIA) {
-        p.set(Quantity::AttemptA, current_a);
+pub(super) fn attempts(p: &Si, places: &mut [start::Config; 1 + ATTEMPTS]) {
+    for (place, [current, inertia, haste]) in places.iter_mut().zip(&COURSES) {
+        p.set(Quantity::AttemptA, current * p.of(Quantity::RampA));
         p.set(Quantity::AttemptJ, inertia * p.of(Quantity::J));
+        p.set(Quantity::Haste, *haste);
         attempt(p, place);
-        current_a *= CURRENT_GROWTH;
     }
 }
 
@@ -53,7 +56,7 @@ fn attempt(p: &Si, place: &mut start::Config) {
         // Greatest acceleration from the current, in electrical rad/s²: p·1.5·p·φ·I/J.
         TorqueNm([1.5] * PolePairs * Flux * AttemptA),
         PossibleRadS2([TORQUE_SHARE] * PolePairs * TorqueNm / AttemptJ),
-        RampRadS2(RampRpmS * PolePairs * Tau / [60.0] min PossibleRadS2),
+        RampRadS2(Haste * RampRpmS * PolePairs * Tau / [60.0] min PossibleRadS2),
     });
     // About the current vector the rotor is a pendulum of ω_n² = 1.5·p²·φ·I/J; yielding by 2ζ/ω_n per unit of speed
     // damps it by ζ.
@@ -64,7 +67,7 @@ fn attempt(p: &Si, place: &mut start::Config) {
         gain yielding(MotJGcm2, [2.0 * SWING_DAMPING] / SwingRadS / T),
         gain yield_rate(MotJGcm2, [YIELD_RATE_SHARE] * SwingRadS * T min [YIELD_RATE_MAX]),
         define SwingAs([PARK_SWINGS * TAU] / SwingRadS * AttemptA),
-        define ParkCharge(ParkAs max SwingAs / UnitAs),
+        define ParkCharge(ParkAs / Haste max SwingAs / UnitAs),
         charge park_charge(ParkCharge),
         define HalfCharge([0.5] * ParkCharge),
         // A third of a turn, from one phase's axis to the next, in the first half.
@@ -128,7 +131,7 @@ mod tests {
         let courses = courses(&[]);
         let inertia = [1.0, 10.0, 20.0, 40.0];
         let current = [4.0, 6.0, 9.0, 13.5];
-        for (n, [amperes, rpm_s, park_s]) in courses.into_iter().enumerate() {
+        for (n, [amperes, rpm_s, park_s]) in courses.into_iter().skip(1).enumerate() {
             assert!((amperes - current[n]).abs() < 1e-3, "{n}: {amperes}");
             // The stated 800 rpm/s, or three tenths of what the current can do.
             let most = possible(current[n], inertia[n]);
@@ -146,10 +149,21 @@ mod tests {
     }
 
     #[test]
+    fn the_quick_attempt_has_four_times_the_current_and_the_stated_ramp() {
+        let [quick, ..] = courses(&[])[..] else {
+            panic!("no attempts")
+        };
+        let swing_s = TAU / square_root(possible(16.0, 1.0));
+        for (got, wanted) in quick.into_iter().zip([16.0, 4800.0, 3.0 * swing_s]) {
+            assert!((got / wanted - 1.0).abs() < 0.01, "{quick:?}");
+        }
+    }
+
+    #[test]
     fn no_attempt_has_more_than_the_bound_of_the_phase_current() {
         let courses = courses(&[(ParamId::LimPhaseA, 7.0)]);
         let currents: std::vec::Vec<f32> = courses.iter().map(|course| course[0]).collect();
-        for (got, wanted) in currents.iter().zip([4.0, 6.0, 7.0, 7.0]) {
+        for (got, wanted) in currents.iter().zip([7.0, 4.0, 6.0, 7.0, 7.0]) {
             assert!((got - wanted).abs() < 1e-3, "{currents:?}");
         }
     }
@@ -157,6 +171,8 @@ mod tests {
     #[test]
     fn park_is_as_long_as_is_stated_where_the_swing_is_shorter() {
         let courses = courses(&[(ParamId::MotJGcm2, 10.0), (ParamId::StaParkAs, 2.0)]);
-        assert!((courses[0][2] - 0.5).abs() < 1e-3, "{courses:?}");
+        // The quick attempt takes a sixth of the charge, with four times the current.
+        assert!((courses[0][2] - 0.0208).abs() < 1e-3, "{courses:?}");
+        assert!((courses[1][2] - 0.5).abs() < 1e-3, "{courses:?}");
     }
 }
