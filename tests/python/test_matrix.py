@@ -26,9 +26,10 @@ OPEN = {
     **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
-    # others' currents up to 2.6 A above 1.2 times the limit in a start, and 1 A in braking. With half of that torque
+    # others' currents up to 2.8 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
     # it is met, and thrust comes later.
-    **cells([FOC], ["high_open", "low_open"], ["start", "braking"], "current"),
+    **cells([FOC], ["high_open", "low_open"], ["start"], "current"),
+    **cells([FOC], ["high_open"], ["braking"], "current"),
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # Nor does the six-step drive report a high side that never turns on at full speed, where it carries on with it.
     **cells([SIX], ["high_open"], ["full"], "cause", "time"),
@@ -38,12 +39,11 @@ OPEN = {
     **cells([SIX], ["sensor_zero"], ["start"], "current"),
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
     **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
-    # After a rotor jams at speed, starts are retried, each longer than the previous one: 1.5 s after it was freed one
-    # is still under way. A jam in the six-step drive's start is not retried. A rotor is known to be lost from its flux
-    # after 0.1 s, if no current trips.
-    **cells([FOC], ["rotor_blocked"], ["full"], "reaction"),
+    # After a rotor jams at speed, the six-step drive retries starts, each longer than the previous one: 1.5 s after it
+    # was freed one is still under way. A jam in its start is not retried. The field-oriented drive finds the rotor lost
+    # from its flux after 0.1 s, if no current trips.
     **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
-    **cells([FOC], ["rotor_blocked"], ["half"], "current", "reaction", "time"),
+    **cells([FOC], ["rotor_blocked"], ["half"], "current", "time"),
     **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
@@ -53,10 +53,11 @@ OPEN = {
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
-    # 10 A into 470 µF is 0.9 V per period: braking backs off ahead of the limit, and what the inductances hold still
-    # takes the supply a tenth of a volt beyond it.
-    **cells([FOC, SIX], ["disconnect"], ["braking"], "supply"),
-    # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
+    # 10 A on 470 µF are 0.9 V a period: braking backs off ahead of the limit and ends a tenth of a volt below it. But the
+    # currents are not yet where they are to be, with a supply that rises by 6 V in a millisecond, and what they return
+    # meanwhile takes it a tenth of a volt beyond.
+    **cells([FOC], ["disconnect"], ["braking"], "supply"),
+    # The six-step drive shoots a short through the winding in its start, and has the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }
 

@@ -12,9 +12,9 @@ use crate::math::{Gain, Held, Multiplier, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Current, Voltage};
 
-/// Periods by which the supply voltage is extrapolated while braking: eight for the filter's lag, the rest until
-/// the bound is updated and the current has followed.
-const AHEAD_PERIODS: i32 = 32;
+/// Periods by which the supply voltage is extrapolated while braking: 8 for the filter's lag, 16 until a bound is updated
+/// again, and 24 for the current to follow, three time constants of a current loop with a 48th of the PWM's frequency.
+const AHEAD_PERIODS: i32 = 48;
 
 /// Consecutive samples above the trip level that count as over-current; a single disturbed reading does not.
 const OVER_CURRENT_SAMPLES: u8 = 2;
