@@ -293,6 +293,9 @@ impl Surroundings {
         if now.blocked != before.blocked {
             self.plant.block(now.blocked);
         }
+        if now.motor_drift != before.motor_drift {
+            self.plant.drift(now.motor_drift.map(|share| 1.0 + share));
+        }
         self.plant.kick(now.kicked_rad_s - before.kicked_rad_s);
         let struck = [now.torque_nm, now.wind_rad_s];
         if struck != self.struck {

@@ -6,7 +6,10 @@ const element = (id) => document.getElementById(id);
 const FAULTS = {
   phase_open: ["phase wire open", true], mosfet_open: ["switch never turns on", true, true],
   mosfet_short: ["switch always on", true, true], sensor_stuck: ["current sensor stuck", true, false, "A", 5],
-  offset_drift: ["current sensor drifts", true, false, "A", 3], noise: ["noise on currents", false, false, "A rms", 1],
+  offset_drift: ["current sensor drifts", true, false, "A", 3],
+  resistance_drift: ["resistance grows", false, false, "share", 0.4],
+  flux_drift: ["flux grows", false, false, "share", -0.08],
+  noise: ["noise on currents", false, false, "A rms", 1],
   hall_stuck: ["Hall sensor stuck", true, false, "level", 1], rotor_blocked: ["rotor blocked"],
   rotor_kick: ["rotor kicked", false, false, "rpm", 500], gust: ["gust", false, false, "rpm", 1000],
   strike: ["torque on the shaft", false, false, "Nm", 0.2], bus_sag: ["supply sags", false, false, "V", 5],

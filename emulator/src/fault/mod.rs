@@ -29,6 +29,10 @@ pub enum Kind {
     SensorStuck(usize, f64),
     /// A current sensor's zero moves by this, A: linearly over the fault's time, and stays.
     OffsetDrift(usize, f64),
+    /// The motor's resistance grows by this share of the bench's: linearly over the fault's time, and stays.
+    ResistanceDrift(f64),
+    /// The same of its flux.
+    FluxDrift(f64),
     /// Extra noise on all currents, A rms.
     Noise(f64),
     /// A Hall sensor reads this level.
@@ -126,7 +130,13 @@ impl Fault {
 
     /// Returns true if its effect changes from period to period.
     fn moves(&self, t_s: f64) -> bool {
-        let grows = matches!(self.kind, Kind::OffsetDrift(..) | Kind::RotorKick(_));
+        let grows = matches!(
+            self.kind,
+            Kind::OffsetDrift(..)
+                | Kind::ResistanceDrift(_)
+                | Kind::FluxDrift(_)
+                | Kind::RotorKick(_)
+        );
         // The chip resets and comes back as the bus falls and rises, which continues after the
         // fault.
         let follows = self.kind.weakens_bus() && self.has_begun(t_s);

@@ -13,6 +13,8 @@ pub struct InForce {
     pub stuck_a: [Option<f64>; 3],
     /// How far the current sensors' zeros have moved, A.
     pub drift_a: [f64; 3],
+    /// By which shares of the bench's the motor's resistance and flux have grown.
+    pub motor_drift: [f64; 2],
     /// Extra noise on the currents, A rms.
     pub noise_a: f64,
     /// What stuck Hall sensors read.
@@ -95,6 +97,7 @@ impl Timeline {
         }
         // These end with their fault.
         self.past.drift_a = [0.0; 3];
+        self.past.motor_drift = [0.0; 2];
         self.past.held = false;
     }
 
@@ -138,6 +141,8 @@ impl InForce {
         self.bus_weakened |= fault.kind.weakens_bus();
         match fault.kind {
             Kind::OffsetDrift(phase, amps) => self.drift_a[phase] += amps * fault.share(t_s),
+            Kind::ResistanceDrift(share) => self.motor_drift[0] += share * fault.share(t_s),
+            Kind::FluxDrift(share) => self.motor_drift[1] += share * fault.share(t_s),
             Kind::RotorKick(rad_s) => self.kicked_rad_s += rad_s * fault.share(t_s),
             Kind::Reset => {
                 self.resets += 1;
@@ -166,7 +171,11 @@ impl InForce {
             Kind::BitErrors(rate) => self.wire.bit_error_rate = rate,
             Kind::Jitter(ns) => self.wire.jitter_ns = ns,
             Kind::FlashFail => self.flash_fails = true,
-            Kind::OffsetDrift(..) | Kind::RotorKick(_) | Kind::Reset => {}
+            Kind::OffsetDrift(..)
+            | Kind::ResistanceDrift(_)
+            | Kind::FluxDrift(_)
+            | Kind::RotorKick(_)
+            | Kind::Reset => {}
         }
     }
 }
@@ -206,8 +215,12 @@ mod tests {
             fault(1.0, Some(2.0), Kind::OffsetDrift(1, 4.0)),
             fault(1.0, None, Kind::OffsetDrift(0, -1.0)),
             fault(2.0, None, Kind::RotorKick(50.0)),
+            fault(1.0, Some(4.0), Kind::ResistanceDrift(0.4)),
+            fault(1.0, None, Kind::FluxDrift(-0.08)),
         ]);
         assert_eq!(timeline.at(0.5), InForce::default());
+        assert_eq!(timeline.at(3.0).motor_drift, [0.2, -0.08]);
+        assert_eq!(timeline.at(9.0).motor_drift, [0.4, -0.08]);
         assert_eq!(timeline.at(1.5).drift_a, [-1.0, 1.0, 0.0]);
         assert_eq!(timeline.at(9.0).drift_a, [-1.0, 4.0, 0.0]);
         assert_eq!(timeline.at(1.9).kicked_rad_s, 0.0);

@@ -106,6 +106,16 @@ impl Plant {
         self.stage.machine.resistance_ohm()
     }
 
+    /// Flux linkage of a phase now, peak Wb.
+    pub fn flux_wb(&self) -> f64 {
+        self.stage.machine.flux_wb()
+    }
+
+    /// Lets resistance and flux be so many times those of the start, whatever else heat does to the winding.
+    pub fn drift(&mut self, factors: [f64; 2]) {
+        self.stage.machine.drift(factors);
+    }
+
     /// Returns the winding's temperature, °C, if simulated.
     pub fn winding_c(&self) -> Option<f64> {
         self.stage.machine.winding_c()

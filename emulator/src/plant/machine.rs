@@ -37,6 +37,10 @@ pub struct Flow {
 #[derive(Clone, Debug)]
 pub(super) struct Machine {
     motor: Motor,
+    /// What its resistance and flux have been multiplied with.
+    drifted: [f64; 2],
+    /// The circuit is another from the next period on.
+    changes: bool,
     load: Load,
     inertia_kgm2: f64,
     /// Speed at which the shaft is held while nothing blocks it, rad/s.
@@ -68,6 +72,8 @@ impl Machine {
         let (sin, cos) = libm::sincos(TAU * angle_turns);
         Self {
             motor,
+            drifted: [1.0; 2],
+            changes: false,
             load,
             inertia_kgm2: motor.inertia_kgm2 + load.inertia_kgm2,
             imposed_rad_s: None,
@@ -114,6 +120,26 @@ impl Machine {
     /// Returns the present phase resistance, Ω.
     pub(super) fn resistance_ohm(&self) -> f64 {
         self.motor.resistance_ohm
+    }
+
+    /// Flux linkage of a phase now, peak Wb.
+    pub(super) fn flux_wb(&self) -> f64 {
+        self.motor.flux_wb
+    }
+
+    /// Lets resistance and flux be so many times those of the start, whatever else heat does to the winding.
+    pub(super) fn drift(&mut self, factors: [f64; 2]) {
+        let before = std::mem::replace(&mut self.drifted, factors);
+        let [resistance, flux] = [0, 1].map(|which| factors[which] / before[which]);
+        self.motor.resistance_ohm *= resistance;
+        self.motor.flux_wb *= flux;
+        if let Some(warming) = &mut self.warming {
+            warming.scale(resistance);
+        }
+        if let Some(magnetics) = &mut self.magnetics {
+            magnetics.scale(flux);
+        }
+        self.changes = true;
     }
 
     /// Returns the winding's temperature, °C, if simulated.
@@ -222,7 +248,7 @@ impl Machine {
     #[inline(always)]
     pub(super) fn begin(&mut self, period_s: f64) {
         let omega = settle(self.middle_rad_s(period_s)) * f64::from(self.motor.pole_pairs);
-        if self.warming.is_some() {
+        if std::mem::take(&mut self.changes) || self.warming.is_some() {
             self.circuit = Circuit::new(&self.motor);
         }
         self.circuit.turn_at(omega, 0.5 * period_s);

@@ -72,6 +72,14 @@ impl Magnetics {
         })
     }
 
+    /// Multiplies the magnets' flux.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.flux_wb *= factor;
+        self.waves
+            .iter_mut()
+            .for_each(|wave| wave.flux_wb *= factor);
+    }
+
     /// See [`Self::order`].
     pub(super) fn order(&self) -> f64 {
         self.order

@@ -117,6 +117,11 @@ impl Warming {
         self.ambient_k = ambient_k;
     }
 
+    /// Multiplies its resistance.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.cold_ohm *= factor;
+    }
+
     /// Heats the winding for a time short against its time constant; returns its resistance then, Ω.
     pub(super) fn advance(&mut self, time_s: f64, copper_w: f64) -> f64 {
         let heat_w = copper_w - self.excess_k / self.winding.resistance_k_per_w;

@@ -11,6 +11,10 @@ use crate::fault::{CHIP_V, Fault, Kind, Side};
 /// The wrong key, and what it needs.
 type Problem = (&'static str, String);
 
+/// Shares by which a motor's resistance and flux may grow. Two that add up leave a tenth still.
+const DRIFT_MIN: f64 = -0.45;
+const DRIFT_MAX: f64 = 5.0;
+
 /// An entry of the time line.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +40,8 @@ enum Name {
     MosfetShort,
     SensorStuck,
     OffsetDrift,
+    ResistanceDrift,
+    FluxDrift,
     Noise,
     HallStuck,
     BusSag,
@@ -94,6 +100,10 @@ impl FaultTable {
             Name::MosfetShort => Kind::MosfetShort(self.phase()?, self.side()?),
             Name::SensorStuck => Kind::SensorStuck(self.phase()?, self.value("A", -1e3, 1e3)?),
             Name::OffsetDrift => Kind::OffsetDrift(self.phase()?, self.value("A", -1e3, 1e3)?),
+            Name::ResistanceDrift => {
+                Kind::ResistanceDrift(self.value("a share", DRIFT_MIN, DRIFT_MAX)?)
+            }
+            Name::FluxDrift => Kind::FluxDrift(self.value("a share", DRIFT_MIN, DRIFT_MAX)?),
             Name::Noise => Kind::Noise(self.value("A rms", 0.0, 1e3)?),
             Name::HallStuck => Kind::HallStuck(self.phase()?, self.level()?),
             Name::BusSag => Kind::BusSag(self.value("V", -70.0, 70.0)?),

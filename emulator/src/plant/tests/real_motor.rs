@@ -301,3 +301,51 @@ proptest! {
         prop_assert!(balance.abs() < 4e-5 * gross, "{balance} of {gross}");
     }
 }
+
+#[test]
+fn a_motor_that_has_drifted_is_one_of_that_resistance_and_flux() {
+    let real = Extras {
+        harmonics: vec![Harmonic {
+            order: 5,
+            share: 0.05,
+            phase_rad: 0.3,
+        }],
+        saliency: 1.3,
+        winding: Some(Winding {
+            resistance_k_per_w: 5.0,
+            capacity_j_per_k: 10.0,
+        }),
+        ..Extras::default()
+    };
+    for extras in [Extras::default(), real] {
+        let of = |motor| {
+            let mut plant = Plant::new(Fidelity::Averaged, motor, Load::default(), 0.0, 0.1);
+            plant.fit(&extras);
+            plant.impose(3000.0 * TAU / 60.0);
+            plant
+        };
+        let mut drifted = of(*MOTOR);
+        drifted.drift([2.0, 0.9]);
+        drifted.drift([1.4, 0.92]);
+        let mut wanted = of(Motor {
+            resistance_ohm: 1.4 * MOTOR.resistance_ohm,
+            flux_wb: 0.92 * MOTOR.flux_wb,
+            ..*MOTOR
+        });
+        for _ in 0..2000 {
+            let bridge = field_oriented(&drifted, 5.0, 24.0);
+            let [flow, of] = [&mut drifted, &mut wanted]
+                .map(|plant| plant.period([bridge; 2], 24.0, PERIOD_S, DEAD_TIME_S));
+            assert!(
+                (flow.torque_nm - of.torque_nm).abs() < 1e-9,
+                "{flow:?} {of:?}"
+            );
+            assert!(
+                (flow.copper_w - of.copper_w).abs() < 1e-6,
+                "{flow:?} {of:?}"
+            );
+        }
+        assert!((drifted.resistance_ohm() / wanted.resistance_ohm() - 1.0).abs() < 1e-9);
+        assert!((drifted.flux_wb() / wanted.flux_wb() - 1.0).abs() < 1e-9);
+    }
+}
