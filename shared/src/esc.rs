@@ -7,7 +7,9 @@ use heapless::Vec;
 
 use crate::answer::info::info;
 use crate::check::Check;
-use crate::drive::{Config, Phase, Setpoint, Snapshot, Witness, put_default};
+#[cfg(feature = "drift")]
+use crate::drive::Tracker;
+use crate::drive::{Config, Drift, Phase, Setpoint, Snapshot, Witness, put_default};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
@@ -15,8 +17,7 @@ use crate::math::{Real, magnitude};
 use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
 use crate::params::{
-    Board, BuildError, ParamId, Params, TRIP_SHARE, build, build_in, scale, thresholds,
-    unbalance_max,
+    Board, BuildError, ParamId, Params, TRIP_SHARE, build_in, scale, thresholds, unbalance_max,
 };
 use crate::record::Record;
 use crate::statistics::{Recorder, Sight};
@@ -28,6 +29,8 @@ use storage::{Asker, Storage, Unstored};
 use tunes::Tunes;
 
 mod check;
+#[cfg(feature = "drift")]
+mod drift;
 #[cfg(feature = "group")]
 mod group;
 mod identify;
@@ -70,6 +73,9 @@ pub struct Esc {
     scale: Scale,
     charge: Charge,
     witness: Witness,
+    /// Follows the motor's resistance and flux.
+    #[cfg(feature = "drift")]
+    tracker: Tracker,
     recorder: Recorder,
     /// One entry for each of the two commands that set a value.
     unstored: Vec<Unstored, 2>,
@@ -131,7 +137,7 @@ impl Given {
 #[inline(never)]
 pub fn check(params: &Params, board: &Board) -> Result<(), BuildError> {
     let mut place = MaybeUninit::<Config>::uninit();
-    build_in(params, board, put_default(&mut place))
+    build_in(params, board, Drift::NONE, put_default(&mut place))
 }
 
 impl Esc {
@@ -171,6 +177,8 @@ impl Esc {
             telemetry: Telemetry::new(),
             charge: Charge::default(),
             witness: Witness::default(),
+            #[cfg(feature = "drift")]
+            tracker: Tracker::default(),
             recorder: Recorder::default(),
             params,
             too_hot: false,
@@ -197,7 +205,9 @@ impl Esc {
     /// # Errors
     /// Never with the parameters in force, which have been validated.
     pub fn config(&self) -> Result<Config, BuildError> {
-        build(&self.running(), &self.board)
+        let mut config = Config::default();
+        self.config_in(&mut config)?;
+        Ok(config)
     }
 
     /// Writes the result of [`Esc::config`] to `place`.
@@ -205,7 +215,13 @@ impl Esc {
     /// # Errors
     /// Those of [`Esc::config`].
     pub fn config_in(&self, place: &mut Config) -> Result<(), BuildError> {
-        build_in(&self.running(), &self.board, place)
+        let running = self.running();
+        #[cfg(feature = "drift")]
+        if build_in(&running, &self.board, self.tracker.in_force(), place).is_ok() {
+            return Ok(());
+        }
+        // The motor as stated has been tried before.
+        build_in(&running, &self.board, Drift::NONE, place)
     }
 
     /// Returns the parameters as the drive runs with them, including the motor assumed by a running
@@ -322,6 +338,8 @@ impl Esc {
         };
         // A NaN reading counts as too hot.
         self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
+        #[cfg(feature = "drift")]
+        self.follow_motor(snapshot);
         self.telemetry.observe(snapshot, &self.scale, time_us);
         let found = self.witness.look(snapshot, unbalance_max(&self.board));
         for limit in found.without(self.telemetry.limits).iter() {

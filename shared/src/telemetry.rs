@@ -30,6 +30,10 @@ pub struct Telemetry {
     pub fault_count: u32,
     /// Consecutive failed starts; the drive retries a few times.
     pub failed_starts: u8,
+    /// The motor's resistance as it is followed, mΩ; 0 where this program follows none.
+    pub r_mohm: f32,
+    /// Its flux, mWb, likewise.
+    pub flux_mwb: f32,
     /// Throttle may turn the motor.
     pub armed: bool,
     /// Frames on the throttle wire that failed their check since power-up.
@@ -46,9 +50,10 @@ pub struct Telemetry {
 
 /// Names of the streamable control signals, in the bit order of `TEL_SIGNALS`: mechanical speed and its
 /// reference, rpm; current and voltage in the rotor's frame, A and V; voltage as a share of the maximum without
-/// over-modulation; instantaneous supply voltage and current, V and A.
-pub const SIGNALS: [&str; 9] = [
-    "rpm", "rpm_ref", "i_d", "i_q", "v_d", "v_q", "duty", "bus_v", "bus_a",
+/// over-modulation; instantaneous supply voltage and current, V and A; the motor's followed resistance and flux, mΩ and
+/// mWb.
+pub const SIGNALS: [&str; 11] = [
+    "rpm", "rpm_ref", "i_d", "i_q", "v_d", "v_q", "duty", "bus_v", "bus_a", "r_mohm", "flux_mwb",
 ];
 
 /// Below this speed the shaft counts as at rest when the bridge does not drive it, rpm. It is the lowest
@@ -93,6 +98,8 @@ impl Telemetry {
             limits: Limits::NONE,
             fault_count: 0,
             failed_starts: 0,
+            r_mohm: 0.0,
+            flux_mwb: 0.0,
             armed: false,
             bad_frames: 0,
             bad_share: 0.0,
@@ -141,6 +148,8 @@ impl Telemetry {
             duty,
             self.bus_v,
             bus_a,
+            self.r_mohm,
+            self.flux_mwb,
         ];
     }
 }
@@ -185,10 +194,14 @@ mod tests {
         snapshot.bus = volts(24.0);
         snapshot.bus_current = scale.current_from_a(-1.25);
         let mut telemetry = Telemetry::new();
+        telemetry.r_mohm = 54.0;
+        telemetry.flux_mwb = 1.2;
         telemetry.observe(&snapshot, &scale, 1000);
         // 5 of 24/√3 V.
         let duty = 5.0 * SQRT_3 / 24.0;
-        let wanted = [-3000.0, -3100.0, -0.5, -4.0, 3.0, -4.0, duty, 24.0, -1.25];
+        let wanted = [
+            -3000.0, -3100.0, -0.5, -4.0, 3.0, -4.0, duty, 24.0, -1.25, 54.0, 1.2,
+        ];
         for ((name, found), wanted) in SIGNALS.iter().zip(telemetry.signals).zip(wanted) {
             assert!((found - wanted).abs() < 1e-3, "{name}: {found}");
         }

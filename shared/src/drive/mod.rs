@@ -81,10 +81,11 @@
 //! # File order
 //! Each file uses only those before it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
 //! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
-//! `witness`, `state`, `mode_change`, `step`.
+//! `witness`, `drift`, `state`, `mode_change`, `step`.
 
 mod charge;
 pub mod config;
+mod drift;
 mod excitation;
 mod excite;
 mod foc;
@@ -108,6 +109,7 @@ mod witness;
 
 pub use crate::protection::{Fault, Faults, Limit, Limits};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop, put_default};
+pub use drift::{Drift, Stated, Tracker};
 pub use excitation::{Excitation, Ripple};
 pub use io::{Bridge, Sample, Setpoint};
 pub use limited::Thresholds;

@@ -4,7 +4,7 @@ use super::phase::Phase;
 use crate::control::speed::Bounds;
 use crate::control::transform::Dq;
 use crate::protection::Faults;
-use crate::units::{AdcCounts, Angle, Current, Speed, Voltage};
+use crate::units::{AdcCounts, Angle, Current, Flux, Speed, Voltage};
 
 /// The control's state variables for the tasks, copied out of the interrupt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +28,8 @@ pub struct Snapshot {
     pub i_q_reference: Current,
     /// Commanded voltage.
     pub u: Dq<Voltage>,
+    /// Flux of the rotor as the default observer sees it; the stated one with any other.
+    pub flux: Flux,
     /// Readings of the three phase currents, in an order that stays constant while the motor turns: from the last
     /// sample, or with six-step from the end of the last sextant with a crossing.
     pub currents: [AdcCounts; 3],

@@ -255,6 +255,7 @@ impl State {
             i: seen.i,
             i_q_reference: self.foc.loops.reference.i.q,
             u: seen.u,
+            flux: self.foc.observer.compensated.phi,
             currents: shared.shown,
             bus: shared.protection.bus,
             bus_current: seen.bus_current,

@@ -9,7 +9,7 @@ pub(super) struct Pace {
 }
 
 /// Bytes that may always leave at once: the longest frame, or all of the control's signals, signed.
-const AT_ONCE_MAX: usize = 400;
+const AT_ONCE_MAX: usize = 480;
 
 /// Bytes that may otherwise leave at once, as time of the share.
 const BURST_US: u64 = 20_000;
@@ -53,14 +53,14 @@ mod tests {
         }
         // A second's share and the first burst.
         assert!(
-            (5760 - 37..=5760 + 400).contains(&sent_bytes),
+            (5760 - 37..=5760 + 480).contains(&sent_bytes),
             "{sent_bytes}"
         );
     }
 
     #[test]
     fn a_slow_link_still_sends_the_longest() {
-        assert!(Pace::new(1).take(0, 400));
-        assert!(!Pace::new(1).take(0, 401));
+        assert!(Pace::new(1).take(0, 480));
+        assert!(!Pace::new(1).take(0, 481));
     }
 }

@@ -36,6 +36,8 @@ pub(super) const TELEMETRY: Telemetry = Telemetry {
     limits: Limits::NONE,
     fault_count: 0,
     failed_starts: 0,
+    r_mohm: 0.0,
+    flux_mwb: 0.0,
     armed: false,
     bad_frames: 0,
     bad_share: 0.0,

@@ -375,8 +375,8 @@ parameters! {
         "Rate of ESC_STATUS and ESC_TELEMETRY_1_TO_4";
     81 TelBaud "TEL_BAUD" "bit/s" Whole 115200.0..921600.0 = 115200.0 restart
         "Speed of the board's serial MAVLink port";
-    82 TelSignals "TEL_SIGNALS" "" Whole 0.0..511.0 = 0.0 live
-        "Signals streamed for tuning, a sum: 1 rpm, 2 rpm_ref, 4 i_d, 8 i_q, 16 v_d, 32 v_q, 64 duty, 128 bus_v, 256 bus_a";
+    82 TelSignals "TEL_SIGNALS" "" Whole 0.0..2047.0 = 0.0 live
+        "Signals streamed for tuning, a sum: 1 rpm, 2 rpm_ref, 4 i_d, 8 i_q, 16 v_d, 32 v_q, 64 duty, 128 bus_v, 256 bus_a, 512 r_mohm, 1024 flux_mwb";
     83 TelSigHz "TEL_SIG_HZ" "Hz" Real 1.0..500.0 = 50.0 live
         "Rate of the signals streamed for tuning; a link too slow for them carries what it can";
 }

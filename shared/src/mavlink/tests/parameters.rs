@@ -77,12 +77,12 @@ fn a_list_is_whole_and_takes_half_the_link() {
     };
     assert_eq!(usize::from(first.param_count), TABLE.len());
     assert_eq!(first.param_type, MavParamType::MAV_PARAM_TYPE_REAL32);
-    // Within any 100 ms the list takes 576 bytes and the first burst of 400.
+    // Within any 100 ms the list takes 576 bytes and the first burst of 480.
     let half = f64::from(bench.link_bytes_per_s) / 2.0;
     for window in list.windows(16) {
         let bytes: usize = window.iter().map(|sent| sent.len).sum();
         let seconds = (window[15].at_us - window[0].at_us) as f64 * 1e-6;
-        assert!(bytes as f64 <= half * seconds + 400.0 + 37.0);
+        assert!(bytes as f64 <= half * seconds + 480.0 + 37.0);
     }
 }
 

@@ -55,7 +55,7 @@ fn a_slow_link_is_shared_and_the_heartbeat_stays() {
     let mut bench = Bench::with(params, 5000);
     let sent = bench.run_ms(10_000);
     let bytes: usize = sent.iter().map(|sent| sent.len).sum();
-    assert!(bytes <= 25_000 + 400 + 21 * 10, "{bytes} bytes in 10 s");
+    assert!(bytes <= 25_000 + 480 + 21 * 10, "{bytes} bytes in 10 s");
     assert_eq!(count(&sent, HEARTBEAT), 10);
     // It takes its turn, some milliseconds late: the tenth may fall outside.
     assert!((9..=10).contains(&count(&sent, ESC_INFO)));

@@ -6,6 +6,7 @@ use super::formula::define;
 use super::quantity::Quantity;
 use super::si::{LINEARISED_SHARE, SLOW_SHARE, Si};
 use crate::control::PERIODS;
+use crate::drive::Drift;
 use crate::params::choice::CtlObserver;
 use crate::params::from_motor::FromMotor;
 use crate::params::table::ParamId;
@@ -34,10 +35,12 @@ const GIVEN: &[(Quantity, ParamId, f32)] = &[
 impl Si<'_> {
     /// Sets the quantities shared by several blocks. Separate from [`Si::new`], where the chip would copy them all into
     /// place.
-    pub(super) fn prepare(&self) {
+    pub(super) fn prepare(&self, drift: Drift) {
         for (quantity, param, factor) in GIVEN {
             self.set(*quantity, self.params.get(*param) * factor);
         }
+        self.set(Quantity::R, self.of(Quantity::R) * drift.resistance);
+        self.set(Quantity::Flux, self.of(Quantity::Flux) * drift.flux);
         let from_motor = FromMotor::new(self.params);
         self.set(Quantity::LeastRpm, from_motor.least_rpm);
         self.set(Quantity::SlewRpmS, from_motor.slew_rpm_s);

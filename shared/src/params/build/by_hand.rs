@@ -10,6 +10,7 @@ use super::si::Si;
 use super::{low_speed, observer, sensing};
 use crate::control::speed::Bounds;
 use crate::control::{dead_time, observer as observers};
+use crate::drive::Drift;
 use crate::params::from_motor::tests::RACING;
 use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
 use crate::units::{Current, Speed};
@@ -22,7 +23,7 @@ fn made<T>(changes: &[(ParamId, f32)], block: impl FnOnce(&Si) -> T) -> T {
     }
     let (made, quantities, refused) = (params.in_force(), Si::quantities(), Cell::new(None));
     let p = Si::new(&made, &Board::BENCH, &quantities, &refused);
-    p.prepare();
+    p.prepare(Drift::NONE);
     block(&p)
 }
 

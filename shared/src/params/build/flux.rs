@@ -11,6 +11,7 @@ use super::si::{SLOW_SHARE, Si};
 use crate::control::observer::edges::{Config, Sensors};
 use crate::control::observer::flux_linkage::HighPass;
 use crate::control::observer::{flux_linkage, position};
+use crate::drive::Drift;
 use crate::math::{Real, settled, square_root};
 use crate::params::choice::{CtlFluxForm, CtlHall, CtlObserver};
 use crate::params::from_motor::LEAST_SHARE;
@@ -81,7 +82,7 @@ impl FluxSettings {
         let (quantities, refused) = (Si::quantities(), Cell::new(None));
         // They are the same on any board.
         let p = Si::new(params, &Board::BENCH, &quantities, &refused);
-        p.prepare();
+        p.prepare(Drift::NONE);
         Self::of(&p)
     }
 

@@ -399,6 +399,7 @@ const LEAST: i32 = 64;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::Drift;
     use crate::params::{BOSSO_BENCH, Board, Params};
 
     struct Place {
@@ -416,7 +417,7 @@ mod tests {
         let (params, quantities) = (Params::of(&BOSSO_BENCH), Si::quantities());
         let refused = Cell::new(None);
         let p = Si::new(&params, &Board::BENCH, &quantities, &refused);
-        p.prepare();
+        p.prepare(Drift::NONE);
         p.set(Quantity::R, 0.018);
         test(&p);
         refused.get().map(|refused| refused.param)

@@ -34,7 +34,7 @@ use super::values::Params;
 use crate::control::low_speed;
 use crate::control::modulator::{self, Modulation};
 use crate::control::sensing::Shunts;
-use crate::drive::{Config, Direction, Stop, Thresholds};
+use crate::drive::{Config, Direction, Drift, Stop, Thresholds};
 use crate::input::signal::Signal;
 use crate::math::Real;
 use crate::protection;
@@ -120,20 +120,26 @@ const ABOVE_FASTEST: &str = "above CTL_RPM_MAX";
 /// A [`BuildError`] names the parameter that takes a coefficient out of its range.
 pub fn build(params: &Params, board: &Board) -> Result<Config, BuildError> {
     let mut config = Config::default();
-    build_in(params, board, &mut config)?;
+    build_in(params, board, Drift::NONE, &mut config)?;
     Ok(config)
 }
 
-/// Like [`build`], but in the caller's place: on the chip a copy takes 0.9 KB of stack.
+/// Like [`build`], but for a motor that has drifted from the parameters' one, and in the caller's place: on the chip a
+/// copy takes 0.9 KB of stack. The units, and the settings that follow from the motor, stay those of the stated motor.
 ///
 /// # Errors
 /// As [`build`]; the place then holds no valid configuration.
-pub fn build_in(params: &Params, board: &Board, place: &mut Config) -> Result<(), BuildError> {
+pub fn build_in(
+    params: &Params,
+    board: &Board,
+    drift: Drift,
+    place: &mut Config,
+) -> Result<(), BuildError> {
     let refused = Cell::new(None);
     let made = params.in_force();
     let quantities = Si::quantities();
     let p = Si::new(&made, board, &quantities, &refused);
-    p.prepare();
+    p.prepare(drift);
     if let Some(unknown) = params.unknown() {
         p.refuse_if(
             p.chosen(CtlDrive::FieldOriented),
@@ -381,7 +387,13 @@ mod tests {
         };
         let mut place = build(&others, &board).expect("it makes a drive");
         let wanted = build(&Params::of(&BOSSO_MOTOR), &Board::BENCH).expect("the defaults fit");
-        build_in(&Params::of(&BOSSO_MOTOR), &Board::BENCH, &mut place).expect("the defaults fit");
+        build_in(
+            &Params::of(&BOSSO_MOTOR),
+            &Board::BENCH,
+            Drift::NONE,
+            &mut place,
+        )
+        .expect("the defaults fit");
         assert_eq!(place, wanted);
     }
 
