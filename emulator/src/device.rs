@@ -377,7 +377,7 @@ impl Device {
         };
         self.esc
             .poll(throttle, now_us, &snapshot, temperature_c, &mut send);
-        onlooker.limits(self.esc.telemetry().limits);
+        onlooker.tasks(self.esc.telemetry());
         if let Some(mut latest) = self.latest.map(Latest) {
             self.esc.test_itself(&snapshot, &mut latest);
         }

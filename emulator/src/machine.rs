@@ -1,6 +1,6 @@
 //! What runs on the bench: an ESC in any form, as seen by the links, the clock and onlookers.
 
-use siskin_control::drive::Limits;
+use siskin_control::telemetry::Telemetry;
 use thiserror::Error;
 
 use crate::fault::Fault;
@@ -95,9 +95,9 @@ pub trait Onlooker {
         let _ = (time_ns, leg, gate);
     }
 
-    /// The limits that bind, after a round of an ESC's tasks.
-    fn limits(&mut self, limits: Limits) {
-        let _ = limits;
+    /// After a round of an ESC's tasks: its state as they report it.
+    fn tasks(&mut self, telemetry: &Telemetry) {
+        let _ = telemetry;
     }
 
     /// The throttle wire's level changed at `time_ns`, before the next period and after everything earlier.

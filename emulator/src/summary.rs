@@ -7,9 +7,11 @@ mod window;
 
 use serde::Serialize;
 use siskin_control::drive::{Fault, Faults, Limit, Limits, Phase};
+use siskin_control::telemetry::Telemetry;
 
 use xxhash_rust::xxh3::Xxh3;
 
+use crate::plant::Plant;
 use crate::rig::{Period, Rig};
 use crate::shaft::Units;
 use crate::surroundings::Passage;
@@ -28,6 +30,8 @@ pub struct Summary {
     warnings: Limits,
     /// The drive's phase in the previous period.
     phase: Phase,
+    /// The motor's resistance and flux as they are followed, mΩ and mWb.
+    motor: [f32; 2],
     windows: Vec<Window>,
 }
 
@@ -144,6 +148,7 @@ impl Summary {
             faults: Faults::NONE,
             warnings: Limits::NONE,
             phase: Phase::Idle,
+            motor: [0.0; 2],
             windows: windows
                 .map(|(name, t0_s, t1_s)| Window::new(name, t0_s, t1_s))
                 .collect(),
@@ -161,6 +166,7 @@ impl Summary {
         }
         let started = snapshot.phase == Phase::Park && self.phase != Phase::Park;
         self.phase = snapshot.phase;
+        let drift_pct = self.drift_pct(rig.plant());
         for window in &mut self.windows {
             if window.covers(t_s) {
                 window.add(&Look {
@@ -171,17 +177,26 @@ impl Summary {
                         snapshot: &snapshot,
                         units: Units::of(rig.config()),
                         started,
+                        drift_pct,
                     }),
                 });
             }
         }
     }
 
-    /// Adds the limits that bind, some of which are warnings.
-    pub fn limited(&mut self, limits: Limits) {
-        for warning in limits.iter().filter(|limit| limit.warns()) {
-            self.warnings.insert(warning);
-        }
+    /// Returns by how much the followed resistance and flux exceed the true ones, %.
+    fn drift_pct(&self, plant: &Plant) -> [f64; 2] {
+        let truth = [plant.resistance_ohm(), plant.flux_wb()];
+        [0, 1].map(|which| 0.1 * f64::from(self.motor[which]) / truth[which] - 100.0)
+    }
+
+    /// Takes in what the tasks report.
+    pub fn told(&mut self, telemetry: &Telemetry) {
+        let limits = telemetry.limits.iter();
+        limits
+            .filter(|limit| limit.warns())
+            .for_each(|warning| self.warnings.insert(warning));
+        self.motor = [telemetry.r_mohm, telemetry.flux_mwb];
     }
 
     /// Adds a period that began at `t_s` of a machine whose control is not visible.

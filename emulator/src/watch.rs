@@ -1,6 +1,6 @@
 //! Observes a run: its figures, and a recording if wanted.
 
-use siskin_control::drive::Limits;
+use siskin_control::telemetry::Telemetry;
 use thiserror::Error;
 
 use crate::machine::Onlooker;
@@ -135,8 +135,8 @@ impl Onlooker for Watches {
         self.each[self.esc].gates(time_ns, leg, gate);
     }
 
-    fn limits(&mut self, limits: Limits) {
-        self.each[self.esc].limits(limits);
+    fn tasks(&mut self, telemetry: &Telemetry) {
+        self.each[self.esc].tasks(telemetry);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {
@@ -183,8 +183,8 @@ impl Onlooker for Watch {
         self.record(|recorder| recorder.gates(time_ns, leg, gate));
     }
 
-    fn limits(&mut self, limits: Limits) {
-        self.summary.limited(limits);
+    fn tasks(&mut self, telemetry: &Telemetry) {
+        self.summary.told(telemetry);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

@@ -18,6 +18,7 @@ ROWS = {
     "low-150": ("1..20", ["angle_error_max_deg"]),
     "start-propeller": None,
     "start-inertia": None,
+    "heat": ("1..2", ["r_error_max_pct", "flux_error_max_pct"]),
     "random-drives": None,
     "catch": ("1..20", ["current_max_a"]),
 }

@@ -13,8 +13,8 @@ WINDOW_KEYS = set(
     name t0_s t1_s rpm_mean rpm_min rpm_max rpm_ref_mean speed_error_rms_rpm speed_error_max_rpm
     speed_estimate_error_rms_rpm angle_error_mean_deg angle_error_rms_deg angle_error_std_deg
     angle_error_max_deg lock_s torque_mean_nm torque_ripple_pct p_motor_w p_copper_w efficiency
-    i_q_mean_a i_d_mean_a current_max_a bus_v_mean bus_a_mean turned_back_deg reached_s settled_s
-    starts lock_lost
+    i_q_mean_a i_d_mean_a current_max_a r_error_max_pct flux_error_max_pct bus_v_mean bus_a_mean
+    turned_back_deg reached_s settled_s starts lock_lost
     """.split()
 )
 

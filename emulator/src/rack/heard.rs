@@ -1,6 +1,6 @@
 //! Keeps the answers of a rack's ESCs as they pass to an onlooker.
 
-use siskin_control::drive::Limits;
+use siskin_control::telemetry::Telemetry;
 
 use crate::machine::Onlooker;
 use crate::plant::Gate;
@@ -39,8 +39,8 @@ impl<O: Onlooker> Onlooker for Heard<'_, O> {
         self.onlooker.gates(time_ns, leg, gate);
     }
 
-    fn limits(&mut self, limits: Limits) {
-        self.onlooker.limits(limits);
+    fn tasks(&mut self, telemetry: &Telemetry) {
+        self.onlooker.tasks(telemetry);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {

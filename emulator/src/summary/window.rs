@@ -65,6 +65,10 @@ pub struct Figures {
     pub i_d_mean_a: Option<f64>,
     /// Greatest magnitude of a true phase current at a sample, A.
     pub current_max_a: Option<f64>,
+    /// Greatest magnitude by which the resistance that is followed exceeds the true one, %.
+    pub r_error_max_pct: Option<f64>,
+    /// The same of the flux.
+    pub flux_error_max_pct: Option<f64>,
     /// Mean supply voltage, V.
     pub bus_v_mean: Option<f64>,
     /// Mean current from the supply, A.
@@ -85,7 +89,7 @@ pub struct Figures {
 
 impl Figures {
     /// The keys of figures that are the control's, or need to know what it did.
-    pub const OF_CONTROL: [&str; 18] = [
+    pub const OF_CONTROL: [&str; 20] = [
         "rpm_ref_mean",
         "speed_error_rms_rpm",
         "speed_error_max_rpm",
@@ -99,6 +103,8 @@ impl Figures {
         "efficiency",
         "i_q_mean_a",
         "i_d_mean_a",
+        "r_error_max_pct",
+        "flux_error_max_pct",
         "turned_back_deg",
         "reached_s",
         "settled_s",
@@ -128,6 +134,8 @@ pub(super) struct Control<'a> {
     pub(super) units: Units<'a>,
     /// Whether the drive began a start.
     pub(super) started: bool,
+    /// By how much resistance and flux as they are followed exceed the true ones, %.
+    pub(super) drift_pct: [f64; 2],
 }
 
 /// Sums over a measuring window.
@@ -146,6 +154,8 @@ pub(super) struct Window {
     current_max_a: f64,
     speed_error_max_rpm: f64,
     angle_error_max_deg: f64,
+    /// Of resistance and flux.
+    drift_max_pct: [f64; 2],
     /// Since when the observer leads.
     led: Since,
     /// Since when it leads with a small angle error.
@@ -203,6 +213,7 @@ impl Window {
             current_max_a: 0.0,
             speed_error_max_rpm: 0.0,
             angle_error_max_deg: 0.0,
+            drift_max_pct: [0.0; 2],
             led: Since(None),
             locked: Since(None),
             turning: Turning::new(),
@@ -250,11 +261,15 @@ impl Window {
             snapshot,
             units,
             started,
+            drift_pct,
         } = control;
         self.control.add([
             f64::from(units.scale.amperes(snapshot.i.q)),
             f64::from(units.scale.amperes(snapshot.i.d)),
         ]);
+        for (most, drift) in self.drift_max_pct.iter_mut().zip(drift_pct) {
+            *most = most.max(drift.abs());
+        }
         self.drove |= snapshot.phase.drives();
         self.turning.add(t_s, rpm, period.setpoint, units);
         self.starts += u64::from(started);
@@ -328,6 +343,8 @@ impl Window {
             i_q_mean_a: self.control.get(0),
             i_d_mean_a: self.control.get(1),
             current_max_a: self.all.any(self.current_max_a),
+            r_error_max_pct: self.control.any(self.drift_max_pct[0]),
+            flux_error_max_pct: self.control.any(self.drift_max_pct[1]),
             bus_v_mean: self.all.get(5),
             bus_a_mean: self.all.get(6),
             turned_back_deg: self.control.any(self.turning.turned_back_deg()),

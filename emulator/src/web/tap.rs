@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use siskin_control::drive::Limits;
+use siskin_control::telemetry::Telemetry;
 use siskin_scope::ViewerId;
 
 use super::channel::{Control, Point};
@@ -161,8 +161,8 @@ impl<O: Onlooker> Onlooker for Tapped<'_, O> {
         self.onlooker.gates(time_ns, leg, gate);
     }
 
-    fn limits(&mut self, limits: Limits) {
-        self.onlooker.limits(limits);
+    fn tasks(&mut self, telemetry: &Telemetry) {
+        self.onlooker.tasks(telemetry);
     }
 
     fn edge(&mut self, time_ns: u64, level: bool) {
