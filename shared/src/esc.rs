@@ -388,7 +388,7 @@ impl Esc {
             Some(Request::Reboot) => {
                 self.storage.reboot();
                 if self.storage.reboots_later(now_us) {
-                    self.warn_of("Reboot waits up to 3 min: saves are spaced");
+                    self.warn_of("Reboot waits up to 3 min for the next save");
                 }
             }
             Some(Request::FactoryReset) => {

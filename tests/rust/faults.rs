@@ -388,7 +388,7 @@ fn the_default_observer_keeps_that_rotor() {
     }
 }
 
-const FAILED: &str = "Start failed: the motor is tried again";
+const FAILED: &str = "Start failed: retrying";
 
 #[test]
 fn a_blocked_rotor_is_tried_a_few_times_and_then_stuck() {

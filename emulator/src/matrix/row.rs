@@ -104,7 +104,7 @@ const PHASE_OPEN: &str = "phase open";
 const SENSOR: &str = "current sensor defect";
 const SENSOR_DRIFTS: &str = "current sensor drifts";
 const HALL: &str = "position sensor";
-const FAILED_START: &str = "Start failed: the motor is tried again";
+const FAILED_START: &str = "Start failed: retrying";
 const FLASH: &str = "storage";
 /// A restarting chip announces its name.
 const RESTART: &str = "Siskin ESC";

@@ -144,7 +144,7 @@ fn tell(esc: &mut Esc, fit: Fit) {
         }
         Fit::Refused => {
             esc.lose_stored();
-            let text = "Parameters do not fit the board: defaults in force";
+            let text = "Parameters do not fit the board: using defaults";
             push(&mut warning, text);
         }
     }

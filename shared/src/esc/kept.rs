@@ -21,7 +21,7 @@ impl Esc {
             self.warn_of(trouble);
         }
         if self.params.get(ParamId::MotPolePairs) == 0.0 {
-            self.warn_of("MOT_POLE_PAIRS not known: speeds are told as of 7");
+            self.warn_of("MOT_POLE_PAIRS unknown: speeds assume 7");
         }
     }
 

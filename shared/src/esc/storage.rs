@@ -31,7 +31,7 @@ const OWED_MAX_US: u64 = (SAVES_AT_ONCE - 1) * SAVE_EVERY_US;
 const REMIND_US: u64 = 10_000_000;
 
 /// Warns the user, and refuses to store anything else over lost settings.
-pub(super) const LOST: &str = "Settings lost: set and store them, or reset them";
+pub(super) const LOST: &str = "Settings lost: set and store, or reset";
 
 /// Who requested storage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

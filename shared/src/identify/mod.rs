@@ -200,7 +200,7 @@ impl Identify {
         } else if !sight.snapshot.faults.is_empty() {
             Err("a fault holds")
         } else if passed_s > LONGEST_S {
-            Err("it does not turn as it should")
+            Err("it does not turn properly")
         } else {
             self.goes_on(sight, passed_s)
         };

@@ -61,9 +61,9 @@ impl Winding {
             if motor.l_h > 0.0 && report.l_uh.spread < L_SPREAD {
                 return Ok(());
             }
-            return Err("L differs from phase to phase");
+            return Err("L differs between phases");
         }
-        Err("R differs from phase to phase")
+        Err("R differs between phases")
     }
 }
 

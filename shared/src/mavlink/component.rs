@@ -189,10 +189,10 @@ impl Component {
         let signing = &mut self.writer.sender.signing;
         let is_time = signing.set_up(frame.bytes(10), frame.u64(0));
         let (severity, text) = if !is_time {
-            let text = "Signing refused: its time is too far ahead";
+            let text = "Signing refused: time too far ahead";
             (MavSeverity::MAV_SEVERITY_WARNING, text)
         } else if signing.signs() {
-            let text = "Signing: only who has the key may change anything";
+            let text = "Signing: changes need the key";
             (MavSeverity::MAV_SEVERITY_NOTICE, text)
         } else {
             (MavSeverity::MAV_SEVERITY_NOTICE, "Signing: off")

@@ -202,11 +202,11 @@ conditions! {
     /// A phase carries no current in one direction or in both.
     PhaseOpen = 21 "phase open" Some(Raised::Warning),
         "a phase carries no current, or in one direction only: a loose wire, or a switch that does not turn on"
-        "turns on, with less torque: land, then `siskin check`";
+        "keeps running, with less torque: land, then `siskin check`";
     /// The phase currents do not sum to zero.
     SensorDrift = 22 "current sensor drifts" Some(Raised::Warning),
-        "the phases' currents do not come to none: a current sensor's zero has moved, or it shows nothing"
-        "turns on, with a torque that swings: land, then `siskin check`";
+        "the phase currents do not sum to zero: a current sensor's zero has moved, or it reads nothing"
+        "keeps running, with a pulsating torque: land, then `siskin check`";
     /// A Hall sensor does not switch as the others do.
     PositionSensor = 23 "position sensor defect" Some(Raised::Warning),
         "a Hall sensor does not switch as the others do"

@@ -41,9 +41,9 @@ impl StoreError {
     /// Returns a short text for the user.
     pub const fn text(self) -> &'static str {
         match self {
-            Self::BadRange => "storage: too few or uneven pages of flash",
+            Self::BadRange => "storage: unusable flash pages",
             Self::Flash => "storage: the flash failed",
-            Self::NotStored => "storage: the flash does not hold the values",
+            Self::NotStored => "storage: write not verified",
         }
     }
 }

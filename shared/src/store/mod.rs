@@ -49,11 +49,11 @@ impl Loaded {
     /// Returns the trouble that the user must know of, if any.
     pub const fn trouble(&self) -> Option<&'static str> {
         match self.integrity {
-            Integrity::Incomplete => Some("storage: not whole, an older save may be in force"),
-            Integrity::Unfinished => Some("storage: the first save was cut off"),
-            Integrity::Corrupt => Some("storage: corrupt, all values are the defaults"),
-            Integrity::Unreadable => Some("storage: unreadable, all values are the defaults"),
-            _ if self.out_of_range => Some("storage: out of range, some values are defaults"),
+            Integrity::Incomplete => Some("storage: incomplete, an older save may apply"),
+            Integrity::Unfinished => Some("storage: first save cut off"),
+            Integrity::Corrupt => Some("storage: corrupt, using the defaults"),
+            Integrity::Unreadable => Some("storage: unreadable, using the defaults"),
+            _ if self.out_of_range => Some("storage: out of range, using some defaults"),
             _ if self.unknown => Some("storage: values of another firmware are kept"),
             Integrity::Sound | Integrity::Empty => None,
         }

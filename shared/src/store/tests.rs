@@ -246,7 +246,7 @@ fn a_value_out_of_range_is_told_until_the_next_save() {
         store(&mut flash, &[(key, bits), (limit, 12.5_f32.to_bits())]);
         let loaded = load(&mut flash, RANGE);
         assert!(loaded.out_of_range && !loaded.unknown, "{key}");
-        let trouble = "storage: out of range, some values are defaults";
+        let trouble = "storage: out of range, using some defaults";
         assert_eq!(loaded.trouble(), Some(trouble));
         let mut wanted = Kept::default();
         wanted

@@ -56,7 +56,7 @@ fn a_direction_does_not_store_settings_that_were_lost() {
     bench.frames(1_000, 0);
     assert_eq!(bench.requests, [Request::ParamsChanged]);
     assert_eq!(bench.take_results(), [FAILED]);
-    let lost = "Settings lost: set and store them, or reset them";
+    let lost = "Settings lost: set and store, or reset";
     assert_eq!(bench.texts.last().map(String::as_str), Some(lost));
     assert!(!bench.esc.telemetry().armed);
     // Once those are stored in their own right, so is it.

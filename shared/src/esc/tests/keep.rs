@@ -207,7 +207,7 @@ fn restart_that_waits() -> Bench {
 #[test]
 fn a_restart_that_waits_says_so() {
     let mut bench = restart_that_waits();
-    let waits = "Reboot waits up to 3 min: saves are spaced";
+    let waits = "Reboot waits up to 3 min for the next save";
     assert_eq!(bench.texts, ["Rebooting", waits]);
     bench.wait_ms(60_000);
     bench.storage_done(Ok(()));
@@ -383,7 +383,7 @@ fn where_settings_were_lost_nothing_turns_the_motor_until_some_are_stored() {
         bench.esc.recall(&loaded(integrity));
         bench.frames(12_000, 0);
         assert!(!bench.esc.telemetry().armed, "{integrity:?}");
-        let lost = "Settings lost: set and store them, or reset them";
+        let lost = "Settings lost: set and store, or reset";
         let told = |text: &&String| text.as_str() == lost;
         assert_eq!(bench.texts.iter().filter(told).count(), 1);
         assert!(bench.texts[0].starts_with("storage: "), "{:?}", bench.texts);

@@ -43,7 +43,7 @@ impl Component {
         if self.replies.take_overrun() {
             self.text(
                 MavSeverity::MAV_SEVERITY_WARNING,
-                &["MAVLink: too many requests at once"],
+                &["MAVLink: too many requests"],
                 send,
             );
         }
@@ -90,7 +90,7 @@ impl Component {
         // Until the last attempt, which is a fault, nothing else says why the motor does not turn.
         let failed = context.telemetry.failed_starts;
         if failed > core::mem::replace(&mut self.failed_starts, failed) && faults.is_empty() {
-            let text = "Start failed: the motor is tried again";
+            let text = "Start failed: retrying";
             self.text(MavSeverity::MAV_SEVERITY_WARNING, &[text], send);
         }
     }
@@ -164,11 +164,12 @@ impl Component {
                 return self.send_named(context.now_us, "bad_frames", share, send);
             }
             Stream::Signals => {
-                let chosen = schedule::signals(context.params);
-                for (bit, name) in SIGNALS.into_iter().enumerate() {
-                    if chosen >> bit & 1 != 0 {
-                        self.send_named(context.now_us, name, telemetry.signals[bit], send);
+                let mut chosen = schedule::signals(context.params);
+                for (name, value) in SIGNALS.iter().zip(&telemetry.signals) {
+                    if chosen & 1 != 0 {
+                        self.send_named(context.now_us, name, *value, send);
                     }
+                    chosen >>= 1;
                 }
                 return;
             }

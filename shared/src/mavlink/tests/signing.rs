@@ -69,7 +69,7 @@ pub(super) fn keyed() -> Bench {
     let mut bench = Bench::new();
     bench.receive(&encode(STATION, &setup(KEY, TODAY), &[]));
     let answers = bench.answers();
-    let wanted = ["Signing: only who has the key may change anything"];
+    let wanted = ["Signing: changes need the key"];
     assert_eq!(texts(&answers), wanted);
     bench
 }

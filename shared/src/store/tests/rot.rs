@@ -27,7 +27,7 @@ fn a_wrong_byte_anywhere_is_noticed() {
             let mut flash = flash.clone();
             flash.bytes[at] = byte;
             let loaded = load(&mut flash, RANGE);
-            let trouble = "storage: not whole, an older save may be in force";
+            let trouble = "storage: incomplete, an older save may apply";
             assert_eq!(loaded.trouble(), Some(trouble), "{byte:#x} at {at}");
             assert_eq!(Some(&loaded.kept), sets.last(), "{byte:#x} at {at}");
         }
@@ -108,7 +108,7 @@ fn where_both_copies_rot_an_earlier_save_is_in_force() {
     }
     let loaded = load(&mut flash, RANGE);
     assert_eq!(loaded.kept, changed());
-    let trouble = "storage: not whole, an older save may be in force";
+    let trouble = "storage: incomplete, an older save may apply";
     assert_eq!(loaded.trouble(), Some(trouble));
     save(&mut flash, RANGE, &changed()).expect("goes to the other half");
     assert_eq!(sound(&mut flash), changed());
