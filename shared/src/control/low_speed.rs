@@ -19,8 +19,8 @@ pub struct Config {
     i_q: Current,
     /// Bound on i_q over the speed, where larger.
     i_q_slope: Gain<Speed, Current>,
-    /// What bounds both: `LIM_PHASE_A`, or what the winding's flux allows.
-    phase: Current,
+    /// Bounds on both in braking and in driving: `LIM_PHASE_A`, or what the winding's flux allows.
+    most: [Current; 2],
     /// The highest speed at which this acts.
     end: Speed,
 }
@@ -28,18 +28,18 @@ pub struct Config {
 impl Config {
     /// Creates the support: `i_d` along d at standstill, decreasing by `i_d_slope` over the speed; along q at most
     /// `i_q`, or `i_q_slope` times the speed where that is larger. No slope is negative. The q current is at most
-    /// `phase`; the drive's own bound is `limit`.
+    /// `most` in braking and in driving, the first no larger than the second; the drive's own bound is `limit`.
     pub fn new(
         (i_d, i_d_slope): (Current, Gain<Speed, Current>),
         (i_q, i_q_slope): (Current, Gain<Speed, Current>),
-        (phase, limit): (Current, Current),
+        (most, limit): ([Current; 2], Current),
     ) -> Self {
         let mut config = Self {
             i_d,
             i_d_slope,
             i_q,
             i_q_slope,
-            phase,
+            most,
             end: Speed::MAX,
         };
         config.end = config.last(limit);
@@ -47,9 +47,9 @@ impl Config {
     }
 
     /// Creates one that never acts.
-    pub fn none(phase: Current) -> Self {
+    pub fn none(limit: Current) -> Self {
         let i_d = (Current::ZERO, Gain::ZERO);
-        Self::new(i_d, (Current::MAX, Gain::ZERO), (phase, phase))
+        Self::new(i_d, (Current::MAX, Gain::ZERO), ([limit; 2], limit))
     }
 
     /// Returns the highest speed at which this acts, by bisection: with rising speed i_d* only falls and the bound
@@ -57,7 +57,7 @@ impl Config {
     fn last(&self, limit: Current) -> Speed {
         let acts = |bits| {
             let speed = Speed::from_bits(bits);
-            self.i_d_at(speed) > Current::ZERO || self.i_q_at(speed).min(self.phase) < limit
+            self.i_d_at(speed) > Current::ZERO || self.i_q_at(speed).min(self.most[0]) < limit
         };
         if !acts(0) {
             return Speed::MIN;
@@ -83,11 +83,13 @@ impl Config {
     #[cold]
     fn slow(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         let i_d = self.i_d_at(speed);
-        // Both together stay below `phase` while i_d is below 0.47 of it. A root would lengthen the longest period.
-        let most = self.i_q_at(speed).min(self.phase.minus(i_d / 4));
+        // Both together stay below `most` while i_d is below 0.47 of it. A root would lengthen the longest period.
+        let i_q = self.i_q_at(speed);
+        let [braking, driving] = self.most;
+        let quarter = i_d / 4;
         let bounds = Bounds {
-            min: full.min.max(-most),
-            max: full.max.min(most),
+            min: full.min.max(-i_q.min(braking.minus(quarter))),
+            max: full.max.min(i_q.min(driving.minus(quarter))),
         };
         (i_d, bounds)
     }
@@ -117,7 +119,11 @@ mod tests {
     fn config() -> Config {
         let gain = |k| Gain::new(k).expect("in range");
         let at_rest = Current::from_num(0.2);
-        Config::new((at_rest, gain(10.0)), (at_rest, gain(40.0)), (PHASE, PHASE))
+        Config::new(
+            (at_rest, gain(10.0)),
+            (at_rest, gain(40.0)),
+            ([PHASE; 2], PHASE),
+        )
     }
 
     #[test]
@@ -152,7 +158,11 @@ mod tests {
         for share in [0.01, 0.1, 0.3] {
             let i_d = PHASE.to_num::<f64>() * share;
             let wide = (Current::MAX, Gain::ZERO);
-            let config = Config::new((Current::from_num(i_d), Gain::ZERO), wide, (PHASE, PHASE));
+            let config = Config::new(
+                (Current::from_num(i_d), Gain::ZERO),
+                wide,
+                ([PHASE; 2], PHASE),
+            );
             let (_, bounds) = config.bounds(FULL, Speed::ZERO);
             let together = bounds.max.to_num::<f64>().hypot(i_d) / PHASE.to_num::<f64>();
             assert!((0.965..1.0).contains(&together), "{share}: {together}");
@@ -162,11 +172,12 @@ mod tests {
     #[test]
     fn a_bound_below_the_drive_s_own_holds_at_any_speed() {
         let none = (Current::ZERO, Gain::ZERO);
-        let bound = Current::lit("0.7");
-        let config = Config::new(none, (Current::MAX, Gain::ZERO), (bound, PHASE));
+        let [braking, driving] = [Current::lit("0.7"), Current::lit("1.05")];
+        let wide = (Current::MAX, Gain::ZERO);
+        let config = Config::new(none, wide, ([braking, driving], PHASE));
         for speed in [Speed::MIN, Speed::ZERO, Speed::MAX] {
             let (_, bounds) = config.bounds(FULL, speed);
-            assert_eq!((bounds.min, bounds.max), (-bound, bound));
+            assert_eq!((bounds.min, bounds.max), (-braking, driving));
         }
     }
 

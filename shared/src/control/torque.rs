@@ -9,11 +9,14 @@ use crate::math::Held;
 use crate::trace::traced;
 use crate::units::Current;
 
-/// Limit of the change.
+/// Limits of the change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     /// Largest change of i_q* per outer-loop period.
     pub slew: Current,
+    /// Largest growth of a driving i_q* in that time, at most the slew. With L stated wrongly the rotor seems to turn
+    /// by asin(ΔL·i_q/φ), and the observer needs time to follow.
+    pub growth: Current,
 }
 
 traced! {
@@ -25,22 +28,27 @@ traced! {
     }
 }
 
+impl State {
+    /// Returns the largest i_q* to which a driving one may have grown.
+    fn most(&self, config: &Config) -> Current {
+        self.i_q.max(Current::ZERO).plus(config.growth)
+    }
+}
+
 /// Returns `wanted` with its i_q* clamped to the bounds and slew-limited.
 pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
     let i_q = bounds
         .hold(wanted.i.q)
-        .min(state.i_q.plus(config.slew))
+        .min(state.i_q.plus(config.slew).min(state.most(config)))
         .max(state.i_q.minus(config.slew));
     state.i_q = i_q;
     wanted.with_i_q(i_q)
 }
 
-/// Returns `wanted` with the growth of its i_q* slew-limited, for the speed regulator; it may fall at once. With L
-/// stated wrongly the rotor seems to turn by asin(ΔL·i_q/φ), and the observer needs time to follow.
+/// Returns `wanted` with the growth of its i_q* limited, for the speed regulator; it may fall at once.
 pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
     let least = state.i_q.min(Current::ZERO).minus(config.slew);
-    let most = state.i_q.max(Current::ZERO).plus(config.slew);
-    state.i_q = wanted.i.q.min(most).max(least);
+    state.i_q = wanted.i.q.min(state.most(config)).max(least);
     wanted.with_i_q(state.i_q)
 }
 
@@ -50,6 +58,7 @@ mod tests {
 
     const CONFIG: Config = Config {
         slew: Current::lit("0.01"),
+        growth: Current::lit("0.005"),
     };
 
     fn bounds(min: f64, max: f64) -> Bounds {
@@ -67,7 +76,7 @@ mod tests {
 
     #[test]
     fn what_is_commanded_moves_by_the_slew_and_stays_within_the_bounds() {
-        for (asked, end, periods) in [(0.2, 0.1, 10), (-0.2, -0.05, 5), (0.03, 0.03, 3)] {
+        for (asked, end, periods) in [(0.2, 0.1, 20), (-0.2, -0.05, 5), (0.03, 0.03, 6)] {
             let mut state = State::default();
             let asked = Reference::steady(Current::from_num(asked));
             let mut moved = 0;
@@ -89,11 +98,11 @@ mod tests {
     }
 
     #[test]
-    fn a_current_may_grow_by_the_slew_and_fall_at_once() {
+    fn a_current_may_grow_by_so_much_and_fall_at_once() {
         for (before, asked, got) in [
-            (0.0, 1.0, 0.01),
+            (0.0, 1.0, 0.005),
             (0.0, -1.0, -0.01),
-            (0.5, 1.0, 0.51),
+            (0.5, 1.0, 0.505),
             (0.5, 0.0, 0.0),
             (0.5, -1.0, -0.01),
             (-0.5, -1.0, -0.51),

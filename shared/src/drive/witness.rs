@@ -139,7 +139,7 @@ impl Rounds {
         }
         // A torque that swings in step with the turns asks a sound phase for current in one direction only, and gets it.
         // An open phase leaves an error.
-        if round.error > round.i_q / 4 {
+        if round.error > round.i_q >> 2 {
             self.suspect += 1;
         }
         *round = Round::default();
@@ -160,8 +160,8 @@ impl Round {
             self.peaks[back] = self.peaks[back].max(current.wrapping_neg());
         }
         let error = snapshot.i.q.minus(snapshot.i_q_reference);
-        self.i_q = self.i_q.max(snapshot.i.q.saturating_abs());
-        self.error = self.error.max(error.saturating_abs());
+        self.i_q = self.i_q.max(snapshot.i.q.abs());
+        self.error = self.error.max(error.abs());
         // The top of the product with six counts the sextants.
         self.sextants |= 1 << ((u64::from(snapshot.angle.to_bits() as u32) * 6) >> 32) as u32;
         let missing = ALL_SEXTANTS ^ self.sextants;

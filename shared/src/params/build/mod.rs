@@ -83,6 +83,9 @@ const TORQUE_LEAST_SHARE: f32 = 0.5;
 /// Greatest resistive drop of i_q over the back-EMF: with R stated 30 % too high, three times that leaves no estimate.
 const TORQUE_DROP_SHARE: f32 = 1.0;
 
+/// Greatest driving current over the one whose flux is the rotor's: an L stated 30 % too high then turns the flux by 24°.
+const DRIVING_SHARE: f32 = 1.5;
+
 /// Time constant with which the reported speed decays while the bridge is off, s. The bench's propeller takes 1.1 s.
 const COAST_S: f32 = 2.0;
 
@@ -300,9 +303,12 @@ fn low_speed(p: &Si) -> low_speed::Config {
     let formulas = formulas!(p, {
         number limit(LimitA / UnitA),
         // A current whose flux exceeds the rotor's takes more voltage than the rotor induces: the supply cannot hold it
-        // in braking, and a 30 % error of L turns the flux by more than 17°.
-        define BoundA(Flux / L min LimitA),
-        number phase(BoundA / UnitA),
+        // in braking.
+        define WindingA(Flux / L),
+        define BrakingA(WindingA min LimitA),
+        number braking(BrakingA / UnitA),
+        define DrivingA([DRIVING_SHARE] * WindingA min LimitA),
+        number driving(DrivingA / UnitA),
         // At the least speed each phase current has a clear sign except briefly: it exceeds the PWM ripple, and the
         // more the dead time costs, the shorter it is without one.
         define SlowV(LeastRpm * PolePairs * Tau / [60.0] * Flux),
@@ -321,10 +327,10 @@ fn low_speed(p: &Si) -> low_speed::Config {
     if !is_helped(p) {
         return low_speed::Config::none(limit);
     }
-    let phase = formulas.number();
+    let most = [formulas.number(), formulas.number()];
     let i_d = (formulas.number(), formulas.gain());
     let i_q = (formulas.number(), formulas.gain());
-    low_speed::Config::new(i_d, i_q, (phase, limit))
+    low_speed::Config::new(i_d, i_q, (most, limit))
 }
 
 fn limits(p: &Si, place: &mut protection::Config) {

@@ -29,6 +29,10 @@ const JERK_S: f32 = 0.005;
 /// Least time in which i_q* goes from zero to `LIM_PHASE_A`, s.
 const TORQUE_S: f32 = 0.003;
 
+/// Least time in which a driving i_q* grows by the current whose flux is the rotor's, s. In slams with L stated 30 %
+/// wrong it keeps the angle error of idle to 11°, where 5 ms reaches 20°.
+const GROWTH_S: f32 = 0.008;
+
 /// Both times of the modified regulator over the others': it does not decouple, and at 6000 rpm on
 /// the bench its slow pole pair is at 870 1/s where theirs are at 2357.
 const MODIFIED_SLOWER: f32 = 4.0;
@@ -38,7 +42,10 @@ pub(super) fn torque(p: &Si, place: &mut torque::Config) {
     define_slower(p);
     fill!(p, place, {
         define SlowerS([TORQUE_S] * Slower),
-        number slew(LimitA / SlowerS * OuterT / UnitA),
+        define SlewAS(LimitA / SlowerS),
+        number slew(SlewAS * OuterT / UnitA),
+        define GrowthAS(Flux / L / [GROWTH_S] min SlewAS),
+        number growth(GrowthAS * OuterT / UnitA),
     });
 }
 

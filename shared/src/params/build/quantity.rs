@@ -134,7 +134,7 @@ quantities! {
         BoundA,
     }
     // Of low speed and the limits.
-    own { SlowV, RippleA, HiddenA, BiasA, DeadEndV, ReturnV, EndV, EndRadS }
+    own { WindingA, BrakingA, DrivingA, SlowV, RippleA, HiddenA, BiasA, DeadEndV, ReturnV, EndV, EndRadS }
     // Of the edges.
     own {
         StatorFlux, CornerS, Turns, Ae, SlowRadS, TauInt, Edges, Acceleration, Known, Lag,
@@ -151,7 +151,7 @@ quantities! {
     own { KI, SlopeV, EmfTurns, TurnsPerVoltage }
     // Of the outer loop.
     own {
-        Slower, SlowerS, Slew, PlannerT, Inertia, Trusted, NmPerA, APerNm, Fastest, FastestSquare,
+        SlewAS, GrowthAS, Slower, SlowerS, Slew, PlannerT, Inertia, Trusted, NmPerA, APerNm, Fastest, FastestSquare,
         CurrentPerSpeed,
     }
     // Of the sensing.
