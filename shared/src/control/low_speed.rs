@@ -83,13 +83,12 @@ impl Config {
     #[cold]
     fn slow(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         let i_d = self.i_d_at(speed);
-        // Both together stay below `most` while i_d is below 0.47 of it. A root would lengthen the longest period.
-        let i_q = self.i_q_at(speed);
         let [braking, driving] = self.most;
-        let quarter = i_d / 4;
+        // Both together stay below `driving` while i_d is below 0.47 of it. A root would lengthen the longest period.
+        let most = self.i_q_at(speed).min(driving.minus(i_d >> 2));
         let bounds = Bounds {
-            min: full.min.max(-i_q.min(braking.minus(quarter))),
-            max: full.max.min(i_q.min(driving.minus(quarter))),
+            min: full.min.max(-most.min(braking)),
+            max: full.max.min(most),
         };
         (i_d, bounds)
     }

@@ -28,18 +28,16 @@ traced! {
     }
 }
 
-impl State {
-    /// Returns the largest i_q* to which a driving one may have grown.
-    fn most(&self, config: &Config) -> Current {
-        self.i_q.max(Current::ZERO).plus(config.growth)
-    }
-}
-
 /// Returns `wanted` with its i_q* clamped to the bounds and slew-limited.
 pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
+    let rise = if state.i_q < Current::ZERO {
+        config.slew
+    } else {
+        config.growth
+    };
     let i_q = bounds
         .hold(wanted.i.q)
-        .min(state.i_q.plus(config.slew).min(state.most(config)))
+        .min(state.i_q.plus(rise))
         .max(state.i_q.minus(config.slew));
     state.i_q = i_q;
     wanted.with_i_q(i_q)
@@ -48,7 +46,8 @@ pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bou
 /// Returns `wanted` with the growth of its i_q* limited, for the speed regulator; it may fall at once.
 pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
     let least = state.i_q.min(Current::ZERO).minus(config.slew);
-    state.i_q = wanted.i.q.min(state.most(config)).max(least);
+    let most = state.i_q.max(Current::ZERO).plus(config.growth);
+    state.i_q = wanted.i.q.min(most).max(least);
     wanted.with_i_q(state.i_q)
 }
 

@@ -489,7 +489,7 @@ fn pole_pairs_that_are_not_known_are_told_at_the_start() {
         bench.set("MOT_POLE_PAIRS", pole_pairs);
         bench.esc.recall(&loaded(Integrity::Sound));
         bench.wait_ms(5);
-        let tells = |text: &String| text.starts_with("MOT_POLE_PAIRS not known");
+        let tells = |text: &String| text.starts_with("MOT_POLE_PAIRS unknown");
         assert_eq!(bench.texts.iter().any(tells), told, "{:?}", bench.texts);
     }
 }
