@@ -38,7 +38,8 @@ OPEN = {
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
     **cells([SIX], ["sensor_zero"], ["start"], "current"),
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
-    **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
+    # Its start takes the current 0.2 A beyond.
+    **cells([FOC], ["hall_stuck"], ["idle"], "reaction", "current"),
     # After a rotor jams at speed, the six-step drive retries starts, each longer than the previous one: 1.5 s after it
     # was freed one is still under way. A jam in its start is not retried. The field-oriented drive finds the rotor lost
     # from its flux after 0.1 s, if no current trips.
