@@ -13,7 +13,7 @@ const R_OHM: [f64; 2] = [1e-3, 10.0];
 /// Inductance of one phase, H.
 const L_H: [f64; 2] = [5e-7, 1e-2];
 
-/// Peak flux linkage of one phase, Wb: a hub motor of 10 rpm/V and 15 pole pairs has a seventh of the maximum.
+/// Peak flux linkage of one phase, Wb: a hub motor of 10 rpm/V and 15 pole pairs has 18 % of the maximum.
 const FLUX_WB: [f64; 2] = [1e-5, 0.2];
 
 /// Inertia of the rotor, kg·m².

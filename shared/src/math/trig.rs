@@ -70,8 +70,8 @@ pub fn sin_cos(angle: Angle) -> SinCos {
 
 /// Returns the angle of the vector (`x`, `y`) in turns, −0.5 to 0.5; 0 for the zero vector.
 ///
-/// A polynomial over one octant, accurate to 0.02°. It divides, so it is for the events of a start, not for each
-/// period.
+/// A polynomial over one octant, accurate to 0.02°. It divides, so the default drive calls it in a start only; the
+/// modified regulator and the flux crossings' observer call it in each period.
 #[inline(always)] // in each period
 pub fn atan2_turns<T: Number>(y: T, x: T) -> Angle {
     Angle::from_bits(direction(y.to_bits(), x.to_bits()))

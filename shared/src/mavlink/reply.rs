@@ -15,7 +15,7 @@ use super::sender::Sender;
 use crate::params::{ParamId, TABLE};
 
 /// Replies that can wait. A poll empties the queue, so it holds the most that may arrive between
-/// two: 1 ms of a serial link carries at most one frame, a datagram of 1500 bytes 35 commands.
+/// two: 1 ms of a serial link carries at most one frame, a datagram of 1500 bytes 33 commands.
 const WAITING: usize = 40;
 const CHUNK_LEN: usize = 50;
 /// The longest text: a parameter's refusal with another's name and the reason.

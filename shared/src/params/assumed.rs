@@ -16,7 +16,7 @@ pub(crate) const POLE_PAIRS: f32 = 7.0;
 /// PWM periods per electrical turn at full speed: just over the four per sextant that six-step needs.
 const TURN_PERIODS: f32 = 25.0;
 
-/// Drop of `LIM_PHASE_A` across R as a share of the supply: 0.05 to 0.15 for motors that the limit suits.
+/// Drop of `LIM_PHASE_A` across R over the supply/√3: 0.05 to 0.15 for motors that the limit suits.
 const DROP_SHARE: f32 = 0.1;
 
 /// L/R, s: 0.15 to 0.8 ms for motors of all sizes.

@@ -6,6 +6,8 @@
 //! | `@SYS/faults.txt` | faults and the last warning, in words |
 //! | `@SYS/faults.bin` | the [fault record](crate::record), while the motor is at rest or a trip holds it; if the program [keeps](crate::record::KEPT) one |
 //! | `@SYS/statistics.txt` | statistics over the life of the ESC, in words |
+//! | `@SYS/check.txt` | the last self-test, in words |
+//! | `@SYS/identify.txt` | what the last identification found, in words |
 //! | `general.json.xz` | the place of the next one ([`metadata()`] has that of this one) |
 //! | `parameter.json.xz` | units, ranges, choices and descriptions of the parameters, for a ground station to show |
 //!
