@@ -135,14 +135,22 @@ impl Timeline {
     }
 }
 
+/// The least share to which all drifts together change the motor's resistance or flux.
+const LEAST_DRIFT: f64 = -0.9;
+
 impl InForce {
+    fn drift_motor(&mut self, which: usize, share: f64) {
+        let drift = &mut self.motor_drift[which];
+        *drift = (*drift + share).max(LEAST_DRIFT);
+    }
+
     /// Adds the lasting effect of a fault, whether it still acts or not.
     fn grow(&mut self, fault: &Fault, t_s: f64) {
         self.bus_weakened |= fault.kind.weakens_bus();
         match fault.kind {
             Kind::OffsetDrift(phase, amps) => self.drift_a[phase] += amps * fault.share(t_s),
-            Kind::ResistanceDrift(share) => self.motor_drift[0] += share * fault.share(t_s),
-            Kind::FluxDrift(share) => self.motor_drift[1] += share * fault.share(t_s),
+            Kind::ResistanceDrift(share) => self.drift_motor(0, share * fault.share(t_s)),
+            Kind::FluxDrift(share) => self.drift_motor(1, share * fault.share(t_s)),
             Kind::RotorKick(rad_s) => self.kicked_rad_s += rad_s * fault.share(t_s),
             Kind::Reset => {
                 self.resets += 1;
@@ -221,6 +229,9 @@ mod tests {
         assert_eq!(timeline.at(0.5), InForce::default());
         assert_eq!(timeline.at(3.0).motor_drift, [0.2, -0.08]);
         assert_eq!(timeline.at(9.0).motor_drift, [0.4, -0.08]);
+        // Some of each motor is left.
+        let three = Timeline::new(vec![fault(1.0, None, Kind::FluxDrift(-0.45)); 3]);
+        assert_eq!(three.at(9.0).motor_drift, [0.0, -0.9]);
         assert_eq!(timeline.at(1.5).drift_a, [-1.0, 1.0, 0.0]);
         assert_eq!(timeline.at(9.0).drift_a, [-1.0, 4.0, 0.0]);
         assert_eq!(timeline.at(1.9).kicked_rad_s, 0.0);

@@ -11,7 +11,7 @@ use crate::fault::{CHIP_V, Fault, Kind, Side};
 /// The wrong key, and what it needs.
 type Problem = (&'static str, String);
 
-/// Shares by which a motor's resistance and flux may grow. Two that add up leave a tenth still.
+/// Range of the shares by which one fault lets a motor's resistance or flux grow.
 const DRIFT_MIN: f64 = -0.45;
 const DRIFT_MAX: f64 = 5.0;
 
