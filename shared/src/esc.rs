@@ -220,7 +220,7 @@ impl Esc {
         if build_in(&running, &self.board, self.tracker.in_force(), place).is_ok() {
             return Ok(());
         }
-        // The motor as stated has been tried before.
+        // Where the parameters have just changed it may not fit any more; the motor as stated has been tried.
         build_in(&running, &self.board, Drift::NONE, place)
     }
 

@@ -1,17 +1,16 @@
-//! What heat does to a motor that turns: its resistance rises, its flux falls. Snapshots show both, and the tasks follow
-//! them, not the interrupt.
+//! Follows a turning motor's resistance and flux: as it warms up, the resistance rises and the flux falls.
 //!
-//! The flux φ̂ of the default observer is off by what its model of the voltage leaves out, over the speed:
-//! ω·(φ̂ − φ) = (R − R̂)·i_q + v, where v is what the dead time's compensation leaves, with the current's sign. While the
-//! rotor accelerates its flux leads the frame by some z_q, and the observer's leak takes another ω·z_q/2; that shows along
-//! d, where u_d + ω·L·i_q = −ω·z_q.
+//! This works on snapshots, in the tasks, not in the interrupt. The default observer's φ̂ is wrong by what its voltage
+//! model leaves out, divided by the speed: ω·(φ̂ − φ) = (R − R̂)·i_q + v, where v is the residual of the dead-time
+//! compensation and has the current's sign. While the rotor accelerates, its flux leads the frame by some z_q, and the
+//! observer's leak takes another ω·z_q/2; this shows along d, where u_d + ω·L·i_q = −ω·z_q.
 //!
-//! One look tells nothing of φ, R and v; those of a throttle that moves do. A Kalman filter follows the three, which
-//! wander: each look moves only what it shows, by as much as that is uncertain, and what no look shows stays as it was.
-//! Without v, a dead time that is off by 50 ns would pass for a fifth of a racing motor's resistance.
+//! A single look cannot tell φ, R and v apart, but a varying throttle can. A Kalman filter tracks the three as random
+//! walks: each look corrects only what it shows, in proportion to the uncertainty, and the rest stays. Without v in the
+//! model, a dead time wrong by 50 ns would pass for a fifth of a racing motor's resistance.
 //!
-//! What is followed is held within what heat, and a motor that is told wrong, may come to. It changes no parameter, and
-//! is forgotten without power.
+//! The estimates are clamped to the range that heat and a wrongly stated motor can explain. They change no parameter, and
+//! are forgotten without power.
 
 use super::phase::Phase;
 use super::snapshot::Snapshot;
@@ -35,40 +34,40 @@ impl Drift {
     };
 }
 
-/// Units of what is followed: flux and resistance, of the stated ones, and v, of the supply. Each is what it may be off by
-/// at the start, positive the way in which heat takes it.
+/// Units of the estimates: flux and resistance relative to the stated ones, and v relative to the supply. Each is its
+/// initial standard deviation, with the sign of its change with heat.
 const UNITS: [f32; 3] = [-0.025, 0.1, 0.01];
 
-/// Ends of each. Copper of 180 °C has 1.6 times the resistance that was told at 25 °C; magnets lose 0.1 to 0.2 % a kelvin.
-/// The rest is for a motor that is told wrong.
+/// Range of the estimates. At 180 °C copper has 1.6 times its resistance at 25 °C; magnets lose 0.1 to 0.2 % per kelvin.
+/// The rest allows for a wrongly stated motor.
 const LEAST: f32 = -3.0;
 const MOST: f32 = 6.0;
 
-/// Variance that a look adds to each: a minute makes a resistance as uncertain as it is at the start.
+/// Variance that each look adds to an estimate: after a minute a resistance is as uncertain as at the start.
 const WANDER: f32 = 1.5e-5;
 
-/// Variance of a look's voltage, of the supply's square. Far above that of the sensors' noise: what a transient has wrong
-/// is the same in many looks.
+/// Variance of a look's voltage relative to the supply's square. Far above the sensors' noise, because errors in a
+/// transient are correlated over many looks.
 const NOISE: f32 = 4e-4;
 
-/// Least current whose sign is sure: a few percent of a board's range.
+/// Smallest current with a reliable sign: a few percent of a board's range.
 const LEAST_CURRENT: Current = Current::lit("0.03");
 
-/// Least back-EMF, of the supply.
+/// Smallest back-EMF, relative to the supply.
 const LEAST_EMF: f32 = 0.03;
 
-/// Greatest flux of the inductance, and greatest lead of the rotor, over the rotor's flux. Beyond, an inductance that is
-/// told wrong by a third, or an angle that is off, bends the flux by more than a percent.
+/// Largest flux of the inductance and largest lead of the rotor, relative to the rotor's flux. Beyond them an inductance
+/// stated a third wrong, or an angle error, changes the flux by more than a percent.
 const MOST_OWN_FLUX: f32 = 0.4;
 const MOST_LEAD: f32 = 0.05;
 
-/// Looks between two changes of what is in force.
+/// Looks between two changes of the values in force.
 const PAUSE: u16 = 1000;
 
-/// Least difference that makes one.
+/// Smallest difference that causes a change.
 const CHANGE: f32 = 0.01;
 
-/// The motor that the parameters state, as a unit of current shows it.
+/// The motor as the parameters state it, per unit of current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stated {
     /// The drop across the resistance, in units of voltage.
@@ -78,7 +77,7 @@ pub struct Stated {
 }
 
 impl Stated {
-    /// None that can be followed.
+    /// A motor that cannot be followed.
     pub const NONE: Self = Self {
         drop: 0.0,
         own_flux: 0.0,
@@ -89,7 +88,7 @@ impl Stated {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracker {
     stated: Stated,
-    /// Flux, resistance and v over those of the motor as stated, in [`UNITS`].
+    /// Flux, resistance and v relative to the stated motor, in [`UNITS`].
     found: [f32; 3],
     covariance: [[f32; 3]; 3],
     in_force: Drift,
@@ -118,8 +117,8 @@ impl Tracker {
         }
     }
 
-    /// Looks at a snapshot, about each millisecond. Where another motor is stated than before all begins anew. Returns
-    /// true if what is [in force](Self::in_force) has changed.
+    /// Looks at a snapshot, about once a millisecond, and starts anew if a different motor is stated. Returns true if the
+    /// values [in force](Self::in_force) have changed.
     // In its own registers: the caller has none left.
     #[inline(never)]
     pub fn look(&mut self, snapshot: &Snapshot, stated: Stated) -> bool {
@@ -129,7 +128,7 @@ impl Tracker {
             return changes;
         }
         if !snapshot.phase.drives() {
-            // A winding at rest cools.
+            // A winding at rest cools, and what was stated wrongly is forgotten with it.
             self.found[1] -= self.found[1] * WANDER;
         } else if snapshot.phase == Phase::Run && self.stated != Stated::NONE {
             self.measure(snapshot);
@@ -148,7 +147,7 @@ impl Tracker {
         changes
     }
 
-    /// Takes in a look at which the current's sign is sure and there is back-EMF.
+    /// Takes in a look if the current has a reliable sign and there is enough back-EMF.
     fn measure(&mut self, snapshot: &Snapshot) {
         let i_q = snapshot.i.q;
         let magnitude = i_q.saturating_abs();
@@ -157,7 +156,6 @@ impl Tracker {
         let sure = magnitude > LEAST_CURRENT && snapshot.i.d.saturating_abs() < magnitude / 4;
         let own_flux = self.stated.own_flux * i_q.to_f32();
         let leads = snapshot.u.d.to_f32() + emf * own_flux;
-        // Of no supply there is no part.
         let shows = emf < supply
             && emf > LEAST_EMF * supply
             && own_flux.abs() < MOST_OWN_FLUX
@@ -165,13 +163,13 @@ impl Tracker {
         if !sure || !shows {
             return;
         }
-        // All voltages are parts of the supply.
+        // All voltages are relative to the supply.
         let (emf, leads) = (emf / supply, leads / supply);
         let drop = self.stated.drop * i_q.to_f32() / supply;
         let sign = if i_q.is_negative() { -1.0 } else { 1.0 };
         let shown = [emf * UNITS[0], drop * UNITS[1], sign * UNITS[2]];
         let excess = snapshot.flux.to_f32() / FLUX_NOMINAL.to_f32() - 1.0;
-        // Over the voltage of the motor as stated.
+        // Relative to the stated motor's voltage.
         let seen = emf * excess - 0.5 * leads + (self.in_force.resistance - 1.0) * drop;
         let error = seen - product(&self.found, &shown);
         let gains = self.covariance.map(|row| product(&row, &shown));
@@ -188,7 +186,12 @@ impl Tracker {
         }
     }
 
-    /// What has been found by now.
+    /// Gives up the values in force, with which no valid drive can be built, and starts anew.
+    pub fn reject(&mut self) {
+        *self = Self::new(self.stated);
+    }
+
+    /// Returns the present estimate.
     pub fn drift(&self) -> Drift {
         Drift {
             resistance: 1.0 + self.found[1] * UNITS[1],
@@ -196,13 +199,13 @@ impl Tracker {
         }
     }
 
-    /// What the control is to run with.
+    /// Returns the values that the control runs with.
     pub fn in_force(&self) -> Drift {
         self.in_force
     }
 }
 
-/// The sum of the products of each place.
+/// Returns the scalar product.
 fn product(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -318,6 +321,18 @@ mod tests {
         );
         assert!((found.flux - used.flux).abs() < 0.02, "{used:?}");
         assert!((2..=60).contains(&bench.changes), "{}", bench.changes);
+    }
+
+    #[test]
+    fn a_drift_that_was_rejected_is_found_again_from_the_stated_motor() {
+        let mut bench = Bench::new();
+        bench.fly(HOT, 60);
+        bench.tracker.reject();
+        assert_eq!(bench.tracker.in_force(), Drift::NONE);
+        assert_eq!(bench.tracker.drift(), Drift::NONE);
+        bench.fly(HOT, 60);
+        let off_by = bench.off_by(HOT);
+        assert!(within(off_by, 0.02), "{off_by:?}");
     }
 
     #[test]

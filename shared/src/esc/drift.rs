@@ -1,18 +1,28 @@
-//! The motor's resistance and flux as the ESC follows and tells them.
+//! Follows the motor's resistance and flux, and reports them.
+
+use core::mem::MaybeUninit;
 
 use super::Esc;
-use crate::drive::{Snapshot, Stated};
-use crate::params::ParamId;
+use crate::drive::{Config, Drift, Snapshot, Stated, put_default};
 use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
+use crate::params::{Board, ParamId, Params, build_in};
+
+/// Returns true if the drive can be built for a motor that has drifted so far. Never inlined: a configuration takes
+/// 0.9 KB of stack.
+#[inline(never)]
+fn fits(params: &Params, board: &Board, drift: Drift) -> bool {
+    let mut place = MaybeUninit::<Config>::uninit();
+    build_in(params, board, drift, put_default(&mut place)).is_ok()
+}
 
 impl Esc {
-    /// Looks at what the default observer shows of the motor. The configuration is made anew where that has changed.
+    /// Looks at what the default observer shows of the motor, and has the configuration rebuilt if that has changed.
     pub(super) fn follow_motor(&mut self, snapshot: &Snapshot) {
         let params = &self.params;
         let shows = params.unknown().is_none()
             && !params.chosen(CtlDrive::SixStep)
             && params.chosen(CtlObserver::Compensated)
-            // An inductance that is adapted is another than the one that is stated.
+            // An adapted inductance differs from the stated one.
             && params.chosen(CtlAdaptL::Off)
             && !self.identify.is_under_way();
         let [r_mohm, l_uh, flux_mwb] =
@@ -26,7 +36,12 @@ impl Esc {
         } else {
             Stated::NONE
         };
-        self.reassumes |= self.tracker.look(snapshot, stated);
+        if self.tracker.look(snapshot, stated) {
+            self.reassumes = true;
+            if !fits(&self.running(), &self.board, self.tracker.in_force()) {
+                self.tracker.reject();
+            }
+        }
         let drift = self.tracker.drift();
         self.telemetry.r_mohm = r_mohm * drift.resistance;
         self.telemetry.flux_mwb = flux_mwb * drift.flux;
