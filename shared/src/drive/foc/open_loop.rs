@@ -113,8 +113,8 @@ pub(in crate::drive) fn rotor(
             if progress.run_periods >= config.proven_periods {
                 shared.failed_starts = 0;
                 shared.latch.retry_periods = config.retry_periods;
-                // With sensors an attempt is not quick.
-                if config.slow_periods == 0 {
+                // Sensors drive a held rotor for as long as it may be slow: such an attempt is not quick.
+                if config.slow_periods == 0 && config.retry_periods > 0 {
                     shared.latch.quick_attempts = QUICK_ATTEMPTS;
                 }
             }
@@ -130,7 +130,7 @@ fn failed(shared: &mut Shared) -> Why {
     let quick = &mut shared.latch.quick_attempts;
     if *quick > 0 {
         *quick -= 1;
-        // Told once. What more current has not turned the first attempt of a start need not try.
+        // Counted once, and then the first attempt of a start is skipped: it has less current than these.
         shared.failed_starts = 1;
         return Why::Failed;
     }
