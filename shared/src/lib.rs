@@ -25,7 +25,7 @@
 //! test enforces this order, and that every folder has a place in it.
 //!
 //! # Inlining
-//! The chip build optimizes for size, so the compiler inlines only what is no longer than a call. Every inline
+//! The chip build optimises for size, so the compiler inlines only what is no longer than a call. Every inline
 //! attribute states its reason. The common ones:
 //!
 //! - `#[inline(always)] // in each period`: a call and its register saves would cost every control period more

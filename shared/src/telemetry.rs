@@ -28,7 +28,7 @@ pub struct Telemetry {
     pub limits: Limits,
     /// Number of times a fault has turned the bridge off since power-up.
     pub fault_count: u32,
-    /// Consecutive failed starts; the drive retries a few times.
+    /// Consecutive failed starts; the drive retries a few times. A row of quick attempts counts as one.
     pub failed_starts: u8,
     /// The motor's resistance as it is followed, mΩ; 0 where this program follows none.
     pub r_mohm: f32,

@@ -1,4 +1,4 @@
-"""A rotor that jams in flight and is let go turns again soon, whatever the drive was at when it was."""
+"""A rotor that jams in flight turns again soon after it is let go, whatever the drive was doing at that moment."""
 
 import pytest
 

@@ -54,11 +54,10 @@ OPEN = {
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
     **cells([SIX], ["strike_torque"], ["start"], "reaction"),
-    # 10 A on 470 µF are 0.9 V a period: braking backs off ahead of the limit and ends a tenth of a volt below it. But the
-    # currents are not yet where they are to be, with a supply that rises by 6 V in a millisecond, and what they return
-    # meanwhile takes it a tenth of a volt beyond.
+    # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
+    # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC], ["disconnect"], ["braking"], "supply"),
-    # The six-step drive shoots a short through the winding in its start, and has the comparators' level.
+    # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }
 

@@ -27,7 +27,7 @@ const GENERIC = 0;
 const SERVO = 33;
 /** Components of ESCs that have a number, which is their place in messages of four. */
 const [FIRST, LAST] = [140, 153];
-const ALL_SIGNALS = 511;
+const SHOWN_SIGNALS = 511;
 const EVENTS = 500;
 const WARNING = 4;
 const SLOTS = 4;
@@ -217,7 +217,7 @@ function drive(state) {
 
 element("stream").addEventListener("click", async () => {
   const isOn = element("stream").getAttribute("aria-pressed") === "true";
-  await parameters.set("TEL_SIGNALS", isOn ? 0 : ALL_SIGNALS);
+  await parameters.set("TEL_SIGNALS", isOn ? 0 : SHOWN_SIGNALS);
 });
 
 /** A piece of the traces has been drawn. */

@@ -19,7 +19,7 @@ pub struct Config {
     i_q: Current,
     /// Bound on i_q over the speed, where larger.
     i_q_slope: Gain<Speed, Current>,
-    /// Bounds on both in braking and in driving: `LIM_PHASE_A`, or what the winding's flux allows.
+    /// Largest current in braking and in driving: `LIM_PHASE_A`, or what the winding's flux allows.
     most: [Current; 2],
     /// The highest speed at which this acts.
     end: Speed,
@@ -84,7 +84,8 @@ impl Config {
     fn slow(&self, full: Bounds, speed: Speed) -> (Current, Bounds) {
         let i_d = self.i_d_at(speed);
         let [braking, driving] = self.most;
-        // Both together stay below `driving` while i_d is below 0.47 of it. A root would lengthen the longest period.
+        // Both together stay below `driving` while i_d is below 0.47 of it. A root would lengthen the longest period. The
+        // braking bound is no limit of the current's, and needs no such care.
         let most = self.i_q_at(speed).min(driving.minus(i_d >> 2));
         let bounds = Bounds {
             min: full.min.max(-most.min(braking)),

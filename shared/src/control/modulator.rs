@@ -78,7 +78,7 @@ traced! {
 }
 
 traced! {
-    /// The longest available voltage vector, and its q component linearized around a d component.
+    /// The longest available voltage vector, and its q component linearised around a d component.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Longest {
         length: Voltage,
@@ -102,7 +102,7 @@ impl Longest {
         slope: Multiplier::from_bits(0),
     };
 
-    /// Creates one of this length, linearized around this d component.
+    /// Creates one of this length, linearised around this d component.
     pub fn new(length: Voltage, d: Voltage) -> Self {
         let d = d.min(length).max(-length);
         let q = other_leg(length, d);
@@ -192,7 +192,7 @@ pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<W
     let d = u.d.min(most).max(-most);
     let short_d = d.scaled();
     let mut q_max = longest.beside(short_d);
-    // Far from its operating point the linearization is too generous, never too strict.
+    // Far from its operating point the linearisation is too generous, never too strict.
     if square_of(Dq { d, q: q_max }) > longest.square + (longest.square >> TOO_LONG) {
         q_max = wide(other_leg(longest.length, short_d));
     }
@@ -246,7 +246,7 @@ pub fn duties(
     let half: I1F31 = whole(middle) >> 1;
     let common: I1F31 = (config.duty_max >> 1) + (half & config.centred);
     let [ca, cb, cc] = phases_in(order, certainty);
-    // Not by `map` or a closure, which become a loop or calls in a build optimized for size.
+    // Not by `map` or a closure, which become a loop or calls in a build optimised for size.
     [
         config.duty(common, dead_time.compensated(a, ca)),
         config.duty(common, dead_time.compensated(b, cb)),

@@ -30,6 +30,7 @@ traced! {
 
 /// Returns `wanted` with its i_q* clamped to the bounds and slew-limited.
 pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
+    // From braking it may cross zero by up to the slew.
     let rise = if state.i_q < Current::ZERO {
         config.slew
     } else {

@@ -49,8 +49,8 @@ pub struct Charge {
 /// Attempts of a start.
 pub const ATTEMPTS: usize = 4;
 
-/// Quick attempts ahead of them of a motor that has turned in this flight: something holds it, or has, and when it is let
-/// go it is to turn again soon.
+/// Quick attempts ahead of them, for a motor that has turned in this flight: it is probably held, and should turn again
+/// soon after it is let go.
 pub const QUICK_ATTEMPTS: u8 = 32;
 
 /// The drive's configuration, computed by [`crate::params::build`] and swapped in whole.

@@ -179,7 +179,7 @@ impl Latch {
         !known || phase != Phase::Idle
     }
 
-    /// Nothing is tried again of a flight that has ended.
+    /// Ends all retries: the flight is over.
     pub(super) fn forget_flight(&mut self) {
         self.retry_periods = 0;
         self.quick_attempts = 0;

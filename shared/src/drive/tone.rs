@@ -64,7 +64,7 @@ traced! {
 }
 
 impl State {
-    /// Ends the tone and records whether to return to the low sides; the next tone initializes the rest.
+    /// Ends the tone and records whether to return to the low sides; the next tone initialises the rest.
     pub(super) fn end(&mut self, shorted_before: bool) {
         self.pitch = Speed::ZERO;
         self.shorted_before = shorted_before;

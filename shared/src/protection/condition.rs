@@ -210,7 +210,7 @@ conditions! {
     /// A Hall sensor does not switch as the others do.
     PositionSensor = 23 "position sensor defect" Some(Raised::Warning),
         "a Hall sensor does not switch as the others do"
-        "goes on with the others, and without them at speed";
+        "keeps running on the others, and without them at speed";
 }
 
 impl Fault {

@@ -204,7 +204,7 @@ mod tests {
         }
     }
 
-    /// The terminal voltage for a back-EMF, clamped by the diodes and quantized to counts.
+    /// The terminal voltage for a back-EMF, clamped by the diodes and quantised to counts.
     fn terminal(emf_v: f64) -> Voltage {
         let held_v = (1.5 * emf_v).clamp(0.0, BUS_V + 0.7);
         Voltage::from_num((held_v / COUNT_V).round() * COUNT_V / BASE_V)

@@ -83,7 +83,8 @@ const TORQUE_LEAST_SHARE: f32 = 0.5;
 /// Greatest resistive drop of i_q over the back-EMF: with R stated 30 % too high, three times that leaves no estimate.
 const TORQUE_DROP_SHARE: f32 = 1.0;
 
-/// Greatest driving current over the one whose flux is the rotor's: an L stated 30 % too high then turns the flux by 24°.
+/// Greatest driving current over the one whose flux is the rotor's: an error of 30 % of that L turns the flux by asin 0.45,
+/// 27°.
 const DRIVING_SHARE: f32 = 1.5;
 
 /// Time constant with which the reported speed decays while the bridge is off, s. The bench's propeller takes 1.1 s.

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_quick_attempt_has_four_times_the_current_and_the_stated_ramp() {
+    fn the_quick_attempt_has_four_times_the_current_and_six_times_the_ramp() {
         let [quick, ..] = courses(&[])[..] else {
             panic!("no attempts")
         };
