@@ -1,4 +1,4 @@
-//! Outer-loop work, time-sliced over 32 periods; 20 of Run's 32 have none.
+//! Outer-loop work, time-sliced over 32 periods; 21 of Run's 32 have none.
 //!
 //! Every 8 periods the reference is computed (3 kHz at 24 kHz PWM, for a bandwidth of tens of hertz), and two
 //! periods later the dead-time signs. Every 16 come the supply and the bounds of i_q; every 32 the observer's
@@ -106,7 +106,7 @@ const RUN: &[Row] = &[
     (Work::DEAD_TIME_SIGN, 2, PERIODS),
     (Work::SUPPLY, 2, SUPPLY_PERIODS),
     (Work::SUPPLY_BOUNDS, 2, SUPPLY_PERIODS),
-    (Work::TRIP_LEVEL, 6, SUPPLY_PERIODS),
+    (Work::TRIP_LEVEL, 6, CYCLE),
     (Work::LONGEST_VECTOR, 4, SUPPLY_PERIODS),
     (Work::SPEED_BOUNDS, 4, SUPPLY_PERIODS),
     (Work::OBSERVER_GAINS, 6, CYCLE),
