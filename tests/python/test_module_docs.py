@@ -32,7 +32,7 @@ PRINTED = {
     "record": r"(?s)^48001 control periods with t_s, .*run: 0\.\d+ to 2\.000 s, at most 31\d\d rpm",
     "scenario": r"(R x (0\.8|1\.0|1\.2): \w+ at \d+\.\d rpm, trace [0-9a-f]{16}: held\n){15}",
     "simulator": r"\d\.\d\d m after 2\.4 s, \d\.\d\d m/s at (\d{4,5}), \1, \1, \1 rpm",
-    "sweep": r"<Table of 2 runs, 0 failed> with 109 columns",
+    "sweep": r"<Table of 2 runs, 0 failed> with 115 columns",
 }
 
 

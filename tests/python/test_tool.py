@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+import time
 
 import pytest
 
@@ -132,8 +133,13 @@ def test_what_needs_no_esc_offers_no_way_to_one(command):
 
 def test_the_hint_of_the_emulator_reaches_it(start):
     emulator = start()
-    hints = [line.split("--", maxsplit=2)[2] for line in emulator.output().splitlines()
-             if "-p siskin --" in line]
+    until = time.monotonic() + 20.0
+    hints = []
+    # They come after the ports, for which the start has waited.
+    while len(hints) < 2 and time.monotonic() < until:
+        time.sleep(0.02)
+        lines = emulator.output().splitlines()
+        hints = [line.split("--", maxsplit=2)[2] for line in lines if "-p siskin --" in line]
     assert len(hints) == 2, emulator.output()
     for hint in hints:
         command = f"--{hint}".replace("-- ", "", 1).split()
