@@ -448,8 +448,8 @@ pub(crate) fn us(cycles: Cycles) -> f64 {
     ns(cycles) as f64 / 1e3
 }
 
-/// The end of the flash, which neither the image nor a store with few entries uses: erased, it is not an instruction.
-pub(crate) const ERASED: u32 = 0x0801_fff0;
+/// The last words of the image's flash, which the image leaves: erased, they are not an instruction.
+pub(crate) const ERASED: u32 = 0x0801_eff8;
 
 /// Puts a jump to itself into free SRAM: after everything in the image, below the end of the chip's 22 KB.
 pub(crate) fn endless_loop(board: &mut Board) -> u32 {
