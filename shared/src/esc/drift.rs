@@ -1,19 +1,9 @@
 //! Follows the motor's resistance and flux, and reports them.
 
-use core::mem::MaybeUninit;
-
-use super::Esc;
-use crate::drive::{Config, Drift, Snapshot, Stated, put_default};
+use super::{Esc, check_drifted};
+use crate::drive::{Snapshot, Stated};
+use crate::params::ParamId;
 use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
-use crate::params::{Board, ParamId, Params, build_in};
-
-/// Returns true if the drive can be built for a motor that has drifted so far. Never inlined: a configuration takes
-/// 0.9 KB of stack.
-#[inline(never)]
-fn fits(params: &Params, board: &Board, drift: Drift) -> bool {
-    let mut place = MaybeUninit::<Config>::uninit();
-    build_in(params, board, drift, put_default(&mut place)).is_ok()
-}
 
 impl Esc {
     /// Looks at what the default observer shows of the motor, and has the configuration rebuilt if that has changed.
@@ -38,7 +28,8 @@ impl Esc {
         };
         if self.tracker.look(snapshot, stated) {
             self.reassumes = true;
-            if !fits(&self.running(), &self.board, self.tracker.in_force()) {
+            let drift = self.tracker.in_force();
+            if check_drifted(&self.running(), &self.board, drift).is_err() {
                 self.tracker.reject();
             }
         }
