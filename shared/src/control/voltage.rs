@@ -25,13 +25,13 @@ pub fn reference(
     i_d: Current,
     u_q: Voltage,
 ) -> Reference {
-    let wanted = Reference {
+    let reference = Reference {
         i: Dq {
             d: i_d,
             q: Current::ZERO,
         },
         ..Reference::default()
     };
-    let i_q = config.current_at(state, &wanted, fb, u_q);
-    wanted.with_i_q(i_q)
+    let i_q = config.current_at(state, &reference, fb, u_q);
+    reference.with_i_q(i_q)
 }

@@ -1,7 +1,7 @@
 //! Current regulators: from the reference current to the voltage.
 //!
 //! All three take the same [`Reference`] and [`Feedback`], and each holds two integrators. A period is
-//! [`Config::voltage`], [`Config::integrate`], and [`Config::give_way`] where the modulator's limit cuts
+//! [`Regulator::voltage`], [`Regulator::integrate`], and [`Regulator::anti_windup`] where the modulator's limit cuts
 //! something off.
 
 pub mod modified;
@@ -42,14 +42,26 @@ traced! {
     }
 }
 
-impl Config {
+/// A current regulator in a control period: the selected one, or one known at compile time.
+pub trait Regulator {
     /// Returns the voltage that drives the currents to their references, before any limit.
-    #[inline(always)] // in each period
-    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+    fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage>;
+
+    /// Advances the integrators by one period.
+    fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback);
+
+    /// Corrects [`Regulator::integrate`] for the voltage that the limit cut off. The integrators continue as if only
+    /// the current within reach of the remaining voltage had been demanded, so they respond at once when the demand
+    /// falls.
+    fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>);
+}
+
+impl Regulator for Config {
+    fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
         let u = match self {
-            Self::ObserverBased(c) => c.voltage(&state.observer_based, wanted, fb),
-            Self::Synchronous(c) => return c.voltage(&state.synchronous, wanted, fb),
-            Self::Modified(c) => c.voltage(&state.modified, wanted, fb),
+            Self::ObserverBased(c) => c.voltage(&state.observer_based, reference, fb),
+            Self::Synchronous(c) => return c.voltage(&state.synchronous, reference, fb),
+            Self::Modified(c) => c.voltage(&state.modified, reference, fb),
         };
         Dq {
             d: wide(u.d),
@@ -57,8 +69,42 @@ impl Config {
         }
     }
 
-    /// Returns the i_q* at which [`Config::voltage`] gives `u_q` along q (for the modified regulator, the
-    /// voltage's length), whatever i_q* `wanted` has.
+    fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
+        match self {
+            Self::ObserverBased(c) => c.integrate(&mut state.observer_based, reference, fb),
+            Self::Synchronous(c) => c.integrate(&mut state.synchronous, reference, fb),
+            Self::Modified(c) => c.integrate(&mut state.modified, reference, fb),
+        }
+    }
+
+    fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        match self {
+            Self::ObserverBased(c) => c.anti_windup(&mut state.observer_based, cut),
+            Self::Synchronous(c) => c.anti_windup(&mut state.synchronous, cut),
+            Self::Modified(c) => c.anti_windup(&mut state.modified, cut),
+        }
+    }
+}
+
+impl Regulator for synchronous::Config {
+    #[inline(always)] // in each period
+    fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+        Self::voltage(self, &state.synchronous, reference, fb)
+    }
+
+    #[inline(always)] // in each period
+    fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
+        Self::integrate(self, &mut state.synchronous, reference, fb);
+    }
+
+    fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        Self::anti_windup(self, &mut state.synchronous, cut);
+    }
+}
+
+impl Config {
+    /// Returns the i_q* at which [`Regulator::voltage`] gives `u_q` along q (for the modified regulator, the
+    /// voltage's length), whatever i_q* `reference` has.
     ///
     /// Regulated this way, the current goes where the voltage takes it, and a bound on i_q* bounds the current,
     /// which reaches it with the regulator's own dynamics.
@@ -66,96 +112,33 @@ impl Config {
     pub fn current_at(
         &self,
         state: &State,
-        wanted: &Reference,
+        reference: &Reference,
         fb: &Feedback,
         u_q: Voltage,
     ) -> Current {
         match self {
-            Self::ObserverBased(c) => c.current_at(&state.observer_based, wanted, fb, u_q),
-            Self::Synchronous(c) => c.current_at(&state.synchronous, wanted, fb, u_q),
-            Self::Modified(c) => c.current_at(&state.modified, wanted, fb, u_q),
+            Self::ObserverBased(c) => c.current_at(&state.observer_based, reference, fb, u_q),
+            Self::Synchronous(c) => c.current_at(&state.synchronous, reference, fb, u_q),
+            Self::Modified(c) => c.current_at(&state.modified, reference, fb, u_q),
         }
     }
 
-    /// Advances the integrators by one period.
-    #[inline(always)] // in each period
-    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        match self {
-            Self::ObserverBased(c) => c.integrate(&mut state.observer_based, wanted, fb),
-            Self::Synchronous(c) => c.integrate(&mut state.synchronous, wanted, fb),
-            Self::Modified(c) => c.integrate(&mut state.modified, wanted, fb),
-        }
-    }
-
-    /// Anti-windup: corrects [`Config::integrate`] for the voltage that the limit cut off. The integrators
-    /// continue as if only the current within reach of the remaining voltage had been wanted, so they respond
-    /// at once when the demand falls.
-    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        match self {
-            Self::ObserverBased(c) => c.give_way(&mut state.observer_based, cut),
-            Self::Synchronous(c) => c.give_way(&mut state.synchronous, cut),
-            Self::Modified(c) => c.give_way(&mut state.modified, cut),
-        }
-    }
-
-    /// Presets the integrators so that [`Config::voltage`] is `u`: a bumpless takeover from whatever applied
+    /// Presets the integrators so that [`Regulator::voltage`] is `u`: a bumpless takeover from whatever applied
     /// that voltage.
     ///
     /// The modified regulator takes over within a quarter turn of the q axis, with either sign.
-    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
+    pub fn preset(&self, state: &mut State, u: Dq<Voltage>, reference: &Reference, fb: &Feedback) {
         match self {
-            Self::ObserverBased(c) => c.begin(&mut state.observer_based, u, wanted, fb),
-            Self::Synchronous(c) => c.begin(&mut state.synchronous, u, wanted, fb),
-            Self::Modified(c) => c.begin(&mut state.modified, u, wanted, fb),
+            Self::ObserverBased(c) => c.preset(&mut state.observer_based, u, reference, fb),
+            Self::Synchronous(c) => c.preset(&mut state.synchronous, u, reference, fb),
+            Self::Modified(c) => c.preset(&mut state.modified, u, reference, fb),
         }
     }
 
     /// Updates the speed-dependent coefficients, every few periods.
-    pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
+    pub fn schedule_gains(&self, state: &mut State, omega: Speed, inductance: Factor) {
         if let Self::Synchronous(c) = self {
-            c.pace(&mut state.synchronous, omega, inductance);
+            c.schedule_gains(&mut state.synchronous, omega, inductance);
         }
-    }
-}
-
-/// A current regulator in a control period: the selected one, or one known at compile time.
-pub trait Regulator {
-    /// Returns the voltage that drives the currents to their references, before any limit.
-    fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage>;
-
-    /// Advances the integrators by one period; see [`Config::integrate`].
-    fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback);
-
-    /// Corrects the integrators for what the limit cut off; see [`Config::give_way`].
-    fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>);
-}
-
-impl Regulator for Config {
-    fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
-        Self::voltage(self, state, wanted, fb)
-    }
-
-    fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        Self::integrate(self, state, wanted, fb);
-    }
-
-    fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        Self::give_way(self, state, cut);
-    }
-}
-
-impl Regulator for synchronous::Config {
-    #[inline(always)] // in each period
-    fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
-        Self::voltage(self, &state.synchronous, wanted, fb)
-    }
-
-    #[inline(always)] // in each period
-    fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        Self::integrate(self, &mut state.synchronous, wanted, fb);
-    }
-
-    fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        Self::give_way(self, &mut state.synchronous, cut);
     }
 }

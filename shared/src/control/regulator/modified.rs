@@ -7,7 +7,7 @@
 
 use fixed::types::extra::U28;
 
-use super::reference::{Feedback, Reference, beyond};
+use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
 use crate::trace::traced;
@@ -43,10 +43,10 @@ const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
 
 impl Config {
     /// Returns the voltage of length V at phase δ ahead of q, before any limit: (−V·sin δ, V·cos δ).
-    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
-        let length = self.length(state, wanted, fb);
-        let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
-        let phase = bounded(state.phase.plus(self.phase_k_p.held(e_d)));
+    pub fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        let length = self.length(state, reference, fb);
+        let e_d = with_sign_of(length, fb.i.d.minus(reference.i.d));
+        let phase = within_quarter_turn(state.phase.plus(self.phase_k_p.held(e_d)));
         let SinCos { cos, sin } = SinCos::of(phase);
         // 28 + 31 − 32 fraction bits; both components are within the length.
         Dq {
@@ -56,54 +56,54 @@ impl Config {
     }
 
     /// V.
-    fn length(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Voltage {
-        let e_q = wanted.i.q.minus(fb.i.q);
-        let length = state.length.plus(self.k_p.held(e_q)).plus(wanted.u_q);
+    fn length(&self, state: &State, reference: &Reference, fb: &Feedback) -> Voltage {
+        let e_q = reference.i.q.minus(fb.i.q);
+        let length = state.length.plus(self.k_p.held(e_q)).plus(reference.u_q);
         // Twice the product at the type's minimum would overflow.
         length.max(-Voltage::MAX)
     }
 
-    /// Returns the i_q* at which the voltage has the length `u_q`, whatever i_q* `wanted` has.
+    /// Returns the i_q* at which the voltage has the length `u_q`, whatever i_q* `reference` has.
     pub fn current_at(
         &self,
         state: &State,
-        wanted: &Reference,
+        reference: &Reference,
         fb: &Feedback,
         u_q: Voltage,
     ) -> Current {
-        let wanted = wanted.with_i_q(Current::ZERO);
-        let without = self.length(state, &wanted, fb);
+        let reference = reference.with_i_q(Current::ZERO);
+        let without = self.length(state, &reference, fb);
         self.admittance.held(u_q.minus(without))
     }
 
     /// Advances the integrators by one period.
-    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        let step = self.k_i.held(wanted.i.q.minus(fb.i.q));
+    pub fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
+        let step = self.k_i.held(reference.i.q.minus(fb.i.q));
         // The limit keeps the d component: while it cuts, the phase alone regulates i_d.
-        let length = self.length(state, wanted, fb);
-        let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
+        let length = self.length(state, reference, fb);
+        let e_d = with_sign_of(length, fb.i.d.minus(reference.i.d));
         let turn = self.phase_k_i.held(e_d);
         state.length = state.length.plus(step);
-        state.phase = bounded(state.phase.plus(turn));
+        state.phase = within_quarter_turn(state.phase.plus(turn));
     }
 
     /// Takes back what the length integrated for the voltage that was cut off.
-    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        let beyond = beyond(self.admittance, cut);
-        state.length = state.length.minus(self.k_i.held(beyond.q));
+    pub fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        let excess = excess_current(self.admittance, cut);
+        state.length = state.length.minus(self.k_i.held(excess.q));
     }
 
     /// Presets the integrators so that the voltage is `u`, which always lies within a quarter turn of the q
     /// axis with one sign or the other.
-    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
+    pub fn preset(&self, state: &mut State, u: Dq<Voltage>, reference: &Reference, fb: &Feedback) {
         state.set(u);
         let length = state.length;
-        let e_d = leads_with(length, fb.i.d.minus(wanted.i.d));
+        let e_d = with_sign_of(length, fb.i.d.minus(reference.i.d));
         let phase = state.phase.minus(self.phase_k_p.held(e_d));
-        let without = self.length(&State::default(), wanted, fb);
+        let without = self.length(&State::default(), reference, fb);
         *state = State {
             length: length.minus(without),
-            phase: bounded(phase),
+            phase: within_quarter_turn(phase),
         };
     }
 }
@@ -116,13 +116,13 @@ impl State {
         let sign = |x: Voltage| if behind { x.saturating_neg() } else { x };
         *self = Self {
             length: sign(length),
-            phase: bounded(atan2_turns(sign(u.d).saturating_neg(), sign(u.q))),
+            phase: within_quarter_turn(atan2_turns(sign(u.d).saturating_neg(), sign(u.q))),
         };
     }
 }
 
 /// i_d's error as the phase sees it: a negative length flips its sign.
-fn leads_with(length: Voltage, error: Current) -> Current {
+fn with_sign_of(length: Voltage, error: Current) -> Current {
     if length.is_negative() {
         error.saturating_neg()
     } else {
@@ -130,6 +130,6 @@ fn leads_with(length: Voltage, error: Current) -> Current {
     }
 }
 
-fn bounded(phase: Angle) -> Angle {
+fn within_quarter_turn(phase: Angle) -> Angle {
     phase.min(QUARTER_TURN).max(-QUARTER_TURN)
 }

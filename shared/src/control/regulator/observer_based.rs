@@ -1,6 +1,6 @@
 //! The observer-based current regulator of the first paper (10).
 
-use super::reference::{Feedback, Reference, beyond};
+use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, TopProduct};
 use crate::trace::traced;
@@ -34,80 +34,80 @@ traced! {
 
 impl Config {
     /// Returns the voltage that drives the estimated currents to (i_d*, i_q*), before any limit (10).
-    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
-        let u = self.forced(wanted, fb);
+    pub fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        let u = self.without_integrators(reference, fb);
         Dq {
             d: u.d.plus(state.sigma.d),
             q: u.q.plus(state.sigma.q),
         }
     }
 
-    /// Returns the i_q* at which the q voltage is `u_q`, whatever i_q* `wanted` has.
+    /// Returns the i_q* at which the q voltage is `u_q`, whatever i_q* `reference` has.
     pub fn current_at(
         &self,
         state: &State,
-        wanted: &Reference,
+        reference: &Reference,
         fb: &Feedback,
         u_q: Voltage,
     ) -> Current {
-        let wanted = wanted.with_i_q(Current::ZERO);
-        let without = self.voltage(state, &wanted, fb).q;
+        let reference = reference.with_i_q(Current::ZERO);
+        let without = self.voltage(state, &reference, fb).q;
         self.admittance.held(u_q.minus(without))
     }
 
     /// (10) without the integrators. Not inlined: all callers share one copy.
     #[inline(never)]
-    fn forced(&self, wanted: &Reference, fb: &Feedback) -> Dq<Voltage> {
-        let e = error(wanted, fb);
+    fn without_integrators(&self, reference: &Reference, fb: &Feedback) -> Dq<Voltage> {
+        let e = error(reference, fb);
         let cross_d = fb.inductance.of(fb.omega.top(fb.i.q));
         let cross_q = fb.inductance.of(fb.omega.top(fb.i.d));
         let d = self
             .resistance
-            .held(wanted.i.d)
+            .held(reference.i.d)
             .minus(narrow(fb.h_hat.d))
             .minus(self.reactance.held(cross_d))
             .minus(self.k_pe.held(e.d));
         let q = self
             .resistance
-            .held(wanted.i.q)
+            .held(reference.i.q)
             .minus(narrow(fb.h_hat.q))
             .plus(self.reactance.held(cross_q))
-            .plus(self.inductance.held(wanted.i_q_step))
+            .plus(self.inductance.held(reference.i_q_step))
             .minus(self.k_pe.held(e.q))
-            .plus(wanted.u_q);
+            .plus(reference.u_q);
         Dq { d, q }
     }
 
     /// Advances the integrators by one period.
-    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        let e = error(wanted, fb);
+    pub fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
+        let e = error(reference, fb);
         let sigma = &mut state.sigma;
         sigma.d = sigma.d.minus(self.k_ie.held(e.d));
         sigma.q = sigma.q.minus(self.k_ie.held(e.q));
     }
 
     /// Takes back what the integrators gained for the voltage that was cut off.
-    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        let beyond = beyond(self.admittance, cut);
+    pub fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        let excess = excess_current(self.admittance, cut);
         let sigma = &mut state.sigma;
-        sigma.d = sigma.d.minus(self.k_ie.held(beyond.d));
-        sigma.q = sigma.q.minus(self.k_ie.held(beyond.q));
+        sigma.d = sigma.d.minus(self.k_ie.held(excess.d));
+        sigma.q = sigma.q.minus(self.k_ie.held(excess.q));
     }
 
     /// Presets the integrators so that the voltage is `u`.
-    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
-        let forced = self.forced(wanted, fb);
+    pub fn preset(&self, state: &mut State, u: Dq<Voltage>, reference: &Reference, fb: &Feedback) {
+        let without_integrators = self.without_integrators(reference, fb);
         state.sigma = Dq {
-            d: u.d.minus(forced.d),
-            q: u.q.minus(forced.q),
+            d: u.d.minus(without_integrators.d),
+            q: u.q.minus(without_integrators.q),
         };
     }
 }
 
 /// e_d and e_q: estimated currents minus references.
-fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
+fn error(reference: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
-        d: fb.i_hat.d.minus(wanted.i.d),
-        q: fb.i_hat.q.minus(wanted.i.q),
+        d: fb.i_hat.d.minus(reference.i.d),
+        q: fb.i_hat.q.minus(reference.i.q),
     }
 }

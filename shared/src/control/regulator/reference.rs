@@ -74,7 +74,10 @@ pub struct Feedback {
 
 /// Returns the current that the cut-off voltage would have produced in the first-order loop.
 #[inline(always)] // in the longest period
-pub(super) fn beyond(admittance: Gain<Voltage, Current>, cut: Dq<WideVoltage>) -> Dq<Current> {
+pub(super) fn excess_current(
+    admittance: Gain<Voltage, Current>,
+    cut: Dq<WideVoltage>,
+) -> Dq<Current> {
     Dq {
         d: admittance.saturating_apply(narrow(cut.d)),
         q: admittance.saturating_apply(narrow(cut.q)),

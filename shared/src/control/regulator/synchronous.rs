@@ -50,83 +50,83 @@ impl Config {
     /// where the last i_d and i_q are the model's, and u_q* is what the speed regulator of figure 47 feeds forward,
     /// else zero.
     #[inline(always)] // in each period
-    pub fn voltage(&self, state: &State, wanted: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
-        let e = error(wanted, fb);
+    pub fn voltage(&self, state: &State, reference: &Reference, fb: &Feedback) -> Dq<WideVoltage> {
+        let e = error(reference, fb);
         let model = &state.model;
         // Currents are within four units and k_p is below eight: no sum gets near 128.
         let d = self.k_p.added(state.sigma.d, e.d);
         let q = self.k_p.added(state.sigma.q, e.q);
-        let forward = wide(wanted.u_q).wrapping_sub(fb.h_hat.q);
+        let forward = wide(reference.u_q).wrapping_sub(fb.h_hat.q);
         Dq {
             d: state.cross.taken(d, model.q),
             q: state.cross.added(q, model.d).wrapping_add(forward),
         }
     }
 
-    /// Returns the i_q* at which V_q is `u_q`, whatever i_q* `wanted` has.
+    /// Returns the i_q* at which V_q is `u_q`, whatever i_q* `reference` has.
     pub fn current_at(
         &self,
         state: &State,
-        wanted: &Reference,
+        reference: &Reference,
         fb: &Feedback,
         u_q: Voltage,
     ) -> Current {
-        let wanted = wanted.with_i_q(Current::ZERO);
-        let without = self.voltage(state, &wanted, fb).q;
+        let reference = reference.with_i_q(Current::ZERO);
+        let without = self.voltage(state, &reference, fb).q;
         self.admittance.saturating_apply(wide(u_q).minus(without))
     }
 
     /// Advances the integrators by one period.
     #[inline(always)] // in each period
-    pub fn integrate(&self, state: &mut State, wanted: &Reference, fb: &Feedback) {
-        let e = error(wanted, fb);
+    pub fn integrate(&self, state: &mut State, reference: &Reference, fb: &Feedback) {
+        let e = error(reference, fb);
         let sigma = &mut state.sigma;
         sigma.d = self.k_i.added(sigma.d, e.d);
         sigma.q = self.k_i.added(sigma.q, e.q);
         let model = &mut state.model;
-        model.d = self.rate.added(model.d, wanted.i.d.minus(model.d));
-        model.q = self.rate.added(model.q, wanted.i.q.minus(model.q));
+        model.d = self.rate.added(model.d, reference.i.d.minus(model.d));
+        model.q = self.rate.added(model.q, reference.i.q.minus(model.q));
     }
 
     /// Takes back what the integrators and the model gained for the current that the cut-off voltage would have
     /// produced in the first-order loop.
-    pub fn give_way(&self, state: &mut State, cut: Dq<WideVoltage>) {
-        let beyond = Dq {
+    pub fn anti_windup(&self, state: &mut State, cut: Dq<WideVoltage>) {
+        let excess = Dq {
             d: self.admittance.saturating_apply(cut.d),
             q: self.admittance.saturating_apply(cut.q),
         };
         let State { sigma, model, .. } = state;
-        sigma.d = self.k_i.taken(sigma.d, beyond.d);
-        sigma.q = self.k_i.taken(sigma.q, beyond.q);
-        model.d = self.rate.taken(model.d, beyond.d);
-        model.q = self.rate.taken(model.q, beyond.q);
+        sigma.d = self.k_i.taken(sigma.d, excess.d);
+        sigma.q = self.k_i.taken(sigma.q, excess.q);
+        model.d = self.rate.taken(model.d, excess.d);
+        model.q = self.rate.taken(model.q, excess.q);
     }
 
     /// Updates ω̂·L, every few periods.
-    pub fn pace(&self, state: &mut State, omega: Speed, inductance: Factor) {
+    pub fn schedule_gains(&self, state: &mut State, omega: Speed, inductance: Factor) {
         // The gain's output type has 28 fraction bits, as the multiplier has.
         let product = inductance.of(self.reactance.saturating_apply(omega));
         state.cross = Multiplier::from_bits(product.to_bits());
     }
 
     /// Presets the integrators so that the voltage is `u`.
-    pub fn begin(&self, state: &mut State, u: Dq<Voltage>, wanted: &Reference, fb: &Feedback) {
-        self.pace(state, fb.omega, fb.inductance);
+    pub fn preset(&self, state: &mut State, u: Dq<Voltage>, reference: &Reference, fb: &Feedback) {
+        self.schedule_gains(state, fb.omega, fb.inductance);
         state.model = fb.i;
         state.sigma = Dq::default();
-        let forced = self.voltage(state, wanted, fb);
+        let without_integrators = self.voltage(state, reference, fb);
         state.sigma = Dq {
-            d: wide(u.d).minus(forced.d),
-            q: wide(u.q).minus(forced.q),
+            d: wide(u.d).minus(without_integrators.d),
+            q: wide(u.q).minus(without_integrators.q),
         };
     }
 }
 
 /// References minus measured currents.
 #[inline(always)] // in each period
-fn error(wanted: &Reference, fb: &Feedback) -> Dq<Current> {
+fn error(reference: &Reference, fb: &Feedback) -> Dq<Current> {
     Dq {
-        d: wanted.i.d.minus(fb.i.d),
-        q: wanted.i.q.minus(fb.i.q),
+        d: reference.i.d.minus(fb.i.d),
+        q: reference.i.q.minus(fb.i.q),
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{L, P, PHI, R, TS, Units};
 use crate::control::inductance::Factor;
 use crate::control::modulator::{self, Longest};
-use crate::control::regulator::{Feedback, Reference, State};
+use crate::control::regulator::{Feedback, Reference, Regulator, State};
 use crate::control::transform::Dq;
 use crate::units::{Current, Voltage, WideVoltage, narrow};
 
@@ -146,12 +146,12 @@ impl Loop {
     pub(super) fn period(&mut self, wanted: &Reference) -> (f64, f64) {
         let feedback = self.feedback();
         let regulator = &self.units.0.regulator;
-        regulator.pace(&mut self.regulator, feedback.omega, feedback.inductance);
+        regulator.schedule_gains(&mut self.regulator, feedback.omega, feedback.inductance);
         let asked = regulator.voltage(&self.regulator, wanted, &feedback);
         let (u, cut) = modulator::limit(asked, &Longest::new(self.vector_max, narrow(asked.d)));
         regulator.integrate(&mut self.regulator, wanted, &feedback);
         if let Some(cut) = cut {
-            regulator.give_way(&mut self.regulator, cut);
+            regulator.anti_windup(&mut self.regulator, cut);
         }
         self.missing = if cut.is_some() {
             wanted.i.q - feedback.i.q

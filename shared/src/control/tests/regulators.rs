@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use super::motor::{Loop, Motor};
 use super::{K_IE, K_PE, L, P, PHI, R, TABLE_III, TS, Units, config_with, near};
 use crate::control::inductance::Factor;
-use crate::control::regulator::{Feedback, Reference, State};
+use crate::control::regulator::{Feedback, Reference, Regulator, State};
 use crate::control::transform::Dq;
 use crate::params::ParamId;
 use crate::units::{Current, Voltage, WideVoltage};
@@ -110,7 +110,7 @@ fn at(units: &Units, sigma: [f64; 2]) -> State {
         u_ff: 0.0,
         factor: 1.0,
     };
-    units.0.regulator.begin(
+    units.0.regulator.preset(
         &mut state,
         voltages(units, sigma),
         &idle.wanted(units),
@@ -124,7 +124,7 @@ fn two_periods(units: &Units, state: &mut State, case: &Case) -> [[f64; 2]; 2] {
     let regulator = &units.0.regulator;
     let (wanted, feedback) = (case.wanted(units), case.feedback(units));
     let volts = |u: Dq<WideVoltage>| [units.wide_volts(u.d), units.wide_volts(u.q)];
-    regulator.pace(state, feedback.omega, feedback.inductance);
+    regulator.schedule_gains(state, feedback.omega, feedback.inductance);
     let now = volts(regulator.voltage(state, &wanted, &feedback));
     regulator.integrate(state, &wanted, &feedback);
     [now, volts(regulator.voltage(state, &wanted, &feedback))]
@@ -158,7 +158,7 @@ proptest! {
         let units = units(SYNCHRONOUS);
         let mut state = State::default();
         let (wanted, feedback) = (before.wanted(&units), before.feedback(&units));
-        units.0.regulator.begin(&mut state, Dq::default(), &wanted, &feedback);
+        units.0.regulator.preset(&mut state, Dq::default(), &wanted, &feedback);
         let [now, next] = two_periods(&units, &mut state, &case);
 
         let k_p = BANDWIDTH * L;
@@ -225,7 +225,7 @@ proptest! {
             let regulator = &units.0.regulator;
             let (wanted, feedback) = (case.wanted(&units), case.feedback(&units));
             let mut state = State::default();
-            regulator.begin(&mut state, voltages(&units, u), &wanted, &feedback);
+            regulator.preset(&mut state, voltages(&units, u), &wanted, &feedback);
             let got = regulator.voltage(&state, &wanted, &feedback);
             let settled = kind != MODIFIED || u[1].abs() > 2.0 * u[0].abs() && (case.i[0] - case.i_star[0]).abs() < 10.0;
             if settled {

@@ -133,7 +133,7 @@ fn regulate(config: &Config, foc: &mut State, omega: Speed) {
     let reference = Reference::default();
     config
         .regulator
-        .begin(&mut loops.regulator, emf(omega), &reference, &fb);
+        .preset(&mut loops.regulator, emf(omega), &reference, &fb);
 }
 
 /// Returns the last two commands for a rotor at `theta` at the first period's sample: the back-EMF

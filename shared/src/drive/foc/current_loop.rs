@@ -114,7 +114,7 @@ fn limited(
     shared.applied.expect_unreadable();
     let (u, cut) = modulator::limit(wanted, &shared.supply.longest);
     if let Some(cut) = cut {
-        regulator.give_way(&mut loops.regulator, cut);
+        regulator.anti_windup(&mut loops.regulator, cut);
         loops.deficit = loops.reference.i.q.minus(shared.seen.i.q);
     }
     u

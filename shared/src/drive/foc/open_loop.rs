@@ -185,7 +185,7 @@ pub(in crate::drive) fn hand_over(
     let reference = Reference::steady(i.q).with_i_d(i.d);
     config
         .regulator
-        .begin(&mut loops.regulator, u, &reference, &fb);
+        .preset(&mut loops.regulator, u, &reference, &fb);
     loops.reference = reference;
     Some(Why::HandedOver)
 }

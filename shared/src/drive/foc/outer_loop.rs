@@ -219,5 +219,5 @@ pub(in crate::drive) fn decoupling(config: &Config, foc: &mut State, shared: &Sh
     let factor = foc.loops.inductance.factor;
     config
         .regulator
-        .pace(&mut foc.loops.regulator, shared.seen.speed, factor);
+        .schedule_gains(&mut foc.loops.regulator, shared.seen.speed, factor);
 }
