@@ -1,7 +1,7 @@
 //! The compensated flux observer with a phase-locked loop: the default.
 //!
 //! A voltage model of the stator flux in the stator's frame, held against drift by the flux that the loop expects
-//! at its own angle. This leak rotates with the estimate, so it causes no steady-state error, and the speed comes
+//! at its armature angle. This leak rotates with the estimate, so it causes no steady-state error, and the speed comes
 //! from the loop alone: neither R nor L enters its gain, as they do in ω̂ = ξ̂·|ĥ| of the first paper (7), which
 //! loses lock when they are wrong.
 //!
@@ -68,26 +68,26 @@ traced! {
         /// ψ, the stator flux.
         psi: AlphaBeta<Flux>,
         /// ω̂ − ω̂_i, smoothed.
-        smooth: Speed,
+        excess: Speed,
         /// Current at the last sample.
         i_before: AlphaBeta<Current>,
         /// Coefficients at the present speed.
-        pace: Pace,
+        gains: Gains,
     }
 }
 
 traced! {
-    /// Coefficients that follow the speed and the inductance; [`pace`] updates them every few periods.
+    /// Coefficients that follow the speed and the inductance; [`schedule_gains`] updates them every few periods.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
-    struct Pace {
+    struct Gains {
         /// L, including its adaptation.
         inductance: Multiplier<Current, WideFlux>,
         /// 0.5·ω⁺·T_s.
         leak: I0F32,
         /// 0.5·ω⁺·T_s − β·ω⁺²·T_s.
-        held: I0F32,
+        leak_less_bias: I0F32,
         /// Rate of φ̂, 0.15·ω⁺·T_s.
-        phi: I0F32,
+        phi_rate: I0F32,
         /// ω_n²·T_s, for half of ε.
         integral: Speed,
         /// 1.8·ω_n, for half of ε.
@@ -106,9 +106,9 @@ impl Default for State {
             omega_i: Speed::ZERO,
             phi: FLUX_NOMINAL,
             psi: AlphaBeta::default(),
-            smooth: Speed::ZERO,
+            excess: Speed::ZERO,
             i_before: AlphaBeta::default(),
-            pace: Pace::default(),
+            gains: Gains::default(),
         }
     }
 }
@@ -134,7 +134,7 @@ const PHI_MAX: Flux = Flux::from_bits(341_782_638);
 const PHI_LOST: Flux = Flux::from_bits(68_356_528);
 
 /// Begins with a known rotor speed, and its angle at the next sample. Keeps the coefficients: Park has set those of
-/// a rotor at rest, and for a caught one [`pace`] sets them afterwards.
+/// a rotor at rest, and for a caught one [`schedule_gains`] sets them afterwards.
 pub fn begin(
     config: &Config,
     state: &mut State,
@@ -146,22 +146,22 @@ pub fn begin(
         FLUX_NOMINAL,
         sin_cos(theta.wrapping_sub(omega.over_period())),
     );
-    let own = stator_flux(config.inductance, i);
+    let armature = stator_flux(config.inductance, i);
     *state = State {
         theta,
         omega_i: omega,
         psi: AlphaBeta {
-            alpha: rotor.alpha.plus(own.alpha),
-            beta: rotor.beta.plus(own.beta),
+            alpha: rotor.alpha.plus(armature.alpha),
+            beta: rotor.beta.plus(armature.beta),
         },
         i_before: i,
-        pace: state.pace,
+        gains: state.gains,
         ..State::default()
     };
 }
 
 /// Updates the coefficients that follow the speed and the requested q current, every few periods.
-pub fn pace(config: &Config, state: &mut State, inductance: Factor, i_q: Current) {
+pub fn schedule_gains(config: &Config, state: &mut State, inductance: Factor, i_q: Current) {
     state.phi = state.phi.max(PHI_MIN).min(PHI_MAX);
     let omega = state.omega_i;
     // An eighth of a turn per period keeps the leak below one.
@@ -183,11 +183,11 @@ pub fn pace(config: &Config, state: &mut State, inductance: Factor, i_q: Current
         .max(following)
         .min(config.omega_n_max);
     let four_pi_omega_n = omega_n.top(EIGHTH_PI) << 5;
-    state.pace = Pace {
+    state.gains = Gains {
         inductance: inductance.multiplied(config.inductance),
         leak,
-        held: leak.minus(config.bias.apply(omega_plus.top(omega_plus))),
-        phi: omega_plus.turns().top(PHI_RATE_HALF) << 1,
+        leak_less_bias: leak.minus(config.bias.apply(omega_plus.top(omega_plus))),
+        phi_rate: omega_plus.turns().top(PHI_RATE_HALF) << 1,
         integral: four_pi_omega_n.top(omega_n).over_period(),
         proportional: omega_n.top(DAMPING) << 3,
         // A speed in turns takes 2π: 16·π/8, and a voltage with 24 fraction bits accounts for a sixteenth.
@@ -207,13 +207,13 @@ pub fn estimate(
     imposed: Option<Speed>,
 ) -> Estimate {
     let frame = sin_cos(state.theta);
-    let pace = &state.pace;
+    let gains = &state.gains;
     if let Some(speed) = imposed {
         state.omega_i = speed;
     }
 
     // ψ += T_s·u − R·T_s/2·(i_k + i_{k−1}), ψ_r = ψ − L·i.
-    let step = |v: Voltage, now: Current, before: Current| {
+    let psi_step = |v: Voltage, now: Current, before: Current| {
         config
             .half_resistance
             .taken(v.over_period(), now.plus(before))
@@ -222,17 +222,17 @@ pub fn estimate(
         alpha: state
             .psi
             .alpha
-            .plus(step(input.v.alpha, input.i.alpha, state.i_before.alpha)),
+            .plus(psi_step(input.v.alpha, input.i.alpha, state.i_before.alpha)),
         beta: state
             .psi
             .beta
-            .plus(step(input.v.beta, input.i.beta, state.i_before.beta)),
+            .plus(psi_step(input.v.beta, input.i.beta, state.i_before.beta)),
     };
     state.i_before = input.i;
-    let own = stator_flux(pace.inductance, input.i);
+    let armature = stator_flux(gains.inductance, input.i);
     let psi_r = AlphaBeta {
-        alpha: psi.alpha.minus(own.alpha),
-        beta: psi.beta.minus(own.beta),
+        alpha: psi.alpha.minus(armature.alpha),
+        beta: psi.beta.minus(armature.beta),
     };
     // 28 + 31 − 32 fraction bits.
     let z: Dq<Component> = Dq {
@@ -242,34 +242,34 @@ pub fn estimate(
     let z_d = Flux::from_bits(z.d.plus(z.d).to_bits());
 
     // ψ += T_s·(β·ω⁺²·ψ_r − 0.5·ω⁺·(ψ_r − φ̂·e^{jθ̂})). The leak is below a half, which frees one bit.
-    let led: Quantity<Weber, U29> = state.phi.top(pace.leak).scaled();
+    let toward_rotor: Quantity<Weber, U29> = state.phi.top(gains.leak).scaled();
     state.psi = AlphaBeta {
         alpha: psi
             .alpha
-            .minus_top(psi_r.alpha, pace.held)
-            .plus_top(led, frame.cos),
+            .minus_top(psi_r.alpha, gains.leak_less_bias)
+            .plus_top(toward_rotor, frame.cos),
         beta: psi
             .beta
-            .minus_top(psi_r.beta, pace.held)
-            .plus_top(led, frame.sin),
+            .minus_top(psi_r.beta, gains.leak_less_bias)
+            .plus_top(toward_rotor, frame.sin),
     };
 
     // φ̂ += 0.15·T_s·ω⁺·(z_d − φ̂).
-    let off = z_d.minus(state.phi);
-    state.phi = state.phi.plus_top(off, pace.phi);
+    let phi_error = z_d.minus(state.phi);
+    state.phi = state.phi.plus_top(phi_error, gains.phi_rate);
 
     // ω̂_i += T_s·ω_n²·ε, ω̂ = ω̂_i + 1.8·ω_n·ε.
     let epsilon_half = half_epsilon(config, z);
     if imposed.is_none() {
-        state.omega_i = state.omega_i.plus(pace.integral.top(epsilon_half));
+        state.omega_i = state.omega_i.plus(gains.integral.top(epsilon_half));
     }
-    let proportional = pace.proportional.top(epsilon_half);
+    let proportional = gains.proportional.top(epsilon_half);
     let omega = state.omega_i.plus(proportional);
     // Under acceleration ω̂_i lags by 1.8·ω̇/ω_n. ω̂ does not, but passes the noise, so its excess over ω̂_i is
     // added smoothed.
-    state.smooth = config
+    state.excess = config
         .smoothing
-        .added(state.smooth, proportional.minus(state.smooth));
+        .added(state.excess, proportional.minus(state.excess));
     let theta = state.theta;
     state.theta = theta.wrapping_add(omega.over_period());
     Estimate {
@@ -280,9 +280,9 @@ pub fn estimate(
     }
 }
 
-/// Returns the slow part of the estimate, `periods` after [`pace`].
+/// Returns the slow part of the estimate, `periods` after [`schedule_gains`].
 pub fn slow_estimate(config: &Config, state: &State, periods: u32) -> SlowEstimate {
-    let change = state.omega_bar().minus(state.pace.omega_bar);
+    let change = state.omega_bar().minus(state.gains.omega_bar);
     SlowEstimate {
         omega_bar_step: change / periods as i32,
         xi: config.xi_nominal,
@@ -318,18 +318,18 @@ fn rotor_flux(phi: Flux, frame: SinCos) -> AlphaBeta<Flux> {
 #[inline(always)] // in each period
 fn half_epsilon(config: &Config, z: Dq<Component>) -> I0F32 {
     let quarter = config.quarter_per_flux.of(z.q).to_bits();
-    let held = if z.d.is_negative() {
-        whole(quarter)
+    let clamped = if z.d.is_negative() {
+        full_scale(quarter)
     } else {
         quarter.clamp(-ONE_QUARTER, ONE_QUARTER - 1)
     };
-    I0F32::from_bits(held << 6)
+    I0F32::from_bits(clamped << 6)
 }
 
 /// Returns full scale with this sign.
 #[cold]
 #[inline(never)] // seldom
-fn whole(quarter: i32) -> i32 {
+fn full_scale(quarter: i32) -> i32 {
     (quarter >> 31) ^ (ONE_QUARTER - 1)
 }
 
@@ -337,22 +337,22 @@ fn whole(quarter: i32) -> i32 {
 const ONE_QUARTER: i32 = 1 << 25;
 
 /// Returns the rotor's angle at the next sample, if its flux is near the stated one.
-pub fn found(state: &State) -> Option<Angle> {
-    let near = state.phi > FLUX_NOMINAL / 2 && state.phi < FLUX_NOMINAL * 2 - FLUX_NOMINAL / 2;
-    near.then_some(state.theta)
+pub fn locked_angle(state: &State) -> Option<Angle> {
+    let locked = state.phi > FLUX_NOMINAL / 2 && state.phi < FLUX_NOMINAL * 2 - FLUX_NOMINAL / 2;
+    locked.then_some(state.theta)
 }
 
 impl State {
     /// Returns the back-EMF.
     #[inline(always)] // in each period
     pub(super) fn emf(&self) -> WideVoltage {
-        self.pace.emf.of(self.omega_i)
+        self.gains.emf.of(self.omega_i)
     }
 
     /// Returns ω̄̂.
     #[inline(always)] // in each period
     fn omega_bar(&self) -> Speed {
-        self.omega_i.plus(self.smooth)
+        self.omega_i.plus(self.excess)
     }
 }
 

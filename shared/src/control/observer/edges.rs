@@ -243,7 +243,7 @@ pub fn begin(config: &Config, state: &mut State, theta: Angle, omega: Speed, i: 
 }
 
 /// Sets the rotor to rest in the sector that the Hall sensors show. Returns false if they cannot be trusted.
-pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
+pub fn begin_at_rest(config: &Config, state: &mut State, hall: u8) -> bool {
     if config.sensors == Sensors::None {
         return false;
     }
@@ -255,7 +255,7 @@ pub fn stand(config: &Config, state: &mut State, hall: u8) -> bool {
 }
 
 /// Returns the rotor's angle at the next sample, if crossings are tracked.
-pub fn found(state: &State) -> Option<Angle> {
+pub fn locked_angle(state: &State) -> Option<Angle> {
     let position = &state.position;
     let known = state.crossing.tracks && position.omega.is_positive();
     known.then(|| position.theta.wrapping_add(position.omega.over_period()))

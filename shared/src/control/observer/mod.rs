@@ -47,7 +47,7 @@ pub struct State {
     pub compensated: compensated::State,
     /// The position reported to the drive for this period.
     pub given: given::State,
-    /// The slow part of the estimate; [`pace`] updates it for the compensated flux observer.
+    /// The slow part of the estimate; [`schedule_gains`] updates it for the compensated flux observer.
     pub slow_estimate: SlowEstimate,
 }
 
@@ -57,7 +57,7 @@ pub trait Observer {
     /// imposes on the rotor.
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate;
 
-    /// Returns true if observation during alignment counts; otherwise [`expect`] restarts the observer.
+    /// Returns true if observation during alignment counts; otherwise [`begin_aligned`] restarts the observer.
     fn follows_park(&self) -> bool;
 
     /// Returns the current regulator's feedback: the speed of the control's frame, the measured current in it, and
@@ -73,19 +73,72 @@ impl Observer for Config {
     // One copy for all callers.
     #[inline(never)]
     fn estimate(&self, state: &mut State, input: &Input, imposed: Option<Speed>) -> Estimate {
-        estimate(self, state, input, imposed)
+        match self {
+            Self::BackEmf(config) => {
+                let (estimate, slow) =
+                    back_emf::estimate(config, &mut state.back_emf, imposed, input.planned);
+                state.slow_estimate = slow;
+                estimate
+            }
+            Self::Edges(config) => {
+                let (v, i) = (phases(input.v), phases(input.i));
+                let position = edges::estimate(config, &mut state.edges, v, i, input.hall);
+                state.slow_estimate = SlowEstimate {
+                    omega_bar_step: position.omega_step,
+                    lost: !position.known,
+                    ..SlowEstimate::default()
+                };
+                Estimate {
+                    theta: position.theta,
+                    frame: SinCos::of(position.theta),
+                    omega: position.omega,
+                    omega_bar: position.omega,
+                }
+            }
+            Self::Compensated(config) => {
+                compensated::estimate(config, &mut state.compensated, input, imposed)
+            }
+            Self::Given => {
+                let (estimate, slow) = given::estimate(&state.given, input.swapped);
+                state.slow_estimate = slow;
+                estimate
+            }
+        }
     }
 
     fn follows_park(&self) -> bool {
         !matches!(self, Self::Compensated(_))
     }
 
-    fn feedback(&self, state: &State, frame: (Speed, Dq<Current>), inductance: Factor) -> Feedback {
-        feedback(self, state, frame, inductance)
+    #[inline(always)] // in the longest period
+    fn feedback(
+        &self,
+        state: &State,
+        (omega, i): (Speed, Dq<Current>),
+        inductance: Factor,
+    ) -> Feedback {
+        let (i_hat, h_hat) = match self {
+            Self::BackEmf(_) => {
+                let h = state.back_emf.h;
+                let (d, q) = (wide(h.d), wide(h.q));
+                (state.back_emf.i, Dq { d, q })
+            }
+            Self::Edges(_) | Self::Given => (i, emf(omega, FLUX_NOMINAL)),
+            Self::Compensated(config) => return config.feedback(state, (omega, i), inductance),
+        };
+        Feedback {
+            omega,
+            i,
+            i_hat,
+            h_hat,
+            inductance,
+        }
     }
 
     fn advance(&self, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
-        advance(self, state, fb, u);
+        if let Self::BackEmf(config) = self {
+            back_emf::advance(config, &mut state.back_emf, fb, u);
+        }
     }
 }
 
@@ -120,59 +173,16 @@ impl Observer for compensated::Config {
 }
 
 impl Config {
-    /// Returns true if [`advance`] has any effect: only the adaptive back-EMF observer works in the control's
+    /// Returns true if [`Observer::advance`] has any effect: only the adaptive back-EMF observer works in the control's
     /// frame.
     pub fn works_in_frame(&self) -> bool {
         matches!(self, Self::BackEmf(_))
     }
 }
 
-/// Advances the selected observer from the last sample to this one.
-///
-/// `imposed` is the speed that an open-loop start imposes on the rotor.
-#[inline(always)] // in each period
-pub fn estimate(
-    config: &Config,
-    state: &mut State,
-    input: &Input,
-    imposed: Option<Speed>,
-) -> Estimate {
-    match config {
-        Config::BackEmf(config) => {
-            let (estimate, slow) =
-                back_emf::estimate(config, &mut state.back_emf, imposed, input.planned);
-            state.slow_estimate = slow;
-            estimate
-        }
-        Config::Edges(config) => {
-            let (v, i) = (phases(input.v), phases(input.i));
-            let position = edges::estimate(config, &mut state.edges, v, i, input.hall);
-            state.slow_estimate = SlowEstimate {
-                omega_bar_step: position.omega_step,
-                lost: !position.known,
-                ..SlowEstimate::default()
-            };
-            Estimate {
-                theta: position.theta,
-                frame: SinCos::of(position.theta),
-                omega: position.omega,
-                omega_bar: position.omega,
-            }
-        }
-        Config::Compensated(config) => {
-            compensated::estimate(config, &mut state.compensated, input, imposed)
-        }
-        Config::Given => {
-            let (estimate, slow) = given::estimate(&state.given, input.swapped);
-            state.slow_estimate = slow;
-            estimate
-        }
-    }
-}
-
 /// Updates the gains every `periods` periods, by the speed and the requested current `i_q`, and refreshes
 /// [`State::slow_estimate`].
-pub fn pace(
+pub fn schedule_gains(
     config: &Config,
     state: &mut State,
     (inductance, i_q): (Factor, Current),
@@ -180,20 +190,20 @@ pub fn pace(
 ) {
     if let Config::Compensated(config) = config {
         state.slow_estimate = compensated::slow_estimate(config, &state.compensated, periods);
-        compensated::pace(config, &mut state.compensated, inductance, i_q);
+        compensated::schedule_gains(config, &mut state.compensated, inductance, i_q);
     }
 }
 
 /// Begins a start: the rotor stands where this sample's position sensors say. Returns false if there are none to
 /// tell; the rotor must then be parked, by the control's frame, which is at angle `frame`.
-pub fn stand(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool {
+pub fn begin_at_rest(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool {
     state.clear(config);
     match config {
         Config::BackEmf(config) => {
             state.back_emf = back_emf::begin(config, frame, Speed::ZERO);
             false
         }
-        Config::Edges(config) => edges::stand(config, &mut state.edges, hall),
+        Config::Edges(config) => edges::begin_at_rest(config, &mut state.edges, hall),
         Config::Compensated(_) => false,
         Config::Given => true,
     }
@@ -202,33 +212,6 @@ pub fn stand(config: &Config, state: &mut State, frame: Angle, hall: u8) -> bool
 /// Returns true if a position sensor has failed.
 pub fn sensor_fault(state: &State) -> bool {
     state.edges.hall.fault
-}
-
-/// Returns the current regulator's feedback: the speed of the control's frame, the measured current in it, and the
-/// observer's estimates.
-#[inline(always)] // in each period
-pub fn feedback(
-    config: &Config,
-    state: &State,
-    (omega, i): (Speed, Dq<Current>),
-    inductance: Factor,
-) -> Feedback {
-    let (i_hat, h_hat) = match config {
-        Config::BackEmf(_) => {
-            let h = state.back_emf.h;
-            let (d, q) = (wide(h.d), wide(h.q));
-            (state.back_emf.i, Dq { d, q })
-        }
-        Config::Edges(_) | Config::Given => (i, emf(omega, FLUX_NOMINAL)),
-        Config::Compensated(config) => return config.feedback(state, (omega, i), inductance),
-    };
-    Feedback {
-        omega,
-        i,
-        i_hat,
-        h_hat,
-        inductance,
-    }
 }
 
 /// Returns ĥ of a flux along d: −ω·φ along q.
@@ -252,17 +235,8 @@ pub fn flux(config: &Config, state: &State) -> Flux {
     }
 }
 
-/// Tells the observer the voltage `u` commanded in this period, in the feedback's frame. Only the adaptive back-EMF
-/// observer works in that frame.
-#[inline(always)] // in each period
-pub fn advance(config: &Config, state: &mut State, fb: &Feedback, u: Dq<Voltage>) {
-    if let Config::BackEmf(config) = config {
-        back_emf::advance(config, &mut state.back_emf, fb, u);
-    }
-}
-
 /// Begins with a rotor known to turn at `omega` and to be at `theta` at the next sample, with the current `i`. Call
-/// [`pace`] first.
+/// [`schedule_gains`] first.
 pub fn begin(
     config: &Config,
     state: &mut State,
@@ -284,8 +258,8 @@ pub fn begin(
     }
 }
 
-/// Expects the aligned rotor at rest at `theta`, with the current `i`.
-pub fn expect(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
+/// Begins with the aligned rotor at rest at `theta`, with the current `i`.
+pub fn begin_aligned(config: &Config, state: &mut State, theta: Angle, i: AlphaBeta<Current>) {
     match config {
         // The former works in the frame that the start imposes, the latter needs no start.
         Config::BackEmf(_) | Config::Given => {}
@@ -308,9 +282,11 @@ pub fn take_over(
 ) -> Option<Angle> {
     match config {
         Config::BackEmf(config) => back_emf::take_over(config, &mut state.back_emf, omega_s),
-        Config::Edges(_) => edges::found(&state.edges).map(|theta| theta.wrapping_sub(frame)),
+        Config::Edges(_) => {
+            edges::locked_angle(&state.edges).map(|theta| theta.wrapping_sub(frame))
+        }
         Config::Compensated(_) => {
-            compensated::found(&state.compensated).map(|theta| theta.wrapping_sub(frame))
+            compensated::locked_angle(&state.compensated).map(|theta| theta.wrapping_sub(frame))
         }
         // Never started by an imposed frame.
         Config::Given => None,

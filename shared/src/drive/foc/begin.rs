@@ -3,7 +3,7 @@
 use super::outer_loop::{self, READY_PIECES};
 use super::state::State;
 use crate::control::catch::Rotor;
-use crate::control::observer;
+use crate::control::observer::{self, Observer};
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, inverse_park, rotate, voltages};
 use crate::drive::config::{Config, Direction};
@@ -100,7 +100,7 @@ fn go(
         }
     } else {
         let (frame, hall) = (foc.loops.start.frame, hall(sample, swapped));
-        if observer::stand(&config.observer, &mut foc.observer, frame, hall) {
+        if observer::begin_at_rest(&config.observer, &mut foc.observer, frame, hall) {
             config.speed.begin(speed, Speed::ZERO, Current::ZERO);
             Why::Caught
         } else {
@@ -129,7 +129,9 @@ fn regulate(config: &Config, foc: &mut State, omega: Speed) {
     let still = Dq::default();
     let loops = &mut foc.loops;
     let factor = loops.inductance.factor;
-    let fb = observer::feedback(&config.observer, &foc.observer, (omega, still), factor);
+    let fb = config
+        .observer
+        .feedback(&foc.observer, (omega, still), factor);
     let reference = Reference::default();
     config
         .regulator

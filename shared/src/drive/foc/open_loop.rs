@@ -1,6 +1,7 @@
 //! The open-loop start, Park and Ramp, and mode changes caused by the rotor.
 
 use super::state::State;
+use crate::control::observer::Observer;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, rotate_frame};
 use crate::control::{PERIODS, observer, start};
@@ -31,7 +32,7 @@ pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, 
     let start = &mut foc.loops.start;
     let first = foc.loops.slot % PERIODS as u8 == 1;
     if first && phase == Phase::Park && start::aligned(attempt, start) {
-        expect(config, foc, shared);
+        expect_aligned(config, foc, shared);
     } else {
         let felt = (shared.seen.i, shared.seen.u);
         start::damp(attempt, start, felt, DAMP_PERIODS);
@@ -62,12 +63,12 @@ pub(in crate::drive) fn current(
 }
 
 /// Expects the rotor's flux along the current, on the frame's q axis.
-fn expect(config: &Config, foc: &mut State, shared: &Shared) {
+fn expect_aligned(config: &Config, foc: &mut State, shared: &Shared) {
     let frame = foc.loops.start.frame;
     let rotor = frame.wrapping_add(Angle::from_bits(1 << 30));
     let Dq { d: alpha, q: beta } = rotate_frame(shared.seen.i, SinCos::of(frame.wrapping_neg()));
     let i = AlphaBeta { alpha, beta };
-    observer::expect(&config.observer, &mut foc.observer, rotor, i);
+    observer::begin_aligned(&config.observer, &mut foc.observer, rotor, i);
 }
 
 /// Every [`CYCLE`], returns the mode change the rotor calls for: another attempt if it has not followed or has
@@ -181,7 +182,9 @@ pub(in crate::drive) fn hand_over(
     let u = rotate_frame(shared.seen.u, lead);
     let i = rotate_frame(shared.seen.i, lead);
     let factor = loops.inductance.factor;
-    let fb = observer::feedback(&config.observer, &foc.observer, (omega_s, i), factor);
+    let fb = config
+        .observer
+        .feedback(&foc.observer, (omega_s, i), factor);
     let reference = Reference::steady(i.q).with_i_d(i.d);
     config
         .regulator

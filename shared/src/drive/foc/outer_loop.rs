@@ -1,6 +1,7 @@
 //! The pieces of outer-loop work.
 
 use super::state::State;
+use crate::control::observer::Observer;
 use crate::control::regulator::Reference;
 use crate::control::speed::{self, Bounds};
 use crate::control::{PERIODS, dead_time, observer, torque, voltage};
@@ -171,7 +172,7 @@ fn at_voltage(
     let u_q = voltage::of_share(share, shared.supply.longest.length()).max(config.least_u_q);
     let frame = (shared.seen.speed, shared.seen.i);
     let factor = foc.loops.inductance.factor;
-    let fb = observer::feedback(&config.observer, &foc.observer, frame, factor);
+    let fb = config.observer.feedback(&foc.observer, frame, factor);
     let i_d = foc.loops.i_d;
     voltage::reference(&config.regulator, &foc.loops.regulator, &fb, i_d, u_q)
 }
@@ -210,7 +211,7 @@ pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
 #[inline(never)] // only some periods
 pub(in crate::drive) fn observer_gains(config: &Config, foc: &mut State) {
     let follows = (foc.loops.inductance.factor, foc.loops.reference.i.q);
-    observer::pace(&config.observer, &mut foc.observer, follows, CYCLE);
+    observer::schedule_gains(&config.observer, &mut foc.observer, follows, CYCLE);
 }
 
 /// Updates the decoupling of the regulator's axes at this speed.

@@ -133,14 +133,14 @@ proptest! {
             omega_i: speed(omega_i),
             phi: Flux::from_num(phi / f64::from(scale.flux_wb())),
             psi: units.flux(psi),
-            smooth: speed(smooth),
+            excess: speed(smooth),
             i_before: units.current(i_before),
             ..State::default()
         };
         if let Some(imposed) = imposed {
             state.omega_i = speed(imposed);
         }
-        pace(&config, &mut state, Factor::ONE, Current::ZERO);
+        schedule_gains(&config, &mut state, Factor::ONE, Current::ZERO);
         let got = estimate(&config, &mut state, &units.input(i, u), imposed.map(speed));
 
         // 1.
@@ -177,7 +177,7 @@ proptest! {
         let flux = 5e-5 * PHI;
         let slow = slow_estimate(&config, &state, 1);
         // The bounds of φ̂.
-        pace(&config, &mut state, Factor::ONE, Current::ZERO);
+        schedule_gains(&config, &mut state, Factor::ONE, Current::ZERO);
         near("ψ α", units.wb(state.psi.alpha), psi.0, flux)?;
         near("ψ β", units.wb(state.psi.beta), psi.1, flux)?;
         // Its rate has three digits.
@@ -222,7 +222,7 @@ proptest! {
             let imposed = (known && what & 1 == 0).then_some(Speed::from_bits(f));
             estimate(&config, &mut state, &input, imposed);
             if what & 7 == 0 {
-                pace(&config, &mut state, Factor::ONE, Current::ZERO);
+                schedule_gains(&config, &mut state, Factor::ONE, Current::ZERO);
                 prop_assert!((PHI_MIN..=PHI_MAX).contains(&state.phi));
             }
         }
@@ -268,7 +268,7 @@ impl Bench {
         let i = self.units.current(self.current(self.theta));
         let angle = Angle::wrapping_from_num(coming / TAU);
         begin(&self.config, &mut self.state, (angle, speed(self.omega)), i);
-        pace(&self.config, &mut self.state, Factor::ONE, Current::ZERO);
+        schedule_gains(&self.config, &mut self.state, Factor::ONE, Current::ZERO);
     }
 
     /// Runs one period; returns the angle error in degrees.
@@ -286,7 +286,7 @@ impl Bench {
         let got = estimate(&self.config, &mut self.state, &input, None);
         self.periods += 1;
         if self.periods.is_multiple_of(PERIODS) {
-            pace(&self.config, &mut self.state, Factor::ONE, Current::ZERO);
+            schedule_gains(&self.config, &mut self.state, Factor::ONE, Current::ZERO);
         }
         wrapped(got.theta.to_num::<f64>() * TAU - self.theta).to_degrees()
     }
@@ -400,9 +400,9 @@ fn the_loop_is_faster_where_a_current_accelerates_the_rotor() {
     let omega_n = |amperes: f32| {
         let mut state = State::default();
         let i_q = scale.current_from_a(amperes);
-        pace(&config, &mut state, Factor::ONE, i_q);
+        schedule_gains(&config, &mut state, Factor::ONE, i_q);
         // 1.8·ω_n, for half of ε.
-        rad_s(state.pace.proportional) / 3.6
+        rad_s(state.gains.proportional) / 3.6
     };
     for (amperes, wanted) in [(0.0, 150.0), (20.0, 270.0), (-20.0, 270.0)] {
         let got = omega_n(amperes);
@@ -418,10 +418,10 @@ fn a_rotor_without_its_flux_is_lost() {
     let lost = (0..2400_u32).filter(|period| {
         estimate(&bench.config, &mut bench.state, &standing, None);
         if period.is_multiple_of(PERIODS) {
-            pace(&bench.config, &mut bench.state, Factor::ONE, Current::ZERO);
+            schedule_gains(&bench.config, &mut bench.state, Factor::ONE, Current::ZERO);
         }
         slow_estimate(&bench.config, &bench.state, 1).lost
     });
     assert!(lost.count() > 2000);
-    assert_eq!(found(&bench.state), None);
+    assert_eq!(locked_angle(&bench.state), None);
 }
