@@ -7,10 +7,11 @@ use core::cell::Cell;
 
 use super::quantity::Quantity;
 use super::si::Si;
-use super::{low_speed, observer, sensing};
+use super::{low_speed, observer, outer, sensing};
 use crate::control::speed::Bounds;
-use crate::control::{dead_time, observer as observers};
+use crate::control::{dead_time, observer as observers, torque};
 use crate::drive::Drift;
+use crate::params::choice::{CtlObsCure, CtlObserver, CtlRegulator};
 use crate::params::from_motor::tests::RACING;
 use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
 use crate::units::{Current, Speed};
@@ -37,13 +38,26 @@ fn near(what: &str, got: f32, wanted: f32) {
 /// Returns i_d at standstill, A.
 fn bias_a(changes: &[(ParamId, f32)]) -> f32 {
     made(changes, |p| {
-        let full = Bounds {
-            min: -Current::ONE,
-            max: Current::ONE,
-        };
-        let (i_d, _) = low_speed(p).bounds(full, Speed::ZERO);
+        let (i_d, _) = low_speed(p).bounds(limits(p), Speed::ZERO);
         p.scale.amperes(i_d)
     })
+}
+
+/// Returns the largest i_q at full speed, in braking and in driving, A.
+fn most_a(changes: &[(ParamId, f32)]) -> [f32; 2] {
+    made(changes, |p| {
+        let (_, bounds) = low_speed(p).bounds(limits(p), Speed::MAX);
+        [-bounds.min, bounds.max].map(|i_q| p.scale.amperes(i_q))
+    })
+}
+
+/// Returns the bounds that `LIM_PHASE_A` alone sets.
+fn limits(p: &Si) -> Bounds {
+    let limit = p.scale.current_from_a(p.of(Quantity::LimitA));
+    Bounds {
+        min: -limit,
+        max: limit,
+    }
 }
 
 #[test]
@@ -57,6 +71,65 @@ fn the_bias_along_d_is_the_greatest_of_three() {
     near("hidden", bias_a(&[(ParamId::PwmDeadtimeNs, 1000.0)]), 4.734);
     // Never more than the start's current: 0.4571 V over 48 kHz·1 µH is 9.5 A.
     near("start", bias_a(&[(ParamId::MotLUh, 1.0)]), 8.0);
+}
+
+/// φ/L, 26.79 A, bounds i_q in braking, and 1.5 times as much, 40.19 A, in driving.
+#[test]
+fn a_current_whose_flux_would_hide_the_rotor_s_is_bounded() {
+    for (changes, braking, driving) in [
+        // 1.5·φ/L is above LIM_PHASE_A.
+        (&[][..], 26.79, 40.0),
+        (&[(ParamId::MotLUh, 15.0)][..], 21.43, 32.15),
+        (&[(ParamId::MotFluxMwb, 0.2)][..], 16.67, 25.0),
+        (&[(ParamId::MotRMohm, 66.0)][..], 26.79, 40.0),
+        (&[(ParamId::LimPhaseA, 20.0)][..], 20.0, 20.0),
+    ] {
+        let made = most_a(changes);
+        near("braking", made[0], braking);
+        near("driving", made[1], driving);
+    }
+}
+
+#[test]
+fn the_published_observer_and_the_sensors_have_no_such_bound() {
+    for observer in [CtlObserver::BackEmf, CtlObserver::Hall] {
+        let made = most_a(&[(ParamId::MotLUh, 24.0), observer.setting()]);
+        for most in made {
+            near("limit", most, 40.0);
+        }
+    }
+    // The cured one has.
+    let cured = [CtlObserver::BackEmf.setting(), CtlObsCure::Cured.setting()];
+    let [braking, driving] = most_a(&[&[(ParamId::MotLUh, 24.0)], &cured[..]].concat());
+    near("braking", braking, 13.4);
+    near("driving", driving, 20.09);
+}
+
+/// Returns the slew of i_q, and the growth of a driving one, A/s.
+fn rates_a_s(changes: &[(ParamId, f32)]) -> [f32; 2] {
+    made(changes, |p| {
+        let mut place = torque::Config::default();
+        outer::torque(p, &mut place);
+        [place.slew, place.growth].map(|step| p.scale.amperes(step) / p.of(Quantity::OuterT))
+    })
+}
+
+/// 40 A take 3 ms, and in driving φ/L takes 8 ms.
+#[test]
+fn a_driving_current_grows_by_the_rotor_s_flux_in_8_ms() {
+    for (changes, slew, growth) in [
+        (&[][..], 13_333.0, 3349.0),
+        (&[(ParamId::MotLUh, 24.0)][..], 13_333.0, 1674.5),
+        (&[(ParamId::MotFluxMwb, 0.643)][..], 13_333.0, 6698.0),
+        (&[(ParamId::MotRMohm, 66.0)][..], 13_333.0, 3349.0),
+        // Never faster than the slew: 6 A in 3 ms, and four times as long with the modified regulator.
+        (&[(ParamId::LimPhaseA, 6.0)][..], 2000.0, 2000.0),
+        (&[CtlRegulator::Modified.setting()][..], 3333.0, 3333.0),
+    ] {
+        let made = rates_a_s(changes);
+        near("slew", made[0], slew);
+        near("growth", made[1], growth);
+    }
 }
 
 #[test]
