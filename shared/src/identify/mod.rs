@@ -28,7 +28,7 @@ use crate::drive::{Excitation, Phase, Ripple, Setpoint, Snapshot};
 use crate::params::choice::CtlDrive;
 use crate::params::{Choice, Kind, ParamId, Params};
 use crate::units::{Scale, Speed};
-use means::{EXCITED_LOOKS, Means, SPUN_LOOKS, seconds, seen};
+use means::{EXCITED_LOOKS, Means, OperatingPoint, SPUN_LOOKS, seconds};
 use report::Motor;
 use shaft::Shaft;
 use winding::Winding;
@@ -41,8 +41,10 @@ const EXCITATIONS: [(f32, Ripple); 4] = [
     (1.0, Ripple::Across),
 ];
 
+const EXCITATIONS_PER_PHASE: u8 = EXCITATIONS.len() as u8;
+
 /// The number of excitations over all phases.
-const EXCITED: u8 = 12;
+const EXCITED: u8 = 3 * EXCITATIONS_PER_PHASE;
 
 /// The greatest current of an excitation, and that of a run, over `LIM_PHASE_A`.
 const EXCITED_SHARE: f32 = 0.5;
@@ -78,7 +80,7 @@ enum Step {
     /// None is under way.
     Over,
     /// The drive forgets the motor.
-    Forget,
+    Reset,
     /// An excitation, by number: four of each phase.
     Excite(u8),
     /// Six-step.
@@ -86,7 +88,7 @@ enum Step {
     /// The bridge turns off.
     Release,
     /// The drive is rebuilt with the results so far.
-    Learn,
+    Rebuild,
     /// A torque along the rotation.
     Up,
     /// A torque against it.
@@ -169,7 +171,7 @@ impl Identify {
     /// Begins an identification.
     pub fn begin(&mut self, now_us: u64) -> Outcome {
         *self = Self::default();
-        self.go(now_us, Step::Forget, Setpoint::Stop);
+        self.enter(now_us, Step::Reset, Setpoint::Stop);
         Outcome::Assume
     }
 
@@ -202,23 +204,23 @@ impl Identify {
         } else if passed_s > LONGEST_S {
             Err("it does not turn properly")
         } else {
-            self.goes_on(sight, passed_s)
+            self.advance(sight, passed_s)
         };
         result.unwrap_or_else(|reason| self.end(reason))
     }
 
-    fn goes_on(&mut self, sight: &Sight, passed_s: f32) -> Result<Option<Outcome>, &'static str> {
+    fn advance(&mut self, sight: &Sight, passed_s: f32) -> Result<Option<Outcome>, &'static str> {
         match self.step {
-            Step::Forget if passed_s > ADOPTED_S => Ok(Some(self.excite(sight, 0))),
-            Step::Learn if passed_s > ADOPTED_S => {
-                self.go(sight.now_us, Step::Up, self.torque(sight, 1.0));
+            Step::Reset if passed_s > ADOPTED_S => Ok(Some(self.excite(sight, 0))),
+            Step::Rebuild if passed_s > ADOPTED_S => {
+                self.enter(sight.now_us, Step::Up, self.torque(sight, 1.0));
                 Ok(Some(Outcome::Progress(80)))
             }
-            Step::Over | Step::Forget | Step::Learn => Ok(None),
-            Step::Excite(number) => self.excited(sight, number, passed_s),
-            Step::Spin => Ok(self.spun(sight)),
-            Step::Release => Ok(self.released(sight, passed_s)),
-            Step::Up | Step::Down => self.runs(sight),
+            Step::Over | Step::Reset | Step::Rebuild => Ok(None),
+            Step::Excite(number) => self.measure_excitation(sight, number, passed_s),
+            Step::Spin => Ok(self.measure_spin(sight)),
+            Step::Release => Ok(self.await_release(sight, passed_s)),
+            Step::Up | Step::Down => self.measure_run(sight),
             Step::Halt if sight.snapshot.phase == Phase::Run => Ok(None),
             Step::Halt => {
                 self.step = Step::Over;
@@ -229,7 +231,7 @@ impl Identify {
 
     // Out of line: each step ends with one.
     #[inline(never)]
-    fn go(&mut self, now_us: u64, step: Step, setpoint: Setpoint) {
+    fn enter(&mut self, now_us: u64, step: Step, setpoint: Setpoint) {
         self.step = step;
         self.since_us = now_us;
         self.setpoint = setpoint;
@@ -237,30 +239,35 @@ impl Identify {
     }
 
     fn excite(&mut self, sight: &Sight, number: u8) -> Outcome {
-        let (share, ripple) = EXCITATIONS[usize::from(number % 4)];
+        let (share, ripple) = EXCITATIONS[usize::from(number % EXCITATIONS_PER_PHASE)];
         let current_a = share * EXCITED_SHARE * sight.limit_a;
         let current = sight.scale.current_from_a(current_a);
-        let excitation = Excitation::new(number / 4, current, ripple);
+        let excitation = Excitation::new(number / EXCITATIONS_PER_PHASE, current, ripple);
         let setpoint = Setpoint::Excite(excitation);
-        self.go(sight.now_us, Step::Excite(number), setpoint);
+        self.enter(sight.now_us, Step::Excite(number), setpoint);
         Outcome::Progress(5 * number)
     }
 
     /// Looks at the windings.
-    fn excited(
+    fn measure_excitation(
         &mut self,
         sight: &Sight,
         number: u8,
         passed_s: f32,
     ) -> Result<Option<Outcome>, &'static str> {
         let (snapshot, period_s) = (sight.snapshot, sight.scale.period_s);
-        let (phase, step) = (usize::from(number / 4), number % 4);
+        let phase = usize::from(number / EXCITATIONS_PER_PHASE);
+        let excitation_of_phase = number % EXCITATIONS_PER_PHASE;
         if self.means.looks == 0 {
             let Setpoint::Excite(excitation) = self.setpoint else {
                 return Ok(None);
             };
             let asked = excitation.current();
-            let settled_s = if step == 0 { ALIGNED_S } else { SETTLED_S };
+            let settled_s = if excitation_of_phase == winding::LOWER {
+                ALIGNED_S
+            } else {
+                SETTLED_S
+            };
             let settled = passed_s > settled_s + SETTLED_PERIODS * period_s;
             let reached = (snapshot.i.d - asked).abs() < asked >> 5;
             // If the supply is too weak for the current, what flows is as good.
@@ -273,19 +280,20 @@ impl Identify {
         if self.means.looks < EXCITED_LOOKS {
             return Ok(None);
         }
-        self.winding.take(phase, step, self.means.get(), period_s);
+        self.winding
+            .take(phase, excitation_of_phase, self.means.get(), period_s);
         if number + 1 < EXCITED {
             return Ok(Some(self.excite(sight, number + 1)));
         }
         let supply = (sight.scale, sight.bus_v());
         self.winding
-            .judge(&mut self.report, &mut self.motor, supply)?;
-        self.go(sight.now_us, Step::Spin, Setpoint::Voltage(SPIN_SHARE));
+            .evaluate(&mut self.report, &mut self.motor, supply)?;
+        self.enter(sight.now_us, Step::Spin, Setpoint::Voltage(SPIN_SHARE));
         Ok(Some(Outcome::Progress(60)))
     }
 
     /// Looks at a rotor turned by six-step.
-    fn spun(&mut self, sight: &Sight) -> Option<Outcome> {
+    fn measure_spin(&mut self, sight: &Sight) -> Option<Outcome> {
         let snapshot = sight.snapshot;
         if snapshot.phase != Phase::Run {
             return None;
@@ -300,23 +308,25 @@ impl Identify {
             return None;
         }
         let dead_v = self.winding.dead_v();
-        self.motor.flux_wb = Shaft::about(self.means.get(), &self.motor, dead_v);
-        self.go(sight.now_us, Step::Release, Setpoint::Stop);
+        self.motor.flux_wb = Shaft::rough_flux_wb(self.means.get(), &self.motor, dead_v);
+        self.enter(sight.now_us, Step::Release, Setpoint::Stop);
         Some(Outcome::Progress(70))
     }
 
     /// Waits until the bridge is off: only then can the drive be rebuilt.
-    fn released(&mut self, sight: &Sight, passed_s: f32) -> Option<Outcome> {
+    fn await_release(&mut self, sight: &Sight, passed_s: f32) -> Option<Outcome> {
         if sight.snapshot.phase != Phase::Idle || passed_s < ADOPTED_S {
             return None;
         }
-        self.rpm_max = self.shaft.choose(sight.bus_v(), &self.motor, sight.scale);
-        self.go(sight.now_us, Step::Learn, Setpoint::Stop);
+        self.rpm_max = self
+            .shaft
+            .choose_speed(sight.bus_v(), &self.motor, sight.scale);
+        self.enter(sight.now_us, Step::Rebuild, Setpoint::Stop);
         Some(Outcome::Assume)
     }
 
     /// Looks at a run.
-    fn runs(&mut self, sight: &Sight) -> Result<Option<Outcome>, &'static str> {
+    fn measure_run(&mut self, sight: &Sight) -> Result<Option<Outcome>, &'static str> {
         if sight.snapshot.phase != Phase::Run {
             return Ok(None);
         }
@@ -325,16 +335,17 @@ impl Identify {
             self.risen_s = (self.risen_s + LOOK_S).min(RISE_S);
             self.setpoint = self.torque(sight, 1.0);
         }
-        let seen = seen(sight.snapshot, sight.scale);
-        if !self.shaft.look(sight.now_us, seen, down, &self.motor) {
+        let point = OperatingPoint::of(sight.snapshot, sight.scale);
+        if !self.shaft.measure(sight.now_us, point, down, &self.motor) {
             return Ok(None);
         }
         if !down {
-            self.go(sight.now_us, Step::Down, self.torque(sight, -AGAINST));
+            self.enter(sight.now_us, Step::Down, self.torque(sight, -AGAINST));
             return Ok(Some(Outcome::Progress(90)));
         }
-        self.shaft.judge(&mut self.report, sight.scale.pole_pairs)?;
-        self.go(sight.now_us, Step::Halt, self.setpoint);
+        self.shaft
+            .evaluate(&mut self.report, sight.scale.pole_pairs)?;
+        self.enter(sight.now_us, Step::Halt, self.setpoint);
         Ok(None)
     }
 

@@ -2,7 +2,7 @@
 
 use core::f32::consts::TAU;
 
-use super::means::{Seen, seconds};
+use super::means::{OperatingPoint, seconds};
 use super::report::{Figure, Motor, Report};
 use crate::math::{SQRT_3, square_root};
 use crate::units::Scale;
@@ -45,28 +45,28 @@ struct Run {
 }
 
 impl Run {
-    fn add(&mut self, now_us: u64, seen: Seen, motor: &Motor) {
-        let [_, i_q, .., omega] = seen;
+    fn add(&mut self, now_us: u64, point: OperatingPoint, motor: &Motor) {
+        let omega_rad_s = point.omega_rad_s;
         if self.looks == 0.0 {
-            self.first_rad_s = omega;
+            self.first_rad_s = omega_rad_s;
         } else {
             let passed_s = seconds(now_us, self.last_us);
-            self.charge_as += i_q * passed_s;
-            self.square += omega * omega * passed_s;
+            self.charge_as += point.i_q_a * passed_s;
+            self.square += omega_rad_s * omega_rad_s * passed_s;
         }
         self.last_us = now_us;
-        self.gained_rad_s = omega - self.first_rad_s;
+        self.gained_rad_s = omega_rad_s - self.first_rad_s;
         self.looks += 1.0;
-        self.flux_wb += emf(seen, motor) / omega;
+        self.flux_wb += emf_v(point, motor) / omega_rad_s;
     }
 }
 
 /// Returns the magnitude of the voltage that the current does not account for, whatever the angle of the frame.
-fn emf([i_d, i_q, u_d, u_q, omega]: Seen, motor: &Motor) -> f32 {
-    let reactance_ohm = omega * motor.l_h;
-    let e_d = u_d - motor.r_ohm * i_d + reactance_ohm * i_q;
-    let e_q = u_q - motor.r_ohm * i_q - reactance_ohm * i_d;
-    length(e_d, e_q)
+fn emf_v(point: OperatingPoint, motor: &Motor) -> f32 {
+    let reactance_ohm = point.omega_rad_s * motor.l_h;
+    let e_d_v = point.u_d_v - motor.r_ohm * point.i_d_a + reactance_ohm * point.i_q_a;
+    let e_q_v = point.u_q_v - motor.r_ohm * point.i_q_a - reactance_ohm * point.i_d_a;
+    length(e_d_v, e_q_v)
 }
 
 fn length(x: f32, y: f32) -> f32 {
@@ -76,34 +76,44 @@ fn length(x: f32, y: f32) -> f32 {
 impl Shaft {
     /// Returns a rough flux, Wb, from what six-step shows. One of its two legs switches: the dead time takes √3/4 of
     /// what it takes along a phase.
-    pub(super) fn about([i_d, i_q, u_d, u_q, omega]: Seen, motor: &Motor, dead_v: f32) -> f32 {
-        let dropped_v = motor.r_ohm * length(i_d, i_q) + SQRT_3 / 4.0 * dead_v;
-        (length(u_d, u_q) - dropped_v) / (SIX_STEP_SHARE * omega)
+    pub(super) fn rough_flux_wb(mean: OperatingPoint, motor: &Motor, dead_v: f32) -> f32 {
+        let dropped_v = motor.r_ohm * length(mean.i_d_a, mean.i_q_a) + SQRT_3 / 4.0 * dead_v;
+        (length(mean.u_d_v, mean.u_q_v) - dropped_v) / (SIX_STEP_SHARE * mean.omega_rad_s)
     }
 
     /// Chooses the speed of the runs. Returns the greatest speed to build the drive for, rpm.
-    pub(super) fn choose(&mut self, bus_v: f32, motor: &Motor, scale: &Scale) -> f32 {
+    pub(super) fn choose_speed(&mut self, bus_v: f32, motor: &Motor, scale: &Scale) -> f32 {
         let by_supply = RUN_SHARE * bus_v / (SQRT_3 * motor.flux_wb);
         self.fast_rad_s = by_supply.min(RUN_TURNS * TAU / scale.period_s);
         RESERVE * self.fast_rad_s * 60.0 / (TAU * scale.pole_pairs)
     }
 
-    /// Looks at a run up or down. Returns true at its end.
-    pub(super) fn look(&mut self, now_us: u64, seen: Seen, down: bool, motor: &Motor) -> bool {
-        let slow = SLOW_SHARE * self.fast_rad_s;
-        let [.., omega] = seen;
-        if slow < omega && omega < self.fast_rad_s {
-            self.runs[usize::from(down)].add(now_us, seen, motor);
+    /// Measures during a run up or down. Returns true at its end.
+    pub(super) fn measure(
+        &mut self,
+        now_us: u64,
+        point: OperatingPoint,
+        down: bool,
+        motor: &Motor,
+    ) -> bool {
+        let slow_rad_s = SLOW_SHARE * self.fast_rad_s;
+        let omega_rad_s = point.omega_rad_s;
+        if slow_rad_s < omega_rad_s && omega_rad_s < self.fast_rad_s {
+            self.runs[usize::from(down)].add(now_us, point, motor);
         }
         if down {
-            omega <= slow
+            omega_rad_s <= slow_rad_s
         } else {
-            omega >= self.fast_rad_s
+            omega_rad_s >= self.fast_rad_s
         }
     }
 
     /// Computes the runs' figures, or says why there are none.
-    pub(super) fn judge(&self, report: &mut Report, pole_pairs: f32) -> Result<(), &'static str> {
+    pub(super) fn evaluate(
+        &self,
+        report: &mut Report,
+        pole_pairs: f32,
+    ) -> Result<(), &'static str> {
         let [up, down] = &self.runs;
         let flux_wb = self.runs.map(|run| run.flux_wb / run.looks);
         report.flux_mwb = Figure::of(&flux_wb, 1e3);

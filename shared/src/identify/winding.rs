@@ -1,6 +1,6 @@
 //! R and L from the means of the excitations.
 
-use super::means::Seen;
+use super::means::OperatingPoint;
 use super::report::{Figure, Motor, Report};
 use crate::units::Scale;
 
@@ -8,11 +8,17 @@ use crate::units::Scale;
 const R_SPREAD: f32 = 0.1;
 const L_SPREAD: f32 = 0.5;
 
+/// A phase's excitations in order: two currents, then a square wave along the current and one across it.
+pub(super) const LOWER: u8 = 0;
+const UPPER: u8 = 1;
+const ALONG: u8 = 2;
+
 /// The measurements from the excitations of the three phases.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Winding {
-    /// Voltage and current at the lower of two currents.
-    lower: (f32, f32),
+    /// Current and voltage at the lower of two currents.
+    lower_a: f32,
+    lower_v: f32,
     r_ohm: [f32; 3],
     dead_v: [f32; 3],
     /// L along each phase's axis and across it.
@@ -20,19 +26,26 @@ pub(super) struct Winding {
 }
 
 impl Winding {
-    /// Takes the means of a phase's excitation, by its step number.
-    pub(super) fn take(&mut self, phase: usize, step: u8, seen: Seen, period_s: f32) {
-        let [i_a, ripple_a, u_v, ripple_v, _] = seen;
-        match step {
-            0 => self.lower = (u_v, i_a),
-            1 => {
-                let r_ohm = (u_v - self.lower.0) / (i_a - self.lower.1);
+    /// Takes the mean over one of a phase's excitations, by its number from [`LOWER`] on.
+    pub(super) fn take(
+        &mut self,
+        phase: usize,
+        excitation: u8,
+        mean: OperatingPoint,
+        period_s: f32,
+    ) {
+        let (i_a, u_v) = (mean.i_d_a, mean.u_d_v);
+        match excitation {
+            LOWER => (self.lower_a, self.lower_v) = (i_a, u_v),
+            UPPER => {
+                let r_ohm = (u_v - self.lower_v) / (i_a - self.lower_a);
                 self.r_ohm[phase] = r_ohm;
                 self.dead_v[phase] = u_v - r_ohm * i_a;
             }
             _ => {
-                let l_h = inductance(self.r_ohm[phase], period_s, ripple_v, ripple_a);
-                self.l_h[usize::from(step & 1)][phase] = l_h;
+                let axis = usize::from(excitation - ALONG);
+                self.l_h[axis][phase] =
+                    inductance(self.r_ohm[phase], period_s, mean.u_q_v, mean.i_q_a);
             }
         }
     }
@@ -43,7 +56,7 @@ impl Winding {
     }
 
     /// Computes the winding's figures, or says why there are none.
-    pub(super) fn judge(
+    pub(super) fn evaluate(
         &self,
         report: &mut Report,
         motor: &mut Motor,
