@@ -55,11 +55,12 @@ pub fn stand(base: &str, given: Table) -> Result<Standing, ScenarioError> {
 
 #[cfg(test)]
 mod tests {
-    use siskin_control::params::{Params, build};
+    use siskin_control::control::speed::Bounds;
+    use siskin_control::params::{BOSSO_BENCH, Params, build};
+    use siskin_control::units::{Current, Speed};
 
     use super::*;
     use crate::bench::library;
-    use siskin_control::params::BOSSO_BENCH;
 
     #[test]
     fn the_default_bench_is_the_first_one_of_the_library() {
@@ -97,5 +98,34 @@ mod tests {
             believes(ParamId::MotFluxMwb, 1e3 * bench.motor.flux_wb, name);
             believes(ParamId::MotJGcm2, 1e7 * inertia, name);
         }
+    }
+
+    /// As the control's README has it: φ/L bounds i_q in braking on three benches, and 1.5·φ/L in driving on none.
+    #[test]
+    fn the_winding_s_flux_bounds_the_braking_current_of_three_benches() {
+        let full = Bounds {
+            min: Current::MIN,
+            max: Current::MAX,
+        };
+        let [mut braking, mut driving] = [Vec::new(), Vec::new()];
+        for name in library::names() {
+            let Standing { bench, params, .. } = stand(name, Table::new()).unwrap();
+            let mut stated = Params::default();
+            for (id, value) in params {
+                stated.set(id, value).unwrap();
+            }
+            let built = build(&stated, &bench.sensing.board(bench.delay)).unwrap();
+            let (_, bounds) = built.low_speed.bounds(full, Speed::MAX);
+            let limit = built.scale.current_from_a(stated.get(ParamId::LimPhaseA));
+            if bounds.min > -limit {
+                braking.push(name);
+            }
+            if bounds.max < limit {
+                driving.push(name);
+            }
+        }
+        braking.sort_unstable();
+        assert_eq!(braking, ["cinelifter", "quad-5-inch", "quad-7-inch"]);
+        assert!(driving.is_empty(), "{driving:?}");
     }
 }
