@@ -9,7 +9,7 @@ use crate::answer::info::info;
 use crate::check::Check;
 #[cfg(feature = "drift")]
 use crate::drive::Tracker;
-use crate::drive::{Config, Drift, Phase, Setpoint, Snapshot, Witness, put_default};
+use crate::drive::{Config, CurrentMonitor, Drift, Phase, Setpoint, Snapshot, put_default};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
 use crate::math::{Real, magnitude};
@@ -20,7 +20,7 @@ use crate::params::{
     Board, BuildError, ParamId, Params, TRIP_SHARE, build_in, scale, thresholds, unbalance_max,
 };
 use crate::record::Record;
-use crate::statistics::{Recorder, Sight};
+use crate::statistics::{Inputs, Recorder};
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{Polled, Reach, Reached, Throttle};
 use crate::tune::Tune;
@@ -72,7 +72,7 @@ pub struct Esc {
     params: Params,
     scale: Scale,
     charge: Charge,
-    witness: Witness,
+    current_monitor: CurrentMonitor,
     /// Follows the motor's resistance and flux.
     #[cfg(feature = "drift")]
     tracker: Tracker,
@@ -181,7 +181,7 @@ impl Esc {
             component: Component::new(&params, &board.image, link_bytes_per_s),
             telemetry: Telemetry::new(),
             charge: Charge::default(),
-            witness: Witness::default(),
+            current_monitor: CurrentMonitor::default(),
             #[cfg(feature = "drift")]
             tracker: Tracker::default(),
             recorder: Recorder::default(),
@@ -316,8 +316,8 @@ impl Esc {
         self.command = throttle.reach(|throttle| throttle.command());
         let rests = self.command.rests();
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
-        self.tunes.look(now_us, snapshot, rests);
-        self.look_at_motor(now_us, snapshot);
+        self.tunes.poll(now_us, snapshot, rests);
+        self.poll_identification(now_us, snapshot);
         let polled = Polled {
             note: self.tunes.note().filter(|_| !self.check.powers_up()),
             test: self
@@ -346,7 +346,9 @@ impl Esc {
         #[cfg(feature = "drift")]
         self.follow_motor(snapshot);
         self.telemetry.observe(snapshot, &self.scale, time_us);
-        let found = self.witness.look(snapshot, unbalance_max(&self.board));
+        let found = self
+            .current_monitor
+            .update(snapshot, unbalance_max(&self.board));
         for limit in found.without(self.telemetry.limits).iter() {
             self.warn_of(limit.text());
         }
@@ -356,14 +358,14 @@ impl Esc {
             .add(self.scale.amperes(snapshot.bus_current), time_us);
         self.telemetry.consumed_mah = self.charge.mah();
         self.telemetry.temperature_c = temperature_c;
-        let sight = Sight {
+        let inputs = Inputs {
             phase: snapshot.phase,
             faults: snapshot.faults,
             temperature_c,
             phase_a: self.scale.amperes(magnitude(snapshot.i.d, snapshot.i.q)),
             time_us: u32::try_from(time_us).unwrap_or(u32::MAX),
         };
-        let rests = self.recorder.look(&mut self.telemetry.statistics, &sight);
+        let rests = self.recorder.poll(&mut self.telemetry.statistics, &inputs);
         if rests {
             self.storage.changed(now_us);
         }

@@ -59,7 +59,7 @@ impl Statistics {
     }
 }
 
-/// State carried from look to look.
+/// State carried from poll to poll.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Recorder {
     faults: Faults,
@@ -71,37 +71,37 @@ pub(crate) struct Recorder {
     run_us: u32,
 }
 
-/// State of the drive and the board at a look.
-pub(crate) struct Sight {
+/// State of the drive and the board at a poll.
+pub(crate) struct Inputs {
     pub(crate) phase: Phase,
     pub(crate) faults: Faults,
     pub(crate) temperature_c: f32,
     pub(crate) phase_a: f32,
-    /// Time since the last look, µs.
+    /// Time since the last poll, µs.
     pub(crate) time_us: u32,
 }
 
 impl Recorder {
-    /// Takes in one look. Returns true if the motor has just come to rest.
-    pub(crate) fn look(&mut self, statistics: &mut Statistics, sight: &Sight) -> bool {
+    /// Takes in one poll. Returns true if the motor has just come to rest.
+    pub(crate) fn poll(&mut self, statistics: &mut Statistics, inputs: &Inputs) -> bool {
         for (fault, count) in Fault::ALL.into_iter().zip(&mut statistics.faults) {
-            if sight.faults.contains(fault) && !self.faults.contains(fault) {
+            if inputs.faults.contains(fault) && !self.faults.contains(fault) {
                 *count = count.saturating_add(1);
             }
         }
-        self.faults = sight.faults;
-        statistics.temperature_max_c = statistics.temperature_max_c.max(sight.temperature_c);
-        statistics.phase_max_a = statistics.phase_max_a.max(sight.phase_a);
+        self.faults = inputs.faults;
+        statistics.temperature_max_c = statistics.temperature_max_c.max(inputs.temperature_c);
+        statistics.phase_max_a = statistics.phase_max_a.max(inputs.phase_a);
 
-        let driven = sight.phase.drives();
+        let driven = inputs.phase.drives();
         let rests = self.driven && !driven;
         self.driven = driven;
         if driven {
-            self.run_us = self.run_us.saturating_add(sight.time_us);
+            self.run_us = self.run_us.saturating_add(inputs.time_us);
             statistics.run_s = statistics.run_s.saturating_add(self.run_us / SECOND_US);
             self.run_us %= SECOND_US;
         }
-        let runs = sight.phase == Phase::Run;
+        let runs = inputs.phase == Phase::Run;
         if runs && !self.started {
             statistics.starts = statistics.starts.saturating_add(1);
         }
@@ -114,8 +114,8 @@ impl Recorder {
 mod tests {
     use super::*;
 
-    fn sight(phase: Phase) -> Sight {
-        Sight {
+    fn inputs(phase: Phase) -> Inputs {
+        Inputs {
             phase,
             faults: Faults::NONE,
             temperature_c: 25.0,
@@ -130,7 +130,7 @@ mod tests {
         let mut statistics = Statistics::NONE;
         let mut ends = 0;
         for _ in 0..2 {
-            for (phase, looks) in [
+            for (phase, polls) in [
                 (Phase::Idle, 500),
                 (Phase::Sense, 100),
                 (Phase::Park, 250),
@@ -141,8 +141,8 @@ mod tests {
                 (Phase::Run, 250),
                 (Phase::Idle, 1_000),
             ] {
-                for _ in 0..looks {
-                    ends += usize::from(recorder.look(&mut statistics, &sight(phase)));
+                for _ in 0..polls {
+                    ends += usize::from(recorder.poll(&mut statistics, &inputs(phase)));
                 }
             }
         }
@@ -157,8 +157,8 @@ mod tests {
         let mut recorder = Recorder::default();
         let mut statistics = Statistics::NONE;
         for _ in 0..3 {
-            assert!(!recorder.look(&mut statistics, &sight(Phase::Park)));
-            assert!(recorder.look(&mut statistics, &sight(Phase::Idle)));
+            assert!(!recorder.poll(&mut statistics, &inputs(Phase::Park)));
+            assert!(recorder.poll(&mut statistics, &inputs(Phase::Idle)));
         }
         assert_eq!(statistics.starts, 0);
     }
@@ -175,13 +175,13 @@ mod tests {
             (Faults::NONE, 61.0, 1.0),
             (stuck, 20.0, 0.0),
         ] {
-            recorder.look(
+            recorder.poll(
                 &mut statistics,
-                &Sight {
+                &Inputs {
                     faults,
                     temperature_c,
                     phase_a,
-                    ..sight(Phase::Idle)
+                    ..inputs(Phase::Idle)
                 },
             );
         }

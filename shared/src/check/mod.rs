@@ -48,23 +48,23 @@ pub enum Own {
     Value(f32),
 }
 
-/// Looks to discard while the set-point and its effect are still in the pipeline.
+/// Polls to discard while the set-point and its effect are still in the pipeline.
 const LATENCY: u8 = 8;
 
-/// Looks at power-up until the supply filter has settled.
-const POWER_UP_LOOKS: u8 = 3;
+/// Polls at power-up until the supply filter has settled.
+const POWER_UP_POLLS: u8 = 3;
 
-/// Looks averaged for the zero and its noise.
+/// Polls averaged for the zero and its noise.
 const LISTENED: u8 = 64;
 
-/// Looks the drive may take to see that the shaft is at rest.
-const SHAFT_LOOKS: u8 = 200;
+/// Polls that the drive may take to see that the shaft is at rest.
+const SHAFT_POLLS: u8 = 200;
 
-/// The maximum looks to pull a leg up: at 8 kHz it takes 32 ms.
-const UP_LOOKS: u8 = 60;
+/// The maximum polls to pull a leg up: at 8 kHz it takes 32 ms.
+const UP_POLLS: u8 = 60;
 
-/// The maximum looks to wait for a current through two legs.
-const THROUGH_LOOKS: u8 = 20;
+/// The maximum polls to wait for a current through two legs.
+const THROUGH_POLLS: u8 = 20;
 
 /// The level at which a leg counts as up, percent of the supply.
 const UP_PERCENT: f32 = 90.0;
@@ -87,7 +87,7 @@ enum Step {
     Pull(Pull),
 }
 
-/// The outcome of a look.
+/// The outcome of a poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The test continues; percent done.
@@ -99,7 +99,7 @@ pub enum Outcome {
     },
 }
 
-/// What follows a look.
+/// What follows a poll.
 enum Next {
     /// Stay in this step.
     Wait,
@@ -118,9 +118,9 @@ impl Next {
     }
 }
 
-/// The drive's state at a look.
+/// The drive's state at a poll.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight<'a> {
+pub struct Inputs<'a> {
     /// Snapshot of the drive.
     pub snapshot: &'a Snapshot,
     /// Scale of its units.
@@ -131,7 +131,7 @@ pub struct Sight<'a> {
     pub rests: bool,
 }
 
-impl Sight<'_> {
+impl Inputs<'_> {
     /// Returns true if the drive has a fault.
     fn faulted(&self) -> bool {
         !self.snapshot.faults.is_empty()
@@ -142,8 +142,8 @@ impl Sight<'_> {
 #[derive(Clone, Debug)]
 pub struct Check {
     step: Step,
-    /// Looks taken in this step.
-    looks: u8,
+    /// Polls in this step.
+    polls: u8,
     /// Sums of the current readings, and of their squares, A and A².
     sums: [f32; 3],
     squares: [f32; 3],
@@ -156,7 +156,7 @@ impl Check {
     pub fn new(board: &Board) -> Self {
         Self {
             step: Step::PowerUp,
-            looks: 0,
+            polls: 0,
             sums: [0.0; 3],
             squares: [0.0; 3],
             report: Report::new(board.current_range_a, board.current_a_per_count),
@@ -187,22 +187,22 @@ impl Check {
     /// Advances the test, about every millisecond, and returns news to report.
     // Out of line, so that its stack is free again for what the caller does next.
     #[inline(never)]
-    pub fn look(
+    pub fn poll(
         &mut self,
-        sight: &Sight,
+        inputs: &Inputs,
         (board, params): (&Board, &Params),
         probe: &mut impl Probe,
     ) -> Option<Outcome> {
-        self.looks = self.looks.saturating_add(1);
+        self.polls = self.polls.saturating_add(1);
         let next = match self.step {
             Step::Over => return None,
-            Step::PowerUp => self.power_up(sight, probe),
-            _ if !sight.rests => Next::Abandoned,
-            Step::Listen => self.sensors(sight, (board, params), probe),
-            Step::Shaft => self.shaft(sight),
+            Step::PowerUp => self.power_up(inputs, probe),
+            _ if !inputs.rests => Next::Abandoned,
+            Step::Listen => self.sensors(inputs, (board, params), probe),
+            Step::Shaft => self.shaft(inputs),
             Step::Pull(pull) => {
                 let share = terminals(board, &probe.sample());
-                self.pulled(pull, sight, &share, params)
+                self.pulled(pull, inputs, &share, params)
             }
         };
         match next {
@@ -214,8 +214,8 @@ impl Check {
     }
 
     /// Handles power-up, once the supply has had some readings.
-    fn power_up(&mut self, sight: &Sight, probe: &mut impl Probe) -> Next {
-        if self.looks < POWER_UP_LOOKS || !self.own(sight, probe) {
+    fn power_up(&mut self, inputs: &Inputs, probe: &mut impl Probe) -> Next {
+        if self.polls < POWER_UP_POLLS || !self.own(inputs, probe) {
             return Next::Wait;
         }
         Next::Measured
@@ -224,17 +224,17 @@ impl Check {
     /// Reads the sensors without current. No leg may be pulled while a terminal is at the supply.
     fn sensors(
         &mut self,
-        sight: &Sight,
+        inputs: &Inputs,
         (board, params): (&Board, &Params),
         probe: &mut impl Probe,
     ) -> Next {
         let sample = probe.sample();
-        if self.looks > LATENCY {
+        if self.polls > LATENCY {
             for (phase, counts) in sample.currents.into_iter().enumerate() {
                 self.listen(phase, counts.to_f32() * board.current_a_per_count);
             }
         }
-        if self.looks < LATENCY + LISTENED || !self.own(sight, probe) {
+        if self.polls < LATENCY + LISTENED || !self.own(inputs, probe) {
             return Next::Wait;
         }
         for phase in 0..board.shunts.count() {
@@ -249,26 +249,26 @@ impl Check {
     }
 
     /// Waits for the drive to see that the shaft is at rest.
-    fn shaft(&self, sight: &Sight) -> Next {
-        let stands = sight.snapshot.phase == Phase::Tone;
-        if !stands && !sight.faulted() && self.looks <= SHAFT_LOOKS {
+    fn shaft(&self, inputs: &Inputs) -> Next {
+        let stands = inputs.snapshot.phase == Phase::Tone;
+        if !stands && !inputs.faulted() && self.polls <= SHAFT_POLLS {
             return Next::Wait;
         }
         Next::go_if(stands, Step::Pull(Pull::UpA))
     }
 
     /// Checks the legs while one is pulled; `share` holds the terminals, in percent of the supply.
-    fn pulled(&mut self, pull: Pull, sight: &Sight, share: &[f32; 3], params: &Params) -> Next {
-        let faulted = sight.faulted();
-        let (leg, i) = (pull.leg(), sight.snapshot.i);
-        let [next_a, last_a] = [i.d, i.q].map(|i| sight.scale.amperes(i));
-        let up = self.looks > LATENCY && share[usize::from(leg)] >= UP_PERCENT;
+    fn pulled(&mut self, pull: Pull, inputs: &Inputs, share: &[f32; 3], params: &Params) -> Next {
+        let faulted = inputs.faulted();
+        let (leg, i) = (pull.leg(), inputs.snapshot.i);
+        let [next_a, last_a] = [i.d, i.q].map(|i| inputs.scale.amperes(i));
+        let up = self.polls > LATENCY && share[usize::from(leg)] >= UP_PERCENT;
         let most = if pull.is_through() {
-            THROUGH_LOOKS
+            THROUGH_POLLS
         } else {
-            UP_LOOKS
+            UP_POLLS
         };
-        if !up && !faulted && self.looks <= most {
+        if !up && !faulted && self.polls <= most {
             return Next::Wait;
         }
         let [next, last] = [(leg + 1) % 3, (leg + 2) % 3];
@@ -289,7 +289,7 @@ impl Check {
 
     fn go(&mut self, step: Step) -> Outcome {
         self.step = step;
-        self.looks = 0;
+        self.polls = 0;
         self.sums = [0.0; 3];
         self.squares = [0.0; 3];
         Outcome::Progress(match step {
@@ -307,10 +307,10 @@ impl Check {
     }
 
     /// Makes the measurements that need neither time nor the bridge; returns false if some must wait.
-    fn own(&mut self, sight: &Sight, probe: &mut impl Probe) -> bool {
-        let bus_v = sight.scale.volts(sight.snapshot.bus);
+    fn own(&mut self, inputs: &Inputs, probe: &mut impl Probe) -> bool {
+        let bus_v = inputs.scale.volts(inputs.snapshot.bus);
         self.report.set(Kind::Supply, 0, bus_v);
-        self.report.set(Kind::Temperature, 0, sight.temperature_c);
+        self.report.set(Kind::Temperature, 0, inputs.temperature_c);
         for item in Item::OWN {
             match probe.own(item) {
                 Own::Absent => {}

@@ -5,8 +5,8 @@
 //! compensation and has the current's sign. While the rotor accelerates, its flux leads the frame by some z_q, and the
 //! observer's leak takes another ω·z_q/2; this shows along d, where u_d + ω·L·i_q = −ω·z_q.
 //!
-//! A single look cannot tell φ, R and v apart, but a varying throttle can. A Kalman filter tracks the three as random
-//! walks: each look corrects only what it shows, in proportion to the uncertainty, and the rest stays. Without v in the
+//! A single sample cannot tell φ, R and v apart, but a varying throttle can. A Kalman filter tracks the three as random
+//! walks: each sample corrects only what it shows, in proportion to the uncertainty, and the rest stays. Without v in the
 //! model, a dead time wrong by 50 ns would pass for a fifth of a racing motor's resistance.
 //!
 //! The estimates are clamped to the range that heat and a wrongly stated motor can explain. They change no parameter, and
@@ -43,11 +43,11 @@ const UNITS: [f32; 3] = [-0.025, 0.1, 0.01];
 const LEAST: f32 = -3.0;
 const MOST: f32 = 6.0;
 
-/// Variance that each look adds to an estimate: after a minute a resistance is as uncertain as at the start.
+/// Variance that each sample adds to an estimate: after a minute a resistance is as uncertain as at the start.
 const WANDER: f32 = 1.5e-5;
 
-/// Variance of a look's voltage relative to the supply's square. Far above the sensors' noise, because errors in a
-/// transient are correlated over many looks.
+/// Variance of a sample's voltage relative to the supply's square. Far above the sensors' noise, because errors in a
+/// transient are correlated over many samples.
 const NOISE: f32 = 4e-4;
 
 /// Smallest current with a reliable sign: a few percent of a board's range.
@@ -61,7 +61,7 @@ const LEAST_EMF: f32 = 0.03;
 const MOST_OWN_FLUX: f32 = 0.4;
 const MOST_LEAD: f32 = 0.05;
 
-/// Looks between two changes of the values in force.
+/// Samples between two changes of the values in force.
 const PAUSE: u16 = 1000;
 
 /// Smallest difference that causes a change.
@@ -93,7 +93,7 @@ pub struct Tracker {
     covariance: [[f32; 3]; 3],
     in_force: Drift,
     /// Since the last change of it, up to [`PAUSE`].
-    looks: u16,
+    samples: u16,
 }
 
 impl Default for Tracker {
@@ -113,15 +113,15 @@ impl Tracker {
             found: [0.0; 3],
             covariance,
             in_force: Drift::NONE,
-            looks: 0,
+            samples: 0,
         }
     }
 
-    /// Looks at a snapshot, about once a millisecond, and starts anew if a different motor is stated. Returns true if the
+    /// Takes in a snapshot, about once a millisecond, and starts anew if a different motor is stated. Returns true if the
     /// values [in force](Self::in_force) have changed.
     // In its own registers: the caller has none left.
     #[inline(never)]
-    pub fn look(&mut self, snapshot: &Snapshot, stated: Stated) -> bool {
+    pub fn update(&mut self, snapshot: &Snapshot, stated: Stated) -> bool {
         if stated != self.stated {
             let changes = self.in_force != Drift::NONE;
             *self = Self::new(stated);
@@ -133,11 +133,11 @@ impl Tracker {
         } else if snapshot.phase == Phase::Run && self.stated != Stated::NONE {
             self.measure(snapshot);
         }
-        self.looks += 1;
-        if self.looks < PAUSE {
+        self.samples += 1;
+        if self.samples < PAUSE {
             return false;
         }
-        self.looks = 0;
+        self.samples = 0;
         let (now, before) = (self.drift(), self.in_force);
         let changes = (now.resistance - before.resistance).abs() > CHANGE
             || (now.flux - before.flux).abs() > CHANGE;
@@ -147,7 +147,7 @@ impl Tracker {
         changes
     }
 
-    /// Takes in a look if the current has a reliable sign and there is enough back-EMF.
+    /// Takes in a sample if the current has a reliable sign and there is enough back-EMF.
     fn measure(&mut self, snapshot: &Snapshot) {
         let i_q = snapshot.i.q;
         let magnitude = i_q.saturating_abs();
@@ -251,15 +251,15 @@ mod tests {
             };
             bench.snapshot.bus = Voltage::from_f32(SUPPLY);
             bench.snapshot.phase = Phase::Run;
-            bench.look();
+            bench.update();
             bench
         }
 
-        fn look(&mut self) {
-            self.changes += u32::from(self.tracker.look(&self.snapshot, STATED));
+        fn update(&mut self) {
+            self.changes += u32::from(self.tracker.update(&self.snapshot, STATED));
         }
 
-        /// A look at a motor at a speed, in turns a period, and a current, while its flux leads the frame by a part of
+        /// A sample of a motor at a speed, in turns a period, and a current, while its flux leads the frame by a part of
         /// it: what the observer makes of that, by its derivation.
         fn see(&mut self, motor: Drift, speed: f32, current: f32, leads: f32) {
             let emf = 4.0 * speed;
@@ -271,13 +271,13 @@ mod tests {
             snapshot.i.q = Current::from_f32(current);
             snapshot.u.d = Voltage::from_f32(-emf * (STATED.own_flux * current + leads));
             snapshot.flux = Flux::from_f32(flux * FLUX_NOMINAL.to_f32());
-            self.look();
+            self.update();
         }
 
         /// So many seconds of a propeller whose speed swings by a fifth.
         fn fly(&mut self, motor: Drift, seconds: u32) {
-            for look in 0..1000 * seconds {
-                let (sin, cos) = (look as f32 * 0.004).sin_cos();
+            for sample in 0..1000 * seconds {
+                let (sin, cos) = (sample as f32 * 0.004).sin_cos();
                 let speed = 0.025 * (1.0 + 0.2 * sin);
                 // 4.3 A at the mean speed, and 2.7 A to accelerate.
                 let current = 256.0 * speed * speed + 0.1 * cos;
@@ -387,7 +387,7 @@ mod tests {
         let before = bench.tracker.drift();
         bench.snapshot.phase = Phase::Idle;
         for _ in 0..200_000 {
-            bench.look();
+            bench.update();
         }
         let now = bench.tracker.drift();
         assert!((1.0..1.05).contains(&now.resistance), "{now:?}");
@@ -417,9 +417,9 @@ mod tests {
             drop: 0.06,
             ..STATED
         };
-        assert!(bench.tracker.look(&bench.snapshot, other));
+        assert!(bench.tracker.update(&bench.snapshot, other));
         assert_eq!(bench.tracker.in_force(), Drift::NONE);
         assert_eq!(bench.tracker.drift(), Drift::NONE);
-        assert!(!bench.tracker.look(&bench.snapshot, STATED));
+        assert!(!bench.tracker.update(&bench.snapshot, STATED));
     }
 }

@@ -37,7 +37,7 @@
 //! | a stop has come to rest; a start has failed; the rotor is lost, or stuck | `foc/open_loop.rs`; six-step: `six_step/start.rs`, `six_step/period.rs` |
 //! | a current sensor's zero is off | `off.rs` |
 //!
-//! A defective sensor or phase of a turning motor is reported and ends no drive: `witness.rs`. `drift.rs` follows its
+//! A defective sensor or phase of a turning motor is reported and ends no drive: `current_monitor.rs`. `drift.rs` follows its
 //! resistance and flux.
 //!
 //! Throttle that is lost, closed or not armed reaches this point as a set-point of rest:
@@ -82,10 +82,11 @@
 //! # File order
 //! Each file uses only those before it: `phase`, `pull`, `excitation`, `io`, `config`, `transitions`,
 //! `schedule`, `seen`, `shared`, `off`, `charge`, `tone`, `self_test`, `excite`, `foc`, `six_step`, `snapshot`, `limited`,
-//! `witness`, `drift`, `state`, `mode_change`, `step`.
+//! `current_monitor`, `drift`, `state`, `mode_change`, `step`.
 
 mod charge;
 pub mod config;
+mod current_monitor;
 mod drift;
 mod excitation;
 mod excite;
@@ -106,10 +107,10 @@ mod state;
 mod step;
 mod tone;
 mod transitions;
-mod witness;
 
 pub use crate::protection::{Fault, Faults, Limit, Limits};
 pub use config::{ATTEMPTS, Charge, Config, Direction, Stop, put_default};
+pub use current_monitor::CurrentMonitor;
 pub use drift::{Drift, Stated, Tracker};
 pub use excitation::{Excitation, Ripple};
 pub use io::{Bridge, Sample, Setpoint};
@@ -119,7 +120,6 @@ pub use pull::Pull;
 pub use snapshot::Snapshot;
 pub use state::{LastFault, State};
 pub use step::step;
-pub use witness::Witness;
 
 #[cfg(test)]
 mod tests;

@@ -1,21 +1,21 @@
 //! Runs the self-test and reports it.
 
 use super::Esc;
-use crate::check::{Outcome, Probe, Sight};
+use crate::check::{Inputs, Outcome, Probe};
 use crate::drive::Snapshot;
 use crate::mavlink::Warning;
 
 impl Esc {
     /// Advances a running self-test with the board's measurements. Call it after each [`Esc::poll`].
     pub fn test_itself(&mut self, snapshot: &Snapshot, probe: &mut impl Probe) {
-        let sight = Sight {
+        let inputs = Inputs {
             snapshot,
             scale: &self.scale,
             temperature_c: self.telemetry.temperature_c,
             rests: self.command.rests(),
         };
         let with = (&self.board, &self.params);
-        match self.check.look(&sight, with, probe) {
+        match self.check.poll(&inputs, with, probe) {
             None => {}
             Some(Outcome::Progress(percent)) => self.component.tell_progress(percent),
             Some(Outcome::Done { passed }) => {

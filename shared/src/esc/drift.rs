@@ -26,7 +26,7 @@ impl Esc {
         } else {
             Stated::NONE
         };
-        if self.tracker.look(snapshot, stated) {
+        if self.tracker.update(snapshot, stated) {
             self.reassumes = true;
             let drift = self.tracker.in_force();
             if check_drifted(&self.running(), &self.board, drift).is_err() {

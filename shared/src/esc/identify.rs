@@ -2,7 +2,7 @@
 
 use super::{Esc, check};
 use crate::drive::{Setpoint, Snapshot};
-use crate::identify::{Outcome, Sight};
+use crate::identify::{Inputs, Outcome};
 use crate::input::access::Access;
 use crate::mavlink::Warning;
 use crate::params::ParamId;
@@ -65,22 +65,22 @@ impl Esc {
     }
 
     /// Advances a running identification.
-    pub(super) fn look_at_motor(&mut self, now_us: u64, snapshot: &Snapshot) {
+    pub(super) fn poll_identification(&mut self, now_us: u64, snapshot: &Snapshot) {
         if !self.identify.is_under_way() {
-            // Not in the look that ends it: both need stack.
+            // Not in the poll that ends it: both need stack.
             if core::mem::take(&mut self.keeps) && self.identify.report.settings().is_some() {
                 self.keep_identified();
             }
             return;
         }
-        let sight = Sight {
+        let inputs = Inputs {
             now_us,
             snapshot,
             scale: &self.scale,
             limit_a: self.params.get(ParamId::LimPhaseA),
             rests: self.command.rests(),
         };
-        if let Some(outcome) = self.identify.look(&sight) {
+        if let Some(outcome) = self.identify.poll(&inputs) {
             self.identified(outcome);
         }
     }

@@ -8,7 +8,7 @@ use crate::units::Speed;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tunes {
     player: Player,
-    /// The note due at the last look.
+    /// The note due at the last poll.
     note: Option<Note>,
     /// Only beacons sound.
     silent: bool,
@@ -35,7 +35,7 @@ impl Tunes {
 
     /// Updates the note that is due. Throttle, a test and a fault end a tune; one that starts while the shaft
     /// turns is played when it has stopped.
-    pub(super) fn look(&mut self, now_us: u64, snapshot: &Snapshot, rests: bool) {
+    pub(super) fn poll(&mut self, now_us: u64, snapshot: &Snapshot, rests: bool) {
         let turns = snapshot.phase.drives() || snapshot.speed != Speed::ZERO;
         if !rests || !snapshot.faults.is_empty() {
             self.player.stop();

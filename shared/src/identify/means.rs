@@ -1,4 +1,4 @@
-//! Averages what the drive shows over many looks.
+//! Averages what the drive shows over many polls.
 
 use core::f32::consts::TAU;
 
@@ -6,11 +6,11 @@ use crate::drive::Snapshot;
 use crate::math::Real;
 use crate::units::Scale;
 
-/// Looks averaged for an excitation.
-pub(super) const EXCITED_LOOKS: u16 = 150;
+/// Polls averaged for an excitation.
+pub(super) const EXCITED_POLLS: u16 = 150;
 
-/// Looks averaged for a turning rotor.
-pub(super) const SPUN_LOOKS: u16 = 200;
+/// Polls averaged for a turning rotor.
+pub(super) const SPUN_POLLS: u16 = 200;
 
 /// Returns the time elapsed, s: less than an hour, so the low words suffice.
 pub(super) fn seconds(now_us: u64, then_us: u64) -> f32 {
@@ -66,10 +66,10 @@ impl OperatingPoint {
     }
 }
 
-/// Averages of an operating point over the looks of a step.
+/// Averages of an operating point over the polls of a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Means {
-    pub(super) looks: u16,
+    pub(super) polls: u16,
     sums: [f32; 5],
 }
 
@@ -77,7 +77,7 @@ impl Means {
     // Out of line, like `OperatingPoint::of`.
     #[inline(never)]
     pub(super) fn add(&mut self, snapshot: &Snapshot, scale: &Scale) {
-        self.looks += 1;
+        self.polls += 1;
         let values = OperatingPoint::of(snapshot, scale).values();
         for (sum, value) in self.sums.iter_mut().zip(values) {
             *sum += value;
@@ -85,6 +85,6 @@ impl Means {
     }
 
     pub(super) fn get(&self) -> OperatingPoint {
-        OperatingPoint::from_values(self.sums.map(|sum| sum / f32::from(self.looks)))
+        OperatingPoint::from_values(self.sums.map(|sum| sum / f32::from(self.polls)))
     }
 }

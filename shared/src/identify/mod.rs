@@ -28,7 +28,7 @@ use crate::drive::{Excitation, Phase, Ripple, Setpoint, Snapshot};
 use crate::params::choice::CtlDrive;
 use crate::params::{Choice, Kind, ParamId, Params};
 use crate::units::{Scale, Speed};
-use means::{EXCITED_LOOKS, Means, OperatingPoint, SPUN_LOOKS, seconds};
+use means::{EXCITED_POLLS, Means, OperatingPoint, SPUN_POLLS, seconds};
 use report::Motor;
 use shaft::Shaft;
 use winding::Winding;
@@ -59,8 +59,8 @@ const RISE_S: f32 = 1.0;
 const BEGUN_S: f32 = 0.15;
 /// The torque against the rotation over the torque at the end of the run up.
 const AGAINST: f32 = 0.5;
-/// Time between two looks, s.
-const LOOK_S: f32 = 1e-3;
+/// Time between two polls, s.
+const POLL_S: f32 = 1e-3;
 
 /// Time until the drive has been rebuilt, s.
 const ADOPTED_S: f32 = 0.02;
@@ -97,7 +97,7 @@ enum Step {
     Halt,
 }
 
-/// The outcome of a look.
+/// The outcome of a poll.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
     /// It goes on; percent done.
@@ -108,9 +108,9 @@ pub enum Outcome {
     Done(Result<(), &'static str>),
 }
 
-/// The drive's state at a look.
+/// The drive's state at a poll.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight<'a> {
+pub struct Inputs<'a> {
     /// The time, µs.
     pub now_us: u64,
     /// Of the drive.
@@ -123,7 +123,7 @@ pub struct Sight<'a> {
     pub rests: bool,
 }
 
-impl Sight<'_> {
+impl Inputs<'_> {
     fn bus_v(&self) -> f32 {
         self.scale.volts(self.snapshot.bus)
     }
@@ -195,33 +195,33 @@ impl Identify {
     /// Advances it; call it about every millisecond.
     // Out of line: its stack is free for what the caller does next.
     #[inline(never)]
-    pub fn look(&mut self, sight: &Sight) -> Option<Outcome> {
-        let passed_s = seconds(sight.now_us, self.since_us);
-        let result = if !sight.rests {
+    pub fn poll(&mut self, inputs: &Inputs) -> Option<Outcome> {
+        let passed_s = seconds(inputs.now_us, self.since_us);
+        let result = if !inputs.rests {
             Err("the throttle is open")
-        } else if !sight.snapshot.faults.is_empty() {
+        } else if !inputs.snapshot.faults.is_empty() {
             Err("a fault holds")
         } else if passed_s > LONGEST_S {
             Err("it does not turn properly")
         } else {
-            self.advance(sight, passed_s)
+            self.advance(inputs, passed_s)
         };
         result.unwrap_or_else(|reason| self.end(reason))
     }
 
-    fn advance(&mut self, sight: &Sight, passed_s: f32) -> Result<Option<Outcome>, &'static str> {
+    fn advance(&mut self, inputs: &Inputs, passed_s: f32) -> Result<Option<Outcome>, &'static str> {
         match self.step {
-            Step::Reset if passed_s > ADOPTED_S => Ok(Some(self.excite(sight, 0))),
+            Step::Reset if passed_s > ADOPTED_S => Ok(Some(self.excite(inputs, 0))),
             Step::Rebuild if passed_s > ADOPTED_S => {
-                self.enter(sight.now_us, Step::Up, self.torque(sight, 1.0));
+                self.enter(inputs.now_us, Step::Up, self.torque(inputs, 1.0));
                 Ok(Some(Outcome::Progress(80)))
             }
             Step::Over | Step::Reset | Step::Rebuild => Ok(None),
-            Step::Excite(number) => self.measure_excitation(sight, number, passed_s),
-            Step::Spin => Ok(self.measure_spin(sight)),
-            Step::Release => Ok(self.await_release(sight, passed_s)),
-            Step::Up | Step::Down => self.measure_run(sight),
-            Step::Halt if sight.snapshot.phase == Phase::Run => Ok(None),
+            Step::Excite(number) => self.measure_excitation(inputs, number, passed_s),
+            Step::Spin => Ok(self.measure_spin(inputs)),
+            Step::Release => Ok(self.await_release(inputs, passed_s)),
+            Step::Up | Step::Down => self.measure_run(inputs),
+            Step::Halt if inputs.snapshot.phase == Phase::Run => Ok(None),
             Step::Halt => {
                 self.step = Step::Over;
                 Ok(Some(Outcome::Done(Ok(()))))
@@ -238,27 +238,27 @@ impl Identify {
         self.means = Means::default();
     }
 
-    fn excite(&mut self, sight: &Sight, number: u8) -> Outcome {
+    fn excite(&mut self, inputs: &Inputs, number: u8) -> Outcome {
         let (share, ripple) = EXCITATIONS[usize::from(number % EXCITATIONS_PER_PHASE)];
-        let current_a = share * EXCITED_SHARE * sight.limit_a;
-        let current = sight.scale.current_from_a(current_a);
+        let current_a = share * EXCITED_SHARE * inputs.limit_a;
+        let current = inputs.scale.current_from_a(current_a);
         let excitation = Excitation::new(number / EXCITATIONS_PER_PHASE, current, ripple);
         let setpoint = Setpoint::Excite(excitation);
-        self.enter(sight.now_us, Step::Excite(number), setpoint);
+        self.enter(inputs.now_us, Step::Excite(number), setpoint);
         Outcome::Progress(5 * number)
     }
 
-    /// Looks at the windings.
+    /// Measures a winding.
     fn measure_excitation(
         &mut self,
-        sight: &Sight,
+        inputs: &Inputs,
         number: u8,
         passed_s: f32,
     ) -> Result<Option<Outcome>, &'static str> {
-        let (snapshot, period_s) = (sight.snapshot, sight.scale.period_s);
+        let (snapshot, period_s) = (inputs.snapshot, inputs.scale.period_s);
         let phase = usize::from(number / EXCITATIONS_PER_PHASE);
         let excitation_of_phase = number % EXCITATIONS_PER_PHASE;
-        if self.means.looks == 0 {
+        if self.means.polls == 0 {
             let Setpoint::Excite(excitation) = self.setpoint else {
                 return Ok(None);
             };
@@ -276,25 +276,25 @@ impl Identify {
                 return Ok(None);
             }
         }
-        self.means.add(snapshot, sight.scale);
-        if self.means.looks < EXCITED_LOOKS {
+        self.means.add(snapshot, inputs.scale);
+        if self.means.polls < EXCITED_POLLS {
             return Ok(None);
         }
         self.winding
             .take(phase, excitation_of_phase, self.means.get(), period_s);
         if number + 1 < EXCITED {
-            return Ok(Some(self.excite(sight, number + 1)));
+            return Ok(Some(self.excite(inputs, number + 1)));
         }
-        let supply = (sight.scale, sight.bus_v());
+        let supply = (inputs.scale, inputs.bus_v());
         self.winding
             .evaluate(&mut self.report, &mut self.motor, supply)?;
-        self.enter(sight.now_us, Step::Spin, Setpoint::Voltage(SPIN_SHARE));
+        self.enter(inputs.now_us, Step::Spin, Setpoint::Voltage(SPIN_SHARE));
         Ok(Some(Outcome::Progress(60)))
     }
 
-    /// Looks at a rotor turned by six-step.
-    fn measure_spin(&mut self, sight: &Sight) -> Option<Outcome> {
-        let snapshot = sight.snapshot;
+    /// Measures a rotor turned by six-step.
+    fn measure_spin(&mut self, inputs: &Inputs) -> Option<Outcome> {
+        let snapshot = inputs.snapshot;
         if snapshot.phase != Phase::Run {
             return None;
         }
@@ -303,58 +303,58 @@ impl Identify {
             self.speed = snapshot.speed;
             self.means = Means::default();
         }
-        self.means.add(snapshot, sight.scale);
-        if self.means.looks < SPUN_LOOKS {
+        self.means.add(snapshot, inputs.scale);
+        if self.means.polls < SPUN_POLLS {
             return None;
         }
         let dead_v = self.winding.dead_v();
         self.motor.flux_wb = Shaft::rough_flux_wb(self.means.get(), &self.motor, dead_v);
-        self.enter(sight.now_us, Step::Release, Setpoint::Stop);
+        self.enter(inputs.now_us, Step::Release, Setpoint::Stop);
         Some(Outcome::Progress(70))
     }
 
     /// Waits until the bridge is off: only then can the drive be rebuilt.
-    fn await_release(&mut self, sight: &Sight, passed_s: f32) -> Option<Outcome> {
-        if sight.snapshot.phase != Phase::Idle || passed_s < ADOPTED_S {
+    fn await_release(&mut self, inputs: &Inputs, passed_s: f32) -> Option<Outcome> {
+        if inputs.snapshot.phase != Phase::Idle || passed_s < ADOPTED_S {
             return None;
         }
         self.rpm_max = self
             .shaft
-            .choose_speed(sight.bus_v(), &self.motor, sight.scale);
-        self.enter(sight.now_us, Step::Rebuild, Setpoint::Stop);
+            .choose_speed(inputs.bus_v(), &self.motor, inputs.scale);
+        self.enter(inputs.now_us, Step::Rebuild, Setpoint::Stop);
         Some(Outcome::Assume)
     }
 
-    /// Looks at a run.
-    fn measure_run(&mut self, sight: &Sight) -> Result<Option<Outcome>, &'static str> {
-        if sight.snapshot.phase != Phase::Run {
+    /// Measures a run.
+    fn measure_run(&mut self, inputs: &Inputs) -> Result<Option<Outcome>, &'static str> {
+        if inputs.snapshot.phase != Phase::Run {
             return Ok(None);
         }
         let down = self.step == Step::Down;
         if !down {
-            self.risen_s = (self.risen_s + LOOK_S).min(RISE_S);
-            self.setpoint = self.torque(sight, 1.0);
+            self.risen_s = (self.risen_s + POLL_S).min(RISE_S);
+            self.setpoint = self.torque(inputs, 1.0);
         }
-        let point = OperatingPoint::of(sight.snapshot, sight.scale);
-        if !self.shaft.measure(sight.now_us, point, down, &self.motor) {
+        let point = OperatingPoint::of(inputs.snapshot, inputs.scale);
+        if !self.shaft.measure(inputs.now_us, point, down, &self.motor) {
             return Ok(None);
         }
         if !down {
-            self.enter(sight.now_us, Step::Down, self.torque(sight, -AGAINST));
+            self.enter(inputs.now_us, Step::Down, self.torque(inputs, -AGAINST));
             return Ok(Some(Outcome::Progress(90)));
         }
         self.shaft
-            .evaluate(&mut self.report, sight.scale.pole_pairs)?;
-        self.enter(sight.now_us, Step::Halt, self.setpoint);
+            .evaluate(&mut self.report, inputs.scale.pole_pairs)?;
+        self.enter(inputs.now_us, Step::Halt, self.setpoint);
         Ok(None)
     }
 
     /// Returns the torque reached by now, in this direction.
     // Out of line: three calls.
     #[inline(never)]
-    fn torque(&self, sight: &Sight, way: f32) -> Setpoint {
-        let current_a = way * RUN_SHARE * self.risen_s / RISE_S * sight.limit_a;
-        Setpoint::Torque(sight.scale.current_from_a(current_a))
+    fn torque(&self, inputs: &Inputs, way: f32) -> Setpoint {
+        let current_a = way * RUN_SHARE * self.risen_s / RISE_S * inputs.limit_a;
+        Setpoint::Torque(inputs.scale.current_from_a(current_a))
     }
 
     /// Replaces the parameters' motor by the one known so far, and what follows from it.

@@ -31,10 +31,10 @@ pub(super) struct Shaft {
     runs: [Run; 2],
 }
 
-/// Sums over the looks of a run between the two speeds.
+/// Sums over the polls of a run between the two speeds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Run {
-    looks: f32,
+    polls: f32,
     flux_wb: f32,
     /// ∫i_q dt and ∫ω² dt.
     charge_as: f32,
@@ -47,7 +47,7 @@ struct Run {
 impl Run {
     fn add(&mut self, now_us: u64, point: OperatingPoint, motor: &Motor) {
         let omega_rad_s = point.omega_rad_s;
-        if self.looks == 0.0 {
+        if self.polls == 0.0 {
             self.first_rad_s = omega_rad_s;
         } else {
             let passed_s = seconds(now_us, self.last_us);
@@ -56,7 +56,7 @@ impl Run {
         }
         self.last_us = now_us;
         self.gained_rad_s = omega_rad_s - self.first_rad_s;
-        self.looks += 1.0;
+        self.polls += 1.0;
         self.flux_wb += emf_v(point, motor) / omega_rad_s;
     }
 }
@@ -115,7 +115,7 @@ impl Shaft {
         pole_pairs: f32,
     ) -> Result<(), &'static str> {
         let [up, down] = &self.runs;
-        let flux_wb = self.runs.map(|run| run.flux_wb / run.looks);
+        let flux_wb = self.runs.map(|run| run.flux_wb / run.polls);
         report.flux_mwb = Figure::of(&flux_wb, 1e3);
         // J·Δω = k·∫i_q dt − c·∫ω² dt in both runs: two equations for J and c.
         let k = 1.5 * pole_pairs * pole_pairs * 1e-3 * report.flux_mwb.value;

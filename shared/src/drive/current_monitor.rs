@@ -18,7 +18,7 @@ use crate::units::{AdcCounts, Angle, Current};
 
 /// What the currents have shown since the motor rested.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Witness {
+pub struct CurrentMonitor {
     /// Means of the currents' sum: as it is, and with the signs of the angle's sine and cosine.
     sums: [AdcCounts; 3],
     rounds: Rounds,
@@ -40,10 +40,10 @@ struct Rounds {
     round: Round,
 }
 
-/// Looks at one turn or a few, until the rotor has been seen in five sextants.
+/// Covers one turn or a few, until the rotor has been seen in five sextants.
 ///
-/// At a speed that meets the pace of the looks, these see the same few places of each turn. Two places half a turn apart
-/// may miss a sound phase's current altogether, and count as four sextants as the speed wavers. Five places, 72 degrees
+/// At a speed in step with the samples, these see the same few places of each turn. Two places half a turn apart may
+/// miss a sound phase's current altogether, and count as four sextants as the speed wavers. Five places, 72 degrees
 /// apart, show at least 0.8 of each direction's peak. At four places a turn an open phase goes unseen.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Round {
@@ -64,21 +64,21 @@ const OPEN_ROUNDS: u32 = 8;
 /// A quarter of a turn.
 const QUARTER: Angle = Angle::from_bits(1 << 30);
 
-/// Time constant of the sum's means, in looks, as a power of two: 32 ms.
-const MEAN_LOOKS_LOG2: u32 = 5;
+/// Time constant of the sum's means, in samples, as a power of two: 32 ms.
+const MEAN_SAMPLES_LOG2: u32 = 5;
 
-impl Witness {
-    /// Looks at a snapshot, about once a millisecond, and returns the warnings.
+impl CurrentMonitor {
+    /// Takes in a snapshot, about once a millisecond, and returns the warnings.
     ///
     /// `unbalance_max` is what the currents of sound sensors may sum to on average.
     // In its own registers: the caller has none left.
     #[inline(never)]
-    pub fn look(&mut self, snapshot: &Snapshot, unbalance_max: AdcCounts) -> Limits {
+    pub fn update(&mut self, snapshot: &Snapshot, unbalance_max: AdcCounts) -> Limits {
         if !snapshot.phase.drives() {
             *self = Self::default();
         } else if snapshot.missed_sextants > 0 || !self.is_balanced(snapshot, unbalance_max) {
             self.rounds = Rounds::default();
-        } else if self.rounds.look(snapshot, unbalance_max) {
+        } else if self.rounds.update(snapshot, unbalance_max) {
             self.warnings.insert(Limit::PhaseOpen);
         }
         if snapshot.sensor_fault {
@@ -113,15 +113,15 @@ impl Witness {
 
 /// Takes a value into a mean, and returns the mean's magnitude.
 fn average(mean: &mut AdcCounts, value: AdcCounts) -> AdcCounts {
-    *mean += value.wrapping_sub(*mean) >> MEAN_LOOKS_LOG2;
+    *mean += value.wrapping_sub(*mean) >> MEAN_SAMPLES_LOG2;
     mean.wrapping_abs()
 }
 
 impl Rounds {
-    /// Looks at the currents; one of up to `none` may be no current. Returns true if a direction is open.
-    fn look(&mut self, snapshot: &Snapshot, none: AdcCounts) -> bool {
+    /// Takes in the currents; one of up to `none` may be no current. Returns true if a direction is open.
+    fn update(&mut self, snapshot: &Snapshot, none: AdcCounts) -> bool {
         let round = &mut self.round;
-        if !round.look(snapshot) {
+        if !round.update(snapshot) {
             return false;
         }
         let greatest = round
@@ -152,8 +152,8 @@ impl Rounds {
 }
 
 impl Round {
-    /// Looks at the currents. Returns true if this completes the round.
-    fn look(&mut self, snapshot: &Snapshot) -> bool {
+    /// Takes in the currents. Returns true if this completes the round.
+    fn update(&mut self, snapshot: &Snapshot) -> bool {
         for (phase, current) in snapshot.currents.iter().enumerate() {
             let [forth, back] = [phase, phase + 3];
             self.peaks[forth] = self.peaks[forth].max(*current);
@@ -179,46 +179,46 @@ mod tests {
     use crate::drive::{Phase, State};
     use crate::params::{BOSSO_BENCH, Board, Params, build};
 
-    /// Turns of the rotor from look to look: at idle, at 1200 turns a second, near a half, and nearly one.
+    /// Turns of the rotor from sample to sample: at idle, at 1200 turns a second, near a half, and nearly one.
     const STEPS: [f64; 4] = [0.094, 0.2, 0.49, 0.933];
 
     const MOST: AdcCounts = AdcCounts::lit("100");
 
-    /// The warnings after so many looks at a rotor that turns so far from one to the next. Currents and their readings
+    /// The warnings after so many samples at a rotor that turns so far from one to the next. Currents and their readings
     /// are in parts of `MOST`.
     fn found(
         step: f64,
-        looks: u32,
+        samples: u32,
         currents: impl Fn(u32, f64) -> [f64; 3],
         shown: impl Fn([f64; 3]) -> [f64; 3],
     ) -> Vec<Limit> {
-        let turns = |look| 0.013 + step * f64::from(look);
-        found_at(turns, looks, currents, shown, None)
+        let turns = |sample| 0.013 + step * f64::from(sample);
+        found_at(turns, samples, currents, shown, None)
     }
 
-    /// The same with the rotor at so many turns at each look, and with the current along q that is asked for: without
+    /// The same with the rotor at so many turns at each sample, and with the current along q that is asked for: without
     /// it the one that flows.
     fn found_at(
         turns: impl Fn(u32) -> f64,
-        looks: u32,
+        samples: u32,
         currents: impl Fn(u32, f64) -> [f64; 3],
         shown: impl Fn([f64; 3]) -> [f64; 3],
         asked: Option<f64>,
     ) -> Vec<Limit> {
-        let mut witness = Witness::default();
+        let mut monitor = CurrentMonitor::default();
         let mut snapshot = snapshot();
-        for look in 0..looks {
-            let turns = turns(look);
-            let currents = currents(look, turns);
+        for sample in 0..samples {
+            let turns = turns(sample);
+            let currents = currents(sample, turns);
             let along_q: f64 = currents.iter().zip(unit(turns)).map(|(i, q)| i * q).sum();
             let i_q = 2.0 / 3.0 * along_q;
             snapshot.currents = shown(currents).map(|part| MOST * AdcCounts::from_num(part));
             snapshot.i.q = Current::from_num(i_q / 16.0);
             snapshot.i_q_reference = Current::from_num(asked.unwrap_or(i_q) / 16.0);
             snapshot.angle = Angle::wrapping_from_num(turns);
-            witness.look(&snapshot, MOST);
+            monitor.update(&snapshot, MOST);
         }
-        witness.warnings.iter().collect()
+        monitor.warnings.iter().collect()
     }
 
     /// Of a motor that runs.
@@ -255,16 +255,16 @@ mod tests {
                 );
             }
             // A torque that changes its sign.
-            for looks in [2, 7, 40] {
-                let pushed = |look: u32, turns: f64| {
-                    let along = if (look / looks).is_multiple_of(2) {
+            for samples in [2, 7, 40] {
+                let pushed = |sample: u32, turns: f64| {
+                    let along = if (sample / samples).is_multiple_of(2) {
                         4.0
                     } else {
                         -4.0
                     };
-                    sound(along)(look, turns)
+                    sound(along)(sample, turns)
                 };
-                assert_eq!(found(step, 5000, pushed, as_is), vec![], "{step} {looks}");
+                assert_eq!(found(step, 5000, pushed, as_is), vec![], "{step} {samples}");
             }
         }
     }
@@ -273,13 +273,13 @@ mod tests {
     fn a_speed_that_is_that_of_the_looks_is_no_open_phase() {
         for step in [1.0, 0.5, 1.0 / 3.0, 0.25, 0.2, 1.0001, 0.5001] {
             for lag in 0..24 {
-                let late = |look, turns: f64| sound(4.0)(look, turns - f64::from(lag) / 24.0);
+                let late = |sample, turns: f64| sound(4.0)(sample, turns - f64::from(lag) / 24.0);
                 // It is held to a degree.
                 for swing in [0.0, 0.003] {
                     for begin in 0..24 {
-                        let at = |look| {
-                            let swung = swing * f64::from(look).sin();
-                            f64::from(begin) / 24.0 + step * f64::from(look) + swung
+                        let at = |sample| {
+                            let swung = swing * f64::from(sample).sin();
+                            f64::from(begin) / 24.0 + step * f64::from(sample) + swung
                         };
                         let found = found_at(at, 1000, late, as_is, None);
                         assert_eq!(found, vec![], "{step} {lag} {swing} {begin}");
@@ -301,8 +301,9 @@ mod tests {
         let noise: Vec<[f64; 3]> = (0..5000).map(|_| [(); 3].map(|()| rms * noise())).collect();
         for step in STEPS {
             for amplitude in [0.0, 4.0] {
-                let noisy = |look: u32, turns| {
-                    let (current, noise) = (sound(amplitude)(look, turns), noise[look as usize]);
+                let noisy = |sample: u32, turns| {
+                    let (current, noise) =
+                        (sound(amplitude)(sample, turns), noise[sample as usize]);
                     [0, 1, 2].map(|phase| current[phase] + noise[phase])
                 };
                 assert_eq!(
@@ -320,14 +321,14 @@ mod tests {
             let through = 4.0 * (TAU * turns).cos();
             [through, 0.0, -through]
         };
-        let switch = |look, turns| {
-            let [a, b, c] = sound(4.0)(look, turns);
+        let switch = |sample, turns| {
+            let [a, b, c] = sound(4.0)(sample, turns);
             let less = b.max(0.0);
             [a + less / 2.0, b - less, c + less / 2.0]
         };
         for step in STEPS {
             let open = vec![Limit::PhaseOpen];
-            let turns = |look| 0.013 + step * f64::from(look);
+            let turns = |sample| 0.013 + step * f64::from(sample);
             let asked = Some(4.0);
             assert_eq!(found_at(turns, 600, wire, as_is, asked), open, "{step}");
             assert_eq!(found_at(turns, 600, switch, as_is, asked), open, "{step}");
@@ -350,21 +351,21 @@ mod tests {
 
     #[test]
     fn what_was_wrong_is_forgotten_at_rest_but_a_position_sensor_that_still_is() {
-        let mut witness = Witness::default();
+        let mut monitor = CurrentMonitor::default();
         let mut snapshot = Snapshot {
             sensor_fault: true,
             currents: [MOST * AdcCounts::lit("3"); 3],
             ..snapshot()
         };
         for _ in 0..200 {
-            witness.look(&snapshot, MOST);
+            monitor.update(&snapshot, MOST);
         }
         let all = [Limit::SensorDrift, Limit::PositionSensor];
-        assert!(witness.look(&snapshot, MOST).iter().eq(all));
+        assert!(monitor.update(&snapshot, MOST).iter().eq(all));
         snapshot.phase = Phase::Brake;
         let still = [Limit::PositionSensor];
-        assert!(witness.look(&snapshot, MOST).iter().eq(still));
+        assert!(monitor.update(&snapshot, MOST).iter().eq(still));
         snapshot.sensor_fault = false;
-        assert!(witness.look(&snapshot, MOST).is_empty());
+        assert!(monitor.update(&snapshot, MOST).is_empty());
     }
 }
