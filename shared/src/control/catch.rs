@@ -15,7 +15,7 @@
 //!   w = Σ(∂r/∂θ_e)²/E² and their ages, S_0 = Σw, S_1 = Σw·age and S_2 = Σw·age² split an innovation between angle
 //!   and speed. So the gains fall as knowledge grows, and rise again over a gap (for a sixth of a turn only one
 //!   half-wave shows, near its peak, where the angle is hardly visible), and the sums tell the speed's uncertainty:
-//!   `learn.rs`.
+//!   `least_squares.rs`.
 //! - The sums forget with a time constant of one electrical turn, so that the observer follows a decelerating
 //!   rotor: a propeller coasts with a time constant of a second.
 //!
@@ -24,7 +24,7 @@
 //! compared. Ages, and all times in the configuration, count such looks.
 
 mod compare;
-mod learn;
+mod least_squares;
 mod state;
 
 use fixed::types::{I0F32, I4F28, I16F16, I17F15, I20F12};
@@ -74,19 +74,19 @@ impl Trace for Rotor {
 pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) -> Rotor {
     state.theta = state.theta.wrapping_add(state.omega.over_period());
     // 12 bits plus fraction, whatever lies above.
-    let held = |v: AdcCounts| I17F15::from_bits(v.to_bits() >> 1 & ((1 << 27) - 1));
+    let reading = |v: AdcCounts| I17F15::from_bits(v.to_bits() >> 1 & ((1 << 27) - 1));
     let [a, b, c] = terminals;
-    let readings @ [a, b, c] = [held(a), held(b), held(c)];
-    if state.stage == Stage::Look {
-        look(config, state, readings);
+    let readings @ [a, b, c] = [reading(a), reading(b), reading(c)];
+    if state.stage == Stage::Compare {
+        compare_readings(config, state, readings);
     } else {
         let [before_a, before_b, before_c] = state.readings;
         state.readings = [before_a + a, before_b + b, before_c + c];
-        learn::learn(config, state);
+        least_squares::run_stage(config, state);
     }
     if state.level < config.standing {
         Rotor::Standing
-    } else if state.looks == 0 || state.fitting < config.sure_looks {
+    } else if state.looks == 0 || state.fits < config.sure_looks {
         Rotor::Unknown
     } else {
         // The back-EMF leads the flux by a quarter of a turn, in the direction of rotation.
@@ -102,24 +102,24 @@ pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) ->
     }
 }
 
-/// Runs the look stage on the terminals.
-fn look(config: &Config, state: &mut State, readings: [I17F15; 3]) {
+/// Runs the first stage: acquires the rotor, or tracks it.
+fn compare_readings(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let [a, b, c] = readings;
     let highest = I16F16::from_bits(a.max(b).max(c).to_bits() << 1);
     state.level += (highest - state.level).top(config.level_share);
-    if state.level < config.standing || state.unfitting > config.lost_looks {
+    if state.level < config.standing || state.misfits > config.lost_looks {
         state.restart();
-    } else if state.seeks(config) {
-        seek(config, state, readings);
+    } else if state.is_acquiring(config) {
+        acquire(config, state, readings);
     } else {
-        follow(config, state, readings);
+        track(config, state, readings);
     }
 }
 
-/// Runs one look of a beginning: two looks, a period apart, where the back-EMF is large.
+/// Acquires the rotor by one look: two looks, a period apart, where the back-EMF is large.
 #[cold]
 #[inline(never)] // only some periods
-fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
+fn acquire(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let Some((theta, amplitude)) = vector(config, readings) else {
         state.restart();
         return;
@@ -137,7 +137,7 @@ fn seek(config: &Config, state: &mut State, readings: [I17F15; 3]) {
         state.ages = [3 << (SUM_FRACTION - 3), 3 << (SUM_FRACTION - 5)];
         state.amplitude_weight = state.weight;
     }
-    if !state.seeks(config) {
+    if !state.is_acquiring(config) {
         // There is nothing to weigh; this reading is the first of the next mean.
         state.difference = Difference::default();
         state.readings = readings;
@@ -194,8 +194,8 @@ fn begin(config: &Config, state: &mut State) {
     state.amplitude_weight = I20F12::ZERO;
 }
 
-/// Runs every later look.
-fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
+/// Tracks the rotor: compares every later look.
+fn track(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     let (theta, readings) = if state.is_slow() {
         let [before_a, before_b, before_c] = state.readings;
         let [a, b, c] = readings;
@@ -213,7 +213,7 @@ fn follow(config: &Config, state: &mut State, readings: [I17F15; 3]) {
     state.difference = compare::compare(config.diode, theta, state.amplitude, readings);
     state.looks = state.looks.saturating_add(1);
     state.readings = [I17F15::ZERO; 3];
-    state.stage = Stage::Weigh;
+    state.stage = Stage::Gains;
 }
 
 /// √3/4; adding the product to itself gives √3/2.

@@ -16,7 +16,7 @@ use crate::units::Speed;
 
 /// Offset measurements without knowing whether the rotor turns: after eight times 5 ms it is too slow to matter, or
 /// its terminals cannot be read.
-const LOOKS: u8 = 8;
+const MEASUREMENTS_MAX: u8 = 8;
 
 /// The sample at which the bridge turns off, and one for a period of delay.
 const SETTLING_PERIODS: u8 = 2;
@@ -28,7 +28,7 @@ traced! {
         /// Samples that may still show current from before the bridge was off.
         settling_periods: u8,
         /// Offset measurements since Sense began.
-        looks: u8,
+        offset_measurements: u8,
         /// The rotor, from the open terminals, for the phase order a, b, c.
         pub(super) rotor: Rotor,
         catch: catch::State,
@@ -40,7 +40,7 @@ impl State {
     pub(super) fn new(config: &Config) -> Self {
         Self {
             settling_periods: 0,
-            looks: 0,
+            offset_measurements: 0,
             rotor: Rotor::Unknown,
             catch: catch::State::new(&config.catch),
         }
@@ -49,12 +49,12 @@ impl State {
     /// Begins Sense: nothing is measured yet.
     pub(super) fn begin(&mut self) {
         self.settling_periods = SETTLING_PERIODS;
-        self.looks = 0;
+        self.offset_measurements = 0;
     }
 
-    /// Returns true if this period looks at a tracked rotor; the next one does not.
-    pub(super) fn is_looking(&self) -> bool {
-        self.catch.is_looking()
+    /// Returns true if this period compares a tracked rotor with its prediction; the next one does not.
+    pub(super) fn is_compare_due(&self) -> bool {
+        self.catch.is_compare_due()
     }
 
     /// Forgets the rotor: the terminals have been driven since.
@@ -96,8 +96,9 @@ pub(super) fn sense(
         Zeroing::Measuring => None,
         Zeroing::Defect => Some(Why::Tripped(Fault::CurrentSensor)),
         Zeroing::Done => {
-            state.looks += 1;
-            let known = state.rotor != Rotor::Unknown || state.looks >= LOOKS;
+            state.offset_measurements += 1;
+            let known =
+                state.rotor != Rotor::Unknown || state.offset_measurements >= MEASUREMENTS_MAX;
             known.then_some(Why::Sensed)
         }
     }

@@ -111,7 +111,7 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
             }
             nothing
         }
-        (Phase::Idle, _) => state.off.is_looking(),
+        (Phase::Idle, _) => state.off.is_compare_due(),
         (Phase::Sense, Setpoint::Speed(_)) => {
             config.six_step.is_none() && setpoint.rotation(config.both_ways) != Rotation::Rest
         }

@@ -27,9 +27,15 @@ traced! {
     }
 }
 
-/// A phase: its component of a unit vector, that component's derivative by the vector's angle, and
-/// its terminal's reading.
-type Phase = (I2F30, I2F30, I17F15);
+/// A terminal: what a unit vector predicts for it, and its reading.
+#[derive(Clone, Copy)]
+struct Terminal {
+    /// The phase's component of the unit vector.
+    component: I2F30,
+    /// That component's derivative by the vector's angle.
+    derivative: I2F30,
+    reading: I17F15,
+}
 
 /// Compares readings with the terminal voltages that a vector of this amplitude at `theta`
 /// produces.
@@ -51,32 +57,41 @@ pub(super) fn compare(
         beta: cos,
     });
     let [ra, rb, rc] = readings;
-    let (a, b, c): (Phase, Phase, Phase) = ((a, da, ra), (b, db, rb), (c, dc, rc));
-    let (lowest, one, other) = if a.0 <= b.0 && a.0 <= c.0 {
+    let terminal = |component, derivative, reading| Terminal {
+        component,
+        derivative,
+        reading,
+    };
+    let (a, b, c) = (
+        terminal(a, da, ra),
+        terminal(b, db, rb),
+        terminal(c, dc, rc),
+    );
+    let (lowest, one, other) = if a.component <= b.component && a.component <= c.component {
         (a, b, c)
-    } else if b.0 <= c.0 {
+    } else if b.component <= c.component {
         (b, a, c)
     } else {
         (c, a, b)
     };
-    let (low_seen, low_turned, low_reading) = lowest;
     // 16 + 30 − 32 fraction bits.
-    let counts = |seen: I2F30| I17F15::from_bits(amplitude.top(seen).to_bits() << 1);
+    let counts = |component: I2F30| I17F15::from_bits(amplitude.top(component).to_bits() << 1);
     // The readings sit on the lowest phase's diode drop, if that diode conducts.
-    let lift = counts(-low_seen) - I17F15::from_bits(diode.to_bits() >> 1);
-    let (lift, base_seen, base_turned) = if lift > I17F15::ZERO {
-        (lift, low_seen, low_turned)
+    let lift = counts(-lowest.component) - I17F15::from_bits(diode.to_bits() >> 1);
+    let (lift, base_component, base_derivative) = if lift > I17F15::ZERO {
+        (lift, lowest.component, lowest.derivative)
     } else {
         (I17F15::ZERO, I2F30::ZERO, I2F30::ZERO)
     };
     let half_amplitude = I17F15::from_bits(amplitude.to_bits() >> 2);
     // The lowest phase is predicted at its clamp.
     let mut sum = Difference {
-        misfit: low_reading,
+        misfit: lowest.reading,
         ..Difference::default()
     };
-    let mut take = |(seen, turned, reading): Phase| {
-        let predicted = counts(seen) + lift;
+    let mut add = |terminal: Terminal| {
+        let reading = terminal.reading;
+        let predicted = counts(terminal.component) + lift;
         if predicted >= CLAMP && reading >= CLAMP {
             return;
         }
@@ -85,14 +100,15 @@ pub(super) fn compare(
         // Slightly above zero where nothing is predicted is noise; half the amplitude is not.
         if predicted > I17F15::ZERO || reading >= half_amplitude {
             // At most √3.
-            let (by_amplitude, by_angle) = (seen - base_seen, turned - base_turned);
+            let by_amplitude = terminal.component - base_component;
+            let by_angle = terminal.derivative - base_derivative;
             sum.by_angle += by_angle.top(error);
             sum.by_amplitude += by_amplitude.top(error);
             sum.angle_weight += by_angle.top(by_angle);
             sum.amplitude_weight += by_amplitude.top(by_amplitude);
         }
     };
-    take(one);
-    take(other);
+    add(one);
+    add(other);
     sum
 }

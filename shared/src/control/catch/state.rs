@@ -38,13 +38,13 @@ traced! {
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub(super) enum Stage {
         /// Compares the readings with the prediction.
-        Look,
+        Compare,
         /// Computes the gains of the angle and speed corrections.
-        Weigh,
+        Gains,
         /// Corrects angle, speed and amplitude.
         Correct,
         /// Judges whether everything fits.
-        Judge,
+        CheckFit,
     }
 }
 
@@ -83,9 +83,9 @@ traced! {
         /// S_1/S_0, looks with 12 fraction bits.
         pub(super) mean_age: i32,
         /// Consecutive looks that fitted.
-        pub(super) fitting: u32,
+        pub(super) fits: u32,
         /// Looks that did not.
-        pub(super) unfitting: u32,
+        pub(super) misfits: u32,
     }
 }
 
@@ -95,7 +95,7 @@ impl State {
         Self {
             // Twice the threshold, which tells a resting rotor from one not yet seen.
             level: config.standing.saturating_mul_int(2),
-            stage: Stage::Look,
+            stage: Stage::Compare,
             readings: [I17F15::ZERO; 3],
             looks: 0,
             theta: Angle::ZERO,
@@ -109,27 +109,27 @@ impl State {
             difference: Difference::default(),
             speed_gain: 0,
             mean_age: 0,
-            fitting: 0,
-            unfitting: 0,
+            fits: 0,
+            misfits: 0,
         }
     }
 
     /// Restarts the observation; keeps the mean that tells a resting rotor.
     pub fn restart(&mut self) {
-        self.stage = Stage::Look;
+        self.stage = Stage::Compare;
         self.looks = 0;
         self.omega = Speed::ZERO;
         self.residual = I17F15::ZERO;
-        self.fitting = 0;
-        self.unfitting = 0;
+        self.fits = 0;
+        self.misfits = 0;
     }
 }
 
 impl State {
     /// Returns true if the next sample will be compared with the prediction for a tracked rotor. The one after it
     /// will not.
-    pub fn is_looking(&self) -> bool {
-        self.stage == Stage::Look && self.looks >= 2
+    pub fn is_compare_due(&self) -> bool {
+        self.stage == Stage::Compare && self.looks >= 2
     }
 
     /// Returns true if looks use the mean of four readings.
@@ -140,7 +140,7 @@ impl State {
     /// Returns true if there is no vector yet, or a large one without a speed. For a large back-EMF the difference
     /// of two vectors gives the speed, because a prediction from standstill may be too far off; a small one means a
     /// slow rotor and is too noisy for that.
-    pub(super) fn seeks(&self, config: &Config) -> bool {
+    pub(super) fn is_acquiring(&self, config: &Config) -> bool {
         self.looks == 0 || self.looks == 1 && self.amplitude >> 1 > config.diode
     }
 }

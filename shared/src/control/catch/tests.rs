@@ -347,7 +347,7 @@ proptest! {
             let seen = state.level >= config.standing;
             prop_assert_eq!(rotor == Rotor::Standing, !seen);
             if matches!(rotor, Rotor::Turning { .. }) {
-                prop_assert!(state.fitting >= config.sure_looks);
+                prop_assert!(state.fits >= config.sure_looks);
             }
         }
     }

@@ -37,43 +37,43 @@ const QUIET: I17F15 = I17F15::lit("7");
 
 /// Runs the stage of a period after a look.
 #[inline(never)] // only some periods
-pub(super) fn learn(config: &Config, state: &mut State) {
+pub(super) fn run_stage(config: &Config, state: &mut State) {
     match state.stage {
-        Stage::Look => {}
-        Stage::Weigh => {
+        Stage::Compare => {}
+        Stage::Gains => {
             state.stage = Stage::Correct;
-            weigh(config, state);
+            update_gains(config, state);
         }
         Stage::Correct => {
-            state.stage = Stage::Judge;
+            state.stage = Stage::CheckFit;
             correct(state);
         }
-        Stage::Judge => {
-            state.stage = Stage::Look;
-            judge(config, state);
+        Stage::CheckFit => {
+            state.stage = Stage::Compare;
+            check_fit(config, state);
         }
     }
 }
 
 /// Ages the sums by one look, forgets a share of them and adds the last look's weights; derives the gains and the
 /// spread of the ages.
-fn weigh(config: &Config, state: &mut State) {
+fn update_gains(config: &Config, state: &mut State) {
     let omega = state.omega.to_bits().saturating_abs().min(FORGET_MAX);
     // A turn is 1/(4·ω) looks.
     let share = (omega << LOOK_SHIFT).max(config.forget_min.to_bits());
     let share = I0F32::from_bits(share);
     // Sixteen fraction bits of the share: S_2 has up to 47 bits.
-    let of_ages = (share.to_bits() >> 16) as u32;
-    let keep = |sum: i64| sum - ((sum as u64 * u64::from(of_ages)) >> 16) as i64;
+    let age_share = (share.to_bits() >> 16) as u32;
+    let kept = |sum: i64| sum - ((sum as u64 * u64::from(age_share)) >> 16) as i64;
     let [s_1, s_2] = state.ages;
     let s_0 = i64::from(state.weight.to_bits());
-    let [s_1, s_2] = [keep(s_1 + s_0), keep(s_2 + 2 * s_1 + s_0)];
+    let [s_1, s_2] = [kept(s_1 + s_0), kept(s_2 + 2 * s_1 + s_0)];
     state.ages = [s_1, s_2];
     let difference = &state.difference;
-    let of_angle = I20F12::from_bits(difference.angle_weight.to_bits() >> 16);
-    let of_amplitude = I20F12::from_bits(difference.amplitude_weight.to_bits() >> 16);
-    state.weight += of_angle - state.weight.top(share);
-    state.amplitude_weight += of_amplitude - state.amplitude_weight.top(share);
+    let angle_weight = I20F12::from_bits(difference.angle_weight.to_bits() >> 16);
+    let amplitude_weight = I20F12::from_bits(difference.amplitude_weight.to_bits() >> 16);
+    state.weight += angle_weight - state.weight.top(share);
+    state.amplitude_weight += amplitude_weight - state.amplitude_weight.top(share);
     if state.weight < WEIGHT_MIN {
         return;
     }
@@ -87,8 +87,11 @@ fn weigh(config: &Config, state: &mut State) {
         let whole = (spread >> 16) as u32;
         (whole.min(u32::MAX >> 4) << 4, quotient(mean_age, whole, 14))
     } else {
-        let by = (spread as u32).max(mean_age as u32).max(1);
-        ((spread >> SUM_FRACTION) as u32, quotient(mean_age, by, 30))
+        let divisor = (spread as u32).max(mean_age as u32).max(1);
+        (
+            (spread >> SUM_FRACTION) as u32,
+            quotient(mean_age, divisor, 30),
+        )
     };
     state.mean_age = mean_age;
 }
@@ -123,43 +126,58 @@ fn correct(state: &mut State) {
     }
 }
 
-/// Judges whether the readings pin the speed to 1 %, over nearly half a turn, and whether amplitude, speed and
-/// residual agree.
-fn judge(config: &Config, state: &mut State) {
+/// Judges whether the speed is known, and whether amplitude, speed and residual agree.
+fn check_fit(config: &Config, state: &mut State) {
     state.residual += (state.difference.misfit - state.residual) >> RESIDUAL_SHIFT;
     let omega = state.omega.magnitude_bits();
-    let a_look = omega.min(u32::MAX >> LOOK_SHIFT) << LOOK_SHIFT;
-    let amplitude = state.amplitude.to_bits() as u32;
-    // The speed's standard deviation is σ/(E·√spread) radians per look: (E·ω)² > WANTED/spread with ω in turns per
-    // look, four times that per period. 16 fraction bits, and at most 64 counts, at which a spread of one suffices.
-    // Drops eight fraction bits of the square.
-    let slope = ((u64::from(amplitude) * u64::from(a_look)) >> 32).min(1 << 22);
-    let wanted = WANTED << (32 - 8);
-    // The mean of four readings has half the noise.
-    let wanted = wanted >> if state.is_slow() { 2 } else { 0 };
-    // Over a gap between half-waves a known speed fades: half of that suffices.
-    let wanted = wanted >> u32::from(state.fitting > 0);
-    let precise = ((slope * slope) >> 8) * u64::from(state.spread.min(1 << 24)) > wanted;
+    let turns_per_look = omega.min(u32::MAX >> LOOK_SHIFT) << LOOK_SHIFT;
     // 0.43 turns since the observation began.
-    let far = u64::from(a_look) * u64::from(state.looks) > FAR;
-    let known = precise && far;
-    // A flux between half and twice the stated one.
-    let expected = ((u64::from(config.emf) * u64::from(omega)) >> 32) as u32;
-    let made = amplitude >> 8;
-    let fits = 2 * made > expected && made < 2 * expected;
-    // Plus three sixteenths of the amplitude for unmodelled effects: the diode drop depends on its current.
-    let left_out = I17F15::from_bits((amplitude >> 4) as i32 + (amplitude >> 5) as i32);
-    let quiet = state.residual < QUIET + left_out;
+    let far = u64::from(turns_per_look) * u64::from(state.looks) > FAR;
+    let known = is_speed_precise(state, turns_per_look) && far;
+    let fits = fits_stated_flux(config, state, omega);
+    let quiet = is_quiet(state);
     if known && fits && quiet {
-        state.fitting = state.fitting.saturating_add(1);
-        state.unfitting = 0;
+        state.fits = state.fits.saturating_add(1);
+        state.misfits = 0;
     } else {
-        state.fitting = 0;
+        state.fits = 0;
         let settled = state.looks > config.lost_looks;
         if settled && (!quiet || (known && !fits)) {
-            state.unfitting += 1;
+            state.misfits += 1;
         }
     }
+}
+
+/// Returns true if the readings pin the speed to 1 %.
+///
+/// Its standard deviation is σ/(E·√spread) radians per look: (E·ω)² > WANTED/spread with ω in turns per look, four
+/// times that per period.
+fn is_speed_precise(state: &State, turns_per_look: u32) -> bool {
+    let amplitude = state.amplitude.to_bits() as u32;
+    // 16 fraction bits, and at most 64 counts, at which a spread of one suffices.
+    let slope = ((u64::from(amplitude) * u64::from(turns_per_look)) >> 32).min(1 << 22);
+    // The mean of four readings has half the noise.
+    let averaged_shift = if state.is_slow() { 2 } else { 0 };
+    // Over a gap between half-waves a known speed fades: half of that suffices.
+    let known_shift = u32::from(state.fits > 0);
+    // Drops eight fraction bits of the square.
+    let wanted = (WANTED << (32 - 8)) >> averaged_shift >> known_shift;
+    ((slope * slope) >> 8) * u64::from(state.spread.min(1 << 24)) > wanted
+}
+
+/// Returns true if amplitude and speed make a flux between half and twice the stated one.
+fn fits_stated_flux(config: &Config, state: &State, omega: u32) -> bool {
+    let expected = ((u64::from(config.emf) * u64::from(omega)) >> 32) as u32;
+    let found = state.amplitude.to_bits() as u32 >> 8;
+    2 * found > expected && found < 2 * expected
+}
+
+/// Returns true if the residual is what noise and unmodelled effects leave: three sixteenths of the amplitude for
+/// the latter, since the diode drop depends on its current.
+fn is_quiet(state: &State) -> bool {
+    let amplitude = state.amplitude.to_bits() as u32;
+    let unmodelled = I17F15::from_bits((amplitude >> 4) as i32 + (amplitude >> 5) as i32);
+    state.residual < QUIET + unmodelled
 }
 
 /// Returns the lower 32 bits of `a·2^fraction/by`, within 2^-15 of its value. `by` must not be 0, and `fraction` at
