@@ -19,6 +19,8 @@ use mavlink::{MavlinkVersion, Message, MessageData};
 
 mod actions;
 mod check;
+#[cfg(feature = "drift")]
+mod drift;
 mod keep;
 mod storage;
 mod warnings;
