@@ -97,6 +97,30 @@ mod tests {
         }
     }
 
+    /// Zero is crossed by the slew; from there on it is driving, and grows.
+    #[test]
+    fn braking_ends_by_the_slew_and_driving_grows() {
+        let mut state = at(-0.025);
+        let asked = Reference::steady(Current::from_num(0.5));
+        for wanted in [-0.015, -0.005, 0.005, 0.01, 0.015] {
+            follow(&CONFIG, &mut state, asked, bounds(-1.0, 1.0));
+            let i_q = state.i_q.to_num::<f64>();
+            assert!((i_q - wanted).abs() < 1e-7, "{wanted}: {i_q}");
+        }
+    }
+
+    /// A bound that has come down holds no faster than by the slew.
+    #[test]
+    fn a_braking_current_beyond_its_bound_comes_back_by_the_slew() {
+        let mut state = at(-0.055);
+        let asked = Reference::steady(Current::from_num(-0.5));
+        for wanted in [-0.045, -0.035, -0.03, -0.03] {
+            follow(&CONFIG, &mut state, asked, bounds(-0.03, 1.0));
+            let i_q = state.i_q.to_num::<f64>();
+            assert!((i_q - wanted).abs() < 1e-7, "{wanted}: {i_q}");
+        }
+    }
+
     #[test]
     fn a_current_may_grow_by_so_much_and_fall_at_once() {
         for (before, asked, got) in [
