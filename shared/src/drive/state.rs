@@ -13,7 +13,7 @@ use crate::trace::Trace;
 use crate::units::{AdcCounts, Angle, Flux, Speed};
 
 /// No kind of set-point.
-const UNDECIDED: u8 = u8::MAX;
+const NO_KIND: u8 = u8::MAX;
 
 /// The last fault that turned the bridge off; an arbitrary one before the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,8 +30,8 @@ pub struct LastFault {
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     pub(super) phase: Phase,
-    /// The kind of set-point for which field-oriented control drives, or [`UNDECIDED`].
-    decided: u8,
+    /// The kind of set-point for which field-oriented control drives, or [`NO_KIND`].
+    foc_kind: u8,
     /// The present phase, one of rest, has just begun.
     enters_rest: bool,
     pub(super) shared: Shared,
@@ -49,7 +49,7 @@ impl State {
     pub fn new(config: &Config) -> Self {
         Self {
             phase: Phase::Idle,
-            decided: UNDECIDED,
+            foc_kind: NO_KIND,
             enters_rest: false,
             shared: Shared::new(config),
             off: off::State::new(config),
@@ -65,7 +65,7 @@ impl State {
     /// Continues under a new configuration. If its units differ, everything but the faults restarts, because the
     /// numbers would change their meaning; that is for a drive at rest.
     pub fn adopt(&mut self, before: &Config, now: &Config) {
-        self.decided = UNDECIDED;
+        self.foc_kind = NO_KIND;
         if before.scale != now.scale {
             self.restart(now);
         }
@@ -96,14 +96,14 @@ impl State {
     /// Returns true if field-oriented control drives for this kind of set-point: its schedule alone then decides
     /// when to check the mode.
     #[inline(always)] // in each period
-    pub(super) fn is_decided_for(&self, setpoint: &Setpoint) -> bool {
-        self.decided == setpoint.kind()
+    pub(super) fn foc_drives_for(&self, setpoint: &Setpoint) -> bool {
+        self.foc_kind == setpoint.kind()
     }
 
     /// Returns true if field-oriented control drives.
     #[inline(always)] // in each period
-    pub(super) fn is_decided(&self) -> bool {
-        self.decided != UNDECIDED
+    pub(super) fn foc_drives(&self) -> bool {
+        self.foc_kind != NO_KIND
     }
 
     /// Returns the bridge for the first period of a phase of rest. The phase's own work begins in the next period,
@@ -120,11 +120,11 @@ impl State {
     }
 
     /// Records that the phase suits this set-point.
-    pub(super) fn set_decided_for(&mut self, config: &Config, setpoint: &Setpoint) {
-        self.decided = if self.phase.drives() && config.six_step.is_none() {
+    pub(super) fn set_foc_kind(&mut self, config: &Config, setpoint: &Setpoint) {
+        self.foc_kind = if self.phase.drives() && config.six_step.is_none() {
             setpoint.kind()
         } else {
-            UNDECIDED
+            NO_KIND
         };
     }
 
@@ -189,7 +189,7 @@ impl State {
             self.off.forget();
         }
         self.enters_rest = why != Why::Retried;
-        self.decided = UNDECIDED;
+        self.foc_kind = NO_KIND;
         shared.progress = Default::default();
         shared.seen.rest();
         self.foc.rest();
@@ -292,7 +292,7 @@ impl State {
         // Destructured in full, so that a new field cannot be forgotten.
         let Self {
             phase,
-            decided,
+            foc_kind,
             enters_rest,
             shared,
             off,
@@ -304,7 +304,7 @@ impl State {
             excite,
         } = self;
         phase.trace(out);
-        decided.trace(out);
+        foc_kind.trace(out);
         enters_rest.trace(out);
         shared.trace(out);
         off.trace(out);

@@ -22,7 +22,7 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
     // Decide the mode from what the last period saw. While field-oriented control drives, only its schedule does
     // so: once per cycle, and in a start also where its own pieces are due. This precedes reading the sample, so
     // that no sample is kept across it.
-    let field_oriented = if state.is_decided_for(&setpoint) {
+    let field_oriented = if state.foc_drives_for(&setpoint) {
         match schedule::next(&mut state.foc.loops.slot) {
             Work::NOTHING => true,
             Work::REFERENCE => {
@@ -31,40 +31,48 @@ pub fn step(config: &Config, state: &mut State, sample: Sample, setpoint: Setpoi
                 outer_loop::reference(config, &mut state.foc, &state.shared, &setpoint);
                 true
             }
-            due => outer(config, state, &setpoint, due),
+            due => outer_loop_slice(config, state, &setpoint, due),
         }
     } else {
-        !stays(config, state, &setpoint) && decide(config, state, &setpoint)
+        !mode_stays(config, state, &setpoint) && decide_mode(config, state, &setpoint)
     };
 
     // Sense. Then the mode's own work: voltage, duties, and what is seen.
     if !field_oriented {
-        return other(config, state, &sample, &setpoint);
+        return other_modes(config, state, &sample, &setpoint);
     }
-    match sense(config, state, &sample, true) {
+    match checked_currents(config, state, &sample, Readings::Currents) {
         Some(currents) => {
             state.shared.shown = currents;
-            let drive = (&mut state.foc, &mut state.shared);
-            period(config, drive, &sample, currents)
+            period(config, &mut state.foc, &mut state.shared, &sample, currents)
         }
         None => state.enters_rest().unwrap_or(Bridge::Off),
     }
 }
 
+/// What a sample's current readings are.
+#[derive(Clone, Copy, PartialEq)]
+enum Readings {
+    /// Currents, which may be a fault.
+    Currents,
+    /// The sensors' offsets, which may not be measured yet: the bridge is off.
+    Offsets,
+}
+
 /// Returns a sample's currents; `None` if the sample is a fault, which ends the drive.
 // Inlined into the period: a call would pass the three currents through memory.
 #[inline(always)]
-fn sense(
+fn checked_currents(
     config: &Config,
     state: &mut State,
     sample: &Sample,
-    flowing: bool,
+    readings: Readings,
 ) -> Option<[AdcCounts; 3]> {
     let currents = state.shared.currents(config, sample);
     let bus = config.bus.of(sample.bus).scaled();
     let protection = &mut state.shared.protection;
-    let judged = flowing.then_some(currents);
-    if let Some(fault) = protection::check(&config.protection, protection, judged, bus) {
+    let flowing = (readings == Readings::Currents).then_some(currents);
+    if let Some(fault) = protection::check(&config.protection, protection, flowing, bus) {
         state.change(config, Why::Tripped(fault));
         return None;
     }
@@ -74,25 +82,27 @@ fn sense(
 /// Runs a period of any mode except field-oriented control, including every mode of the six-step drive.
 // Inlined into the period, which has already saved the registers.
 #[inline(always)]
-fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
-    // With the bridge off a reading is its offset, which may not be measured yet.
-    let flowing = !state.phase.is_off();
-    let currents = sense(config, state, sample, flowing);
+fn other_modes(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
+    let readings = if state.phase.is_off() {
+        Readings::Offsets
+    } else {
+        Readings::Currents
+    };
+    let currents = checked_currents(config, state, sample, readings);
     if let Some(bridge) = state.enters_rest() {
         return bridge;
     }
     if state.phase.is_off() {
-        return off(config, state, (sample, setpoint));
+        return bridge_off(config, state, sample, setpoint);
     }
     let Some(currents) = currents else {
         return Bridge::Off;
     };
     if state.phase == Phase::Brake && config.six_step.is_none() {
-        let drive = (&mut state.foc, &mut state.shared);
-        brake::watch(config, drive, sample, currents);
+        brake::watch(config, &mut state.foc, &mut state.shared, sample, currents);
         return Bridge::Brake;
     }
-    energised(config, state, (sample, setpoint), currents)
+    energised(config, state, sample, setpoint, currents)
 }
 
 /// Returns true if the mode need not be decided in this period:
@@ -101,7 +111,7 @@ fn other(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoin
 /// - A drive in Sense is still asked to turn.
 /// - In Idle this period looks at a turning rotor, the longest of four; a request begins in the next.
 #[inline(always)] // in each period
-fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
+fn mode_stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {
         (Phase::Idle | Phase::Brake, Setpoint::Stop | Setpoint::Zero) => {
             let nothing = !state.tone.shorted_before && state.shared.latch.faults.is_empty();
@@ -121,10 +131,10 @@ fn stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
 
 /// Decides the mode from the set-point. Returns whether field-oriented control drives.
 #[inline(never)] // only some periods
-fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
+fn decide_mode(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     // Skips this period's slice of the outer loop, which comes round again, except the damping of a start, where
     // the observer is told once where the aligned rotor is. No other mode has this schedule.
-    if state.is_decided() && schedule::next(&mut state.foc.loops.slot) == Work::DAMP {
+    if state.foc_drives() && schedule::next(&mut state.foc.loops.slot) == Work::DAMP {
         open_loop::damp(config, &mut state.foc, &state.shared, state.phase);
     }
     if let Setpoint::Fault(fault) = setpoint {
@@ -135,9 +145,9 @@ fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     {
         state.change(config, why);
     }
-    state.set_decided_for(config, setpoint);
+    state.set_foc_kind(config, setpoint);
     state.shared.seen.phase = state.phase;
-    state.is_decided()
+    state.foc_drives()
 }
 
 /// Runs this period's slice of field-oriented control's outer loop, with its mode changes. Returns whether
@@ -145,7 +155,7 @@ fn decide(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
 // Cold, to keep its needs out of the periods without it.
 #[cold]
 #[inline(never)]
-fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> bool {
+fn outer_loop_slice(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> bool {
     let phase = state.phase;
     let State { foc, shared, .. } = state;
     let why = match due {
@@ -153,24 +163,29 @@ fn outer(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> 
             open_loop::damp(config, foc, shared, phase);
             None
         }
-        Work::START_CURRENT => open_loop::current(config, foc, shared, (phase, setpoint)),
+        Work::START_CURRENT => open_loop::current(config, foc, shared, phase, setpoint),
         Work::STAND_BY => {
             open_loop::stand_by(config, foc);
             None
         }
         Work::HAND_OVER => open_loop::hand_over(config, foc, shared, phase),
-        _ => together(config, state, setpoint, due),
+        _ => combined_slice(config, state, setpoint, due),
     };
     if let Some(why) = why {
         state.change(config, why);
     }
     state.shared.seen.phase = state.phase;
-    state.is_decided()
+    state.foc_drives()
 }
 
 /// Runs the pieces that may share a period; returns the mode change they call for.
 #[inline(always)] // in each period
-fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) -> Option<Why> {
+fn combined_slice(
+    config: &Config,
+    state: &mut State,
+    setpoint: &Setpoint,
+    due: Work,
+) -> Option<Why> {
     let State { foc, shared, .. } = state;
     if due.includes(Work::ROTOR)
         && let Some(why) = open_loop::rotor(config, foc, shared, state.phase)
@@ -187,7 +202,7 @@ fn together(config: &Config, state: &mut State, setpoint: &Setpoint, due: Work) 
 
 /// Runs a period with the bridge off.
 #[inline(never)] // only some periods
-fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoint)) -> Bridge {
+fn bridge_off(config: &Config, state: &mut State, sample: &Sample, setpoint: &Setpoint) -> Bridge {
     let shared = &mut state.shared;
     if state.phase == Phase::Idle {
         off::watch(config, &mut state.off, shared, sample);
@@ -205,7 +220,8 @@ fn off(config: &Config, state: &mut State, (sample, setpoint): (&Sample, &Setpoi
 fn energised(
     config: &Config,
     state: &mut State,
-    (sample, setpoint): (&Sample, &Setpoint),
+    sample: &Sample,
+    setpoint: &Setpoint,
     currents: [AdcCounts; 3],
 ) -> Bridge {
     let phase = state.phase;
@@ -214,7 +230,7 @@ fn energised(
         (Phase::Charge, _) => {
             let rotor = &mut state.off.rotor;
             let charged = charge::period(config, &mut state.charge, rotor, &mut shared.seen);
-            let why = charged.and_then(|n| ready(config, state, (sample, setpoint), n));
+            let why = charged.and_then(|n| prepare_drive(config, state, sample, setpoint, n));
             (Bridge::Charge(config.charge.duty), why)
         }
         (Phase::Brake, _) => {
@@ -233,7 +249,7 @@ fn energised(
     };
     if let Some(why) = why {
         state.change(config, why);
-        state.set_decided_for(config, setpoint);
+        state.set_foc_kind(config, setpoint);
     }
     state.enters_rest().unwrap_or(bridge)
 }
@@ -241,17 +257,18 @@ fn energised(
 /// Prepares the next mode in period `n`, from 1, after Charge.
 #[cold]
 #[inline(never)] // only some periods
-fn ready(
+fn prepare_drive(
     config: &Config,
     state: &mut State,
-    (sample, setpoint): (&Sample, &Setpoint),
+    sample: &Sample,
+    setpoint: &Setpoint,
     n: u32,
 ) -> Option<Why> {
     let (foc, shared) = (&mut state.foc, &mut state.shared);
     if matches!(setpoint, Setpoint::Tone(_) | Setpoint::Excite(_)) {
         // A tone needs to know only what the supply allows.
-        outer_loop::ready(config, foc, shared, n);
-        return (n + 1 >= tone::READY_PERIODS).then_some(Why::ToneReady);
+        outer_loop::prepare(config, foc, shared, n);
+        return (n + 1 >= tone::PREPARATION_PERIODS).then_some(Why::ToneReady);
     }
     match &config.six_step {
         Some(six_step) => {
@@ -266,7 +283,7 @@ fn ready(
         }
         None => {
             let rotor = state.off.rotor;
-            begin::begin(config, foc, shared, rotor, (sample, setpoint), n)
+            begin::begin(config, foc, shared, rotor, sample, setpoint, n)
         }
     }
 }

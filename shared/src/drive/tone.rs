@@ -33,7 +33,7 @@ use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, Wid
 const DEAD_SHIFT: u32 = 3;
 
 /// The period after Charge in which a tone begins; the ones before it read the supply.
-pub(super) const READY_PERIODS: u32 = 3;
+pub(super) const PREPARATION_PERIODS: u32 = 3;
 
 /// Slot of the cycle that updates the supply voltage.
 const SUPPLY_SLOT: u8 = 0;

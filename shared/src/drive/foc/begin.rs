@@ -1,6 +1,6 @@
 //! The beginning of a drive after Charge, in pieces: a flying start if the rotor turns.
 
-use super::outer_loop::{self, READY_PIECES};
+use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
 use crate::control::catch::Rotor;
 use crate::control::observer::{self, Observer};
@@ -14,39 +14,47 @@ use crate::drive::transitions::Why;
 use crate::math::SinCos;
 use crate::units::{Angle, Current, Speed, Voltage, stated_emf};
 
-/// Periods after Charge that prepare a drive, one piece each.
-pub(in crate::drive) const READY_PERIODS: u32 = 10;
+// The periods after Charge, from 1, that prepare a drive. The first ones are the outer loop's; those of a flying start
+// have nothing to do if the rotor stands.
+const OBSERVER: u32 = PREPARATION_PIECES + 1;
+const OBSERVER_GAINS: u32 = OBSERVER + 1;
+const REGULATOR: u32 = OBSERVER_GAINS + 1;
+const COMMANDED: u32 = REGULATOR + 1;
 
-/// Runs piece `n`, from 1, of the preparation. In the period after the last piece the rotor is
-/// caught if it turns, started from where its sensors show it, or parked.
+/// Periods after Charge that prepare a drive.
+pub(in crate::drive) const PREPARATION_PERIODS: u32 = COMMANDED + 1;
+
+/// Prepares a drive, one piece a period: this is period `n`, from 1. In the last one the rotor is caught if it turns,
+/// started from where its sensors show it, or parked.
 #[cold]
 pub(in crate::drive) fn begin(
     config: &Config,
     foc: &mut State,
     shared: &mut Shared,
     rotor: Rotor,
-    (sample, setpoint): (&Sample, &Setpoint),
+    sample: &Sample,
+    setpoint: &Setpoint,
     n: u32,
 ) -> Option<Why> {
     let turning = turning(config, shared, rotor);
     // Until the first driving period.
-    let periods = READY_PERIODS as i32 + 1 - n as i32;
+    let periods = PREPARATION_PERIODS as i32 + 1 - n as i32;
     match (n, turning) {
-        (1..=READY_PIECES, _) => outer_loop::ready(config, foc, shared, n),
-        (6, Some((theta, omega))) => {
+        (1..=PREPARATION_PIECES, _) => outer_loop::prepare(config, foc, shared, n),
+        (OBSERVER, Some((theta, omega))) => {
             let theta = theta.wrapping_add(omega.over_periods(periods));
             let rest = AlphaBeta::default();
             observer::begin(&config.observer, &mut foc.observer, (theta, omega), rest);
         }
-        (7, Some(_)) => outer_loop::observer_gains(config, foc),
-        (8, Some((_, omega))) => regulate(config, foc, omega),
-        (9, Some((theta, omega))) => {
+        (OBSERVER_GAINS, Some(_)) => outer_loop::observer_gains(config, foc),
+        (REGULATOR, Some((_, omega))) => preset_regulator(config, foc, omega),
+        (COMMANDED, Some((theta, omega))) => {
             let theta = theta.wrapping_add(omega.over_periods(periods));
             foc.loops.commanded = commanded(config, theta, omega);
         }
-        (READY_PERIODS, _) => {
+        (PREPARATION_PERIODS, _) => {
             let omega = turning.map(|(_, omega)| omega);
-            return Some(go(config, foc, shared, (sample, setpoint), omega));
+            return Some(enter_drive(config, foc, shared, sample, setpoint, omega));
         }
         _ => {}
     }
@@ -69,12 +77,13 @@ fn turning(config: &Config, shared: &mut Shared, rotor: Rotor) -> Option<(Angle,
     }
 }
 
-/// Returns the mode in which a drive begins, for a rotor that turns at `omega` or stands.
-fn go(
+/// Begins a drive; returns the reason for its mode, for a rotor that turns at `omega` or stands.
+fn enter_drive(
     config: &Config,
     foc: &mut State,
     shared: &mut Shared,
-    (sample, setpoint): (&Sample, &Setpoint),
+    sample: &Sample,
+    setpoint: &Setpoint,
     omega: Option<Speed>,
 ) -> Why {
     let backward = setpoint.rotation(config.both_ways) == Rotation::Backward;
@@ -125,7 +134,7 @@ fn emf(omega: Speed) -> Dq<Voltage> {
 }
 
 /// Presets the current regulator at this speed, without current.
-fn regulate(config: &Config, foc: &mut State, omega: Speed) {
+fn preset_regulator(config: &Config, foc: &mut State, omega: Speed) {
     let still = Dq::default();
     let loops = &mut foc.loops;
     let factor = loops.inductance.factor;

@@ -1,7 +1,7 @@
 //! Brake: all low sides are on, and the observer keeps running.
 
 use super::current_loop::input;
-use super::outer_loop::{self, READY_PIECES};
+use super::outer_loop::{self, PREPARATION_PIECES};
 use super::state::State;
 use crate::control::observer::Observer;
 use crate::control::transform::{AlphaBeta, Dq, clarke_in, park};
@@ -14,14 +14,15 @@ use crate::drive::shared::Shared;
 use crate::units::{AdcCounts, Current, Speed};
 
 /// Slots between two pieces of preparation.
-const READY_SLOTS: u32 = 4;
+const PREPARATION_SLOTS: u32 = 4;
 
 /// Runs the observer on. With the low sides on the voltage is known to be zero, so the speed can be
 /// reported until the back-EMF drowns in noise.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn watch(
     config: &Config,
-    (foc, shared): (&mut State, &mut Shared),
+    foc: &mut State,
+    shared: &mut Shared,
     sample: &Sample,
     currents: [AdcCounts; 3],
 ) {
@@ -37,9 +38,11 @@ pub(in crate::drive) fn watch(
     let slot = u32::from(foc.loops.slot);
     if slot == 0 {
         outer_loop::observer_gains(config, foc);
-    } else if slot.is_multiple_of(READY_SLOTS) && slot <= READY_SLOTS * READY_PIECES {
+    } else if slot.is_multiple_of(PREPARATION_SLOTS)
+        && slot <= PREPARATION_SLOTS * PREPARATION_PIECES
+    {
         // A drive may resume at any time.
-        outer_loop::ready(config, foc, shared, slot / READY_SLOTS);
+        outer_loop::prepare(config, foc, shared, slot / PREPARATION_SLOTS);
     }
     let loops = &foc.loops;
     if observer.works_in_frame() {

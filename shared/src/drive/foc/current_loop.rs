@@ -13,85 +13,94 @@ use crate::drive::shared::Shared;
 use crate::math::{Held, SinCos, sin_cos};
 use crate::units::{Current, Speed, Voltage, WideVoltage};
 
-/// State of field-oriented control, and the state shared by all modes.
-pub(in crate::drive) type Drive<'a> = (&'a mut State, &'a mut Shared);
-
-/// The control's frame in a period: cosine and sine, and speed.
-pub(super) type Frame = (SinCos, Speed);
+/// The control's frame in a period.
+#[derive(Clone, Copy)]
+pub(super) struct Frame {
+    /// Its angle's cosine and sine.
+    angle: SinCos,
+    /// Its speed.
+    omega: Speed,
+}
 
 /// Returns the frame from the observer.
 #[inline(always)] // in each period
 pub(super) fn observed(
-    (observer, delay): (&impl Observer, Delay),
-    (foc, shared): Drive<'_>,
+    observer: &impl Observer,
+    delay: Delay,
+    foc: &mut State,
+    shared: &mut Shared,
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Frame {
-    let State {
-        loops,
-        observer: of,
-    } = foc;
+    let loops = &mut foc.loops;
     let input = input(loops, delay, sample, stator);
-    let estimate = observer.estimate(of, &input, None);
+    let estimate = observer.estimate(&mut foc.observer, &input, None);
     shared.seen.angle = loops.order.angle(estimate.theta);
     shared.seen.speed = estimate.omega_bar;
-    (estimate.frame, estimate.omega)
+    Frame {
+        angle: estimate.frame,
+        omega: estimate.omega,
+    }
 }
 
 /// Returns the frame that an open-loop start imposes; the observer runs along.
 #[inline(always)] // in each period
 pub(super) fn imposed(
-    (observer, delay): (&impl Observer, Delay),
-    (foc, shared): Drive<'_>,
+    observer: &impl Observer,
+    delay: Delay,
+    foc: &mut State,
+    shared: &mut Shared,
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Frame {
-    let State {
-        loops,
-        observer: of,
-    } = foc;
+    let loops = &mut foc.loops;
     if shared.seen.phase == Phase::Ramp || observer.follows_park() {
         let input = input(loops, delay, sample, stator);
-        observer.estimate(of, &input, Some(loops.start.omega_s));
+        observer.estimate(&mut foc.observer, &input, Some(loops.start.omega_s));
     }
     let theta = loops.start.frame;
     shared.seen.angle = loops.order.angle(theta);
     shared.seen.speed = loops.start.omega_s;
-    (sin_cos(theta), start::advance(&mut loops.start))
+    Frame {
+        angle: sin_cos(theta),
+        omega: start::advance(&mut loops.start),
+    }
 }
 
 /// Runs the loop from the current in a frame to the duties, with this observer and regulator.
 #[inline(always)] // in each period
 pub(super) fn current_loop(
-    (observer, regulator): (&impl Observer, &impl Regulator),
+    observer: &impl Observer,
+    regulator: &impl Regulator,
     config: &Config,
-    (foc, shared): Drive<'_>,
-    (frame, omega): Frame,
+    foc: &mut State,
+    shared: &mut Shared,
+    frame: Frame,
     stator: AlphaBeta<Current>,
 ) -> Bridge {
-    let State {
-        loops,
-        observer: of,
-    } = foc;
-    let i = park(stator, frame);
+    let loops = &mut foc.loops;
+    let i = park(stator, frame.angle);
     shared.seen.i = i;
 
     // The voltage that drives the current to its reference, as far as the supply allows.
-    let fb = observer.feedback(of, (omega, i), loops.inductance.factor);
-    let wanted = regulator.voltage(&loops.regulator, &loops.reference, &fb);
+    let fb = observer.feedback(&foc.observer, (frame.omega, i), loops.inductance.factor);
+    let demand = regulator.voltage(&loops.regulator, &loops.reference, &fb);
     regulator.integrate(&mut loops.regulator, &loops.reference, &fb);
-    let u = if modulator::square_of(wanted) <= shared.supply.readable {
-        modulator::short(wanted)
+    let u = if modulator::square_of(demand) <= shared.supply.readable {
+        modulator::short(demand)
     } else {
-        limited(regulator, loops, shared, wanted)
+        limited(regulator, loops, shared, demand)
     };
-    observer.advance(of, &fb, u);
+    observer.advance(&mut foc.observer, &fb, u);
     shared.seen.u = u;
 
     // The duties, for where the frame will be when they act.
-    let v = inverse_park(rotate(u, loops.advance), frame);
+    let v = inverse_park(rotate(u, loops.advance), frame.angle);
     loops.commanded = [voltages(v), loops.commanded[0]];
-    let dead_time = (&config.dead_time, inverse_park(loops.dead_time_sign, frame));
+    let dead_time = (
+        &config.dead_time,
+        inverse_park(loops.dead_time_sign, frame.angle),
+    );
     let duties = modulator::duties(
         &config.modulator,
         &shared.supply,
@@ -109,10 +118,10 @@ fn limited(
     regulator: &impl Regulator,
     loops: &mut Loops,
     shared: &mut Shared,
-    wanted: Dq<WideVoltage>,
+    demand: Dq<WideVoltage>,
 ) -> Dq<Voltage> {
     shared.applied.expect_unreadable();
-    let (u, cut) = modulator::limit(wanted, &shared.supply.longest);
+    let (u, cut) = modulator::limit(demand, &shared.supply.longest);
     if let Some(cut) = cut {
         regulator.anti_windup(&mut loops.regulator, cut);
         loops.deficit = loops.reference.i.q.minus(shared.seen.i.q);

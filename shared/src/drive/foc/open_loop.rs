@@ -45,7 +45,8 @@ pub(in crate::drive) fn current(
     config: &Config,
     foc: &mut State,
     shared: &Shared,
-    (phase, setpoint): (Phase, &Setpoint),
+    phase: Phase,
+    setpoint: &Setpoint,
 ) -> Option<Why> {
     let attempt = attempt(config, shared);
     let mut i_q = attempt.current.min(shared.protection.bounds.max);

@@ -16,10 +16,10 @@ use crate::protection;
 use crate::units::{Current, Speed};
 
 /// Pieces that prepare a drive, one per period.
-pub(in crate::drive) const READY_PIECES: u32 = 5;
+pub(in crate::drive) const PREPARATION_PIECES: u32 = 5;
 
-/// Runs a piece of the outer-loop work before a drive's first period, one of [`READY_PIECES`].
-pub(in crate::drive) fn ready(config: &Config, foc: &mut State, shared: &mut Shared, piece: u32) {
+/// Runs a piece of the outer-loop work before a drive's first period, one of [`PREPARATION_PIECES`].
+pub(in crate::drive) fn prepare(config: &Config, foc: &mut State, shared: &mut Shared, piece: u32) {
     match piece {
         1 => {
             trip_level(config, shared);

@@ -2,7 +2,8 @@
 //! configuration selects any others at each call.
 
 use super::any::any;
-use super::current_loop::{Drive, current_loop, imposed, observed};
+use super::current_loop::{current_loop, imposed, observed};
+use super::state::State;
 use crate::control::delay::Delay;
 use crate::control::observer::{self, compensated};
 use crate::control::regulator::{self, synchronous};
@@ -10,6 +11,7 @@ use crate::control::transform::{AlphaBeta, clarke_in};
 use crate::drive::config::Config;
 use crate::drive::io::{Bridge, Sample};
 use crate::drive::schedule;
+use crate::drive::shared::Shared;
 use crate::units::{AdcCounts, Current};
 
 /// Runs a period of Park, Ramp, Run or Stopping. The default observer and regulator have dedicated code; all others
@@ -17,7 +19,8 @@ use crate::units::{AdcCounts, Current};
 #[inline(always)] // in each period
 pub(in crate::drive) fn period(
     config: &Config,
-    (foc, shared): Drive<'_>,
+    foc: &mut State,
+    shared: &mut Shared,
     sample: &Sample,
     currents: [AdcCounts; 3],
 ) -> Bridge {
@@ -26,27 +29,27 @@ pub(in crate::drive) fn period(
         (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
             if config.delay == Delay::One && config.adapt_l.is_none() =>
         {
-            let parts = (observer, regulator);
             if schedule::is_start(foc.loops.slot) {
-                return start(parts, config, (foc, shared), sample, stator);
+                return start(observer, regulator, config, foc, shared, sample, stator);
             }
-            let frame = observed((observer, Delay::One), (foc, shared), sample, stator);
-            current_loop(parts, config, (foc, shared), frame, stator)
+            let frame = observed(observer, Delay::One, foc, shared, sample, stator);
+            current_loop(observer, regulator, config, foc, shared, frame, stator)
         }
-        _ => any(config, (foc, shared), sample, stator),
+        _ => any(config, foc, shared, sample, stator),
     }
 }
 
 /// Runs a period of an open-loop start with the default parts.
 #[inline(never)] // only a start
 fn start(
-    (observer, regulator): (&compensated::Config, &synchronous::Config),
+    observer: &compensated::Config,
+    regulator: &synchronous::Config,
     config: &Config,
-    (foc, shared): Drive<'_>,
+    foc: &mut State,
+    shared: &mut Shared,
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Bridge {
-    let parts = (observer, Delay::One);
-    let frame = imposed(parts, (foc, shared), sample, stator);
-    current_loop((observer, regulator), config, (foc, shared), frame, stator)
+    let frame = imposed(observer, Delay::One, foc, shared, sample, stator);
+    current_loop(observer, regulator, config, foc, shared, frame, stator)
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::control::catch::Rotor;
-use crate::drive::foc::begin::READY_PERIODS;
+use crate::drive::foc::begin::PREPARATION_PERIODS;
 
 /// A rotor that turns at constant speed without current.
 struct Coasting {
@@ -71,7 +71,7 @@ fn a_rotor_that_turns_is_caught_into_run() {
                 let turn = motor.bench.turn();
                 let periods = motor.until(Phase::Run, turn);
                 // 128 offset readings, 63 µs of charge, and the preparation.
-                assert!(periods < 145 + READY_PERIODS, "{case}: {periods}");
+                assert!(periods < 145 + PREPARATION_PERIODS, "{case}: {periods}");
                 let error = motor.angle_error_deg();
                 assert!(error.abs() < 5.0, "{case}: {error}");
                 let seen = motor.seen_rpm();

@@ -27,7 +27,7 @@ fn within(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     bench.until(Phase::Park, turn);
     bench.state.phase = phase;
     let asked = asked(&bench, phase);
-    bench.state.set_decided_for(&bench.config, &asked);
+    bench.state.set_foc_kind(&bench.config, &asked);
     bench
 }
 

@@ -5,10 +5,11 @@ use crate::control::observer::sector::Sector;
 use crate::control::transform::clarke_in;
 use crate::drive::config::QUICK_ATTEMPTS;
 use crate::drive::foc::any::any;
-use crate::drive::foc::begin::READY_PERIODS;
-use crate::drive::foc::current_loop::Drive;
+use crate::drive::foc::begin::PREPARATION_PERIODS;
 use crate::drive::foc::period::period;
+use crate::drive::foc::state::State as Foc;
 use crate::drive::schedule::CYCLE;
+use crate::drive::shared::Shared;
 use crate::units::Angle;
 use fixed::types::I1F31;
 
@@ -31,7 +32,7 @@ fn a_start_senses_charges_parks_and_ramps() {
     // 5 ms are 128 periods, rounded to a power of two; two before them let the current decay, and
     // one after them judges the readings.
     assert_eq!(sense, 2 + 128 + 1);
-    assert_eq!(charge, pulses + READY_PERIODS);
+    assert_eq!(charge, pulses + PREPARATION_PERIODS);
     // Three periods of the rotor's swing, more than 0.4 As at 4 A, in steps of eight, and eight for
     // the observer.
     let expected = 3.0 * TAU / swing_rad_s * 24_000.0;
@@ -361,6 +362,9 @@ fn what_flows_as_the_bridge_is_turned_off_is_no_offset() {
     assert_eq!(bench.state.shared.zeros.offsets, [AdcCounts::ZERO; 3]);
 }
 
+/// A period of field-oriented control.
+type Period = fn(&Config, &mut Foc, &mut Shared, &Sample, [AdcCounts; 3]) -> Bridge;
+
 /// With a moving supply, and currents of no real rotor, so that every start fails.
 #[test]
 fn the_default_loop_does_what_the_one_of_any_observer_and_regulator_does() {
@@ -374,17 +378,17 @@ fn the_default_loop_does_what_the_one_of_any_observer_and_regulator_does() {
         let flowing = sample([current(0.0), current(1.0), current(2.0)], bus_v);
         let phase = bench.phase();
         if phase.drives() {
-            let with = |period: fn(&Config, Drive<'_>, &Sample, [AdcCounts; 3]) -> Bridge| {
+            let with = |period: Period| {
                 let mut state = bench.state.clone();
-                let drive = (&mut state.foc, &mut state.shared);
-                let bridge = period(&bench.config, drive, &flowing, flowing.currents);
+                let State { foc, shared, .. } = &mut state;
+                let bridge = period(&bench.config, foc, shared, &flowing, flowing.currents);
                 (bridge, state)
             };
             assert_eq!(
                 with(period),
-                with(|config, (foc, shared), sample, currents| {
+                with(|config, foc, shared, sample, currents| {
                     let stator = clarke_in(foc.loops.order, currents);
-                    any(config, (foc, shared), sample, stator)
+                    any(config, foc, shared, sample, stator)
                 }),
                 "{k}: {phase:?}"
             );
