@@ -172,40 +172,47 @@ pub fn bound(
     (bus_current, i_q): (Current, Current),
     periods: u32,
 ) {
-    let rate = |excess| {
-        let change: Current = config.bound_rate.of(excess);
-        change.saturating_mul_int(periods as i32)
-    };
+    let may_return = may_return(config, state);
     let bounds = &mut state.bounds;
     let too_much_drawn = bus_current.minus(config.bus_draw);
     if too_much_drawn.is_positive() || bounds.max != config.phase {
-        let lowered = bounds.max.minus(rate(too_much_drawn));
+        let lowered = bounds.max.minus(change(config, too_much_drawn, periods));
         bounds.max = lowered.min(config.phase).max(Current::ZERO);
     }
-    let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
-    let above = ahead.minus(config.bus_return_v);
-    let may_return = if above.is_positive() {
-        let less = config.bus_return_slope.saturating_apply(above);
-        config.bus_return.minus(less)
-    } else {
-        config.bus_return
-    };
-    let min = bounds.min;
     let raised = if may_return.is_negative() {
         Current::ZERO
     } else if i_q.is_negative() {
         let too_much_returned = bus_current.saturating_neg().minus(may_return);
         // Until the current has reached the bound, nothing shows that more is available.
-        let arrived = i_q < min - (min >> 3);
+        let arrived = i_q < bounds.min - (bounds.min >> 3);
         if arrived || too_much_returned.is_positive() {
-            min.plus(rate(too_much_returned))
+            bounds.min.plus(change(config, too_much_returned, periods))
         } else {
-            min
+            bounds.min
         }
     } else {
         // The bus current is at most 1.5/√3 of i_q, at full modulation: 1 + 1/8 + 1/32 approximates 2/√3.
-        let most = may_return.max(Current::ZERO);
-        most.plus((most >> 3) + (most >> 5)).saturating_neg()
+        may_return
+            .plus((may_return >> 3) + (may_return >> 5))
+            .saturating_neg()
     };
     bounds.min = raised.max(-config.phase).min(Current::ZERO);
+}
+
+/// Returns the change of a bound in `periods` for a bus current that exceeds its own bound by this.
+fn change(config: &Config, excess: Current, periods: u32) -> Current {
+    let change: Current = config.bound_rate.of(excess);
+    change.saturating_mul_int(periods as i32)
+}
+
+/// Returns the current that the supply may sink at its extrapolated voltage; negative beyond the limit.
+fn may_return(config: &Config, state: &State) -> Current {
+    let ahead = state.bus.plus(state.rise.saturating_mul_int(AHEAD_PERIODS));
+    let above = ahead.minus(config.bus_return_v);
+    if above.is_positive() {
+        let less = config.bus_return_slope.saturating_apply(above);
+        config.bus_return.minus(less)
+    } else {
+        config.bus_return
+    }
 }
