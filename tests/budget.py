@@ -1,5 +1,5 @@
-"""The first board's memory and time in one table, from what the steps of `tests/run` have printed: the current
-figures, and the targets. The bounds that fail are where the figures are measured.
+"""Prints the first board's memory and time in one table, from what the steps of `tests/run` have printed: each figure
+with its unit, the statistic that it is, and the target. The limits that fail are where the figures are measured.
     budget.py LOGS
 
 Exit status 1 if a figure is not in the logs.
@@ -9,55 +9,73 @@ import re
 import sys
 from pathlib import Path
 
-# Name, the log that has it, and where: the figures are the pattern's groups. Last, the target.
-ROWS = [
-    ("flash, bytes", "sizes-b-g431b-esc1", r"^flash +(\d+) of", "at most 98304"),
-    ("SRAM with the worst stack, bytes", "sizes-b-g431b-esc1", r"^SRAM +(\d+) of", "at most 16384"),
-    ("CCM, bytes", "sizes-b-g431b-esc1", r"^CCM +(\d+) of", "at most 9216"),
+# What is measured, its unit, the log that has it, and where: the figures are the pattern's groups. Last, for each
+# figure, the statistic that it is, and its target.
+MEASURED = [
+    ("flash", "bytes", "sizes-b-g431b-esc1", r"^flash +(\d+) of", [("", "at most 98304")]),
+    ("SRAM", "bytes", "sizes-b-g431b-esc1", r"^SRAM +(\d+) of", [("with the deepest stack", "at most 16384")]),
+    ("CCM", "bytes", "sizes-b-g431b-esc1", r"^CCM +(\d+) of", [("", "at most 9216")]),
     (
-        "step of the default drive, instructions: median, most",
+        "default drive's step, on QEMU",
+        "instructions",
         "counts",
         r"^(?:.* )?default: the same bits(?:.*\n)*?all +\d+ +\d+ +(\d+) +(\d+)$",
-        "at most 330, 500",
+        [("median", "at most 330"), ("maximum", "at most 500")],
     ),
     (
-        "whole interrupt, instructions: median, most",
+        "PWM interrupt, on QEMU",
+        "instructions",
         "counts",
         r"^(?:.* )?the whole interrupt:(?:.*\n)*?all +\d+ +\d+ +(\d+) +(\d+)$",
-        "at most 470, 750",
+        [("median", "at most 470"), ("maximum", "at most 750")],
     ),
     (
-        "whole interrupt, estimated cycles: mean, most",
+        "PWM interrupt, on the virtual board",
+        "estimated cycles",
         "virtual-board",
         r"^PWM interrupt: .*estimated (\d+) cycles, at most (\d+);",
-        "at most 800, 1400",
+        [("mean", "at most 800"), ("maximum", "at most 1400")],
     ),
     (
-        "emulator, of the yardstick: averaged, switching",
+        "emulator's speed, averaged plant",
+        "of the yardstick's",
         "bench",
-        r"^averaged +[\d.]+ +([\d.]+) (?:.*\n)*?switching +[\d.]+ +([\d.]+) ",
-        "at least 0.62, 0.24",
+        r"^averaged +[\d.]+ +([\d.]+) ",
+        [("median", "at least 0.62")],
+    ),
+    (
+        "emulator's speed, switching plant",
+        "of the yardstick's",
+        "bench",
+        r"^switching +[\d.]+ +([\d.]+) ",
+        [("median", "at least 0.24")],
     ),
 ]
 
 
-def row(logs: Path, log: str, pattern: str) -> str | None:
-    """Returns a row's figures; `None` if its step has not printed them."""
+def row(what: str, unit: str, statistic: str, now: str, target: str) -> str:
+    """Returns a row of the table."""
+    return f"{what:<37}{unit:<20}{statistic:<24}{now:<14}{target}"
+
+
+def found(logs: Path, log: str, pattern: str, count: int) -> list[str]:
+    """Returns this many figures; each as "not measured" if its step has not printed them."""
     path = logs / f"{log}.log"
-    found = re.search(pattern, path.read_text(), re.MULTILINE) if path.exists() else None
-    return found and ", ".join(found.groups())
+    match = re.search(pattern, path.read_text(), re.MULTILINE) if path.exists() else None
+    return list(match.groups()) if match else ["not measured"] * count
 
 
 def main() -> int:
     if len(sys.argv) != 2:
         print("usage: budget.py LOGS", file=sys.stderr)
         return 2
-    missing = 0
-    print(f"{'':<55}{'now':<16}wanted")
-    for name, log, pattern, wanted in ROWS:
-        figures = row(Path(sys.argv[1]), log, pattern)
-        missing += figures is None
-        print(f"{name:<55}{figures or 'not measured':<16}{wanted}")
+    missing = False
+    print(row("", "unit", "statistic", "now", "target"))
+    for what, unit, log, pattern, figures in MEASURED:
+        values = found(Path(sys.argv[1]), log, pattern, len(figures))
+        missing |= "not measured" in values
+        for value, (statistic, target) in zip(values, figures, strict=True):
+            print(row(what, unit, statistic, value, target))
     return 1 if missing else 0
 
 
