@@ -47,7 +47,7 @@ pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> 
     let items = report.lines().map(Item::parse);
     let items = items.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
         what: REPORT.into(),
-        reason: "it is not understood; is the image newer than this program?".into(),
+        reason: "cannot be parsed; is the image newer than this program?".into(),
     })?;
     if as_json {
         let items: Vec<_> = items.iter().map(Item::json).collect();
@@ -62,7 +62,7 @@ pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> 
         return Ok(());
     }
     let mut summary = if wrong.is_empty() {
-        "self-test: not done to its end; is the throttle at zero, and the shaft at rest?".to_owned()
+        "self-test: not completed; is the throttle at zero, and the shaft at rest?".to_owned()
     } else {
         let names: Vec<_> = wrong.iter().map(|item| item.name.as_str()).collect();
         format!("self-test: {} out of bounds", names.join(", "))

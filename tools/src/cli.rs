@@ -82,15 +82,15 @@ pub(crate) enum Command {
     /// Reads VCD, and CSV as exported by PulseView, sigrok-cli and Saleae Logic. Successive equal frames share
     /// a line. Throttle is shown for one direction and the factory pulse ends.
     Decode(DecodeArgs),
-    /// Compute between which speeds the flux crossings (CTL_OBSERVER 1) hold the rotor's angle, and what limits
-    /// them.
+    /// Compute the speed range in which the flux crossings (CTL_OBSERVER 1) hold the rotor's angle, and what limits
+    /// it.
     ///
     /// The worst case of Colton 2014, Table 1, from the ESC's parameters; options given here override them. N
     /// and A_e from the parameters apply from the speeds at which the drive begins to use them; given here they
     /// apply at every speed, as in the paper. The drive compensates for the lead and delay that it knows of, so
     /// its errors stay below these.
     Budget(BudgetArgs),
-    /// Compute the settings of the start and the control loops that follow from the motor, and say from what.
+    /// Compute the start and control-loop settings that follow from the motor, and what each follows from.
     ///
     /// From resistance, flux, pole pairs and inertia (MOT_...), LIM_PHASE_A, LIM_BUS_V_MAX, CTL_RPM_MAX,
     /// PWM_FREQ_HZ and PWM_DEADTIME_NS, by the rules that start motors from 3-inch propellers to 3 kW lift
@@ -331,7 +331,7 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
-    number(text, |x| x >= 0.0 && x.is_finite(), "a number from 0")
+    number(text, |x| x >= 0.0 && x.is_finite(), "a number of 0 or more")
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -349,5 +349,5 @@ fn time_constant(text: &str) -> Result<f64, String> {
 fn even(text: &str) -> Result<u32, String> {
     let poles = text.parse::<u32>().ok();
     let poles = poles.filter(|poles| *poles >= 2 && poles % 2 == 0);
-    poles.ok_or_else(|| "give an even number from 2".to_owned())
+    poles.ok_or_else(|| "give an even number of 2 or more".to_owned())
 }

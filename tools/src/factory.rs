@@ -28,7 +28,7 @@ impl Factory {
         let file = ftp::read(session, FILE)?;
         parse(&file).map(Self).ok_or_else(|| Error::Refused {
             what: FILE.into(),
-            reason: "its parameters are packed in a way that this program does not know".into(),
+            reason: "its parameters are packed in a format that this program does not know".into(),
         })
     }
 

@@ -27,7 +27,7 @@ pub(crate) fn run(
     let file = ftp::read(session, RECORD)?;
     let recorded = Recorded::read(&file).ok_or(Error::Refused {
         what: RECORD.into(),
-        reason: "it is not understood; is the image of another version than this program?".into(),
+        reason: "cannot be parsed; is the image of another version than this program?".into(),
     })?;
     if let Some(path) = &args.save {
         save(path, &file)?;
@@ -80,7 +80,7 @@ fn period_json(seen: &PeriodSeen) -> Value {
 
 fn print(recorded: &Recorded, out: &mut dyn Write) -> Result<(), Error> {
     if recorded.faults.is_empty() {
-        writeln!(out, "no fault since the supply was turned on")?;
+        writeln!(out, "no fault since power-up")?;
     }
     for seen in &recorded.faults {
         writeln!(out, "{}", line(seen))?;
@@ -88,7 +88,7 @@ fn print(recorded: &Recorded, out: &mut dyn Write) -> Result<(), Error> {
     if let Some(holder) = recorded.holder {
         writeln!(
             out,
-            "with {} control periods before fault {holder}: --save keeps them for a picture",
+            "{} control periods before fault {holder} on record: --save keeps them for a plot",
             recorded.periods.len()
         )?;
     }

@@ -34,7 +34,7 @@ pub(crate) fn read(session: &mut Session, path: &str) -> Result<Vec<u8>, Error> 
         Error::Refused {
         what: path.into(),
         reason: match number {
-            NO_SESSIONS_AVAILABLE => "another program reads a file of it; try again in 10 s",
+            NO_SESSIONS_AVAILABLE => "another program is reading one of its files; try again in 10 s",
             _ => "this component does not have it: its image is older than this program, or has no room for it",
         }
         .into(),

@@ -51,7 +51,7 @@ impl Link {
             ),
             Endpoint::Serial { path, baud } => (
                 open_serial(path, *baud).map(Stream::Serial),
-                "check the cable, the path and your right to open it",
+                "check the cable, the path and its permissions",
             ),
         };
         opened
@@ -130,7 +130,7 @@ impl Link {
                 _ => Err(Error::Link {
                     endpoint: self.endpoint.to_string(),
                     reason: format!("connection lost ({})", plain(&e)),
-                    remedy: "check that the other side still runs",
+                    remedy: "check that the other side is still running",
                 }),
             },
         }

@@ -148,7 +148,7 @@ impl<'a> Task<'a> {
                 store: _,
             } => {
                 params::storage(session, Storage::Reset)?;
-                writeln!(out, "all parameters are the factory's, and stored")?;
+                writeln!(out, "all parameters reset to factory values, and stored")?;
                 Ok(())
             }
             Self::Reset {

@@ -54,7 +54,7 @@ pub(crate) fn read(file: &str) -> Result<Vec<Line>, Vec<String>> {
                     }),
                     Some(first) => {
                         bad.push(format!(
-                            "line {number}: {} is on line {first} already",
+                            "line {number}: {} is already on line {first}",
                             param.name
                         ));
                     }

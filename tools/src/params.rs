@@ -269,7 +269,7 @@ pub(crate) fn storage(session: &mut Session, what: Storage) -> Result<(), Error>
         Storage::Write => (
             "storing",
             1.0,
-            "failed; the values hold until power-off only",
+            "failed; the values last only until power-off",
         ),
         Storage::Reset => ("the reset", 2.0, "failed"),
     };

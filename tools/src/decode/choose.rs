@@ -31,7 +31,7 @@ pub(super) fn choose(
         [only] => Ok(only),
         [] => Err("no channel has an edge; capture while the flight controller sends".to_owned()),
         _ => Err(format!(
-            "several channels have edges; choose by --channel: {}",
+            "several channels have edges; choose one with --channel: {}",
             list(&names, &changing)
         )),
     }
@@ -57,7 +57,7 @@ fn find(names: &[String], wanted: &str) -> Result<usize, Reason> {
         [] => {}
         _ => {
             return Err(format!(
-                "several channels are called '{wanted}'; choose by place: {}",
+                "several channels are called '{wanted}'; choose by index: {}",
                 list(names, &found)
             ));
         }
@@ -68,10 +68,7 @@ fn find(names: &[String], wanted: &str) -> Result<usize, Reason> {
         .filter(|&place: &usize| place < names.len());
     place.ok_or_else(|| {
         let all: Vec<_> = (0..names.len()).collect();
-        format!(
-            "there is no channel '{wanted}'; there are {}",
-            list(names, &all)
-        )
+        format!("there is no channel '{wanted}', only {}", list(names, &all))
     })
 }
 

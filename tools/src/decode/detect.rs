@@ -38,7 +38,7 @@ pub(super) fn detect(mut capture: Capture<impl BufRead>, channel: usize) -> Resu
     wire.signal().or_else(|| tally.winner()).ok_or_else(|| {
         let name = &capture.channels()[channel];
         if edges == 0 {
-            format!("channel {name} has no edge; choose another by --channel")
+            format!("channel {name} has no edge; choose another with --channel")
         } else {
             format!(
                 "no throttle signal is in the {edges} edges of channel {name}; capture more of it \

@@ -55,7 +55,7 @@ struct Edge {
 #[derive(Clone, Debug, Default, Args)]
 pub struct Options {
     /// Channel by name or by index from 0, instead of the only one with edges.
-    #[arg(long, value_name = "NAME_OR_PLACE")]
+    #[arg(long, value_name = "NAME|INDEX")]
     pub channel: Option<String>,
     /// Signal by its INP_PROTO number or its name, for example 12 or DShot600, instead of detecting it.
     #[arg(long, value_name = "SIGNAL", value_parser = signal)]

@@ -262,7 +262,7 @@ impl Summary {
     fn print_replies(&self, out: &mut dyn Write) -> io::Result<()> {
         let replies = &self.replies;
         if self.telemetry > 0 {
-            writeln!(out, "telemetry  asked for by {} frames", self.telemetry)?;
+            writeln!(out, "telemetry  requested by {} frames", self.telemetry)?;
         }
         if replies.good + replies.bad + replies.missing == 0 {
             return Ok(());

@@ -36,7 +36,7 @@ pub(super) fn write(image: &Image) -> Result<(), Error> {
         DFU_UTIL.run(command(begin).arg("--download").arg(&bin))?;
         DFU_UTIL.run(command(whole).arg("--upload").arg(&back))?;
         if fs::read(&back)? != *bytes {
-            return Err(DFU_UTIL.failed("the flash does not hold what was written; try again"));
+            return Err(DFU_UTIL.failed("the flash does not contain what was written; try again"));
         }
     }
     Ok(())

@@ -32,7 +32,7 @@ pub(crate) fn run(args: &FlashArgs, out: &mut dyn Write) -> Result<(), Error> {
         dfu::write(&image)?;
         writeln!(
             out,
-            "written and read back; release BOOT0 and power the board up anew"
+            "written and verified; release BOOT0 and power-cycle the board"
         )?;
     } else {
         probe::write(&image, args.probe.as_deref())?;

@@ -8,7 +8,7 @@ use crate::program::Program;
 
 const PROBE_RS: Program = Program {
     name: "probe-rs",
-    remedy: "install it as https://probe.rs says",
+    remedy: "see https://probe.rs for how to install it",
 };
 
 /// Writes the image as an ELF file, reads it back, and resets the chip. Only the image's pages are erased.

@@ -30,5 +30,5 @@ pub(super) fn build(board: Board) -> Result<PathBuf, Error> {
         .lines()
         .filter_map(|line| serde_json::from_str::<Value>(line).ok())
         .find_map(|message| message["executable"].as_str().map(PathBuf::from));
-    executable.ok_or_else(|| CARGO.failed("it names no file that it has built"))
+    executable.ok_or_else(|| CARGO.failed("it reported no executable"))
 }

@@ -77,14 +77,18 @@ impl Image {
         let (mut segments, entry) = segments(bytes)?;
         segments.sort_by_key(|segment| segment.at);
         if segments.is_empty() {
-            return Err("nothing in it goes into the flash".to_owned());
+            return Err("nothing in it is for the flash".to_owned());
         }
         // Checked before anything is laid out, since an address may be anything.
         let found = segments.iter();
         let mut found = found.filter_map(|segment| Some((segment.at, Tag::find(segment.data)?)));
-        let (tag_from, tag) = found.next().ok_or("no tag of a Siskin image in it")?;
-        let board = Board::named(&tag.board)
-            .ok_or_else(|| format!("made for '{}', which is no board known here", tag.board))?;
+        let (tag_from, tag) = found.next().ok_or("it has no Siskin image tag")?;
+        let board = Board::named(&tag.board).ok_or_else(|| {
+            format!(
+                "made for '{}', a board that this program does not know",
+                tag.board
+            )
+        })?;
         let flash = board.flash();
         let mut pieces: Vec<Piece> = Vec::new();
         for &Segment { at, data, .. } in &segments {
@@ -100,7 +104,7 @@ impl Image {
             }
             match pieces.last_mut() {
                 Some(last) if at < last.end() => {
-                    return Err(format!("two parts of it have the address {at:#010x}"));
+                    return Err(format!("two of its parts overlap at {at:#010x}"));
                 }
                 Some(last) if at - last.end() <= GAP_BYTES => {
                     last.bytes.resize((at - last.at) as usize, ERASED);
@@ -150,17 +154,17 @@ struct Segment<'a> {
 
 /// Returns what is to be loaded, and the entry address.
 fn segments(bytes: &[u8]) -> Result<(Vec<Segment<'_>>, u32), String> {
-    let no_elf = |e| format!("no ELF file of 32 bits: {e}");
+    let no_elf = |e| format!("not a 32-bit ELF file: {e}");
     let header = FileHeader32::<LittleEndian>::parse(bytes).map_err(no_elf)?;
     let endian = header.endian().map_err(no_elf)?;
     if header.e_machine(endian) != EM_ARM {
-        return Err("no ELF file for an Arm chip".to_owned());
+        return Err("not an ELF file for an Arm chip".to_owned());
     }
     let mut segments = Vec::new();
     for segment in header.program_headers(endian, bytes).map_err(no_elf)? {
         if segment.p_type(endian) == PT_LOAD && segment.p_filesz(endian) > 0 {
             let data = segment.data(endian, bytes);
-            let data = data.map_err(|()| "the file is cut off".to_owned())?;
+            let data = data.map_err(|()| "the file is truncated".to_owned())?;
             let begin = segment.p_offset(endian) as usize;
             segments.push(Segment {
                 at: segment.p_paddr(endian),

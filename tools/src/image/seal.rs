@@ -33,9 +33,7 @@ impl Seal {
             // What is in neither range is a hole, or the sum.
             && pieces.iter().all(|piece| !(behind..program.start).contains(&piece.at));
         if !is_sound {
-            return Err(
-                "damaged: the addresses behind its tag are not those of its parts".to_owned(),
-            );
+            return Err("damaged: the addresses after its tag do not match its parts".to_owned());
         }
         let contents = |range: &std::ops::Range<u32>| -> Vec<u32> {
             let mut bytes = vec![ERASED; range.len()];

@@ -115,13 +115,13 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
     let untagged = with(vec![(1, 0x0800_0000, vec![0x55; 1000])]);
     let tagged = |address| with(vec![(1, address, tag("b-g431b-esc1", [0; 4]))]);
     vec![
-        (Vec::new(), "no ELF file"),
-        (b":10000000".to_vec(), "no ELF file"),
-        (cut(60), "no ELF file"),
-        (cut(30_000), "cut off"),
+        (Vec::new(), "not a 32-bit ELF file"),
+        (b":10000000".to_vec(), "not a 32-bit ELF file"),
+        (cut(60), "ELF file"),
+        (cut(30_000), "truncated"),
         (foreign.bytes(), "Arm"),
         (with(Vec::new()).bytes(), "nothing in it"),
-        (untagged.bytes(), "no tag"),
+        (untagged.bytes(), "no Siskin image tag"),
         (Elf::of("third").bytes(), "'third'"),
         (tagged(0x0801_EFF0).bytes(), "0x0801f000"),
         (tagged(0x1000_0000).bytes(), "0x10000000"),

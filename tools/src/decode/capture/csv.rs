@@ -119,7 +119,7 @@ impl<R: BufRead> Csv<R> {
             Some(b"1") => Ok(Some(true)),
             Some(b"X" | b"x" | b"") => Ok(None),
             Some(other) => Err(format!(
-                "line {}: '{}' is no level, which is 0 or 1; export digital channels",
+                "line {}: '{}' is not a level (0 or 1); export digital channels",
                 self.line(),
                 shown(other)
             )),
@@ -145,7 +145,7 @@ impl<R: BufRead> Csv<R> {
         let text = self.row.get(0).unwrap_or_default();
         number(&String::from_utf8_lossy(text)).ok_or_else(|| {
             format!(
-                "line {}: '{}' is no time; export numbers, not dates",
+                "line {}: '{}' is not a time; export numbers, not dates",
                 self.line(),
                 shown(text)
             )
@@ -194,7 +194,7 @@ impl Header {
                 Some(0) => TimeColumn::None,
                 Some(1) if !told.is_empty() => TimeColumn::Unitless,
                 _ => {
-                    return Err("nothing names its columns; export it with a header".to_owned());
+                    return Err("it has no header; export it with one".to_owned());
                 }
             };
             return Ok(Self {
@@ -228,8 +228,7 @@ impl Header {
             (TimeColumn::None, Some(sample_ns)) => Clock::Rows { sample_ns },
             (TimeColumn::None, None) => {
                 return Err(
-                    "it has neither a column of time nor a sample rate; export it with one"
-                        .to_owned(),
+                    "it has neither a time column nor a sample rate; export it with one".to_owned(),
                 );
             }
             (TimeColumn::Unitless | TimeColumn::Sigrok(_), Some(sample_ns)) => {

@@ -70,7 +70,7 @@ impl<R: BufRead> Capture<R> {
         let start = input.fill_buf().map_err(|error| error.to_string())?;
         let start = start.trim_ascii_start();
         if start.starts_with(b"PK\x03\x04") || start.starts_with(b"<SALEAE>") {
-            return Err("it is an analyser's own format; export it as CSV or VCD".to_owned());
+            return Err("it is in an analyser's own format; export it as CSV or VCD".to_owned());
         }
         if start.contains(&0) {
             return Err("it is neither CSV nor VCD; export the capture as one of them".to_owned());

@@ -56,7 +56,7 @@ pub(super) fn judge(bytes: &[u8], board: Board) -> Result<Reach, String> {
     let program = Program::parse(bytes)?;
     let name = board.pwm_interrupt();
     let vector = program.symbol(name).and_then(|at| program.function(at));
-    let vector = vector.ok_or_else(|| format!("it has no {name}, the PWM interrupt"))?;
+    let vector = vector.ok_or_else(|| format!("it has no PWM interrupt ({name})"))?;
     let vectors = program.symbol("__ram_vectors");
     if vectors.is_none_or(|at| FLASH.contains(&at)) {
         return Err("its vector table stays in the flash".to_owned());
@@ -69,7 +69,7 @@ pub(super) fn judge(bytes: &[u8], board: Board) -> Result<Reach, String> {
             more => format!(", and {more} more"),
         };
         return Err(format!(
-            "while the flash is written, the PWM interrupt needs from it {first}{more}; {REMEDY}"
+            "while the flash is being written, the PWM interrupt needs from it {first}{more}; {REMEDY}"
         ));
     }
     let running = Callers::of(&program, vector, None);

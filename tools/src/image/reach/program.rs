@@ -70,7 +70,7 @@ impl<'a> Program<'a> {
         }
         program.read_symbols(&file);
         if relocations.is_empty() {
-            return Err("what refers to what is not in it; link it with --emit-relocs".to_owned());
+            return Err("it has no relocations; link it with --emit-relocs".to_owned());
         }
         let mut low = BTreeMap::new();
         for (place, relocation) in relocations {
@@ -97,12 +97,12 @@ impl<'a> Program<'a> {
                     let code = program.word(place)?;
                     let low = low.get(&(symbol.0, register(code)));
                     let low = low.copied().ok_or_else(|| {
-                        format!("the upper half of an address at {place:#010x} has no lower one")
+                        format!("the upper half of an address at {place:#010x} has no lower half")
                     })?;
                     program.held.insert(place, immediate(code) << 16 | low);
                 }
                 R_ARM_NONE | R_ARM_PREL31 => {}
-                other => return Err(format!("a relocation of kind {other} is not understood")),
+                other => return Err(format!("relocation type {other} is not supported")),
             }
         }
         Ok(program)
@@ -234,7 +234,7 @@ impl<'a> Program<'a> {
             let bytes = bytes.get((address - place.start) as usize..)?;
             bytes.first_chunk().map(|word| u32::from_le_bytes(*word))
         });
-        word.ok_or_else(|| format!("nothing stands at {address:#010x}, which holds an address"))
+        word.ok_or_else(|| format!("{address:#010x}, which should hold an address, is empty"))
     }
 }
 
