@@ -22,7 +22,7 @@ use crate::params::{
 use crate::record::Record;
 use crate::statistics::{Inputs, Recorder};
 use crate::telemetry::{Charge, Telemetry};
-use crate::throttle::{Polled, Reach, Reached, Throttle};
+use crate::throttle::{LockThrottle, LockedAuthority, TaskDemands, Throttle};
 use crate::tune::Tune;
 use crate::units::Scale;
 use storage::{Asker, Storage, Unstored};
@@ -55,18 +55,18 @@ pub struct Esc {
     light: bool,
     too_hot: bool,
     /// Keep what the identification finds.
-    keeps: bool,
+    keeps_result: bool,
     /// The wire carried a signal at the last poll.
     traffic: bool,
     /// The assumed motor has changed.
-    reassumes: bool,
+    motor_reassumed: bool,
     /// The command to the motor at the last poll.
     command: Command,
     polled_us: Option<u64>,
     rests_since_us: Option<u64>,
     storage: Storage,
     record: Option<&'static Record>,
-    given: Given,
+    overrides: Overrides,
     tunes: Tunes,
     telemetry: Telemetry,
     params: Params,
@@ -90,7 +90,7 @@ pub struct Esc {
 
 /// Values the drive runs with in place of the parameters.
 #[derive(Clone, Copy, Debug)]
-struct Given {
+struct Overrides {
     /// The frequency at power-up, which the timer runs at, Hz.
     pwm_freq_hz: f32,
     /// Dead time, ns.
@@ -99,7 +99,7 @@ struct Given {
     opposite: bool,
 }
 
-impl Given {
+impl Overrides {
     /// Returns the parameters that the drive actually runs with.
     fn running(self, params: &Params) -> Params {
         let mut running = params.clone();
@@ -172,7 +172,7 @@ impl Esc {
     pub fn unchecked(params: Params, board: Board, link_bytes_per_s: u32) -> Self {
         Self {
             board,
-            given: Given {
+            overrides: Overrides {
                 pwm_freq_hz: params.get(ParamId::PwmFreqHz),
                 pwm_deadtime_ns: params.get(ParamId::PwmDeadtimeNs),
                 opposite: false,
@@ -191,14 +191,14 @@ impl Esc {
             tunes: Tunes::default(),
             check: Check::new(&board),
             identify: Identify::default(),
-            keeps: false,
+            keeps_result: false,
             record: None,
             light: false,
             command: Command::Stop,
             rests_since_us: None,
             traffic: false,
             storage: Storage::default(),
-            reassumes: false,
+            motor_reassumed: false,
             unstored: Vec::new(),
             #[cfg(feature = "group")]
             four: None,
@@ -232,7 +232,7 @@ impl Esc {
     /// Returns the parameters as the drive runs with them, including the motor assumed by a running
     /// identification.
     fn running(&self) -> Params {
-        let mut running = self.given.running(&self.params);
+        let mut running = self.overrides.running(&self.params);
         if self.identify.is_under_way() {
             self.identify.assume(&mut running);
         }
@@ -269,7 +269,7 @@ impl Esc {
     }
 
     /// Handles a frame from any MAVLink link.
-    pub fn receive(&mut self, throttle: &mut impl Reach, now_us: u64, frame: &Frame) {
+    pub fn receive(&mut self, throttle: &mut impl LockThrottle, now_us: u64, frame: &Frame) {
         self.with_component(throttle, now_us, |component, context| {
             component.handle(frame, context);
         });
@@ -279,7 +279,7 @@ impl Esc {
     /// millisecond.
     pub fn poll(
         &mut self,
-        throttle: &mut impl Reach,
+        throttle: &mut impl LockThrottle,
         now_us: u64,
         snapshot: &Snapshot,
         temperature_c: f32,
@@ -295,13 +295,13 @@ impl Esc {
             temperature_c,
             now_us - before_us.min(now_us),
         );
-        let standing = throttle.reach(|throttle| throttle.poll(now_us, &self.telemetry));
-        self.telemetry.armed = standing.armed;
-        self.telemetry.signal = standing.signal;
-        self.telemetry.bad_frames = standing.bad_frames;
-        self.telemetry.bad_share = standing.bad_share;
-        self.traffic = standing.traffic;
-        self.command = standing.command;
+        let wire = throttle.lock(|throttle| throttle.poll(now_us, &self.telemetry));
+        self.telemetry.armed = wire.armed;
+        self.telemetry.signal = wire.signal;
+        self.telemetry.bad_frames = wire.bad_frames;
+        self.telemetry.bad_share = wire.bad_share;
+        self.traffic = wire.traffic;
+        self.command = wire.command;
         self.follow_wire(throttle, now_us);
         if self.storage.reminds(now_us) {
             self.warn_of(storage::LOST);
@@ -312,13 +312,13 @@ impl Esc {
         if let Some(act) = self.component.take_act() {
             self.act(throttle, now_us, act);
         }
-        self.end_order();
-        self.command = throttle.reach(|throttle| throttle.command());
+        self.clear_identify_request();
+        self.command = throttle.lock(|throttle| throttle.command());
         let rests = self.command.rests();
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
         self.tunes.poll(now_us, snapshot, rests);
         self.poll_identification(now_us, snapshot);
-        let polled = Polled {
+        let demands = TaskDemands {
             note: self.tunes.note().filter(|_| !self.check.powers_up()),
             test: self
                 .check
@@ -330,7 +330,7 @@ impl Esc {
                 || self.storage.is_lost()
                 || !self.check.report.may_turn(&self.params),
         };
-        throttle.reach(|throttle| throttle.take_polled(polled));
+        throttle.lock(|throttle| throttle.set_demands(demands));
     }
 
     /// Takes in the state of the drive and the board.
@@ -377,9 +377,9 @@ impl Esc {
     /// storage request waits until the bridge is at rest and the previous request has finished; from then until
     /// [`Esc::storage_done`] nothing turns the motor. A restart waits for storage, and is abandoned if the wire
     /// is armed meanwhile.
-    pub fn take_request(&mut self, throttle: &mut impl Reach) -> Option<Request> {
+    pub fn take_request(&mut self, throttle: &mut impl LockThrottle) -> Option<Request> {
         let now_us = self.polled_us.unwrap_or(0);
-        if core::mem::take(&mut self.reassumes) {
+        if core::mem::take(&mut self.motor_reassumed) {
             self.apply(throttle);
             return Some(Request::ParamsChanged);
         }
@@ -401,7 +401,7 @@ impl Esc {
             Some(Request::FactoryReset) => {
                 let mut defaults = Params::default();
                 defaults.fit(&self.board);
-                match self.given.check(&defaults, &self.board) {
+                match self.overrides.check(&defaults, &self.board) {
                     Ok(()) => self.storage.ask(request),
                     Err(error) => self.component.storage_done(Err(error.reason)),
                 }
@@ -423,12 +423,12 @@ impl Esc {
             self.warn_of(reason);
         }
         // From here on nothing turns the motor.
-        if self.storage.reboots() && throttle.reach(Throttle::store) {
+        if self.storage.reboots() && throttle.lock(Throttle::store) {
             self.storage.cancel_reboot();
             return Some(Request::Reboot);
         }
         let stores = self.storage.waits(now_us) && self.may_store();
-        if stores && throttle.reach(Throttle::store) {
+        if stores && throttle.lock(Throttle::store) {
             return self.storage.take(now_us);
         }
         None
@@ -453,38 +453,42 @@ impl Esc {
     }
 
     /// Reports how a storage request ended, so that it is acknowledged, and releases the motor.
-    pub fn storage_done(&mut self, throttle: &mut impl Reach, result: Result<(), &'static str>) {
-        throttle.reach(Throttle::stored);
+    pub fn storage_done(
+        &mut self,
+        throttle: &mut impl LockThrottle,
+        result: Result<(), &'static str>,
+    ) {
+        throttle.lock(Throttle::stored);
         if self.storage.takes_all() && result.is_ok() {
             self.unstored.clear();
         }
         match (self.storage.done(result.is_ok()), result) {
-            (Some(Asker::Wire), _) => self.component.tell_stored(result),
+            (Some(Asker::Wire), _) => self.component.report_stored(result),
             (Some(Asker::Mavlink), _) => self.component.storage_done(result),
             (Some(Asker::Nobody), Err(reason)) => self.warn_of(reason),
             _ => {}
         }
     }
 
-    fn apply(&mut self, throttle: &mut impl Reach) {
+    fn apply(&mut self, throttle: &mut impl LockThrottle) {
         // Every change has been validated: it makes a valid drive.
         self.scale = scale(&self.running(), &self.board);
-        throttle.reach(|throttle| throttle.adopt(&self.params, self.scale));
-        self.tell_info(throttle);
+        throttle.lock(|throttle| throttle.adopt(&self.params, self.scale));
+        self.update_info(throttle);
     }
 
-    fn tell_info(&self, throttle: &mut impl Reach) {
+    fn update_info(&self, throttle: &mut impl LockThrottle) {
         let info = info(&self.params, self.light, &self.board.image);
-        throttle.reach(|throttle| throttle.tell_info(info));
+        throttle.lock(|throttle| throttle.set_info(info));
     }
 
     fn with_component(
         &mut self,
-        throttle: &mut impl Reach,
+        throttle: &mut impl LockThrottle,
         now_us: u64,
         run: impl FnOnce(&mut Component, &mut Context),
     ) {
-        let (given, board) = (self.given, self.board);
+        let (overrides, board) = (self.overrides, self.board);
         let mut context = Context {
             now_us,
             params: &mut self.params,
@@ -495,8 +499,8 @@ impl Esc {
             check: &self.check.report,
             identification: &self.identify.report,
             record: self.record,
-            authority: &mut Reached(throttle),
-            validate: &|params| given.check(params, &board),
+            authority: &mut LockedAuthority(throttle),
+            validate: &|params| overrides.check(params, &board),
         };
         run(&mut self.component, &mut context);
     }

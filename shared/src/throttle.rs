@@ -2,7 +2,7 @@
 //! do.
 //!
 //! On the chip it belongs to a task of higher priority than [`Esc`](crate::esc::Esc)'s, which accesses it
-//! through [`Reach`], briefly. Each side copies what it needs of the other during such an access.
+//! through [`LockThrottle`], briefly. Each side copies what it needs of the other during such an access.
 
 use core::mem::discriminant;
 
@@ -25,7 +25,7 @@ use crate::units::Scale;
 
 /// How long the tasks' demands on the drive hold, µs: tasks poll every millisecond, and a dead one must not
 /// turn a motor.
-const POLLED_US: u64 = 100_000;
+const DEMANDS_US: u64 = 100_000;
 
 /// A throttle wire, the answers on it, and its demands on the drive.
 // Ordered by use: the most used fields are within reach of the chip's short instructions.
@@ -35,8 +35,8 @@ pub struct Throttle {
     storing: bool,
     /// The current time, and when the tasks' demands on the drive expire unless renewed, µs.
     now_us: u64,
-    polled_until_us: u64,
-    polled: Polled,
+    demands_until_us: u64,
+    demands: TaskDemands,
     /// Orders from DShot commands since the last poll, and those that wait: one of each kind, of which seven
     /// are for the tasks.
     orders: Vec<Order, 7>,
@@ -51,7 +51,7 @@ pub struct Throttle {
 
 /// What the tasks demand at each poll.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Polled {
+pub(crate) struct TaskDemands {
     /// The note due, played while nothing turns the motor.
     pub(crate) note: Option<Note>,
     /// The set-point of a self-test or an identification, in place of notes.
@@ -64,7 +64,7 @@ pub(crate) struct Polled {
 
 /// The state of the wire.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Standing {
+pub(crate) struct WireStatus {
     pub(crate) command: Command,
     pub(crate) armed: bool,
     pub(crate) signal: Option<Signal>,
@@ -75,13 +75,13 @@ pub(crate) struct Standing {
 }
 
 /// Gives tasks access to the throttle side, which may preempt them.
-pub trait Reach {
+pub trait LockThrottle {
     /// Calls `act` with it, atomically. On the chip edges are held off meanwhile, so keep it short.
-    fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T;
+    fn lock<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T;
 }
 
-impl Reach for Throttle {
-    fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T {
+impl LockThrottle for Throttle {
+    fn lock<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T {
         act(self)
     }
 }
@@ -103,9 +103,9 @@ impl Throttle {
             basis: Basis::new(scale),
             telemetry: Telemetry::new(),
             info: info::info(params, false, &board.image),
-            polled: Polled::default(),
+            demands: TaskDemands::default(),
             now_us: 0,
-            polled_until_us: 0,
+            demands_until_us: 0,
             orders: Vec::new(),
             storing: false,
         }
@@ -195,15 +195,15 @@ impl Throttle {
 
     /// Returns the drive's set-point.
     pub fn setpoint(&self) -> Setpoint {
-        if self.polled.too_hot {
+        if self.demands.too_hot {
             return Setpoint::Fault(Fault::OverTemperature);
         }
         if self.storing {
             return Setpoint::Stop;
         }
         let command = self.command();
-        match (self.polled.test, self.polled.note) {
-            (Some(test), _) if command.rests() && self.now_us < self.polled_until_us => test,
+        match (self.demands.test, self.demands.note) {
+            (Some(test), _) if command.rests() && self.now_us < self.demands_until_us => test,
             (None, Some(note)) if command.rests() => self.mapping.tone(note),
             _ => self.mapping.setpoint(command),
         }
@@ -220,13 +220,13 @@ impl Throttle {
     }
 
     /// Advances time and takes in the drive's state.
-    pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> Standing {
+    pub(crate) fn poll(&mut self, now_us: u64, telemetry: &Telemetry) -> WireStatus {
         self.telemetry = *telemetry;
-        self.polled_until_us = now_us + POLLED_US;
+        self.demands_until_us = now_us + DEMANDS_US;
         self.input.poll(now_us, telemetry.drive(self.command()));
         self.follow_wire();
         let authority = self.input.authority();
-        Standing {
+        WireStatus {
             command: authority.command(),
             armed: authority.armed(),
             signal: self.input.signal(now_us),
@@ -272,13 +272,13 @@ impl Throttle {
     }
 
     /// Takes over the tasks' demands.
-    pub(crate) fn take_polled(&mut self, polled: Polled) {
-        self.polled = polled;
-        self.input.authority_mut().bar(polled.barred);
+    pub(crate) fn set_demands(&mut self, demands: TaskDemands) {
+        self.demands = demands;
+        self.input.authority_mut().bar(demands.barred);
     }
 
     /// Sets the answer to a request for the ESC's information.
-    pub(crate) fn tell_info(&mut self, info: [u8; info::BYTES]) {
+    pub(crate) fn set_info(&mut self, info: [u8; info::BYTES]) {
         self.info = info;
     }
 
@@ -307,16 +307,16 @@ impl Throttle {
     }
 }
 
-/// The authority of a throttle behind [`Reach`].
-pub(crate) struct Reached<'a, R>(pub(crate) &'a mut R);
+/// The authority of a throttle behind [`LockThrottle`].
+pub(crate) struct LockedAuthority<'a, R>(pub(crate) &'a mut R);
 
-impl<R: Reach> Reached<'_, R> {
+impl<R: LockThrottle> LockedAuthority<'_, R> {
     fn authority<T>(&mut self, act: impl FnOnce(&mut Authority) -> T) -> T {
-        self.0.reach(|throttle| act(throttle.input.authority_mut()))
+        self.0.lock(|throttle| act(throttle.input.authority_mut()))
     }
 }
 
-impl<R: Reach> Access for Reached<'_, R> {
+impl<R: LockThrottle> Access for LockedAuthority<'_, R> {
     fn command(&mut self) -> Command {
         self.authority(Access::command)
     }

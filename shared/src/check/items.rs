@@ -194,11 +194,11 @@ impl Report {
         self.values[Item::of(kind, phase).place()] = value;
     }
 
-    /// Calls `tell` with each measured item's line, bounded by these parameters.
-    pub fn tell(&self, params: &Params, mut tell: impl FnMut(&Line)) {
+    /// Calls `act` with each measured item's line, bounded by these parameters.
+    pub fn for_each_line(&self, params: &Params, mut act: impl FnMut(&Line)) {
         for place in 0..self.values.len() {
             if let Some(line) = self.line(place, params) {
-                tell(&line);
+                act(&line);
             }
         }
     }

@@ -17,7 +17,7 @@ impl Esc {
         let with = (&self.board, &self.params);
         match self.check.poll(&inputs, with, probe) {
             None => {}
-            Some(Outcome::Progress(percent)) => self.component.tell_progress(percent),
+            Some(Outcome::Progress(percent)) => self.component.report_progress(percent),
             Some(Outcome::Done { passed }) => {
                 if let Some(text) = self.misfits() {
                     self.warn(text);
@@ -30,7 +30,7 @@ impl Esc {
     /// Returns the items that are out of bounds, as many as the text holds; the file lists all.
     fn misfits(&self) -> Option<Warning> {
         let mut text = Warning::new();
-        self.check.report.tell(&self.params, |line| {
+        self.check.report.for_each_line(&self.params, |line| {
             if line.ok() {
                 return;
             }

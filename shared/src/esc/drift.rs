@@ -27,7 +27,7 @@ impl Esc {
             Stated::NONE
         };
         if self.tracker.update(snapshot, stated) {
-            self.reassumes = true;
+            self.motor_reassumed = true;
             let drift = self.tracker.in_force();
             if check_drifted(&self.running(), &self.board, drift).is_err() {
                 self.tracker.reject();

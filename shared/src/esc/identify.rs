@@ -6,7 +6,7 @@ use crate::identify::{Inputs, Outcome};
 use crate::input::access::Access;
 use crate::mavlink::Warning;
 use crate::params::ParamId;
-use crate::throttle::{Reach, Reached};
+use crate::throttle::{LockThrottle, LockedAuthority};
 
 /// Steps reported to the user, each with the progress at which it begins, percent.
 const STEPS: [(u8, &str); 6] = [
@@ -21,9 +21,9 @@ const STEPS: [(u8, &str); 6] = [
 impl Esc {
     /// Starts an identification requested by the stick, under the same conditions as a command; its result is
     /// kept. After a loss of settings it refuses, since the defaults would be stored with the result.
-    pub(super) fn identify_by_stick(&mut self, throttle: &mut impl Reach, now_us: u64) {
+    pub(super) fn identify_by_stick(&mut self, throttle: &mut impl LockThrottle, now_us: u64) {
         let drive = self.drive();
-        if !self.storage.is_lost() && Reached(throttle).may_test(now_us, drive) {
+        if !self.storage.is_lost() && LockedAuthority(throttle).may_test(now_us, drive) {
             self.identify(now_us, true);
         } else {
             self.warn_of("Not identified: a fault, or settings lost");
@@ -32,7 +32,7 @@ impl Esc {
 
     /// Starts an identification; `keeps` has its result stored.
     pub(super) fn identify(&mut self, now_us: u64, keeps: bool) {
-        self.keeps = keeps;
+        self.keeps_result = keeps;
         let outcome = self.identify.begin(now_us);
         self.identified(outcome);
     }
@@ -68,7 +68,8 @@ impl Esc {
     pub(super) fn poll_identification(&mut self, now_us: u64, snapshot: &Snapshot) {
         if !self.identify.is_under_way() {
             // Not in the poll that ends it: both need stack.
-            if core::mem::take(&mut self.keeps) && self.identify.report.settings().is_some() {
+            if core::mem::take(&mut self.keeps_result) && self.identify.report.settings().is_some()
+            {
                 self.keep_identified();
             }
             return;
@@ -86,18 +87,18 @@ impl Esc {
     }
 
     /// Clears MOT_IDENTIFY once what it requested is over or refused.
-    pub(super) fn end_order(&mut self) {
+    pub(super) fn clear_identify_request(&mut self) {
         let id = ParamId::MotIdentify;
         if self.params.get(id) != 0.0 && !self.identify.is_under_way() {
             // 0 is in range.
             let _ = self.params.set(id, 0.0);
-            self.component.tell_value(id);
+            self.component.report_value(id);
         }
     }
 
     fn identified(&mut self, mut outcome: Outcome) {
         if outcome == Outcome::Assume {
-            self.reassumes = true;
+            self.motor_reassumed = true;
             let made = check(&self.running(), &self.board);
             let Err(error) = made else {
                 return;
@@ -107,16 +108,16 @@ impl Esc {
         }
         match outcome {
             Outcome::Progress(percent) => {
-                self.component.tell_progress(percent);
+                self.component.report_progress(percent);
                 if let Some((_, step)) = STEPS.iter().find(|(begun, _)| *begun == percent) {
-                    self.component.tell_step(step);
+                    self.component.report_step(step);
                 }
             }
             Outcome::Assume => {}
             Outcome::Done(result) => {
-                self.reassumes = true;
+                self.motor_reassumed = true;
                 match result {
-                    Ok(()) => self.component.tell_step("done"),
+                    Ok(()) => self.component.report_step("done"),
                     Err(reason) => self.warn_in_pieces("Not identified: ", [reason, "", ""]),
                 }
                 self.component.check_done(result.is_ok());

@@ -4,7 +4,7 @@ use super::Esc;
 use crate::params::{BuildError, ParamId};
 use crate::record::Record;
 use crate::store::{Kept, Loaded};
-use crate::throttle::Reach;
+use crate::throttle::LockThrottle;
 
 impl Esc {
     /// Restores stored values at power-up. The ESC was already created with the stored parameters.
@@ -62,11 +62,11 @@ impl Esc {
     /// The parameter that does not fit the board; nothing has changed then.
     pub fn replace(
         &mut self,
-        throttle: &mut impl Reach,
+        throttle: &mut impl LockThrottle,
         kept: &mut Kept,
     ) -> Result<(), BuildError> {
         kept.params.fit(&self.board);
-        self.given.check(&kept.params, &self.board)?;
+        self.overrides.check(&kept.params, &self.board)?;
         self.params = kept.params.clone();
         self.component.keep_intervals(&kept.intervals);
         if kept.signing.is_none() {

@@ -320,7 +320,7 @@ fn what_waits_is_forgotten_at_throttle_at_a_test_and_with_the_signal() {
                     stopped: true,
                     faulted: false,
                 };
-                let mut authority = Reached(&mut bench.throttle);
+                let mut authority = LockedAuthority(&mut bench.throttle);
                 let tested = authority.actuator_test(bench.now_us, 0.1, 0.005, drive);
                 assert_eq!(tested, Ok(()));
                 bench.frames(1, 0);

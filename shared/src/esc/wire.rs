@@ -9,7 +9,7 @@ use crate::input::command::Order;
 use crate::input::endpoints::EndPoints;
 use crate::mavlink::Act;
 use crate::params::{BuildError, ParamId};
-use crate::throttle::Reach;
+use crate::throttle::LockThrottle;
 use crate::tune::{Beacon, Tune};
 
 impl Esc {
@@ -19,8 +19,8 @@ impl Esc {
     }
 
     /// Does the tasks' part of the wire's work.
-    pub(super) fn follow_wire(&mut self, throttle: &mut impl Reach, now_us: u64) {
-        while let Some(news) = throttle.reach(|throttle| throttle.news(now_us)) {
+    pub(super) fn follow_wire(&mut self, throttle: &mut impl LockThrottle, now_us: u64) {
+        while let Some(news) = throttle.lock(|throttle| throttle.news(now_us)) {
             self.hear(now_us, news);
             if news == News::Calibration(Step::Identify) {
                 self.identify_by_stick(throttle, now_us);
@@ -28,16 +28,16 @@ impl Esc {
         }
         // The motor may have been asked to turn since the order came.
         let stopped = self.drive().stopped;
-        while let Some(order) = throttle.reach(|throttle| throttle.next_order(stopped)) {
+        while let Some(order) = throttle.lock(|throttle| throttle.next_order(stopped)) {
             self.obey(throttle, now_us, order);
         }
     }
 
     /// Carries out a MAVLink command.
-    pub(super) fn act(&mut self, throttle: &mut impl Reach, now_us: u64, act: Act) {
+    pub(super) fn act(&mut self, throttle: &mut impl LockThrottle, now_us: u64, act: Act) {
         match act {
             Act::Beep => self.tunes.play(now_us, Tune::Beacon(Beacon::One)),
-            Act::Calibrate => throttle.reach(|throttle| throttle.calibrate(now_us, true)),
+            Act::Calibrate => throttle.lock(|throttle| throttle.calibrate(now_us, true)),
             Act::Check => self.check.begin(),
             Act::Identify => self.identify(now_us, false),
             Act::EndIdentification => self.end_identification("cancelled"),
@@ -45,7 +45,7 @@ impl Esc {
                 let kept = self.keep_identified();
                 self.component.check_done(kept);
             }
-            Act::EndCalibration => throttle.reach(|throttle| throttle.calibrate(now_us, false)),
+            Act::EndCalibration => throttle.lock(|throttle| throttle.calibrate(now_us, false)),
         }
     }
 
@@ -56,7 +56,7 @@ impl Esc {
             }
             news => news,
         };
-        self.component.tell(news);
+        self.component.report_news(news);
         let tune = match news {
             News::Armed => Tune::Armed,
             News::Lost { armed: true } => Tune::Lost,
@@ -70,7 +70,7 @@ impl Esc {
         self.tunes.play(now_us, tune);
     }
 
-    fn obey(&mut self, throttle: &mut impl Reach, now_us: u64, order: Order) {
+    fn obey(&mut self, throttle: &mut impl LockThrottle, now_us: u64, order: Order) {
         let number = |on| f32::from(u8::from(on));
         match order {
             Order::Beacon(beacon) => self.tunes.play(now_us, Tune::Beacon(beacon)),
@@ -82,13 +82,13 @@ impl Esc {
             }
             Order::Save => self.storage.save(),
             Order::Spin { opposite } => {
-                self.given.opposite = opposite;
+                self.overrides.opposite = opposite;
                 // No value changes, but the configuration does.
                 self.component.changed(&[]);
             }
             Order::Light(on) => {
                 self.light = on;
-                self.tell_info(throttle);
+                self.update_info(throttle);
             }
             Order::Silent => self.tunes.toggle_silent(),
             Order::Info | Order::Extended(_) => {}
@@ -145,7 +145,7 @@ impl Esc {
                 reason: "out of range",
             })?;
         }
-        self.given.check(&params, &self.board)?;
+        self.overrides.check(&params, &self.board)?;
         self.params = params;
         for (id, _) in values {
             self.component.changed(&[*id]);

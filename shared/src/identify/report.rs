@@ -75,8 +75,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// Passes each line to `tell`; none before an identification has completed.
-    pub fn tell(&self, mut tell: impl FnMut(&Line)) {
+    /// Passes each line to `act`; none before an identification has completed.
+    pub fn for_each_line(&self, mut act: impl FnMut(&Line)) {
         if self.settings().is_none() {
             return;
         }
@@ -91,7 +91,7 @@ impl Report {
             self.dead_time_ns,
         ];
         for ((name, unit), figure) in ROWS.into_iter().zip(figures) {
-            tell(&Line { name, unit, figure });
+            act(&Line { name, unit, figure });
         }
     }
 

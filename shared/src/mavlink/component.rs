@@ -286,12 +286,12 @@ impl Component {
     }
 
     /// Like [`Component::changed`], for a value that does not affect the configuration.
-    pub fn tell_value(&mut self, id: ParamId) {
+    pub fn report_value(&mut self, id: ParamId) {
         self.replies.value(id);
     }
 
     /// Reports the throttle wire's news.
-    pub fn tell(&mut self, news: News) {
+    pub fn report_news(&mut self, news: News) {
         if let News::Calibration(step) = news {
             self.commands.follow_stick(step, &mut self.replies);
         }
@@ -301,12 +301,12 @@ impl Component {
     }
 
     /// Reports a self-test's progress, percent.
-    pub fn tell_progress(&mut self, percent: u8) {
+    pub fn report_progress(&mut self, percent: u8) {
         self.commands.check_progress(percent, &mut self.replies);
     }
 
     /// Reports that an identification has reached this step.
-    pub fn tell_step(&mut self, step: &'static str) {
+    pub fn report_step(&mut self, step: &'static str) {
         let text = ["Identification: ", step];
         self.replies
             .push(Reply::Text(MavSeverity::MAV_SEVERITY_INFO, text));
@@ -324,7 +324,7 @@ impl Component {
     }
 
     /// Reports the outcome of a storage request that did not come by MAVLink.
-    pub fn tell_stored(&mut self, result: Result<(), &'static str>) {
+    pub fn report_stored(&mut self, result: Result<(), &'static str>) {
         let (severity, text) = match result {
             Ok(()) => (MavSeverity::MAV_SEVERITY_INFO, "Parameters stored"),
             Err(reason) => (MavSeverity::MAV_SEVERITY_ERROR, reason),

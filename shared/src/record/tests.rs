@@ -98,7 +98,7 @@ impl Bench {
     fn read(&self) -> Recorded {
         let mut file = Vec::new();
         let put = &mut |word: u32| file.extend(word.to_le_bytes());
-        self.record.tell(&Board::BENCH, 7.0, put);
+        self.record.for_each_word(&Board::BENCH, 7.0, put);
         // A truncated file is refused or yields less; it never panics.
         for end in (0..file.len()).step_by(7) {
             let cut = Recorded::read(&file[..end]);

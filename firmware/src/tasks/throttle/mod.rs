@@ -17,7 +17,7 @@ use siskin_control::drive::{Setpoint, Snapshot};
 use siskin_control::input::dshot::Rate;
 use siskin_control::input::line::Event;
 use siskin_control::input::signal::Signal;
-use siskin_control::throttle::{Reach, Throttle};
+use siskin_control::throttle::{LockThrottle, Throttle};
 use static_cell::StaticCell;
 
 use super::clock::now;
@@ -56,8 +56,8 @@ impl Port {
     }
 }
 
-impl Reach for Port {
-    fn reach<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T {
+impl LockThrottle for Port {
+    fn lock<T>(&mut self, act: impl FnOnce(&mut Throttle) -> T) -> T {
         self.0.lock(|throttle| act(&mut borrow(throttle)))
     }
 }
@@ -184,7 +184,7 @@ impl Listener {
         let snapshot = self.snapshot.read()?;
         let (speed_bits, signal) = self
             .port
-            .reach(|throttle| (throttle.speed_bits(&snapshot), throttle.signal()));
+            .lock(|throttle| (throttle.speed_bits(&snapshot), throttle.signal()));
         Some(Ready {
             snapshot,
             speed_bits,
@@ -243,7 +243,7 @@ impl Listener {
     fn look(&mut self, looks: &mut Looks, ready: Option<&Ready>) -> Option<Query> {
         self.fill_with_frame(looks);
         let edges = &mut self.capture.edges;
-        let (query, setpoint) = self.port.reach(|throttle| {
+        let (query, setpoint) = self.port.lock(|throttle| {
             if throttle.is_storing() {
                 edges.forget();
                 return Some((None, Some(throttle.setpoint())));
@@ -299,7 +299,7 @@ impl Listener {
         if reply.is_some() && sending.is_none() {
             TROUBLE.late_reply();
         }
-        let (setpoint, Serial { kiss, info }) = self.port.reach(|throttle| {
+        let (setpoint, Serial { kiss, info }) = self.port.lock(|throttle| {
             let setpoint = looks.unheard.as_ref().map(|event| {
                 // The answer to its request is already being sent.
                 let _ = throttle.hear(now_us(), event);

@@ -29,7 +29,7 @@ impl Component {
     pub fn poll(&mut self, context: &mut Context, send: &mut dyn FnMut(&[u8])) {
         self.writer.sender.signing.advance(context.now_us);
         self.files.rest();
-        self.tell_faults(context, send);
+        self.report_faults(context, send);
         if !core::mem::replace(&mut self.started, true) {
             let text = [START_TEXT, self.image.board];
             self.text(MavSeverity::MAV_SEVERITY_INFO, &text, send);
@@ -73,7 +73,7 @@ impl Component {
     }
 
     /// Reports faults in words, and by an immediate ESC_INFO, whose flags would otherwise be up to a second late.
-    fn tell_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
+    fn report_faults(&mut self, context: &Context, send: &mut dyn FnMut(&[u8])) {
         let faults = context.telemetry.faults;
         if core::mem::replace(&mut self.faults, faults) != faults {
             self.schedule.hasten(Stream::EscInfo);

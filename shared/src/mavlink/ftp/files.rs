@@ -155,7 +155,7 @@ impl File {
             Content::Record => {
                 if let Some(record) = record(view) {
                     let pole_pairs = view.params.get(ParamId::MotPolePairs);
-                    record.tell(view.board, pole_pairs, &mut |word| {
+                    record.for_each_word(view.board, pole_pairs, &mut |word| {
                         sink.put(&word.to_le_bytes());
                     });
                 }

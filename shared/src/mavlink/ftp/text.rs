@@ -52,7 +52,7 @@ fn row(name: &str, number: u32, unit: &str, sink: &mut Sink) {
 /// `@SYS/check.txt`: a line for each measured item, with its name, value, unit, bounds and whether
 /// it is within them; `-` is a value that a sensor does not provide.
 pub(super) fn check(view: &View, sink: &mut Sink) {
-    view.check.tell(view.params, |line| {
+    view.check.for_each_line(view.params, |line| {
         for piece in [line.name[0], line.name[1], " "] {
             sink.put(piece.as_bytes());
         }
@@ -67,7 +67,7 @@ pub(super) fn check(view: &View, sink: &mut Sink) {
 
 /// `@SYS/identify.txt`: a line for each figure, with its name, value, unit and spread in percent.
 pub(super) fn identification(view: &View, sink: &mut Sink) {
-    view.identification.tell(|line| {
+    view.identification.for_each_line(|line| {
         sink.put(line.name.as_bytes());
         sink.put(b" ");
         thousandths(line.figure.value, sink);

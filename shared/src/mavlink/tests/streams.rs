@@ -448,7 +448,7 @@ fn what_the_wire_tells_is_told_in_words() {
         ),
         (News::Armed, &[]),
     ] {
-        bench.component.tell(news);
+        bench.component.report_news(news);
         assert_eq!(texts(&bench.answers()), words);
     }
 }

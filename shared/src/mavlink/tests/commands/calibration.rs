@@ -24,7 +24,7 @@ fn begun() -> Bench {
 
 impl Bench {
     fn step(&mut self, step: Step) -> Vec<(u16, u8)> {
-        self.component.tell(News::Calibration(step));
+        self.component.report_news(News::Calibration(step));
         acks(&self.answers())
     }
 }
@@ -48,7 +48,7 @@ fn a_calibration_is_acknowledged_step_by_step_and_when_it_is_stored() {
             max_us: 1912,
         };
         assert_eq!(bench.step(Step::Done(ends)), []);
-        bench.component.tell_stored(stored);
+        bench.component.report_stored(stored);
         assert_eq!(acks(&bench.answers()), [(241, result as u8)]);
         // That ACK was lost.
         bench.receive(&long(ESC, 241, &BEGIN, 2));

@@ -17,7 +17,7 @@ fn a_self_test_is_acknowledged_step_by_step() {
         let mut bench = Bench::new();
         assert_eq!(ack(&bench.command(RUN, &[])), (IN_PROGRESS, 255));
         assert_eq!(bench.component.take_act(), Some(Act::Check));
-        bench.component.tell_progress(40);
+        bench.component.report_progress(40);
         assert_eq!(ack(&bench.answers()), (IN_PROGRESS, 40));
         // Resent, and what must not interrupt it; the stick calibration is separate.
         bench.receive(&long(ESC, RUN, &[], 1));
@@ -28,7 +28,7 @@ fn a_self_test_is_acknowledged_step_by_step() {
         let test = [0.1, 1.0, 0.0, 0.0, 1.0];
         assert_eq!(bench.result(310, &test), REJECTED as u8);
         assert_eq!(bench.result(241, &[0.0; 7]), ACCEPTED as u8);
-        bench.component.tell_stored(Ok(()));
+        bench.component.report_stored(Ok(()));
         assert_eq!(acks(&bench.answers()), []);
         bench.component.check_done(passed);
         assert_eq!(ack(&bench.answers()), (result as u8, 0));
@@ -37,7 +37,7 @@ fn a_self_test_is_acknowledged_step_by_step() {
         assert_eq!(bench.component.take_act(), None);
         // Self-tests that nobody requested are not reported.
         bench.component.check_done(passed);
-        bench.component.tell_progress(50);
+        bench.component.report_progress(50);
         assert_eq!(bench.answers().len(), 0);
     }
 }
