@@ -106,19 +106,19 @@ pub fn begin(config: &Config, theta: Angle, omega: Speed) -> State {
 
 /// Returns the speed at a sample by (7) and (28), and advances ξ̂ by one period.
 ///
-/// With an `imposed` speed the frame does not follow the rotor, so nothing adapts. `planned` is the
+/// With an `imposed` speed the frame does not follow the rotor, so nothing adapts. `reference_step` is the
 /// change of the speed reference per period; only the cure uses it.
 pub fn estimate(
     config: &Config,
     state: &mut State,
     imposed: Option<Speed>,
-    planned: Speed,
+    reference_step: Speed,
 ) -> (Estimate, SlowEstimate) {
     let theta = state.theta;
     let frame = SinCos::of(theta);
     let length = magnitude(state.h.d, state.h.q);
     if let Some(cure) = &config.cure {
-        return cured(config, cure, state, (theta, frame), length, planned);
+        return cured(config, cure, state, (theta, frame), length, reference_step);
     }
     // ξ·|h| has 28 fraction bits, a speed 32. With ξ below a half and |h| up to 8 it reaches 4
     // turns per period; above half a turn, the maximum of a speed, the rotor is lost anyway.
@@ -151,7 +151,7 @@ fn cured(
     state: &mut State,
     (theta, frame): (Angle, SinCos),
     length: Voltage,
-    planned: Speed,
+    reference_step: Speed,
 ) -> (Estimate, SlowEstimate) {
     // Twelve bits of the quotient suffice for a direction: 0.01°.
     let quotient = (state.h.d.to_bits() >> 2) / (length.to_bits() >> 14).max(1);
@@ -159,7 +159,7 @@ fn cured(
     let before = state.omega_i;
     state.omega_i = before
         .plus(cure.integral.apply(epsilon))
-        .plus(planned)
+        .plus(reference_step)
         .max(Speed::ZERO);
     let estimate = Estimate {
         theta,

@@ -16,7 +16,7 @@ pub struct Input {
     /// L over the stated inductance.
     pub inductance: Factor,
     /// Change of the speed reference in the last period, ω̇*·T_s.
-    pub planned: Speed,
+    pub reference_step: Speed,
     /// Hall sensors, see [`Sample`](crate::drive::Sample).
     pub hall: u8,
     /// Phases b and c are swapped in all of this.

@@ -76,7 +76,7 @@ impl Observer for Config {
         match self {
             Self::BackEmf(config) => {
                 let (estimate, slow) =
-                    back_emf::estimate(config, &mut state.back_emf, imposed, input.planned);
+                    back_emf::estimate(config, &mut state.back_emf, imposed, input.reference_step);
                 state.slow_estimate = slow;
                 estimate
             }

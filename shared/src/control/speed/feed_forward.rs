@@ -46,7 +46,7 @@ impl Config {
             .plus(self.k_p.saturating_apply(error))
             .plus(self.propeller(omega_r));
         let bounded = input.bounds.hold(i_q);
-        let over = i_q.minus(bounded).plus(input.missing);
+        let over = i_q.minus(bounded).plus(input.i_q_shortfall);
         let step = self.k_i.saturating_apply(error);
         if over == Current::ZERO || over.is_negative() != step.is_negative() {
             state.sigma = state.sigma.plus(step);

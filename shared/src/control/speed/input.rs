@@ -17,7 +17,7 @@ pub struct Input {
     pub bounds: Bounds,
     /// i_q* minus i_q of the last period if its voltage was limited, else zero: the torque that the
     /// supply cannot deliver.
-    pub missing: Current,
+    pub i_q_shortfall: Current,
 }
 
 traced! {

@@ -73,8 +73,8 @@ impl Config {
         let integral_step = self.k_i.held(error);
         let i_q = slow.xi.top(torque);
         let bounded = input.bounds.hold(i_q);
-        if bounded != i_q || input.missing != Current::ZERO {
-            let over = i_q.minus(bounded).plus(input.missing);
+        if bounded != i_q || input.i_q_shortfall != Current::ZERO {
+            let over = i_q.minus(bounded).plus(input.i_q_shortfall);
             let step = self.conditioned(state, (step, slew), over, integral_step);
             planner.advance(step);
             return Reference::steady(bounded);

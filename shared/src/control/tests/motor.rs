@@ -108,7 +108,7 @@ pub(super) struct Loop {
     pub(super) motor: Motor,
     pub(super) vector_max: Voltage,
     /// i_q* minus i_q while the voltage is limited.
-    pub(super) missing: Current,
+    pub(super) i_q_shortfall: Current,
 }
 
 impl Loop {
@@ -117,7 +117,7 @@ impl Loop {
         Self {
             vector_max: units.voltage(13.4),
             regulator: State::default(),
-            missing: Current::ZERO,
+            i_q_shortfall: Current::ZERO,
             units,
             motor,
         }
@@ -153,7 +153,7 @@ impl Loop {
         if let Some(cut) = cut {
             regulator.anti_windup(&mut self.regulator, cut);
         }
-        self.missing = if cut.is_some() {
+        self.i_q_shortfall = if cut.is_some() {
             wanted.i.q - feedback.i.q
         } else {
             Current::ZERO

@@ -62,7 +62,7 @@ impl Bench {
                     ..SlowEstimate::default()
                 },
                 bounds: self.bounds,
-                missing: self.inner.missing,
+                i_q_shortfall: self.inner.i_q_shortfall,
             };
             self.wanted = units.0.speed.current(&mut self.speed, &input);
         }

@@ -84,7 +84,7 @@ impl Case {
                     min: units.current(-self.bound),
                     max: units.current(self.bound),
                 },
-                missing: units.current(self.missing),
+                i_q_shortfall: units.current(self.missing),
             },
         );
         let after = sigma(units, &state);

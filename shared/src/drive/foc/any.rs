@@ -49,6 +49,6 @@ fn adapt(config: &Config, foc: &mut State, shared: &Shared) {
         let flux = observer::flux(&config.observer, &foc.observer);
         let i_d = shared.seen.i.d;
         let wave = inductance::step(adapt, &mut foc.loops.inductance, i_d, flux);
-        foc.loops.reference.i.d = foc.loops.i_d + wave;
+        foc.loops.reference.i.d = foc.loops.i_d_reference + wave;
     }
 }

@@ -50,7 +50,7 @@ pub(in crate::drive) fn begin(
         (REGULATOR, Some((_, omega))) => preset_regulator(config, foc, omega),
         (COMMANDED, Some((theta, omega))) => {
             let theta = theta.wrapping_add(omega.over_periods(periods));
-            foc.loops.commanded = commanded(config, theta, omega);
+            foc.loops.commanded_voltages = commanded_voltages(config, theta, omega);
         }
         (PREPARATION_PERIODS, _) => {
             let omega = turning.map(|(_, omega)| omega);
@@ -93,7 +93,7 @@ fn enter_drive(
         shared.reversed = backward;
     }
     let swapped = shared.swapped(config);
-    foc.loops.order = if swapped {
+    foc.loops.phase_order = if swapped {
         PhaseOrder::SWAPPED
     } else {
         PhaseOrder::NORMAL
@@ -149,7 +149,7 @@ fn preset_regulator(config: &Config, foc: &mut State, omega: Speed) {
 
 /// Returns the last two commands for a rotor at `theta` at the first period's sample: the back-EMF
 /// was at the terminals, as if commanded.
-fn commanded(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
+fn commanded_voltages(config: &Config, theta: Angle, omega: Speed) -> [AlphaBeta<Voltage>; 2] {
     let to_middle = config
         .delay
         .advance(omega)

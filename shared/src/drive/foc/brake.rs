@@ -28,8 +28,8 @@ pub(in crate::drive) fn watch(
 ) {
     let loops = &mut foc.loops;
     loops.slot = (loops.slot + 1) % CYCLE as Slot;
-    let stator = clarke_in(loops.order, currents);
-    loops.commanded = [AlphaBeta::default(), loops.commanded[0]];
+    let stator = clarke_in(loops.phase_order, currents);
+    loops.commanded_voltages = [AlphaBeta::default(), loops.commanded_voltages[0]];
     let input = input(loops, config.delay, sample, stator);
     let observer = &config.observer;
     let estimate = observer.estimate(&mut foc.observer, &input, None);
@@ -54,7 +54,7 @@ pub(in crate::drive) fn watch(
     let turns = estimate.omega_bar.to_bits() > config.slow.to_bits() >> 3;
     shared.seen = Seen {
         phase: Phase::Brake,
-        angle: loops.order.angle(estimate.theta),
+        angle: loops.phase_order.angle(estimate.theta),
         speed: if turns {
             estimate.omega_bar
         } else {

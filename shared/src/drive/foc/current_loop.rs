@@ -35,7 +35,7 @@ pub(super) fn observed(
     let loops = &mut foc.loops;
     let input = input(loops, delay, sample, stator);
     let estimate = observer.estimate(&mut foc.observer, &input, None);
-    shared.seen.angle = loops.order.angle(estimate.theta);
+    shared.seen.angle = loops.phase_order.angle(estimate.theta);
     shared.seen.speed = estimate.omega_bar;
     Frame {
         angle: estimate.frame,
@@ -59,7 +59,7 @@ pub(super) fn imposed(
         observer.estimate(&mut foc.observer, &input, Some(loops.start.omega_s));
     }
     let theta = loops.start.frame;
-    shared.seen.angle = loops.order.angle(theta);
+    shared.seen.angle = loops.phase_order.angle(theta);
     shared.seen.speed = loops.start.omega_s;
     Frame {
         angle: sin_cos(theta),
@@ -95,8 +95,8 @@ pub(super) fn current_loop(
     shared.seen.u = u;
 
     // The duties, for where the frame will be when they act.
-    let v = inverse_park(rotate(u, loops.advance), frame.angle);
-    loops.commanded = [voltages(v), loops.commanded[0]];
+    let v = inverse_park(rotate(u, loops.delay_rotation), frame.angle);
+    loops.commanded_voltages = [voltages(v), loops.commanded_voltages[0]];
     let dead_time = (
         &config.dead_time,
         inverse_park(loops.dead_time_sign, frame.angle),
@@ -104,7 +104,7 @@ pub(super) fn current_loop(
     let duties = modulator::duties(
         &config.modulator,
         &shared.supply,
-        (v, loops.order),
+        (v, loops.phase_order),
         dead_time,
     );
     shared.applied.command(duties);
@@ -124,7 +124,7 @@ fn limited(
     let (u, cut) = modulator::limit(demand, &shared.supply.longest);
     if let Some(cut) = cut {
         regulator.anti_windup(&mut loops.regulator, cut);
-        loops.deficit = loops.reference.i.q.minus(shared.seen.i.q);
+        loops.i_q_shortfall = loops.reference.i.q.minus(shared.seen.i.q);
     }
     u
 }
@@ -137,8 +137,8 @@ pub(super) fn input(
     sample: &Sample,
     stator: AlphaBeta<Current>,
 ) -> Input {
-    let swapped = loops.order == PhaseOrder::SWAPPED;
-    let [now, before] = loops.commanded;
+    let swapped = loops.phase_order == PhaseOrder::SWAPPED;
+    let [now, before] = loops.commanded_voltages;
     Input {
         i: stator,
         v: AlphaBeta {
@@ -146,7 +146,7 @@ pub(super) fn input(
             beta: delay.applied(now.beta, before.beta),
         },
         inductance: loops.inductance.factor,
-        planned: loops.planned,
+        reference_step: loops.reference_step,
         hall: hall(sample, swapped),
         swapped,
     }

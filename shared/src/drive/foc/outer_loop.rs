@@ -109,8 +109,8 @@ pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &
     let bounds = shared.protection.bounds;
     let loops = &mut foc.loops;
     let (i_d, bounds) = config.low_speed.bounds(bounds, shared.seen.speed);
-    loops.i_d = protection::burn(&config.protection, &shared.protection, i_d);
-    loops.bounds = bounds;
+    loops.i_d_reference = protection::burn(&config.protection, &shared.protection, i_d);
+    loops.i_q_bounds = bounds;
 }
 
 /// Updates the current reference in Run and Stopping.
@@ -127,21 +127,21 @@ pub(in crate::drive) fn reference(
         *setpoint
     };
     let loops = &mut foc.loops;
-    let deficit = core::mem::take(&mut loops.deficit);
+    let i_q_shortfall = core::mem::take(&mut loops.i_q_shortfall);
     let (command, bounds) = match (shared.seen.phase, setpoint) {
-        (Phase::Run, Setpoint::Speed(command)) => (command, loops.bounds),
+        (Phase::Run, Setpoint::Speed(command)) => (command, loops.i_q_bounds),
         (Phase::Run, Setpoint::Torque(i_q) | Setpoint::Test(i_q)) => {
-            return commanded(config, foc, shared, Reference::steady(i_q));
+            return follow_command(config, foc, shared, Reference::steady(i_q));
         }
         (Phase::Run, Setpoint::Voltage(share)) => {
             let reference = at_voltage(config, foc, shared, share);
-            return commanded(config, foc, shared, reference);
+            return follow_command(config, foc, shared, reference);
         }
         // Stopping, and reversing, brake regeneratively.
         _ => {
             let braking = Bounds {
                 max: Current::ZERO,
-                ..loops.bounds
+                ..loops.i_q_bounds
             };
             (Speed::ZERO, braking)
         }
@@ -151,13 +151,13 @@ pub(in crate::drive) fn reference(
         speed: shared.seen.speed,
         slow_estimate: foc.observer.slow_estimate,
         bounds,
-        missing: deficit,
+        i_q_shortfall,
     };
     let before = loops.speed.reference();
     let reference = config.speed.current(&mut loops.speed, &input);
-    loops.planned = loops.speed.reference().minus(before) / PERIODS as i32;
+    loops.reference_step = loops.speed.reference().minus(before) / PERIODS as i32;
     loops.reference =
-        torque::grow(&config.torque, &mut loops.torque, reference).with_i_d(loops.i_d);
+        torque::grow(&config.torque, &mut loops.torque, reference).with_i_d(loops.i_d_reference);
 }
 
 /// Returns the current reference for a share of the voltage.
@@ -173,20 +173,25 @@ fn at_voltage(
     let frame = (shared.seen.speed, shared.seen.i);
     let factor = foc.loops.inductance.factor;
     let fb = config.observer.feedback(&foc.observer, frame, factor);
-    let i_d = foc.loops.i_d;
+    let i_d = foc.loops.i_d_reference;
     voltage::reference(&config.regulator, &foc.loops.regulator, &fb, i_d, u_q)
 }
 
 /// Applies a commanded current, while the speed regulator stands by to take over.
 #[inline(always)] // in the longest period
-fn commanded(config: &Config, foc: &mut State, shared: &Shared, reference: Reference) {
+fn follow_command(config: &Config, foc: &mut State, shared: &Shared, reference: Reference) {
     let loops = &mut foc.loops;
-    let reference = torque::follow(&config.torque, &mut loops.torque, reference, loops.bounds);
+    let reference = torque::follow(
+        &config.torque,
+        &mut loops.torque,
+        reference,
+        loops.i_q_bounds,
+    );
     config
         .speed
         .begin(&mut loops.speed, shared.seen.speed, reference.i.q);
-    loops.planned = Speed::ZERO;
-    loops.reference = reference.with_i_d(loops.i_d);
+    loops.reference_step = Speed::ZERO;
+    loops.reference = reference.with_i_d(loops.i_d_reference);
 }
 
 /// Delay compensation. The voltage acts from `delay` to `delay + 1` periods after the sample, while the rotor keeps
@@ -194,7 +199,7 @@ fn commanded(config: &Config, foc: &mut State, shared: &Shared, reference: Refer
 /// 15 kHz.
 #[inline(always)] // in the longest period
 pub(in crate::drive) fn delay_compensation(config: &Config, foc: &mut State, shared: &Shared) {
-    foc.loops.advance = sin_cos(config.delay.advance(shared.seen.speed));
+    foc.loops.delay_rotation = sin_cos(config.delay.advance(shared.seen.speed));
 }
 
 /// Updates the signs of the phase currents for the dead time, two periods after each reference. Where braking
@@ -204,7 +209,7 @@ pub(in crate::drive) fn delay_compensation(config: &Config, foc: &mut State, sha
 pub(in crate::drive) fn dead_time_sign(config: &Config, foc: &mut State) {
     let loops = &mut foc.loops;
     loops.dead_time_sign =
-        dead_time::certainty(&config.dead_time, loops.reference.i, loops.advance);
+        dead_time::certainty(&config.dead_time, loops.reference.i, loops.delay_rotation);
 }
 
 /// Updates the observer's gains, which follow speed and torque.

@@ -24,7 +24,7 @@ pub(in crate::drive) fn period(
     sample: &Sample,
     currents: [AdcCounts; 3],
 ) -> Bridge {
-    let stator = clarke_in(foc.loops.order, currents);
+    let stator = clarke_in(foc.loops.phase_order, currents);
     match (&config.observer, &config.regulator) {
         (observer::Config::Compensated(observer), regulator::Config::Synchronous(regulator))
             if config.delay == Delay::One && config.adapt_l.is_none() =>

@@ -25,27 +25,27 @@ traced! {
         /// The last period's slot in the schedule.
         pub(in crate::drive) slot: Slot,
         /// The phase order as the control sees it.
-        pub(in crate::drive) order: PhaseOrder,
+        pub(in crate::drive) phase_order: PhaseOrder,
         /// Reference of the current regulator.
         pub(in crate::drive) reference: Reference,
         pub(in crate::drive) regulator: regulator::State,
         /// Delay compensation: the frame's rotation until the voltage acts.
-        pub(in crate::drive) advance: SinCos,
+        pub(in crate::drive) delay_rotation: SinCos,
         /// Dead-time signs: the reference current as the compensation uses it.
         pub(in crate::drive) dead_time_sign: dead_time::Certainty,
         /// The last two commanded voltages in the stator's frame, latest first.
-        pub(in crate::drive) commanded: [AlphaBeta<Voltage>; 2],
+        pub(in crate::drive) commanded_voltages: [AlphaBeta<Voltage>; 2],
         pub(in crate::drive) inductance: inductance::State,
         pub(in crate::drive) speed: speed::State,
         pub(in crate::drive) torque: torque::State,
         /// Change of ω* in the last period.
-        pub(in crate::drive) planned: Speed,
+        pub(in crate::drive) reference_step: Speed,
         /// i_d* at the present speed.
-        pub(in crate::drive) i_d: Current,
+        pub(in crate::drive) i_d_reference: Current,
         /// Bounds of i_q* at the present speed.
-        pub(in crate::drive) bounds: Bounds,
+        pub(in crate::drive) i_q_bounds: Bounds,
         /// Anti-windup: i_q* minus i_q where the voltage was limited.
-        pub(in crate::drive) deficit: Current,
+        pub(in crate::drive) i_q_shortfall: Current,
         /// The open-loop start.
         pub(in crate::drive) start: start::State,
     }
@@ -57,19 +57,19 @@ impl State {
         Self {
             loops: Loops {
                 slot: 0,
-                order: PhaseOrder::NORMAL,
+                phase_order: PhaseOrder::NORMAL,
                 reference: Reference::default(),
                 regulator: regulator::State::default(),
-                advance: SinCos::of(Angle::ZERO),
+                delay_rotation: SinCos::of(Angle::ZERO),
                 dead_time_sign: Dq::default(),
-                commanded: [AlphaBeta::default(); 2],
+                commanded_voltages: [AlphaBeta::default(); 2],
                 inductance: inductance::State::default(),
                 speed: speed::State::default(),
                 torque: torque::State::default(),
-                planned: Speed::ZERO,
-                i_d: Current::ZERO,
-                bounds: Bounds::default(),
-                deficit: Current::ZERO,
+                reference_step: Speed::ZERO,
+                i_d_reference: Current::ZERO,
+                i_q_bounds: Bounds::default(),
+                i_q_shortfall: Current::ZERO,
                 start: start::State::default(),
             },
             observer: observer::State::default(),
@@ -85,9 +85,9 @@ impl State {
     /// Ends a drive: the next one inherits only the inductance factor.
     pub(in crate::drive) fn rest(&mut self) {
         let loops = &mut self.loops;
-        loops.commanded = [AlphaBeta::default(); 2];
-        loops.planned = Speed::ZERO;
-        loops.deficit = Current::ZERO;
+        loops.commanded_voltages = [AlphaBeta::default(); 2];
+        loops.reference_step = Speed::ZERO;
+        loops.i_q_shortfall = Current::ZERO;
         loops.torque = torque::State::default();
         loops.reference = Reference::default();
         loops.inductance.begin();

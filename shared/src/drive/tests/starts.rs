@@ -387,7 +387,7 @@ fn the_default_loop_does_what_the_one_of_any_observer_and_regulator_does() {
             assert_eq!(
                 with(period),
                 with(|config, foc, shared, sample, currents| {
-                    let stator = clarke_in(foc.loops.order, currents);
+                    let stator = clarke_in(foc.loops.phase_order, currents);
                     any(config, foc, shared, sample, stator)
                 }),
                 "{k}: {phase:?}"

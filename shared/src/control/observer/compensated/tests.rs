@@ -81,7 +81,7 @@ impl Units {
             i: self.current(i),
             v: self.voltage(v),
             inductance: Factor::ONE,
-            planned: Speed::ZERO,
+            reference_step: Speed::ZERO,
             hall: 7,
             swapped: false,
         }
@@ -215,7 +215,7 @@ proptest! {
                 i,
                 v,
                 inductance: Factor::ONE,
-                planned: Speed::from_bits(e),
+                reference_step: Speed::from_bits(e),
                 hall: 0,
                 swapped: false,
             };
