@@ -103,6 +103,9 @@ pub type WideFlux = Quantity<Weber, U24>;
 /// The motor's stated flux, 2/π: the voltage base makes it so for every motor.
 pub const FLUX_NOMINAL: Flux = Flux::from_bits(170_891_319);
 
+/// A quarter of an electrical turn, or 90°.
+pub const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
+
 /// The inverse flux ξ = 1/φ in units of [`Scale::inverse_flux_per_wb`].
 pub type InverseFlux = Quantity<PerWeber, U32>;
 

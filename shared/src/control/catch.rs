@@ -33,7 +33,7 @@ use state::{LOOK_SHIFT, SUM_FRACTION, Stage};
 
 use crate::math::{SinCos, TopProduct, atan2_turns};
 use crate::trace::Trace;
-use crate::units::{AdcCounts, Angle, Speed};
+use crate::units::{AdcCounts, Angle, QUARTER_TURN, Speed};
 use compare::Difference;
 
 /// The highest reading that an observation needs to begin: three times the noise.
@@ -91,12 +91,12 @@ pub fn observe(config: &Config, state: &mut State, terminals: [AdcCounts; 3]) ->
     } else {
         // The back-EMF leads the flux by a quarter of a turn, in the direction of rotation.
         let quarter = if state.omega.is_negative() {
-            -1 << 30
+            -QUARTER_TURN
         } else {
-            1 << 30
+            QUARTER_TURN
         };
         Rotor::Turning {
-            theta: state.theta.wrapping_sub(Angle::from_bits(quarter)),
+            theta: state.theta.wrapping_sub(quarter),
             omega: state.omega,
         }
     }

@@ -10,7 +10,9 @@ use super::transform::Dq;
 use crate::math::{Gain, Held, Quantity, TopProduct};
 use crate::trace::traced;
 use crate::units::dimension::TurnPerPeriod;
-use crate::units::{Angle, Charge, Current, CurrentRate, InverseFlux, Speed, Voltage};
+use crate::units::{
+    Angle, Charge, Current, CurrentRate, InverseFlux, QUARTER_TURN, Speed, Voltage,
+};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,7 +68,7 @@ traced! {
 impl Default for State {
     fn default() -> Self {
         Self {
-            frame: Angle::from_bits(-1 << 30),
+            frame: -QUARTER_TURN,
             charge: Charge::ZERO,
             omega_s: Speed::ZERO,
             acceleration: Speed::ZERO,

@@ -14,7 +14,7 @@
 use super::snapshot::Snapshot;
 use crate::math::Held;
 use crate::protection::{Limit, Limits};
-use crate::units::{AdcCounts, Angle, Current};
+use crate::units::{AdcCounts, Angle, Current, QUARTER_TURN};
 
 /// What the currents have shown since the motor rested.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -61,9 +61,6 @@ const ALL_SEXTANTS: u32 = 0b11_1111;
 /// Suspect rounds after which a direction that has not conducted is open.
 const OPEN_ROUNDS: u32 = 8;
 
-/// A quarter of a turn.
-const QUARTER: Angle = Angle::from_bits(1 << 30);
-
 /// Time constant of the sum's means, in samples, as a power of two: 32 ms.
 const MEAN_SAMPLES_LOG2: u32 = 5;
 
@@ -101,7 +98,7 @@ impl CurrentMonitor {
         let [constant, sine, cosine] = &mut self.sums;
         let turning = average(sine, signed(snapshot.angle)).wrapping_add(average(
             cosine,
-            signed(snapshot.angle.wrapping_add(QUARTER)),
+            signed(snapshot.angle.wrapping_add(QUARTER_TURN)),
         ));
         let unbalance = average(constant, sum).max(turning);
         if unbalance > unbalance_max {

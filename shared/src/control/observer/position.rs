@@ -10,7 +10,7 @@ use fixed::types::U20F12;
 use super::sector::Sector;
 use crate::math::{Gain, divide};
 use crate::trace::traced;
-use crate::units::{Angle, Speed};
+use crate::units::{Angle, QUARTER_TURN, Speed};
 
 /// A time in control periods.
 pub type Periods = U20F12;
@@ -68,7 +68,7 @@ const EDGES_MAX: usize = 6 * TURNS_MAX as usize;
 pub const TURNS_MAX: u8 = 4;
 
 /// θ_inc ≤ 90° (2.4.1).
-const LIMIT: Angle = Angle::from_bits(1 << 30);
+const LIMIT: Angle = QUARTER_TURN;
 
 /// If the estimated speed would have covered a third of a turn without an edge, it was twice too high: the rotor
 /// has turned less than a sixth.

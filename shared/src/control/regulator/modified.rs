@@ -11,7 +11,7 @@ use super::reference::{Feedback, Reference, excess_current};
 use crate::control::transform::Dq;
 use crate::math::{Gain, Held, SinCos, TopProduct, atan2_turns, magnitude};
 use crate::trace::traced;
-use crate::units::{Angle, Current, Voltage, WideVoltage};
+use crate::units::{Angle, Current, QUARTER_TURN, Voltage, WideVoltage};
 
 /// Coefficients for one sample period T_s.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,8 +38,6 @@ traced! {
         pub phase: Angle,
     }
 }
-
-const QUARTER_TURN: Angle = Angle::from_bits(1 << 30);
 
 impl Config {
     /// Returns the voltage of length V at phase δ ahead of q, before any limit: (−V·sin δ, V·cos δ).

@@ -13,7 +13,7 @@ use crate::drive::shared::Shared;
 use crate::drive::transitions::Why;
 use crate::math::SinCos;
 use crate::protection::Fault;
-use crate::units::{Angle, Current};
+use crate::units::{Current, QUARTER_TURN};
 
 /// The coefficients of the attempt that is being made.
 fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
@@ -66,7 +66,7 @@ pub(in crate::drive) fn current(
 /// Expects the rotor's flux along the current, on the frame's q axis.
 fn expect_aligned(config: &Config, foc: &mut State, shared: &Shared) {
     let frame = foc.loops.start.frame;
-    let rotor = frame.wrapping_add(Angle::from_bits(1 << 30));
+    let rotor = frame.wrapping_add(QUARTER_TURN);
     let Dq { d: alpha, q: beta } = rotate_frame(shared.seen.i, SinCos::of(frame.wrapping_neg()));
     let i = AlphaBeta { alpha, beta };
     observer::begin_aligned(&config.observer, &mut foc.observer, rotor, i);
