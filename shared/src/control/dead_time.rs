@@ -33,10 +33,10 @@ pub type Certainty = Dq<FixedI32<U25>>;
 
 /// Returns the certainty of the reference current, which carries no noise. The error by which it lags or leads
 /// is smaller than the proportional zone around zero, where the ripple crosses zero within a period. Called
-/// every few periods; `ahead` is the frame's rotation until the voltage acts.
-pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certainty {
-    let d = config.certainty.saturating_apply(wanted.d).to_bits();
-    let q = config.certainty.saturating_apply(wanted.q).to_bits();
+/// every few periods; `delay_rotation` is the frame's rotation until the voltage acts.
+pub fn certainty(config: &Config, reference: Dq<Current>, delay_rotation: SinCos) -> Certainty {
+    let d = config.certainty.saturating_apply(reference.d).to_bits();
+    let q = config.certainty.saturating_apply(reference.q).to_bits();
     // Shifts less where the result would exceed its type, ±32; beyond that the proportional zone widens in
     // proportion.
     let room = (magnitude(d) | magnitude(q)).leading_zeros() - 1;
@@ -45,7 +45,7 @@ pub fn certainty(config: &Config, wanted: Dq<Current>, ahead: SinCos) -> Certain
         d: I6F26::from_bits(d << shift),
         q: I6F26::from_bits(q << shift),
     };
-    rotate(scaled, ahead)
+    rotate(scaled, delay_rotation)
 }
 
 /// Extra fraction bits of a certainty over its gain's output.

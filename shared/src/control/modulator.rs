@@ -71,16 +71,16 @@ traced! {
         /// 1/V with 28 fraction bits, saturating at 8.
         pub reciprocal: InverseVoltage,
         /// Longest available voltage vector.
-        pub longest: Longest,
+        pub longest: VectorLimit,
         /// Square of the length up to which every phase can be read.
-        pub readable: WideVoltageSquare,
+        pub readable_square: WideVoltageSquare,
     }
 }
 
 traced! {
     /// The longest available voltage vector, and its q component linearised around a d component.
     #[derive(Clone, Copy, Debug, PartialEq)]
-    pub struct Longest {
+    pub struct VectorLimit {
         length: Voltage,
         square: WideVoltageSquare,
         /// Square of that d component.
@@ -92,7 +92,7 @@ traced! {
     }
 }
 
-impl Longest {
+impl VectorLimit {
     /// No vector at all.
     const NONE: Self = Self {
         length: Voltage::ZERO,
@@ -124,7 +124,7 @@ impl Longest {
 
     /// Returns the largest q component beside this d component.
     #[inline(always)] // in each period
-    fn beside(&self, d: Voltage) -> WideVoltage {
+    fn q_max_beside(&self, d: Voltage) -> WideVoltage {
         // Both squares are below 12, the slope below 8.
         let less = self.slope.of(d.top(d) - self.d_square).scaled();
         (self.q - less).max(WideVoltage::ZERO)
@@ -137,17 +137,17 @@ impl Supply {
         let mut supply = Self {
             bus,
             reciprocal: InverseVoltage::ZERO,
-            longest: Longest::NONE,
-            readable: WideVoltageSquare::ZERO,
+            longest: VectorLimit::NONE,
+            readable_square: WideVoltageSquare::ZERO,
         };
-        supply.follow(bus);
-        supply.reach(config, d);
+        supply.set_bus(bus);
+        supply.update_limits(config, d);
         supply
     }
 
-    /// Updates the voltage; [`reach`](Self::reach) updates the lengths it allows.
+    /// Updates the voltage; [`update_limits`](Self::update_limits) updates the lengths it allows.
     #[inline(never)] // only some periods
-    pub fn follow(&mut self, bus: Voltage) {
+    pub fn set_bus(&mut self, bus: Voltage) {
         // 2^56/bus: a 32-bit division by the voltage's upper bits, accurate to 2^-11 at worst, and one Newton
         // step. A bus below 1/8 unit counts as 1/8, which bounds the reciprocal.
         let bits = bus.to_bits().max(1 << 25);
@@ -161,10 +161,10 @@ impl Supply {
 
     /// Updates the lengths a vector may have, for commands with a d component near `d`.
     #[inline(never)] // only some periods
-    pub fn reach(&mut self, config: &Config, d: Voltage) {
+    pub fn update_limits(&mut self, config: &Config, d: Voltage) {
         let length = config.vector_max.top(self.bus).scaled();
-        self.longest = Longest::new(length, d);
-        self.readable = if config.readable.is_negative() {
+        self.longest = VectorLimit::new(length, d);
+        self.readable_square = if config.readable.is_negative() {
             -WideVoltageSquare::DELTA
         } else {
             square(config.readable.top(wide(self.bus)).scaled())
@@ -184,17 +184,17 @@ const TOO_LONG: u32 = 10;
 ///
 /// Returns the vector, and the part cut off if it was shortened.
 #[inline(always)] // in each period
-pub fn limit(u: Dq<WideVoltage>, longest: &Longest) -> (Dq<Voltage>, Option<Dq<WideVoltage>>) {
+pub fn limit(u: Dq<WideVoltage>, longest: &VectorLimit) -> (Dq<Voltage>, Option<Dq<WideVoltage>>) {
     if square_of(u) <= longest.square {
         return (short(u), None);
     }
     let most = wide(longest.length - (longest.length >> D_RESERVE));
     let d = u.d.min(most).max(-most);
-    let short_d = d.scaled();
-    let mut q_max = longest.beside(short_d);
+    let narrow_d = d.scaled();
+    let mut q_max = longest.q_max_beside(narrow_d);
     // Far from its operating point the linearisation is too generous, never too strict.
     if square_of(Dq { d, q: q_max }) > longest.square + (longest.square >> TOO_LONG) {
-        q_max = wide(other_leg(longest.length, short_d));
+        q_max = wide(other_leg(longest.length, narrow_d));
     }
     let q = u.q.min(q_max).max(-q_max);
     let cut = Dq {
@@ -232,8 +232,10 @@ pub fn short(u: Dq<WideVoltage>) -> Dq<Voltage> {
 pub fn duties(
     config: &Config,
     supply: &Supply,
-    (v, order): (AlphaBeta<TurnedVoltage>, PhaseOrder),
-    (dead_time, certainty): (&dead_time::Config, AlphaBeta<I8F24>),
+    v: AlphaBeta<TurnedVoltage>,
+    order: PhaseOrder,
+    dead_time: &dead_time::Config,
+    certainty: AlphaBeta<I8F24>,
 ) -> [Duty; 3] {
     let share: AlphaBeta<Share> = AlphaBeta {
         alpha: v.alpha.top(supply.reciprocal),
@@ -304,8 +306,8 @@ mod tests {
                 alpha: TurnedVoltage::from_num(alpha),
                 beta: TurnedVoltage::from_num(beta),
             };
-            let none = (&dead_time::Config::NONE, AlphaBeta::default());
-            let made = vector(duties(&config, &supply, (v, PhaseOrder::NORMAL), none), bus);
+            let (none, certainty) = (&dead_time::Config::NONE, AlphaBeta::default());
+            let made = vector(duties(&config, &supply, v, PhaseOrder::NORMAL, none, certainty), bus);
             let error = (made.0 - alpha).hypot(made.1 - beta);
             prop_assert!(error < 2e-3 * length.max(1.0), "{error}");
         }
@@ -328,8 +330,10 @@ mod tests {
                         let made = duties(
                             &config,
                             &supply,
-                            (v, PhaseOrder::NORMAL),
-                            (&dead_time::Config::NONE, AlphaBeta::default()),
+                            v,
+                            PhaseOrder::NORMAL,
+                            &dead_time::Config::NONE,
+                            AlphaBeta::default(),
                         );
                         let (alpha, beta) = vector(made, bus);
                         assert!((alpha - length * cos).abs() < 2e-5 * bus.max(1.0));
@@ -352,8 +356,10 @@ mod tests {
         let [a, b, c] = duties(
             &config,
             &supply,
-            (v, PhaseOrder::NORMAL),
-            (&dead_time::Config::NONE, AlphaBeta::default()),
+            v,
+            PhaseOrder::NORMAL,
+            &dead_time::Config::NONE,
+            AlphaBeta::default(),
         )
         .map(|d| d.to_num::<f64>());
         assert!((a + b - 0.9).abs() < 1e-5 && (b - c).abs() < 1e-6);
@@ -366,7 +372,7 @@ mod tests {
             q: WideVoltage::from_num(20),
         };
         let longest =
-            |length: f64| Longest::new(Voltage::from_num(length), Voltage::from_num(-0.29));
+            |length: f64| VectorLimit::new(Voltage::from_num(length), Voltage::from_num(-0.29));
         let (limited, cut) = limit(u, &longest(0.5));
         let rest = Dq {
             d: WideVoltage::ZERO,
@@ -397,8 +403,15 @@ mod tests {
             alpha: I8F24::from_num(20),
             beta: I8F24::from_num(-20.0 / 3.0_f64.sqrt()),
         };
-        let v = (AlphaBeta::default(), PhaseOrder::NORMAL);
-        let made = duties(&config, &supply, v, (&dead_time, certainty));
+        let v = AlphaBeta::default();
+        let made = duties(
+            &config,
+            &supply,
+            v,
+            PhaseOrder::NORMAL,
+            &dead_time,
+            certainty,
+        );
         let [a, b, c] = made.map(|d| d.to_num::<f64>());
         assert!((a - 0.505).abs() < 1e-6, "{a}");
         assert!((b - 0.485).abs() < 1e-6, "{b}");

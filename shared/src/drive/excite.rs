@@ -77,8 +77,10 @@ pub(super) fn period(
         state.mean_h = Voltage::ZERO;
     }
     let at = |behind: usize| (usize::from(phase) + behind) % 3;
-    shared.supply.follow(shared.protection.bus);
-    shared.supply.reach(&config.modulator, Voltage::ZERO);
+    shared.supply.set_bus(shared.protection.bus);
+    shared
+        .supply
+        .update_limits(&config.modulator, Voltage::ZERO);
     // Ordered from the excited phase on, so that Clarke's first component lies along its axis.
     let now = clarke([0, 1, 2].map(|behind| currents[at(behind)]));
     regulate(config, state, shared.supply.bus, now, excitation.current());
@@ -106,9 +108,14 @@ pub(super) fn period(
         alpha: along.scaled(),
         beta: across.scaled(),
     };
-    let none = (&dead_time::Config::NONE, AlphaBeta::default());
-    let v = (v, PhaseOrder::NORMAL);
-    let turned = modulator::duties(&config.modulator, &shared.supply, v, none);
+    let turned = modulator::duties(
+        &config.modulator,
+        &shared.supply,
+        v,
+        PhaseOrder::NORMAL,
+        &dead_time::Config::NONE,
+        AlphaBeta::default(),
+    );
     let mut duties = [Duty::ZERO; 3];
     for (behind, duty) in turned.into_iter().enumerate() {
         duties[at(behind)] = duty;

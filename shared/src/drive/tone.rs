@@ -82,8 +82,10 @@ pub(super) fn period(
 ) -> Bridge {
     state.slot = (state.slot + 1) % CYCLE as u8;
     match state.slot {
-        SUPPLY_SLOT => shared.supply.follow(shared.protection.bus),
-        LONGEST_SLOT => shared.supply.reach(&config.modulator, Voltage::ZERO),
+        SUPPLY_SLOT => shared.supply.set_bus(shared.protection.bus),
+        LONGEST_SLOT => shared
+            .supply
+            .update_limits(&config.modulator, Voltage::ZERO),
         _ => {}
     }
     let currents = currents.map(reading);
@@ -113,15 +115,20 @@ pub(super) fn period(
         alpha: u.scaled(),
         beta: TurnedVoltage::ZERO,
     };
-    let v = (v, PhaseOrder::NORMAL);
-    let none = (&dead_time::Config::NONE, AlphaBeta::default());
-    let duties = modulator::duties(&config.modulator, &shared.supply, v, none);
+    let duties = modulator::duties(
+        &config.modulator,
+        &shared.supply,
+        v,
+        PhaseOrder::NORMAL,
+        &dead_time::Config::NONE,
+        AlphaBeta::default(),
+    );
     // A tone's voltage may be as long as the supply allows.
     let wanted = Dq {
         d: wide(u),
         q: WideVoltage::ZERO,
     };
-    if modulator::square_of(wanted) > shared.supply.readable {
+    if modulator::square_of(wanted) > shared.supply.readable_square {
         shared.applied.expect_unreadable();
     }
     shared.applied.command(duties);

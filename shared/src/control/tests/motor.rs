@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{L, P, PHI, R, TS, Units};
 use crate::control::inductance::Factor;
-use crate::control::modulator::{self, Longest};
+use crate::control::modulator::{self, VectorLimit};
 use crate::control::regulator::{Feedback, Reference, Regulator, State};
 use crate::control::transform::Dq;
 use crate::units::{Current, Voltage, WideVoltage, narrow};
@@ -148,7 +148,7 @@ impl Loop {
         let regulator = &self.units.0.regulator;
         regulator.schedule_gains(&mut self.regulator, feedback.omega, feedback.inductance);
         let asked = regulator.voltage(&self.regulator, wanted, &feedback);
-        let (u, cut) = modulator::limit(asked, &Longest::new(self.vector_max, narrow(asked.d)));
+        let (u, cut) = modulator::limit(asked, &VectorLimit::new(self.vector_max, narrow(asked.d)));
         regulator.integrate(&mut self.regulator, wanted, &feedback);
         if let Some(cut) = cut {
             regulator.anti_windup(&mut self.regulator, cut);

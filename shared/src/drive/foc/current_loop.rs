@@ -86,7 +86,7 @@ pub(super) fn current_loop(
     let fb = observer.feedback(&foc.observer, (frame.omega, i), loops.inductance.factor);
     let demand = regulator.voltage(&loops.regulator, &loops.reference, &fb);
     regulator.integrate(&mut loops.regulator, &loops.reference, &fb);
-    let u = if modulator::square_of(demand) <= shared.supply.readable {
+    let u = if modulator::square_of(demand) <= shared.supply.readable_square {
         modulator::short(demand)
     } else {
         limited(regulator, loops, shared, demand)
@@ -97,15 +97,14 @@ pub(super) fn current_loop(
     // The duties, for where the frame will be when they act.
     let v = inverse_park(rotate(u, loops.delay_rotation), frame.angle);
     loops.commanded_voltages = [voltages(v), loops.commanded_voltages[0]];
-    let dead_time = (
-        &config.dead_time,
-        inverse_park(loops.dead_time_sign, frame.angle),
-    );
+    let certainty = inverse_park(loops.dead_time_sign, frame.angle);
     let duties = modulator::duties(
         &config.modulator,
         &shared.supply,
-        (v, loops.phase_order),
-        dead_time,
+        v,
+        loops.phase_order,
+        &config.dead_time,
+        certainty,
     );
     shared.applied.command(duties);
     Bridge::Duty(duties)

@@ -77,14 +77,16 @@ pub(in crate::drive) fn trip_level(config: &Config, shared: &mut Shared) {
 /// Updates supply voltage and current.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn supply(shared: &mut Shared) {
-    shared.supply.follow(shared.protection.bus);
+    shared.supply.set_bus(shared.protection.bus);
     shared.seen.bus_current = bus_current(shared.seen.u, shared.seen.i, &shared.supply);
 }
 
 /// Updates the longest vector that the supply allows.
 #[inline(never)] // only some periods
 pub(in crate::drive) fn longest_vector(config: &Config, shared: &mut Shared) {
-    shared.supply.reach(&config.modulator, shared.seen.u.d);
+    shared
+        .supply
+        .update_limits(&config.modulator, shared.seen.u.d);
 }
 
 /// Updates the bounds of i_q from the supply current.

@@ -229,12 +229,13 @@ mod tests {
                     alpha: I8F24::from_num(20.0 * cos),
                     beta: I8F24::from_num(20.0 * sin),
                 };
-                let dead_time = (&config.dead_time, certainty);
                 let made = duties(
                     &config.modulator,
                     &supply,
-                    (v, PhaseOrder::NORMAL),
-                    dead_time,
+                    v,
+                    PhaseOrder::NORMAL,
+                    &config.dead_time,
+                    certainty,
                 );
                 let mut made = made.map(|d| d.to_num::<f32>());
                 made.sort_by(f32::total_cmp);
