@@ -22,9 +22,8 @@ OPEN = {
     # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
     # the motor that far, the regulator's voltage rises until the current trips.
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
-    **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
-    **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
-    **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
+    **cells([SIX], ["phase_open"], ["start", "half", "full", "braking"], "current", "cause"),
+    **cells([SIX], ["low_open"], ["start"], "current", "cause"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
     # others' currents up to 2.8 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
     # it is met, and thrust comes later.
@@ -33,32 +32,29 @@ OPEN = {
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # Nor does the six-step drive report a high side that never turns on at full speed, where it carries on with it.
     **cells([SIX], ["high_open"], ["full"], "cause", "time"),
-    # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
-    # nothing with more current.
+    # At idle little more flows than a sound sensor may be off by.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
-    **cells([SIX], ["sensor_zero"], ["start"], "current"),
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
     # Its start takes the current 0.2 A beyond.
     **cells([FOC], ["hall_stuck"], ["idle"], "reaction", "current"),
-    # After a rotor jams at speed, the six-step drive retries starts, each longer than the previous one: 1.5 s after it
-    # was freed one is still under way. A jam in its start is not retried. The field-oriented drive finds the rotor lost
-    # from its flux after 0.1 s, if no current trips.
-    **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
+    # The field-oriented drive finds a jammed rotor lost from its flux after 0.1 s, if no current trips. The six-step
+    # drive misses three sextants first, a period too late at idle; a jam in its start is not retried.
+    **cells([FOC, SIX], ["rotor_blocked"], ["idle"], "time"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "time"),
-    **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
+    **cells([SIX], ["rotor_blocked"], ["half"], "current", "cause"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
     # Nearly all of the back-EMF vanishes faster than the currents are regulated.
-    **cells([FOC, SIX], ["strike"], ["full"], "current"),
+    **cells([FOC], ["strike"], ["full"], "current"),
+    **cells([SIX], ["strike"], ["full"], "current", "cause"),
     **cells([SIX], ["strike"], ["half"], "current"),
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
-    **cells([SIX], ["strike_torque"], ["start"], "reaction"),
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC], ["disconnect"], ["braking"], "supply"),
-    # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
-    **cells([SIX], ["high_short"], ["start"], "current"),
+    # At idle the six-step drive shoots a short through the winding, up to the comparators' level.
+    **cells([SIX], ["high_short"], ["idle"], "current"),
 }
 
 

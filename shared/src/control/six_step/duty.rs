@@ -70,14 +70,14 @@ impl State {
 /// Returns the range that keeps the current `i` within its bounds: the more headroom the current has, the faster
 /// the duty may change; beyond a bound it turns back.
 ///
-/// With `min` = `max` the range is a single value: a current regulator. Adding three times the current's deviation
-/// from its smoothed value looks some 25 periods ahead, which damps motors whose current responds slowly.
+/// With `min` = `max` the range is a single value: a current regulator. Adding four times the current's deviation
+/// from its smoothed value looks some 30 periods ahead, which damps motors whose current responds slowly.
 pub fn range(config: &Config, state: &mut State, i: Current, bounds: Bounds) -> Range {
     let change = i.minus(state.smoothed);
     state.smoothed = state.smoothed.plus(change >> 3);
     let forgotten = state.peak >> PEAK_SHIFT;
     state.peak = state.peak.minus(forgotten).max(i.saturating_abs());
-    let ahead = i.plus(change.saturating_mul_int(3));
+    let ahead = i.plus(change.saturating_mul_int(4));
     let until = |bound: Current| {
         let step = config.k_b.held(bound.minus(ahead));
         let duty = state.duty.plus(step);
@@ -128,7 +128,7 @@ mod tests {
         Config {
             k_p: Gain::new(1.0 / 0.03).expect("in range"),
             k_i: Gain::new(5e-4 / 0.03).expect("in range"),
-            k_b: Gain::new(0.008 / LIMIT_A as f32 * 20.0).expect("in range"),
+            k_b: Gain::new(0.0025 / LIMIT_A as f32 * 20.0).expect("in range"),
             duty_max: I1F31::from_num(0.92),
         }
     }
