@@ -65,7 +65,7 @@ impl Config {
     }
 
     /// Starts or resumes at this speed with this current, bumplessly.
-    pub fn begin(&self, state: &mut State, speed: Speed, i_q: Current) {
+    pub fn preset(&self, state: &mut State, speed: Speed, i_q: Current) {
         state.planner = planner::State::begin(speed);
         match &self.law {
             Law::Nested(_) => state.nested.sigma = stated_torque(i_q),

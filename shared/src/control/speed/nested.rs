@@ -58,9 +58,9 @@ impl Config {
         input: &Input,
     ) -> Reference {
         let slow = &input.slow_estimate;
-        let wanted = planner.reference.plus(step);
+        let reference = planner.reference.plus(step);
         let half_trust = self.trust.held(input.speed).max(I0F32::ZERO);
-        let error = input.speed.minus(wanted);
+        let error = input.speed.minus(reference);
         let error = if half_trust < ALMOST_HALF {
             error.top(half_trust) << 1
         } else {
@@ -75,7 +75,7 @@ impl Config {
         let bounded = input.bounds.hold(i_q);
         if bounded != i_q || input.i_q_shortfall != Current::ZERO {
             let over = i_q.minus(bounded).plus(input.i_q_shortfall);
-            let step = self.conditioned(state, (step, slew), over, integral_step);
+            let step = self.anti_windup(state, (step, slew), over, integral_step);
             planner.advance(step);
             return Reference::steady(bounded);
         }
@@ -104,7 +104,7 @@ impl Config {
     /// unavailable. The error then continues as if nothing were limited, and so may the integrator,
     /// unless that step exceeds the slew.
     #[cold]
-    fn conditioned(
+    fn anti_windup(
         &self,
         state: &mut State,
         (step, slew): (Speed, Speed),

@@ -33,7 +33,7 @@ impl Bench {
         };
         let mut speed = speed::State::default();
         let begin = units.speed(motor.omega());
-        units.0.speed.begin(&mut speed, begin, Current::ZERO);
+        units.0.speed.preset(&mut speed, begin, Current::ZERO);
         Self {
             inner: Loop::new(units, motor),
             speed,

@@ -66,7 +66,7 @@ impl Case {
         let mut state = State::default();
         let begin = units.speed(P * self.omega_star);
         let i_q = units.current(self.sigma_nm / TORQUE_CONSTANT);
-        config.begin(&mut state, begin, i_q);
+        config.preset(&mut state, begin, i_q);
         let before = sigma(units, &state);
         let step = units.speed(P * self.omega_dot_star * T);
         let wanted = config.current(
@@ -215,7 +215,7 @@ fn the_current_of_the_propeller_goes_with_the_square_of_the_speed() {
     let at = |rpm: f32| {
         let speed = units.0.scale.speed_from_rpm(rpm);
         let mut state = State::default();
-        units.0.speed.begin(&mut state, speed, Current::ZERO);
+        units.0.speed.preset(&mut state, speed, Current::ZERO);
         -sigma(&units, &state)[1]
     };
     for (rpm, i_q) in [(6000.0, 8.0), (3000.0, 2.0), (600.0, 0.08), (-3000.0, -2.0)] {

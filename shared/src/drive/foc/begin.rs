@@ -100,7 +100,7 @@ fn enter_drive(
     };
     let speed = &mut foc.loops.speed;
     if let Some(omega) = omega {
-        config.speed.begin(speed, omega, Current::ZERO);
+        config.speed.preset(speed, omega, Current::ZERO);
         // A rotor that turns the other way is stopped first.
         if shared.reversed == backward {
             Why::Caught
@@ -110,7 +110,7 @@ fn enter_drive(
     } else {
         let (frame, hall) = (foc.loops.start.frame, hall(sample, swapped));
         if observer::begin_at_rest(&config.observer, &mut foc.observer, frame, hall) {
-            config.speed.begin(speed, Speed::ZERO, Current::ZERO);
+            config.speed.preset(speed, Speed::ZERO, Current::ZERO);
             Why::Caught
         } else {
             Why::Stands
@@ -122,7 +122,7 @@ fn enter_drive(
 #[cold]
 pub(in crate::drive) fn resume(config: &Config, foc: &mut State, shared: &Shared) {
     let (speed, i_q) = (shared.seen.speed, shared.seen.i.q);
-    config.speed.begin(&mut foc.loops.speed, speed, i_q);
+    config.speed.preset(&mut foc.loops.speed, speed, i_q);
 }
 
 /// Returns the back-EMF at this speed.

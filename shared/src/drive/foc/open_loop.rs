@@ -151,7 +151,7 @@ pub(in crate::drive) fn stand_by(config: &Config, foc: &mut State) {
     // The ramp current includes the acceleration, which the load does not take.
     config
         .speed
-        .begin(&mut loops.speed, loops.start.omega_s, Current::ZERO);
+        .preset(&mut loops.speed, loops.start.omega_s, Current::ZERO);
 }
 
 /// Ends the ramp: turns the control's frame from the ramp's angle to the rotor, and begins Run with the present

@@ -191,7 +191,7 @@ fn follow_command(config: &Config, foc: &mut State, shared: &Shared, reference: 
     );
     config
         .speed
-        .begin(&mut loops.speed, shared.seen.speed, reference.i.q);
+        .preset(&mut loops.speed, shared.seen.speed, reference.i.q);
     loops.reference_step = Speed::ZERO;
     loops.reference = reference.with_i_d(loops.i_d_reference);
 }
