@@ -156,8 +156,6 @@ pub fn lost(config: &Config, state: &State) -> bool {
     state.astray > config.astray_periods
 }
 
-impl State {}
-
 /// The maximum speed, half a turn per period, with 28 fraction bits.
 const SPEED_END: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(1 << 27);
 

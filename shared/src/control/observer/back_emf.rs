@@ -247,8 +247,6 @@ pub fn take_over(config: &Config, state: &mut State, omega_s: Speed) -> Option<A
     Some(lead)
 }
 
-impl State {}
-
 /// Returns the rotor's angle from the imposed frame: θ̃ = θ − θ̂ of h = χ·(sin θ̃, −cos θ̃) (5).
 ///
 /// `None` if the back-EMF is not between half and twice what the stated flux gives at the frame's

@@ -96,7 +96,7 @@ pub fn detect(
     };
     let excess = beyond(now);
     if excess > Flux::ZERO {
-        return cross(config, state, next, (beyond(before), excess), now, omega);
+        return accept(config, state, next, (beyond(before), excess), now, omega);
     }
     if state.since >= config.patience {
         state.sound = 0;
@@ -106,7 +106,7 @@ pub fn detect(
 }
 
 /// Handles a flux beyond the deadband: a crossing, unless held off.
-fn cross(
+fn accept(
     config: &Config,
     state: &mut State,
     sector: Sector,
@@ -131,9 +131,10 @@ fn cross(
     state.sector = sector;
     state.since = 0;
     // If it was already beyond, the hold-off delayed the crossing, or it came out of order.
-    let late = match before < Flux::ZERO {
-        true => ratio(excess, excess.minus(before)),
-        false => Periods::ONE,
+    let late = if before < Flux::ZERO {
+        ratio(excess, excess.minus(before))
+    } else {
+        Periods::ONE
     };
     Some(Crossing {
         sector,

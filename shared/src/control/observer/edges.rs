@@ -103,22 +103,22 @@ pub fn estimate(
     };
     let crossing = match config.sensors {
         Sensors::Hall => None,
-        Sensors::None | Sensors::Merged => observe(config, state, v, i),
+        Sensors::None | Sensors::Merged => flux_crossing(config, state, v, i),
     };
-    choose(config, state);
+    select_source(config, state);
     match (state.source, step, crossing) {
-        (Source::Hall, Some(step), _) => sensed(config, state, step),
-        (Source::Flux, _, Some(crossing)) => crossed(config, state, &crossing),
+        (Source::Hall, Some(step), _) => hall_edge(config, state, step),
+        (Source::Flux, _, Some(crossing)) => flux_edge(config, state, &crossing),
         _ => {}
     }
     if state.source == Source::Hall {
-        rest(config, state);
+        rest_without_edges(config, state);
     }
-    position(state)
+    estimated_position(state)
 }
 
 /// Runs the flux observers and their comparator; checks crossings against the Hall sensors.
-fn observe(
+fn flux_crossing(
     config: &Config,
     state: &mut State,
     v: [Voltage; 3],
@@ -143,8 +143,8 @@ fn observe(
     flux_linkage::adapt(&config.flux, flux, found.amplitude);
     if crossing.trusted()
         && position.omega >= config.hall_below
-        && let Some(sensed) = hall.sector
-        && matches!(sensed.steps_to(found.sector), 2..=4)
+        && let Some(hall_sector) = hall.sector
+        && matches!(hall_sector.steps_to(found.sector), 2..=4)
     {
         hall::contradict(hall);
     }
@@ -152,7 +152,7 @@ fn observe(
 }
 
 /// Selects the source by the available sensors and, with both, by speed.
-fn choose(config: &Config, state: &mut State) {
+fn select_source(config: &Config, state: &mut State) {
     let omega = state.position.omega;
     let wanted = match (config.sensors, state.source) {
         (Sensors::None, _) => Source::Flux,
@@ -169,17 +169,17 @@ fn choose(config: &Config, state: &mut State) {
     };
     if wanted != state.source {
         state.source = wanted;
-        position::retime(&mut state.position);
+        position::restart_timing(&mut state.position);
     }
 }
 
 /// Handles a flux edge.
-fn crossed(config: &Config, state: &mut State, crossing: &Crossing) {
-    position::time(&config.position, &mut state.position, crossing.late);
+fn flux_edge(config: &Config, state: &mut State, crossing: &Crossing) {
+    position::time_edge(&config.position, &mut state.position, crossing.late);
     // λ̂ leads the rotor's flux and so crosses zero early; the deadband makes it late.
     let lead = flux_linkage::lead(&config.flux, state.position.omega);
     let ahead = config.crossing.deadband_angle.wrapping_sub(lead);
-    position::place(
+    position::place_at_edge(
         &config.position,
         &mut state.position,
         crossing.sector,
@@ -188,14 +188,14 @@ fn crossed(config: &Config, state: &mut State, crossing: &Crossing) {
 }
 
 /// Handles a change of the Hall code.
-fn sensed(config: &Config, state: &mut State, step: Step) {
+fn hall_edge(config: &Config, state: &mut State, step: Step) {
     let position = &mut state.position;
     match step {
-        Step::Found(sector) | Step::Back(sector) => position::stand(position, sector),
-        Step::Jump(sector) => position::settle(position, sector.middle()),
+        Step::Found(sector) | Step::Back(sector) => position::set_to_rest(position, sector),
+        Step::Jump(sector) => position::set_angle(position, sector.middle()),
         Step::Forward(sector) => {
-            position::time(&config.position, position, HALL_LATE);
-            position::place(&config.position, position, sector, Angle::ZERO);
+            position::time_edge(&config.position, position, HALL_LATE);
+            position::place_at_edge(&config.position, position, sector, Angle::ZERO);
         }
     }
 }
@@ -205,17 +205,17 @@ fn sensed(config: &Config, state: &mut State, step: Step) {
 const HALL_LATE: Periods = Periods::from_bits((2 * hall::SAMPLES - 1) << (Periods::FRAC_NBITS - 1));
 
 /// After a long time without edges, sets the rotor to rest somewhere in its sector.
-fn rest(config: &Config, state: &mut State) {
+fn rest_without_edges(config: &Config, state: &mut State) {
     let position = &mut state.position;
     if position.since >= config.crossing.patience
         && position.omega > Speed::ZERO
-        && let Some(sector) = state.hall.believed()
+        && let Some(sector) = state.hall.trusted_sector()
     {
-        position::stand(position, sector);
+        position::set_to_rest(position, sector);
     }
 }
 
-fn position(state: &State) -> Position {
+fn estimated_position(state: &State) -> Position {
     let position = &state.position;
     Position {
         theta: position.theta,
@@ -223,7 +223,7 @@ fn position(state: &State) -> Position {
         omega_step: position.omega_step,
         known: match state.source {
             Source::Flux => state.crossing.tracks,
-            Source::Hall => state.hall.believed().is_some(),
+            Source::Hall => state.hall.trusted_sector().is_some(),
         },
         sensor_fault: state.hall.fault,
     }
@@ -247,10 +247,10 @@ pub fn begin_at_rest(config: &Config, state: &mut State, hall: u8) -> bool {
     if config.sensors == Sensors::None {
         return false;
     }
-    let Some(sector) = hall::look(&mut state.hall, hall) else {
+    let Some(sector) = hall::read_at_rest(&mut state.hall, hall) else {
         return false;
     };
-    position::stand(&mut state.position, sector);
+    position::set_to_rest(&mut state.position, sector);
     true
 }
 
@@ -260,8 +260,6 @@ pub fn locked_angle(state: &State) -> Option<Angle> {
     let known = state.crossing.tracks && position.omega.is_positive();
     known.then(|| position.theta.wrapping_add(position.omega.over_period()))
 }
-
-impl State {}
 
 #[cfg(test)]
 mod tests;

@@ -180,7 +180,5 @@ fn shortened(flux: Flux, angle: Angle) -> Flux {
     flux.top(SinCos::of(angle).cos).scaled()
 }
 
-impl State {}
-
 #[cfg(test)]
 mod tests;

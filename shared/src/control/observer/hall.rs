@@ -18,7 +18,7 @@ traced! {
         /// Code of the last sample.
         pub code: u8,
         /// Last code seen in two consecutive samples.
-        pub held: u8,
+        pub stable_code: u8,
         /// Sector of the last valid one.
         pub sector: Option<Sector>,
         /// Periods for which it has been invalid.
@@ -57,11 +57,12 @@ pub fn read(config: &Config, state: &mut State, code: u8) -> Option<Step> {
     let code = code & 7;
     let lasts = code == state.code;
     state.code = code;
-    let step = match lasts && code != state.held {
-        true => change(state, code),
-        false => None,
+    let step = if lasts && code != state.stable_code {
+        step_to(state, code)
+    } else {
+        None
     };
-    if Sector::of_code(state.held).is_some() {
+    if Sector::of_code(state.stable_code).is_some() {
         state.invalid = 0;
     } else {
         state.invalid = state.invalid.saturating_add(1);
@@ -72,20 +73,20 @@ pub fn read(config: &Config, state: &mut State, code: u8) -> Option<Step> {
 
 /// Returns the sector, from this sample's code, of a rotor not tracked since the last drive, if the sensors can be
 /// trusted. Keeps the evidence against them, but drops the position from before, as the rotor may have been turned.
-pub fn look(state: &mut State, code: u8) -> Option<Sector> {
+pub fn read_at_rest(state: &mut State, code: u8) -> Option<Sector> {
     let code = code & 7;
     *state = State {
         code,
-        held: code,
+        stable_code: code,
         sector: Sector::of_code(code),
         invalid: 0,
         ..*state
     };
-    state.believed()
+    state.trusted_sector()
 }
 
-fn change(state: &mut State, code: u8) -> Option<Step> {
-    state.held = code;
+fn step_to(state: &mut State, code: u8) -> Option<Step> {
+    state.stable_code = code;
     let Some(sector) = Sector::of_code(code) else {
         contradict(state);
         return None;
@@ -115,7 +116,7 @@ pub fn contradict(state: &mut State) {
 
 impl State {
     /// Returns the sector while the sensors can be trusted.
-    pub fn believed(&self) -> Option<Sector> {
+    pub fn trusted_sector(&self) -> Option<Sector> {
         self.sector.filter(|_| !self.fault)
     }
 }
@@ -161,11 +162,11 @@ mod tests {
         let sector = |code| Sector::of_code(code).expect("valid");
         show(&mut state, 0b011);
         for code in [0b011, 0b100] {
-            assert_eq!(look(&mut state, code), Some(sector(code)));
+            assert_eq!(read_at_rest(&mut state, code), Some(sector(code)));
             assert_eq!(show(&mut state, code), None);
         }
         assert_eq!(state.evidence, 0);
-        assert_eq!(look(&mut state, 0b111), None);
+        assert_eq!(read_at_rest(&mut state, 0b111), None);
         assert!(!state.fault);
     }
 
@@ -207,7 +208,7 @@ mod tests {
                     });
                 }
                 assert!(state.fault, "{bit} {high}");
-                assert_eq!(state.believed(), None);
+                assert_eq!(state.trusted_sector(), None);
             }
         }
     }

@@ -89,47 +89,47 @@ pub fn advance(state: &mut State) {
     state.theta_inc += step;
     state.since = state.since.saturating_add(1);
     if state.theta_inc == LIMIT && turned(state.since, state.omega) >= THIRD_TURN {
-        overdue(state);
+        halve_speed(state);
     }
 }
 
 #[cold]
-fn overdue(state: &mut State) {
+fn halve_speed(state: &mut State) {
     state.omega = state.omega >> 1;
     state.omega_step = Speed::ZERO;
-    forget(state);
+    discard_intervals(state);
 }
 
 /// Excludes the intervals so far from the next measurements.
-fn forget(state: &mut State) {
+fn discard_intervals(state: &mut State) {
     state.edges = 0;
     state.window = Periods::ZERO;
 }
 
 /// Uses the time of an edge, `late` before this sample, to measure the speed.
-pub fn time(config: &Config, state: &mut State, late: Periods) {
+pub fn time_edge(config: &Config, state: &mut State, late: Periods) {
     let since = Periods::saturating_from_num(state.since);
     let interval = since.saturating_add(state.late).saturating_sub(late);
     state.since = 0;
     state.late = late;
     if !state.timed {
         state.timed = true;
-        forget(state);
+        discard_intervals(state);
         return;
     }
     let wanted = 6 * config.turns.clamp(1, TURNS_MAX);
-    remember(state, interval, wanted);
+    store_interval(state, interval, wanted);
     // 32 + 12 fraction bits. Slow: at that speed the rotor would have turned more than a sixth in the interval.
     let whole_turns = u64::from(config.whole_turns_above.to_bits().max(0) as u32);
     if u64::from(interval.to_bits()) * whole_turns > (1 << 44) / 6 {
-        measure(state, 1, interval);
+        set_speed(state, 1, interval);
     } else if state.edges == wanted {
-        measure(state, wanted, state.window);
+        set_speed(state, wanted, state.window);
     }
 }
 
 /// Stores an interval in the ring, replacing the oldest once the wanted number is there.
-fn remember(state: &mut State, interval: Periods, wanted: u8) {
+fn store_interval(state: &mut State, interval: Periods, wanted: u8) {
     let size = EDGES_MAX as u8;
     if state.edges >= wanted {
         let oldest = usize::from((state.next + size - wanted) % size);
@@ -143,7 +143,7 @@ fn remember(state: &mut State, interval: Periods, wanted: u8) {
 }
 
 /// Sets ω̂ from this many sixths of a turn in this time.
-fn measure(state: &mut State, sixths: u8, time: Periods) {
+fn set_speed(state: &mut State, sixths: u8, time: Periods) {
     // Turns with 44 fraction bits over periods with 12.
     let turns = divide(u64::from(sixths) << 44, 6);
     let omega = divide(turns, time.to_bits().max(1)).min(OMEGA_MAX);
@@ -160,7 +160,7 @@ fn measure(state: &mut State, sixths: u8, time: Periods) {
 
 /// Uses the position of an edge: the start of `sector`, where the rotor was [`State::late`] before this sample,
 /// `ahead` of the nominal edge. Merges it with the extrapolated angle (2.4.2).
-pub fn place(config: &Config, state: &mut State, sector: Sector, ahead: Angle) {
+pub fn place_at_edge(config: &Config, state: &mut State, sector: Sector, ahead: Angle) {
     let mut theta = sector.begin();
     if config.compensates {
         // 32 + 12 − 12 fraction bits; less than two periods at less than a quarter turn each.
@@ -181,22 +181,22 @@ pub fn place(config: &Config, state: &mut State, sector: Sector, ahead: Angle) {
 }
 
 /// Puts the rotor where it must be, and restarts the speed measurement at the next edge.
-pub fn settle(state: &mut State, theta: Angle) {
+pub fn set_angle(state: &mut State, theta: Angle) {
     state.theta = theta;
     state.theta_inc = Angle::ZERO;
-    retime(state);
+    restart_timing(state);
 }
 
 /// Restarts the speed measurement: the next edges come from another source.
-pub fn retime(state: &mut State) {
+pub fn restart_timing(state: &mut State) {
     // The next edge discards the intervals so far.
     state.timed = false;
     state.omega_step = Speed::ZERO;
 }
 
 /// Sets the rotor to rest, somewhere in this sector.
-pub fn stand(state: &mut State, sector: Sector) {
-    settle(state, sector.middle());
+pub fn set_to_rest(state: &mut State, sector: Sector) {
+    set_angle(state, sector.middle());
     state.omega = Speed::ZERO;
 }
 
@@ -210,8 +210,6 @@ pub fn begin(state: &mut State, theta: Angle, omega: Speed) {
         ..State::default()
     };
 }
-
-impl State {}
 
 #[cfg(test)]
 mod tests;

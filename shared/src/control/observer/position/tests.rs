@@ -24,8 +24,8 @@ fn sector(index: u32) -> Sector {
 }
 
 fn edge(config: &Config, state: &mut State, index: u32, late: f64) {
-    time(config, state, Periods::from_num(late));
-    place(config, state, sector(index), Angle::ZERO);
+    time_edge(config, state, Periods::from_num(late));
+    place_at_edge(config, state, sector(index), Angle::ZERO);
 }
 
 /// A rotor at constant speed, with an edge in the sample after each sixth of a turn.
@@ -123,12 +123,12 @@ proptest! {
             (0..times).for_each(|_| advance(&mut state));
             match what {
                 0 => begin(&mut state, Angle::from_bits(a as i32), Speed::from_bits(b as i32)),
-                1 => stand(&mut state, sector(a % 6)),
-                2 => settle(&mut state, Angle::from_bits(a as i32)),
+                1 => set_to_rest(&mut state, sector(a % 6)),
+                2 => set_angle(&mut state, Angle::from_bits(a as i32)),
                 3 => state.since = u32::MAX - 1,
                 _ => {
-                    time(&config, &mut state, Periods::from_bits(b % 6145));
-                    place(&config, &mut state, sector(a % 6), Angle::from_bits(c as i32));
+                    time_edge(&config, &mut state, Periods::from_bits(b % 6145));
+                    place_at_edge(&config, &mut state, sector(a % 6), Angle::from_bits(c as i32));
                 }
             }
             prop_assert!((Angle::ZERO..=LIMIT).contains(&state.theta_inc), "{}", state.theta_inc);
