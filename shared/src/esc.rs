@@ -12,15 +12,13 @@ use crate::drive::Tracker;
 use crate::drive::{Config, CurrentMonitor, Drift, Phase, Setpoint, Snapshot, put_default};
 use crate::identify::Identify;
 use crate::input::authority::{Command, DriveStatus};
-use crate::math::{Real, magnitude};
+use crate::math::Real;
 #[cfg(feature = "group")]
 use crate::mavlink::Four;
 use crate::mavlink::{Component, Context, Frame, NO_REBOOT_ARMED, Request, Warning};
-use crate::params::{
-    Board, BuildError, ParamId, Params, TRIP_SHARE, build_in, scale, thresholds, unbalance_max,
-};
+use crate::params::{Board, BuildError, ParamId, Params, TRIP_SHARE, build_in, scale};
 use crate::record::Record;
-use crate::statistics::{Inputs, Recorder};
+use crate::statistics::Recorder;
 use crate::telemetry::{Charge, Telemetry};
 use crate::throttle::{LockThrottle, LockedAuthority, TaskDemands, Throttle};
 use crate::tune::Tune;
@@ -35,14 +33,12 @@ mod drift;
 mod group;
 mod identify;
 mod kept;
+mod observe;
 mod storage;
 mod tunes;
 mod wire;
 
 pub use storage::obey;
-
-/// How far below `LIM_TEMP_C` an over-temperature clears, °C.
-const TEMPERATURE_HYSTERESIS_C: f32 = 5.0;
 
 /// How long a wire with a signal must have demanded rest before the flash is written, µs: writing stalls the
 /// processor, so a flight controller's frames are missed.
@@ -289,19 +285,9 @@ impl Esc {
             self.tunes.play(now_us, Tune::Start);
         }
         let before_us = self.polled_us.replace(now_us).unwrap_or(now_us);
-        self.observe(
-            now_us,
-            snapshot,
-            temperature_c,
-            now_us - before_us.min(now_us),
-        );
-        let wire = throttle.lock(|throttle| throttle.poll(now_us, &self.telemetry));
-        self.telemetry.armed = wire.armed;
-        self.telemetry.signal = wire.signal;
-        self.telemetry.bad_frames = wire.bad_frames;
-        self.telemetry.bad_share = wire.bad_share;
-        self.traffic = wire.traffic;
-        self.command = wire.command;
+        let elapsed_us = now_us - before_us.min(now_us);
+        self.observe(now_us, snapshot, temperature_c, elapsed_us);
+        self.poll_wire(throttle, now_us);
         self.follow_wire(throttle, now_us);
         if self.storage.reminds(now_us) {
             self.warn_of(storage::LOST);
@@ -318,56 +304,35 @@ impl Esc {
         self.rests_since_us = rests.then(|| self.rests_since_us.unwrap_or(now_us));
         self.tunes.poll(now_us, snapshot, rests);
         self.poll_identification(now_us, snapshot);
-        let demands = TaskDemands {
-            note: self.tunes.note().filter(|_| !self.check.powers_up()),
+        let demands = self.demands();
+        throttle.lock(|throttle| throttle.set_demands(demands));
+    }
+
+    /// Polls the throttle wire and takes in its status.
+    fn poll_wire(&mut self, throttle: &mut impl LockThrottle, now_us: u64) {
+        let wire = throttle.lock(|throttle| throttle.poll(now_us, &self.telemetry));
+        self.telemetry.armed = wire.armed;
+        self.telemetry.signal = wire.signal;
+        self.telemetry.bad_frames = wire.bad_frames;
+        self.telemetry.bad_share = wire.bad_share;
+        self.traffic = wire.traffic;
+        self.command = wire.command;
+    }
+
+    /// Returns what the tasks demand of the drive.
+    fn demands(&self) -> TaskDemands {
+        let powers_up = self.check.powers_up();
+        TaskDemands {
+            note: self.tunes.note().filter(|_| !powers_up),
             test: self
                 .check
                 .pull()
                 .map(Setpoint::Pull)
                 .or_else(|| self.identification()),
             too_hot: self.too_hot,
-            barred: self.check.powers_up()
+            barred: powers_up
                 || self.storage.is_lost()
                 || !self.check.report.may_turn(&self.params),
-        };
-        throttle.lock(|throttle| throttle.set_demands(demands));
-    }
-
-    /// Takes in the state of the drive and the board.
-    fn observe(&mut self, now_us: u64, snapshot: &Snapshot, temperature_c: f32, time_us: u64) {
-        let limit_c = self.params.get(ParamId::LimTempC);
-        let limit_c = if self.too_hot {
-            limit_c - TEMPERATURE_HYSTERESIS_C
-        } else {
-            limit_c
-        };
-        // A NaN reading counts as too hot.
-        self.too_hot = temperature_c.is_nan() || temperature_c > limit_c;
-        #[cfg(feature = "drift")]
-        self.follow_motor(snapshot);
-        self.telemetry.observe(snapshot, &self.scale, time_us);
-        let found = self
-            .current_monitor
-            .update(snapshot, unbalance_max(&self.board));
-        for limit in found.without(self.telemetry.limits).iter() {
-            self.warn_of(limit.text());
-        }
-        let binding = thresholds(&self.params, &self.scale).limits(snapshot);
-        self.telemetry.limits = binding.with(found);
-        self.charge
-            .add(self.scale.amperes(snapshot.bus_current), time_us);
-        self.telemetry.consumed_mah = self.charge.mah();
-        self.telemetry.temperature_c = temperature_c;
-        let inputs = Inputs {
-            phase: snapshot.phase,
-            faults: snapshot.faults,
-            temperature_c,
-            phase_a: self.scale.amperes(magnitude(snapshot.i.d, snapshot.i.q)),
-            time_us: u32::try_from(time_us).unwrap_or(u32::MAX),
-        };
-        let rests = self.recorder.poll(&mut self.telemetry.statistics, &inputs);
-        if rests {
-            self.storage.changed(now_us);
         }
     }
 
