@@ -57,9 +57,9 @@ traced! {
         /// Its change per period.
         pub acceleration: Speed,
         /// Angle by which the frame yields to the rotor's swing.
-        pub yielded: Angle,
+        pub yield_angle: Angle,
         /// Its change per period.
-        pub yielding: Speed,
+        pub yield_speed: Speed,
         /// Periods in which the rotor turned too slowly, minus those in which it did not.
         pub astray: u32,
     }
@@ -72,8 +72,8 @@ impl Default for State {
             charge: Charge::ZERO,
             omega_s: Speed::ZERO,
             acceleration: Speed::ZERO,
-            yielded: Angle::ZERO,
-            yielding: Speed::ZERO,
+            yield_angle: Angle::ZERO,
+            yield_speed: Speed::ZERO,
             astray: 0,
         }
     }
@@ -106,7 +106,7 @@ pub fn ramp(config: &Config, state: &mut State, current: Current) {
 /// Advances the frame by one period and returns its speed.
 pub fn advance(state: &mut State) -> Speed {
     state.omega_s = state.omega_s.plus(state.acceleration);
-    let omega = state.omega_s.plus(state.yielding);
+    let omega = state.omega_s.plus(state.yield_speed);
     state.frame = state.frame.wrapping_add(omega.over_period());
     omega
 }
@@ -118,26 +118,27 @@ pub fn advance(state: &mut State) -> Speed {
 ///
 /// Called every `periods` periods, which are few compared with a swing.
 pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage>), periods: u32) {
-    state.yielded = state
-        .yielded
-        .plus((state.yielding * periods as i32).over_period());
+    state.yield_angle = state
+        .yield_angle
+        .plus((state.yield_speed * periods as i32).over_period());
     let omega_s = state.omega_s;
-    let omega = omega_s.plus(state.yielding);
+    let omega = omega_s.plus(state.yield_speed);
     let h_d = config
         .resistance
         .saturating_apply(i.d)
         .minus(config.reactance.saturating_apply(omega.top(i.q)))
         .minus(u.d);
     // ξ·h_d has 28 fraction bits, a speed 32.
-    let rotor = config.xi_nominal.top(h_d);
-    let rotor = rotor
+    let rotor_speed = config
+        .xi_nominal
+        .top(h_d)
         .max(-SPEED_END)
         .min(SPEED_END - Quantity::DELTA)
         .scaled();
     // On average a rotor that follows turns as fast as the frame. Below a quarter of the speed at
     // which Run begins, its swing is as fast.
     if omega_s > config.run_speed / 4 {
-        state.astray = if rotor < omega_s / 2 {
+        state.astray = if rotor_speed < omega_s / 2 {
             state.astray + periods
         } else {
             state.astray.saturating_sub(periods)
@@ -145,10 +146,10 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
     }
     let target = config
         .yielding
-        .saturating_apply(omega_s.minus(rotor))
-        .min(YIELDED_MAX)
-        .max(-YIELDED_MAX);
-    state.yielding = config.yield_rate.apply(target.minus(state.yielded));
+        .saturating_apply(omega_s.minus(rotor_speed))
+        .min(YIELD_ANGLE_MAX)
+        .max(-YIELD_ANGLE_MAX);
+    state.yield_speed = config.yield_rate.apply(target.minus(state.yield_angle));
 }
 
 /// Returns true if the rotor has lost the frame of Ramp.
@@ -160,7 +161,7 @@ pub fn lost(config: &Config, state: &State) -> bool {
 const SPEED_END: Quantity<TurnPerPeriod, U28> = Quantity::from_bits(1 << 27);
 
 /// The most that the frame yields: a sixteenth of a turn.
-const YIELDED_MAX: Angle = Angle::from_bits(1 << 28);
+const YIELD_ANGLE_MAX: Angle = Angle::from_bits(1 << 28);
 
 #[cfg(test)]
 mod tests {
@@ -236,7 +237,7 @@ mod tests {
             for _ in 0..1000 {
                 damp(&config, &mut state, (i, u), 2);
             }
-            state.yielded.to_num::<f64>()
+            state.yield_angle.to_num::<f64>()
         };
         // Rotor at ξ·h_d = 0.00025 turns per period: 200 times that against the swing.
         assert!((settle(0.001, 0.0) + 0.05).abs() < 1e-3);
@@ -252,7 +253,7 @@ mod tests {
         let (omega_s, yielding) = (0.001, 0.0005);
         let mut state = State {
             omega_s: Speed::from_num(omega_s),
-            yielding: Speed::from_num(yielding),
+            yield_speed: Speed::from_num(yielding),
             ..State::default()
         };
         // The rotor turns as fast as the current's vector without its yielding. R·i_d is none.
@@ -267,7 +268,7 @@ mod tests {
         damp(&config, &mut state, (i, u), 2);
         // Back by a fiftieth of what it has yielded in the two periods.
         let back = 0.02 * 2.0 * yielding;
-        let error = state.yielding.to_num::<f64>() + back;
+        let error = state.yield_speed.to_num::<f64>() + back;
         assert!(error.abs() < 1e-7, "{state:?}");
     }
 
