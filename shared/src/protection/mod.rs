@@ -100,7 +100,7 @@ pub fn check(
     state.rise = bus.wrapping_sub(state.bus) >> 3;
     state.bus = state.bus.wrapping_add(state.rise);
 
-    if currents.is_some_and(|currents| beyond(state.trip, currents)) {
+    if currents.is_some_and(|currents| exceeds_trip(state.trip, currents)) {
         state.over_current_samples = state.over_current_samples.saturating_add(1);
         if state.over_current_samples >= OVER_CURRENT_SAMPLES {
             return Some(Fault::OverCurrent);
@@ -120,12 +120,13 @@ pub fn check(
 }
 
 /// Returns true if a phase's current is beyond ±`trip`.
-fn beyond(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
+fn exceeds_trip(trip: AdcCounts, currents: [AdcCounts; 3]) -> bool {
     let trip = trip.to_bits();
     // Below −trip wraps around to above 2·trip: one comparison per phase.
-    let far = |current: AdcCounts| current.to_bits().wrapping_add(trip) as u32 > 2 * trip as u32;
+    let exceeds =
+        |current: AdcCounts| current.to_bits().wrapping_add(trip) as u32 > 2 * trip as u32;
     let [a, b, c] = currents;
-    far(a) || far(b) || far(c)
+    exceeds(a) || exceeds(b) || exceeds(c)
 }
 
 /// Makes the trip follow `LIM_PHASE_A`: at once if raised; if lowered, when the current vector `i` is down to
@@ -143,17 +144,17 @@ pub fn follow_limit(config: &Config, state: &mut State, i: Dq<Current>) {
 /// Returns `i_d`, or a larger one that burns more of the supply's power as its voltage nears the limit: no bound on
 /// i_q and no current measurement is exact enough for a supply that sinks no current at all.
 #[inline(always)] // a comparison, in the longest period of the control
-pub fn burn(config: &Config, state: &State, i_d: Current) -> Current {
+pub fn burning_i_d(config: &Config, state: &State, i_d: Current) -> Current {
     if state.bus <= config.bus_return_v {
         i_d
     } else {
-        burnt(config, state).max(i_d)
+        burning_current(config, state).max(i_d)
     }
 }
 
 #[cold]
 #[inline(never)] // rare, so not part of the longest period
-fn burnt(config: &Config, state: &State) -> Current {
+fn burning_current(config: &Config, state: &State) -> Current {
     let above = state.bus.minus(config.bus_return_v);
     config.burn_slope.saturating_apply(above)
 }

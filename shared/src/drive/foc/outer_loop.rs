@@ -111,7 +111,7 @@ pub(in crate::drive) fn speed_bounds(config: &Config, foc: &mut State, shared: &
     let bounds = shared.protection.bounds;
     let loops = &mut foc.loops;
     let (i_d, bounds) = config.low_speed.bounds(bounds, shared.seen.speed);
-    loops.i_d_reference = protection::burn(&config.protection, &shared.protection, i_d);
+    loops.i_d_reference = protection::burning_i_d(&config.protection, &shared.protection, i_d);
     loops.i_q_bounds = bounds;
 }
 
