@@ -24,28 +24,24 @@ pub(super) fn mode_change(config: &Config, state: &mut State, setpoint: &Setpoin
 /// While field-oriented control drives.
 #[inline(always)] // in the longest period
 fn driving(config: &Config, shared: &mut Shared, phase: Phase, setpoint: &Setpoint) -> Option<Why> {
-    let along = shared.is_along(config, setpoint);
-    match phase {
-        Phase::Stopping if along => return Some(Why::Resumed),
-        _ if along => return None,
-        Phase::Park | Phase::Ramp => {
-            shared.failed_starts = 0;
-            return Some(Why::Released);
-        }
-        _ => {}
+    if shared.is_along(config, setpoint) {
+        return (phase == Phase::Stopping).then_some(Why::Resumed);
+    }
+    if phase.is_open_loop() {
+        shared.failed_starts = 0;
+        return Some(Why::Released);
     }
     // A torque against the rotation slows the motor down within Run but does not reverse it.
-    let holds = matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
-        && shared.seen.speed >= config.slow;
-    let nothing = setpoint.rotation(config.both_ways) == Rotation::Rest;
-    if config.stop == Stop::Coast && nothing && !holds {
-        // Bridge off at once: without current the terminals show how the shaft turns.
-        Some(Why::Coasts)
-    } else if phase == Phase::Run && !holds {
-        Some(Why::Released)
-    } else {
-        None
+    if matches!(setpoint, Setpoint::Torque(_) | Setpoint::Test(_))
+        && shared.seen.speed >= config.slow
+    {
+        return None;
     }
+    if config.stop == Stop::Coast && setpoint.rotation(config.both_ways) == Rotation::Rest {
+        // Bridge off at once: without current the terminals show how the shaft turns.
+        return Some(Why::Coasts);
+    }
+    (phase == Phase::Run).then_some(Why::Released)
 }
 
 /// Handles set-points while nothing drives.
