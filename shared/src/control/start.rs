@@ -153,7 +153,7 @@ pub fn damp(config: &Config, state: &mut State, (i, u): (Dq<Current>, Dq<Voltage
 }
 
 /// Returns true if the rotor has lost the frame of Ramp.
-pub fn lost(config: &Config, state: &State) -> bool {
+pub fn has_lost_rotor(config: &Config, state: &State) -> bool {
     state.astray > config.astray_periods
 }
 
@@ -306,7 +306,7 @@ mod tests {
             };
             (1..1000).find(|_| {
                 damp(&config, &mut state, (Dq::default(), u), 1);
-                lost(&config, &state)
+                has_lost_rotor(&config, &state)
             })
         };
         assert_eq!(

@@ -54,7 +54,7 @@ impl Work {
     /// Damping of the rotor's swing in the open-loop start's frame.
     pub(super) const DAMP: Self = Self(1 << 13);
     /// Preparation of the speed regulator for the end of an open-loop start.
-    pub(super) const STAND_BY: Self = Self(1 << 14);
+    pub(super) const SPEED_PRESET: Self = Self(1 << 14);
     /// The end of an open-loop start that has reached its speed.
     pub(super) const HAND_OVER: Self = Self(1 << 15);
 
@@ -62,7 +62,7 @@ impl Work {
     const ALONE: Self = Self::REFERENCE
         .with(Self::START_CURRENT)
         .with(Self::DAMP)
-        .with(Self::STAND_BY)
+        .with(Self::SPEED_PRESET)
         .with(Self::HAND_OVER);
 
     /// Returns true if it includes any of these pieces.
@@ -130,7 +130,7 @@ const START: &[Row] = &[
     (Work::SETPOINT, 10, CYCLE),
     (Work::DECOUPLING, 26, CYCLE),
     (Work::ROTOR, 26, CYCLE),
-    (Work::STAND_BY, 28, CYCLE),
+    (Work::SPEED_PRESET, 28, CYCLE),
     (Work::HAND_OVER, 30, CYCLE),
 ];
 

@@ -164,8 +164,8 @@ fn outer_loop_slice(config: &Config, state: &mut State, setpoint: &Setpoint, due
             None
         }
         Work::START_CURRENT => open_loop::current(config, foc, shared, phase, setpoint),
-        Work::STAND_BY => {
-            open_loop::stand_by(config, foc);
+        Work::SPEED_PRESET => {
+            open_loop::preset_speed_regulator(config, foc);
             None
         }
         Work::HAND_OVER => open_loop::hand_over(config, foc, shared, phase),
@@ -188,7 +188,7 @@ fn combined_slice(
 ) -> Option<Why> {
     let State { foc, shared, .. } = state;
     if due.includes(Work::ROTOR)
-        && let Some(why) = open_loop::rotor(config, foc, shared, state.phase)
+        && let Some(why) = open_loop::rotor_mode_change(config, foc, shared, state.phase)
     {
         return Some(why);
     }

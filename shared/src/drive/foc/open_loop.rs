@@ -30,12 +30,12 @@ fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
 pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, phase: Phase) {
     let attempt = attempt(config, shared);
     let start = &mut foc.loops.start;
-    let first = foc.loops.slot % PERIODS as u8 == 1;
-    if first && phase == Phase::Park && start::aligned(attempt, start) {
+    let outer_loop_period = foc.loops.slot % PERIODS as u8 == 1;
+    if outer_loop_period && phase == Phase::Park && start::aligned(attempt, start) {
         expect_aligned(config, foc, shared);
     } else {
-        let felt = (shared.seen.i, shared.seen.u);
-        start::damp(attempt, start, felt, DAMP_PERIODS);
+        let measured = (shared.seen.i, shared.seen.u);
+        start::damp(attempt, start, measured, DAMP_PERIODS);
     }
 }
 
@@ -75,7 +75,7 @@ fn expect_aligned(config: &Config, foc: &mut State, shared: &Shared) {
 /// Every [`CYCLE`], returns the mode change the rotor calls for: another attempt if it has not followed or has
 /// become too slow, the end of a stop, a fault if it is lost.
 #[inline(never)] // only some periods
-pub(in crate::drive) fn rotor(
+pub(in crate::drive) fn rotor_mode_change(
     config: &Config,
     foc: &mut State,
     shared: &mut Shared,
@@ -94,20 +94,20 @@ pub(in crate::drive) fn rotor(
     }
     match phase {
         Phase::Ramp => {
-            let astray = start::lost(attempt(config, shared), &foc.loops.start);
-            astray.then(|| failed(shared))
+            let has_lost_rotor = start::has_lost_rotor(attempt(config, shared), &foc.loops.start);
+            has_lost_rotor.then(|| attempt_failed(shared))
         }
         // Before the speed check: sensors that fail at standstill are lost there.
         Phase::Run | Phase::Stopping if progress.lost_periods >= config.lost_periods => {
             Some(if progress.run_periods < config.proven_periods {
-                failed(shared)
+                attempt_failed(shared)
             } else {
                 Why::Tripped(Fault::ObserverLost)
             })
         }
         Phase::Run if slow => {
             progress.slow_periods += CYCLE;
-            (progress.slow_periods > config.slow_periods).then(|| failed(shared))
+            (progress.slow_periods > config.slow_periods).then(|| attempt_failed(shared))
         }
         Phase::Stopping if slow => Some(Why::Stopped),
         Phase::Run if progress.run_periods < config.proven_periods => {
@@ -128,7 +128,7 @@ pub(in crate::drive) fn rotor(
 
 /// A start has failed, or the motor has become too slow: the next attempt, if there is one.
 #[cold]
-fn failed(shared: &mut Shared) -> Why {
+fn attempt_failed(shared: &mut Shared) -> Why {
     let quick = &mut shared.latch.quick_attempts;
     if *quick > 0 {
         *quick -= 1;
@@ -146,7 +146,7 @@ fn failed(shared: &mut Shared) -> Why {
 
 /// Prepares the speed regulator for [`hand_over`], shortly before it.
 #[cold]
-pub(in crate::drive) fn stand_by(config: &Config, foc: &mut State) {
+pub(in crate::drive) fn preset_speed_regulator(config: &Config, foc: &mut State) {
     let loops = &mut foc.loops;
     // The ramp current includes the acceleration, which the load does not take.
     config
@@ -176,7 +176,7 @@ pub(in crate::drive) fn hand_over(
         omega_s,
     );
     let Some(lead) = lead else {
-        return Some(failed(shared));
+        return Some(attempt_failed(shared));
     };
     let lead = SinCos::of(lead);
     // The voltage continues unchanged, in the new frame.
