@@ -72,7 +72,7 @@ pub enum Request {
 pub enum Act {
     /// Sound a beacon.
     Beep,
-    /// Begin a stick calibration; [`Component::tell`](super::Component::tell) reports its steps.
+    /// Begin a stick calibration; [`Component::report_news`](super::Component::report_news) reports its steps.
     Calibrate,
     /// End it.
     EndCalibration,
@@ -82,6 +82,6 @@ pub enum Act {
     EndIdentification,
     /// Keep its results; [`Component::check_done`](super::Component::check_done) reports it.
     KeepIdentified,
-    /// Begin a self-test; [`Component::tell_progress`](super::Component::tell_progress) and [`Component::check_done`](super::Component::check_done) report it.
+    /// Begin a self-test; [`Component::report_progress`](super::Component::report_progress) and [`Component::check_done`](super::Component::check_done) report it.
     Check,
 }
