@@ -181,8 +181,8 @@ mod tests {
 
     const MOST: AdcCounts = AdcCounts::lit("100");
 
-    /// The warnings after so many samples at a rotor that turns so far from one to the next. Currents and their readings
-    /// are in parts of `MOST`.
+    /// The warnings after so many samples of a rotor that turns so far from one to the next. Currents and their
+    /// readings are in parts of `MOST`.
     fn found(
         step: f64,
         samples: u32,

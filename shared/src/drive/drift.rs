@@ -6,8 +6,8 @@
 //! observer's leak takes another ω·z_q/2; this shows along d, where u_d + ω·L·i_q = −ω·z_q.
 //!
 //! A single sample cannot tell φ, R and v apart, but a varying throttle can. A Kalman filter tracks the three as random
-//! walks: each sample corrects only what it shows, in proportion to the uncertainty, and the rest stays. Without v in the
-//! model, a dead time wrong by 50 ns would pass for a fifth of a racing motor's resistance.
+//! walks: each sample corrects only what it shows, in proportion to the uncertainty, and the rest stays. Without v in
+//! the model, a dead time wrong by 50 ns would pass for a fifth of a racing motor's resistance.
 //!
 //! The estimates are clamped to the range that heat and a wrongly stated motor can explain. They change no parameter, and
 //! are forgotten without power.
@@ -117,8 +117,8 @@ impl Tracker {
         }
     }
 
-    /// Takes in a snapshot, about once a millisecond, and starts anew if a different motor is stated. Returns true if the
-    /// values [in force](Self::in_force) have changed.
+    /// Takes in a snapshot, about once a millisecond, and starts anew if a different motor is stated. Returns true if
+    /// the values [in force](Self::in_force) have changed.
     // In its own registers: the caller has none left.
     #[inline(never)]
     pub fn update(&mut self, snapshot: &Snapshot, stated: Stated) -> bool {
@@ -259,8 +259,8 @@ mod tests {
             self.changes += u32::from(self.tracker.update(&self.snapshot, STATED));
         }
 
-        /// A sample of a motor at a speed, in turns a period, and a current, while its flux leads the frame by a part of
-        /// it: what the observer makes of that, by its derivation.
+        /// A sample of a motor at a speed, in turns a period, and a current, while its flux leads the frame by a part
+        /// of it: what the observer makes of that, by its derivation.
         fn see(&mut self, motor: Drift, speed: f32, current: f32, leads: f32) {
             let emf = 4.0 * speed;
             let drop =

@@ -37,8 +37,8 @@
 //! | a stop has come to rest; a start has failed; the rotor is lost, or stuck | `foc/open_loop.rs`; six-step: `six_step/start.rs`, `six_step/period.rs` |
 //! | a current sensor's zero is off | `off.rs` |
 //!
-//! A defective sensor or phase of a turning motor is reported and ends no drive: `current_monitor.rs`. `drift.rs` follows its
-//! resistance and flux.
+//! A defective sensor or phase of a turning motor is reported and ends no drive: `current_monitor.rs`. `drift.rs` follows
+//! its resistance and flux.
 //!
 //! Throttle that is lost, closed or not armed reaches this point as a set-point of rest:
 //! [`Throttle::setpoint`](crate::throttle::Throttle::setpoint) sees to that.

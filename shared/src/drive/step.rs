@@ -109,7 +109,8 @@ fn other_modes(config: &Config, state: &mut State, sample: &Sample, setpoint: &S
 ///
 /// - A drive at rest is asked for nothing, which also clears the count of failed starts.
 /// - A drive in Sense is still asked to turn.
-/// - In Idle this period compares a turning rotor with its prediction, the longest of four; a request begins in the next.
+/// - In Idle this period compares a turning rotor with its prediction, the longest of four; a request waits for the
+///   next.
 #[inline(always)] // in each period
 fn mode_stays(config: &Config, state: &mut State, setpoint: &Setpoint) -> bool {
     match (state.phase, setpoint) {

@@ -82,6 +82,7 @@ pub enum Act {
     EndIdentification,
     /// Keep its results; [`Component::check_done`](super::Component::check_done) reports it.
     KeepIdentified,
-    /// Begin a self-test; [`Component::report_progress`](super::Component::report_progress) and [`Component::check_done`](super::Component::check_done) report it.
+    /// Begin a self-test; [`Component::report_progress`](super::Component::report_progress) and
+    /// [`Component::check_done`](super::Component::check_done) report it.
     Check,
 }

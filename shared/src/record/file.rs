@@ -12,8 +12,8 @@ use crate::params::{Board, POLE_PAIRS};
 const HEAD: usize = 3;
 
 impl Record {
-    /// Passes the words of the file to `put`: amperes and volts per count of the converters, pole pairs, and the words of the record; the
-    /// periods only while they are held.
+    /// Passes the words of the file to `put`: amperes and volts per count of the converters, pole pairs, and the words
+    /// of the record; the periods only while they are held.
     pub(crate) fn for_each_word(&self, board: &Board, pole_pairs: f32, put: &mut dyn FnMut(u32)) {
         for number in [board.current_a_per_count, board.bus_v_per_count, pole_pairs] {
             put(number.to_bits());
