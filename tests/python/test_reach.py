@@ -141,4 +141,4 @@ def test_what_cannot_be_judged_is_refused(tmp_path):
     text, vectors = (part.replace("ADC1_2", "OTHER") for part in (LEVELS, VECTORS))
     image = build(tmp_path, text + TAG + vectors)
     told = tool(image, "image", "--output", tmp_path / "files")
-    assert told.returncode == 2 and "no ADC1_2" in told.stderr
+    assert told.returncode == 2 and "no PWM interrupt (ADC1_2)" in told.stderr

@@ -197,7 +197,7 @@ mod tests {
                 "line 2", "line 3", "line 4", "line 5", "line 6", "line 7", "line 8", "line 9"
             ]
         );
-        assert!(bad[7].contains("line 1 already"), "{}", bad[7]);
+        assert!(bad[7].contains("already on line 1"), "{}", bad[7]);
     }
 
     proptest! {

@@ -8,7 +8,7 @@ use crate::program::Program;
 
 const PROBE_RS: Program = Program {
     name: "probe-rs",
-    remedy: "see https://probe.rs for how to install it",
+    remedy: "install it as described at https://probe.rs",
 };
 
 /// Writes the image as an ELF file, reads it back, and resets the chip. Only the image's pages are erased.

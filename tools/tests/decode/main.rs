@@ -301,7 +301,7 @@ fn bad_input_is_one_line_that_says_what_to_do() {
             &[],
             "nor a sample rate",
         ),
-        ("0,1\n1,0\n".to_owned(), &[], "export it with a header"),
+        ("0,1\n1,0\n".to_owned(), &[], "it has no header"),
         ("Time [s],A\n0,0\n1,3.3\n".to_owned(), &[], "line 3: '3.3'"),
         ("Time [s],A\nnoon,0\n".to_owned(), &[], "line 2: 'noon'"),
         (
