@@ -1,4 +1,4 @@
-//! `siskin budget`: no ESC is needed.
+//! `siskin budget`, which needs no ESC.
 
 #[path = "common/run.rs"]
 mod run;
@@ -9,7 +9,7 @@ use run::{Run, siskin};
 use serde_json::Value;
 use siskin_control::params::{BOSSO_MOTOR, ParamId};
 
-/// Status, output and complaints.
+/// Exit status, stdout and stderr.
 fn budget(arguments: &[&str]) -> (i32, String, String) {
     let Run { status, out, err } = siskin(&[&["budget"], arguments].concat());
     (status, out, err)
@@ -65,7 +65,7 @@ fn the_papers_figures_give_the_papers_ranges() {
 }
 
 #[test]
-fn what_limits_adds_up_to_the_bound_and_the_delay_limits_the_top() {
+fn contributions_add_up_to_the_bound_and_the_delay_limits_the_top() {
     let param = |(id, value): &(ParamId, f32)| format!("--param={}={value}", id.entry().name);
     let motor: Vec<_> = BOSSO_MOTOR.settings.iter().map(param).collect();
     let motor: Vec<_> = motor.iter().map(String::as_str).collect();
@@ -88,7 +88,7 @@ fn what_limits_adds_up_to_the_bound_and_the_delay_limits_the_top() {
 }
 
 #[test]
-fn a_file_and_what_is_given_over_it_count_alike() {
+fn options_override_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("esc.param");
     let text = "# Siskin\nMOT_POLE_PAIRS 7\nPWM_FREQ_HZ 48000\nMOT_KV 605.9\nCTL_FLUX_FORM 0\n";
@@ -110,7 +110,7 @@ fn a_file_and_what_is_given_over_it_count_alike() {
 }
 
 #[test]
-fn where_no_speed_will_do_the_best_is_told() {
+fn without_a_valid_speed_the_best_one_is_reported() {
     let (status, out, _) = budget(&[&FIGURE_28[..], &["--error", "3"]].concat());
     assert_eq!(status, 0);
     assert!(out.contains("within 3 deg at no speed"), "{out}");
@@ -121,7 +121,7 @@ fn where_no_speed_will_do_the_best_is_told() {
 }
 
 #[test]
-fn bad_input_is_one_line_that_names_it() {
+fn bad_input_is_named_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("bad.param");
     fs::write(&file, "MOT_POLE_PAIRS 7\nCTL_AE 3\n").expect("written");

@@ -20,7 +20,7 @@ fn ended(run: &Run, status: i32) -> &str {
 }
 
 #[test]
-fn the_list_is_complete_though_every_fifth_packet_is_lost() {
+fn the_list_is_complete_with_every_fifth_packet_lost() {
     for lose_every in [None, Some(5)] {
         let esc = Esc::start(Behaviour {
             lose_every,
@@ -48,7 +48,7 @@ fn the_list_is_complete_though_every_fifth_packet_is_lost() {
 }
 
 #[test]
-fn get_prints_what_there_is_and_names_what_is_not() {
+fn get_prints_known_parameters_and_names_unknown_ones() {
     let esc = Esc::start(Behaviour {
         lose_every: Some(3),
         ..Behaviour::default()
@@ -80,7 +80,7 @@ fn get_prints_what_there_is_and_names_what_is_not() {
 }
 
 #[test]
-fn set_tells_what_was_taken_and_why_not() {
+fn set_reports_each_value_and_the_reason_of_each_refusal() {
     let esc = Esc::start(Behaviour {
         lose_every: Some(5),
         ..Behaviour::default()
@@ -127,7 +127,7 @@ fn set_tells_what_was_taken_and_why_not() {
 }
 
 #[test]
-fn a_storage_that_fails_is_told_with_its_reason() {
+fn a_storage_failure_is_reported_with_its_reason() {
     let esc = Esc::start(Behaviour {
         storage_fault: Some("flash worn out"),
         ..Behaviour::default()
@@ -143,7 +143,7 @@ fn a_storage_that_fails_is_told_with_its_reason() {
 }
 
 #[test]
-fn what_is_saved_can_be_loaded_into_another() {
+fn a_saved_file_loads_into_another_esc() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("motor.param");
     let file = file.to_str().expect("text");
@@ -257,7 +257,7 @@ fn monitor_prints_samples_and_ends() {
 }
 
 #[test]
-fn an_esc_on_udp_is_talked_to_whoever_speaks_first() {
+fn udp_works_whichever_side_speaks_first() {
     for waits in [false, true] {
         let esc = Esc::start(Behaviour::default());
         let relay = UdpRelay::start(&esc, waits);
@@ -281,7 +281,7 @@ fn an_esc_on_udp_is_talked_to_whoever_speaks_first() {
 }
 
 #[test]
-fn another_component_than_the_one_asked_for_is_not_talked_to() {
+fn only_the_requested_component_is_talked_to() {
     let esc = Esc::start(Behaviour::default());
     let run = esc.siskin(&["--component", "7", "params", "set", "MOT_STOP", "0"]);
     ended(&run, 2);
@@ -306,7 +306,7 @@ fn another_component_than_the_one_asked_for_is_not_talked_to() {
 }
 
 #[test]
-fn bad_input_is_one_line_and_status_2() {
+fn bad_input_ends_with_one_line_and_status_2() {
     let folder = tempfile::tempdir().expect("a folder");
     let bad = folder.path().join("bad.param");
     fs::write(&bad, "MOT_STOP 0\nMOT_DIR\nMOT_DIR left\n").expect("writable");

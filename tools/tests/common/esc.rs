@@ -23,19 +23,19 @@ const PARAM_VALUE: u32 = 22;
 /// How an ESC behaves.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Behaviour {
-    /// Every which parameter message is lost, in each direction.
+    /// One in this many parameter messages is lost, in each direction.
     pub(crate) lose_every: Option<u32>,
     /// Why parameters cannot be stored.
     pub(crate) storage_fault: Option<&'static str>,
 }
 
-/// What it was asked for, and what it has in the end.
+/// The requests it received, and its final values.
 pub(crate) struct Outcome {
     pub(crate) params: Params,
     pub(crate) saves: u32,
 }
 
-/// A running ESC; it ends with [`Esc::stop`].
+/// A running ESC, until [`Esc::stop`].
 pub(crate) struct Esc {
     endpoint: String,
     stopping: Arc<AtomicBool>,
@@ -57,7 +57,7 @@ impl Esc {
         }
     }
 
-    /// Runs `siskin --connect` to it with these arguments.
+    /// Runs `siskin --connect` on it with these arguments.
     pub(crate) fn siskin(&self, arguments: &[&str]) -> Run {
         siskin(&[&["--connect", &self.endpoint], arguments].concat())
     }
@@ -76,7 +76,7 @@ pub(crate) struct UdpRelay {
 }
 
 impl UdpRelay {
-    /// Starts one that waits for `udpout` to speak, or that speaks to a waiting `udpin`.
+    /// Starts a bridge that waits for a `udpout` client, or one that sends first to a `udpin` client.
     pub(crate) fn start(esc: &Esc, waits: bool) -> Self {
         let address = esc.endpoint.strip_prefix("tcp:").expect("made so");
         let stream = TcpStream::connect(address).expect("it listens");
@@ -87,7 +87,7 @@ impl UdpRelay {
                 None,
             )
         } else {
-            // A port that was free a moment ago: siskin binds it.
+            // A port that was just free, for siskin to bind.
             let free = UdpSocket::bind("127.0.0.1:0").expect("a free loopback port");
             let address = free.local_addr().expect("bound");
             (format!("udpin:{address}"), Some(address))
@@ -124,7 +124,7 @@ fn relay(
     let mut buffer = [0; 2048];
     while !stop.load(Ordering::Relaxed) {
         if let Ok(length) = stream.read(&mut buffer) {
-            // Nobody may listen yet, or any more: that is how datagrams are.
+            // Datagrams may fail: the other end may not listen yet, or any more.
             let _ = peer.map(|peer| socket.send_to(&buffer[..length], peer));
         }
         if let Ok((length, from)) = socket.recv_from(&mut buffer) {
@@ -134,7 +134,7 @@ fn relay(
     }
 }
 
-/// Counts messages, and tells which are lost.
+/// Counts messages, and decides which are lost.
 struct Loss {
     every: Option<u32>,
     seen: u32,
@@ -148,7 +148,7 @@ impl Loss {
     }
 }
 
-/// A rule over two parameters, as the drive's configuration has them.
+/// A rule that ties two parameters, like those of the drive's configuration.
 fn validate(params: &Params) -> Result<(), BuildError> {
     if params.get(ParamId::CtlRpmMin) < params.get(ParamId::CtlRpmMax) {
         Ok(())
@@ -183,7 +183,7 @@ fn serve(listener: &TcpListener, behaviour: Behaviour, stop: &AtomicBool) -> Out
     while !stop.load(Ordering::Relaxed) {
         let now_us = u64::try_from(started.elapsed().as_micros()).expect("short");
         let telemetry = Telemetry {
-            // At rest, so that every parameter may be changed, but not quite still.
+            // At rest, so that every parameter may change, but not quite still.
             rpm: -42.0,
             bus_v: 24.0,
             bus_a: 3.5,

@@ -2,7 +2,7 @@
 
 use std::process::{Command, Output};
 
-/// What a command printed, and its exit status.
+/// A command's output and exit status.
 #[derive(Debug)]
 pub(crate) struct Run {
     pub(crate) status: i32,
@@ -10,12 +10,12 @@ pub(crate) struct Run {
     pub(crate) err: String,
 }
 
-/// Runs it to its end.
+/// Runs it to completion.
 pub(crate) fn siskin(arguments: &[&str]) -> Run {
     run(Command::new(env!("CARGO_BIN_EXE_siskin")).args(arguments))
 }
 
-/// Runs a prepared command to its end.
+/// Runs a prepared command to completion.
 pub(crate) fn run(command: &mut Command) -> Run {
     let Output {
         status,

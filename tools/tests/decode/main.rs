@@ -15,7 +15,7 @@ use serde_json::Value;
 use generator::{Layout, Wire, word};
 use run::{Run, siskin};
 
-/// Runs it on a capture: exit status, output and complaints.
+/// Runs it on a capture; returns exit status, stdout and stderr.
 fn decode(capture: impl AsRef<[u8]>, arguments: &[&str]) -> (i32, String, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("capture");
@@ -25,7 +25,7 @@ fn decode(capture: impl AsRef<[u8]>, arguments: &[&str]) -> (i32, String, String
     (status, out, err)
 }
 
-/// Its lines as objects: the rows, and the summary.
+/// Returns its lines as JSON objects: the rows, and the summary.
 #[track_caller]
 fn rows(capture: impl AsRef<[u8]>, arguments: &[&str]) -> (Vec<Value>, Value) {
     let (status, out, err) = decode(capture, &[arguments, &["--json"]].concat());
@@ -36,10 +36,10 @@ fn rows(capture: impl AsRef<[u8]>, arguments: &[&str]) -> (Vec<Value>, Value) {
     (rows, summary)
 }
 
-/// What the sender of [`drill`] means: a value and how often.
+/// What the sender of [`drill`] sends: a value and its count.
 const DRILL: [(u16, u64); 4] = [(0, 60), (13, 10), (48, 1), (1046, 29)];
 
-/// 100 frames at 2 kHz, from 1 ms on, and answered if they are bidirectional.
+/// 100 frames at 2 kHz, from 1 ms on, with replies if they are bidirectional.
 fn drill(bit_hz: f64, bidirectional: bool) -> Wire {
     let mut wire = Wire::new(bidirectional);
     let mut at_ns = 1e6;
@@ -47,7 +47,7 @@ fn drill(bit_hz: f64, bidirectional: bool) -> Wire {
         for _ in 0..times {
             let end_ns = wire.frame(at_ns, word(value, false, bidirectional), bit_hz);
             if bidirectional {
-                // 500 us a turn.
+                // 500 us per turn.
                 wire.reply(
                     end_ns + 30_000.0,
                     0x1F4 << 4 | !(0x1 ^ 0xF ^ 0x4) & 0xF,
@@ -60,7 +60,7 @@ fn drill(bit_hz: f64, bidirectional: bool) -> Wire {
     wire
 }
 
-/// The rows and the summary are those of [`drill`].
+/// Asserts that the rows and the summary are those of [`drill`].
 #[track_caller]
 fn is_the_drill((rows, summary): &(Vec<Value>, Value), signal: &str, begin_s: f64) {
     assert_eq!(summary["signal"], signal);
@@ -87,7 +87,7 @@ fn is_the_drill((rows, summary): &(Vec<Value>, Value), signal: &str, begin_s: f6
 const RATES: [f64; 4] = [150e3, 300e3, 600e3, 1200e3];
 
 #[test]
-fn every_format_tells_the_same() {
+fn every_format_decodes_alike() {
     let wire = drill(600e3, false);
     for (name, capture, begin_s) in [
         ("Logic 2", wire.saleae(24.0), 0.001),
@@ -107,7 +107,7 @@ fn every_format_tells_the_same() {
 }
 
 #[test]
-fn every_layout_of_sigrok_tells_the_same() {
+fn every_sigrok_layout_decodes_alike() {
     let wire = drill(600e3, false);
     for layout in [
         Layout::Time,
@@ -117,7 +117,7 @@ fn every_layout_of_sigrok_tells_the_same() {
         Layout::Bare,
     ] {
         println!("{layout:?}");
-        // At 24 MHz the column of time is 1.6 % off, and begins one period late.
+        // At 24 MHz the time column is 1.6 % off, and starts one period late.
         let begin_s = match layout {
             Layout::Levels | Layout::Bare => 0.001,
             _ => 0.001 + 1.0 / 24e6,
@@ -127,7 +127,7 @@ fn every_layout_of_sigrok_tells_the_same() {
 }
 
 #[test]
-fn every_dshot_is_told_by_itself() {
+fn every_dshot_rate_is_detected() {
     for (bit_hz, number) in RATES.into_iter().zip([150, 300, 600, 1200]) {
         for mhz in [16.0, 24.0, 100.0] {
             let capture = drill(bit_hz, false).saleae(mhz);
@@ -152,7 +152,7 @@ fn every_dshot_is_told_by_itself() {
 }
 
 #[test]
-fn every_pulse_is_told_by_itself() {
+fn every_pulse_protocol_is_detected() {
     for (name, least_us, most_us, hz) in [
         ("servo", 1000.0, 2000.0, 50.0),
         ("servo", 1000.0, 2000.0, 450.0),
@@ -203,7 +203,7 @@ fn a_dump_in_microseconds_carries_servo_pulses() {
 }
 
 #[test]
-fn frames_as_close_as_the_esc_takes_them_are_all_told() {
+fn frames_at_the_esc_s_closest_spacing_are_all_decoded() {
     for (bit_hz, telemetry) in [(600e3, false), (600e3, true), (630e3, false), (630e3, true)] {
         let bit_ns = 1e9 / bit_hz;
         let mut wire = Wire::new(false);
@@ -240,12 +240,12 @@ fn a_capture_may_begin_and_end_anywhere() {
 }
 
 #[test]
-fn a_signal_that_is_named_is_decoded_as_it() {
+fn a_named_signal_is_decoded_as_such() {
     let capture = drill(600e3, false).saleae(24.0);
     for name in ["12", "dshot600", "DShot600"] {
         is_the_drill(&rows(&capture, &["--protocol", name]), "DShot600", 0.001);
     }
-    // Frames that are all bad are what is to be seen, and no wrong use.
+    // All frames are bad, which is a result and not a usage error.
     for name in ["bidirectional-dshot600", "11"] {
         let (_, summary) = rows(&capture, &["--protocol", name]);
         assert_eq!(summary["good"], 0, "{summary}");
@@ -254,7 +254,7 @@ fn a_signal_that_is_named_is_decoded_as_it() {
 }
 
 #[test]
-fn who_reads_no_more_is_no_error() {
+fn a_closed_reader_is_no_error() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("capture.csv");
     let mut wire = Wire::new(false);
@@ -283,7 +283,7 @@ fn who_reads_no_more_is_no_error() {
 }
 
 #[test]
-fn bad_input_is_one_line_that_says_what_to_do() {
+fn bad_input_ends_with_one_line_that_says_what_to_do() {
     let wire = drill(600e3, false);
     let saleae = wire.saleae(24.0);
     let vcd = wire.vcd(24.0, "1 ns", 1e3);

@@ -1,4 +1,4 @@
-//! What a capture comes to.
+//! The summary of a capture.
 
 use crate::generator::{Layout, Wire, word};
 use crate::{decode, drill, rows};
@@ -8,7 +8,7 @@ fn timing_is_measured() {
     let mut wire = Wire::new(false);
     let mut at_ns = 1e6;
     for frame in 0..200 {
-        // 3 % fast, then a rest of half a second.
+        // 3 % fast, then half a second of silence.
         wire.frame(at_ns, word(frame, false, false), 618e3);
         at_ns += if frame == 120 { 5e8 } else { 250e3 };
     }
@@ -46,7 +46,7 @@ fn the_mean_rate_counts_frames() {
 }
 
 #[test]
-fn commands_are_counted_with_how_many_came_in_a_row() {
+fn commands_are_counted_with_the_longest_run_of_each() {
     let mut wire = Wire::new(false);
     let values = [(0, 60), (7, 5), (0, 1), (7, 3), (1, 1), (12, 10), (31, 5)];
     let mut at_ns = 1e6;
@@ -56,7 +56,7 @@ fn commands_are_counted_with_how_many_came_in_a_row() {
             at_ns += 1e6;
         }
     }
-    // What a bad frame parts is not in a row, and what is ignored cannot be too few.
+    // A bad frame ends a run, and ignored commands are never too few.
     for bits in [13, 13, 13, 0, 13, 13, 13, 32].map(|value| word(value, true, false)) {
         let wrong = if bits == word(0, true, false) { 1 } else { 0 };
         wire.frame(at_ns, bits ^ wrong, 300e3);
@@ -96,7 +96,7 @@ fn commands_are_counted_with_how_many_came_in_a_row() {
 }
 
 #[test]
-fn a_coarse_capture_says_so() {
+fn a_coarse_capture_is_warned_of() {
     for (bit_hz, mhz, coarse) in [
         (150e3, 4.0, false),
         (300e3, 4.0, false),
@@ -113,7 +113,7 @@ fn a_coarse_capture_says_so() {
     }
     let (_, out, _) = decode(drill(600e3, false).sigrok(4, Layout::Levels), &[]);
     assert!(out.contains("sample at 7.2 MHz or more"), "{out}");
-    // Nothing can be seen at one sample a bit, and that is why.
+    // At one sample per bit nothing decodes, and the message says why.
     let (status, out, err) = decode(drill(600e3, false).sigrok(1, Layout::Levels), &[]);
     assert_eq!((status, out.as_str()), (2, ""));
     assert!(

@@ -1,10 +1,10 @@
-//! The lines of the table.
+//! The rows of the table.
 
 use crate::generator::{Wire, word};
 use crate::{DRILL, decode, drill, rows};
 
 #[test]
-fn a_wrong_bit_is_told_with_what_was_sent() {
+fn a_wrong_bit_is_shown_with_the_sent_value() {
     for bidirectional in [false, true] {
         let mut wire = Wire::new(bidirectional);
         for frame in 0..100 {
@@ -27,7 +27,7 @@ fn a_wrong_bit_is_told_with_what_was_sent() {
 }
 
 #[test]
-fn replies_are_told_with_what_is_wrong_with_them() {
+fn replies_are_shown_with_their_errors() {
     let mut wire = Wire::new(true);
     for frame in 0..100 {
         let at_ns = 1e6 + f64::from(frame) * 250e3;
@@ -38,7 +38,7 @@ fn replies_are_told_with_what_is_wrong_with_them() {
             _ => 0xFFF,
         };
         let sum = !(data ^ data >> 4 ^ data >> 8) & 0xF;
-        // One has a wrong check sum, one does not come, and their clock is 4 % slow.
+        // One has a wrong check sum, one is missing, and their clock is 4 % slow.
         match frame {
             52 => wire.reply(end_ns + 25e3, data << 4 | sum ^ 1, 720e3),
             53 => {}
@@ -68,7 +68,7 @@ fn replies_are_told_with_what_is_wrong_with_them() {
 }
 
 #[test]
-fn the_table_has_a_line_for_equal_frames_or_for_each() {
+fn the_table_has_a_row_per_run_of_equal_frames_or_per_frame() {
     let capture = drill(300e3, true).saleae(24.0);
     let (status, out, err) = decode(&capture, &[]);
     assert_eq!((status, err.as_str()), (0, ""));
@@ -83,9 +83,9 @@ fn the_table_has_a_line_for_equal_frames_or_for_each() {
 }
 
 #[test]
-fn replies_of_a_turning_motor_share_a_line() {
+fn replies_of_a_turning_motor_share_a_row() {
     let mut wire = Wire::new(true);
-    // The fifth does not come, and the eighth tells a temperature.
+    // The fifth is missing, and the eighth carries a temperature.
     let data: [Option<u16>; 10] = [
         Some(0x1F4),
         Some(0x1F0),

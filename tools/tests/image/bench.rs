@@ -1,4 +1,4 @@
-//! A folder with files, and with programs that stand in for the real ones.
+//! A folder with files, and with stand-ins for the real programs.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -10,15 +10,15 @@ use tempfile::TempDir;
 use crate::elf::Elf;
 use crate::run::{Run, run};
 
-/// Where everything is installed, until it is not.
+/// A folder with files and installed stand-ins.
 pub(crate) struct Bench {
     folder: TempDir,
-    /// Further variables of the programs' environment.
+    /// Further environment variables for the programs.
     pub(crate) variables: Vec<(&'static str, String)>,
 }
 
 impl Bench {
-    /// With these programs on the search path, and no others.
+    /// Creates one with only these programs on the search path.
     pub(crate) fn with(programs: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("path");
@@ -37,7 +37,7 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    /// A file in it, by its whole name.
+    /// Returns the full path of a file in it.
     pub(crate) fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
         let path = self.path(name);
         fs::write(&path, bytes).expect("written");
@@ -57,7 +57,7 @@ impl Bench {
         run(&mut command)
     }
 
-    /// What the programs were asked for, a line each.
+    /// Returns the programs' invocations, one per line.
     pub(crate) fn asked(&self) -> Vec<String> {
         let log = fs::read_to_string(self.path("log")).unwrap_or_default();
         log.lines().map(str::to_owned).collect()

@@ -1,7 +1,7 @@
-//! ELF files, byte by byte: what a linker makes, as far as `siskin` looks at it.
+//! ELF files, byte by byte: as much of a linker's output as `siskin` reads.
 
-/// An image's tag as the firmware and its linker script lay it out: texts, two ranges of addresses for the
-/// check sum, and room for that.
+/// An image's tag as the firmware and its linker script lay it out: texts, two address ranges for the
+/// check sum, and room for it.
 pub(crate) fn tag(board: &str, ranges: [u32; 4]) -> Vec<u8> {
     let mut tag = b"SISKIN\x00\x02".to_vec();
     for field in [board, "0.1.0", "0123456789ab+"] {
@@ -13,20 +13,20 @@ pub(crate) fn tag(board: &str, ranges: [u32; 4]) -> Vec<u8> {
     tag
 }
 
-/// Where the sum stands: behind the vectors, the texts and the ranges.
+/// Address of the check sum: after the vectors, the texts and the ranges.
 const SUM_AT: u32 = 0x1D8 + 96;
 
-/// One file: its machine, and what it loads.
+/// A file: its machine, and its segments.
 #[derive(Clone)]
 pub(crate) struct Elf {
     /// 40 is Arm.
     pub(crate) machine: u16,
-    /// Kind (1 is loaded), address where it stands in the flash, and bytes.
+    /// Type (1 is loadable), load address in the flash, and bytes.
     pub(crate) segments: Vec<(u32, u32, Vec<u8>)>,
 }
 
 impl Elf {
-    /// Vectors and tag, a hole of 12 bytes, and 70 000 bytes of code that cross a border of 64 KB.
+    /// Vectors and tag, a hole of 12 bytes, and 70 000 bytes of code that cross a 64 KB boundary.
     pub(crate) fn of(board: &str) -> Self {
         Self::with_code_at(board, FLASH + SUM_AT + 8 + 12)
     }
@@ -40,7 +40,7 @@ impl Elf {
         let code = (0..CODE_BYTES).map(|i| (i * 7 % 251) as u8).collect();
         Self {
             machine: 40,
-            // Not in order, with a segment that only takes memory, and one that is no load.
+            // Out of order, with a segment that has no file content, and one that is not loadable.
             segments: vec![
                 (1, code_at, code),
                 (1, 0x2000_0000, Vec::new()),
@@ -50,7 +50,7 @@ impl Elf {
         }
     }
 
-    /// With its check sum.
+    /// Returns it with its check sum filled in.
     pub(crate) fn stamped(mut self) -> Self {
         let [code, _, first, _] = &mut self.segments[..] else {
             panic!("four segments")
@@ -75,7 +75,7 @@ impl Elf {
         let half = |file: &mut Vec<u8>, value: u16| file.extend(value.to_le_bytes());
         half(&mut file, 2);
         half(&mut file, self.machine);
-        // Version, entry, segments and sections from the file's start, flags.
+        // Version, entry, offsets of segments and sections, flags.
         words(
             &mut file,
             &[1, 0x0800_0401, HEADER_BYTES, sections_at, 0x0500_0400],
@@ -91,7 +91,7 @@ impl Elf {
         let mut at = HEADER_BYTES + count * SEGMENT_BYTES;
         for (kind, address, data) in &self.segments {
             let length = data.len() as u32;
-            // A run-time address that differs, as initialised data has it.
+            // A different run-time address, as for initialised data.
             words(
                 &mut file,
                 &[*kind, at, 0x2000_0000, *address, length, length, 5, 4],
@@ -119,8 +119,8 @@ impl Elf {
         file
     }
 
-    /// An interrupt in RAM that calls nothing but itself, by a relocation. Of each section: name; kind,
-    /// flags, address, section that it is linked with, information, bytes of an entry; contents.
+    /// An interrupt in RAM that calls only itself, by a relocation. Of each section: name; type,
+    /// flags, address, linked section, info, entry size; contents.
     fn sections(&self) -> Vec<(&'static str, [u32; 6], Vec<u8>)> {
         // bl to itself.
         let code = [0xFF, 0xF7, 0xFE, 0xFF].to_vec();
@@ -131,7 +131,7 @@ impl Elf {
             symbol.extend([kind, 1].iter().flat_map(|half| half.to_le_bytes()));
             symbol
         };
-        // Global; a function by the names of both boards, and a place.
+        // Global: a function named for each board, and an address.
         let symbols = [
             vec![0; SYMBOL_BYTES as usize],
             symbol("ADC1_2", CONTROL + 1, 4, 0x12),
@@ -157,7 +157,7 @@ const SYMBOL_BYTES: u32 = 16;
 
 const FLASH: u32 = 0x0800_0000;
 
-/// Where the interrupt stands.
+/// Address of the interrupt.
 const CONTROL: u32 = 0x1000_0000;
 
 const NAMES: &str = "\0.control\0.symtab\0.rel\0.names\0ADC1_2\0ADC\0__ram_vectors\0";

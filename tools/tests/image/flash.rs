@@ -1,4 +1,4 @@
-//! What the flashing programs are asked for, and what follows from how they end.
+//! How the flashing programs are invoked, and what their exit status leads to.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use crate::bench::Bench;
 use crate::elf::Elf;
 
 #[test]
-fn a_probe_is_told_chip_and_file_then_resets() {
+fn a_probe_gets_chip_and_file_and_then_resets() {
     for (board, chip) in [
         ("b-g431b-esc1", "STM32G431CBUx"),
         ("vesc4-f405", "STM32F405RGTx"),
@@ -27,7 +27,7 @@ fn a_probe_is_told_chip_and_file_then_resets() {
         let wanted = format!("probe-rs download --chip {chip} --verify ");
         assert!(download.starts_with(&wanted), "{download}");
         assert_eq!(*reset, format!("probe-rs reset --chip {chip}"));
-        // What the linker left has its check sum by then.
+        // By then the linked image has its check sum.
         let written = fs::read(bench.path("flash")).expect("downloaded");
         assert!(written == Elf::of(board).stamped().bytes());
     }
@@ -79,9 +79,9 @@ fn over_usb_the_flash_is_read_back() {
 }
 
 #[test]
-fn what_is_stored_in_a_hole_of_the_image_is_not_written_over() {
+fn storage_in_a_hole_of_the_image_is_not_overwritten() {
     let bench = Bench::with(&["dfu-util"]);
-    // The code is behind the second and the third sector.
+    // The code is beyond the second and third sectors.
     let elf = Elf::with_code_at("vesc4-f405", 0x0800_C000);
     let path = bench.path("holed.elf");
     fs::write(&path, elf.bytes()).expect("written");
@@ -96,7 +96,7 @@ fn what_is_stored_in_a_hole_of_the_image_is_not_written_over() {
 }
 
 #[test]
-fn a_flash_that_holds_something_else_is_told() {
+fn a_flash_that_reads_back_differently_is_reported() {
     let mut bench = Bench::with(&["dfu-util"]);
     let image = bench.image("vesc4-f405");
     bench.file("worn", [0xFF; 100]);
@@ -108,7 +108,7 @@ fn a_flash_that_holds_something_else_is_told() {
 }
 
 #[test]
-fn a_board_without_usb_is_not_asked_over_usb() {
+fn a_board_without_usb_is_not_flashed_over_usb() {
     let bench = Bench::with(&["dfu-util"]);
     let image = bench.image("b-g431b-esc1");
     let ended = bench.siskin(&["flash", &image, "--dfu"]);
@@ -119,7 +119,7 @@ fn a_board_without_usb_is_not_asked_over_usb() {
 }
 
 #[test]
-fn a_program_that_fails_or_is_not_there_is_named() {
+fn a_program_that_fails_or_is_missing_is_named() {
     for (board, option, program, remedy) in [
         ("b-g431b-esc1", None, "probe-rs", "https://probe.rs"),
         ("vesc4-f405", Some("--dfu"), "dfu-util", "package dfu-util"),

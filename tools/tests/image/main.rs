@@ -1,5 +1,5 @@
 //! `siskin image` and `siskin flash`: from a linked image to files, and to the programs that write
-//! it. There is no board here to write to: those programs are stand-ins that note their arguments.
+//! it. There is no board to write to: those programs are stand-ins that record their arguments.
 
 mod bench;
 mod elf;
@@ -14,7 +14,7 @@ use elf::{Elf, tag};
 use ihex::{Reader, Record};
 use run::siskin;
 
-/// What the flash then holds: first the vectors and the tag, then a hole, then the code.
+/// The flash's contents then: the vectors and the tag, a hole, and the code.
 fn flash(elf: &Elf) -> Vec<u8> {
     let [code, _, first, _] = &elf.segments[..] else {
         panic!("four segments")
@@ -69,7 +69,7 @@ fn one_command_writes_elf_bin_and_hex() {
 }
 
 #[test]
-fn by_its_board_it_is_built_first() {
+fn an_image_for_a_board_is_built_first() {
     let mut bench = Bench::with(&["cargo"]);
     let image = bench.image("b-g431b-esc1");
     bench.variables.push(("EXECUTABLE", format!("{image:?}")));
@@ -100,7 +100,7 @@ fn by_its_board_it_is_built_first() {
     assert!(missing.err.contains("rustup.rs"), "{}", missing.err);
 }
 
-/// Files that must not get anywhere, and a word of the complaint.
+/// Files that must be refused, each with a part of the message.
 fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
     let good = Elf::of("b-g431b-esc1");
     let with = |segments| Elf {
@@ -131,7 +131,7 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
 }
 
 #[test]
-fn what_is_no_image_is_refused_in_one_line_by_both() {
+fn both_commands_refuse_a_bad_image_in_one_line() {
     for (bytes, named) in bad_images() {
         let bench = Bench::with(&["probe-rs", "dfu-util"]);
         let image = bench.file("bad", &bytes);
@@ -155,7 +155,7 @@ fn a_flipped_bit_of_a_stamped_image_is_refused() {
     let image = bench.file("image", &stamped);
     assert_eq!(bench.siskin(&["flash", &image]).status, 0);
     let asked = bench.asked();
-    // Behind the headers: the code, then vectors and tag, all of whose words are taken.
+    // After the headers: the code, then vectors and tag, every word of which is hit.
     let loaded = 52 + 4 * 32;
     let tag = loaded + 70_000;
     let sampled = (0..70_000).step_by(1009).map(|byte| loaded + byte);
@@ -177,7 +177,7 @@ fn a_flipped_bit_of_a_stamped_image_is_refused() {
 }
 
 #[test]
-fn bad_arguments_are_one_line() {
+fn bad_arguments_end_with_one_line() {
     let bench = Bench::with(&[]);
     let image = bench.image("b-g431b-esc1");
     let folder = bench.file("a-file", "");
