@@ -1,7 +1,7 @@
 //! Fatal failures turn the bridge off while the motor turns, and are reported after the restart. Run with
 //! `--release`.
 
-use crate::common::{Board, ERASED, MS, PWM_PERIOD, Throttle, US, endless_loop, image, us};
+use crate::common::{Board, MS, PWM_PERIOD, Throttle, US, endless_loop, image, undefined, us};
 use siskin_vboard::image::Image;
 use siskin_vboard::processor::{Register, Surroundings};
 use siskin_vboard::time::{CLOCK_HZ, Cycles};
@@ -68,8 +68,9 @@ fn a_panic() {
 #[test]
 fn an_instruction_that_is_none() {
     // The undefined instruction's bit in CFSR.
-    let words = format!("Restart: hard fault at {ERASED:x}, status 10000");
-    fails("undefined instruction", &[(Register::Pc, ERASED)], &words);
+    let at = undefined(&image());
+    let words = format!("Restart: hard fault at {at:x}, status 10000");
+    fails("undefined instruction", &[(Register::Pc, at)], &words);
 }
 
 #[test]
@@ -173,16 +174,18 @@ fn a_debugger_that_halts_the_processor() {
 /// and the timer's break acts.
 #[test]
 fn a_processor_that_locks_up() {
-    let mut board = Board::turning(&image());
+    let image = image();
+    let at = undefined(&image);
+    let mut board = Board::turning(&image);
     board.stop_in(THREAD);
-    board.set_register(Register::Pc, ERASED);
+    board.set_register(Register::Pc, at);
     let faults = board.run_until(1, US, |board| board.exception() == 3);
     assert!(faults.is_some());
     assert!(
         !board.world().bridge().is_off(),
         "the handler has not begun"
     );
-    board.set_register(Register::Pc, ERASED);
+    board.set_register(Register::Pc, at);
     let took = board.until_off(MS);
     println!("lock-up: off {took} cycles after it");
     assert!(took < PWM_PERIOD, "{took} cycles");

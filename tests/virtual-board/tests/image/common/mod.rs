@@ -448,8 +448,16 @@ pub(crate) fn us(cycles: Cycles) -> f64 {
     ns(cycles) as f64 / 1e3
 }
 
-/// The last words of the image's flash, which the image leaves: erased, they are not an instruction.
-pub(crate) const ERASED: u32 = 0x0801_eff8;
+/// Returns where in the image a halfword is the permanently undefined instruction `udf`, whatever it is there for.
+pub(crate) fn undefined(image: &Image) -> u32 {
+    const UDF: u8 = 0xde;
+    let mut halfwords = image.segments.iter().flat_map(|segment| {
+        let addresses = (segment.address..).step_by(2);
+        addresses.zip(segment.bytes.chunks_exact(2))
+    });
+    let found = halfwords.find(|(_, halfword)| halfword[1] == UDF);
+    found.expect("one halfword in 256 is").0
+}
 
 /// Puts a jump to itself into free SRAM: after everything in the image, below the end of the chip's 22 KB.
 pub(crate) fn endless_loop(board: &mut Board) -> u32 {
