@@ -136,8 +136,8 @@ def test_a_program_sends_frames_of_its_own():
         (lambda e: e.environment(supply_v=101.0), "voltage of the supply = 101 is out of range; give 0 to 100"),
         (lambda e: e.environment(torque_nm=[1.0]), "torque_nm: 1 values for 2 ESCs"),
         (lambda e: e.faults.inject(0, "mosfet_open"), "phase: "),
-        (lambda e: e.record(), "nothing is recorded; make the emulator with record=True"),
-        (lambda e: e.trace_hashes, "no trace is kept; make the emulator with trace=True"),
+        (lambda e: e.record(), "nothing is recorded; create the emulator with record=True"),
+        (lambda e: e.trace_hashes, "no trace is kept; create the emulator with trace=True"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_a_line(attempt, said):
@@ -149,7 +149,7 @@ def test_what_cannot_be_done_is_said_in_a_line(attempt, said):
 def test_an_esc_that_is_not_there_is_an_index_error():
     emulator = siskin.Emulator("bosso", escs=2)
     for attempt in (lambda: emulator.throttle[2], lambda: emulator.faults[5], lambda: emulator.params.of(-3)):
-        with pytest.raises(IndexError, match="is not there; give 0 to 1"):
+        with pytest.raises(IndexError, match="there is no ESC [^;]*; give 0 to 1"):
             attempt()
 
 

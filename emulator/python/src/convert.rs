@@ -32,7 +32,7 @@ pub(crate) fn to_toml(value: &Bound<'_, PyAny>) -> PyResult<Value> {
         return Ok(Value::Float(number));
     }
     let kind = value.get_type().name()?;
-    let what = format!("a {kind} is no value of a scenario; give a number, text, list or dict");
+    let what = format!("a {kind} is not a scenario value; give a number, text, list or dict");
     Err(Error::new_err(what))
 }
 

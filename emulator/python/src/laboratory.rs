@@ -44,7 +44,7 @@ impl Laboratory {
     ) -> PyResult<T> {
         py.detach(|| match self.inner.lock() {
             Ok(mut inner) => Ok(work(&mut inner)),
-            Err(_) => Err(wrong("the emulator has failed; make a new one")),
+            Err(_) => Err(wrong("the emulator has failed; create a new one")),
         })
     }
 
@@ -52,7 +52,7 @@ impl Laboratory {
         if esc < self.escs {
             return Ok(esc);
         }
-        let what = format!("ESC {esc} is not there; give 0 to {}", self.escs - 1);
+        let what = format!("there is no ESC {esc}; give 0 to {}", self.escs - 1);
         Err(PyIndexError::new_err(what))
     }
 }

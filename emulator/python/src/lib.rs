@@ -16,7 +16,7 @@ pyo3::create_exception!(
     siskin,
     Error,
     PyValueError,
-    "Something cannot be done; its text is one line, as the program prints it."
+    "Any error of this package, with the one-line message that the program prints."
 );
 
 /// The compiled part of siskin.

@@ -106,7 +106,7 @@ class Emulator:
         """Advances simulated time.
 
         :param seconds: how far, to the nanosecond.
-        :raises siskin.Error: if that is not a valid time, or the simulated motor has left all bounds.
+        :raises siskin.Error: if the time is invalid, or the simulated motor has diverged.
         """
         self._laboratory.advance(seconds)
 
@@ -130,10 +130,10 @@ class Emulator:
         self._throttle[:] = throttle
 
     def send(self, esc: int, datagram: bytes, after_s: float = 0.0) -> None:
-        """Plays a frame of your own on an ESC's wire; set its :attr:`throttle` to ``None`` first.
+        """Sends a raw frame on an ESC's wire; set its :attr:`throttle` to ``None`` first.
 
         :param datagram: as over UDP, described in the emulator's guide under "The throttle wire over UDP".
-        :param after_s: time of its first edge, s from now. A frame that still plays is waited for.
+        :param after_s: time of its first edge, s from now. Starts after any frame still being sent.
         :raises siskin.Error: if it is malformed, or more than 100 ms of frames are waiting.
         """
         self._laboratory.send(_index.one(self._laboratory.escs, esc), datagram, after_s)
@@ -147,7 +147,7 @@ class Emulator:
         torque_nm: Values = None,
         wind_rpm: Values = None,
     ) -> None:
-        """Changes the ESCs' surroundings from now on. A value that is left out or ``None`` stays unchanged.
+        """Changes the ESCs' surroundings from now on. A value that is omitted or ``None`` stays unchanged.
 
         :param supply_v: open-circuit voltage of the supply, V, 0 to 100; replaces that of a battery, which then never
             runs empty.
@@ -184,7 +184,7 @@ class Emulator:
         The columns are those of the program's recordings: ``record()["rpm"]`` is the true speed. ``phase`` is an index
         into :data:`siskin.PHASES`; a missing number is NaN. A second takes 1.3 MB at 15 kHz.
 
-        :raises siskin.Error: if the emulator was made without ``record=True``.
+        :raises siskin.Error: if the emulator was created without ``record=True``.
         """
         return _record.rows(self._laboratory.take_recorded(_index.one(self._laboratory.escs, esc)))
 
@@ -192,11 +192,11 @@ class Emulator:
     def trace_hashes(self) -> list[str]:
         """A hash over the control's state in every step, for each ESC; equal for equal inputs on any machine.
 
-        :raises siskin.Error: if the emulator was made without ``trace=True``.
+        :raises siskin.Error: if the emulator was created without ``trace=True``.
         """
         hashes = [self._laboratory.trace_hash(esc) for esc in range(self._laboratory.escs)]
         if any(found is None for found in hashes):
-            raise Error("no trace is kept; make the emulator with trace=True")
+            raise Error("no trace is kept; create the emulator with trace=True")
         return [found for found in hashes if found is not None]
 
     scenario = staticmethod(scenario)

@@ -17,7 +17,7 @@ def one(escs: int, esc: int) -> int:
     try:
         return range(escs)[esc]
     except IndexError:
-        raise IndexError(f"ESC {esc} is not there; give 0 to {escs - 1}") from None
+        raise IndexError(f"there is no ESC {esc}; give 0 to {escs - 1}") from None
 
 
 def each(name: str, escs: int, values: Values) -> list[float | None]:

@@ -15,5 +15,5 @@ dtype: np.dtype[np.void] = np.dtype([(column, _TYPES.get(column, "<f4")) for col
 def rows(packed: bytes | None) -> np.ndarray[Any, np.dtype[np.void]]:
     """Returns what the emulator has packed, as a writable array."""
     if packed is None:
-        raise Error("nothing is recorded; make the emulator with record=True")
+        raise Error("nothing is recorded; create the emulator with record=True")
     return np.frombuffer(bytearray(packed), dtype)

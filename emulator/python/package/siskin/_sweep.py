@@ -99,7 +99,7 @@ def sweep(
         plan = Plan(path, ends, given, None)
         return Table(plan.rows(0, plan.runs, threads))
     if threads is not None:
-        raise Error("threads are for this machine and client is for others; give one of them")
+        raise Error("threads applies to this machine and client to a cluster; give one of them")
     return Table(_on_cluster(client, Path(path).resolve(), ends, given, retries))
 
 
@@ -124,7 +124,7 @@ def _part(
 ) -> list[Cells]:
     """Plays some of the runs on a worker: on one thread, since each of a worker's threads has a part of its own."""
     if _hash(path) != text:
-        raise Error(f"{path}: the file differs between this worker and who has asked it; give both the same")
+        raise Error(f"{path}: the file on this worker differs from the client's; give both the same")
     return Plan(path, ends, overrides, None).rows(*part, 1)
 
 
@@ -139,7 +139,7 @@ def _ends(seeds: range | None) -> tuple[int, int] | None:
     if seeds is None:
         return None
     if seeds.step != 1 or not seeds or seeds[0] < 0:
-        raise Error(f"seeds = {seeds}: give them from the first on without gaps, as range(1, 201)")
+        raise Error(f"seeds = {seeds}: give consecutive seeds, such as range(1, 201)")
     return seeds[0], seeds[-1]
 
 
