@@ -21,29 +21,29 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Runs one ESC or several in real time, or in lockstep with a simulator (the default)
+    /// Run one ESC or several in real time, or in lockstep with a simulator (default)
     Run(RunArgs),
-    /// Runs a scenario from a file, offline
+    /// Play a scenario from a file, offline
     Scenario(ScenarioArgs),
-    /// Measures the figures of a paper
+    /// Measure a paper's figures
     Reproduce(ReproduceArgs),
-    /// Measures how fast the emulator is on this machine
+    /// Measure how fast the emulator is on this machine
     Bench(BenchArgs),
-    /// Plays every fault at every moment of a flight with either drive, and judges what the ESC makes of it
+    /// Inject every fault in every phase of a flight, with both drives, and judge how the ESC reacts
     Matrix(MatrixArgs),
-    /// Draws a recording
+    /// Plot a recording
     Plot(PlotArgs),
 }
 
 #[derive(Args, Debug)]
 pub(crate) struct ReproduceArgs {
-    /// The paper
+    /// Paper to reproduce
     #[arg(value_enum)]
     pub(crate) paper: Paper,
-    /// Draws the paper's figures into this folder, each as SVG and PNG
+    /// Plot the paper's figures into this folder, each as SVG and PNG
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
-    /// Prints the figures as one JSON object
+    /// Print the figures as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -58,26 +58,26 @@ pub(crate) enum Paper {
 
 #[derive(Args, Debug)]
 pub(crate) struct BenchArgs {
-    /// Prints the figures as one JSON object
+    /// Print the figures as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 #[derive(Args, Debug)]
 pub(crate) struct MatrixArgs {
-    /// Draws them
+    /// Plot the cells to this file
     #[arg(short, long, value_name = "PICTURE.svg|.png")]
     pub(crate) output: Option<PathBuf>,
-    /// Prints the cells as one JSON object
+    /// Print the cells as one JSON object
     #[arg(long)]
     pub(crate) json: bool,
 }
 
 #[derive(Args, Debug)]
 pub(crate) struct PlotArgs {
-    /// A recording, or the fault record of an ESC (.bin, from siskin faults --save)
+    /// Recording, or an ESC's fault record (.bin, from siskin faults --save)
     pub(crate) record: PathBuf,
-    /// The picture to make
+    /// Picture to write
     #[arg(short, long, value_name = "PICTURE.svg|.png")]
     pub(crate) output: PathBuf,
 }

@@ -41,45 +41,46 @@ pub struct RunArgs {
     /// MAVLink endpoints.
     #[arg(long, value_name = "ENDPOINT", help = MAVLINK_HELP)]
     pub mavlink: Vec<Endpoint>,
-    /// Where the throttle wire listens
+    /// Address on which the throttle wire listens
     #[arg(long, value_name = "udp:H:P", default_value = "udp:127.0.0.1:14600")]
     pub signal: SignalAddress,
-    /// ESCs on one MAVLink link and one supply: above 1 they are peripherals, components MAV_COMP_ID (140) and
-    /// on; ESC i takes throttle on the port i higher
+    /// Number of ESCs, on one MAVLink link and one supply: several are peripherals, components MAV_COMP_ID (140)
+    /// and up; ESC i takes throttle on the port i higher
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = RangedU64ValueParser::<usize>::new().range(1..=ESCS_MAX as u64))]
     pub escs: usize,
-    /// A built-in bench or a TOML file
+    /// Built-in bench or TOML file
     #[arg(long, value_name = "NAME|FILE", help = bench_help())]
     pub bench: Option<String>,
-    /// A built-in motor or a TOML file [default: the bench's]
+    /// Built-in motor or TOML file [default: the bench's]
     #[arg(long, value_name = "NAME|FILE")]
     pub motor: Option<String>,
-    /// A built-in load or a TOML file [default: the bench's]
+    /// Built-in load or TOML file [default: the bench's]
     #[arg(long, value_name = "NAME|FILE")]
     pub load: Option<String>,
-    /// Supply: volts, a battery as 4s or 6s, or a TOML file [default: the bench's]
+    /// Supply: volts, a battery such as 4s or 6s, or a TOML file [default: the bench's]
     #[arg(long, value_name = "VOLTS|Ns|FILE", allow_hyphen_values = true)]
     pub bus: Option<String>,
-    /// Where the scope's page is served, or none [default: 127.0.0.1:8080, or nowhere if that is taken]
+    /// Address on which to serve the scope's page, or none [default: 127.0.0.1:8080, or none if that is taken]
     #[arg(long, value_name = "HOST:PORT|none")]
     pub web: Option<WebAddress>,
-    /// How the inverter is simulated
+    /// Inverter model
     #[arg(long, value_enum, default_value_t = Fidelity::Averaged)]
     pub plant: Fidelity,
-    /// Simulated seconds a second, max, or lockstep: as a client on the throttle wire says
+    /// Simulated seconds per second, max, or lockstep: advanced by a client on the throttle wire
     #[arg(long, value_name = "X|max|lockstep", default_value = "1", value_parser = speed)]
     pub speed: Speed,
-    /// Simulated seconds after which to end
+    /// Simulated time after which to stop, s
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub duration: Option<f64>,
-    /// Seed of all randomness
+    /// Random seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// File behind the simulated flash, PATH.0, PATH.1 ... of several ESCs, or none [default: a file in your
+    /// File that holds the simulated flash (PATH.0, PATH.1 ... with several ESCs), or none [default: a file in your
     /// state folder]
     #[arg(long, value_name = "PATH|none")]
     pub storage: Option<PathBuf>,
-    /// A fault as a scenario has it, from the start on where it says no at_s, as kind = "mosfet_open", phase = 1; repeatable
+    /// Fault, with a scenario's keys, such as kind = "mosfet_open", phase = 1; acts from the start unless it has
+    /// at_s; repeatable
     #[arg(long, value_name = "KEYS", value_parser = scenario::fault)]
     pub fault: Vec<Fault>,
     /// What runs in real time and offline have in common.
@@ -90,19 +91,19 @@ pub struct RunArgs {
 /// What a scenario is played with.
 #[derive(Args, Debug)]
 pub struct ScenarioArgs {
-    /// The scenario, a TOML file
+    /// Scenario, a TOML file
     pub file: PathBuf,
-    /// Another seed than the file's
+    /// Seed, instead of the file's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Runs the scenario for each seed from A to B, both included
+    /// Play the scenario with each seed from A to B, inclusive
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with = "seed")]
     pub seeds: Option<RangeInclusive<u64>>,
-    /// Gives a key of the file one value, in place of what sweeps or draws it, as bench.scale.R=0.7
+    /// Set a key of the file to one value, instead of sweeping or drawing it, such as bench.scale.R=0.7
     /// or signal.0.rpm=3000.0 (entries count from 0); repeatable
     #[arg(long, value_name = "KEY=VALUE", value_parser = key)]
     pub set: Vec<(String, toml::Value)>,
-    /// Writes a row for each run: its seed, swept and drawn keys, figures and verdicts, to .csv or .parquet
+    /// Write a row for each run to .csv or .parquet: its seed, swept and drawn keys, figures and verdicts
     #[arg(long, value_name = "PATH")]
     pub table: Option<PathBuf>,
     /// What runs in real time and offline have in common.
@@ -113,17 +114,17 @@ pub struct ScenarioArgs {
 /// What both have.
 #[derive(Args, Debug)]
 pub struct CommonArgs {
-    /// Sets the parameters of a named set before the start, as --param does: bosso-table-iii is the
+    /// Set the parameters of a preset before the start, as --param does: bosso-table-iii is the
     /// first paper's drive as published
     #[arg(long, value_name = "NAME", value_parser = parameter::preset)]
     pub preset: Option<&'static Preset>,
-    /// Sets a parameter before the start, over what is stored or in the file, without storing it; repeatable
+    /// Set a parameter before the start, overriding what is stored or in the file, without storing it; repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = parameter::assignment)]
     pub param: Vec<(ParamId, f32)>,
-    /// Records to a file: each control period to .csv or .parquet, the wires to .vcd, MAVLink to .tlog
+    /// Record to a file: each control period to .csv or .parquet, the wires to .vcd, MAVLink to .tlog
     #[arg(long, value_name = "PATH")]
     pub record: Option<PathBuf>,
-    /// Prints the summary as one JSON object at the end
+    /// Print the summary as one JSON object at the end
     #[arg(long)]
     pub json: bool,
 }
@@ -250,7 +251,7 @@ fn storage(
                 Some(Err(error)) => format!("{error};"),
                 None => "no home folder:".to_owned(),
             };
-            let warning = format!("{why} settings are kept until the end only");
+            let warning = format!("{why} settings are kept only until the program ends");
             Ok((in_memory(), Some(warning)))
         }
     }
@@ -276,7 +277,7 @@ pub fn usage(program: &str, error: &clap::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let what = one_line(&error.to_string());
-    eprintln!("{program}: {what}; --help lists what there is");
+    eprintln!("{program}: {what}; try --help");
     ExitCode::from(2)
 }
 
@@ -292,9 +293,9 @@ fn one_line(message: &str) -> String {
 fn bench_help() -> String {
     let names: Vec<_> = library::names().collect();
     format!(
-        "A built-in bench ({}) or a TOML file: motor, load, supply and the parameters that the ESC \
-         needs for them, set before the start as --param does [default: {}, whose parameters \
-         give way to stored ones]",
+        "Built-in bench ({}) or TOML file: motor, load, supply and the parameters that the ESC \
+         needs for them, set before the start as by --param [default: {}, whose parameters \
+         yield to stored ones]",
         names.join(", "),
         library::DEFAULT
     )

@@ -69,10 +69,10 @@ impl Image {
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
         let file = ElfFile32::<object::Endianness>::parse(bytes);
-        let file = file.map_err(|error| format!("it is no ELF file of 32 bits ({error})"))?;
+        let file = file.map_err(|error| format!("it is not a 32-bit ELF file ({error})"))?;
         let endian = file.endian();
         if file.elf_header().e_machine.get(endian) != elf::EM_ARM {
-            return Err("it is not for an ARM".to_owned());
+            return Err("it is not for an Arm chip".to_owned());
         }
         let mut segments = Vec::new();
         for header in file.elf_program_headers() {

@@ -17,12 +17,12 @@ use siskin_vboard::image::Image;
 use siskin_vboard::load::Figures;
 use siskin_vboard::machine::VirtualBoard;
 
-/// The flashed image, on a simulated B-G431B-ESC1 that turns a simulated motor.
+/// Runs a board's image on a simulated B-G431B-ESC1 that drives a simulated motor.
 #[derive(Debug, Parser)]
 #[command(name = "siskin-vboard", version)]
 struct Cli {
-    /// The linked image, an ELF file. It knows no command line: what --param, --preset and --bench set is
-    /// put into its flash before it starts, and is stored with the rest when it stores
+    /// Linked image, an ELF file. It has no command line: what --param, --preset and --bench set is
+    /// written to its flash before it starts, and stored with the rest whenever it stores
     image: PathBuf,
     #[command(subcommand)]
     command: Option<Command>,
@@ -32,7 +32,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Plays a scenario from a file, offline; it must ask for throttle, not for speed or current
+    /// Play a scenario from a file, offline; its signals must be throttle, not speed or current
     Scenario(ScenarioArgs),
 }
 
