@@ -76,7 +76,7 @@
 //!   |                                                           +--> Idle or Brake
 //!   +--- Coasts (Run, Stopping), Failed (Ramp, Run, Stopping), Tripped (any)
 //!
-//!  Ramp, Run, Stopping -- Retried, by the six-step drive --> Park        Idle -- Shorted --> Brake
+//!  Idle -- Shorted --> Brake
 //! ```
 //!
 //! # File order

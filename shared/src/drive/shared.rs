@@ -1,9 +1,10 @@
 //! State that every mode uses and none owns: protection, current offsets, faults, applied duties.
 
-use super::config::{Config, Direction};
+use super::config::{ATTEMPTS, Config, Direction, QUICK_ATTEMPTS};
 use super::io::{Rotation, Sample, Setpoint};
 use super::phase::Phase;
 use super::seen::Seen;
+use super::transitions::Why;
 use crate::control::delay::Delay;
 use crate::control::modulator::Supply;
 use crate::control::sensing::{self, Shunts};
@@ -110,6 +111,37 @@ impl Shared {
                 unreadable: UNREADABLE,
             },
             supply: Supply::new(&config.modulator, Voltage::ZERO, Voltage::ZERO),
+        }
+    }
+
+    /// A motor has turned long enough: whatever stops it now, it is to turn again.
+    #[cold]
+    #[inline(never)] // two callers
+    pub(super) fn start_succeeded(&mut self, config: &Config) {
+        self.failed_starts = 0;
+        self.latch.retry_periods = config.retry_periods;
+        // With sensors, or the six-step drive, an attempt takes too long.
+        if config.slow_periods == 0 && config.retry_periods > 0 && config.six_step.is_none() {
+            self.latch.quick_attempts = QUICK_ATTEMPTS;
+        }
+    }
+
+    /// A start has failed, or the motor has become too slow: the next attempt, if there is one.
+    #[cold]
+    #[inline(never)] // two callers
+    pub(super) fn start_failed(&mut self) -> Why {
+        let quick = &mut self.latch.quick_attempts;
+        if *quick > 0 {
+            *quick -= 1;
+            // Counted once, and then the first attempt of a start is skipped: it has less current than these.
+            self.failed_starts = 1;
+            return Why::Failed;
+        }
+        self.failed_starts += 1;
+        if usize::from(self.failed_starts) >= ATTEMPTS {
+            Why::Tripped(Fault::Stuck)
+        } else {
+            Why::Failed
         }
     }
 

@@ -144,7 +144,7 @@ impl State {
         };
         self.phase = to;
         schedule::choose(&mut self.foc.loops.slot, to.is_open_loop());
-        if to.is_off() || to == Phase::Brake || why == Why::Retried {
+        if to.is_off() || to == Phase::Brake {
             self.rest(from, why);
         }
         match (why, &config.six_step) {
@@ -188,7 +188,7 @@ impl State {
         if !from.is_off() && from != Phase::Charge {
             self.off.forget();
         }
-        self.enters_rest = why != Why::Retried;
+        self.enters_rest = true;
         self.foc_kind = NO_KIND;
         shared.progress = Default::default();
         shared.seen.rest();
@@ -239,12 +239,6 @@ impl State {
         let shared = &self.shared;
         let seen = &shared.seen;
         let signed = |speed: Speed| if shared.reversed { -speed } else { speed };
-        let losses = if self.phase.drives() {
-            self.six_step.losses()
-        } else {
-            // The six-step drive's counts stay as they were when it ended.
-            six_step::state::Losses::default()
-        };
         Snapshot {
             phase: seen.phase,
             faults: shared.latch.faults,
@@ -262,9 +256,9 @@ impl State {
             bounds: shared.protection.bounds,
             trip: self.trip_level(),
             sensor_fault: observer::sensor_fault(&self.foc.observer),
-            failed_starts: shared.failed_starts.max(losses.failed_starts),
+            failed_starts: shared.failed_starts,
             lost_periods: shared.progress.lost_periods,
-            missed_sextants: losses.missed_sextants,
+            missed_sextants: self.six_step.missed,
         }
     }
 

@@ -40,8 +40,6 @@ pub(super) enum Why {
     /// Loss of synchronism in a start, or Run too slow for too long: to Idle, where a set-point that still asks to
     /// turn begins another attempt.
     Failed,
-    /// Loss of synchronism in a six-step start: it aligns the rotor again.
-    Retried,
     /// Bridge off until zero throttle, or a retry.
     Tripped(Fault),
 }
@@ -68,7 +66,6 @@ pub(super) const fn next(from: Phase, why: Why, stop: Stop) -> Option<Phase> {
         },
         (Run | Stopping, Why::Coasts) => Idle,
         (Ramp | Run | Stopping, Why::Failed) => Idle,
-        (Ramp | Run | Stopping, Why::Retried) => Park,
         (_, Why::Tripped(_)) => Idle,
         _ => return None,
     })
@@ -79,7 +76,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const ALL: [Why; 18] = [
+    const ALL: [Why; 17] = [
         Why::Drive,
         Why::Tone,
         Why::Released,
@@ -96,7 +93,6 @@ mod tests {
         Why::Resumed,
         Why::Stopped,
         Why::Failed,
-        Why::Retried,
         Why::Tripped(Fault::OverCurrent),
     ];
 

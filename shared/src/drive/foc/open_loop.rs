@@ -5,7 +5,7 @@ use crate::control::observer::Observer;
 use crate::control::regulator::Reference;
 use crate::control::transform::{AlphaBeta, Dq, rotate_frame};
 use crate::control::{PERIODS, observer, start};
-use crate::drive::config::{ATTEMPTS, Config, QUICK_ATTEMPTS};
+use crate::drive::config::{ATTEMPTS, Config};
 use crate::drive::io::Setpoint;
 use crate::drive::phase::Phase;
 use crate::drive::schedule::{CYCLE, DAMP_PERIODS};
@@ -95,52 +95,29 @@ pub(in crate::drive) fn rotor_mode_change(
     match phase {
         Phase::Ramp => {
             let has_lost_rotor = start::has_lost_rotor(attempt(config, shared), &foc.loops.start);
-            has_lost_rotor.then(|| attempt_failed(shared))
+            has_lost_rotor.then(|| shared.start_failed())
         }
         // Before the speed check: sensors that fail at standstill are lost there.
         Phase::Run | Phase::Stopping if progress.lost_periods >= config.lost_periods => {
             Some(if progress.run_periods < config.proven_periods {
-                attempt_failed(shared)
+                shared.start_failed()
             } else {
                 Why::Tripped(Fault::ObserverLost)
             })
         }
         Phase::Run if slow => {
             progress.slow_periods += CYCLE;
-            (progress.slow_periods > config.slow_periods).then(|| attempt_failed(shared))
+            (progress.slow_periods > config.slow_periods).then(|| shared.start_failed())
         }
         Phase::Stopping if slow => Some(Why::Stopped),
         Phase::Run if progress.run_periods < config.proven_periods => {
             progress.run_periods += CYCLE;
             if progress.run_periods >= config.proven_periods {
-                shared.failed_starts = 0;
-                shared.latch.retry_periods = config.retry_periods;
-                // Sensors drive a held rotor for as long as it may be slow: such an attempt is not quick.
-                if config.slow_periods == 0 && config.retry_periods > 0 {
-                    shared.latch.quick_attempts = QUICK_ATTEMPTS;
-                }
+                shared.start_succeeded(config);
             }
             None
         }
         _ => None,
-    }
-}
-
-/// A start has failed, or the motor has become too slow: the next attempt, if there is one.
-#[cold]
-fn attempt_failed(shared: &mut Shared) -> Why {
-    let quick = &mut shared.latch.quick_attempts;
-    if *quick > 0 {
-        *quick -= 1;
-        // Counted once, and then the first attempt of a start is skipped: it has less current than these.
-        shared.failed_starts = 1;
-        return Why::Failed;
-    }
-    shared.failed_starts += 1;
-    if usize::from(shared.failed_starts) >= ATTEMPTS {
-        Why::Tripped(Fault::Stuck)
-    } else {
-        Why::Failed
     }
 }
 
@@ -176,7 +153,7 @@ pub(in crate::drive) fn hand_over(
         omega_s,
     );
     let Some(lead) = lead else {
-        return Some(attempt_failed(shared));
+        return Some(shared.start_failed());
     };
     let lead = SinCos::of(lead);
     // The voltage continues unchanged, in the new frame.

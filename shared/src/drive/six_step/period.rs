@@ -128,12 +128,12 @@ pub(in crate::drive) fn period(
     if let Some(position) = position {
         given::follow(six_step, (s, shared), position);
     } else if !crossings(six_step, (s, shared), terminals, ramping) {
-        return (Bridge::Off, Some(start::lost(six_step, s, phase)));
+        return (Bridge::Off, Some(start::lost(six_step, (s, shared), phase)));
     }
 
     let (mut shown, mut why) = (phase, None);
     if ramping {
-        let ramp_current = start::current(six_step, (s, shared), setpoint);
+        let ramp_current = start::current(six_step, shared, setpoint);
         hold(six_step, s, i, ramp_current);
         if s.tracking.crossings >= KNOWN && s.tracking.omega_bar >= six_step.run_speed {
             s.tracking.acceleration = Speed::ZERO;
@@ -178,12 +178,11 @@ fn rotor(
         Phase::Run if slow && given => {
             given::is_stuck(config, shared).then_some(Why::Tripped(Fault::Stuck))
         }
-        Phase::Run if slow => Some(start::lost(six_step, s, phase)),
+        Phase::Run if slow => Some(start::lost(six_step, (s, shared), phase)),
         Phase::Run if *run_periods < config.proven_periods => {
             *run_periods += 1;
             if *run_periods == config.proven_periods {
-                s.failed = 0;
-                shared.latch.retry_periods = config.retry_periods;
+                shared.start_succeeded(config);
             }
             None
         }

@@ -17,9 +17,6 @@ use crate::drive::transitions::Why;
 use crate::protection::Fault;
 use crate::units::{AdcCounts, Current, Duty};
 
-/// Consecutive starts that may fail.
-const ATTEMPTS: u8 = 3;
-
 /// Then along phase a, at 0°: a rotor opposite to c does not stay there.
 const SECOND_PARK: Sector = Sector::Ac;
 
@@ -28,13 +25,9 @@ const SECOND_PARK: Sector = Sector::Ac;
 const FIRST_RAMP: Sector = Sector::Ba;
 
 /// Returns the current of Park and Ramp: half more after each failed start, up to the bound.
-pub(super) fn current(
-    six_step: &Config,
-    (s, shared): (&State, &Shared),
-    setpoint: &Setpoint,
-) -> Current {
+pub(super) fn current(six_step: &Config, shared: &Shared, setpoint: &Setpoint) -> Current {
     let more = |current: Current, _| current.saturating_add(current / 2);
-    let current = (0..s.failed).fold(six_step.start_current, more);
+    let current = (0..shared.failed_starts).fold(six_step.start_current, more);
     let current = current.min(shared.protection.bounds.max);
     match setpoint {
         Setpoint::Test(_) => current.min(six_step.test_current),
@@ -52,7 +45,7 @@ pub(super) fn park(
     currents: [AdcCounts; 3],
     setpoint: &Setpoint,
 ) -> (Bridge, Option<Why>) {
-    let wanted = current(six_step, (s, shared), setpoint);
+    let wanted = current(six_step, shared, setpoint);
     let swapped = shared.swapped(config);
     let currents = in_order(swapped, currents);
     let Legs {
@@ -65,7 +58,7 @@ pub(super) fn park(
     // Counts at most the first attempt's current: a larger one damps the swing no sooner. Twice as long after a
     // failed start.
     s.charge += wanted.min(six_step.start_current).over_periods(1);
-    let long = six_step.park_charge * (1 + i64::from(s.failed > 0));
+    let long = six_step.park_charge * (1 + i64::from(shared.failed_starts > 0));
     if s.sector == FIRST_PARK {
         if s.charge >= long {
             s.charge = I36F28::ZERO;
@@ -98,20 +91,13 @@ pub(super) fn park(
 
 /// Handles loss of synchronism: another start, or none. A motor that is being stopped loses nothing and coasts.
 #[cold]
-pub(super) fn lost(six_step: &Config, s: &mut State, phase: Phase) -> Why {
+pub(super) fn lost(six_step: &Config, (s, shared): (&State, &mut Shared), phase: Phase) -> Why {
     let starting = phase == Phase::Ramp || s.tracking.omega_bar <= six_step.run_speed;
-    let failed = s.failed + 1;
     if phase == Phase::Stopping {
         Why::Coasts
-    } else if !starting {
-        Why::Tripped(Fault::ObserverLost)
-    } else if failed > ATTEMPTS {
-        Why::Tripped(Fault::Stuck)
+    } else if starting {
+        shared.start_failed()
     } else {
-        *s = State {
-            failed,
-            ..State::default()
-        };
-        Why::Retried
+        Why::Tripped(Fault::ObserverLost)
     }
 }

@@ -17,7 +17,7 @@ traced! {
     pub(in crate::drive) struct State {
         pub(super) sector: Sector,
         pub(super) crossing: crossing::State,
-        pub(super) tracking: tracking::State,
+        pub(in crate::drive) tracking: tracking::State,
         pub(super) duty: duty::State,
         /// ∫i dt at the present angle of Park.
         pub(super) charge: I36F28,
@@ -30,21 +30,10 @@ traced! {
         /// Consecutive periods without current while the low sides are on.
         pub(super) still: u16,
         /// Consecutive sextants without a crossing.
-        pub(super) missed: u8,
-        /// Consecutive failed starts.
-        pub(super) failed: u8,
+        pub(in crate::drive) missed: u8,
         /// ω* and its trajectory.
         pub(in crate::drive) planner: planner::State,
     }
-}
-
-/// Signs of lost synchronism, for telemetry.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::drive) struct Losses {
-    /// Consecutive failed starts.
-    pub(in crate::drive) failed_starts: u8,
-    /// Consecutive sextants without a crossing.
-    pub(in crate::drive) missed_sextants: u8,
 }
 
 impl Default for State {
@@ -60,7 +49,6 @@ impl Default for State {
             astray: 0,
             still: 0,
             missed: 0,
-            failed: 0,
             planner: planner::State::default(),
         }
     }
@@ -70,14 +58,7 @@ impl State {
     /// Ends a drive.
     pub(in crate::drive) fn rest(&mut self) {
         self.still = 0;
+        self.missed = 0;
         self.planner = planner::State::default();
-    }
-
-    /// Returns the present signs of lost synchronism.
-    pub(in crate::drive) fn losses(&self) -> Losses {
-        Losses {
-            failed_starts: self.failed,
-            missed_sextants: self.missed,
-        }
     }
 }

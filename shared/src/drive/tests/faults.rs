@@ -26,6 +26,10 @@ fn within(drive: &[(ParamId, f32)], phase: Phase) -> Bench {
     let turn = bench.turn();
     bench.until(Phase::Park, turn);
     bench.state.phase = phase;
+    if let Some(six_step) = &bench.config.six_step {
+        // One that stands still in Run has failed to start.
+        bench.state.six_step.tracking.omega_bar = six_step.run_speed;
+    }
     let asked = asked(&bench, phase);
     bench.state.set_foc_kind(&bench.config, &asked);
     bench
