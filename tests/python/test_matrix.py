@@ -35,8 +35,7 @@ OPEN = {
     # At idle little more flows than a sound sensor may be off by.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
-    # Its start takes the current 0.2 A beyond.
-    **cells([FOC], ["hall_stuck"], ["idle"], "reaction", "current"),
+    **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
     # The field-oriented drive finds a jammed rotor lost from its flux after 0.1 s, if no current trips. The six-step
     # drive misses three sextants first, a period too late at idle; a jam in its start is not retried.
     **cells([FOC, SIX], ["rotor_blocked"], ["idle"], "time"),
