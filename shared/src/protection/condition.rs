@@ -197,8 +197,8 @@ conditions! {
         "returns less to the supply, and turns more into heat in the motor";
     /// The motor has all the voltage that the supply can give.
     Duty = 20 "duty" None,
-        "the motor has all the voltage that the supply gives"
-        "turns no faster";
+        "the motor gets the full supply voltage"
+        "cannot speed up";
     /// A phase carries no current in one direction or in both.
     PhaseOpen = 21 "phase open" Some(Raised::Warning),
         "a phase carries no current, or in one direction only: a loose wire, or a switch that does not turn on"
