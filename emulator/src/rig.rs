@@ -137,7 +137,6 @@ impl Rig {
     }
 
     /// Passes every word of the control state to `out`.
-    #[inline(always)]
     pub fn trace(&self, out: &mut impl FnMut(u32)) {
         self.state.trace(&self.config, out);
     }

@@ -156,7 +156,6 @@ impl Summary {
     }
 
     /// Adds a period that began at `t_s`.
-    #[inline]
     pub fn add(&mut self, t_s: f64, period: &Period, rig: &Rig) {
         self.steps += 1;
         self.trace.take(rig);

@@ -162,7 +162,7 @@ impl Surroundings {
     }
 
     /// Returns what there is to sense now.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn truth(&self) -> Truth {
         Truth {
             currents_a: self.plant.shunts_a(self.plant.currents_a()),
@@ -174,7 +174,7 @@ impl Surroundings {
     }
 
     /// Returns the readings of the emulator's converter.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn sample(&mut self) -> Sample {
         let mut sample = self.sensing.sample(&self.truth(), &mut self.noise);
         for (counts, stuck_a) in sample.currents.iter_mut().zip(self.stuck_a) {
@@ -203,7 +203,7 @@ impl Surroundings {
     }
 
     /// Applies stuck Hall sensors to their bits.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn seen(&self, mut hall: u8) -> u8 {
         for (phase, stuck) in self.hall_stuck.into_iter().enumerate() {
             if let Some(level) = stuck {
@@ -214,7 +214,7 @@ impl Surroundings {
     }
 
     /// Runs a whole control period with a command for each half.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn period(&mut self, halves: [Bridge; 2], period_s: f64, dead_time_s: f64) -> Motion {
         let start = self.start();
         let bus_v = self.bus.volts();
@@ -255,7 +255,7 @@ impl Surroundings {
     }
 
     /// Returns the present state of the motor and its supply.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn start(&self) -> Motion {
         Motion {
             angle_turns: self.plant.angle_turns(),
@@ -268,7 +268,7 @@ impl Surroundings {
     }
 
     /// Advances bus and board after a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn follow(&mut self, start: Motion, flow: Flow, time_s: f64) -> Motion {
         self.bus.advance(time_s, flow.bus_a);
         let current_square = flow.copper_w / (1.5 * self.plant.resistance_ohm());

@@ -86,7 +86,6 @@ impl Bus {
     }
 
     /// Ends a period in which the bridge took this mean current, A; negative is returned.
-    #[inline]
     pub fn advance(&mut self, time_s: f64, current_a: f64) {
         if self.fed && self.connected {
             return;

@@ -50,7 +50,7 @@ pub(super) struct Stretch {
 
 impl Stretch {
     /// Returns one twice as long.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn twice(&self) -> Self {
         Self {
             time_s: 2.0 * self.time_s,
@@ -71,7 +71,7 @@ pub(super) struct Moment {
 
 impl Moment {
     /// Returns the current vector in the stator's frame, A.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn stator_a(&self) -> [f64; 2] {
         turn(self.i, self.direction)
     }
@@ -112,7 +112,7 @@ pub(super) struct Course {
 
 impl Course {
     /// Advances to a stretch's end.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn go(&mut self, to: Moment) {
         self.now = to;
         self.reach(largest(to.stator_a()));
@@ -120,7 +120,7 @@ impl Course {
 
     /// Records a phase current, A.
     // By comparison: `max` checks for NaN.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn reach(&mut self, current_a: f64) {
         if current_a > self.most_a {
             self.most_a = current_a;
@@ -191,7 +191,7 @@ impl Circuit {
     }
 
     /// Prepares a stretch of at most half a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn stretch(&self, time_s: f64) -> Stretch {
         let (angle, fall) = (self.omega * time_s, self.rate * time_s);
         Stretch {
@@ -206,7 +206,7 @@ impl Circuit {
     }
 
     /// Returns the remaining share of a transient.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn decay(&self, fall: f64) -> f64 {
         if self.short[0] {
             small_decay(fall)
@@ -216,7 +216,7 @@ impl Circuit {
     }
 
     /// Returns the closed solution over a stretch.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn solve(&self, now: &Moment, drive: &Drive, stretch: &Stretch) -> Solution {
         let direction = turn(now.direction, stretch.rotation);
         let settled = [drive.u[0] * self.inverse_r, drive.u[1] * self.inverse_r];
@@ -241,7 +241,7 @@ impl Circuit {
     }
 
     /// Advances the currents and the rotor.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn conduct(&self, course: &mut Course, drive: &Drive, stretch: &Stretch) {
         let solution = self.solve(&course.now, drive, stretch);
         self.follow(course, drive, stretch, &solution);
@@ -253,7 +253,7 @@ impl Circuit {
     /// and Maclaurin's trapezoid): the error is h⁵/720 of the fourth derivative, 1e-6 of the
     /// current if the rotor turns by 0.1. The integral of the current itself, and so charge and
     /// energy, is exact: the flux linkage L·i + φ·e^(jθ) grows by u·h − R·∫i.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn follow(
         &self,
         course: &mut Course,
@@ -293,13 +293,13 @@ impl Circuit {
     }
 
     /// Returns the slope that a voltage along it gives a current, A/s.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn slope_of(&self, volts: f64) -> f64 {
         volts * self.inverse_r * self.rate
     }
 
     /// Returns the slope of the currents in the stator's frame without voltage, A/s.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn free_slope(&self, now: &Moment) -> [f64; 2] {
         turn(self.slope([0.0; 2], now.i), now.direction)
     }
@@ -312,7 +312,7 @@ impl Circuit {
     }
 
     /// Returns the derivatives of i_d and i_q: (u − R·i)/L − jω·(i + φ/L).
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn slope(&self, settled: [f64; 2], [d, q]: [f64; 2]) -> [f64; 2] {
         [
             self.rate * (settled[0] - d) + self.omega * q,
@@ -321,7 +321,7 @@ impl Circuit {
     }
 
     /// Returns the flux linkage L·i + φ·e^(jθ) in the stator's frame, Vs.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn linkage(&self, at: &Moment) -> [f64; 2] {
         let l = self.inductance_h;
         turn([l * (at.i[0] + self.magnet_a), l * at.i[1]], at.direction)
@@ -329,7 +329,7 @@ impl Circuit {
 }
 
 /// Returns the part of a current vector that can flow.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn confine(i: [f64; 2], way: Way) -> [f64; 2] {
     match way {
         Way::Star => i,

@@ -282,7 +282,7 @@ impl Plant {
 
     /// Runs some time on the mean voltages, less the dead time's loss, a share of the period, by the sign of each
     /// current: once the supply's voltage and twice a diode's per period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn mean(&mut self, duties: [f64; 3], dead_share: f64, time_s: f64) {
         if self.settled != Some(Rail::Low) {
             self.close_low();
@@ -323,7 +323,6 @@ impl Plant {
     }
 
     /// Plays half a period, whatever the legs do in it.
-    #[inline(never)]
     fn play(&mut self, halves: [Half; 3], half_s: f64, dead_time_s: f64) {
         let mut halves = halves.map(|half| half.timed(half_s, dead_time_s));
         let mut next_s = [0.0; 3];

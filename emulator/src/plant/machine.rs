@@ -112,7 +112,7 @@ impl Machine {
 
     /// Returns true if the currents have a closed solution between two changes of the inverter, and solutions
     /// superpose.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn is_linear(&self) -> bool {
         self.magnetics.is_none()
     }
@@ -207,7 +207,7 @@ impl Machine {
     }
 
     /// Returns the currents into the phases, A.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn currents_a(&self) -> [f64; 3] {
         phases(self.now().stator_a())
     }
@@ -245,7 +245,7 @@ impl Machine {
     }
 
     /// Begins a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn begin(&mut self, period_s: f64) {
         let omega = settle(self.middle_rad_s(period_s)) * f64::from(self.motor.pole_pairs);
         if std::mem::take(&mut self.changes) || self.warming.is_some() {
@@ -262,7 +262,7 @@ impl Machine {
     }
 
     /// Advances the currents and the rotor.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn conduct(&mut self, drive: &Drive, stretch: &Stretch) {
         if let Some(magnetics) = &self.magnetics {
             let conduction = Conduction {
@@ -277,7 +277,7 @@ impl Machine {
     }
 
     /// Advances the currents and the rotor at a mean voltage; the supply provides the power that goes into the motor.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn conduct_mean(&mut self, u: [f64; 2], bus_v: f64, time_s: f64) {
         if self.is_linear() {
             let course = &mut self.course;
@@ -295,7 +295,7 @@ impl Machine {
 
     /// Returns the phase currents expected in the middle of a stretch, A: i_d and i_q held constant, and the rotor's
     /// turn taken as a straight line, 2 % too long at 0.2 rad.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn middle_a(&self, time_s: f64) -> [f64; 3] {
         let turned = 0.5 * self.circuit.omega * time_s;
         phases(turn(self.now().stator_a(), [1.0, turned]))
@@ -330,7 +330,7 @@ impl Machine {
     }
 
     /// Ends the period: the shaft takes its mean torque.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn finish(&mut self, period_s: f64) -> Flow {
         let turns = self.circuit.omega * period_s * (1.0 / TAU);
         let angle_turns = self.angle_turns;

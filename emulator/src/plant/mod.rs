@@ -2,6 +2,11 @@
 //!
 //! Double precision, `libm`'s functions and a fixed order of operations: equal inputs give equal
 //! bits on every machine.
+//!
+//! # Inlining
+//! `#[inline] // in each period`, here and in [`surroundings`](crate::surroundings): without these attributes
+//! `siskin-emulator bench` shows the averaged plant at 24 % less speed and the switching plant at 8 %; without those of
+//! `surroundings` alone 8 % and 4 %, of `sensing` alone 7 % and 5 %.
 
 mod air;
 mod breaks;

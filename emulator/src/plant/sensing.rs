@@ -92,7 +92,7 @@ impl Sensing {
     }
 
     /// Takes one sample of everything.
-    #[inline]
+    #[inline] // in each period
     pub fn sample(&self, truth: &Truth, noise: &mut Noise) -> Sample {
         let per_a = 1.0 / self.range_a;
         let mut currents = [AdcCounts::ZERO; 3];
@@ -108,7 +108,7 @@ impl Sensing {
     }
 
     /// Returns a phase sensor's output before conversion, A.
-    #[inline]
+    #[inline] // in each period
     pub fn shown_a(&self, truth: &Truth, phase: usize, noise: &mut Noise) -> f64 {
         let current_a = self.shunt_a(truth, phase) + self.offset_a[phase];
         if self.noise_a > 0.0 {
@@ -152,7 +152,7 @@ impl Sensing {
     }
 
     /// Returns the Hall sensors' bits.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub fn hall(&self, direction: [f64; 2]) -> u8 {
         let mut through = phases(direction);
         for (phase, through) in through.iter_mut().enumerate() {
@@ -185,7 +185,7 @@ fn fixed(counts: f64) -> AdcCounts {
 
 /// Rounds to the nearest whole number, ties to even: next to 1.5·2^52 a double has no bits for more, and the number is
 /// in its lowest ones. Several times faster than a conversion, for any size and NaN.
-#[inline(always)]
+#[inline(always)] // in each period
 fn nearest(x: f64) -> i32 {
     (x + 6_755_399_441_055_744.0).to_bits() as i32
 }

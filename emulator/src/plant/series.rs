@@ -13,7 +13,7 @@ impl Number for f64 {}
 impl Number for wide::f64x4 {}
 
 /// Returns cosine and sine to 1e-15 by their series up to x¹¹, for up to [`ROTATION_MAX`] radians.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn small_rotation<T: Number>(radians: T) -> [T; 2] {
     let cos = polynomial(
         radians * radians,
@@ -30,7 +30,7 @@ pub(super) fn small_rotation<T: Number>(radians: T) -> [T; 2] {
 }
 
 /// Returns sin(x)/x to 1e-15, for up to [`ROTATION_MAX`] radians.
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn small_sinc<T: Number>(radians: T) -> T {
     polynomial(
         radians * radians,
@@ -47,7 +47,7 @@ pub(super) fn small_sinc<T: Number>(radians: T) -> T {
 
 /// Evaluates a polynomial of six coefficients, the constant one first, in pairs (Estrin): half the latency of Horner's
 /// rule.
-#[inline(always)]
+#[inline(always)] // in each period
 fn polynomial<T: Number>(x: T, c: [f64; 6]) -> T {
     let square = x * x;
     (x * c[1] + c[0]) + square * ((x * c[3] + c[2]) + square * (x * c[5] + c[4]))
@@ -63,7 +63,7 @@ pub(super) fn rotation(radians: f64) -> [f64; 2] {
 }
 
 /// Returns e^(−x) to 2e-15 by its series up to x⁹, for 0 to [`DECAY_MAX`].
-#[inline(always)]
+#[inline(always)] // in each period
 pub(super) fn small_decay<T: Number>(x: T) -> T {
     let square = x * x;
     let low = polynomial(

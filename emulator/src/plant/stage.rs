@@ -93,7 +93,7 @@ impl Stage {
     }
 
     /// Begins a period at a supply voltage, in which there must be `dead_s` between the switches of a leg.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn begin(&mut self, bus_v: f64, period_s: f64, dead_s: f64) {
         self.bus_v = bus_v;
         self.guard.begin(dead_s, self.now_s);
@@ -116,7 +116,7 @@ impl Stage {
     }
 
     /// Turns one of a leg's switches on, or both off.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn set(&mut self, leg: usize, on: Option<Rail>) {
         self.guard.turn(leg, on, self.now_s);
         self.switch(leg, on);
@@ -131,7 +131,7 @@ impl Stage {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn switch(&mut self, leg: usize, on: Option<Rail>) {
         if !self.sound {
             return self.set_broken(leg, on);
@@ -151,7 +151,7 @@ impl Stage {
     }
 
     /// Returns what carries a leg's current with both switches off.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn diode(&self, leg: usize) -> Path {
         let current_a = dot(AXES[leg], self.machine.now().stator_a());
         if current_a > ZERO_A {
@@ -179,7 +179,7 @@ impl Stage {
     }
 
     /// Runs on mean voltages of the three terminals in place of switches, V.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn run_averaged(&mut self, terminals_v: [f64; 3], time_s: f64) {
         let [alpha, beta] = along_axes(terminals_v);
         let u = [alpha * (2.0 / 3.0), beta * (2.0 / 3.0)];
@@ -188,7 +188,7 @@ impl Stage {
     }
 
     /// Returns how long each leg's current has been flowing through its low side, s; `None` if it does not.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn low_s(&self) -> [Option<f64>; 3] {
         [0, 1, 2].map(|leg| match self.paths[leg] {
             path if path.is_low() => Some(self.now_s - self.low_from_s[leg]),
@@ -197,7 +197,7 @@ impl Stage {
     }
 
     /// Returns the terminals' voltages against the negative pole, V.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(super) fn terminals_v(&self) -> [f64; 3] {
         if self.legs_off == 0 {
             return [0, 1, 2].map(|leg| self.leg_v(leg));
@@ -286,7 +286,7 @@ impl Stage {
 
 /// Returns the drive of all phases conducting, from the sum of the axes of those at the positive pole, and the diodes'
 /// share of the voltages as such a sum.
-#[inline(always)]
+#[inline(always)] // in each period
 fn star(bus_v: f64, high: [f64; 2], drop_v: [f64; 2]) -> Drive {
     Drive {
         u: [

@@ -48,7 +48,6 @@ impl Half {
 /// Converts an edge's time from the counter's top to the sample. With each turn-on late by the dead
 /// time, the middle of the low side's on-time, which is when the sample is taken, is half a dead
 /// time behind the top.
-#[inline]
 pub(super) fn delayed(edge_s: f64, dead_time_s: f64) -> f64 {
     (edge_s - 0.5 * dead_time_s).max(0.0)
 }
@@ -80,7 +79,6 @@ impl Timer {
 }
 
 /// Returns the duties of a command under which all legs switch, 0..1.
-#[inline]
 pub(super) fn duties(bridge: Bridge) -> Option<[f64; 3]> {
     match bridge {
         Bridge::Duty(duties) => Some(duties.map(share)),
@@ -91,7 +89,6 @@ pub(super) fn duties(bridge: Bridge) -> Option<[f64; 3]> {
 }
 
 /// Converts a duty to 0..1.
-#[inline]
 pub(super) fn share(duty: Duty) -> f64 {
     (f64::from(duty.to_bits()) * DUTY_BIT).min(1.0)
 }

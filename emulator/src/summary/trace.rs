@@ -30,7 +30,6 @@ impl Trace {
     }
 
     /// Adds the state after a period.
-    #[inline]
     pub(super) fn take(&mut self, rig: &Rig) {
         let Some(room) = self.room() else { return };
         let mut len = 0;
@@ -63,7 +62,6 @@ impl Trace {
     }
 
     /// Returns room for a period after what is buffered, where each word has a fixed place: no per-word checks.
-    #[inline]
     fn room(&mut self) -> Option<&mut [u8; PERIOD_BYTES]> {
         if self.waiting > BYTES {
             self.hash.update(&self.bytes[..self.waiting]);

@@ -254,7 +254,6 @@ impl Window {
         }
     }
 
-    #[inline(always)]
     fn add_control(&mut self, t_s: f64, rpm: f64, control: Control) {
         let Control {
             period,

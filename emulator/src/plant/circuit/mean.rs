@@ -11,7 +11,7 @@ impl Circuit {
     /// The means of i_d and i_q are exact, by their equation's: (R + jωL) times the mean is the mean of the voltage,
     /// which turns against the rotor, less the growth of the flux linkage. For their squares the variance is a
     /// parabola's.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(in super::super) fn conduct_mean(
         &self,
         course: &mut Course,

@@ -49,7 +49,7 @@ struct Vectors {
 }
 
 impl Vectors {
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn from(of: impl Fn(usize) -> [f64; 2]) -> Self {
         Self {
             x: f64x4::from(array::from_fn(|k| of(k)[0])),
@@ -57,7 +57,7 @@ impl Vectors {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn plus(self, other: Self) -> Self {
         Self {
             x: self.x + other.x,
@@ -65,7 +65,7 @@ impl Vectors {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn less(self, other: Self) -> Self {
         Self {
             x: self.x - other.x,
@@ -73,7 +73,7 @@ impl Vectors {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn times(self, factor: f64) -> Self {
         Self {
             x: self.x * factor,
@@ -82,7 +82,7 @@ impl Vectors {
     }
 
     /// Multiplies each by a vector, as complex numbers.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn turned(self, [cos, sin]: [f64; 2]) -> Self {
         Self {
             x: self.x * cos - self.y * sin,
@@ -90,18 +90,18 @@ impl Vectors {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn dot(self, other: Self) -> f64x4 {
         self.x * other.x + self.y * other.y
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn cross(self, other: Self) -> f64x4 {
         self.x * other.y - self.y * other.x
     }
 
     /// Returns those at the stretches' starts, from those at their ends and the first.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn before(self, first: [f64; 2]) -> Self {
         let ([a, b, c, _], [d, e, f, _]) = (self.x.to_array(), self.y.to_array());
         Self {
@@ -110,14 +110,14 @@ impl Vectors {
         }
     }
 
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn last(self) -> [f64; 2] {
         [self.x.to_array()[3], self.y.to_array()[3]]
     }
 }
 
 /// Sums in this order on every machine.
-#[inline(always)]
+#[inline(always)] // in each period
 fn sum(parts: f64x4) -> f64 {
     let [a, b, c, d] = parts.to_array();
     (a + b) + (c + d)
@@ -130,7 +130,7 @@ impl Circuit {
     /// In each stretch i_q is taken as a parabola through its values and derivatives at both ends: the mean is accurate
     /// to fourth order, and the mean of the square is the mean's square plus the variance. The current's square is by
     /// the trapezoid, and the charge exact, as in [`Circuit::follow`].
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(in super::super) fn sweep(&self, course: &mut Course, sweep: &Sweep) -> bool {
         let Sweep { volts, dead_s, .. } = *sweep;
         let [a, b, c] = sweep.order;
@@ -264,7 +264,7 @@ impl Circuit {
     }
 
     /// Returns cosines and sines of the rotor's angle over times of at most half a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn rotations(&self, times_s: f64x4) -> Vectors {
         let angles = times_s * self.omega;
         if self.short[1] {
@@ -277,7 +277,7 @@ impl Circuit {
     }
 
     /// Returns the remaining share of a transient after times of at most half a period.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn decays(&self, times_s: f64x4) -> f64x4 {
         let falls = times_s * self.rate;
         if self.short[0] {

@@ -20,7 +20,7 @@ const ON_OHM: f64 = 3e-3;
 
 impl Stage {
     /// Returns true if nothing is broken.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(in super::super) fn is_sound(&self) -> bool {
         self.sound
     }
@@ -69,7 +69,7 @@ impl Stage {
     }
 
     /// Turns a leg's gates on or off; both on is a shoot-through.
-    #[inline(always)]
+    #[inline(always)] // in each period
     pub(in super::super) fn set_gates(&mut self, leg: usize, gate: Gate) {
         if self.sound && !gate.shoots() {
             self.set(leg, gate.on());

@@ -7,7 +7,6 @@ use super::{DIODE_V, Path, Rail, Stage};
 impl Stage {
     /// Runs half a period in which each leg has an edge at its given time, leaving room for the dead time. Returns
     /// false, having done nothing, if a current comes too close to zero in it.
-    #[inline(never)]
     pub(in super::super) fn sweep(
         &mut self,
         to: Rail,
@@ -47,7 +46,7 @@ impl Stage {
 
     /// Returns whether each leg's current is expected to flow into the motor at its edge, from its slope without
     /// voltage and what the legs before it take from it.
-    #[inline(always)]
+    #[inline(always)] // in each period
     fn inward(&self, edges_s: [f64; 3], rises: bool) -> [bool; 3] {
         let [a, b, c] = edges_s;
         let since_s = [
@@ -66,7 +65,7 @@ impl Stage {
 }
 
 /// Returns the legs in order of these times.
-#[inline(always)]
+#[inline(always)] // in each period
 fn order([a, b, c]: [f64; 3]) -> [usize; 3] {
     let (first, last) = if a <= b { (0, 1) } else { (1, 0) };
     let (early, late) = (a.min(b), a.max(b));
