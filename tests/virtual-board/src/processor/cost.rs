@@ -68,7 +68,6 @@ impl Costs {
     }
 
     /// Returns the number of the block of `bytes` bytes at this address, and its current cost.
-    #[inline]
     pub(super) fn enter(
         &mut self,
         address: u32,

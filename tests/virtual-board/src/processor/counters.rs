@@ -25,7 +25,6 @@ impl SysTick {
     }
 
     /// Returns when it next reaches zero.
-    #[inline(always)]
     pub(super) fn due(&self) -> Cycles {
         if self.bits & ENABLED == 0 {
             NEVER

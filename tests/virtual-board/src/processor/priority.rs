@@ -60,7 +60,6 @@ impl Exceptions {
 
     /// Samples the lines: one that is up makes its interrupt pending unless that is being handled; one that
     /// rises does so in any case.
-    #[inline(always)]
     pub(super) fn latch(&mut self, lines: &Lines) {
         let risen = lines.take_risen() << INTERRUPTS;
         let lines = lines.interrupts << INTERRUPTS | u128::from(lines.non_maskable) << NMI;
@@ -71,7 +70,6 @@ impl Exceptions {
     }
 
     /// Returns whether any enabled exception is pending, masked or not.
-    #[inline(always)]
     pub(super) fn any(&self) -> bool {
         self.pending & self.enabled != 0
     }

@@ -75,7 +75,6 @@ enum Sleep {
 
 impl<S: Surroundings> Inside<S> {
     /// Completes the block that was being executed: its time has passed.
-    #[inline]
     fn settle(&mut self) {
         if let Some(running) = self.running.take() {
             let block = self.costs.block(running.number);
@@ -98,7 +97,6 @@ impl<S: Surroundings> Inside<S> {
     }
 
     /// Samples what has come up by now.
-    #[inline(always)]
     fn latch(&mut self) {
         self.private.exceptions.latch(self.surroundings.lines());
         if self.private.sys_tick.due() <= self.surroundings.now() {
