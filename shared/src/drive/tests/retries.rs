@@ -36,6 +36,15 @@ impl Flight {
         })
     }
 
+    /// Both drives in flight, each with the set-point that turns it.
+    fn proven(change: (ParamId, f32)) -> [(Self, Setpoint); 2] {
+        Self::both(change).map(|flight| {
+            let flight = flight.flown(true);
+            let turn = flight.bench.turn();
+            (flight, turn)
+        })
+    }
+
     fn fly(&mut self, sample: Sample, setpoint: Setpoint) {
         let rpm = if self.stands { 0.0 } else { 3000.0 };
         let omega = self.bench.config.scale.speed_from_rpm(rpm);
@@ -88,9 +97,7 @@ const IN_FLIGHT: (ParamId, f32) = (ParamId::LimPolicy, 1.0);
 
 #[test]
 fn a_proven_drive_is_tried_again_three_times_with_growing_pauses_and_then_held() {
-    for flight in Flight::both(IN_FLIGHT) {
-        let mut flight = flight.flown(true);
-        let turn = flight.bench.turn();
+    for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
         for wanted_s in [0.02, 0.08, 0.32] {
             flight.trip();
             let pause_s = flight.pause_s(turn).expect("it is tried again");
@@ -107,9 +114,7 @@ fn a_proven_drive_is_tried_again_three_times_with_growing_pauses_and_then_held()
 
 #[test]
 fn a_retry_that_proves_itself_has_all_retries_again() {
-    for flight in Flight::both(IN_FLIGHT) {
-        let mut flight = flight.flown(true);
-        let turn = flight.bench.turn();
+    for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
         for _ in 0..5 {
             flight.trip();
             let pause_s = flight.pause_s(turn).expect("it is tried again");
@@ -121,9 +126,7 @@ fn a_retry_that_proves_itself_has_all_retries_again() {
 
 #[test]
 fn a_pause_begins_when_the_cause_is_gone() {
-    for flight in Flight::both(IN_FLIGHT) {
-        let mut flight = flight.flown(true);
-        let turn = flight.bench.turn();
+    for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
         for _ in 0..flight.bench.periods(1.0) {
             flight.fly(sample([0.0; 3], 8.0), turn);
         }
@@ -136,16 +139,12 @@ fn a_pause_begins_when_the_cause_is_gone() {
 #[test]
 fn zero_throttle_and_stop_take_the_retries() {
     for stopped in [Setpoint::Zero, Setpoint::Stop] {
-        for flight in Flight::both(IN_FLIGHT) {
-            let mut flight = flight.flown(true);
-            let turn = flight.bench.turn();
+        for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
             flight.trip();
             flight.quiet(1e-3, stopped);
             assert_eq!(flight.pause_s(turn), None, "{stopped:?}");
         }
-        for flight in Flight::both(IN_FLIGHT) {
-            let mut flight = flight.flown(true);
-            let turn = flight.bench.turn();
+        for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
             flight.stands = true;
             flight.quiet(0.01, stopped);
             flight.stands = false;
@@ -167,9 +166,7 @@ fn a_start_that_has_not_proven_itself_is_not_tried_again() {
 
 #[test]
 fn on_the_bench_a_fault_holds_until_zero_throttle() {
-    for flight in Flight::both((ParamId::LimPolicy, 0.0)) {
-        let mut flight = flight.flown(true);
-        let turn = flight.bench.turn();
+    for (mut flight, turn) in Flight::proven((ParamId::LimPolicy, 0.0)) {
         flight.trip();
         assert_eq!(flight.pause_s(turn), None);
         let pause_s = flight.pause_s(Setpoint::Zero).expect("zero throttle");
@@ -180,9 +177,7 @@ fn on_the_bench_a_fault_holds_until_zero_throttle() {
 #[test]
 fn what_cannot_pass_by_itself_is_not_tried_again() {
     for fault in Fault::ALL {
-        for flight in Flight::both(IN_FLIGHT) {
-            let mut flight = flight.flown(true);
-            let turn = flight.bench.turn();
+        for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
             flight.quiet(1e-3, Setpoint::Fault(fault));
             let tried = flight.pause_s(turn).is_some();
             assert_eq!(tried, fault.is_retried(), "{fault:?}");
@@ -192,9 +187,7 @@ fn what_cannot_pass_by_itself_is_not_tried_again() {
 
 #[test]
 fn two_faults_of_which_one_cannot_pass_hold() {
-    for flight in Flight::both(IN_FLIGHT) {
-        let mut flight = flight.flown(true);
-        let turn = flight.bench.turn();
+    for (mut flight, turn) in Flight::proven(IN_FLIGHT) {
         flight.trip();
         flight.quiet(1e-3, Setpoint::Fault(Fault::OverTemperature));
         assert_eq!(flight.pause_s(turn), None);
