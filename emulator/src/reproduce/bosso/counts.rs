@@ -240,7 +240,7 @@ mod tests {
             speed,
             reference,
             [all(TRANSFORM, "clarke_in"), all(TRANSFORM, "park")].concat(),
-            ["voltage", "forced", "error", "integrate"]
+            ["voltage", "without_integrators", "error", "integrate"]
                 .map(|name| all(REGULATOR, name))
                 .concat(),
             high_gain,
