@@ -22,7 +22,8 @@ OPEN = {
     # A phase is known to be open once the rotor has been seen everywhere over some turns. Where two phases do not turn
     # the motor that far, the regulator's voltage rises until the current trips.
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
-    **cells([SIX], ["phase_open"], ["start", "half", "full", "braking"], "current", "cause"),
+    **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
+    **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
     **cells([SIX], ["low_open"], ["start"], "current", "cause"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
     # others' currents up to 2.8 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
@@ -37,23 +38,27 @@ OPEN = {
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
     **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
     # The field-oriented drive finds a jammed rotor lost from its flux after 0.1 s, if no current trips. The six-step
-    # drive misses three sextants first, a period too late at idle; a jam in its start is not retried.
+    # drive gives a rotor up after twelve sextants without a crossing, which at idle takes 26 ms, and three turns 24. At
+    # half speed its current trips first, so that over-current is named. At full speed the restarts after it are still
+    # under way 1.5 s after the rotor was freed. A jam in its start is not retried.
     **cells([FOC, SIX], ["rotor_blocked"], ["idle"], "time"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "time"),
     **cells([SIX], ["rotor_blocked"], ["half"], "current", "cause"),
+    **cells([SIX], ["rotor_blocked"], ["full"], "reaction"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
-    # Nearly all of the back-EMF vanishes faster than the currents are regulated.
+    # Nearly all of the back-EMF vanishes faster than the currents are regulated. The six-step drive's trip.
     **cells([FOC], ["strike"], ["full"], "current"),
     **cells([SIX], ["strike"], ["full"], "current", "cause"),
     **cells([SIX], ["strike"], ["half"], "current"),
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
+    **cells([SIX], ["strike_torque"], ["start"], "reaction"),
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC], ["disconnect"], ["braking"], "supply"),
-    # At idle the six-step drive shoots a short through the winding, up to the comparators' level.
-    **cells([SIX], ["high_short"], ["idle"], "current"),
+    # In a start, a high side that shorts drives the six-step drive's winding up to the comparators' level.
+    **cells([SIX], ["high_short"], ["start"], "current"),
 }
 
 

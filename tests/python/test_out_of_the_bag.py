@@ -1,4 +1,4 @@
-"""An ESC out of the bag, played by `out_of_the_bag.py`, with motors of the usual sizes."""
+"""An ESC out of the bag, played by `out_of_the_bag.py`, with motors of the usual sizes and of any."""
 
 import random
 
@@ -7,7 +7,8 @@ from out_of_the_bag import AT_REST, MOST_CURRENT, drawn, opened
 
 MOTORS = 150
 EXTREMES = range(250, 300)
-"""A tenth of the campaign's: among them windings in which the supply drives the limit within a quarter of a period."""
+"""A tenth of the campaign's motors; in some of their windings the supply drives the current to its limit within a quarter
+of a period."""
 
 
 def test_any_motor_turns_the_right_way_within_3_s_of_the_throttle(tmp_path):
