@@ -118,7 +118,6 @@ struct Notes {
     stage_c: f64,
     speed_rad_s: f64,
     driven: bool,
-    phase: Phase,
     /// Range of speeds in the observed stretch, rad/s.
     least_rad_s: f64,
     most_rad_s: f64,
@@ -138,7 +137,6 @@ impl Onlooker for Notes {
         if t_s < self.from_s {
             self.faults_before = snapshot.fault_count;
             self.driven = period.bridge != Bridge::Off;
-            self.phase = snapshot.phase;
             return;
         }
         if t_s >= self.from_s + SETTLED_S {
@@ -150,11 +148,7 @@ impl Onlooker for Notes {
             .winding_c
             .max(rig.plant().winding_c().unwrap_or_default());
         self.stage_c = self.stage_c.max(rig.around().sensor_c());
-        // The six-step drive restarts without a period of rest.
-        let retried =
-            snapshot.phase == Phase::Park && self.phase.drives() && self.phase != Phase::Park;
-        self.phase = snapshot.phase;
-        let off = self.driven && period.bridge == Bridge::Off || retried;
+        let off = self.driven && period.bridge == Bridge::Off;
         self.off |= off;
         if off || snapshot.fault_count > self.faults_before {
             self.note(t_s);
@@ -180,7 +174,6 @@ impl Notes {
             stage_c: 0.0,
             speed_rad_s: 0.0,
             driven: false,
-            phase: Phase::Idle,
             least_rad_s: f64::INFINITY,
             most_rad_s: f64::NEG_INFINITY,
         }

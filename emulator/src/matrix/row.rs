@@ -83,7 +83,7 @@ pub enum Row {
 pub enum Reaction {
     /// The motor keeps turning as commanded.
     GoesOn,
-    /// It turns again as commanded, after the bridge was off or a start had begun.
+    /// It turns again as commanded, after the bridge was off.
     Recovers,
     /// It is at rest, or coming to rest, as commanded.
     Rests,
