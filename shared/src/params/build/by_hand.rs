@@ -125,8 +125,14 @@ fn a_driving_current_grows_by_the_rotor_s_flux_in_8_ms() {
         // Never faster than the slew: 6 A in 3 ms, and four times as long with the modified regulator.
         (&[(ParamId::LimPhaseA, 6.0)][..], 2000.0, 2000.0),
         (&[CtlRegulator::Modified.setting()][..], 3333.0, 3333.0),
+        // Not limited with sensors, nor with the published observer; with the cured one it is.
         (&[CtlObserver::Hall.setting()][..], 13_333.0, 13_333.0),
         (&[CtlObserver::BackEmf.setting()][..], 13_333.0, 13_333.0),
+        (
+            &[CtlObserver::BackEmf.setting(), CtlObsCure::Cured.setting()][..],
+            13_333.0,
+            3349.0,
+        ),
     ] {
         let made = rates_a_s(changes);
         near("slew", made[0], slew);

@@ -26,9 +26,7 @@ pub use si::{BuildError, scale};
 use si::{Si, TEST_SHARE, TOO_FEW_PERIODS};
 
 use super::board::Board;
-use super::choice::{
-    CtlDrive, CtlModulation, CtlObsCure, CtlObserver, Inp3d, LimPolicy, MotDir, MotStop,
-};
+use super::choice::{CtlDrive, CtlModulation, CtlObserver, Inp3d, LimPolicy, MotDir, MotStop};
 use super::table::ParamId;
 use super::values::Params;
 use crate::control::low_speed;
@@ -283,16 +281,9 @@ fn refuse_contradictions(p: &Si) {
     );
 }
 
-/// Returns true if the observer is helped where there is little back-EMF. The first paper's stays as published, and
-/// sensors give the position at any speed.
-fn is_helped(p: &Si) -> bool {
-    let published = p.chosen(CtlObserver::BackEmf) && p.chosen(CtlObsCure::Published);
-    !published && !p.chosen(CtlObserver::Hall)
-}
-
 /// Returns the least voltage along q in voltage mode.
 fn least_u_q(p: &Si) -> Voltage {
-    if is_helped(p) {
+    if p.is_helped() {
         stated_emf(p.scale.speed_from_rpm(p.of(Quantity::LeastRpm)))
     } else {
         Voltage::ZERO
@@ -325,7 +316,7 @@ fn low_speed(p: &Si) -> low_speed::Config {
         gain i_q_slope(MotRMohm, [TORQUE_DROP_SHARE] * Flux / R * RadPerUnit / UnitA),
     });
     let limit = formulas.number();
-    if !is_helped(p) {
+    if !p.is_helped() {
         return low_speed::Config::none(limit);
     }
     let most = [formulas.number(), formulas.number()];

@@ -1,7 +1,6 @@
 //! Coefficients of the outer loop.
 
 use super::formula::fill;
-use super::is_helped;
 use super::quantity::Quantity;
 use super::si::Si;
 use crate::control::speed::{Config, Law, feed_forward, nested};
@@ -48,7 +47,7 @@ pub(super) fn torque(p: &Si, place: &mut torque::Config) {
         define GrowthAS(Flux / L / [GROWTH_S] min SlewAS),
         number growth(GrowthAS * OuterT / UnitA),
     });
-    if !is_helped(p) {
+    if !p.is_helped() {
         // Sensors do not take the growth for a turn of the rotor, and the first paper has no such limit.
         place.growth = place.slew;
     }

@@ -5,6 +5,7 @@ use core::f32::consts::FRAC_PI_2;
 
 use super::quantity::Quantity;
 use crate::params::board::Board;
+use crate::params::choice::{CtlObsCure, CtlObserver};
 use crate::params::table::{Choice, ParamId};
 use crate::params::values::Params;
 use crate::units::Scale;
@@ -91,6 +92,13 @@ impl<'a> Si<'a> {
 
     pub(super) fn chosen<C: Choice>(&self, choice: C) -> bool {
         self.params.chosen(choice)
+    }
+
+    /// Returns true if the observer is helped where there is little back-EMF. The first paper's stays as published, and
+    /// sensors give the position at any speed.
+    pub(super) fn is_helped(&self) -> bool {
+        let published = self.chosen(CtlObserver::BackEmf) && self.chosen(CtlObsCure::Published);
+        !published && !self.chosen(CtlObserver::Hall)
     }
 
     /// Converts a time to whole periods.
