@@ -30,7 +30,7 @@ type Position = Option<(Angle, Speed)>;
 /// Returns the mode change that a set-point asks for while this drive drives.
 pub(in crate::drive) fn mode_change(
     config: &config::Config,
-    shared: &Shared,
+    shared: &mut Shared,
     phase: Phase,
     setpoint: &Setpoint,
 ) -> Option<Why> {
@@ -38,7 +38,10 @@ pub(in crate::drive) fn mode_change(
     match phase {
         Phase::Stopping if !is_to_stop => Some(Why::Resumed),
         Phase::Run if is_to_stop => Some(Why::Released),
-        Phase::Park | Phase::Ramp if !shared.is_along(config, setpoint) => Some(Why::Released),
+        Phase::Park | Phase::Ramp if !shared.is_along(config, setpoint) => {
+            shared.failed_starts = 0;
+            Some(Why::Released)
+        }
         _ => None,
     }
 }

@@ -150,6 +150,22 @@ fn zero_throttle_between_two_attempts_begins_with_the_first_one() {
 }
 
 #[test]
+fn a_start_the_other_way_begins_with_the_first_attempt() {
+    for drive in [0.0, 1.0] {
+        // A speed that gives six-step enough periods per sextant.
+        let drives = [(ParamId::CtlDrive, drive), (ParamId::CtlRpmMax, 4500.0)];
+        let mut bench = Bench::new(&[&drives[..], &[(ParamId::Inp3d, 1.0)]].concat());
+        let turn = bench.turn();
+        bench.until(Phase::Park, turn);
+        bench.state.shared.failed_starts = 1;
+        bench.quiet(CYCLE, turn);
+        assert_eq!(bench.state.shared.failed_starts, 1);
+        bench.quiet(CYCLE, turn.mirrored());
+        assert_eq!(bench.state.shared.failed_starts, 0, "{drive}");
+    }
+}
+
+#[test]
 fn stop_ends_a_start_at_once() {
     for (stop, bridge) in [(1.0, Bridge::Brake), (0.0, Bridge::Off)] {
         for phase in [Phase::Sense, Phase::Charge, Phase::Park, Phase::Ramp] {
