@@ -29,7 +29,7 @@ pub(crate) enum Command {
     Reproduce(ReproduceArgs),
     /// Measure how fast the emulator is on this machine
     Bench(BenchArgs),
-    /// Inject every fault in every phase of a flight, with both drives, and judge how the ESC reacts
+    /// Inject every fault at every moment of a flight, with both drives, and judge how the ESC reacts
     Matrix(MatrixArgs),
     /// Plot a recording
     Plot(PlotArgs),

@@ -126,7 +126,7 @@ def test_a_program_sends_frames_of_its_own():
     [
         (lambda e: siskin.Emulator("bosso", escs=9), "9 ESCs; give 1 to 8"),
         (lambda e: siskin.Emulator("bosso", escs=-1), "-1 ESCs; give 1 to 8"),
-        (lambda e: siskin.Emulator("bosso", wire="pwm"), "'pwm' is no wire; give one of servo, "),
+        (lambda e: siskin.Emulator("bosso", wire="pwm"), "'pwm' is not a throttle signal; give one of servo, "),
         (lambda e: siskin.Emulator("bosso", amps=1), "unknown field"),
         (lambda e: siskin.Emulator("bosso", noise_a=-1.0), "bench.noise_a = -1 is out of range; give 0 to"),
         (lambda e: e.advance(-1.0), "-1 s are out of range; give 0 to"),

@@ -47,7 +47,7 @@ pub(crate) fn run(session: &mut Session, as_json: bool, out: &mut dyn Write) -> 
     let items = report.lines().map(Item::parse);
     let items = items.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
         what: REPORT.into(),
-        reason: "cannot be parsed; is the image newer than this program?".into(),
+        reason: "cannot be parsed; use the siskin program of the image's version".into(),
     })?;
     if as_json {
         let items: Vec<_> = items.iter().map(Item::json).collect();

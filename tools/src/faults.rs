@@ -27,7 +27,7 @@ pub(crate) fn run(
     let file = ftp::read(session, RECORD)?;
     let recorded = Recorded::read(&file).ok_or(Error::Refused {
         what: RECORD.into(),
-        reason: "cannot be parsed; is the image of another version than this program?".into(),
+        reason: "cannot be parsed; use the siskin program of the image's version".into(),
     })?;
     if let Some(path) = &args.save {
         save(path, &file)?;
@@ -88,7 +88,7 @@ fn print(recorded: &Recorded, out: &mut dyn Write) -> Result<(), Error> {
     if let Some(holder) = recorded.holder {
         writeln!(
             out,
-            "{} control periods before fault {holder} on record: --save keeps them for a plot",
+            "the {} control periods before fault {holder} are on record; --save keeps them for a plot",
             recorded.periods.len()
         )?;
     }

@@ -49,7 +49,7 @@ pub(crate) fn run(
     let figures = report.lines().map(Figure::parse);
     let figures = figures.collect::<Option<Vec<_>>>().ok_or(Error::Refused {
         what: REPORT.into(),
-        reason: "cannot be parsed; is the image newer than this program?".into(),
+        reason: "cannot be parsed; use the siskin program of the image's version".into(),
     })?;
     if as_json {
         let figures: Vec<_> = figures.iter().map(Figure::json).collect();

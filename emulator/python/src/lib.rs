@@ -16,7 +16,7 @@ pyo3::create_exception!(
     siskin,
     Error,
     PyValueError,
-    "Any error of this package, with the one-line message that the program prints."
+    "Something cannot be done; the message is the line that the program prints."
 );
 
 /// The compiled part of siskin.

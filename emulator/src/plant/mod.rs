@@ -4,9 +4,9 @@
 //! bits on every machine.
 //!
 //! # Inlining
-//! `#[inline] // in each period`, here and in [`surroundings`](crate::surroundings): without these attributes
-//! `siskin-emulator bench` shows the averaged plant at 24 % less speed and the switching plant at 8 %; without those of
-//! `surroundings` alone 8 % and 4 %, of `sensing` alone 7 % and 5 %.
+//! Without the attributes marked `// in each period`, here and in [`surroundings`](crate::surroundings), the averaged
+//! plant runs 24 % slower in `siskin-emulator bench`, and the switching plant 8 %; without those of `surroundings` alone
+//! 8 % and 4 %, of `sensing` alone 7 % and 5 %.
 
 mod air;
 mod breaks;

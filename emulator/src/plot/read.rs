@@ -170,7 +170,7 @@ fn rows_of_record(path: &Path) -> Result<Rows, PlotError> {
     let recorded = Recorded::read(&bytes).ok_or_else(|| {
         content(
             path,
-            "it is no fault record: `siskin faults --save`".to_owned(),
+            "not a fault record; give the file of `siskin faults --save`".to_owned(),
         )
     })?;
     let rows = trip::rows(&recorded).into_iter().enumerate();

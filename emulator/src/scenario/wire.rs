@@ -36,7 +36,10 @@ impl TryFrom<String> for Wire {
         let signal = Signal::all().find(|signal| name(*signal) == text);
         signal.map(Self).ok_or_else(|| {
             let names: Vec<_> = Signal::all().map(name).collect();
-            format!("'{text}' is no wire; give one of {}", names.join(", "))
+            format!(
+                "'{text}' is not a throttle signal; give one of {}",
+                names.join(", ")
+            )
         })
     }
 }
@@ -122,7 +125,7 @@ mod tests {
         }
         let problem = Wire::try_from("pwm".to_owned()).unwrap_err();
         assert!(
-            problem.starts_with("'pwm' is no wire; give one of servo, oneshot125,"),
+            problem.starts_with("'pwm' is not a throttle signal; give one of servo, oneshot125,"),
             "{problem}"
         );
     }

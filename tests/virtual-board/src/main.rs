@@ -17,7 +17,7 @@ use siskin_vboard::image::Image;
 use siskin_vboard::load::Figures;
 use siskin_vboard::machine::VirtualBoard;
 
-/// Runs a board's image on a simulated B-G431B-ESC1 that drives a simulated motor.
+/// Run a board's image on a simulated B-G431B-ESC1 that drives a simulated motor.
 #[derive(Debug, Parser)]
 #[command(name = "siskin-vboard", version)]
 struct Cli {

@@ -117,7 +117,7 @@ fn bad_images() -> Vec<(Vec<u8>, &'static str)> {
     vec![
         (Vec::new(), "not a 32-bit ELF file"),
         (b":10000000".to_vec(), "not a 32-bit ELF file"),
-        (cut(60), "ELF file"),
+        (cut(60), "not a 32-bit ELF file"),
         (cut(30_000), "truncated"),
         (foreign.bytes(), "Arm"),
         (with(Vec::new()).bytes(), "nothing in it"),

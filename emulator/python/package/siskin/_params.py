@@ -34,7 +34,7 @@ class Params(MutableMapping[str, float]):
             self._laboratory.set_param(esc, name, value)
 
     def __delitem__(self, name: str) -> None:
-        raise TypeError("a parameter cannot be deleted")
+        raise TypeError("a parameter cannot be deleted; set it to another value")
 
     def __iter__(self) -> Iterator[str]:
         return iter(PARAMETERS)
