@@ -38,14 +38,14 @@ MEASURED = [
     ),
     (
         "emulator's speed, averaged plant",
-        "of the yardstick's",
+        "times the yardstick's",
         "bench",
         r"^averaged +[\d.]+ +([\d.]+) ",
         [("median", "at least 0.62")],
     ),
     (
         "emulator's speed, switching plant",
-        "of the yardstick's",
+        "times the yardstick's",
         "bench",
         r"^switching +[\d.]+ +([\d.]+) ",
         [("median", "at least 0.24")],

@@ -30,7 +30,7 @@ impl Health {
     }
 
     /// Takes a reading when due.
-    pub(crate) fn look(&mut self, now: Instant) {
+    pub(crate) fn poll(&mut self, now: Instant) {
         if now >= self.due {
             self.due = now + EVERY;
             self.temperature_c = NTC.celsius(self.sensor.read(interrupt::periods));

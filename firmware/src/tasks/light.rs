@@ -24,7 +24,7 @@ impl Light {
     }
 
     /// Shows the pattern that is due. If all is well, a flight controller may have ordered the light on.
-    pub(crate) fn look(&mut self, now: Instant, snapshot: Option<&Snapshot>, ordered: bool) {
+    pub(crate) fn poll(&mut self, now: Instant, snapshot: Option<&Snapshot>, ordered: bool) {
         if now < self.due {
             return;
         }

@@ -118,16 +118,16 @@ impl MainTask<'_> {
     #[inline(never)] // its stack is free for what comes next
     fn look(&mut self) -> bool {
         let now = now();
-        self.supervisor.look(now);
+        self.supervisor.poll(now);
         let snapshot = self.snapshot.read();
-        self.light.look(now, snapshot.as_ref(), self.esc.light());
+        self.light.poll(now, snapshot.as_ref(), self.esc.light());
         let Some(snapshot) = snapshot else {
             return false;
         };
         if let Some(warning) = self.teller.next(now) {
             self.esc.warn(warning);
         }
-        self.health.look(now);
+        self.health.poll(now);
         self.esc.poll(
             &mut self.throttle,
             now.as_micros(),

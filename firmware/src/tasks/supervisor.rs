@@ -48,7 +48,7 @@ impl Supervisor {
     }
 
     /// Feeds the watchdog when due, as long as everything is alive.
-    pub(crate) fn look(&mut self, now: Instant) {
+    pub(crate) fn poll(&mut self, now: Instant) {
         if now < self.due {
             return;
         }

@@ -28,8 +28,13 @@ traced! {
     }
 }
 
-/// Returns `wanted` with its i_q* clamped to the bounds and slew-limited.
-pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bounds) -> Reference {
+/// Returns `reference` with its i_q* clamped to the bounds and slew-limited.
+pub fn follow(
+    config: &Config,
+    state: &mut State,
+    reference: Reference,
+    bounds: Bounds,
+) -> Reference {
     // From braking it may cross zero by up to the slew.
     let rise = if state.i_q < Current::ZERO {
         config.slew
@@ -37,19 +42,19 @@ pub fn follow(config: &Config, state: &mut State, wanted: Reference, bounds: Bou
         config.growth
     };
     let i_q = bounds
-        .hold(wanted.i.q)
+        .hold(reference.i.q)
         .min(state.i_q.plus(rise))
         .max(state.i_q.minus(config.slew));
     state.i_q = i_q;
-    wanted.with_i_q(i_q)
+    reference.with_i_q(i_q)
 }
 
-/// Returns `wanted` with the growth of its i_q* limited, for the speed regulator; it may fall at once.
-pub fn grow(config: &Config, state: &mut State, wanted: Reference) -> Reference {
+/// Returns `reference` with the growth of its i_q* limited, for the speed regulator; it may fall at once.
+pub fn grow(config: &Config, state: &mut State, reference: Reference) -> Reference {
     let least = state.i_q.min(Current::ZERO).minus(config.slew);
     let most = state.i_q.max(Current::ZERO).plus(config.growth);
-    state.i_q = wanted.i.q.min(most).max(least);
-    wanted.with_i_q(state.i_q)
+    state.i_q = reference.i.q.min(most).max(least);
+    reference.with_i_q(state.i_q)
 }
 
 #[cfg(test)]

@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_that_is_that_of_the_looks_is_no_open_phase() {
+    fn a_speed_in_step_with_the_samples_is_no_open_phase() {
         for step in [1.0, 0.5, 1.0 / 3.0, 0.25, 0.2, 1.0001, 0.5001] {
             for lag in 0..24 {
                 let late = |sample, turns: f64| sound(4.0)(sample, turns - f64::from(lag) / 24.0);

@@ -128,7 +128,7 @@ impl Shared {
 
     /// A start has failed, or the motor has become too slow: the next attempt, if there is one.
     #[cold]
-    #[inline(never)] // two callers
+    #[inline(never)] // one copy for both drives
     pub(super) fn start_failed(&mut self) -> Why {
         let quick = &mut self.latch.quick_attempts;
         if *quick > 0 {

@@ -119,7 +119,7 @@ impl State {
         })
     }
 
-    /// Records that the phase suits this set-point.
+    /// Records the kind of set-point for which field-oriented control drives, if it drives.
     pub(super) fn set_foc_kind(&mut self, config: &Config, setpoint: &Setpoint) {
         self.foc_kind = if self.phase.drives() && config.six_step.is_none() {
             setpoint.kind()

@@ -6,7 +6,7 @@ use crate::params::ParamId;
 use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
 
 impl Esc {
-    /// Looks at what the default observer shows of the motor, and has the configuration rebuilt if that has changed.
+    /// Takes in what the default observer shows of the motor, and has the configuration rebuilt if that has changed.
     pub(super) fn follow_motor(&mut self, snapshot: &Snapshot) {
         let params = &self.params;
         let shows = params.unknown().is_none()

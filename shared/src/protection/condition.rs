@@ -191,7 +191,7 @@ conditions! {
     RegenCurrent = 18 "returned current" None,
         "braking returns `LIM_REGEN_A`"
         "brakes more slowly";
-    /// The supply is within a volt of `LIM_BUS_V_MAX`.
+    /// The supply is within 1 V of `LIM_BUS_V_MAX`.
     BusVoltage = 19 "supply voltage" None,
         "the supply is within 1 V of `LIM_BUS_V_MAX`"
         "returns less to the supply, and turns more into heat in the motor";

@@ -1,7 +1,7 @@
 //! The compensated flux observer with a phase-locked loop: the default.
 //!
 //! A voltage model of the stator flux in the stator's frame, held against drift by the flux that the loop expects
-//! at its armature angle. This leak rotates with the estimate, so it causes no steady-state error, and the speed comes
+//! at its own angle. This leak rotates with the estimate, so it causes no steady-state error, and the speed comes
 //! from the loop alone: neither R nor L enters its gain, as they do in ω̂ = ξ̂·|ĥ| of the first paper (7), which
 //! loses lock when they are wrong.
 //!

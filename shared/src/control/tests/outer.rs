@@ -262,11 +262,11 @@ fn a_commanded_current_brakes_within_the_bounds() {
 
 /// Braking into a battery: the returned current stays within `LIM_REGEN_A` and decreases as the
 /// voltage nears its limit. The second battery, nearly full and with a quarter ohm, would rise to
-/// 30.5 V.
+/// 30.5 V; at 5 A it has 29.25 V, where half of the 10 A is left.
 #[test]
 fn braking_is_bounded_by_the_supplys_current_and_voltage() {
-    for (open_v, resistance_ohm, regen_a, volts_at_most) in
-        [(24.0, 0.05, 5.0, 25.0), (28.0, 0.25, 10.0, 29.9)]
+    for (open_v, resistance_ohm, regen_a, volts_at_most, expected_a) in
+        [(24.0, 0.05, 5.0, 25.0, 5.0), (28.0, 0.25, 10.0, 29.9, 5.0)]
     {
         let changes = [(ParamId::CtlRegulator, 1.0), (ParamId::LimRegenA, regen_a)];
         let mut bench = Bench::new(&changes, Motor::bench(6000.0));
@@ -279,7 +279,7 @@ fn braking_is_bounded_by_the_supplys_current_and_voltage() {
         }
         let asked = Reference::steady(bench.inner.units.current(-20.0));
         let mut bus_v = open_v;
-        let (mut most_v, mut settled_a) = (0.0_f64, 0.0_f64);
+        let (mut most_v, mut most_a) = (0.0_f64, 0.0_f64);
         for period in 0..(0.1 / TS) as u32 {
             let bus = bench.inner.units.voltage(bus_v);
             let fault = protection::check(&limits, &mut state, Some([AdcCounts::ZERO; 3]), bus);
@@ -299,14 +299,14 @@ fn braking_is_bounded_by_the_supplys_current_and_voltage() {
             bus_v = open_v + resistance_ohm * returned_a;
             most_v = most_v.max(bus_v);
             if period > 300 {
-                settled_a = settled_a.max(returned_a);
+                most_a = most_a.max(returned_a);
             }
         }
         assert!(
             most_v < volts_at_most,
-            "{resistance_ohm} ohm: {most_v} V, {settled_a} A"
+            "{resistance_ohm} ohm: {most_v} V, {most_a} A"
         );
-        assert!(settled_a < 1.02 * f64::from(regen_a), "{settled_a} A");
-        assert!(settled_a > 0.5 * f64::from(regen_a), "{settled_a} A");
+        assert!(most_a < 1.02 * f64::from(regen_a), "{most_a} A");
+        assert!(most_a > 0.95 * expected_a, "{most_a} A");
     }
 }

@@ -30,8 +30,8 @@ fn attempt<'a>(config: &'a Config, shared: &Shared) -> &'a start::Config {
 pub(in crate::drive) fn damp(config: &Config, foc: &mut State, shared: &Shared, phase: Phase) {
     let attempt = attempt(config, shared);
     let start = &mut foc.loops.start;
-    let outer_loop_period = foc.loops.slot % PERIODS as u8 == 1;
-    if outer_loop_period && phase == Phase::Park && start::aligned(attempt, start) {
+    let is_outer_loop_period = foc.loops.slot % PERIODS as u8 == 1;
+    if is_outer_loop_period && phase == Phase::Park && start::aligned(attempt, start) {
         expect_aligned(config, foc, shared);
     } else {
         let measured = (shared.seen.i, shared.seen.u);

@@ -5,7 +5,7 @@ use crate::drive::Drift;
 use crate::params::choice::{CtlAdaptL, CtlDrive, CtlObserver};
 use crate::units::{Current, FLUX_NOMINAL, Flux, Speed, Voltage};
 
-/// More looks than pass between two changes of the values in force.
+/// More samples than pass between two changes of the values in force.
 const FOLLOWED_MS: u32 = 1200;
 
 impl Bench {
