@@ -87,5 +87,5 @@ def test_a_file_that_is_no_record_is_no_picture(tmp_path):
     record = tmp_path / "record.bin"
     record.write_bytes(b"nothing of the kind")
     drawn = run("plot", record, "-o", tmp_path / "picture.svg")
-    assert drawn.returncode == 2 and "no fault record" in drawn.stderr
+    assert drawn.returncode == 2 and "not a fault record" in drawn.stderr
     assert len(drawn.stderr.splitlines()) == 1

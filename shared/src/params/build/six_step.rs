@@ -37,7 +37,7 @@ const BOUND_RATE: f32 = 170.0;
 
 /// The least bound, A, for which the loop's gain still grows: a lower one makes a motor's current respond no slower.
 /// With 20 A, motors of some amperes did not start.
-const BOUND_LEAST_A: f32 = 6.0;
+const BOUND_LEAST_A: f32 = 9.0;
 
 /// Time for which a start waits for a crossing, s: under its ramp's current a rotor with ten times the bench's inertia
 /// takes 0.08 s.
