@@ -24,7 +24,7 @@ OPEN = {
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
     **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
-    **cells([SIX], ["low_open"], ["start"], "current", "cause"),
+    **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
     # others' currents up to 2.8 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
     # it is met, and thrust comes later.
@@ -33,23 +33,22 @@ OPEN = {
     **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # Nor does the six-step drive report a high side that never turns on at full speed, where it carries on with it.
     **cells([SIX], ["high_open"], ["full"], "cause", "time"),
-    # At idle little more flows than a sound sensor may be off by.
+    # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
+    # nothing with more current.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
+    **cells([SIX], ["sensor_zero"], ["start"], "current"),
     # The control knows that a Hall sensor is at fault, and cannot continue without it at low speed.
     **cells([FOC], ["hall_stuck"], ["idle"], "reaction"),
-    # The field-oriented drive finds a jammed rotor lost from its flux after 0.1 s, if no current trips. The six-step
-    # drive gives a rotor up after twelve sextants without a crossing, which at idle takes 26 ms, and three turns 24. At
-    # half speed its current trips first, so that over-current is named. At full speed the restarts after it are still
-    # under way 1.5 s after the rotor was freed. A jam in its start is not retried.
-    **cells([FOC, SIX], ["rotor_blocked"], ["idle"], "time"),
+    # After a rotor jams at speed, the six-step drive retries starts, each longer than the previous one: 1.5 s after it
+    # was freed one is still under way. A jam in its start is not retried. The field-oriented drive finds the rotor lost
+    # from its flux after 0.1 s, if no current trips.
+    **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "time"),
-    **cells([SIX], ["rotor_blocked"], ["half"], "current", "cause"),
-    **cells([SIX], ["rotor_blocked"], ["full"], "reaction"),
+    **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
     **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
-    # Nearly all of the back-EMF vanishes faster than the currents are regulated. The six-step drive's trip.
-    **cells([FOC], ["strike"], ["full"], "current"),
-    **cells([SIX], ["strike"], ["full"], "current", "cause"),
+    # Nearly all of the back-EMF vanishes faster than the currents are regulated.
+    **cells([FOC, SIX], ["strike"], ["full"], "current"),
     **cells([SIX], ["strike"], ["half"], "current"),
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
@@ -57,7 +56,7 @@ OPEN = {
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC], ["disconnect"], ["braking"], "supply"),
-    # In a start, a high side that shorts drives the six-step drive's winding up to the comparators' level.
+    # In its start the six-step drive shoots a short through the winding, up to the comparators' level.
     **cells([SIX], ["high_short"], ["start"], "current"),
 }
 

@@ -31,13 +31,12 @@ const PROPORTIONAL: f32 = 1.0;
 /// of 46 ms under constant duty.
 const CORNER_SHARE: f32 = 0.4;
 
-/// Rate of the duty while the whole of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], is left, 1/s. At 320 the
-/// current of a winding of low inductance rang to 1.39 times the limit.
-const BOUND_RATE: f32 = 170.0;
+/// Rate of the duty while the whole of `LIM_PHASE_A`, or of [`BOUND_LEAST_A`], is left, 1/s.
+const BOUND_RATE: f32 = 320.0;
 
-/// The least bound, A, for which the loop's gain still grows: a lower one makes a motor's current respond no slower.
-/// With 20 A, motors of some amperes did not start.
-const BOUND_LEAST_A: f32 = 9.0;
+/// The least bound, A, for which the loop's gain still grows: a lower one makes a motor's current respond no slower. On
+/// the bench at 5 A the loop would ring by half of it.
+const BOUND_LEAST_A: f32 = 20.0;
 
 /// Time for which a start waits for a crossing, s: under its ramp's current a rotor with ten times the bench's inertia
 /// takes 0.08 s.
