@@ -23,16 +23,15 @@ OPEN = {
     # the motor that far, the regulator's voltage rises until the current trips.
     **cells([FOC], ["phase_open"], ["start", "idle"], "current", "cause"),
     **cells([SIX], ["phase_open"], ["start"], "current", "cause", "time"),
-    **cells([SIX], ["phase_open"], ["idle"], "reaction"),
-    **cells([SIX], ["phase_open"], ["half", "full", "braking"], "current", "cause"),
+    **cells([SIX], ["phase_open"], ["half"], "current"),
+    **cells([SIX], ["phase_open"], ["full", "braking"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
     # others' currents up to 2.8 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
     # it is met, and thrust comes later.
     **cells([FOC], ["high_open", "low_open"], ["start"], "current"),
     **cells([FOC], ["high_open"], ["braking"], "current"),
-    # Nor does the six-step drive report a high side that never turns on at full speed, where it carries on with it.
-    **cells([SIX], ["high_open"], ["full"], "cause", "time"),
+    **cells([SIX], ["low_open"], ["braking"], "current", "cause"),
     # At idle little more flows than a sound sensor may be off by. The six-step drive's start meets a sensor that shows
     # nothing with more current.
     **cells([FOC], ["sensor_zero"], ["idle"], "time"),
@@ -44,13 +43,14 @@ OPEN = {
     # from its flux after 0.1 s, if no current trips.
     **cells([FOC], ["rotor_blocked"], ["idle"], "time"),
     **cells([FOC], ["rotor_blocked"], ["half"], "current", "time"),
-    **cells([SIX], ["rotor_blocked"], ["half"], "current", "reaction"),
+    **cells([SIX], ["rotor_blocked"], ["half"], "reaction"),
     **cells([SIX], ["rotor_blocked"], ["start"], "cause", "reaction", "time"),
-    **cells([FOC, SIX], ["rotor_blocked"], ["braking"], "current"),
+    **cells([FOC], ["rotor_blocked"], ["braking"], "current"),
     # Nearly all of the back-EMF vanishes faster than the currents are regulated.
     **cells([FOC, SIX], ["strike"], ["full"], "current"),
     # A start that is struck is retried, which takes time.
     **cells([FOC], ["strike_torque"], ["start"], "cause", "reaction"),
+    **cells([SIX], ["strike_torque"], ["start"], "reaction"),
     # 10 A into 470 µF is 0.9 V per period. Braking backs off ahead of the limit, but the currents lag behind a supply that
     # rises so fast, and what they still return takes it a tenth of a volt beyond the limit.
     **cells([FOC], ["disconnect"], ["braking"], "supply"),

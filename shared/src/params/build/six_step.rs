@@ -38,7 +38,8 @@ const BOUND_RATE: f32 = 320.0;
 /// the bench at 5 A the loop would ring by half of it.
 const BOUND_LEAST_A: f32 = 20.0;
 
-/// Greatest lead away from a bound, over `LIM_PHASE_A`.
+/// Greatest lead towards zero current, over `LIM_PHASE_A`, while the current is only bounded. Without it the currents of
+/// 500 random motors overshoot by up to 39 % (`tests/python/out_of_the_bag.py`).
 const LEAD_SHARE: f32 = 0.125;
 
 /// Time for which a start waits for a crossing, s: under its ramp's current a rotor with ten times the bench's inertia
@@ -78,7 +79,7 @@ pub(super) fn six_step(p: &Si, duty_max: f32, place: &mut Config) {
         gain k_p(CtlRpmMax, KP),
         gain k_i(CtlBwSpdHz, KP * CornerRadS * T),
         gain k_b(LimPhaseA, [BOUND_RATE] * T * UnitA / BoundA),
-        number lead_away([LEAD_SHARE] * LimitA / UnitA),
+        number lead_to_zero([LEAD_SHARE] * LimitA / UnitA),
     });
     duty.duty_max = I1F31::from_f32(duty_max);
     place.delay = p.board.delay;
