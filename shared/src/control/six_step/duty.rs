@@ -181,6 +181,13 @@ mod tests {
             self.i_a = settled + (self.i_a - settled) * (-self.r_ohm / self.l_h * 25e-6).exp();
             self.applied = duty.to_num();
         }
+
+        /// A period at this share, as far as the current's bounds permit.
+        fn share(&mut self, config: &Config, state: &mut State, wanted: I1F31, bounds: Bounds) {
+            let range = range(config, state, amperes(self.i_a), bounds);
+            share(state, wanted, range);
+            self.period(state.duty);
+        }
     }
 
     #[test]
@@ -198,14 +205,7 @@ mod tests {
             };
             let mut most = 0.0_f64;
             for _ in 0..4000 {
-                let range = range(
-                    &config,
-                    &mut state,
-                    amperes(winding.i_a),
-                    bounds(-5.0, 20.0),
-                );
-                share(&mut state, config.duty_max, range);
-                winding.period(state.duty);
+                winding.share(&config, &mut state, config.duty_max, bounds(-5.0, 20.0));
                 most = most.max(winding.i_a);
             }
             assert!(most < 1.2 * LIMIT_A, "{r_ohm}: {most}");
@@ -236,14 +236,7 @@ mod tests {
             if period % 400 == 0 {
                 winding.i_a /= 2.0;
             }
-            let range = range(
-                &config,
-                &mut state,
-                amperes(winding.i_a),
-                bounds(-5.0, LIMIT_A),
-            );
-            share(&mut state, config.duty_max, range);
-            winding.period(state.duty);
+            winding.share(&config, &mut state, config.duty_max, bounds(-5.0, LIMIT_A));
             most = most.max(winding.i_a);
         }
         // As much as an unknown motor's may; an unlimited lead gives 1.4.
@@ -302,14 +295,7 @@ mod tests {
         state.duty = I1F31::from_num(0.518);
         let mut least = 0.0_f64;
         for _ in 0..4000 {
-            let range = range(
-                &config,
-                &mut state,
-                amperes(winding.i_a),
-                bounds(-5.0, 20.0),
-            );
-            share(&mut state, I1F31::ZERO, range);
-            winding.period(state.duty);
+            winding.share(&config, &mut state, I1F31::ZERO, bounds(-5.0, 20.0));
             least = least.min(winding.i_a);
         }
         assert!(least > -6.0, "{least}");
