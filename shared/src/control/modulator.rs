@@ -170,6 +170,13 @@ impl Supply {
             square(config.readable.top(wide(self.bus)).scaled())
         };
     }
+
+    /// Allows no vector longer than this until [`update_limits`](Self::update_limits) is called.
+    pub fn shorten(&mut self, length: Voltage) {
+        let length = length.min(self.longest.length);
+        self.longest = VectorLimit::new(length, Voltage::ZERO);
+        self.readable_square = self.readable_square.min(self.longest.square);
+    }
 }
 
 /// The d component leaves 2^-this of the length.
@@ -429,6 +436,28 @@ mod tests {
                 * bus.to_num::<f64>();
             assert!((product - 1.0).abs() < 1e-6, "{bus}: {product}");
         }
+    }
+
+    #[test]
+    fn a_shortened_vector_is_no_longer_than_that_and_all_of_the_supply_comes_back() {
+        // Here every phase can be read up to 0.9 of the longest vector.
+        let config = Config::new(Modulation::SpaceVector, 0.95, 0.9);
+        let mut supply = Supply::new(&config, Voltage::from_num(4), Voltage::ZERO);
+        let all = supply;
+        supply.shorten(Voltage::from_num(0.5));
+        let asked = Dq {
+            d: WideVoltage::from_num(0.3),
+            q: WideVoltage::from_num(1.0),
+        };
+        assert!(square_of(asked) <= all.readable_square);
+        assert!(square_of(asked) > supply.readable_square);
+        let (u, cut) = limit(asked, &supply.longest);
+        let length = u.d.to_num::<f64>().hypot(u.q.to_num());
+        assert!((length - 0.5).abs() < 1e-3 && cut.is_some(), "{length}");
+        supply.shorten(Voltage::from_num(6));
+        assert_eq!(supply.longest.length(), Voltage::from_num(0.5));
+        supply.update_limits(&config, Voltage::ZERO);
+        assert_eq!(supply, all);
     }
 
     #[test]

@@ -117,7 +117,7 @@ const RUN: &[Row] = &[
 ];
 
 /// Open-loop start. Its current takes little of the supply's voltage and is bounded by the supply alone, so it
-/// needs neither the longest vector nor the speed-dependent bounds.
+/// needs no speed-dependent bounds, and its longest vector is the one that it began with.
 const START: &[Row] = &[
     (Work::DAMP, 1, DAMP_PERIODS),
     (Work::START_CURRENT, 0, PERIODS),

@@ -113,6 +113,7 @@ fn enter_drive(
             config.speed.preset(speed, Speed::ZERO, Current::ZERO);
             Why::Caught
         } else {
+            shared.supply.shorten(config.start_voltage);
             Why::Stands
         }
     }
