@@ -27,6 +27,8 @@ OPEN = {
     **cells([SIX], ["phase_open"], ["half"], "current"),
     **cells([SIX], ["phase_open"], ["full", "braking"], "current", "cause"),
     **cells([SIX], ["high_open", "low_open"], ["start"], "current", "cause"),
+    # The six-step drive keeps its full speed without this switch, within its current, and does not say so.
+    **cells([SIX], ["high_open"], ["full"], "cause", "time"),
     # With a switch that never turns on, the torque that low speed allows, a drop as large as the back-EMF, takes the
     # others' currents up to 1.9 A above 1.2 times the limit in a start, and 0.3 A in braking. With half of that torque
     # it is met, and thrust comes later.

@@ -6,8 +6,8 @@ from motors import motor_of
 from out_of_the_bag import AT_REST, MOST_CURRENT, drawn, opened
 
 MOTORS = 150
-EXTREMES = range(250, 300)
-"""A tenth of the campaign's motors; in some of their windings the supply drives the current to its limit within a quarter
+ANY_SIZE = range(250, 300)
+"""A tenth of the campaign's motors. In some of their windings the supply drives the current to its limit within a quarter
 of a period."""
 
 
@@ -25,8 +25,8 @@ def test_any_motor_turns_the_right_way_within_3_s_of_the_throttle(tmp_path):
     assert len(at_rest) <= AT_REST * MOTORS, at_rest
 
 
-def test_motors_of_any_size_turn_or_are_told_why(tmp_path):
-    outcomes = {number: drawn(tmp_path, number) for number in EXTREMES}
+def test_motors_of_any_size_turn_within_their_current_or_are_told_why(tmp_path):
+    outcomes = {number: drawn(tmp_path, number) for number in ANY_SIZE}
     assert {number: outcome for number, outcome in outcomes.items() if not outcome.holds()} == {}
-    at_rest = [number for number, outcome in outcomes.items() if not outcome.turns()]
-    assert len(at_rest) <= AT_REST * len(EXTREMES), at_rest
+    at_rest = {number: outcome for number, outcome in outcomes.items() if not outcome.turns()}
+    assert len(at_rest) <= AT_REST * len(ANY_SIZE), at_rest

@@ -11,7 +11,8 @@ use super::{low_speed, observer, outer, sensing};
 use crate::control::speed::Bounds;
 use crate::control::{dead_time, observer as observers, torque};
 use crate::drive::Drift;
-use crate::params::choice::{CtlObsCure, CtlObserver, CtlRegulator};
+use crate::drive::config::six_step;
+use crate::params::choice::{CtlDrive, CtlObsCure, CtlObserver, CtlRegulator};
 use crate::params::from_motor::tests::RACING;
 use crate::params::{BOSSO_MOTOR, Board, ParamId, Params};
 use crate::units::{Current, Speed};
@@ -149,6 +150,24 @@ fn the_compensation_is_the_dead_time_s_share_and_the_diodes() {
         place.duty.to_num::<f32>()
     });
     near("duty", duty, 0.0096 * 1.07);
+}
+
+#[test]
+fn the_six_step_bound_looks_towards_zero_by_a_quarter_of_the_limit() {
+    let changes = [CtlDrive::SixStep.setting(), (ParamId::LimPhaseA, 8.0)];
+    let [lead_a, all_in_s] = made(&changes, |p| {
+        let mut place = six_step::Config::default();
+        super::six_step::six_step(p, 0.9, &mut place);
+        let duty = &place.duty;
+        let per_period: f32 = duty.k_b.held(p.scale.current_from_a(20.0)).to_num();
+        [
+            p.scale.amperes(duty.lead_to_zero_max),
+            p.of(Quantity::T) / per_period,
+        ]
+    });
+    near("lead", lead_a, 2.0);
+    // With 20 A to the bound, which counts where the limit is less.
+    near("rate", all_in_s, 1.0 / 320.0);
 }
 
 /// Returns the observer's ω_n that follows `LIM_PHASE_A`, and its greatest, 1/s.
