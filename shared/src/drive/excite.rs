@@ -15,10 +15,9 @@ use super::io::Bridge;
 use super::phase::Phase;
 use super::seen::Seen;
 use super::shared::Shared;
-use crate::control::dead_time;
 use crate::control::delay::Delay;
 use crate::control::modulator;
-use crate::control::transform::{AlphaBeta, Dq, PhaseOrder, clarke};
+use crate::control::transform::{AlphaBeta, Dq, clarke};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Duty, Speed, Voltage};
 
@@ -108,14 +107,7 @@ pub(super) fn period(
         alpha: along.scaled(),
         beta: across.scaled(),
     };
-    let turned = modulator::duties(
-        &config.modulator,
-        &shared.supply,
-        v,
-        PhaseOrder::NORMAL,
-        &dead_time::Config::NONE,
-        AlphaBeta::default(),
-    );
+    let turned = modulator::uncompensated(&config.modulator, &shared.supply, v);
     let mut duties = [Duty::ZERO; 3];
     for (behind, duty) in turned.into_iter().enumerate() {
         duties[at(behind)] = duty;

@@ -21,9 +21,8 @@ use super::phase::Phase;
 use super::schedule::CYCLE;
 use super::seen::{Seen, bus_current, greatest, reading};
 use super::shared::Shared;
-use crate::control::dead_time;
 use crate::control::modulator::{self, Supply};
-use crate::control::transform::{AlphaBeta, Dq, PhaseOrder};
+use crate::control::transform::{AlphaBeta, Dq};
 use crate::math::{Held, SinCos, TopProduct, magnitude};
 use crate::trace::traced;
 use crate::units::{AdcCounts, Angle, Current, Speed, TurnedVoltage, Voltage, WideVoltage, wide};
@@ -115,14 +114,7 @@ pub(super) fn period(
         alpha: u.scaled(),
         beta: TurnedVoltage::ZERO,
     };
-    let duties = modulator::duties(
-        &config.modulator,
-        &shared.supply,
-        v,
-        PhaseOrder::NORMAL,
-        &dead_time::Config::NONE,
-        AlphaBeta::default(),
-    );
+    let duties = modulator::uncompensated(&config.modulator, &shared.supply, v);
     // A tone's voltage may be as long as the supply allows.
     let wanted = Dq {
         d: wide(u),
